@@ -1,0 +1,52 @@
+# Each target does everything from a bare clone: environment, installation, work.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+SOURCES := vcam_cli tests scripts
+CAMERA ?= still-life
+
+.PHONY: run test check bench schemas tables lock clean
+
+run: $(VENV)/.runtime  ## simulate the shipped still life: out/still-life/
+	$(BIN)/vcam run $(CAMERA)
+
+test: $(VENV)/.dev  ## all tests
+	$(BIN)/python -m pytest -q -n auto tests
+
+check: $(VENV)/.dev  ## format, lint, types, tests
+	$(BIN)/ruff format --check $(SOURCES)
+	$(BIN)/ruff check $(SOURCES)
+	$(BIN)/mypy
+	$(MAKE) test
+
+bench: $(VENV)/.dev  ## speed, as ratios to the cost of the transforms and draws alone
+	$(BIN)/python -m tests.bench
+
+schemas: $(VENV)/.dev  ## JSON Schemas of the files a user writes, from the models
+	$(BIN)/vcam schema schemas
+
+tables: $(VENV)/.dev  ## the data tables of the package, from colour-science
+	$(BIN)/python scripts/make_tables.py
+
+lock: $(VENV)/.dev  ## new versions for reproducible installs
+	$(BIN)/python -m pip install -q uv
+	$(BIN)/uv pip compile -q --universal --python-version 3.11 --no-header --no-emit-index-url \
+	    --no-emit-find-links --no-annotate pyproject.toml -o requirements.lock
+	$(BIN)/uv pip compile -q --universal --python-version 3.11 --no-header --no-emit-index-url \
+	    --no-emit-find-links --no-annotate --extra dev pyproject.toml -o requirements-dev.lock
+
+clean:
+	rm -rf $(VENV) out build dist
+
+$(VENV)/bin/python:
+	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "vcam needs Python 3.11 or newer")'
+	$(PYTHON) -m venv $(VENV)
+
+$(VENV)/.runtime: $(VENV)/bin/python pyproject.toml requirements.lock
+	$(BIN)/python -m pip install -q --disable-pip-version-check -r requirements.lock
+	$(BIN)/python -m pip install -q --disable-pip-version-check --no-deps -e .
+	touch $@
+
+$(VENV)/.dev: $(VENV)/.runtime requirements-dev.lock
+	$(BIN)/python -m pip install -q --disable-pip-version-check -r requirements-dev.lock
+	touch $@

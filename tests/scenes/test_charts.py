@@ -1,0 +1,248 @@
+"""Every chart: averages are averages of its point values; and each chart's own geometry."""
+
+import math
+
+import numpy as np
+import pytest
+from support import brute, scene, view
+
+from vcam_cli.scenes.base import ChartScene, WaveScene
+from vcam_cli.scenes.build import build
+from vcam_cli.scenes.slanted_edge import half_plane
+
+CSF = {"kind": "chart", "chart": "csf", "max_frequency": "120 lp/mm", "phase": "40 deg"}
+EDGE = {"kind": "chart", "chart": "slanted-edge", "angle": "5 deg", "contrast": 0.8}
+CHECKER = {"kind": "chart", "chart": "colorchecker"}
+LEAVES = {"kind": "chart", "chart": "dead-leaves", "seed": 3}
+BOTH = LEAVES | {"colorchecker": 0.6}
+WAVE = {"kind": "chart", "chart": "sinusoid", "frequency": "50 lp/mm", "orientation": "30 deg"}
+FLAT = {"kind": "chart", "chart": "uniform", "reflectance": 0.4}
+
+SMOOTH = [CSF, WAVE, FLAT]
+EDGED = [EDGE, EDGE | {"angle": "-60 deg"}, EDGE | {"angle": "0 deg"}, CHECKER]
+
+
+def sampled(source, **of_view) -> ChartScene:
+    built = build(scene(source), view(**of_view), None)
+    assert isinstance(built, ChartScene)
+    return built
+
+
+def mix_of(built, planes=2):
+    return np.random.default_rng(1).random((planes, len(built.spectra)))
+
+
+@pytest.mark.parametrize("source", SMOOTH)
+def test_averages_of_smooth_charts(source):
+    # 64 midpoints a cell err by (pi f w)^2/6/64^2 = 3e-5 of the modulation at f w = 0.4.
+    # A width below the array's makes all of them sampled, and frames them in black.
+    chart = sampled(source, margin=2, scene_width=1e-3)if source is CSF else sampled(
+        source, margin=2, scene_width=33e-6
+    )
+    mix = mix_of(chart)
+    assert chart.shape == (16, 20)
+    inside = np.s_[:, 6:10, 6:14]
+    np.testing.assert_allclose(chart.planes(mix)[inside], brute(chart, mix, 64)[inside], atol=3e-5)
+
+
+@pytest.mark.parametrize("source", EDGED)
+@pytest.mark.parametrize("oversampling", [1, 3])
+def test_averages_of_charts_with_edges(source, oversampling):
+    # Along an edge parallel to the points, n points a cell err by at most half of 1/n; slanted
+    # edges do better.
+    chart = sampled(source, margin=1, oversampling=oversampling)
+    mix = mix_of(chart)
+    error = chart.planes(mix) - brute(chart, mix, 100)
+    assert abs(error).max() < 0.006 * mix.sum(1).max()
+
+
+@pytest.mark.parametrize("source", [LEAVES, BOTH])
+def test_averages_of_dead_leaves(source):
+    # Cells of 1/16 of the picture hold dozens of leaves. 64 x 64 points err by about 1e-3 where
+    # many edges cross a cell, the painter by a few times 4^-4 of a cell.
+    chart = sampled(source, margin=1)
+    mix = mix_of(chart)
+    error = chart.planes(mix) - brute(chart, mix, 64)
+    assert np.sqrt((error**2).mean()) < 2e-3
+    assert abs(error).max() < 1e-2
+
+
+@pytest.mark.parametrize("source", [CSF, EDGE, CHECKER, LEAVES, BOTH])
+def test_a_black_frame_around_a_scene_of_its_own_width(source):
+    width = 33e-6  # of 48: the frame cuts cells in x and in y
+    chart = sampled(source, margin=1, scene_width=width)
+    mix = mix_of(chart)
+    planes = chart.planes(mix)
+    assert not planes[:, :, :3].any()
+    assert not planes[:, :2].any()
+    np.testing.assert_allclose(planes, brute(chart, mix, 64), atol=0.02)
+    # half of column 3 is outside: -25.5 um .. -16.5 um is its frame edge
+    assert planes[:, 5:9, 3].max() < 0.6 * mix.sum(1).max()
+
+
+@pytest.mark.parametrize("source", [CSF, EDGE, CHECKER, LEAVES, BOTH])
+def test_finer_cells_average_to_coarser_ones(source):
+    coarse, fine = sampled(source, margin=1), sampled(source, margin=1, oversampling=3)
+    mix = mix_of(coarse)
+    small = fine.planes(mix).reshape(2, 14, 3, 18, 3).mean((2, 4))
+    # Exact but for the corners of leaves: a few of 4^-4.
+    tolerance = 1e-2 if source in (LEAVES, BOTH) else 1e-12
+    np.testing.assert_allclose(small, coarse.planes(mix), atol=tolerance)
+
+
+def test_planes_are_linear_in_the_mix_and_in_the_dtype_of_the_view():
+    chart = sampled(BOTH, dtype=np.float32)
+    mix = mix_of(chart, 3)
+    planes = chart.planes(mix)
+    assert planes.dtype == np.float32
+    assert chart.at(np.zeros(1), np.zeros(1), mix).dtype == np.float32
+    # float32 rounding of sums of a few parts
+    np.testing.assert_allclose(chart.planes(mix[:1] + mix[1:2])[0], planes[0] + planes[1], rtol=1e-5)
+
+
+def test_bands_of_rows_join_seamlessly(monkeypatch):
+    chart = sampled(BOTH, margin=1)
+    mix = mix_of(chart)
+    whole, points = chart.planes(mix), brute(chart, mix, 2)
+    monkeypatch.setattr("vcam_cli.scenes.base.CELLS_A_BAND", 40)
+    np.testing.assert_allclose(chart.planes(mix), whole, rtol=1e-12, atol=1e-14)
+    np.testing.assert_allclose(brute(chart, mix, 2), points, rtol=1e-12)
+
+
+# ---- waves
+
+
+def test_a_uniform_field_is_one_wave_of_frequency_zero():
+    built = build(scene(FLAT), view(), None)
+    assert isinstance(built, WaveScene)
+    np.testing.assert_allclose(built.at(np.arange(3.0), np.arange(2.0), np.array([[2.0]])), 0.8)
+
+
+@pytest.mark.parametrize(
+    ("orientation", "direction"),
+    [("0 deg", (1, 0)), ("90 deg", (0, -1)), ("30 deg", (math.sqrt(3) / 2, -0.5))],
+)
+def test_a_sinusoid_runs_along_its_orientation(orientation, direction):
+    source = WAVE | {"orientation": orientation, "phase": "20 deg", "mean": 0.4, "contrast": 0.7}
+    built = build(scene(source), view(), None)
+    x, y = np.linspace(-1e-4, 1e-4, 7), np.linspace(-2e-4, 1e-4, 5)
+    along = np.add.outer(direction[1] * y, direction[0] * x)
+    expected = 0.4 * (1 + 0.7 * np.cos(2 * np.pi * 50e3 * along + np.radians(20)))
+    np.testing.assert_allclose(built.at(x, y, np.ones((1, 1)))[0], expected, atol=1e-12)
+
+
+def test_a_sinusoid_of_phase_zero_has_a_maximum_at_the_center():
+    built = build(scene(WAVE), view(), None)
+    assert built.at(np.zeros(1), np.zeros(1), np.ones((1, 1))) == pytest.approx(0.75)
+
+
+@pytest.mark.parametrize("source", [WAVE, FLAT])
+def test_a_wide_frame_leaves_waves_exact(source):
+    assert isinstance(build(scene(source), view(scene_width=48e-6), None), WaveScene)
+    assert isinstance(build(scene(source), view(scene_width=48e-6, margin=1), None), ChartScene)
+
+
+# ---- csf
+
+
+def test_csf_grows_in_frequency_to_the_right_and_in_contrast_upward():
+    chart = sampled(CSF | {"phase": "0 deg", "max_contrast": 0.9, "mean": 0.5})
+    width, height = 48e-6, 36e-6
+    x = np.linspace(-width / 2, width / 2, 4001)
+    top, middle, bottom = chart.at(x, np.array([-height / 2, 0, height / 2]), np.ones((1, 1)))[0]
+    assert top[0] == pytest.approx(0.5 * 1.9)
+    assert np.ptp(bottom) == pytest.approx(0.0, abs=1e-12)
+    np.testing.assert_allclose(middle - 0.5, (top - 0.5) / 2, atol=1e-12)
+    # Phase pi F W = 2 pi F W/2: half the cycles of a constant F.
+    phase = np.arccos(np.clip((top - 0.5) / 0.45, -1, 1))
+    cycles = np.abs(np.diff(phase)).sum() / (2 * np.pi)
+    assert cycles == pytest.approx(120e3 * width / 2, rel=1e-3)
+
+
+def test_csf_keeps_a_reflectance_beyond_its_frame():
+    chart = sampled(CSF, margin=12)
+    planes = chart.planes(np.ones((1, 1)))[0]
+    assert 0.0 <= planes.min() < planes.max() <= 1.0
+    np.testing.assert_allclose(planes[24:], 0.5, atol=1e-12)  # below: no contrast
+    np.testing.assert_allclose(planes[:12], planes[:1].repeat(12, 0))  # above: that of the top
+
+
+def test_csf_of_frequency_zero_is_flat_along_a_row():
+    from vcam_cli.scenes.base import Frame
+    from vcam_cli.scenes.csf import Csf
+
+    chart = Csf(Frame(1e-3, 1e-3), 0.0, 0.5, 1.0, 0.0)
+    edges = np.linspace(-5e-4, 5e-4, 5)
+    row = chart.averages(edges, edges, np.ones((1, 1)))[0, 0]
+    np.testing.assert_allclose(row, 0.5 * (1 + 0.875), rtol=1e-12)
+
+
+# ---- slanted edge
+
+
+@pytest.mark.parametrize("angle", [0.0, 1e-9, 0.09, 0.7, math.pi / 2, 2.0])
+def test_half_plane_conserves_area(angle):
+    # A strip of cells through which the whole border runs: the bright area is half of it, by
+    # symmetry about the centre.
+    edges = np.linspace(-1, 1, 12)
+    middle, width = (edges[1:] + edges[:-1]) / 2, np.diff(edges)
+    distance = np.add.outer(math.sin(angle) * middle, math.cos(angle) * middle)
+    part = half_plane(
+        distance, abs(math.cos(angle)) * width[None], abs(math.sin(angle)) * width[:, None]
+    )
+    assert part.mean() == pytest.approx(0.5, abs=1e-12)
+    assert part.min() >= 0.0
+    assert part.max() <= 1.0
+
+
+def test_half_plane_cuts_a_corner():
+    # A border at 45 degrees that leaves a triangle of legs 1/2 of a unit square: 1/8.
+    side = np.array(math.sqrt(0.5))
+    assert half_plane(-np.array(0.5) * math.sqrt(0.5), side, side) == pytest.approx(0.125)
+
+
+def test_the_edge_is_dark_on_the_left_and_leans_to_the_right():
+    chart = sampled(EDGE | {"angle": "20 deg"})
+    planes = chart.planes(np.ones((1, 1)))[0]
+    assert planes[6, 0] == pytest.approx(0.1)
+    assert planes[6, -1] == pytest.approx(0.9)
+    dark = (planes < 0.5).sum(1)
+    assert dark[0] > dark[-1]  # the upper end lies to the right
+    # moved by tan 20 degrees a row
+    assert (dark[0] - dark[-1]) / 11 == pytest.approx(math.tan(math.radians(20)), abs=0.1)
+
+
+# ---- colorchecker
+
+
+def test_colorchecker_is_upright_and_keeps_its_aspect():
+    for rows, columns in [(120, 300), (300, 120)]:
+        chart = sampled(CHECKER, rows=rows, columns=columns)
+        planes = chart.planes(np.eye(25))
+        patches = planes[:24] >= 1 - 1e-12
+        y, x = (np.array([np.argwhere(p).mean(0) for p in patches]) - [rows / 2, columns / 2]).T
+        grid_x, grid_y = x.reshape(4, 6), y.reshape(4, 6)
+        step = np.diff(grid_x, axis=1)
+        np.testing.assert_allclose(step, step[0, 0], atol=1.0)  # rows of six from left to right
+        np.testing.assert_allclose(np.diff(grid_y, axis=0), step[0, 0], atol=1.0)  # squares
+        card = (planes[24] > 0) & (planes[24] < 0.03 + 1e-12) | patches.any(0)
+        high, wide = np.ptp(np.argwhere(card), axis=0) + 1
+        assert max(high / rows, wide / columns) > 0.99  # as large as it fits
+
+
+def test_colorchecker_parts_add_up():
+    # Patches, card and surround share every cell: patch + (card or surround) has weight 1.
+    chart = sampled(CHECKER)
+    planes = chart.planes(np.eye(25))
+    flat = planes[24]
+    patches = planes[:24].sum(0)
+    assert (flat <= 0.08 * (1 - patches) + 1e-12).all()
+    assert (flat >= 0.03 * (1 - patches) - 1e-12).all()
+
+
+def test_a_colorchecker_of_a_height_lies_in_the_middle_of_the_leaves():
+    chart = sampled(LEAVES | {"colorchecker": 0.5}, rows=80, columns=90)
+    card = chart.planes(np.eye(25)[24:])[0] > 0.0299
+    rows, columns = np.argwhere(card).T
+    assert (rows.min(), rows.max()) == (20, 59)
+    assert columns.min() + columns.max() == 89

@@ -1,0 +1,126 @@
+"""Dead leaves: discs in cells, one picture a seed, and natural statistics."""
+
+import numpy as np
+import pytest
+from support import scene, view
+
+from vcam_cli.scenes import dead_leaves, discs
+from vcam_cli.scenes.base import cell_edges
+from vcam_cli.scenes.build import build
+from vcam_cli.scenes.discs import Discs
+
+LEAVES = {"kind": "chart", "chart": "dead-leaves"}
+ONE = np.array([[0.0, 1.0]])
+
+
+@pytest.mark.parametrize("radius", [0.07, 0.5, 3.0, 40.0])
+@pytest.mark.parametrize("center", [(0.0, 0.0), (0.3, -1.62), (30.0, 20.0)])
+def test_a_disc_keeps_its_area(radius, center):
+    disc = Discs(np.array([center[0]]), np.array([center[1]]), np.array([radius]))
+    edges = cell_edges(181, 1.0)
+    cells = discs.averages(disc, ONE, edges, edges)[0]
+    assert cells.sum() == pytest.approx(np.pi * radius**2, rel=1e-11)
+    assert cells.min() >= 0.0
+    assert cells.max() <= 1.0
+
+
+def test_a_later_disc_hides_an_earlier():
+    color = np.array([[0.0, 1.0, 5.0]])
+    two = Discs(np.array([0.0, 1.0]), np.zeros(2), np.array([3.0, 3.0]))
+    edges = cell_edges(20, 0.5)
+    cells = discs.averages(two, color, edges, edges)[0]
+    # the lens of two circles of radius r at distance d: 2 r^2 acos(d/2r) - d/2 sqrt(4 r^2 - d^2)
+    lens = 2 * 9 * np.arccos(1 / 6) - 0.5 * np.sqrt(36 - 1)
+    expected = 5 * 9 * np.pi + (9 * np.pi - lens)
+    # two corners where edges meet, each good to a few of 4^-4 of a cell of 0.25
+    assert cells.sum() * 0.25 == pytest.approx(expected, abs=2 * 0.25 * 4 * 3 / 256)
+
+
+def test_discs_in_cells_against_points():
+    draw = np.random.default_rng(5)
+    many = Discs(*draw.uniform(-1, 1, (2, 300)), draw.uniform(0.01, 0.4, 300))
+    color = draw.random((2, 301))
+    # uneven cells, as a frame cuts them at its border
+    edges = np.concatenate([[-0.98], np.linspace(-0.95, 0.95, 20), [0.951]])
+    cells = discs.averages(many, color, edges, edges)
+    n = 60
+    at = (np.arange(n) + 0.5) / n
+    points = (edges[:-1, None] + np.diff(edges)[:, None] * at).ravel()
+    fine = discs.values(many, color, points, points).reshape(2, 21, n, 21, n).mean((2, 4))
+    # points: about n^-1.5 = 2e-3 an edge; cells: about 4^-4 where edges meet
+    assert np.sqrt(((cells - fine) ** 2).mean()) < 1.5e-3
+    assert abs(cells - fine).max() < 1.5e-2
+
+
+def test_points_see_the_frontmost_disc():
+    draw = np.random.default_rng(6)
+    many = Discs(*draw.uniform(-1, 1, (2, 40)), draw.uniform(0.1, 0.6, 40))
+    x, y = np.sort(draw.uniform(-1, 1, 17)), np.sort(draw.uniform(-1, 1, 13))
+    color = np.arange(41.0)[None]
+    seen = discs.values(many, color, x, y)[0]
+    for (i, j), label in np.ndenumerate(seen):
+        inside = np.hypot(many.x - x[j], many.y - y[i]) <= many.radius
+        assert label == (np.flatnonzero(inside).max() + 1 if inside.any() else 0)
+
+
+def test_the_same_seed_is_the_same_picture_whatever_the_sampling():
+    mix = np.random.default_rng(0).random((1, 12))
+    x, y = np.linspace(-14e-6, 14e-6, 9), np.linspace(-9e-6, 9e-6, 7)
+    one = build(scene(LEAVES), view(rows=12, columns=16), None)
+    # three times the pixels in the same frame; another aspect crops centrally
+    two = build(scene(LEAVES), view(rows=6, columns=16, oversampling=3, margin=5), None)
+    np.testing.assert_array_equal(one.at(x, y, mix), two.at(x, y, mix))
+    other = build(scene(LEAVES | {"seed": 2}), view(), None)
+    assert (other.at(x, y, mix) != one.at(x, y, mix)).mean() > 0.5
+
+
+def test_the_first_leaves_of_a_seed_stay_what_they_are():
+    # A guard against a change of generator or of the order of draws: pictures are reproducible.
+    leaves = dead_leaves.grow(1)
+    first = [leaves.discs.x[0], leaves.discs.y[0], leaves.discs.radius[0], leaves.factor[0]]
+    np.testing.assert_allclose(first, FIRST, rtol=1e-12)
+    assert leaves.pigment[:5].tolist() == PIGMENTS
+
+
+FIRST = [-0.2946479485398621, -0.4491205186264361, 0.00411700712001076, 0.2779924393308212]
+PIGMENTS = [3, 1, 8, 3, 8]
+
+
+def test_radii_follow_the_inverse_cube():
+    radius = dead_leaves.grow(4).discs.radius
+    assert radius.min() >= dead_leaves.SMALLEST
+    assert radius.max() <= dead_leaves.LARGEST
+    # P(r > t) = (s/t)^2, the largest radius aside; 5 standard errors of a binomial share
+    for t in (1 / 200, 1 / 100, 1 / 50):
+        ratio = (dead_leaves.SMALLEST / dead_leaves.LARGEST) ** 2
+        share = ((dead_leaves.SMALLEST / t) ** 2 - ratio) / (1 - ratio)
+        error = 5 * np.sqrt(share * (1 - share) / len(radius))
+        assert (radius > t).mean() == pytest.approx(share, abs=error)
+
+
+def test_far_margins_are_covered():
+    # Leaves repeat with a period of 1.5 sides; 40 pixels around 8 are 5.5 sides each way.
+    chart = build(scene(LEAVES), view(rows=4, columns=4, margin=8), None)
+    planes = chart.planes(np.ones((1, 12)))[0]
+    period = 6  # 1.5 sides of 4 pixels
+    np.testing.assert_allclose(planes[:, :-period], planes[:, period:], atol=1e-2)
+    np.testing.assert_allclose(planes[:-period], planes[period:], atol=1e-2)
+    assert planes.min() > 0.05
+
+
+def test_the_power_spectrum_is_that_of_natural_images():
+    # Near 1/f^2 between a few cycles a picture and the smallest leaves; images scatter between
+    # -1.6 and -2.4. One picture of large discs scatters too: three seeds.
+    slopes = []
+    for seed in (1, 2, 3):
+        source = LEAVES | {"seed": seed}
+        gray = build(scene(source), view(rows=256, columns=256), None).planes(np.ones((1, 12)))[0]
+        window = np.hanning(256)[:, None] * np.hanning(256)
+        power = np.abs(np.fft.fft2((gray - gray.mean()) * window)) ** 2
+        frequency = np.hypot(*np.meshgrid(*[np.fft.fftfreq(256, 1 / 256)] * 2))
+        rings = np.geomspace(4, 80, 13)
+        ring = np.digitize(frequency, rings)
+        mean = [power[ring == k].mean() for k in range(1, 13)]
+        slopes.append(np.polyfit(np.log(np.sqrt(rings[1:] * rings[:-1])), np.log(mean), 1)[0])
+    assert np.mean(slopes) == pytest.approx(-2.0, abs=0.4)
+    print(slopes)

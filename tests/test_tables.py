@@ -1,0 +1,93 @@
+"""The shipped tables equal colour-science, and the generic curves equal their formulas."""
+
+import importlib.util
+import re
+import warnings
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+from vcam_cli import spectra
+from vcam_cli.spectra import Spectrum, integral
+
+ROOT = Path(__file__).parent.parent
+GENERIC = sorted([*ROOT.glob("configs/filters/*.csv"), *ROOT.glob("configs/pixels/*.csv")])
+
+
+@pytest.fixture(scope="module")
+def colour() -> ModuleType:
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        import colour
+    return colour
+
+
+def test_illuminants(colour: ModuleType) -> None:
+    for name in spectra.illuminant_names():
+        if name == "equal-energy":
+            continue
+        lamp = colour.SDS_ILLUMINANTS[name]
+        ours = spectra.illuminant(name)
+        np.testing.assert_array_equal(ours.at(lamp.wavelengths / 1e9), lamp.values, err_msg=name)
+
+
+def test_observer(colour: ModuleType) -> None:
+    observer = colour.MSDS_CMFS["CIE 1931 2 Degree Standard Observer"]
+    for table, values in zip(spectra.cmf(), observer.values.T, strict=True):
+        np.testing.assert_array_equal(table.wavelength, observer.wavelengths / 1e9)
+        np.testing.assert_array_equal(table.value, values)
+
+
+def test_colorchecker(colour: ModuleType) -> None:
+    theirs = colour.SDS_COLOURCHECKERS["ColorChecker N Ohta"]
+    ours = spectra.colorchecker()
+    assert [name for name, _ in ours] == list(theirs)
+    for name, patch in ours:
+        np.testing.assert_array_equal(patch.tables[0].value, theirs[name].values, err_msg=name)
+
+
+def test_colorchecker_under_d65_has_the_colors_of_colour_science(colour: ModuleType) -> None:
+    """Within 0.05 % of white of colour-science's XYZ, which interpolates by splines."""
+    d65 = spectra.illuminant("D65")
+    cmf = [Spectrum(tables=(table,)) for table in spectra.cmf()]
+    norm = integral(d65.times(cmf[1]), 360e-9, 780e-9)
+    theirs = colour.SDS_COLOURCHECKERS["ColorChecker N Ohta"]
+    for name, patch in spectra.colorchecker()[::5]:
+        ours = [integral(patch.times(d65, c), 360e-9, 780e-9) / norm for c in cmf]
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            expected = colour.sd_to_XYZ(theirs[name], illuminant=colour.SDS_ILLUMINANTS["D65"])
+        np.testing.assert_allclose(ours, expected / 100, atol=5e-4, err_msg=name)
+
+
+def test_the_files_are_what_the_script_writes(colour: ModuleType) -> None:
+    spec = importlib.util.spec_from_file_location("tables", ROOT / "scripts" / "make_tables.py")
+    assert spec is not None and spec.loader is not None
+    script = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(script)
+    version = re.compile(r"colour-science [0-9.]+")
+    for path, text in script.everything().items():
+        shipped = (ROOT / path).read_text(encoding="utf-8")
+        assert version.sub("", shipped) == version.sub("", text), f"{path} is stale"
+    assert {ROOT / path for path in script.curves()} == set(GENERIC)
+
+
+@pytest.mark.parametrize("file", GENERIC, ids=lambda file: file.stem)
+def test_generic_curves_are_efficiencies(file: Path) -> None:
+    table = spectra.read_csv(file)
+    assert table.covers(300e-9, 1100e-9)
+    assert (table.value >= 0).all() and (table.value <= 1).all()
+    assert np.abs(np.diff(table.value)).max() < 0.16, "smooth at 5 nm"
+    assert "not a measurement" in file.read_text().splitlines()[0]
+
+
+def test_generic_filters_see_their_own_color() -> None:
+    peaks = {
+        name: spectra.read_csv(ROOT / f"configs/filters/generic-{name}.csv").at(nm * 1e-9)
+        for name, nm in (("red", 610), ("green", 535), ("blue", 455))
+    }
+    assert peaks == pytest.approx({"red": 0.90, "green": 0.85, "blue": 0.82}, abs=0.005)
+    cut = spectra.read_csv(ROOT / "configs/filters/ir-cut-650.csv")
+    assert cut.at(650e-9) == pytest.approx(0.485) and cut.at(750e-9) < 1e-4

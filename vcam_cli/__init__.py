@@ -1,0 +1,29 @@
+"""vcam: a digital camera simulator, from scene to raw frame to image quality.
+
+    from vcam_cli import load, simulate
+    result = simulate(load("camera.yaml"))
+    result.dn, result.electrons, result.render
+
+Names are imported when they are first used, so that `import vcam_cli` costs nothing.
+"""
+
+from typing import TYPE_CHECKING, Any
+
+__version__ = "0.1.0"
+__all__ = ["__version__", "load", "simulate"]
+
+if TYPE_CHECKING:
+    from vcam_cli.camera.load import load
+    from vcam_cli.studies.simulate import simulate
+
+
+def __getattr__(name: str) -> Any:
+    if name == "load":
+        from vcam_cli.camera.load import load
+
+        return load
+    if name == "simulate":
+        from vcam_cli.studies.simulate import simulate
+
+        return simulate
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -1,0 +1,62 @@
+"""The analog-to-digital converter."""
+
+from collections.abc import Iterator, Mapping
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import model_validator
+from pydantic_core import InitErrorDetails
+
+from vcam_cli.camera.base import Model, key
+from vcam_cli.camera.explain import failure, fault
+from vcam_cli.camera.values import Quantity, Whole
+
+
+def _one_scale(given: Mapping[str, Any]) -> Iterator[InitErrorDetails]:
+    if "gain" in given and given.get("full_scale", "auto") != "auto":
+        yield fault(("gain",), "gain and full_scale cannot both be given", "keep one of them")
+
+
+def _logarithmic_only(given: Mapping[str, Any]) -> Iterator[InitErrorDetails]:
+    if "reference" in given and given.get("kind", "linear") != "logarithmic":
+        message = "a linear ADC has no reference"
+        yield fault(("reference",), message, "remove it, or write kind: logarithmic")
+    if "gain" in given and given.get("kind") == "logarithmic":
+        yield fault(("gain",), "a logarithmic ADC has no one gain", "give full_scale instead")
+
+
+class Adc(Model):
+    """Linear: dn = round(offset + volts / full_scale x (2^bits - 1 - offset)), clipped."""
+
+    bits: Annotated[int, Whole(least=1, most=24, example="10")] = key(
+        "resolution", example=10, default=10
+    )
+    kind: Literal["linear", "logarithmic"] = key(
+        "its curve", example="linear", default="linear", not_yet=("logarithmic",)
+    )
+    offset: Annotated[float, Quantity("dn", least=0)] = key(
+        "the number for no signal", unit="DN", example="0 DN", default=0.0
+    )
+    full_scale: Annotated[float | None, Quantity("voltage", above=0, words={"auto": None})] = key(
+        "volts at the highest number; auto = voltage_swing x readout.gain",
+        unit="V",
+        example="auto",
+        default=None,
+    )
+    gain: Annotated[float | None, Quantity("adc_gain", above=0)] = key(
+        "in place of full_scale", unit="DN/e", example="0.25 DN/e", default=None
+    )
+    reference: Annotated[float | None, Quantity("voltage", above=0)] = key(
+        "of a logarithmic ADC: where its curve bends; default full_scale / 1000",
+        unit="mV",
+        example="1.38 mV",
+        default=None,
+    )
+
+    rules = (_one_scale, _logarithmic_only)
+
+    @model_validator(mode="after")
+    def _leaves_codes(self) -> Self:
+        if self.offset >= 2**self.bits - 1:
+            message = f"{self.offset:g} DN leaves no number for a signal in {self.bits} bits"
+            raise failure([fault(("offset",), message, "lower it, or give more bits")])
+        return self

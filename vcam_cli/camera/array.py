@@ -1,0 +1,200 @@
+"""The array: how many pixels, in which colors, behind which filters."""
+
+from collections.abc import Iterator, Mapping
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import model_validator
+from pydantic_core import InitErrorDetails
+
+from vcam_cli.camera.base import Model, at_most_one, key, together
+from vcam_cli.camera.explain import failure, fault, one_of, shown
+from vcam_cli.camera.spectrum import Spectral, SpectrumFile, SpectrumSpec, SpectrumTable
+from vcam_cli.camera.values import Either, File, Length, Whole, mapping, word_or, written
+
+BAYER = ("bayer-rggb", "bayer-grbg", "bayer-gbrg", "bayer-bggr")
+PATTERNS: dict[str, tuple[str, ...]] = {
+    "monochrome": ("Y",),
+    **dict.fromkeys(BAYER, ("R", "G", "B")),
+    "quad-bayer": ("R", "G", "B"),
+    "rgbw": ("R", "G", "B", "W"),
+    "honeycomb": ("R", "G", "B"),
+    "stacked": ("R", "G", "B"),
+}
+"""Pattern -> its colors, in the order of color planes."""
+CLEAR = ("Y", "W")
+"""Colors that need no filter."""
+DEFAULT_FILTERS = "generic-rgb"
+
+_FILTER = Spectral(most=1.0)
+_Count = Whole(least=1, most=10**7, example="512")
+Color = Literal["R", "G", "B", "W", "Y"]
+
+
+class Die(Model):
+    """A piece of silicon: count = round(die / pitch)."""
+
+    width: Length = key("width of the sensitive area", unit="mm", example="2.7 mm")
+    height: Length = key("height of the sensitive area", unit="mm", example="2.7 mm")
+
+
+class Block(Model):
+    """A repeated block of colors."""
+
+    block: tuple[tuple[str, ...], ...] = key(
+        "rows of color names", example=[["R", "G"], ["G", "B"]]
+    )
+
+    @model_validator(mode="after")
+    def _rectangular(self) -> Self:
+        if not self.block or not self.block[0] or len({len(row) for row in self.block}) > 1:
+            message = "its rows are not equally long"
+            raise failure([fault(("block",), message, "write for example [[R, G], [G, B]]")])
+        return self
+
+
+class Positions(Model):
+    """Pixels at places of their own."""
+
+    positions: File = key("CSV file with the columns x_um,y_um,color", example="pixels.csv")
+
+
+class Binning(Model):
+    """Pixels that are read as one."""
+
+    rows: Annotated[int, Whole(least=1, most=64, example="2")] = key("in a column", example=2)
+    columns: Annotated[int, Whole(least=1, most=64, example="2")] = key("in a row", example=2)
+    kind: Literal["charge", "voltage", "digital"] = key(
+        "where they are added", example="charge", default="charge"
+    )
+
+
+def _pattern(given: Any) -> Any:
+    if isinstance(given, (Block, Positions)) or (isinstance(given, str) and given in PATTERNS):
+        return given
+    if isinstance(given, Mapping):
+        return (Positions if "positions" in given else Block).model_validate(given)
+    also = "{block: [[R, G], [G, B]]} or {positions: file.csv}"
+    raise failure([fault((), *one_of(given, PATTERNS, also), given)])
+
+
+def _filters(given: Any) -> dict[str, SpectrumSpec]:
+    if isinstance(given, str):
+        return filter_set(given)
+    if not isinstance(given, Mapping):
+        raise ValueError(f"{shown(given)} is not a set of filters; write for example {{R: 0.9, ...}}")
+    found, mistakes = {}, []
+    for color, item in given.items():
+        try:
+            if not isinstance(color, str) or not color.isidentifier():
+                raise ValueError(f"{shown(color)} is not the name of a color; write for example R")
+            found[color] = _FILTER.read(item)
+        except ValueError as error:
+            mistakes += _below(error, color, item)
+    if mistakes:
+        raise failure(mistakes)
+    return found
+
+
+def _below(error: ValueError, color: Any, given: Any) -> list[InitErrorDetails]:
+    from vcam_cli.camera.spectrum import moved
+
+    return moved(error, color, given)
+
+
+def filter_set(name: str) -> dict[str, SpectrumSpec]:
+    """The filters of a set that ships, by color. ValueError for a name that does not."""
+    from vcam_cli.camera import shipped, yaml_tree
+    from vcam_cli.errors import BadInput
+
+    try:
+        path = shipped.find("filters", name)
+        tree = yaml_tree.read_file(path).plain()
+    except BadInput as error:
+        problem = error.problems[0]
+        raise ValueError(f"{problem.message}; {problem.remedy}") from None
+    beside = {
+        color: {**item, "file": str(path.parent / item["file"])}
+        if isinstance(item, Mapping) and "file" in item
+        else item
+        for color, item in tree.items()
+        if color != "name"
+    }
+    return _filters(beside)
+
+
+class Array(Model):
+    """The pixel array: rows and columns, or a die to fill."""
+
+    rows: Annotated[int | None, _Count] = key("pixels in a column", example=512, default=None)
+    columns: Annotated[int | None, _Count] = key("pixels in a row", example=512, default=None)
+    die: Annotated[Die | None, mapping(Die)] = key(
+        "size of the sensitive area, in place of rows and columns",
+        example={"width": "2.7 mm", "height": "2.7 mm"},
+        default=None,
+    )
+    pattern: Annotated[
+        str | Block | Positions,
+        Either(_pattern, Literal[tuple(PATTERNS)] | Block | Positions),  # type: ignore[operator]
+    ] = key(
+        "colors of the pixels, row 0 column 0 first",
+        example="bayer-rggb",
+        default="bayer-rggb",
+        not_yet=("quad-bayer", "rgbw", "honeycomb", "stacked", "block", "positions"),
+    )
+    filters: Annotated[
+        dict[str, SpectrumSpec],
+        Either(
+            _filters,
+            str | dict[str, Annotated[SpectrumSpec, _FILTER]],
+            write=lambda value: {color: spec.written() for color, spec in value.items()},
+        ),
+    ] = key(
+        "transmittance of each color's filter (a spectrum), or the name of a shipped set; "
+        "default generic-rgb, and no filter on monochrome pixels (color Y) and on W",
+        example={"R": {"file": "r.csv"}, "G": {"file": "g.csv"}, "B": {"file": "b.csv"}},
+        default=dict,
+    )
+    binning: Annotated[Binning | None, word_or(Binning, {"none": None})] = key(
+        "pixels that are read as one", example="none", default=None, not_yet=True
+    )
+
+    @property
+    def colors(self) -> tuple[str, ...]:
+        """The colors of the pattern, in the order of color planes; () for positions from a file."""
+        if isinstance(self.pattern, Block):
+            return tuple(dict.fromkeys(color for row in self.pattern.block for color in row))
+        return PATTERNS[self.pattern] if isinstance(self.pattern, str) else ()
+
+    @property
+    def mosaic(self) -> bool:
+        """Whether a pixel holds one color of several."""
+        return len(self.colors) != 1 and self.pattern != "stacked"
+
+    @staticmethod
+    def _size(given: Mapping[str, Any]) -> Iterator[InitErrorDetails]:
+        """Rows and columns, or a die; nothing where every pixel has a place of its own."""
+        pattern = given.get("pattern")
+        if isinstance(pattern, Mapping) and "positions" in pattern:
+            return
+        if not {"rows", "columns", "die"} & set(given):
+            yield fault((), "its size is missing", "add rows: 512 and columns: 512, or a die")
+
+    @model_validator(mode="after")
+    def _complete_filters(self) -> Self:
+        filters = self.filters
+        if "filters" not in self.model_fields_set and set(self.colors) - set(CLEAR):
+            filters = filter_set(DEFAULT_FILTERS)
+        for color in self.colors:
+            if color not in filters and color not in CLEAR:
+                message = f"has no filter for {color}, a color of {shown(written(self.pattern))}"
+                raise failure([fault(("filters",), message, f"add {color}: and its spectrum")])
+        self._fill(filters={c: filters[c] for c in self.colors if c in filters} or filters)
+        return self
+
+
+Array.rules = (
+    Array._size,
+    at_most_one("die", "rows"),
+    at_most_one("die", "columns"),
+    together("rows", "columns"),
+)

@@ -1,0 +1,38 @@
+"""The display on which pictures are compared."""
+
+from typing import Annotated, Literal, Self
+
+from pydantic import model_validator
+
+from vcam_cli.camera.base import Model, at_most_one, key
+from vcam_cli.camera.values import Length, MaybeLength, MaybePositive, Positive, Quantity
+
+
+class Display(Model):
+    """A display and its viewer; metrics that model the eye use it."""
+
+    dpi: MaybePositive = key("dots per inch; default 72", example=72.0, default=None)
+    width: MaybeLength = key(
+        "in place of dpi: the picture is always shown that wide",
+        unit="in",
+        example="7.11 in",
+        default=None,
+    )
+    viewing_distance: Length = key(
+        "from eye to display", unit="in", example="18 in", default=0.4572
+    )
+    primaries: Literal["crt-brainard", "srgb"] = key(
+        "spectra of its primaries", example="crt-brainard", default="crt-brainard"
+    )
+    gamma: Positive = key("exponent of its tone curve", example=2.2, default=2.2)
+    white: Annotated[float, Quantity("luminance", above=0)] = key(
+        "luminance of its white", unit="cd/m2", example="100 cd/m2", default=100.0
+    )
+
+    rules = (at_most_one("dpi", "width"),)
+
+    @model_validator(mode="after")
+    def _default(self) -> Self:
+        if self.dpi is None and self.width is None:
+            self._fill(dpi=72.0)
+        return self

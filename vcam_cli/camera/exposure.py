@@ -1,0 +1,113 @@
+"""Exposure: given, chosen by the camera, or several samples of one integration."""
+
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import model_validator
+
+from vcam_cli.camera.base import Model, exactly_one, key
+from vcam_cli.camera.explain import failure, fault, shown
+from vcam_cli.camera.values import Either, MaybeTime, Number, Quantity, Time, Whole, mapping
+
+_TIME = Quantity("time", above=0)
+
+
+class AutoExposure(Model):
+    """The exposure time that brings a chosen level to a fraction of the full well."""
+
+    max: Time = key("longest time", unit="ms", example="100 ms", default=0.1)
+    min: Annotated[float, Quantity("time", least=0)] = key(
+        "shortest time", unit="ms", example="0 s", default=0.0
+    )
+    method: Literal["white", "percentile", "mean"] = key(
+        "the level: the perfect white's, a percentile of the picture, or its mean",
+        example="white",
+        default="white",
+        not_yet=("mean",),
+    )
+    target: Annotated[float, Number(above=0, most=1, example="0.9")] = key(
+        "fraction of the full well", example=0.9, default=0.9
+    )
+    percentile: Annotated[float, Number(least=0, most=100, example="99.9")] = key(
+        "which percentile, for that method", example=99.9, default=99.9
+    )
+
+    @model_validator(mode="after")
+    def _in_order(self) -> Self:
+        if self.min > self.max:
+            raise failure([fault(("min",), "is longer than max", "exchange the two")])
+        return self
+
+
+class CaptureSchedule(Model):
+    """Capture times chosen by the camera."""
+
+    schedule: Literal["optimal"] = key("how they are chosen", example="optimal")
+    count: Annotated[int, Whole(least=1, most=1000, example="8")] = key(
+        "number of captures", example=8
+    )
+    max: Time = key("the last capture's time", unit="ms", example="100 ms")
+
+
+def _captures(given: Any) -> Any:
+    if isinstance(given, (Mapping, CaptureSchedule)):
+        return CaptureSchedule.model_validate(given)
+    if not isinstance(given, (list, tuple)) or not given:
+        raise ValueError(f"{shown(given)} is not a list of times; write for example [5 ms, 30 ms]")
+    times: list[float] = []
+    mistakes = []
+    for i, item in enumerate(given):
+        try:
+            time = _TIME.read(item)
+        except ValueError as error:
+            message, _, remedy = str(error).partition("; ")
+            mistakes.append(fault((i,), message, remedy, item))
+            continue
+        if times and time <= times[-1]:
+            mistakes.append(fault((i,), "the times must rise", "sort them", item))
+        times.append(time)
+    if mistakes:
+        raise failure(mistakes)
+    return tuple(times)
+
+
+class Exposure(Model):
+    """Exactly one of time, auto and captures."""
+
+    time: MaybeTime = key("exposure time", unit="ms", example="30 ms", default=None)
+    auto: Annotated[AutoExposure | None, mapping(AutoExposure)] = key(
+        "automatic exposure", example={"max": "100 ms", "method": "white"}, default=None
+    )
+    captures: Annotated[
+        tuple[float, ...] | CaptureSchedule | None,
+        Either(
+            _captures,
+            list[Annotated[float, _TIME]] | CaptureSchedule,
+            write=lambda value: [_TIME.text(t) for t in value]
+            if isinstance(value, tuple)
+            else value and value.model_dump(mode="json"),
+        ),
+    ] = key(
+        "non-destructive samples of one integration, rising; or {schedule: optimal, count, max}",
+        unit="ms",
+        example=["5 ms", "15 ms", "30 ms", "200 ms"],
+        default=None,
+        not_yet=True,
+    )
+    estimator: Literal["lsbs", "weighted"] = key(
+        "how captures become one picture: the last sample before saturation, or the optimal "
+        "weighted mean",
+        example="lsbs",
+        default="lsbs",
+        not_yet=("weighted",),
+    )
+
+    rules = (
+        exactly_one(
+            "time",
+            "auto",
+            "captures",
+            of="the exposure",
+            remedy="write for example time: 30 ms",
+        ),
+    )

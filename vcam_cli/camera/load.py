@@ -1,0 +1,179 @@
+"""A camera file -> a `Camera`: read, put together, check, and say everything that is wrong.
+
+The steps: read the YAML with its places, read in the parts and bases, lay `--set` over it, make
+file names absolute, validate the model, refuse what is not supported yet, check the geometry.
+Every step gives its problems the place in the file they come from, and as many as can be known
+are reported at once.
+"""
+
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from pydantic import ValidationError
+
+from vcam_cli import errors
+from vcam_cli.camera import explain, geometry, shipped, support
+from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.merge import merge
+from vcam_cli.camera.parts import Parts, existing, looks_like_path
+from vcam_cli.camera.yaml_tree import Node, Source, below, read_text, walk
+from vcam_cli.errors import BadInput, Collector, Problem, bad, nearest, one_line
+
+FILE_KEYS = ("file", "positions")
+
+
+@dataclass(frozen=True)
+class Origin:
+    """Where a camera comes from: its file, all YAML files read, and the place of every key."""
+
+    file: Path
+    files: tuple[Path, ...]
+    places: dict[errors.Path, str]
+
+    def locate(self, path: errors.Path) -> str:
+        """ "camera.yaml:12:10" of `path`, or of the nearest thing around it that is written."""
+        while path not in self.places and path:
+            path = path[:-1]
+        return self.places.get(path, "")
+
+
+def load(camera: str | Path, sets: Sequence[str] = (), folder: Path | None = None) -> Camera:
+    """The validated camera of a file, or of a shipped camera's name.
+
+    `sets` are overrides "PATH=VALUE", VALUE read as YAML; `folder` is where relative paths start
+    (default the current one). `camera.locate(path)` of the result gives the place of a key.
+    Raises BadInput with every problem of the file, CannotDo where a file may not be read.
+    """
+    file = find(camera, folder or Path.cwd())
+    tree, origin, parts = _read(file, sets, folder or Path.cwd())
+    problems = parts.problems
+    tree = _absolute_files(tree, problems, parts.failed)
+    result = _validated(tree, origin, problems, parts.failed)
+    problems.raise_if_any()
+    assert result is not None
+    _check(result, origin)
+    return result.with_origin(origin)
+
+
+def find(camera: str | Path, folder: Path) -> Path:
+    """The camera file meant by a path or the name of a shipped one. Raises BadInput."""
+    text = str(camera)
+    path = folder / text
+    if isinstance(camera, Path) or looks_like_path(text) or path.is_file():
+        try:
+            return existing(path, text)
+        except BadInput as error:
+            near = nearest(path.stem, shipped.names("cameras"))
+            if near is None or (near != path.stem and "did you mean" in str(error)):
+                raise
+            raise bad((), error.problems[0].message, f"a camera {near!r} ships") from None
+    return shipped.find("cameras", text)
+
+
+def overlay(sets: Sequence[str], folder: Path) -> Node:
+    """The tree of "PATH=VALUE" overrides. Raises BadInput for what is none."""
+    whole = Node({}, Source("--set", folder, lines=False))
+    problems = Collector()
+    for item in sets:
+        source = Source(f"--set {one_line(item)}", folder, lines=False)
+        path, _, text = item.partition("=")
+        keys = errors.split(path.strip())
+        if not keys or not text.strip():
+            problem = Problem((), f"{item!r} is not PATH=VALUE", "write pixel.width=8um", "--set")
+            problems.extend(BadInput([problem]))
+            continue
+        try:
+            node = read_text(text, source)
+            for key in reversed(keys):
+                node = Node({key: node}, source)
+            whole = merge(whole, node)
+        except BadInput as error:
+            problems.extend(error)
+    problems.raise_if_any()
+    return whole
+
+
+def places(tree: Node) -> dict[errors.Path, str]:
+    """The place of every value; of a block that begins below its key, the place of the key."""
+    found: dict[errors.Path, str] = {}
+    for path, node in walk(tree):
+        found.setdefault(path, node.where)
+        for key, standing in node.keys.items():
+            child = node.get(key)
+            if child is not None and isinstance(child.value, (dict, list)):
+                begins_below = child.source is standing.source and child.line > standing.line
+                found[below(path, key)] = standing.where if begins_below else child.where
+    return found
+
+
+def _read(file: Path, sets: Sequence[str], folder: Path) -> tuple[Node, Origin, Parts]:
+    """The whole tree of a file, its origin, and the parts that went into it."""
+    parts = Parts()
+    tree = parts.file(file, "cameras")
+    tree = merge(tree, parts.expand(overlay(sets, folder), (), ()))
+    if tree.get("name") is None:
+        stem = re.sub(r"[^A-Za-z0-9._-]+", "-", file.stem)[:64] or "camera"
+        name = Node(stem, tree.source, tree.line, tree.column)
+        tree = replace(tree, value={"name": name} | (tree.mapping or {}))
+    return tree, Origin(file, tuple(parts.files), places(tree)), parts
+
+
+def _absolute_files(node: Node, problems: Collector, failed: set[errors.Path]) -> Node:
+    """The tree with every file name absolute; files that are not there are reported."""
+
+    def visit(node: Node, path: errors.Path) -> Node:
+        if path and path[-1] in FILE_KEYS and isinstance(node.value, str):
+            try:
+                return replace(node, value=str(_absolute(node)))
+            except BadInput as error:
+                failed.add(path)
+                problems.extend(BadInput(replace(p, path=path) for p in error.problems))
+                return node
+        if isinstance(node.value, dict):
+            entries = {k: visit(child, below(path, k)) for k, child in node.value.items()}
+            return replace(node, value=entries)
+        if isinstance(node.value, list):
+            return replace(node, value=[visit(c, (*path, i)) for i, c in enumerate(node.value)])
+        return node
+
+    return visit(node, ())
+
+
+def _absolute(node: Node) -> Path:
+    text = str(node.value)
+    try:
+        return existing(node.source.folder / text, text)
+    except BadInput as error:
+        raise error.located(lambda _: node.where) from None
+
+
+def _validated(
+    tree: Node, origin: Origin, problems: Collector, failed: set[errors.Path]
+) -> Camera | None:
+    """The camera, or None with its problems collected, those of failed parts left out."""
+    value = tree.plain()
+    assert isinstance(value, dict)
+    try:
+        return Camera.model_validate(value)
+    except ValidationError as error:
+        found = explain.problems(error, Camera, value)
+    for problem in found:
+        if not any(problem.path[: len(path)] == path for path in failed):
+            problems.extend(BadInput([problem]).located(origin.locate))
+    return None
+
+
+def _check(camera: Camera, origin: Origin) -> None:
+    """Raises BadInput for all that a valid camera can still have wrong."""
+    problems = Collector()
+    problems.extend(BadInput(support.unsupported(camera)))
+    checks: tuple[Callable[[Camera], None], ...] = (geometry.check,)
+    for check in checks:
+        try:
+            check(camera)
+        except BadInput as error:
+            problems.extend(error)
+    if problems.problems:
+        raise BadInput(problems.problems).located(origin.locate)

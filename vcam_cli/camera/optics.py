@@ -1,0 +1,221 @@
+"""The lens."""
+
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Annotated, Any, Literal
+
+from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
+from pydantic_core import CoreSchema, InitErrorDetails, core_schema
+
+from vcam_cli.camera.base import Model, at_most_one, key
+from vcam_cli.camera.explain import failure, fault, shown
+from vcam_cli.camera.spectrum import Spectral, SpectrumSpec, flat
+from vcam_cli.camera.values import (
+    File,
+    Fraction,
+    Length,
+    MaybeLength,
+    Number,
+    Quantity,
+    Shift,
+    Switch,
+    word_or,
+)
+
+
+class FalloffFile(Model):
+    """Relative illumination of the lens, measured or from a lens program."""
+
+    file: File = key(
+        "CSV file with the columns image_height_mm,value", example="relative-illumination.csv"
+    )
+
+
+class Psf(Model):
+    """A point spread function, measured or from a lens program."""
+
+    file: File = key("image file of the point spread function", example="psf.exr")
+    pitch: Length = key("distance of its samples on the sensor", unit="um", example="0.5 um")
+    wavelength: MaybeLength = key(
+        "the wavelength it holds for, where there is one", unit="nm", example="550 nm", default=None
+    )
+    wavelengths: tuple[Length, ...] = key(
+        "the wavelengths of its channels", unit="nm", example=["450 nm", "550 nm"], default=()
+    )
+
+    rules = (at_most_one("wavelength", "wavelengths"),)
+
+
+Terms = tuple[tuple[int, float], ...]
+"""((Noll index, coefficient [m]), ...)"""
+
+
+@dataclass(frozen=True)
+class Wavefront:
+    """Terms at places of the field: ((place, terms), ...), place 0 center .. 1 corner.
+
+    None as place: the same everywhere. Empty: a perfect lens.
+    """
+
+    at: tuple[tuple[float | None, Terms], ...] = ()
+
+    def written(self) -> Any:
+        """The YAML form."""
+        terms = [{str(n): _COEFFICIENT.text(c) for n, c in terms} for _, terms in self.at]
+        if not self.at or self.at[0][0] is None:
+            return terms[0] if terms else {}
+        return [{"field": f, **t} for (f, _), t in zip(self.at, terms, strict=True)]
+
+
+_COEFFICIENT = Quantity("length")
+_FIELD = Number(least=0, most=1)
+
+
+class Zernike:
+    """The type of a wavefront: {4: 0.05 um}, or a list of {field: 0.7, 4: 0.05 um}."""
+
+    def __get_pydantic_core_schema__(
+        self, source: Any, handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
+        return core_schema.no_info_plain_validator_function(
+            self.read,
+            serialization=core_schema.plain_serializer_function_ser_schema(
+                Wavefront.written, when_used="json"
+            ),
+        )
+
+    def __get_pydantic_json_schema__(
+        self, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        terms = {r"^[1-9]\d{0,2}$": _COEFFICIENT.form()}
+        one = {"type": "object", "patternProperties": terms, "additionalProperties": False}
+        place = {"description": "where: 0 center, 1 corner", "examples": [0.7]} | _FIELD.form()
+        placed = one | {"properties": {"field": place}, "required": ["field"]}
+        return {"anyOf": [one, {"type": "array", "items": placed}]}
+
+    def read(self, given: Any) -> Wavefront:
+        """The wavefront of what is written in YAML."""
+        if isinstance(given, Wavefront):
+            return given
+        if isinstance(given, Mapping):
+            terms = _terms(given, ())
+            return Wavefront(((None, terms),) if terms else ())
+        if not isinstance(given, (list, tuple)):
+            raise ValueError(f"{shown(given)} is no wavefront; write for example {{4: 0.05 um}}")
+        return Wavefront(tuple(self._placed(i, item) for i, item in enumerate(given)))
+
+    def _placed(self, i: int, given: Any) -> tuple[float, Terms]:
+        if not isinstance(given, Mapping) or "field" not in given:
+            message = "has no field"
+            raise failure([fault((i,), message, "write for example {field: 0.7, 4: 0.05 um}")])
+        try:
+            place = _FIELD.read(given["field"])
+        except ValueError as error:
+            raise failure([fault((i, "field"), str(error))]) from None
+        return place, _terms({k: v for k, v in given.items() if k != "field"}, (i,))
+
+
+def _terms(given: Mapping[Any, Any], loc: tuple[int, ...]) -> Terms:
+    found, mistakes = [], []
+    for name, item in given.items():
+        try:
+            index = int(name) if str(name).isascii() and str(name).isdigit() else 0
+            if not 1 <= index <= 999:
+                raise ValueError(f"{shown(name)} is no Noll index; write for example 4 (defocus)")
+            found.append((index, _COEFFICIENT.read(item)))
+        except ValueError as error:
+            message, _, remedy = str(error).partition("; ")
+            mistakes.append(fault((*loc, name), message, remedy, item))
+    if mistakes:
+        raise failure(mistakes)
+    return tuple(sorted(found))
+
+
+_GROUPS = (
+    ("focal_length", "field_of_view"),
+    ("f_number", "numerical_aperture"),
+    ("aperture_diameter",),
+)
+
+
+def _determined(given: Mapping[str, Any]) -> Iterator[InitErrorDetails]:
+    """Two of focal length, f-number and aperture, or of what may stand for them."""
+    known = [group for group in _GROUPS if any(name in given for name in group)]
+    if len(known) < 2:
+        yield fault(
+            (),
+            "the lens is not determined: two of f_number, focal_length and aperture_diameter are "
+            "needed (field_of_view may stand for focal_length, numerical_aperture for f_number)",
+            "add for example focal_length: 3.2 mm" if known else "add f_number and focal_length",
+        )
+
+
+class Optics(Model):
+    """The lens: any two of f_number, focal_length and aperture_diameter; more must agree."""
+
+    f_number: Annotated[float | None, Number(above=0, example="2.8")] = key(
+        "focal length over diameter of the aperture", example=2.8, default=None
+    )
+    focal_length: MaybeLength = key("focal length", unit="mm", example="3.2 mm", default=None)
+    aperture_diameter: MaybeLength = key(
+        "diameter of the entrance pupil", unit="mm", example="1.14 mm", default=None
+    )
+    field_of_view: Annotated[float | None, Quantity("angle", above=0, below=math.pi)] = key(
+        "full, over the array's diagonal; may stand for focal_length",
+        unit="deg",
+        example="46 deg",
+        default=None,
+    )
+    numerical_aperture: Annotated[
+        float | None, Number(above=0, below=1, example="0.18")
+    ] = key("on the image side; may stand for f_number", example=0.18, default=None)
+    transmittance: Annotated[SpectrumSpec, Spectral(most=1.0)] = key(
+        "of lens and filters in front of the sensor: a spectrum",
+        example=0.95,
+        default=flat(0.95),
+    )
+    off_axis: Annotated[
+        Literal["exact", "cos4", "none"] | FalloffFile,
+        word_or(FalloffFile, {"exact": "exact", "cos4": "cos4", "none": "none"}),
+    ] = key(
+        "falloff of light away from the axis: exact (uniform Lambertian disk), cos4, none, or "
+        "measured",
+        example="exact",
+        default="exact",
+        not_yet=("file",),
+    )
+    exit_pupil_distance: Annotated[
+        float | None, Quantity("length", above=0, words={"auto": None})
+    ] = key(
+        "from the sensor; auto = the image distance (1 - m) f; sets the angles at the pixel",
+        unit="mm",
+        example="auto",
+        default=None,
+        not_yet=True,
+    )
+    diffraction: Switch = key("whether the aperture diffracts", example=True, default=True)
+    defocus: Shift = key(
+        "shift of the image plane", unit="um", example="0 um", default=0.0, not_yet=True
+    )
+    zernike: Annotated[Wavefront, Zernike()] = key(
+        "wavefront by Noll index; or a list of {field: 0.7, ...} (0 center, 1 corner)",
+        unit="um",
+        example={"4": "0.05 um", "8": "0.1 um"},
+        default=Wavefront(),
+        not_yet=True,
+    )
+    psf: Annotated[Psf | None, word_or(Psf, {"none": None})] = key(
+        "a point spread function in place of aberrations and diffraction",
+        example="none",
+        default=None,
+        not_yet=True,
+    )
+    stray_light: Fraction = key(
+        "fraction of the mean irradiance that is spread evenly",
+        example=0.0,
+        default=0.0,
+        not_yet=True,
+    )
+
+    rules = (_determined,)

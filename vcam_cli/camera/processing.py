@@ -1,0 +1,175 @@
+"""Processing: what is done to the raw frame, step by step, in the user's order."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import Annotated, Any, Literal
+
+from pydantic_core import InitErrorDetails
+
+from vcam_cli.camera.base import Model, key
+from vcam_cli.camera.explain import failure, fault, one_of, shown
+from vcam_cli.camera.spectrum import moved
+from vcam_cli.camera.values import Either, Number, Quantity, word_or, written
+
+
+class Step(Model):
+    """One entry of `processing`: a mapping of one key, the step's name."""
+
+    @property
+    def name(self) -> str:
+        return next(iter(type(self).model_fields))
+
+    @property
+    def value(self) -> Any:
+        return getattr(self, self.name)
+
+
+_DN = Quantity("dn", least=0, words={"subtract": "subtract", "none": "none"})
+_BARE = Number(least=0, example="64")
+
+
+def _black_level(given: Any) -> Any:
+    """A number of DN may be written with or without its unit."""
+    bare = isinstance(given, (int, float)) and not isinstance(given, bool)
+    return _BARE.read(given) if bare else _DN.read(given)
+
+
+class BlackLevel(Step):
+    """What is subtracted from the raw numbers."""
+
+    black_level: Annotated[
+        float | Literal["subtract", "none"],
+        Either(_black_level, Annotated[float, _DN] | Annotated[float, _BARE], write=_DN.write),
+    ] = key(
+        "subtract (mean dark signal and offset), none, or a number of DN",
+        unit="DN",
+        example="subtract",
+    )
+
+
+class Demosaic(Step):
+    """All colors at every pixel."""
+
+    demosaic: Literal["bilinear", "edge-aware"] = key(
+        "how missing colors are found", example="bilinear", not_yet=("edge-aware",)
+    )
+
+
+class WhiteBalance(Step):
+    """A gain for each color. It may stand before demosaic or after it."""
+
+    white_balance: Literal["gray-world", "bright-block", "illuminant", "none"] = key(
+        "how the gains are found",
+        example="gray-world",
+        not_yet=("bright-block", "illuminant"),
+    )
+
+
+class Matrix(Model):
+    """A color matrix."""
+
+    matrix: tuple[tuple[Annotated[float, Number()], ...], ...] = key(
+        "rows for display R, G, B; columns for the camera's colors",
+        example=[[1.6, -0.4, -0.2], [-0.3, 1.5, -0.2], [0.0, -0.5, 1.5]],
+    )
+
+
+class ColorCorrection(Step):
+    """From the camera's colors to the display's."""
+
+    color_correction: Annotated[
+        Literal["fit", "none"] | Matrix, word_or(Matrix, {"fit": "fit", "none": "none"})
+    ] = key(
+        "fit (to the ColorChecker), none, or a matrix", example="fit", not_yet=("fit", "matrix")
+    )
+
+
+class Gamma(Step):
+    """The tone curve of the render."""
+
+    gamma: Annotated[float | Literal["srgb"], Number(above=0, example="2.2", words={"srgb": "srgb"})] = key(
+        "a number, or srgb", example="srgb"
+    )
+
+
+STEPS: dict[str, type[Step]] = {
+    "black_level": BlackLevel,
+    "demosaic": Demosaic,
+    "white_balance": WhiteBalance,
+    "color_correction": ColorCorrection,
+    "gamma": Gamma,
+}
+Steps = tuple[Step, ...]
+_ANY = BlackLevel | Demosaic | WhiteBalance | ColorCorrection | Gamma
+
+
+def _steps(given: Any) -> Steps:
+    if not isinstance(given, (list, tuple)):
+        message = f"{shown(given)} is not a list of steps"
+        raise failure([fault((), message, "write [] or a list such as [gamma: srgb]", given)])
+    found: list[Step] = []
+    mistakes: list[InitErrorDetails] = []
+    for i, item in enumerate(given):
+        try:
+            found.append(_step(item))
+        except ValueError as error:
+            mistakes += moved(error, i, item)
+    if mistakes:
+        raise failure(mistakes)
+    return tuple(found)
+
+
+def _step(given: Any) -> Step:
+    if isinstance(given, Step):
+        return given
+    if not isinstance(given, Mapping) or len(given) != 1:
+        raise ValueError(f"{shown(given)} is not a step; write one key, such as demosaic: bilinear")
+    name = next(iter(given))
+    if name not in STEPS:
+        near = one_of(name, STEPS)
+        raise failure([fault((name,), *near, given=given)])
+    return STEPS[name].model_validate(given)
+
+
+STEP_LIST = Either(_steps, list[_ANY])
+"""The type of `processing`."""
+
+
+def default_steps(monochrome: bool) -> Steps:
+    """What is done where the file does not say."""
+    color = (Demosaic(demosaic="bilinear"), WhiteBalance(white_balance="gray-world"))
+    return (
+        BlackLevel.model_validate({"black_level": "subtract"}),
+        *(() if monochrome else color),
+        Gamma.model_validate({"gamma": "srgb"}),
+    )
+
+
+def order_mistakes(steps: Sequence[Step], mosaic: bool, colors: int) -> Iterator[InitErrorDetails]:
+    """Why these steps cannot work in this order on an array of so many colors."""
+    names = [step.name for step in steps]
+    for i, step in enumerate(steps):
+        before, name = names[:i], step.name
+        for message, remedy in _reasons(name, step.value == "none", before, names, mosaic, colors):
+            yield fault(("processing", i, name), message, remedy, written(step))
+
+
+def _reasons(
+    name: str, idle: bool, before: list[str], names: list[str], mosaic: bool, colors: int
+) -> Iterator[tuple[str, str]]:
+    if name in before:
+        yield f"{name} comes twice", "keep one of them"
+    elif "gamma" in before:
+        yield f"{name} after gamma: the steps work on linear light", "put gamma last"
+    if idle:
+        return
+    late = [step for step in ("white_balance", "color_correction") if step in before]
+    if name == "black_level" and late:
+        yield f"black_level after {late[0]}: gains need black at zero", "put black_level first"
+    if name == "demosaic" and not mosaic:
+        yield "every pixel of this array has all its colors", "remove this step"
+    if name in ("white_balance", "color_correction") and colors == 1:
+        yield "a monochrome array has no colors to change", "remove this step"
+    elif name == "white_balance" and mosaic and "demosaic" not in names:
+        yield "the colors of a mosaic need a demosaic", "add demosaic: bilinear"
+    elif name == "color_correction" and mosaic and "demosaic" not in before:
+        yield "a pixel of a mosaic has one color only", "put demosaic before it"

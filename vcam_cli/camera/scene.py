@@ -1,0 +1,383 @@
+"""The scene: what stands in front of the lens, how it is lit, how far away and how large."""
+
+from collections.abc import Mapping
+from pathlib import PurePath
+from typing import Annotated, Any, ClassVar, Literal, Self
+
+from pydantic import model_validator
+
+from vcam_cli.camera.base import Model, exactly_one, key
+from vcam_cli.camera.explain import failure, fault, one_of, shown
+from vcam_cli.camera.spectrum import IlluminantSpec, Lamp
+from vcam_cli.camera.values import (
+    Angle,
+    Either,
+    File,
+    Fraction,
+    Frequency,
+    Length,
+    Number,
+    Positive,
+    Quantity,
+    Whole,
+    word_or,
+    written,
+)
+
+Seed = Annotated[int, Whole(least=0, most=2**63 - 1, example="1")]
+
+
+class Chart(Model):
+    """A test chart: reflectances between 0 and 1, computed and not read from a file."""
+
+    kind: Literal["chart"] = key("what kind of source this is", example="chart")
+
+
+class Uniform(Chart):
+    """The same reflectance everywhere."""
+
+    chart: Literal["uniform"] = key("which chart", example="uniform")
+    reflectance: Fraction = key("reflectance everywhere", example=1.0, default=1.0)
+
+
+class Sinusoid(Chart):
+    """One spatial frequency: reflectance mean x (1 + contrast cos(2 pi f u + phase))."""
+
+    chart: Literal["sinusoid"] = key("which chart", example="sinusoid")
+    frequency: Frequency = key(
+        "spatial frequency on the sensor plane", unit="lp/mm", example="50 lp/mm"
+    )
+    contrast: Fraction = key("modulation over mean", example=0.5, default=0.5)
+    mean: Fraction = key("mean reflectance", example=0.5, default=0.5)
+    orientation: Angle = key(
+        "direction of modulation; 0 deg = along a row", unit="deg", example="0 deg", default=0.0
+    )
+    phase: Angle = key(
+        "0 deg = a maximum at the image center", unit="deg", example="90 deg", default=0.0
+    )
+
+    @model_validator(mode="after")
+    def _is_a_reflectance(self) -> Self:
+        return _no_more_than_white(self, self.contrast, "contrast")
+
+
+class Csf(Chart):
+    """Frequency grows from left to right, contrast from bottom to top, both linearly from 0."""
+
+    chart: Literal["csf"] = key("which chart", example="csf")
+    max_frequency: Frequency = key(
+        "spatial frequency at the right edge, on the sensor plane", unit="lp/mm", example="33 lp/mm"
+    )
+    mean: Fraction = key("mean reflectance", example=0.5, default=0.5)
+    phase: Angle = key("phase at the left edge", unit="deg", example="0 deg", default=0.0)
+    max_contrast: Fraction = key("contrast at the top", example=1.0, default=1.0)
+
+    @model_validator(mode="after")
+    def _is_a_reflectance(self) -> Self:
+        return _no_more_than_white(self, self.max_contrast, "max_contrast")
+
+
+class SlantedEdge(Chart):
+    """A straight edge through the center, dark on its left, bright on its right (ISO 12233)."""
+
+    chart: Literal["slanted-edge"] = key("which chart", example="slanted-edge")
+    angle: Annotated[float, Quantity("angle")] = key(
+        "between the edge and the columns", unit="deg", example="5 deg", default=0.08726646259971647
+    )
+    contrast: Fraction = key(
+        "(bright - dark) / (bright + dark); 0.6 is the 4:1 of ISO 12233", example=0.6, default=0.6
+    )
+
+
+class StepWedge(Chart):
+    """Vertical bars of equal steps in density, brightest on the left."""
+
+    chart: Literal["step-wedge"] = key("which chart", example="step-wedge")
+    steps: Annotated[int, Whole(least=2, most=1000, example="20")] = key(
+        "number of bars", example=20, default=20
+    )
+    density_range: Annotated[float, Number(above=0, most=10, example="2")] = key(
+        "density of the darkest bar over the brightest (log10)", example=2.0, default=2.0
+    )
+    not_yet: ClassVar[str] = "chart"
+
+
+class ColorChecker(Chart):
+    """The 24 patches of the ColorChecker."""
+
+    chart: Literal["colorchecker"] = key("which chart", example="colorchecker")
+
+
+class SiemensStar(Chart):
+    """Spokes whose frequency grows towards the center."""
+
+    chart: Literal["siemens-star"] = key("which chart", example="siemens-star")
+    spokes: Annotated[int, Whole(least=2, most=1000, example="72")] = key(
+        "number of bright spokes", example=72, default=72
+    )
+    contrast: Fraction = key("modulation over mean", example=1.0, default=1.0)
+    not_yet: ClassVar[str] = "chart"
+
+
+class PointGrid(Chart):
+    """Bright points on black."""
+
+    chart: Literal["point-grid"] = key("which chart", example="point-grid")
+    spacing: Length = key("between points, on the sensor plane", unit="um", example="200 um")
+    diameter: Length = key(
+        "of a point, on the sensor plane", unit="um", example="2 um", default=2e-6
+    )
+    not_yet: ClassVar[str] = "chart"
+
+
+class DeadLeaves(Chart):
+    """Overlapping disks of random size and reflectance: the statistics of natural images."""
+
+    chart: Literal["dead-leaves"] = key("which chart", example="dead-leaves")
+    seed: Seed = key("which arrangement of leaves", example=1, default=1)
+    colorchecker: Fraction = key(
+        "height of a ColorChecker in the middle over the chart's height; 0 = none",
+        example=0.4,
+        default=0.0,
+    )
+
+
+class EyeChart(Chart):
+    """Rows of letters, smaller from row to row."""
+
+    chart: Literal["eye-chart"] = key("which chart", example="eye-chart")
+    rows: Annotated[int, Whole(least=1, most=20, example="8")] = key(
+        "rows of letters", example=8, default=8
+    )
+    not_yet: ClassVar[str] = "chart"
+
+
+class HdrPatches(Chart):
+    """Patches of widely different radiance, and a lamp."""
+
+    chart: Literal["hdr-patches"] = key("which chart", example="hdr-patches")
+    dynamic_range: Positive = key(
+        "brightest over darkest patch", example=10000.0, default=10000.0
+    )
+    patches: Annotated[int, Whole(least=2, most=1000, example="24")] = key(
+        "number of patches", example=24, default=24
+    )
+    lamp: Positive = key(
+        "radiance of the lamp over that of the perfect white", example=100.0, default=100.0
+    )
+    not_yet: ClassVar[str] = "chart"
+
+
+class ImageFile(Model):
+    """A picture, read as the reflectance or the radiance of a flat scene."""
+
+    kind: Literal["image"] = key("what kind of source this is", example="image")
+    file: File = key("any image file that OpenImageIO reads", example="photo.png")
+    encoding: Literal["srgb", "linear"] | None = key(
+        "how the file codes light; default srgb, for .exr, .hdr and .pfm linear",
+        example="srgb",
+        default=None,
+    )
+    white: Positive = key("value in the file that has the stated luminance", example=1.0, default=1.0)
+    model: Literal["reflectance", "laser", "rgb-display", "mallett"] = key(
+        "what channels mean: reflectance (one channel), laser (450, 550 and 650 nm, equal planes "
+        "= equal radiance in W), rgb-display (a display's primaries), mallett (reflectances)",
+        example="reflectance",
+        default="reflectance",
+        not_yet=("rgb-display", "mallett"),
+    )
+
+    @model_validator(mode="after")
+    def _encoding(self) -> Self:
+        if self.encoding is None:
+            linear = PurePath(self.file).suffix.lower() in (".exr", ".hdr", ".pfm")
+            self._fill(encoding="linear" if linear else "srgb")
+        return self
+
+
+class Hyperspectral(Model):
+    """A file of spectra: spectral EXR, ENVI, ISETCam scene, npz, multichannel TIFF."""
+
+    kind: Literal["hyperspectral"] = key("what kind of source this is", example="hyperspectral")
+    file: File = key("exr, hdr, mat, npz or tif file", example="scene.exr")
+    not_yet: ClassVar[str] = "kind"
+
+
+CHARTS: dict[str, type[Chart]] = {
+    "uniform": Uniform,
+    "sinusoid": Sinusoid,
+    "csf": Csf,
+    "slanted-edge": SlantedEdge,
+    "step-wedge": StepWedge,
+    "colorchecker": ColorChecker,
+    "siemens-star": SiemensStar,
+    "point-grid": PointGrid,
+    "dead-leaves": DeadLeaves,
+    "eye-chart": EyeChart,
+    "hdr-patches": HdrPatches,
+}
+KINDS: dict[str, type[Model] | None] = {
+    "chart": None,
+    "image": ImageFile,
+    "hyperspectral": Hyperspectral,
+}
+Source = (
+    Uniform
+    | Sinusoid
+    | Csf
+    | SlantedEdge
+    | StepWedge
+    | ColorChecker
+    | SiemensStar
+    | PointGrid
+    | DeadLeaves
+    | EyeChart
+    | HdrPatches
+    | ImageFile
+    | Hyperspectral
+)
+
+
+def _no_more_than_white(chart: Any, contrast: float, name: str) -> Any:
+    brightest = chart.mean * (1 + contrast)
+    if brightest > 1 + 1e-12:
+        message = f"mean x (1 + {name}) is {brightest:.4g}, more than a reflectance can be"
+        raise failure([fault((name,), message, "make it at most 1")])
+    return chart
+
+
+def _source(given: Any) -> Any:
+    """The source that a mapping describes, told apart by kind and chart."""
+    if isinstance(given, Model):
+        return given
+    if not isinstance(given, Mapping):
+        raise ValueError(f"{shown(given)} is not a source; write {{kind: chart, chart: uniform}}")
+    kind = given.get("kind")
+    if not isinstance(kind, str) or kind not in KINDS:
+        raise failure([_choice("kind", kind, KINDS, given)])
+    model = KINDS[kind]
+    if model is None:
+        chart = given.get("chart")
+        if not isinstance(chart, str) or chart not in CHARTS:
+            raise failure([_choice("chart", chart, CHARTS, given)])
+        model = CHARTS[chart]
+    return model.model_validate(given)
+
+
+def _choice(name: str, word: object, allowed: Any, given: Mapping[Any, Any]) -> Any:
+    if name not in given:
+        return fault((name,), "is missing", f"write one of: {', '.join(allowed)}", given)
+    return fault((name,), *one_of(word, allowed), given=word)
+
+
+class Extent(Model):
+    """A scene of a given size."""
+
+    width: Length = key("width in the scene plane; the scene is centered", unit="m", example="0.5 m")
+
+
+class Wavelengths(Model):
+    """The part of the spectrum that is simulated."""
+
+    start: Length = key("shortest wavelength", unit="nm", example="380 nm", default=380e-9)
+    stop: Length = key("longest wavelength", unit="nm", example="780 nm", default=780e-9)
+    step: Annotated[float | None, Quantity("length", above=0, words={"auto": None})] = key(
+        "spacing at which the lens's blur is evaluated; auto follows from the accuracy",
+        unit="nm",
+        example="auto",
+        default=None,
+    )
+
+    @model_validator(mode="after")
+    def _in_order(self) -> Self:
+        if self.start >= self.stop:
+            raise failure([fault(("stop",), "must be longer than start", "exchange the two")])
+        if self.step is not None and self.step > self.stop - self.start:
+            raise failure([fault(("step",), "is longer than start..stop", "make it smaller")])
+        return self
+
+
+
+_LUMINANCE = Quantity("luminance", above=0, words={"from-file": "from-file"})
+
+
+class Scene(Model):
+    """What the camera looks at."""
+
+    source: Annotated[Source, Either(_source, Source)] = key(
+        "a chart, an image file or a hyperspectral file", example={"kind": "chart", "chart": "csf"}
+    )
+    illuminant: Annotated[IlluminantSpec | None, Lamp()] = key(
+        "the lamp; default D65; to be absent for images that emit (model laser or rgb-display)",
+        example="D65",
+        default=None,
+    )
+    luminance: Annotated[float | Literal["from-file"] | None, _LUMINANCE] = key(
+        "of a perfect white diffuser (of the display's white, for images that emit); "
+        "from-file where the file is in absolute radiance",
+        unit="cd/m2",
+        example="100 cd/m2",
+        default=None,
+        not_yet=("from-file",),
+    )
+    radiance: Annotated[float | None, Quantity("radiance", above=0)] = key(
+        "of a perfect white diffuser, over the wavelengths simulated",
+        unit="W/(sr m2)",
+        example="0.4 W/(sr m2)",
+        default=None,
+    )
+    illuminance: Annotated[float | None, Quantity("illuminance", above=0)] = key(
+        "on a perfect white diffuser", unit="lx", example="300 lx", default=None
+    )
+    distance: Annotated[float, Quantity("distance", above=0)] = key(
+        "from lens to scene, or infinity", unit="m", example="1 m", default=1.0
+    )
+    extent: Annotated[
+        Literal["sensor"] | Extent, word_or(Extent, {"sensor": "sensor"})
+    ] = key(
+        "sensor: the scene covers the array, cropped centrally to its aspect; or its width in "
+        "the scene plane, black outside",
+        example="sensor",
+        default="sensor",
+    )
+    wavelengths: Wavelengths = key(
+        "range of wavelengths simulated",
+        example={"start": "380 nm", "stop": "780 nm", "step": "auto"},
+        default=Wavelengths,
+    )
+
+    rules = (
+        exactly_one(
+            "luminance",
+            "radiance",
+            "illuminance",
+            of="the light level",
+            remedy="write for example luminance: 100 cd/m2",
+        ),
+    )
+
+    @property
+    def emits(self) -> bool:
+        """Whether the source shines by itself and needs no lamp."""
+        source = self.source
+        return isinstance(source, ImageFile) and source.model in ("laser", "rgb-display")
+
+    @model_validator(mode="after")
+    def _lamp(self) -> Self:
+        if self.emits and self.illuminant is not None:
+            message = "an image that emits light has no lamp"
+            raise failure([fault(("illuminant",), message, "remove it", written(self.illuminant))])
+        if not self.emits and self.illuminant is None:
+            self._fill(illuminant=IlluminantSpec("D65"))
+        return self
+
+    @model_validator(mode="after")
+    def _levels(self) -> Self:
+        if self.luminance == "from-file" and not isinstance(self.source, Hyperspectral):
+            message = "this source has no absolute radiance in a file"
+            raise failure([fault(("luminance",), message, "write for example 100 cd/m2")])
+        line = self.illuminant.line if self.illuminant else None
+        if line is not None and not self.wavelengths.start <= line <= self.wavelengths.stop:
+            message = f"{line * 1e9:.6g} nm is outside the wavelengths simulated"
+            raise failure([fault(("illuminant", "monochromatic"), message, "widen wavelengths")])
+        return self

@@ -1,0 +1,181 @@
+"""`vcam list`: what ships."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from vcam_cli.commands import options
+
+PARTS = ("scenes", "optics", "pixels", "arrays")
+
+
+@dataclass(frozen=True)
+class Item:
+    """Something that ships: its name, one line about it, and its file where it is one."""
+
+    name: str
+    about: str
+    file: Path | None = None
+
+
+def complete_kind(incomplete: str) -> list[str]:
+    return [kind for kind in KINDS if kind.startswith(incomplete)]
+
+
+def list_(
+    kind: Annotated[
+        str | None,
+        typer.Argument(metavar="[KIND]", help="One of the kinds.", autocompletion=complete_kind),
+    ] = None,
+    name: Annotated[
+        str | None, typer.Argument(metavar="[NAME]", help="Print this file or description.")
+    ] = None,
+    as_json: options.Json = False,
+) -> None:
+    """Lists what ships; with a NAME prints the file.
+
+    Kinds: cameras, parts, technologies, studies, charts, illuminants, filters, effects, metrics.
+
+    \b
+    Example:
+      vcam list
+      vcam list charts
+      vcam list illuminants D65
+    """
+    from vcam_cli.errors import bad, nearest
+
+    if kind is not None and kind not in KINDS:
+        near = nearest(kind, KINDS)
+        remedy = f"did you mean {near}?" if near else f"kinds: {', '.join(KINDS)}"
+        raise bad((), f"{kind!r} is not a kind of thing that ships", remedy)
+    found = {k: list(KINDS[k]()) for k in ([kind] if kind else KINDS)}
+    if kind is not None and name is not None:
+        _show(kind, _choose(kind, name, found[kind]), as_json)
+    elif as_json:
+        options.write_json({k: [_plain(item) for item in items] for k, items in found.items()})
+    elif kind is not None:
+        _table(found[kind])
+    else:
+        for k, items in found.items():
+            print(f"{k + ':':14}{', '.join(item.name for item in items) or '(none yet)'}")
+
+
+def _choose(kind: str, name: str, items: list[Item]) -> Item:
+    """The item of that name; a part may be named without its folder. Raises BadInput."""
+    from vcam_cli.errors import bad, nearest
+
+    for item in items:
+        if name in (item.name, item.name.rpartition("/")[2]):
+            return item
+    near = nearest(name, [item.name for item in items])
+    remedy = f"did you mean {near}?" if near else f"`vcam list {kind}` shows them all"
+    raise bad((), f"{name!r} is not among the {kind} that ship", remedy)
+
+
+def _show(kind: str, item: Item, as_json: bool) -> None:
+    text = item.file.read_text("utf-8") if item.file else ""
+    if as_json:
+        options.write_json({"kind": kind} | _plain(item) | ({"text": text} if text else {}))
+    else:
+        print(text.rstrip() if text else f"{item.name}: {item.about}")
+
+
+def _table(items: list[Item]) -> None:
+    width = max((len(item.name) for item in items), default=0)
+    for item in items:
+        print(f"{item.name:{width}}  {item.about}".rstrip())
+
+
+def _plain(item: Item) -> dict[str, str]:
+    file = {"file": str(item.file)} if item.file else {}
+    return {"name": item.name, "about": item.about} | file
+
+
+def _files(*kinds: str) -> list[Item]:
+    """Shipped YAML files; of several kinds, each is named with its folder."""
+    from vcam_cli.camera import shipped
+
+    return [
+        Item(name if len(kinds) == 1 else f"{kind}/{name}", first_comment(file), file)
+        for kind in kinds
+        for name, file in shipped.files(kind).items()
+    ]
+
+
+def first_comment(file: Path) -> str:
+    """What the first comment of a file says, up to the first full stop."""
+    words: list[str] = []
+    with file.open(encoding="utf-8") as lines:
+        for line in lines:
+            if not line.startswith("#"):
+                break
+            if "yaml-language-server" not in line:
+                words.append(line.strip("# \n"))
+    return " ".join(words).partition(". ")[0].rstrip(".")
+
+
+def _filters() -> list[Item]:
+    from vcam_cli.camera import shipped
+
+    spectra = [Item(name, first_comment(f), f) for name, f in shipped.files("spectra").items()]
+    return _files("filters") + spectra
+
+
+def _charts() -> list[Item]:
+    from vcam_cli.camera.scene import CHARTS
+
+    return [Item(name, _first_line(c)) for name, c in CHARTS.items() if not c.not_yet]
+
+
+def _illuminants() -> list[Item]:
+    from vcam_cli.spectra import illuminant_names
+
+    named = [Item(name, "CIE illuminant, by name") for name in illuminant_names()]
+    return [
+        *named,
+        Item("{blackbody: 5500 K}", "a blackbody of any temperature"),
+        Item("{monochromatic: 550 nm}", "a single line"),
+        Item("{file: lamp.csv}", "columns wavelength_nm,value"),
+    ]
+
+
+def _effects() -> list[Item]:
+    from vcam_cli.effects.order import ORDER
+
+    return [Item(effect.name, f"{_first_line(effect)} ({effect.reference})") for effect in ORDER]
+
+
+def _first_line(thing: object) -> str:
+    return (thing.__doc__ or "").strip().partition("\n")[0].rstrip(".")
+
+
+def _metrics() -> list[Item]:
+    always = {
+        "exposure_time": "exposure time [s]",
+        "mean_electrons": "mean of the raw signal [e]",
+        "saturated_fraction": "fraction of pixels at the full well",
+        "snr_db": "SNR at 20 % of the well [dB] (eq 3.2)",
+        "dynamic_range_db": "dynamic range [dB] (eq 3.1)",
+        "well_capacity": "full well [e]",
+    }
+    asked = {
+        "mse": "mean squared error against the ideal image; ask for it in `quality`",
+        "psnr": "peak signal-to-noise ratio, white = 1 [dB]; ask for it in `quality`",
+    }
+    return [Item(name, about) for name, about in (always | asked).items()]
+
+
+KINDS: dict[str, Callable[[], list[Item]]] = {
+    "cameras": lambda: _files("cameras"),
+    "parts": lambda: _files(*PARTS),
+    "technologies": lambda: _files("technologies"),
+    "studies": lambda: _files("studies"),
+    "charts": _charts,
+    "illuminants": _illuminants,
+    "filters": _filters,
+    "effects": _effects,
+    "metrics": _metrics,
+}

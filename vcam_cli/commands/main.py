@@ -1,0 +1,122 @@
+"""The program `vcam`: its commands, and how it ends.
+
+Exit codes: 0 done, 2 bad input or usage, 3 this machine cannot do it, 1 a bug (only then a
+traceback), 130 interrupted.
+
+Why commands are looked up by name: a command's module is imported when that command is asked
+for, and imports its physics when it runs, so `vcam --help` and shell completion are quick.
+"""
+
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib import import_module
+from typing import Annotated, Any
+
+import typer
+from typer.core import TyperGroup
+
+from vcam_cli.errors import VcamError
+
+COMMANDS = {
+    "run": "run:run",
+    "validate": "validate:validate",
+    "list": "list_:list_",
+    "init": "init:init",
+    "schema": "schema:schema",
+}  # command -> module in this package : function
+
+
+class Commands(TyperGroup):
+    """The commands of `COMMANDS`, each imported when it is wanted."""
+
+    def list_commands(self, ctx: Any) -> list[str]:
+        return list(COMMANDS)
+
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+        if cmd_name not in COMMANDS:
+            return None
+        if cmd_name not in self.commands:
+            module, function = COMMANDS[cmd_name].split(":")
+            one = typer.Typer(add_completion=False, rich_markup_mode=None)
+            one.command(cmd_name)(getattr(import_module(f"vcam_cli.commands.{module}"), function))
+            self.commands[cmd_name] = typer.main.get_command(one)  # type: ignore[assignment]
+        return self.commands[cmd_name]
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        if args and args[0] not in COMMANDS:
+            for name in COMMANDS:  # so that the nearest one can be suggested
+                self.get_command(ctx, name)
+        return super().resolve_command(ctx, args)
+
+    def invoke(self, ctx: Any) -> Any:
+        with failures_told():
+            return super().invoke(ctx)
+
+
+app = typer.Typer(
+    cls=Commands,
+    context_settings={"help_option_names": ["-h", "--help"]},
+    no_args_is_help=True,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+)
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        from importlib.metadata import version
+
+        print(f"vcam {version('vcam-cli')}")
+        raise typer.Exit
+
+
+@app.callback()
+def vcam(
+    version: Annotated[
+        bool,
+        typer.Option("--version", callback=_version, is_eager=True, help="Print the version."),
+    ] = False,
+) -> None:
+    """Simulates digital cameras: from a scene to a raw frame, its render and its quality.
+
+    \b
+    Begin with:
+      vcam init mycamera
+      vcam run mycamera/camera.yaml
+    """
+
+
+@contextmanager
+def failures_told() -> Iterator[None]:
+    """Turns what a user can cause into one-line messages on stderr and an exit code."""
+    try:
+        yield
+    except VcamError as error:
+        _end(str(error), error.exit_code, error)
+    except MemoryError as error:
+        _end("not enough memory; use a smaller array, or --accuracy draft", 3, error)
+    except KeyboardInterrupt as error:
+        _end("interrupted; nothing unfinished was kept, run the same command again", 130, error)
+
+
+def _end(message: str, code: int, error: BaseException) -> None:
+    print(message, file=sys.stderr)
+    raise typer.Exit(code) from error
+
+
+def main() -> None:
+    """Runs `vcam` and leaves the process."""
+    try:
+        try:
+            app(prog_name="vcam")
+        finally:
+            sys.stdout.flush()
+    except BrokenPipeError:  # the reader (head, less) has gone: nothing more to say
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        sys.exit(1)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,117 @@
+"""Arguments and options that several commands share, and how commands speak.
+
+Results go to stdout, everything else to stderr; with `--json` stdout carries one JSON document.
+"""
+
+import json
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+PRESETS = ("draft", "standard", "reference")
+
+
+def complete_camera(incomplete: str) -> list[str]:
+    """Shell completion: shipped cameras, YAML files and folders."""
+    from vcam_cli.camera import shipped
+
+    folder = Path(incomplete).parent if incomplete and not incomplete.endswith("/") else incomplete
+    found = [n for n in shipped.names("cameras") if n.startswith(incomplete)]
+    for path in sorted(Path(folder or ".").glob("*")):
+        text = str(path) + ("/" if path.is_dir() else "")
+        if text.startswith(incomplete) and (path.is_dir() or path.suffix in (".yaml", ".yml")):
+            found.append(text)
+    return found
+
+
+def check_accuracy(value: str | None) -> str | None:
+    """draft, standard, reference, or a fraction ("0.01", "1 %")."""
+    if value is None or value in PRESETS:
+        return value
+    from vcam_cli.errors import nearest
+    from vcam_cli.units import parse_fraction
+
+    try:
+        fraction = parse_fraction(value)
+    except ValueError:
+        near = nearest(value, PRESETS)
+        hint = f"; did you mean {near}?" if near else ""
+        message = f"{value!r} is neither {', '.join(PRESETS)} nor a fraction such as 0.01{hint}"
+        raise typer.BadParameter(message) from None
+    if not 0 < fraction < 1:
+        raise typer.BadParameter(f"{value!r} is not between 0 and 1; write for example 0.01")
+    return value
+
+
+Camera = Annotated[
+    str,
+    typer.Argument(
+        metavar="CAMERA.yaml",
+        help="A camera file, or the name of a shipped camera (see `vcam list cameras`).",
+        autocompletion=complete_camera,
+        show_default=False,
+    ),
+]
+Out = Annotated[
+    Path | None,
+    typer.Option("-o", "--out", metavar="DIR", help="Folder to write into; default out/NAME."),
+]
+Set = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        metavar="PATH=VALUE",
+        help='Override a key of the file, as in --set pixel.width="8 um". Repeatable.',
+    ),
+]
+Seed = Annotated[
+    int | None,
+    typer.Option(
+        "--seed", metavar="N", min=0, help="Frame seed; the sensor's fixed pattern stays."
+    ),
+]
+Accuracy = Annotated[
+    str | None,
+    typer.Option(
+        "--accuracy",
+        metavar="LEVEL",
+        callback=check_accuracy,
+        help="draft, standard, reference, or a tolerance such as 0.01.",
+    ),
+]
+Json = Annotated[
+    bool, typer.Option("--json", help="Machine-readable summary on stdout, nothing else there.")
+]
+Quiet = Annotated[bool, typer.Option("-q", "--quiet", help="No messages but errors.")]
+Workers = Annotated[
+    int | None,
+    typer.Option(
+        "--workers", metavar="N", min=1, help="Threads; default all cores. Results do not change."
+    ),
+]
+
+
+def overrides(
+    sets: Sequence[str] | None, seed: int | None = None, accuracy: str | None = None
+) -> list[str]:
+    """`--set`, `--seed` and `--accuracy` as one list of "PATH=VALUE"."""
+    found = list(sets or ())
+    if seed is not None:
+        found.append(f"seed.frame={seed}")
+    if accuracy is not None:
+        found.append(f"accuracy={accuracy}")
+    return found
+
+
+def say(message: object, quiet: bool = False) -> None:
+    """A line for the user, on stderr."""
+    if not quiet:
+        print(message, file=sys.stderr, flush=True)
+
+
+def write_json(value: object) -> None:
+    """One JSON document on stdout."""
+    print(json.dumps(value, indent=2, allow_nan=False, ensure_ascii=False))

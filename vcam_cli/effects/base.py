@@ -1,0 +1,168 @@
+"""What an effect is.
+
+The camera file says what exists; an effect is what one of these things does to the light. Its
+kind says in mathematics what it does, and so where in the order it acts (`order.py`):
+
+    Transfer   multiplies the spectrum of the image, H(f, wavelength)      no unit
+    Gain       multiplies the signal, pixel by pixel                       no unit
+    Charge     adds electrons                                              electrons
+    Draw       adds randomness, of known variance                          electrons
+    Limit      clamps                                                      electrons
+    Code       turns electrons into digital numbers                        electrons -> DN
+
+Each effect lives in a file of its own and knows: whether a camera has it (`of`), what it
+contributes (so that the plan can leave it out), what it costs, how it acts, where it comes from.
+Adding an effect is adding a file, and its class to the tuple in `order.py`.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import ClassVar, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.geometry import Geometry
+
+
+@dataclass(frozen=True)
+class Outlook:
+    """What is known of the signal before a frame is computed; bounds refer to it."""
+
+    full_signal: float
+    """Largest noise-free mean signal on the array, at most the full well [electrons]."""
+    time: float
+    """Exposure time [s]."""
+
+
+class Effect(ABC):
+    """One thing that a camera does to the light."""
+
+    name: ClassVar[str]
+    """Its name in the camera file's `effects`."""
+    reference: ClassVar[str]
+    """Equation and paper."""
+    absent: ClassVar[str]
+    """Why a camera does not have it: a sentence."""
+    seconds_per_pixel: ClassVar[float] = 0.0
+    """Cost on one core of 2020s hardware, for the plan's estimate."""
+    removable: ClassVar[bool] = True
+    """Whether the plan may leave it out (a user always may)."""
+
+    @classmethod
+    @abstractmethod
+    def of(cls, camera: Camera, geometry: Geometry) -> Self | None:
+        """The effect with this camera's numbers, or None where the camera does not have it."""
+
+    @abstractmethod
+    def describe(self) -> str:
+        """What it does in this camera: a short clause with numbers and units."""
+
+    def mean_error(self, outlook: Outlook) -> float:
+        """Largest rms change of the mean signal by leaving it out [electrons]."""
+        return 0.0
+
+
+class RadialTransfer(Effect):
+    """A transfer function that depends on the length of the spatial frequency only."""
+
+    @abstractmethod
+    def otf(self, frequency: NDArray, wavelength: float) -> NDArray:
+        """Transfer at `frequency` [cycles/m] and `wavelength` [m]; 1 at frequency 0."""
+
+    @abstractmethod
+    def cutoff(self, wavelength: float) -> float:
+        """Frequency from which on it is zero [cycles/m]; inf where there is none."""
+
+
+class SeparableTransfer(Effect):
+    """A transfer function that is a product of one along x and one along y."""
+
+    @abstractmethod
+    def along_x(self, frequency: NDArray) -> NDArray:
+        """Transfer along x at `frequency` [cycles/m]."""
+
+    @abstractmethod
+    def along_y(self, frequency: NDArray) -> NDArray:
+        """Transfer along y at `frequency` [cycles/m]."""
+
+
+class Gain(Effect):
+    """A factor on the photo signal that varies slowly over the array."""
+
+    @abstractmethod
+    def gain(self, x: NDArray, y: NDArray) -> NDArray:
+        """Factor at the positions x (columns,), y (rows,) [m]: (rows, columns)."""
+
+
+class Charge(Effect):
+    """Electrons that are not light."""
+
+    @abstractmethod
+    def rate(self) -> float:
+        """Mean electrons a pixel collects per second [e/s]."""
+
+
+@dataclass(frozen=True)
+class Site:
+    """Where a draw happens: a block of rows, and its random streams."""
+
+    rows: int
+    columns: int
+    stream: Callable[[str], np.random.Generator]
+    """Generator of a named stream for this block of rows."""
+    line_stream: Callable[[str], np.random.Generator]
+    """Generator of a named stream shared by all blocks, for draws per column."""
+    dtype: type
+
+    def normal(self, name: str) -> NDArray:
+        """One standard normal a pixel, (rows, columns)."""
+        return self.stream(name).standard_normal((self.rows, self.columns), dtype=self.dtype)
+
+    def normal_columns(self, name: str) -> NDArray:
+        """One standard normal a column, the same for every block, (columns,)."""
+        return self.line_stream(name).standard_normal(self.columns, dtype=self.dtype)
+
+
+class Draw(Effect):
+    """A random contribution. Whoever adds it also states its variance."""
+
+    scope: ClassVar[str]
+    """'frame': new in every frame; 'sensor': stays with the sensor."""
+
+    @abstractmethod
+    def apply(self, electrons: NDArray, site: Site) -> NDArray:
+        """The block with this draw in it [electrons]; may reuse the array handed in."""
+
+    @abstractmethod
+    def variance(self, mean: float) -> float:
+        """Variance it adds to a pixel of mean signal `mean` [electrons squared]."""
+
+
+class Limit(Effect):
+    """A clamp."""
+
+    removable = False
+
+    @abstractmethod
+    def apply(self, electrons: NDArray) -> NDArray:
+        """The clamped block; may reuse the array handed in."""
+
+
+class Code(Effect):
+    """Conversion to digital numbers."""
+
+    removable = False
+    bits: int
+
+    @abstractmethod
+    def apply(self, electrons: NDArray) -> NDArray:
+        """Integer-valued digital numbers [DN] of `electrons`, same float type."""
+
+    @abstractmethod
+    def line(self, electrons: NDArray) -> NDArray:
+        """The same relation before rounding and clipping [DN]."""

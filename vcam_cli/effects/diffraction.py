@@ -1,0 +1,36 @@
+"""Diffraction by the circular aperture of the lens."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from vcam_cli.effects.base import RadialTransfer
+from vcam_cli.physics import diffraction
+
+
+@dataclass(frozen=True)
+class Diffraction(RadialTransfer):
+    """Incoherent transfer function of an ideal circular pupil."""
+
+    f_number: float
+    magnification: float
+
+    name = "diffraction"
+    reference = "Chen 2003, section 2.2.1; Goodman, Introduction to Fourier Optics, section 6.3"
+    absent = "the file says optics.diffraction: false"
+
+    @classmethod
+    def of(cls, camera, geometry):
+        if not camera.optics.diffraction:
+            return None
+        return cls(geometry.f_number, geometry.magnification)
+
+    def describe(self) -> str:
+        cutoff = self.cutoff(550e-9) / 1e3
+        return f"cuts off at {cutoff:.4g} lp/mm at 550 nm"
+
+    def otf(self, frequency, wavelength):
+        return diffraction.otf_circular(frequency, wavelength, self.f_number, self.magnification)
+
+    def cutoff(self, wavelength):
+        return diffraction.cutoff_frequency(wavelength, self.f_number, self.magnification)

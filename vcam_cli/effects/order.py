@@ -1,0 +1,42 @@
+"""The order in which light becomes numbers. Read this first.
+
+    in                      kind        effects                          out
+    ----------------------  ----------  -------------------------------  ----------------------
+    radiance of the scene   optics      eq 2.18, no choice               photons / (s m2 m)
+    spectrum of the image   Transfer    diffraction, pixel_aperture      electrons / s, blurred
+    electrons / s           Gain        off_axis                         electrons / s
+    electrons / s           Charge      dark_current                     electrons (mean signal)
+    electrons               Draw        shot_noise, fpn, reset_noise,    electrons
+                                        read_noise
+    electrons               Limit       saturation                       electrons
+    electrons               Code        quantization                     DN
+
+Within a kind the order of this tuple is the order of action. It is written nowhere else.
+"""
+
+from __future__ import annotations
+
+from vcam_cli.effects.base import Effect
+from vcam_cli.effects.dark_current import DarkCurrent
+from vcam_cli.effects.diffraction import Diffraction
+from vcam_cli.effects.fpn import FixedPattern
+from vcam_cli.effects.off_axis import OffAxis
+from vcam_cli.effects.pixel_aperture import PixelAperture
+from vcam_cli.effects.quantization import Quantization
+from vcam_cli.effects.read_noise import ReadNoise
+from vcam_cli.effects.reset_noise import ResetNoise
+from vcam_cli.effects.saturation import Saturation
+from vcam_cli.effects.shot_noise import ShotNoise
+
+ORDER: tuple[type[Effect], ...] = (
+    Diffraction,
+    PixelAperture,
+    OffAxis,
+    DarkCurrent,
+    ShotNoise,
+    FixedPattern,
+    ResetNoise,
+    ReadNoise,
+    Saturation,
+    Quantization,
+)

@@ -1,0 +1,34 @@
+"""Blur by the photodetector, which averages over its own area."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vcam_cli.effects.base import SeparableTransfer
+
+
+@dataclass(frozen=True)
+class PixelAperture(SeparableTransfer):
+    """Rectangular sampling aperture: sinc(f w) along each axis. [m]"""
+
+    width: float
+    height: float
+
+    name = "pixel_aperture"
+    reference = "Chen 2003, eq 2.23 (integral over the photodetector) and section 2.2.2"
+    absent = "every pixel has one"
+
+    @classmethod
+    def of(cls, camera, geometry):
+        return cls(geometry.detector_width, geometry.detector_height)
+
+    def describe(self) -> str:
+        return f"averages over {self.width * 1e6:.4g} x {self.height * 1e6:.4g} um"
+
+    def along_x(self, frequency):
+        return np.sinc(frequency * self.width)
+
+    def along_y(self, frequency):
+        return np.sinc(frequency * self.height)

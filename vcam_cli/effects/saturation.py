@@ -1,0 +1,32 @@
+"""A well holds so many electrons and no more."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vcam_cli.camera.electrical import electrical
+from vcam_cli.effects.base import Limit
+
+
+@dataclass(frozen=True)
+class Saturation(Limit):
+    """Clips above at the full well [electrons]; never below."""
+
+    full_well: float
+
+    name = "saturation"
+    reference = "Chen 2003, eq 2.26: Q_max = V_s / g"
+    absent = "every pixel has it"
+    seconds_per_pixel = 0.5e-9
+
+    @classmethod
+    def of(cls, camera, geometry):
+        return cls(electrical(camera).full_well)
+
+    def describe(self) -> str:
+        return f"full well of {self.full_well:.6g} electrons"
+
+    def apply(self, electrons):
+        return np.minimum(electrons, electrons.dtype.type(self.full_well), out=electrons)

@@ -1,0 +1,214 @@
+"""From the scene to the rate of photo-electrons in every pixel: the linear part.
+
+All on-axis physics is one filter per scene component and color (`transfer.py`); slowly varying
+factors multiply the result. Scenes known as waves are evaluated in closed form; pictures without
+any optical blur are integrated as boxes; everything else goes through the cosine spectrum.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.fft
+from numpy.typing import NDArray
+
+from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.geometry import Geometry
+from vcam_cli.effects.base import Effect, Gain, RadialTransfer, SeparableTransfer
+from vcam_cli.engine import sampling
+from vcam_cli.engine.axis import Axis
+from vcam_cli.engine.mosaic import Mosaic
+from vcam_cli.engine.parallel import each, pieces
+from vcam_cli.engine.settings import Settings
+from vcam_cli.engine.transfer import Band, Transfer, tabulate, transfer
+from vcam_cli.physics import radiometry
+from vcam_cli.rng import blocks
+from vcam_cli.scenes.base import SampledScene, View, WaveScene
+from vcam_cli.spectra import Spectrum
+
+MARGIN = 32
+"""Pixels that a chart goes on beyond the array, at least: its far borders are mirrored, and the
+light an Airy pattern throws further than this is below 1 % in any lens worth simulating."""
+
+Rows = Callable[[int, int], NDArray]
+
+
+def view(geometry: Geometry, settings: Settings) -> View:
+    """The rectangle that a scene has to fill, with a margin that makes fast transform sizes."""
+    return View(
+        rows=geometry.rows,
+        columns=geometry.columns,
+        pitch_x=geometry.pitch_x,
+        pitch_y=geometry.pitch_y,
+        oversampling=settings.oversampling,
+        margin=_margin(geometry, settings.oversampling),
+        scene_width=geometry.scene_width_on_sensor,
+        dtype=settings.dtype,
+    )
+
+
+def _margin(geometry: Geometry, oversampling: int) -> int:
+    """Smallest margin from `MARGIN` on that gives both axes sizes with small prime factors."""
+
+    def slow(margin: int) -> int:
+        sizes = [n + 2 * margin for n in (geometry.rows, geometry.columns)]
+        return sum(scipy.fft.next_fast_len(n, real=True) - n for n in sizes)
+
+    return min(range(MARGIN, MARGIN + 33), key=lambda m: (slow(m), m))
+
+
+def responses(camera: Camera, mosaic: Mosaic) -> list[Spectrum]:
+    """Electrons per photon for each color: transmittance x filter x QE."""
+    common = camera.optics.transmittance.resolve(), (
+        camera.pixel.photodetector.quantum_efficiency.spectrum.resolve()
+    )
+    out = []
+    for color in mosaic.colors:
+        spec = camera.array.filters.get(color)
+        filters = () if spec is None else (spec.resolve(),)
+        out.append(common[0].times(common[1], *filters))
+    return out
+
+
+def scene_transfer(
+    camera: Camera,
+    geometry: Geometry,
+    settings: Settings,
+    spectra: Sequence[Spectrum],
+    mosaic: Mosaic,
+    effects: Sequence[Effect],
+) -> Transfer:
+    """H_kc of scene spectra [W / (sr m2 m)] in this camera, eq 2.18 and 2.23. [electrons / s]"""
+    area = geometry.detector_area
+    if camera.pixel.photodetector.quantum_efficiency.per_pixel:
+        area = geometry.pixel_width * geometry.pixel_height
+    irradiance = float(
+        radiometry.irradiance_per_radiance(geometry.f_number, geometry.magnification)
+    )
+    wavelengths = camera.scene.wavelengths
+    return transfer(
+        spectra,
+        responses(camera, mosaic),
+        irradiance * area,
+        Band(wavelengths.start, wavelengths.stop, settings.wavelength_step),
+        [e for e in effects if isinstance(e, RadialTransfer)],
+    )
+
+
+@dataclass(frozen=True)
+class Linear:
+    """Everything the linear part needs; `rate` computes it."""
+
+    scene: WaveScene | SampledScene
+    exact: Transfer
+    geometry: Geometry
+    settings: Settings
+    mosaic: Mosaic
+    effects: tuple[Effect, ...]
+    workers: int
+
+    def rate(self) -> NDArray:
+        """Photo-electrons per second in every pixel, noise-free: (rows, columns) [e/s]."""
+        rows = self._rows()
+        g = self.geometry
+        out = np.empty((g.rows, g.columns), self.settings.dtype)
+        gains = [e for e in self.effects if isinstance(e, Gain)]
+        x = ((np.arange(g.columns) + 0.5 - g.columns / 2) * g.pitch_x).astype(out.dtype)
+        y = ((np.arange(g.rows) + 0.5 - g.rows / 2) * g.pitch_y).astype(out.dtype)
+
+        def compute(block: slice) -> None:
+            tile = out[block]
+            self._assemble(rows, block, tile)
+            np.maximum(tile, 0, out=tile)
+            for effect in gains:
+                tile *= effect.gain(x, y[block])
+
+        each(compute, blocks(g.rows), self.workers)
+        return out
+
+    def _assemble(self, rows: Sequence[Rows], block: slice, tile: NDArray) -> None:
+        """Puts the values of each color where that color's pixels are."""
+        period = len(self.mosaic.block)
+        for phase in range(min(period, len(tile))):
+            row = block.start + phase
+            for color, columns in self.mosaic.in_row(row):
+                tile[phase::period, columns] = rows[color](slice(row, block.stop, period))[:, columns]
+
+    def _rows(self) -> list[Rows]:
+        """For each color, a function from array rows (a slice) to their values."""
+        if isinstance(self.scene, WaveScene):
+            return self._waves(self.scene)
+        if self.scene.samples == "squares" and not self.exact.effects:
+            return self._boxes(self.scene)
+        return self._filtered(self.scene)
+
+    def _apertures(self) -> list[SeparableTransfer]:
+        return [e for e in self.effects if isinstance(e, SeparableTransfer)]
+
+    def _centers(self) -> tuple[NDArray, NDArray]:
+        """Positions of the photodetectors' centers along x and y [m]."""
+        g = self.geometry
+        x = (np.arange(g.columns) + 0.5 - g.columns / 2) * g.pitch_x + g.detector_x
+        y = (np.arange(g.rows) + 0.5 - g.rows / 2) * g.pitch_y + g.detector_y
+        return x, y
+
+    def _waves(self, scene: WaveScene) -> list[Rows]:
+        """Each wave keeps its shape: its transfer is a number per color."""
+        x, y = self._centers()
+        parts = []
+        for wave in scene.waves:
+            frequency = np.array([np.hypot(wave.fx, wave.fy)])
+            level = np.asarray(wave.weights) @ self.exact.at(frequency)[..., 0]
+            for e in self._apertures():
+                level = level * e.along_x(np.array([wave.fx])) * e.along_y(np.array([wave.fy]))
+            ex = np.exp(1j * (2 * np.pi * wave.fx * x + wave.phase))
+            parts.append((level, ex, np.exp(2j * np.pi * wave.fy * y)))
+
+        def rows(color: int, s: slice) -> NDArray:
+            total = np.zeros((len(y[s]), len(x)))
+            for level, ex, ey in parts:
+                total += level[color] * (ey[s, None] * ex[None, :]).real
+            return total
+
+        return [lambda s, c=c: rows(c, s) for c in range(len(self.mosaic.colors))]
+
+    def _axes(self, scene: SampledScene) -> tuple[Axis, Axis]:
+        g, o = self.geometry, self.settings.oversampling
+        ny, nx = scene.shape
+        squares = scene.samples == "squares"
+
+        def axis(samples: int, pitch: float, pixels: int, pixel: float, shift: float) -> Axis:
+            first = samples * pitch / 2 + (0.5 - pixels / 2) * pixel + shift
+            bandwidth = min(o * 0.5 / pixel, self.exact.cutoff)
+            return Axis(samples, pitch, pixels, pixel, first, squares, bandwidth)
+
+        return (
+            axis(nx, scene.pitch_x, g.columns, g.pitch_x, g.detector_x),
+            axis(ny, scene.pitch_y, g.rows, g.pitch_y, g.detector_y),
+        )
+
+    def _filtered(self, scene: SampledScene) -> list[Rows]:
+        """Through the cosine spectrum."""
+        x, y = self._axes(scene)
+        top = min(self.exact.cutoff, float(np.hypot(x.bandwidth, y.bandwidth)))
+        s = self.settings
+        tables = tabulate(self.exact, top, s.table_size, s.mixing_tolerance)
+        along_x, along_y = np.ones(x.terms), np.ones(y.terms)
+        for e in self._apertures():
+            along_x *= e.along_x(x.frequencies)
+            along_y *= e.along_y(y.frequencies)
+        coefficients = sampling.spectrum(scene.planes(tables.mix), self.workers)
+        series = sampling.Filter(x, y, tables, along_x, along_y).apply(coefficients, self.workers)
+        return [lambda s, c=c: x.evaluate(series[c, s], axis=1) for c in range(len(series))]
+
+    def _boxes(self, scene: SampledScene) -> list[Rows]:
+        """Without optical blur a photodetector sees means over boxes, exactly."""
+        x, y = self._axes(scene)
+        aperture = bool(self._apertures())
+        width = self.geometry.detector_width if aperture else 0.0
+        height = self.geometry.detector_height if aperture else 0.0
+        planes = scene.planes(self.exact.level.T)
+        values = [sampling.boxes(plane, x, y, width, height) for plane in planes]
+        return [lambda s, c=c: values[c][s] for c in range(len(values))]

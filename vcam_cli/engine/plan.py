@@ -1,0 +1,226 @@
+"""The plan: which effects run, which do not, and why.
+
+The section keys of a camera file say what exists; `effects` says what the user wants simulated;
+what is left to the plan is decided by two promises, with tolerance T:
+
+- mean: leaving effects out changes the mean raw by at most T of full signal (rms over the array);
+- variance: at 1, 10 and 100 % of full signal, temporal and fixed-pattern variance each stay
+  within 2 T of everything on.
+
+Why two: a read noise of 5 electrons is 0.06 % of full signal and most of the variance in the
+shadows. One number cannot serve both. Half of the mean's tolerance is kept for the settings.
+
+Transfer functions cost next to nothing beside the transform they multiply into: the plan applies
+whichever is described.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+
+import numpy as np
+
+from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.geometry import Geometry
+from vcam_cli.effects.base import Charge, Draw, Effect, Gain, Outlook
+from vcam_cli.effects.order import ORDER
+from vcam_cli.engine.settings import Settings
+from vcam_cli.errors import Collector
+
+LEVELS = (0.01, 0.1, 1.0)
+"""Shares of full signal at which the variance promise holds."""
+
+
+@dataclass(frozen=True)
+class Decision:
+    """What becomes of one effect."""
+
+    name: str
+    state: str
+    """on | off"""
+    by: str
+    """user | plan | camera"""
+    reason: str
+    contribution: float | None
+    """How much leaving it out would change, at most, in `unit`."""
+    unit: str
+    seconds: float
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Decisions in the order of action, the effects that run, and what that will cost."""
+
+    decisions: tuple[Decision, ...]
+    active: tuple[Effect, ...]
+    settings: Settings
+    seconds: float
+    memory_bytes: int
+
+    def effect(self, kind: type[Effect]) -> Effect | None:
+        """The running effect of a class, if it runs."""
+        return next((e for e in self.active if isinstance(e, kind)), None)
+
+    def report(self) -> dict:
+        """The plan as `run.json` and `--json` show it."""
+        return {
+            "effects": [asdict(d) for d in self.decisions],
+            "settings": self.settings.report(),
+            "seconds": self.seconds,
+            "memory_bytes": self.memory_bytes,
+        }
+
+
+def described(camera: Camera, geometry: Geometry) -> dict[str, Effect | None]:
+    """Every effect with this camera's numbers, or None where it does not have it.
+
+    Raises BadInput for `on` for something the file does not describe.
+    """
+    found = {kind.name: kind.of(camera, geometry) for kind in ORDER}
+    if isinstance(camera.effects, dict):
+        problems = Collector()
+        absent = {kind.name: kind.absent for kind in ORDER}
+        for name, wish in camera.effects.items():
+            if wish == "on" and found.get(name) is None:
+                why = absent.get(name, "the file describes nothing of the kind")
+                problems.add(
+                    ("effects", name),
+                    f"on, but there is nothing to simulate: {why}",
+                    "describe it in its section, or remove this line",
+                )
+        problems.raise_if_any()
+    return found
+
+
+def optical(camera: Camera, geometry: Geometry) -> tuple[Effect, ...]:
+    """Effects of the linear part that run, as far as no signal level is needed to decide it."""
+    return tuple(
+        e
+        for e in described(camera, geometry).values()
+        if e is not None and not isinstance(e, Charge | Draw) and _wish(camera, e) != "off"
+    )
+
+
+def make(
+    camera: Camera,
+    geometry: Geometry,
+    settings: Settings,
+    outlook: Outlook,
+    memory_bytes: int,
+) -> Plan:
+    """Decides every effect of `camera` for the signal that is expected."""
+    found = described(camera, geometry)
+    present = [e for e in found.values() if e is not None]
+    candidates = [e for e in present if e.removable and _wish(camera, e) == "auto"]
+    dropped = _negligible_mean(candidates, outlook, camera.accuracy.tolerance)
+    dropped |= _negligible_variance(candidates, present, outlook, camera.accuracy.tolerance)
+    pixels = geometry.rows * geometry.columns
+    decisions, active = [], []
+    for kind in ORDER:
+        effect = found[kind.name]
+        decision = _decide(kind, effect, camera, effect in dropped, present, outlook, pixels)
+        decisions.append(decision)
+        if effect is not None and decision.state == "on":
+            active.append(effect)
+    seconds = sum(d.seconds for d in decisions) + LINEAR_SECONDS_PER_PIXEL * pixels
+    return Plan(tuple(decisions), tuple(active), settings, seconds, memory_bytes)
+
+
+LINEAR_SECONDS_PER_PIXEL = 60e-9
+"""Transforming, filtering and evaluating a Bayer frame, on one core of 2020s hardware."""
+
+
+def _wish(camera: Camera, effect: Effect) -> str:
+    """What the file wants of an effect it describes: on, off or auto."""
+    if camera.effects == "all":
+        return "on"
+    if camera.effects == "auto":
+        return "auto"
+    return camera.effects.get(effect.name, "auto")
+
+
+def _negligible_mean(candidates: list[Effect], outlook: Outlook, tolerance: float) -> set[Effect]:
+    """Gains and charges whose absence stays, together, within half the mean's tolerance."""
+    budget = 0.5 * tolerance * outlook.full_signal
+    out: set[Effect] = set()
+    removable = [e for e in candidates if isinstance(e, Gain | Charge)]
+    for effect in sorted(removable, key=lambda e: e.mean_error(outlook)):
+        budget -= effect.mean_error(outlook)
+        # Dark current is also noise: its electrons must not be missed in the shadows.
+        noise = effect.rate() * outlook.time if isinstance(effect, Charge) else 0.0
+        if budget < 0 or noise > tolerance * LEVELS[0] * outlook.full_signal:
+            break
+        out.add(effect)
+    return out
+
+
+def _negligible_variance(
+    candidates: list[Effect], present: list[Effect], outlook: Outlook, tolerance: float
+) -> set[Effect]:
+    """Draws whose absence changes the variance of their scope by less than 2 T at every level."""
+    out: set[Effect] = set()
+    for scope in ("frame", "sensor"):
+        everything = _variances([e for e in present if _in(e, scope)], outlook)
+        missing = np.zeros(len(LEVELS))
+        draws = [e for e in candidates if _in(e, scope)]
+        for effect in sorted(draws, key=lambda e: float(_variances([e], outlook).max())):
+            missing = missing + _variances([effect], outlook)
+            # Half of it, since the settings and a missing dark current take their share.
+            if np.any(missing > tolerance * everything):
+                break
+            out.add(effect)
+    return out
+
+
+def _in(effect: Effect, scope: str) -> bool:
+    return isinstance(effect, Draw) and effect.scope == scope
+
+
+def _variances(draws: list[Effect], outlook: Outlook) -> np.ndarray:
+    """Summed variance of draws at every level [electrons squared]."""
+    return np.array(
+        [
+            sum(e.variance(level * outlook.full_signal) for e in draws if isinstance(e, Draw))
+            for level in LEVELS
+        ],
+        dtype=float,
+    )
+
+
+def _decide(
+    kind: type[Effect],
+    effect: Effect | None,
+    camera: Camera,
+    dropped: bool,
+    present: list[Effect],
+    outlook: Outlook,
+    pixels: int,
+) -> Decision:
+    """One line of the plan."""
+    if effect is None:
+        return Decision(kind.name, "off", "camera", kind.absent, None, "", 0.0)
+    contribution, unit = _contribution(effect, present, outlook)
+    seconds = kind.seconds_per_pixel * pixels
+    wish = _wish(camera, effect)
+    if wish == "off":
+        return Decision(kind.name, "off", "user", "switched off in effects", contribution, unit, 0)
+    what = effect.describe()
+    if dropped:
+        reason = f"{what}: leaving it out changes less than {camera.accuracy.tolerance:.3g} allows"
+        return Decision(kind.name, "off", "plan", reason, contribution, unit, 0.0)
+    by = "user" if wish == "on" else "plan"
+    return Decision(kind.name, "on", by, what, contribution, unit, seconds)
+
+
+def _contribution(
+    effect: Effect, present: list[Effect], outlook: Outlook
+) -> tuple[float | None, str]:
+    """The effect's largest share, of the mean signal or of the variance of its scope."""
+    if isinstance(effect, Draw):
+        everything = _variances([e for e in present if _in(e, effect.scope)], outlook)
+        kind = "temporal" if effect.scope == "frame" else "fixed-pattern"
+        share = _variances([effect], outlook) / np.maximum(everything, 1e-300)
+        return float(share.max()), f"of the {kind} variance"
+    if isinstance(effect, Gain | Charge):
+        return effect.mean_error(outlook) / outlook.full_signal, "of full signal"
+    return None, ""

@@ -1,0 +1,58 @@
+"""How finely to compute: every knob, and what the tolerance sets it to.
+
+The tolerance T bounds rms(mean raw - converged mean raw) / full signal (camera file key
+`accuracy`). The presets below were chosen by measuring each knob alone on charts and pictures;
+`reference` also switches the arithmetic to 64 bits.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, fields, replace
+
+import numpy as np
+
+from vcam_cli.camera.camera import Camera
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Knobs of the engine; each is a key of the camera file's `accuracy` mapping."""
+
+    wavelength_step: float
+    """Spacing of the wavelengths at which the OTF is computed [m]; levels are exact anyway."""
+    oversampling: int
+    """Spatial frequencies kept, in pixel Nyquist frequencies; cells a chart has per pixel pitch."""
+    table_size: int
+    """Entries of the tables over |f|."""
+    mixing_tolerance: float
+    """Largest error of a transfer function by replacing many spectra by few."""
+    float_width: int
+    """32 or 64 bits."""
+    shot_noise: str = "exact"
+    """exact (Poisson) or gaussian (as the thesis has it)."""
+
+    @property
+    def dtype(self) -> type:
+        return np.float64 if self.float_width == 64 else np.float32
+
+    def report(self) -> dict[str, float | int | str]:
+        return asdict(self)
+
+
+DRAFT = Settings(20e-9, 1, 1 << 14, 2e-3, 32)
+STANDARD = Settings(10e-9, 2, 1 << 15, 2e-4, 32)
+FINE = Settings(10e-9, 3, 1 << 16, 1e-4, 32)
+REFERENCE = Settings(2.5e-9, 6, 1 << 15, 1e-7, 64)
+
+LADDER = ((0.02, DRAFT), (0.005, STANDARD), (0.001, FINE), (0.0, REFERENCE))
+"""Settings for tolerances from the first number of each rung up."""
+
+
+def settings(camera: Camera) -> Settings:
+    """Settings for the camera's tolerance, with the knobs that its file sets itself."""
+    accuracy = camera.accuracy
+    chosen = next(s for least, s in LADDER if accuracy.tolerance >= least)
+    if camera.scene.wavelengths.step is not None:
+        chosen = replace(chosen, wavelength_step=camera.scene.wavelengths.step)
+    known = {f.name for f in fields(Settings)}
+    return replace(chosen, **{k: v for k, v in accuracy.knobs.items() if k in known})

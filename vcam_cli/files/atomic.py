@@ -1,0 +1,82 @@
+"""Files that are whole or not there: write under a temporary name, flush to disk, rename.
+
+Why fsync: a rename alone survives a killed process, not a power cut; flushing 65 MB just
+written costs about 0.02 s on a local disk, against half a second to compress them.
+"""
+
+import errno
+import os
+import secrets
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from vcam_cli.errors import CannotDo
+
+STAGING = ".vcam-new"  # folder where a run's files wait to appear together (see `folder`)
+
+_REASONS = {
+    errno.ENOSPC: ("the disk is full", "free some space, or choose another folder with --out"),
+    errno.EDQUOT: ("the disk quota is used up", "free some space, or choose another --out"),
+    errno.EFBIG: ("the file grew larger than is allowed here", "choose another folder with --out"),
+    errno.EACCES: ("permission denied", "choose a folder you may write to with --out"),
+    errno.EPERM: ("not permitted", "choose a folder you may write to with --out"),
+    errno.EROFS: ("the file system is read-only", "choose another folder with --out"),
+}
+
+
+@contextmanager
+def write_whole(path: Path | str) -> Iterator[Path]:
+    """Gives a temporary name in the folder of `path`; on success the file gets its own name.
+
+    The body writes the file under the name given and closes it. When the body raises,
+    whatever it raises, the temporary file is removed and a former `path` stays as it was.
+
+    Raises CannotDo: disk full, no permission, no such folder (any OSError of the body).
+    """
+    path = Path(path)
+    mark = f"{os.getpid()}-{secrets.token_hex(4)}"
+    temporary = path.with_name(f".{path.name[:64]}.{mark}.part")
+    try:
+        yield temporary
+        _flush(temporary)
+        os.replace(temporary, path)
+        flush_folder(path.parent)
+    except OSError as error:
+        raise cannot_write(path, error) from error
+    finally:
+        with suppress(OSError):
+            temporary.unlink(missing_ok=True)
+
+
+def write_text(path: Path | str, text: str) -> None:
+    """Writes `text` as UTF-8 with line feeds, whole or not at all. Raises CannotDo."""
+    with write_whole(path) as temporary:
+        temporary.write_text(text, encoding="utf-8", newline="\n")
+
+
+def flush_folder(folder: Path) -> None:
+    """Makes renames in `folder` lasting, where the file system knows how to."""
+    with suppress(OSError):
+        _flush(folder)
+
+
+def cannot_write(path: Path | str, error: OSError) -> CannotDo:
+    """The CannotDo that tells why `path` cannot be written and what would help."""
+    default = (error.strerror or str(error), "choose another folder with --out")
+    reason, remedy = _REASONS.get(error.errno or 0, default)
+    return CannotDo(f"cannot write {shown(path)}: {reason}", remedy)
+
+
+def shown(path: Path | str) -> str:
+    """`path` as the user knows it: without the folder where new files wait."""
+    path = Path(path)
+    return str(Path(*(part for part in path.parts if part != STAGING)))
+
+
+def _flush(path: Path) -> None:
+    descriptor = os.open(path, os.O_RDONLY)
+    try:
+        os.fsync(descriptor)
+    finally:
+        os.close(descriptor)

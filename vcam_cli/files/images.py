@@ -1,0 +1,339 @@
+"""Scene images: any file OpenImageIO reads -> linear light, float32, upright.
+
+OpenImageIO expands palettes and small bit depths, and scales 10- and 12-bit samples to
+16 bits. What it does not do, and is done here: turn the image upright, keep color apart
+from alpha, map channels by name, place an EXR's data window, notice that a JPEG ends too early,
+and refuse what is no picture of light (CMYK, CIELAB, NaN, negative values).
+"""
+
+import os
+import stat
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import OpenImageIO as oiio
+
+from vcam_cli.errors import BadInput, CannotDo, bad
+from vcam_cli.files.rows import message
+
+MOST_PIXELS = 10**9
+_PNG_START = b"\x89PNG\r\n\x1a\n"
+_ALPHA = {"A", "ALPHA"}
+_RGB = ("R", "G", "B")
+_LIGHT = {0, 1, 2, 3, 6}  # TIFF photometrics: gray (white or black is zero), RGB, palette, YCbCr
+_READ_AS: dict[str, type[np.integer]] = {
+    "uint8": np.uint8, "uint16": np.uint16, "uint": np.uint32, "uint32": np.uint32,
+    "int8": np.int8, "int16": np.int16, "int": np.int32, "int32": np.int32,
+}  # fmt: skip
+_OIIO_NAMES: dict[type[np.integer], str] = {
+    np.uint32: "uint",
+    np.int32: "int",
+}  # "uint32" would mean something else
+_BLOCK = 64  # rows
+_CONVERT = "convert it to a PNG, TIFF or EXR with one (gray) or three (R, G, B) channels"
+
+
+@dataclass(frozen=True)
+class Picture:
+    """`data`: (h, w, channels) float32, linear light / white; 1 or 3 channels (R, G, B)."""
+
+    data: np.ndarray
+    channels: tuple[str, ...]
+    notes: tuple[str, ...]
+
+
+class _Unusable(Exception):
+    """Reason and remedy why a file cannot serve as a scene."""
+
+    def __init__(self, reason: str, remedy: str = _CONVERT) -> None:
+        super().__init__(reason)
+        self.reason, self.remedy = reason, remedy
+
+
+def read_picture(
+    path: Path | str, encoding: str, white: float, yaml_path: tuple[str | int, ...] | str
+) -> Picture:
+    """Reads an image file as linear light divided by `white`.
+
+    `encoding` is "srgb" (decoded by IEC 61966-2-1) or "linear". Integer samples run from 0 to 1
+    = the largest code; `white` is the linear value that becomes 1. Orientation tags are obeyed.
+    Alpha is dropped (color values stay as stored); the first of several parts is
+    read; both leave a note, as does anything else left aside.
+
+    Raises BadInput (with `yaml_path`) for a file that is missing, no regular file, no image,
+    truncated, of a kind that is no light, with two color channels, negative or not finite;
+    CannotDo when it may not be read or the memory does not suffice.
+    """
+    if encoding not in ("srgb", "linear") or not white > 0:
+        raise ValueError(f"encoding {encoding!r}, white {white!r}")
+    path = Path(path)
+    try:
+        _check_file(path)
+        with _opened(path) as source:
+            return _read(source, encoding == "srgb", white)
+    except _Unusable as error:
+        raise bad(yaml_path, f"{path}: {error.reason}", error.remedy) from None
+    except PermissionError:
+        raise CannotDo(f"{path} may not be read", "give yourself read permission") from None
+    except (OSError, UnicodeError, ValueError, RuntimeError) as error:
+        raise _unreadable(path, error, yaml_path) from error
+    except MemoryError:
+        raise _too_large(f"{path} does not fit the memory") from None
+
+
+def decode_srgb(code: np.ndarray) -> np.ndarray:
+    """Linear light of sRGB-coded values (1 = white), IEC 61966-2-1; float64 in, float64 out."""
+    code = np.asarray(code)
+    high = ((np.maximum(code, 0.04045) + 0.055) / 1.055) ** 2.4
+    return np.where(code <= 0.04045, code / 12.92, high)
+
+
+def available_memory() -> int | None:
+    """Bytes this process may still take without swapping, None where that is unknown."""
+    bounds = [_meminfo(), _group_limit()]
+    return min((bound for bound in bounds if bound is not None), default=None)
+
+
+def _check_file(path: Path) -> None:
+    """Refuses what is no whole regular file, before OpenImageIO sees it."""
+    str(path).encode("utf-8")  # OpenImageIO takes no other names
+    try:
+        status = os.stat(path)
+    except FileNotFoundError:
+        raise _Unusable("there is no such file", "check the name and the folder") from None
+    if stat.S_ISDIR(status.st_mode):
+        raise _Unusable("is a folder, not an image file", "give an image file")
+    if not stat.S_ISREG(status.st_mode):
+        raise _Unusable("is a device, pipe or socket", "give a regular image file")
+    if status.st_size == 0:
+        raise _Unusable("the file is empty", "give a whole image file")
+    with open(path, "rb") as file:
+        if file.read(8) == _PNG_START and not _png_ends(file, status.st_size):
+            raise _truncated()
+
+
+def _png_ends(file: Any, size: int) -> bool:
+    """Whether the chunks of a PNG reach IEND (libpng would print its own complaint)."""
+    place = len(_PNG_START)
+    while place + 12 <= size:
+        file.seek(place)
+        head = file.read(8)
+        if head[4:] == b"IEND":
+            return True
+        place += 12 + int.from_bytes(head[:4], "big")
+    return False
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[Any]:
+    config = oiio.ImageSpec()
+    config.attribute("oiio:UnassociatedAlpha", 1)  # else colors come multiplied by alpha
+    source = oiio.ImageInput.open(str(path.absolute()), config)
+    if source is None:
+        reason = message(oiio.geterror)
+        raise _Unusable(f"is no image that can be read ({_brief(reason, path)})")
+    try:
+        if source.format_name() == "null":
+            raise _Unusable("is no image")
+        yield source
+    finally:
+        source.close()
+        message(source.geterror)
+
+
+def _read(source: Any, srgb: bool, white: float) -> Picture:
+    spec = source.spec()
+    _check_kind(spec)
+    chosen, notes = _choose_channels(tuple(spec.channelnames), spec.alpha_channel)
+    _check_size(spec, len(chosen))
+    data, more = _samples(source, spec, chosen)
+    if source.seek_subimage(1, 0):
+        more.append("only the first of several images in the file is used")
+    message(source.geterror)
+    if source.format_name() == "openexr":
+        data = _on_display_window(data, spec, more)
+    light = _linear(data, srgb, white)
+    light = np.ascontiguousarray(_upright(light, spec, more))
+    names = tuple(spec.channelnames[index] for index in chosen)
+    return Picture(light, names, (*notes, *more, *_remarks(spec)))
+
+
+def _check_kind(spec: Any) -> None:
+    if spec.deep:
+        raise _Unusable("is a deep image")
+    if spec.depth > 1:
+        raise _Unusable("is a volume, not an image")
+    kind = spec.get_string_attribute("jpeg:ColorSpace")
+    photometric = spec.get_int_attribute("tiff:PhotometricInterpretation", 1)
+    if kind in ("CMYK", "YCCK") or photometric == 5:
+        raise _Unusable("holds printing inks (CMYK), not light", "convert it to RGB")
+    if photometric not in _LIGHT:
+        raise _Unusable(f"is a TIFF of photometric kind {photometric}, not gray or RGB")
+    if photometric == 0 and str(spec.format) != "uint8":
+        raise _Unusable("is a TIFF where white is 0, with more than 8 bits")  # not turned by OIIO
+
+
+def _choose_channels(names: tuple[str, ...], alpha: int) -> tuple[tuple[int, ...], tuple[str, ...]]:
+    """Indices of the gray or the R, G, B channels, and notes on what is dropped."""
+    upper = [name.upper() for name in names]
+    color = [i for i, name in enumerate(upper) if name not in _ALPHA and i != alpha]
+    if all(name in upper for name in _RGB):
+        chosen = tuple(upper.index(name) for name in _RGB)
+    elif len(color) == 1:
+        chosen = (color[0],)
+    elif "Y" in upper and not {"RY", "BY"} & set(upper) and len(color) != 2:
+        chosen = (upper.index("Y"),)
+    elif len(color) == 2:
+        shown = ", ".join(names[i] for i in color)
+        raise _Unusable(f"has two color channels ({shown}); one or three are needed")
+    else:
+        raise _Unusable(f"has no channels R, G, B but {', '.join(names) or 'none'}")
+    dropped = [names[i] for i in color if i not in chosen]
+    notes = ["alpha channel dropped"] if len(color) < len(names) else []
+    if dropped:
+        notes.append(f"channels {', '.join(dropped)} dropped")
+    return chosen, tuple(notes)
+
+
+def _check_size(spec: Any, channels: int) -> None:
+    """Refuses by the header alone, before a byte of the image is unpacked."""
+    pixels = max(spec.width * spec.height, spec.full_width * spec.full_height)
+    if pixels > MOST_PIXELS:
+        raise _Unusable(
+            f"claims {spec.width} x {spec.height} pixels; at most {MOST_PIXELS:.0e} are read",
+            "crop it or reduce its size",
+        )
+    need = pixels * channels * (4 + 4) + spec.image_bytes(True)
+    free = available_memory()
+    if free is not None and need > free:
+        size = f"{spec.width} x {spec.height} pixels"
+        raise _too_large(
+            f"an image of {size} needs {need / 1e9:.1f} GB of memory, {free / 1e9:.1f} GB are free"
+        )
+
+
+def _samples(source: Any, spec: Any, chosen: tuple[int, ...]) -> tuple[np.ndarray, list[str]]:
+    """The chosen channels as stored: integers as they are, anything else as float32."""
+    kinds = {str(spec.channelformat(index)) for index in chosen}
+    kind = _READ_AS.get(kinds.pop()) if len(kinds) == 1 else None
+    name = "float" if kind is None else _OIIO_NAMES.get(kind, np.dtype(kind).name)
+    first, last = min(chosen), max(chosen) + 1
+    data = source.read_image(0, 0, first, last, name)
+    reason = message(source.geterror)
+    if data is None or (reason and "extraneous bytes" not in reason):
+        raise _truncated(reason)
+    order = [index - first for index in chosen]
+    notes = ["the file has stray bytes in it"] if reason else []
+    return (data if order == list(range(last - first)) else data[:, :, order]), notes
+
+
+def _on_display_window(data: np.ndarray, spec: Any, notes: list[str]) -> np.ndarray:
+    """An EXR's picture is its display window: black where the file holds no data."""
+    left, top = spec.x - spec.full_x, spec.y - spec.full_y
+    shape = (spec.full_height, spec.full_width)
+    if (left, top) == (0, 0) and shape == data.shape[:2]:
+        return data
+    rows = slice(max(top, 0), min(top + data.shape[0], shape[0]))
+    columns = slice(max(left, 0), min(left + data.shape[1], shape[1]))
+    if rows.start >= rows.stop or columns.start >= columns.stop:
+        raise _Unusable("holds no pixel inside its display window")
+    notes.append("the data window differs from the display window; the latter is used")
+    window = np.zeros((*shape, data.shape[2]), data.dtype)
+    window[rows, columns] = data[
+        rows.start - top : rows.stop - top, columns.start - left : columns.stop - left
+    ]
+    return window
+
+
+def _linear(data: np.ndarray, srgb: bool, white: float) -> np.ndarray:
+    """Samples -> linear light / white, float32: by table up to 16 bits, else block by block."""
+    if data.dtype.kind == "u" and data.dtype.itemsize <= 2:
+        code = np.arange(np.iinfo(data.dtype).max + 1) / np.iinfo(data.dtype).max
+        table = (decode_srgb(code) if srgb else code) / white
+        return table.astype(np.float32)[data]
+    full = 1.0 if data.dtype.kind == "f" else float(np.iinfo(data.dtype).max)
+    light = np.empty(data.shape, np.float32)
+    for row in range(0, len(data), _BLOCK):
+        block = data[row : row + _BLOCK]
+        _check_values(block, row)
+        code = block.astype(np.float64) / full
+        light[row : row + _BLOCK] = (decode_srgb(code) if srgb else code) / white
+    return light
+
+
+def _check_values(block: np.ndarray, row: int) -> None:
+    wrong = ~(np.isfinite(block) & (block >= 0))
+    if wrong.any():
+        y, x, channel = np.argwhere(wrong)[0]
+        value = block[y, x, channel]
+        kind = "a negative value" if value < 0 and np.isfinite(value) else "a value not finite"
+        raise _Unusable(
+            f"holds {kind} ({value:g} at row {row + y}, column {x}); light is 0 or more",
+            "replace such values, for example by 0",
+        )
+
+
+def _upright(data: np.ndarray, spec: Any, notes: list[str]) -> np.ndarray:
+    """The image as it is meant to be seen, by the EXIF / TIFF orientation 1 to 8."""
+    orientation = spec.get_int_attribute("Orientation", 1)
+    if not 2 <= orientation <= 8:
+        return data
+    notes.append(f"turned upright (orientation tag {orientation})")
+    if orientation >= 5:
+        data = data.transpose(1, 0, 2)  # 5 is exactly this
+    if orientation in (2, 3, 6, 7):
+        data = data[:, ::-1]
+    if orientation in (3, 4, 7, 8):
+        data = data[::-1]
+    return data
+
+
+def _remarks(spec: Any) -> list[str]:
+    notes = []
+    if abs(spec.get_float_attribute("PixelAspectRatio", 1.0) - 1) > 1e-3:
+        notes.append("its pixels are not square but taken as square")
+    profile = spec.get_string_attribute("ICCProfile:profile_description")
+    if profile and "srgb" not in profile.lower():
+        notes.append(f"its color profile ({profile[:60]}) is not used")
+    return notes
+
+
+def _truncated(reason: str = "") -> _Unusable:
+    detail = f" ({reason[:100]})" if reason else ""
+    return _Unusable(f"is truncated or damaged{detail}", "copy or download the file again")
+
+
+def _unreadable(path: Path, error: Exception, yaml_path: tuple[str | int, ...] | str) -> BadInput:
+    reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
+    return bad(yaml_path, f"{path}: cannot be read ({_brief(reason, path)})", _CONVERT)
+
+
+def _too_large(text: str) -> CannotDo:
+    return CannotDo(text, "reduce the image's size, or use a machine with more memory")
+
+
+def _brief(reason: str, path: Path) -> str:
+    reason = reason.replace(str(path.absolute()), path.name) or "unknown format"
+    return reason if len(reason) <= 120 else reason[:117] + "..."
+
+
+def _meminfo() -> int | None:
+    try:
+        lines = Path("/proc/meminfo").read_text().splitlines()
+        return next(1024 * int(line.split()[1]) for line in lines if "MemAvailable" in line)
+    except (OSError, ValueError, StopIteration):
+        return None
+
+
+def _group_limit() -> int | None:
+    """What the control group still allows (containers)."""
+    group = Path("/sys/fs/cgroup")
+    try:
+        limit = int((group / "memory.max").read_text())
+        return max(limit - int((group / "memory.current").read_text()), 0)
+    except (OSError, ValueError):
+        return None

@@ -1,0 +1,10 @@
+"""From raw numbers to a picture: the steps of a camera's `processing`, in the user's order.
+
+A raw frame (rows, columns) [DN] goes in; linear display RGB, in which the scene's perfect white
+is 1, comes out, and from it the codes of the render.
+"""
+
+from vcam_cli.processing.base import Context
+from vcam_cli.processing.steps import Processed, check, process
+
+__all__ = ["Context", "Processed", "check", "process"]

@@ -1,0 +1,86 @@
+"""White balance: one gain for each color.
+
+Gray world: the average of a scene is taken to be gray, so each color is multiplied until all
+means are equal (G. Buchsbaum, "A spatial processor model for object colour perception",
+J. Franklin Institute 310(1), 1980, doi:10.1016/0016-0032(80)90058-7).
+
+Why every pixel counts, saturated ones too: that is the classical definition, and the means of
+the picture that comes out are then equal exactly. Dropping the saturated pixels of one color
+would bias its mean against the others, whose pixels at that place would stay in.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vcam_cli.processing.base import Block, Context, Pattern
+
+DARK = 1e-4  # a frame whose means are all below this fraction of white is black
+FAINT = 1e-3  # a color below this fraction of the brightest color holds nothing to balance
+
+
+def gray_world(means: np.ndarray, white: float) -> np.ndarray:
+    """Gains (C,) that make the color means equal; 1 for the color with the largest mean.
+
+    means: (C,) above black; white: the largest signal of a perfect white, in the same unit.
+    A black frame gets gains of 1, and so does a color that sees (next to) nothing, as under
+    monochromatic light: its gain would only amplify noise.
+    """
+    means = np.asarray(means, dtype=np.float64)
+    largest = means.max()
+    gains = np.ones(means.shape)
+    if largest <= DARK * max(white, 0.0):
+        return gains
+    seen = means > FAINT * largest
+    gains[seen] = largest / means[seen]
+    return gains
+
+
+def color_sums(block: Block, context: Context) -> np.ndarray:
+    """(2, C) float64: the sum of each color over a block, and the number of its pixels.
+
+    A mosaic block counts each color at its own pixels.
+    """
+    planes = block.planes
+    if planes.shape[0] == len(context.colors):
+        size = float(planes[0].size)
+        return np.array([[plane.sum(dtype=np.float64), size] for plane in planes]).T
+    sums = np.zeros((2, len(context.colors)))
+    for i, names in enumerate(context.pattern):
+        rows = planes[0, _phase(i, block, context.pattern) :: len(context.pattern)]
+        column_sums = rows.sum(axis=0, dtype=np.float64)
+        for j, name in enumerate(names):
+            part = column_sums[j :: len(names)]
+            sums[:, context.colors.index(name)] += part.sum(), part.size * rows.shape[0]
+    return sums
+
+
+def _phase(row: int, block: Block, pattern: Pattern) -> int:
+    """The first row of a block that has the colors of row `row` of the pattern."""
+    return (row - block.first_row) % len(pattern)
+
+
+@dataclass(frozen=True)
+class Gains:
+    """Multiplies every color by its gain, in a mosaic as well as in full color."""
+
+    gains: tuple[float, ...]
+    context: Context
+    halo: int = 0
+
+    def on_block(self, block: Block) -> Block:
+        planes, context = block.planes, self.context
+        if planes.shape[0] == len(context.colors):
+            for plane, gain in zip(planes, self.gains, strict=True):
+                np.multiply(plane, np.float32(gain), out=plane)
+            return block
+        gain_of = dict(zip(context.colors, self.gains, strict=True))
+        for i, names in enumerate(context.pattern):
+            rows = planes[0, _phase(i, block, context.pattern) :: len(context.pattern)]
+            one_row = np.array([gain_of[name] for name in names], np.float32)
+            np.multiply(rows, np.resize(one_row, planes.shape[2]), out=rows)
+        return block
+
+    def on_colors(self, values: np.ndarray) -> np.ndarray:
+        gains = np.asarray(self.gains, dtype=values.dtype)
+        return values * gains.reshape(-1, *(1,) * (values.ndim - 1))

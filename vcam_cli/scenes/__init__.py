@@ -1,0 +1,1 @@
+"""What stands in front of the camera: charts and image files as light on the sensor plane."""

@@ -1,0 +1,267 @@
+"""What a scene is to the camera: a few spatial parts B_k(x, y), each with one spectrum S_k.
+
+Spectral radiance on the sensor plane: L(x, y, wavelength) = sum_k B_k(x, y) S_k(wavelength)
+[W/(sr m2 m)], with x to the right, y down, in metres on the sensor from the array's centre, and
+upright: magnification's two reversals are left out, the top of the scene is row 0.
+
+Why two kinds of scene: a sinusoid is known in closed form and stays exact through the whole
+linear part, while everything else is handed on as samples. `SampledScene.planes(mix)` paints a
+linear combination of the parts on demand, so that a chart of 25 spectra costs as many planes as
+the camera asks for, and never 25.
+"""
+
+import math
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import Any, Literal, Protocol
+
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
+
+from vcam_cli.spectra import Spectrum
+
+Array = NDArray[Any]
+
+CELLS_A_BAND = 1 << 21  # cells painted at once: bounds the memory of temporaries
+
+
+@dataclass(frozen=True)
+class View:
+    """The rectangle of the sensor plane a scene must fill, centred on the array's centre.
+
+    rows, columns: pixels; pitch_x, pitch_y: [m]; oversampling: chart samples per pixel pitch;
+    margin: pixels a chart goes on beyond the array on every side; scene_width: [m] on the sensor
+    when the scene's extent has a width, None when the scene covers the array; dtype of planes.
+    """
+
+    rows: int
+    columns: int
+    pitch_x: float
+    pitch_y: float
+    oversampling: int = 1
+    margin: int = 0
+    scene_width: float | None = None
+    dtype: DTypeLike = np.float64
+
+    @property
+    def width(self) -> float:
+        """Width of the array [m]."""
+        return self.columns * self.pitch_x
+
+    @property
+    def height(self) -> float:
+        """Height of the array [m]."""
+        return self.rows * self.pitch_y
+
+    @property
+    def frame(self) -> "Frame":
+        """Where a chart's picture lies: the array, or `scene_width` in the array's aspect."""
+        if self.scene_width is None:
+            return Frame(self.width, self.height)
+        return Frame(self.scene_width, self.scene_width * self.height / self.width)
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Cells of a chart (ny, nx): array and margin, `oversampling` a pixel pitch."""
+        rows, columns = self.rows + 2 * self.margin, self.columns + 2 * self.margin
+        return rows * self.oversampling, columns * self.oversampling
+
+
+@dataclass(frozen=True)
+class Frame:
+    """A rectangle centred on the array's centre: width and height [m]."""
+
+    width: float
+    height: float
+
+
+@dataclass(frozen=True)
+class Wave:
+    """B_k(x, y) = weights[k] cos(2 pi (fx x + fy y) + phase); fx, fy [cycles/m], phase [rad]."""
+
+    weights: tuple[float, ...]
+    fx: float = 0.0
+    fy: float = 0.0
+    phase: float = 0.0
+
+
+@dataclass(frozen=True)
+class WaveScene:
+    """A sum of waves, exact everywhere on the plane; `white` is the perfect white's radiance."""
+
+    spectra: tuple[Spectrum, ...]
+    waves: tuple[Wave, ...]
+    white: Spectrum
+
+    def at(self, x: Array, y: Array, mix: Array) -> Array:
+        """sum_k mix[r, k] B_k at the points (y[i], x[j]) [m]: (R, m, n), float64."""
+        return wave_values(self.waves, x, y, mix)
+
+
+@dataclass(frozen=True)
+class SampledScene(ABC):
+    """A grid of samples centred on the array's centre.
+
+    samples = "squares": an image, every sample a uniform square of light, mirrored at the border;
+    "averages": averages of a continuous chart over the cells. `shape` (ny, nx); pitches [m].
+    `spectra` [W/(sr m2 m)] are such that B = 1 is `white`, the perfect white's radiance.
+    """
+
+    spectra: tuple[Spectrum, ...]
+    white: Spectrum
+    shape: tuple[int, int]
+    pitch_x: float
+    pitch_y: float
+    samples: Literal["squares", "averages"]
+    dtype: DTypeLike
+
+    @abstractmethod
+    def planes(self, mix: Array) -> Array:
+        """sum_k mix[r, k] B_k on the grid: (R, ny, nx) in the view's dtype."""
+
+    @abstractmethod
+    def at(self, x: Array, y: Array, mix: Array) -> Array:
+        """sum_k mix[r, k] B_k at the points (y[i], x[j]) [m], both rising: (R, m, n)."""
+
+
+class Chart(Protocol):
+    """A picture on the plane; positions in metres from the array's centre, rising.
+
+    `mix` is (R, K), and its dtype is that of the result.
+    """
+
+    def averages(self, x_edges: Array, y_edges: Array, mix: Array) -> Array:
+        """Averages over the cells between the edges: (R, len(y_edges)-1, len(x_edges)-1)."""
+
+    def values(self, x: Array, y: Array, mix: Array) -> Array:
+        """Point values: (R, len(y), len(x))."""
+
+
+@dataclass(frozen=True)
+class ChartScene(SampledScene):
+    """A chart as cell averages over the view (array and margin), painted in bands of rows."""
+
+    chart: Chart
+
+    def planes(self, mix: Array) -> Array:
+        ny, nx = self.shape
+        x_edges, y_edges = cell_edges(nx, self.pitch_x), cell_edges(ny, self.pitch_y)
+        out = np.empty((len(mix), ny, nx), self.dtype)
+        band = max(1, CELLS_A_BAND // nx)
+        mix = np.asarray(mix, self.dtype)
+        for top in range(0, ny, band):
+            edges = y_edges[top : top + band + 1]
+            out[:, top : top + band] = self.chart.averages(x_edges, edges, mix)
+        return out
+
+    def at(self, x: Array, y: Array, mix: Array) -> Array:
+        x, y = np.asarray(x, float), np.asarray(y, float)
+        out = np.empty((len(mix), len(y), len(x)), self.dtype)
+        band = max(1, CELLS_A_BAND // len(x))
+        mix = np.asarray(mix, self.dtype)
+        for top in range(0, len(y), band):
+            out[:, top : top + band] = self.chart.values(x, y[top : top + band], mix)
+        return out
+
+
+def chart_scene(
+    chart: Chart, spectra: tuple[Spectrum, ...], white: Spectrum, view: View
+) -> ChartScene:
+    """The chart on the view's cells; black outside the frame where the scene has a width."""
+    if view.scene_width is not None:
+        chart = Framed(chart, view.frame)
+    return ChartScene(
+        spectra=spectra,
+        white=white,
+        shape=view.shape,
+        pitch_x=view.pitch_x / view.oversampling,
+        pitch_y=view.pitch_y / view.oversampling,
+        samples="averages",
+        dtype=view.dtype,
+        chart=chart,
+    )
+
+
+def fills(view: View) -> bool:
+    """Whether the chart's frame covers array and margin, so that no black edge is seen."""
+    if view.scene_width is None:
+        return True
+    width = (view.columns + 2 * view.margin) * view.pitch_x
+    height = (view.rows + 2 * view.margin) * view.pitch_y
+    return view.frame.width >= width and view.frame.height >= height
+
+
+def cell_edges(count: int, pitch: float) -> Array:
+    """The count + 1 edges [m] of cells centred on 0."""
+    return (np.arange(count + 1) - count / 2) * pitch
+
+
+def wave_values(waves: tuple[Wave, ...], x: Array, y: Array, mix: Array) -> Array:
+    """Point values of a sum of waves, separably: cos(a + b) = Re(exp(i a) exp(i b))."""
+    return _waves(waves, (x, np.zeros_like(x, float)), (y, np.zeros_like(y, float)), mix)
+
+
+def wave_averages(waves: tuple[Wave, ...], x_edges: Array, y_edges: Array, mix: Array) -> Array:
+    """Cell averages of a sum of waves, exact: the centre's value times sinc(f width) per axis."""
+    return _waves(waves, _cells(x_edges), _cells(y_edges), mix)
+
+
+def _cells(edges: Array) -> tuple[Array, Array]:
+    return (edges[1:] + edges[:-1]) / 2, np.diff(edges)
+
+
+def _waves(
+    waves: tuple[Wave, ...], x: tuple[Array, Array], y: tuple[Array, Array], mix: Array
+) -> Array:
+    out = np.zeros((len(mix), len(y[0]), len(x[0])))
+    for wave in waves:
+        along = _average_phasor(wave.fx, *x)
+        down = _average_phasor(wave.fy, *y) * np.exp(1j * wave.phase)
+        pattern = np.outer(down.real, along.real) - np.outer(down.imag, along.imag)
+        out += (mix @ np.asarray(wave.weights))[:, None, None] * pattern
+    return out
+
+
+def _average_phasor(frequency: float, center: Array, width: Array) -> Array:
+    return np.exp(2j * math.pi * frequency * center) * np.sinc(frequency * width)
+
+
+@dataclass(frozen=True)
+class Framed:
+    """A chart seen through a frame: black outside, cells on the frame's edge area-sampled."""
+
+    chart: Chart
+    frame: Frame
+
+    def averages(self, x_edges: Array, y_edges: Array, mix: Array) -> Array:
+        out = np.zeros((len(mix), len(y_edges) - 1, len(x_edges) - 1), mix.dtype)
+        columns, cover_x, inside_x = clip_cells(x_edges, self.frame.width / 2)
+        rows, cover_y, inside_y = clip_cells(y_edges, self.frame.height / 2)
+        if len(cover_x) and len(cover_y):
+            picture = self.chart.averages(inside_x, inside_y, mix)
+            out[:, rows, columns] = picture * np.outer(cover_y, cover_x)
+        return out
+
+    def values(self, x: Array, y: Array, mix: Array) -> Array:
+        inside = np.outer(abs(y) <= self.frame.height / 2, abs(x) <= self.frame.width / 2)
+        return self.chart.values(x, y, mix) * inside
+
+
+def clip_cells(edges: Array, half: float) -> tuple[slice, Array, Array]:
+    """The cells that reach into [-half, half].
+
+    Returns their range, the part of each that lies inside, and their edges cut to the inside.
+    """
+    sliver = 1e-9 * (edges[-1] - edges[0]) / (len(edges) - 1)  # a rounding error, not a cell
+    first = int(np.searchsorted(edges[1:], sliver - half))
+    last = int(np.searchsorted(edges[:-1], half - sliver))
+    if last <= first:
+        return slice(0, 0), np.empty(0), np.empty(0)
+    inside = np.clip(edges[first : last + 1], -half, half)
+    return slice(first, last), np.diff(inside) / np.diff(edges[first : last + 1]), inside
+
+
+def overlap(edges: Array, low: float, high: float) -> Array:
+    """The part of every cell between `edges` that lies within [low, high]: (n,) in 0..1."""
+    inside = np.minimum(edges[1:], high) - np.maximum(edges[:-1], low)
+    return np.maximum(inside, 0.0) / np.diff(edges)

@@ -1,0 +1,121 @@
+"""The ColorChecker Classic: 24 patches, six by four, on a black card.
+
+Proportions of the printed chart: patches of 40 mm, 5 mm of black between them, 7.5 mm around.
+As large as fits the frame, never stretched; what is left around the card is a dark surround.
+Reflectances: N. Ohta's measurement (1997), `spectra.colorchecker`.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from vcam_cli.scenes.base import Array, Frame, overlap
+from vcam_cli.spectra import Spectrum, colorchecker
+
+ROWS, COLUMNS = 4, 6
+PATCH, GAP, BORDER = 40.0, 5.0, 7.5
+WIDTH = COLUMNS * PATCH + (COLUMNS - 1) * GAP + 2 * BORDER
+HEIGHT = ROWS * PATCH + (ROWS - 1) * GAP + 2 * BORDER
+
+CARD = 0.03  # reflectance of the black card
+SURROUND = 0.08  # of what is behind it
+
+BLACK = 24  # index of the flat spectrum, after the 24 patches
+
+
+def reflectances() -> tuple[Spectrum, ...]:
+    """The 24 patches row by row, then the flat spectrum that card and surround share."""
+    return (*(spectrum for _, spectrum in colorchecker()), Spectrum.flat(1.0))
+
+
+def largest(frame: Frame) -> "Card":
+    """The card as large as it fits, in the middle of the frame."""
+    return Card(min(frame.width / WIDTH, frame.height / HEIGHT))
+
+
+def of_height(part: float, frame: Frame) -> "Card":
+    """The card with a part (0..1) of the frame's height, or what fits its width, in the middle."""
+    return Card(min(part * frame.height / HEIGHT, frame.width / WIDTH))
+
+
+@dataclass(frozen=True)
+class Card:
+    """The card centred on the array; `scale` is the metres on the sensor of one millimetre of it.
+
+    `mix` is (R, 25) in the order of `reflectances`.
+    """
+
+    scale: float
+
+    @property
+    def half_width(self) -> float:
+        return self.scale * WIDTH / 2
+
+    @property
+    def half_height(self) -> float:
+        return self.scale * HEIGHT / 2
+
+    def light(self, cover: "Cover", mix: Array) -> Array:
+        """Light of card and patches, 0 around them; times the card's cover, since x and y part."""
+        card = CARD * mix[:, BLACK]
+        patches = mix[:, :BLACK].reshape(-1, ROWS, COLUMNS) - card[:, None, None]
+        out = np.asarray(cover.rows.T @ patches @ cover.columns)
+        out += card[:, None, None] * np.outer(cover.down, cover.across)
+        return out
+
+    def averaged(self, x_edges: Array, y_edges: Array) -> "Cover":
+        """The parts of cells that card and patches cover: exact, for they are rectangles."""
+        return Cover(
+            overlap(x_edges, -self.half_width, self.half_width),
+            overlap(y_edges, -self.half_height, self.half_height),
+            np.stack([overlap(x_edges, *ends) for ends in self._patches(COLUMNS)]),
+            np.stack([overlap(y_edges, *ends) for ends in self._patches(ROWS)]),
+        )
+
+    def sampled(self, x: Array, y: Array) -> "Cover":
+        """The same at points: 0 or 1."""
+        return Cover(
+            _within(x, -self.half_width, self.half_width),
+            _within(y, -self.half_height, self.half_height),
+            np.stack([_within(x, *ends) for ends in self._patches(COLUMNS)]),
+            np.stack([_within(y, *ends) for ends in self._patches(ROWS)]),
+        )
+
+    def _patches(self, count: int) -> Iterator[tuple[float, float]]:
+        """Where the patches of a row (count 6) or column (4) start and stop [m]."""
+        for number in range(count):
+            start = (number - count / 2) * (PATCH + GAP) + GAP / 2
+            yield start * self.scale, (start + PATCH) * self.scale
+
+
+@dataclass(frozen=True)
+class Cover:
+    """How much of each column and row the card covers: across (n,), down (m,); and each of the
+    columns and rows of patches: columns (6, n), rows (4, m). A cell's cover is their product."""
+
+    across: Array
+    down: Array
+    columns: Array
+    rows: Array
+
+
+@dataclass(frozen=True)
+class ColorChecker:
+    """The chart: the card before its surround."""
+
+    card: Card
+
+    def averages(self, x_edges: Array, y_edges: Array, mix: Array) -> Array:
+        return self._before_surround(self.card.averaged(x_edges, y_edges), mix)
+
+    def values(self, x: Array, y: Array, mix: Array) -> Array:
+        return self._before_surround(self.card.sampled(x, y), mix)
+
+    def _before_surround(self, cover: Cover, mix: Array) -> Array:
+        around = SURROUND * mix[:, BLACK, None, None] * (1 - np.outer(cover.down, cover.across))
+        return self.card.light(cover, mix) + around
+
+
+def _within(position: Array, low: float, high: float) -> Array:
+    return ((position >= low) & (position <= high)).astype(float)

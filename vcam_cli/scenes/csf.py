@@ -1,0 +1,67 @@
+"""The contrast sensitivity chart: a chirp whose frequency grows to the right, contrast upward.
+
+Reflectance mean (1 + c(y) cos(pi F x^2 / W + phase)), x [m] from the frame's left edge, W its
+width: the frequency F x / W grows linearly from 0 to F = max_frequency at the right edge (on the
+sensor plane). The contrast c grows linearly from 0 at the bottom edge to max_contrast at the top.
+
+Beyond the frame the chirp goes on (frequencies above F to the right; to the left the even
+continuation, its own mirror image), and the contrast stays at 0 below and at max_contrast above,
+since a contrast above 1 would be negative light.
+
+Source: the test chart of chapter 3 of T. Chen, "Digital camera system simulator and
+applications", Stanford 2003, after Campbell and Robson, J. Physiol. 197 (1968) 551.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from vcam_cli.scenes.base import Array, Frame
+
+
+@dataclass(frozen=True)
+class Csf:
+    """max_frequency [cycles/m], mean 0..1, max_contrast 0..1, phase [rad], on `frame`."""
+
+    frame: Frame
+    max_frequency: float
+    mean: float
+    max_contrast: float
+    phase: float
+
+    def averages(self, x_edges: Array, y_edges: Array, mix: Array) -> Array:
+        """Exact: the chirp is separable, its integral along x is a pair of Fresnel integrals."""
+        chirp = np.diff(self._chirp_integral(x_edges)) / np.diff(x_edges)
+        contrast = np.diff(self._contrast_integral(y_edges)) / np.diff(y_edges)
+        return self._mixed(contrast, chirp, mix)
+
+    def values(self, x: Array, y: Array, mix: Array) -> Array:
+        from_left = x + self.frame.width / 2
+        rate = self.max_frequency / self.frame.width
+        chirp = np.cos(math.pi * rate * from_left**2 + self.phase)
+        contrast = self.max_contrast * np.clip(0.5 - y / self.frame.height, 0.0, 1.0)
+        return self._mixed(contrast, chirp, mix)
+
+    def _mixed(self, contrast: Array, chirp: Array, mix: Array) -> Array:
+        chirp, contrast = chirp.astype(mix.dtype), contrast.astype(mix.dtype)
+        level = mix[:, 0] * mix.dtype.type(self.mean)
+        return np.asarray(level[:, None, None] * (np.outer(contrast, chirp) + 1))
+
+    def _chirp_integral(self, x: Array) -> Array:
+        """Integral of cos(pi F x^2/W + phase) from the left edge to x [m]."""
+        from scipy.special import fresnel
+
+        from_left = x + self.frame.width / 2
+        rate = self.max_frequency / self.frame.width
+        if rate == 0.0:
+            return from_left * math.cos(self.phase)
+        scale = math.sqrt(2.0 * rate)
+        sine, cosine = fresnel(scale * from_left)
+        return (math.cos(self.phase) * cosine - math.sin(self.phase) * sine) / scale
+
+    def _contrast_integral(self, y: Array) -> Array:
+        """Integral [m] over y (down) of max_contrast clip(1/2 - y/H, 0, 1), up to a constant."""
+        up = 0.5 - y / self.frame.height
+        ramp = np.clip(up, 0.0, 1.0)
+        return -self.max_contrast * self.frame.height * (ramp**2 / 2 + np.maximum(up - 1.0, 0.0))

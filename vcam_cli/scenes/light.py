@@ -1,0 +1,71 @@
+"""How bright the scene is: the spectral radiance of the scene's perfect white.
+
+A camera file states one level, for a perfect white diffuser under the illuminant (or the display
+white of an image that emits): luminance [cd/m2], radiance [W/(sr m2)], or illuminance [lx] on the
+diffuser, which is pi times its luminance. Luminance is 683 lm/W times the integral with V(lambda),
+radiance the plain integral, both over the scene's wavelengths: light outside them is not there.
+"""
+
+import math
+
+from vcam_cli.camera.scene import Scene
+from vcam_cli.errors import bad
+from vcam_cli.spectra import Spectrum, integral, luminance
+
+# Dissertation section 2.3.1: an RGB image as three laser lines, in the order of its channels.
+LASER_LINES = (650e-9, 550e-9, 450e-9)
+
+
+def white_radiance(scene: Scene) -> Spectrum:
+    """Spectral radiance [W/(sr m2 m)] of a perfect white diffuser under the illuminant.
+
+    Raises BadInput where the illuminant does not cover the scene's wavelengths, or emits nothing
+    there that the stated level could measure.
+    """
+    path = ("scene", "illuminant")
+    if scene.illuminant is None:
+        raise bad(path, "this scene needs an illuminant", "write for example illuminant: D65")
+    try:
+        return at_level(scene.illuminant.resolve(path), scene)
+    except ValueError as error:
+        raise bad(path, str(error)) from None
+
+
+def laser_white(scene: Scene) -> tuple[tuple[Spectrum, ...], Spectrum]:
+    """The radiances of full red, green and blue planes, and their sum, the display white.
+
+    Equal planes are equal radiances in watts; their sum has the stated level.
+    """
+    start, stop = scene.wavelengths.start, scene.wavelengths.stop
+    if min(LASER_LINES) < start or max(LASER_LINES) > stop:
+        raise bad(
+            ("scene", "wavelengths"),
+            "the laser model emits at 450, 550 and 650 nm, and not all of these are simulated",
+            "let the wavelengths start at or below 450 nm and stop at or above 650 nm",
+        )
+    white = at_level(Spectrum(lines=tuple((line, 1.0) for line in LASER_LINES)), scene)
+    power = dict(white.lines or ())
+    return tuple(Spectrum.line(line, power[line]) for line in LASER_LINES), white
+
+
+def at_level(relative: Spectrum, scene: Scene) -> Spectrum:
+    """The spectrum scaled to the scene's stated level; ValueError where that cannot be."""
+    start, stop = scene.wavelengths.start, scene.wavelengths.stop
+    if scene.radiance is not None:
+        level, measured, what = scene.radiance, integral(relative, start, stop), "power"
+    else:
+        level, measured, what = _luminance(scene), luminance(relative, start, stop), "visible light"
+    if not measured > 0.0:
+        raise ValueError(
+            f"the light has no {what} within the simulated {start * 1e9:g}-{stop * 1e9:g} nm, "
+            "so the stated level cannot be reached"
+        )
+    return relative.scaled(level / measured)
+
+
+def _luminance(scene: Scene) -> float:
+    if isinstance(scene.luminance, float):
+        return scene.luminance
+    if scene.illuminance is not None:
+        return scene.illuminance / math.pi
+    raise bad(("scene", "luminance"), "from-file is not supported yet", "write a luminance")

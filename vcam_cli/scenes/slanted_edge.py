@@ -1,0 +1,64 @@
+"""A straight edge, dark to the left and bright to the right, turned a little from the vertical.
+
+It passes through the array's centre and goes on without end. The angle is that of ISO 12233,
+between the edge and the columns; a positive one turns the edge clockwise as seen (its upper end
+to the right). Reflectances mean (1 - contrast) and mean (1 + contrast) with mean 1/2, so that a
+contrast of 1 is black against white.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from vcam_cli.scenes.base import Array
+
+MEAN = 0.5
+
+
+@dataclass(frozen=True)
+class SlantedEdge:
+    """angle [rad], contrast 0..1 (Michelson)."""
+
+    angle: float
+    contrast: float
+
+    def averages(self, x_edges: Array, y_edges: Array, mix: Array) -> Array:
+        """Exact: the bright half plane's area in every cell."""
+        x, y = (x_edges[1:] + x_edges[:-1]) / 2, (y_edges[1:] + y_edges[:-1]) / 2
+        across, down = self._normal()
+        distance = np.add.outer(down * y, across * x)
+        widths = abs(across) * np.diff(x_edges)[None, :], abs(down) * np.diff(y_edges)[:, None]
+        return self._mixed(half_plane(distance, *widths), mix)
+
+    def values(self, x: Array, y: Array, mix: Array) -> Array:
+        across, down = self._normal()
+        distance = np.add.outer(down * np.asarray(y), across * np.asarray(x))
+        return self._mixed(np.heaviside(distance, 0.5), mix)
+
+    def _normal(self) -> tuple[float, float]:
+        """Unit vector (x, y down) toward the bright side."""
+        return math.cos(self.angle), math.sin(self.angle)
+
+    def _mixed(self, bright: Array, mix: Array) -> Array:
+        value = MEAN * (1.0 + self.contrast * (2.0 * bright - 1.0))
+        return np.asarray(mix[:, 0][:, None, None] * value.astype(mix.dtype))
+
+
+def half_plane(distance: Array, width_x: Array, width_y: Array) -> Array:
+    """The part of a rectangle that lies in a half plane, 0..1.
+
+    distance [m]: of the rectangle's centre from the border, positive inside. width_x, width_y
+    [m]: the rectangle's sides times |cos|, |sin| of the border normal. The part is the chance
+    that distance + U_x + U_y > 0 for U uniform on these widths: linear while the border crosses
+    two opposite sides, quadratic where it cuts a corner.
+    """
+    large = np.maximum(width_x, width_y)
+    small = np.minimum(width_x, width_y)
+    away = np.abs(distance)
+    linear = 0.5 + away / large
+    corner = np.maximum((large + small) / 2 - away, 0.0)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        cut = 1.0 - corner**2 / (2.0 * large * small)
+    part = np.where(away <= (large - small) / 2, linear, np.where(corner > 0.0, cut, 1.0))
+    return np.where(distance < 0.0, 1.0 - part, part)

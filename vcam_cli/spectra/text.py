@@ -1,0 +1,71 @@
+"""Reading tables of spectra from CSV text: `#` comments, one header line, numbers in rows."""
+
+import math
+from os import PathLike
+from pathlib import Path
+
+import numpy as np
+
+from vcam_cli.spectra.spectrum import Floats, Outside, Table
+
+HEADER = ("wavelength_nm", "value")
+MOST_ROWS = 200_000
+
+
+def read_rows(path: str | PathLike[str]) -> tuple[list[str], Floats]:
+    """The header's names and the numbers (rows, columns) of a CSV file.
+
+    Raises ValueError that names the file and the line: not text, no header, a row of another
+    length, something that is no finite number. OSError as `open` raises it.
+    """
+    file = Path(path)
+    try:
+        lines = file.read_text(encoding="utf-8-sig").splitlines()
+    except UnicodeDecodeError:
+        raise ValueError(f"{file}: is not a text file") from None
+    rows = [(n, line.strip()) for n, line in enumerate(lines, 1)]
+    rows = [(n, line) for n, line in rows if line and not line.startswith("#")]
+    if not rows:
+        raise ValueError(f"{file}: is empty; it needs a header and rows of numbers")
+    if len(rows) > MOST_ROWS:
+        raise ValueError(f"{file}: has {len(rows)} rows; at most {MOST_ROWS} are read")
+    header = [name.strip() for name in rows[0][1].split(",")]
+    numbers = [_row(file, n, line, len(header)) for n, line in rows[1:]]
+    return header, np.array(numbers, dtype=np.float64).reshape(len(numbers), len(header))
+
+
+def _row(file: Path, number: int, line: str, columns: int) -> list[float]:
+    cells = line.split(",")
+    if len(cells) != columns:
+        raise ValueError(f"{file}:{number}: has {len(cells)} columns; the header has {columns}")
+    try:
+        values = [float(cell) for cell in cells]
+    except ValueError:
+        raise ValueError(f"{file}:{number}: {line!r} is not a row of numbers") from None
+    if not all(math.isfinite(value) for value in values):
+        raise ValueError(f"{file}:{number}: {line!r} holds a value that is not finite")
+    return values
+
+
+def read_csv(path: str | PathLike[str], outside: Outside = "error") -> Table:
+    """A spectrum from a CSV file with the columns wavelength_nm,value.
+
+    Wavelengths in nm, rising; values not negative, dimensionless (or relative, for a lamp).
+    Raises ValueError that names file and line for anything else, OSError where it cannot be read.
+    """
+    header, rows = read_rows(path)
+    if tuple(header) != HEADER:
+        raise ValueError(
+            f"{path}: the header is {','.join(header)!r}; it must be 'wavelength_nm,value'"
+        )
+    if len(rows) == 0:
+        raise ValueError(f"{path}: has no rows below its header")
+    if (rows[:, 1] < 0).any():
+        wavelength, value = rows[rows[:, 1] < 0][0]
+        raise ValueError(f"{path}: {value:g} at {wavelength:g} nm; a value must not be negative")
+    if (rows[:, 0] <= 0).any():
+        raise ValueError(f"{path}: a wavelength must be positive")
+    try:
+        return Table(rows[:, 0] / 1e9, rows[:, 1], outside)
+    except ValueError as error:
+        raise ValueError(f"{path}: {error}") from None

@@ -1,0 +1,132 @@
+"""One camera from its model to all its results, in memory: what `vcam run` writes to files."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcam_cli.camera.camera import Camera
+from vcam_cli.engine.frame import Frame, Stages, expose, figures
+from vcam_cli.engine.parallel import available_workers
+from vcam_cli.errors import BadInput
+from vcam_cli.processing import Context, Processed, process
+from vcam_cli.quality.mse import mse, psnr_db
+
+
+@dataclass(frozen=True)
+class Result:
+    """A simulated photograph. Arrays are (rows, columns) unless they say otherwise."""
+
+    frame: Frame
+    processed: Processed
+    stages: Stages
+    notes: tuple[str, ...] = ()
+    extra: dict = field(default_factory=dict)
+
+    @property
+    def dn(self) -> NDArray:
+        """Raw digital numbers, whole. [DN]"""
+        return self.frame.dn
+
+    @property
+    def electrons(self) -> NDArray:
+        """Raw signal before the ADC, noisy, clipped above at the full well. [electrons]"""
+        return self.frame.electrons
+
+    @property
+    def volts(self) -> NDArray:
+        """Raw signal at the ADC's input. [V]"""
+        e = self.frame.electrical
+        return self.electrons * self.electrons.dtype.type(e.conversion_gain * e.analog_gain)
+
+    @property
+    def mean_electrons(self) -> NDArray:
+        """Noise-free signal, photo + dark, before saturation. [electrons]"""
+        return self.frame.mean_electrons
+
+    @property
+    def exposure_time(self) -> float:
+        """[s]"""
+        return self.frame.exposure_time
+
+    @property
+    def x(self) -> NDArray:
+        """Centers of the columns, right of the array's center, (columns,) [m]."""
+        g = self.frame.geometry
+        return (np.arange(g.columns) + 0.5 - g.columns / 2) * g.pitch_x
+
+    @property
+    def y(self) -> NDArray:
+        """Centers of the rows, below the array's center, (rows,) [m]."""
+        g = self.frame.geometry
+        return (np.arange(g.rows) + 0.5 - g.rows / 2) * g.pitch_y
+
+    @cached_property
+    def render(self) -> NDArray:
+        """Codes of the render after `processing`: (rows, columns) or (rows, columns, 3)."""
+        with self.stages("processing"):
+            return self.processed.encode(self.frame.camera.output.render or 8)
+
+    @cached_property
+    def linear(self) -> NDArray:
+        """The render in linear light, perfect white = 1: (rows, columns, channels)."""
+        with self.stages("processing"):
+            return self.processed.linear
+
+    @cached_property
+    def ideal(self) -> NDArray:
+        """The scene point-sampled in the same colors and scale: (rows, columns, channels)."""
+        with self.stages("ideal"):
+            return self.processed.ideal(self.frame.ideal_dn())
+
+    @cached_property
+    def metrics(self) -> list[tuple[str, float, str]]:
+        """(metric, value, unit): those every run has, then those that `quality` asks for."""
+        out = figures(self.frame)
+        if {"mse", "psnr"} & set(self.frame.camera.quality):
+            image, ideal = self.linear, self.ideal
+            with self.stages("quality"):
+                error = mse(image, ideal)
+                out += [("mse", error, ""), ("psnr_db", psnr_db(image, ideal), "dB")]
+        return out
+
+
+def simulate(
+    camera: Camera, workers: int | None = None, say: Callable[[str], None] | None = None
+) -> Result:
+    """Simulates `camera` looking at its scene.
+
+    workers: threads, default all processors; results do not depend on it. say: called with notes
+    for the user. Raises BadInput (with positions in the camera's file) and CannotDo.
+    """
+    try:
+        return _simulate(camera, workers or available_workers())
+    except BadInput as error:
+        raise error.located(camera.locate) from None
+
+
+def _simulate(camera: Camera, workers: int) -> Result:
+    stages = Stages()
+    picture, notes = None, ()
+    source = camera.scene.source
+    if source.kind == "image":
+        from vcam_cli.files.images import read_picture
+
+        with stages("read"):
+            read = read_picture(
+                source.file, source.encoding, source.white, ("scene", "source", "file")
+            )
+        picture, notes = read.data, read.notes
+    frame = expose(camera, picture, workers, stages)
+    context = Context(
+        pattern=frame.mosaic.block,
+        colors=frame.mosaic.colors,
+        white_dn=frame.white_dn,
+        black_dn=frame.black_dn,
+    )
+    processed = process(frame.dn, context, camera.processing, workers=workers)
+    return Result(frame, processed, stages, notes)

@@ -1,0 +1,265 @@
+"""Quantities: text with a unit <-> float in SI.
+
+`parse("6.5 um", "length")` is 6.5e-6 and `render(6.5e-6, "length")` is "6.5 um". A quantity
+is a number or a quotient of two ("1/60 s"), then a unit of the dimension that is asked for;
+a bare number, NaN, infinity or another dimension's unit is a ValueError whose text is meant
+for the user.
+
+Why a grammar of our own: it is strict (one dimension is expected, nothing is guessed) and
+exact. Arithmetic is rational, so "6.5 um" is the double nearest to 6.5e-6 and rendering
+can promise `parse(render(x)) == x` bit for bit.
+"""
+
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from decimal import Decimal
+from fractions import Fraction
+from types import MappingProxyType
+
+_NUMBER = r"(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d{1,3})?"
+_QUANTITY = re.compile(rf"([+-]?{_NUMBER})(?:\s*/\s*({_NUMBER}))?\s*(.*)", re.ASCII | re.DOTALL)
+_LONGEST = 80  # characters; keeps rational arithmetic small
+_PI = Fraction("3.14159265358979323846264338327950288419716939937510")
+_PREFIXES = {
+    "a": -18, "f": -15, "p": -12, "n": -9, "u": -6, "m": -3, "": 0, "k": 3, "M": 6, "G": 9,
+}  # fmt: skip
+_SPELLINGS = str.maketrans({"µ": "u", "μ": "u", "²": "2", "³": "3", "°": "deg", "Ω": "ohm"})
+
+
+@dataclass(frozen=True)
+class Dimension:
+    """A kind of quantity: its SI unit inside, its accepted units, and how it is shown.
+
+    `units` maps a unit to its size in SI; `shown` are the units `render` chooses from (all of
+    them powers of ten except where `render` checks), rising in size; `example` is a value a
+    user might write; `offsets` are added before the unit's size is applied (degC).
+    """
+
+    name: str
+    title: str  # with its article: "a length"
+    si: str
+    units: Mapping[str, Fraction]
+    shown: tuple[str, ...]
+    example: str
+    offsets: Mapping[str, Fraction] = field(default_factory=dict)
+    words: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def pattern(self) -> str:
+        """A regular expression (JSON Schema dialect) of everything `parse` may accept."""
+        names = sorted(self.units, key=lambda unit: (-len(unit), unit))
+        units = "|".join(map(_spellings, names))
+        words = "".join(f"|{word}" for word in self.words)
+        return rf"^\s*([+-]?{_NUMBER}(\s*/\s*{_NUMBER})?\s*({units}){words})\s*$"
+
+
+def parse(text: object, dimension: str) -> float:
+    """The quantity `text` in the SI unit of `dimension` (a key of `DIMENSIONS`).
+
+    Raises ValueError, with a sentence that names the dimension and gives an example.
+    """
+    kind = DIMENSIONS[dimension]
+    if isinstance(text, (int, float)) and not isinstance(text, bool):
+        if not math.isfinite(text):
+            raise ValueError(f"{text} is not {kind.title}; write for example {kind.example}")
+        raise ValueError(f"{text} is a bare number; {_needs(kind)}")
+    if not isinstance(text, str):
+        raise ValueError(f"{kind.title} is a number with its unit, for example {kind.example}")
+    plain = " ".join(text.translate(_SPELLINGS).split())
+    if plain in kind.words:
+        return kind.words[plain]
+    if len(plain) > _LONGEST:
+        raise ValueError(f"{text[:20]!r}... is too long; {_needs(kind)}")
+    match = _QUANTITY.fullmatch(plain)
+    if match is None:
+        raise ValueError(f"{text!r} does not begin with a number; {_needs(kind)}")
+    number, divisor, unit = match.groups()
+    size = _unit_size(kind, text, unit)
+    return _value(kind, text, Fraction(number), divisor, kind.offsets.get(unit), size)
+
+
+def parse_fraction(value: object) -> float:
+    """A dimensionless number: bare (0.05) or in percent ("5 %"). Raises ValueError."""
+    if isinstance(value, (int, float)) and not isinstance(value, bool):
+        if not math.isfinite(value):
+            raise ValueError(f"{value} is not a number that can be used; write for example 0.05")
+        return float(value)
+    match = _QUANTITY.fullmatch(value.strip()) if isinstance(value, str) else None
+    if match is None or len(str(value)) > _LONGEST:
+        raise ValueError(f"{value!r} is not a number; write for example 0.05 or 5 %")
+    number, divisor, unit = match.groups()
+    if unit not in ("", "%"):
+        raise ValueError(f"{value!r} has the unit {unit!r}; write a bare number, or 5 %")
+    return _value(_FRACTION, str(value), Fraction(number), divisor, None, _FRACTION.units[unit])
+
+
+def render(value: float, dimension: str) -> str:
+    """The shortest text with `parse(text, dimension) == value`, in a readable unit."""
+    kind = DIMENSIONS[dimension]
+    value = float(value)
+    for word, meaning in kind.words.items():
+        if value == meaning:
+            return word
+    if not math.isfinite(value):
+        raise ValueError(f"{value} is not {kind.title}")
+    exact = Decimal(repr(value))
+    unit = kind.shown[0] if value else kind.example.partition(" ")[2]
+    for larger in kind.shown[1:]:
+        if abs(value) >= kind.units[larger]:
+            unit = larger
+    size = kind.units[unit]
+    if size.numerator == 1 or size.denominator == 1:
+        return f"{_decimal(exact * size.denominator / size.numerator)} {unit}"
+    rounded = f"{float(Fraction(value) / size):.15g}"  # deg: exact where a short number is
+    if abs(float(rounded)) < 1e6 and parse(f"{rounded} {unit}", dimension) == value:
+        return f"{_decimal(Decimal(rounded))} {unit}"
+    return f"{_decimal(exact)} {kind.si}"
+
+
+def _spellings(unit: str) -> str:
+    """A regular expression of the ways to write `unit`: um, µm; m2, m^2, m²."""
+    unit = re.sub(r"([()])", r"\\\1", unit).replace("u", "[uµμ]").replace("deg", "(deg|°)")
+    return re.sub(r"(?<=m)2", "\\^?[2²]", re.sub(r"(?<=m)3", "\\^?[3³]", unit))
+
+
+def _needs(kind: Dimension) -> str:
+    return f"{kind.title} needs its unit, for example {kind.example}"
+
+
+def _unit_size(kind: Dimension, text: str, unit: str) -> Fraction:
+    """The size of `unit` in SI, or a ValueError that says which units there are."""
+    key = unit.replace("^", "")
+    if key in kind.units:
+        return kind.units[key]
+    if not unit:
+        raise ValueError(f"{text!r} has no unit; {_needs(kind)}")
+    if "," in unit:
+        raise ValueError(f"{text!r} has a comma; write a decimal point, for example {kind.example}")
+    for allowed in kind.units:
+        if allowed.lower() == key.lower():
+            raise ValueError(f"{text!r}: there is no unit {unit!r}; did you mean {allowed}?")
+    others = [other.title for other in DIMENSIONS.values() if key in other.units]
+    units = ", ".join(list(kind.units)[:10])
+    said = f"is {others[0]}, not {kind.title}" if others else f": unknown unit {unit!r}"
+    raise ValueError(
+        f"{text!r}{' ' if others else ''}{said}; {kind.title} is given in {units}, "
+        f"for example {kind.example}"
+    )
+
+
+def _value(
+    kind: Dimension,
+    text: str,
+    number: Fraction,
+    divisor: str | None,
+    offset: Fraction | None,
+    size: Fraction,
+) -> float:
+    """number / divisor in SI as the nearest double; ValueError where there is none."""
+    if divisor is not None:
+        if Fraction(divisor) == 0:
+            raise ValueError(f"{text!r} divides by zero; write for example {kind.example}")
+        number /= Fraction(divisor)
+    exact = (number + (offset or 0)) * size
+    try:
+        value = float(exact)
+    except OverflowError:
+        value = math.inf
+    if math.isinf(value) or (value == 0 and exact != 0):
+        raise ValueError(f"{text!r} is out of range; write for example {kind.example}")
+    return value
+
+
+def _decimal(number: Decimal) -> str:
+    """The shortest spelling of a decimal number."""
+    if number == 0:
+        return "0"
+    digits = number.normalize()
+    plain = format(digits, "f")
+    short = len(plain) <= 20 and abs(digits.adjusted()) <= 8
+    return plain if short else f"{digits:e}".replace("e+", "e")
+
+
+def _prefixed(unit: str, prefixes: str, power: int = 1, scale: int = 0) -> dict[str, Fraction]:
+    """{"um": 1e-6, ...}: `unit` with every prefix ("-" stands for none), to a power."""
+    names = ["" if letter == "-" else letter for letter in prefixes]
+    return {p + unit: Fraction(10) ** (_PREFIXES[p] * power + scale) for p in names}
+
+
+def _per(top: dict[str, Fraction], bottom: dict[str, Fraction]) -> dict[str, Fraction]:
+    """All quotients "top/bottom"."""
+    return {f"{t}/{b}": ts / bs for t, ts in top.items() for b, bs in bottom.items()}
+
+
+def _dimensions() -> dict[str, Dimension]:
+    length = _prefixed("m", "num-pk") | {"cm": Fraction(1, 100), "in": Fraction(254, 10000)}
+    time = _prefixed("s", "-munp") | {"min": Fraction(60)}
+    area = {"cm2": Fraction(1, 10**4), "m2": Fraction(1), "mm2": Fraction(1, 10**6)}
+    area["um2"] = Fraction(1, 10**12)
+    cm_or_m = {"cm": Fraction(1, 100), "m": Fraction(1)}
+    volume = {"cm3": Fraction(1, 10**6), "m3": Fraction(1), "um3": Fraction(1, 10**18)}
+    current = _prefixed("A", "fpnum-a")
+    farad = _prefixed("F", "fpanum-")
+    electrons = _prefixed("e", "-kM")
+    pairs = {"lp/mm": 1000, "cycles/mm": 1000, "c/mm": 1000, "lp/m": 1, "cycles/m": 1, "lp/cm": 100}
+    watts = {f"{p}W": s for p, s in (("", 1), ("m", Fraction(1, 1000)), ("u", Fraction(1, 10**6)))}
+    forms = ("{}/(sr m2)", "{}/(m2 sr)", "{}/sr/m2", "{}/m2/sr")
+    radiance = {form.format(w): Fraction(size) for form in forms for w, size in watts.items()}
+    per_volume = {f"{one}/{v}": 1 / s for v, s in volume.items() for one in ("1", "")}
+    per_volume |= {"cm-3": Fraction(10**6), "m-3": Fraction(1)}
+    angle = {"deg": _PI / 180, "rad": Fraction(1), "mrad": Fraction(1, 1000)}
+    kelvin = {"K": Fraction(1), "degC": Fraction(1)}
+    lengths = ("nm", "um", "mm", "m")
+    far = {"infinity": math.inf}
+    table = [
+        Dimension("length", "a length", "m", length, lengths, "6.5 um"),
+        Dimension("distance", "a distance", "m", length, (*lengths, "km"), "1 m", words=far),
+        Dimension("time", "a time", "s", time, ("ns", "us", "ms", "s"), "30 ms"),
+        Dimension("voltage", "a voltage", "V", _prefixed("V", "-munk"), ("uV", "mV", "V"),
+                  "1.38 V"),
+        Dimension("capacitance", "a capacitance", "F", farad, ("aF", "fF", "pF", "nF"), "12 fF"),
+        Dimension("temperature", "a temperature", "K", kelvin, ("K",), "300 K",
+                  offsets={"degC": Fraction("273.15")}),
+        Dimension("angle", "an angle", "rad", angle, ("deg",), "45 deg"),
+        Dimension("charge", "a charge in electrons", "e", electrons, ("e", "ke", "Me"), "5 e"),
+        Dimension("rate", "a rate in electrons per second", "e/s",
+                  _per(electrons, {"s": Fraction(1), "ms": Fraction(1, 1000)}),
+                  ("e/s", "ke/s", "Me/s"), "12 e/s"),
+        Dimension("current_density", "a current density", "A/m2", _per(current, area),
+                  ("pA/cm2", "nA/cm2", "uA/cm2", "mA/cm2", "A/cm2"), "1 nA/cm2"),
+        Dimension("linear_current_density", "a current per length", "A/m", _per(current, cm_or_m),
+                  ("pA/cm", "nA/cm", "uA/cm"), "0.437 pA/cm"),
+        Dimension("current", "a current", "A", current, ("fA", "pA", "nA", "uA", "mA"), "5 fA"),
+        Dimension("luminance", "a luminance", "cd/m2",
+                  _per(_prefixed("cd", "-mk"), {"m2": Fraction(1)}), ("mcd/m2", "cd/m2", "kcd/m2"),
+                  "100 cd/m2"),
+        Dimension("radiance", "a radiance", "W/(sr m2)", radiance,
+                  ("W/(sr m2)",), "0.4 W/(sr m2)"),
+        Dimension("illuminance", "an illuminance", "lx", _prefixed("lx", "-mk"),
+                  ("mlx", "lx", "klx"), "300 lx"),
+        Dimension("spatial_frequency", "a spatial frequency", "cycles/m",
+                  {name: Fraction(size) for name, size in pairs.items()}, ("lp/mm",), "33 lp/mm"),
+        Dimension("conversion_gain", "a conversion gain", "V/e",
+                  _per(_prefixed("V", "umn-"), {"e": Fraction(1)}),
+                  ("nV/e", "uV/e", "mV/e", "V/e"), "20 uV/e"),
+        Dimension("adc_gain", "an ADC gain", "DN/e",
+                  {"DN/e": Fraction(1), "DN/ke": Fraction(1, 1000)}, ("DN/e",), "0.25 DN/e"),
+        Dimension("dn", "a number of DN", "DN", {"DN": Fraction(1)}, ("DN",), "64 DN"),
+        Dimension("capacitance_per_area", "a capacitance per area", "F/m2", _per(farad, area),
+                  ("fF/um2", "pF/um2"), "0.906 fF/um2"),
+        Dimension("capacitance_per_length", "a capacitance per length", "F/m",
+                  _per(farad, {"um": Fraction(1, 10**6)} | cm_or_m), ("fF/um", "pF/um"),
+                  "0.297 fF/um"),
+        Dimension("concentration", "a concentration", "1/m3", per_volume, ("1/cm3",), "1e15 1/cm3"),
+        Dimension("diffusivity", "a diffusivity", "m2/s", _per(area, {"s": Fraction(1)}),
+                  ("cm2/s",), "12 cm2/s"),
+    ]  # fmt: skip
+    return {dimension.name: dimension for dimension in table}
+
+
+_FRACTION = Dimension(
+    "fraction", "a number", "", {"": Fraction(1), "%": Fraction(1, 100)}, ("",), "0.05 or 5 %"
+)
+DIMENSIONS: Mapping[str, Dimension] = MappingProxyType(_dimensions())
