@@ -10,8 +10,8 @@ The tools are the plainest that reach the accuracy wanted, in float64 throughout
 
 - Wavelength: Gauss's rule with three points inside every nanometer (exact for products of up to
   five tables with knots on whole nanometers); spectral lines are a sum over the lines.
-- A scene is either *squares of light* (every image sample is a uniform square; a chart is painted
-  on squares far smaller than the pixel) or a sum of waves, which have a closed form.
+- A scene is *squares of light* (every image sample is a uniform square; a chart may be painted on
+  squares far smaller than the pixel), or rectangles and products across(x) down(y), or waves.
 - The light that a photodetector collects from squares is the sum of the overlaps of rectangles,
   read off the running sum of the squares; exact.
 - Blur is the definition of convolution, one displacement after another: the Airy pattern sends a
@@ -30,6 +30,7 @@ are upright: row 0 is the top of the scene.
 """
 
 import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -50,10 +51,40 @@ class Squares:
 
 
 @dataclass(frozen=True)
-class Rectangles:
-    """B_k = 1 inside its own rectangle (left, right, top, bottom) [m], 0 elsewhere: (K, 4)."""
+class Rectangle:
+    """B = 1 inside a rectangle of the sensor plane [m], 0 elsewhere."""
 
-    edges: np.ndarray
+    left: float
+    right: float
+    top: float
+    bottom: float
+
+    @property
+    def far(self) -> float:
+        """What it amounts to far away: a rectangle without end is the same everywhere."""
+        return float(math.isinf(self.left))
+
+    def inside(self, x: np.ndarray, y: np.ndarray, width: float, height: float) -> np.ndarray:
+        """Area common to the rectangle and those centerd at every (y, x): (m, n) [m2]."""
+        wide = np.minimum(x + width / 2, self.right) - np.maximum(x - width / 2, self.left)
+        tall = np.minimum(y + height / 2, self.bottom) - np.maximum(y - height / 2, self.top)
+        return np.maximum(tall, 0)[:, None] * np.maximum(wide, 0)
+
+
+@dataclass(frozen=True)
+class Product:
+    """B = across(x) down(y), smooth in a photodetector; 0 on average far away."""
+
+    across: Callable[[np.ndarray], np.ndarray]
+    down: Callable[[np.ndarray], np.ndarray]
+    far = 0.0
+
+    def inside(self, x: np.ndarray, y: np.ndarray, width: float, height: float) -> np.ndarray:
+        """Integral over the rectangles centered at every (y, x), eight Gauss points a side."""
+        node, weight = np.polynomial.legendre.leggauss(8)
+        wide = self.across(x[:, None] + node * width / 2) @ weight
+        tall = self.down(y[:, None] + node * height / 2) @ weight
+        return np.outer(tall, wide) * width * height / 4
 
 
 @dataclass(frozen=True)
@@ -70,7 +101,7 @@ class Waves:
 class Setup:
     """All the reference needs to know of one camera and its scene; SI units."""
 
-    scene: Squares | Rectangles | Waves
+    scene: Squares | Waves | tuple[Rectangle | Product, ...]  # a tuple: its parts added up
     wavelength: np.ndarray  # (J,) [m]
     weight: np.ndarray  # (J,) quadrature weights [m]; 1 for spectral lines
     radiance: np.ndarray  # (K, J) S_k [W/(sr m2 m)]; [W/(sr m2)] for lines
@@ -247,33 +278,12 @@ class Collector:
         return corner[m:, n:] - corner[:m, n:] - corner[m:, :n] + corner[:m, :n]
 
 
-@dataclass(frozen=True)
-class Rectangle:
-    """The same for one rectangle of light."""
-
-    left: float
-    right: float
-    top: float
-    bottom: float
-
-    @property
-    def far(self) -> float:
-        """What it amounts to far away: a rectangle without end is the same everywhere."""
-        return float(math.isinf(self.left))
-
-    def inside(self, x: np.ndarray, y: np.ndarray, width: float, height: float) -> np.ndarray:
-        """Area common to the rectangle and those centerd at every (y, x): (m, n) [m2]."""
-        wide = np.minimum(x + width / 2, self.right) - np.maximum(x - width / 2, self.left)
-        tall = np.minimum(y + height / 2, self.bottom) - np.maximum(y - height / 2, self.top)
-        return np.maximum(tall, 0)[:, None] * np.maximum(wide, 0)
-
-
-def collectors(setup: Setup, room: float) -> list[Collector | Rectangle]:
+def collectors(setup: Setup, room: float) -> Sequence[Collector | Rectangle | Product]:
     """One for every component of the scene, good to `room` [m] beyond the array."""
     scene = setup.scene
-    if isinstance(scene, Rectangles):
+    if isinstance(scene, tuple):
         assert setup.off_axis == "none"
-        return [Rectangle(*edges) for edges in scene.edges]
+        return scene
     assert isinstance(scene, Squares)
     planes, x0, y0 = widened(scene, setup, room)
     sides = -2 * x0 / planes.shape[2], -2 * y0 / planes.shape[1]
@@ -281,7 +291,7 @@ def collectors(setup: Setup, room: float) -> list[Collector | Rectangle]:
 
 
 def electrons_of_areas(setup: Setup) -> np.ndarray:
-    """Mean photo-electrons of every pixel, scene of squares or rectangles: (rows, columns)."""
+    """Mean photo-electrons of every pixel, of whatever is not waves: (rows, columns)."""
     rows, columns = setup.color.shape
     off_x, off_y, width, height = setup.aperture
     ring = setup.wavelength.max() * setup.f_number * one_minus_m(setup.focal_length, setup.distance)

@@ -11,11 +11,12 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-from reference import BOLTZMANN, LIGHT, PLANCK, Rectangles, Squares, Waves, centers
+from reference import BOLTZMANN, LIGHT, PLANCK, Product, Rectangle, Squares, Waves, centers
 
 ROOT = Path(__file__).parent.parent
 DATA = ROOT / "vcam_cli" / "data"
 OfWavelength = Callable[[np.ndarray], np.ndarray]
+EVERYWHERE = Rectangle(-math.inf, math.inf, -math.inf, math.inf)
 
 # --- spectra -------------------------------------------------------------------------------------
 
@@ -88,19 +89,19 @@ def framed_image(camera, picture: np.ndarray) -> Squares:
 
 
 def painted(
-    value, columns: int, rows: int, pitch_x: float, pitch_y: float, margin: int, cells: int = 12
+    value, columns: int, rows: int, pitch_x: float, pitch_y: float, margin: int, cells: int = 24
 ) -> Squares:
     """A chart value(x, y) on `cells` x `cells` squares a pixel, `margin` pixels beyond the array.
 
-    Each square has the mean of 4 x 4 points. `value` may return (K, ...) planes.
+    Each square has the mean of 2 x 2 points. `value` may return (K, ...) planes.
     """
     nx, ny = (columns + 2 * margin) * cells, (rows + 2 * margin) * cells
     side_x, side_y = pitch_x / cells, pitch_y / cells
     x, y = centers(nx, side_x), centers(ny, side_y)[:, None]
-    fine = (np.arange(4) + 0.5) / 4 - 0.5
-    total = sum(value(x + a * side_x, y + b * side_y) for a in fine for b in fine) / 16
+    fine = (-0.25, 0.25)
+    total = sum(value(x + a * side_x, y + b * side_y) for a in fine for b in fine) / 4
     return Squares(
-        np.broadcast_to(total, np.shape(total)[:-2] + (ny, nx)).reshape(-1, ny, nx), side_x, side_y
+        np.broadcast_to(total, (*np.shape(total)[:-2], ny, nx)).reshape(-1, ny, nx), side_x, side_y
     )
 
 
@@ -113,19 +114,20 @@ def grating(camera) -> Waves:
     return Waves((source.mean, swing), (0.0, fx), (0.0, fy), (0.0, source.phase))
 
 
-def csf_chart(camera) -> Squares:
-    """Frequency from 0 at the left edge, contrast from 0 at the bottom edge to 1 at the top."""
+def csf_chart(camera) -> tuple[Rectangle, Product]:
+    """Frequency from 0 at the left edge, contrast from 0 at the bottom edge to most at the top."""
     width = camera.array.columns * camera.pixel.width
     height = camera.array.rows * camera.pixel.width
     source = camera.scene.source
 
-    def value(x, y):
-        phase = np.pi * source.max_frequency * (x + width / 2) ** 2 / width
-        contrast = source.max_contrast * np.clip(0.5 - y / height, 0, 1)
-        return source.mean * (1 + contrast * np.cos(phase + source.phase))
+    def chirp(x: np.ndarray) -> np.ndarray:
+        along = np.pi * source.max_frequency * (x + width / 2) ** 2 / width
+        return np.cos(along + source.phase)
 
-    pitch = camera.pixel.width
-    return painted(value, camera.array.columns, camera.array.rows, pitch, pitch, margin=24)
+    def contrast(y: np.ndarray) -> np.ndarray:
+        return source.max_contrast * np.clip(0.5 - y / height, 0, 1)
+
+    return EVERYWHERE, Product(chirp, contrast)
 
 
 def edge_chart(camera) -> Squares:
@@ -139,7 +141,7 @@ def edge_chart(camera) -> Squares:
     return painted(value, camera.array.columns, camera.array.rows, pitch, pitch, margin=36)
 
 
-def color_chart(camera) -> tuple[Rectangles, OfWavelength]:
+def color_chart(camera) -> tuple[tuple[Rectangle, ...], OfWavelength]:
     """Patches of 40 mm, 5 mm apart, 7.5 mm of a card of 3 % around them, a surround of 8 %.
 
     Surround, card, patches lie on each other, each with what it adds to the one below: rectangles
@@ -151,9 +153,12 @@ def color_chart(camera) -> tuple[Rectangles, OfWavelength]:
     mm = min(wide / 280, high / 190)
     lefts = [(-140 + 7.5 + 45 * i) for i in range(6)]
     tops = [(-95 + 7.5 + 45 * i) for i in range(4)]
-    patches = [(left, left + 40, top, top + 40) for top in tops for left in lefts]
-    everywhere = (-math.inf, math.inf, -math.inf, math.inf)
-    edges = np.array([everywhere, (-140, 140, -95, 95), *patches]) * mm
+    card = Rectangle(-140 * mm, 140 * mm, -95 * mm, 95 * mm)
+    patches = [
+        Rectangle(left * mm, (left + 40) * mm, top * mm, (top + 40) * mm)
+        for top in tops
+        for left in lefts
+    ]
     rows = (DATA / "colorchecker.csv").read_text(encoding="utf-8").splitlines()
     header = next(row for row in rows if not row.startswith("#"))
     names = next(csv.reader([header]))[1:]
@@ -162,4 +167,4 @@ def color_chart(camera) -> tuple[Rectangles, OfWavelength]:
         table = [column(DATA / "colorchecker.csv", name)(wavelength) - 0.03 for name in names]
         return np.array([flat(0.08)(wavelength), flat(-0.05)(wavelength), *table])
 
-    return Rectangles(edges), reflectance
+    return (EVERYWHERE, card, *patches), reflectance

@@ -239,6 +239,7 @@ array: {rows: 32, columns: 48, pattern: monochrome}
 """,
     lambda camera, picture: setup_of(
         camera, scenes.csf_chart(camera), continuous(lambda w: scenes.planck(w, 5500)),
+        parts=np.full((2, 1), camera.scene.source.mean),
         glass=flat(0.8), quantum=flat(0.4),
     ),
 )  # fmt: skip
@@ -252,7 +253,7 @@ scene:
   radiance: 1 W/(sr m2)
   distance: infinity
   wavelengths: {start: 420 nm, stop: 680 nm}
-optics: {f_number: 8, focal_length: 0.5 mm, transmittance: 1, off_axis: cos4}
+optics: {f_number: 8, focal_length: 1.5 mm, transmittance: 1, off_axis: cos4}
 pixel:
   width: 7 um
   photodetector: {fill_factor: 1, quantum_efficiency: 0.6}
@@ -444,7 +445,7 @@ NOISY = (
     )
     .replace("dark_current_scale: 3}", "dark_current_scale: 3, capacitance: 5 fF}")
     .replace("  READOUT", "  fpn: {offset_pixel: 20 e, gain_pixel: 2 %}\n  " + READOUT)
-    .replace("20 uV/e", "20 uV/e, read_noise: 12 e")
+    .replace("20 uV/e", "20 uV/e, read_noise: 12 e, reset_noise: ktc")
 )
 NOISES = ("shot_noise", "reset_noise", "read_noise", "fpn")
 QUIET = "{" + ", ".join(f"{name}: off" for name in NOISES) + "}"
@@ -469,11 +470,11 @@ def test_variance_of_each_source(source, tmp_path):
 
 
 def test_codes_of_a_camera_without_noise(tmp_path):
-    # a swing of 30 mV is 1500 electrons: the brightest pixels are clipped to 4095
+    # a swing of 10 mV is 500 electrons: the brightest pixels are clipped to 4095
     case = EXACT["sharp"]
-    yaml = case.yaml.replace("READOUT", READOUT.replace("20 V", "30 mV, gain: 1.2"))
+    yaml = case.yaml.replace("READOUT", READOUT.replace("20 V", "10 mV, gain: 1.2"))
     camera = Case(yaml, case.reference, case.picture).load(tmp_path, "codes", QUIET, "reference")
     mean = ref.mean_electrons(case.reference(camera, case.picture))
-    expected = ref.digital_number(np.minimum(mean, 1500), 20e-6, 1.2, 36e-3, 12, 64)
+    expected = ref.digital_number(np.minimum(mean, 500), 20e-6, 1.2, 12e-3, 12, 64)
     assert expected.max() == 4095
     assert np.array_equal(vcam_cli.simulate(camera).dn, expected)

@@ -152,12 +152,12 @@ def test_a_rectangle_is_the_same_as_its_squares():
     planes = np.zeros((1, 6, 8))
     planes[0, 1:3, 2:5] = 1
     squares = camera(ref.Squares(planes, 8e-6, 10e-6, outside="black"))
-    edges = np.array([[-16e-6, 8e-6, -20e-6, 0.0]])
-    expected = ref.mean_electrons(replace(squares, scene=ref.Rectangles(edges)))
+    rectangle = (ref.Rectangle(-16e-6, 8e-6, -20e-6, 0.0),)
+    expected = ref.mean_electrons(replace(squares, scene=rectangle))
     found = ref.mean_electrons(squares)
     assert found == pytest.approx(expected, abs=1e-9 * expected.max())
     sharp = replace(squares, diffraction=False)
-    expected = ref.mean_electrons(replace(sharp, scene=ref.Rectangles(edges)))
+    expected = ref.mean_electrons(replace(sharp, scene=rectangle))
     assert ref.mean_electrons(sharp) == pytest.approx(expected, abs=1e-9 * expected.max())
 
 
@@ -170,18 +170,23 @@ def test_squares_are_black_outside_when_asked():
 
 
 @pytest.mark.parametrize("f_number", [1.2, 2.8, 8])
-def test_blurred_squares_agree_with_the_blurred_wave(f_number):
-    # a wave painted on squares a twelfth of the pixel: painting alone errs by (pi f s)^2/6 = 3e-5
-    scene = wave(30e3)
+@pytest.mark.parametrize("kind", ["squares", "product"])
+def test_blur_agrees_with_the_blurred_wave(kind, f_number):
+    # painting on squares a 24th of the pixel errs by (pi f s)^2/3 = 1e-4
+    scene = wave(30e3, angle=0.0)
+    fx = scene.fx[1]
+    exact = ref.mean_electrons(camera(scene, f_number=f_number, wavelength=(450e-9, 650e-9)))
 
-    def value(x, y):
-        swing = np.cos(2 * np.pi * (scene.fx[1] * x + scene.fy[1] * y) + 0.9)
-        return 0.5 + 0.4 * swing
+    def swing(x):
+        return 0.4 * np.cos(2 * np.pi * fx * x + 0.9)
 
-    painted = scenes.painted(value, 16, 12, 4e-6, 5e-6, margin=40)
-    setup = camera(scene, f_number=f_number, wavelength=(450e-9, 650e-9))
-    exact = ref.mean_electrons(setup)
-    found = ref.mean_electrons(replace(setup, scene=painted))
+    parts = (scenes.EVERYWHERE, ref.Product(swing, np.ones_like))
+    radiance = np.array([[0.5, 0.5], [1.0, 1.0]])
+    if kind == "squares":
+        radiance = np.ones((1, 2))
+        parts = scenes.painted(lambda x, y: 0.5 + swing(x), 16, 12, 4e-6, 5e-6, margin=40)
+    setup = camera(parts, f_number=f_number, wavelength=(450e-9, 650e-9), radiance=radiance)
+    found = ref.mean_electrons(setup)
     assert np.abs(found - exact).max() < 2e-4 * exact.max()
 
 

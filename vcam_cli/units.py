@@ -84,7 +84,7 @@ def parse_fraction(value: object) -> float:
     """A dimensionless number: bare (0.05) or in percent ("5 %"). Raises ValueError."""
     if isinstance(value, (int, float)) and not isinstance(value, bool):
         if not math.isfinite(value):
-            raise ValueError(f"{value} is not a number that can be used; write for example 0.05")
+            raise ValueError(f"{value} is not finite; write a finite number, for example 0.05")
         return float(value)
     match = _QUANTITY.fullmatch(value.strip()) if isinstance(value, str) else None
     if match is None or len(str(value)) > _LONGEST:

@@ -288,7 +288,7 @@ class TestFilesNamedInside:
             ("/dev/zero", "'/dev/zero' is not a regular file"),
             ("~/photo.png", "~ is not expanded"),
             ("$HOME/photo.png", "there is no file '$HOME/photo.png'"),
-            ("file:///photo.png", "is a URL"),
+            ("file:///photo.png", "'file:///photo.png' is a URL"),
         ],
     )
     def test_what_is_no_file(self, folder, name, said):

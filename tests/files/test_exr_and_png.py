@@ -127,7 +127,7 @@ def test_misuse_is_an_error_and_leaves_nothing(tmp_path):
         (0, {**blocks, "dn": blocks["dn"][:3]}),
     ]
     for row, block in wrong:
-        with pytest.raises(ValueError), ExrWriter(tmp_path / "a.exr", (70, 41), list(FRAME)) as w:  # noqa: PT011
+        with pytest.raises(ValueError), ExrWriter(tmp_path / "a.exr", (70, 41), list(FRAME)) as w:
             w.write_rows(row, block)
     with (
         pytest.raises(ValueError, match="of 70 rows"),

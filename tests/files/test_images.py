@@ -115,16 +115,14 @@ def test_png_with_a_palette(tmp_path):
 def test_alpha_is_dropped_and_colors_stay_as_stored(tmp_path, kind, names):
     data = RANDOM.integers(0, 256, (4, 5, len(names))).astype(np.uint8)
     path = tmp_path / f"a.{kind}"
-    write(path, data, names, alpha=None, oiio__UnassociatedAlpha=1) if kind == "png" else (
-        write_tiff_alpha(path, data, names)
-    )
+    write_with_alpha(path, data, names)
     found = read(path)
     np.testing.assert_allclose(found.data, data[..., :-1] / 255, rtol=6e-8)
     assert found.channels == names[:-1]
     assert any("alpha" in note for note in found.notes)
 
 
-def write_tiff_alpha(path, data, names):
+def write_with_alpha(path, data, names):
     spec = oiio.ImageSpec(data.shape[1], data.shape[0], len(names), "uint8")
     spec.channelnames, spec.alpha_channel = names, len(names) - 1
     spec.attribute("oiio:UnassociatedAlpha", 1)

@@ -86,7 +86,12 @@ def test_record_of_another_program_owns_nothing(tmp_path, record):
 
 def test_file_as_output_is_bad_input(tmp_path):
     (tmp_path / "out").write_text("a file")
-    for path in (tmp_path / "out", tmp_path / "out" / "below", tmp_path / ("x" * 300)):
+    for path in (
+        tmp_path / "out",
+        tmp_path / "out" / "below",
+        tmp_path / ("x" * 300),
+        tmp_path / "a\0b",
+    ):
         with pytest.raises(BadInput):
             run(path, {"raw.exr": "1"})
     assert tree(tmp_path) == ["out"]
@@ -106,7 +111,18 @@ def test_hostile_record_removes_nothing_outside(tmp_path):
     (out / "link").symlink_to(outside)
     (out / "kept").mkdir()
     (out / "kept" / "b").write_text("keep")
-    names = ["../outside/a", str(outside / "a"), "link/a", "kept", "", ".", "a\0b", "raw.exr"]
+    names = [
+        "../outside/a",
+        str(outside / "a"),
+        "link/a",
+        "kept",
+        "",
+        ".",
+        "a\0b",
+        "raw.exr",
+        "\ud800",
+        "y" * 999,
+    ]
     (out / "run.json").write_text(json.dumps({"program": "vcam", "files": names}))
     run(out, {"render.png": "2"})
     assert (outside / "a").read_text() == "keep"
@@ -218,7 +234,7 @@ def test_folder_that_cannot_be_written_is_cannot_do(tmp_path, monkeypatch, numbe
         raise OSError(code, os.strerror(code))
 
     monkeypatch.setattr(folder_module.os, "open", refuse)
-    with pytest.raises(CannotDo, match="out.*;") as caught, OutputFolder(tmp_path / "out"):
+    with pytest.raises(CannotDo, match=r"out.*;") as caught, OutputFolder(tmp_path / "out"):
         pass
     assert caught.value.exit_code == 3
     monkeypatch.undo()

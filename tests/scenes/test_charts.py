@@ -35,10 +35,8 @@ def mix_of(built, planes=2):
 @pytest.mark.parametrize("source", SMOOTH)
 def test_averages_of_smooth_charts(source):
     # 64 midpoints a cell err by (pi f w)^2/6/64^2 = 3e-5 of the modulation at f w = 0.4.
-    # A width below the array's makes all of them sampled, and frames them in black.
-    chart = sampled(source, margin=2, scene_width=1e-3)if source is CSF else sampled(
-        source, margin=2, scene_width=33e-6
-    )
+    # A width below the array's makes waves, too, a sampled scene, with black around.
+    chart = sampled(source, margin=2, scene_width=1e-3 if source is CSF else 33e-6)
     mix = mix_of(chart)
     assert chart.shape == (16, 20)
     inside = np.s_[:, 6:10, 6:14]
@@ -59,7 +57,7 @@ def test_averages_of_charts_with_edges(source, oversampling):
 @pytest.mark.parametrize("source", [LEAVES, BOTH])
 def test_averages_of_dead_leaves(source):
     # Cells of 1/16 of the picture hold dozens of leaves. 64 x 64 points err by about 1e-3 where
-    # many edges cross a cell, the painter by a few times 4^-4 of a cell.
+    # many edges cross a cell, the painter by a fraction of that.
     chart = sampled(source, margin=1)
     mix = mix_of(chart)
     error = chart.planes(mix) - brute(chart, mix, 64)
@@ -85,8 +83,8 @@ def test_finer_cells_average_to_coarser_ones(source):
     coarse, fine = sampled(source, margin=1), sampled(source, margin=1, oversampling=3)
     mix = mix_of(coarse)
     small = fine.planes(mix).reshape(2, 14, 3, 18, 3).mean((2, 4))
-    # Exact but for the corners of leaves: a few of 4^-4.
-    tolerance = 1e-2 if source in (LEAVES, BOTH) else 1e-12
+    # Exact but for the places where leaves' edges meet, dozens a cell: seen 2e-3 at most.
+    tolerance = 4e-3 if source in (LEAVES, BOTH) else 1e-12
     np.testing.assert_allclose(small, coarse.planes(mix), atol=tolerance)
 
 
@@ -97,7 +95,9 @@ def test_planes_are_linear_in_the_mix_and_in_the_dtype_of_the_view():
     assert planes.dtype == np.float32
     assert chart.at(np.zeros(1), np.zeros(1), mix).dtype == np.float32
     # float32 rounding of sums of a few parts
-    np.testing.assert_allclose(chart.planes(mix[:1] + mix[1:2])[0], planes[0] + planes[1], rtol=1e-5)
+    np.testing.assert_allclose(
+        chart.planes(mix[:1] + mix[1:2])[0], planes[0] + planes[1], rtol=1e-5
+    )
 
 
 def test_bands_of_rows_join_seamlessly(monkeypatch):

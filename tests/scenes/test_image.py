@@ -98,7 +98,9 @@ def test_points_see_the_sample_they_fall_into():
 
 def test_points_around_a_small_image_are_black():
     shown = image_scene(picture(3, 4) + 1, (WHITE,), WHITE, view(scene_width=24e-6))
-    light = shown.at(np.array([-13e-6, -11e-6, 11e-6, 13e-6]), np.array([-10e-6, 0]), np.ones((1, 1)))
+    light = shown.at(
+        np.array([-13e-6, -11e-6, 11e-6, 13e-6]), np.array([-10e-6, 0]), np.ones((1, 1))
+    )
     assert (light[0] > 0).tolist() == [[False] * 4, [False, True, True, False]]
 
 
@@ -124,7 +126,7 @@ def test_planes_are_the_linear_combination_of_channels():
 
 
 def test_reflectance_of_three_channels_names_the_other_models():
-    with pytest.raises(BadInput, match="scene.source.model: .*one channel.*laser") as caught:
+    with pytest.raises(BadInput, match=r"scene.source.model: .*one channel.*laser") as caught:
         build(scene(GRAY), view(), picture(4, 4, 3))
     assert caught.value.problems[0].path == ("scene", "source", "model")
 
@@ -153,5 +155,5 @@ def test_laser_luminance():
 
 def test_laser_lines_outside_the_wavelengths_are_an_error():
     narrow = {"start": "500 nm", "stop": "700 nm"}
-    with pytest.raises(BadInput, match="scene.wavelengths: .*450"):
+    with pytest.raises(BadInput, match=r"scene.wavelengths: .*450"):
         build(scene(LASER, wavelengths=narrow), view(), picture(4, 4, 3))

@@ -40,13 +40,14 @@ def test_a_lamp_that_nobody_sees_has_no_luminance():
     infrared = {"start": "900 nm", "stop": "1000 nm"}
     lamp = {"monochromatic": "950 nm"}
     dark = scene(FLAT, illuminant=lamp, luminance="100 cd/m2", wavelengths=infrared)
-    with pytest.raises(BadInput, match="scene.illuminant: .*no visible light"):
+    with pytest.raises(BadInput, match=r"scene.illuminant: .*no visible light"):
         white_radiance(dark)
     lit = scene(FLAT, illuminant=lamp, radiance="1 W/(sr m2)", wavelengths=infrared)
     assert integral(white_radiance(lit), 900e-9, 1000e-9) == pytest.approx(1.0)
 
 
-def test_a_lamp_that_does_not_cover_the_wavelengths_is_an_error():
-    wide = {"start": "100 nm", "stop": "780 nm"}
-    with pytest.raises(BadInput, match="scene.illuminant"):
-        white_radiance(scene(FLAT, illuminant="D65", luminance="1 cd/m2", wavelengths=wide))
+def test_a_lamp_that_does_not_cover_the_wavelengths_is_an_error(tmp_path):
+    lamp = tmp_path / "lamp.csv"
+    lamp.write_text("wavelength_nm,value\n400,1\n700,2\n")
+    with pytest.raises(BadInput, match=r"scene.illuminant: .*400-700 nm"):
+        white_radiance(scene(FLAT, illuminant={"file": str(lamp)}))

@@ -8,7 +8,7 @@ from pydantic_core import InitErrorDetails
 
 from vcam_cli.camera.base import Model, at_most_one, key, together
 from vcam_cli.camera.explain import failure, fault, one_of, shown
-from vcam_cli.camera.spectrum import Spectral, SpectrumFile, SpectrumSpec, SpectrumTable
+from vcam_cli.camera.spectrum import Spectral, SpectrumSpec, moved
 from vcam_cli.camera.values import Either, File, Length, Whole, mapping, word_or, written
 
 BAYER = ("bayer-rggb", "bayer-grbg", "bayer-gbrg", "bayer-bggr")
@@ -27,7 +27,6 @@ DEFAULT_FILTERS = "generic-rgb"
 
 _FILTER = Spectral(most=1.0)
 _Count = Whole(least=1, most=10**7, example="512")
-Color = Literal["R", "G", "B", "W", "Y"]
 
 
 class Die(Model):
@@ -81,7 +80,9 @@ def _filters(given: Any) -> dict[str, SpectrumSpec]:
     if isinstance(given, str):
         return filter_set(given)
     if not isinstance(given, Mapping):
-        raise ValueError(f"{shown(given)} is not a set of filters; write for example {{R: 0.9, ...}}")
+        raise ValueError(
+            f"{shown(given)} is not a set of filters; write for example {{R: 0.9, ...}}"
+        )
     found, mistakes = {}, []
     for color, item in given.items():
         try:
@@ -89,16 +90,10 @@ def _filters(given: Any) -> dict[str, SpectrumSpec]:
                 raise ValueError(f"{shown(color)} is not the name of a color; write for example R")
             found[color] = _FILTER.read(item)
         except ValueError as error:
-            mistakes += _below(error, color, item)
+            mistakes += moved(error, color, item)
     if mistakes:
         raise failure(mistakes)
     return found
-
-
-def _below(error: ValueError, color: Any, given: Any) -> list[InitErrorDetails]:
-    from vcam_cli.camera.spectrum import moved
-
-    return moved(error, color, given)
 
 
 def filter_set(name: str) -> dict[str, SpectrumSpec]:
@@ -108,7 +103,7 @@ def filter_set(name: str) -> dict[str, SpectrumSpec]:
 
     try:
         path = shipped.find("filters", name)
-        tree = yaml_tree.read_file(path).plain()
+        tree: Any = yaml_tree.read_file(path).plain()
     except BadInput as error:
         problem = error.problems[0]
         raise ValueError(f"{problem.message}; {problem.remedy}") from None
@@ -134,7 +129,7 @@ class Array(Model):
     )
     pattern: Annotated[
         str | Block | Positions,
-        Either(_pattern, Literal[tuple(PATTERNS)] | Block | Positions),  # type: ignore[operator]
+        Either(_pattern, Literal[tuple(PATTERNS)] | Block | Positions),
     ] = key(
         "colors of the pixels, row 0 column 0 first",
         example="bayer-rggb",
@@ -152,7 +147,7 @@ class Array(Model):
         "transmittance of each color's filter (a spectrum), or the name of a shipped set; "
         "default generic-rgb, and no filter on monochrome pixels (color Y) and on W",
         example={"R": {"file": "r.csv"}, "G": {"file": "g.csv"}, "B": {"file": "b.csv"}},
-        default=dict,
+        default=None,
     )
     binning: Annotated[Binning | None, word_or(Binning, {"none": None})] = key(
         "pixels that are read as one", example="none", default=None, not_yet=True
@@ -181,7 +176,7 @@ class Array(Model):
 
     @model_validator(mode="after")
     def _complete_filters(self) -> Self:
-        filters = self.filters
+        filters = self.filters or {}
         if "filters" not in self.model_fields_set and set(self.colors) - set(CLEAR):
             filters = filter_set(DEFAULT_FILTERS)
         for color in self.colors:

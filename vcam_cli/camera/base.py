@@ -32,7 +32,9 @@ Rule = Callable[[Mapping[str, Any]], Iterable[InitErrorDetails]]
 class Model(BaseModel):
     """A mapping of a camera file."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, protected_namespaces=())
+    model_config = ConfigDict(
+        extra="forbid", frozen=True, allow_inf_nan=False, protected_namespaces=()
+    )
     rules: ClassVar[tuple[Rule, ...]] = ()
     not_yet: ClassVar[str] = ""
     """Set on a choice that is not built yet: the key that names it."""

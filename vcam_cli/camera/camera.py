@@ -28,6 +28,9 @@ class Origin(Protocol):
     @property
     def file(self) -> FilePath: ...
 
+    @property
+    def files(self) -> tuple[FilePath, ...]: ...
+
     def locate(self, path: Path) -> str: ...
 
 
@@ -49,12 +52,13 @@ class Camera(Model):
     """A camera that looks at a scene: everything that a run depends on."""
 
     name: Word = key(
-        "name of the camera and of its output folder; default the file's", example="example",
+        "name of the camera and of its output folder; default the file's",
+        example="example",
         default="camera",
     )
     scene: Scene = key(
         "what stands in front of the lens",
-        example={"source": {"kind": "chart", "chart": "csf"}, "luminance": "100 cd/m2"},
+        example={"source": {"kind": "chart", "chart": "colorchecker"}, "luminance": "100 cd/m2"},
     )
     optics: Optics = key("the lens", example={"f_number": 2.8, "focal_length": "3.2 mm"})
     pixel: Pixel = key("one pixel", example={"width": "6.5 um"})
@@ -64,9 +68,9 @@ class Camera(Model):
     processing: Annotated[Steps, STEP_LIST] = key(
         "steps on the raw frame, in order; [] for none; default by pattern",
         example=[{"black_level": "subtract"}, {"demosaic": "bilinear"}, {"gamma": "srgb"}],
-        default=(),
+        default=None,
     )
-    quality: Annotated[tuple[str, ...], Either(_quality, list[Literal[METRICS]])] = key(  # type: ignore[valid-type]
+    quality: Annotated[tuple[str, ...], Either(_quality, list[Literal[METRICS]])] = key(
         "metrics of the picture against the ideal image",
         example=["mse", "psnr"],
         default=(),
@@ -118,6 +122,11 @@ class Camera(Model):
     def origin(self) -> FilePath | None:
         """The file it was read from."""
         return None if self._origin is None else self._origin.file
+
+    @property
+    def files(self) -> tuple[FilePath, ...]:
+        """All YAML files it was read from."""
+        return () if self._origin is None else self._origin.files
 
     def locate(self, path: Path) -> str:
         """Where a key stands, "camera.yaml:12:10"; "" for a camera that comes from no file."""

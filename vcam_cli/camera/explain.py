@@ -47,7 +47,12 @@ def failure(faults: Iterable[InitErrorDetails], title: str = "camera") -> Valida
 
 def sentences(error: ValidationError, model: type[BaseModel]) -> list[InitErrorDetails]:
     """The mistakes of an error raised while `model` was validated, put into words."""
-    return [_said(item, model) for item in error.errors(include_url=False)]
+    known = names(model)
+    return [
+        _said(item, model)
+        for item in error.errors(include_url=False)
+        if item["type"] != "extra_forbidden" or item["loc"][0] not in known  # a key's other name
+    ]
 
 
 def shown(value: object) -> str:

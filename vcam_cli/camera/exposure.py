@@ -83,9 +83,11 @@ class Exposure(Model):
         Either(
             _captures,
             list[Annotated[float, _TIME]] | CaptureSchedule,
-            write=lambda value: [_TIME.text(t) for t in value]
-            if isinstance(value, tuple)
-            else value and value.model_dump(mode="json"),
+            write=lambda value: (
+                [_TIME.text(t) for t in value]
+                if isinstance(value, tuple)
+                else value and value.model_dump(mode="json")
+            ),
         ),
     ] = key(
         "non-destructive samples of one integration, rising; or {schedule: optimal, count, max}",

@@ -73,12 +73,12 @@ class Geometry:
         """Photodetector area over width x height of the pixel (gaps not counted)."""
         return self.detector_area / (self.pixel_width * self.pixel_height)
 
-    def report(self, oversampling: int) -> dict[str, float | int]:
+    def report(self, oversampling: float) -> dict[str, float | int]:
         """The numbers of `run.json`'s `geometry`; a unit other than SI is in the name."""
         w, h, si = self.sensor_width, self.sensor_height, self.image_distance
         d = math.hypot(w, h)
         finite = math.isfinite(self.object_distance)
-        sample_x = self.pitch_x / oversampling
+        sample_x = self.pitch_x / (oversampling or 1)
         return {
             "focal_length": self.focal_length,
             "f_number": self.f_number,

@@ -17,8 +17,8 @@ from vcam_cli import errors
 from vcam_cli.camera import explain, geometry, shipped, support
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.merge import merge
-from vcam_cli.camera.parts import Parts, existing, looks_like_path
-from vcam_cli.camera.yaml_tree import Node, Source, below, read_text, walk
+from vcam_cli.camera.parts import Findings, Parts, existing, looks_like_path
+from vcam_cli.camera.yaml_tree import Key, Node, Source, below, read_text, walk
 from vcam_cli.errors import BadInput, Collector, Problem, bad, nearest, one_line
 
 FILE_KEYS = ("file", "positions")
@@ -26,7 +26,10 @@ FILE_KEYS = ("file", "positions")
 
 @dataclass(frozen=True)
 class Origin:
-    """Where a camera comes from: its file, all YAML files read, and the place of every key."""
+    """Where a camera comes from: its file, all input files, and the place of every key.
+
+    `files` are the YAML files read, then the files that they name (pictures, tables).
+    """
 
     file: Path
     files: tuple[Path, ...]
@@ -47,13 +50,15 @@ def load(camera: str | Path, sets: Sequence[str] = (), folder: Path | None = Non
     Raises BadInput with every problem of the file, CannotDo where a file may not be read.
     """
     file = find(camera, folder or Path.cwd())
-    tree, origin, parts = _read(file, sets, folder or Path.cwd())
-    problems = parts.problems
-    tree = _absolute_files(tree, problems, parts.failed)
-    result = _validated(tree, origin, problems, parts.failed)
-    problems.raise_if_any()
-    assert result is not None
-    _check(result, origin)
+    tree, parts = _read(file, sets, folder or Path.cwd())
+    findings = parts.findings
+    tree, named = _absolute_files(tree, findings)
+    origin = Origin(file, tuple(dict.fromkeys((*parts.files, *named))), places(tree))
+    result = _validated(tree, origin, findings)
+    if result is not None:
+        _check(result, origin, findings)
+    if findings.problems or result is None:
+        raise BadInput(sorted(findings.problems, key=_place))
     return result.with_origin(origin)
 
 
@@ -108,28 +113,29 @@ def places(tree: Node) -> dict[errors.Path, str]:
     return found
 
 
-def _read(file: Path, sets: Sequence[str], folder: Path) -> tuple[Node, Origin, Parts]:
-    """The whole tree of a file, its origin, and the parts that went into it."""
+def _read(file: Path, sets: Sequence[str], folder: Path) -> tuple[Node, Parts]:
+    """The whole tree of a file, and the parts that went into it."""
     parts = Parts()
     tree = parts.file(file, "cameras")
     tree = merge(tree, parts.expand(overlay(sets, folder), (), ()))
     if tree.get("name") is None:
         stem = re.sub(r"[^A-Za-z0-9._-]+", "-", file.stem)[:64] or "camera"
-        name = Node(stem, tree.source, tree.line, tree.column)
-        tree = replace(tree, value={"name": name} | (tree.mapping or {}))
-    return tree, Origin(file, tuple(parts.files), places(tree)), parts
+        entries: dict[Key, Node] = {"name": Node(stem, tree.source, tree.line, tree.column)}
+        tree = replace(tree, value=entries | (tree.mapping or {}))
+    return tree, parts
 
 
-def _absolute_files(node: Node, problems: Collector, failed: set[errors.Path]) -> Node:
-    """The tree with every file name absolute; files that are not there are reported."""
+def _absolute_files(node: Node, findings: Findings) -> tuple[Node, list[Path]]:
+    """The tree with every file name absolute, and the files; what is no file is reported."""
+    named: list[Path] = []
 
     def visit(node: Node, path: errors.Path) -> Node:
         if path and path[-1] in FILE_KEYS and isinstance(node.value, str):
             try:
-                return replace(node, value=str(_absolute(node)))
+                named.append(_absolute(node))
+                return replace(node, value=str(named[-1]))
             except BadInput as error:
-                failed.add(path)
-                problems.extend(BadInput(replace(p, path=path) for p in error.problems))
+                findings.fail(path, error.problems)
                 return node
         if isinstance(node.value, dict):
             entries = {k: visit(child, below(path, k)) for k, child in node.value.items()}
@@ -138,7 +144,7 @@ def _absolute_files(node: Node, problems: Collector, failed: set[errors.Path]) -
             return replace(node, value=[visit(c, (*path, i)) for i, c in enumerate(node.value)])
         return node
 
-    return visit(node, ())
+    return visit(node, ()), named
 
 
 def _absolute(node: Node) -> Path:
@@ -149,31 +155,29 @@ def _absolute(node: Node) -> Path:
         raise error.located(lambda _: node.where) from None
 
 
-def _validated(
-    tree: Node, origin: Origin, problems: Collector, failed: set[errors.Path]
-) -> Camera | None:
-    """The camera, or None with its problems collected, those of failed parts left out."""
+def _validated(tree: Node, origin: Origin, findings: Findings) -> Camera | None:
+    """The camera, or None with its problems added to the findings."""
     value = tree.plain()
     assert isinstance(value, dict)
     try:
         return Camera.model_validate(value)
     except ValidationError as error:
-        found = explain.problems(error, Camera, value)
-    for problem in found:
-        if not any(problem.path[: len(path)] == path for path in failed):
-            problems.extend(BadInput([problem]).located(origin.locate))
-    return None
+        findings.add(explain.problems(error, Camera, value), origin.locate)
+        return None
 
 
-def _check(camera: Camera, origin: Origin) -> None:
-    """Raises BadInput for all that a valid camera can still have wrong."""
-    problems = Collector()
-    problems.extend(BadInput(support.unsupported(camera)))
-    checks: tuple[Callable[[Camera], None], ...] = (geometry.check,)
+def _check(camera: Camera, origin: Origin, findings: Findings) -> None:
+    """Finds all that a valid camera can still have wrong."""
+    findings.add(support.unsupported(camera), origin.locate)
+    checks: tuple[Callable[[Camera], None], ...] = (support.check_spectra, geometry.check)
     for check in checks:
         try:
             check(camera)
         except BadInput as error:
-            problems.extend(error)
-    if problems.problems:
-        raise BadInput(problems.problems).located(origin.locate)
+            findings.add(error.problems, origin.locate)
+
+
+def _place(problem: Problem) -> tuple[str, int, int]:
+    """File, line and column of a problem, to tell problems in the order of the file."""
+    match = re.fullmatch(r"(.*?):(\d+):(\d+)", problem.where)
+    return (match[1], int(match[2]), int(match[3])) if match else (problem.where, 0, 0)

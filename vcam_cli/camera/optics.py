@@ -167,9 +167,9 @@ class Optics(Model):
         example="46 deg",
         default=None,
     )
-    numerical_aperture: Annotated[
-        float | None, Number(above=0, below=1, example="0.18")
-    ] = key("on the image side; may stand for f_number", example=0.18, default=None)
+    numerical_aperture: Annotated[float | None, Number(above=0, below=1, example="0.18")] = key(
+        "on the image side; may stand for f_number", example=0.18, default=None
+    )
     transmittance: Annotated[SpectrumSpec, Spectral(most=1.0)] = key(
         "of lens and filters in front of the sensor: a spectrum",
         example=0.95,

@@ -8,6 +8,7 @@ Why a name never means the file it stands in (or another camera, for shipped one
 `csf.yaml` may well say `scene: csf`.
 """
 
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -29,12 +30,33 @@ _SUFFIXES = (".yaml", ".yml")
 
 
 @dataclass
+class Findings:
+    """The problems found so far, and the paths of what could not be had at all.
+
+    What later steps find wrong below such a path would only be an echo, and is dropped.
+    """
+
+    problems: list[Problem] = field(default_factory=list)
+    failed: set[errors.Path] = field(default_factory=set)
+
+    def fail(self, path: errors.Path, problems: Iterable[Problem]) -> None:
+        """`path` could not be had, because of `problems`."""
+        self.failed.add(path)
+        self.problems.extend(_under(path, problem) for problem in problems)
+
+    def add(self, problems: Iterable[Problem], locate: Callable[[errors.Path], str]) -> None:
+        """Further problems, put in place by `locate`."""
+        for problem in BadInput(problems).located(locate).problems:
+            if not any(problem.path[: len(path)] == path for path in self.failed):
+                self.problems.append(problem)
+
+
+@dataclass
 class Parts:
-    """Expands trees; remembers the files read and the sections whose part was not to be had."""
+    """Expands trees; remembers the files read and what was wrong with parts."""
 
     files: list[Path] = field(default_factory=list)
-    failed: set[errors.Path] = field(default_factory=set)
-    problems: errors.Collector = field(default_factory=errors.Collector)
+    findings: Findings = field(default_factory=Findings)
 
     def file(
         self, path: Path, kind: str, at: errors.Path = (), chain: tuple[Path, ...] = ()
@@ -78,8 +100,7 @@ class Parts:
                 part = merge(part, self.expand(without(node, "use"), at, chain), at)
             return replace(part, whole=True)
         except BadInput as error:
-            self.failed.add(at)
-            self.problems.extend(BadInput(_under(at, problem) for problem in error.problems))
+            self.findings.fail(at, error.problems)
             return node
 
     def _part(self, name: Node, kind: str, at: errors.Path, chain: tuple[Path, ...]) -> Node:

@@ -9,7 +9,7 @@ from pydantic_core import InitErrorDetails
 
 from vcam_cli.camera.base import Model, at_most_one, exactly_one, key, needs, together
 from vcam_cli.camera.explain import failure, fault
-from vcam_cli.camera.spectrum import Spectral, SpectrumFile, SpectrumSpec, SpectrumTable
+from vcam_cli.camera.spectrum import Spectral, SpectrumSpec
 from vcam_cli.camera.technology import CHOICE, Junction, TechnologyChoice
 from vcam_cli.camera.values import (
     Either,
@@ -106,7 +106,7 @@ def _dark_density(given: Any) -> Any:
     if isinstance(given, (Mapping, DarkCurrentDensity)):
         return DarkCurrentDensity.model_validate(given)
     value = _DENSITY.read(given)
-    return value if value == "junction" else DarkCurrentDensity(value=_DENSITY.text(value))  # type: ignore[arg-type]
+    return value if value == "junction" else DarkCurrentDensity(value=_DENSITY.text(value))
 
 
 class ChargeDiffusion(Model):
@@ -293,7 +293,9 @@ class Defects(Model):
     """Pixels that do not work."""
 
     hot: Fraction = key("fraction of pixels that are hot", example=1e-4, default=0.0, not_yet=True)
-    dead: Fraction = key("fraction of pixels that are dead", example=1e-4, default=0.0, not_yet=True)
+    dead: Fraction = key(
+        "fraction of pixels that are dead", example=1e-4, default=0.0, not_yet=True
+    )
 
 
 class Layer(Model):
@@ -349,7 +351,7 @@ class Pixel(Model):
     )
     width: Length = key("width of the pixel", unit="um", example="6.5 um")
     height: Annotated[float, Quantity("length", above=0)] = key(
-        "height of the pixel; default its width", unit="um", example="6.5 um", default=0.0
+        "height of the pixel; default its width", unit="um", example="6.5 um", default=None
     )
     gap_x: Gap = key(
         "between pixels of a row; pitch = width + gap", unit="um", example="0 um", default=0.0

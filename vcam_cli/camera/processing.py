@@ -86,9 +86,9 @@ class ColorCorrection(Step):
 class Gamma(Step):
     """The tone curve of the render."""
 
-    gamma: Annotated[float | Literal["srgb"], Number(above=0, example="2.2", words={"srgb": "srgb"})] = key(
-        "a number, or srgb", example="srgb"
-    )
+    gamma: Annotated[
+        float | Literal["srgb"], Number(above=0, example="2.2", words={"srgb": "srgb"})
+    ] = key("a number, or srgb", example="srgb")
 
 
 STEPS: dict[str, type[Step]] = {

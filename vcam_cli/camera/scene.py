@@ -11,6 +11,7 @@ from vcam_cli.camera.explain import failure, fault, one_of, shown
 from vcam_cli.camera.spectrum import IlluminantSpec, Lamp
 from vcam_cli.camera.values import (
     Angle,
+    Choice,
     Either,
     File,
     Fraction,
@@ -156,9 +157,7 @@ class HdrPatches(Chart):
     """Patches of widely different radiance, and a lamp."""
 
     chart: Literal["hdr-patches"] = key("which chart", example="hdr-patches")
-    dynamic_range: Positive = key(
-        "brightest over darkest patch", example=10000.0, default=10000.0
-    )
+    dynamic_range: Positive = key("brightest over darkest patch", example=10000.0, default=10000.0)
     patches: Annotated[int, Whole(least=2, most=1000, example="24")] = key(
         "number of patches", example=24, default=24
     )
@@ -173,12 +172,14 @@ class ImageFile(Model):
 
     kind: Literal["image"] = key("what kind of source this is", example="image")
     file: File = key("any image file that OpenImageIO reads", example="photo.png")
-    encoding: Literal["srgb", "linear"] | None = key(
+    encoding: Annotated[str, Choice("srgb", "linear")] = key(
         "how the file codes light; default srgb, for .exr, .hdr and .pfm linear",
         example="srgb",
         default=None,
     )
-    white: Positive = key("value in the file that has the stated luminance", example=1.0, default=1.0)
+    white: Positive = key(
+        "value in the file that has the stated luminance", example=1.0, default=1.0
+    )
     model: Literal["reflectance", "laser", "rgb-display", "mallett"] = key(
         "what channels mean: reflectance (one channel), laser (450, 550 and 650 nm, equal planes "
         "= equal radiance in W), rgb-display (a display's primaries), mallett (reflectances)",
@@ -189,7 +190,7 @@ class ImageFile(Model):
 
     @model_validator(mode="after")
     def _encoding(self) -> Self:
-        if self.encoding is None:
+        if "encoding" not in self.model_fields_set:
             linear = PurePath(self.file).suffix.lower() in (".exr", ".hdr", ".pfm")
             self._fill(encoding="linear" if linear else "srgb")
         return self
@@ -273,7 +274,9 @@ def _choice(name: str, word: object, allowed: Any, given: Mapping[Any, Any]) -> 
 class Extent(Model):
     """A scene of a given size."""
 
-    width: Length = key("width in the scene plane; the scene is centered", unit="m", example="0.5 m")
+    width: Length = key(
+        "width in the scene plane; the scene is centered", unit="m", example="0.5 m"
+    )
 
 
 class Wavelengths(Model):
@@ -297,7 +300,6 @@ class Wavelengths(Model):
         return self
 
 
-
 _LUMINANCE = Quantity("luminance", above=0, words={"from-file": "from-file"})
 
 
@@ -305,7 +307,8 @@ class Scene(Model):
     """What the camera looks at."""
 
     source: Annotated[Source, Either(_source, Source)] = key(
-        "a chart, an image file or a hyperspectral file", example={"kind": "chart", "chart": "csf"}
+        "a chart, an image file or a hyperspectral file",
+        example={"kind": "chart", "chart": "colorchecker"},
     )
     illuminant: Annotated[IlluminantSpec | None, Lamp()] = key(
         "the lamp; default D65; to be absent for images that emit (model laser or rgb-display)",
@@ -332,9 +335,7 @@ class Scene(Model):
     distance: Annotated[float, Quantity("distance", above=0)] = key(
         "from lens to scene, or infinity", unit="m", example="1 m", default=1.0
     )
-    extent: Annotated[
-        Literal["sensor"] | Extent, word_or(Extent, {"sensor": "sensor"})
-    ] = key(
+    extent: Annotated[Literal["sensor"] | Extent, word_or(Extent, {"sensor": "sensor"})] = key(
         "sensor: the scene covers the array, cropped centrally to its aspect; or its width in "
         "the scene plane, black outside",
         example="sensor",

@@ -7,7 +7,7 @@ from pydantic import Strict, create_model, model_validator
 
 from vcam_cli.camera.base import Model, at_most_one, key
 from vcam_cli.camera.explain import failure, fault, one_of, shown
-from vcam_cli.camera.values import Either, Number, Quantity, Whole
+from vcam_cli.camera.values import Choice, Either, Number, Quantity, Whole
 
 EFFECTS = {
     "off_axis": "falloff of light away from the axis",
@@ -64,14 +64,14 @@ _TOLERANCE = Number(above=0, most=0.5, example="0.1 %")
 class Accuracy(Model):
     """How exact the simulation is to be: a preset or a tolerance, and knobs that it sets."""
 
-    preset: Literal["draft", "standard", "reference"] | None = key(
+    preset: Annotated[str | None, Choice(*PRESETS)] = key(
         "draft (2 %), standard (0.5 %) or reference (0.02 %)", example="standard", default=None
     )
     tolerance: Annotated[float, _TOLERANCE] = key(
         "in place of a preset: error allowed, relative to full signal",
         unit="%",
         example="0.1 %",
-        default=0.005,
+        default=None,
     )
     wavelength_step: Annotated[float | None, Quantity("length", above=0)] = key(
         "spacing of wavelengths", unit="nm", example="5 nm", default=None
@@ -82,10 +82,10 @@ class Accuracy(Model):
     table_size: Annotated[int | None, Whole(least=16, most=2**20, example="4096")] = key(
         "entries of a table of transfer over spatial frequency", example=4096, default=None
     )
-    float_width: Literal[32, 64] | None = key(
+    float_width: Annotated[int | None, Choice(32, 64)] = key(
         "bits of the numbers computed with", example=32, default=None
     )
-    shot_noise: Literal["exact", "gaussian"] | None = key(
+    shot_noise: Annotated[str | None, Choice("exact", "gaussian")] = key(
         "exact: Poisson; gaussian: a normal distribution of the same variance",
         example="exact",
         default=None,
@@ -120,7 +120,7 @@ def _accuracy(given: Any) -> Accuracy:
     if isinstance(given, (Mapping, Accuracy)):
         return Accuracy.model_validate(given)
     if isinstance(given, str) and given in PRESETS:
-        return Accuracy(preset=given)  # type: ignore[arg-type]
+        return Accuracy(preset=given)
     if isinstance(given, str) and not given.lstrip("+-. ")[:1].isdigit():
         also = "a fraction such as 0.1 %"
         raise failure([fault((), *one_of(given, PRESETS, also), given)])
@@ -174,10 +174,11 @@ def _render(given: Any) -> int | None:
 class Output(Model):
     """What a run writes beside run.json and metrics.csv."""
 
-    raw: Annotated[
-        tuple[str, ...], Either(_raw, list[Literal["dn", "electrons", "volts"]])
-    ] = key("channels of raw.exr: dn, electrons, volts", example=["dn", "electrons"],
-            default=("dn", "electrons"))
+    raw: Annotated[tuple[str, ...], Either(_raw, list[Literal["dn", "electrons", "volts"]])] = key(
+        "channels of raw.exr: dn, electrons, volts",
+        example=["dn", "electrons"],
+        default=("dn", "electrons"),
+    )
     render: Annotated[
         Literal[8, 16] | None, Either(_render, Literal[8, 16, "none"], words={"none": None})
     ] = key("bits of render.png: 8, 16 or none", example=8, default=8, not_yet=("16",))

@@ -10,14 +10,14 @@ from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
+from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler, ValidationError
 from pydantic_core import CoreSchema, core_schema
 
 from vcam_cli import spectra
 from vcam_cli.camera import shipped
 from vcam_cli.camera.base import Model, key
 from vcam_cli.camera.explain import failure, fault, shown
-from vcam_cli.camera.values import File, Number, Quantity, Temperature, written
+from vcam_cli.camera.values import DEFINED, File, Number, Quantity, Temperature, written
 from vcam_cli.errors import BadInput, Path, bad
 
 NAME = r"^[A-Za-z0-9._-]{1,64}$"
@@ -51,7 +51,9 @@ class Points:
 
     def read(self, given: Any) -> tuple[tuple[float, float], ...]:
         if not isinstance(given, Mapping) or not given:
-            raise ValueError(f"{shown(given)} is not a table; write for example {{400: 0.1, 500: 0.3}}")
+            raise ValueError(
+                f"{shown(given)} is not a table; write for example {{400: 0.1, 500: 0.3}}"
+            )
         found, mistakes, last = [], [], 0.0
         for name, item in given.items():
             try:
@@ -195,15 +197,19 @@ class Spectral:
     def __get_pydantic_json_schema__(
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
     ) -> dict[str, Any]:
-        forms = handler(schema["json_schema_input_schema"])["anyOf"]  # type: ignore[typeddict-item]
+        forms = handler(schema["json_schema_input_schema"])["anyOf"]
         number = {"type": "number", "minimum": 0}
+        if self.most is not None:
+            number["maximum"] = self.most
         percent = {"type": "string", "pattern": r"^\s*\d+(\.\d*)?\s*%\s*$"}
         factor = [number, percent, {"type": "string", "pattern": NAME}, *forms]
         return {
-            "title": "spectrum",
-            "description": f"A spectrum: {_FORMS} (their product).",
+            DEFINED: {
+                "name": "spectrum" if self.most is None else "spectrum_at_most_1",
+                "description": f"A spectrum: {_FORMS} (their product).",
+                "examples": [0.95, {"table": {"400": 0.1, "700": 0.3}}],
+            },
             "anyOf": [*factor, {"type": "array", "minItems": 1, "items": {"anyOf": factor}}],
-            "examples": [0.95, {"table": {"400": 0.1, "700": 0.3}}],
         }
 
     def read(self, given: Any) -> SpectrumSpec:
@@ -249,7 +255,9 @@ def shipped_name(given: str) -> str:
 def table_or_file(given: Mapping[Any, Any]) -> SpectrumFile | SpectrumTable:
     """The spectrum that a mapping describes."""
     if "file" in given and "table" in given:
-        raise failure([fault(("table",), "file and table cannot both be given", "keep one of them")])
+        raise failure(
+            [fault(("table",), "file and table cannot both be given", "keep one of them")]
+        )
     if "file" in given:
         return SpectrumFile.model_validate(given)
     if "table" in given:
@@ -257,10 +265,8 @@ def table_or_file(given: Mapping[Any, Any]) -> SpectrumFile | SpectrumTable:
     raise ValueError(f"{shown(given)} is not a spectrum; write {_FORMS}")
 
 
-def moved(error: ValueError, index: int, given: Any) -> list[Any]:
-    """The mistakes of an item of a list, at its place."""
-    from pydantic import ValidationError
-
+def moved(error: ValueError, index: str | int, given: Any) -> list[Any]:
+    """The mistakes of an item of a list or mapping, at its place."""
     if not isinstance(error, ValidationError):
         message, _, remedy = str(error).partition("; ")
         return [fault((index,), message, remedy, given)]
@@ -346,12 +352,14 @@ class Lamp:
     def __get_pydantic_json_schema__(
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
     ) -> dict[str, Any]:
-        forms = handler(schema["json_schema_input_schema"])["anyOf"]  # type: ignore[typeddict-item]
+        forms = handler(schema["json_schema_input_schema"])["anyOf"]
         return {
-            "title": "illuminant",
-            "description": f"A lamp: {_LAMP_FORMS}.",
+            DEFINED: {
+                "name": "illuminant",
+                "description": f"A lamp: {_LAMP_FORMS}.",
+                "examples": ["D65", {"blackbody": "5500 K"}],
+            },
             "anyOf": [{"type": "string", "examples": list(spectra.illuminant_names())}, *forms],
-            "examples": ["D65", {"blackbody": "5500 K"}],
         }
 
     def read(self, given: Any) -> IlluminantSpec:
@@ -359,11 +367,7 @@ class Lamp:
         if isinstance(given, IlluminantSpec):
             return given
         if isinstance(given, str):
-            IlluminantSpec(given)
-            try:
-                spectra.illuminant(given)
-            except ValueError as error:
-                raise ValueError(str(error)) from None
+            spectra.illuminant(given)  # ValueError for a name that nobody knows
             return IlluminantSpec(given)
         if isinstance(given, Mapping):
             kinds = [name for name in _LAMPS if name in given]

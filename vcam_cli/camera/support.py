@@ -6,7 +6,7 @@ ignored. When the effect is built the mark goes, and with it the refusal.
 """
 
 from collections.abc import Iterator, Mapping
-from typing import Any
+from typing import Any, get_args
 
 from pydantic import BaseModel
 from pydantic.fields import FieldInfo
@@ -15,6 +15,7 @@ from vcam_cli.camera.base import Model
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.explain import in_yaml
 from vcam_cli.camera.processing import Step
+from vcam_cli.camera.scene import CHARTS
 from vcam_cli.camera.spectrum import IlluminantSpec, SpectrumSpec
 from vcam_cli.camera.values import written
 from vcam_cli.errors import BadInput, Collector, Path, Problem, bad
@@ -77,7 +78,9 @@ def _values(value: Any, path: Path) -> Iterator[tuple[Path, Any]]:
 def _unsupported(model: Model, path: Path) -> Iterator[Problem]:
     if model.not_yet:
         word = getattr(model, model.not_yet)
-        yield Problem((*path, model.not_yet), f"{word} {_MESSAGE}", "choose another")
+        built = [name for name, chart in CHARTS.items() if not chart.not_yet]
+        instead = "use a chart or an image" if model.not_yet == "kind" else _instead(built)
+        yield Problem((*path, model.not_yet), f"{word} {_MESSAGE}", instead)
         return
     for name, field in type(model).model_fields.items():
         value, here = getattr(model, name), (*path, field.alias or name)
@@ -86,7 +89,7 @@ def _unsupported(model: Model, path: Path) -> Iterator[Problem]:
             if value != field.get_default(call_default_factory=True):
                 yield Problem(here, _MESSAGE, _neutral(field))
             continue
-        found = list(_marked(value, here, mark)) if mark else []
+        found = list(_marked(value, here, mark, field)) if mark else []
         yield from found
         if not found:
             yield from _below(value, here)
@@ -101,7 +104,7 @@ def _below(value: Any, path: Path) -> Iterator[Problem]:
                 yield from _unsupported(item, (*path, i))
 
 
-def _marked(value: Any, path: Path, words: list[str]) -> Iterator[Problem]:
+def _marked(value: Any, path: Path, words: list[str], field: FieldInfo) -> Iterator[Problem]:
     """The parts of a value that are one of the marked words, or have it as their key."""
     items = enumerate(value) if isinstance(value, tuple) else [(None, value)]
     for i, item in items:
@@ -110,7 +113,27 @@ def _marked(value: Any, path: Path, words: list[str]) -> Iterator[Problem]:
         for word in words:
             if word in said:
                 here = path if i is None else (*path, i)
-                yield Problem(here, f"{word} {_MESSAGE}", "choose another")
+                yield Problem(here, f"{word} {_MESSAGE}", _instead(_built(field, words)))
+
+
+def _built(field: FieldInfo, unbuilt: list[str]) -> list[str]:
+    """The words a key takes that are built."""
+    every = _words(field.annotation)
+    for mark in field.metadata:
+        every += _words(getattr(mark, "forms", None))
+    return [word for word in dict.fromkeys(every) if word not in unbuilt]
+
+
+def _words(annotation: Any) -> list[str]:
+    """The words that a type lists (Literal), unions and containers looked through."""
+    found: list[str] = []
+    for item in get_args(annotation):
+        found += [str(item)] if isinstance(item, (str, int)) else _words(item)
+    return found
+
+
+def _instead(built: list[str]) -> str:
+    return f"supported: {', '.join(built)}" if built else "remove it, or give numbers"
 
 
 def not_yet(field: FieldInfo) -> bool | list[str]:

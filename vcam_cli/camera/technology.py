@@ -28,7 +28,7 @@ _EXPONENT = Number(example="1")
 
 
 class Thresholds(Model):
-    """Voltages from which the swing follows: (supply - reset - gate-source) - (bias - bias gate)."""
+    """Voltages that make the swing: (supply - reset - gate-source) - (bias - bias gate)."""
 
     reset: Annotated[float, _VOLTAGE] = key(
         "threshold of the reset transistor", unit="V", example="0.8 V"
@@ -222,9 +222,7 @@ class Technology(_Process):
 class TechnologyChoice(_Process):
     """The technology of a camera's pixel: a name, and what is changed of it."""
 
-    from_: Text = key(
-        "name or path of a technology file", example="cmos-0.35um", alias="from"
-    )
+    from_: Text = key("name or path of a technology file", example="cmos-0.35um", alias="from")
     feature_size: MaybeLength = key(
         "scales the technology to this feature size", unit="um", example="0.13 um", default=None
     )

@@ -14,12 +14,20 @@ from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, GetCoreSchemaHandler, GetJsonSchemaHandler, Strict, StringConstraints
+from pydantic import (
+    BaseModel,
+    GetCoreSchemaHandler,
+    GetJsonSchemaHandler,
+    Strict,
+    StringConstraints,
+)
 from pydantic_core import CoreSchema, core_schema
 
 from vcam_cli import units
 from vcam_cli.camera.explain import failure, fault, names, one_of, shown
 
+DEFINED = "x-definition"
+"""In a JSON Schema: name, description and examples of a form that `schema` gathers."""
 NONE: Mapping[str, Any] = MappingProxyType({})
 
 
@@ -78,14 +86,16 @@ class _Value:
         low, high = self.above, self.below
         if value <= low or value < self.least:
             limit, how = (low, "more than") if value <= low else (self.least, "at least")
-        elif value >= high or value > self.most:
+        elif (value >= high and high < math.inf) or value > self.most:
             limit, how = (high, "less than") if value >= high else (self.most, "at most")
         else:
             return
         if limit == 0:
             wrong = "is zero" if value == 0 else "is negative"
             raise ValueError(f"{shown(given)} {wrong}; write {self.hint}")
-        raise ValueError(f"{shown(given)} is out of range; it must be {how} {self.text(limit)}")
+        text = self.text(limit)
+        limit_text = f"{text:g}" if isinstance(text, float) else text
+        raise ValueError(f"{shown(given)} is out of range; it must be {how} {limit_text}")
 
     def number(self, given: Any) -> float:
         """The number itself, limits aside."""
@@ -130,17 +140,19 @@ class Quantity(_Value):
     def form(self) -> dict[str, Any]:
         dimension = units.DIMENSIONS[self.dimension]
         pattern, name = dimension.pattern, self.dimension
+        units_ = ", ".join(list(dimension.units)[:12])
         if not self.signed:
             pattern = pattern.replace("[+-]?", "[+]?", 1)
         else:
             name = f"signed_{name}"
         return {
-            "title": name,
+            DEFINED: {
+                "name": name,
+                "description": f"{dimension.title.capitalize()} with its unit: {units_}.",
+                "examples": [dimension.example],
+            },
             "type": "string",
             "pattern": pattern,
-            "description": f"{dimension.title.capitalize()} with its unit: "
-            f"{', '.join(list(dimension.units)[:12])}.",
-            "examples": [dimension.example],
         }
 
     @property
@@ -177,7 +189,9 @@ class Number(_Value):
         percent = r"^\s*[+]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d{1,3})?\s*%\s*$"
         if self.signed:
             percent = percent.replace("[+]?", "[+-]?", 1)
-        return {"anyOf": [{"type": "number"} | self._limits(), {"type": "string", "pattern": percent}]}
+        return {
+            "anyOf": [{"type": "number"} | self._limits(), {"type": "string", "pattern": percent}]
+        }
 
     def _limits(self) -> dict[str, float]:
         limits = {
@@ -213,6 +227,32 @@ class Whole(Number):
         return f"a whole number such as {self.example}"
 
 
+@dataclass(frozen=True, init=False)
+class Choice:
+    """One of some words (or numbers that name a choice), for a key that need not be given."""
+
+    allowed: tuple[str | int, ...]
+
+    def __init__(self, *allowed: str | int) -> None:
+        object.__setattr__(self, "allowed", allowed)
+
+    def __get_pydantic_core_schema__(
+        self, source: Any, handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
+        return core_schema.no_info_plain_validator_function(self.read)
+
+    def __get_pydantic_json_schema__(
+        self, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        return {"enum": list(self.allowed)}
+
+    def read(self, given: Any) -> Any:
+        """`given` when it is allowed; true and 32.0 are no choices."""
+        if type(given) in (str, int) and given in self.allowed:
+            return given
+        raise failure([fault((), *one_of(given, self.allowed), given)])
+
+
 @dataclass(frozen=True)
 class Either:
     """One of several forms, told apart by `pick`, which validates what is written.
@@ -242,6 +282,8 @@ class Either:
         for word, meaning in self.words.items():
             if value is meaning:
                 return word
+        if value is None:
+            return None
         return written(value) if self.write is None else self.write(value)
 
 
@@ -255,10 +297,12 @@ def word_or(model: type[BaseModel], words: Mapping[str, Any]) -> Either:
             return words[given]
         also = "a mapping of " + ", ".join(names(model))
         if not words:
-            raise failure([fault((), f"{shown(given)} is not allowed here", f"write {also}", given)])
+            raise failure(
+                [fault((), f"{shown(given)} is not allowed here", f"write {also}", given)]
+            )
         raise failure([fault((), *one_of(given, words, also), given)])
 
-    forms = Literal[tuple(words)] | model if words else model  # type: ignore[operator]
+    forms = Literal[tuple(words)] | model if words else model
     return Either(pick, forms, words)
 
 
@@ -296,8 +340,13 @@ Frequency = Annotated[float, Quantity("spatial_frequency", least=0)]
 Fraction = Annotated[float, Number(least=0, most=1)]
 Positive = Annotated[float, Number(above=0, example="1")]
 Switch = Annotated[bool, Strict()]
-Word = Annotated[str, StringConstraints(strict=True, pattern=r"^[A-Za-z0-9._-]{1,64}$")]
-"""A name that becomes a folder."""
+Word = Annotated[
+    str,
+    StringConstraints(
+        strict=True, max_length=64, pattern=r"^[A-Za-z0-9._-]*[A-Za-z0-9_-][A-Za-z0-9._-]*$"
+    ),
+]
+"""A name that becomes a folder: letters, digits, '.', '_', '-', and not dots alone."""
 Text = Annotated[str, StringConstraints(strict=True)]
 
 # The same where a key need not be given; YAML's null is not "not given" but a mistake.

@@ -41,7 +41,7 @@ class Commands(TyperGroup):
             module, function = COMMANDS[cmd_name].split(":")
             one = typer.Typer(add_completion=False, rich_markup_mode=None)
             one.command(cmd_name)(getattr(import_module(f"vcam_cli.commands.{module}"), function))
-            self.commands[cmd_name] = typer.main.get_command(one)  # type: ignore[assignment]
+            self.commands[cmd_name] = typer.main.get_command(one)
         return self.commands[cmd_name]
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:

@@ -32,7 +32,7 @@ def run(
     from vcam_cli.studies import outputs
     from vcam_cli.studies.simulate import simulate
 
-    inputs = tuple(Path(name) for name in model.files)
+    inputs = outputs.inputs(model)
     with OutputFolder(out or Path("out") / model.name, inputs=inputs) as folder:
         result = simulate(model, workers)
         for note in result.notes:

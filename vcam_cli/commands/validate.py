@@ -11,7 +11,7 @@ def validate(
     files: Annotated[
         list[str],
         typer.Argument(
-            metavar="FILE...",
+            metavar="FILE",
             help="Camera files, or names of shipped cameras.",
             autocompletion=options.complete_camera,
             show_default=False,

@@ -18,13 +18,13 @@ from vcam_cli.camera.electrical import Electrical, electrical
 from vcam_cli.camera.geometry import Geometry, geometry
 from vcam_cli.effects.base import Charge, Code, Draw, Outlook
 from vcam_cli.effects.quantization import Quantization
-from vcam_cli.engine import capture, exposure, memory, optics, plan
+from vcam_cli.engine import bandwidth, capture, exposure, memory, optics, plan
 from vcam_cli.engine.mosaic import Mosaic, mosaic
 from vcam_cli.engine.parallel import available_workers
 from vcam_cli.engine.settings import Settings, settings
 from vcam_cli.errors import bad
 from vcam_cli.physics import readout
-from vcam_cli.scenes.base import SampledScene, View, WaveScene
+from vcam_cli.scenes.base import SampledScene, WaveScene
 from vcam_cli.scenes.build import build
 
 
@@ -52,7 +52,6 @@ class Frame:
     plan: plan.Plan
     mosaic: Mosaic
     scene: WaveScene | SampledScene
-    view: View
     transfer: optics.Transfer
     """Of the scene's components."""
     white_rate: NDArray
@@ -61,6 +60,8 @@ class Frame:
     """[e/s]"""
     exposure_time: float
     """[s]"""
+    oversampling: float
+    """Pixel Nyquist frequencies that the scene's spectrum was followed to; 0: in closed form."""
     mean_electrons: NDArray
     """(rows, columns) noise-free signal before saturation [electrons]"""
     electrons: NDArray
@@ -105,22 +106,23 @@ def expose(camera: Camera, picture: NDArray | None, workers: int | None, stages:
     workers = workers or available_workers()
     g, e = geometry(camera), electrical(camera)
     knobs = settings(camera)
+    colors = mosaic(camera)
+    needed = memory.of_frame(g, knobs, len(colors.colors), bool(camera.quality))
+    memory.require(needed, g)
+
+    def scene_at(oversampling: int) -> WaveScene | SampledScene:
+        return build(camera.scene, optics.view(g, knobs, oversampling), picture)
+
     with stages("scene"):
-        view = optics.view(g, knobs)
-        memory.require(memory.estimate(g, knobs, 0, 1, False), g)
-        scene = build(camera.scene, view, picture)
-        colors = mosaic(camera)
-        needed = memory.estimate(
-            g, knobs, memory.samples_of(scene), len(colors.colors), bool(camera.quality)
-        )
-        memory.require(needed, g)
+        scene = scene_at(bandwidth.first_guess(g, knobs))
     with stages("optics"):
         effects = plan.optical(camera, g)
-        spectra = (*scene.spectra, scene.white)
-        both = _transfer(camera, g, knobs, spectra, colors, effects)
+        both = _transfer(camera, g, knobs, (*scene.spectra, scene.white), colors, effects)
         transfer = optics.Transfer(both.wavelengths, both.weights[:-1], both.effects)
         white_rate = both.level[-1]
-        rate = optics.Linear(scene, transfer, g, knobs, colors, effects, workers).rate()
+        linear = optics.Linear(scene, scene_at, transfer, g, knobs, colors, effects, workers)
+        found = linear.rate()
+        rate = found.values
     with stages("exposure"):
         present = plan.described(camera, g).values()
         dark = sum(x.rate() for x in present if isinstance(x, Charge))
@@ -142,11 +144,11 @@ def expose(camera: Camera, picture: NDArray | None, workers: int | None, stages:
         plan=decided,
         mosaic=colors,
         scene=scene,
-        view=view,
         transfer=transfer,
         white_rate=white_rate,
         dark_rate=sum(x.rate() for x in active if isinstance(x, Charge)),
         exposure_time=time,
+        oversampling=found.oversampling,
         mean_electrons=mean,
         electrons=electrons,
         dn=dn,

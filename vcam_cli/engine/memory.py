@@ -9,7 +9,7 @@ from pathlib import Path
 from vcam_cli.camera.geometry import Geometry
 from vcam_cli.engine.settings import Settings
 from vcam_cli.errors import CannotDo
-from vcam_cli.scenes.base import SampledScene, WaveScene
+from vcam_cli.scenes.base import SampledScene
 
 BASE = 150_000_000
 """Interpreter and libraries [bytes]."""
@@ -32,24 +32,22 @@ def available() -> int:
     return min(found)
 
 
-def estimate(
-    geometry: Geometry, settings: Settings, samples: int, colors: int, judged: bool
-) -> int:
-    """Peak memory of a frame [bytes]: planes of the scene, spectra of the colors, the frame.
+def of_frame(geometry: Geometry, knobs: Settings, colors: int, judged: bool) -> int:
+    """Peak memory of a frame without its scene [bytes]: spectra, signal, raw, render.
 
-    samples: of one scene plane; judged: whether an ideal image is made.
+    judged: whether an ideal image is made and compared.
     """
     pixels = geometry.rows * geometry.columns
-    width = settings.float_width // 8
-    planes = samples * width * max(1, colors)
-    series = 2 * pixels * width * colors
-    frame = pixels * (3 * width + 2 + 12 * colors)
-    return BASE + max(planes + series, frame) + (pixels * 8 * colors if judged else 0)
+    width = knobs.float_width // 8
+    series = pixels * width * (2 * colors + 1)
+    frame = pixels * (3 * width + 2 + colors)
+    return BASE + max(series, frame) + (16 * pixels * colors if judged else 0)
 
 
-def samples_of(scene: WaveScene | SampledScene) -> int:
-    """Samples of one plane of a scene; none for a scene known in closed form."""
-    return 0 if isinstance(scene, WaveScene) else scene.shape[0] * scene.shape[1]
+def of_planes(scene: SampledScene, planes: int, geometry: Geometry, knobs: Settings) -> int:
+    """Peak memory while a sampled scene of so many planes is filtered [bytes]."""
+    samples = scene.shape[0] * scene.shape[1]
+    return samples * planes * (knobs.float_width // 8) + of_frame(geometry, knobs, 3, False)
 
 
 def require(needed: int, geometry: Geometry) -> None:

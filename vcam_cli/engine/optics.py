@@ -17,12 +17,12 @@ from numpy.typing import NDArray
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.geometry import Geometry
 from vcam_cli.effects.base import Effect, Gain, RadialTransfer, SeparableTransfer
-from vcam_cli.engine import sampling
+from vcam_cli.engine import bandwidth, memory, sampling
 from vcam_cli.engine.axis import Axis
 from vcam_cli.engine.mosaic import Mosaic
 from vcam_cli.engine.parallel import each, pieces
 from vcam_cli.engine.settings import Settings
-from vcam_cli.engine.transfer import Band, Transfer, tabulate, transfer
+from vcam_cli.engine.transfer import Band, Tables, Transfer, tabulate, transfer
 from vcam_cli.physics import radiometry
 from vcam_cli.rng import blocks
 from vcam_cli.scenes.base import SampledScene, View, WaveScene
@@ -35,21 +35,21 @@ light an Airy pattern throws further than this is below 1 % in any lens worth si
 Rows = Callable[[int, int], NDArray]
 
 
-def view(geometry: Geometry, settings: Settings) -> View:
+def view(geometry: Geometry, settings: Settings, oversampling: int) -> View:
     """The rectangle that a scene has to fill, with a margin that makes fast transform sizes."""
     return View(
         rows=geometry.rows,
         columns=geometry.columns,
         pitch_x=geometry.pitch_x,
         pitch_y=geometry.pitch_y,
-        oversampling=settings.oversampling,
-        margin=_margin(geometry, settings.oversampling),
+        oversampling=oversampling,
+        margin=_margin(geometry),
         scene_width=geometry.scene_width_on_sensor,
         dtype=settings.dtype,
     )
 
 
-def _margin(geometry: Geometry, oversampling: int) -> int:
+def _margin(geometry: Geometry) -> int:
     """Smallest margin from `MARGIN` on that gives both axes sizes with small prime factors."""
 
     def slow(margin: int) -> int:
@@ -98,10 +98,24 @@ def scene_transfer(
 
 
 @dataclass(frozen=True)
+class Rate:
+    """What the linear part gives."""
+
+    values: NDArray
+    """(rows, columns) [electrons / s]"""
+    oversampling: float
+    """Pixel Nyquist frequencies that the spectrum reached; 0 where none was needed."""
+    lost: float
+    """Estimated rms of what frequencies beyond add [electrons / s]"""
+
+
+@dataclass(frozen=True)
 class Linear:
     """Everything the linear part needs; `rate` computes it."""
 
     scene: WaveScene | SampledScene
+    repaint: Callable[[int], SampledScene]
+    """The same chart with another number of cells per pixel pitch."""
     exact: Transfer
     geometry: Geometry
     settings: Settings
@@ -109,9 +123,9 @@ class Linear:
     effects: tuple[Effect, ...]
     workers: int
 
-    def rate(self) -> NDArray:
-        """Photo-electrons per second in every pixel, noise-free: (rows, columns) [e/s]."""
-        rows = self._rows()
+    def rate(self) -> Rate:
+        """Photo-electrons per second in every pixel, noise-free."""
+        rows, oversampling, lost = self._rows()
         g = self.geometry
         out = np.empty((g.rows, g.columns), self.settings.dtype)
         gains = [e for e in self.effects if isinstance(e, Gain)]
@@ -126,7 +140,7 @@ class Linear:
                 tile *= effect.gain(x, y[block])
 
         each(compute, blocks(g.rows), self.workers)
-        return out
+        return Rate(out, oversampling, lost)
 
     def _assemble(self, rows: Sequence[Rows], block: slice, tile: NDArray) -> None:
         """Puts the values of each color where that color's pixels are."""
@@ -136,12 +150,15 @@ class Linear:
             for color, columns in self.mosaic.in_row(row):
                 tile[phase::period, columns] = rows[color](slice(row, block.stop, period))[:, columns]
 
-    def _rows(self) -> list[Rows]:
-        """For each color, a function from array rows (a slice) to their values."""
+    def _rows(self) -> tuple[list[Rows], float, float]:
+        """For each color, a function from array rows (a slice) to their values.
+
+        Also the oversampling it took, and the rms that is lost by no more of it [electrons / s].
+        """
         if isinstance(self.scene, WaveScene):
-            return self._waves(self.scene)
+            return self._waves(self.scene), 0.0, 0.0
         if self.scene.samples == "squares" and not self.exact.effects:
-            return self._boxes(self.scene)
+            return self._boxes(self.scene), 0.0, 0.0
         return self._filtered(self.scene)
 
     def _apertures(self) -> list[SeparableTransfer]:
@@ -174,14 +191,14 @@ class Linear:
 
         return [lambda s, c=c: rows(c, s) for c in range(len(self.mosaic.colors))]
 
-    def _axes(self, scene: SampledScene) -> tuple[Axis, Axis]:
-        g, o = self.geometry, self.settings.oversampling
+    def _axes(self, scene: SampledScene, oversampling: float) -> tuple[Axis, Axis]:
+        g = self.geometry
         ny, nx = scene.shape
         squares = scene.samples == "squares"
 
         def axis(samples: int, pitch: float, pixels: int, pixel: float, shift: float) -> Axis:
             first = samples * pitch / 2 + (0.5 - pixels / 2) * pixel + shift
-            bandwidth = min(o * 0.5 / pixel, self.exact.cutoff)
+            bandwidth = min(oversampling * 0.5 / pixel, self.exact.cutoff)
             return Axis(samples, pitch, pixels, pixel, first, squares, bandwidth)
 
         return (
@@ -189,23 +206,72 @@ class Linear:
             axis(ny, scene.pitch_y, g.rows, g.pitch_y, g.detector_y),
         )
 
-    def _filtered(self, scene: SampledScene) -> list[Rows]:
-        """Through the cosine spectrum."""
-        x, y = self._axes(scene)
-        top = min(self.exact.cutoff, float(np.hypot(x.bandwidth, y.bandwidth)))
-        s = self.settings
-        tables = tabulate(self.exact, top, s.table_size, s.mixing_tolerance)
+    def _filter(self, scene: SampledScene, tables: Tables, oversampling: float) -> sampling.Filter:
+        x, y = self._axes(scene, oversampling)
         along_x, along_y = np.ones(x.terms), np.ones(y.terms)
         for e in self._apertures():
             along_x *= e.along_x(x.frequencies)
             along_y *= e.along_y(y.frequencies)
-        coefficients = sampling.spectrum(scene.planes(tables.mix), self.workers)
-        series = sampling.Filter(x, y, tables, along_x, along_y).apply(coefficients, self.workers)
-        return [lambda s, c=c: x.evaluate(series[c, s], axis=1) for c in range(len(series))]
+        return sampling.Filter(x, y, tables, along_x, along_y)
+
+    def _filtered(self, scene: SampledScene) -> tuple[list[Rows], float, float]:
+        """Through the cosine spectrum, as far up as the tolerance asks."""
+        knobs, g, cutoff = self.settings, self.geometry, self.exact.cutoff
+        widest = min(knobs.most_oversampling, bandwidth.limit(g, cutoff))
+        tables = tabulate(
+            self.exact, bandwidth.top(g, widest, cutoff), knobs.table_size, knobs.mixing_tolerance
+        )
+        oversampling = bandwidth.first_guess(g, knobs)
+        while True:
+            memory.require(memory.of_planes(scene, len(tables.mix), g, knobs), g)
+            planes = scene.planes(tables.mix)
+            budget = bandwidth.SHARE * knobs.tolerance * bandwidth.peak(planes, tables)
+            coefficients = sampling.spectrum(planes, self.workers)
+            if scene.samples == "squares":
+                spread = self._spread(scene, tables, coefficients, widest)
+                enough = max(spread.enough(budget), min(oversampling, widest))
+                lost = spread.beyond(enough)
+                break
+            spread = self._spread(scene, tables, coefficients, oversampling)
+            lost = spread.of_sampling(oversampling, self._passes)
+            enough = oversampling
+            oversampling = bandwidth.finer(enough, lost, budget, g, knobs, cutoff)
+            if oversampling == enough:
+                break
+            del planes, coefficients
+            scene = self.repaint(oversampling)
+        chosen = self._filter(scene, tables, enough)
+        series = chosen.apply(coefficients, self.workers)
+        rows = [lambda s, c=c: chosen.x.evaluate(series[c, s], axis=1) for c in range(len(series))]
+        return rows, enough, lost
+
+    def _passes(self, frequency: NDArray) -> NDArray:
+        """Transfer of lens and photodetector, without its zeros, in the best color.
+
+        frequency: (n,) in pixel Nyquist frequencies.
+        """
+        g = self.geometry
+        per_meter = 0.5 / max(g.pitch_x, g.pitch_y)
+        table = np.linspace(0, max(1e-9, float(frequency.max(initial=0))), 513)
+        levels = self.exact.level.sum(axis=0)
+        values = self.exact.at(table * per_meter).sum(axis=0) / np.maximum(levels, 1e-300)[:, None]
+        lens = np.interp(frequency, table, values.max(axis=0))
+        width = min(g.detector_width, g.detector_height) if self._apertures() else 0.0
+        return lens / np.hypot(1, np.pi * frequency * per_meter * width)
+
+    def _spread(
+        self, scene: SampledScene, tables: Tables, coefficients: NDArray, oversampling: float
+    ) -> bandwidth.Spread:
+        """The signal's spectrum, as if all of it lay on the array and none in the margin."""
+        g = self.geometry
+        whole = scene.shape[0] * scene.pitch_y * scene.shape[1] * scene.pitch_x
+        frequency, power = self._filter(scene, tables, oversampling).power(coefficients)
+        density = whole / (g.sensor_width * g.sensor_height)
+        return bandwidth.Spread(frequency * 2 * g.pitch_x, power * density)
 
     def _boxes(self, scene: SampledScene) -> list[Rows]:
         """Without optical blur a photodetector sees means over boxes, exactly."""
-        x, y = self._axes(scene)
+        x, y = self._axes(scene, 1.0)
         aperture = bool(self._apertures())
         width = self.geometry.detector_width if aperture else 0.0
         height = self.geometry.detector_height if aperture else 0.0

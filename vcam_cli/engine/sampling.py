@@ -5,6 +5,7 @@ The heart of the engine. Work is cut into fixed pieces of rows or columns that t
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -81,10 +82,17 @@ class Filter:
         into: NDArray,
     ) -> None:
         """Adds the filtered terms (rows of the spectrum) to their folded rows, all colors."""
+        for c, product in enumerate(self._products(coefficients, lookup, terms, weights)):
+            into[c] += self.x.fold(product)
+
+    def _products(
+        self, coefficients: NDArray, lookup: "_Lookup", terms: NDArray, weights: NDArray
+    ) -> Iterator[NDArray]:
+        """For each color, rows of the filtered spectrum, (terms, as many as are not zero)."""
         x, y, dtype = self.x, self.y, coefficients.dtype
         fy = y.frequencies[terms]
         reach = self.tables.top**2 - fy.min() ** 2
-        if reach <= 0:
+        if reach < 0:
             return
         count = min(x.terms, int(np.sqrt(reach) * 2 * x.length) + 1)
         index, sign = y.base(terms)
@@ -96,14 +104,46 @@ class Filter:
             part *= by_row[:, None]
             rows.append(part)
         position = lookup.position(x.frequencies[:count], fy)
-        for c in range(into.shape[0]):
+        for c in range(self.tables.values.shape[1]):
             total = lookup(0, c, position)
             total *= rows[0]
             for r in range(1, len(rows)):
                 part = lookup(r, c, position)
                 part *= rows[r]
                 total += part
-            into[c] += x.fold(total)
+            yield total
+
+    def power(self, coefficients: NDArray) -> tuple[NDArray, NDArray]:
+        """Mean squares of the signal by frequency, estimated from a sample of rows.
+
+        Returns the frequency [cycles/m], the larger of |fx| and |fy|, and for each color the
+        mean square that terms of such frequencies add to the signal: (n,) and (C, n), rising in
+        frequency, by Parseval's theorem.
+        """
+        lookup = _Lookup(self.tables, coefficients.dtype)
+        frequency, power = [], []
+        for term, stands_for in _rows_to_sample(self.y.terms):
+            at = np.array([term])
+            parts = [p[0] for p in self._products(coefficients, lookup, at, np.ones(1))]
+            if not parts:
+                break
+            square = np.array(parts, dtype=np.float64) ** 2
+            square[:, 1:] *= 2
+            frequency.append(np.maximum(self.x.frequencies[: square.shape[1]], self.y.frequencies[term]))
+            power.append(square * (stands_for * (2 if term else 1)))
+        order = np.argsort(together := np.concatenate(frequency), kind="stable")
+        return together[order], np.concatenate(power, axis=1)[:, order]
+
+
+def _rows_to_sample(terms: int) -> list[tuple[int, float]]:
+    """(term, number of terms it stands for): all of the first few, then ever fewer.
+
+    Straight edges along the array put their energy into the first rows and columns.
+    """
+    sample = np.unique(np.concatenate([np.arange(min(24, terms)), np.geomspace(24, terms, 72)]).astype(int))
+    sample = sample[sample < terms]
+    edges = np.concatenate([[-0.5], (sample[1:] + sample[:-1]) / 2, [terms - 0.5]])
+    return list(zip(sample.tolist(), np.diff(edges).tolist(), strict=True))
 
 
 class _Lookup:

@@ -7,7 +7,7 @@ The tolerance T bounds rms(mean raw - converged mean raw) / full signal (camera 
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
 
@@ -21,7 +21,10 @@ class Settings:
     wavelength_step: float
     """Spacing of the wavelengths at which the OTF is computed [m]; levels are exact anyway."""
     oversampling: int
-    """Spatial frequencies kept, in pixel Nyquist frequencies; cells a chart has per pixel pitch."""
+    """Spatial frequencies kept at least, in pixel Nyquist frequencies; cells a chart has per
+    pixel pitch."""
+    most_oversampling: int
+    """The same at most, where the scene's spectrum calls for it."""
     table_size: int
     """Entries of the tables over |f|."""
     mixing_tolerance: float
@@ -30,6 +33,8 @@ class Settings:
     """32 or 64 bits."""
     shot_noise: str = "exact"
     """exact (Poisson) or gaussian (as the thesis has it)."""
+    tolerance: float = 0.005
+    """What these settings are to keep, relative to full signal."""
 
     @property
     def dtype(self) -> type:
@@ -39,10 +44,10 @@ class Settings:
         return asdict(self)
 
 
-DRAFT = Settings(20e-9, 1, 1 << 14, 2e-3, 32)
-STANDARD = Settings(10e-9, 2, 1 << 15, 2e-4, 32)
-FINE = Settings(10e-9, 3, 1 << 16, 1e-4, 32)
-REFERENCE = Settings(2.5e-9, 6, 1 << 15, 1e-7, 64)
+DRAFT = Settings(20e-9, 1, 4, 1 << 14, 2e-3, 32)
+STANDARD = Settings(10e-9, 2, 12, 1 << 15, 5e-4, 32)
+FINE = Settings(10e-9, 2, 16, 1 << 16, 2e-4, 32)
+REFERENCE = Settings(2.5e-9, 4, 24, 1 << 15, 1e-7, 64)
 
 LADDER = ((0.02, DRAFT), (0.005, STANDARD), (0.001, FINE), (0.0, REFERENCE))
 """Settings for tolerances from the first number of each rung up."""
@@ -52,7 +57,10 @@ def settings(camera: Camera) -> Settings:
     """Settings for the camera's tolerance, with the knobs that its file sets itself."""
     accuracy = camera.accuracy
     chosen = next(s for least, s in LADDER if accuracy.tolerance >= least)
+    chosen = replace(chosen, tolerance=accuracy.tolerance)
     if camera.scene.wavelengths.step is not None:
         chosen = replace(chosen, wavelength_step=camera.scene.wavelengths.step)
-    known = {f.name for f in fields(Settings)}
-    return replace(chosen, **{k: v for k, v in accuracy.knobs.items() if k in known})
+    knobs = accuracy.knobs
+    if "oversampling" in knobs:
+        knobs = {**knobs, "most_oversampling": knobs["oversampling"]}
+    return replace(chosen, **knobs)

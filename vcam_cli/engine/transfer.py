@@ -14,7 +14,7 @@ apart: they multiply along the axes (`Axis`).
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -53,7 +53,12 @@ class Transfer:
         for row, wavelength in zip(otf, self.wavelengths, strict=True):
             for effect in self.effects:
                 row *= effect.otf(frequency, float(wavelength))
-        return self.weights @ otf
+        components, colors, count = self.weights.shape
+        return (self.weights.reshape(-1, count) @ otf).reshape(components, colors, -1)
+
+    def mixed(self, mix: NDArray) -> "Transfer":
+        """The transfer of mixtures of the components, mix: (R, K)."""
+        return replace(self, weights=np.tensordot(mix, self.weights, axes=1))
 
     @property
     def level(self) -> NDArray:
@@ -132,26 +137,25 @@ def tabulate(exact: Transfer, top: float, size: int, tolerance: float) -> Tables
     by the fewest mixtures (singular vectors of H_kc over all c and f) that keep every H_kc within
     `tolerance` of the largest level.
     """
-    values = exact.at(np.linspace(0, top, size))
-    components, colors = values.shape[:2]
+    mix, error = _mixtures(exact, top, tolerance)
+    return Tables(mix, exact.mixed(mix).at(np.linspace(0, top, size)), top, error)
+
+
+def _mixtures(exact: Transfer, top: float, tolerance: float) -> tuple[NDArray, float]:
+    """Fewest mixtures (R, K) of the components, and the largest relative error they leave.
+
+    Judged at 256 frequencies: the functions are smooth.
+    """
+    components, colors = exact.weights.shape[:2]
+    every = np.eye(components)
     if components <= max(colors, 3):
-        return Tables(np.eye(components), values, top, 0.0)
-    # The directions come from a thinned table: 96 frequencies say all about a smooth function.
-    thin = values[:, :, np.linspace(0, size - 1, 96).astype(int)].reshape(components, -1)
-    u, _, _ = np.linalg.svd(thin, full_matrices=False)
+        return every, 0.0
+    table = exact.at(np.linspace(0, top, 256)).reshape(components, -1)
+    directions = np.linalg.svd(table, full_matrices=False)[0].T
     peak = np.abs(exact.level).max() or 1.0
-    rank, error = components, 0.0
-    for few in range(1, components):
-        error = _loss(u[:, :few].T, thin) / peak
-        if error <= tolerance and (error := _loss(u[:, :few].T, values.reshape(components, -1)) / peak) <= tolerance:
-            rank = few
-            break
-    if rank == components:
-        return Tables(np.eye(components), values, top, 0.0)
-    mix = u[:, :rank].T
-    return Tables(mix, np.tensordot(mix, values, axes=1), top, error)
-
-
-def _loss(mix: NDArray, table: NDArray) -> float:
-    """Largest entry of a table (K, n) that mixtures (R, K) with orthonormal rows do not hold."""
-    return float(np.abs(mix.T @ (mix @ table) - table).max())
+    for rank in range(1, components):
+        mix = directions[:rank]
+        error = float(np.abs(mix.T @ (mix @ table) - table).max() / peak)
+        if error <= tolerance:
+            return mix, error
+    return every, 0.0

@@ -70,6 +70,8 @@ class OutputFolder:
         except OSError as error:
             self._leave()
             raise self._no_folder(error) from error
+        except ValueError as error:  # a NUL, or no text of this system
+            raise bad("--out", f"{self.path} is no folder name ({error})") from error
         except BaseException:
             self._leave()
             raise
@@ -172,7 +174,8 @@ class OutputFolder:
         """Learns what the previous run left; clears away what a killed one left half done."""
         self._clear_staging()
         record = self._recorded()
-        self._previous = frozenset(record["files"] if record else self._journal())
+        names = record["files"] if record else self._journal()
+        self._previous = frozenset(filter(_harmless, names))
         self._protect_inputs([*self._previous, self._record])
         if not record:
             self._remove(sorted(self._previous))
@@ -266,7 +269,9 @@ class OutputFolder:
 
     def _no_folder(self, error: OSError) -> BadInput | CannotDo:
         if error.errno in _NOT_A_FOLDER:
-            reason = "is a file" if self.path.is_file() else f"is no folder ({error.strerror})"
+            reason = (
+                "is a file" if os.path.isfile(self.path) else f"is no folder ({error.strerror})"
+            )
             return bad("--out", f"{self.path} {reason}", "choose another folder")
         return cannot_write(self.path, error)
 
@@ -302,14 +307,14 @@ def _claim(path: Path) -> dict[str, Any] | None:
 
 
 def _harmless(name: str) -> bool:
-    """A relative name that stays inside its folder."""
+    """A name that a file can have and that stays inside its folder."""
     path = PurePosixPath(name)
-    return (
-        bool(path.parts)
-        and not path.is_absolute()
-        and ".." not in path.parts
-        and ("\0" not in name)
-    )
+    try:
+        short = all(len(os.fsencode(part)) <= 255 for part in path.parts)
+    except UnicodeError:
+        return False
+    inside = bool(path.parts) and not path.is_absolute() and ".." not in path.parts
+    return short and inside and "\0" not in name
 
 
 def _real_parents(folder: Path, name: str) -> bool:

@@ -6,9 +6,11 @@ So a writer stops at its first failure, and the end of the file is read back bef
 gets its name.
 """
 
+import errno
 import os
+import shutil
 from collections.abc import Callable, Mapping
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from pathlib import Path
 from types import TracebackType
 from typing import Self
@@ -17,9 +19,10 @@ import numpy as np
 import OpenImageIO as oiio
 
 from vcam_cli.errors import CannotDo
-from vcam_cli.files.atomic import shown, write_whole
+from vcam_cli.files.atomic import cannot_write, shown, write_whole
 
 Attribute = str | int | float
+_FULL = 1 << 16  # bytes: a failed write on a disk with less room is the disk's fault
 
 
 class RowWriter:
@@ -98,6 +101,9 @@ class RowWriter:
             raise self._failed(reason or "the file is not whole")
 
     def _failed(self, reason: str) -> CannotDo:
+        with suppress(OSError):
+            if shutil.disk_usage(self._path.parent).free < _FULL:
+                return cannot_write(self._path, OSError(errno.ENOSPC, "disk full"))
         text = f"cannot write {shown(self._path)}: {reason or 'the write failed'}"
         return CannotDo(text, "free some disk space, or choose another folder with --out")
 

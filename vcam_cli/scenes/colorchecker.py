@@ -60,9 +60,13 @@ class Card:
         """Light of card and patches, 0 around them; times the card's cover, since x and y part."""
         card = CARD * mix[:, BLACK]
         patches = mix[:, :BLACK].reshape(-1, ROWS, COLUMNS) - card[:, None, None]
-        out = np.asarray(cover.rows.T @ patches @ cover.columns)
-        out += card[:, None, None] * np.outer(cover.down, cover.across)
-        return out
+        # the card as one more row and column of patches: one product for all
+        block = np.zeros((len(mix), ROWS + 1, COLUMNS + 1), mix.dtype)
+        block[:, :ROWS, :COLUMNS] = patches
+        block[:, ROWS, COLUMNS] = card
+        down = np.concatenate([cover.rows, cover.down[None]]).astype(mix.dtype)
+        across = np.concatenate([cover.columns, cover.across[None]]).astype(mix.dtype)
+        return np.asarray((down.T @ block) @ across)
 
     def averaged(self, x_edges: Array, y_edges: Array) -> "Cover":
         """The parts of cells that card and patches cover: exact, for they are rectangles."""
@@ -113,8 +117,12 @@ class ColorChecker:
         return self._before_surround(self.card.sampled(x, y), mix)
 
     def _before_surround(self, cover: Cover, mix: Array) -> Array:
-        around = SURROUND * mix[:, BLACK, None, None] * (1 - np.outer(cover.down, cover.across))
-        return self.card.light(cover, mix) + around
+        surround = SURROUND * mix[:, BLACK, None, None]
+        out = self.card.light(cover, mix)
+        covered = np.outer(cover.down, cover.across).astype(mix.dtype)
+        for plane, level in zip(out, surround, strict=True):
+            plane += level * (1 - covered)
+        return out
 
 
 def _within(position: Array, low: float, high: float) -> Array:

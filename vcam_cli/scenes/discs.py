@@ -3,7 +3,7 @@
 Where each cell is the plain color of one disc, which is nearly everywhere, it is found by filling
 rows of cells back to front. Cells crossed by one visible edge take the exact area of the circle
 within the cell. Cells crossed by more are divided in four, again and again; after `DEPTH`
-divisions what is left is judged at the parts' centres, so the error is at most a few times
+divisions the discs in what is left are taken as independent, so the error is a fraction of
 4^-DEPTH of a cell where edges meet, and rounding elsewhere.
 
 Why labels: the picture is painted once as disc numbers, and colored afterwards, so that any number
@@ -16,7 +16,7 @@ import numpy as np
 
 from vcam_cli.scenes.base import Array
 
-DEPTH = 4
+DEPTH = 5
 
 
 @dataclass(frozen=True)
@@ -198,7 +198,8 @@ class _Parts:
     """Rectangles still to be judged, equal shares of their cells at one depth.
 
     box (4, m): left, right, top, bottom; back (m,): what lies behind the edges; cell (m,): whose
-    part it is; and the edges that cross them as pairs: of_part (p,), front (p,).
+    part it is; and the edges that cross them as pairs: of_part (p,) rising,
+    front (p,) falling within a part.
     """
 
     box: Array
@@ -232,7 +233,9 @@ def _resolve(discs: Discs, parts: _Parts, color: Array) -> Array:
             break
         parts = _keep(parts, several)
         if depth == DEPTH:
-            add(parts.cell, _at_center(discs, parts), share)
+            seen, behind = _layered(discs, parts)
+            add(parts.cell[parts.of_part], parts.front, share * seen)
+            add(parts.cell, parts.back, share * behind)
         else:
             parts = _divide(discs, parts)
     return out
@@ -278,15 +281,19 @@ def _distances(discs: Discs, index: Array, box: Array) -> tuple[Array, Array]:
     return np.hypot(near_x, near_y), np.hypot(far_x, far_y)
 
 
-def _at_center(discs: Discs, parts: _Parts) -> Array:
-    """The label seen at the centres of the parts."""
-    left, right, top, bottom = parts.box[:, parts.of_part]
-    index = parts.front - 1
-    away = np.hypot((left + right) / 2 - discs.x[index], (top + bottom) / 2 - discs.y[index])
-    label = parts.back.copy()
-    inside = away <= discs.radius[index]
-    np.maximum.at(label, parts.of_part[inside], parts.front[inside])
-    return label
+def _layered(discs: Discs, parts: _Parts) -> tuple[Array, Array]:
+    """What is seen of each edge's disc, and of what lies behind all, as parts of 1.
+
+    From the front, a disc is seen in its own share of what those before it leave free: exact
+    where the edges are independent. Pairs (p,) and parts (m,).
+    """
+    cover = np.minimum(_cover(discs, parts.front - 1, parts.box[:, parts.of_part]), 1 - 1e-12)
+    shade = np.log1p(-cover)
+    before = np.cumsum(shade) - shade
+    first = np.flatnonzero(np.diff(parts.of_part, prepend=-1))
+    before -= np.repeat(before[first], _counts(first, parts.of_part))
+    behind = np.exp(np.bincount(parts.of_part, shade, minlength=len(parts.back)))
+    return cover * np.exp(before), behind
 
 
 def _cover(discs: Discs, index: Array, box: Array) -> Array:

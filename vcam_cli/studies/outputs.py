@@ -8,7 +8,7 @@ from __future__ import annotations
 import platform
 import resource
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from importlib.metadata import version
 from pathlib import Path
@@ -18,6 +18,7 @@ import numpy as np
 
 import vcam_cli
 from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.load import FILE_KEYS
 from vcam_cli.files.exr import ExrWriter
 from vcam_cli.files.folder import OutputFolder
 from vcam_cli.files.png import write_png
@@ -101,7 +102,7 @@ def record(result: Result, inputs: tuple[Path, ...], seconds: float) -> dict[str
         "name": camera.name,
         "camera": camera.model_dump(mode="json"),
         "plan": frame.plan.report(),
-        "geometry": frame.geometry.report(frame.settings.oversampling),
+        "geometry": frame.geometry.report(frame.oversampling),
         "metrics": {name: value for name, value, _ in result.metrics},
         "stages": result.stages.seconds,
         "seconds": seconds,
@@ -114,6 +115,24 @@ def record(result: Result, inputs: tuple[Path, ...], seconds: float) -> dict[str
         "versions": versions(),
         "notes": list(result.notes),
     }
+
+
+def inputs(camera: Camera) -> tuple[Path, ...]:
+    """Every file that a run reads: YAML files, and what they name."""
+
+    def named(value: Any) -> Iterator[str]:
+        if isinstance(value, dict):
+            for key, item in value.items():
+                if key in FILE_KEYS and isinstance(item, str):
+                    yield item
+                else:
+                    yield from named(item)
+        elif isinstance(value, list):
+            for item in value:
+                yield from named(item)
+
+    files = [str(path) for path in camera.files]
+    return tuple(Path(f) for f in sorted({*files, *named(camera.model_dump(mode="json"))}))
 
 
 def peak_memory() -> int:

@@ -1,0 +1,122 @@
+"""Spectra as a camera file writes them, resolved to numbers."""
+
+import numpy as np
+import pytest
+from camera_trees import camera, mistakes
+
+from vcam_cli.camera.spectrum import SpectrumSpec
+from vcam_cli.errors import BadInput
+
+NM = 1e-9
+
+
+def transmittance(written) -> SpectrumSpec:
+    return camera(optics__transmittance=written).optics.transmittance
+
+
+def at(written, nm):
+    return transmittance(written).resolve().at(np.asarray(nm) * NM)
+
+
+class TestForms:
+    def test_a_number(self):
+        assert at(0.95, 550) == 0.95
+        assert at("95 %", [400, 700]) == pytest.approx([0.95, 0.95], rel=1e-15)
+
+    def test_a_table(self):
+        table = {"table": {400: 0.1, 500: 0.3, 600.5: 0.2}}
+        # straight lines; 1e-12: rounding of nm to m moves a wavelength by 1e-16 of itself
+        assert at(table, [400, 450, 500]) == pytest.approx([0.1, 0.2, 0.3], rel=1e-12)
+
+    def test_outside_of_a_table(self):
+        points = {400: 0.1, 500: 0.3}
+        with pytest.raises(ValueError, match="covers 400-500 nm"):
+            at({"table": points}, 510)
+        assert at({"table": points, "outside": "zero"}, [390, 510]) == pytest.approx([0, 0])
+        assert at({"table": points, "outside": "hold"}, [390, 510]) == pytest.approx([0.1, 0.3])
+
+    def test_a_file(self, tmp_path):
+        file = tmp_path / "x.csv"
+        file.write_text("wavelength_nm,value\n400,0.2\n600,0.4\n")
+        assert at({"file": str(file)}, 500) == pytest.approx(0.3, rel=1e-12)
+
+    def test_a_shipped_name(self):
+        assert at("ir-cut-650", 550) > 0.8 > 0.2 > at("ir-cut-650", 750)
+
+    def test_a_product(self):
+        factors = [0.5, "ir-cut-650", {"table": {380: 0.4, 780: 0.4}}]
+        expected = 0.2 * at("ir-cut-650", 600)
+        assert at(factors, 600) == pytest.approx(expected, rel=1e-12)
+
+
+class TestRefused:
+    @pytest.mark.parametrize(
+        ("written", "where", "words"),
+        [
+            (1.01, "", "at most 1"),
+            (-0.1, "", "negative"),
+            ("120 %", "", "at most 1"),
+            (True, "", "true"),
+            ([], "", "empty"),
+            ({}, "", "not a spectrum"),
+            ({"fiel": "x.csv"}, "", "not a spectrum"),
+            ({"file": "x.csv", "outsid": "hold"}, ".outsid", "did you mean outside?"),
+            ({"file": "x.csv", "table": {400: 1}}, ".table", "both"),
+            ({"file": 3}, ".file", "name of a file"),
+            ({"table": {500: 0.1, 400: 0.1}}, ".table.400", "follows 500 nm"),
+            ({"table": {400: 0.1, "red": 0.1}}, ".table.red", "wavelength in nm"),
+            ({"table": {400: -0.1}}, ".table.400", "negative"),
+            ({"table": {400: 0.1}, "outside": "one"}, ".outside", "error, zero, hold"),
+            (["ir-cut-650", "ir-cut-65"], ".1", "did you mean 'ir-cut-650'?"),
+            ("filters/x.csv", "", "{file: filters/x.csv}"),
+            ([[0.5]], ".0", "not a spectrum"),
+        ],
+    )
+    def test_as_written(self, written, where, words):
+        (mistake,) = mistakes({"optics.transmittance": written})
+        assert mistake.startswith(f"optics.transmittance{where}: ")
+        assert words in mistake, mistake
+
+    def test_more_than_one_when_resolved(self):
+        spec = transmittance({"table": {400: 95, 700: 80}})
+        with pytest.raises(BadInput, match=r"optics\.transmittance: reaches 95, more than 1"):
+            spec.resolve(("optics", "transmittance"))
+
+    def test_a_product_may_pass_one_on_its_way(self):
+        table = {"table": {400: 1.5, 700: 1.5}}
+        assert transmittance([0.5, table]).resolve().at(500 * NM) == pytest.approx(0.75)
+
+    def test_a_file_that_is_not_there(self):
+        spec = transmittance({"file": "/nowhere/x.csv"})
+        with pytest.raises(BadInput, match=r"^optics\.file: .*cannot be read"):
+            spec.resolve(("optics",))
+
+
+class TestLamps:
+    def lamp(self, written):
+        return camera(scene__illuminant=written).scene.illuminant
+
+    def test_a_name(self):
+        assert self.lamp("A").resolve().at(560 * NM) == pytest.approx(100.0)
+        assert self.lamp("equal-energy").resolve().at([400 * NM, 700 * NM]).tolist() == [100, 100]
+
+    def test_a_blackbody_has_its_peak_where_wien_says(self):
+        wavelength = np.linspace(400, 700, 3001) * NM
+        power = self.lamp({"blackbody": "5500 K"}).resolve().at(wavelength)
+        # Wien: 2897.77 um K / 5500 K = 526.87 nm; the grid is 0.1 nm, the top is flat: 0.5 nm
+        assert wavelength[power.argmax()] == pytest.approx(526.87 * NM, abs=0.5 * NM)
+
+    def test_a_line(self):
+        lamp = self.lamp({"monochromatic": "550 nm"})
+        assert lamp.line == 550 * NM
+        ((wavelength, power),) = lamp.resolve().lines
+        assert (wavelength, power) == (550 * NM, 1.0)
+
+    def test_a_file(self, tmp_path):
+        file = tmp_path / "lamp.csv"
+        file.write_text("wavelength_nm,value\n380,20\n780,60\n")
+        assert self.lamp({"file": str(file)}).resolve().at(580 * NM) == pytest.approx(40)
+
+    def test_emitting_images_have_none(self):
+        image = {"kind": "image", "file": "a.png", "model": "laser"}
+        assert camera(scene__source=image).scene.illuminant is None

@@ -1,0 +1,41 @@
+"""`vcam schema`."""
+
+import json
+
+import pytest
+from typer.testing import CliRunner
+
+from vcam_cli.camera.schema import schemas, text
+from vcam_cli.commands.main import app
+
+
+@pytest.fixture
+def run(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    return lambda *arguments: CliRunner().invoke(app, ["schema", *arguments])
+
+
+def test_writes_all_schemas_into_a_new_folder(run, tmp_path):
+    result = run("a/b")
+    assert result.exit_code == 0
+    assert result.stdout == ""
+    written = {file.name: file.read_text("utf-8") for file in (tmp_path / "a" / "b").iterdir()}
+    assert written == {name: text(schema) for name, schema in schemas().items()}
+
+
+def test_writes_into_the_current_folder_over_older_ones(run, tmp_path):
+    (tmp_path / "camera.schema.json").write_text("old")
+    assert run("--quiet").exit_code == 0
+    assert json.loads((tmp_path / "camera.schema.json").read_text("utf-8"))["title"]
+
+
+def test_names_its_files(run):
+    result = run("here", "--json")
+    assert json.loads(result.stdout)["files"] == [f"here/{name}" for name in schemas()]
+
+
+def test_a_file_is_no_folder(run, tmp_path):
+    (tmp_path / "file").write_text("")
+    result = run("file")
+    assert result.exit_code == 2
+    assert "file is not a folder" in result.stderr

@@ -1,0 +1,303 @@
+"""The commands that run nothing, and how `vcam` ends: exit codes, stdout and stderr."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import typer
+from typer.testing import CliRunner
+
+from vcam_cli.camera import shipped
+from vcam_cli.camera.load import load
+from vcam_cli.commands import list_, main, options
+from vcam_cli.errors import BadInput, CannotDo, bad
+
+VCAM = [sys.executable, "-m", "vcam_cli.commands.main"]
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path, monkeypatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def vcam(*args: str, code: int = 0):
+    """Runs a command in this process; gives what it printed."""
+    result = CliRunner().invoke(main.app, list(args), prog_name="vcam")
+    assert result.exit_code == code, result.output
+    return result
+
+
+def process(*args: str, **more) -> subprocess.CompletedProcess:
+    root = str(Path(main.__file__).parents[2])
+    env = os.environ | {"PYTHONPATH": root} | more.pop("env", {})
+    return subprocess.run([*VCAM, *args], capture_output=True, text=True, env=env, **more)
+
+
+class TestMain:
+    def test_help_names_every_command(self):
+        text = vcam("--help").stdout
+        for name in main.COMMANDS:
+            assert f"\n  {name} " in text
+
+    @pytest.mark.parametrize("command", main.COMMANDS)
+    def test_every_command_has_help_with_an_example(self, command):
+        text = vcam(command, "--help").stdout
+        assert "Example:" in text
+        assert f"    vcam {command}" in text  # indented as written, not wrapped into a paragraph
+
+    def test_help_imports_nothing_heavy(self):
+        code = (
+            "import sys\n"
+            "from vcam_cli.commands.main import main\n"
+            "try: main()\n"
+            "except SystemExit: pass\n"
+            "print([m for m in ('numpy', 'scipy', 'pydantic', 'colour', 'OpenImageIO', 'yaml')"
+            " if m in sys.modules], file=sys.stderr)"
+        )
+        root = str(Path(main.__file__).parents[2])
+        env = os.environ | {"PYTHONPATH": root}
+        run = [sys.executable, "-c", code, "--help"]
+        result = subprocess.run(run, capture_output=True, text=True, env=env, check=True)
+        assert result.stderr.strip() == "[]"
+
+    def test_version(self):
+        assert vcam("--version").stdout.startswith("vcam ")
+
+    def test_no_arguments_is_help(self):
+        assert "Usage: vcam" in CliRunner().invoke(main.app, [], prog_name="vcam").output
+
+    @pytest.mark.parametrize(
+        ("args", "said"),
+        [
+            (["validat"], "Did you mean 'validate'"),
+            (["validate", "--jsn", "x"], "--json"),
+            (["validate"], "Missing argument"),
+            (["run", "x", "--workers", "0"], "--workers"),
+            (["run", "x", "--workers", "many"], "--workers"),
+            (["run", "x", "--seed", "-1"], "--seed"),
+            (["run", "x", "--accuracy", "standrd"], "did you mean standard?"),
+            (["run", "x", "--accuracy", "2"], "not between 0 and 1"),
+        ],
+    )
+    def test_usage_errors_end_with_2(self, args, said):
+        assert said in vcam(*args, code=2).stderr
+
+    @pytest.mark.parametrize(
+        ("error", "code", "said"),
+        [
+            (bad("a.b", "wrong", "do this"), 2, "a.b: wrong; do this\n"),
+            (
+                CannotDo("the disk is full", "free some space"),
+                3,
+                "the disk is full; free some space\n",
+            ),
+            (MemoryError(), 3, "not enough memory"),
+            (KeyboardInterrupt(), 130, "interrupted"),
+        ],
+    )
+    def test_failures_become_messages_and_exit_codes(self, error, code, said, capsys):
+        with pytest.raises(typer.Exit) as caught, main.failures_told():
+            raise error
+        assert caught.value.exit_code == code
+        out, err = capsys.readouterr()
+        assert out == ""
+        assert err.startswith(said)
+        assert len(err.splitlines()) == 1
+
+    def test_a_bug_keeps_its_traceback_and_ends_with_1(self):
+        code = (
+            "import vcam_cli.commands.validate as v\n"
+            "def broken(*_): raise ZeroDivisionError('a bug')\n"
+            "v._check = broken\n"
+            "from vcam_cli.commands.main import main\n"
+            "main()"
+        )
+        env = os.environ | {"PYTHONPATH": str(Path(main.__file__).parents[2])}
+        run = [sys.executable, "-c", code, "validate", "x.yaml"]
+        result = subprocess.run(run, capture_output=True, text=True, env=env)
+        assert result.returncode == 1
+        assert "ZeroDivisionError: a bug" in result.stderr
+
+    def test_a_reader_that_goes_away_is_no_error_to_tell(self):
+        read, write = os.pipe()
+        os.close(read)
+        env = os.environ | {"PYTHONPATH": str(Path(main.__file__).parents[2])}
+        run = [*VCAM, "list", "filters", "generic-red"]
+        result = subprocess.run(run, stdout=write, stderr=subprocess.PIPE, env=env)
+        os.close(write)
+        assert result.stderr == b""
+
+    def test_completion(self):
+        env = {"_VCAM_COMPLETE": "complete_bash", "COMP_WORDS": "vcam li", "COMP_CWORD": "1"}
+        assert process(env=env).stdout.split() == ["list"]
+        env = {"_VCAM_COMPLETE": "complete_bash", "COMP_WORDS": "vcam run start", "COMP_CWORD": "2"}
+        assert process(env=env).stdout.split() == ["starter"]
+
+    def test_completion_of_paths(self, folder):
+        (folder / "cams").mkdir()
+        for name in ("cams/a.yaml", "cams/b.png", "c.yml"):
+            (folder / name).write_text("")
+        named = [name for name in shipped.names("cameras") if name.startswith("c")]
+        assert options.complete_camera("c") == [*named, "c.yml", "cams/"]
+        assert options.complete_camera("cams/") == ["cams/a.yaml"]
+        assert options.complete_camera("nothing/here") == []
+
+    def test_options_become_overrides(self):
+        assert options.overrides(["a=1"], 7, "0.01") == ["a=1", "seed.frame=7", "accuracy=0.01"]
+        assert options.overrides(None) == []
+
+
+class TestValidate:
+    def test_good_files(self):
+        result = vcam("validate", "starter", "still-life")
+        assert result.stdout == "starter: ok (starter)\nstill-life: ok (still-life)\n"
+        assert result.stderr == ""
+
+    def test_quiet(self):
+        result = vcam("validate", "-q", "starter")
+        assert (result.stdout, result.stderr) == ("", "")
+
+    def test_every_mistake_of_every_file_on_stderr(self):
+        Path("a.yaml").write_text("extends: starter\npixel: {widht: 3 um}\nadc: {bits: 99}\n")
+        Path("b.yaml").write_text("")
+        result = vcam("validate", "a.yaml", "starter", "b.yaml", code=2)
+        assert result.stdout == "starter: ok (starter)\n"
+        first, second, third = result.stderr.splitlines()
+        assert first.startswith("a.yaml:2:16: pixel.widht: ") and "width" in first
+        assert second.startswith("a.yaml:3:13: adc.bits: ")
+        assert third.startswith("b.yaml:1:1: the file is empty")
+
+    def test_json(self):
+        Path("a.yaml").write_text("extends: starter\nadc: {bits: 99}\n")
+        result = vcam("validate", "--json", "a.yaml", "starter", code=2)
+        summary = json.loads(result.stdout)
+        assert summary["ok"] is False
+        bad_file, good = summary["files"]
+        assert (good["file"], good["ok"], good["problems"]) == ("starter", True, [])
+        (problem,) = bad_file["problems"]
+        assert problem["where"] == "a.yaml:2:13"
+        assert problem["path"] == "adc.bits"
+        assert problem["message"]
+
+    def test_set(self):
+        vcam("validate", "starter", "--set", "adc.bits=12", "--set", "pixel.width=8 um")
+        assert "--set adc.bit=12: adc.bit: " in vcam(
+            "validate", "starter", "--set", "adc.bit=12", code=2
+        ).stderr  # fmt: skip
+
+    def test_a_study_is_refused_clearly(self):
+        Path("study.yaml").write_text("kind: sweep\nname: pixel-size\n")
+        text = vcam("validate", "study.yaml", code=2).stderr
+        assert text.startswith("study.yaml:1:7: kind: this is a study (kind: sweep)")
+        assert "not supported yet" in text
+
+    def test_a_machine_that_cannot_ends_with_3(self, monkeypatch):
+        def refuse(*_):
+            raise CannotDo("a.yaml: cannot be read: Permission denied", "check its permissions")
+
+        monkeypatch.setattr("vcam_cli.camera.load.load", refuse)
+        assert "Permission denied" in vcam("validate", "a.yaml", code=3).stderr
+
+    def test_it_writes_nothing(self, folder):
+        vcam("validate", "starter")
+        assert list(folder.iterdir()) == []
+
+
+class TestList:
+    @pytest.mark.parametrize("kind", list_.KINDS)
+    def test_every_kind_in_words_and_json(self, kind):
+        lines = vcam("list", kind).stdout.splitlines()
+        items = json.loads(vcam("list", kind, "--json").stdout)[kind]
+        assert [line.split("  ")[0] for line in lines] == [item["name"] for item in items]
+
+    def test_all(self):
+        text = vcam("list").stdout
+        assert [line.partition(":")[0] for line in text.splitlines()] == list(list_.KINDS)
+        assert "starter" in text and "dead-leaves" in text and "shot_noise" in text
+
+    @pytest.mark.parametrize(
+        ("kind", "name"),
+        [("cameras", "starter"), ("filters", "generic-rgb"), ("parts", "optics/f2.8-normal")],
+    )
+    def test_a_file_is_printed(self, kind, name):
+        text = vcam("list", kind, name).stdout
+        part = name.rpartition("/")[2]
+        files = {path.stem: path for path in shipped.folder().glob("*/*.yaml")}
+        assert text == files[part].read_text().rstrip() + "\n"
+
+    def test_what_is_no_file_is_described(self):
+        assert "dark" in vcam("list", "effects", "dark_current").stdout.lower()
+        assert vcam("list", "charts", "csf").stdout.startswith("csf: ")
+
+    def test_what_ships_and_is_listed_loads(self):
+        for item in json.loads(vcam("list", "cameras", "--json").stdout)["cameras"]:
+            assert load(item["name"]).name == item["name"]
+            assert item["about"], f"{item['name']} should begin with a comment that describes it"
+
+    def test_charts_that_are_not_built_are_not_listed(self):
+        assert "siemens-star" not in vcam("list", "charts").stdout
+
+    @pytest.mark.parametrize(
+        ("args", "said"),
+        [
+            (["camera"], "did you mean cameras?"),
+            (["nonsense"], "kinds: cameras, parts,"),
+            (["cameras", "startr"], "did you mean starter?"),
+            (["cameras", "zzzz"], "`vcam list cameras` shows them all"),
+        ],
+    )
+    def test_unknown_names(self, args, said):
+        assert said in vcam("list", *args, code=2).stderr
+
+    def test_the_first_sentence_of_a_comment(self, folder):
+        file = folder / "x.yaml"
+        file.write_text(
+            "# yaml-language-server: $schema=x\n# One two\n# three. Four.\na: 1\n# no\n"
+        )
+        assert list_.first_comment(file) == "One two three"
+        file.write_text("a: 1\n")
+        assert list_.first_comment(file) == ""
+
+
+class TestInit:
+    def test_the_file_is_good_and_commented(self, folder):
+        assert "next: vcam run new/camera.yaml" in vcam("init", "new").stderr
+        assert load("new/camera.yaml").array.rows * load("new/camera.yaml").array.columns < 200_000
+        assert Path("new/camera.yaml").read_text().count("#") > 8
+        assert [path.name for path in (folder / "new").iterdir()] == ["camera.yaml"]
+
+    def test_the_current_folder_is_the_default(self):
+        vcam("init", "-q")
+        assert Path("camera.yaml").is_file()
+
+    def test_json(self):
+        result = vcam("init", "new", "--json")
+        assert json.loads(result.stdout) == {"files": ["new/camera.yaml"]}
+        assert result.stderr == ""
+
+    def test_nothing_is_overwritten(self):
+        Path("camera.yaml").write_text("mine")
+        assert "exists already" in vcam("init", code=2).stderr
+        assert Path("camera.yaml").read_text() == "mine"
+
+    def test_a_link_to_nowhere_is_not_followed(self, folder):
+        Path("camera.yaml").symlink_to(folder / "elsewhere")
+        vcam("init", code=2)
+        assert not (folder / "elsewhere").exists()
+
+    def test_a_file_is_no_folder(self):
+        Path("x").write_text("")
+        assert "not a folder" in vcam("init", "x", code=2).stderr
+
+    def test_a_folder_that_cannot_be_made(self):
+        Path("x").write_text("")
+        vcam("init", "x/y", code=3)
+        assert Path("x").read_text() == ""
+
+
+def test_errors_know_their_exit_codes():
+    assert (BadInput.exit_code, CannotDo.exit_code) == (2, 3)

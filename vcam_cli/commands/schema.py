@@ -1,0 +1,45 @@
+"""`vcam schema`: the JSON Schemas of the files a user writes."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from vcam_cli.commands import options
+
+
+def schema(
+    folder: Annotated[
+        Path,
+        typer.Argument(metavar="[DIR]", help="Folder to write into; default the current one."),
+    ] = Path("."),
+    as_json: options.Json = False,
+    quiet: options.Quiet = False,
+) -> None:
+    """Writes the JSON Schemas of camera and technology files, for editors and programs.
+
+    An editor that reads YAML schemas completes and checks a camera file whose first line is
+    `# yaml-language-server: $schema=camera.schema.json`.
+
+    \b
+    Example:
+      vcam schema schemas
+    """
+    from vcam_cli.camera.schema import schemas, text
+    from vcam_cli.errors import bad
+    from vcam_cli.files import atomic
+
+    if folder.exists() and not folder.is_dir():
+        raise bad((), f"{folder} is not a folder", "give another one")
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise atomic.cannot_write(folder, error) from error
+    written = []
+    for name, content in schemas().items():
+        atomic.write_text(folder / name, text(content))
+        written.append(str(folder / name))
+    if as_json:
+        options.write_json({"files": written})
+    else:
+        options.say(f"wrote {', '.join(written)}", quiet)

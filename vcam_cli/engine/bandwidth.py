@@ -1,0 +1,110 @@
+"""How far up the spectrum goes: as far as the tolerance asks, no further than the lens.
+
+Pixels fold every frequency that reaches them into the picture; leaving out those above
+`oversampling` pixel Nyquist frequencies loses detail that would have been folded. By Parseval's
+theorem the rms of what is lost is known from the spectrum itself. A picture's spectrum goes on
+for ever and is at hand; a chart's ends with its sampling, and the part beyond is extrapolated from
+the top octave: the power of edges halves from octave to octave, times what the lens lets through.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcam_cli.camera.geometry import Geometry
+from vcam_cli.engine.settings import Settings
+from vcam_cli.engine.transfer import Tables
+
+SHARE = 0.1
+"""Part of the tolerance that the truncation of the spectrum may use up."""
+FREE_SAMPLES = 1 << 22
+"""Samples of a plane that cost little beside the rest of a run."""
+MOST_SAMPLES = 1 << 26
+"""Samples of one plane beyond which a chart is not sampled more finely."""
+
+
+@dataclass(frozen=True)
+class Spread:
+    """What the signal's spectrum holds: frequencies and the mean squares they add."""
+
+    frequency: NDArray
+    """(n,) larger of |fx| and |fy|, in pixel Nyquist frequencies, rising."""
+    power: NDArray
+    """(C, n) mean square of the signal [(electrons / s) squared]"""
+
+    def beyond(self, frequency: float) -> float:
+        """Rms that all higher frequencies add, in the color where it is most [electrons / s]."""
+        first = int(np.searchsorted(self.frequency, frequency, side="right"))
+        return math.sqrt(float(self.power[:, first:].sum(axis=1).max(initial=0.0)))
+
+    def of_sampling(self, highest: float, passes: Callable[[NDArray], NDArray]) -> float:
+        """Rms error of a chart sampled up to `highest`, as its spectrum's top octave foretells.
+
+        passes: transfer of lens and pixel at frequencies (n,), in pixel Nyquist frequencies. For
+        edges, whose amplitude falls as 1/f, there are two parts [electrons / s]:
+        - beyond f_N = highest: each octave has half the power of the last, all of them together
+          at most as much as this one, passed as its double is;
+        - folded: cell means take 2 f_N - f for f, weakened by f / (2 f_N - f). With v half of
+          2 f_N - f, in this octave, that is half its power times ((f_N - v) / v)^2, passed as f.
+        """
+        first = int(np.searchsorted(self.frequency, highest / 2, side="right"))
+        v = self.frequency[first:]
+        here = passes(v)
+        beyond = passes(2 * v) ** 2
+        folded = passes(np.maximum(2 * highest - 2 * v, 0)) ** 2 * 0.5 * (highest / v - 1) ** 2
+        # Where the lens lets nothing through, nothing is known: at most a thousandfold.
+        share = (beyond + folded) / np.maximum(here, 1e-3) ** 2
+        return math.sqrt(float((self.power[:, first:] * share).sum(axis=1).max(initial=0.0)))
+
+    def enough(self, budget: float) -> float:
+        """Lowest frequency beyond which an rms of at most `budget` is left."""
+        tail = np.cumsum(self.power[:, ::-1], axis=1)[:, ::-1].max(axis=0)
+        kept = np.flatnonzero(tail > budget**2)
+        return float(self.frequency[kept[-1]]) if len(kept) else 0.0
+
+
+def first_guess(geometry: Geometry, knobs: Settings) -> int:
+    """Oversampling to begin with: more where the array is small and it costs nothing."""
+    pixels = geometry.rows * geometry.columns
+    free = round(math.sqrt(FREE_SAMPLES / pixels))
+    return max(knobs.oversampling, min(free, 4, knobs.most_oversampling))
+
+
+def limit(geometry: Geometry, cutoff: float) -> float:
+    """Oversampling at which the lens's cut-off [cycles/m] is reached along both axes."""
+    return cutoff * 2 * max(geometry.pitch_x, geometry.pitch_y)
+
+
+def top(geometry: Geometry, oversampling: float, cutoff: float) -> float:
+    """Highest |f| of a spectrum cut at `oversampling` [cycles/m]."""
+    corner = math.hypot(0.5 / geometry.pitch_x, 0.5 / geometry.pitch_y)
+    return min(cutoff, oversampling * corner)
+
+
+def finer(
+    now: int, lost: float, budget: float, geometry: Geometry, knobs: Settings, cutoff: float
+) -> int:
+    """Oversampling a chart needs when `now` loses `lost`; `now` itself where it will do.
+
+    The power of an edge falls with the fourth power of the frequency (its own square and the
+    photodetector's), so what is lost falls with the 3/2 power of the oversampling.
+    """
+    if lost <= budget:
+        return now
+    pixels = geometry.rows * geometry.columns
+    affordable = max(now, int(math.sqrt(MOST_SAMPLES / pixels)))
+    needed = math.ceil(now * (lost / budget) ** (2 / 3)) if budget > 0 else knobs.most_oversampling
+    wanted = min(max(needed, now + 1), knobs.most_oversampling, affordable)
+    return max(now, min(wanted, max(now, math.ceil(min(limit(geometry, cutoff), 1e6)))))
+
+
+def peak(planes: NDArray, tables: Tables) -> float:
+    """Largest signal of a scene before blur, from every fourth sample [electrons / s]."""
+    level = tables.values[:, :, 0]
+    thin = planes[:, ::4, ::4].reshape(len(planes), -1)
+    return float((level.T @ thin).max())
