@@ -14,7 +14,12 @@ def test_equal_keys_give_equal_numbers():
 
 @pytest.mark.parametrize(
     "other",
-    [(4, "shot_noise", 1, 7), (3, "read_noise", 1, 7), (3, "shot_noise", 2, 7), (3, "shot_noise", 1, 8)],
+    [
+        (4, "shot_noise", 1, 7),
+        (3, "read_noise", 1, 7),
+        (3, "shot_noise", 2, 7),
+        (3, "shot_noise", 1, 8),
+    ],
 )
 def test_every_part_of_the_key_counts(other):
     a = stream(3, "shot_noise", 1, 7).standard_normal(1000)

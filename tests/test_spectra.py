@@ -159,7 +159,7 @@ def test_outside_says_what_holds_outside() -> None:
         lambda s: s.require(START, STOP),
     ],
 )
-def test_what_is_not_covered_is_an_error(use) -> None:  # noqa: ANN001
+def test_what_is_not_covered_is_an_error(use) -> None:
     with pytest.raises(ValueError, match=r"covers 400-700 nm, but .* nm is needed") as caught:
         use(Spectrum.sampled([400e-9, 700e-9], [1.0, 1.0]))
     assert "outside: hold" in str(caught.value)
@@ -217,7 +217,7 @@ def test_knots_of_a_product() -> None:
 def test_blackbody_is_planck(temperature: float, error: float) -> None:
     wavelength = np.linspace(START, STOP, 4001)
 
-    def planck(wl):  # noqa: ANN001, ANN202
+    def planck(wl):
         x = spectra.PLANCK * spectra.SPEED_OF_LIGHT / (wl * spectra.BOLTZMANN * temperature)
         return wl**-5 / np.expm1(x)
 
@@ -312,6 +312,6 @@ def test_reads_csv(tmp_path: Path) -> None:
 def test_broken_csv_is_refused_with_its_place(
     tmp_path: Path, text: str | bytes, message: str
 ) -> None:
-    with pytest.raises(ValueError, match="x.csv") as caught:
+    with pytest.raises(ValueError, match=r"x\.csv") as caught:
         spectra.read_csv(write(tmp_path, text))
     assert message in str(caught.value)

@@ -12,7 +12,10 @@ def tables(components, colors, top, size=4001):
     """Smooth, different tables that end at zero: what transfer functions look like."""
     f = np.linspace(0, 1, size)
     values = np.array(
-        [[(1 - f) ** (1 + 0.3 * c) * (1 + 0.5 * r * f) for c in range(colors)] for r in range(components)]
+        [
+            [(1 - f) ** (1 + 0.3 * c) * (1 + 0.5 * r * f) for c in range(colors)]
+            for r in range(components)
+        ]
     )
     return Tables(np.eye(components), values, top, 0.0)
 
@@ -28,7 +31,8 @@ def dense(planes, x, y, table, along_x, along_y):
         # coefficients of the mirrored staircase (or of what the cell means came from)
         box = np.sinc(k / 2 / axis.samples)
         box = box if axis.squares else 1 / box
-        analysis = np.cos(np.pi * np.outer(k, n)) * (box * np.where(k == 0, 1, 2) / axis.samples)[:, None]
+        count = np.where(k == 0, 1, 2) / axis.samples
+        analysis = np.cos(np.pi * np.outer(k, n)) * (box * count)[:, None]
         at = (axis.first + np.arange(axis.pixels) * axis.pixel_pitch) / axis.length
         return analysis, np.cos(np.pi * np.outer(at, k))
 
@@ -46,8 +50,14 @@ def dense(planes, x, y, table, along_x, along_y):
 
 GRIDS = {
     "aligned": (Axis(24, 1.0, 24, 1.0, 0.5, True, 1.2), Axis(18, 1.0, 18, 1.0, 0.5, True, 1.2)),
-    "coarse picture": (Axis(8, 3.0, 24, 1.0, 0.5, True, 1.5), Axis(6, 3.0, 18, 1.0, 0.5, True, 1.5)),
-    "fine chart": (Axis(48, 0.5, 20, 1.0, 2.5, False, 1.0), Axis(36, 0.5, 14, 1.0, 2.5, False, 1.0)),
+    "coarse picture": (
+        Axis(8, 3.0, 24, 1.0, 0.5, True, 1.5),
+        Axis(6, 3.0, 18, 1.0, 0.5, True, 1.5),
+    ),
+    "fine chart": (
+        Axis(48, 0.5, 20, 1.0, 2.5, False, 1.0),
+        Axis(36, 0.5, 14, 1.0, 2.5, False, 1.0),
+    ),
     "odd ratio": (Axis(20, 1.2, 24, 1.0, 0.5, True, 2.0), Axis(16, 1.2, 17, 1.0, 1.1, True, 2.0)),
     "off center": (Axis(24, 1.0, 24, 1.0, 0.7, True, 1.0), Axis(18, 1.0, 18, 1.0, 0.4, True, 1.0)),
 }
@@ -104,7 +114,9 @@ def test_boxes_equal_summed_overlaps(grid, size):
     def overlaps(axis):
         low = axis.first + np.arange(axis.pixels) * axis.pixel_pitch - size / 2
         edge = np.arange(axis.samples) * axis.sample_pitch
-        shared = np.minimum(low[:, None] + size, edge + axis.sample_pitch) - np.maximum(low[:, None], edge)
+        shared = np.minimum(low[:, None] + size, edge + axis.sample_pitch) - np.maximum(
+            low[:, None], edge
+        )
         return np.clip(shared, 0, None) / size
 
     expected = overlaps(y) @ plane @ overlaps(x).T
@@ -121,7 +133,7 @@ def test_box_of_no_size_reads_the_sample_under_it():
 
 
 def test_filter_approaches_boxes_as_the_bandwidth_grows():
-    """Without optical blur the spectrum's way and the exact one meet: error falls as 1/bandwidth."""
+    """Without optical blur the spectrum's way and the exact one meet, as 1 / bandwidth."""
     errors = []
     for bandwidth in (2.0, 20.0):
         x = Axis(20, 1.2, 24, 1.0, 0.5, True, bandwidth)

@@ -19,7 +19,9 @@ def bell(center, width=40e-9):
 def test_a_line_is_its_own_otf():
     """Monochromatic light: H is the OTF at that wavelength, no grid in between."""
     wavelength = 553.7e-9
-    h = transfer([Spectrum.line(wavelength, 2.0)], [bell(540e-9)], 3.0, Band(400e-9, 700e-9, 50e-9), [LENS])
+    h = transfer(
+        [Spectrum.line(wavelength, 2.0)], [bell(540e-9)], 3.0, Band(400e-9, 700e-9, 50e-9), [LENS]
+    )
     photons = 2.0 * wavelength / (PLANCK * SPEED_OF_LIGHT)
     level = 3.0 * photons * bell(540e-9).at(np.array([wavelength]))[0]
     np.testing.assert_allclose(h.at(F)[0, 0], level * LENS.otf(F, wavelength), rtol=1e-12)
@@ -39,9 +41,7 @@ def test_many_wavelengths_by_brute_force(lamp, step, tolerance):
     edges = np.linspace(400e-9, 700e-9, 6001)
     mid = (edges[1:] + edges[:-1]) / 2
     density = light.at(mid) * green.at(mid) * mid / (PLANCK * SPEED_OF_LIGHT)
-    direct = sum(
-        d * LENS.otf(F, w) for d, w in zip(density * np.diff(edges), mid, strict=True)
-    )
+    direct = sum(d * LENS.otf(F, w) for d, w in zip(density * np.diff(edges), mid, strict=True))
     got = h.at(F)[0, 0]
     np.testing.assert_allclose(got, direct, atol=tolerance * direct[0])
     # the level does not depend on the step at all
@@ -49,9 +49,13 @@ def test_many_wavelengths_by_brute_force(lamp, step, tolerance):
 
 
 def test_cutoff_is_that_of_the_shortest_wavelength_in_use():
-    h = transfer([Spectrum.line(500e-9)], [Spectrum.flat(1.0)], 1.0, Band(400e-9, 700e-9, 10e-9), [LENS])
+    h = transfer(
+        [Spectrum.line(500e-9)], [Spectrum.flat(1.0)], 1.0, Band(400e-9, 700e-9, 10e-9), [LENS]
+    )
     assert h.cutoff == pytest.approx(LENS.cutoff(500e-9), rel=1e-12)
-    assert transfer([bell(5e-7)], [bell(5e-7)], 1.0, Band(400e-9, 700e-9, 1e-8), []).cutoff == np.inf
+    assert (
+        transfer([bell(5e-7)], [bell(5e-7)], 1.0, Band(400e-9, 700e-9, 1e-8), []).cutoff == np.inf
+    )
 
 
 def test_few_mixtures_stand_for_many_spectra():

@@ -65,7 +65,7 @@ def test_whole_and_never_negative(mean, z):
 @given(mean=st.floats(1e-6, 7.9), z=st.floats(-6, 6))
 def test_inversion_is_the_quantile(mean, z):
     k = poisson_from_normal(np.array([mean]), np.array([z]))[0]
-    # scipy's quantile of the upper tail; where a tail hits a step to rounding, either side is right.
+    # scipy's quantile of the upper tail; where a tail hits a step, either side is right.
     expected = stats.poisson.isf(stats.norm.sf(z), mean)
     near = abs(stats.poisson.sf(min(k, expected), mean) - stats.norm.sf(z)) < 1e-14
     assert k == expected or near

@@ -62,21 +62,26 @@ def test_the_exposure_is_known_so_a_dim_picture_stays_dim_and_a_bright_one_excee
     assert bright.encode(8).min() == 255
 
 
-def test_without_white_balance_the_largest_color_of_white_is_one():
+BT709 = np.array([0.2126, 0.7152, 0.0722])
+
+
+def test_without_white_balance_the_luminance_of_white_is_one():
     plain = steps(black_level="subtract", demosaic="bilinear")
     done = process(mosaic_of(flat(1.0)), CONTEXT, plain)
-    np.testing.assert_allclose(done.linear[3, 4], [0.5, 1.0, 0.25], rtol=5e-7)
+    white = np.array([0.5, 1.0, 0.25])
+    np.testing.assert_allclose(done.linear[3, 4], white / (white @ BT709), rtol=5e-7)
 
 
 def test_without_black_level_black_counts_in_white_and_picture_alike():
     for none in (steps(demosaic="bilinear"), steps(black_level="none", demosaic="bilinear")):
         done = process(mosaic_of(flat(1.0)), CONTEXT, none)
-        np.testing.assert_allclose(done.linear[3, 4], CONTEXT.white_dn / 1020.0, rtol=5e-7)
+        np.testing.assert_allclose(done.linear[3, 4], CONTEXT.white_dn / (CONTEXT.white_dn @ BT709), rtol=5e-7)
 
 
 def test_a_black_level_given_as_a_number():
     done = process(mosaic_of(flat(1.0)), CONTEXT, steps(black_level=120.0, demosaic="bilinear"))
-    np.testing.assert_allclose(done.linear[3, 4], [400 / 900, 1.0, 150 / 900], rtol=5e-7)
+    white = np.array([400, 900, 150])
+    np.testing.assert_allclose(done.linear[3, 4], white / (white @ BT709), rtol=5e-7)
 
 
 @pytest.mark.parametrize("demosaic_first", [True, False])
@@ -112,7 +117,7 @@ def test_linear_is_the_composition_of_its_steps_across_block_borders():
     planes = bilinear(raw - BLACK, RGGB, RGB).astype(float)
     means = planes.mean(axis=(1, 2))
     gains = means.max() / means
-    scale = 1 / ((CONTEXT.white_dn - BLACK) * gains).max()
+    scale = 1 / (((CONTEXT.white_dn - BLACK) * gains) @ BT709)
     expected = np.moveaxis(planes * (gains * scale)[:, None, None], 0, 2)
     done = process(raw, CONTEXT, FULL)
     # values of about 1 to 4 in float32

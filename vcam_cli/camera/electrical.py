@@ -51,7 +51,7 @@ def electrical(camera: Camera) -> Electrical:
     Raises BadInput where the file leaves it open or contradicts itself.
     """
     pixel, adc = camera.pixel, camera.adc
-    capacitance = pixel.photodetector.capacitance
+    capacitance = _number(pixel.photodetector.capacitance)
     gain, swing, well = _solve(
         pixel.readout.conversion_gain,
         pixel.readout.voltage_swing,
@@ -81,6 +81,11 @@ def electrical(camera: Camera) -> Electrical:
         offset=adc.offset,
         full_scale=full_scale,
     )
+
+
+def _number(value: float | str | None) -> float | None:
+    """The value, where the file gives one (`junction` stands for one that is computed)."""
+    return None if isinstance(value, str) else value
 
 
 def check(camera: Camera) -> None:

@@ -166,8 +166,8 @@ def _lens(camera: Camera) -> tuple[float, float, float]:
     if distance <= f:
         raise bad(
             "scene.distance",
-            f"the scene is {distance:.6g} m from the lens, not beyond its focal length of {f:.6g} m:"
-            " no real image",
+            f"a scene {distance:.6g} m from the lens lies within its focal length of {f:.6g} m"
+            " and forms no real image",
             "put the scene further away, or use a shorter focal length",
         )
     m = float(radiometry.magnification(f, distance))
@@ -277,7 +277,10 @@ def _detector(camera: Camera) -> tuple[float, float, float, float]:
     x = pd.x if pd.x is not None else (pixel.width - w) / 2
     y = pd.y if pd.y is not None else (pixel.height - h) / 2
     slack = 1e-9
-    for size, start, full, side_name in ((w, x, pixel.width, "width"), (h, y, pixel.height, "height")):
+    for size, start, full, side_name in (
+        (w, x, pixel.width, "width"),
+        (h, y, pixel.height, "height"),
+    ):
         if start < -slack * full or start + size > full * (1 + slack):
             raise bad(
                 f"pixel.photodetector.{side_name}",

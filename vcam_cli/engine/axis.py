@@ -161,7 +161,7 @@ class Axis:
         size, before, kernel, after = self._chirp_parts
         kind = np.complex64 if values.dtype == np.float32 else np.complex128
         shape = (-1, 1) if axis == 0 else (1, -1)
-        work = values * before.astype(kind).reshape(shape)
+        work: NDArray = values * np.asarray(before, kind).reshape(shape)
         work = scipy.fft.fft(work, size, axis=axis)
         work *= kernel.astype(kind).reshape(shape)
         work = scipy.fft.ifft(work, axis=axis, overwrite_x=True)

@@ -22,10 +22,7 @@ def exposure_time(
     if auto is None:
         assert camera.exposure.time is not None
         return camera.exposure.time
-    if auto.method == "white":
-        level = white_rate
-    else:
-        level = percentile(rate, auto.percentile)
+    level = white_rate if auto.method == "white" else percentile(rate, auto.percentile)
     return _reach(auto, level + dark_rate, saturation)
 
 

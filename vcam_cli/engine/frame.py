@@ -160,7 +160,9 @@ def _transfer(camera, g, knobs, spectra, colors, effects) -> optics.Transfer:
     try:
         return optics.scene_transfer(camera, g, knobs, spectra, colors, effects)
     except ValueError as error:
-        raise bad("scene.wavelengths", str(error), "narrow the wavelengths, or extend the spectrum") from None
+        raise bad(
+            "scene.wavelengths", str(error), "narrow the wavelengths, or extend the spectrum"
+        ) from None
 
 
 def figures(frame: Frame) -> list[tuple[str, float, str]]:

@@ -38,4 +38,4 @@ class Mosaic:
 
 def mosaic(camera: Camera) -> Mosaic:
     """The camera's mosaic."""
-    return Mosaic(BLOCKS[camera.array.pattern])
+    return Mosaic(BLOCKS[str(camera.array.pattern)])

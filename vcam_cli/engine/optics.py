@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import scipy.fft
@@ -20,7 +21,7 @@ from vcam_cli.effects.base import Effect, Gain, RadialTransfer, SeparableTransfe
 from vcam_cli.engine import bandwidth, memory, sampling
 from vcam_cli.engine.axis import Axis
 from vcam_cli.engine.mosaic import Mosaic
-from vcam_cli.engine.parallel import each, pieces
+from vcam_cli.engine.parallel import each
 from vcam_cli.engine.settings import Settings
 from vcam_cli.engine.transfer import Band, Tables, Transfer, tabulate, transfer
 from vcam_cli.physics import radiometry
@@ -32,7 +33,7 @@ MARGIN = 32
 """Pixels that a chart goes on beyond the array, at least: its far borders are mirrored, and the
 light an Airy pattern throws further than this is below 1 % in any lens worth simulating."""
 
-Rows = Callable[[int, int], NDArray]
+Rows = Callable[[slice], NDArray]
 
 
 def view(geometry: Geometry, settings: Settings, oversampling: int) -> View:
@@ -61,8 +62,9 @@ def _margin(geometry: Geometry) -> int:
 
 def responses(camera: Camera, mosaic: Mosaic) -> list[Spectrum]:
     """Electrons per photon for each color: transmittance x filter x QE."""
-    common = camera.optics.transmittance.resolve(), (
-        camera.pixel.photodetector.quantum_efficiency.spectrum.resolve()
+    common = (
+        camera.optics.transmittance.resolve(),
+        (camera.pixel.photodetector.quantum_efficiency.spectrum.resolve()),
     )
     out = []
     for color in mosaic.colors:
@@ -114,7 +116,7 @@ class Linear:
     """Everything the linear part needs; `rate` computes it."""
 
     scene: WaveScene | SampledScene
-    repaint: Callable[[int], SampledScene]
+    repaint: Callable[[int], WaveScene | SampledScene]
     """The same chart with another number of cells per pixel pitch."""
     exact: Transfer
     geometry: Geometry
@@ -127,7 +129,7 @@ class Linear:
         """Photo-electrons per second in every pixel, noise-free."""
         rows, oversampling, lost = self._rows()
         g = self.geometry
-        out = np.empty((g.rows, g.columns), self.settings.dtype)
+        out: NDArray = np.empty((g.rows, g.columns), self.settings.dtype)
         gains = [e for e in self.effects if isinstance(e, Gain)]
         x = ((np.arange(g.columns) + 0.5 - g.columns / 2) * g.pitch_x).astype(out.dtype)
         y = ((np.arange(g.rows) + 0.5 - g.rows / 2) * g.pitch_y).astype(out.dtype)
@@ -148,7 +150,9 @@ class Linear:
         for phase in range(min(period, len(tile))):
             row = block.start + phase
             for color, columns in self.mosaic.in_row(row):
-                tile[phase::period, columns] = rows[color](slice(row, block.stop, period))[:, columns]
+                tile[phase::period, columns] = rows[color](slice(row, block.stop, period))[
+                    :, columns
+                ]
 
     def _rows(self) -> tuple[list[Rows], float, float]:
         """For each color, a function from array rows (a slice) to their values.
@@ -189,7 +193,7 @@ class Linear:
                 total += level[color] * (ey[s, None] * ex[None, :]).real
             return total
 
-        return [lambda s, c=c: rows(c, s) for c in range(len(self.mosaic.colors))]
+        return [partial(rows, color) for color in range(len(self.mosaic.colors))]
 
     def _axes(self, scene: SampledScene, oversampling: float) -> tuple[Axis, Axis]:
         g = self.geometry
@@ -239,11 +243,16 @@ class Linear:
             if oversampling == enough:
                 break
             del planes, coefficients
-            scene = self.repaint(oversampling)
+            finer = self.repaint(oversampling)
+            assert isinstance(finer, SampledScene)
+            scene = finer
         chosen = self._filter(scene, tables, enough)
         series = chosen.apply(coefficients, self.workers)
-        rows = [lambda s, c=c: chosen.x.evaluate(series[c, s], axis=1) for c in range(len(series))]
-        return rows, enough, lost
+
+        def rows(color: int, s: slice) -> NDArray:
+            return chosen.x.evaluate(series[color, s], axis=1)
+
+        return [partial(rows, color) for color in range(len(series))], enough, lost
 
     def _passes(self, frequency: NDArray) -> NDArray:
         """Transfer of lens and photodetector, without its zeros, in the best color.
@@ -277,4 +286,4 @@ class Linear:
         height = self.geometry.detector_height if aperture else 0.0
         planes = scene.planes(self.exact.level.T)
         values = [sampling.boxes(plane, x, y, width, height) for plane in planes]
-        return [lambda s, c=c: values[c][s] for c in range(len(values))]
+        return [value.__getitem__ for value in values]

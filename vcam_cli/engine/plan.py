@@ -22,10 +22,11 @@ import numpy as np
 
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.geometry import Geometry
+from vcam_cli.camera.geometry import geometry as solve
 from vcam_cli.effects.base import Charge, Draw, Effect, Gain, Outlook
 from vcam_cli.effects.order import ORDER
 from vcam_cli.engine.settings import Settings
-from vcam_cli.errors import Collector
+from vcam_cli.errors import BadInput, Collector
 
 LEVELS = (0.01, 0.1, 1.0)
 """Shares of full signal at which the variance promise holds."""
@@ -90,6 +91,14 @@ def described(camera: Camera, geometry: Geometry) -> dict[str, Effect | None]:
                 )
         problems.raise_if_any()
     return found
+
+
+def check(camera: Camera) -> None:
+    """Raises BadInput, with its place, where `effects` asks for what the file does not describe."""
+    try:
+        described(camera, solve(camera))
+    except BadInput as error:
+        raise error.located(camera.locate) from None
 
 
 def optical(camera: Camera, geometry: Geometry) -> tuple[Effect, ...]:

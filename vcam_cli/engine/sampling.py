@@ -76,7 +76,7 @@ class Filter:
     def _multiply(
         self,
         coefficients: NDArray,
-        lookup: "_Lookup",
+        lookup: _Lookup,
         terms: NDArray,
         weights: NDArray,
         into: NDArray,
@@ -86,7 +86,7 @@ class Filter:
             into[c] += self.x.fold(product)
 
     def _products(
-        self, coefficients: NDArray, lookup: "_Lookup", terms: NDArray, weights: NDArray
+        self, coefficients: NDArray, lookup: _Lookup, terms: NDArray, weights: NDArray
     ) -> Iterator[NDArray]:
         """For each color, rows of the filtered spectrum, (terms, as many as are not zero)."""
         x, y, dtype = self.x, self.y, coefficients.dtype
@@ -129,7 +129,9 @@ class Filter:
                 break
             square = np.array(parts, dtype=np.float64) ** 2
             square[:, 1:] *= 2
-            frequency.append(np.maximum(self.x.frequencies[: square.shape[1]], self.y.frequencies[term]))
+            frequency.append(
+                np.maximum(self.x.frequencies[: square.shape[1]], self.y.frequencies[term])
+            )
             power.append(square * (stands_for * (2 if term else 1)))
         order = np.argsort(together := np.concatenate(frequency), kind="stable")
         return together[order], np.concatenate(power, axis=1)[:, order]
@@ -140,7 +142,9 @@ def _rows_to_sample(terms: int) -> list[tuple[int, float]]:
 
     Straight edges along the array put their energy into the first rows and columns.
     """
-    sample = np.unique(np.concatenate([np.arange(min(24, terms)), np.geomspace(24, terms, 72)]).astype(int))
+    sample = np.unique(
+        np.concatenate([np.arange(min(24, terms)), np.geomspace(24, terms, 72)]).astype(int)
+    )
     sample = sample[sample < terms]
     edges = np.concatenate([[-0.5], (sample[1:] + sample[:-1]) / 2, [terms - 0.5]])
     return list(zip(sample.tolist(), np.diff(edges).tolist(), strict=True))

@@ -56,7 +56,7 @@ class Transfer:
         components, colors, count = self.weights.shape
         return (self.weights.reshape(-1, count) @ otf).reshape(components, colors, -1)
 
-    def mixed(self, mix: NDArray) -> "Transfer":
+    def mixed(self, mix: NDArray) -> Transfer:
         """The transfer of mixtures of the components, mix: (R, K)."""
         return replace(self, weights=np.tensordot(mix, self.weights, axes=1))
 

@@ -2,7 +2,7 @@
 
 The steps become operations (see `base`) on blocks of rows; white balance looks at the picture as
 the steps before it left it. A last operation scales the picture so that the scene's perfect white
-under this exposure is 1: the white passes through the same steps, and its largest color counts.
+under this exposure has luminance 1: the white passes through the same steps.
 The exposure is known, so the scale never depends on the brightest pixel of the picture.
 
 Nothing is computed before it is asked for: `Processed` holds the raw frame and the operations.
@@ -121,9 +121,7 @@ def through(operations: Sequence[Operation], values: np.ndarray) -> np.ndarray:
     return values
 
 
-def process(
-    dn: np.ndarray, context: Context, steps: Sequence[Step], workers: int = 1
-) -> Processed:
+def process(dn: np.ndarray, context: Context, steps: Sequence[Step], workers: int = 1) -> Processed:
     """A raw frame (rows, columns) [DN] made ready: gains measured, scale known.
 
     Raises BadInput where the steps cannot work (see `check`), where the frame is too small to
@@ -140,15 +138,19 @@ def process(
             curve = step.value
         elif step.name == "demosaic":
             if min(dn.shape) < 2:
-                raise bad(path, f"{dn.shape[0]} x {dn.shape[1]} pixels cannot be demosaiced",
-                          "use an array of at least 2 x 2 pixels")
+                raise bad(
+                    path,
+                    f"{dn.shape[0]} x {dn.shape[1]} pixels cannot be demosaiced",
+                    "use an array of at least 2 x 2 pixels",
+                )
             operations += (Bilinear(context.pattern, context.colors),)
             full_color = True
         elif step.name == "black_level" and step.value != "none":
             operations += (_black_level(step, context, path),)
         elif step.name == "white_balance" and step.value != "none":
             operations += (_gray_world(dn, operations, context, workers),)
-    scale = _scale(through(operations, np.asarray(context.white_dn, dtype=np.float64)))
+    white = through(operations, np.asarray(context.white_dn, dtype=np.float64))
+    scale = _scale(white, context.colors)
     operations += (white_balance.Gains((scale,) * len(context.colors), context),)
     return Processed(dn, context, operations, curve, full_color, workers)
 
@@ -159,8 +161,11 @@ def _black_level(
     level = black_level.level(step.value, context.black_dn)
     white = float(np.max(context.white_dn))
     if step.value != "subtract" and level >= white > context.black_dn:
-        raise bad(path, f"{level:g} DN leaves nothing of the perfect white, which is {white:g} DN",
-                  "write `subtract`, or a smaller number")
+        raise bad(
+            path,
+            f"{level:g} DN leaves nothing of the perfect white, which is {white:g} DN",
+            "write `subtract`, or a smaller number",
+        )
     return black_level.BlackLevel(level)
 
 
@@ -178,10 +183,19 @@ def _gray_world(
     return white_balance.Gains(tuple(gains.tolist()), context)
 
 
-def _scale(white: np.ndarray) -> float:
-    """What makes the largest color of white 1; 0, a black picture, where white gives no signal."""
-    largest = float(np.max(white))
-    return 1.0 / largest if largest > 0 else 0.0
+LUMINANCE = {"R": 0.2126, "G": 0.7152, "B": 0.0722}
+"""Shares of the display's primaries in luminance, ITU-R BT.709; any other color counts fully."""
+
+
+def _scale(white: np.ndarray, colors: Sequence[str]) -> float:
+    """What makes the luminance of white 1; 0, a black picture, where white gives no signal.
+
+    Why luminance and not the largest color: a strong gain for blue, in a yellowish scene, would
+    darken the whole picture.
+    """
+    shares = np.array([LUMINANCE.get(color, 1.0) for color in colors])
+    luminance = float(white @ shares / shares.sum())
+    return 1.0 / luminance if luminance > 0 else 0.0
 
 
 def check(
@@ -204,11 +218,15 @@ def check(
         if step.name in before:
             found.add(path, f"{step.name} comes twice", "keep one of them")
         if "gamma" in before:
-            found.add(path, f"{step.name} after gamma: the steps work on linear light",
-                      "put gamma last")
+            found.add(
+                path, f"{step.name} after gamma: the steps work on linear light", "put gamma last"
+            )
         if step.name == "black_level" and "white_balance" in before:
-            found.add(path, "black_level after white_balance: gains need black at zero",
-                      "put black_level before white_balance")
+            found.add(
+                path,
+                "black_level after white_balance: gains need black at zero",
+                "put black_level before white_balance",
+            )
         if step.name == "demosaic" and not is_bayer(pattern):
             found.add(path, "demosaic needs a Bayer pattern", "remove this step")
         if step.name == "white_balance" and step.value != "none" and len(colors) == 1:
@@ -223,8 +241,11 @@ def _check_value(found: Collector, path: tuple[str | int, ...], step: Step) -> N
     if isinstance(step.value, str):
         if step.value not in allowed:
             likely = nearest(step.value, allowed)
-            found.add(path, f"`{step.value}` is not known",
-                      f"write `{likely}`" if likely else _one_of(allowed))
+            found.add(
+                path,
+                f"`{step.value}` is not known",
+                f"write `{likely}`" if likely else _one_of(allowed),
+            )
     elif step.name not in _NUMBER_TOO or not np.isfinite(step.value):
         found.add(path, f"{step.value!r} is not allowed", _one_of(allowed))
     elif step.name == "gamma" and step.value <= 0:

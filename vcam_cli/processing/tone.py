@@ -23,9 +23,7 @@ _SHIFTS = range(14, 8, -1)  # bits of a float32 left out of the table's index: 6
 def srgb(linear: np.ndarray) -> np.ndarray:
     """sRGB encoding of linear light, clipped to [0, 1]; float64 in, float64 out."""
     linear = np.clip(np.asarray(linear, dtype=np.float64), 0.0, 1.0)
-    return np.where(
-        linear <= 0.0031308, 12.92 * linear, 1.055 * np.power(linear, 1 / 2.4) - 0.055
-    )
+    return np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * np.power(linear, 1 / 2.4) - 0.055)
 
 
 def power_law(linear: np.ndarray, gamma: float) -> np.ndarray:

@@ -12,8 +12,9 @@ the camera asks for, and never 25.
 
 import math
 from abc import ABC, abstractmethod
-from dataclasses import dataclass
-from typing import Any, Literal, Protocol
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
@@ -22,7 +23,7 @@ from vcam_cli.spectra import Spectrum
 
 Array = NDArray[Any]
 
-CELLS_A_BAND = 1 << 21  # cells painted at once: bounds the memory of temporaries
+CELLS_A_BAND = 1 << 19  # cells painted at once: bounds the memory of temporaries
 
 
 @dataclass(frozen=True)
@@ -116,25 +117,40 @@ class SampledScene(ABC):
     dtype: DTypeLike
 
     @abstractmethod
-    def planes(self, mix: Array) -> Array:
-        """sum_k mix[r, k] B_k on the grid: (R, ny, nx) in the view's dtype."""
+    def planes(self, mix: Array, workers: int = 1) -> Array:
+        """sum_k mix[r, k] B_k on the grid: (R, ny, nx) in the view's dtype.
+
+        workers: threads that share the work; the result is the same for any number.
+        """
 
     @abstractmethod
     def at(self, x: Array, y: Array, mix: Array) -> Array:
         """sum_k mix[r, k] B_k at the points (y[i], x[j]) [m], both rising: (R, m, n)."""
 
 
-class Chart(Protocol):
+class Chart(ABC):
     """A picture on the plane; positions in metres from the array's centre, rising.
 
     `mix` is (R, K), and its dtype is that of the result.
     """
 
-    def averages(self, x_edges: Array, y_edges: Array, mix: Array) -> Array:
-        """Averages over the cells between the edges: (R, len(y_edges)-1, len(x_edges)-1)."""
+    @abstractmethod
+    def paint(self, x_edges: Array, y_edges: Array, mix: Array, out: Array) -> None:
+        """Writes the averages over the cells between the edges into out (R, ny, nx)."""
 
+    @abstractmethod
     def values(self, x: Array, y: Array, mix: Array) -> Array:
         """Point values: (R, len(y), len(x))."""
+
+    def within(self, x_edges: Array, y_edges: Array) -> "Chart":
+        """A chart that looks the same on these cells, if there is one that is faster there."""
+        return self
+
+    def averages(self, x_edges: Array, y_edges: Array, mix: Array) -> Array:
+        """The averages over the cells: (R, len(y_edges)-1, len(x_edges)-1)."""
+        out = np.empty((len(mix), len(y_edges) - 1, len(x_edges) - 1), mix.dtype)
+        self.paint(x_edges, y_edges, mix, out)
+        return out
 
 
 @dataclass(frozen=True)
@@ -143,15 +159,21 @@ class ChartScene(SampledScene):
 
     chart: Chart
 
-    def planes(self, mix: Array) -> Array:
+    def planes(self, mix: Array, workers: int = 1) -> Array:
         ny, nx = self.shape
         x_edges, y_edges = cell_edges(nx, self.pitch_x), cell_edges(ny, self.pitch_y)
         out = np.empty((len(mix), ny, nx), self.dtype)
         band = max(1, CELLS_A_BAND // nx)
         mix = np.asarray(mix, self.dtype)
-        for top in range(0, ny, band):
+        chart = self.chart.within(x_edges, y_edges)
+
+        def paint(top: int) -> None:
             edges = y_edges[top : top + band + 1]
-            out[:, top : top + band] = self.chart.averages(x_edges, edges, mix)
+            chart.paint(x_edges, edges, mix, out[:, top : top + band])
+
+        with ThreadPoolExecutor(max(1, workers)) as pool:
+            for _ in pool.map(paint, range(0, ny, band)):
+                pass  # raises what `paint` has raised
         return out
 
     def at(self, x: Array, y: Array, mix: Array) -> Array:
@@ -227,20 +249,27 @@ def _average_phasor(frequency: float, center: Array, width: Array) -> Array:
 
 
 @dataclass(frozen=True)
-class Framed:
+class Framed(Chart):
     """A chart seen through a frame: black outside, cells on the frame's edge area-sampled."""
 
     chart: Chart
     frame: Frame
 
-    def averages(self, x_edges: Array, y_edges: Array, mix: Array) -> Array:
-        out = np.zeros((len(mix), len(y_edges) - 1, len(x_edges) - 1), mix.dtype)
+    def paint(self, x_edges: Array, y_edges: Array, mix: Array, out: Array) -> None:
+        out[:] = 0
         columns, cover_x, inside_x = clip_cells(x_edges, self.frame.width / 2)
         rows, cover_y, inside_y = clip_cells(y_edges, self.frame.height / 2)
         if len(cover_x) and len(cover_y):
             picture = self.chart.averages(inside_x, inside_y, mix)
-            out[:, rows, columns] = picture * np.outer(cover_y, cover_x)
-        return out
+            picture *= np.outer(cover_y, cover_x).astype(mix.dtype)
+            out[:, rows, columns] = picture
+
+    def within(self, x_edges: Array, y_edges: Array) -> "Framed":
+        _, _, inside_x = clip_cells(x_edges, self.frame.width / 2)
+        _, _, inside_y = clip_cells(y_edges, self.frame.height / 2)
+        if len(inside_x) and len(inside_y):
+            return replace(self, chart=self.chart.within(inside_x, inside_y))
+        return self
 
     def values(self, x: Array, y: Array, mix: Array) -> Array:
         inside = np.outer(abs(y) <= self.frame.height / 2, abs(x) <= self.frame.width / 2)

@@ -2,7 +2,7 @@
 
 A scene that covers the sensor is scaled by one factor until it does (never stretched), and cropped
 centrally to the whole samples that the array touches. A scene with a width of its own is scaled to
-that width and centred, with black samples around it until the array is covered.
+that width and centred, with black samples around it until array and margin are covered.
 """
 
 import math
@@ -33,9 +33,12 @@ def place(rows: int, columns: int, view: View) -> Placement:
         pitch = max(view.width / columns, view.height / rows)
         while pitch * columns < view.width or pitch * rows < view.height:  # a rounding error
             pitch = math.nextafter(pitch, math.inf)
-    else:
-        pitch = view.scene_width / columns
-    return Placement(pitch, _cut(columns, view.width / pitch), _cut(rows, view.height / pitch))
+        return Placement(pitch, _cut(columns, view.width / pitch), _cut(rows, view.height / pitch))
+    # A stated size: what lies beyond the array, black or not, is there and is blurred into it.
+    pitch = view.scene_width / columns
+    width = view.width + 2 * view.margin * view.pitch_x
+    height = view.height + 2 * view.margin * view.pitch_y
+    return Placement(pitch, _cut(columns, width / pitch), _cut(rows, height / pitch))
 
 
 def _cut(samples: int, needed: float) -> int:

@@ -73,7 +73,7 @@ def _ideal(result: Result, path: Path) -> None:
 
 def _attributes(result: Result) -> dict[str, str | int | float]:
     frame, e = result.frame, result.frame.electrical
-    block = frame.mosaic.block
+    block = "/".join("".join(row) for row in frame.mosaic.block)
     return {
         "name": frame.camera.name,
         "vcam:version": vcam_cli.__version__,
@@ -84,7 +84,7 @@ def _attributes(result: Result) -> dict[str, str | int | float]:
         "vcam:whiteLevel": float(e.highest_code),
         "vcam:conversionGain": e.conversion_gain,
         "vcam:electronsPerDN": e.electrons_per_dn,
-        "vcam:cfa": "monochrome" if len(frame.mosaic.colors) == 1 else "/".join(map("".join, block)),
+        "vcam:cfa": "monochrome" if len(frame.mosaic.colors) == 1 else block,
         "vcam:configHash": config_hash(frame.camera),
     }
 

@@ -111,7 +111,8 @@ def simulate(
 
 def _simulate(camera: Camera, workers: int) -> Result:
     stages = Stages()
-    picture, notes = None, ()
+    picture: NDArray | None = None
+    notes: tuple[str, ...] = ()
     source = camera.scene.source
     if source.kind == "image":
         from vcam_cli.files.images import read_picture

@@ -1,0 +1,301 @@
+"""The house rules, read from the sources: who may import whom, who may write, how long, how told.
+
+Every rule is a function from parsed modules to the places that break it, and is itself tried on a
+small module that does: a rule that finds nothing anywhere proves nothing.
+"""
+
+import ast
+import io
+import os
+import re
+import subprocess
+import sys
+import tokenize
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+import vcam_cli
+
+PACKAGE = Path(vcam_cli.__file__).parent
+
+FLOORS = (
+    {"errors", "units", "rng", "spectra"},
+    {"physics"},
+    {"scheduling"},
+    {"camera"},
+    {"scenes", "effects"},
+    {"engine"},
+    {"processing"},
+    {"quality"},
+    {"files"},
+    {"studies"},
+    {"commands"},
+)
+"""From the bottom: a module imports from floors below its own, and from its own room (package)."""
+FLOOR = {room: number for number, rooms in enumerate(FLOORS) for room in rooms}
+HEAVY = ("colour", "matplotlib", "scipy.signal", "scipy.optimize", "scipy.interpolate")
+LONGEST = 450
+"""Lines of a module."""
+UNFINISHED = ("TODO", "FIXME", "XXX", "HACK", "NotImplementedError")
+WRITERS = {
+    "write_text", "write_bytes", "touch", "tofile", "savetxt", "savez", "savez_compressed",
+    "memmap", "savefig", "mkstemp", "NamedTemporaryFile", "TemporaryDirectory", "mkdtemp",
+    "copyfile", "copy2", "copytree", "rmtree", "unlink", "rename", "symlink_to", "truncate",
+    "rmdir", "removedirs", "renames",
+}  # fmt: skip
+"""Names of calls that change the disk, whatever they are called on. A folder may be made anywhere
+(`mkdir`): an empty one holds nothing that could be half written."""
+OF_OS = {"remove", "replace", "write", "fdopen", "link", "symlink"}
+"""The same, but only as `os.NAME`: elsewhere they are ordinary words."""
+
+
+@dataclass(frozen=True)
+class Module:
+    """A parsed source file; `name` is dotted, without `vcam_cli.`."""
+
+    name: str
+    text: str
+
+    @property
+    def room(self) -> str:
+        return self.name.partition(".")[0]
+
+    @property
+    def tree(self) -> ast.Module:
+        return ast.parse(self.text)
+
+
+def sources() -> list[Module]:
+    found = []
+    for path in sorted(PACKAGE.rglob("*.py")):
+        parts = path.relative_to(PACKAGE).with_suffix("").parts
+        name = ".".join(part for part in parts if part != "__init__")
+        found.append(Module(name, path.read_text("utf-8")))
+    return found
+
+
+MODULES = sources()
+
+
+def imported(node: ast.AST) -> list[str]:
+    """The dotted names that a statement imports, `from a import b` as a.b."""
+    if isinstance(node, ast.Import):
+        return [alias.name for alias in node.names]
+    if isinstance(node, ast.ImportFrom):
+        return ["." * node.level + f"{node.module or ''}.{alias.name}" for alias in node.names]
+    if isinstance(node, ast.Call) and "import_module" in ast.unparse(node.func):
+        return [a.value for a in node.args if isinstance(a, ast.Constant)]
+    return []
+
+
+def imports(module: Module) -> Iterator[tuple[int, str]]:
+    """(line, dotted name) of every import, inside functions and TYPE_CHECKING as well."""
+    for node in ast.walk(module.tree):
+        for name in imported(node):
+            yield getattr(node, "lineno", 0), name
+
+
+def at_top(module: Module) -> Iterator[tuple[int, str]]:
+    """(line, dotted name) of the imports that run when the module is imported."""
+    queue: list[ast.AST] = [module.tree]
+    while queue:
+        node = queue.pop()
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda):
+            continue
+        for name in imported(node):
+            yield getattr(node, "lineno", 0), name
+        queue.extend(ast.iter_child_nodes(node))
+
+
+def climbs(module: Module) -> list[str]:
+    """Imports of a floor above, or beside, the module's own."""
+    found = []
+    for line, name in imports(module):
+        if name.startswith("."):
+            found.append(f"{module.name}:{line}: {name} is relative; write vcam_cli...")
+        package, _, rest = name.partition(".")
+        room = rest.partition(".")[0]
+        if package != "vcam_cli" or room == "__version__":
+            continue
+        if room not in FLOOR:
+            found.append(f"{module.name}:{line}: {name} is on no floor")
+        elif room != module.room and FLOOR[room] >= FLOOR[module.room]:
+            found.append(f"{module.name}:{line}: {module.room} imports {room}")
+    return found
+
+
+def image_library(module: Module) -> list[str]:
+    """Imports of OpenImageIO outside files/."""
+    if module.room == "files":
+        return []
+    return [f"{module.name}:{line}" for line, n in imports(module) if n.startswith("OpenImageIO")]
+
+
+def heavy(module: Module) -> list[str]:
+    """Slow libraries imported at the top."""
+    slow = tuple(f"{name}." for name in HEAVY)
+    return [f"{module.name}:{line}: {n}" for line, n in at_top(module) if f"{n}.".startswith(slow)]
+
+
+def writes(module: Module) -> list[str]:
+    """Calls that change the disk outside files/."""
+    if module.room == "files":
+        return []
+    calls = (node for node in ast.walk(module.tree) if isinstance(node, ast.Call))
+    return [f"{module.name}:{call.lineno}: {ast.unparse(call)}" for call in calls if _writes(call)]
+
+
+def _writes(call: ast.Call) -> bool:
+    whole = ast.unparse(call.func)
+    name = whole.rpartition(".")[2]
+    if name == "open":
+        return _opens_to_write(call, whole)
+    if whole in ("np.save", "numpy.save"):
+        return True
+    owner = whole.rpartition(".")[0]
+    if owner == "os":
+        return name in OF_OS | WRITERS
+    # files.atomic is how the others write.
+    return name in WRITERS and owner != "atomic"
+
+
+def _opens_to_write(call: ast.Call, whole: str) -> bool:
+    """open(path, mode), path.open(mode); a mode that is no plain read counts as writing."""
+    if whole == "os.open":  # the null device aside
+        return ast.unparse(call.args[0]) != "os.devnull"
+    given = [k.value for k in call.keywords if k.arg == "mode"]
+    given += call.args[1:2] if whole in ("open", "io.open") else call.args[:1]
+    return any(not isinstance(m, ast.Constant) or set(str(m.value)) & set("wax+") for m in given)
+
+
+def too_long(module: Module) -> list[str]:
+    lines = len(module.text.splitlines())
+    return [f"{module.name}: {lines} lines"] if lines > LONGEST else []
+
+
+def undocumented(module: Module) -> list[str]:
+    """Modules, public classes and public functions without a docstring.
+
+    A method is documented where its class, or the base that it fulfils, says what it does.
+    """
+    tree = module.tree
+    found = [module.name] if module.text.strip() and not ast.get_docstring(tree) else []
+    for node in ast.walk(tree):
+        named = isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef)
+        if not named or node.name.startswith("_") or ast.get_docstring(node):
+            continue
+        if isinstance(node, ast.ClassDef) or node in tree.body:
+            found.append(f"{module.name}:{node.lineno}: {node.name}")
+    return found
+
+
+def unfinished(module: Module) -> list[str]:
+    """Words of work left undone, in code and comments."""
+    words = re.compile(rf"\b({'|'.join(UNFINISHED)})\b")
+    tokens = tokenize.generate_tokens(io.StringIO(module.text).readline)
+    return [
+        f"{module.name}:{t.start[0]}: {t.line.strip()}" for t in tokens if words.search(t.string)
+    ]
+
+
+RULES = (climbs, image_library, heavy, writes, too_long, undocumented, unfinished)
+
+
+@pytest.mark.parametrize("rule", RULES, ids=lambda rule: rule.__name__)
+def test_the_house_keeps_its_rules(rule):
+    assert [place for module in MODULES for place in rule(module)] == []
+
+
+BROKEN = [
+    (climbs, "physics.lens", "def f():\n    from vcam_cli.engine import plan\n"),
+    (climbs, "units", "from vcam_cli import errors\n"),
+    (climbs, "effects.x", "from vcam_cli.scenes.base import View\n"),
+    (climbs, "camera.x", "import vcam_cli.files.png\n"),
+    (climbs, "camera.x", "from typing import TYPE_CHECKING\nif TYPE_CHECKING:\n"
+     "    from vcam_cli.studies import simulate\n"),
+    (climbs, "camera.x", "from vcam_cli import simulate\n"),
+    (climbs, "camera.x", "from .base import Model\n"),
+    (climbs, "camera.x", "import importlib\nimportlib.import_module('vcam_cli.files.png')\n"),
+    (image_library, "scenes.image", "def f():\n    import OpenImageIO as oiio\n"),
+    (heavy, "physics.x", "from scipy import signal\n"),
+    (heavy, "physics.x", "import scipy.interpolate as si\n"),
+    (heavy, "physics.x", "class A:\n    import colour\n"),
+    (heavy, "physics.x", "try:\n    from matplotlib import pyplot\nexcept ImportError:\n    pass\n"),
+    (writes, "studies.x", "open('a', 'w')\n"),
+    (writes, "studies.x", "from pathlib import Path\nPath('a').open('ab')\n"),
+    (writes, "studies.x", "open('a', mode=how)\n"),
+    (writes, "studies.x", "from pathlib import Path\nPath('a').write_text('b')\n"),
+    (writes, "studies.x", "import os\nos.replace('a', 'b')\n"),
+    (writes, "studies.x", "import numpy as np\nnp.save('a', b)\n"),
+    (writes, "studies.x", "array.tofile('a')\n"),
+    (too_long, "x", "a = 1\n" * (LONGEST + 1)),
+    (undocumented, "x", "a = 1\n"),
+    (undocumented, "x", "'''Module.'''\ndef public():\n    pass\n"),
+    (undocumented, "x", "'''Module.'''\nclass Public:\n    pass\n"),
+    (unfinished, "x", "a = 1  # TO" + "DO: more\n"),
+    (unfinished, "x", "raise NotImplemented" + "Error\n"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("rule", "name", "text"), BROKEN, ids=[f"{b[0].__name__}-{i}" for i, b in enumerate(BROKEN)]
+)
+def test_every_rule_can_be_broken(rule, name, text):
+    assert rule(Module(name, text))
+
+
+KEPT = [
+    (climbs, "engine.x", "from vcam_cli.effects.base import Effect\nfrom vcam_cli import errors\n"),
+    (climbs, "spectra.x", "from vcam_cli.spectra.text import read\n"),
+    (climbs, "studies.x", "import vcam_cli\nfrom vcam_cli import __version__\n"),
+    (heavy, "physics.x", "import scipy.fft\ndef f():\n    from scipy import signal\n"),
+    (writes, "camera.x", "open('a', 'rb')\nopen('a', encoding='utf-8')\npath.open()\n"),
+    (writes, "commands.x", "atomic.write_text('a', 'b')\n'a'.replace('a', 'b')\n"),
+    (writes, "files.x", "open('a', 'w')\n"),
+    (undocumented, "x", "'''Module.'''\ndef _private():\n    pass\n"),
+]
+
+
+@pytest.mark.parametrize(
+    ("rule", "name", "text"), KEPT, ids=[f"{k[0].__name__}-{i}" for i, k in enumerate(KEPT)]
+)
+def test_no_rule_forbids_too_much(rule, name, text):
+    assert rule(Module(name, text)) == []
+
+
+def test_every_room_has_a_floor():
+    rooms = {m.room for m in MODULES} - {"", "data"}
+    assert rooms <= set(FLOOR)
+
+
+def test_configs_and_tests_are_no_part_of_the_sources():
+    assert len(MODULES) > 80
+    assert not {m.room for m in MODULES} & {"tests", "configs"}
+
+
+LIGHT = {
+    "--help": ("numpy", "pydantic", "scipy", "yaml", "OpenImageIO", "colour", "matplotlib"),
+    "--version": ("numpy", "pydantic", "scipy", "yaml", "OpenImageIO", "colour", "matplotlib"),
+    "validate starter": ("scipy.signal", "scipy.optimize", "colour", "matplotlib"),
+    "run --help": ("numpy", "pydantic", "scipy", "OpenImageIO", "colour", "matplotlib"),
+}
+"""Command -> libraries it must not import: each costs more than the command itself."""
+
+
+@pytest.mark.parametrize("command", LIGHT)
+def test_commands_import_only_what_they_need(command, tmp_path):
+    code = (
+        "import sys\n"
+        "from vcam_cli.commands.main import main\n"
+        "try: main()\n"
+        "except SystemExit as end: code = end.code\n"
+        f"found = [name for name in {LIGHT[command]!r} if name in sys.modules]\n"
+        "print('found', code or 0, found, file=sys.stderr)"
+    )
+    env = os.environ | {"PYTHONPATH": str(PACKAGE.parent)}
+    line = [sys.executable, "-c", code, *command.split()]
+    result = subprocess.run(line, capture_output=True, text=True, env=env, cwd=tmp_path)
+    assert result.stderr.splitlines()[-1:] == ["found 0 []"], result.stderr
