@@ -157,7 +157,7 @@ case(
 case(
     "a choice that is not supported yet",
     ("bayer-rggb", "quad-bayer"),
-    says=[("19:39", "array.pattern", "quad-bayer is not supported yet", "choose")],
+    says=[("19:39", "array.pattern", "quad-bayer is not supported yet", "supported: monochrome")],
 )
 
 # --- quantities and numbers
@@ -231,7 +231,7 @@ case(
 case(
     "an object inside the focal length",
     ("1 m\n", "3 mm\n"),
-    says=[("6:13", "scene.distance", "not beyond its focal length", "further away")],
+    says=[("6:13", "scene.distance", "lies within its focal length", "further away")],
 )
 case(
     "a size at infinity",
@@ -414,7 +414,7 @@ case(
     ("f_number: 2.8", "f_number: 2.8\n  defocus: 1 um"),
     ("transmittance: 0.9", "transmittance: {file: short.csv}"),
     says=[
-        ("6:13", "scene.distance", "not beyond its focal length", "further away"),
+        ("6:13", "scene.distance", "lies within its focal length", "further away"),
         ("9:12", "optics.defocus", "not supported yet", "remove"),
         ("11:18", "optics.transmittance", "380-780 nm", "outside"),
     ],

@@ -221,14 +221,16 @@ def test_a_mosaic_without_demosaic_is_shown_gray_and_cannot_be_judged():
 
 def test_no_steps_at_all_show_the_raw_frame():
     raw = mosaic_of(flat(1.0))
-    np.testing.assert_allclose(process(raw, CONTEXT, ()).linear[..., 0], raw / 1020, rtol=5e-7)
+    expected = raw / (CONTEXT.white_dn @ BT709)
+    np.testing.assert_allclose(process(raw, CONTEXT, ()).linear[..., 0], expected, rtol=5e-7)
 
 
 @pytest.mark.parametrize("level", [0.0, BLACK, BLACK + 0.05])
 def test_a_black_frame_is_black_and_finite(level):
     done = process(np.full((8, 8), level), CONTEXT, FULL)
     assert np.all(np.isfinite(done.linear)) and done.encode().max() <= 1
-    np.testing.assert_allclose(done.linear, (level - BLACK) / 1000, atol=1e-8)
+    white = (CONTEXT.white_dn - BLACK) @ BT709
+    np.testing.assert_allclose(done.linear, (level - BLACK) / white, atol=1e-8)
 
 
 def test_a_scene_without_light_is_black():
