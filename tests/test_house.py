@@ -145,8 +145,10 @@ def writes(module: Module) -> list[str]:
     """Calls that change the disk outside files/."""
     if module.room == "files":
         return []
-    calls = (node for node in ast.walk(module.tree) if isinstance(node, ast.Call))
-    return [f"{module.name}:{call.lineno}: {ast.unparse(call)}" for call in calls if _writes(call)]
+    calls = [node for node in ast.walk(module.tree) if isinstance(node, ast.Call)]
+    found = [f"{module.name}:{c.lineno}: {ast.unparse(c)}" for c in calls if _writes(c)]
+    names = {f"{owner}.{name}" for owner in ("os", "shutil") for name in WRITERS | OF_OS}
+    return found + [f"{module.name}:{line}: {n}" for line, n in imports(module) if n in names]
 
 
 def _writes(call: ast.Call) -> bool:
@@ -232,6 +234,7 @@ BROKEN = [
     (writes, "studies.x", "import os\nos.replace('a', 'b')\n"),
     (writes, "studies.x", "import numpy as np\nnp.save('a', b)\n"),
     (writes, "studies.x", "array.tofile('a')\n"),
+    (writes, "studies.x", "from shutil import rmtree\n"),
     (too_long, "x", "a = 1\n" * (LONGEST + 1)),
     (undocumented, "x", "a = 1\n"),
     (undocumented, "x", "'''Module.'''\ndef public():\n    pass\n"),

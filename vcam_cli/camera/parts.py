@@ -135,6 +135,7 @@ def locate(name: Node, kind: str, chain: tuple[Path, ...] = ()) -> Path:
 
 
 def looks_like_path(text: str) -> bool:
+    """Whether a text names a file and not something that ships."""
     return "/" in text or text.endswith(_SUFFIXES)
 
 

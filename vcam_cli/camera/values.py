@@ -9,6 +9,7 @@ paths that are not in the file.
 """
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
@@ -32,7 +33,7 @@ NONE: Mapping[str, Any] = MappingProxyType({})
 
 
 @dataclass(frozen=True, kw_only=True)
-class _Value:
+class _Value(ABC):
     """Base of the scalar types: limits, and words that stand for a value."""
 
     above: float = -math.inf
@@ -97,22 +98,22 @@ class _Value:
         limit_text = f"{text:g}" if isinstance(text, float) else text
         raise ValueError(f"{shown(given)} is out of range; it must be {how} {limit_text}")
 
+    @abstractmethod
     def number(self, given: Any) -> float:
         """The number itself, limits aside."""
-        raise NotImplementedError
 
+    @abstractmethod
     def text(self, value: Any) -> Any:
         """A number as it is written in YAML."""
-        raise NotImplementedError
 
+    @abstractmethod
     def form(self) -> dict[str, Any]:
         """JSON Schema of what may be written."""
-        raise NotImplementedError
 
     @property
+    @abstractmethod
     def hint(self) -> str:
         """What to write, for messages."""
-        raise NotImplementedError
 
     @property
     def signed(self) -> bool:

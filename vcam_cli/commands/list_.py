@@ -22,6 +22,7 @@ class Item:
 
 
 def complete_kind(incomplete: str) -> list[str]:
+    """Shell completion: kinds of things that ship."""
     return [kind for kind in KINDS if kind.startswith(incomplete)]
 
 

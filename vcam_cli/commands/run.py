@@ -29,6 +29,7 @@ def run(
     start = time.perf_counter()
     model = load(camera, options.overrides(set_, seed, accuracy))
     from vcam_cli.files.folder import OutputFolder
+    from vcam_cli.files.report import to_json
     from vcam_cli.studies import outputs
     from vcam_cli.studies.simulate import simulate
 
@@ -41,7 +42,7 @@ def run(
         record = outputs.record(result, inputs, time.perf_counter() - start)
         folder.finish(record)
     if as_json:
-        options.write_json(summary(record, folder.path))
+        print(to_json(summary(record, folder.path)), end="")
     elif not quiet:
         print(report(result.metrics, record, folder.path))
 

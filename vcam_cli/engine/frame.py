@@ -124,8 +124,7 @@ def expose(camera: Camera, picture: NDArray | None, workers: int | None, stages:
         found = linear.rate()
         rate = found.values
     with stages("exposure"):
-        present = plan.described(camera, g).values()
-        dark = sum(x.rate() for x in present if isinstance(x, Charge))
+        dark = sum(x.rate() for x in plan.wanted(camera, g) if isinstance(x, Charge))
         time = exposure.exposure_time(camera, rate, float(white_rate.max()), dark, e.saturation)
         peak = (float(rate.max()) + dark) * time
         outlook = Outlook(full_signal=max(1.0, min(e.full_well, peak)), time=time)
@@ -166,11 +165,15 @@ def _transfer(camera, g, knobs, spectra, colors, effects) -> optics.Transfer:
 
 
 def figures(frame: Frame) -> list[tuple[str, float, str]]:
-    """The metrics every run has: (metric, value, unit). Eqs 3.1 and 3.2 for DR and SNR."""
+    """The metrics every run has: (metric, value, unit). Eqs 3.1 and 3.2 for DR and SNR.
+
+    These two are of the camera that the file describes, whatever the plan left out of the frame.
+    """
     e = frame.electrical
-    draws = [x for x in frame.plan.active if isinstance(x, Draw) and x.scope == "frame"]
+    wanted = plan.wanted(frame.camera, frame.geometry)
+    draws = [x for x in wanted if isinstance(x, Draw) and x.scope == "frame"]
     floor = sum(x.variance(0.0) for x in draws)
-    dark = frame.dark_rate * frame.exposure_time
+    dark = sum(x.rate() for x in wanted if isinstance(x, Charge)) * frame.exposure_time
     saturated = (frame.electrons >= e.full_well) | (frame.dn >= e.highest_code)
     return [
         ("exposure_time", frame.exposure_time, "s"),

@@ -101,13 +101,15 @@ def check(camera: Camera) -> None:
         raise error.located(camera.locate) from None
 
 
+def wanted(camera: Camera, geometry: Geometry) -> tuple[Effect, ...]:
+    """Effects that the camera has and the user has not switched off."""
+    found = described(camera, geometry).values()
+    return tuple(e for e in found if e is not None and _wish(camera, e) != "off")
+
+
 def optical(camera: Camera, geometry: Geometry) -> tuple[Effect, ...]:
     """Effects of the linear part that run, as far as no signal level is needed to decide it."""
-    return tuple(
-        e
-        for e in described(camera, geometry).values()
-        if e is not None and not isinstance(e, Charge | Draw) and _wish(camera, e) != "off"
-    )
+    return tuple(e for e in wanted(camera, geometry) if not isinstance(e, Charge | Draw))
 
 
 def make(

@@ -12,6 +12,7 @@ the camera asks for, and never 25.
 
 import math
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from typing import Any, Literal
@@ -163,17 +164,13 @@ class ChartScene(SampledScene):
         ny, nx = self.shape
         x_edges, y_edges = cell_edges(nx, self.pitch_x), cell_edges(ny, self.pitch_y)
         out = np.empty((len(mix), ny, nx), self.dtype)
-        band = max(1, CELLS_A_BAND // nx)
         mix = np.asarray(mix, self.dtype)
         chart = self.chart.within(x_edges, y_edges)
 
-        def paint(top: int) -> None:
-            edges = y_edges[top : top + band + 1]
-            chart.paint(x_edges, edges, mix, out[:, top : top + band])
+        def paint(rows: slice) -> None:
+            chart.paint(x_edges, y_edges[rows.start : rows.stop + 1], mix, out[:, rows])
 
-        with ThreadPoolExecutor(max(1, workers)) as pool:
-            for _ in pool.map(paint, range(0, ny, band)):
-                pass  # raises what `paint` has raised
+        by_bands(paint, ny, nx, workers)
         return out
 
     def at(self, x: Array, y: Array, mix: Array) -> Array:
@@ -184,6 +181,19 @@ class ChartScene(SampledScene):
         for top in range(0, len(y), band):
             out[:, top : top + band] = self.chart.values(x, y[top : top + band], mix)
         return out
+
+
+def by_bands(paint: Callable[[slice], None], rows: int, columns: int, workers: int) -> None:
+    """Calls `paint` on bands of rows, which do not depend on the number of workers."""
+    band = max(1, CELLS_A_BAND // columns)
+    bands = [slice(top, min(top + band, rows)) for top in range(0, rows, band)]
+    if workers <= 1:
+        for rows_of_band in bands:
+            paint(rows_of_band)
+        return
+    with ThreadPoolExecutor(workers) as pool:
+        for _ in pool.map(paint, bands):
+            pass  # raises what `paint` has raised
 
 
 def chart_scene(

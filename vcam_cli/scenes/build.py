@@ -17,6 +17,7 @@ from vcam_cli.scenes.csf import Csf
 from vcam_cli.scenes.image import image_scene
 from vcam_cli.scenes.sinusoid import WaveChart
 from vcam_cli.scenes.slanted_edge import SlantedEdge
+from vcam_cli.scenes.still_life import WithColorChecker
 from vcam_cli.spectra import Spectrum
 
 SOURCE = ("scene", "source")
@@ -77,7 +78,7 @@ def _chart(source: object, view: View) -> tuple[Chart, tuple[Spectrum, ...]]:
             if source.colorchecker == 0.0:
                 return leaves, dead_leaves.reflectances()
             card = colorchecker.of_height(source.colorchecker, frame)
-            return dead_leaves.WithColorChecker(leaves, card), colorchecker.reflectances()
+            return WithColorChecker(leaves, card), colorchecker.reflectances()
     raise bad(SOURCE, "this source is not supported yet", "use another chart, or an image")
 
 

@@ -6,11 +6,12 @@ Reflectances: N. Ohta's measurement (1997), `spectra.colorchecker`.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
-from vcam_cli.scenes.base import Array, Frame, overlap
+from vcam_cli.scenes.base import Array, Chart, Frame, overlap
 from vcam_cli.spectra import Spectrum, colorchecker
 
 ROWS, COLUMNS = 4, 6
@@ -68,6 +69,13 @@ class Card:
         across = np.concatenate([cover.columns, cover.across[None]]).astype(mix.dtype)
         return np.asarray((down.T @ block) @ across)
 
+    def add_light(self, cover: "Cover", mix: Array, out: Array) -> None:
+        """The same, added to out."""
+        alike = cover.alike()
+        light = self.light(cover.of_rows([rows.start for rows in alike]), mix)
+        for number, rows in enumerate(alike):
+            out[:, rows] += light[:, number, None]
+
     def averaged(self, x_edges: Array, y_edges: Array) -> "Cover":
         """The parts of cells that card and patches cover: exact, for they are rectangles."""
         return Cover(
@@ -103,15 +111,30 @@ class Cover:
     columns: Array
     rows: Array
 
+    def alike(self) -> list[slice]:
+        """Runs of rows that are covered alike: few, for what lies on them are rectangles."""
+        last = np.diff(self.down) != 0
+        last |= np.diff(self.rows).any(axis=0)
+        bounds = [0, *(np.flatnonzero(last) + 1).tolist(), len(self.down)]
+        return [slice(*ends) for ends in pairwise(bounds)]
+
+    def of_rows(self, index: list[int]) -> "Cover":
+        """That of some rows alone."""
+        return replace(self, down=self.down[index], rows=self.rows[:, index])
+
 
 @dataclass(frozen=True)
-class ColorChecker:
+class ColorChecker(Chart):
     """The chart: the card before its surround."""
 
     card: Card
 
-    def averages(self, x_edges: Array, y_edges: Array, mix: Array) -> Array:
-        return self._before_surround(self.card.averaged(x_edges, y_edges), mix)
+    def paint(self, x_edges: Array, y_edges: Array, mix: Array, out: Array) -> None:
+        cover = self.card.averaged(x_edges, y_edges)
+        alike = cover.alike()
+        light = self._before_surround(cover.of_rows([rows.start for rows in alike]), mix)
+        for number, rows in enumerate(alike):
+            out[:, rows] = light[:, number, None]
 
     def values(self, x: Array, y: Array, mix: Array) -> Array:
         return self._before_surround(self.card.sampled(x, y), mix)

@@ -17,11 +17,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vcam_cli.scenes.base import Array, Frame
+from vcam_cli.scenes.base import Array, Chart, Frame
 
 
 @dataclass(frozen=True)
-class Csf:
+class Csf(Chart):
     """max_frequency [cycles/m], mean 0..1, max_contrast 0..1, phase [rad], on `frame`."""
 
     frame: Frame
@@ -30,23 +30,25 @@ class Csf:
     max_contrast: float
     phase: float
 
-    def averages(self, x_edges: Array, y_edges: Array, mix: Array) -> Array:
+    def paint(self, x_edges: Array, y_edges: Array, mix: Array, out: Array) -> None:
         """Exact: the chirp is separable, its integral along x is a pair of Fresnel integrals."""
         chirp = np.diff(self._chirp_integral(x_edges)) / np.diff(x_edges)
         contrast = np.diff(self._contrast_integral(y_edges)) / np.diff(y_edges)
-        return self._mixed(contrast, chirp, mix)
+        self._mix(contrast, chirp, mix, out)
 
     def values(self, x: Array, y: Array, mix: Array) -> Array:
         from_left = x + self.frame.width / 2
         rate = self.max_frequency / self.frame.width
         chirp = np.cos(math.pi * rate * from_left**2 + self.phase)
         contrast = self.max_contrast * np.clip(0.5 - y / self.frame.height, 0.0, 1.0)
-        return self._mixed(contrast, chirp, mix)
+        out = np.empty((len(mix), len(y), len(x)), mix.dtype)
+        self._mix(contrast, chirp, mix, out)
+        return out
 
-    def _mixed(self, contrast: Array, chirp: Array, mix: Array) -> Array:
-        chirp, contrast = chirp.astype(mix.dtype), contrast.astype(mix.dtype)
-        level = mix[:, 0] * mix.dtype.type(self.mean)
-        return np.asarray(level[:, None, None] * (np.outer(contrast, chirp) + 1))
+    def _mix(self, contrast: Array, chirp: Array, mix: Array, out: Array) -> None:
+        pattern = np.outer(contrast.astype(mix.dtype), chirp.astype(mix.dtype)) + 1
+        for plane, level in zip(out, mix[:, 0] * mix.dtype.type(self.mean), strict=True):
+            np.multiply(pattern, level, out=plane)
 
     def _chirp_integral(self, x: Array) -> Array:
         """Integral of cos(pi F x^2/W + phase) from the left edge to x [m]."""

@@ -8,7 +8,7 @@ darkened by a factor of its own.
 
 The picture belongs to the seed alone: leaves are placed in units of the frame's longer side, so
 that another array, sampling or aspect shows the same leaves, cropped centrally. Beyond 3/4 of a
-side from the centre the leaves repeat. A ColorChecker may lie on them, in the middle.
+side from the centre the leaves repeat.
 
 Sources: A. B. Lee, D. Mumford, J. Huang, "Occlusion models for natural images", International
 Journal of Computer Vision 41 (2001) 35-59; as a test chart: F. Cao, F. Guichard, H. Hornung,
@@ -22,9 +22,9 @@ from functools import lru_cache
 import numpy as np
 
 from vcam_cli.scenes import discs
-from vcam_cli.scenes.base import Array, Frame, clip_cells
-from vcam_cli.scenes.colorchecker import Card
-from vcam_cli.scenes.discs import Discs
+from vcam_cli.scenes.base import Array, Chart, Frame
+from vcam_cli.scenes.disc_edges import Discs
+from vcam_cli.scenes.discs import Cells
 from vcam_cli.spectra import Spectrum, colorchecker
 
 SMALLEST, LARGEST = 1 / 400, 1 / 4  # radii, in units of the frame's longer side
@@ -58,16 +58,27 @@ def reflectances() -> tuple[Spectrum, ...]:
 
 @dataclass(frozen=True)
 class Leaves:
-    """Discs on the torus of side `PERIOD`, the pigment (an index) and factor of each."""
+    """Discs, and the pigment (an index) and factor of each."""
 
     discs: Discs
     pigment: Array
     factor: Array
 
+    def take(self, index: Array) -> "Leaves":
+        return Leaves(self.discs.take(index), self.pigment[index], self.factor[index])
+
+    def color(self, mix: Array) -> Array:
+        """The color of the ground and of every leaf: (R, n + 1)."""
+        ground = GROUND * mix[:, :1]
+        return np.concatenate([ground, mix[:, self.pigment] * self.factor], axis=1)
+
 
 @lru_cache(maxsize=4)
 def grow(seed: int) -> Leaves:
-    """The leaves of a seed (a whole number from 0 up), about 60 000; a later one lies in front."""
+    """The leaves of a seed (a whole number from 0 up), about 60 000; a later one lies in front.
+
+    They lie on the torus of side `PERIOD`.
+    """
     smallest, largest = SMALLEST, LARGEST
     ratio = (smallest / largest) ** 2
     mean_area = 2 * math.pi * smallest**2 * math.log(largest / smallest) / (1 - ratio)
@@ -83,21 +94,69 @@ def grow(seed: int) -> Leaves:
 
 
 @dataclass(frozen=True)
-class DeadLeaves:
-    """The chart; `mix` is (R, 12) in the order of `PIGMENTS`. unit [m]: the longer side."""
+class Laid(Chart):
+    """Leaves as they lie; `mix` is (R, 12) in the order of `PIGMENTS`. unit [m]: that of their
+    places."""
 
     leaves: Leaves
     unit: float
 
-    def averages(self, x_edges: Array, y_edges: Array, mix: Array) -> Array:
+    def paint(
+        self,
+        x_edges: Array,
+        y_edges: Array,
+        mix: Array,
+        out: Array,
+        hidden: Cells | None = None,
+    ) -> None:
+        """The averages; 0 in the cells that are hidden."""
+        color = self.leaves.color(mix).astype(mix.dtype, copy=False)
         x, y = x_edges / self.unit, y_edges / self.unit
-        leaves = _spread(self.leaves, x[0], x[-1], y[0], y[-1])
-        return discs.averages(leaves.discs, _colors(leaves, mix), x, y)
+        discs.paint(self.leaves.discs, color, x, y, out, hidden)
 
     def values(self, x: Array, y: Array, mix: Array) -> Array:
-        x, y = x / self.unit, y / self.unit
-        leaves = _spread(self.leaves, x[0], x[-1], y[0], y[-1])
-        return discs.values(leaves.discs, _colors(leaves, mix), x, y)
+        color = self.leaves.color(mix)
+        return discs.values(self.leaves.discs, color, x / self.unit, y / self.unit)
+
+
+@dataclass(frozen=True)
+class DeadLeaves(Chart):
+    """The chart: leaves that repeat with `PERIOD`. unit [m]: the frame's longer side."""
+
+    leaves: Leaves
+    unit: float
+
+    def within(self, x_edges: Array, y_edges: Array, hidden: Cells | None = None) -> Laid:
+        """The leaves that may be seen on the cells; those of `hidden` are not looked at.
+
+        What is not seen is found on cells of `step` times `step`: a leaf behind one that covers
+        such a cell is behind it in all of its cells, so that no cell changes.
+        """
+        laid = self._laid(x_edges, y_edges)
+        step = int(2 * SMALLEST * self.unit * (len(x_edges) - 1) / (x_edges[-1] - x_edges[0]))
+        if step < 4:
+            return laid
+        x, y = _every(step, x_edges) / self.unit, _every(step, y_edges) / self.unit
+        behind = None if hidden is None else (_whole(step, hidden[0]), _whole(step, hidden[1]))
+        seen = discs.visible(laid.leaves.discs, x, y, behind)
+        return replace(laid, leaves=laid.leaves.take(seen))
+
+    def paint(
+        self,
+        x_edges: Array,
+        y_edges: Array,
+        mix: Array,
+        out: Array,
+        hidden: Cells | None = None,
+    ) -> None:
+        self._laid(x_edges, y_edges).paint(x_edges, y_edges, mix, out, hidden)
+
+    def values(self, x: Array, y: Array, mix: Array) -> Array:
+        return self._laid(x, y).values(x, y, mix)
+
+    def _laid(self, x: Array, y: Array) -> Laid:
+        left, right, top, bottom = (end / self.unit for end in (x[0], x[-1], y[0], y[-1]))
+        return Laid(_spread(self.leaves, left, right, top, bottom), self.unit)
 
 
 def dead_leaves(seed: int, frame: Frame) -> DeadLeaves:
@@ -105,10 +164,14 @@ def dead_leaves(seed: int, frame: Frame) -> DeadLeaves:
     return DeadLeaves(grow(seed), max(frame.width, frame.height))
 
 
-def _colors(leaves: Leaves, mix: Array) -> Array:
-    """The color of the ground and of every leaf: (R, n + 1)."""
-    ground = GROUND * mix[:, :1]
-    return np.concatenate([ground, mix[:, leaves.pigment] * leaves.factor], axis=1)
+def _every(step: int, edges: Array) -> Array:
+    """Every step-th edge, and the last."""
+    return np.append(edges[:-1:step], edges[-1])
+
+
+def _whole(step: int, cells: slice) -> slice:
+    """Of the cells between every step-th edge, those that lie within a range of cells."""
+    return slice(-(-cells.start // step), cells.stop // step)
 
 
 def _spread(leaves: Leaves, left: float, right: float, top: float, bottom: float) -> Leaves:
@@ -126,69 +189,6 @@ def _spread(leaves: Leaves, left: float, right: float, top: float, bottom: float
             y.append(leaves.discs.y[here] + dy)
     every = np.concatenate(index)
     order = np.argsort(every, kind="stable")
-    every = every[order]
-    there = Discs(np.concatenate(x)[order], np.concatenate(y)[order], leaves.discs.radius[every])
-    return replace(leaves, discs=there, pigment=leaves.pigment[every], factor=leaves.factor[every])
-
-
-@dataclass(frozen=True)
-class WithColorChecker:
-    """A ColorChecker lying on the leaves; `mix` is (R, 25), as for the card."""
-
-    leaves: DeadLeaves
-    card: Card
-
-    def averages(self, x_edges: Array, y_edges: Array, mix: Array) -> Array:
-        of_leaves = mix[:, _patches_of_pigments()]
-        out = self.leaves.averages(x_edges, y_edges, of_leaves)
-        columns, cover_x, inside_x = clip_cells(x_edges, self.card.half_width)
-        rows, cover_y, inside_y = clip_cells(y_edges, self.card.half_height)
-        if len(cover_x) and len(cover_y):
-            hidden = _Hidden(self.leaves, of_leaves, cover_x, cover_y, inside_x, inside_y)
-            out[:, rows, columns] = hidden.taken_from(out[:, rows, columns])
-            here = x_edges[columns.start : columns.stop + 1], y_edges[rows.start : rows.stop + 1]
-            out[:, rows, columns] += self.card.light(self.card.averaged(*here), mix)
-        return out
-
-    def values(self, x: Array, y: Array, mix: Array) -> Array:
-        cover = self.card.sampled(x, y)
-        leaves = self.leaves.values(x, y, mix[:, _patches_of_pigments()])
-        return leaves * (1 - np.outer(cover.down, cover.across)) + self.card.light(cover, mix)
-
-
-def _patches_of_pigments() -> list[int]:
-    names = [name for name, _ in colorchecker()]
-    return [names.index(name) for name in PIGMENTS]
-
-
-@dataclass(frozen=True)
-class _Hidden:
-    """The leaves under the card, to be taken away: all but in the outermost rows and columns of
-    its cells, where only what lies under it is."""
-
-    leaves: DeadLeaves
-    mix: Array
-    cover_x: Array
-    cover_y: Array
-    inside_x: Array
-    inside_y: Array
-
-    def taken_from(self, light: Array) -> Array:
-        out = np.zeros_like(light)
-        for row in self._outermost(self.cover_y):
-            out[:, row] = light[:, row] - self._under(row, slice(0, len(self.cover_x)))
-        for column in self._outermost(self.cover_x):
-            under = self._under(slice(0, len(self.cover_y)), column)
-            out[:, :, column] = light[:, :, column] - under
-        return np.asarray(np.maximum(out, 0.0))
-
-    def _outermost(self, cover: Array) -> list[slice]:
-        """The first and last cell, where the card covers them in part."""
-        ends = {0, len(cover) - 1}
-        return [slice(end, end + 1) for end in sorted(ends) if cover[end] < 1.0]
-
-    def _under(self, rows: slice, columns: slice) -> Array:
-        x = self.inside_x[columns.start : columns.stop + 1]
-        y = self.inside_y[rows.start : rows.stop + 1]
-        cover = np.outer(self.cover_y[rows], self.cover_x[columns])
-        return self.leaves.averages(x, y, self.mix) * cover
+    spread = leaves.take(every[order])
+    there = replace(spread.discs, x=np.concatenate(x)[order], y=np.concatenate(y)[order])
+    return replace(spread, discs=there)

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vcam_cli.scenes.base import Array, SampledScene, View
+from vcam_cli.scenes.base import Array, SampledScene, View, by_bands
 from vcam_cli.spectra import Spectrum
 
 # A sample of which less than this is needed is a rounding error, not a sample.
@@ -54,16 +54,20 @@ class ImageScene(SampledScene):
     picture: Array
     black: tuple[int, int]
 
-    def planes(self, mix: Array) -> Array:
+    def planes(self, mix: Array, workers: int = 1) -> Array:
         """The linear combinations of the channels: (R, ny, nx)."""
         height, width, _ = self.picture.shape
         down, across = self.black
         mix = np.asarray(mix, self.dtype)
         out = np.zeros((len(mix), *self.shape), self.dtype)
         inside = out[:, down : down + height, across : across + width]
-        for plane, weights in zip(inside, mix, strict=True):
-            for channel in np.flatnonzero(weights):
-                plane += weights[channel] * self.picture[:, :, channel]
+
+        def paint(rows: slice) -> None:
+            for plane, weights in zip(inside[:, rows], mix, strict=True):
+                for channel in np.flatnonzero(weights):
+                    plane += weights[channel] * self.picture[rows, :, channel]
+
+        by_bands(paint, height, width, workers)
         return out
 
     def at(self, x: Array, y: Array, mix: Array) -> Array:

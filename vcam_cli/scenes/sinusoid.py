@@ -8,7 +8,7 @@ counterclockwise as seen, so that at 90 degrees it runs up a column.
 import math
 from dataclasses import dataclass
 
-from vcam_cli.scenes.base import Array, Wave, wave_averages, wave_values
+from vcam_cli.scenes.base import Array, Chart, Wave, wave_averages, wave_values
 
 
 def waves(
@@ -26,13 +26,13 @@ def _clean(value: float) -> float:
 
 
 @dataclass(frozen=True)
-class WaveChart:
+class WaveChart(Chart):
     """Waves as a chart, for a scene that ends within the view and so must be sampled."""
 
     waves: tuple[Wave, ...]
 
-    def averages(self, x_edges: Array, y_edges: Array, mix: Array) -> Array:
-        return wave_averages(self.waves, x_edges, y_edges, mix)
+    def paint(self, x_edges: Array, y_edges: Array, mix: Array, out: Array) -> None:
+        out[:] = wave_averages(self.waves, x_edges, y_edges, mix)
 
     def values(self, x: Array, y: Array, mix: Array) -> Array:
         return wave_values(self.waves, x, y, mix)

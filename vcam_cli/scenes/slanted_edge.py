@@ -11,25 +11,36 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vcam_cli.scenes.base import Array
+from vcam_cli.scenes.base import Array, Chart
+from vcam_cli.scenes.runs import members
 
 MEAN = 0.5
 
 
 @dataclass(frozen=True)
-class SlantedEdge:
+class SlantedEdge(Chart):
     """angle [rad], contrast 0..1 (Michelson)."""
 
     angle: float
     contrast: float
 
-    def averages(self, x_edges: Array, y_edges: Array, mix: Array) -> Array:
+    def paint(self, x_edges: Array, y_edges: Array, mix: Array, out: Array) -> None:
         """Exact: the bright half plane's area in every cell."""
         x, y = (x_edges[1:] + x_edges[:-1]) / 2, (y_edges[1:] + y_edges[:-1]) / 2
         across, down = self._normal()
-        distance = np.add.outer(down * y, across * x)
-        widths = abs(across) * np.diff(x_edges)[None, :], abs(down) * np.diff(y_edges)[:, None]
-        return self._mixed(half_plane(distance, *widths), mix)
+        widths = abs(across) * np.diff(x_edges), abs(down) * np.diff(y_edges)
+        if across < 0.0:  # so that every row grows brighter from left to right
+            x, widths, out = x[::-1], (widths[0][::-1], widths[1]), out[:, :, ::-1]
+        along, offset = across * x, down * y
+        reach = (widths[0].max() + widths[1].max()) / 2
+        start = np.searchsorted(along, -offset - reach)
+        stop = np.searchsorted(along, -offset + reach, side="right")
+        row, column = members(start, stop)
+        part = half_plane(offset[row] + along[column], widths[0][column], widths[1][row])
+        plain = self._mixed((np.arange(len(x)) >= start[:, None]), mix)
+        for plane, edge, field in zip(out, self._mixed(part, mix), plain, strict=True):
+            plane[:] = field
+            plane[row, column] = edge
 
     def values(self, x: Array, y: Array, mix: Array) -> Array:
         across, down = self._normal()
@@ -42,7 +53,8 @@ class SlantedEdge:
 
     def _mixed(self, bright: Array, mix: Array) -> Array:
         value = MEAN * (1.0 + self.contrast * (2.0 * bright - 1.0))
-        return np.asarray(mix[:, 0][:, None, None] * value.astype(mix.dtype))
+        light = value.astype(mix.dtype)
+        return np.asarray(np.multiply.outer(mix[:, 0], light))
 
 
 def half_plane(distance: Array, width_x: Array, width_y: Array) -> Array:

@@ -17,8 +17,10 @@ from typing import Any
 import numpy as np
 
 import vcam_cli
+from vcam_cli.camera import shipped
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.load import FILE_KEYS
+from vcam_cli.camera.support import spectra
 from vcam_cli.files.exr import ExrWriter
 from vcam_cli.files.folder import OutputFolder
 from vcam_cli.files.png import write_png
@@ -131,8 +133,15 @@ def inputs(camera: Camera) -> tuple[Path, ...]:
             for item in value:
                 yield from named(item)
 
+    shipped_spectra = (
+        str(shipped.find("spectra", factor))
+        for _, spec in spectra(camera)
+        for factor in getattr(spec, "factors", ())
+        if isinstance(factor, str)
+    )
     files = [str(path) for path in camera.files]
-    return tuple(Path(f) for f in sorted({*files, *named(camera.model_dump(mode="json"))}))
+    found = {*files, *named(camera.model_dump(mode="json")), *shipped_spectra}
+    return tuple(Path(name) for name in sorted(found))
 
 
 def peak_memory() -> int:

@@ -1,0 +1,374 @@
+"""What every effect must hold, one battery over `effects.order.ORDER`.
+
+A new effect needs an entry in CASES: a camera that has it, and one whose file gives it no strength.
+Noise is judged by standard errors of the sample it was measured on, five of them; everything else
+in 64 bits, where only rounding is left.
+"""
+
+import math
+import re
+import sys
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any
+
+import numpy as np
+import pytest
+from making import QUIET, camera, radiance_for
+
+from vcam_cli import simulate
+from vcam_cli.camera.geometry import geometry
+from vcam_cli.camera.settings import EFFECTS
+from vcam_cli.effects.base import (
+    Charge,
+    Code,
+    Draw,
+    Gain,
+    Limit,
+    Outlook,
+    RadialTransfer,
+    SeparableTransfer,
+    Site,
+)
+from vcam_cli.effects.order import ORDER
+from vcam_cli.rng import stream
+
+WAVE = {"kind": "chart", "chart": "sinusoid", "frequency": "60 lp/mm", "contrast": 0.8, "mean": 0.5}
+
+
+@dataclass(frozen=True)
+class Case:
+    """has: changes to the plain camera that give it the effect; none: that leave nothing of it,
+    or None where every camera has it; shows: changes to the scene by which it shows."""
+
+    has: dict[str, Any]
+    none: dict[str, Any] | None
+    shows: dict[str, Any] = field(default_factory=lambda: {"scene.radiance": radiance_for(900)})
+
+
+CASES: dict[str, Case] = {
+    "diffraction": Case({}, {"optics.diffraction": False}, {"scene.source": WAVE}),
+    "pixel_aperture": Case({}, None, {"scene.source": WAVE}),
+    "off_axis": Case({"optics.off_axis": "exact"}, {"optics.off_axis": "none"}),
+    "dark_current": Case(
+        {"pixel.photodetector.dark_current": "5 ke/s"},
+        {"pixel.photodetector.dark_current": "0 e/s"},
+    ),
+    "shot_noise": Case({}, None),
+    "fpn": Case(
+        {"pixel.fpn": {"dsnu": "7 e", "offset_column": "3 e", "prnu": "2 %", "gain_column": "1 %"}},
+        {"pixel.fpn": {"dsnu": "0 e", "offset_column": "0 e", "prnu": "0 %", "gain_column": 0}},
+    ),
+    "reset_noise": Case(
+        {"pixel.readout.reset_noise": "12 e"}, {"pixel.readout.reset_noise": "0 e"}
+    ),
+    "read_noise": Case({"pixel.readout.read_noise": "9 e"}, {"pixel.readout.read_noise": "0 e"}),
+    "saturation": Case({}, None, {"scene.radiance": radiance_for(2e5)}),
+    "quantization": Case({}, None),
+}
+
+DRAWS = [kind for kind in ORDER if issubclass(kind, Draw)]
+
+
+def every(*bases: type) -> pytest.MarkDecorator:
+    """Parametrizes a test over the effects of these kinds; over all of them without any."""
+    kinds = [kind for kind in ORDER if issubclass(kind, bases or (object,))]
+    return pytest.mark.parametrize("kind", kinds, ids=[kind.name for kind in kinds])
+
+
+def effect_of(kind, folder, changes=None):
+    """The effect with the numbers of the camera that has it (further changed)."""
+    made = camera(folder, CASES[kind.name].has | (changes or {}))
+    return kind.of(made, geometry(made))
+
+
+def site(rows: int, columns: int, seed: int = 1, block: int = 0, dtype=np.float64) -> Site:
+    return Site(rows, columns, partial(stream, seed, block=block), partial(stream, seed), dtype)
+
+
+def test_every_effect_is_in_the_battery():
+    assert set(CASES) == {kind.name for kind in ORDER}
+
+
+# --- documented ----------------------------------------------------------------------------------
+
+
+@every()
+def test_documented_with_a_reference(kind, tmp_path):
+    module = sys.modules[kind.__module__]
+    assert module.__doc__ and kind.__doc__
+    assert module.__name__.endswith(f".{kind.name}"), "one effect, one file, one name"
+    assert kind.name in EFFECTS, "the camera file can switch it"
+    assert re.search(r"\d", kind.reference), "a reference names an equation, a section or a year"
+    assert " " in kind.absent
+    assert re.search(r"\d|equal", effect_of(kind, tmp_path).describe()), "a clause with numbers"
+    assert kind.removable == (not issubclass(kind, Limit | Code))
+
+
+# --- zero strength -------------------------------------------------------------------------------
+
+
+@every()
+def test_absent_at_zero_strength(kind, tmp_path):
+    case = CASES[kind.name]
+    assert effect_of(kind, tmp_path) is not None
+    if case.none is not None:
+        assert effect_of(kind, tmp_path, case.none) is None
+
+
+@every()
+def test_switched_off_is_zero_strength_and_on_is_not(kind, tmp_path):
+    """`off` and a file that gives it no strength are the same bytes; `on` shows in the signal."""
+    case = CASES[kind.name]
+    scene = case.has | case.shows
+    on = simulate(camera(tmp_path, scene))
+    off = simulate(camera(tmp_path, scene | {"effects": {kind.name: "off"}}))
+    if not issubclass(kind, Code):  # the ADC makes codes of electrons, and leaves electrons alone
+        assert on.electrons.tobytes() != off.electrons.tobytes()
+    if case.none is not None:
+        none = simulate(camera(tmp_path, scene | case.none))
+        assert none.electrons.tobytes() == off.electrons.tobytes()
+        assert none.mean_electrons.tobytes() == off.mean_electrons.tobytes()
+        assert none.dn.tobytes() == off.dn.tobytes()
+
+
+def test_what_every_camera_has_is_identity_in_its_limit(tmp_path):
+    """No photodetector to average over, a bottomless well, an ADC of small steps, no light."""
+    kinds = {kind.name: kind for kind in ORDER}
+    x = np.linspace(-50.0, 3e5, 1001)
+    f = np.linspace(0, 1e6, 50)
+    assert np.array_equal(kinds["pixel_aperture"](0.0, 0.0).along_x(f), np.ones(50))
+    assert np.array_equal(kinds["pixel_aperture"](0.0, 0.0).along_y(f), np.ones(50))
+    assert np.array_equal(kinds["saturation"](math.inf).apply(x.copy()), x)
+    assert not kinds["shot_noise"]().apply(np.zeros((4, 9)), site(4, 9)).any()
+    # a 32-bit ADC of 1e-3 electrons a step rounds by half a step at most
+    fine = kinds["quantization"](offset=1e5, electrons_per_dn=1e-3, bits=32)
+    electrons = (fine.apply(x.copy()) - 1e5) * 1e-3
+    np.testing.assert_allclose(electrons, x, atol=0.5e-3 * (1 + 1e-6))
+
+
+# --- units in, units out -------------------------------------------------------------------------
+
+
+@every(RadialTransfer, SeparableTransfer)
+def test_a_transfer_is_a_pure_number_that_is_one_at_rest(kind, tmp_path):
+    effect = effect_of(kind, tmp_path)
+    f = np.linspace(0, 2e6, 4001)
+    if issubclass(kind, RadialTransfer):
+        curves = [effect.otf(f, 550e-9)]
+        assert not curves[0][f >= effect.cutoff(550e-9)].any()
+    else:
+        curves = [effect.along_x(f), effect.along_y(f)]
+    for curve in curves:
+        assert curve.shape == f.shape
+        assert curve[0] == 1
+        assert np.all(np.abs(curve) <= 1)
+
+
+@every(Gain)
+def test_a_gain_is_a_pure_number_that_is_one_on_the_axis(kind, tmp_path):
+    effect = effect_of(kind, tmp_path)
+    for dtype in (np.float32, np.float64):
+        gain = effect.gain(np.linspace(-1e-4, 1e-4, 5, dtype=dtype), np.zeros(1, dtype))
+        assert gain.shape == (1, 5) and gain.dtype == dtype
+        # 32 bits: a polynomial good to 1e-7, in numbers good to 6e-8
+        assert gain[0, 2] == pytest.approx(1, abs=3e-7)
+        assert np.all((gain > 0) & (gain <= 1 + 3e-7))
+
+
+@every(Charge)
+def test_charge_is_electrons_a_second(kind, tmp_path):
+    """Twice the time, twice the electrons, as many as the rate says."""
+    rate = effect_of(kind, tmp_path).rate()
+    for time in (0.01, 0.02):
+        scene = CASES[kind.name].has | {"exposure.time": f"{time} s"}
+        on = simulate(camera(tmp_path, scene)).mean_electrons
+        off = simulate(camera(tmp_path, scene | {"effects": {kind.name: "off"}})).mean_electrons
+        np.testing.assert_allclose(on - off, rate * time, rtol=1e-9)
+
+
+@every(Draw, Limit, Code)
+def test_electrons_in_electrons_out(kind, tmp_path):
+    """A draw, a limit or a code keeps shape and float type; a code gives whole numbers."""
+    effect = effect_of(kind, tmp_path)
+    for dtype in (np.float32, np.float64):
+        electrons = np.full((3, 50), 500, dtype)
+        more = (site(3, 50, dtype=dtype),) if issubclass(kind, Draw) else ()
+        out = effect.apply(electrons, *more)
+        assert out.shape == (3, 50) and out.dtype == dtype
+        if issubclass(kind, Code):
+            assert np.array_equal(out, np.rint(out))
+            # a step of the line is a step of the code
+            step = np.array([0.0, effect.electrons_per_dn])
+            assert np.diff(effect.line(step))[0] == pytest.approx(1, rel=1e-12)
+
+
+# --- variance ------------------------------------------------------------------------------------
+
+
+@every(Draw)
+@pytest.mark.parametrize("mean", [0.0, 0.4, 6.0, 30.0, 2e4])
+def test_stated_variance_is_the_measured_one(kind, mean, tmp_path):
+    """One row of 200 000 pixels, so that draws per column are as many as those per pixel.
+
+    Standard errors: of the mean sqrt(v / n); of the variance v sqrt((k - 1) / n) with the kurtosis
+    k, 3 for normal numbers and 3 + 1/m for Poisson's.
+    """
+    n = 200_000
+    effect = effect_of(kind, tmp_path)
+    out = effect.apply(np.full((1, n), mean), site(1, n, seed=5))
+    stated = effect.variance(mean)
+    kurtosis = 3 + (1 / mean if kind.name == "shot_noise" and mean else 0)
+    assert out.mean() == pytest.approx(mean, abs=5 * math.sqrt(stated / n))
+    assert out.var() == pytest.approx(stated, rel=5 * math.sqrt((kurtosis - 1) / n))
+
+
+# --- contribution --------------------------------------------------------------------------------
+
+
+def ablation(folder, kind, scene) -> tuple[float, float]:
+    """(rms change of the mean raw by leaving the effect out, what `mean_error` says it is)."""
+    made = camera(folder, scene | {"effects": QUIET})
+    on = simulate(made)
+    off = simulate(camera(folder, scene | {"effects": QUIET | {kind.name: "off"}}))
+    well = on.frame.electrical.full_well
+    change = np.minimum(on.mean_electrons, well) - np.minimum(off.mean_electrons, well)
+    full = max(1.0, min(well, float(on.mean_electrons.max())))
+    effect = kind.of(made, geometry(made))
+    return (
+        float(np.sqrt(np.mean(np.square(change, dtype=float)))),
+        effect.mean_error(Outlook(full_signal=full, time=on.exposure_time)),
+    )
+
+
+@every(RadialTransfer, SeparableTransfer, Gain, Charge, Draw)
+def test_mean_error_bounds_the_ablation(kind, tmp_path):
+    """The change of the mean raw by leaving it out is at most what the effect says of itself.
+
+    Only rounding may be on top of it. Where it says more than nothing, not more than threefold:
+    a bound that says anything leaves nothing out.
+    """
+    case = CASES[kind.name]
+    change, bound = ablation(tmp_path, kind, case.has | case.shows)
+    assert change <= bound * (1 + 1e-6) + 1e-9
+    assert bound <= 3 * change + 1e-9
+
+
+# --- keys ----------------------------------------------------------------------------------------
+
+
+@every(Draw)
+def test_deterministic_under_its_key(kind, tmp_path):
+    """Same seed and block, same bytes; another seed, or another block, other numbers."""
+    effect = effect_of(kind, tmp_path)
+
+    def shot(**key) -> bytes:
+        return effect.apply(np.full((8, 16), 500.0), site(8, 16, **key)).tobytes()
+
+    assert shot() == shot()
+    assert shot() != shot(seed=2)
+    assert shot() != shot(block=1)
+    assert kind.scope in ("frame", "sensor")
+
+
+@every(Draw)
+def test_streams_carry_its_name(kind, tmp_path):
+    """No two effects share a stream, so none can move another's numbers."""
+    opened = []
+
+    def recording(name: str) -> np.random.Generator:
+        opened.append(name)
+        return stream(1, name)
+
+    where = Site(4, 8, recording, recording, np.float64)
+    effect_of(kind, tmp_path).apply(np.full((4, 8), 500.0), where)
+    assert opened and len(set(opened)) == len(opened)
+    assert all(name.split()[0] == kind.name for name in opened)
+
+
+NOISY = {
+    "pixel.photodetector.dark_current": "5 ke/s",
+    "pixel.fpn": {"offset_pixel": "7 e", "offset_column": "3 e"},
+    "pixel.readout.reset_noise": "12 e",
+    "pixel.readout.read_noise": "9 e",
+    "scene.radiance": radiance_for(900),
+    "array.rows": 150,
+}
+
+
+def electrons(folder, **changes) -> np.ndarray:
+    return simulate(camera(folder, NOISY | changes)).electrons
+
+
+def only(*names: str) -> dict[str, str]:
+    return {kind.name: "on" if kind.name in names else "off" for kind in DRAWS}
+
+
+@every(Draw)
+def test_switching_one_off_leaves_the_draws_of_the_others(kind, tmp_path):
+    """Each draw is what it is alone, added to the mean, in every block of rows of a whole frame.
+
+    Offsets and no gains here, so that all draws add up; 1e-9 is rounding of numbers near 1000.
+    """
+    mean = electrons(tmp_path, effects=QUIET)
+    alone = {k.name: electrons(tmp_path, effects=only(k.name)) - mean for k in DRAWS}
+    others = [k.name for k in DRAWS if k is not kind]
+    expected = mean + sum(alone[name] for name in others)
+    found = electrons(tmp_path, effects={kind.name: "off"})
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-9)
+    assert np.abs(alone[kind.name]).max() > 1
+
+
+def test_gain_noise_keeps_its_draws_when_light_is_noisy(tmp_path):
+    """Gains multiply what was collected: the same gains with shot noise and without."""
+    gains = {"pixel.fpn": {"gain_pixel": "2 %", "gain_column": "1 %"}}
+    quiet = electrons(tmp_path, effects=only("fpn"), **gains) / electrons(tmp_path, effects=QUIET)
+    light = electrons(tmp_path, effects=only("shot_noise"))
+    both = electrons(tmp_path, effects=only("shot_noise", "fpn"), **gains)
+    np.testing.assert_allclose(both / light, quiet, rtol=1e-12)
+
+
+@every(Draw)
+def test_each_seed_moves_its_own_draws_only(kind, tmp_path):
+    """Fixed patterns stay with the sensor when the frame changes; the rest is new."""
+    alone = {"effects": only(kind.name)}
+    first = electrons(tmp_path, **alone)
+    frame = electrons(tmp_path, **alone, **{"seed.frame": 2})
+    sensor = electrons(tmp_path, **alone, **{"seed.sensor": 2})
+    moved, kept = (frame, sensor) if kind.scope == "frame" else (sensor, frame)
+    assert np.array_equal(first, kept)
+    # hardly a pixel is the same: whole electrons of shot noise coincide by chance in 1 of 100
+    assert np.mean(first == moved) < 0.05
+    assert kind.scope == ("sensor" if kind.name == "fpn" else "frame")
+
+
+# --- hostile input -------------------------------------------------------------------------------
+
+
+@every()
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_finite_on_hostile_input(kind, dtype, tmp_path):
+    """Any finite signal, position or frequency gives a finite answer, without a warning."""
+    effect = effect_of(kind, tmp_path)
+    if isinstance(effect, RadialTransfer):
+        f = np.array([0, 1e-300, 1.0, 1e6, 1e9, 1e300])
+        results = [effect.otf(f, w) for w in (1e-9, 550e-9, 1e-3)]
+        assert all(effect.cutoff(w) > 0 for w in (1e-9, 550e-9, 1e-3))
+    elif isinstance(effect, SeparableTransfer):
+        f = np.array([-1e9, -1.0, 0, 1e-300, 1.0, 1e9])
+        results = [effect.along_x(f), effect.along_y(f)]
+    elif isinstance(effect, Gain):
+        places = np.array([-1.0, -1e-12, 0, 1e-6, 1e-3], dtype)
+        results = [effect.gain(places, places)]
+    elif isinstance(effect, Charge):
+        results = [np.array(effect.rate())]
+    else:
+        signal = np.array([[-1e9, -1.0, 0, 1e-30, 0.5, 7.9999, 8.0, 1e6, 1e12]], dtype)
+        more = (site(1, 9, dtype=dtype),) if isinstance(effect, Draw) else ()
+        results = [effect.apply(signal.repeat(1, axis=0), *more)]
+        if isinstance(effect, Code):
+            assert results[0].min() >= 0 and results[0].max() <= 2**effect.bits - 1
+    for result in results:
+        assert np.isfinite(result).all()
+    outlook = Outlook(full_signal=1.0, time=1e-12)
+    assert math.isfinite(effect.mean_error(outlook)) and effect.mean_error(outlook) >= 0

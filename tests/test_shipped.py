@@ -1,0 +1,181 @@
+"""What ships: every camera loads and runs, every part has its use, every number makes sense."""
+
+import csv
+import json
+import math
+import re
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from vcam_cli import load, simulate
+from vcam_cli.camera import shipped
+from vcam_cli.camera.electrical import electrical
+from vcam_cli.camera.geometry import geometry
+from vcam_cli.commands.list_ import first_comment
+from vcam_cli.commands.main import app
+
+CAMERAS = shipped.names("cameras")
+YAMLS = sorted(shipped.folder().glob("*/*.yaml"))
+TABLES = sorted(shipped.folder().glob("*/*.csv"))
+SMALL = ("array.rows=64", "array.columns=80", "accuracy=draft")
+
+
+def label(path: Path) -> str:
+    return f"{path.parent.name}/{path.stem}"
+
+
+@cache
+def small(name: str):
+    """A shipped camera with fewer pixels, simulated."""
+    return simulate(load(name, SMALL))
+
+
+def test_there_are_some():
+    assert {"still-life", "12mp-bayer", "starter", "low-light"} <= set(CAMERAS)
+    assert YAMLS and TABLES
+
+
+@pytest.mark.parametrize("name", CAMERAS)
+class TestCameras:
+    def test_validates_and_is_named_after_its_file(self, name):
+        result = CliRunner().invoke(app, ["validate", name], prog_name="vcam")
+        assert (result.exit_code, result.stdout) == (0, f"{name}: ok ({name})\n")
+
+    def test_runs(self, name, tmp_path):
+        line = ["run", name, "-q", "-o", str(tmp_path / "out")]
+        line += [word for item in SMALL for word in ("--set", item)]
+        result = CliRunner().invoke(app, line, prog_name="vcam")
+        assert result.exit_code == 0, result.output
+        assert (result.stdout, result.stderr) == ("", "")
+        run = json.loads((tmp_path / "out" / "run.json").read_text("utf-8"))
+        assert run["name"] == name
+        for file in ("raw.exr", "render.png", "metrics.csv"):
+            assert (tmp_path / "out" / file).stat().st_size > 100
+
+    def test_the_exposure_suits_the_scene(self, name):
+        result = small(name)
+        well = electrical(result.frame.camera).full_well
+        assert 1e-4 <= result.exposure_time <= 1
+        assert np.isfinite(result.electrons).all()
+        # Neither black nor burnt out: something between a thousandth and all of the well.
+        assert well / 1000 < np.quantile(result.mean_electrons, 0.99) < well
+        saturated = dict((n, v) for n, v, _ in result.metrics)["saturated_fraction"]
+        assert saturated < 0.01
+
+    def test_the_picture_is_one(self, name):
+        """Dark and light areas, and not mostly clipped, in every channel together."""
+        render = small(name).render.astype(float)
+        assert render.std() > 10
+        assert 20 < render.mean() < 220
+        assert np.mean((render == 0) | (render == 255)) < 0.25
+
+    def test_the_lens_and_the_pixels_could_be_built(self, name):
+        camera = load(name)
+        g, e = geometry(camera), electrical(camera)
+        assert 0.9 <= g.f_number <= 22
+        assert 1e-3 <= g.focal_length <= 0.1
+        assert math.radians(5) < 2 * math.atan(g.sensor_width / 2 / g.image_distance) < 2.1
+        assert 1e-6 <= g.pitch_x <= 20e-6 and 1e-6 <= g.pitch_y <= 20e-6
+        assert 0.1 <= g.fill_factor <= 1 + 1e-9
+        assert 5e-6 <= e.conversion_gain <= 300e-6
+        assert 0.2 <= e.voltage_swing <= 3
+        assert 1e3 <= e.full_well <= 2e5
+        assert 8 <= e.bits <= 16
+        assert e.full_well / 2**e.bits < e.electrons_per_dn * 1.5
+        assert camera.pixel.readout.read_noise < 0.01 * e.full_well
+        assert 250 <= camera.pixel.temperature <= 350
+
+
+def test_the_benchmark_camera():
+    """Twelve megapixels, Bayer, and every effect that it describes on."""
+    camera = load("12mp-bayer")
+    assert (camera.array.rows, camera.array.columns) == (3000, 4000)
+    assert camera.array.pattern == "bayer-rggb"
+    assert camera.effects == "all"
+    states = {d.name: d.state for d in small("12mp-bayer").frame.plan.decisions}
+    noises = ("shot_noise", "fpn", "reset_noise", "read_noise", "dark_current")
+    assert [states[noise] for noise in noises] == ["on"] * 5
+
+
+def test_the_starter_is_complete_by_itself():
+    """It is copied to the user's folder, so it can lean on nothing beside it."""
+    assert [file.name for file in load("starter").files if file.suffix == ".yaml"] == [
+        "starter.yaml"
+    ]
+    assert "$schema" not in shipped.find("cameras", "starter").read_text()
+
+
+def test_low_light_is_as_good_as_light_gets():
+    """Shot noise and quantization are all there is: Poisson statistics at every level."""
+    result = small("low-light")
+    on = {d.name for d in result.frame.plan.decisions if d.state == "on"}
+    assert not on & {"read_noise", "reset_noise", "fpn", "dark_current"}
+    z = (result.electrons - result.mean_electrons) / np.sqrt(result.mean_electrons)
+    # The variance of n draws of unit variance has a standard error of sqrt(2 / n); 5 of them.
+    assert float(z.var()) == pytest.approx(1, abs=5 * math.sqrt(2 / z.size))
+    assert 20 < result.mean_electrons.mean() < 2000
+
+
+@pytest.mark.parametrize("path", YAMLS, ids=label)
+class TestFiles:
+    def test_begins_with_a_sentence_that_says_what_it_is(self, path):
+        lines = path.read_text("utf-8").splitlines()
+        if "yaml-language-server" in lines[0]:
+            lines = lines[1:]
+        assert re.match(r"# [A-Z]", lines[0]), lines[0]
+        assert len(first_comment(path)) > 20
+        assert max(len(line) for line in lines) <= 100
+
+    def test_its_schema_is_there(self, path):
+        first = path.read_text("utf-8").splitlines()[0]
+        match = re.search(r"\$schema=(\S+)", first)
+        if path.parent.name == "cameras" and path.stem != "starter":
+            assert match, "editors need it"
+        if match:
+            assert (path.parent / match[1]).is_file()
+
+    def test_some_camera_uses_it(self, path):
+        used = {file for name in CAMERAS for file in load(name).files}
+        assert path.resolve() in used
+
+
+@pytest.mark.parametrize("path", TABLES, ids=label)
+class TestTables:
+    def test_some_file_names_it(self, path):
+        texts = [file.read_text("utf-8") for file in YAMLS]
+        assert any(re.search(rf"\b{re.escape(path.stem)}\b", text) for text in texts)
+
+    def test_is_what_its_comment_says(self, path):
+        comments, rows = read(path)
+        (line,) = [c for c in comments if "value = " in c]
+        formula = line.partition("value = ")[2].partition(",")[0]
+        python = re.sub(r"(?<=\d) (?=exp)", " * ", formula).replace("^", "**")
+        wavelength, value = np.array(rows, float).T
+        names = {"exp": np.exp, "wavelength_nm": wavelength}
+        # Rounded to 5 decimals; 1e-12 for the last bit of the rounding.
+        assert np.abs(eval(python, {}, names) - value).max() <= 0.5e-5 + 1e-12
+
+    def test_covers_every_wavelength_with_fractions(self, path):
+        wavelength, value = np.array(read(path)[1], float).T
+        assert wavelength[0] <= 380 and wavelength[-1] >= 1000
+        assert np.all(np.diff(wavelength) > 0)
+        assert value.min() >= 0 and value.max() <= 1
+
+
+def read(path: Path) -> tuple[list[str], list[list[str]]]:
+    """Comment lines, and the rows of a spectrum."""
+    lines = path.read_text("utf-8").splitlines()
+    comments = [line for line in lines if line.startswith("#")]
+    header, *rows = csv.reader(line for line in lines if not line.startswith("#"))
+    assert header == ["wavelength_nm", "value"]
+    return comments, rows
+
+
+def test_names_are_clear_across_kinds():
+    """Spectra are looked up by name alone."""
+    stems = [path.stem for path in TABLES]
+    assert len(stems) == len(set(stems))

@@ -1,0 +1,117 @@
+"""The wheel: everything that a camera needs travels in it, and nothing else does.
+
+It is built by the same backend as pip would use, without pip's isolated environment (which would
+be fetched from the network), and used from where it was unpacked.
+"""
+
+import json
+import os
+import subprocess
+import sys
+import zipfile
+from pathlib import Path
+
+import pytest
+
+import vcam_cli
+
+ROOT = Path(vcam_cli.__file__).parents[1]
+
+pytestmark = pytest.mark.skipif(
+    not (ROOT / "pyproject.toml").is_file(), reason="needs a checkout to build from"
+)
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory) -> Path:
+    folder = tmp_path_factory.mktemp("dist")
+    build = [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(folder)]
+    env = os.environ | {"PYTHONDONTWRITEBYTECODE": "1"}
+    result = subprocess.run(build, cwd=ROOT, capture_output=True, text=True, env=env)
+    assert result.returncode == 0, result.stderr
+    (file,) = folder.glob("*.whl")
+    return file
+
+
+@pytest.fixture(scope="module")
+def installed(wheel, tmp_path_factory) -> Path:
+    """The folder that the wheel was unpacked into."""
+    folder = tmp_path_factory.mktemp("site")
+    with zipfile.ZipFile(wheel) as archive:
+        archive.extractall(folder)
+    return folder
+
+
+def python(installed: Path, code: str, folder: Path) -> subprocess.CompletedProcess:
+    """Runs code far from the checkout, which the unpacked wheel comes before."""
+    env = {k: v for k, v in os.environ.items() if not k.startswith("PYTHON")}
+    env |= {"PYTHONPATH": str(installed), "PYTHONDONTWRITEBYTECODE": "1"}
+    line = [sys.executable, "-c", code]
+    return subprocess.run(line, capture_output=True, text=True, env=env, cwd=folder)
+
+
+def files(folder: Path, suffixes: tuple[str, ...]) -> set[str]:
+    found = (path for path in folder.rglob("*") if path.suffix in suffixes)
+    return {str(path.relative_to(folder)) for path in found if "__pycache__" not in path.parts}
+
+
+def test_all_of_configs_lies_in_the_package(installed):
+    shipped = files(ROOT / "configs", (".yaml", ".csv"))
+    assert shipped and shipped == files(installed / "vcam_cli" / "configs", (".yaml", ".csv"))
+    for name in shipped:
+        there = installed / "vcam_cli" / "configs" / name
+        assert there.read_bytes() == (ROOT / "configs" / name).read_bytes()
+
+
+def test_all_sources_and_data_tables(installed):
+    kinds = (".py", ".csv", ".npz", ".json")
+    mine = files(ROOT / "vcam_cli", kinds)
+    there = {n for n in files(installed / "vcam_cli", kinds) if not n.startswith("configs/")}
+    assert {n for n in mine if n.startswith("data/")}
+    assert there == mine
+
+
+def test_nothing_else(wheel):
+    with zipfile.ZipFile(wheel) as archive:
+        names = archive.namelist()
+    assert {name.partition("/")[0].partition("-")[0] for name in names} == {"vcam_cli"}
+    assert not [name for name in names if "__pycache__" in name or "tests" in name]
+    assert any(name.endswith("licenses/LICENSE") for name in names)
+    assert sum(1 for name in names if name.endswith("entry_points.txt")) == 1
+
+
+def test_the_program_is_announced(installed):
+    (entry,) = installed.glob("*.dist-info/entry_points.txt")
+    assert "vcam = vcam_cli.commands.main:main" in entry.read_text()
+
+
+def test_shipped_cameras_load_from_the_unpacked_wheel(installed, tmp_path):
+    code = (
+        "import json, vcam_cli\n"
+        "from vcam_cli import load\n"
+        "from vcam_cli.camera import shipped\n"
+        "names = {n: load(n).name for n in shipped.names('cameras')}\n"
+        "files = [str(f) for f in load('still-life').files]\n"
+        "print(json.dumps({'from': vcam_cli.__file__, 'names': names, 'files': files}))"
+    )
+    result = python(installed, code, tmp_path)
+    assert result.returncode == 0, result.stderr
+    said = json.loads(result.stdout)
+    assert Path(said["from"]).parent == installed / "vcam_cli"
+    assert said["names"]["still-life"] == "still-life"
+    assert len(said["files"]) >= 5
+    assert all(Path(file).is_relative_to(installed) for file in said["files"])
+
+
+def test_a_camera_runs_from_the_unpacked_wheel(installed, tmp_path):
+    code = (
+        "import sys\n"
+        "from vcam_cli.commands.main import main\n"
+        "sys.argv = ['vcam', 'run', 'csf-monochrome', '-q', '-o', 'out',"
+        " '--set', 'array.rows=16', '--set', 'array.columns=24']\n"
+        "main()"
+    )
+    result = python(installed, code, tmp_path)
+    assert result.returncode == 0, result.stderr
+    assert (tmp_path / "out" / "raw.exr").is_file()
+    assert str(installed) in (tmp_path / "out" / "run.json").read_text()
