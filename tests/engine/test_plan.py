@@ -136,12 +136,11 @@ def test_promise_of_the_variance(name, scope, share, run):
 def test_the_cameras_put_the_promises_to_the_test(run):
     """What the plan may leave out it leaves out of one camera, and keeps in another.
 
-    Not among it: fixed-pattern noise, all there is of the sensor's variance, and shot noise, most
-    of the variance at full signal wherever there is light.
+    Not among it: fixed-pattern noise, which is all there is of the sensor's variance.
     """
     results = [run(name) for name in CAMERAS]
     out = {name for result in results for name in left_out(result)}
-    assert out == {"off_axis", "dark_current", "reset_noise", "read_noise"}
+    assert out == {"off_axis", "dark_current", "shot_noise", "reset_noise", "read_noise"}
     assert {e.name for result in results for e in result.frame.plan.active} == set(NAMES)
 
 
@@ -223,10 +222,8 @@ def test_all_wishes_that_cannot_be_are_told_at_once(tmp_path):
     made = camera(tmp_path, {"effects": {"fpn": "on", "read_noise": "on", "shot_noise": "on"}})
     with pytest.raises(BadInput) as caught:
         plan.check(made)
-    assert [p.path for p in caught.value.problems] == [
-        ("effects", "fpn"),
-        ("effects", "read_noise"),
-    ]
+    paths = {p.path for p in caught.value.problems}
+    assert paths == {("effects", "fpn"), ("effects", "read_noise")}
 
 
 # --- what it says --------------------------------------------------------------------------------

@@ -10,6 +10,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
+
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.scene import Extent
 from vcam_cli.errors import BadInput, Collector, bad
@@ -144,6 +147,17 @@ def geometry(camera: Camera) -> Geometry:
         detector_y=detector[3],
         scene_width_on_sensor=_scene_width(camera, magnification),
     )
+
+
+def pixel_centers(geometry: Geometry, detector: bool = False) -> tuple[NDArray, NDArray]:
+    """Centers of the columns (columns,) and rows (rows,) on the sensor [m].
+
+    detector: centers of the photodetectors instead of the pixels' cells.
+    """
+    g = geometry
+    x = (np.arange(g.columns) + 0.5 - g.columns / 2) * g.pitch_x
+    y = (np.arange(g.rows) + 0.5 - g.rows / 2) * g.pitch_y
+    return (x + g.detector_x, y + g.detector_y) if detector else (x, y)
 
 
 def check(camera: Camera) -> None:

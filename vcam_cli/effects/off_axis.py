@@ -19,8 +19,9 @@ class OffAxis(Gain):
     tan2_cone: float
     """Squared tangent of the half-angle of the image-side cone."""
     image_distance: float
-    corner: float
-    """Distance of the outermost pixel from the axis [m]."""
+    half_width: float
+    half_height: float
+    """Half the sensor's width and height [m]."""
 
     name = "off_axis"
     reference = "Chen 2003, eq 2.22 (exact) and 2.21 (cos4)"
@@ -31,9 +32,14 @@ class OffAxis(Gain):
     def of(cls, camera, geometry):
         if camera.optics.off_axis == "none":
             return None
-        corner = ((geometry.sensor_width / 2) ** 2 + (geometry.sensor_height / 2) ** 2) ** 0.5
         tan2_cone = 1 / (4 * geometry.working_f_number**2)
-        return cls(camera.optics.off_axis, tan2_cone, geometry.image_distance, corner)
+        half = geometry.sensor_width / 2, geometry.sensor_height / 2
+        return cls(camera.optics.off_axis, tan2_cone, geometry.image_distance, *half)
+
+    @property
+    def corner(self) -> float:
+        """Distance of the corner from the axis [m]."""
+        return float(np.hypot(self.half_width, self.half_height))
 
     def describe(self) -> str:
         loss = 1 - float(self._of_tan2((self.corner / self.image_distance) ** 2))
@@ -71,7 +77,10 @@ class OffAxis(Gain):
         return None
 
     def mean_error(self, outlook) -> float:
-        # Bound: a field at full signal everywhere; the loss grows with the squared distance, so
-        # its rms over a rectangle is at most 0.6 of the corner's (square: sqrt(7/45) + mean).
-        loss = 1 - float(self._of_tan2((self.corner / self.image_distance) ** 2))
-        return 0.6 * loss * outlook.full_signal
+        # A field at full signal everywhere: rms of the loss over a quadrant, by the midpoint rule
+        # (64 points a side give it to 1e-3 even at 160 degrees, which the bound is raised by).
+        at = (np.arange(64) + 0.5) / 64
+        x, y = at * self.half_width, at * self.half_height
+        tan2 = (x[None, :] ** 2 + y[:, None] ** 2) / self.image_distance**2
+        loss = 1 - self._of_tan2(tan2)
+        return 1.002 * float(np.sqrt(np.mean(loss**2))) * outlook.full_signal

@@ -8,20 +8,22 @@ from __future__ import annotations
 import time as clock
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.electrical import Electrical, electrical
-from vcam_cli.camera.geometry import Geometry, geometry
+from vcam_cli.camera.geometry import Geometry, geometry, pixel_centers
 from vcam_cli.effects.base import Charge, Code, Draw, Outlook
 from vcam_cli.effects.quantization import Quantization
 from vcam_cli.engine import bandwidth, capture, exposure, memory, optics, plan
 from vcam_cli.engine.mosaic import Mosaic, mosaic
 from vcam_cli.engine.parallel import available_workers
 from vcam_cli.engine.settings import Settings, settings
+from vcam_cli.engine.transfer import Transfer
+from vcam_cli.engine.ways import Optics
 from vcam_cli.errors import bad
 from vcam_cli.physics import readout
 from vcam_cli.scenes.base import SampledScene, WaveScene
@@ -52,7 +54,7 @@ class Frame:
     plan: plan.Plan
     mosaic: Mosaic
     scene: WaveScene | SampledScene
-    transfer: optics.Transfer
+    transfer: Transfer
     """Of the scene's components."""
     white_rate: NDArray
     """(C,) Photo-electrons per second of the perfect white on the axis, in every color [e/s]."""
@@ -90,9 +92,7 @@ class Frame:
 
         (C, rows, columns); no blur, no falloff, no noise; black included.
         """
-        g = self.geometry
-        x = (np.arange(g.columns) + 0.5 - g.columns / 2) * g.pitch_x
-        y = (np.arange(g.rows) + 0.5 - g.rows / 2) * g.pitch_y
+        x, y = pixel_centers(self.geometry)
         photo = self.scene.at(x, y, self.transfer.level.T * self.exposure_time)
         return self.to_dn(photo + self.dark_rate * self.exposure_time)
 
@@ -118,17 +118,16 @@ def expose(camera: Camera, picture: NDArray | None, workers: int | None, stages:
     with stages("optics"):
         effects = plan.optical(camera, g)
         both = _transfer(camera, g, knobs, (*scene.spectra, scene.white), colors, effects)
-        transfer = optics.Transfer(both.wavelengths, both.weights[:-1], both.effects)
+        transfer = replace(both, weights=both.weights[:-1])
         white_rate = both.level[-1]
-        linear = optics.Linear(scene, scene_at, transfer, g, knobs, colors, effects, workers)
-        found = linear.rate()
+        found = optics.photo_rate(Optics(transfer, g, knobs, colors, effects, workers), scene_at)
         rate = found.values
     with stages("exposure"):
         dark = sum(x.rate() for x in plan.wanted(camera, g) if isinstance(x, Charge))
         time = exposure.exposure_time(camera, rate, float(white_rate.max()), dark, e.saturation)
         peak = (float(rate.max()) + dark) * time
         outlook = Outlook(full_signal=max(1.0, min(e.full_well, peak)), time=time)
-        decided = plan.make(camera, g, knobs, outlook, needed)
+        decided = plan.make(camera, g, knobs, outlook, needed, found.spectrum.changes)
     with stages("capture"):
         active = tuple(x for x in decided.active if not isinstance(x, Code))
         code = Quantization.of(camera, g)
@@ -147,14 +146,14 @@ def expose(camera: Camera, picture: NDArray | None, workers: int | None, stages:
         white_rate=white_rate,
         dark_rate=sum(x.rate() for x in active if isinstance(x, Charge)),
         exposure_time=time,
-        oversampling=found.oversampling,
+        oversampling=found.spectrum.oversampling,
         mean_electrons=mean,
         electrons=electrons,
         dn=dn,
     )
 
 
-def _transfer(camera, g, knobs, spectra, colors, effects) -> optics.Transfer:
+def _transfer(camera, g, knobs, spectra, colors, effects) -> Transfer:
     """The scene's transfer; spectra that do not cover the wavelengths are the user's error."""
     try:
         return optics.scene_transfer(camera, g, knobs, spectra, colors, effects)

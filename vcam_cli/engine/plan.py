@@ -16,6 +16,7 @@ whichever is described.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 
 import numpy as np
@@ -23,11 +24,21 @@ import numpy as np
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.geometry import Geometry
 from vcam_cli.camera.geometry import geometry as solve
-from vcam_cli.effects.base import Charge, Draw, Effect, Gain, Outlook
+from vcam_cli.effects.base import (
+    Charge,
+    Draw,
+    Effect,
+    Gain,
+    Outlook,
+    RadialTransfer,
+    SeparableTransfer,
+)
 from vcam_cli.effects.order import ORDER
 from vcam_cli.engine.settings import Settings
 from vcam_cli.errors import BadInput, Collector
 
+MEAN_SHARE = 0.25
+"""Part of the mean's tolerance for the gains that are left out, and again for the charges."""
 LEVELS = (0.01, 0.1, 1.0)
 """Shares of full signal at which the variance promise holds."""
 
@@ -109,7 +120,16 @@ def wanted(camera: Camera, geometry: Geometry) -> tuple[Effect, ...]:
 
 def optical(camera: Camera, geometry: Geometry) -> tuple[Effect, ...]:
     """Effects of the linear part that run, as far as no signal level is needed to decide it."""
-    return tuple(e for e in wanted(camera, geometry) if not isinstance(e, Charge | Draw))
+    here = [e for e in wanted(camera, geometry) if not isinstance(e, Charge | Draw)]
+    return tuple(e for e in here if _worth_its_cost(camera, e))
+
+
+def _worth_its_cost(camera: Camera, effect: Effect) -> bool:
+    """Whether a gain is more than a quarter of the tolerance; whatever is no gain is worth it."""
+    if not isinstance(effect, Gain) or _wish(camera, effect) != "auto":
+        return True
+    relative = effect.mean_error(Outlook(full_signal=1.0, time=1.0))
+    return relative > MEAN_SHARE * camera.accuracy.tolerance
 
 
 def make(
@@ -118,18 +138,27 @@ def make(
     settings: Settings,
     outlook: Outlook,
     memory_bytes: int,
+    changes: Mapping[str, float],
 ) -> Plan:
-    """Decides every effect of `camera` for the signal that is expected."""
+    """Decides every effect of `camera` for the signal that is expected.
+
+    changes: rms change of the signal by leaving out each transfer [electrons / s].
+    """
     found = described(camera, geometry)
-    present = [e for e in found.values() if e is not None]
+    present = list(wanted(camera, geometry))
+    tolerance = camera.accuracy.tolerance
+    dropped = {e for e in present if not _worth_its_cost(camera, e)}
     candidates = [e for e in present if e.removable and _wish(camera, e) == "auto"]
-    dropped = _negligible_mean(candidates, outlook, camera.accuracy.tolerance)
-    dropped |= _negligible_variance(candidates, present, outlook, camera.accuracy.tolerance)
+    dropped |= _negligible_charges(candidates, outlook, tolerance)
+    dropped |= _negligible_variance(candidates, present, outlook, tolerance)
     pixels = geometry.rows * geometry.columns
     decisions, active = [], []
     for kind in ORDER:
         effect = found[kind.name]
-        decision = _decide(kind, effect, camera, effect in dropped, present, outlook, pixels)
+        change = changes.get(kind.name, 0.0) * outlook.time
+        decision = _decide(
+            kind, effect, camera, effect in dropped, present, outlook, pixels, change
+        )
         decisions.append(decision)
         if effect is not None and decision.state == "on":
             active.append(effect)
@@ -150,15 +179,17 @@ def _wish(camera: Camera, effect: Effect) -> str:
     return camera.effects.get(effect.name, "auto")
 
 
-def _negligible_mean(candidates: list[Effect], outlook: Outlook, tolerance: float) -> set[Effect]:
-    """Gains and charges whose absence stays, together, within half the mean's tolerance."""
-    budget = 0.5 * tolerance * outlook.full_signal
+def _negligible_charges(
+    candidates: list[Effect], outlook: Outlook, tolerance: float
+) -> set[Effect]:
+    """Charges whose absence stays, together, within its share of the mean's tolerance."""
+    budget = MEAN_SHARE * tolerance * outlook.full_signal
     out: set[Effect] = set()
-    removable = [e for e in candidates if isinstance(e, Gain | Charge)]
-    for effect in sorted(removable, key=lambda e: e.mean_error(outlook)):
+    charges = [e for e in candidates if isinstance(e, Charge)]
+    for effect in sorted(charges, key=lambda e: e.mean_error(outlook)):
         budget -= effect.mean_error(outlook)
         # Dark current is also noise: its electrons must not be missed in the shadows.
-        noise = effect.rate() * outlook.time if isinstance(effect, Charge) else 0.0
+        noise = effect.rate() * outlook.time
         if budget < 0 or noise > tolerance * LEVELS[0] * outlook.full_signal:
             break
         out.add(effect)
@@ -206,11 +237,12 @@ def _decide(
     present: list[Effect],
     outlook: Outlook,
     pixels: int,
+    change: float,
 ) -> Decision:
     """One line of the plan."""
     if effect is None:
         return Decision(kind.name, "off", "camera", kind.absent, None, "", 0.0)
-    contribution, unit = _contribution(effect, present, outlook)
+    contribution, unit = _contribution(effect, present, outlook, change)
     seconds = kind.seconds_per_pixel * pixels
     wish = _wish(camera, effect)
     if wish == "off":
@@ -224,7 +256,7 @@ def _decide(
 
 
 def _contribution(
-    effect: Effect, present: list[Effect], outlook: Outlook
+    effect: Effect, present: list[Effect], outlook: Outlook, change: float
 ) -> tuple[float | None, str]:
     """The effect's largest share, of the mean signal or of the variance of its scope."""
     if isinstance(effect, Draw):
@@ -234,4 +266,6 @@ def _contribution(
         return float(share.max()), f"of the {kind} variance"
     if isinstance(effect, Gain | Charge):
         return effect.mean_error(outlook) / outlook.full_signal, "of full signal"
+    if isinstance(effect, RadialTransfer | SeparableTransfer):
+        return change / outlook.full_signal, "of full signal"
     return None, ""

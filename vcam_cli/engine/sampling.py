@@ -5,16 +5,17 @@ The heart of the engine. Work is cut into fixed pieces of rows or columns that t
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.fft
 from numpy.typing import NDArray
 
+from vcam_cli.effects.base import RadialTransfer, SeparableTransfer
 from vcam_cli.engine.axis import Axis
 from vcam_cli.engine.parallel import each, pieces
-from vcam_cli.engine.transfer import Tables
+from vcam_cli.engine.transfer import Tables, Transfer
 
 PIECE = 32
 """Rows or columns a thread takes at once: few enough for the cache."""
@@ -115,8 +116,12 @@ class Filter:
                 total += part
             yield total
 
-    def power(self, coefficients: NDArray) -> tuple[NDArray, NDArray]:
+    def power(
+        self, coefficients: NDArray, factor: Callable[[int], NDArray] | None = None
+    ) -> tuple[NDArray, NDArray]:
         """Mean squares of the signal by frequency, estimated from a sample of rows.
+
+        factor: a further factor along each row of the spectrum, from the row's term (terms of x,).
 
         Returns the frequency [cycles/m], the larger of |fx| and |fy|, and for each color the
         mean square that terms of such frequencies add to the signal: (n,) and (C, n), rising in
@@ -130,6 +135,8 @@ class Filter:
             if not parts:
                 break
             square = np.array(parts, dtype=np.float64) ** 2
+            if factor is not None:
+                square *= factor(term)[: square.shape[1]] ** 2
             square[:, 1:] *= 2
             frequency.append(
                 np.maximum(self.x.frequencies[: square.shape[1]], self.y.frequencies[term])
@@ -137,6 +144,24 @@ class Filter:
             power.append(square * (stands_for * (2 if term else 1)))
         order = np.argsort(together := np.concatenate(frequency), kind="stable")
         return together[order], np.concatenate(power, axis=1)[:, order]
+
+    def without(self, effect: RadialTransfer, transfer: Transfer) -> Filter:
+        """What leaving out a radial transfer adds to this filter. `transfer`: the whole of it."""
+        others = [e for e in transfer.effects if e is not effect]
+        size = self.tables.values.shape[-1]
+        grid = np.linspace(0, self.tables.top, size)
+        values = transfer.through(others).mixed(self.tables.mix).at(grid) - self.tables.values
+        return replace(self, tables=replace(self.tables, values=values))
+
+    def without_separable(self, effect: SeparableTransfer, coefficients: NDArray) -> NDArray:
+        """Mean squares (C, n) that leaving out a separable transfer adds to the signal."""
+        x, y = effect.along_x(self.x.frequencies), effect.along_y(self.y.frequencies)
+
+        def others(factors: NDArray, own: NDArray) -> NDArray:
+            return np.divide(factors, own, out=np.ones_like(factors), where=np.abs(own) > 1e-12)
+
+        rest = replace(self, along_x=others(self.along_x, x), along_y=others(self.along_y, y))
+        return rest.power(coefficients, lambda term: 1 - x * y[term])[1]
 
 
 def _rows_to_sample(terms: int) -> list[tuple[int, float]]:

@@ -56,6 +56,11 @@ class Transfer:
         components, colors, count = self.weights.shape
         return (self.weights.reshape(-1, count) @ otf).reshape(components, colors, -1)
 
+    def through(self, effects: Sequence[object]) -> Transfer:
+        """The same light through other effects, of which only radial transfers count."""
+        radial = tuple(e for e in effects if isinstance(e, RadialTransfer))
+        return replace(self, effects=radial)
+
     def mixed(self, mix: NDArray) -> Transfer:
         """The transfer of mixtures of the components, mix: (R, K)."""
         return replace(self, weights=np.tensordot(mix, self.weights, axes=1))

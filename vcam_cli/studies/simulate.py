@@ -6,10 +6,10 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
 
-import numpy as np
 from numpy.typing import NDArray
 
 from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.geometry import pixel_centers
 from vcam_cli.engine.frame import Frame, Stages, expose, figures
 from vcam_cli.engine.parallel import available_workers
 from vcam_cli.errors import BadInput
@@ -56,14 +56,12 @@ class Result:
     @property
     def x(self) -> NDArray:
         """Centers of the columns, right of the array's center, (columns,) [m]."""
-        g = self.frame.geometry
-        return (np.arange(g.columns) + 0.5 - g.columns / 2) * g.pitch_x
+        return pixel_centers(self.frame.geometry)[0]
 
     @property
     def y(self) -> NDArray:
         """Centers of the rows, below the array's center, (rows,) [m]."""
-        g = self.frame.geometry
-        return (np.arange(g.rows) + 0.5 - g.rows / 2) * g.pitch_y
+        return pixel_centers(self.frame.geometry)[1]
 
     @cached_property
     def render(self) -> NDArray:
