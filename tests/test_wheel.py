@@ -63,10 +63,15 @@ def test_all_of_configs_lies_in_the_package(installed):
         assert there.read_bytes() == (ROOT / "configs" / name).read_bytes()
 
 
+def test_all_schemas_lie_where_the_shipped_files_look_for_them(installed):
+    schemas = files(ROOT / "schemas", (".json",))
+    assert schemas and schemas == files(installed / "vcam_cli" / "schemas", (".json",))
+
+
 def test_all_sources_and_data_tables(installed):
     kinds = (".py", ".csv", ".npz", ".json")
     mine = files(ROOT / "vcam_cli", kinds)
-    there = {n for n in files(installed / "vcam_cli", kinds) if not n.startswith("configs/")}
+    there = {n for n in files(installed / "vcam_cli", kinds) if not n.startswith(("configs/", "schemas/"))}
     assert {n for n in mine if n.startswith("data/")}
     assert there == mine
 

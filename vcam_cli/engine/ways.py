@@ -139,7 +139,7 @@ def cosines(
         coefficients = sampling.spectrum(planes, optics.workers)
         if scene.samples == "squares":
             spread = _spread(optics, scene, _filter(optics, scene, tables, widest), coefficients)
-            enough = max(spread.enough(budget), min(oversampling, widest))
+            enough = max(spread.enough(budget), min(knobs.oversampling, widest))
             lost = spread.beyond(enough)
             break
         enough = float(oversampling)
