@@ -265,7 +265,7 @@ def falloff(folder, model: str, f_number: float, degrees: float, accuracy: str) 
 @pytest.mark.parametrize("degrees", [10, 30, 45, 60])
 @pytest.mark.parametrize("f_number", [1.2, 8])
 def test_exact_falloff(f_number, degrees, accuracy, tmp_path):
-    """Eq 2.22 by summing the light of the whole pupil; cos^4 is 18 % below it at 45 degrees, f/1.2."""
+    """Eq 2.22 by summing the light of the whole pupil; at f/1.2, 45 degrees cos^4 is 18 % below."""
     tangent = math.tan(math.radians(degrees))
     expected = disk(tangent, f_number) / disk(0.0, f_number)
     found = falloff(tmp_path, "exact", f_number, degrees, accuracy)

@@ -273,17 +273,17 @@ def test_a_contribution_is_the_share_it_has(tmp_path):
 @pytest.mark.parametrize("source", [EDGE, PATCHES, CSF], ids=["edge", "patches", "csf"])
 @pytest.mark.parametrize("name", ["diffraction", "pixel_aperture"])
 def test_contribution_of_a_transfer_is_what_leaving_it_out_changes(name, source, tmp_path):
-    """By Parseval's theorem over the scene with its margin; the array sees a part of that.
+    """By Parseval's theorem over the scene with its margin of 32 pixels or more.
 
-    TOLERANCE
+    20 %: the margin is part of the sum, and the array is not; 0.90 to 1.17 were seen on this one.
     """
-    chosen = {"effects": QUIET, "accuracy": "standard"} | source
+    chosen = {"effects": QUIET, "accuracy": "standard", "array.rows": 256, "array.columns": 320}
+    chosen |= source
     on = simulate(camera(tmp_path, chosen))
     off = simulate(camera(tmp_path, chosen | {"effects": QUIET | {name: "off"}}))
     change = np.asarray(on.mean_electrons, float) - off.mean_electrons
     rms = float(np.sqrt(np.mean(change**2))) / full_signal(on)
-    print("RATIO", name, decisions(on)[name].contribution, rms, decisions(on)[name].contribution / rms)
-    assert 0.5 < decisions(on)[name].contribution / rms < 2
+    assert decisions(on)[name].contribution == pytest.approx(rms, rel=0.2)
 
 
 def test_report_is_what_run_json_shows(run):

@@ -66,7 +66,7 @@ def electrical(camera: Camera) -> Electrical:
         )
     codes = 2**adc.bits - 1 - adc.offset
     if adc.gain is not None:
-        full_scale = gain * codes / adc.gain
+        full_scale = gain * pixel.readout.gain * codes / adc.gain
     elif adc.full_scale is not None:
         full_scale = adc.full_scale
     else:

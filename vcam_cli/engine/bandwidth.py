@@ -42,15 +42,20 @@ class Spread:
         first = int(np.searchsorted(self.frequency, frequency, side="right"))
         return math.sqrt(float(self.power[:, first:].sum(axis=1).max(initial=0.0)))
 
-    def of_sampling(self, highest: float, passes: Callable[[NDArray], NDArray]) -> float:
-        """Rms error of a chart sampled up to `highest`, as its spectrum's top octave foretells.
+    def of_sampling(
+        self, highest: float, cutoff: float, passes: Callable[[NDArray], NDArray]
+    ) -> float:
+        """Rms error of a chart sampled up to `highest`, as its spectrum foretells.
 
-        passes: transfer of lens and pixel at frequencies (n,), in pixel Nyquist frequencies. For
-        edges, whose amplitude falls as 1/f, there are two parts [electrons / s]:
+        cutoff: of the lens; passes: transfer of lens and pixel at frequencies (n,), all in pixel
+        Nyquist frequencies. For edges, whose amplitude falls as 1/f, there are two parts
+        [electrons / s]:
         - beyond f_N = highest: each octave has half the power of the last, all of them together
-          at most as much as this one, passed as its double is;
+          at most as much as the top one here, passed as its double is;
         - folded: cell means take 2 f_N - f for f, weakened by f / (2 f_N - f). With v half of
-          2 f_N - f, in this octave, that is half its power times ((f_N - v) / v)^2, passed as f.
+          2 f_N - f, in the top octave, that is half its power times ((f_N - v) / v)^2, passed as
+          f. Where v is beyond the cut-off its power is not seen: then from that at f itself,
+          (f / (2 f_N - f))^4 of it.
         """
         first = int(np.searchsorted(self.frequency, highest / 2, side="right"))
         v = self.frequency[first:]
@@ -59,7 +64,11 @@ class Spread:
         folded = passes(np.maximum(2 * highest - 2 * v, 0)) ** 2 * 0.5 * (highest / v - 1) ** 2
         # Where the lens lets nothing through, nothing is known: at most a thousandfold.
         share = (beyond + folded) / np.maximum(here, 1e-3) ** 2
-        return math.sqrt(float((self.power[:, first:] * share).sum(axis=1).max(initial=0.0)))
+        seen = (self.power[:, first:] * share * (v < cutoff)).sum(axis=1)
+        f = self.frequency
+        unseen = (f < 2 * (highest - cutoff)) & (f < highest)
+        guess = np.where(unseen, (f / np.maximum(2 * highest - f, highest)) ** 4, 0.0)
+        return math.sqrt(float((seen + (self.power * guess).sum(axis=1)).max(initial=0.0)))
 
     def enough(self, budget: float) -> float:
         """Lowest frequency beyond which an rms of at most `budget` is left."""
@@ -86,9 +95,7 @@ def top(geometry: Geometry, oversampling: float, cutoff: float) -> float:
     return min(cutoff, oversampling * corner)
 
 
-def finer(
-    now: int, lost: float, budget: float, geometry: Geometry, knobs: Settings, cutoff: float
-) -> int:
+def finer(now: int, lost: float, budget: float, geometry: Geometry, knobs: Settings) -> int:
     """Oversampling a chart needs when `now` loses `lost`; `now` itself where it will do.
 
     The power of an edge falls with the fourth power of the frequency (its own square and the
@@ -99,8 +106,7 @@ def finer(
     pixels = geometry.rows * geometry.columns
     affordable = max(now, int(math.sqrt(MOST_SAMPLES / pixels)))
     needed = math.ceil(now * (lost / budget) ** (2 / 3)) if budget > 0 else knobs.most_oversampling
-    wanted = min(max(needed, now + 1), knobs.most_oversampling, affordable)
-    return max(now, min(wanted, max(now, math.ceil(min(limit(geometry, cutoff), 1e6)))))
+    return max(now, min(max(needed, now + 1), knobs.most_oversampling, affordable))
 
 
 def peak(planes: NDArray, tables: Tables) -> float:

@@ -144,8 +144,8 @@ def cosines(
             break
         enough = float(oversampling)
         spread = _spread(optics, scene, _filter(optics, scene, tables, enough), coefficients)
-        lost = spread.of_sampling(enough, partial(_passes, optics))
-        finer = bandwidth.finer(oversampling, lost, budget, g, knobs, cutoff)
+        lost = spread.of_sampling(enough, bandwidth.limit(g, cutoff), partial(_passes, optics))
+        finer = bandwidth.finer(oversampling, lost, budget, g, knobs)
         if finer == oversampling:
             break
         del planes, coefficients
