@@ -83,7 +83,7 @@ def test_loss_of_a_chart_is_foretold(name, f_number, cells, sampled):
     """Never less than half of what is lost; at most twelvefold where edges run with the pixels.
 
     What lies beyond the sampling is guessed from its top octave, so a small factor either way is in
-    the nature of it: 0.66 to 8 were seen. Diagonal edges were foretold up to thirtyfold: their
+    the nature of it: 0.66 to 8 were seen. Diagonal edges were foretold up to 700-fold: their
     energy is not where the pixels fold it to. A factor of f costs f^(2/3) in cells per pixel.
     """
     found = sampled(name, f_number, cells)

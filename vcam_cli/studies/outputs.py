@@ -104,7 +104,7 @@ def record(result: Result, inputs: tuple[Path, ...], seconds: float) -> dict[str
         "name": camera.name,
         "camera": camera.model_dump(mode="json"),
         "plan": frame.plan.report(),
-        "geometry": frame.geometry.report(frame.oversampling),
+        "geometry": frame.geometry.report(frame.spectrum.oversampling),
         "metrics": {name: value for name, value, _ in result.metrics},
         "stages": result.stages.seconds,
         "seconds": seconds,

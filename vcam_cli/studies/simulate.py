@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.geometry import pixel_centers
-from vcam_cli.engine.frame import Frame, Stages, expose, figures
+from vcam_cli.engine.frame import Frame, expose, figures
 from vcam_cli.engine.parallel import available_workers
+from vcam_cli.engine.prepare import Stages
 from vcam_cli.errors import BadInput
 from vcam_cli.processing import Context, Processed, process
 from vcam_cli.quality.mse import mse, psnr_db

@@ -1,0 +1,123 @@
+"""All that comes before a frame is taken: the light in every pixel, the exposure time, the plan.
+
+This is the linear half of the engine in one short function; each line is a module beside this one.
+"""
+
+from __future__ import annotations
+
+import time as clock
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+
+from numpy.typing import NDArray
+
+from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.electrical import Electrical, electrical
+from vcam_cli.camera.geometry import Geometry, geometry
+from vcam_cli.effects.base import Charge, Outlook
+from vcam_cli.engine import bandwidth, exposure, memory, optics, plan
+from vcam_cli.engine.mosaic import Mosaic, mosaic
+from vcam_cli.engine.settings import Settings, settings
+from vcam_cli.engine.transfer import Transfer
+from vcam_cli.engine.ways import Followed, Optics
+from vcam_cli.errors import bad
+from vcam_cli.scenes.base import SampledScene, WaveScene
+from vcam_cli.scenes.build import build
+
+
+@dataclass
+class Stages:
+    """Seconds that each stage took, in the order in which they ran."""
+
+    seconds: dict[str, float] = field(default_factory=dict)
+
+    @contextmanager
+    def __call__(self, name: str) -> Iterator[None]:
+        start = clock.perf_counter()
+        yield
+        self.seconds[name] = self.seconds.get(name, 0.0) + clock.perf_counter() - start
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """A camera ready to take its frame."""
+
+    camera: Camera
+    geometry: Geometry
+    electrical: Electrical
+    settings: Settings
+    mosaic: Mosaic
+    scene: WaveScene | SampledScene
+    transfer: Transfer
+    """Of the scene's components."""
+    white_rate: NDArray
+    """(C,) Photo-electrons per second of the perfect white on the axis, in every color [e/s]."""
+    rate: NDArray
+    """(rows, columns) Photo-electrons per second of every pixel [e/s]."""
+    spectrum: Followed
+    """How far the scene's spectrum was followed."""
+    exposure_time: float
+    """[s]"""
+    plan: plan.Plan
+
+    @property
+    def dark_rate(self) -> float:
+        """Dark electrons per second that are simulated [e/s]."""
+        return sum(e.rate() for e in self.plan.active if isinstance(e, Charge))
+
+
+def prepare(camera: Camera, picture: NDArray | None, workers: int, stages: Stages) -> Prepared:
+    """Brings the light of the scene to the pixels, times the exposure, decides what will run.
+
+    picture: samples of the scene's image file, (h, w, channels), linear light; None for charts.
+    Raises BadInput where the camera contradicts itself, CannotDo where memory does not suffice.
+    """
+    g, e = geometry(camera), electrical(camera)
+    knobs = settings(camera)
+    colors = mosaic(camera)
+    needed = memory.of_frame(g, knobs, len(colors.colors), bool(camera.quality))
+    memory.require(needed, g)
+
+    def scene_at(oversampling: int) -> WaveScene | SampledScene:
+        return build(camera.scene, optics.view(g, knobs, oversampling), picture)
+
+    with stages("scene"):
+        scene = scene_at(bandwidth.first_guess(g, knobs))
+    with stages("optics"):
+        effects = plan.optical(camera, g)
+        both = _transfer(camera, g, knobs, (*scene.spectra, scene.white), colors, effects)
+        transfer = replace(both, weights=both.weights[:-1])
+        white_rate = both.level[-1]
+        found = optics.photo_rate(Optics(transfer, g, knobs, colors, effects, workers), scene_at)
+    with stages("exposure"):
+        rate, white = found.values, float(white_rate.max())
+        dark = sum(x.rate() for x in plan.wanted(camera, g) if isinstance(x, Charge))
+        time = exposure.exposure_time(camera, rate, white, dark, e.saturation)
+        peak = (float(rate.max()) + dark) * time
+        outlook = Outlook(full_signal=max(1.0, min(e.full_well, peak)), time=time)
+        decided = plan.make(camera, g, knobs, outlook, needed, found.spectrum.changes)
+    return Prepared(
+        camera=camera,
+        geometry=g,
+        electrical=e,
+        settings=knobs,
+        mosaic=colors,
+        scene=scene,
+        transfer=transfer,
+        white_rate=white_rate,
+        rate=rate,
+        spectrum=found.spectrum,
+        exposure_time=time,
+        plan=decided,
+    )
+
+
+def _transfer(camera, g, knobs, spectra, colors, effects) -> Transfer:
+    """The scene's transfer; spectra that do not cover the wavelengths are the user's error."""
+    try:
+        return optics.scene_transfer(camera, g, knobs, spectra, colors, effects)
+    except ValueError as error:
+        raise bad(
+            "scene.wavelengths", str(error), "narrow the wavelengths, or extend the spectrum"
+        ) from None
