@@ -21,6 +21,7 @@ from vcam_cli.errors import VcamError
 
 COMMANDS = {
     "run": "run:run",
+    "plan": "plan:plan",
     "validate": "validate:validate",
     "list": "list_:list_",
     "init": "init:init",

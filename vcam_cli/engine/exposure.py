@@ -16,14 +16,23 @@ def exposure_time(
 
     rate: photo-electrons per second of every pixel; white_rate: of the scene's perfect white on
     the axis in its brightest color; dark_rate: of the dark [e/s]; saturation: electrons at which
-    well or ADC is full.
+    well or ADC is full. The level that is brought to its target is the white's, a percentile of
+    the pixels', or their mean; each with the dark signal on it.
     """
     auto = camera.exposure.auto
     if auto is None:
         assert camera.exposure.time is not None
         return camera.exposure.time
-    level = white_rate if auto.method == "white" else percentile(rate, auto.percentile)
-    return _reach(auto, level + dark_rate, saturation)
+    return _reach(auto, _level(auto, rate, white_rate) + dark_rate, saturation)
+
+
+def _level(auto: AutoExposure, rate: NDArray, white_rate: float) -> float:
+    """The photo rate that decides [e/s]."""
+    if auto.method == "white":
+        return white_rate
+    if auto.method == "mean":
+        return float(rate.mean(dtype=np.float64))
+    return percentile(rate, auto.percentile)
 
 
 def _reach(auto: AutoExposure, rate: float, saturation: float) -> float:

@@ -35,14 +35,18 @@ class Frame(Prepared):
         return capture.mean_electrons(self.rate, self.exposure_time, self.plan.active)
 
     @property
+    def code(self) -> Code:
+        """The ADC."""
+        return Quantization.of(self.camera, self.geometry)
+
+    @property
     def black_dn(self) -> float:
-        """Mean dark signal and offset of the ADC [DN]."""
-        dark = self.dark_rate * self.exposure_time
-        return self.electrical.offset + dark / self.electrical.electrons_per_dn
+        """Code of the mean dark signal, offset included [DN]."""
+        return float(self.to_dn(np.array([self.dark_rate * self.exposure_time]))[0])
 
     def to_dn(self, electrons: NDArray) -> NDArray:
-        """The ADC's line before rounding and clipping [DN]."""
-        return electrons * (1 / self.electrical.electrons_per_dn) + self.electrical.offset
+        """The ADC's curve before rounding and clipping [DN]."""
+        return self.code.line(electrons)
 
     @property
     def white_dn(self) -> NDArray:

@@ -162,12 +162,8 @@ def make(
         decisions.append(decision)
         if effect is not None and decision.state == "on":
             active.append(effect)
-    seconds = sum(d.seconds for d in decisions) + LINEAR_SECONDS_PER_PIXEL * pixels
+    seconds = sum(d.seconds for d in decisions)
     return Plan(tuple(decisions), tuple(active), settings, seconds, memory_bytes)
-
-
-LINEAR_SECONDS_PER_PIXEL = 60e-9
-"""Transforming, filtering and evaluating a Bayer frame, on one core of 2020s hardware."""
 
 
 def _wish(camera: Camera, effect: Effect) -> str:

@@ -16,7 +16,7 @@ from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.electrical import Electrical, electrical
 from vcam_cli.camera.geometry import Geometry, geometry
 from vcam_cli.effects.base import Charge, Outlook
-from vcam_cli.engine import bandwidth, exposure, memory, optics, plan
+from vcam_cli.engine import bandwidth, cost, exposure, memory, optics, plan
 from vcam_cli.engine.mosaic import Mosaic, mosaic
 from vcam_cli.engine.settings import Settings, settings
 from vcam_cli.engine.transfer import Transfer
@@ -97,6 +97,9 @@ def prepare(camera: Camera, picture: NDArray | None, workers: int, stages: Stage
         peak = (float(rate.max()) + dark) * time
         outlook = Outlook(full_signal=max(1.0, min(e.full_well, peak)), time=time)
         decided = plan.make(camera, g, knobs, outlook, needed, found.spectrum.changes)
+        core = decided.seconds + cost.linear(g, colors, found.spectrum)
+        core += cost.after(camera, g, colors)
+        decided = replace(decided, seconds=core * cost.slowness() / cost.threads(workers))
     return Prepared(
         camera=camera,
         geometry=g,

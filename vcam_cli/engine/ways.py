@@ -52,6 +52,10 @@ class Followed:
     """Pixel Nyquist frequencies; 0 where the scene is known in closed form."""
     lost: float = 0.0
     """Estimated rms of the signal beyond [electrons / s]"""
+    samples: int = 0
+    """Samples of one plane of the scene; 0 where its waves are known."""
+    planes: int = 0
+    """Planes that were transformed."""
     changes: dict[str, float] = field(default_factory=dict)
     """Transfer -> rms change of the signal by leaving it out [electrons / s]"""
 
@@ -159,7 +163,9 @@ def cosines(
     def values(color: int, s: slice) -> NDArray:
         return chosen.x.evaluate(series[color, s], axis=1)
 
-    return [partial(values, c) for c in range(len(series))], Followed(enough, lost, changes)
+    samples, count = planes[0].size, len(planes)
+    followed = Followed(enough, lost, samples, count, changes)
+    return [partial(values, c) for c in range(len(series))], followed
 
 
 def _axes(optics: Optics, scene: SampledScene, oversampling: float) -> tuple[Axis, Axis]:

@@ -12,7 +12,8 @@ from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.geometry import pixel_centers
 from vcam_cli.engine.frame import Frame, expose, figures
 from vcam_cli.engine.parallel import available_workers
-from vcam_cli.engine.prepare import Stages
+from vcam_cli.engine.prepare import Prepared, Stages
+from vcam_cli.engine.prepare import prepare as bring_light
 from vcam_cli.errors import BadInput
 from vcam_cli.processing import Context, Processed, process
 from vcam_cli.quality.mse import mse, psnr_db
@@ -108,25 +109,39 @@ def simulate(
         raise error.located(camera.locate) from None
 
 
+def prepare(camera: Camera, workers: int | None = None) -> tuple[Prepared, tuple[str, ...]]:
+    """The camera ready to take its frame, and notes for the user: what `vcam plan` shows."""
+    try:
+        stages = Stages()
+        picture, notes = _picture(camera, stages)
+        return bring_light(camera, picture, workers or available_workers(), stages), notes
+    except BadInput as error:
+        raise error.located(camera.locate) from None
+
+
+def _picture(camera: Camera, stages: Stages) -> tuple[NDArray | None, tuple[str, ...]]:
+    """Samples of the scene's image file and notes about them; None where there is no file."""
+    source = camera.scene.source
+    if source.kind != "image":
+        return None, ()
+    from vcam_cli.files.images import read_picture
+
+    with stages("read"):
+        path = ("scene", "source", "file")
+        read = read_picture(source.file, source.encoding, source.white, path)
+    return read.data, read.notes
+
+
 def _simulate(camera: Camera, workers: int) -> Result:
     stages = Stages()
-    picture: NDArray | None = None
-    notes: tuple[str, ...] = ()
-    source = camera.scene.source
-    if source.kind == "image":
-        from vcam_cli.files.images import read_picture
-
-        with stages("read"):
-            read = read_picture(
-                source.file, source.encoding, source.white, ("scene", "source", "file")
-            )
-        picture, notes = read.data, read.notes
+    picture, notes = _picture(camera, stages)
     frame = expose(camera, picture, workers, stages)
     context = Context(
         pattern=frame.mosaic.block,
         colors=frame.mosaic.colors,
         white_dn=frame.white_dn,
         black_dn=frame.black_dn,
+        linearize=None if frame.electrical.reference is None else frame.code.linear,
     )
     processed = process(frame.dn, context, camera.processing, workers=workers)
     return Result(frame, processed, stages, notes)

@@ -1,0 +1,58 @@
+"""`vcam plan`: what it says, and that it says the same as the run does."""
+
+import json
+
+from typer.testing import CliRunner
+
+from vcam_cli.commands.main import app
+from vcam_cli.effects.order import ORDER
+
+SMALL = ["--set", "array.rows=48", "--set", "array.columns=64"]
+
+
+def plan(*arguments):
+    done = CliRunner().invoke(app, ["plan", "still-life", *SMALL, *arguments])
+    assert done.exit_code == 0, done.output
+    return done.stdout
+
+
+def test_json_has_the_keys_of_the_contract():
+    report = json.loads(plan("--json"))
+    assert {"effects", "settings", "seconds", "memory_bytes", "geometry"} <= set(report)
+    keys = {"name", "state", "by", "reason", "contribution", "unit", "seconds"}
+    assert all(set(effect) == keys for effect in report["effects"])
+    assert [effect["name"] for effect in report["effects"]] == [kind.name for kind in ORDER]
+    assert report["seconds"] > 0 and report["memory_bytes"] > 0
+
+
+def test_the_run_does_what_the_plan_says(tmp_path):
+    told = json.loads(plan("--json"))
+    out = tmp_path / "out"
+    done = CliRunner().invoke(app, ["run", "still-life", *SMALL, "-o", str(out), "-q"])
+    assert done.exit_code == 0, done.output
+    ran = json.loads((out / "run.json").read_text())["plan"]
+    states = [(e["name"], e["state"], e["by"], e["contribution"]) for e in told["effects"]]
+    assert states == [(e["name"], e["state"], e["by"], e["contribution"]) for e in ran["effects"]]
+    assert told["settings"] == ran["settings"]
+
+
+def test_a_person_reads_every_effect_with_its_reason():
+    text = plan("--set", "effects={read_noise: off}")
+    for kind in ORDER:
+        assert kind.name in text
+    assert "switched off in effects" in text
+    assert "% of full signal" in text
+    assert "10 nm" in text
+
+
+def test_nothing_is_written(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    plan()
+    assert not list(tmp_path.iterdir())
+
+
+def test_what_cannot_be_switched_on_is_refused_with_its_place():
+    arguments = ["plan", "still-life", "--set", "effects={charge_transfer: on}"]
+    done = CliRunner().invoke(app, arguments)
+    assert done.exit_code == 2
+    assert "effects.charge_transfer" in done.stderr

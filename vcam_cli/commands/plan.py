@@ -1,0 +1,70 @@
+"""`vcam plan`: what a run would simulate, what not, why, and at what cost."""
+
+from vcam_cli.commands import options
+
+
+def plan(
+    camera: options.Camera,
+    set_: options.Set = None,
+    accuracy: options.Accuracy = None,
+    as_json: options.Json = False,
+    quiet: options.Quiet = False,
+    workers: options.Workers = None,
+) -> None:
+    """Says which effects will run, which will not and why, and what a run will cost.
+
+    The scene is brought to the pixels, since its spectrum decides what blur contributes; no frame
+    is taken and nothing is written.
+
+    \b
+    Example:
+      vcam plan still-life
+      vcam plan camera.yaml --accuracy 0.001 --json
+    """
+    from vcam_cli.camera.load import load
+    from vcam_cli.files.report import to_json
+    from vcam_cli.studies.simulate import prepare
+
+    model = load(camera, options.overrides(set_, accuracy=accuracy))
+    ready, notes = prepare(model, workers)
+    for note in notes:
+        options.say(note, quiet)
+    report = ready.plan.report()
+    geometry = ready.geometry.report(ready.spectrum.oversampling)
+    if as_json:
+        print(to_json({**report, "geometry": geometry}), end="")
+    else:
+        print(table(report))
+        print(facts(report, geometry, ready.exposure_time))
+
+
+def table(report: dict) -> str:
+    """The decisions as text: one line an effect, its reason below it."""
+    lines = []
+    for effect in report["effects"]:
+        share = effect["contribution"]
+        amount = "" if share is None else f"{100 * share:.3g} % {effect['unit']}"
+        line = f"{effect['state']:<3}  {effect['name']:<17}{effect['by']:<7} {amount}"
+        lines.append(line.rstrip())
+        lines.append(f"     {effect['reason']}")
+    return "\n".join(lines)
+
+
+def facts(report: dict, geometry: dict, exposure_time: float) -> str:
+    """Settings, geometry and cost, a few lines."""
+    from vcam_cli.units import render
+
+    named = dict(report["settings"])
+    named["wavelength_step"] = render(named["wavelength_step"], "length")
+    knobs = ", ".join(f"{name} {value}" for name, value in named.items())
+    scene = f"{geometry['scene_width']:.4g} x {geometry['scene_height']:.4g} m"
+    return "\n".join(
+        (
+            "",
+            f"settings   {knobs}",
+            f"geometry   {geometry['rows']} x {geometry['columns']} pixels see {scene}"
+            f" at magnification {geometry['magnification']:.4g}",
+            f"exposure   {exposure_time:.4g} s",
+            f"cost       about {report['seconds']:.2g} s and {report['memory_bytes'] / 1e6:.0f} MB",
+        )
+    )

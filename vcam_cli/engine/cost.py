@@ -1,0 +1,78 @@
+"""What a frame will cost in time, before it is taken.
+
+Seconds on one core of the machine the constants were measured on, times how fast this machine is
+at the most common of these works, drawing normals; shared by the threads that run.
+"""
+
+from __future__ import annotations
+
+import time
+from functools import cache
+
+import numpy as np
+
+from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.geometry import Geometry
+from vcam_cli.engine.mosaic import Mosaic
+from vcam_cli.engine.ways import Followed
+
+NORMAL = 8.2e-9
+"""Drawing one normal number, the unit of speed [s]."""
+SAMPLE = 11e-9
+"""Painting and transforming one sample of one plane of the scene [s]."""
+TERM = 5e-9
+"""Filtering one term of the spectrum for one plane and color [s]."""
+EVALUATE = 9e-9
+"""One pixel of one color from its spectrum [s]."""
+WAVE = 12e-9
+"""One pixel of one wave, or of one box [s]."""
+PROCESS = 14e-9
+"""One pixel through demosaic to the render's codes [s]."""
+JUDGE = 60e-9
+"""One pixel of ideal image and metrics, per color [s]."""
+EXR = 28e-9
+"""One noisy value into an EXR file [s]."""
+PNG = 14e-9
+"""One noisy value into a PNG file [s]."""
+
+
+@cache
+def slowness() -> float:
+    """Time this machine takes for the unit of work, relative to the constants' machine."""
+    generator = np.random.Generator(np.random.Philox(0))
+    count = 1 << 17
+    seconds = []
+    for _ in range(3):
+        start = time.perf_counter()
+        generator.standard_normal(count, dtype=np.float32)
+        seconds.append(time.perf_counter() - start)
+    return min(seconds) / count / NORMAL
+
+
+def threads(workers: int) -> float:
+    """How much faster so many threads are than one: memory is shared between them."""
+    return workers**0.75
+
+
+def linear(geometry: Geometry, mosaic: Mosaic, followed: Followed) -> float:
+    """Core seconds of the linear part."""
+    pixels, colors = geometry.rows * geometry.columns, len(mosaic.colors)
+    if not followed.samples:
+        return WAVE * pixels * colors
+    terms = pixels * followed.oversampling**2
+    return (
+        SAMPLE * followed.samples * followed.planes
+        + TERM * terms * followed.planes * colors
+        + EVALUATE * pixels * colors
+    )
+
+
+def after(camera: Camera, geometry: Geometry, mosaic: Mosaic) -> float:
+    """Core seconds of processing, metrics and files."""
+    pixels, colors = geometry.rows * geometry.columns, len(mosaic.colors)
+    seconds = EXR * pixels * len(camera.output.raw)
+    if camera.output.render:
+        seconds += (PROCESS + PNG * colors) * pixels
+    if camera.quality:
+        seconds += (JUDGE + EXR) * pixels * colors
+    return seconds
