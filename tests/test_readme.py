@@ -1,0 +1,65 @@
+"""The README is kept true: its commands run, its camera file and Python lines work, its tables are
+whole."""
+
+import re
+import shlex
+from pathlib import Path
+
+from typer.testing import CliRunner
+
+from vcam_cli.commands.main import COMMANDS, app
+
+ROOT = Path(__file__).parent.parent
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+BLOCKS = re.findall(r"```(\w+)\n(.*?)```", README, re.DOTALL)
+TARGETS = re.findall(r"^(\w+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE)
+
+
+def lines(language, start):
+    text = [line for kind, body in BLOCKS if kind == language for line in body.splitlines()]
+    return [line.removeprefix("$ ") for line in text if line.startswith(start)]
+
+
+def test_vcam_commands_run_in_their_order(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    commands = lines("console", "$ vcam ")
+    assert len(commands) >= 3
+    for command in commands:
+        words = shlex.split(command.partition("  #")[0])[1:]
+        done = CliRunner().invoke(app, words)
+        assert done.exit_code == 0, (command, done.output)
+
+
+def test_make_targets_exist():
+    named = {command.split()[1] for command in lines("console", "$ make ")}
+    assert named and named <= set(TARGETS)
+
+
+def test_the_camera_file_runs(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    yaml = next(body for kind, body in BLOCKS if kind == "yaml")
+    Path("example.yaml").write_text(yaml, encoding="utf-8")
+    small = ["--set", "array.rows=48", "--set", "array.columns=64"]
+    done = CliRunner().invoke(app, ["run", "example.yaml", "-q", *small])
+    assert done.exit_code == 0, done.output
+    assert Path("out/example/render.png").exists()
+
+
+def test_the_python_lines_work():
+    code = next(body for kind, body in BLOCKS if kind == "python")
+    exec(code.replace('"still-life"', '"still-life", ["array.rows=48", "array.columns=64"]'), {})
+
+
+def test_every_command_is_in_the_table():
+    named = set(re.findall(r"^\| `vcam (\w+)", README, re.MULTILINE))
+    assert named == set(COMMANDS)
+
+
+def test_the_mistake_shown_is_what_vcam_says(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    yaml = next(body for kind, body in BLOCKS if kind == "yaml")
+    Path("camera.yaml").write_text(yaml.replace("time: 60 ms", "time: 30"), encoding="utf-8")
+    done = CliRunner().invoke(app, ["validate", "camera.yaml"])
+    assert done.exit_code == 2
+    shown = next(body for kind, body in BLOCKS if kind == "text")
+    assert done.stderr == shown
