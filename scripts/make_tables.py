@@ -22,6 +22,8 @@ ILLUMINANTS = ("A", "C", "D50", "D55", "D65", "D75")
 FLUORESCENT = tuple(f"FL{n}" for n in range(1, 13))
 OBSERVER = "CIE 1931 2 Degree Standard Observer"
 CHECKER = "ColorChecker N Ohta"
+PHOSPHORS = "Typical CRT Brainard 1997"
+CAMERA = "Nikon 5100 (NPL)"
 LICENSE = "Written by scripts/make_tables.py from colour-science {version} (BSD-3-Clause)."
 
 Columns = Mapping[str, NDArray[np.float64]]
@@ -29,7 +31,7 @@ Columns = Mapping[str, NDArray[np.float64]]
 
 def everything() -> dict[Path, str]:
     """Path from the root of the repository -> text, of every file this script writes."""
-    return {**{DATA / name: text for name, text in tables().items()}, **curves()}
+    return {**{DATA / name: text for name, text in tables().items()}, **curves(), **cameras()}
 
 
 def tables() -> dict[str, str]:
@@ -40,6 +42,8 @@ def tables() -> dict[str, str]:
     lamps = colour.SDS_ILLUMINANTS
     observer = colour.MSDS_CMFS[OBSERVER]
     patches = colour.SDS_COLOURCHECKERS[CHECKER]
+    phosphors = colour.MSDS_DISPLAY_PRIMARIES[PHOSPHORS]
+    basis = colour.recovery.MSDS_BASIS_FUNCTIONS_sRGB_MALLETT2019
     note = LICENSE.format(version=colour.__version__)
     return {
         "illuminants.csv": _text(
@@ -66,6 +70,46 @@ def tables() -> dict[str, str]:
             next(iter(patches.values())).wavelengths,
             {name: patch.values for name, patch in patches.items()},
         ),
+        "crt-brainard.csv": _text(
+            [
+                "Phosphors of a typical CRT, relative spectral power of full red, green and blue.",
+                "Measured by D. H. Brainard, 1997.",
+                note,
+            ],
+            phosphors.wavelengths,
+            dict(zip(phosphors.labels, phosphors.values.T, strict=True)),
+        ),
+        "srgb-reflectances.csv": _text(
+            [
+                "Reflectances of linear sRGB red, green and blue under D65; their sum is 1.",
+                "I. Mallett, C. Yuksel (2019). doi:10.2312/SR.20191216",
+                note,
+            ],
+            basis.wavelengths,
+            dict(zip(basis.labels, basis.values.T, strict=True)),
+        ),
+    }
+
+
+def cameras() -> dict[Path, str]:
+    """Path -> text of the measured sensitivities of a camera, one file a color."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        import colour
+    measured = colour.MSDS_CAMERA_SENSITIVITIES[CAMERA]
+    return {
+        Path(f"configs/filters/nikon-5100-{color}.csv"): _text(
+            [
+                f"Relative spectral sensitivity of a Nikon 5100, {color}, its largest value 1;",
+                "infrared cut and silicon are in it. Taken as electrons per photon.",
+                "Measured at NPL: M. M. Darrodi, G. Finlayson, T. Goodman, M. Mackiewicz (2015),",
+                "doi:10.1364/JOSAA.32.000381.",
+                LICENSE.format(version=colour.__version__),
+            ],
+            measured.wavelengths,
+            {"value": values},
+        )
+        for color, values in zip(measured.labels, measured.values.T, strict=True)
     }
 
 

@@ -49,6 +49,7 @@ def folder(tmp_path, monkeypatch) -> Path:
     image("good.exr", np.full((4, 4, 3), 0.5))
     image("nan.exr", np.full((4, 4, 3), np.nan))
     image("negative.exr", np.full((4, 4, 3), -0.5))
+    image("gray.exr", np.full((4, 4, 1), 0.5))
     image("two.exr", np.full((4, 4, 2), 0.5))
     Path("truncated.exr").write_bytes(Path("good.exr").read_bytes()[:-40])
     Path("text.png").write_text("this is no picture\n")
@@ -378,6 +379,17 @@ case(
     (CHART, IMAGE.replace("PICTURE", "good.exr").replace("laser", "reflectance")),
     says=[("3:48", "scene.source.model", "needs one channel", "laser, rgb-display, mallett")],
 )
+case(
+    "a picture without color where colors are needed",
+    (CHART, IMAGE.replace("PICTURE", "gray.exr")),
+    (LAMP, ""),
+    says=[("3:31", PICTURE, "the image has 1 channel", "write model: reflectance")],
+)
+case(
+    "too few rows for a demosaic",
+    ("rows: 6", "rows: 1"),
+    says=[("19:15", "array.rows", "1 x 8 pixels cannot be demosaiced", "at least 2 x 2")],
+)
 for _name, _file, _at, _path, _message, _remedy in (
     ("a missing table", "shrt.csv", "10:25", ".file", "no file 'shrt.csv'", "'short.csv'?"),
     ("a table too short", "short.csv", "10:18", "", "380-780 nm is needed", "outside: zero"),
@@ -419,6 +431,20 @@ case(
         ("11:18", "optics.transmittance", "380-780 nm", "outside"),
     ],
 )
+case(
+    "mistakes that others used to hide",
+    ("1 m\n", "1 mm\n"),
+    (CHART, IMAGE.replace("PICTURE", "two.exr").replace("laser", "reflectance")),
+    ("fill_factor: 0.3", "width: 9 um\n    height: 9 um"),
+    ("bits: 10}", "bits: 4, offset: 20 DN}\neffects: {fpn: on}"),
+    says=[
+        ("3:31", PICTURE, "two color channels", "one (gray) or three"),
+        ("6:13", "scene.distance", "lies within its focal length", "further away"),
+        ("14:12", "pixel.photodetector.width", "from -1.25 to 7.75 um", "make it smaller"),
+        ("22:24", "adc.offset", "20 DN leaves no number", "more bits"),
+        ("23:16", "effects.fpn", "there is nothing to simulate", "describe it"),
+    ],
+)
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -437,6 +463,17 @@ def test_refused_with_place_path_and_remedy_and_nothing_written(name, folder):
         assert message in body, line
         assert re.search(rf"[;?] .*{re.escape(remedy)}", body), line
     assert contents(folder) == before
+
+
+BY_ITS_CONTENT = ("a truncated image", "an image of NaN", "an image below zero")
+
+
+@pytest.mark.parametrize("name", [name for name in CASES if name not in BY_ITS_CONTENT])
+def test_validate_refuses_what_run_refuses(name, folder):
+    """All but what only the pixels of a picture tell: `vcam validate` reads its header."""
+    Path("broken.yaml").write_text(CASES[name][0])
+    validated = CliRunner().invoke(app, ["validate", "broken.yaml"], prog_name="vcam")
+    assert (validated.exit_code, validated.stderr) == (2, run("-o", "result").stderr)
 
 
 def contents(folder: Path) -> dict[str, bytes]:

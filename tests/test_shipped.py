@@ -21,6 +21,8 @@ from vcam_cli.commands.main import app
 CAMERAS = shipped.names("cameras")
 YAMLS = sorted(shipped.folder().glob("*/*.yaml"))
 TABLES = sorted(shipped.folder().glob("*/*.csv"))
+MEASURED = sorted(shipped.folder().glob("filters/nikon-*.csv"))
+"""Copied from a publication, where all others are formulas."""
 SMALL = ("array.rows=64", "array.columns=80", "accuracy=draft")
 
 
@@ -70,7 +72,7 @@ class TestCameras:
         """Dark and light areas, and not mostly clipped, in every channel together."""
         render = small(name).render.astype(float)
         assert render.std() > 10
-        assert 20 < render.mean() < 220
+        assert 20 < render.mean() < 240  # an eye chart is white paper, most of it
         assert np.mean((render == 0) | (render == 255)) < 0.25
 
     def test_the_lens_and_the_pixels_could_be_built(self, name):
@@ -151,6 +153,9 @@ class TestTables:
 
     def test_is_what_its_comment_says(self, path):
         comments, rows = read(path)
+        if path in MEASURED:
+            assert any("doi:10." in line for line in comments)
+            return
         (line,) = [c for c in comments if "value = " in c]
         formula = line.partition("value = ")[2].partition(",")[0]
         python = re.sub(r"(?<=\d) (?=exp)", " * ", formula).replace("^", "**")
@@ -161,7 +166,8 @@ class TestTables:
 
     def test_covers_every_wavelength_with_fractions(self, path):
         wavelength, value = np.array(read(path)[1], float).T
-        assert wavelength[0] <= 380 and wavelength[-1] >= 1000
+        # A camera's sensitivities end where they were measured; its infrared cut is in them.
+        assert wavelength[0] <= 380 and wavelength[-1] >= (780 if path in MEASURED else 1000)
         assert np.all(np.diff(wavelength) > 0)
         assert value.min() >= 0 and value.max() <= 1
 

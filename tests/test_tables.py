@@ -13,7 +13,10 @@ from vcam_cli import spectra
 from vcam_cli.spectra import Spectrum, integral
 
 ROOT = Path(__file__).parent.parent
-GENERIC = sorted([*ROOT.glob("configs/filters/*.csv"), *ROOT.glob("configs/pixels/*.csv")])
+MEASURED = sorted(ROOT.glob("configs/filters/nikon-*.csv"))
+GENERIC = sorted(
+    {*ROOT.glob("configs/filters/*.csv"), *ROOT.glob("configs/pixels/*.csv")} - {*MEASURED}
+)
 
 
 @pytest.fixture(scope="module")
@@ -48,6 +51,24 @@ def test_colorchecker(colour: ModuleType) -> None:
         np.testing.assert_array_equal(patch.tables[0].value, theirs[name].values, err_msg=name)
 
 
+def test_display_primaries(colour: ModuleType) -> None:
+    theirs = colour.MSDS_DISPLAY_PRIMARIES["Typical CRT Brainard 1997"]
+    ours, white = spectra.display_primaries("crt-brainard")
+    assert theirs.labels == ["red", "green", "blue"]
+    for primary, values in zip(ours, theirs.values.T, strict=True):
+        np.testing.assert_array_equal(primary.at(theirs.wavelengths / 1e9), values)
+    np.testing.assert_allclose(white.at(theirs.wavelengths / 1e9), theirs.values.sum(1), rtol=1e-15)
+    with pytest.raises(ValueError, match="crt-brainard, srgb"):
+        spectra.display_primaries("p3")
+
+
+def test_srgb_reflectances(colour: ModuleType) -> None:
+    theirs = colour.recovery.MSDS_BASIS_FUNCTIONS_sRGB_MALLETT2019
+    assert theirs.labels == ["red", "green", "blue"]
+    for basis, values in zip(spectra.srgb_reflectances(), theirs.values.T, strict=True):
+        np.testing.assert_array_equal(basis.at(theirs.wavelengths / 1e9), values)
+
+
 def test_colorchecker_under_d65_has_the_colors_of_colour_science(colour: ModuleType) -> None:
     """Within 0.05 % of white of colour-science's XYZ, which interpolates by splines."""
     d65 = spectra.illuminant("D65")
@@ -72,6 +93,7 @@ def test_the_files_are_what_the_script_writes(colour: ModuleType) -> None:
         shipped = (ROOT / path).read_text(encoding="utf-8")
         assert version.sub("", shipped) == version.sub("", text), f"{path} is stale"
     assert {ROOT / path for path in script.curves()} == set(GENERIC)
+    assert {ROOT / path for path in script.cameras()} == set(MEASURED)
 
 
 @pytest.mark.parametrize("file", GENERIC, ids=lambda file: file.stem)
@@ -81,6 +103,13 @@ def test_generic_curves_are_efficiencies(file: Path) -> None:
     assert (table.value >= 0).all() and (table.value <= 1).all()
     assert np.abs(np.diff(table.value)).max() < 0.16, "smooth at 5 nm"
     assert "not a measurement" in file.read_text().splitlines()[0]
+
+
+def test_the_measured_camera_is_that_of_colour_science(colour: ModuleType) -> None:
+    theirs = colour.MSDS_CAMERA_SENSITIVITIES["Nikon 5100 (NPL)"]
+    for name, values in zip(theirs.labels, theirs.values.T, strict=True):
+        ours = spectra.read_csv(ROOT / f"configs/filters/nikon-5100-{name}.csv")
+        np.testing.assert_array_equal(ours.at(theirs.wavelengths / 1e9), values, err_msg=name)
 
 
 def test_generic_filters_see_their_own_color() -> None:

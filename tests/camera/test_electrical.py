@@ -123,3 +123,14 @@ def test_an_offset_must_leave_codes(offset, tmp_path):
     [problem] = refused(tmp_path, {"adc": {"bits": 8, "offset": f"{offset} DN"}})
     assert problem.path == ("adc", "offset")
     assert "lower" in problem.remedy
+
+
+def test_a_logarithmic_adc_bends_at_a_thousandth_of_full_scale_or_where_the_file_says(tmp_path):
+    adc = {"bits": 10, "kind": "logarithmic"}
+    e = solved(tmp_path, THREE, adc)
+    assert e.reference == pytest.approx(SWING / 1000, rel=1e-12)
+    assert e.saturation == pytest.approx(WELL, rel=1e-12)
+    e = solved(tmp_path, THREE, adc | {"full_scale": "0.69 V", "reference": "3 mV"})
+    assert e.reference == pytest.approx(3e-3, rel=1e-12)
+    assert e.saturation == pytest.approx(WELL / 2, rel=1e-12), "the ADC is full first"
+    assert solved(tmp_path, THREE, {"bits": 10}).reference is None

@@ -6,7 +6,7 @@ import pytest
 
 from vcam_cli.camera import shipped
 from vcam_cli.camera.load import load
-from vcam_cli.errors import BadInput
+from vcam_cli.errors import BadInput, CannotDo, bad
 
 CAMERA = """\
 scene:
@@ -85,6 +85,20 @@ class TestPlain:
         assert text == "there is no file 'camra.yaml'; did you mean 'camera.yaml'?"
         (text,) = problems("starter.yaml")
         assert "a camera 'starter' ships" in text
+
+    def test_a_name_too_long_for_a_file(self, folder):
+        (text,) = problems("a" * 300)
+        assert text.startswith(f"'{'a' * 300}' is not a camera that ships; shipped: ")
+        (text,) = problems(sets=[f"optics={'a' * 300}"])
+        assert "is not an optics that ships" in text
+
+    def test_a_folder_that_is_gone(self, folder, monkeypatch):
+        (folder / "gone").mkdir()
+        monkeypatch.chdir(folder / "gone")
+        (folder / "gone").rmdir()
+        with pytest.raises(CannotDo, match="the current folder is gone"):
+            load("starter")
+        assert load("starter", folder=folder).name == "starter"
 
     def test_a_study_is_no_camera(self, folder):
         for kind in ("sweep", "schedule"):
@@ -253,6 +267,9 @@ class TestSet:
             ("optics.f_number.x=3", "--set optics.f_number.x=3: optics.f_number: "),
             ("pixel.width", "--set: 'pixel.width' is not PATH=VALUE"),
             ("=3", "--set: '=3' is not PATH=VALUE"),
+            ("pixel..width=8 um", "--set: 'pixel..width=8 um' is not PATH=VALUE"),
+            (".pixel.width=8 um", "--set: '.pixel.width=8 um' is not PATH=VALUE"),
+            ("pixel.width.=8 um", "--set: 'pixel.width.=8 um' is not PATH=VALUE"),
             ("pixel.width=", "--set: 'pixel.width=' is not PATH=VALUE"),
             ("pixel.width=[", "--set pixel.width=[: is not YAML"),
             ("pixel.width=!x 3", "--set pixel.width=!x 3: the YAML tag"),
@@ -284,6 +301,8 @@ class TestFilesNamedInside:
         [
             ("photo.pgn", "there is no file 'photo.pgn'; did you mean 'photo.png'?"),
             ("no/such.png", "there is no file 'no/such.png'; looked in"),
+            ("dangling.png", "'dangling.png' is a broken link; point it"),
+            ("loop.png", "'loop.png' is a broken link; point it"),
             (".", "'.' is not a regular file"),
             ("/dev/zero", "'/dev/zero' is not a regular file"),
             ("~/photo.png", "~ is not expanded"),
@@ -293,6 +312,8 @@ class TestFilesNamedInside:
     )
     def test_what_is_no_file(self, folder, name, said):
         Path("photo.png").write_bytes(b"")
+        Path("dangling.png").symlink_to("nowhere")
+        Path("loop.png").symlink_to("loop.png")
         change(folder, "{kind: chart, chart: csf, max_frequency: 33 lp/mm}",
                f"{{kind: image, file: '{name}', model: laser}}")  # fmt: skip
         change(folder, "rows: 32", "rows: 0")
@@ -318,3 +339,42 @@ def test_what_is_not_supported_yet_and_bad_geometry_come_together(folder):
     assert any("stray_light" in t and "not supported yet" in t for t in texts)
     assert any("scene.distance" in t for t in texts)
     assert all(text.startswith("camera.yaml:") for text in texts)
+
+
+def test_a_wrong_section_hides_no_contradiction_of_others(folder):
+    change(folder, "exposure:", "adc: {bits: 4, offset: 20 DN}\nexposure:")
+    change(folder, "    fill_factor: 0.3\n", "    width: 9 um\n    height: 9 um\n")
+    change(folder, "  luminance: 100 cd/m2", "  luminance: 100 cd/m2\n  distance: 1 mm")
+    texts = problems()
+    assert [text.split(": ")[1] for text in texts] == [
+        "scene.distance", "pixel.photodetector.width", "adc.offset",
+    ]  # fmt: skip
+    assert all(text.startswith("camera.yaml:") for text in texts)
+
+
+def test_an_example_in_place_of_a_wrong_section_makes_no_mistakes_of_its_own(folder):
+    """A die for pixels of 6.5 um, and 7 um between them, must not meet another camera's pixel."""
+    change(folder, "{rows: 32, columns: 48, pattern: monochrome}",
+           "{die: {width: 1 um, height: 1 um}, pattern: monochrome}")  # fmt: skip
+    change(folder, "width: 6.5 um", "width: 0.1")
+    assert [text.split(": ")[1] for text in problems()] == ["pixel.width"]
+
+
+def test_further_checks_are_made_with_the_others_where_their_sections_are_right(folder):
+    seen = []
+
+    def check(camera):
+        seen.append(camera.name)
+        raise bad("pixel.width", "does not please", "take another")
+
+    change(folder, "  luminance: 100 cd/m2", "  luminance: 100 cd/m2\n  distance: 1 mm")
+    with pytest.raises(BadInput) as caught:
+        load("camera.yaml", checks=[(check, "pixel"), (check, "pixel")])
+    first, second = map(str, caught.value.problems)  # the same is said once
+    assert first.startswith("camera.yaml:4:13: scene.distance: ")
+    assert second == "camera.yaml:9:10: pixel.width: does not please; take another"
+    with pytest.raises(BadInput):
+        load("camera.yaml", ["pixel.width=3"], checks=[(check, "pixel")])
+    with pytest.raises(BadInput):
+        load("camera.yaml", ["pixel.fpn.dark=0.1"], checks=[(check, "pixel")])
+    assert seen == ["camera", "camera"]

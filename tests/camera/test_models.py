@@ -185,7 +185,11 @@ class TestDefaults:
             return [{s.name: s.value} for s in camera(array__pattern=pattern).processing]
 
         first, last = {"black_level": "subtract"}, {"gamma": "srgb"}
-        color = [{"demosaic": "bilinear"}, {"white_balance": "gray-world"}]
+        color = [
+            {"demosaic": "bilinear"},
+            {"white_balance": "gray-world"},
+            {"color_correction": "fit"},
+        ]
         assert steps("monochrome") == [first, last]
         assert steps("bayer-gbrg") == [first, *color, last]
 
@@ -374,6 +378,23 @@ class TestRefused:
             ),
             ({"adc": {"full_scale": "1 V", "gain": "1 DN/e"}}, "adc.gain", "full_scale"),
             ({"display": {"dpi": 72, "width": "7 in"}}, "display.width", "dpi"),
+            (
+                {
+                    "scene.source": {
+                        "kind": "chart",
+                        "chart": "point-grid",
+                        "spacing": "10 um",
+                        "diameter": "11 um",
+                    }
+                },
+                "scene.source.diameter",
+                "overlap",
+            ),
+            (
+                {"scene.source": {"kind": "chart", "chart": "hdr-patches", "dynamic_range": 1}},
+                "scene.source.dynamic_range",
+                "more than 1",
+            ),
             ({"accuracy": {"preset": "draft", "tolerance": 0.1}}, "accuracy.tolerance", "both"),
             ({"pixel.microlens": {"gain": 2, "efficiency": 0.9}}, "pixel.microlens.eff", "gain"),
         ],
@@ -487,6 +508,13 @@ class TestRefused:
 
     def test_steps_that_say_none_fit_any_array(self):
         camera(array__pattern="monochrome", processing=[{"white_balance": "none"}])
+
+    @pytest.mark.parametrize("matrix", [[[1]], [[1, 0, 0]] * 2, [[1, 0]] * 3, [[1, 0, 0]] * 4])
+    def test_a_matrix_suits_the_colors(self, matrix):
+        steps = [{"demosaic": "bilinear"}, {"color_correction": {"matrix": matrix}}]
+        (found,) = mistakes({"processing": steps})
+        assert found.startswith("processing.1.color_correction.matrix: ")
+        assert "three rows" in found and "3 numbers" in found
 
     def test_all_mistakes_at_once(self):
         found = mistakes(
@@ -622,7 +650,7 @@ class TestWritten:
                 "processing": [
                     {"black_level": "64 DN"},
                     {"demosaic": "edge-aware"},
-                    {"color_correction": {"matrix": [[1, 0, 0]]}},
+                    {"color_correction": {"matrix": [[1.5, -0.5, 0], [0, 1, 0], [0, 0, 1]]}},
                     {"gamma": 2.2},
                 ]
             },

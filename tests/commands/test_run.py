@@ -184,6 +184,46 @@ class TestFiles:
             "vcam:cfa"
         ] == "monochrome"
 
+    @pytest.mark.parametrize("pattern", ["bayer-rggb", "monochrome"])
+    def test_a_render_of_16_bits(self, pattern):
+        """65 536 codes of the same curve: the upper byte is that of 8 bits, to rounding."""
+        options = ["output.render=16", f"array.pattern={pattern}"]
+        vcam(*sets(*options))
+        data, spec = image("out/small/render.png")
+        assert spec.format == oiio.UINT16
+        expected = simulate(load("small.yaml", options)).render
+        assert expected.dtype == np.uint16
+        assert np.array_equal(data.squeeze(), expected)
+        coarse = simulate(load("small.yaml", [options[1]])).render
+        assert np.abs(expected / 257 - coarse).max() <= 0.5 + 1e-2
+
+    def test_irradiance_in_the_spectral_layout(self):
+        """A channel for every 10 nm, the wavelength in its name; the numbers of the engine."""
+        from vcam_cli.engine import irradiance
+
+        vcam(*sets("output.irradiance=true"))
+        data, spec = image("out/small/irradiance.exr")
+        said = {a.name: a.value for a in spec.extra_attribs}
+        assert said["spectralLayoutVersion"] == "1.0"
+        assert said["emissiveUnits"] == "W.m^-2.nm^-1"
+        assert spec.channelnames == tuple(f"S0.{w},000000nm" for w in range(380, 781, 10))
+        frame = simulate(load("small.yaml")).frame
+        for channel, plane in enumerate(irradiance.planes(frame, 1)):
+            np.testing.assert_allclose(data[:, :, channel], plane * 1e-9, rtol=2e-6)
+        assert "irradiance.exr" in record()["files"]
+        assert record()["stages"]["irradiance"] > 0
+
+    def test_a_logarithmic_adc_says_how_to_read_its_codes(self):
+        options = sets("adc.kind=logarithmic", "output.raw=[dn, volts]")
+        vcam(*options)
+        said = {a.name: a.value for a in image("out/small/raw.exr")[1].extra_attribs}
+        assert said["vcam:adc"] == "logarithmic" and "vcam:electronsPerDN" not in said
+        full, bend, offset = (said[f"vcam:adc{k}"] for k in ("FullScale", "Reference", "Offset"))
+        assert (full, bend) == (pytest.approx(1.0), pytest.approx(1e-3))  # V
+        volts = raw()["volts"].astype(float)
+        codes = offset + (4095 - offset) * np.log1p(volts / bend) / np.log1p(full / bend)
+        assert np.abs(raw()["dn"] - np.clip(codes, 0, 4095)).max() <= 0.5 + 2e-2
+
     def test_no_render(self):
         vcam(*sets("output.render=none"))
         assert set(contents("out/small")) == {"raw.exr", "metrics.csv", "run.json"}
@@ -336,6 +376,33 @@ class TestRecord:
         assert run["name"] == "small"
 
 
+class TestSummary:
+    """What a person reads: what ran, what did not and why, the time, where the pictures are."""
+
+    def test_it_names_every_effect_and_every_picture(self):
+        said = vcam(*sets("quality=[mse]")).stdout
+        plan = record()["plan"]
+        on = [e["name"] for e in plan["effects"] if e["state"] == "on"]
+        text = " ".join(said.split())
+        assert f"simulated {', '.join(on)}" in text
+        for name in ("render.png", "raw.exr", "ideal.exr"):
+            assert f"out/small/{name}" in said
+        assert "delta_e.png" not in said
+        assert f"{plan['seconds']:.2f} s were foretold" in said
+        took = sum(record()["stages"].values())
+        assert f"{took:.2f} s" in said
+        assert max(map(len, said.splitlines())) <= 100
+
+    def test_what_was_left_out_comes_with_its_reason(self):
+        options = ["pixel.readout.read_noise=0.5 e", "effects.fpn=off"]
+        said = vcam(*sets(*options)).stdout
+        [dropped] = [e for e in record()["plan"]["effects"] if e["name"] == "read_noise"]
+        assert (dropped["state"], dropped["by"]) == ("off", "plan")
+        text = " ".join(said.split())
+        assert f"left out read_noise: {dropped['reason']}" in text
+        assert "switched off fpn" in text
+
+
 class TestOptions:
     def test_json_is_one_document_and_nothing_else(self):
         result = process("--json")
@@ -459,6 +526,29 @@ class TestOutputFolder:
         result = vcam(*sets("quality=[mse]"), code=2)
         assert "was not written by vcam" in result.stderr
         assert contents("out") == before
+
+    def test_a_folder_in_the_way_leaves_the_former_results(self):
+        vcam()
+        Path("out/small/raw.exr").unlink()
+        Path("out/small/raw.exr").mkdir()
+        before = contents("out")
+        assert "raw.exr is there already" in vcam("--seed", "2", code=2).stderr
+        assert contents("out") == before and "small/run.json" in before
+
+    @pytest.mark.skipif(sys.platform == "darwin", reason="names are text there")
+    def test_names_that_are_no_text(self, folder, monkeypatch):
+        """Refused for results, which OpenImageIO could not write; all right around them."""
+        monkeypatch.setattr("vcam_cli.studies.simulate.simulate", pytest.fail)
+        (line,) = vcam("-o", "o/b\udcffad", code=2).stderr.splitlines()
+        assert "is no folder name: is not UTF-8; choose another folder" in line
+        assert not Path("o").exists()
+        monkeypatch.undo()
+        place = folder / "b\udcffad"
+        place.mkdir()
+        monkeypatch.chdir(place)
+        Path("small.yaml").write_text(CAMERA)
+        vcam()
+        assert str(place / "small.yaml") in record()["hashes"]["inputs"]
 
     def test_a_foreign_folder_is_refused(self):
         Path("mine").mkdir()

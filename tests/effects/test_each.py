@@ -17,7 +17,7 @@ from vcam_cli.effects.diffraction import Diffraction
 from vcam_cli.effects.fpn import FixedPattern
 from vcam_cli.effects.off_axis import OffAxis
 from vcam_cli.effects.pixel_aperture import PixelAperture
-from vcam_cli.effects.quantization import Quantization
+from vcam_cli.effects.quantization import Logarithmic, Quantization
 from vcam_cli.effects.reset_noise import ResetNoise
 from vcam_cli.effects.saturation import Saturation
 
@@ -389,3 +389,70 @@ def test_quantization_switched_off_still_writes_codes(tmp_path):
     off = simulate(camera(tmp_path, changes | {"effects": {"quantization": "off"}}))
     assert np.issubdtype(off.dn.dtype, np.integer)
     assert np.array_equal(on.dn, off.dn)
+
+
+BEND, FULL = 50.0, 20_000.0  # electrons
+
+
+def by_hand(electrons: float, offset: float, bits: int) -> float:
+    """The logarithmic code, as it is defined, before rounding and clipping."""
+    span = 2**bits - 1 - offset
+    return offset + span * math.log(1 + electrons / BEND) / math.log(1 + FULL / BEND)
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize(("offset", "bits"), [(0.0, 8), (64.0, 12), (3.5, 10)])
+def test_a_logarithmic_code_is_the_formula(offset, bits, dtype):
+    """Noise below zero included; float32 may round a half the other way, not more."""
+    adc = Logarithmic(offset, BEND, FULL, bits)
+    electrons = np.array([-49.0, -20.0, -0.3, 0.0, 0.3, 7.0, 50.0, 1234.5, 2e4, 3e4], dtype)
+    exact = np.array([by_hand(float(e), offset, bits) for e in electrons])
+    np.testing.assert_allclose(adc.line(electrons.copy()), exact, rtol=2e-6, atol=2e-3)
+    codes = adc.apply(electrons.copy())
+    assert codes.dtype == dtype
+    assert np.abs(codes - np.clip(exact, 0, 2**bits - 1)).max() <= 0.5 + 2e-3
+    assert codes[-2] == codes[-1] == 2**bits - 1
+    assert codes[3] == np.rint(offset)
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_a_logarithm_of_nothing_is_code_zero(dtype):
+    """From -bend on the formula has no value; no warning, whatever the offset."""
+    adc = Logarithmic(254.0, BEND, FULL, 8)
+    assert adc.apply(np.array([-50.0, -51.0, -1e9], dtype)).tolist() == [0, 0, 0]
+    assert adc.apply(np.array([1e12, 1e30], dtype)).tolist() == [255, 255]
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_logarithmic_codes_are_made_linear_again(dtype):
+    """The numbers of a linear ADC of the same offset and full scale."""
+    adc, straight = Logarithmic(16.0, BEND, FULL, 12), Quantization(16.0, FULL / (4095 - 16), 12)
+    electrons = np.array([-40.0, 0.0, 1.0, 300.0, 2e4, 5e4], dtype)
+    back = adc.linear(adc.line(electrons))
+    assert back.dtype == dtype
+    np.testing.assert_allclose(back, straight.line(electrons), rtol=5e-6, atol=1e-4)
+    codes = np.array([0.0, 16.0, 4095.0], dtype)
+    assert np.array_equal(straight.linear(codes), codes)
+
+
+def test_a_bend_far_above_full_scale_is_a_linear_adc():
+    """ln(1 + x) is x for small x: here to 1e-6 of it."""
+    bent = Logarithmic(10.0, 1e12, 1020.0, 8)
+    straight = Quantization(10.0, 1020 / 245, 8)
+    electrons = np.linspace(-30.0, 1100, 500)
+    np.testing.assert_allclose(bent.line(electrons), straight.line(electrons), rtol=1e-6)
+
+
+def test_which_adc_the_camera_has(tmp_path):
+    """Full scale is the well; the bend is a thousandth of it, or where the file says."""
+    adc = {"bits": 12, "kind": "logarithmic", "offset": "8 DN"}
+    found = Quantization.of(made := camera(tmp_path, {"adc": adc}), geometry(made))
+    assert isinstance(found, Logarithmic)
+    assert (found.offset, found.bits) == (8, 12)
+    assert found.full == pytest.approx(1e5, rel=1e-12)
+    assert found.bend == pytest.approx(100, rel=1e-12)
+    changes = {"adc": adc | {"reference": "4 mV", "full_scale": "1 V"}}
+    found = Quantization.of(made := camera(tmp_path, changes), geometry(made))
+    assert found.full == pytest.approx(1 / 20e-6, rel=1e-12)
+    assert found.bend == pytest.approx(4e-3 / 20e-6, rel=1e-12)
+    assert "4096 codes" in found.describe() and "electrons a step" in found.describe()

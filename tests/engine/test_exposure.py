@@ -102,3 +102,30 @@ def test_percentile_is_a_value_of_the_picture():
     assert percentile(values, 50) == 99_000
     assert percentile(values, 0) == 0
     assert percentile(values, 99.5) == 198_000
+
+
+@pytest.mark.parametrize("target", [0.18, 1])
+def test_the_mean_reaches_the_target(target, tmp_path):
+    """The mean over all pixels, bright ones beyond the well as they are."""
+    chart = {"kind": "chart", "chart": "csf", "max_frequency": "60 lp/mm"}
+    changes = auto(method="mean", target=target) | {"scene.source": chart}
+    mean = run(tmp_path, changes).mean_electrons
+    assert mean.mean() == pytest.approx(target * WELL, rel=1e-12)
+    assert mean.max() > 1.2 * mean.mean()
+
+
+def test_the_mean_is_that_of_the_mosaic(tmp_path):
+    """Twice as many green pixels as red ones or blue ones count twice; the dark counts too."""
+    day = {
+        "scene.illuminant": "D65",
+        "array.pattern": "bayer-rggb",
+        "pixel.photodetector.dark_current": "50 ke/s",
+    }
+    mean = run(tmp_path, auto(method="mean", target=0.3) | day).mean_electrons
+    colors = [mean[0, 0], mean[0, 1], mean[1, 0], mean[1, 1]]
+    assert np.mean(colors) == pytest.approx(0.3 * WELL, rel=1e-9)
+    assert max(colors) > 1.1 * min(colors)
+
+
+def test_the_mean_keeps_the_limits(tmp_path):
+    assert run(tmp_path, auto(method="mean", max="100 ms")).exposure_time == 0.1

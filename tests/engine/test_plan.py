@@ -136,11 +136,12 @@ def test_promise_of_the_variance(name, scope, share, run):
 def test_the_cameras_put_the_promises_to_the_test(run):
     """What the plan may leave out it leaves out of one camera, and keeps in another.
 
-    Not among it: fixed-pattern noise, which is all there is of the sensor's variance.
+    Not among it: fixed-pattern noise, which is all there is of the sensor's variance, and dark
+    current, which costs an addition.
     """
     results = [run(name) for name in CAMERAS]
     out = {name for result in results for name in left_out(result)}
-    assert out == {"off_axis", "dark_current", "shot_noise", "reset_noise", "read_noise"}
+    assert out == {"off_axis", "shot_noise", "reset_noise", "read_noise"}
     assert {e.name for result in results for e in result.frame.plan.active} == set(NAMES)
 
 
@@ -186,7 +187,7 @@ def test_off_leaves_out_that_one_alone(name, tmp_path):
     assert {d.name for d in found.values() if d.state == "off" and d.by == "user"} == {name}
 
 
-@pytest.mark.parametrize("name", ["off_axis", "dark_current", "reset_noise", "read_noise"])
+@pytest.mark.parametrize("name", ["off_axis", "reset_noise", "read_noise"])
 def test_on_keeps_what_the_plan_would_leave_out(name, run, tmp_path):
     assert name in left_out(run("all traces"))
     chosen = CAMERAS["all traces"] | {"effects": {name: "on"}}
@@ -273,9 +274,10 @@ def test_a_contribution_is_the_share_it_has(tmp_path):
 @pytest.mark.parametrize("source", [EDGE, PATCHES, CSF], ids=["edge", "patches", "csf"])
 @pytest.mark.parametrize("name", ["diffraction", "pixel_aperture"])
 def test_contribution_of_a_transfer_is_what_leaving_it_out_changes(name, source, tmp_path):
-    """By Parseval's theorem over the scene with its margin of 32 pixels or more.
+    """By Parseval's theorem over the scene with its margin of 32 pixels, as if all lay on the array.
 
-    20 %: the margin is part of the sum, and the array is not; 0.90 to 1.17 were seen on this one.
+    That is sqrt(320 x 384 / (256 x 320)) = 1.22 times the truth for a scene that is the same
+    everywhere, and 20 % about it for these; the truth is never to be more than 10 % above.
     """
     chosen = {"effects": QUIET, "accuracy": "standard", "array.rows": 256, "array.columns": 320}
     chosen |= source
@@ -283,7 +285,8 @@ def test_contribution_of_a_transfer_is_what_leaving_it_out_changes(name, source,
     off = simulate(camera(tmp_path, chosen | {"effects": QUIET | {name: "off"}}))
     change = np.asarray(on.mean_electrons, float) - off.mean_electrons
     rms = float(np.sqrt(np.mean(change**2))) / full_signal(on)
-    assert decisions(on)[name].contribution == pytest.approx(rms, rel=0.2)
+    ratio = decisions(on)[name].contribution / rms
+    assert ratio == pytest.approx(1.22, rel=0.2) and ratio >= 0.9
 
 
 def test_report_is_what_run_json_shows(run):

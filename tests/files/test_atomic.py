@@ -1,6 +1,7 @@
 """Whole files: the name appears with the last byte, a failure leaves the former file."""
 
 import errno
+import json
 import os
 import signal
 import subprocess
@@ -53,6 +54,16 @@ def test_failure_of_the_disk_says_why_and_what_helps(tmp_path, monkeypatch, numb
 def test_missing_folder_is_cannot_do(tmp_path):
     with pytest.raises(CannotDo, match="No such file"):
         write_text(tmp_path / "missing" / "a.txt", "x")
+
+
+def test_no_remedy_names_an_option_that_some_commands_lack():
+    for number in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EACCES, errno.EROFS, errno.EIO):
+        assert "--" not in str(atomic.cannot_write("a", OSError(number, os.strerror(number))))
+
+
+def test_bytes_of_a_name_that_are_no_text_are_escaped(tmp_path):
+    write_text(tmp_path / "a.json", '"b\udcffad"')
+    assert json.loads((tmp_path / "a.json").read_bytes()) == "b\udcffad"
 
 
 def test_long_names_fit(tmp_path):

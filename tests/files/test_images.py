@@ -102,6 +102,26 @@ def test_png_of_few_bits(tmp_path, depth):
     assert read(tmp_path / "a.png").data.ravel().tolist() == [1, 0]
 
 
+@pytest.mark.parametrize("depth", [1, 2, 4])
+def test_tiff_of_few_bits(tmp_path, depth):
+    code = np.array([[0, 1, 2**depth - 1, 0, 1, 1, 0, 0]]) / (2**depth - 1)
+    data = np.round(code * 255).astype(np.uint8)[..., None]
+    path = write(tmp_path / "a.tif", data, oiio__BitsPerSample=depth)
+    source = oiio.ImageInput.open(str(path))
+    assert source.spec().get_int_attribute("oiio:BitsPerSample") == depth
+    source.close()
+    np.testing.assert_allclose(read(path).data[..., 0], code, rtol=6e-8)
+
+
+def test_palette_of_few_bits_with_transparency(tmp_path):
+    colors = np.array([[0, 51, 102], [255, 0, 0], [0, 255, 0], [153, 153, 153]])
+    extra = (b"PLTE", bytes(colors.ravel().tolist())), (b"tRNS", b"\0\x80")
+    (tmp_path / "a.png").write_bytes(png(2, 3, 4, [bytes([0b00_01_10_11])], *extra))
+    found = read(tmp_path / "a.png")
+    np.testing.assert_allclose(found.data, [colors / 255], rtol=6e-8)
+    assert found.notes == ("alpha channel dropped",)
+
+
 def test_png_with_a_palette(tmp_path):
     palette = (b"PLTE", bytes([255, 0, 51, 0, 255, 102]))
     (tmp_path / "a.png").write_bytes(png(8, 3, 2, [b"\1\0"], palette))
@@ -146,6 +166,64 @@ def test_float_values_stay_as_they_are(tmp_path, kind):
 def test_half_floats(tmp_path):
     data = (FLOAT * 16).round().astype(np.float32)  # exact in half
     np.testing.assert_array_equal(read(write(tmp_path / "a.exr", data, sample="half")).data, data)
+
+
+def test_wide_integers_and_doubles(tmp_path):
+    codes = RANDOM.integers(0, 2**32, (4, 5, 3), dtype=np.uint32)
+    found = read(write(tmp_path / "a.tif", codes, sample="uint"))
+    # through float64, rounded once to float32
+    np.testing.assert_allclose(found.data, codes / (2**32 - 1), rtol=6e-8)
+    values = RANDOM.random((4, 5, 3))
+    found = read(write(tmp_path / "b.tif", values, sample="double"))
+    np.testing.assert_allclose(found.data, values, rtol=6e-8)
+
+
+def test_tiled_halves(tmp_path):
+    data = RANDOM.integers(0, 2048, (20, 33, 3)).astype(np.float32) / 64  # exact in half
+    found = read(write(tmp_path / "a.exr", data, sample="half", tile=16))
+    np.testing.assert_array_equal(found.data, data)
+
+
+def test_channels_of_several_kinds(tmp_path):
+    """Colors as halves beside a depth in 32 bits, as renderers write them."""
+    spec = oiio.ImageSpec(5, 6, 4, "float")
+    spec.channelnames = ("R", "G", "B", "Z")
+    spec.channelformats = ("half", "half", "half", "float")
+    data = RANDOM.integers(0, 2048, (6, 5, 4)).astype(np.float32) / 64
+    output = oiio.ImageOutput.create("exr")
+    path = tmp_path / "a.exr"
+    assert output.open(str(path), spec) and output.write_image(data) and output.close()
+    found = read(path)
+    np.testing.assert_array_equal(found.data, data[..., :3])
+    assert found.notes == ("channels Z dropped",)
+
+
+@pytest.mark.parametrize(("kind", "sample"), [("png", "uint16"), ("tif", "float"), ("exr", "half")])
+def test_gray_with_alpha_of_many_bits(tmp_path, kind, sample):
+    data = RANDOM.integers(0, 64, (4, 5, 2)).astype(np.float32) / 64
+    spec = oiio.ImageSpec(5, 4, 2, sample)
+    spec.channelnames, spec.alpha_channel = ("Y", "A"), 1
+    spec.attribute("oiio:UnassociatedAlpha", 1)
+    output = oiio.ImageOutput.create(kind)
+    path = tmp_path / f"a.{kind}"
+    assert output.open(str(path), spec) and output.write_image(data) and output.close()
+    found = read(path)
+    # 16 bits: half a code
+    np.testing.assert_allclose(found.data[..., 0], data[..., 0], atol=0.51 / 65535)
+    assert found.data.shape == (4, 5, 1)
+    assert found.notes == ("alpha channel dropped",)
+
+
+def test_pages_of_a_tiff(tmp_path):
+    spec = oiio.ImageSpec(5, 6, 3, "uint8")
+    output = oiio.ImageOutput.create("tif")
+    path = str(tmp_path / "a.tif")
+    assert output.open(path, spec) and output.write_image(RGB8)
+    assert output.open(path, spec, "AppendSubimage") and output.write_image(255 - RGB8)
+    assert output.close()
+    found = read(tmp_path / "a.tif")
+    np.testing.assert_allclose(found.data, RGB8 / 255, rtol=6e-8)
+    assert "first of several" in " ".join(found.notes)
 
 
 def test_channels_are_found_by_name(tmp_path):
@@ -230,6 +308,35 @@ def test_truncated_files(tmp_path, kind, capfd):
         path.write_bytes(whole[: int(part * len(whole))])
         refused(path, "truncated|no image")
     assert capfd.readouterr().err == ""  # no complaint of a library beside ours
+
+
+@pytest.mark.parametrize("harmed", [b"IDAT", b"IHDR"])
+def test_damaged_png_leaves_the_complaint_to_us(tmp_path, harmed, capfd):
+    path = write(tmp_path / "a.png", RGB8)
+    whole = bytearray(path.read_bytes())
+    whole[whole.index(harmed) + 6] ^= 255
+    path.write_bytes(whole)
+    refused(path, "truncated or damaged")
+    assert capfd.readouterr().err == ""
+
+
+def test_damaged_text_in_a_png_does_no_harm(tmp_path):
+    body = png(8, 0, 1, [b"\xff"], (b"tEXt", b"Title\0words"))
+    (tmp_path / "a.png").write_bytes(body.replace(b"words", b"swords"[:5]))
+    assert read(tmp_path / "a.png").data.ravel().tolist() == [1]
+
+
+@pytest.mark.parametrize("channels", [1, 3])
+def test_color_channels_by_the_header_alone(tmp_path, channels):
+    path = write(tmp_path / "a.exr", np.full((2, 2, channels), np.nan, np.float32))
+    assert images.color_channels(path, YAML) == channels
+
+
+def test_header_of_what_is_no_image(tmp_path):
+    (tmp_path / "a.png").write_text("no image")
+    with pytest.raises(BadInput, match="no image") as caught:
+        images.color_channels(tmp_path / "a.png", YAML)
+    assert caught.value.problems[0].path == YAML
 
 
 @pytest.mark.parametrize("name", ["a.png", "a.exr", "a.jpg", "a.tif", "a.null", "a.xyz", "a"])

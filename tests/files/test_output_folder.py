@@ -146,6 +146,40 @@ def test_input_of_the_run_is_not_replaced(tmp_path):
     assert tree(tmp_path / "out") == ["render.png", "run.json"]
 
 
+def test_folder_that_has_come_into_the_way_is_refused_and_removes_nothing(tmp_path):
+    out = tmp_path / "out"
+    run(out, {"raw.exr": "1", "render.png": "1"})
+    (out / "raw.exr").unlink()
+    (out / "raw.exr").mkdir()
+    present = tree(out)
+    with pytest.raises(BadInput, match=r"raw\.exr is there already"):
+        run(out, {"render.png": "2", "raw.exr": "2"})
+    assert tree(out) == present
+    assert (out / "render.png").read_text() == "1"
+
+
+@pytest.mark.parametrize("late", ["in the way", "not written"])
+def test_finish_removes_nothing_unless_all_can_be_moved_in(tmp_path, late):
+    out = tmp_path / "out"
+    run(out, {"raw.exr": "1", "old.csv": "1"})
+    with pytest.raises((BadInput, CannotDo)), OutputFolder(out) as folder:
+        place = folder.new("raw.exr")
+        if late == "in the way":
+            place.write_text("2")
+            (out / "raw.exr").unlink()
+            (out / "raw.exr").mkdir()
+        folder.finish({})
+    assert (out / "old.csv").read_text() == "1"
+    assert json.loads((out / "run.json").read_text())["files"] == ["old.csv", "raw.exr"]
+
+
+def test_name_that_is_no_text_is_refused_before_anything_is_made(tmp_path):
+    with pytest.raises(BadInput, match="not UTF-8") as caught:
+        run(tmp_path / "made" / "b\udcffad", {"raw.exr": "1"})
+    assert caught.value.problems[0].remedy
+    assert tree(tmp_path) == []
+
+
 @pytest.mark.parametrize("name", ["../x", "/x", "", "run.json", LOCK, f"{STAGING}/x"])
 def test_new_refuses_names_that_are_no_result(tmp_path, name):
     with OutputFolder(tmp_path / "out") as folder, pytest.raises(ValueError, match="no name"):

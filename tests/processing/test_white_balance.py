@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vcam_cli.processing.base import Block, Context
-from vcam_cli.processing.white_balance import Gains, color_sums, gray_world
+from vcam_cli.processing.white_balance import Gains, color_sums, gray_world, illuminant
 
 BAYER = Context((("R", "G"), ("G", "B")), ("R", "G", "B"), np.ones(3), 0.0)
 MEANS = st.lists(st.floats(1.0, 500.0), min_size=3, max_size=3)
@@ -74,3 +74,9 @@ def test_full_color_is_summed_and_balanced_by_planes():
     assert expected.dtype == np.float32
     np.testing.assert_array_equal(gains.on_block(Block(planes, 0)).planes, expected)
     np.testing.assert_array_equal(gains.on_colors(np.ones(3)), [2.0, 1.0, 0.5])
+
+
+def test_the_illuminant_makes_white_gray():
+    gains = illuminant(np.array([500.0, 1000.0, 250.0]))
+    assert gains.tolist() == [2.0, 1.0, 4.0]
+    assert illuminant(np.zeros(3)).tolist() == [1.0, 1.0, 1.0]

@@ -11,11 +11,14 @@ from support import scene, view
 from vcam_cli.errors import BadInput
 from vcam_cli.scenes.build import build
 from vcam_cli.scenes.image import image_scene, place
-from vcam_cli.spectra import Spectrum
+from vcam_cli.spectra import Spectrum, cmf, integral, luminance, srgb_reflectances
 
 GRAY = {"kind": "image", "file": "/a.png", "model": "reflectance"}
 LASER = {"kind": "image", "file": "/a.png", "model": "laser"}
+MALLETT = {"kind": "image", "file": "/a.png", "model": "mallett"}
+DISPLAY = {"kind": "image", "file": "/a.png", "model": "rgb-display"}
 WHITE = Spectrum.flat(1.0)
+START, STOP = 380e-9, 780e-9
 
 
 def picture(rows, columns, channels=1):
@@ -83,6 +86,21 @@ def test_a_width_of_its_own_puts_black_around():
     assert planes.sum() == pytest.approx(given_picture.sum(), rel=1e-6)
 
 
+@pytest.mark.parametrize(("rows", "columns"), [(3, 4), (4, 3), (1, 1), (2, 2), (1, 2)])
+def test_samples_far_larger_than_the_array_stay_in_place(rows, columns):
+    """The middle sample, or the two that meet in the middle; few and small, whatever the width."""
+    given_picture = picture(rows, columns) + 1
+    seen = view(scene_width=1e3, margin=2)
+    shown = image_scene(given_picture, (WHITE,), WHITE, seen)
+    assert max(shown.shape) <= 2
+    assert shown.pitch_x * shown.shape[1] == pytest.approx(seen.width + 4 * seen.pitch_x)
+    assert shown.pitch_y * shown.shape[0] == pytest.approx(seen.height + 4 * seen.pitch_y)
+    light = shown.at(np.array([-1e-6, 1e-6]), np.array([-1e-6, 1e-6]), np.ones((1, 1)))[0]
+    down = [(rows - 1) // 2, rows // 2]
+    across = [(columns - 1) // 2, columns // 2]
+    np.testing.assert_array_equal(light, given_picture[np.ix_(down, across)][:, :, 0])
+
+
 def test_points_see_the_sample_they_fall_into():
     given_picture = picture(24, 41)
     shown = image_scene(given_picture, (WHITE,), WHITE, view())
@@ -131,10 +149,19 @@ def test_reflectance_of_three_channels_names_the_other_models():
     assert caught.value.problems[0].path == ("scene", "source", "model")
 
 
-@pytest.mark.parametrize(("source", "channels"), [(LASER, 1), (GRAY, 2), (LASER, 2), (LASER, 4)])
-def test_other_numbers_of_channels_are_refused(source, channels):
-    with pytest.raises(BadInput, match=f"{channels} channel"):
+@pytest.mark.parametrize("source", [LASER, MALLETT, DISPLAY], ids=lambda source: source["model"])
+@pytest.mark.parametrize("channels", [1, 2, 4])
+def test_models_for_colors_want_three_channels(source, channels):
+    with pytest.raises(BadInput, match=f"{channels} channels? .*needs 3") as caught:
         build(scene(source), view(), picture(4, 4, channels))
+    (problem,) = caught.value.problems
+    assert problem.path == ("scene", "source", "file")
+    assert ("model: reflectance" in problem.remedy) == (channels == 1)
+
+
+def test_two_channels_are_no_reflectance():
+    with pytest.raises(BadInput, match=r"2 channels .*needs 1"):
+        build(scene(GRAY), view(), picture(4, 4, 2))
 
 
 def test_laser_white_is_the_sum_of_equal_lines():
@@ -157,3 +184,78 @@ def test_laser_lines_outside_the_wavelengths_are_an_error():
     narrow = {"start": "500 nm", "stop": "700 nm"}
     with pytest.raises(BadInput, match=r"scene.wavelengths: .*450"):
         build(scene(LASER, wavelengths=narrow), view(), picture(4, 4, 3))
+
+
+# ---- colors by the display's primaries and by reflectances
+
+
+def color(spectrum) -> np.ndarray:
+    """Chromaticity x, y."""
+    xyz = [integral(spectrum.times(Spectrum(tables=(c,))), START, STOP) for c in cmf()]
+    return np.array(xyz[:2]) / sum(xyz)
+
+
+def light(built, rgb) -> float:
+    """Luminance of a color [cd/m2]."""
+    return sum(v * luminance(s, START, STOP) for v, s in zip(rgb, built.spectra, strict=True))
+
+
+@pytest.mark.parametrize("primaries", ["crt-brainard", "srgb"])
+def test_display_white_has_the_stated_luminance(primaries):
+    shown = build(scene(DISPLAY, luminance="80 cd/m2"), view(), picture(4, 4, 3), primaries)
+    assert luminance(shown.white, START, STOP) == pytest.approx(80, rel=1e-12)
+    assert light(shown, [1, 1, 1]) == pytest.approx(80, rel=1e-12)
+    assert light(shown, [0.5, 0.5, 0.5]) == pytest.approx(40, rel=1e-12)
+    powers = [integral(s, START, STOP) for s in (*shown.spectra, shown.white)]
+    assert sum(powers[:3]) == pytest.approx(powers[3], rel=1e-12)
+
+
+def test_display_by_radiance_and_in_other_primaries():
+    shown = build(scene(DISPLAY, radiance="0.3 W/(sr m2)"), view(), picture(4, 4, 3), "srgb")
+    assert integral(shown.white, START, STOP) == pytest.approx(0.3, rel=1e-12)
+
+
+def test_display_primaries_have_their_colors():
+    # BT.709, which the reflectances of Mallett & Yuksel have as sums over 5 nm; and such sums of
+    # the CRT with colour-science. Straight lines between the 5 nm instead: up to 6.3e-4.
+    srgb = build(scene(DISPLAY), view(), picture(4, 4, 3), "srgb")
+    expected = [(0.64, 0.33), (0.30, 0.60), (0.15, 0.06), (0.3127, 0.3290)]
+    for spectrum, xy in zip((*srgb.spectra, srgb.white), expected, strict=True):
+        assert color(spectrum) == pytest.approx(xy, abs=7e-4)
+    crt = build(scene(DISPLAY), view(), picture(4, 4, 3))
+    expected = [(0.6189, 0.3440), (0.2765, 0.6049), (0.1512, 0.0611), (0.2884, 0.3131)]
+    for spectrum, xy in zip((*crt.spectra, crt.white), expected, strict=True):
+        assert color(spectrum) == pytest.approx(xy, abs=7e-4)
+
+
+def test_a_display_beyond_the_wavelengths_is_an_error():
+    dark = {"start": "800 nm", "stop": "900 nm"}
+    with pytest.raises(BadInput, match=r"scene.wavelengths: .*no visible light"):
+        build(scene(DISPLAY, wavelengths=dark), view(), picture(4, 4, 3))
+
+
+def test_mallett_white_is_a_perfect_diffuser():
+    shown = build(scene(MALLETT, illuminant="FL2"), view(), picture(4, 4, 3))
+    at = np.linspace(START, STOP, 201)
+    total = sum(s.at(at) for s in shown.spectra)
+    np.testing.assert_allclose(total, shown.white.at(at), rtol=1.1e-5)  # of the published basis
+    assert luminance(shown.white, START, STOP) == pytest.approx(100, rel=1e-12)
+
+
+def test_mallett_colors_under_d65_are_those_of_the_file():
+    shown = build(scene(MALLETT), view(), picture(4, 4, 3))
+    rgb = np.array([0.2, 0.5, 0.8])
+    xyz = [
+        sum(v * integral(s.times(Spectrum(tables=(c,))), START, STOP)
+            for v, s in zip(rgb, shown.spectra, strict=True))
+        for c in cmf()
+    ]  # fmt: skip
+    # IEC 61966-2-1, the matrix of linear sRGB; white has Y = 1. As above.
+    matrix = [[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]]
+    white = integral(shown.white.times(Spectrum(tables=(cmf()[1],))), START, STOP)
+    np.testing.assert_allclose(np.array(xyz) / white, matrix @ rgb, atol=8e-4)
+
+
+def test_mallett_reflectances_reflect_at_most_all():
+    for basis in srgb_reflectances():
+        assert basis.tables[0].value.min() >= 0 and basis.tables[0].value.max() <= 1

@@ -25,14 +25,16 @@ def _logarithmic_only(given: Mapping[str, Any]) -> Iterator[InitErrorDetails]:
 
 
 class Adc(Model):
-    """Linear: dn = round(offset + volts / full_scale x (2^bits - 1 - offset)), clipped."""
+    """From volts to numbers, rounded and clipped to 0..2^bits - 1.
+
+    Linear: dn = offset + v / full_scale x (2^bits - 1 - offset). Logarithmic: dn = offset +
+    ln(1 + v / reference) / ln(1 + full_scale / reference) x (2^bits - 1 - offset).
+    """
 
     bits: Annotated[int, Whole(least=1, most=24, example="10")] = key(
         "resolution", example=10, default=10
     )
-    kind: Literal["linear", "logarithmic"] = key(
-        "its curve", example="linear", default="linear", not_yet=("logarithmic",)
-    )
+    kind: Literal["linear", "logarithmic"] = key("its curve", example="linear", default="linear")
     offset: Annotated[float, Quantity("dn", least=0)] = key(
         "the number for no signal", unit="DN", example="0 DN", default=0.0
     )

@@ -74,7 +74,6 @@ class Camera(Model):
         "metrics of the picture against the ideal image",
         example=["mse", "psnr"],
         default=(),
-        not_yet=("cielab", "s-cielab"),
     )
     display: Display = key(
         "the display on which pictures are compared", example={"dpi": 72}, default=Display

@@ -28,6 +28,8 @@ class Electrical:
     """ADC code of no signal [DN]"""
     full_scale: float
     """Voltage of the highest ADC code [V]"""
+    reference: float | None = None
+    """Voltage at which a logarithmic ADC's curve bends [V]; None for a linear one."""
 
     @property
     def highest_code(self) -> int:
@@ -35,6 +37,7 @@ class Electrical:
 
     @property
     def electrons_per_dn(self) -> float:
+        """Of a linear ADC; a logarithmic one's codes are as many from black to full scale."""
         return self.full_scale / (
             self.conversion_gain * self.analog_gain * (self.highest_code - self.offset)
         )
@@ -71,6 +74,9 @@ def electrical(camera: Camera) -> Electrical:
         full_scale = adc.full_scale
     else:
         full_scale = swing * pixel.readout.gain
+    reference = None
+    if adc.kind == "logarithmic":
+        reference = full_scale / 1000 if adc.reference is None else adc.reference
     return Electrical(
         conversion_gain=gain,
         voltage_swing=swing,
@@ -80,6 +86,7 @@ def electrical(camera: Camera) -> Electrical:
         bits=adc.bits,
         offset=adc.offset,
         full_scale=full_scale,
+        reference=reference,
     )
 
 

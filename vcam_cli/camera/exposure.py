@@ -23,7 +23,6 @@ class AutoExposure(Model):
         "the level: the perfect white's, a percentile of the picture, or its mean",
         example="white",
         default="white",
-        not_yet=("mean",),
     )
     target: Annotated[float, Number(above=0, most=1, example="0.9")] = key(
         "fraction of the full well", example=0.9, default=0.9

@@ -3,7 +3,7 @@
 The steps: read the YAML with its places, read in the parts and bases, lay `--set` over it, make
 file names absolute, validate the model, refuse what is not supported yet, check the geometry.
 Every step gives its problems the place in the file they come from, and as many as can be known
-are reported at once.
+are reported at once: what is wrong in one section keeps back only the checks that need it.
 """
 
 import re
@@ -14,14 +14,25 @@ from pathlib import Path
 from pydantic import ValidationError
 
 from vcam_cli import errors
-from vcam_cli.camera import explain, geometry, shipped, support
+from vcam_cli.camera import electrical, explain, geometry, shipped, support
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.merge import merge
-from vcam_cli.camera.parts import Findings, Parts, existing, looks_like_path
+from vcam_cli.camera.parts import Findings, Parts, existing, is_file, looks_like_path
 from vcam_cli.camera.yaml_tree import Key, Node, Source, below, read_text, walk
-from vcam_cli.errors import BadInput, Collector, Problem, bad, nearest, one_line
+from vcam_cli.errors import BadInput, CannotDo, Collector, Problem, bad, nearest, one_line
 
 FILE_KEYS = ("file", "positions")
+EXAMPLE = "starter"
+"""The shipped camera whose sections stand in for those that a file has wrong."""
+
+Check = tuple[Callable[[Camera], None], str]
+"""What raises BadInput for a camera that is wrong, and the sections that it needs to say so."""
+_CHECKS: tuple[Check, ...] = (
+    (support.check_spectra, "scene"),
+    (geometry.check, "scene optics pixel array"),
+)
+_OF_WHAT_IS_BUILT: tuple[Check, ...] = ((electrical.check, "pixel adc"),)
+"""Those that do not know the values that are not supported yet."""
 
 
 @dataclass(frozen=True)
@@ -42,23 +53,30 @@ class Origin:
         return self.places.get(path, "")
 
 
-def load(camera: str | Path, sets: Sequence[str] = (), folder: Path | None = None) -> Camera:
+def load(
+    camera: str | Path,
+    sets: Sequence[str] = (),
+    folder: Path | None = None,
+    checks: Sequence[Check] = (),
+) -> Camera:
     """The validated camera of a file, or of a shipped camera's name.
 
     `sets` are overrides "PATH=VALUE", VALUE read as YAML; `folder` is where relative paths start
     (default the current one). `camera.locate(path)` of the result gives the place of a key.
+    `checks` are further ones, made where the sections that they need are valid and supported.
     Raises BadInput with every problem of the file, CannotDo where a file may not be read.
     """
-    file = find(camera, folder or Path.cwd())
-    tree, parts = _read(file, sets, folder or Path.cwd())
+    start = folder or _current()
+    file = find(camera, start)
+    tree, parts = _read(file, sets, start)
     findings = parts.findings
     tree, named = _absolute_files(tree, findings)
     origin = Origin(file, tuple(dict.fromkeys((*parts.files, *named))), places(tree))
-    result = _validated(tree, origin, findings)
+    result, wrong = _validated(tree, origin, findings)
     if result is not None:
-        _check(result, origin, findings)
+        _check(result, origin, findings, wrong, checks)
     if findings.problems or result is None:
-        raise BadInput(sorted(findings.problems, key=_place))
+        raise BadInput(dict.fromkeys(sorted(findings.problems, key=_place)))
     return result.with_origin(origin)
 
 
@@ -66,7 +84,7 @@ def find(camera: str | Path, folder: Path) -> Path:
     """The camera file meant by a path or the name of a shipped one. Raises BadInput."""
     text = str(camera)
     path = folder / text
-    if isinstance(camera, Path) or looks_like_path(text) or path.is_file():
+    if isinstance(camera, Path) or looks_like_path(text) or is_file(path):
         try:
             return existing(path, text)
         except BadInput as error:
@@ -85,7 +103,7 @@ def overlay(sets: Sequence[str], folder: Path) -> Node:
         source = Source(f"--set {one_line(item)}", folder, lines=False)
         path, _, text = item.partition("=")
         keys = errors.split(path.strip())
-        if not keys or not text.strip():
+        if "" in path.strip().split(".") or not text.strip():
             problem = Problem((), f"{item!r} is not PATH=VALUE", "write pixel.width=8um", "--set")
             problems.extend(BadInput([problem]))
             continue
@@ -111,6 +129,15 @@ def places(tree: Node) -> dict[errors.Path, str]:
                 begins_below = child.source is standing.source and child.line > standing.line
                 found[below(path, key)] = standing.where if begins_below else child.where
     return found
+
+
+def _current() -> Path:
+    """The current folder. Raises CannotDo where it has been removed."""
+    try:
+        return Path.cwd()
+    except OSError as error:
+        reason = error.strerror or error
+        raise CannotDo(f"the current folder is gone: {reason}", "go to another one") from error
 
 
 def _read(file: Path, sets: Sequence[str], folder: Path) -> tuple[Node, Parts]:
@@ -155,21 +182,39 @@ def _absolute(node: Node) -> Path:
         raise error.located(lambda _: node.where) from None
 
 
-def _validated(tree: Node, origin: Origin, findings: Findings) -> Camera | None:
-    """The camera, or None with its problems added to the findings."""
+def _validated(tree: Node, origin: Origin, findings: Findings) -> tuple[Camera | None, set]:
+    """The camera, and which of its sections are not the file's, since they are wrong there.
+
+    What is wrong is added to the findings. None where no camera can be made.
+    """
     value = tree.plain()
     assert isinstance(value, dict)
     try:
-        return Camera.model_validate(value)
+        return Camera.model_validate(value), set()
     except ValidationError as error:
-        findings.add(explain.problems(error, Camera, value), origin.locate)
-        return None
+        problems = explain.problems(error, Camera, value)
+        findings.add(problems, origin.locate)
+    wrong = {problem.path[0] for problem in problems if problem.path}
+    findings.failed |= {(name,) for name in wrong}
+    right = {name: section for name, section in value.items() if name not in wrong}
+    good = load(shipped.find("cameras", EXAMPLE), folder=shipped.folder())
+    needed = {n for n, field in Camera.model_fields.items() if field.is_required()} & wrong
+    try:
+        return Camera.model_validate(right | {name: getattr(good, name) for name in needed}), wrong
+    except ValidationError:  # what is wrong between sections
+        return None, wrong
 
 
-def _check(camera: Camera, origin: Origin, findings: Findings) -> None:
-    """Finds all that a valid camera can still have wrong."""
-    findings.add(support.unsupported(camera), origin.locate)
-    checks: tuple[Callable[[Camera], None], ...] = (support.check_spectra, geometry.check)
+def _check(
+    camera: Camera, origin: Origin, findings: Findings, wrong: set, more: Sequence[Check]
+) -> None:
+    """Finds all that a valid camera can still have wrong, but for its sections `wrong`."""
+    unsupported = support.unsupported(camera)
+    findings.add(unsupported, origin.locate)
+    unbuilt = wrong | {problem.path[0] for problem in unsupported}
+    checks = [check for check, needed in _CHECKS if not wrong & set(needed.split())]
+    for check, needed in (*_OF_WHAT_IS_BUILT, *more):
+        checks += [check] if not unbuilt & set(needed.split()) else []
     for check in checks:
         try:
             check(camera)

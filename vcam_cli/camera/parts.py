@@ -129,7 +129,7 @@ def locate(name: Node, kind: str, chain: tuple[Path, ...] = ()) -> Path:
     inside_shipped = shipped.folder() in (folder, *folder.parents)
     for suffix in _SUFFIXES:
         beside = folder / (text + suffix)
-        if not inside_shipped and beside.is_file() and beside.resolve() not in chain:
+        if not inside_shipped and is_file(beside) and beside.resolve() not in chain:
             return beside
     return shipped.find(kind, text)
 
@@ -137,6 +137,14 @@ def locate(name: Node, kind: str, chain: tuple[Path, ...] = ()) -> Path:
 def looks_like_path(text: str) -> bool:
     """Whether a text names a file and not something that ships."""
     return "/" in text or text.endswith(_SUFFIXES)
+
+
+def is_file(path: Path) -> bool:
+    """Whether there is such a file; False for what cannot be a file's name at all."""
+    try:
+        return path.is_file()
+    except (OSError, ValueError):
+        return False
 
 
 def existing(path: Path, text: str) -> Path:
@@ -148,6 +156,8 @@ def existing(path: Path, text: str) -> Path:
     try:
         if path.is_file():
             return path
+        if path.is_symlink():
+            raise bad((), f"{text!r} is a broken link", "point it to a file, or give another one")
         if path.exists():
             raise bad((), f"{text!r} is not a regular file", "give the path of a file")
         siblings = [p.name for p in path.parent.iterdir()] if path.parent.is_dir() else []

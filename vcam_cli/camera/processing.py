@@ -50,7 +50,7 @@ class Demosaic(Step):
     """All colors at every pixel."""
 
     demosaic: Literal["bilinear", "edge-aware"] = key(
-        "how missing colors are found", example="bilinear", not_yet=("edge-aware",)
+        "how missing colors are found", example="bilinear"
     )
 
 
@@ -58,9 +58,7 @@ class WhiteBalance(Step):
     """A gain for each color. It may stand before demosaic or after it."""
 
     white_balance: Literal["gray-world", "bright-block", "illuminant", "none"] = key(
-        "how the gains are found",
-        example="gray-world",
-        not_yet=("bright-block", "illuminant"),
+        "how the gains are found", example="gray-world"
     )
 
 
@@ -72,15 +70,17 @@ class Matrix(Model):
         example=[[1.6, -0.4, -0.2], [-0.3, 1.5, -0.2], [0.0, -0.5, 1.5]],
     )
 
+    def suits(self, colors: int) -> bool:
+        """Whether it has three rows of one number for each of the camera's colors."""
+        return len(self.matrix) == 3 and {len(row) for row in self.matrix} == {colors}
+
 
 class ColorCorrection(Step):
     """From the camera's colors to the display's."""
 
     color_correction: Annotated[
         Literal["fit", "none"] | Matrix, word_or(Matrix, {"fit": "fit", "none": "none"})
-    ] = key(
-        "fit (to the ColorChecker), none, or a matrix", example="fit", not_yet=("fit", "matrix")
-    )
+    ] = key("fit (to the ColorChecker), none, or a matrix", example="fit")
 
 
 class Gamma(Step):
@@ -136,7 +136,11 @@ STEP_LIST = Either(_steps, list[_ANY])
 
 def default_steps(monochrome: bool) -> Steps:
     """What is done where the file does not say."""
-    color = (Demosaic(demosaic="bilinear"), WhiteBalance(white_balance="gray-world"))
+    color = (
+        Demosaic(demosaic="bilinear"),
+        WhiteBalance(white_balance="gray-world"),
+        ColorCorrection.model_validate({"color_correction": "fit"}),
+    )
     return (
         BlackLevel.model_validate({"black_level": "subtract"}),
         *(() if monochrome else color),
@@ -151,6 +155,10 @@ def order_mistakes(steps: Sequence[Step], mosaic: bool, colors: int) -> Iterator
         before, name = names[:i], step.name
         for message, remedy in _reasons(name, step.value == "none", before, names, mosaic, colors):
             yield fault(("processing", i, name), message, remedy, written(step))
+        if isinstance(step.value, Matrix) and not step.value.suits(colors):
+            message = f"is no matrix for {colors} colors"
+            remedy = f"write three rows (display R, G, B) of {colors} numbers (the camera's colors)"
+            yield fault(("processing", i, name, "matrix"), message, remedy, written(step.value))
 
 
 def _reasons(

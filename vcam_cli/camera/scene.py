@@ -100,7 +100,6 @@ class StepWedge(Chart):
     density_range: Annotated[float, Number(above=0, most=10, example="2")] = key(
         "density of the darkest bar over the brightest (log10)", example=2.0, default=2.0
     )
-    not_yet: ClassVar[str] = "chart"
 
 
 class ColorChecker(Chart):
@@ -110,25 +109,30 @@ class ColorChecker(Chart):
 
 
 class SiemensStar(Chart):
-    """Spokes whose frequency grows towards the center."""
+    """Sharp spokes whose frequency grows towards the center."""
 
     chart: Literal["siemens-star"] = key("which chart", example="siemens-star")
     spokes: Annotated[int, Whole(least=2, most=1000, example="72")] = key(
         "number of bright spokes", example=72, default=72
     )
     contrast: Fraction = key("modulation over mean", example=1.0, default=1.0)
-    not_yet: ClassVar[str] = "chart"
 
 
 class PointGrid(Chart):
-    """Bright points on black."""
+    """Bright points on black, one of them at the center."""
 
     chart: Literal["point-grid"] = key("which chart", example="point-grid")
     spacing: Length = key("between points, on the sensor plane", unit="um", example="200 um")
     diameter: Length = key(
         "of a point, on the sensor plane", unit="um", example="2 um", default=2e-6
     )
-    not_yet: ClassVar[str] = "chart"
+
+    @model_validator(mode="after")
+    def _apart(self) -> Self:
+        if self.diameter > self.spacing:
+            message = "is more than the spacing: the points would overlap"
+            raise failure([fault(("diameter",), message, "make it smaller, or the spacing larger")])
+        return self
 
 
 class DeadLeaves(Chart):
@@ -144,27 +148,27 @@ class DeadLeaves(Chart):
 
 
 class EyeChart(Chart):
-    """Rows of letters, smaller from row to row."""
+    """Rows of five Sloan letters, black on white, 10^0.1 times smaller from row to row."""
 
     chart: Literal["eye-chart"] = key("which chart", example="eye-chart")
     rows: Annotated[int, Whole(least=1, most=20, example="8")] = key(
         "rows of letters", example=8, default=8
     )
-    not_yet: ClassVar[str] = "chart"
 
 
 class HdrPatches(Chart):
     """Patches of widely different radiance, and a lamp."""
 
     chart: Literal["hdr-patches"] = key("which chart", example="hdr-patches")
-    dynamic_range: Positive = key("brightest over darkest patch", example=10000.0, default=10000.0)
+    dynamic_range: Annotated[float, Number(above=1, example="10000")] = key(
+        "brightest over darkest patch", example=10000.0, default=10000.0
+    )
     patches: Annotated[int, Whole(least=2, most=1000, example="24")] = key(
         "number of patches", example=24, default=24
     )
     lamp: Positive = key(
         "radiance of the lamp over that of the perfect white", example=100.0, default=100.0
     )
-    not_yet: ClassVar[str] = "chart"
 
 
 class ImageFile(Model):
@@ -182,10 +186,10 @@ class ImageFile(Model):
     )
     model: Literal["reflectance", "laser", "rgb-display", "mallett"] = key(
         "what channels mean: reflectance (one channel), laser (450, 550 and 650 nm, equal planes "
-        "= equal radiance in W), rgb-display (a display's primaries), mallett (reflectances)",
+        "= equal radiance in W), rgb-display (the primaries of the camera file's display), mallett "
+        "(the smooth reflectances that have these sRGB colors under D65)",
         example="reflectance",
         default="reflectance",
-        not_yet=("rgb-display", "mallett"),
     )
 
     @model_validator(mode="after")
@@ -284,7 +288,7 @@ class Wavelengths(Model):
 
     start: Length = key("shortest wavelength", unit="nm", example="380 nm", default=380e-9)
     stop: Length = key("longest wavelength", unit="nm", example="780 nm", default=780e-9)
-    step: Annotated[float | None, Quantity("length", above=0, words={"auto": None})] = key(
+    step: Annotated[float | None, Quantity("length", least=1e-10, words={"auto": None})] = key(
         "spacing at which the lens's blur is evaluated; auto follows from the accuracy",
         unit="nm",
         example="auto",

@@ -73,7 +73,7 @@ class Accuracy(Model):
         example="0.1 %",
         default=None,
     )
-    wavelength_step: Annotated[float | None, Quantity("length", above=0)] = key(
+    wavelength_step: Annotated[float | None, Quantity("length", least=1e-10)] = key(
         "spacing of wavelengths", unit="nm", example="5 nm", default=None
     )
     oversampling: Annotated[int | None, Whole(least=1, most=64, example="4")] = key(
@@ -181,7 +181,9 @@ class Output(Model):
     )
     render: Annotated[
         Literal[8, 16] | None, Either(_render, Literal[8, 16, "none"], words={"none": None})
-    ] = key("bits of render.png: 8, 16 or none", example=8, default=8, not_yet=("16",))
+    ] = key("bits of render.png: 8, 16 or none", example=8, default=8)
     irradiance: Annotated[bool, Strict()] = key(
-        "also write irradiance.exr", example=False, default=False, not_yet=True
+        "also write irradiance.exr: W/(m2 nm) on the sensor, a channel a wavelength",
+        example=False,
+        default=False,
     )

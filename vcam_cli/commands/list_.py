@@ -165,6 +165,8 @@ def _metrics() -> list[Item]:
     asked = {
         "mse": "mean squared error against the ideal image; ask for it in `quality`",
         "psnr": "peak signal-to-noise ratio, white = 1 [dB]; ask for it in `quality`",
+        "cielab": "mean CIELAB Delta E (1976) on the `display`; ask for it in `quality`",
+        "s-cielab": "mean S-CIELAB Delta E, as the eye sees it there; ask for it in `quality`",
     }
     return [Item(name, about) for name, about in (always | asked).items()]
 

@@ -7,21 +7,28 @@ Why commands are looked up by name: a command's module is imported when that com
 for, and imports its physics when it runs, so `vcam --help` and shell completion are quick.
 """
 
-import os
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
-from importlib import import_module
-from typing import Annotated, Any
 
-import typer
-from typer.core import TyperGroup
+try:
+    import errno
+    import io
+    import os
+    from collections.abc import Iterator
+    from contextlib import contextmanager, suppress
+    from importlib import import_module
+    from typing import Annotated, Any
 
-from vcam_cli.errors import VcamError
+    import typer
+    from typer.core import TyperGroup
+
+    from vcam_cli.errors import CannotDo, VcamError
+except KeyboardInterrupt:  # most of the time until a command begins goes by here
+    sys.exit(130)
 
 COMMANDS = {
     "run": "run:run",
     "plan": "plan:plan",
+    "compare": "compare:compare",
     "validate": "validate:validate",
     "list": "list_:list_",
     "init": "init:init",
@@ -50,6 +57,10 @@ class Commands(TyperGroup):
             for name in COMMANDS:  # so that the nearest one can be suggested
                 self.get_command(ctx, name)
         return super().resolve_command(ctx, args)
+
+    def make_context(self, *args: Any, **more: Any) -> Any:
+        with failures_told():
+            return super().make_context(*args, **more)
 
     def invoke(self, ctx: Any) -> Any:
         with failures_told():
@@ -103,20 +114,56 @@ def failures_told() -> Iterator[None]:
 
 
 def _end(message: str, code: int, error: BaseException) -> None:
-    print(message, file=sys.stderr)
+    _tell(message)
     raise typer.Exit(code) from error
+
+
+def _tell(message: object) -> None:
+    """A line on stderr; where that is lost too, the exit code has to do."""
+    with suppress(OSError):
+        print(message, file=sys.stderr, flush=True)
 
 
 def main() -> None:
     """Runs `vcam` and leaves the process."""
+    _replace_closed()
     try:
         try:
             app(prog_name="vcam")
         finally:
             sys.stdout.flush()
+    except KeyboardInterrupt:
+        sys.exit(130)
     except BrokenPipeError:  # the reader (head, less) has gone: nothing more to say
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        _drop_stdout()
         sys.exit(1)
+    except OSError as error:
+        if error.errno not in NOT_WRITTEN or error.filename is not None:
+            raise
+        _tell(CannotDo(f"cannot write to stdout: {error.strerror}", "send it elsewhere"))
+        _drop_stdout()
+        sys.exit(3)
+
+
+NOT_WRITTEN = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO}
+"""What a write can end with. All but those to stdout are told where they happen."""
+
+
+def _replace_closed() -> None:
+    """Gives a process that was started without stdout or stderr (`>&-`) ones that forget.
+
+    Their numbers are taken as well: a result opened next would get them, and all that libraries
+    print.
+    """
+    for name in ("stdout", "stderr"):
+        if getattr(sys, name) is None:
+            os.open(os.devnull, os.O_WRONLY)
+            setattr(sys, name, io.StringIO())
+
+
+def _drop_stdout() -> None:
+    """What stdout still holds goes nowhere, else Python complains at its end."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 if __name__ == "__main__":

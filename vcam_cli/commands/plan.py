@@ -1,6 +1,7 @@
 """`vcam plan`: what a run would simulate, what not, why, and at what cost."""
 
 from vcam_cli.commands import options
+from vcam_cli.commands.progress import Progress
 
 
 def plan(
@@ -21,12 +22,13 @@ def plan(
       vcam plan still-life
       vcam plan camera.yaml --accuracy 0.001 --json
     """
-    from vcam_cli.camera.load import load
     from vcam_cli.files.report import to_json
+    from vcam_cli.studies.checks import load
     from vcam_cli.studies.simulate import prepare
 
     model = load(camera, options.overrides(set_, accuracy=accuracy))
-    ready, notes = prepare(model, workers)
+    with Progress(quiet) as progress:
+        ready, notes = prepare(model, workers, progress)
     for note in notes:
         options.say(note, quiet)
     report = ready.plan.report()

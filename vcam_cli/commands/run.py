@@ -3,6 +3,7 @@
 from pathlib import Path
 
 from vcam_cli.commands import options
+from vcam_cli.commands.progress import Progress
 
 
 def run(
@@ -24,7 +25,7 @@ def run(
     """
     import time
 
-    from vcam_cli.camera.load import load
+    from vcam_cli.studies.checks import load
 
     start = time.perf_counter()
     model = load(camera, options.overrides(set_, seed, accuracy))
@@ -34,17 +35,18 @@ def run(
     from vcam_cli.studies.simulate import simulate
 
     inputs = outputs.inputs(model)
-    with OutputFolder(out or Path("out") / model.name, inputs=inputs) as folder:
-        result = simulate(model, workers)
-        for note in result.notes:
-            options.say(note, quiet)
+    place = OutputFolder(out or Path("out") / model.name, inputs=inputs)
+    with place as folder, Progress(quiet) as progress:
+        result = simulate(model, workers, progress)
         outputs.write(result, folder)
         record = outputs.record(result, inputs, time.perf_counter() - start)
         folder.finish(record)
+    for note in result.notes:
+        options.say(note, quiet)
     if as_json:
         print(to_json(summary(record, folder.path)), end="")
     elif not quiet:
-        print(report(result.metrics, record, folder.path))
+        print(report(result.metrics, record, folder.path, folder.names))
 
 
 def summary(record: dict, path: Path) -> dict:
@@ -53,13 +55,50 @@ def summary(record: dict, path: Path) -> dict:
     return {"out": str(path), **{name: record[name] for name in names}}
 
 
-def report(metrics: list[tuple[str, float, str]], record: dict, path: Path) -> str:
-    """What a person reads after a run."""
+def report(
+    metrics: list[tuple[str, float, str]], record: dict, path: Path, files: tuple[str, ...]
+) -> str:
+    """What a person reads after a run: figures, what was simulated, the time, where it all is."""
     lines = [f"{name:<20} {value:>12.6g} {unit}".rstrip() for name, value, unit in metrics]
-    left_out = [
-        e["name"] for e in record["plan"]["effects"] if e["by"] == "plan" and e["state"] == "off"
-    ]
-    if left_out:
-        lines.append(f"left out by the plan: {', '.join(left_out)} (why: {path}/run.json)")
-    lines.append(f"{record['name']}: {path}/ in {record['seconds']:.2f} s")
+    lines += ["", *effects(record["plan"]["effects"])]
+    foretold, took = record["plan"]["seconds"], sum(record["stages"].values())
+    lines.append(
+        f"time         {took:.2f} s, {foretold:.2f} s were foretold"
+        f" ({record['seconds']:.2f} s with start-up)"
+    )
+    lines += [f"{said:<12} {path / name}" for name, said in FILES.items() if name in files]
+    lines.append(f"{record['name']}: {path}/")
     return "\n".join(lines)
+
+
+FILES = {
+    "render.png": "render",
+    "raw.exr": "raw frame",
+    "ideal.exr": "ideal image",
+    "delta_e.png": "error map",
+    "irradiance.exr": "irradiance",
+}
+"""Pictures a run may leave, and what they are."""
+
+
+def effects(decisions: list[dict]) -> list[str]:
+    """What was simulated, and what the plan or the file left out."""
+
+    def names(state: str, *by: str) -> list[str]:
+        return [e["name"] for e in decisions if e["state"] == state and e["by"] in by]
+
+    lines = wrapped("simulated", ", ".join(names("on", "plan", "user")) or "nothing but light")
+    for e in decisions:
+        if e["state"] == "off" and e["by"] == "plan":
+            lines += wrapped("left out", f"{e['name']}: {e['reason']}")
+    if names("off", "user"):
+        lines += wrapped("switched off", ", ".join(names("off", "user")))
+    return lines
+
+
+def wrapped(label: str, text: str) -> list[str]:
+    """Lines of at most 100 characters, with a label before the first."""
+    import textwrap
+
+    lines = textwrap.wrap(text, 100 - 12 - 1) or [""]
+    return [f"{label if not i else '':<12} {line}" for i, line in enumerate(lines)]

@@ -42,14 +42,12 @@ def validate(
 
 def _check(file: str, sets: list[str]) -> dict[str, Any]:
     """What there is to say about one file."""
-    from vcam_cli.camera.load import load
-    from vcam_cli.engine import plan
     from vcam_cli.errors import BadInput, CannotDo, dotted
+    from vcam_cli.studies.checks import load
 
     report: dict[str, Any] = {"file": file, "ok": False, "exit_code": 0, "problems": []}
     try:
         camera = load(file, sets)
-        plan.check(camera)
     except BadInput as error:
         report["problems"] = [
             {

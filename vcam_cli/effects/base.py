@@ -52,6 +52,8 @@ class Effect(ABC):
     """Cost on one core of 2020s hardware, for the plan's estimate."""
     removable: ClassVar[bool] = True
     """Whether the plan may leave it out (a user always may)."""
+    in_lens: ClassVar[bool] = False
+    """Whether it acts on the light before that reaches the sensor."""
 
     @classmethod
     @abstractmethod
@@ -166,3 +168,25 @@ class Code(Effect):
     @abstractmethod
     def line(self, electrons: NDArray) -> NDArray:
         """The same relation before rounding and clipping [DN]."""
+
+    def rounding(self, level: float, variance: float) -> float:
+        """Largest mean square of the rounding error at a signal `level` [electrons squared].
+
+        variance: of the noise in the signal. Of noise wider than half a step it is q^2 / 12; of
+        less it depends on where between two codes the signal lies, and is q^2 / 4 at most:
+        q^2 / 12 + (q / pi)^2 sum_k exp(-2 (pi k sigma / q)^2) / k^2, where cosines of the place
+        are set to 1. Widrow and Kollar, Quantization Noise, 2008, section 5.3.
+        """
+        ends = np.array([level, level + max(1.0, 1e-3 * level)])
+        below, above = self.line(ends)
+        step = (ends[1] - ends[0]) / float(above - below)
+        k = np.arange(1, 30)
+        dithered = np.exp(-2 * (np.pi * k) ** 2 * variance / step**2) / k**2
+        return float(step**2 / 12 + (step / np.pi) ** 2 * dithered.sum())
+
+    def linear(self, dn: NDArray) -> NDArray:
+        """What a linear ADC of the same offset and full scale has for these codes [DN].
+
+        Same float type. A straight line of electrons whatever the curve is.
+        """
+        return dn

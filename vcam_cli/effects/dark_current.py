@@ -5,7 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from vcam_cli.effects.base import Charge
+from vcam_cli.errors import bad
 from vcam_cli.physics import readout
+
+MOST_DOUBLINGS = 60
+"""The rule of a doubling every few kelvin holds over some tens of them, not over hundreds."""
 
 
 @dataclass(frozen=True)
@@ -44,5 +48,13 @@ def _rate(camera, geometry) -> float:
         return 0.0
     value = density.value
     if density.temperature is not None:
-        value *= 2 ** ((camera.pixel.temperature - density.temperature) / density.doubling)
+        doublings = (camera.pixel.temperature - density.temperature) / density.doubling
+        if abs(doublings) > MOST_DOUBLINGS:
+            raise bad(
+                "pixel.photodetector.dark_current_density",
+                f"from {density.temperature:g} K to {camera.pixel.temperature:g} K it doubles"
+                f" {doublings:.3g} times",
+                "give it at a temperature nearer to the pixel's, or another doubling",
+            )
+        value *= 2**doublings
     return value * geometry.detector_area / readout.ELEMENTARY_CHARGE * pd.dark_current_scale

@@ -18,6 +18,7 @@ class Diffraction(RadialTransfer):
     name = "diffraction"
     reference = "Chen 2003, section 2.2.1; Goodman, Introduction to Fourier Optics, section 6.3"
     absent = "the file says optics.diffraction: false"
+    in_lens = True
 
     @classmethod
     def of(cls, camera, geometry):

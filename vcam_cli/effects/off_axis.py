@@ -26,6 +26,7 @@ class OffAxis(Gain):
     name = "off_axis"
     reference = "Chen 2003, eq 2.22 (exact) and 2.21 (cos4)"
     absent = "the file says optics.off_axis: none"
+    in_lens = True
     seconds_per_pixel = 8e-9
 
     @classmethod

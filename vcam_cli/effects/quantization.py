@@ -1,4 +1,4 @@
-"""The ADC."""
+"""The ADC, linear or logarithmic."""
 
 from __future__ import annotations
 
@@ -26,7 +26,11 @@ class Quantization(Code):
     @classmethod
     def of(cls, camera, geometry):
         e = electrical(camera)
-        return cls(e.offset, e.electrons_per_dn, e.bits)
+        if e.reference is None:
+            return cls(e.offset, e.electrons_per_dn, e.bits)
+        volts_per_electron = e.conversion_gain * e.analog_gain
+        bend, full = e.reference / volts_per_electron, e.full_scale / volts_per_electron
+        return Logarithmic(e.offset, bend, full, e.bits)
 
     def describe(self) -> str:
         return f"{self.electrons_per_dn:.4g} electrons a step, {2**self.bits} codes"
@@ -37,5 +41,72 @@ class Quantization(Code):
     def apply(self, electrons):
         code = electrons * electrons.dtype.type(1 / self.electrons_per_dn)
         code += electrons.dtype.type(self.offset)
-        np.rint(code, out=code)
-        return np.clip(code, 0, 2**self.bits - 1, out=code)
+        return _whole(code, self.bits)
+
+
+@dataclass(frozen=True)
+class Logarithmic(Code):
+    """Logarithmic ADC: equal ratios of light are equal steps, far above `bend`.
+
+    dn = clip(round(offset + span ln(1 + electrons / bend) / ln(1 + full / bend)), 0, 2^bits - 1),
+    span = 2^bits - 1 - offset.
+
+    Noise makes signals of less than nothing: down to -bend the formula holds and gives codes below
+    the offset; from there on, where it has no value, the code is 0.
+    """
+
+    offset: float
+    bend: float
+    """Signal at which the curve turns from straight to logarithmic [electrons]."""
+    full: float
+    """Signal of the highest code [electrons]."""
+    bits: int
+
+    name = Quantization.name
+    reference = Quantization.reference
+    absent = Quantization.absent
+    seconds_per_pixel = 15e-9
+
+    @classmethod
+    def of(cls, camera, geometry):
+        found = Quantization.of(camera, geometry)
+        return found if isinstance(found, cls) else None
+
+    def describe(self) -> str:
+        step = self.bend / self._slope
+        return (
+            f"{step:.4g} electrons a step in the dark and {step * (1 + self.full / self.bend):.4g}"
+            f" at full scale, {2**self.bits} codes"
+        )
+
+    @property
+    def _span(self) -> float:
+        return 2**self.bits - 1 - self.offset
+
+    @property
+    def _slope(self) -> float:
+        """Codes per natural logarithm [DN]."""
+        return self._span / float(np.log1p(self.full / self.bend))
+
+    def line(self, electrons):
+        signal = np.maximum(electrons * (1 / self.bend), -1)
+        with np.errstate(divide="ignore"):  # ln(0) = -inf, which is clipped
+            level = np.log1p(signal, out=signal)
+        level *= self._slope
+        level += self.offset
+        return level
+
+    def apply(self, electrons):
+        return _whole(self.line(electrons), self.bits)
+
+    def linear(self, dn):
+        signal = np.expm1((dn - self.offset) * (1 / self._slope))
+        signal *= self._span * self.bend / self.full
+        signal += self.offset
+        return signal
+
+
+def _whole(level, bits):
+    """The nearest codes, clipped; overwrites its argument."""
+    np.rint(level, out=level)
+    return np.clip(level, 0, 2**bits - 1, out=level)

@@ -109,6 +109,13 @@ def finer(now: int, lost: float, budget: float, geometry: Geometry, knobs: Setti
     return max(now, min(max(needed, now + 1), knobs.most_oversampling, affordable))
 
 
+def brightest(planes: NDArray, tables: Tables) -> float:
+    """Bound on the signal of the brightest sample of a scene [electrons / s]."""
+    level = np.abs(tables.values[:, :, 0])
+    most = np.array([max(float(plane.max()), -float(plane.min())) for plane in planes])
+    return float((level.T @ most).max())
+
+
 def peak(planes: NDArray, tables: Tables) -> float:
     """Largest signal of a scene before blur, from every eighth sample [electrons / s]."""
     level = tables.values[:, :, 0]

@@ -13,7 +13,10 @@ import numpy as np
 
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.geometry import Geometry
+from vcam_cli.engine import bandwidth
 from vcam_cli.engine.mosaic import Mosaic
+from vcam_cli.engine.settings import Settings
+from vcam_cli.engine.transfer import Band
 from vcam_cli.engine.ways import Followed
 
 NORMAL = 8.2e-9
@@ -32,6 +35,8 @@ JUDGE = 60e-9
 """One pixel of ideal image and metrics, per color [s]."""
 EXR = 28e-9
 """One noisy value into an EXR file [s]."""
+BANDS_AT_ONCE = 4
+"""Bands of the spectral irradiance that are computed together, as the colors of a frame are."""
 PNG = 14e-9
 """One noisy value into a PNG file [s]."""
 
@@ -76,3 +81,26 @@ def after(camera: Camera, geometry: Geometry, mosaic: Mosaic) -> float:
     if camera.quality:
         seconds += (JUDGE + EXR) * pixels * colors
     return seconds
+
+
+def irradiance(camera: Camera, geometry: Geometry, knobs: Settings, followed: Followed) -> float:
+    """Core seconds of the spectral irradiance, where it is asked for: its bands are as colors."""
+    if not camera.output.irradiance:
+        return 0.0
+    band = camera.scene.wavelengths
+    count = len(Band(band.start, band.stop, knobs.wavelength_step).nodes())
+    bands = Mosaic((tuple(str(i) for i in range(BANDS_AT_ONCE)),))
+    together = linear(geometry, bands, followed) / BANDS_AT_ONCE
+    return count * (together + EXR * geometry.rows * geometry.columns)
+
+
+def at_first_sight(
+    camera: Camera, geometry: Geometry, mosaic: Mosaic, knobs: Settings, workers: int
+) -> float:
+    """Seconds of a whole run, before anything is known of its scene."""
+    oversampling = bandwidth.first_guess(geometry, knobs)
+    samples = geometry.rows * geometry.columns * oversampling**2
+    guess = Followed(oversampling=oversampling, samples=samples, planes=3)
+    core = linear(geometry, mosaic, guess) + after(camera, geometry, mosaic)
+    core += irradiance(camera, geometry, knobs, guess)
+    return core * slowness() / threads(workers)

@@ -35,6 +35,18 @@ def _level(auto: AutoExposure, rate: NDArray, white_rate: float) -> float:
     return percentile(rate, auto.percentile)
 
 
+def ceiling(camera: Camera, white_rate: float, saturation: float) -> float:
+    """Photo-electrons per second that fill a pixel, as far as it is known before the light is.
+
+    A given time tells. An automatic one will be about that of the perfect white, or the longest.
+    """
+    auto = camera.exposure.auto
+    if auto is None:
+        assert camera.exposure.time is not None
+        return saturation / camera.exposure.time
+    return max(white_rate / auto.target, saturation / auto.max)
+
+
 def _reach(auto: AutoExposure, rate: float, saturation: float) -> float:
     """Time at which `rate` fills the target's share of the well, within the limits."""
     wanted = auto.target * saturation / rate if rate > 0 else np.inf

@@ -14,10 +14,12 @@ from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.geometry import pixel_centers
 from vcam_cli.effects.base import Charge, Code, Draw
 from vcam_cli.effects.quantization import Quantization
-from vcam_cli.engine import capture, plan
+from vcam_cli.engine import capture, optics, plan
 from vcam_cli.engine.parallel import available_workers
-from vcam_cli.engine.prepare import Prepared, Stages, prepare
+from vcam_cli.engine.prepare import Prepared, prepare
+from vcam_cli.engine.stages import Stages
 from vcam_cli.physics import readout
+from vcam_cli.spectra import colorchecker
 
 
 @dataclass(frozen=True)
@@ -53,6 +55,20 @@ class Frame(Prepared):
         """(C,) perfect white on the axis, noise-free, dark included, not clipped [DN]."""
         electrons = (self.white_rate + self.dark_rate) * self.exposure_time
         return np.asarray(self.to_dn(electrons))
+
+    @property
+    def saturated_dn(self) -> float:
+        """The lowest code of a saturated pixel: of a full well, or the ADC's highest [DN]."""
+        full = float(np.rint(self.to_dn(np.array([self.electrical.full_well], float))[0]))
+        return min(full, float(self.electrical.highest_code))
+
+    def patches_dn(self) -> NDArray:
+        """(C, 24) a ColorChecker in the light of the scene, on the axis, as `white_dn` [DN]."""
+        lit = [self.scene.white.times(reflectance) for _, reflectance in colorchecker()]
+        seen = optics.scene_transfer(
+            self.camera, self.geometry, self.settings, lit, self.mosaic, ()
+        )
+        return self.to_dn((seen.level.T + self.dark_rate) * self.exposure_time)
 
     def ideal_dn(self) -> NDArray:
         """The scene point-sampled at the pixels' centers, all colors everywhere [DN].

@@ -5,11 +5,15 @@ from __future__ import annotations
 import contextlib
 import os
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from vcam_cli.camera.geometry import Geometry
 from vcam_cli.engine.settings import Settings
 from vcam_cli.errors import CannotDo
 from vcam_cli.scenes.base import SampledScene
+
+if TYPE_CHECKING:
+    from vcam_cli.engine.ways import Followed
 
 BASE = 150_000_000
 """Interpreter and libraries [bytes]."""
@@ -46,7 +50,15 @@ def of_frame(geometry: Geometry, knobs: Settings, colors: int, judged: bool) -> 
 
 def of_planes(scene: SampledScene, planes: int, geometry: Geometry, knobs: Settings) -> int:
     """Peak memory while a sampled scene of so many planes is filtered [bytes]."""
-    samples = scene.shape[0] * scene.shape[1]
+    return _filtering(scene.shape[0] * scene.shape[1], planes, geometry, knobs)
+
+
+def of_followed(followed: Followed, geometry: Geometry, knobs: Settings) -> int:
+    """Peak memory that a scene took while it was filtered [bytes]."""
+    return _filtering(followed.samples, followed.planes, geometry, knobs)
+
+
+def _filtering(samples: int, planes: int, geometry: Geometry, knobs: Settings) -> int:
     return samples * planes * (knobs.float_width // 8) + of_frame(geometry, knobs, 3, False)
 
 

@@ -28,7 +28,8 @@ from vcam_cli.spectra import Spectrum
 
 MARGIN = 32
 """Pixels that a chart goes on beyond the array, at least: its far borders are mirrored, and the
-light an Airy pattern throws further than this is below 1 % in any lens worth simulating."""
+light an Airy pattern throws further than this is below 1 % in any lens worth simulating. Never
+more than the array itself: a chart nine times as wide as the picture costs more than it tells."""
 
 
 def view(geometry: Geometry, settings: Settings, oversampling: int) -> View:
@@ -52,7 +53,9 @@ def _margin(geometry: Geometry) -> int:
         sizes = [n + 2 * margin for n in (geometry.rows, geometry.columns)]
         return sum(scipy.fft.next_fast_len(n, real=True) - n for n in sizes)
 
-    return min(range(MARGIN, MARGIN + 33), key=lambda m: (slow(m), m))
+    least = min(MARGIN, max(geometry.rows, geometry.columns))
+    most = least + min(32, least)
+    return min(range(least, most + 1), key=lambda m: (slow(m), m))
 
 
 def responses(camera: Camera, mosaic: Mosaic) -> list[Spectrum]:

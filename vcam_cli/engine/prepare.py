@@ -5,10 +5,7 @@ This is the linear half of the engine in one short function; each line is a modu
 
 from __future__ import annotations
 
-import time as clock
-from collections.abc import Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 from numpy.typing import NDArray
 
@@ -16,27 +13,15 @@ from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.electrical import Electrical, electrical
 from vcam_cli.camera.geometry import Geometry, geometry
 from vcam_cli.effects.base import Charge, Outlook
-from vcam_cli.engine import bandwidth, cost, exposure, memory, optics, plan
+from vcam_cli.engine import bandwidth, cost, exposure, memory, optics, pixelwise, plan
 from vcam_cli.engine.mosaic import Mosaic, mosaic
 from vcam_cli.engine.settings import Settings, settings
+from vcam_cli.engine.stages import Stages
 from vcam_cli.engine.transfer import Transfer
 from vcam_cli.engine.ways import Followed, Optics
 from vcam_cli.errors import bad
 from vcam_cli.scenes.base import SampledScene, WaveScene
 from vcam_cli.scenes.build import build
-
-
-@dataclass
-class Stages:
-    """Seconds that each stage took, in the order in which they ran."""
-
-    seconds: dict[str, float] = field(default_factory=dict)
-
-    @contextmanager
-    def __call__(self, name: str) -> Iterator[None]:
-        start = clock.perf_counter()
-        yield
-        self.seconds[name] = self.seconds.get(name, 0.0) + clock.perf_counter() - start
 
 
 @dataclass(frozen=True)
@@ -78,9 +63,11 @@ def prepare(camera: Camera, picture: NDArray | None, workers: int, stages: Stage
     colors = mosaic(camera)
     needed = memory.of_frame(g, knobs, len(colors.colors), bool(camera.quality))
     memory.require(needed, g)
+    stages.watch.expect(cost.at_first_sight(camera, g, colors, knobs, workers))
 
     def scene_at(oversampling: int) -> WaveScene | SampledScene:
-        return build(camera.scene, optics.view(g, knobs, oversampling), picture)
+        view = optics.view(g, knobs, oversampling)
+        return build(camera.scene, view, picture, camera.display.primaries)
 
     with stages("scene"):
         scene = scene_at(bandwidth.first_guess(g, knobs))
@@ -89,17 +76,25 @@ def prepare(camera: Camera, picture: NDArray | None, workers: int, stages: Stage
         both = _transfer(camera, g, knobs, (*scene.spectra, scene.white), colors, effects)
         transfer = replace(both, weights=both.weights[:-1])
         white_rate = both.level[-1]
-        found = optics.photo_rate(Optics(transfer, g, knobs, colors, effects, workers), scene_at)
+        _refuse_too_much(float(white_rate.max()))
+        ceiling = exposure.ceiling(camera, float(white_rate.max()), e.saturation)
+        light = Optics(transfer, g, knobs, colors, effects, workers, ceiling)
+        found = optics.photo_rate(light, scene_at)
     with stages("exposure"):
         rate, white = found.values, float(white_rate.max())
         dark = sum(x.rate() for x in plan.wanted(camera, g) if isinstance(x, Charge))
         time = exposure.exposure_time(camera, rate, white, dark, e.saturation)
         peak = (float(rate.max()) + dark) * time
+        _refuse_too_much(max(peak, white * time))
+        needed = max(needed, memory.of_followed(found.spectrum, g, knobs))
         outlook = Outlook(full_signal=max(1.0, min(e.full_well, peak)), time=time)
-        decided = plan.make(camera, g, knobs, outlook, needed, found.spectrum.changes)
+        here = pixelwise.changes(rate, g, plan.wanted(camera, g), effects, time)
+        decided = plan.make(camera, g, knobs, outlook, needed, found.spectrum.changes | here)
         core = decided.seconds + cost.linear(g, colors, found.spectrum)
         core += cost.after(camera, g, colors)
+        core += cost.irradiance(camera, g, knobs, found.spectrum)
         decided = replace(decided, seconds=core * cost.slowness() / cost.threads(workers))
+        stages.watch.expect(decided.seconds)
     return Prepared(
         camera=camera,
         geometry=g,
@@ -114,6 +109,19 @@ def prepare(camera: Camera, picture: NDArray | None, workers: int, stages: Stage
         exposure_time=time,
         plan=decided,
     )
+
+
+MOST_ELECTRONS = 1e25
+"""More than any pixel ever meets, and far from where 32-bit numbers end."""
+
+
+def _refuse_too_much(electrons: float) -> None:
+    if not electrons < MOST_ELECTRONS:
+        raise bad(
+            "scene",
+            f"light and dark current would make {electrons:.3g} electrons in a pixel",
+            "look for a wrong unit in the light level, the dark current or the exposure",
+        )
 
 
 def _transfer(camera, g, knobs, spectra, colors, effects) -> Transfer:

@@ -47,7 +47,7 @@ class Settings:
 DRAFT = Settings(20e-9, 1, 4, 1 << 14, 2e-3, 32)
 STANDARD = Settings(10e-9, 2, 12, 1 << 15, 5e-4, 32)
 FINE = Settings(10e-9, 2, 16, 1 << 16, 2e-4, 32)
-REFERENCE = Settings(2.5e-9, 4, 24, 1 << 15, 1e-7, 64)
+REFERENCE = Settings(2.5e-9, 4, 16, 1 << 15, 1e-5, 64)
 
 LADDER = ((0.02, DRAFT), (0.005, STANDARD), (0.001, FINE), (0.0, REFERENCE))
 """Settings for tolerances from the first number of each rung up."""
@@ -57,7 +57,8 @@ def settings(camera: Camera) -> Settings:
     """Settings for the camera's tolerance, with the knobs that its file sets itself."""
     accuracy = camera.accuracy
     chosen = next(s for least, s in LADDER if accuracy.tolerance >= least)
-    chosen = replace(chosen, tolerance=accuracy.tolerance)
+    mixing = min(chosen.mixing_tolerance, accuracy.tolerance / 10)
+    chosen = replace(chosen, tolerance=accuracy.tolerance, mixing_tolerance=mixing)
     if camera.scene.wavelengths.step is not None:
         chosen = replace(chosen, wavelength_step=camera.scene.wavelengths.step)
     knobs = accuracy.knobs

@@ -136,10 +136,12 @@ class Tables:
 
 
 EXACT_ENTRIES = 4097
-"""Entries that are computed; more are interpolated between them, to 1e-6 of the level."""
+"""Entries that are computed in 32-bit work; more are interpolated between them, to 1e-6."""
 
 
-def tabulate(exact: Transfer, top: float, size: int, tolerance: float) -> Tables:
+def tabulate(
+    exact: Transfer, top: float, size: int, tolerance: float, computed: int = EXACT_ENTRIES
+) -> Tables:
     """Tables of `exact` up to frequency `top` [cycles/m], with `size` entries.
 
     Where the scene has more components than colors can tell apart, the components are replaced
@@ -148,9 +150,9 @@ def tabulate(exact: Transfer, top: float, size: int, tolerance: float) -> Tables
     """
     mix, error = _mixtures(exact, top, tolerance)
     mixed, grid = exact.mixed(mix), np.linspace(0, top, size)
-    if size <= EXACT_ENTRIES:
+    if size <= computed:
         return Tables(mix, mixed.at(grid), top, error)
-    coarse = np.linspace(0, top, EXACT_ENTRIES)
+    coarse = np.linspace(0, top, computed)
     values = mixed.at(coarse)
     fine = [[np.interp(grid, coarse, row) for row in color] for color in values]
     return Tables(mix, np.array(fine), top, error)

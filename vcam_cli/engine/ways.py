@@ -20,9 +20,11 @@ from vcam_cli.engine import bandwidth, memory, sampling
 from vcam_cli.engine.axis import Axis
 from vcam_cli.engine.mosaic import Mosaic
 from vcam_cli.engine.settings import Settings
-from vcam_cli.engine.transfer import Tables, Transfer, tabulate
+from vcam_cli.engine.transfer import EXACT_ENTRIES, Tables, Transfer, tabulate
 from vcam_cli.scenes.base import SampledScene, Wave, WaveScene
 
+SINGLE = 5e-7
+"""Error of transforms of 32-bit numbers, relative to the brightest sample."""
 Rows = Callable[[slice], NDArray]
 """From array rows to one color's signal there, (rows, columns) [electrons / s]."""
 
@@ -38,6 +40,8 @@ class Optics:
     mosaic: Mosaic
     effects: tuple[Effect, ...]
     workers: int
+    ceiling: float = np.inf
+    """Rate at which a pixel fills up, as far as it is known; brighter ones all look alike [e/s]."""
 
     @property
     def separable(self) -> list[SeparableTransfer]:
@@ -88,14 +92,15 @@ def waves(optics: Optics, scene: WaveScene) -> tuple[list[Rows], Followed]:
         return total
 
     changes = {}
+    some = slice(None, None, max(1, len(y) // 64))
     for effect in optics.effects:
         if isinstance(effect, RadialTransfer | SeparableTransfer):
             others = tuple(e for e in optics.effects if e is not effect)
-            differences = [
-                _wave_level(optics, wave, others) - part[0]
-                for wave, part in zip(scene.waves, parts, strict=True)
-            ]
-            changes[effect.name] = float(np.sqrt((np.square(differences) / 2).sum(axis=0)).max())
+            total = np.zeros((len(optics.mosaic.colors), len(y[some]), len(x)))
+            for wave, (level, ex, ey) in zip(scene.waves, parts, strict=True):
+                difference = _wave_level(optics, wave, others) - level
+                total += difference[:, None, None] * (ey[some, None] * ex[None, :]).real
+            changes[effect.name] = float(np.sqrt(np.square(total).mean(axis=(1, 2)).max()))
     return [partial(values, c) for c in range(len(optics.mosaic.colors))], Followed(changes=changes)
 
 
@@ -134,12 +139,16 @@ def cosines(
     knobs, g, cutoff = optics.settings, optics.geometry, optics.transfer.cutoff
     widest = min(knobs.most_oversampling, bandwidth.limit(g, cutoff))
     top = bandwidth.top(g, widest, cutoff)
-    tables = tabulate(optics.transfer, top, knobs.table_size, knobs.mixing_tolerance)
+    computed = EXACT_ENTRIES if knobs.float_width == 32 else knobs.table_size
+    tables = tabulate(optics.transfer, top, knobs.table_size, knobs.mixing_tolerance, computed)
     oversampling = bandwidth.first_guess(g, knobs)
     while True:
         memory.require(memory.of_planes(scene, len(tables.mix), g, knobs), g)
         planes = scene.planes(tables.mix, optics.workers)
-        budget = bandwidth.SHARE * knobs.tolerance * bandwidth.peak(planes, tables)
+        peak = min(bandwidth.peak(planes, tables), optics.ceiling)
+        budget = bandwidth.SHARE * knobs.tolerance * peak
+        if bandwidth.brightest(planes, tables) * SINGLE > budget:
+            planes = planes.astype(np.float64)
         coefficients = sampling.spectrum(planes, optics.workers)
         if scene.samples == "squares":
             spread = _spread(optics, scene, _filter(optics, scene, tables, widest), coefficients)
@@ -214,7 +223,11 @@ def _density(optics: Optics, scene: SampledScene) -> float:
 def _changes(
     optics: Optics, scene: SampledScene, chosen: sampling.Filter, coefficients: NDArray
 ) -> Iterator[tuple[str, float]]:
-    """Rms change of the signal by leaving out each transfer, by Parseval's theorem."""
+    """Rms change of the signal by leaving out each transfer, by Parseval's theorem.
+
+    As if all of it lay on the array and none in the margin: an upper bound.
+    """
+    density = _density(optics, scene)
     for effect in optics.effects:
         if isinstance(effect, RadialTransfer):
             power = chosen.without(effect, optics.transfer).power(coefficients)[1]
@@ -222,7 +235,7 @@ def _changes(
             power = chosen.without_separable(effect, coefficients)
         else:
             continue
-        yield effect.name, float(np.sqrt(power.sum(axis=1).max()))
+        yield effect.name, float(np.sqrt(density * power.sum(axis=1).max()))
 
 
 def _passes(optics: Optics, frequency: NDArray) -> NDArray:

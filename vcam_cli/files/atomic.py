@@ -16,12 +16,12 @@ from vcam_cli.errors import CannotDo
 STAGING = ".vcam-new"  # folder where a run's files wait to appear together (see `folder`)
 
 _REASONS = {
-    errno.ENOSPC: ("the disk is full", "free some space, or choose another folder with --out"),
-    errno.EDQUOT: ("the disk quota is used up", "free some space, or choose another --out"),
-    errno.EFBIG: ("the file grew larger than is allowed here", "choose another folder with --out"),
-    errno.EACCES: ("permission denied", "choose a folder you may write to with --out"),
-    errno.EPERM: ("not permitted", "choose a folder you may write to with --out"),
-    errno.EROFS: ("the file system is read-only", "choose another folder with --out"),
+    errno.ENOSPC: ("the disk is full", "free some space, or choose another folder"),
+    errno.EDQUOT: ("the disk quota is used up", "free some space, or choose another folder"),
+    errno.EFBIG: ("the file grew larger than is allowed here", "choose another folder"),
+    errno.EACCES: ("permission denied", "choose a folder you may write to"),
+    errno.EPERM: ("not permitted", "choose a folder you may write to"),
+    errno.EROFS: ("the file system is read-only", "choose another folder"),
 }
 
 
@@ -50,9 +50,12 @@ def write_whole(path: Path | str) -> Iterator[Path]:
 
 
 def write_text(path: Path | str, text: str) -> None:
-    """Writes `text` as UTF-8 with line feeds, whole or not at all. Raises CannotDo."""
+    """Writes `text` as UTF-8 with line feeds, whole or not at all. Raises CannotDo.
+
+    Bytes of a file's name that are no text become escapes, which JSON understands.
+    """
     with write_whole(path) as temporary:
-        temporary.write_text(text, encoding="utf-8", newline="\n")
+        temporary.write_text(text, "utf-8", "backslashreplace", newline="\n")
 
 
 def flush_folder(folder: Path) -> None:
@@ -63,7 +66,7 @@ def flush_folder(folder: Path) -> None:
 
 def cannot_write(path: Path | str, error: OSError) -> CannotDo:
     """The CannotDo that tells why `path` cannot be written and what would help."""
-    default = (error.strerror or str(error), "choose another folder with --out")
+    default = (error.strerror or str(error), "choose another folder")
     reason, remedy = _REASONS.get(error.errno or 0, default)
     return CannotDo(f"cannot write {shown(path)}: {reason}", remedy)
 

@@ -63,6 +63,7 @@ class OutputFolder:
 
     def __enter__(self) -> Self:
         try:
+            str(self.path).encode("utf-8")  # the libraries that write pictures take no other names
             self._refuse_foreign(before_lock=True)
             self._make_and_lock()
             self._refuse_foreign()
@@ -71,7 +72,9 @@ class OutputFolder:
             self._leave()
             raise self._no_folder(error) from error
         except ValueError as error:  # a NUL, or no text of this system
-            raise bad("--out", f"{self.path} is no folder name ({error})") from error
+            reason = "is not UTF-8" if isinstance(error, UnicodeError) else f"({error})"
+            message = f"{self.path} is no folder name: {reason}"
+            raise bad("--out", message, "choose another folder") from error
         except BaseException:
             self._leave()
             raise
@@ -100,18 +103,28 @@ class OutputFolder:
             self._new.append(name)
         return path
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The new files' names, in the order in which they were asked for."""
+        return tuple(self._new)
+
     def finish(self, report: Mapping[str, Any]) -> None:
         """Replaces the previous run's files by the new ones, then writes the record.
 
         The record is `report` with `program` and `files` (names of the new files) added.
-        Every name asked of `new` must have been written. Raises CannotDo.
+        Every name asked of `new` must have been written. Raises CannotDo, and BadInput when
+        something has come into the way of a file; then nothing is removed.
         """
         names = sorted(self._new)
+        for name in names:
+            self._check_new(name)
         text = to_json({**report, "program": PROGRAM, "files": names})
         try:
             record = self.path / STAGING / self._record
             record.parent.mkdir(exist_ok=True)
             write_text(record, text)
+            for name in names:  # all are there: else nothing is removed
+                (self.path / STAGING / name).stat()
             self._write_journal(sorted({*names, *self._previous}))
             self._remove([self._record, *sorted(self._previous - set(names))])
             for name in [*names, self._record]:
@@ -142,7 +155,7 @@ class OutputFolder:
             with suppress(FileNotFoundError):
                 if self._try_lock():
                     return
-        raise CannotDo(f"{self.path} cannot be locked", "choose another folder with --out")
+        raise CannotDo(f"{self.path} cannot be locked", "choose another folder")
 
     def _make(self) -> None:
         for folder in [*reversed(self.path.parents), self.path]:
@@ -197,9 +210,8 @@ class OutputFolder:
             raise ValueError(f"{name!r} is no name for a file of a run")
         self._protect_inputs([name])
         target = self.path / name
-        if (os.path.lexists(target) and name not in self._previous) or not _real_parents(
-            self.path, name
-        ):
+        ours = name in self._previous and (target.is_symlink() or not target.is_dir())
+        if (os.path.lexists(target) and not ours) or not _real_parents(self.path, name):
             raise bad(
                 "--out",
                 f"{target} is there already and was not written by vcam",
@@ -282,7 +294,7 @@ def _flock(lock: int, folder: Path) -> None:
     except BlockingIOError:
         raise CannotDo(
             f"folder in use: another run is writing {folder}",
-            "wait for it, or choose another folder with --out",
+            "wait for it, or choose another folder",
         ) from None
     except OSError as error:
         if error.errno not in _NO_LOCKS_HERE:  # some cluster file systems have none

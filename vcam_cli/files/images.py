@@ -8,6 +8,7 @@ and refuse what is no picture of light (CMYK, CIELAB, NaN, negative values).
 
 import os
 import stat
+import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -55,14 +56,21 @@ class _Unusable(Exception):
 
 
 def read_picture(
-    path: Path | str, encoding: str, white: float, yaml_path: tuple[str | int, ...] | str
+    path: Path | str,
+    encoding: str,
+    white: float,
+    yaml_path: tuple[str | int, ...] | str,
+    channels: tuple[str, ...] = _RGB,
+    signed: bool = False,
 ) -> Picture:
     """Reads an image file as linear light divided by `white`.
 
     `encoding` is "srgb" (decoded by IEC 61966-2-1) or "linear". Integer samples run from 0 to 1
     = the largest code; `white` is the linear value that becomes 1. Orientation tags are obeyed.
     Alpha is dropped (color values stay as stored); the first of several parts is
-    read; both leave a note, as does anything else left aside.
+    read; both leave a note, as does anything else left aside. `channels`: the names of the color
+    channels; others than R, G, B must be there by name. `signed`: values below 0 are allowed, as
+    colors outside a display's gamut have them.
 
     Raises BadInput (with `yaml_path`) for a file that is missing, no regular file, no image,
     truncated, of a kind that is no light, with two color channels, negative or not finite;
@@ -71,10 +79,28 @@ def read_picture(
     if encoding not in ("srgb", "linear") or not white > 0:
         raise ValueError(f"encoding {encoding!r}, white {white!r}")
     path = Path(path)
-    try:
+    with _told(path, yaml_path):
         _check_file(path)
         with _opened(path) as source:
-            return _read(source, encoding == "srgb", white)
+            return _read(source, encoding == "srgb", white, channels, signed)
+
+
+def color_channels(
+    path: Path | str, yaml_path: tuple[str | int, ...] | str, channels: tuple[str, ...] = _RGB
+) -> int:
+    """How many channels `read_picture` would give, by the header alone, and raising the same."""
+    path = Path(path)
+    with _told(path, yaml_path):
+        _check_file(path)
+        with _opened(path) as source:
+            return len(_header(source.spec(), channels)[0])
+
+
+@contextmanager
+def _told(path: Path, yaml_path: tuple[str | int, ...] | str) -> Iterator[None]:
+    """Turns what can be wrong with a file into BadInput and CannotDo."""
+    try:
+        yield
     except _Unusable as error:
         raise bad(yaml_path, f"{path}: {error.reason}", error.remedy) from None
     except PermissionError:
@@ -112,20 +138,39 @@ def _check_file(path: Path) -> None:
     if status.st_size == 0:
         raise _Unusable("the file is empty", "give a whole image file")
     with open(path, "rb") as file:
-        if file.read(8) == _PNG_START and not _png_ends(file, status.st_size):
+        if file.read(8) == _PNG_START and not _png_is_whole(file, status.st_size):
             raise _truncated()
 
 
-def _png_ends(file: Any, size: int) -> bool:
-    """Whether the chunks of a PNG reach IEND (libpng would print its own complaint)."""
+def _png_is_whole(file: Any, size: int) -> bool:
+    """Whether a PNG's chunks reach IEND unharmed (libpng would print its own complaint).
+
+    Those that it can do without may be damaged: their name begins with a small letter.
+    """
     place = len(_PNG_START)
     while place + 12 <= size:
         file.seek(place)
         head = file.read(8)
         if head[4:] == b"IEND":
             return True
-        place += 12 + int.from_bytes(head[:4], "big")
+        length = int.from_bytes(head[:4], "big")
+        place += 12 + length
+        if place > size:
+            return False
+        if head[4:5].isupper() and not _check_sum_holds(file, head[4:], length):
+            return False
     return False
+
+
+def _check_sum_holds(file: Any, name: bytes, length: int) -> bool:
+    """Whether the CRC-32 of a PNG's chunk, whose data comes next in the file, is the one stored."""
+    found = zlib.crc32(name)
+    while length > 0:
+        part = file.read(min(length, 1 << 20))
+        found, length = zlib.crc32(part, found), length - len(part)
+        if not part:
+            return False
+    return found == int.from_bytes(file.read(4), "big")
 
 
 @contextmanager
@@ -145,21 +190,27 @@ def _opened(path: Path) -> Iterator[Any]:
         message(source.geterror)
 
 
-def _read(source: Any, srgb: bool, white: float) -> Picture:
+def _read(source: Any, srgb: bool, white: float, wanted: tuple[str, ...], signed: bool) -> Picture:
     spec = source.spec()
-    _check_kind(spec)
-    chosen, notes = _choose_channels(tuple(spec.channelnames), spec.alpha_channel)
-    _check_size(spec, len(chosen))
+    chosen, notes = _header(spec, wanted)
     data, more = _samples(source, spec, chosen)
     if source.seek_subimage(1, 0):
         more.append("only the first of several images in the file is used")
     message(source.geterror)
     if source.format_name() == "openexr":
         data = _on_display_window(data, spec, more)
-    light = _linear(data, srgb, white)
+    light = _linear(data, srgb, white, signed)
     light = np.ascontiguousarray(_upright(light, spec, more))
     names = tuple(spec.channelnames[index] for index in chosen)
     return Picture(light, names, (*notes, *more, *_remarks(spec)))
+
+
+def _header(spec: Any, wanted: tuple[str, ...]) -> tuple[tuple[int, ...], tuple[str, ...]]:
+    """Indices of the channels to read, and notes; _Unusable for what is no picture of light."""
+    _check_kind(spec)
+    chosen, notes = _choose_channels(tuple(spec.channelnames), spec.alpha_channel, wanted)
+    _check_size(spec, len(chosen))
+    return chosen, notes
 
 
 def _check_kind(spec: Any) -> None:
@@ -177,12 +228,19 @@ def _check_kind(spec: Any) -> None:
         raise _Unusable("is a TIFF where white is 0, with more than 8 bits")  # not turned by OIIO
 
 
-def _choose_channels(names: tuple[str, ...], alpha: int) -> tuple[tuple[int, ...], tuple[str, ...]]:
-    """Indices of the gray or the R, G, B channels, and notes on what is dropped."""
+def _choose_channels(
+    names: tuple[str, ...], alpha: int, wanted: tuple[str, ...]
+) -> tuple[tuple[int, ...], tuple[str, ...]]:
+    """Indices of the gray or the wanted channels, and notes on what is dropped."""
     upper = [name.upper() for name in names]
     color = [i for i, name in enumerate(upper) if name not in _ALPHA and i != alpha]
-    if all(name in upper for name in _RGB):
-        chosen = tuple(upper.index(name) for name in _RGB)
+    if all(name in upper for name in wanted):
+        chosen = tuple(upper.index(name) for name in wanted)
+    elif wanted != _RGB:
+        shown = ", ".join(names) or "none"
+        raise _Unusable(
+            f"has no channels {', '.join(wanted)} but {shown}", "name the channels of the file so"
+        )
     elif len(color) == 1:
         chosen = (color[0],)
     elif "Y" in upper and not {"RY", "BY"} & set(upper) and len(color) != 2:
@@ -249,7 +307,7 @@ def _on_display_window(data: np.ndarray, spec: Any, notes: list[str]) -> np.ndar
     return window
 
 
-def _linear(data: np.ndarray, srgb: bool, white: float) -> np.ndarray:
+def _linear(data: np.ndarray, srgb: bool, white: float, signed: bool) -> np.ndarray:
     """Samples -> linear light / white, float32: by table up to 16 bits, else block by block."""
     if data.dtype.kind == "u" and data.dtype.itemsize <= 2:
         code = np.arange(np.iinfo(data.dtype).max + 1) / np.iinfo(data.dtype).max
@@ -259,14 +317,14 @@ def _linear(data: np.ndarray, srgb: bool, white: float) -> np.ndarray:
     light = np.empty(data.shape, np.float32)
     for row in range(0, len(data), _BLOCK):
         block = data[row : row + _BLOCK]
-        _check_values(block, row)
+        _check_values(block, row, signed)
         code = block.astype(np.float64) / full
         light[row : row + _BLOCK] = (decode_srgb(code) if srgb else code) / white
     return light
 
 
-def _check_values(block: np.ndarray, row: int) -> None:
-    wrong = ~(np.isfinite(block) & (block >= 0))
+def _check_values(block: np.ndarray, row: int, signed: bool) -> None:
+    wrong = ~(np.isfinite(block) & ((block >= 0) | signed))
     if wrong.any():
         y, x, channel = np.argwhere(wrong)[0]
         value = block[y, x, channel]

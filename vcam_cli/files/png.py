@@ -21,14 +21,18 @@ _SAMPLES = {np.dtype(np.uint8): "uint8", np.dtype(np.uint16): "uint16"}
 class PngWriter:
     """Context that writes a PNG progressively; `shape` is (h, w), (h, w, 1) or (h, w, 3).
 
-    `dtype` is uint8 or uint16. Every row must be written, in order. The file appears under its
-    name, whole, when the context ends without an error.
+    `description` is a text in the file. `dtype` is uint8 or uint16. Every row must be written,
+    in order. The file appears under its name, whole, when the context ends without an error.
 
     Raises CannotDo (disk full, permission), ValueError for misuse.
     """
 
     def __init__(
-        self, path: Path | str, shape: Sequence[int], dtype: type | np.dtype = np.uint8
+        self,
+        path: Path | str,
+        shape: Sequence[int],
+        dtype: type | np.dtype = np.uint8,
+        description: str = "",
     ) -> None:
         height, width, channels = (*shape, 1) if len(shape) == 2 else shape
         self._dtype = np.dtype(dtype)
@@ -41,6 +45,7 @@ class PngWriter:
                 "png:compressionLevel": 1,
                 "png:filter": SUB_FILTER,
                 "oiio:ColorSpace": "srgb_rec709_scene",
+                **({"ImageDescription": description} if description else {}),
             },
         )
         self._writer = RowWriter(path, "png", spec, _is_whole)
@@ -64,9 +69,9 @@ class PngWriter:
         self._writer.write(first_row, block[:, :, None] if block.ndim == 2 else block)
 
 
-def write_png(path: Path | str, image: np.ndarray) -> None:
+def write_png(path: Path | str, image: np.ndarray, description: str = "") -> None:
     """Writes a uint8 or uint16 array (h, w) or (h, w, 3) of sRGB codes. See `PngWriter`."""
-    with PngWriter(path, image.shape, image.dtype) as writer:
+    with PngWriter(path, image.shape, image.dtype, description) as writer:
         writer.write_rows(0, image)
 
 

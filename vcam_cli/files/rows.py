@@ -105,7 +105,7 @@ class RowWriter:
             if shutil.disk_usage(self._path.parent).free < _FULL:
                 return cannot_write(self._path, OSError(errno.ENOSPC, "disk full"))
         text = f"cannot write {shown(self._path)}: {reason or 'the write failed'}"
-        return CannotDo(text, "free some disk space, or choose another folder with --out")
+        return CannotDo(text, "free some disk space, or choose another folder")
 
 
 def image_spec(height: int, width: int, channels: int, sample: str) -> oiio.ImageSpec:

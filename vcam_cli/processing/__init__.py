@@ -4,7 +4,9 @@ A raw frame (rows, columns) [DN] goes in; linear display RGB, in which the scene
 is 1, comes out, and from it the codes of the render.
 """
 
-from vcam_cli.processing.base import Context
-from vcam_cli.processing.steps import Processed, check, process
+from vcam_cli.processing.base import Context, Patches
+from vcam_cli.processing.check import check
+from vcam_cli.processing.processed import Processed
+from vcam_cli.processing.steps import process
 
-__all__ = ["Context", "Processed", "check", "process"]
+__all__ = ["Context", "Patches", "Processed", "check", "process"]

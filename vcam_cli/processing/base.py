@@ -16,10 +16,27 @@ from typing import Protocol, TypeVar
 
 import numpy as np
 
+from vcam_cli.spectra import Spectrum
+
 BLOCK_ROWS = 64
 
 Pattern = tuple[tuple[str, ...], ...]
 Result = TypeVar("Result")
+
+
+@dataclass(frozen=True)
+class Patches:
+    """A ColorChecker in the light of the scene.
+
+    dn: (C, 24) [DN] what each patch would give on axis in each color, as `Context.white_dn`.
+    light: spectral radiance of the scene's perfect white, any scale; start, stop: the wavelengths
+        simulated [m].
+    """
+
+    dn: np.ndarray
+    light: Spectrum
+    start: float
+    stop: float
 
 
 @dataclass(frozen=True)
@@ -31,12 +48,18 @@ class Context:
     white_dn: (C,) [DN] what the scene's perfect white would give on axis in each color, free
         of noise, black included, not clipped.
     black_dn: [DN] mean dark signal and offset.
+    linearize: the codes of a linear ADC [DN] for those of this one; None where it is linear.
+    saturated_dn: [DN] from which on a pixel is saturated.
+    patches: gives the ColorChecker as this camera sees it; called only where a step asks for it.
     """
 
     pattern: Pattern
     colors: tuple[str, ...]
     white_dn: np.ndarray
     black_dn: float
+    linearize: Callable[[np.ndarray], np.ndarray] | None = None
+    saturated_dn: float = np.inf
+    patches: Callable[[], Patches] | None = None
 
     @property
     def mosaic(self) -> bool:

@@ -1,12 +1,15 @@
-"""White balance: one gain for each color.
+"""White balance: one gain for each color. (`bright_block` has a method of its own.)
 
 Gray world: the average of a scene is taken to be gray, so each color is multiplied until all
 means are equal (G. Buchsbaum, "A spatial processor model for object colour perception",
 J. Franklin Institute 310(1), 1980, doi:10.1016/0016-0032(80)90058-7).
 
-Why every pixel counts, saturated ones too: that is the classical definition, and the means of
-the picture that comes out are then equal exactly. Dropping the saturated pixels of one color
-would bias its mean against the others, whose pixels at that place would stay in.
+Illuminant: the light is known here, so the color of a perfect white is known; each color is
+multiplied until white is gray. What the other methods guess, and the best they can reach.
+
+Why every pixel counts in gray world, saturated ones too: that is the classical definition, and
+the means of the picture that comes out are then equal exactly. Dropping the saturated pixels of
+one color would bias its mean against the others, whose pixels at that place would stay in.
 """
 
 from dataclasses import dataclass
@@ -34,6 +37,11 @@ def gray_world(means: np.ndarray, white: float) -> np.ndarray:
     seen = means > FAINT * largest
     gains[seen] = largest / means[seen]
     return gains
+
+
+def illuminant(white: np.ndarray) -> np.ndarray:
+    """Gains (C,) that make a perfect white gray; white: (C,) its signal above black."""
+    return gray_world(white, float(np.max(white)))
 
 
 def color_sums(block: Block, context: Context) -> np.ndarray:

@@ -135,6 +135,11 @@ class Chart(ABC):
     `mix` is (R, K), and its dtype is that of the result.
     """
 
+    @property
+    def coarsest_cell(self) -> float:
+        """Largest cells [m] that it is painted on; larger ones are painted in parts."""
+        return math.inf
+
     @abstractmethod
     def paint(self, x_edges: Array, y_edges: Array, mix: Array, out: Array) -> None:
         """Writes the averages over the cells between the edges into out (R, ny, nx)."""
@@ -162,6 +167,15 @@ class ChartScene(SampledScene):
 
     def planes(self, mix: Array, workers: int = 1) -> Array:
         ny, nx = self.shape
+        parts = math.ceil(max(self.pitch_x, self.pitch_y) / self.chart.coarsest_cell)
+        if parts > 1:
+            finer = replace(
+                self,
+                shape=(ny * parts, nx * parts),
+                pitch_x=self.pitch_x / parts,
+                pitch_y=self.pitch_y / parts,
+            ).planes(mix, workers)
+            return finer.reshape(len(mix), ny, parts, nx, parts).mean(axis=(2, 4))
         x_edges, y_edges = cell_edges(nx, self.pitch_x), cell_edges(ny, self.pitch_y)
         out = np.empty((len(mix), ny, nx), self.dtype)
         mix = np.asarray(mix, self.dtype)

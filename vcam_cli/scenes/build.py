@@ -2,7 +2,18 @@
 
 from vcam_cli.camera import scene as models
 from vcam_cli.errors import BadInput, bad
-from vcam_cli.scenes import colorchecker, dead_leaves, light, sinusoid, uniform
+from vcam_cli.scenes import (
+    colorchecker,
+    dead_leaves,
+    eye_chart,
+    hdr_patches,
+    light,
+    point_grid,
+    siemens_star,
+    sinusoid,
+    step_wedge,
+    uniform,
+)
 from vcam_cli.scenes.base import (
     Array,
     Chart,
@@ -18,15 +29,18 @@ from vcam_cli.scenes.image import image_scene
 from vcam_cli.scenes.sinusoid import WaveChart
 from vcam_cli.scenes.slanted_edge import SlantedEdge
 from vcam_cli.scenes.still_life import WithColorChecker
-from vcam_cli.spectra import Spectrum
+from vcam_cli.spectra import Spectrum, srgb_reflectances
 
 SOURCE = ("scene", "source")
 
 
-def build(scene: models.Scene, view: View, picture: Array | None) -> WaveScene | SampledScene:
+def build(
+    scene: models.Scene, view: View, picture: Array | None, primaries: str = "crt-brainard"
+) -> WaveScene | SampledScene:
     """The scene as the engine needs it.
 
     picture: for an image source the decoded file, (h, w, channels), linear, 1 = its white.
+    primaries: of the display that shows it (`display.primaries`), for the model rgb-display.
 
     Raises BadInput for a picture whose channels do not suit the model, for a light level that the
     lamp cannot give, and for sources that are not built.
@@ -35,7 +49,7 @@ def build(scene: models.Scene, view: View, picture: Array | None) -> WaveScene |
     if isinstance(source, models.ImageFile):
         if picture is None:
             raise ValueError("an image source needs its decoded picture")
-        return _image(scene, source.model, view, picture)
+        return _image(scene, source.model, view, picture, primaries)
     white = light.white_radiance(scene)
     waves = _waves(source)
     if waves is not None:
@@ -79,33 +93,66 @@ def _chart(source: object, view: View) -> tuple[Chart, tuple[Spectrum, ...]]:
                 return leaves, dead_leaves.reflectances()
             card = colorchecker.of_height(source.colorchecker, frame)
             return WithColorChecker(leaves, card), colorchecker.reflectances()
+        case models.StepWedge():
+            return step_wedge.step_wedge(source.steps, source.density_range, frame), gray
+        case models.SiemensStar():
+            return siemens_star.SiemensStar(source.spokes, source.contrast), gray
+        case models.PointGrid():
+            return point_grid.PointGrid(source.spacing, source.diameter), gray
+        case models.EyeChart():
+            return eye_chart.eye_chart(source.rows, frame), gray
+        case models.HdrPatches():
+            return hdr_patches.hdr_patches(
+                source.patches, source.dynamic_range, source.lamp, frame
+            ), gray
     raise bad(SOURCE, "this source is not supported yet", "use another chart, or an image")
 
 
-def _image(scene: models.Scene, model: str, view: View, picture: Array) -> SampledScene:
-    channels = picture.shape[2] if picture.ndim == 3 else 0
-    if model == "reflectance":
-        if channels != 1:
-            raise _wrong_channels(channels, 1)
-        white = light.white_radiance(scene)
-        return image_scene(picture, (white,), white, view)
-    if model == "laser":
-        if channels != 3:
-            raise _wrong_channels(channels, 3)
-        spectra, white = light.laser_white(scene)
-        return image_scene(picture, spectra, white, view)
-    raise bad((*SOURCE, "model"), f"{model} is not supported yet", "write reflectance or laser")
+def _image(
+    scene: models.Scene, model: str, view: View, picture: Array, primaries: str
+) -> SampledScene:
+    check_channels(model, picture.shape[2] if picture.ndim == 3 else 0)
+    spectra, white = _model(scene, model, primaries)
+    return image_scene(picture, spectra, white, view)
 
 
-def _wrong_channels(given: int, needed: int) -> BadInput:
+def _model(
+    scene: models.Scene, model: str, primaries: str
+) -> tuple[tuple[Spectrum, ...], Spectrum]:
+    """Radiance of every channel where it is 1, and of white."""
+    match model:
+        case "laser":
+            return light.laser_white(scene)
+        case "rgb-display":
+            return light.display_white(scene, primaries)
+    white = light.white_radiance(scene)
+    if model == "mallett":
+        return tuple(white.times(color) for color in srgb_reflectances()), white
+    return (white,), white
+
+
+def check_channels(model: str, channels: int) -> None:
+    """Raises BadInput for an image file whose color channels are not what the model needs."""
+    needed = 1 if model == "reflectance" else 3
+    if channels != needed:
+        raise _wrong_channels(model, channels, needed)
+
+
+def _wrong_channels(model: str, given: int, needed: int) -> BadInput:
     if needed == 1 and given == 3:
         return bad(
             (*SOURCE, "model"),
             "reflectance needs one channel, but this image has three",
             "use one of the models for colors (laser, rgb-display, mallett), or a gray image",
         )
+    remedy = f"use an image with channels R, G, B; {model} takes no other"
+    if given == 1:
+        remedy = "write model: reflectance, or use an image with channels R, G, B"
+    elif needed == 1:
+        remedy = "use a gray image"
     return bad(
         (*SOURCE, "file"),
-        f"the image has {given} channels (alpha aside); this model needs {needed}",
-        "use an image of one channel with reflectance, of three with laser",
+        f"the image has {given} channel{'s' if given != 1 else ''} (alpha aside); "
+        f"{model} needs {needed}",
+        remedy,
     )

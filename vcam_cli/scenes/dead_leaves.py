@@ -126,6 +126,11 @@ class DeadLeaves(Chart):
     leaves: Leaves
     unit: float
 
+    @property
+    def coarsest_cell(self) -> float:
+        """Where many leaves share a cell, telling which is seen where takes time and gigabytes."""
+        return self.unit / 1000
+
     def within(self, x_edges: Array, y_edges: Array, hidden: Cells | None = None) -> Laid:
         """The leaves that may be seen on the cells; those of `hidden` are not looked at.
 

@@ -59,7 +59,7 @@ def colored(discs: Discs, cells: Crossed, color: Array) -> Array:
     single = ~several
     pair = np.repeat(several, cells.count)
     front, back = cells.front[~pair], cells.back[single]
-    inside = _cover(discs, front - 1, cells.box[:, single])
+    inside = cover(discs, front - 1, cells.box[:, single])
     for plane, row in zip(out, color, strict=True):
         plane[single] = row[front] * inside + row[back] * (1 - inside)
     if several.any():
@@ -103,7 +103,7 @@ def _resolve(discs: Discs, parts: _Parts, color: Array) -> Array:
         found.append((parts.cell[plain], parts.back[plain], np.full(int(plain.sum()), share)))
         single = crossings[parts.of_part] == 1
         part, front = parts.of_part[single], parts.front[single]
-        inside = share * _cover(discs, front - 1, parts.box[:, part])
+        inside = share * cover(discs, front - 1, parts.box[:, part])
         found.append((parts.cell[part], front, inside))
         found.append((parts.cell[part], parts.back[part], share - inside))
         parts = _keep(parts, crossings > 1)
@@ -169,16 +169,16 @@ def _layered(discs: Discs, parts: _Parts) -> tuple[Array, Array]:
     From the front, a disc is seen in its own share of what those before it leave free: exact
     where the edges are independent. Pairs (p,) and parts (m,).
     """
-    cover = np.minimum(_cover(discs, parts.front - 1, parts.box[:, parts.of_part]), 1 - 1e-12)
-    shade = np.log1p(-cover)
+    share = np.minimum(cover(discs, parts.front - 1, parts.box[:, parts.of_part]), 1 - 1e-12)
+    shade = np.log1p(-share)
     before = np.cumsum(shade) - shade
     first = np.flatnonzero(np.diff(parts.of_part, prepend=-1))
     before -= np.repeat(before[first], np.diff(first, append=len(before)))
     behind = np.exp(np.bincount(parts.of_part, shade, minlength=len(parts.back)))
-    return cover * np.exp(before), behind
+    return share * np.exp(before), behind
 
 
-def _cover(discs: Discs, index: Array, box: Array) -> Array:
+def cover(discs: Discs, index: Array, box: Array) -> Array:
     """The part of each rectangle, 0..1, that lies in its disc: exact."""
     left, right, top, bottom = box
     radius, x, y = discs.radius[index], discs.x[index], discs.y[index]

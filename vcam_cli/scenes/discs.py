@@ -78,6 +78,27 @@ def values(discs: Discs, color: Array, x: Array, y: Array) -> Array:
     return np.stack([np.take(plane, index) for plane in color]).reshape(-1, len(y), len(x))
 
 
+def cover_of_separate(discs: Discs, x_edges: Array, y_edges: Array) -> Array:
+    """The part of every cell that discs cover which do not overlap, exact: (ny, nx)."""
+    shape = len(y_edges) - 1, len(x_edges) - 1
+    spans = _spans(discs, x_edges, y_edges)
+    # whole cells: 1 at the first of a run, -1 behind its last, summed from the left
+    line = spans.row * (shape[1] + 1)
+    ends = np.bincount(line + spans.full_start, minlength=shape[0] * (shape[1] + 1))
+    ends -= np.bincount(line + spans.full_stop, minlength=len(ends))
+    cover = np.cumsum(ends.reshape(shape[0], -1), axis=1)[:, :-1].astype(float)
+    for start, stop in (
+        (spans.touch_start, spans.full_start),
+        (spans.full_stop, spans.touch_stop),
+    ):
+        span, column = members(start, stop)
+        row, disc = spans.row[span], spans.disc[span]
+        box = np.stack([x_edges[column], x_edges[column + 1], y_edges[row], y_edges[row + 1]])
+        part = disc_edges.cover(discs, disc, box)
+        cover += np.bincount(row * shape[1] + column, part, minlength=cover.size).reshape(shape)
+    return cover
+
+
 def visible(discs: Discs, x_edges: Array, y_edges: Array, hidden: Cells | None = None) -> Array:
     """Indices, in order, of the discs that may be seen on a grid: hardly more than are seen.
 

@@ -36,14 +36,28 @@ def place(rows: int, columns: int, view: View) -> Placement:
         return Placement(pitch, _cut(columns, view.width / pitch), _cut(rows, view.height / pitch))
     # A stated size: what lies beyond the array, black or not, is there and is blurred into it.
     pitch = view.scene_width / columns
-    width = view.width + 2 * view.margin * view.pitch_x
-    height = view.height + 2 * view.margin * view.pitch_y
+    width, height = _reach(view)
     return Placement(pitch, _cut(columns, width / pitch), _cut(rows, height / pitch))
 
 
+def _reach(view: View) -> tuple[float, float]:
+    """Width and height of the array and its margin [m]."""
+    width = view.width + 2 * view.margin * view.pitch_x
+    return width, view.height + 2 * view.margin * view.pitch_y
+
+
+def _middle(pitch: float, samples: int, needed: float) -> float:
+    """The pitch of what is needed of the samples kept.
+
+    One or two samples may be far larger than what is needed; they meet in its middle, and all
+    that it sees of them are parts of equal size.
+    """
+    return min(pitch, needed / samples) if samples <= 2 else pitch
+
+
 def _cut(samples: int, needed: float) -> int:
-    """Whole samples beyond `needed` on either side, rounded toward keeping."""
-    return math.floor((samples - needed) / 2 + SLIVER)
+    """Whole samples beyond `needed` on either side, rounded toward keeping; never all of them."""
+    return min(math.floor((samples - needed) / 2 + SLIVER), (samples - 1) // 2)
 
 
 @dataclass(frozen=True)
@@ -95,12 +109,18 @@ def image_scene(
     rows, columns, _ = picture.shape
     placed = place(rows, columns, view)
     top, left = max(placed.cut_y, 0), max(placed.cut_x, 0)
+    shape = rows - 2 * placed.cut_y, columns - 2 * placed.cut_x
+    pitch_x = pitch_y = placed.pitch
+    if view.scene_width is not None:
+        width, height = _reach(view)
+        pitch_x = _middle(pitch_x, shape[1], width)
+        pitch_y = _middle(pitch_y, shape[0], height)
     return ImageScene(
         spectra=spectra,
         white=white,
-        shape=(rows - 2 * placed.cut_y, columns - 2 * placed.cut_x),
-        pitch_x=placed.pitch,
-        pitch_y=placed.pitch,
+        shape=shape,
+        pitch_x=pitch_x,
+        pitch_y=pitch_y,
         samples="squares",
         dtype=view.dtype,
         picture=picture[top : rows - top, left : columns - left],

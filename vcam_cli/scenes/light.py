@@ -10,7 +10,7 @@ import math
 
 from vcam_cli.camera.scene import Scene
 from vcam_cli.errors import bad
-from vcam_cli.spectra import Spectrum, integral, luminance
+from vcam_cli.spectra import Spectrum, display_primaries, integral, luminance
 
 # Dissertation section 2.3.1: an RGB image as three laser lines, in the order of its channels.
 LASER_LINES = (650e-9, 550e-9, 450e-9)
@@ -46,6 +46,20 @@ def laser_white(scene: Scene) -> tuple[tuple[Spectrum, ...], Spectrum]:
     white = at_level(Spectrum(lines=tuple((line, 1.0) for line in LASER_LINES)), scene)
     power = dict(white.lines or ())
     return tuple(Spectrum.line(line, power[line]) for line in LASER_LINES), white
+
+
+def display_white(scene: Scene, primaries: str) -> tuple[tuple[Spectrum, ...], Spectrum]:
+    """The radiances of a display's full red, green and blue, and their sum, the display white.
+
+    primaries: as in `spectra.display_primaries`. The white has the stated level; the share of each
+    primary in it is the display's own.
+    """
+    colors, relative = display_primaries(primaries)
+    try:
+        white = at_level(relative, scene)
+    except ValueError as error:
+        raise bad(("scene", "wavelengths"), str(error), "let them cover 400 to 700 nm") from None
+    return tuple(color.scaled(white.scale / relative.scale) for color in colors), white
 
 
 def at_level(relative: Spectrum, scene: Scene) -> Spectrum:

@@ -21,6 +21,10 @@ class WithColorChecker(Chart):
     leaves: DeadLeaves | Laid
     card: Card
 
+    @property
+    def coarsest_cell(self) -> float:
+        return self.leaves.coarsest_cell
+
     def within(self, x_edges: Array, y_edges: Array) -> "WithColorChecker":
         """The same with only those leaves that may be seen beside the card."""
         if isinstance(self.leaves, Laid):

@@ -22,9 +22,11 @@ from vcam_cli.spectra.standard import (
     LUMINOUS_EFFICACY,
     cmf,
     colorchecker,
+    display_primaries,
     illuminant,
     illuminant_names,
     luminance,
+    srgb_reflectances,
 )
 from vcam_cli.spectra.text import read_csv
 
@@ -38,6 +40,7 @@ __all__ = [
     "Table",
     "cmf",
     "colorchecker",
+    "display_primaries",
     "hat_weights",
     "illuminant",
     "illuminant_names",
@@ -46,4 +49,5 @@ __all__ = [
     "photons",
     "quadrature",
     "read_csv",
+    "srgb_reflectances",
 ]

@@ -1,4 +1,4 @@
-"""Standard spectra: CIE illuminants, the CIE 1931 observer, the ColorChecker.
+"""Standard spectra: CIE illuminants, the CIE 1931 observer, the ColorChecker, display primaries.
 
 They are small files in `vcam_cli/data`, written from colour-science by `scripts/make_tables.py`.
 An illuminant that does not ship is looked up in colour-science, which takes a second to import.
@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from vcam_cli.spectra.integration import integral
-from vcam_cli.spectra.spectrum import Floats, Spectrum, Table
+from vcam_cli.spectra.spectrum import Floats, Outside, Spectrum, Table
 from vcam_cli.spectra.text import read_rows
 
 DATA = Path(__file__).parent.parent / "data"
@@ -94,6 +94,46 @@ def colorchecker() -> tuple[tuple[str, Spectrum], ...]:
         (name, Spectrum(tables=(Table(wavelength, value, "hold"),)))
         for name, value in columns.items()
     )
+
+
+@cache
+def srgb_reflectances() -> tuple[Spectrum, Spectrum, Spectrum]:
+    """The reflectances, 380 to 780 nm, whose mixture has a linear sRGB color under D65.
+
+    They are not negative and add up to 1 (to 1e-5). Held beyond their table. Source: I. Mallett,
+    C. Yuksel, "Spectral primary decomposition for rendering with sRGB reflectance", Eurographics
+    Symposium on Rendering (2019). doi:10.2312/SR.20191216
+    """
+    red, green, blue, _ = _colors_and_sum("srgb-reflectances.csv", "hold")
+    return red, green, blue
+
+
+@cache
+def display_primaries(name: str) -> tuple[tuple[Spectrum, Spectrum, Spectrum], Spectrum]:
+    """Relative spectral power of a display's full red, green and blue, and of its white, their sum.
+
+    crt-brainard: the phosphors of a typical CRT, measured by D. H. Brainard (1997). srgb: many
+    spectra have the colors of sRGB's primaries; these are the smooth ones of `srgb_reflectances`
+    in the light of D65, so that white is D65 itself. Both are 0 outside 380 to 780 nm.
+    ValueError for other names.
+    """
+    if name == "crt-brainard":
+        red, green, blue, white = _colors_and_sum("crt-brainard.csv", "zero")
+    elif name == "srgb":
+        d65 = illuminant("D65")
+        basis = _colors_and_sum("srgb-reflectances.csv", "zero")
+        red, green, blue, white = (d65.times(each) for each in basis)
+    else:
+        raise ValueError(f"{name!r} are no known display primaries; known: crt-brainard, srgb")
+    return (red, green, blue), white
+
+
+def _colors_and_sum(file: str, outside: Outside) -> tuple[Spectrum, ...]:
+    """The red, green and blue of a shipped table, and their sum."""
+    wavelength, columns = _columns(file)
+    colors = [columns[name] for name in ("red", "green", "blue")]
+    every = (*colors, np.sum(colors, axis=0))
+    return tuple(Spectrum(tables=(Table(wavelength, value, outside),)) for value in every)
 
 
 def luminance(spectral_radiance: Spectrum, start: float, stop: float) -> float:

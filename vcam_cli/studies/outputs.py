@@ -19,12 +19,16 @@ import numpy as np
 import vcam_cli
 from vcam_cli.camera import shipped
 from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.electrical import Electrical
 from vcam_cli.camera.load import FILE_KEYS
 from vcam_cli.camera.support import spectra
+from vcam_cli.engine import irradiance
 from vcam_cli.files.exr import ExrWriter
 from vcam_cli.files.folder import OutputFolder
+from vcam_cli.files.maps import write_map
 from vcam_cli.files.png import write_png
 from vcam_cli.files.report import hash_file, hash_text, to_json
+from vcam_cli.files.spectral import write_spectral
 from vcam_cli.files.tables import write_metrics
 from vcam_cli.rng import BLOCK_ROWS
 from vcam_cli.studies.simulate import Result
@@ -42,10 +46,34 @@ def write(result: Result, folder: OutputFolder) -> None:
         jobs.append(lambda: write_png(folder.new("render.png"), render))
     if camera.quality:
         jobs.append(lambda: _ideal(result, folder.new("ideal.exr")))
+    if "s-cielab" in camera.quality:
+        jobs.append(lambda: write_map(folder.new("delta_e.png"), result.s_cielab))
     with result.stages("files"), ThreadPoolExecutor(2) as pool:
         for done in [pool.submit(job) for job in jobs]:
             done.result()
+    if camera.output.irradiance:
+        with result.stages("irradiance"):
+            _irradiance(result, folder.new("irradiance.exr"))
     write_metrics(folder.new("metrics.csv"), metrics)
+
+
+def _irradiance(result: Result, path: Path) -> None:
+    """Spectral irradiance on the sensor, computed and written wavelength by wavelength."""
+    frame = result.frame
+    nodes = irradiance.nodes(frame)
+
+    def planes() -> Iterator[np.ndarray]:
+        for done, plane in enumerate(irradiance.planes(frame, result.processed.workers)):
+            result.stages.watch.step(done, len(nodes))
+            yield plane * 1e-9
+
+    said = {
+        "name": frame.camera.name,
+        "vcam:version": vcam_cli.__version__,
+        "vcam:quantity": "spectral irradiance on the sensor, mean over each pixel's cell",
+        "vcam:configHash": config_hash(frame.camera),
+    }
+    write_spectral(path, nodes, planes(), frame.dn.shape, "W.m^-2.nm^-1", said)
 
 
 def _raw(result: Result, path: Path) -> None:
@@ -85,9 +113,21 @@ def _attributes(result: Result) -> dict[str, str | int | float]:
         "vcam:blackLevel": frame.black_dn,
         "vcam:whiteLevel": float(e.highest_code),
         "vcam:conversionGain": e.conversion_gain,
-        "vcam:electronsPerDN": e.electrons_per_dn,
+        **_curve(e),
         "vcam:cfa": "monochrome" if len(frame.mosaic.colors) == 1 else block,
         "vcam:configHash": config_hash(frame.camera),
+    }
+
+
+def _curve(e: Electrical) -> dict[str, str | int | float]:
+    """What turns raw numbers back into electrons or volts."""
+    if e.reference is None:
+        return {"vcam:adc": "linear", "vcam:electronsPerDN": e.electrons_per_dn}
+    return {
+        "vcam:adc": "logarithmic",
+        "vcam:adcOffset": e.offset,
+        "vcam:adcFullScale": e.full_scale,
+        "vcam:adcReference": e.reference,
     }
 
 

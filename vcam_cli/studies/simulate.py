@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -12,11 +11,14 @@ from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.geometry import pixel_centers
 from vcam_cli.engine.frame import Frame, expose, figures
 from vcam_cli.engine.parallel import available_workers
-from vcam_cli.engine.prepare import Prepared, Stages
+from vcam_cli.engine.prepare import Prepared
 from vcam_cli.engine.prepare import prepare as bring_light
+from vcam_cli.engine.stages import Observer, Silent, Stages
 from vcam_cli.errors import BadInput
-from vcam_cli.processing import Context, Processed, process
+from vcam_cli.processing import Context, Patches, Processed, process
+from vcam_cli.quality import display
 from vcam_cli.quality.mse import mse, psnr_db
+from vcam_cli.quality.scielab import cielab_map, s_cielab_map
 
 
 @dataclass(frozen=True)
@@ -84,6 +86,17 @@ class Result:
             return self.processed.ideal(self.frame.ideal_dn())
 
     @cached_property
+    def s_cielab(self) -> NDArray:
+        """S-CIELAB Delta E of the render from the ideal image on the camera's `display`."""
+        image, ideal, screen = self.linear, self.ideal, self._screen
+        with self.stages("quality"):
+            return s_cielab_map(image, ideal, screen, workers=self.processed.workers)
+
+    @property
+    def _screen(self) -> display.Screen:
+        return display.screen(self.frame.camera.display, self.frame.geometry.columns)
+
+    @cached_property
     def metrics(self) -> list[tuple[str, float, str]]:
         """(metric, value, unit): those every run has, then those that `quality` asks for."""
         out = figures(self.frame)
@@ -92,27 +105,36 @@ class Result:
             with self.stages("quality"):
                 error = mse(image, ideal)
                 out += [("mse", error, ""), ("psnr_db", psnr_db(image, ideal), "dB")]
+        if "cielab" in self.frame.camera.quality:
+            image, ideal = self.linear, self.ideal
+            with self.stages("quality"):
+                each = cielab_map(image, ideal, self._screen, workers=self.processed.workers)
+                out.append(("mean_delta_e", float(each.mean(dtype=float)), ""))
+        if "s-cielab" in self.frame.camera.quality:
+            out.append(("mean_s_cielab", float(self.s_cielab.mean(dtype=float)), ""))
         return out
 
 
-def simulate(
-    camera: Camera, workers: int | None = None, say: Callable[[str], None] | None = None
-) -> Result:
+def simulate(camera: Camera, workers: int | None = None, watch: Observer | None = None) -> Result:
     """Simulates `camera` looking at its scene.
 
-    workers: threads, default all processors; results do not depend on it. say: called with notes
-    for the user. Raises BadInput (with positions in the camera's file) and CannotDo.
+    workers: threads, default all processors; results do not depend on it. watch: told of stages,
+    here and while the result's properties are computed. Raises BadInput (with positions in the
+    camera's file) and CannotDo.
     """
     try:
-        return _simulate(camera, workers or available_workers())
+        stages = Stages(watch=watch or Silent())
+        return _simulate(camera, workers or available_workers(), stages)
     except BadInput as error:
         raise error.located(camera.locate) from None
 
 
-def prepare(camera: Camera, workers: int | None = None) -> tuple[Prepared, tuple[str, ...]]:
+def prepare(
+    camera: Camera, workers: int | None = None, watch: Observer | None = None
+) -> tuple[Prepared, tuple[str, ...]]:
     """The camera ready to take its frame, and notes for the user: what `vcam plan` shows."""
     try:
-        stages = Stages()
+        stages = Stages(watch=watch or Silent())
         picture, notes = _picture(camera, stages)
         return bring_light(camera, picture, workers or available_workers(), stages), notes
     except BadInput as error:
@@ -132,8 +154,7 @@ def _picture(camera: Camera, stages: Stages) -> tuple[NDArray | None, tuple[str,
     return read.data, read.notes
 
 
-def _simulate(camera: Camera, workers: int) -> Result:
-    stages = Stages()
+def _simulate(camera: Camera, workers: int, stages: Stages) -> Result:
     picture, notes = _picture(camera, stages)
     frame = expose(camera, picture, workers, stages)
     context = Context(
@@ -142,6 +163,15 @@ def _simulate(camera: Camera, workers: int) -> Result:
         white_dn=frame.white_dn,
         black_dn=frame.black_dn,
         linearize=None if frame.electrical.reference is None else frame.code.linear,
+        saturated_dn=frame.saturated_dn,
+        patches=lambda: _patches(frame),
     )
-    processed = process(frame.dn, context, camera.processing, workers=workers)
-    return Result(frame, processed, stages, notes)
+    with stages("balance"):
+        processed = process(frame.dn, context, camera.processing, workers=workers)
+    return Result(frame, processed, stages, notes + processed.notes)
+
+
+def _patches(frame: Frame) -> Patches:
+    """The ColorChecker that color correction is fitted to."""
+    band = frame.camera.scene.wavelengths
+    return Patches(frame.patches_dn(), frame.scene.white, band.start, band.stop)

@@ -1,0 +1,97 @@
+"""The promises of the plan, measured on twelve cameras.
+
+    python -m tests.promise [--json FILE] [CAMERA...]
+
+Prints what the mean signal and the variances lose beside what may be lost, what the plan expected
+of every effect beside its ablation, whether what is not worth its cost is left out, and the time
+that is saved. Exit code 1 where a figure is missed.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import statistics
+import sys
+import tempfile
+from pathlib import Path
+
+from tests.promise import promises
+from vcam_cli.studies import ablation
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser()
+    parser.add_argument("cameras", nargs="*", help="some of them; default all")
+    parser.add_argument("--json", help="also write the figures to this file")
+    options = parser.parse_args()
+    out: dict[str, list] = {"kept": [], "estimates": [], "costly": [], "idle": [], "seconds": []}
+    with tempfile.TemporaryDirectory() as folder:
+        for name in options.cameras or promises.CAMERAS:
+            _one(name, Path(folder), out)
+    figures = _figures(out)
+    print()
+    for text, found, good in figures:
+        print(f"{'ok    ' if good else 'MISSED'}  {text:<78} {found}")
+    if options.json:
+        text = json.dumps({**out, "figures": [f[:2] for f in figures]}, indent=1)
+        Path(options.json).write_text(text, encoding="utf-8")
+    return 0 if all(good for _, _, good in figures) else 1
+
+
+def _one(name: str, folder: Path, out: dict[str, list]) -> None:
+    """Measures one camera and prints its lines."""
+    camera = promises.made(name, folder)
+    true = promises.truth(camera)
+    print(f"\n{name}: full signal {true.full:.4g} e")
+    for k in promises.kept(camera, true):
+        out["kept"].append((name, k.preset, k.mean / k.tolerance, k.variance / (2 * k.tolerance)))
+        print(
+            f"  {k.preset:<10} mean {k.mean:9.2e} of {k.tolerance:7.0e}"
+            f"   variance {k.variance:9.2e} of {2 * k.tolerance:7.0e}"
+        )
+    for e in promises.estimates(camera, true):
+        out["estimates"].append((name, e.name, e.predicted, e.measured, e.ratio))
+        print(f"  {e.name:<16} {e.predicted:10.3e} expected {e.measured:10.3e} found {e.ratio:7.3f}")
+    shares = ablation.variance_shares(true.found, true.full, 2)
+    for preset in promises.PRESETS:
+        for effect, off in promises.worth_leaving_out(camera, preset, true, shares):
+            out["costly"].append((name, preset, effect, off))
+            print(f"  {effect} is not worth its cost at {preset}: {'off' if off else 'ON'}")
+    out["idle"] += [(name, *line) for line in promises.idle_work(camera)]
+    auto, everything = promises.seconds(camera)
+    out["seconds"].append((name, auto, everything))
+    print(f"  auto at standard {auto:.3f} s, all at reference {everything:.3f} s", flush=True)
+
+
+def _figures(out: dict[str, list]) -> list[tuple[str, str, bool]]:
+    """(what is promised, what was found, whether it holds)"""
+    mean, variance = (max(k[i] for k in out["kept"]) for i in (2, 3))
+    ratios = [e[4] for e in out["estimates"] if e[4] != 1.0]
+    off = [c[3] for c in out["costly"]]
+    idle = [i[2] for i in out["idle"]]
+    auto, everything = (sum(s[i] for s in out["seconds"]) for i in (1, 2))
+    parts = [s[1] / s[2] for s in out["seconds"]]
+    middle = statistics.median(ratios)
+    part = sum(off) / len(off) if off else 1.0
+    return [
+        ("error of the mean raw over the tolerance, largest; at most 1", f"{mean:.2f}", mean <= 1),
+        ("change of a variance over twice the tolerance, largest; at most 1", f"{variance:.2f}",
+         variance <= 1),
+        ("expected over measured contribution, least; at least 0.9", f"{min(ratios):.3f}",
+         min(ratios) >= 0.9),
+        ("the same, median; at most 3", f"{middle:.3f}", middle <= 3),
+        ("the same, largest; at most 10", f"{max(ratios):.3f}", max(ratios) <= 10),
+        ("draws of an ablation under a tenth of their share that are off; at least 80 %",
+         f"{sum(off)} of {len(off)}", part >= 0.8),
+        ("work that nobody asks for (ideal image, metrics, demosaic) and is not done; all",
+         f"{sum(idle)} of {len(idle)}", all(idle)),
+        ("time of auto at standard over all at reference, of all cameras; at most 60 %",
+         f"{auto / everything:.0%}", auto <= 0.6 * everything),
+        ("the same, median of the cameras; at most 60 %", f"{statistics.median(parts):.0%}",
+         statistics.median(parts) <= 0.6),
+    ]  # fmt: skip
+
+
+if __name__ == "__main__":
+    sys.exit(main())

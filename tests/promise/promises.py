@@ -1,0 +1,351 @@
+"""Twelve cameras that have little in common, and what the plan promises of each, measured.
+
+Small arrays, since nothing here depends on their size but time and memory.
+"""
+
+from __future__ import annotations
+
+import math
+import statistics
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from vcam_cli import load, simulate
+from vcam_cli.camera.camera import Camera
+from vcam_cli.effects.base import Draw
+from vcam_cli.effects.order import ORDER
+from vcam_cli.engine import plan
+from vcam_cli.engine.prepare import Prepared
+from vcam_cli.files.png import write_png
+from vcam_cli.studies import ablation
+from vcam_cli.studies.accuracy import changes, converged
+from vcam_cli.studies.simulate import prepare
+
+PRESETS = ("draft", "standard", "reference")
+COMMON = """
+array: {rows: 96, columns: 128, pattern: monochrome}
+optics: {f_number: 2.8, focal_length: 4 mm, transmittance: [0.95, ir-cut-650]}
+pixel:
+  width: 4 um
+  photodetector: {fill_factor: 0.5, quantum_efficiency: front-illuminated-qe}
+  readout: {conversion_gain: 40 uV/e, voltage_swing: 1 V, read_noise: 5 e}
+scene: {illuminant: D65, luminance: 300 cd/m2, distance: 1 m}
+exposure: {time: 20 ms}
+adc: {bits: 12}
+"""
+
+CAMERAS = {
+    "phone": """
+scene: {source: {kind: chart, chart: dead-leaves, seed: 3}, luminance: 150 cd/m2}
+optics: {f_number: 1.8, focal_length: 0.15 mm}
+pixel:
+  width: 1.12 um
+  photodetector: {fill_factor: 0.9, dark_current: 20 e/s}
+  readout: {conversion_gain: 120 uV/e, voltage_swing: 0.6 V, read_noise: 2 e}
+  fpn: {offset_pixel: 1 e, gain_pixel: 0.8 %}
+array: {pattern: bayer-rggb}
+exposure: {auto: {max: 100 ms}}
+adc: {bits: 10}
+""",
+    "machine vision": """
+scene: {source: {kind: chart, chart: slanted-edge}, illuminant: FL2, luminance: 1000 cd/m2}
+optics: {f_number: 8, focal_length: 25 mm}
+pixel:
+  width: 5 um
+  photodetector: {fill_factor: 0.8, dark_current: 300 e/s}
+  readout: {conversion_gain: 60 uV/e, voltage_swing: 1.2 V, read_noise: 12 e, reset_noise: ktc}
+  fpn: {offset_pixel: 10 e, offset_column: 4 e, gain_pixel: 1 %}
+array: {rows: 120, columns: 160}
+exposure: {auto: {max: 50 ms}}
+adc: {bits: 8}
+""",
+    "night": """
+scene: {source: {kind: chart, chart: colorchecker}, luminance: 0.05 cd/m2, distance: infinity}
+optics: {f_number: 5.6, focal_length: 50 mm}
+pixel:
+  width: 9 um
+  photodetector: {dark_current: 400 e/s}
+  readout: {read_noise: 8 e, reset_noise: 20 e}
+  fpn: {offset_pixel: 3 e, gain_pixel: 0.5 %}
+exposure: {time: 500 ms}
+adc: {bits: 14, offset: 200 DN}
+""",
+    "aliasing": """
+scene: {source: {kind: chart, chart: csf, max_frequency: 60 lp/mm}}
+optics: {f_number: 2.8, focal_length: 15 mm, transmittance: 1}
+pixel:
+  width: 15 um
+  photodetector: {fill_factor: 0.3}
+  readout: {conversion_gain: 5 uV/e, read_noise: 10 e, reset_noise: 1 e}
+exposure: {auto: {max: 100 ms}}
+""",
+    "stopped down": """
+scene: {source: {kind: chart, chart: dead-leaves, seed: 8}, luminance: 5000 cd/m2}
+optics: {f_number: 16, focal_length: 35 mm, off_axis: cos4}
+pixel: {width: 3 um, photodetector: {fill_factor: 1, dark_current: 5 e/s}}
+array: {pattern: bayer-gbrg}
+exposure: {auto: {max: 100 ms, method: percentile}}
+""",
+    "beyond Nyquist": """
+scene:
+  source: {kind: chart, chart: sinusoid, frequency: 140 lp/mm, orientation: 20 deg}
+  illuminant: {monochromatic: 633 nm}
+  luminance: 500 cd/m2
+optics: {f_number: 4, focal_length: 6 mm, transmittance: 0.9}
+pixel: {width: 5 um, photodetector: {fill_factor: 0.6, dark_current: 2000 e/s}}
+exposure: {auto: {max: 100 ms}}
+""",
+    "color photograph": """
+scene:
+  source: {kind: image, file: color.png, model: laser}
+  illuminant: null
+  luminance: 200 cd/m2
+optics: {f_number: 2, focal_length: 3 mm}
+pixel:
+  width: 2.2 um
+  photodetector: {fill_factor: 0.7, dark_current: 60 e/s}
+  readout: {conversion_gain: 70 uV/e, read_noise: 3 e, reset_noise: 4 e}
+  fpn: {offset_pixel: 2 e, offset_column: 1 e, gain_pixel: 0.6 %, gain_column: 0.1 %}
+array: {pattern: bayer-grbg}
+exposure: {auto: {max: 100 ms}}
+""",
+    "no diffraction": """
+scene: {source: {kind: image, file: gray.png, model: reflectance}, illuminant: A}
+optics: {diffraction: false, off_axis: none}
+pixel: {width: 6 um, photodetector: {fill_factor: 0.25}, readout: {read_noise: 40 e}}
+exposure: {auto: {max: 100 ms}}
+""",
+    "overexposed": """
+scene: {source: {kind: chart, chart: colorchecker}, luminance: 800 cd/m2}
+optics: {f_number: 2.8, focal_length: 2 mm}
+pixel:
+  photodetector: {dark_current: 1000 e/s}
+  readout: {full_well: 15 ke, voltage_swing: null, read_noise: 4 e}
+  fpn: {gain_pixel: 2 %}
+array: {pattern: bayer-rggb}
+exposure: {auto: {max: 100 ms, method: mean, target: 0.5}}
+""",
+    "wide and fast": """
+scene: {source: {kind: chart, chart: slanted-edge, angle: 5 deg}, illuminant: {blackbody: 3200 K}}
+optics: {f_number: 1.2, focal_length: 0.25 mm}
+pixel: {width: 6.5 um, photodetector: {fill_factor: 0.6}, readout: {conversion_gain: 10 uV/e, reset_noise: 0.5 e}}
+exposure: {auto: {max: 100 ms}}
+""",
+    "bright and quiet": """
+scene: {source: {kind: chart, chart: dead-leaves, seed: 1}, luminance: 20000 cd/m2}
+optics: {f_number: 5.6, focal_length: 100 mm}
+pixel:
+  width: 8 um
+  photodetector: {fill_factor: 0.9, dark_current: 50 e/s}
+  readout: {conversion_gain: 5 uV/e, voltage_swing: 1 V, read_noise: 0.5 e, reset_noise: 0.5 e}
+  fpn: {offset_pixel: 0.5 e, gain_pixel: 1 %}
+exposure: {auto: {max: 100 ms}}
+adc: {bits: 16}
+""",
+    "odd pixels": """
+scene:
+  source: {kind: chart, chart: colorchecker}
+  illuminant: FL11
+  extent: {width: 0.4 m}
+optics: {f_number: 4, focal_length: 4 mm}
+pixel:
+  width: 6 um
+  height: 3 um
+  photodetector: {fill_factor: null, width: 3 um, height: 2 um, x: 0.5 um, y: 0.3 um}
+  readout: {read_noise: 1 e, conversion_gain: 15 uV/e}
+array: {rows: 130, columns: 90, pattern: bayer-bggr}
+exposure: {auto: {max: 1 s}}
+""",
+}
+"""Name -> what it has different from `COMMON`; null takes a key away."""
+
+
+def made(name: str, folder: Path, *sets: str) -> Camera:
+    """One of the cameras, read from a file as a user's are."""
+    import yaml
+
+    _pictures(folder)
+    tree = _merged(yaml.safe_load(COMMON), yaml.safe_load(CAMERAS[name]))
+    if "auto" in tree["exposure"]:
+        del tree["exposure"]["time"]
+    path = folder / f"{name.replace(' ', '-')}.yaml"
+    path.write_text(yaml.safe_dump(tree, sort_keys=False), encoding="utf-8")
+    return load(path, sets)
+
+
+def _merged(base: dict, over: dict) -> dict:
+    out = dict(base)
+    for key, value in over.items():
+        if value is None:
+            out.pop(key, None)
+        elif isinstance(value, dict) and isinstance(base.get(key), dict):
+            out[key] = _merged(base[key], value)
+        else:
+            out[key] = value
+    return out
+
+
+def _pictures(folder: Path) -> None:
+    """Pictures with the spectrum of natural ones, 1 / f: color.png and gray.png."""
+    if (folder / "color.png").exists():
+        return
+    rows, columns = 150, 200
+    f = np.hypot(np.fft.fftfreq(rows)[:, None], np.fft.rfftfreq(columns)[None, :])
+    noise = np.fft.rfft2(np.random.default_rng(5).standard_normal((3, rows, columns)))
+    field = np.fft.irfft2(noise / np.maximum(f, 1 / columns), s=(rows, columns))
+    field = 0.4 + 0.2 * (0.3 * field + 0.7 * field.mean(axis=0)) / field.mean(axis=0).std()
+    planes = (np.clip(field, 0, 1) * 65535).astype(np.uint16)
+    write_png(folder / "color.png", np.ascontiguousarray(np.moveaxis(planes, 0, 2)))
+    write_png(folder / "gray.png", planes[0])
+
+
+# --- what is measured ----------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Kept:
+    """The promise of one camera at one preset."""
+
+    preset: str
+    tolerance: float
+    mean: float
+    """rms of (mean raw under auto - mean raw with everything on, converged) / full signal"""
+    variance: float
+    """Largest relative change of a variance at 1, 10, 100 % of full signal, of at most 2 T"""
+
+
+@dataclass(frozen=True)
+class Truth:
+    """One camera, converged."""
+
+    found: Prepared
+    mean: np.ndarray
+    full: float
+
+
+def truth(camera: Camera) -> Truth:
+    """The camera with everything on, and finer than its reference."""
+    coarse = prepare(_at(camera, "reference"))[0]
+    found = converged(camera, coarse, 2)
+    return Truth(found, ablation.mean_raw(found), ablation.full_signal(found))
+
+
+def kept(camera: Camera, true: Truth) -> Iterator[Kept]:
+    """Both promises, at every preset."""
+    for preset in PRESETS:
+        auto = prepare(_at(camera, preset))[0]
+        mean = ablation.rms(ablation.mean_raw(auto) - true.mean) / true.full
+        lost = max(_variance_lost(auto, true, scope) for scope in ("frame", "sensor"))
+        yield Kept(preset, auto.settings.tolerance, mean, lost)
+
+
+def _at(camera: Camera, preset: str) -> Camera:
+    return camera.model_copy(update={"accuracy": type(camera.accuracy)(preset=preset)})
+
+
+def _variance_lost(auto: Prepared, true: Truth, scope: str) -> float:
+    """Largest relative change of the variance, as the effects state it, with what is left out."""
+    worst = 0.0
+    missing = (true.found.dark_rate - auto.dark_rate) * auto.exposure_time
+    for share in plan.LEVELS:
+        level = share * true.full
+        everything = _variance(true.found, scope, level)
+        change = _variance(auto, scope, max(0.0, level - missing)) - everything
+        worst = max(worst, abs(change) / everything if everything else 0.0)
+    return worst
+
+
+def _variance(ready: Prepared, scope: str, level: float) -> float:
+    draws = [e for e in ready.plan.active if isinstance(e, Draw) and e.scope == scope]
+    return sum(e.variance(level) for e in draws)
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """One effect of one camera."""
+
+    name: str
+    predicted: float
+    measured: float
+
+    @property
+    def ratio(self) -> float:
+        """Never below 0.9, at most 10; nothing predicted and nothing measured agree."""
+        if self.measured == 0:
+            return 1.0 if self.predicted == 0 else math.inf
+        return self.predicted / self.measured
+
+
+NOTHING = 1e-9
+"""Of full signal: what is below both ways is rounding."""
+
+
+def estimates(camera: Camera, true: Truth) -> list[Estimate]:
+    """The plan's contribution of every effect at standard, beside its ablation."""
+    auto = prepare(_at(camera, "standard"))[0]
+    names = tuple(ablation.wanted(camera))
+    changed = changes(camera, true.found.exposure_time, names, 2)
+    shares = ablation.variance_shares(true.found, true.full, 2)
+    out = []
+    for d in auto.plan.decisions:
+        if d.name not in names:
+            continue
+        assert d.contribution is not None, d
+        measured = shares.get(d.name, float(changed[d.name][0]) / true.full)
+        if max(measured, d.contribution) < NOTHING:
+            out.append(Estimate(d.name, 0.0, 0.0))
+        else:
+            out.append(Estimate(d.name, d.contribution, measured))
+    return out
+
+
+COSTLY = tuple(kind.name for kind in ORDER if issubclass(kind, Draw))
+"""Effects whose draws cost a tenth of a second each at twelve megapixels."""
+
+
+def worth_leaving_out(
+    camera: Camera, preset: str, true: Truth, shares: dict[str, float]
+) -> list[tuple[str, bool]]:
+    """(effect, whether it is off) of costly ones with an ablation under a tenth of their share.
+
+    Their share is what the promise lets go of a variance: 2 T.
+    """
+    auto = prepare(_at(camera, preset))[0]
+    limit = 0.1 * 2 * auto.settings.tolerance
+    states = {d.name: d.state == "off" for d in auto.plan.decisions}
+    return [(n, states[n]) for n in COSTLY if n in shares and shares[n] < limit]
+
+
+def idle_work(camera: Camera) -> list[tuple[str, bool]]:
+    """(work, whether it is not done) of what this camera does not call for, after a frame."""
+    result = simulate(camera)
+    _ = result.render, result.metrics
+    out = []
+    if not camera.quality:
+        out.append(("ideal image", "ideal" not in result.stages.seconds))
+        out.append(("metrics", "quality" not in result.stages.seconds))
+    if not camera.array.mosaic:
+        steps = [step.name for step in camera.processing]
+        out.append(("demosaic", "demosaic" not in steps))
+        out.append(("white balance", "white_balance" not in steps))
+    return out
+
+
+def seconds(camera: Camera, repeats: int = 3) -> tuple[float, float]:
+    """Of a frame with its render: auto at standard, and everything on at reference, medians."""
+    everything = ablation.switched(_at(camera, "reference"), "all")
+    return tuple(_timed(lambda c=c: simulate(c).render, repeats) for c in (camera, everything))
+
+
+def _timed(work: Callable[[], object], repeats: int) -> float:
+    work()
+    taken = []
+    for _ in range(repeats):
+        start = time.perf_counter()
+        work()
+        taken.append(time.perf_counter() - start)
+    return statistics.median(taken)

@@ -1,0 +1,175 @@
+"""`vcam compare`: how different two image files look."""
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+import typer
+
+from vcam_cli.commands import options
+
+DPI, DISTANCE = 72.0, "18 in"
+
+
+def positive(value: float | None) -> float | None:
+    """A finite number above 0, or none."""
+    if value is not None and not 0 < value < float("inf"):
+        raise typer.BadParameter(f"{value:g} is not a positive number")
+    return value
+
+
+def check_white(value: str | None) -> str | None:
+    """Three positive numbers."""
+    if value is not None:
+        three_numbers(value)
+    return value
+
+
+def three_numbers(text: str) -> tuple[float, float, float]:
+    """ "95.047,100,108.883" as numbers."""
+    try:
+        x, y, z = (float(part) for part in text.split(","))
+    except ValueError:
+        x = y = z = -1.0
+    if not all(0 < part < float("inf") for part in (x, y, z)):
+        message = f"{text!r} is not X,Y,Z; write for example 95.047,100,108.883"
+        raise typer.BadParameter(message)
+    return x, y, z
+
+
+def check_distance(value: str | None) -> str | None:
+    """A length, from the eye to the display."""
+    from vcam_cli.units import parse
+
+    if value is not None:
+        try:
+            length = parse(value, "length")
+        except ValueError as error:
+            raise typer.BadParameter(str(error)) from None
+        if not 0 < length < float("inf"):
+            raise typer.BadParameter(f"{value!r} is not positive; write for example {DISTANCE}")
+    return value
+
+
+def compare(
+    image: Annotated[Path, typer.Argument(metavar="IMAGE", show_default=False)],
+    reference: Annotated[
+        Path,
+        typer.Argument(
+            metavar="REFERENCE",
+            help="Two image files of the same size, any that OpenImageIO reads.",
+            show_default=False,
+        ),
+    ],
+    out: Annotated[
+        Path | None,
+        typer.Option(
+            "-o",
+            "--out",
+            metavar="DIR",
+            help="Folder for compare.csv, s_cielab.exr and s_cielab.png; default: none written.",
+        ),
+    ] = None,
+    ppd: Annotated[
+        float | None,
+        typer.Option("--ppd", metavar="N", callback=positive, help="Pixels in a degree of vision."),
+    ] = None,
+    dpi: Annotated[
+        float | None,
+        typer.Option(
+            "--dpi", metavar="N", callback=positive, help="In place of --ppd; default 72."
+        ),
+    ] = None,
+    distance: Annotated[
+        str | None,
+        typer.Option(
+            "--distance",
+            metavar="LENGTH",
+            callback=check_distance,
+            help='From eye to display; default "18 in".',
+        ),
+    ] = None,
+    space: Annotated[
+        Literal["srgb", "linear-srgb", "xyz"] | None,
+        typer.Option(
+            "--space", help="What the values are; default linear-srgb for EXR, else srgb."
+        ),
+    ] = None,
+    white: Annotated[
+        str | None,
+        typer.Option(
+            "--white",
+            metavar="X,Y,Z",
+            callback=check_white,
+            help="White of --space xyz; default D65 with Y = 100.",
+        ),
+    ] = None,
+    delta_e: Annotated[
+        Literal["1976", "1994", "2000"], typer.Option("--delta-e", help="Formula of Delta E.")
+    ] = "1976",
+    filters: Annotated[
+        Literal["zhang-wandell-1996", "isetcam"],
+        typer.Option("--filters", help="How the eye's filters of S-CIELAB are read."),
+    ] = "zhang-wandell-1996",
+    as_json: options.Json = False,
+    quiet: options.Quiet = False,
+    workers: options.Workers = None,
+) -> None:
+    """Compares two images: MSE, PSNR, CIELAB and S-CIELAB differences.
+
+    \b
+    Example:
+      vcam compare out/a/render.png out/b/render.png
+      vcam compare a.exr b.exr --space xyz --ppd 23 --delta-e 2000 -o out/ab
+    """
+    from vcam_cli.files.folder import OutputFolder
+    from vcam_cli.files.report import hash_file, to_json
+    from vcam_cli.studies import compare as study
+
+    if white is not None and space != "xyz":
+        raise typer.BadParameter("it is for --space xyz only", param_hint="--white")
+    settings = study.Settings(
+        samples_per_degree=_per_degree(ppd, dpi, distance),
+        space=space,
+        white=study.D65 if white is None else three_numbers(white),
+        formula=delta_e,
+        filters=filters,
+    )
+    found = study.compare(image, reference, settings, workers)
+    for note in found.notes:
+        options.say(note, quiet)
+    report = {
+        "image": str(image),
+        "reference": str(reference),
+        "metrics": {name: value for name, value, _ in found.metrics},
+        "settings": {
+            "samples_per_degree": settings.samples_per_degree,
+            "space": [settings.space_of(path) for path in (image, reference)],
+            "white": list(settings.screen.white),
+            "delta_e": delta_e,
+            "filters": filters,
+        },
+    }
+    if out is not None:
+        with OutputFolder(out, "compare.json", inputs=(image, reference)) as folder:
+            study.write(found, folder)
+            hashes = {"inputs": {str(path): hash_file(path) for path in (image, reference)}}
+            folder.finish(report | {"hashes": hashes, "notes": list(found.notes)})
+    if as_json:
+        print(to_json(report | {"out": None if out is None else str(out)}), end="")
+    elif not quiet:
+        print("\n".join(f"{n:<20} {v:>12.6g} {unit}".rstrip() for n, v, unit in found.metrics))
+        if out is not None:
+            print(f"map and numbers: {out}/")
+
+
+def _per_degree(ppd: float | None, dpi: float | None, distance: str | None) -> float:
+    """Pixels in one degree of visual angle."""
+    from vcam_cli.quality.display import samples_per_degree
+    from vcam_cli.units import parse
+
+    if ppd is not None:
+        for name, given in (("--dpi", dpi), ("--distance", distance)):
+            if given is not None:
+                raise typer.BadParameter("it and --ppd cannot both be given", param_hint=name)
+        return ppd
+    return samples_per_degree(DPI if dpi is None else dpi, parse(distance or DISTANCE, "length"))

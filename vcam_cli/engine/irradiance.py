@@ -1,0 +1,137 @@
+"""Spectral irradiance on the sensor: the light before pixels, filters and silicon.
+
+The same linear part as the frame's, with one exchange: a pixel is its whole cell (pitch by pitch),
+sees one narrow band and counts watts. So every value is the mean spectral irradiance over one
+pixel's cell, after the lens's transmittance, falloff and blur (eqs 2.18 and 2.22).
+
+A band is a hat function on one wavelength of the camera's nodes, as wide as its neighbors are
+apart, and the value is the band's irradiance over the hat's area. So the sum of all values times
+these areas (the trapezoid rule) is the irradiance of the whole range exactly, whatever lines the
+lamp has; between the nodes it means the spectrum that is straight from node to node.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcam_cli.camera.geometry import Geometry, pixel_centers
+from vcam_cli.effects.base import Gain, RadialTransfer
+from vcam_cli.effects.pixel_aperture import PixelAperture
+from vcam_cli.engine import optics, ways
+from vcam_cli.engine.cost import BANDS_AT_ONCE
+from vcam_cli.engine.mosaic import Mosaic
+from vcam_cli.engine.parallel import each
+from vcam_cli.engine.prepare import Prepared
+from vcam_cli.engine.settings import Settings
+from vcam_cli.engine.transfer import Band, Transfer
+from vcam_cli.engine.ways import Optics
+from vcam_cli.physics import radiometry
+from vcam_cli.rng import blocks
+from vcam_cli.scenes.base import SampledScene, WaveScene
+from vcam_cli.scenes.build import build
+from vcam_cli.spectra import Spectrum, hat_weights
+
+DARK = 1e-12
+"""Share of the brightest band below which a band is rounding, of a line beside it, and no light."""
+
+
+def nodes(ready: Prepared) -> NDArray:
+    """The wavelengths at which it is given, (J,) rising [m]."""
+    band = ready.camera.scene.wavelengths
+    return Band(band.start, band.stop, ready.settings.wavelength_step).nodes()
+
+
+def planes(ready: Prepared, workers: int) -> Iterator[NDArray]:
+    """Spectral irradiance at each of the `nodes`, one by one: (rows, columns) [W/(m2 m)].
+
+    Raises CannotDo where memory does not suffice.
+    """
+    wavelengths = nodes(ready)
+    level = levels(ready, wavelengths)
+    largest = np.abs(level).max(axis=0)
+    lit = np.flatnonzero(largest > DARK * largest.max())
+    relative = level[:, lit] / largest[lit]
+    parts = (slice(i, i + BANDS_AT_ONCE) for i in range(0, len(lit), BANDS_AT_ONCE))
+    found = (p for s in parts for p in _bands(ready, wavelengths[lit[s]], relative[:, s], workers))
+    for band, peak in enumerate(largest):
+        if band in lit:
+            yield next(found) * ready.settings.dtype(peak)
+        else:
+            yield np.zeros((ready.geometry.rows, ready.geometry.columns), ready.settings.dtype)
+
+
+def _bands(
+    ready: Prepared, wavelengths: NDArray, level: NDArray, workers: int
+) -> Iterator[NDArray]:
+    """The light of a few bands, as if each were a color of its own.
+
+    level: (K, n) of the scene's components in every band. Yields (rows, columns) in its unit.
+    """
+    g = _whole_cells(ready.geometry)
+    in_lens = [e for e in ready.plan.active if e.in_lens]
+    radial = tuple(e for e in in_lens if isinstance(e, RadialTransfer))
+    transfer = Transfer(wavelengths, level[:, :, None] * np.eye(len(wavelengths)), radial)
+    bands = Mosaic((tuple(f"{w * 1e9:.6f}" for w in wavelengths),))
+    effects = (*in_lens, PixelAperture(g.pitch_x, g.pitch_y))
+    light = Optics(transfer, g, _as_fine(ready), bands, effects, workers)
+    dtype = ready.settings.dtype
+    x, y = pixel_centers(g)
+    gains = [e.gain(x.astype(dtype), y.astype(dtype)) for e in in_lens if isinstance(e, Gain)]
+    rows, _ = ways.rows(light, lambda oversampling: _scene(ready, oversampling))
+    for values in rows:
+        out: NDArray = np.empty((g.rows, g.columns), dtype)
+
+        def fill(s: slice, values: ways.Rows = values, out: NDArray = out) -> None:
+            np.maximum(values(s), 0, out=out[s])
+
+        each(fill, blocks(g.rows), workers)
+        for gain in gains:
+            out *= gain
+        yield out
+
+
+def _as_fine(ready: Prepared) -> Settings:
+    """Settings that begin with the sampling at which the frame's chart ended."""
+    if _sampled_once(ready.scene):
+        return ready.settings
+    known = math.ceil(ready.spectrum.oversampling)
+    return replace(ready.settings, oversampling=max(known, ready.settings.oversampling))
+
+
+def _scene(ready: Prepared, oversampling: int) -> WaveScene | SampledScene:
+    if _sampled_once(ready.scene):
+        return ready.scene
+    return build(
+        ready.camera.scene, optics.view(ready.geometry, ready.settings, oversampling), None
+    )
+
+
+def _sampled_once(scene: WaveScene | SampledScene) -> bool:
+    """Whether it is the same however finely it is asked for: waves, and pictures."""
+    return isinstance(scene, WaveScene) or scene.samples == "squares"
+
+
+def levels(ready: Prepared, wavelengths: NDArray) -> NDArray:
+    """Of each of the scene's components on the axis, without blur: (K, J) [W/(m2 m)]."""
+    g = ready.geometry
+    per_radiance = float(radiometry.irradiance_per_radiance(g.f_number, g.magnification))
+    transmittance = ready.camera.optics.transmittance.resolve()
+    spectra = [s.times(transmittance) for s in ready.scene.spectra]
+    bands = np.array([hat_weights(s, wavelengths) for s in spectra])
+    return per_radiance * bands / hat_weights(Spectrum.flat(1.0), wavelengths)
+
+
+def _whole_cells(geometry: Geometry) -> Geometry:
+    """The same sensor with photodetectors that fill their pixels' cells, gaps included."""
+    return replace(
+        geometry,
+        detector_width=geometry.pitch_x,
+        detector_height=geometry.pitch_y,
+        detector_x=0.0,
+        detector_y=0.0,
+    )

@@ -1,0 +1,112 @@
+"""Whether the steps of a camera's `processing` can work, in their order, on its array."""
+
+from collections.abc import Sequence
+from typing import Any, Protocol
+
+import numpy as np
+
+from vcam_cli.errors import Collector, nearest
+from vcam_cli.processing.base import Pattern
+from vcam_cli.processing.demosaic import is_bayer
+
+CHOICES: dict[str, tuple[str, ...]] = {
+    "black_level": ("subtract", "none"),
+    "demosaic": ("bilinear", "edge-aware"),
+    "white_balance": ("gray-world", "bright-block", "illuminant", "none"),
+    "color_correction": ("fit", "none"),
+    "gamma": ("srgb",),
+}
+_NUMBER_TOO = ("black_level", "gamma")
+CANNOT_JUDGE = (
+    "a mosaic without demosaic cannot be judged",
+    "add `demosaic: bilinear` to processing, or write `quality: []`",
+)
+
+
+class Step(Protocol):
+    """One entry of `processing`, such as `gamma: 2.2`."""
+
+    @property
+    def name(self) -> str: ...
+
+    @property
+    def value(self) -> Any:
+        """A word, a number, or for color correction something with a `matrix`."""
+
+
+def check(
+    steps: Sequence[Step], pattern: Pattern, colors: Sequence[str], quality: Sequence[str] = ()
+) -> None:
+    """Raises BadInput with every reason why these steps cannot work on this array.
+
+    `quality`: the metrics asked for; they need all colors at every pixel.
+    """
+    found = Collector()
+    names = [step.name for step in steps]
+    for index, step in enumerate(steps):
+        path = ("processing", index, step.name)
+        if step.name not in CHOICES:
+            likely = nearest(step.name, CHOICES)
+            found.add(path, "no such step", f"write `{likely}`" if likely else _one_of(CHOICES))
+            continue
+        _check_value(found, path, step, len(colors))
+        before = names[:index]
+        if step.name in before:
+            found.add(path, f"{step.name} comes twice", "keep one of them")
+        if "gamma" in before:
+            found.add(
+                path, f"{step.name} after gamma: the steps work on linear light", "put gamma last"
+            )
+        late = [name for name in ("white_balance", "color_correction") if name in before]
+        if step.name == "black_level" and late:
+            found.add(
+                path,
+                f"black_level after {late[0]}: gains need black at zero",
+                f"put black_level before {late[0]}",
+            )
+        if step.name == "demosaic" and not is_bayer(pattern):
+            found.add(path, "demosaic needs a Bayer pattern", "remove this step")
+        if step.name == "white_balance" and step.value != "none" and len(colors) == 1:
+            found.add(path, "white_balance needs an array of several colors", "remove this step")
+        if step.name == "color_correction" and step.value != "none":
+            if len(colors) == 1:
+                found.add(path, "a monochrome array has no colors to change", "remove this step")
+            elif "demosaic" not in before:
+                found.add(path, "a pixel of a mosaic has one color only", "put demosaic before it")
+    if quality and len(colors) > 1 and "demosaic" not in names:
+        found.add(("quality",), *CANNOT_JUDGE)
+    found.raise_if_any()
+
+
+def _check_value(found: Collector, path: tuple[str | int, ...], step: Step, colors: int) -> None:
+    allowed = CHOICES[step.name]
+    matrix = getattr(step.value, "matrix", None)
+    if step.name == "color_correction" and matrix is not None:
+        if len(matrix) != 3 or any(len(row) != colors for row in matrix):
+            found.add((*path, "matrix"), *matrix_shape(colors))
+        return
+    if isinstance(step.value, str):
+        if step.value not in allowed:
+            likely = nearest(step.value, allowed)
+            found.add(
+                path,
+                f"`{step.value}` is not known",
+                f"write `{likely}`" if likely else _one_of(allowed),
+            )
+    elif step.name not in _NUMBER_TOO or not np.isfinite(step.value):
+        found.add(path, f"{step.value!r} is not allowed", _one_of(allowed))
+    elif step.name == "gamma" and step.value <= 0:
+        found.add(path, f"{step.value!r} is not allowed", "write a number above 0, or `srgb`")
+
+
+def _one_of(allowed: Sequence[str] | dict[str, tuple[str, ...]]) -> str:
+    return "write one of " + ", ".join(allowed)
+
+
+def matrix_shape(colors: int) -> tuple[str, str]:
+    """Why a matrix is refused, and what to write."""
+    return (
+        "the matrix does not suit this array",
+        f"write three rows, for display R, G and B, of {colors} numbers, one for each of the "
+        "camera's colors",
+    )

@@ -1,0 +1,44 @@
+"""Highlights: where a color is saturated, it is not known, only that it was at least so bright.
+
+After white balance the colors saturate at different levels, and the matrix of color correction
+would turn clipped white into magenta. A saturated color is therefore raised to the brightest of
+its pixel's colors: clipped highlights become white, and a lamp whose brightest color alone is
+clipped keeps its color. Between 95 and 100 % of saturation it is raised in part, so that nothing
+jumps; below, nothing changes.
+
+Why raised and not clipped to the lowest: that would darken all of a picture that is overexposed.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vcam_cli.processing.base import Block
+
+KNEE = 0.95
+"""Share of saturation from which on a color is raised."""
+
+
+@dataclass(frozen=True)
+class Highlights:
+    """Acts on full color; `ceilings`: where each color saturates, black being 0."""
+
+    ceilings: tuple[float, ...]
+    halo: int = 0
+
+    def on_block(self, block: Block) -> Block:
+        planes = block.planes
+        knees = [KNEE * ceiling if ceiling > 0 else np.inf for ceiling in self.ceilings]
+        reached = [plane.max() > knee for plane, knee in zip(planes, knees, strict=True)]
+        if not any(reached):
+            return block
+        brightest = planes.max(axis=0)
+        for plane, ceiling, knee, high in zip(planes, self.ceilings, knees, reached, strict=True):
+            if high:
+                share = (plane - np.float32(knee)) * np.float32(1 / (ceiling - knee))
+                plane += np.clip(share, 0, 1, out=share) * (brightest - plane)
+        return block
+
+    def on_colors(self, values: np.ndarray) -> np.ndarray:
+        """Nothing: the ideal camera does not saturate."""
+        return values

@@ -1,0 +1,25 @@
+"""Linear light from the codes of an ADC that is not linear: before all other steps.
+
+It is no step of the user's: whatever `processing` says, its steps mean linear light.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from vcam_cli.processing.base import Block
+
+
+@dataclass(frozen=True)
+class Linearize:
+    """Applies `curve`, from codes to the codes of a linear ADC [DN]."""
+
+    curve: Callable[[np.ndarray], np.ndarray]
+    halo: int = 0
+
+    def on_block(self, block: Block) -> Block:
+        return Block(self.curve(block.planes), block.first_row)
+
+    def on_colors(self, values: np.ndarray) -> np.ndarray:
+        return self.curve(values)

@@ -1,0 +1,91 @@
+"""The display on which pictures are judged: what light its values make, how fine its pixels look.
+
+Linear display values, where white is 1, become CIE 1931 XYZ by one matrix. The tone curve
+(`display.gamma`) is no part of it: pictures are judged on linear values, and a display that shows
+them is driven through the inverse of its curve. CIELAB measures relative to white, so the
+luminance of white scales XYZ and changes no Delta E.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cache
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcam_cli.camera.display import Display
+from vcam_cli.errors import bad
+from vcam_cli.spectra import Spectrum, cmf, display_primaries, integral
+
+Primaries = Literal["crt-brainard", "srgb"]
+D65 = (95.047, 100.0, 108.883)
+"""XYZ of CIE D65, 2 degree observer, Y = 100. ASTM E308, the numbers that sRGB is used with."""
+FINEST = 1e6
+"""Samples per degree; the eye's own cones are 120 to a degree."""
+BT709 = ((0.64, 0.33), (0.30, 0.60), (0.15, 0.06))
+"""Chromaticities x, y of the red, green and blue of sRGB. IEC 61966-2-1:1999."""
+
+
+@dataclass(frozen=True)
+class Screen:
+    """What the eye gets from an image (rows, columns, 3).
+
+    to_xyz: (3, 3) XYZ = to_xyz @ values [cd/m2, or any unit: only ratios to white count].
+    samples_per_degree: pixels of the image in one degree of visual angle.
+    """
+
+    to_xyz: NDArray[np.float64]
+    samples_per_degree: float
+
+    def __post_init__(self) -> None:
+        if not 0 < self.samples_per_degree <= FINEST:
+            raise bad(
+                (),
+                f"{self.samples_per_degree:.3g} pixels in a degree of vision; at most"
+                f" {FINEST:.0e} can be judged",
+                "check the display's dpi or width, and the viewing distance",
+            )
+
+    @property
+    def white(self) -> NDArray[np.float64]:
+        """XYZ of the values 1, 1, 1."""
+        return self.to_xyz.sum(axis=1)
+
+
+def screen(display: Display, columns: int) -> Screen:
+    """The camera file's display with a picture of so many columns on it."""
+    dpi = columns * 0.0254 / display.width if display.width is not None else display.dpi
+    assert dpi is not None
+    per_degree = samples_per_degree(dpi, display.viewing_distance)
+    return Screen(rgb_to_xyz(display.primaries, display.white), per_degree)
+
+
+def samples_per_degree(dpi: float, distance: float) -> float:
+    """Pixels in one degree of visual angle at the center: dpi [1/inch], distance [m]."""
+    return dpi * distance / 0.0254 * math.tan(math.radians(1.0))
+
+
+def rgb_to_xyz(primaries: Primaries, white: float = 100.0) -> NDArray[np.float64]:
+    """(3, 3) XYZ of full red, green, blue in its columns; their sum has Y = white [cd/m2].
+
+    crt-brainard: the spectra of a cathode-ray tube's phosphors, each at its full power, so its
+    white is bluish (x, y = 0.288, 0.313). srgb: BT.709 chromaticities that add up to D65.
+    """
+    if primaries == "srgb":
+        chromaticity = np.array([(x / y, 1.0, (1.0 - x - y) / y) for x, y in BT709]).T
+        matrix = chromaticity * np.linalg.solve(chromaticity, np.array(D65))
+    else:
+        matrix = _crt()
+    return matrix * (white / matrix[1].sum())
+
+
+@cache
+def _crt() -> NDArray[np.float64]:
+    """(3, 3) integrals of the phosphors (columns) with the CIE 1931 functions (rows), relative."""
+    observer = [Spectrum(tables=(table,)) for table in cmf()]
+    guns, _ = display_primaries("crt-brainard")
+    start, stop = guns[0].tables[0].start, guns[0].tables[0].stop
+    return np.array([[integral(gun.times(eye), start, stop) for gun in guns] for eye in observer])

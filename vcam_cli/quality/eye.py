@@ -1,0 +1,124 @@
+"""The eye's pattern filters of S-CIELAB: opponent planes, and what blurs each of them.
+
+Each of three opponent planes (light-dark, red-green, blue-yellow) is seen through a weighted sum
+of Gaussians, which on pixels are separable. Two programs read the same numbers differently:
+
+- `zhang-wandell-1996`, the authors' first code: the spread is the FULL width at half maximum, and
+  kernels are sampled at 224 or more per degree, averaged over a pixel by a triangle, and decimated.
+- `isetcam`: the spread is HALF the width, and kernels are sampled at the pixels.
+
+Both are cut to about one degree and have the sum 1: a uniform field stays as it is. (The 1996
+code leaves its sum up to 0.8 % off.)
+
+References
+----------
+.. [1] X. Zhang, B. Wandell, "A spatial extension of CIELAB for digital color image reproduction",
+   SID Symposium Digest 27, 731-734 (1996); Journal of the SID 5, 61-63 (1997),
+   DOI 10.1889/1.1985127.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+Filters = Literal["zhang-wandell-1996", "isetcam"]
+Gaussian = tuple[float, float]
+
+GAUSSIANS: tuple[tuple[Gaussian, ...], ...] = (
+    ((0.05, 1.00327), (0.225, 0.114416), (7.0, -0.117686)),
+    ((0.0685, 0.616725), (0.826, 0.383275)),
+    ((0.092, 0.567885), (0.6451, 0.432115)),
+)
+"""(spread [degrees], weight) of every Gaussian of the light-dark, red-green, blue-yellow plane."""
+
+OPPONENT: dict[str, tuple[tuple[float, float, float], ...]] = {
+    "zhang-wandell-1996": (
+        (0.2787336, 0.7218031, -0.106552),
+        (-0.4487736, 0.2898056, 0.0771569),
+        (0.0859513, -0.5899859, 0.5011089),
+    ),
+    "isetcam": (
+        (0.2885613, 0.6597617, -0.1305654),
+        (-0.4648864, 0.3262702, 0.06242),
+        (0.0798787, -0.5547976, 0.4814746),
+    ),
+}
+"""XYZ -> opponent planes: for the 2 degree observer, and for the 10 degree one."""
+
+FINEST = 224.0
+"""Samples per degree at which the 1996 kernels are sampled, at least."""
+
+
+@dataclass(frozen=True)
+class Kernel:
+    """weights[i] x the outer product of taps[i] with itself, summed; its own sum is 1."""
+
+    weights: NDArray[np.float64]
+    taps: NDArray[np.float64]
+    """(Gaussians, 2 reach + 1), symmetric."""
+
+    @property
+    def reach(self) -> int:
+        """Pixels to either side."""
+        return self.taps.shape[1] // 2
+
+    def response(self, rows: int, columns: int) -> NDArray[np.float64]:
+        """(rows, columns) factors of the DCT-II of a picture, mirrored at its borders for ever."""
+        down, across = (_cosines(self.taps, count) for count in (rows, columns))
+        return np.einsum("i,ir,ic->rc", self.weights, down, across)
+
+
+def kernels(filters: Filters, samples_per_degree: float) -> tuple[Kernel, ...]:
+    """The kernels of the three planes. Raises ValueError for filters that are not known."""
+    if filters not in OPPONENT:
+        raise ValueError(f"filters {filters!r}; they must be one of {', '.join(OPPONENT)}")
+    sampled = _sampled_1996 if filters == "zhang-wandell-1996" else _sampled_isetcam
+    return tuple(_kernel(plane, sampled(plane, samples_per_degree)) for plane in GAUSSIANS)
+
+
+def _kernel(plane: tuple[Gaussian, ...], taps: NDArray[np.float64]) -> Kernel:
+    weights = np.array([weight for _, weight in plane])
+    return Kernel(weights / (weights @ taps.sum(axis=1) ** 2), taps)
+
+
+def _sampled_1996(plane: tuple[Gaussian, ...], per_degree: float) -> NDArray[np.float64]:
+    """One row of taps a Gaussian, as the 1996 code makes them."""
+    finer = max(1, math.ceil(FINEST / per_degree))
+    fine = finer * per_degree
+    half = math.ceil(fine / 2) - 1
+    if half < finer:  # a pixel is half a degree or more: one tap is left
+        return np.ones((len(plane), 1))
+    place = np.arange(-half, half + 1)
+    widths = np.array([spread for spread, _ in plane]) * fine - 1  # full, at half maximum
+    sampled = _unit_sum(np.exp(-4 * math.log(2) * (place / widths[:, None]) ** 2))
+    triangle = np.minimum(np.arange(1, 2 * finer), np.arange(2 * finer - 1, 0, -1)) / finer
+    averaged = [np.convolve(row, triangle)[finer - 1 :][: place.size] for row in sampled]
+    return np.array(averaged)[:, half % finer :: finer]
+
+
+def _sampled_isetcam(plane: tuple[Gaussian, ...], per_degree: float) -> NDArray[np.float64]:
+    """One row of taps a Gaussian, as ISETCam makes them."""
+    half = (math.ceil(per_degree) - 1) // 2
+    place = np.arange(-half, half + 1)
+    widths = np.array([spread for spread, _ in plane]) * per_degree  # half, at half maximum
+    return _unit_sum(np.exp(-math.log(2) * (place / widths[:, None]) ** 2))
+
+
+def _unit_sum(rows: NDArray[np.float64]) -> NDArray[np.float64]:
+    return rows / rows.sum(axis=1, keepdims=True)
+
+
+def _cosines(taps: NDArray[np.float64], count: int) -> NDArray[np.float64]:
+    """(Gaussians, count): sum over n of taps[n] cos(pi k n / count) for k = 0 .. count - 1.
+
+    Taps beyond a period of the mirrored picture fold onto it: no kernel is too large.
+    """
+    reach = taps.shape[1] // 2
+    period = np.zeros((len(taps), 2 * count))
+    place = np.arange(-reach, reach + 1) % (2 * count)
+    for row, tap in zip(period, taps, strict=True):
+        np.add.at(row, place, tap)
+    return np.fft.rfft(period, axis=1).real[:, :count]

@@ -1,0 +1,47 @@
+"""Bright points on black: round ones on a square grid, one of them at the array's center.
+
+The points have the radiance of a perfect white; the grid goes on without end.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from vcam_cli.scenes import discs
+from vcam_cli.scenes.base import Array, Chart
+from vcam_cli.scenes.disc_edges import Discs
+
+
+@dataclass(frozen=True)
+class PointGrid(Chart):
+    """Points of a diameter, at most the spacing of their centers [m]."""
+
+    spacing: float
+    diameter: float
+
+    def paint(self, x_edges: Array, y_edges: Array, mix: Array, out: Array) -> None:
+        """Exact: the area of circles within the cells."""
+        points = self._points(x_edges[[0, -1]], y_edges[[0, -1]])
+        light = discs.cover_of_separate(points, x_edges, y_edges).astype(mix.dtype)
+        for plane, level in zip(out, mix[:, 0], strict=True):
+            np.multiply(light, level, out=plane)
+
+    def values(self, x: Array, y: Array, mix: Array) -> Array:
+        across, down = (
+            position - self.spacing * np.rint(position / self.spacing)
+            for position in (np.asarray(x), np.asarray(y))
+        )
+        light = np.add.outer(down**2, across**2) <= (self.diameter / 2) ** 2
+        return np.asarray(np.multiply.outer(mix[:, 0], light.astype(mix.dtype)))
+
+    def _points(self, x: Array, y: Array) -> Discs:
+        """Those that may reach into a rectangle between two x and two y, row by row."""
+        across, down = (self._places(*ends) for ends in (x, y))
+        rows, columns = np.repeat(down, len(across)), np.tile(across, len(down))
+        return Discs(columns, rows, np.full(len(rows), self.diameter / 2))
+
+    def _places(self, low: float, high: float) -> Array:
+        first = math.ceil((low - self.diameter / 2) / self.spacing)
+        last = math.floor((high + self.diameter / 2) / self.spacing)
+        return np.arange(first, last + 1) * self.spacing

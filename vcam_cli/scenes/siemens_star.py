@@ -1,0 +1,54 @@
+"""A Siemens star: bright and dark spokes that run to the center, where their frequency has no end.
+
+At a distance r from the center there are n / (2 pi r) spokes a meter. The edges are sharp; one
+bright spoke lies along the row to the right of the center. The spokes fill the frame and go on
+beyond it. Reflectances (1 - contrast) / 2 and (1 + contrast) / 2.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from vcam_cli.scenes import polygons
+from vcam_cli.scenes.base import Array, Chart
+
+MEAN = 0.5
+
+
+@dataclass(frozen=True)
+class SiemensStar(Chart):
+    """spokes: bright ones, at least 2; contrast 0..1 (Michelson)."""
+
+    spokes: int
+    contrast: float
+
+    def paint(self, x_edges: Array, y_edges: Array, mix: Array, out: Array) -> None:
+        """Exact: bright spokes are triangles that reach beyond the cells."""
+        corner = math.hypot(abs(x_edges[[0, -1]]).max(), abs(y_edges[[0, -1]]).max())
+        reach = 1.01 * corner / math.cos(math.pi / (2 * self.spokes))
+        self._mixed(polygons.cover(self._triangles(reach), x_edges, y_edges), mix, out)
+
+    def values(self, x: Array, y: Array, mix: Array) -> Array:
+        angle = np.arctan2(np.asarray(y)[:, None], np.asarray(x)[None, :])
+        out = np.empty((len(mix), len(y), len(x)), mix.dtype)
+        bright = np.heaviside(np.cos(self.spokes * angle), 0.5)
+        bright[np.hypot.outer(y, x) == 0.0] = 0.5
+        self._mixed(bright, mix, out)
+        return out
+
+    def _triangles(self, reach: float) -> polygons.Sides:
+        """The bright spokes up to a distance [m]."""
+        middle = 2 * math.pi * np.arange(self.spokes) / self.spokes
+        half = math.pi / (2 * self.spokes)
+        # y is down: counterclockwise as seen is toward falling angles
+        first, second = middle + half, middle - half
+        corners = np.zeros((self.spokes, 3, 2))
+        corners[:, 1] = reach * np.stack([np.cos(first), np.sin(first)], axis=1)
+        corners[:, 2] = reach * np.stack([np.cos(second), np.sin(second)], axis=1)
+        return polygons.sides(corners)
+
+    def _mixed(self, bright: Array, mix: Array, out: Array) -> None:
+        light = (MEAN * (1 - self.contrast + 2 * self.contrast * bright)).astype(mix.dtype)
+        for plane, level in zip(out, mix[:, 0], strict=True):
+            np.multiply(light, level, out=plane)

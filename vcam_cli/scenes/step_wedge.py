@@ -1,0 +1,48 @@
+"""A step wedge: vertical bars of equal steps in density, the brightest, perfect white, on the left.
+
+Bar i of n has the reflectance 10^(-D i / (n - 1)), D the density range. The bars fill the frame;
+beyond it the first and the last go on, and all go on above and below.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vcam_cli.scenes.base import Array, Chart, Frame
+
+
+@dataclass(frozen=True)
+class StepWedge(Chart):
+    """Levels (n,) from left to right, 0..1, and the borders (n - 1,) between them [m]."""
+
+    levels: Array
+    borders: Array
+
+    def paint(self, x_edges: Array, y_edges: Array, mix: Array, out: Array) -> None:
+        """Exact."""
+        out[:] = _times(mix, step_averages(self.levels, self.borders, x_edges))
+
+    def values(self, x: Array, y: Array, mix: Array) -> Array:
+        line = _times(mix, self.levels[self.borders.searchsorted(x, side="right")])
+        return np.repeat(line, len(y), axis=1)
+
+
+def step_wedge(steps: int, density_range: float, frame: Frame) -> StepWedge:
+    """Bars of equal width over the frame."""
+    density = density_range * np.arange(steps) / (steps - 1)
+    return StepWedge(10.0**-density, (np.arange(1, steps) / steps - 0.5) * frame.width)
+
+
+def step_averages(levels: Array, borders: Array, edges: Array) -> Array:
+    """Averages (n,) between rising edges of a function that is constant between borders.
+
+    Sums of positive parts: a dark bar keeps all its digits beside a bright one.
+    """
+    within = borders[(borders > edges[0]) & (borders < edges[-1])]
+    ends = np.sort(np.concatenate([edges, within]))
+    light = levels[borders.searchsorted((ends[1:] + ends[:-1]) / 2, side="right")] * np.diff(ends)
+    return np.add.reduceat(light, ends.searchsorted(edges[:-1])) / np.diff(edges)
+
+
+def _times(mix: Array, line: Array) -> Array:
+    return np.asarray(np.multiply.outer(mix[:, 0], line.astype(mix.dtype))[:, None, :])

@@ -1,0 +1,143 @@
+"""What each effect does, measured: the plan's estimates are held to this.
+
+Of an effect that changes the mean signal: rms over the array of (mean raw with everything on -
+mean raw without it), relative to full signal. Of noise, which changes no mean: its share of the
+variance, from draws at 1, 10 and 100 % of full signal with and without it. Every draw has random
+numbers of its own, so that the difference of two frames is the effect and nothing else.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.geometry import geometry
+from vcam_cli.effects.base import Code, Draw
+from vcam_cli.effects.order import ORDER
+from vcam_cli.effects.quantization import Quantization
+from vcam_cli.effects.saturation import Saturation
+from vcam_cli.engine import capture, plan
+from vcam_cli.engine.prepare import Prepared
+
+FLAT = (4, 1 << 16)
+"""Rows and columns of the fields that noise is measured on: many columns, since some of it is the
+same along a whole column. A variance is good to sqrt(2 / columns) = 0.6 % then."""
+
+
+@dataclass(frozen=True)
+class Ablation:
+    """One effect: what the plan expected of leaving it out, and what that did."""
+
+    name: str
+    state: str
+    """on | off, in the camera as its file has it"""
+    by: str
+    """user | plan"""
+    predicted: float | None
+    measured: float
+    unit: str
+    """What both are relative to."""
+    seconds_saved: float
+    """Time a frame takes less without it [s]; below 0: more."""
+
+    @property
+    def ratio(self) -> float | None:
+        """Predicted over measured; None where there is nothing to compare."""
+        if self.predicted is None or self.measured <= 0:
+            return None
+        return self.predicted / self.measured
+
+
+def switched(camera: Camera, every: str, *left_out: str) -> Camera:
+    """The camera with what its file wants on `auto` or `on`, but for what is left out.
+
+    What the file itself switches off stays off.
+    """
+    off = {n for n, wish in camera.effects.items() if wish == "off"} if _chosen(camera) else set()
+    off |= set(left_out)
+    if every == "auto":
+        return camera.model_copy(update={"effects": dict.fromkeys(sorted(off), "off") or "auto"})
+    found = {n for n, effect in plan.described(camera, geometry(camera)).items() if effect}
+    states = {name: "off" if name in off else "on" for name in sorted(found | off)}
+    return camera.model_copy(update={"effects": states})
+
+
+def wanted(camera: Camera) -> list[str]:
+    """Names of the effects that the file describes and does not switch off, in their order."""
+    names = {e.name for e in plan.wanted(camera, geometry(camera))}
+    return [kind.name for kind in ORDER if kind.name in names]
+
+
+def exposed_for(camera: Camera, time: float) -> Camera:
+    """The camera with its exposure time fixed [s]: an effect left out must not change it."""
+    fixed = camera.exposure.model_copy(update={"auto": None, "time": time})
+    return camera.model_copy(update={"exposure": fixed})
+
+
+def mean_raw(ready: Prepared) -> NDArray:
+    """Noise-free raw signal of every pixel, clipped where the well is full, float64 [electrons]."""
+    mean = capture.mean_electrons(ready.rate, ready.exposure_time, ready.plan.active)
+    mean = mean.astype(np.float64)
+    well = next((e.full_well for e in ready.plan.active if isinstance(e, Saturation)), np.inf)
+    return np.minimum(mean, well, out=mean)
+
+
+def full_signal(ready: Prepared) -> float:
+    """Largest noise-free mean signal on the array, at most the full well, at least 1 electron."""
+    mean = capture.mean_electrons(ready.rate, ready.exposure_time, ready.plan.active)
+    return max(1.0, min(ready.electrical.full_well, float(mean.max())))
+
+
+def rms(values: NDArray) -> float:
+    """Root of the mean square."""
+    return float(np.sqrt(np.mean(np.square(values))))
+
+
+def variance_shares(ready: Prepared, full: float, workers: int) -> dict[str, float]:
+    """Of every draw, and of the ADC's rounding: its largest share of the variance of its scope.
+
+    ready: the camera with everything on; full: its full signal [electrons].
+    """
+    fields = [np.full(FLAT, share * full) for share in plan.LEVELS]
+    draws = [e for e in ready.plan.active if isinstance(e, Draw)]
+    shares = {}
+    for scope in ("frame", "sensor"):
+        here = tuple(e for e in draws if e.scope == scope)
+        everything = [_taken(ready, field, here, workers) for field in fields]
+        for effect in here:
+            others = tuple(e for e in here if e is not effect)
+            shares[effect.name] = max(
+                np.mean((taken - _taken(ready, field, others, workers)) ** 2) / _variance(taken)
+                for taken, field in zip(everything, fields, strict=True)
+            )
+        code = next((e for e in ready.plan.active if isinstance(e, Code)), None)
+        if scope == "frame" and code is not None:
+            shares[code.name] = max(_rounding_share(code, taken) for taken in everything)
+    return {name: float(share) for name, share in shares.items()}
+
+
+def _rounding_share(code: Code, electrons: NDArray) -> float:
+    """Mean square of the rounding error over the variance with it."""
+    line = code.line(electrons.copy())
+    ends = electrons.mean() * np.array([1.0, 1.001]) + np.array([0.0, 1.0])
+    per_code = float(np.diff(ends)[0] / np.diff(code.line(ends.copy()))[0])
+    error = float(np.mean((np.rint(line) - line) ** 2)) * per_code**2
+    return error / max(error + float(np.var(electrons)), 1e-300)
+
+
+def _variance(taken: NDArray) -> float:
+    return max(float(np.var(taken)), 1e-300)
+
+
+def _taken(ready: Prepared, field: NDArray, draws: tuple[Draw, ...], workers: int) -> NDArray:
+    """A flat field [electrons] with these draws in it, never clipped."""
+    seeds = {"sensor": ready.camera.seed.sensor, "frame": ready.camera.seed.frame}
+    code = Quantization.of(ready.camera, ready.geometry)
+    return capture.capture(field, 1.0, draws, code, seeds, workers)[0]
+
+
+def _chosen(camera: Camera) -> bool:
+    return isinstance(camera.effects, dict)
