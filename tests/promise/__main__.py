@@ -52,7 +52,9 @@ def _one(name: str, folder: Path, out: dict[str, list]) -> None:
         )
     for e in promises.estimates(camera, true):
         out["estimates"].append((name, e.name, e.predicted, e.measured, e.ratio))
-        print(f"  {e.name:<16} {e.predicted:10.3e} expected {e.measured:10.3e} found {e.ratio:7.3f}")
+        print(
+            f"  {e.name:<16} {e.predicted:10.3e} expected {e.measured:10.3e} found {e.ratio:7.3f}"
+        )
     shares = ablation.variance_shares(true.found, true.full, 2)
     for preset in promises.PRESETS:
         for effect, off in promises.worth_leaving_out(camera, preset, true, shares):

@@ -132,7 +132,10 @@ exposure: {auto: {max: 100 ms, method: mean, target: 0.5}}
     "wide and fast": """
 scene: {source: {kind: chart, chart: slanted-edge, angle: 5 deg}, illuminant: {blackbody: 3200 K}}
 optics: {f_number: 1.2, focal_length: 0.25 mm}
-pixel: {width: 6.5 um, photodetector: {fill_factor: 0.6}, readout: {conversion_gain: 10 uV/e, reset_noise: 0.5 e}}
+pixel:
+  width: 6.5 um
+  photodetector: {fill_factor: 0.6}
+  readout: {conversion_gain: 10 uV/e, reset_noise: 0.5 e}
 exposure: {auto: {max: 100 ms}}
 """,
     "bright and quiet": """

@@ -1,12 +1,21 @@
 """`vcam accuracy`: what accuracy costs for this camera."""
 
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from vcam_cli.commands import options
+from vcam_cli.commands.progress import Progress
 
 if TYPE_CHECKING:
     from vcam_cli.studies.accuracy import Study
+
+SHARE_OF = {
+    "of full signal": "full signal",
+    "of the temporal variance": "temporal var.",
+    "of the fixed-pattern variance": "fixed var.",
+}
+"""Units of the plan, short enough for a table."""
 
 
 def accuracy(
@@ -29,18 +38,18 @@ def accuracy(
       vcam accuracy starter
       vcam accuracy camera.yaml -o out/knobs --set optics.f_number=8
     """
-    from vcam_cli.camera.load import load
     from vcam_cli.files import plots, report, tables
     from vcam_cli.files.folder import OutputFolder
     from vcam_cli.studies import accuracy as study
     from vcam_cli.studies import outputs
+    from vcam_cli.studies.checks import load
 
     model = load(camera, options.overrides(set_, seed, level))
     inputs = outputs.inputs(model)
-    path = out or Path("out") / f"{model.name[:55]}-accuracy"
-    with OutputFolder(path, record="accuracy.json", inputs=inputs) as folder:
-        with options.progress(quiet) as say:
-            found = study.accuracy(model, workers, say)
+    path = out or Path("out") / model.name
+    place = OutputFolder(path, record="accuracy.json", inputs=inputs)
+    with place as folder, Progress(quiet) as progress:
+        found = study.accuracy(model, workers, progress)
         rows = (point.row for point in found.points)
         tables.write_table(folder.new("accuracy.csv"), study.COLUMNS, rows)
         plots.pareto(folder.new("accuracy.png"), *pictured(found))
@@ -84,17 +93,18 @@ def tell(found: "Study", path: Path) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    console = Console(soft_wrap=True, highlight=False)
+    width = None if sys.stdout.isatty() else 120
+    console = Console(width=width, soft_wrap=True, highlight=False)
     style = box.SIMPLE_HEAD if console.is_terminal else None
     for title, head, rows in (
         ("", ("knob", "setting", "rms error", "largest", "electrons", "seconds", "spread"),
          settings(found)),
         ("what the plan expected of each effect, and what leaving it out did",
-         ("effect", "state", "expected", "measured", "ratio", "of", "saves"), effects(found)),
+         ("effect", "state", "expected", "measured", "ratio", "share of", "saves"), effects(found)),
     ):  # fmt: skip
         table = Table(title=title or None, title_justify="left", box=style, pad_edge=False)
         for i, name in enumerate(head):
-            text = i < 2 or name == "of"
+            text = i < 2 or name == "share of"
             table.add_column(name, justify="left" if text else "right", no_wrap=True)
         for row in rows:
             table.add_row(*row)
@@ -133,11 +143,11 @@ def effects(found: "Study") -> list[tuple[str, ...]]:
     return [
         (
             e.name,
-            f"{e.state} ({e.by})",
+            e.state,
             "-" if e.predicted is None else f"{e.predicted:.2e}",
             f"{e.measured:.2e}",
             "-" if e.ratio is None else f"{e.ratio:.2f}",
-            e.unit.removeprefix("of ").removeprefix("the "),
+            SHARE_OF.get(e.unit, e.unit),
             f"{1000 * e.seconds_saved:.0f} ms",
         )
         for e in found.effects

@@ -28,6 +28,7 @@ except KeyboardInterrupt:  # most of the time until a command begins goes by her
 COMMANDS = {
     "run": "run:run",
     "plan": "plan:plan",
+    "accuracy": "accuracy:accuracy",
     "compare": "compare:compare",
     "validate": "validate:validate",
     "list": "list_:list_",

@@ -29,6 +29,8 @@ from vcam_cli.files.report import to_json
 
 LOCK = ".vcam-lock"
 PROGRAM = "vcam"  # a record is vcam's when it says {"program": "vcam", "files": [...]}
+RECORDS = ("run.json", "accuracy.json", "study.json", "compare.json")
+"""Records of vcam's commands: what one of them wrote, another may add to."""
 _LARGEST_RECORD = 1 << 26  # bytes
 _NO_LOCKS_HERE = {errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOSYS}
 _NOT_A_FOLDER = {errno.ENOTDIR, errno.EEXIST, errno.ENAMETOOLONG, errno.ELOOP, errno.EINVAL}
@@ -142,7 +144,8 @@ class OutputFolder:
             return
         if before_lock and LOCK in present:
             return  # perhaps in the middle of another run: judged under the lock
-        if present - {LOCK, STAGING} and not (self._recorded() or self._journal()):
+        ours = self._recorded() or self._journal() or self._of_another()
+        if present - {LOCK, STAGING} and not ours:
             raise bad(
                 "--out",
                 f"{self.path} is not empty and holds no {self._record} of vcam",
@@ -221,6 +224,10 @@ class OutputFolder:
     def _recorded(self) -> dict[str, Any] | None:
         """The record of the previous run, when it is vcam's."""
         return _claim(self.path / self._record)
+
+    def _of_another(self) -> bool:
+        """Whether another command of vcam has finished here."""
+        return any(_claim(self.path / name) for name in RECORDS if name != self._record)
 
     def _journal(self) -> list[str]:
         claim = _claim(self.path / LOCK)

@@ -101,16 +101,17 @@ def _error_over_time(
         x = [p[0] for p in curve.points]
         y = [max(p[1], FLOOR) for p in curve.points]
         axes.plot(x, y, marker=marker, ms=3.8, lw=0.9, color=color, alpha=0.85, label=curve.name)
-    for x, error, name in sorted(presets):
+    for i, (x, error, name) in enumerate(sorted(presets)):
         y = max(error, FLOOR)
         axes.plot(x, y, "o", ms=8, mfc="white", mec="black", mew=1.4, zorder=5)
         left = x > (min(seconds) * max(seconds)) ** 0.5
         axes.annotate(
             name,
             (x, y),
-            xytext=(-8 if left else 8, 8),
+            xytext=(-7 if left else 7, -8 if i % 2 else 8),
             textcoords="offset points",
             ha="right" if left else "left",
+            va="top" if i % 2 else "bottom",
             fontweight="bold",
             zorder=6,
         )
@@ -127,7 +128,7 @@ def _error_over_time(
     axes.set_xscale("log")
     axes.set_yscale("log")
     axes.set_xlim(min(seconds) / 1.4, max(seconds) * 1.4)
-    axes.set_ylim(max(min(errors), FLOOR) / 3, max(*errors, tolerance) * 3)
+    axes.set_ylim(max(min(errors), FLOOR) / 3, max([*errors, tolerance]) * 3)
     _plain_seconds(axes.xaxis)
     axes.yaxis.set_minor_locator(LogLocator(subs="auto"))
     axes.yaxis.set_minor_formatter(NullFormatter())

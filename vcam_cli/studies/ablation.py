@@ -56,8 +56,8 @@ def switched(camera: Camera, every: str, *left_out: str) -> Camera:
 
     What the file itself switches off stays off.
     """
-    off = {n for n, wish in camera.effects.items() if wish == "off"} if _chosen(camera) else set()
-    off |= set(left_out)
+    own = camera.effects if isinstance(camera.effects, dict) else {}
+    off = {*left_out, *(name for name, wish in own.items() if wish == "off")}
     if every == "auto":
         return camera.model_copy(update={"effects": dict.fromkeys(sorted(off), "off") or "auto"})
     found = {n for n, effect in plan.described(camera, geometry(camera)).items() if effect}
@@ -137,7 +137,3 @@ def _taken(ready: Prepared, field: NDArray, draws: tuple[Draw, ...], workers: in
     seeds = {"sensor": ready.camera.seed.sensor, "frame": ready.camera.seed.frame}
     code = Quantization.of(ready.camera, ready.geometry)
     return capture.capture(field, 1.0, draws, code, seeds, workers)[0]
-
-
-def _chosen(camera: Camera) -> bool:
-    return isinstance(camera.effects, dict)

@@ -15,7 +15,6 @@ from __future__ import annotations
 import math
 import statistics
 import time
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -23,12 +22,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.geometry import geometry
 from vcam_cli.camera.settings import PRESETS, Accuracy
 from vcam_cli.effects.base import Code, Draw
 from vcam_cli.engine import memory
 from vcam_cli.engine.optics import MARGIN
 from vcam_cli.engine.parallel import available_workers
 from vcam_cli.engine.prepare import Prepared
+from vcam_cli.engine.stages import Observer, Silent
 from vcam_cli.studies import ablation
 from vcam_cli.studies.ablation import Ablation
 from vcam_cli.studies.simulate import prepare, simulate
@@ -143,37 +144,35 @@ class Study:
         }
 
 
-Said = Callable[[str, float], None]
-"""Called with what is being done, and the part of the whole that is done, 0 to 1."""
-
-
-def accuracy(camera: Camera, workers: int | None = None, say: Said | None = None) -> Study:
+def accuracy(camera: Camera, workers: int | None = None, watch: Observer | None = None) -> Study:
     """Measures `camera` along every knob, with every preset, without every effect.
 
-    workers: threads, default all processors. say: told how it goes. Raises BadInput, CannotDo.
+    workers: threads, default all processors. watch: told of stages. Raises BadInput, CannotDo.
     """
     workers = workers or available_workers()
-    tell = say or (lambda doing, done: None)
+    watch = watch or Silent()
     cases = _cases(camera)
     effects = {n: _without(camera, n) for n in ablation.wanted(camera)}
     first = {repr(case): case for _, _, case in cases}
     signals: dict[str, NDArray] = {}
     frames: dict[str, Prepared] = {}
+    watch.begin("errors of the settings")
     for i, (key, case) in enumerate(first.items()):
-        tell("errors of the settings", 0.2 * i / len(first))
+        watch.step(i, len(first))
         frame = _prepared(case, workers)
         signals[key] = ablation.mean_raw(frame)
         frames[key] = replace(frame, rate=np.empty((0, 0)))  # only its plan is used again
-    tell("converged reference", 0.2)
+    watch.begin("converged reference")
     found = converged(camera, frames[repr(_with(camera, preset="reference"))], workers)
     truth, full = ablation.mean_raw(found), ablation.full_signal(found)
     errors = {key: _error(signal - truth) for key, signal in signals.items()}
     signals.clear()
-    tell("effects left out", 0.4)
+    watch.begin("effects left out")
     changed = changes(camera, found.exposure_time, tuple(effects), workers)
     shares = ablation.variance_shares(found, full, workers)
     timed = first | {repr(case): case for case in effects.values()}
-    seconds = _seconds(timed, workers, lambda part: tell("seconds", 0.5 + 0.5 * part))
+    watch.begin("seconds of the settings")
+    seconds = _seconds(timed, workers, watch)
     points = [
         _point(knob, setting, errors[repr(case)], full, seconds[repr(case)], frames[repr(case)])
         for knob, setting, case in cases
@@ -259,7 +258,8 @@ def _cases(camera: Camera) -> list[tuple[str, str, Camera]]:
     cases = [("preset", name, _with(camera, preset=name)) for name in PRESETS]
     for name in ("auto", "all"):
         cases.append(("effects", name, ablation.switched(camera, name)))
-    most = math.sqrt(MOST_SAMPLES / (camera.array.rows * camera.array.columns))
+    g = geometry(camera)
+    most = math.sqrt(MOST_SAMPLES / (g.rows * g.columns))
     own = camera.accuracy.model_dump(mode="json")
     for knob, settings in KNOBS.items():
         for setting, value in settings.items():
@@ -291,9 +291,7 @@ def _prepared(camera: Camera, workers: int) -> Prepared:
 # --- seconds -------------------------------------------------------------------------------------
 
 
-def _seconds(
-    cases: dict[str, Camera], workers: int, tell: Callable[[float], None]
-) -> dict[str, list[float]]:
+def _seconds(cases: dict[str, Camera], workers: int, watch: Observer) -> dict[str, list[float]]:
     """Seconds of a frame of every camera, run in turns."""
     seconds: dict[str, list[float]] = {key: [] for key in cases}
     _frame(next(iter(cases.values())), workers)  # caches, and pages of memory
@@ -301,7 +299,7 @@ def _seconds(
         for i, (key, case) in enumerate(cases.items()):
             if turn >= 2 and sum(seconds[key]) > ENOUGH:
                 continue
-            tell((turn + i / len(cases)) / ROUNDS)
+            watch.step(turn * len(cases) + i, ROUNDS * len(cases))
             start = time.perf_counter()
             _frame(case, workers)
             seconds[key].append(time.perf_counter() - start)

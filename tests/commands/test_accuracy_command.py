@@ -1,0 +1,65 @@
+"""`vcam accuracy`: the files it leaves and what it says."""
+
+import csv
+import json
+
+import pytest
+from typer.testing import CliRunner
+
+from vcam_cli.commands.main import app
+from vcam_cli.studies import accuracy as study
+
+SMALL = ("--set", "array.rows=12", "--set", "array.columns=16")
+UNIFORM = "scene.source={kind: chart, chart: uniform}"
+
+
+@pytest.fixture(scope="module")
+def ran(tmp_path_factory):
+    out = tmp_path_factory.mktemp("accuracy") / "out"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(study, "ROUNDS", 2)
+        arguments = ["accuracy", "slanted-edge-f8", *SMALL, "-o", str(out)]
+        text = CliRunner().invoke(app, [*arguments, "--set", UNIFORM, "--workers", "1"])
+        assert text.exit_code == 0, text.output
+        again = CliRunner().invoke(app, [*arguments, "--set", UNIFORM, "--json"])
+        assert again.exit_code == 0, again.output
+    return out, text.stdout, json.loads(again.stdout)
+
+
+def test_files(ran):
+    out, _, _ = ran
+    assert sorted(p.name for p in out.iterdir()) == [
+        "accuracy.csv",
+        "accuracy.json",
+        "accuracy.png",
+    ]
+    header, *rows = csv.reader((out / "accuracy.csv").read_text().splitlines())
+    assert header == "knob,setting,rms_error,max_error,rms_electrons,seconds,seconds_spread".split(
+        ","
+    )
+    assert all(float(cell) >= 0 for row in rows for cell in row[2:])
+    assert {"preset", "effect:diffraction"} <= {row[0] for row in rows}
+    record = json.loads((out / "accuracy.json").read_text())
+    assert record["program"] == "vcam" and record["camera"] and record["effects"]
+
+
+def test_a_person_reads_tables_and_a_recommendation(ran):
+    _, text, _ = ran
+    for word in ("preset", "standard", "shot_noise", "expected", "measured", "recommended: "):
+        assert word in text
+
+
+def test_json_has_the_measurement(ran):
+    _, _, told = ran
+    assert {"out", "points", "effects", "recommendation", "reference"} <= set(told)
+    assert {"predicted", "measured", "ratio", "unit"} <= set(told["effects"][0])
+
+
+def test_it_stands_beside_a_run_in_the_same_folder(tmp_path, monkeypatch):
+    monkeypatch.setattr(study, "ROUNDS", 2)
+    arguments = ["slanted-edge-f8", *SMALL, "--set", UNIFORM, "-o", str(tmp_path / "out"), "-q"]
+    for command in ("run", "accuracy", "run"):
+        done = CliRunner().invoke(app, [command, *arguments])
+        assert done.exit_code == 0, done.output
+    names = {p.name for p in (tmp_path / "out").iterdir()}
+    assert {"raw.exr", "run.json", "accuracy.csv", "accuracy.json"} <= names

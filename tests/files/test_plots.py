@@ -1,0 +1,39 @@
+"""Plots: readable PNG files, the same bytes for the same numbers."""
+
+import struct
+
+import pytest
+
+from vcam_cli.files.plots import Curve, Pair, pareto
+
+PRESETS = ((0.1, 1e-3, "draft"), (0.2, 2e-4, "standard"), (3.0, 0.0, "reference"))
+CURVES = (Curve("oversampling", ((0.1, 4e-3, "1"), (0.4, 1e-4, "8"))),)
+PANELS = (
+    ("of full signal", (Pair("diffraction", 0.02, 0.01), Pair("dark_current", None, 0.0))),
+    ("of the variance", (Pair("shot_noise", 1.0, 1.0),)),
+)
+
+
+def drawn(path, panels=PANELS, curves=CURVES):
+    pareto(path, "made", PRESETS, curves, 0.005, panels)
+    return path.read_bytes()
+
+
+def test_same_numbers_same_bytes(tmp_path):
+    assert drawn(tmp_path / "a.png") == drawn(tmp_path / "b.png")
+
+
+def test_nothing_in_the_file_but_the_picture(tmp_path):
+    """No program, no date."""
+    data = drawn(tmp_path / "a.png")
+    at, names = 8, []
+    while at < len(data):
+        (length,) = struct.unpack(">I", data[at : at + 4])
+        names.append(data[at + 4 : at + 8])
+        at += 12 + length
+    assert set(names) <= {b"IHDR", b"pHYs", b"IDAT", b"IEND"}
+
+
+@pytest.mark.parametrize(("panels", "curves"), [((), CURVES), (PANELS[:1], ()), (PANELS, CURVES)])
+def test_whatever_is_missing_it_draws(panels, curves, tmp_path):
+    assert drawn(tmp_path / "a.png", panels or PANELS[1:], curves).startswith(b"\x89PNG")

@@ -1,0 +1,43 @@
+"""The promises of `python -m tests.promise`, held on three of its cameras, without its clock."""
+
+import pytest
+from promises import CAMERAS, estimates, idle_work, kept, made, truth, worth_leaving_out
+
+from vcam_cli.studies import ablation
+
+FAST = ("night", "color photograph", "aliasing")
+
+
+@pytest.fixture(scope="module", params=FAST)
+def case(request, tmp_path_factory):
+    camera = made(request.param, tmp_path_factory.mktemp("promise"), "accuracy=standard")
+    return camera, truth(camera)
+
+
+def test_mean_and_variance_stay_within_the_tolerance(case):
+    for found in kept(*case):
+        assert found.mean <= found.tolerance, found
+        assert found.variance <= 2 * found.tolerance, found
+
+
+def test_the_plan_expects_what_leaving_out_does(case):
+    """From 10 % too little to ten times too much."""
+    for found in estimates(*case):
+        assert 0.9 <= found.ratio <= 10, found
+
+
+def test_draws_not_worth_their_cost_are_off(case):
+    """At draft the "aliasing" camera has one, at 1 e in a well of 200 ke."""
+    camera, true = case
+    shares = ablation.variance_shares(true.found, true.full, 1)
+    found = worth_leaving_out(camera, "draft", true, shares)
+    assert all(off for _, off in found)
+    assert bool(found) == (camera.name == "aliasing")
+
+
+def test_nobody_asks_for_nothing_is_done(case):
+    assert all(left_out for _, left_out in idle_work(case[0]))
+
+
+def test_twelve_cameras():
+    assert len(CAMERAS) == 12

@@ -1,0 +1,156 @@
+"""The accuracy study: what it measures, and what it recommends."""
+
+import math
+
+import numpy as np
+import pytest
+from making import camera, radiance_for
+
+from vcam_cli import simulate
+from vcam_cli.effects.order import ORDER
+from vcam_cli.studies import ablation
+from vcam_cli.studies import accuracy as study
+from vcam_cli.studies.accuracy import COLUMNS, Point, recommend
+from vcam_cli.studies.simulate import prepare
+
+DARK = "pixel.photodetector.dark_current"
+NOISY = {
+    "scene.radiance": radiance_for(2000),
+    "scene.source": {"kind": "chart", "chart": "slanted-edge"},
+    "optics.off_axis": "exact",
+    "optics.focal_length": "0.6 mm",
+    DARK: "3 ke/s",
+    "pixel.readout.read_noise": "9 e",
+    "pixel.readout.reset_noise": "12 e",
+    "pixel.fpn": {"offset_pixel": "4 e", "offset_column": "2 e", "gain_pixel": "1 %"},
+    "array.rows": 20,
+    "array.columns": 24,
+    "effects": "auto",
+    "accuracy": "standard",
+}
+
+
+@pytest.fixture(scope="module")
+def measured(tmp_path_factory):
+    made = camera(tmp_path_factory.mktemp("study"), NOISY)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(study, "ROUNDS", 2)
+        patch.setattr(study, "MOST_BYTES", 5e7)
+        return study.accuracy(made, workers=1)
+
+
+def of(found, knob: str) -> dict[str, Point]:
+    return {p.setting: p for p in found.points if p.knob == knob}
+
+
+def test_every_preset_knob_and_effect_is_there(measured):
+    knobs = {p.knob for p in measured.points}
+    assert {"preset", "effects", "wavelength_step", "oversampling", "float_width"} <= knobs
+    assert set(of(measured, "preset")) == {"draft", "standard", "reference"}
+    assert set(of(measured, "effects")) == {"auto", "all"}
+    assert {k.removeprefix("effect:") for k in knobs if k.startswith("effect:")} == {
+        kind.name for kind in ORDER if kind.name in {e.name for e in measured.effects}
+    }
+
+
+def test_presets_keep_their_tolerance_and_rise_in_accuracy(measured):
+    presets = of(measured, "preset")
+    for name, tolerance in (("draft", 0.02), ("standard", 0.005), ("reference", 2e-4)):
+        assert presets[name].rms_error <= tolerance
+    assert presets["reference"].rms_error < presets["standard"].rms_error
+
+
+def test_numbers_of_a_point_belong_together(measured):
+    full = measured.reference.full_signal
+    for p in measured.points:
+        assert p.rms_electrons == pytest.approx(p.rms_error * full, rel=1e-12)
+        assert p.max_error >= p.rms_error and p.seconds > 0 and p.seconds_spread >= 0
+        assert len(p.row) == len(COLUMNS)
+
+
+def test_dark_current_left_out_is_its_electrons(measured):
+    """3 ke/s for 10 ms are 30 electrons in every pixel."""
+    left_out = of(measured, "effect:dark_current")["off"]
+    assert left_out.rms_electrons == pytest.approx(30, rel=1e-6)
+    assert left_out.max_error == pytest.approx(left_out.rms_error, rel=1e-6)
+
+
+def test_noise_left_out_changes_no_mean(measured):
+    for name in ("shot_noise", "fpn", "reset_noise", "read_noise", "quantization"):
+        assert of(measured, f"effect:{name}")["off"].max_error == 0
+
+
+def test_expected_stands_beside_measured(measured):
+    """From 10 % too little to ten times too much; variances are closed forms, and sampled to 2 %."""
+    for e in measured.effects:
+        assert e.predicted is not None
+        assert e.ratio is None or 0.9 <= e.ratio <= 10
+        if e.unit.endswith("variance"):
+            assert e.predicted == pytest.approx(e.measured, rel=0.02)
+
+
+def test_report_is_plain(measured):
+    report = measured.report()
+    assert {"points", "effects", "reference", "recommendation", "tolerance"} <= set(report)
+    assert all(math.isfinite(p["rms_error"]) for p in report["points"])
+
+
+def test_an_effect_the_user_switched_off_is_off_everywhere(tmp_path):
+    made = camera(tmp_path, NOISY | {"effects": {"off_axis": "off", "read_noise": "on"}})
+    for every in ("auto", "all"):
+        found = ablation.switched(made, every)
+        states = {d.name: d.state for d in prepare(found)[0].plan.decisions}
+        assert states["off_axis"] == "off"
+    assert states["read_noise"] == "on"
+    assert "off_axis" not in ablation.wanted(made)
+
+
+def test_variance_shares_are_what_frames_have(tmp_path):
+    """On a uniform field at full signal, whose share of read noise is its largest in the dark."""
+    quiet = {"pixel.readout.read_noise": "30 e", "scene.radiance": radiance_for(900)}
+    made = camera(tmp_path, quiet | {"array.rows": 256, "array.columns": 256, "effects": "all"})
+    ready = prepare(made)[0]
+    shares = ablation.variance_shares(ready, 900.0, 1)
+    assert shares["read_noise"] == pytest.approx(900 / 909, rel=0.02)  # at 1 % of full signal
+    frame = simulate(made)
+    noise = np.var(frame.electrons - frame.mean_electrons)
+    assert noise == pytest.approx(900 + 900, rel=0.03)  # five standard errors of 65536 pixels
+    assert shares["shot_noise"] == pytest.approx(0.5, rel=0.03)  # at full signal
+
+
+def point(knob: str, setting: str, error: float, seconds: float, variance: float = 0.0) -> Point:
+    return Point(knob, setting, error, error, error, seconds, 0.0, None, (), variance)
+
+
+OWN = point("file", "as it is", 0.001, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("points", "line"),
+    [
+        ([OWN, point("preset", "draft", 0.004, 0.5)], "accuracy: draft"),
+        ([OWN, point("preset", "draft", 0.006, 0.5)], "accuracy: standard"),
+        ([OWN, point("preset", "draft", 0.001, 0.5, variance=0.02)], "accuracy: standard"),
+        ([OWN, point("preset", "draft", 0.001, 0.95)], "accuracy: standard"),
+        (
+            [OWN, point("preset", "draft", 0.004, 0.8), point("oversampling", "2", 0.003, 0.4)],
+            "accuracy: {preset: standard, oversampling: 2}",
+        ),
+        (
+            [point("file", "as it is", 0.009, 1.0), point("preset", "reference", 1e-4, 9.0)],
+            "accuracy: reference",
+        ),
+    ],
+)
+def test_recommended_is_the_fastest_that_keeps_the_tolerance(points, line, tmp_path):
+    made = camera(tmp_path, {"accuracy": "standard"})
+    found = recommend(made, tuple(points))
+    assert found.line == line and line in found.sentence
+    pasted = camera(tmp_path, {"accuracy": _read(line)})
+    assert pasted.accuracy.tolerance in (0.02, 0.005, 0.0002)
+
+
+def _read(line: str):
+    import yaml
+
+    return yaml.safe_load(line)["accuracy"]
