@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 SOURCES := vcam_cli tests scripts
 CAMERA ?= still-life
 
-.PHONY: run test check bench schemas tables lock clean
+.PHONY: run test check bench promise schemas tables lock clean
 
 run: $(VENV)/.runtime  ## simulate the shipped still life: out/still-life/
 	$(BIN)/vcam run $(CAMERA)
@@ -21,6 +21,9 @@ check: $(VENV)/.dev  ## format, lint, types, tests
 
 bench: $(VENV)/.dev  ## speed, as ratios to the cost of the transforms and draws alone
 	$(BIN)/python -m tests.bench
+
+promise: $(VENV)/.dev  ## the plan's promises, measured on twelve cameras
+	$(BIN)/python -m tests.promise
 
 schemas: $(VENV)/.dev  ## JSON Schemas of the files a user writes, from the models
 	$(BIN)/vcam schema schemas

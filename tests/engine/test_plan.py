@@ -274,7 +274,7 @@ def test_a_contribution_is_the_share_it_has(tmp_path):
 @pytest.mark.parametrize("source", [EDGE, PATCHES, CSF], ids=["edge", "patches", "csf"])
 @pytest.mark.parametrize("name", ["diffraction", "pixel_aperture"])
 def test_contribution_of_a_transfer_is_what_leaving_it_out_changes(name, source, tmp_path):
-    """By Parseval's theorem over the scene with its margin of 32 pixels, as if all lay on the array.
+    """By Parseval's theorem over the scene with its margin, as if all of it lay on the array.
 
     That is sqrt(320 x 384 / (256 x 320)) = 1.22 times the truth for a scene that is the same
     everywhere, and 20 % about it for these; the truth is never to be more than 10 % above.

@@ -81,7 +81,7 @@ def test_noise_left_out_changes_no_mean(measured):
 
 
 def test_expected_stands_beside_measured(measured):
-    """From 10 % too little to ten times too much; variances are closed forms, and sampled to 2 %."""
+    """From 10 % too little to ten times too much; of variances, to the 2 % they are sampled to."""
     for e in measured.effects:
         assert e.predicted is not None
         assert e.ratio is None or 0.9 <= e.ratio <= 10

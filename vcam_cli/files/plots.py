@@ -71,7 +71,8 @@ def pareto(
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    with matplotlib.rc_context({**matplotlib.rcParamsDefault, **STYLE}):
+    style: Any = {**matplotlib.rcParamsDefault, **STYLE}
+    with matplotlib.rc_context(style):
         rows = [max(2, len(pairs)) for _, pairs in panels]
         height = max(3.9, 1.5 + 0.24 * sum(rows))
         figure = Figure(figsize=(9.2, height), dpi=150, layout="constrained")
@@ -101,13 +102,13 @@ def _error_over_time(
         x = [p[0] for p in curve.points]
         y = [max(p[1], FLOOR) for p in curve.points]
         axes.plot(x, y, marker=marker, ms=3.8, lw=0.9, color=color, alpha=0.85, label=curve.name)
-    for i, (x, error, name) in enumerate(sorted(presets)):
-        y = max(error, FLOOR)
-        axes.plot(x, y, "o", ms=8, mfc="white", mec="black", mew=1.4, zorder=5)
-        left = x > (min(seconds) * max(seconds)) ** 0.5
+    for i, (at, error, name) in enumerate(sorted(presets)):
+        height = max(error, FLOOR)
+        axes.plot(at, height, "o", ms=8, mfc="white", mec="black", mew=1.4, zorder=5)
+        left = at > (min(seconds) * max(seconds)) ** 0.5
         axes.annotate(
             name,
-            (x, y),
+            (at, height),
             xytext=(-7 if left else 7, -8 if i % 2 else 8),
             textcoords="offset points",
             ha="right" if left else "left",
