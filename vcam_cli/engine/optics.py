@@ -10,7 +10,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.fft
 from numpy.typing import NDArray
 
 from vcam_cli.camera.camera import Camera
@@ -50,12 +49,22 @@ def _margin(geometry: Geometry) -> int:
     """Smallest margin from `MARGIN` on that gives both axes sizes with small prime factors."""
 
     def slow(margin: int) -> int:
-        sizes = [n + 2 * margin for n in (geometry.rows, geometry.columns)]
-        return sum(scipy.fft.next_fast_len(n, real=True) - n for n in sizes)
+        return sum(_work(n + 2 * margin) for n in (geometry.rows, geometry.columns))
 
     least = min(MARGIN, max(geometry.rows, geometry.columns))
     most = least + min(32, least)
     return min(range(least, most + 1), key=lambda m: (slow(m), m))
+
+
+def _work(size: int) -> int:
+    """Sum of the prime factors of a transform's size: what it costs per sample."""
+    total, factor = 0, 2
+    while factor * factor <= size:
+        while size % factor == 0:
+            total += factor
+            size //= factor
+        factor += 1
+    return total + (size if size > 1 else 0)
 
 
 def responses(camera: Camera, mosaic: Mosaic) -> list[Spectrum]:
