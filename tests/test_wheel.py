@@ -71,7 +71,11 @@ def test_all_schemas_lie_where_the_shipped_files_look_for_them(installed):
 def test_all_sources_and_data_tables(installed):
     kinds = (".py", ".csv", ".npz", ".json")
     mine = files(ROOT / "vcam_cli", kinds)
-    there = {n for n in files(installed / "vcam_cli", kinds) if not n.startswith(("configs/", "schemas/"))}
+    there = {
+        n
+        for n in files(installed / "vcam_cli", kinds)
+        if not n.startswith(("configs/", "schemas/"))
+    }
     assert {n for n in mine if n.startswith("data/")}
     assert there == mine
 

@@ -367,7 +367,7 @@ def test_absurd_sizes_are_refused_by_the_header(tmp_path):
 
 
 def test_image_beyond_the_memory_is_cannot_do(tmp_path, monkeypatch):
-    monkeypatch.setattr(images, "available_memory", lambda: 100)
+    monkeypatch.setattr(images.memory, "available", lambda: 100)
     with pytest.raises(CannotDo, match="memory"):
         read(write(tmp_path / "a.png", RGB8))
 

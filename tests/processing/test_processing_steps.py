@@ -75,7 +75,9 @@ def test_without_white_balance_the_luminance_of_white_is_one():
 def test_without_black_level_black_counts_in_white_and_picture_alike():
     for none in (steps(demosaic="bilinear"), steps(black_level="none", demosaic="bilinear")):
         done = process(mosaic_of(flat(1.0)), CONTEXT, none)
-        np.testing.assert_allclose(done.linear[3, 4], CONTEXT.white_dn / (CONTEXT.white_dn @ BT709), rtol=5e-7)
+        np.testing.assert_allclose(
+            done.linear[3, 4], CONTEXT.white_dn / (CONTEXT.white_dn @ BT709), rtol=5e-7
+        )
 
 
 def test_a_black_level_given_as_a_number():
@@ -97,8 +99,11 @@ def test_gray_world_makes_the_means_equal_where_it_stands(demosaic_first):
         means = linear.mean(axis=(0, 1))
     else:
         cells = [linear[i::2, j::2] for i in range(2) for j in range(2)]
-        means = [cells[0].mean(), np.concatenate([c.ravel() for c in cells[1:3]]).mean(),
-                 cells[3].mean()]
+        means = [
+            cells[0].mean(),
+            np.concatenate([c.ravel() for c in cells[1:3]]).mean(),
+            cells[3].mean(),
+        ]
     # every value carries a few float32 roundings, which average out
     np.testing.assert_allclose(means, means[0], rtol=1e-6)
 
@@ -277,8 +282,9 @@ def test_the_nearest_right_name_is_given():
 
 
 def test_all_problems_are_told_at_once():
-    found = problems(steps(gamma=-1, white_balance="gray-world", demosaic="bilinear"),
-                     (("Y",),), ("Y",))
+    found = problems(
+        steps(gamma=-1, white_balance="gray-world", demosaic="bilinear"), (("Y",),), ("Y",)
+    )
     assert len(found) == 5  # the number, two steps after gamma, two that need several colors
 
 

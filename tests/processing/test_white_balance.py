@@ -48,9 +48,7 @@ def test_a_color_that_sees_nothing_is_left_alone():
 @pytest.mark.parametrize("first_row", [-1, 0, 1, 63, 64])
 def test_a_mosaic_block_is_summed_and_balanced_color_by_color(first_row):
     values = np.random.default_rng(1).random((5, 7)).astype(np.float32)
-    names = [
-        [BAYER.pattern[(first_row + i) % 2][j % 2] for j in range(7)] for i in range(5)
-    ]
+    names = [[BAYER.pattern[(first_row + i) % 2][j % 2] for j in range(7)] for i in range(5)]
     gain = {"R": 2.0, "G": 1.0, "B": 4.0}
     total, count = color_sums(Block(values[np.newaxis], first_row), BAYER)
     for c, name in enumerate(BAYER.colors):

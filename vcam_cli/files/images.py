@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 import OpenImageIO as oiio
 
+from vcam_cli.engine import memory
 from vcam_cli.errors import BadInput, CannotDo, bad
 from vcam_cli.files.rows import message
 
@@ -116,12 +117,6 @@ def decode_srgb(code: np.ndarray) -> np.ndarray:
     code = np.asarray(code)
     high = ((np.maximum(code, 0.04045) + 0.055) / 1.055) ** 2.4
     return np.where(code <= 0.04045, code / 12.92, high)
-
-
-def available_memory() -> int | None:
-    """Bytes this process may still take without swapping, None where that is unknown."""
-    bounds = [_meminfo(), _group_limit()]
-    return min((bound for bound in bounds if bound is not None), default=None)
 
 
 def _check_file(path: Path) -> None:
@@ -266,8 +261,8 @@ def _check_size(spec: Any, channels: int) -> None:
             "crop it or reduce its size",
         )
     need = pixels * channels * (4 + 4) + spec.image_bytes(True)
-    free = available_memory()
-    if free is not None and need > free:
+    free = memory.available()
+    if need > free:
         size = f"{spec.width} x {spec.height} pixels"
         raise _too_large(
             f"an image of {size} needs {need / 1e9:.1f} GB of memory, {free / 1e9:.1f} GB are free"
@@ -377,21 +372,3 @@ def _too_large(text: str) -> CannotDo:
 def _brief(reason: str, path: Path) -> str:
     reason = reason.replace(str(path.absolute()), path.name) or "unknown format"
     return reason if len(reason) <= 120 else reason[:117] + "..."
-
-
-def _meminfo() -> int | None:
-    try:
-        lines = Path("/proc/meminfo").read_text().splitlines()
-        return next(1024 * int(line.split()[1]) for line in lines if "MemAvailable" in line)
-    except (OSError, ValueError, StopIteration):
-        return None
-
-
-def _group_limit() -> int | None:
-    """What the control group still allows (containers)."""
-    group = Path("/sys/fs/cgroup")
-    try:
-        limit = int((group / "memory.max").read_text())
-        return max(limit - int((group / "memory.current").read_text()), 0)
-    except (OSError, ValueError):
-        return None
