@@ -156,7 +156,7 @@ def compare(
             folder.finish(report | {"hashes": hashes, "notes": list(found.notes)})
     if as_json:
         print(to_json(report | {"out": None if out is None else str(out)}), end="")
-    elif not quiet:
+    else:
         print("\n".join(f"{n:<20} {v:>12.6g} {unit}".rstrip() for n, v, unit in found.metrics))
         if out is not None:
             print(f"map and numbers: {out}/")

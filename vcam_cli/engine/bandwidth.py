@@ -24,6 +24,8 @@ SHARE = 0.1
 """Part of the tolerance that the truncation of the spectrum may use up."""
 FREE_SAMPLES = 1 << 22
 """Samples of a plane that cost little beside the rest of a run."""
+CHEAP_SAMPLES = 1 << 24
+"""Samples of a plane that any tolerance may take when it needs them."""
 MOST_SAMPLES = 1 << 26
 """Samples of one plane beyond which a chart is not sampled more finely."""
 
@@ -84,6 +86,14 @@ def first_guess(geometry: Geometry, knobs: Settings) -> int:
     return max(knobs.oversampling, min(free, 4, knobs.most_oversampling))
 
 
+def most(geometry: Geometry, knobs: Settings) -> int:
+    """Highest oversampling to be tried: what the settings say, and more on a small array."""
+    if knobs.most_oversampling <= knobs.oversampling:
+        return knobs.most_oversampling  # the user's own
+    cheap = int(math.sqrt(CHEAP_SAMPLES / (geometry.rows * geometry.columns)))
+    return max(knobs.most_oversampling, min(cheap, 64))
+
+
 def limit(geometry: Geometry, cutoff: float) -> float:
     """Oversampling at which the lens's cut-off [cycles/m] is reached along both axes."""
     return cutoff * 2 * max(geometry.pitch_x, geometry.pitch_y)
@@ -105,8 +115,8 @@ def finer(now: int, lost: float, budget: float, geometry: Geometry, knobs: Setti
         return now
     pixels = geometry.rows * geometry.columns
     affordable = max(now, int(math.sqrt(MOST_SAMPLES / pixels)))
-    needed = math.ceil(now * (lost / budget) ** (2 / 3)) if budget > 0 else knobs.most_oversampling
-    return max(now, min(max(needed, now + 1), knobs.most_oversampling, affordable))
+    needed = math.ceil(now * (lost / budget) ** (2 / 3)) if budget > 0 else most(geometry, knobs)
+    return max(now, min(max(needed, now + 1), most(geometry, knobs), affordable))
 
 
 def brightest(planes: NDArray, tables: Tables) -> float:

@@ -258,7 +258,8 @@ def _contribution(
         share = np.array(rounding) / np.maximum(everything + rounding, 1e-300)
         return float(share.max()), "of the temporal variance"
     if change is not None:
-        return change / outlook.full_signal, "of full signal"
+        # A pixel that is full shows no change beyond the well.
+        return min(change / outlook.full_signal, 1.0), "of full signal"
     if isinstance(effect, Gain | Charge):
         return effect.mean_error(outlook) / outlook.full_signal, "of full signal"
     return None, ""

@@ -137,7 +137,7 @@ def cosines(
 ) -> tuple[list[Rows], Followed]:
     """Through the cosine spectrum, as far up as the tolerance asks."""
     knobs, g, cutoff = optics.settings, optics.geometry, optics.transfer.cutoff
-    widest = min(knobs.most_oversampling, bandwidth.limit(g, cutoff))
+    widest = min(bandwidth.most(g, knobs), bandwidth.limit(g, cutoff))
     top = bandwidth.top(g, widest, cutoff)
     computed = EXACT_ENTRIES if knobs.float_width == 32 else knobs.table_size
     tables = tabulate(optics.transfer, top, knobs.table_size, knobs.mixing_tolerance, computed)
