@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from vcam_cli.effects.base import RadialTransfer, SeparableTransfer
 from vcam_cli.engine.axis import Axis
 from vcam_cli.engine.parallel import each, pieces
-from vcam_cli.engine.transfer import Tables, Transfer
+from vcam_cli.engine.transfer import Tables, Transfer, entries
 
 PIECE = 32
 """Rows or columns a thread takes at once: few enough for the cache."""
@@ -148,9 +148,9 @@ class Filter:
     def without(self, effect: RadialTransfer, transfer: Transfer) -> Filter:
         """What leaving out a radial transfer adds to this filter. `transfer`: the whole of it."""
         others = [e for e in transfer.effects if e is not effect]
+        mixed = transfer.through(others).mixed(self.tables.mix)
         size = self.tables.values.shape[-1]
-        grid = np.linspace(0, self.tables.top, size)
-        values = transfer.through(others).mixed(self.tables.mix).at(grid) - self.tables.values
+        values = entries(mixed, self.tables.top, size) - self.tables.values
         return replace(self, tables=replace(self.tables, values=values))
 
     def without_separable(self, effect: SeparableTransfer, coefficients: NDArray) -> NDArray:

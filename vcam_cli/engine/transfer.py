@@ -49,6 +49,8 @@ class Transfer:
 
     def at(self, frequency: NDArray) -> NDArray:
         """H_kc at spatial frequencies (n,) [cycles/m]: (K, C, n) [electrons / s]."""
+        if not self.effects:
+            return np.repeat(self.level[..., None], len(frequency), axis=-1)
         otf = np.ones((len(self.wavelengths), len(frequency)))
         for row, wavelength in zip(otf, self.wavelengths, strict=True):
             for effect in self.effects:
@@ -135,7 +137,7 @@ class Tables:
         return self.top / (self.values.shape[-1] - 1)
 
 
-EXACT_ENTRIES = 4097
+EXACT_ENTRIES = 2049
 """Entries that are computed in 32-bit work; more are interpolated between them, to 1e-6."""
 
 
@@ -149,13 +151,17 @@ def tabulate(
     `tolerance` of the largest level.
     """
     mix, error = _mixtures(exact, top, tolerance)
-    mixed, grid = exact.mixed(mix), np.linspace(0, top, size)
-    if size <= computed:
-        return Tables(mix, mixed.at(grid), top, error)
+    return Tables(mix, entries(exact.mixed(mix), top, size, computed), top, error)
+
+
+def entries(transfer: Transfer, top: float, size: int, computed: int = EXACT_ENTRIES) -> NDArray:
+    """H_kc at `size` frequencies from 0 to `top`: (K, C, size), of which `computed` are exact."""
+    grid = np.linspace(0, top, size)
+    if size <= computed or not transfer.effects:
+        return transfer.at(grid)
     coarse = np.linspace(0, top, computed)
-    values = mixed.at(coarse)
-    fine = [[np.interp(grid, coarse, row) for row in color] for color in values]
-    return Tables(mix, np.array(fine), top, error)
+    values = transfer.at(coarse)
+    return np.array([[np.interp(grid, coarse, row) for row in color] for color in values])
 
 
 def _mixtures(exact: Transfer, top: float, tolerance: float) -> tuple[NDArray, float]:
