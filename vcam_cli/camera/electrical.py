@@ -67,9 +67,10 @@ def electrical(camera: Camera) -> Electrical:
             f"{adc.offset:g} DN leaves no code of the {adc.bits}-bit ADC for a signal",
             "lower the offset, or give more bits",
         )
-    codes = 2**adc.bits - 1 - adc.offset
     if adc.gain is not None:
-        full_scale = gain * pixel.readout.gain * codes / adc.gain
+        full_scale = float(
+            readout.full_scale_of(gain, pixel.readout.gain, adc.gain, adc.bits, adc.offset)
+        )
     elif adc.full_scale is not None:
         full_scale = adc.full_scale
     else:

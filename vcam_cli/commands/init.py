@@ -35,12 +35,7 @@ def init(
     target = folder / FILE
     if target.exists() or target.is_symlink():
         raise bad((), f"{target} exists already", "give another folder, or remove the file")
-    if folder.exists() and not folder.is_dir():
-        raise bad((), f"{folder} is not a folder", "give another one")
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise atomic.cannot_write(folder, error) from error
+    atomic.make_folder(folder)
     atomic.write_text(target, shipped.find("cameras", STARTER).read_text("utf-8"))
     if as_json:
         options.write_json({"files": [str(target)]})

@@ -26,15 +26,9 @@ def schema(
       vcam schema schemas
     """
     from vcam_cli.camera.schema import schemas, text
-    from vcam_cli.errors import bad
     from vcam_cli.files import atomic
 
-    if folder.exists() and not folder.is_dir():
-        raise bad((), f"{folder} is not a folder", "give another one")
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise atomic.cannot_write(folder, error) from error
+    atomic.make_folder(folder)
     written = []
     for name, content in schemas().items():
         atomic.write_text(folder / name, text(content))

@@ -72,10 +72,6 @@ class Plan:
     seconds: float
     memory_bytes: int
 
-    def effect(self, kind: type[Effect]) -> Effect | None:
-        """The running effect of a class, if it runs."""
-        return next((e for e in self.active if isinstance(e, kind)), None)
-
     def report(self) -> dict:
         """The plan as `run.json` and `--json` show it."""
         return {

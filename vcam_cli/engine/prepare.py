@@ -6,6 +6,7 @@ This is the linear half of the engine in one short function; each line is a modu
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cache
 
 from numpy.typing import NDArray
 
@@ -65,6 +66,7 @@ def prepare(camera: Camera, picture: NDArray | None, workers: int, stages: Stage
     memory.require(needed, g)
     stages.watch.expect(cost.at_first_sight(camera, g, colors, knobs, workers))
 
+    @cache
     def scene_at(oversampling: int) -> WaveScene | SampledScene:
         view = optics.view(g, knobs, oversampling)
         return build(camera.scene, view, picture, camera.display.primaries)

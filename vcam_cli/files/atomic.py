@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from vcam_cli.errors import CannotDo
+from vcam_cli.errors import CannotDo, bad
 
 STAGING = ".vcam-new"  # folder where a run's files wait to appear together (see `folder`)
 
@@ -56,6 +56,19 @@ def write_text(path: Path | str, text: str) -> None:
     """
     with write_whole(path) as temporary:
         temporary.write_text(text, "utf-8", "backslashreplace", newline="\n")
+
+
+def make_folder(folder: Path) -> None:
+    """Makes a folder and its parents where they are missing.
+
+    Raises BadInput where something else has its name, CannotDo where it cannot be made.
+    """
+    if folder.exists() and not folder.is_dir():
+        raise bad((), f"{folder} is not a folder", "give another one")
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise cannot_write(folder, error) from error
 
 
 def flush_folder(folder: Path) -> None:

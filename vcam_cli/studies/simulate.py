@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
 
 from numpy.typing import NDArray
@@ -29,7 +29,6 @@ class Result:
     processed: Processed
     stages: Stages
     notes: tuple[str, ...] = ()
-    extra: dict = field(default_factory=dict)
 
     @property
     def dn(self) -> NDArray:
