@@ -22,7 +22,7 @@ check: $(VENV)/.dev  ## format, lint, types, tests
 bench: $(VENV)/.dev  ## speed, as ratios to the cost of the transforms and draws alone
 	$(BIN)/python -m tests.bench
 
-promise: $(VENV)/.dev  ## the plan's promises, measured on twelve cameras
+promise: $(VENV)/.dev  ## the plan's promises, measured on twenty-two cameras
 	$(BIN)/python -m tests.promise
 
 schemas: $(VENV)/.dev  ## JSON Schemas of the files a user writes, from the models

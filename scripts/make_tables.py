@@ -5,6 +5,7 @@ ship in the wheel because importing colour-science takes a second; tests/test_ta
 equal to it. Values are written so that they read back as the same floating-point numbers.
 
 The generic curves are formulas, written in each file's comment: nobody measured them.
+silicon-absorption.csv is not written here: its comment says where its numbers come from.
 """
 
 import sys
@@ -119,6 +120,10 @@ def curves() -> dict[Path, str]:
         Path("configs/filters/generic-red.csv"): _dye("red", 0.88, 610, 38),
         Path("configs/filters/generic-green.csv"): _dye("green", 0.83, 535, 36),
         Path("configs/filters/generic-blue.csv"): _dye("blue", 0.80, 455, 32),
+        # Peaks of 1, for sensors whose efficiency at the peaks is known.
+        Path("configs/filters/generic-red-620.csv"): _dye("red", 0.98, 620, 38),
+        Path("configs/filters/generic-green-540.csv"): _dye("green", 0.98, 540, 36),
+        Path("configs/filters/generic-blue-470.csv"): _dye("blue", 0.98, 470, 32),
         Path("configs/filters/ir-cut-650.csv"): _curve(
             "Generic infrared-cut filter, half its transmittance at 650 nm; not a measurement.",
             "value = 0.97 / (1 + exp((wavelength_nm - 650) / 8))",

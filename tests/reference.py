@@ -19,6 +19,9 @@ The tools are the plainest that reach the accuracy wanted, in float64 throughout
   photodetector by (-dx, -dy). Displacements lie on circles; the share inside each radius is known
   (1 - J0^2 - J1^2), so no light is lost however far the pattern reaches.
 - The modulation of a wave is the Hankel integral of the Airy pattern, not the closed-form OTF.
+- Other lenses (reference_light) and silicon (reference_silicon) blur squares on a patch: cells on
+  which all displacements and waves of the picture are summed with their shares, by Fourier sums.
+- What lies above a pixel (reference_pixel) is integrated over the exit pupil ray by ray.
 - Relative illumination multiplies the light before it is blurred, at its own place (squares), or
   varies inside the photodetector (waves).
 
@@ -30,71 +33,19 @@ are upright: row 0 is the top of the scene.
 """
 
 import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.special import itj0y0, j0, j1
+from reference_arrays import Pixels
+from reference_collect import Collector, Product, Rectangle, Squares, Waves, centers
+from reference_light import Aberrated, Field, Measured, Rays, Wavefront, airy_modulation, encircled
+from reference_pixel import Pupil, Stack, microlens_shift, vignetting
+from reference_silicon import Diffusion, absorption
+from scipy.special import j1
 
 PLANCK, LIGHT, CHARGE, BOLTZMANN = 6.62607015e-34, 299792458.0, 1.602176634e-19, 1.380649e-23
 GOLDEN = math.pi * (3 - math.sqrt(5))  # the angle that spreads points most evenly
-
-
-@dataclass(frozen=True)
-class Squares:
-    """Squares of light, each uniform, centerd on the array: B_k = planes[k], shape (K, ny, nx)."""
-
-    planes: np.ndarray
-    width: float  # of one square [m]
-    height: float  # [m]
-    outside: str = "mirror"  # what lies beyond them: "mirror" or "black"
-
-
-@dataclass(frozen=True)
-class Rectangle:
-    """B = 1 inside a rectangle of the sensor plane [m], 0 elsewhere."""
-
-    left: float
-    right: float
-    top: float
-    bottom: float
-
-    @property
-    def far(self) -> float:
-        """What it amounts to far away: a rectangle without end is the same everywhere."""
-        return float(math.isinf(self.left))
-
-    def inside(self, x: np.ndarray, y: np.ndarray, width: float, height: float) -> np.ndarray:
-        """Area common to the rectangle and those centerd at every (y, x): (m, n) [m2]."""
-        wide = np.minimum(x + width / 2, self.right) - np.maximum(x - width / 2, self.left)
-        tall = np.minimum(y + height / 2, self.bottom) - np.maximum(y - height / 2, self.top)
-        return np.maximum(tall, 0)[:, None] * np.maximum(wide, 0)
-
-
-@dataclass(frozen=True)
-class Product:
-    """B = across(x) down(y), smooth in a photodetector; 0 on average far away."""
-
-    across: Callable[[np.ndarray], np.ndarray]
-    down: Callable[[np.ndarray], np.ndarray]
-    far = 0.0
-
-    def inside(self, x: np.ndarray, y: np.ndarray, width: float, height: float) -> np.ndarray:
-        """Integral over the rectangles centered at every (y, x), eight Gauss points a side."""
-        node, weight = np.polynomial.legendre.leggauss(8)
-        wide = self.across(x[:, None] + node * width / 2) @ weight
-        tall = self.down(y[:, None] + node * height / 2) @ weight
-        return np.outer(tall, wide) * width * height / 4
-
-
-@dataclass(frozen=True)
-class Waves:
-    """B = sum_n amplitude cos(2 pi (fx x + fy y) + phase); frequencies [cycles/m], one spectrum."""
-
-    amplitude: tuple[float, ...]
-    fx: tuple[float, ...]
-    fy: tuple[float, ...]
-    phase: tuple[float, ...]
 
 
 @dataclass(frozen=True)
@@ -106,7 +57,7 @@ class Setup:
     weight: np.ndarray  # (J,) quadrature weights [m]; 1 for spectral lines
     radiance: np.ndarray  # (K, J) S_k [W/(sr m2 m)]; [W/(sr m2)] for lines
     response: np.ndarray  # (C, J) electrons per photon on the photodetector: tau x filter x QE
-    color: np.ndarray  # (rows, columns) which of the C colors a pixel has
+    color: np.ndarray  # (rows, columns) which of the C colors a pixel has; see reference_arrays
     pitch_x: float
     pitch_y: float
     aperture: tuple[float, float, float, float]  # center x, y from the cell's center; width, height
@@ -117,6 +68,35 @@ class Setup:
     off_axis: str = "none"
     diffraction: bool = True
     dark_rate: float = 0.0  # dark current of one pixel [e/s]
+    lens: Aberrated | Field | Measured | Rays | None = None  # None: perfect
+    cell: float = 0.25e-6  # of the patch on which squares are blurred by any but a perfect lens [m]
+    silicon: Diffusion | None = None
+    illumination: tuple[tuple[float, ...], tuple[float, ...]] = ((), ())  # heights [m], values
+    stray: float = 0.0
+    pupil: float | None = None  # its distance [m]; None: the image distance
+    stack: Stack | None = None
+    tunnel: tuple[float, float] = (0.0, 0.0)  # width, height [m]
+    internal: bool = False  # the response is that of light inside the silicon
+    microlens: str = "none"  # "optimal" follows the chief ray, "centered" does not
+    lag: tuple[float, int] | None = None  # charge left behind at a transfer, transfers a pixel
+    pixels: Pixels | None = None  # where they are, if not in rows and columns a pitch apart
+
+    @property
+    def size(self) -> tuple[float, float]:
+        """Width and height of the sensor [m]."""
+        if self.pixels is not None:
+            return self.pixels.width, self.pixels.height
+        rows, columns = self.color.shape
+        return columns * self.pitch_x, rows * self.pitch_y
+
+    @property
+    def centers(self) -> tuple[np.ndarray, np.ndarray]:
+        """Of the pixels: x, y, each (rows, columns) [m]."""
+        if self.pixels is not None:
+            return self.pixels.x, self.pixels.y
+        rows, columns = self.color.shape
+        x, y = np.meshgrid(centers(columns, self.pitch_x), centers(rows, self.pitch_y))
+        return x, y
 
 
 # --- spectra -------------------------------------------------------------------------------------
@@ -144,6 +124,8 @@ def relative_illumination(setup: Setup, x: np.ndarray, y: np.ndarray) -> np.ndar
     b = (np.asarray(x, np.longdouble) ** 2 + np.asarray(y, np.longdouble) ** 2) / image_distance**2
     if setup.off_axis == "none":
         return np.ones(b.shape)
+    if setup.off_axis == "file":
+        return np.interp(np.sqrt(np.asarray(b, float)) * image_distance, *setup.illumination)
     if setup.off_axis == "cos4":
         return np.asarray((1 + b) ** -2, float)
     working = np.longdouble(setup.f_number) * one_minus_m(setup.focal_length, setup.distance)
@@ -153,27 +135,6 @@ def relative_illumination(setup: Setup, x: np.ndarray, y: np.ndarray) -> np.ndar
         return (1 - (1 - a + b) / np.sqrt(b**2 + 2 * b * (1 - a) + (1 + a) ** 2)) / 2
 
     return np.asarray(disk(b) / disk(np.zeros(1, np.longdouble)), float)
-
-
-def encircled(z: np.ndarray) -> np.ndarray:
-    """Share of an Airy pattern's light inside z = pi r / (lambda N (1 - m)) (Rayleigh)."""
-    return 1 - j0(z) ** 2 - j1(z) ** 2
-
-
-def airy_modulation(nu: float, reach: float = 1000 * np.pi) -> float:
-    """Modulation of the wave nu = f lambda N (1 - m) by the Airy pattern: its Hankel integral.
-
-    integral_0^inf 2 J1(z)^2 / z J0(2 nu z) dz; beyond `reach` J1^2 is taken as its mean 1/(pi z).
-    """
-    node, weight = np.polynomial.legendre.leggauss(8)
-    edges = np.arange(0, reach + 1, np.pi / 2)
-    z = (edges[:-1, None] + np.pi / 4 * (node + 1)).ravel()
-    weights = np.tile(np.pi / 4 * weight, len(edges) - 1)
-    inside = float(weights @ (2 * j1(z) ** 2 / z * j0(2 * nu * z)))
-    if nu == 0:
-        return inside + 2 / (np.pi * edges[-1])
-    a = 2 * nu * edges[-1]  # integral_a^inf J0(u)/u^2 du = J0(a)/a - 1 + integral_0^a J0 - J1(a)
-    return inside + 4 * nu / np.pi * float(j0(a) / a - 1 + itj0y0(a)[0] - j1(a))
 
 
 def displacements(setup: Setup, step: float, reach: float) -> tuple[np.ndarray, np.ndarray]:
@@ -209,11 +170,6 @@ def displacements(setup: Setup, step: float, reach: float) -> tuple[np.ndarray, 
 # --- the light on the photodetectors -------------------------------------------------------------
 
 
-def centers(count: int, pitch: float) -> np.ndarray:
-    """Centers of `count` cells along an axis, the array centerd on 0 [m]."""
-    return (np.arange(count) + 0.5 - count / 2) * pitch
-
-
 def electrons_per_light(setup: Setup) -> np.ndarray:
     """(K, C, J): electrons per m2 of photodetector for B_k = 1 on axis, at each wavelength."""
     working = setup.f_number * one_minus_m(setup.focal_length, setup.distance)
@@ -235,8 +191,7 @@ def widened(squares: Squares, setup: Setup, reach: float) -> tuple[np.ndarray, f
     corners = []
     for axis, side in ((1, squares.height / cut), (2, squares.width / cut)):
         count = planes.shape[axis]
-        extent = setup.color.shape[axis - 1] * (setup.pitch_y, setup.pitch_x)[axis - 1]
-        more = max(0, math.ceil((extent / 2 + reach) / side - count / 2)) + 1
+        more = max(0, math.ceil((setup.size[2 - axis] / 2 + reach) / side - count / 2)) + 1
         index = np.arange(-more, count + more) % (2 * count)
         planes = planes.take(np.where(index < count, index, 2 * count - 1 - index), axis=axis)
         if squares.outside == "black":
@@ -248,34 +203,6 @@ def widened(squares: Squares, setup: Setup, reach: float) -> tuple[np.ndarray, f
     y = corners[0] + (np.arange(planes.shape[1])[:, None] + 0.5) * squares.height / cut
     x = corners[1] + (np.arange(planes.shape[2]) + 0.5) * squares.width / cut
     return planes * relative_illumination(setup, x, y), corners[1], corners[0]
-
-
-class Collector:
-    """Light of one plane of squares inside rectangles, by its running sum (bilinear: exact)."""
-
-    def __init__(
-        self, plane: np.ndarray, outside: str, x0: float, y0: float, width: float, height: float
-    ):
-        self.sum = np.pad(plane.cumsum(axis=0).cumsum(axis=1), ((1, 0), (1, 0))) * width * height
-        self.x0, self.y0, self.width, self.height = x0, y0, width, height
-        self.far = float(plane.mean()) if outside == "mirror" else 0.0  # B far away
-
-    def up_to(self, x: np.ndarray, y: np.ndarray) -> np.ndarray:
-        """Light above and to the left of every (y, x): (m, n) [m2]."""
-        u, v = (x - self.x0) / self.width, (y - self.y0) / self.height
-        i, j = np.floor(v).astype(int), np.floor(u).astype(int)
-        s, t = (v - i)[:, None], u - j
-        above = self.sum[np.ix_(i, j)] * (1 - t) + self.sum[np.ix_(i, j + 1)] * t
-        below = self.sum[np.ix_(i + 1, j)] * (1 - t) + self.sum[np.ix_(i + 1, j + 1)] * t
-        return above * (1 - s) + below * s
-
-    def inside(self, x: np.ndarray, y: np.ndarray, width: float, height: float) -> np.ndarray:
-        """Integral of B over the rectangles centerd at every (y, x): (m, n) [m2]."""
-        sides = np.concatenate([x - width / 2, x + width / 2])
-        rows = np.concatenate([y - height / 2, y + height / 2])
-        corner = self.up_to(sides, rows)
-        m, n = len(y), len(x)
-        return corner[m:, n:] - corner[:m, n:] - corner[m:, :n] + corner[:m, :n]
 
 
 def collectors(setup: Setup, room: float) -> Sequence[Collector | Rectangle | Product]:
@@ -292,96 +219,236 @@ def collectors(setup: Setup, room: float) -> Sequence[Collector | Rectangle | Pr
 
 def electrons_of_areas(setup: Setup) -> np.ndarray:
     """Mean photo-electrons of every pixel, of whatever is not waves: (rows, columns)."""
-    rows, columns = setup.color.shape
     off_x, off_y, width, height = setup.aperture
     ring = setup.wavelength.max() * setup.f_number * one_minus_m(setup.focal_length, setup.distance)
-    size = max(rows * setup.pitch_y, columns * setup.pitch_x)
-    reach = max(size, 60 * ring) if setup.diffraction else 0.0
+    reach = max(*setup.size, 60 * ring) if setup.diffraction else 0.0
     places, shares = np.zeros((1, 2)), np.eye(2, 1) * np.ones(len(setup.wavelength))
     if setup.diffraction:
         places, shares = displacements(setup, min(width, height) / 4, reach)
     amount = electrons_per_light(setup) @ shares.T  # (K, C, n): electrons per m2 sent by each
-    x = centers(columns, setup.pitch_x) + off_x
-    y = centers(rows, setup.pitch_y) + off_y
-    electrons = np.zeros((rows, columns))
+    x, y = places_of(setup)
+    electrons = np.zeros(setup.color.shape)
     room = reach + abs(off_x) + abs(off_y) + width + height
     for sent, collector in zip(amount, collectors(setup, room), strict=True):
         for n, (dx, dy) in enumerate(places):
-            electrons += sent[:, n][setup.color] * collector.inside(x - dx, y - dy, width, height)
+            if setup.pixels is not None:
+                light = collector.at(x - dx, y - dy, width, height)
+            else:
+                light = collector.inside(x[0] - dx, y[:, 0] - dy, width, height)
+            electrons += sent[:, n][setup.color] * light
         electrons += sent[:, -1][setup.color] * collector.far * width * height
     return electrons
 
 
+@dataclass(frozen=True)
+class Patch:
+    """The mirrored picture as it repeats, on square cells that squares of light are cut into."""
+
+    planes: np.ndarray  # (K, ny, nx), the picture in the first quarter
+    step_x: float
+    step_y: float
+
+    @property
+    def x(self) -> np.ndarray:
+        """Displacements from -half to half the period, 0 in the first place [m]."""
+        return np.fft.fftfreq(self.planes.shape[2], 1 / self.planes.shape[2]) * self.step_x
+
+    @property
+    def y(self) -> np.ndarray:
+        return np.fft.fftfreq(self.planes.shape[1], 1 / self.planes.shape[1]) * self.step_y
+
+    @property
+    def frequency(self) -> tuple[np.ndarray, np.ndarray]:
+        ny, nx = self.planes.shape[1:]
+        return np.fft.fftfreq(nx, self.step_x), np.fft.fftfreq(ny, self.step_y)
+
+    def collector(self, plane: np.ndarray, more: int = 4) -> Collector:
+        """Of one plane of this size, good to `more` cells beyond the picture."""
+        ny, nx = plane.shape
+        rows, columns = np.arange(-more, ny // 2 + more) % ny, np.arange(-more, nx // 2 + more) % nx
+        left, top = -(nx / 4 + more) * self.step_x, -(ny / 4 + more) * self.step_y
+        return Collector(plane[np.ix_(rows, columns)], "", left, top, self.step_x, self.step_y)
+
+
+def patch_of(setup: Setup) -> Patch:
+    """The scene's squares, cut into cells, times the relative illumination."""
+    scene = setup.scene
+    assert isinstance(scene, Squares) and scene.outside == "mirror"
+    cut_x, cut_y = (math.ceil(s / setup.cell - 1e-6) for s in (scene.width, scene.height))
+    fine = scene.planes.repeat(cut_y, axis=1).repeat(cut_x, axis=2)
+    step_x, step_y = scene.width / cut_x, scene.height / cut_y
+    x, y = centers(fine.shape[2], step_x), centers(fine.shape[1], step_y)
+    fine = fine * relative_illumination(setup, x, y[:, None])
+    fine = np.concatenate([fine, fine[:, ::-1]], axis=1)
+    return Patch(np.concatenate([fine, fine[:, :, ::-1]], axis=2), step_x, step_y)
+
+
+def lens_shares(setup: Setup, patch: Patch, lens: Aberrated, wavelength: float) -> np.ndarray:
+    """What a lens sends by every displacement on the patch: (ny, nx), of sum 1.
+
+    What goes further than half the period is spread evenly over it.
+    """
+    working = setup.f_number * one_minus_m(setup.focal_length, setup.distance)
+    shares = lens.spread(patch.x, patch.y, wavelength, working)
+    return shares + (1 - shares.sum()) / shares.size
+
+
+def lens_on_patch(setup: Setup, patch: Patch, wavelength: float) -> tuple[np.ndarray, ...]:
+    """Transform of what the lens does: at the patch's frequencies (ny, nx), and far beyond them."""
+    (fx, fy), lens, one = patch.frequency, setup.lens, np.ones((1, 1))
+    if isinstance(lens, Measured):  # displacements by whole cells are the same beyond
+        x, y = lens.places()
+        down = np.exp(-2j * np.pi * np.outer(fy, y))
+        found = down @ lens.shares(wavelength) @ np.exp(-2j * np.pi * np.outer(x, fx))
+        return found, found
+    if isinstance(lens, Field):  # place by place, in electrons_of_field
+        return one, 0 * one
+    if lens is None and not setup.diffraction:
+        return one, one
+    ring = wavelength * setup.f_number * one_minus_m(setup.focal_length, setup.distance)
+    found = np.fft.fft2(lens_shares(setup, patch, lens or Aberrated(Wavefront()), wavelength))
+    return found * (np.hypot(fx, fy[:, None]) < 1 / ring), 0 * one
+
+
+def patch_transfers(setup: Setup, patch: Patch) -> Iterator[np.ndarray]:
+    """What lens and silicon do to the light on the patch's cells, at each wavelength: (ny, nx).
+
+    Cells are squares and not points. Of what the patch holds at a frequency f the part
+    sinc(f cell)^2 (once for the light's squares, once for the photodetector's) is of that
+    frequency, and the rest of those around the multiples of 1 / cell, far beyond it.
+    """
+    fx, fy = patch.frequency
+    own = np.outer(np.sinc(fy * patch.step_y), np.sinc(fx * patch.step_x)) ** 2
+    radius, place = np.unique(np.hypot(fx, fy[:, None]), return_inverse=True)
+    silicon = np.ones((len(setup.wavelength), len(radius) + 1))
+    if setup.silicon is not None:
+        at = np.append(radius, 1 / patch.step_x)
+        silicon = setup.silicon.modulation(at, absorption(setup.wavelength))
+    for passed, wavelength in zip(silicon, setup.wavelength, strict=True):
+        near, far = lens_on_patch(setup, patch, wavelength)
+        yield own * near * passed[place.reshape(own.shape)] + (1 - own) * far * passed[-1]
+
+
+def places_of(setup: Setup) -> tuple[np.ndarray, np.ndarray]:
+    """Centers of the areas that collect the pixels' light: x, y, each (rows, columns) [m]."""
+    cx, cy = setup.centers
+    x, y = cx + setup.aperture[0], cy + setup.aperture[1]
+    if setup.microlens == "optimal" and setup.stack is not None:
+        dx, dy = microlens_shift(setup.stack, cx, cy, pupil_of(setup).distance)
+        return x + dx, y + dy
+    return x, y
+
+
+def electrons_of_patch(setup: Setup) -> np.ndarray:
+    """Mean photo-electrons of every pixel, of squares and any lens and silicon."""
+    patch, light = patch_of(setup), electrons_per_light(setup)
+    spectra = np.fft.fft2(patch.planes)
+    passed = np.zeros((*light.shape[:2], *spectra.shape[1:]), complex)
+    for j, one in enumerate(patch_transfers(setup, patch)):
+        passed += light[:, :, j, None, None] * one
+    planes = np.fft.ifft2((spectra[:, None] * passed).sum(axis=0)).real  # (C, ny, nx)
+    x, y = places_of(setup)
+    each = np.array([patch.collector(p).at(x, y, *setup.aperture[2:]) for p in planes])
+    color = setup.color.reshape(-1, *x.shape)
+    return np.take_along_axis(each, color, axis=0).reshape(setup.color.shape)
+
+
+def electrons_of_field(setup: Setup, chosen: np.ndarray) -> np.ndarray:
+    """The same with a lens that changes over the field: the chosen pixels (rows, columns) of bool.
+
+    The rest is nan. At every chosen pixel the light of all displacements, each with the share that
+    the lens sends by it at this pixel's place, after the silicon (blurs may change places).
+    """
+    patch, light = patch_of(setup), electrons_per_light(setup)
+    spectra = np.fft.fft2(patch.planes)
+    x, y = places_of(setup)
+    found = np.where(chosen, 0.0, np.nan)
+    for j, one in enumerate(patch_transfers(setup, patch)):
+        planes = np.fft.ifft2(spectra * one).real
+        mixed = np.tensordot(light[:, :, j].T, planes, 1)  # (C, ny, nx)
+        whole = [patch.collector(plane, more=max(plane.shape) // 2 + 20) for plane in mixed]
+        for i, k in zip(*np.nonzero(chosen), strict=True):
+            lens = Aberrated(setup.lens.at(x[i, k], y[i, k]))
+            shares = lens_shares(setup, patch, lens, setup.wavelength[j])
+            u, v = np.meshgrid(x[i, k] - patch.x, y[i, k] - patch.y)
+            area = whole[setup.color[i, k]].at(u, v, *setup.aperture[2:])
+            found[i, k] += (shares * area).sum()
+    return found
+
+
+def passed_by(setup: Setup, fx: float, fy: float) -> np.ndarray:
+    """What lens and silicon leave of a wave, at each wavelength: (J,)."""
+    f = math.hypot(fx, fy)
+    working = setup.f_number * one_minus_m(setup.focal_length, setup.distance)
+    passed = np.ones(len(setup.wavelength), complex)
+    if setup.lens is not None:
+        passed *= [setup.lens.transfer(fx, fy, w, working) for w in setup.wavelength]
+    elif setup.diffraction and f:
+        passed *= [airy_modulation(f * w * working) for w in setup.wavelength]
+    if setup.silicon is not None:
+        alpha = absorption(setup.wavelength)
+        passed *= setup.silicon.modulation(np.array([f]), alpha)[:, 0]
+    return passed
+
+
 def electrons_of_waves(setup: Setup, waves: Waves) -> np.ndarray:
     """Mean photo-electrons of every pixel, scene of waves, 12 x 12 Gauss points a photodetector."""
-    rows, columns = setup.color.shape
-    off_x, off_y, width, height = setup.aperture
+    width, height = setup.aperture[2:]
     light = electrons_per_light(setup)[0]
-    ring = setup.wavelength * setup.f_number * one_minus_m(setup.focal_length, setup.distance)
-    frequency = np.hypot(waves.fx, waves.fy)
-    passed = np.ones((len(frequency), len(ring)))
-    if setup.diffraction:
-        passed = np.array([[airy_modulation(f * r) if f else 1.0 for r in ring] for f in frequency])
+    passed = np.array([passed_by(setup, fx, fy) for fx, fy in zip(waves.fx, waves.fy, strict=True)])
     level = np.asarray(waves.amplitude)[:, None] * (passed @ light.T)  # (waves, C)
     node, weight = np.polynomial.legendre.leggauss(12)
-    x = centers(columns, setup.pitch_x) + off_x
-    y = centers(rows, setup.pitch_y)[:, None] + off_y
-    electrons = np.zeros((rows, columns))
+    x, y = places_of(setup)
+    electrons = np.zeros(setup.color.shape)
     for p, wp in zip(node, weight, strict=True):
         for q, wq in zip(node, weight, strict=True):
             u, v = x + q * width / 2, y + p * height / 2
             area = width * height * wp * wq / 4 * relative_illumination(setup, u, v)
             for n, (fx, fy, phase) in enumerate(zip(waves.fx, waves.fy, waves.phase, strict=True)):
-                swing = np.cos(2 * np.pi * (fx * u + fy * v) + phase)
-                electrons += level[n][setup.color] * area * swing
+                swing = np.exp(1j * (2 * np.pi * (fx * u + fy * v) + phase))
+                electrons += (level[n][setup.color] * area * swing).real
     return electrons
+
+
+def pupil_of(setup: Setup) -> Pupil:
+    image = one_minus_m(setup.focal_length, setup.distance) * setup.focal_length
+    working = setup.f_number * one_minus_m(setup.focal_length, setup.distance)
+    return Pupil(image if setup.pupil is None else setup.pupil, working)
+
+
+def unveiled(setup: Setup) -> np.ndarray:
+    """What the light brings each pixel that goes where it should, before the layers above it."""
+    plain = setup.lens is None and setup.silicon is None and setup.microlens == "none"
+    if isinstance(setup.scene, Waves):
+        return electrons_of_waves(setup, setup.scene)
+    return electrons_of_areas(setup) if plain else electrons_of_patch(setup)
+
+
+def photo_electrons(setup: Setup) -> np.ndarray:
+    """The same with stray light: a color's mean over its pixels, or over the sensor."""
+    photo = unveiled(setup)
+    if not setup.stray:
+        return photo
+    whole, color, even = photo, setup.color, np.zeros_like(photo)
+    if setup.pixels is not None and not setup.pixels.even:
+        grid = setup.pixels.everywhere()
+        whole, color = unveiled(replace(setup, pixels=grid, color=grid.color)), grid.color
+    for each in np.unique(color):
+        even[setup.color == each] = whole[color == each].mean()
+    return (1 - setup.stray) * photo + setup.stray * even
+
+
+def pixel_gains(setup: Setup) -> np.ndarray | float:
+    """Part of its light that each pixel keeps of what comes through the layers above it."""
+    if setup.stack is None:
+        return 1.0
+    return vignetting(
+        setup.stack, pupil_of(setup), *setup.centers, setup.tunnel,
+        internal=setup.internal, follows=setup.microlens == "optimal",
+    )  # fmt: skip
 
 
 def mean_electrons(setup: Setup) -> np.ndarray:
     """Mean electrons of every pixel, light and dark current, before saturation: (rows, columns)."""
-    scene = setup.scene
-    if isinstance(scene, Waves):
-        photo = electrons_of_waves(setup, scene)
-    else:
-        photo = electrons_of_areas(setup)
-    return photo + setup.dark_rate * setup.time
-
-
-# --- read-out -------------------------------------------------------------------------------------
-
-
-def noise_variance(
-    setup: Setup,
-    *,
-    read: float = 0.0,
-    reset_capacitance: float = 0.0,
-    temperature: float = 300.0,
-    offset_pixel: float = 0.0,
-    offset_column: float = 0.0,
-    gain_pixel: float = 0.0,
-    gain_column: float = 0.0,
-) -> dict[str, np.ndarray]:
-    """Variance [e^2] of every noise source, a plane (rows, columns) each (eq 2.26)."""
-    mean = mean_electrons(setup)
-    one = np.ones_like(mean)
-    return {
-        "shot_noise": mean,
-        "read_noise": read**2 * one,
-        "reset_noise": BOLTZMANN * temperature * reset_capacitance / CHARGE**2 * one,
-        "fpn": (offset_pixel**2 + offset_column**2) * one
-        + (gain_pixel**2 + gain_column**2) * mean**2,
-    }
-
-
-def digital_number(
-    electrons: np.ndarray,
-    conversion_gain: float,
-    gain: float,
-    full_scale: float,
-    bits: int,
-    offset: float,
-) -> np.ndarray:
-    """Codes of the linear ADC: round, then clip to 0 .. 2^bits - 1."""
-    top = 2**bits - 1
-    code = offset + electrons * conversion_gain * gain / full_scale * (top - offset)
-    return np.clip(np.rint(code), 0, top)
+    kept = photo_electrons(setup) * pixel_gains(setup)
+    return kept + setup.dark_rate * setup.time

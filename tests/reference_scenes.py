@@ -130,26 +130,37 @@ def csf_chart(camera) -> tuple[Rectangle, Product]:
     return EVERYWHERE, Product(chirp, contrast)
 
 
-def edge_chart(camera) -> Squares:
-    """Dark left, bright right of a line through the center, its upper end leaning to the right."""
+def edge_chart(camera, size: tuple[float, float] | None = None) -> Squares:
+    """Dark left, bright right of a line through the center, its upper end leaning to the right.
+
+    size: width and height [m] of a sensor that is not rows and columns of square pixels.
+    """
     source, pitch = camera.scene.source, camera.pixel.width
+    rows, columns = camera.array.rows, camera.array.columns
+    if size is not None:
+        columns, rows = (math.ceil(side / pitch) for side in size)
 
     def value(x, y):
         bright = x * math.cos(source.angle) + y * math.sin(source.angle) > 0
         return 0.5 * (1 + source.contrast * np.where(bright, 1.0, -1.0))
 
-    return painted(value, camera.array.columns, camera.array.rows, pitch, pitch, margin=36)
+    return painted(value, columns, rows, pitch, pitch, margin=36)
 
 
-def color_chart(camera) -> tuple[tuple[Rectangle, ...], OfWavelength]:
+def color_chart(
+    camera, size: tuple[float, float] | None = None
+) -> tuple[tuple[Rectangle, ...], OfWavelength]:
     """Patches of 40 mm, 5 mm apart, 7.5 mm of a card of 3 % around them, a surround of 8 %.
 
     Surround, card, patches lie on each other, each with what it adds to the one below: rectangles
-    and their reflectances, of wavelengths (J,): (26, J).
+    and their reflectances, of wavelengths (J,): (26, J). size: of a sensor [m] that is not as
+    large as its rows and columns say.
     """
-    pixel, array = camera.pixel, camera.array
-    wide = array.columns * (pixel.width + pixel.gap_x)
-    high = array.rows * (pixel.height + pixel.gap_y)
+    if size is None:
+        pixel, array = camera.pixel, camera.array
+        wide, high = pixel.width + pixel.gap_x, pixel.height + pixel.gap_y
+        size = array.columns * wide, array.rows * high
+    wide, high = size
     mm = min(wide / 280, high / 190)
     lefts = [(-140 + 7.5 + 45 * i) for i in range(6)]
     tops = [(-95 + 7.5 + 45 * i) for i in range(4)]

@@ -39,6 +39,7 @@ adc: {bits: 10}
 """
 
 IMAGE = "{kind: image, file: PICTURE, model: laser}"
+CUBE = "{kind: hyperspectral, file: PICTURE}"
 CHART = "{kind: chart, chart: uniform}"
 
 
@@ -51,10 +52,15 @@ def folder(tmp_path, monkeypatch) -> Path:
     image("negative.exr", np.full((4, 4, 3), -0.5))
     image("gray.exr", np.full((4, 4, 1), 0.5))
     image("two.exr", np.full((4, 4, 2), 0.5))
+    nm = np.arange(400.0, 701.0, 100.0)
+    np.savez("cube.npz", wavelength_nm=nm, reflectance=np.full((2, 2, 4), 0.5))
+    np.savez("light.npz", wavelength_nm=nm, radiance=np.full((2, 2, 4), 0.5))
+    np.savez("holes.npz", wavelength_nm=nm, radiance=np.full((2, 2, 4), np.nan))
     Path("truncated.exr").write_bytes(Path("good.exr").read_bytes()[:-40])
     Path("text.png").write_text("this is no picture\n")
     Path("empty.png").write_bytes(b"")
     Path("short.csv").write_text("wavelength_nm,value\n500,0.5\n600,0.5\n")
+    Path("lens.csv").write_text("image_height_mm,value\n0,1\n0.02,0.5\n")
     Path("falling.csv").write_text("wavelength_nm,value\n700,0.5\n400,0.5\n")
     Path("words.csv").write_text("wavelength_nm,value\n400,high\n700,low\n")
     Path("loop.yaml").write_text("extends: ./loop.yaml\n")
@@ -152,13 +158,8 @@ case(
 )
 case(
     "what is not supported yet",
-    ("f_number: 2.8", "f_number: 2.8\n  stray_light: 0.1"),
-    says=[("9:16", "optics.stray_light", "is not supported yet", "remove it")],
-)
-case(
-    "a choice that is not supported yet",
-    ("bayer-rggb", "quad-bayer"),
-    says=[("19:39", "array.pattern", "quad-bayer is not supported yet", "supported: monochrome")],
+    ("{time: 30 ms}", "{captures: {schedule: optimal, count: 8, max: 1 s}}"),
+    says=[("20:22", "exposure.captures", "schedule is not supported yet", "give numbers")],
 )
 
 # --- quantities and numbers
@@ -265,6 +266,52 @@ case(
     says=[("19:16", "pixel.readout.full_well", "is 50000 e, not 10000 e", "two of the three")],
 )
 case(
+    "a relative illumination that ends before the corner",
+    ("f_number: 2.8", "f_number: 2.8\n  off_axis: {file: lens.csv}"),
+    says=[("9:20", "optics.off_axis.file", "is 0.0325 mm from the axis", "up to 0.0325 mm")],
+)
+case(
+    "a spectrum as relative illumination",
+    ("f_number: 2.8", "f_number: 2.8\n  off_axis: {file: short.csv}"),
+    says=[("9:20", "optics.off_axis.file", "the header is", "image_height_mm,value")],
+)
+case(
+    "a passive pixel whose bit line is missing",
+    ("width: 6.5 um", "width: 6.5 um\n  architecture: pps"),
+    ("voltage_swing: 1 V", "voltage_swing: 1 V\n    reset_noise: ktc"),
+    says=[("17:3", "pixel.readout.bit_line_capacitance", "is missing", "2000 fF")],
+)
+case(
+    "transfer of charge without a ccd",
+    ("voltage_swing: 1 V", "voltage_swing: 1 V\n    charge_transfer: {phases: 3}"),
+    says=[("19:22", "pixel.readout.charge_transfer", "an aps-3t pixel transfers no", "ccd")],
+)
+case(
+    "charge that never arrives",
+    ("width: 6.5 um", "width: 6.5 um\n  architecture: ccd"),
+    ("voltage_swing: 1 V", "voltage_swing: 1 V\n    charge_transfer: {inefficiency: 1}"),
+    says=[("20:37", "pixel.readout.charge_transfer.inefficiency", "out of range", "less than 1")],
+)
+case(
+    "captures of a readout that destroys",
+    ("width: 6.5 um", "width: 6.5 um\n  architecture: ccd"),
+    ("time: 30 ms", "captures: [5 ms, 30 ms]"),
+    says=[("21:22", "exposure.captures", "a ccd pixel destroys its charge", "aps-3t or dps")],
+)
+case(
+    "more noise than numbers",
+    ("voltage_swing: 1 V", "voltage_swing: 1 V\n    read_noise: 1e300 e\n    reset_noise: 2e9 e"),
+    says=[
+        ("19:17", "pixel.readout.read_noise", "out of range; it must be at most 1000 Me", ""),
+        ("20:18", "pixel.readout.reset_noise", "out of range; it must be at most 1000 Me", ""),
+    ],
+)
+case(
+    "more defects than pixels",
+    ("width: 6.5 um", "width: 6.5 um\n  defects: {hot: 60 %, dead: 50 %}"),
+    says=[("13:12", "pixel.defects", "are 1.1 of all", "at most 1")],
+)
+case(
     "a die smaller than a pixel",
     ("rows: 6, columns: 8", "die: {width: 1 um, height: 1 um}"),
     says=[("19:14", "array.die", "smaller than one pixel", "a larger die")],
@@ -278,6 +325,44 @@ case(
     "a lamp beside light",
     (CHART, IMAGE.replace("PICTURE", "good.exr")),
     says=[("4:15", "scene.illuminant", "emits light has no lamp", "remove it")],
+)
+NARROW = ("distance: 1 m", "distance: 1 m\n  wavelengths: {start: 400 nm, stop: 700 nm}")
+case(
+    "wavelengths beyond those of a file",
+    (CHART, CUBE.replace("PICTURE", "cube.npz")),
+    says=[
+        ("2:1", "scene.wavelengths", "covers 400 nm to 700 nm, but 380 to 780 nm", "start: 400 nm")
+    ],
+)
+case(
+    "a lamp on light from a file",
+    (CHART, CUBE.replace("PICTURE", "light.npz")),
+    NARROW,
+    says=[("4:15", "scene.illuminant", "holds radiances, which are light", "remove the illum")],
+)
+case(
+    "a level from a file of reflectances",
+    (CHART, CUBE.replace("PICTURE", "cube.npz")),
+    ("100 cd/m2", "from-file"),
+    NARROW,
+    says=[("5:14", "scene.luminance", "holds reflectances", "100 cd/m2")],
+)
+case(
+    "a level from a chart",
+    ("100 cd/m2", "from-file"),
+    says=[("5:14", "scene.luminance", "no absolute radiance in a file", "100 cd/m2")],
+)
+case(
+    "a file of spectra with holes",
+    (CHART, CUBE.replace("PICTURE", "holes.npz")),
+    ("  illuminant: D65\n", ""),
+    NARROW,
+    says=[("3:39", "scene.source.file", "not finite (nan at row 0, column 0, 400 nm", "by 0")],
+)
+case(
+    "a picture where spectra belong",
+    (CHART, CUBE.replace("PICTURE", "good.exr")),
+    says=[("3:39", "scene.source.file", "no channels named like S0.550", "spectral .exr")],
 )
 case(
     "wavelengths in disorder",
@@ -293,6 +378,168 @@ case(
     "an effect of nothing",
     ("adc:", "effects: {read_noise: on}\nadc:"),
     says=[("21:23", "effects.read_noise", "there is nothing to simulate", "describe it")],
+)
+
+# --- the process behind the pixel
+MEASURED = """\
+  width: 6.5 um
+  photodetector:
+    fill_factor: 0.3
+    quantum_efficiency: 0.5
+  readout:
+    conversion_gain: 20 uV/e
+    voltage_swing: 1 V
+"""
+JUNCTION = "{depth: 0.2 um, depletion_width: 0.2 um, substrate_depth: 5 um}"
+
+
+def processed(name: str, *pixel: str, says: list[Line]) -> None:
+    """A case whose pixel (from line 12 on) is left to a technology."""
+    case(name, (MEASURED, "".join(f"  {line}\n" for line in pixel)), says=says)
+
+
+processed(
+    "a misspelt technology",
+    "technology: cmos-0.53um",
+    "width: 6.5 um",
+    "photodetector: {}",
+    says=[("12:15", "pixel.technology.from", "not a technology that ships", "'cmos-0.35um'")],
+)
+processed(
+    "no technology but a number",
+    "technology: 0.35",
+    "width: 6.5 um",
+    "photodetector: {}",
+    says=[("12:15", "pixel.technology", "0.35 is not a technology", "cmos-0.35um")],
+)
+processed(
+    "a pixel too small for its transistors",
+    "technology: cmos-0.35um",
+    "width: 4 um",
+    "photodetector: {}",
+    says=[("13:10", "pixel.width", "too small for its transistors", "that works is 5.097 um")],
+)
+processed(
+    "a feature size far from the technology's",
+    "technology: {from: cmos-0.35um, feature_size: 0.01 um}",
+    "width: 6.5 um",
+    "photodetector: {}",
+    says=[("12:49", "pixel.technology.feature_size", "too far from the 0.35 um", "factor of 20")],
+)
+processed(
+    "thresholds that leave no swing",
+    "technology:",
+    "  from: cmos-0.35um",
+    "  thresholds: {reset: 1 V, bias: 2 V, bias_gate: 0.5 V, follower_gate_source: 1 V}",
+    "width: 6.5 um",
+    "photodetector: {}",
+    says=[("14:17", "pixel.technology.thresholds", "a swing of -0.2 V", "raise the supply")],
+)
+processed(
+    "a negative swing",
+    "technology: {from: cmos-0.35um, voltage_swing: -1 V}",
+    "width: 6.5 um",
+    "photodetector: {}",
+    says=[("12:50", "pixel.technology.voltage_swing", "is negative", "a positive voltage")],
+)
+processed(
+    "a swing beyond the reset voltage",
+    "technology: cmos-0.35um",
+    "width: 6.5 um",
+    "photodetector: {}",
+    "readout: {voltage_swing: 3 V}",
+    says=[("15:28", "pixel.readout.voltage_swing", "2.25 V would bias the", "a smaller")],
+)
+processed(
+    "a depletion region without width",
+    "technology: cmos-0.35um",
+    "width: 6.5 um",
+    "photodetector: {junction: {depletion_width: 0 um}}",
+    says=[
+        ("14:47", "pixel.photodetector.junction.depletion_width", "is zero", "a positive length")
+    ],
+)
+processed(
+    "a substrate of no depth",
+    "technology: cmos-0.35um",
+    "width: 6.5 um",
+    "photodetector: {junction: {substrate_depth: -1 um}}",
+    says=[
+        ("14:47", "pixel.photodetector.junction.substrate_depth", "negative", "a positive length")
+    ],
+)
+processed(
+    "a dark current beyond its model",
+    "technology: cmos-0.35um",
+    "width: 6.5 um",
+    "photodetector: {dark_current_density: junction}",
+    "temperature: 500 K",
+    says=[("15:16", "pixel.temperature", "known from 77 to 400 K", "as a number")],
+)
+case(
+    "a junction without numbers",
+    ("quantum_efficiency: 0.5", "quantum_efficiency: junction"),
+    says=[
+        ("15:25", "pixel.photodetector.quantum_efficiency", "needs junction.depletion_width",
+         "add pixel.photodetector.junction.depletion_width: 0.2 um"),
+    ],
+)  # fmt: skip
+case(
+    "a capacitance without a technology",
+    ("fill_factor: 0.3", "fill_factor: 0.3\n    capacitance: junction"),
+    says=[
+        ("15:18", "pixel.photodetector.capacitance", "needs capacitance.sidewall",
+         "name a technology")
+    ],
+)  # fmt: skip
+case(
+    "wavelengths beyond silicon",
+    ("quantum_efficiency: 0.5", f"quantum_efficiency: junction\n    junction: {JUNCTION}"),
+    ("distance: 1 m", "distance: 1 m\n  wavelengths: {start: 300 nm, stop: 700 nm}"),
+    ("illuminant: D65", "illuminant: equal-energy"),
+    ("pattern: bayer-rggb", "pattern: monochrome"),
+    says=[("7:16", "scene.wavelengths", "known for 350-1100 nm", "narrow them")],
+)
+
+# --- what lies above the photodetector
+LENS = "  width: 6.5 um\n  microlens: {gain: 2}"
+case(
+    "a microlens stated twice",
+    ("  width: 6.5 um", LENS.replace("gain: 2", "gain: 2, efficiency: 0.9")),
+    says=[("13:36", "pixel.microlens.efficiency", "efficiency and gain cannot", "keep one")],
+)
+case(
+    "a microlens without strength",
+    ("  width: 6.5 um", LENS.replace("gain: 2", "shift: centered")),
+    says=[("13:14", "pixel.microlens", "its strength is missing", "write for example gain: 1.8")],
+)
+case(
+    "a microlens that loses light",
+    ("  width: 6.5 um", LENS.replace("gain: 2", "efficiency: 0.2")),
+    says=[("13:27", "pixel.microlens.efficiency", "less than the photodetector's own", "0.3")],
+)
+case(
+    "a microlens on a photodetector that is too large for it",
+    ("  width: 6.5 um", LENS),
+    ("fill_factor: 0.3", "fill_factor: 0.97"),
+    says=[("13:21", "pixel.microlens.gain", "0.95 of the pixel's area", "remove the microlens")],
+)
+case(
+    "layers that cannot be",
+    (
+        "  width: 6.5 um",
+        "  width: 6.5 um\n  stack: {passivation: {thickness: -1 um, index: 2},\n"
+        "          oxide: {thickness: 5 um, index: 0.9}}",
+    ),
+    says=[
+        ("13:36", "pixel.stack.passivation.thickness", "-1 um", ""),
+        ("14:43", "pixel.stack.oxide.index", "0.9 is out of range", "at least 1"),
+    ],
+)
+case(
+    "an exit pupil in the sensor",
+    ("  transmittance: 0.9", "  exit_pupil_distance: 0 mm"),
+    says=[("10:24", "optics.exit_pupil_distance", "is zero", "a positive length")],
 )
 
 # --- words and names
@@ -423,13 +670,37 @@ case(
 case(
     "mistakes of several kinds",
     ("1 m\n", "3 mm\n"),
-    ("f_number: 2.8", "f_number: 2.8\n  defocus: 1 um"),
+    ("time: 30 ms", "captures: {schedule: optimal, count: 2, max: 1 s}"),
     ("transmittance: 0.9", "transmittance: {file: short.csv}"),
     says=[
         ("6:13", "scene.distance", "lies within its focal length", "further away"),
-        ("9:12", "optics.defocus", "not supported yet", "remove"),
-        ("11:18", "optics.transmittance", "380-780 nm", "outside"),
+        ("10:18", "optics.transmittance", "380-780 nm", "outside"),
+        ("20:22", "exposure.captures", "not supported yet", "give numbers"),
     ],
+)
+case(
+    "a Noll index twice",
+    ("f_number: 2.8", "f_number: 2.8\n  zernike: {4: 0.1 um, '04': 0.2 um}"),
+    says=[("9:30", "optics.zernike.04", "Noll index 4 comes twice", "keep one of them")],
+)
+case(
+    "a wavefront in the wrong unit",
+    ("f_number: 2.8", "f_number: 2.8\n  zernike: {8: 0.1 mm}"),
+    says=[("9:12", "optics.zernike", "at most 200 can be followed", "check the unit")],
+)
+case(
+    "a point spread function beside defocus, from no image",
+    ("f_number: 2.8", "f_number: 2.8\n  defocus: 1 um\n  psf: {file: text.png, pitch: 1 um}"),
+    says=[("9:12", "optics.defocus", "cannot be given beside psf", "psf: none")],
+)
+case(
+    "a point spread function below zero",
+    (
+        "f_number: 2.8",
+        "f_number: 2.8\n  psf: {file: negative.exr, pitch: 1 um, wavelengths: "
+        "[450 nm, 550 nm, 650 nm]}",
+    ),
+    says=[("9:15", "optics.psf.file", "negative value", "by 0")],
 )
 case(
     "mistakes that others used to hide",
@@ -465,7 +736,14 @@ def test_refused_with_place_path_and_remedy_and_nothing_written(name, folder):
     assert contents(folder) == before
 
 
-BY_ITS_CONTENT = ("a truncated image", "an image of NaN", "an image below zero")
+ELSEWHERE = ("a study",)  # is a file that `vcam validate` knows
+BY_ITS_CONTENT = (
+    *ELSEWHERE,
+    "a truncated image",
+    "an image of NaN",
+    "an image below zero",
+    "a file of spectra with holes",
+)
 
 
 @pytest.mark.parametrize("name", [name for name in CASES if name not in BY_ITS_CONTENT])

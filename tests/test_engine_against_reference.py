@@ -4,179 +4,22 @@ Six different cameras at standard accuracy: rms over the array within 1e-3 of fu
 every effect on, and within the 5e-3 that standard accuracy promises when the plan may choose.
 Where neither side approximates (no diffraction, or scenes of waves), 1e-6 at `reference`.
 
-The camera is written once, as YAML; the reference takes its sizes from the validated model, but
-its spectra from the shipped tables with np.interp, its charts from their description, its level of
-light from V(lambda), and all physics from tests/reference.py.
+The camera is written once, as YAML, and told to the reference by tests/reference_cameras.py.
 """
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 import pytest
 import reference as ref
+import reference_readout as readout
 import reference_scenes as scenes
-from reference_scenes import DATA, ROOT, column, flat, infrared_cut, lamp, silicon
+from reference_cameras import READOUT, Case, continuous, error, leaves, lines, setup_of
+from reference_scenes import flat, infrared_cut, lamp, silicon
 
 import vcam_cli
 
-if not hasattr(vcam_cli, "simulate"):
-    pytest.skip("the package has no simulate yet", allow_module_level=True)
-
-EFFICACY = 683.0  # lm/W
-BAYER = {"rggb": "RGGB", "grbg": "GRBG", "gbrg": "GBRG", "bggr": "BGGR"}
-
-# --- what the reference is told ------------------------------------------------------------------
-
-
-def pixel_colors(pattern: str, rows: int, columns: int) -> np.ndarray:
-    """Index into R, G, B of every pixel; 0 everywhere for a monochrome array."""
-    if pattern == "monochrome":
-        return np.zeros((rows, columns), int)
-    block = ["RGB".index(c) for c in BAYER[pattern.removeprefix("bayer-")]]
-    i, j = np.indices((rows, columns))
-    return np.array(block)[2 * (i % 2) + j % 2]
-
-
-@dataclass(frozen=True)
-class Light:
-    """Wavelengths, weights, and the perfect white's radiance times each part's reflectance."""
-
-    wavelength: np.ndarray
-    weight: np.ndarray
-    white: np.ndarray
-
-    def scaled(self, scene) -> "Light":
-        """With the level of light that the scene states."""
-        visible = column(DATA / "cie-1931-2-degree.csv", "y")(self.wavelength)
-        lumens = EFFICACY * float(self.weight @ (self.white * visible))
-        watts = float(self.weight @ self.white)
-        if scene.radiance is not None:
-            level = scene.radiance / watts
-        elif scene.luminance is not None:
-            level = scene.luminance / lumens
-        else:
-            level = scene.illuminance / math.pi / lumens
-        return Light(self.wavelength, self.weight, self.white * level)
-
-
-def continuous(spectrum, start: float = 380e-9, stop: float = 780e-9) -> Light:
-    wavelength, weight = ref.nanometer_rule(start, stop)
-    return Light(wavelength, weight, spectrum(wavelength))
-
-
-def lines(*nanometers: float) -> Light:
-    return Light(np.array(nanometers) * 1e-9, np.ones(len(nanometers)), np.ones(len(nanometers)))
-
-
-def setup_of(camera, scene, light: Light, parts=None, glass=None, quantum=None) -> ref.Setup:
-    """The reference's camera. parts (K, J): each component's reflectance or lines; default one.
-
-    glass(wavelength): transmittance of the optics; quantum(wavelength): QE of the photodetector.
-    """
-    light = light.scaled(camera.scene)
-    pixel, array, optics = camera.pixel, camera.array, camera.optics
-    pitch_x, pitch_y = pixel.width + pixel.gap_x, pixel.height + pixel.gap_y
-    rows, columns = array.rows, array.columns
-    if array.die is not None:
-        rows, columns = round(array.die.height / pitch_y), round(array.die.width / pitch_x)
-    detector = pixel.photodetector
-    width, height, x, y = detector.width, detector.height, 0.0, 0.0
-    if width is None:
-        side = math.sqrt(detector.fill_factor)
-        width, height = side * pixel.width, side * pixel.height
-    if detector.x is not None:
-        x = detector.x + width / 2 - pixel.width / 2
-        y = detector.y + height / 2 - pixel.height / 2
-    efficiency = (glass or np.ones_like)(light.wavelength) * (quantum or np.ones_like)(
-        light.wavelength
-    )
-    filters = np.ones((1, len(light.wavelength)))
-    if array.pattern != "monochrome":
-        folder = ROOT / "configs" / "filters"
-        filters = np.array(
-            [column(folder / f"generic-{c}.csv", "value")(light.wavelength)
-             for c in ("red", "green", "blue")]
-        )  # fmt: skip
-    density = detector.dark_current_density
-    dark = density.value * width * height / ref.CHARGE if density else detector.dark_current or 0
-    return ref.Setup(
-        scene=scene,
-        wavelength=light.wavelength,
-        weight=light.weight,
-        radiance=np.atleast_2d(1 if parts is None else parts) * light.white,
-        response=filters * efficiency,
-        color=pixel_colors(array.pattern, rows, columns),
-        pitch_x=pitch_x,
-        pitch_y=pitch_y,
-        aperture=(x, y, width, height),
-        f_number=optics.f_number,
-        focal_length=optics.focal_length,
-        time=camera.exposure.time,
-        distance=camera.scene.distance,
-        off_axis=optics.off_axis,
-        diffraction=optics.diffraction,
-        dark_rate=dark * detector.dark_current_scale,
-    )
-
-
 # --- the cameras ---------------------------------------------------------------------------------
-
-
-def leaves(height: int, width: int, channels: int, seed: int) -> np.ndarray:
-    """A picture with hard edges and shading: disks of random gray over each other, 0..1."""
-    rng = np.random.default_rng(seed)
-    y, x = np.indices((height, width))
-    picture = np.full((height, width, channels), 0.4)
-    for _ in range(60):
-        cx, cy, r = rng.uniform(0, width), rng.uniform(0, height), rng.uniform(2, 12)
-        inside = (x - cx) ** 2 + (y - cy) ** 2 < r**2
-        picture[inside] = rng.uniform(0.02, 1.0, channels)
-    return (picture * (0.7 + 0.3 * x / width)[:, :, None]).astype(np.float32)
-
-
-def write_picture(folder: Path, picture: np.ndarray) -> Path:
-    """A float EXR: what is read back is what was painted."""
-    import OpenImageIO as oiio
-
-    path = folder / "scene.exr"
-    spec = oiio.ImageSpec(picture.shape[1], picture.shape[0], picture.shape[2], "float")
-    spec.channelnames = ("Y",) if picture.shape[2] == 1 else ("R", "G", "B")
-    out = oiio.ImageOutput.create(str(path))
-    assert out.open(str(path), spec) and out.write_image(np.ascontiguousarray(picture))
-    assert out.close()
-    return path
-
-
-COMMON = """
-name: {name}
-exposure: {{time: 20 ms}}
-adc: {{bits: 12, offset: 64 DN}}
-effects: {effects}
-accuracy: {accuracy}
-"""
-READOUT = "readout: {conversion_gain: 20 uV/e, voltage_swing: 20 V}"  # far from saturation
-
-
-@dataclass(frozen=True)
-class Case:
-    """yaml: the camera (PICTURE stands for the image's path); reference(camera, picture)."""
-
-    yaml: str
-    reference: Callable
-    picture: np.ndarray | None = None
-
-    def load(self, folder: Path, name: str, effects: str, accuracy: str):
-        text = COMMON.format(name=name, effects=effects, accuracy=accuracy) + self.yaml
-        text = text.replace("READOUT", READOUT)
-        if self.picture is not None:
-            text = text.replace("PICTURE", str(write_picture(folder, self.picture)))
-        path = folder / f"{name}.yaml"
-        path.write_text(text, encoding="utf-8")
-        return vcam_cli.load(path)
-
 
 DAYLIGHT = Case(
     """
@@ -412,13 +255,6 @@ EXACT = {"sharp": SHARP, "flat": FLAT, "sinusoid": SINUSOID}
 # --- the comparison ------------------------------------------------------------------------------
 
 
-def error(camera, expected: np.ndarray) -> float:
-    """rms over the array of engine - reference, as a fraction of full signal."""
-    found = np.asarray(vcam_cli.simulate(camera).mean_electrons, float)
-    assert found.shape == expected.shape
-    return float(np.sqrt(np.mean((found - expected) ** 2)) / expected.max())
-
-
 @pytest.mark.parametrize("name", CAMERAS)
 def test_standard_accuracy(name, tmp_path):
     case = CAMERAS[name]
@@ -459,7 +295,7 @@ def test_variance_of_each_source(source, tmp_path):
     case = Case(NOISY, FLAT.reference)
     camera = case.load(tmp_path, "noisy", effects, "reference")
     setup = case.reference(camera, None)
-    expected = ref.noise_variance(
+    expected = readout.noise_variance(
         setup, read=12, reset_capacitance=5e-15, offset_pixel=20, gain_pixel=0.02
     )[source]
     found = np.asarray(vcam_cli.simulate(camera).electrons, float)
@@ -475,6 +311,6 @@ def test_codes_of_a_camera_without_noise(tmp_path):
     yaml = case.yaml.replace("READOUT", READOUT.replace("20 V", "10 mV, gain: 1.2"))
     camera = Case(yaml, case.reference, case.picture).load(tmp_path, "codes", QUIET, "reference")
     mean = ref.mean_electrons(case.reference(camera, case.picture))
-    expected = ref.digital_number(np.minimum(mean, 500), 20e-6, 1.2, 12e-3, 12, 64)
+    expected = readout.digital_number(np.minimum(mean, 500), 20e-6, 1.2, 12e-3, 12, 64)
     assert expected.max() == 4095
     assert np.array_equal(vcam_cli.simulate(camera).dn, expected)

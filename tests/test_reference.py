@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import reference as ref
+import reference_readout as readout
 import reference_scenes as scenes
 
 H, C = ref.PLANCK, ref.LIGHT
@@ -243,10 +244,10 @@ def test_cropping_keeps_whole_samples_that_cover_the_array():
 def test_noise_variances_and_codes():
     setup = camera(FLAT, dark_rate=100.0)
     mean = ref.mean_electrons(setup)
-    found = ref.noise_variance(setup, read=5.0, reset_capacitance=10e-15, gain_pixel=0.01)
+    found = readout.noise_variance(setup, read=5.0, reset_capacitance=10e-15, gain_pixel=0.01)
     assert np.array_equal(found["shot_noise"], mean)
     assert found["read_noise"] == pytest.approx(25.0)
     assert found["reset_noise"] == pytest.approx(1613.5, rel=1e-4)  # 40.2 e at 10 fF, 300 K
     assert found["fpn"] == pytest.approx((0.01 * mean) ** 2)
-    codes = ref.digital_number(np.array([0.0, 50.0, 1e9]), 20e-6, 2.0, 1.0, 10, 16)
+    codes = readout.digital_number(np.array([0.0, 50.0, 1e9]), 20e-6, 2.0, 1.0, 10, 16)
     assert codes == pytest.approx([16, 18, 1023])  # 50 e = 2 mV: 16 + 2.014

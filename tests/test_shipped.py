@@ -64,9 +64,15 @@ class TestCameras:
         assert 1e-4 <= result.exposure_time <= 1
         assert np.isfinite(result.electrons).all()
         # Neither black nor burnt out: something between a thousandth and all of the well.
-        assert well / 1000 < np.quantile(result.mean_electrons, 0.99) < well
-        saturated = dict((n, v) for n, v, _ in result.metrics)["saturated_fraction"]
-        assert saturated < 0.01
+        bright = np.quantile(result.mean_electrons, 0.99)
+        assert well / 1000 < bright
+        metrics = {name: value for name, value, _ in result.metrics}
+        if result.times:  # the first sample measures what is bright
+            assert bright * result.times[0] / result.times[-1] < well
+            assert metrics["hdr_saturated_fraction"] < 0.01
+        else:
+            assert bright < well
+            assert metrics["saturated_fraction"] < 0.01
 
     def test_the_picture_is_one(self, name):
         """Dark and light areas, and not mostly clipped, in every channel together."""
@@ -141,6 +147,8 @@ class TestFiles:
             assert (path.parent / match[1]).is_file()
 
     def test_some_camera_uses_it(self, path):
+        if path.parent.name == "studies":
+            pytest.skip("a study uses cameras")
         used = {file for name in CAMERAS for file in load(name).files}
         assert path.resolve() in used
 

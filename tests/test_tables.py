@@ -96,6 +96,17 @@ def test_the_files_are_what_the_script_writes(colour: ModuleType) -> None:
     assert {ROOT / path for path in script.cameras()} == set(MEASURED)
 
 
+def test_silicon_absorbs_as_its_extinction_coefficient_says() -> None:
+    """4 pi k / wavelength of the whole published table; rounded to 4 digits and less in the red."""
+    published = ROOT / "tests" / "data" / "silicon-absorption-green-2008.csv"
+    nm, per_cm, _, extinction = np.loadtxt(published, delimiter=",", skiprows=3).T
+    table = spectra.silicon_absorption()
+    np.testing.assert_array_equal(table.wavelength, nm / 1e9)
+    np.testing.assert_array_equal(table.value, 100 * per_cm)
+    np.testing.assert_allclose(table.value, 4 * np.pi * extinction / (nm * 1e-9), rtol=2e-3)
+    assert not table.covers(349e-9, 400e-9) and not table.covers(1000e-9, 1101e-9)
+
+
 @pytest.mark.parametrize("file", GENERIC, ids=lambda file: file.stem)
 def test_generic_curves_are_efficiencies(file: Path) -> None:
     table = spectra.read_csv(file)

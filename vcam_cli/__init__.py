@@ -10,11 +10,12 @@ Names are imported when they are first used, so that `import vcam_cli` costs not
 from typing import TYPE_CHECKING, Any
 
 __version__ = "0.1.0"
-__all__ = ["__version__", "load", "simulate"]
+__all__ = ["__version__", "load", "simulate", "sweep"]
 
 if TYPE_CHECKING:
     from vcam_cli.camera.load import load
     from vcam_cli.studies.simulate import simulate
+    from vcam_cli.studies.sweep import sweep
 
 
 def __getattr__(name: str) -> Any:
@@ -26,4 +27,8 @@ def __getattr__(name: str) -> Any:
         from vcam_cli.studies.simulate import simulate
 
         return simulate
+    if name == "sweep":
+        from vcam_cli.studies.sweep import sweep
+
+        return sweep
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -95,6 +95,38 @@ def parse_fraction(value: object) -> float:
     return _value(_FRACTION, str(value), Fraction(number), divisor, None, _FRACTION.units[unit])
 
 
+def split(text: object) -> tuple[Fraction, str]:
+    """A quantity of any dimension as its number and its unit: "1/60 s" is (1/60, "s").
+
+    A bare number has the unit "". Raises ValueError for what is no number with a unit.
+    """
+    if isinstance(text, (int, float)) and not isinstance(text, bool) and math.isfinite(text):
+        return Fraction(repr(text)), ""
+    plain = " ".join(text.translate(_SPELLINGS).split()) if isinstance(text, str) else ""
+    match = _QUANTITY.fullmatch(plain)
+    if match is None or len(plain) > _LONGEST:
+        raise ValueError(f"{text!r} is not a number with its unit; write for example 5.3 um")
+    number, divisor, unit = match.groups()
+    if divisor is not None and Fraction(divisor) == 0:
+        raise ValueError(f"{text!r} divides by zero; write for example 5.3 um")
+    return Fraction(number) / Fraction(divisor or 1), unit
+
+
+def convert(number: Fraction, unit: str, other: str) -> Fraction:
+    """A number of one unit in another one of its dimension. Raises ValueError for two dimensions.
+
+    Units whose zeros differ (degC and K) are refused as well.
+    """
+    if unit == other:
+        return number
+    for kind in (*DIMENSIONS.values(), _FRACTION):
+        a, b = kind.units.get(unit.replace("^", "")), kind.units.get(other.replace("^", ""))
+        if a is not None and b is not None and not {unit, other} & kind.offsets.keys():
+            return number * a / b
+    units = f"{unit or 'a bare number'} and {other or 'a bare number'}"
+    raise ValueError(f"{units} do not go together; write all of them in one unit")
+
+
 def render(value: float, dimension: str) -> str:
     """The shortest text with `parse(text, dimension) == value`, in a readable unit."""
     kind = DIMENSIONS[dimension]

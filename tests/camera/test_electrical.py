@@ -75,6 +75,48 @@ def test_one_is_not_enough(only, tmp_path):
     assert "not determined" in problem.message and problem.remedy
 
 
+@pytest.mark.parametrize("gain", [1, 2])
+def test_a_data_sheet_counts_in_electrons_and_numbers(gain, tmp_path):
+    """0.399 DN/e over 12 bits above 240 DN: the ADC is full at 9662 e, whatever volts are."""
+    adc = {"bits": 12, "offset": "240 DN", "gain": "0.399 DN/e"}
+    e = solved(tmp_path, {"full_well": "12 ke", "gain": gain}, adc)
+    assert not e.in_volts and e.capacitance is None
+    assert e.full_well == pytest.approx(12_000, rel=1e-12)
+    assert e.electrons_per_dn == pytest.approx(1 / 0.399, rel=1e-12)
+    assert e.saturation == pytest.approx(3855 / 0.399, rel=1e-12)
+    # nominal: a full well is 1 V
+    assert e.conversion_gain * e.full_well == pytest.approx(1, rel=1e-12)
+
+
+@pytest.mark.parametrize("swing", [{}, {"voltage_swing": "1 V"}])
+def test_volts_that_are_given_stay_volts(swing, tmp_path):
+    adc = {"bits": 12, "gain": "0.25 DN/e"}
+    readout = {"full_well": "10 ke", **(swing or {"conversion_gain": "100 uV/e"})}
+    e = solved(tmp_path, readout, adc)
+    assert e.in_volts
+    assert e.capacitance == pytest.approx(CHARGE / 100e-6, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("changes", "path"),
+    [
+        (
+            {"pixel.readout": {"full_well": "9 ke", "reset_noise": "ktc"}},
+            "pixel.readout.reset_noise",
+        ),
+        ({"output": {"raw": ["dn", "volts"]}}, "output.raw"),
+    ],
+)
+def test_what_needs_volts_is_refused_without_them(changes, path, tmp_path):
+    counted = {"pixel.readout": {"full_well": "9 ke"}, "adc": {"bits": 12, "gain": "0.4 DN/e"}}
+    [problem] = refused(tmp_path, counted | changes)
+    assert ".".join(problem.path) == path
+    assert "needs a voltage" in problem.message and "conversion_gain" in problem.remedy
+    given = {"full_well": "9 ke", "voltage_swing": "1 V"}
+    readout = changes.get("pixel.readout", {})
+    camera(tmp_path, counted | changes | {"pixel.readout": readout | given})
+
+
 # --- the ADC -------------------------------------------------------------------------------------
 
 READOUT = {"conversion_gain": "20 uV/e", "full_well": "69 ke"}

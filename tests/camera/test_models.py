@@ -13,7 +13,8 @@ from pydantic import TypeAdapter, ValidationError
 from vcam_cli.camera import camera as camera_module
 from vcam_cli.camera.base import Model
 from vcam_cli.camera.camera import Camera
-from vcam_cli.camera.pixel import Photodetector, Readout
+from vcam_cli.camera.photodetector import Photodetector
+from vcam_cli.camera.pixel import Readout
 from vcam_cli.camera.processing import Step
 from vcam_cli.camera.scene import CHARTS
 from vcam_cli.camera.settings import EFFECTS
@@ -91,8 +92,7 @@ class TestRequired:
             "pixel.photodetector",
             "pixel.photodetector.fill_factor",
             "pixel.photodetector.quantum_efficiency",
-            "pixel.readout.conversion_gain",
-            "pixel.readout.full_well",
+            "pixel.readout.full_well",  # adc.gain may stand for the other: test_electrical.py
             "array.rows",
             "array.columns",
             "exposure.time",
@@ -239,12 +239,12 @@ class TestValues:
 
     def test_quantum_efficiency_of_a_pixel(self):
         of_detector = camera().pixel.photodetector.quantum_efficiency
-        assert not of_detector.per_pixel and of_detector.spectrum.factors == (0.5,)
+        assert not of_detector.per_pixel and of_detector.given.factors == (0.5,)
         given = {"pixel": 0.2}
         of_pixel = camera(
             pixel__photodetector__quantum_efficiency=given
         ).pixel.photodetector.quantum_efficiency
-        assert of_pixel.per_pixel and of_pixel.spectrum.factors == (0.2,)
+        assert of_pixel.per_pixel and of_pixel.given.factors == (0.2,)
 
     @pytest.mark.parametrize(
         ("written", "preset", "tolerance", "knobs"),

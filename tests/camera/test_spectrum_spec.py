@@ -1,5 +1,7 @@
 """Spectra as a camera file writes them, resolved to numbers."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from camera_trees import camera, mistakes
@@ -47,6 +49,82 @@ class TestForms:
         factors = [0.5, "ir-cut-650", {"table": {380: 0.4, 780: 0.4}}]
         expected = 0.2 * at("ir-cut-650", 600)
         assert at(factors, 600) == pytest.approx(expected, rel=1e-12)
+
+
+def layer(top: str, bottom: str, nm):
+    return at({"silicon": [top, bottom]}, nm)
+
+
+class TestSiliconLayers:
+    """Absorption [1/m] at 400, 550 and 700 nm: M. A. Green, Sol. Energy Mater. Sol. Cells 92, 2008,
+    to the digits of his table."""
+
+    NM = (400, 550, 700)
+    ALPHA = np.array([9.299e6, 6.39e5, 1.89e5])
+
+    @pytest.mark.parametrize("depth", [1e-8, 4e-7, 5e-6, 1e-4])
+    def test_from_the_surface_it_is_what_does_not_go_deeper(self, depth):
+        expected = 1 - np.exp(-self.ALPHA * depth)
+        assert layer("0 um", f"{depth * 1e6!r} um", self.NM) == pytest.approx(expected, rel=1e-9)
+
+    def test_layers_add_up(self):
+        nm = np.arange(350, 1101)
+        edges = ["0 um", "0.2 um", "0.61 um", "3 um", "7 um"]
+        parts = [layer(a, b, nm) for a, b in pairwise(edges)]
+        assert sum(parts) == pytest.approx(layer("0 um", "7 um", nm), rel=1e-12)
+        assert (np.array(parts) >= 0).all() and (sum(parts) <= 1).all()
+
+    def test_what_goes_deep_is_what_was_not_absorbed_above(self):
+        above = layer("0 um", "0.4 um", self.NM)
+        beyond = layer("0.4 um", "10 m", self.NM)
+        assert beyond == pytest.approx(1 - above, rel=1e-12)
+
+    def test_a_thin_deep_layer_loses_no_digits(self):
+        # exp(-a z1) - exp(-a z2) itself would leave none: a dz exp(-a z) is 1e-9 at 700 nm
+        thin, twice = layer("9 um", "9.00001 um", 700), layer("9 um", "9.00002 um", 700)
+        assert twice / thin == pytest.approx(2, rel=1e-5)  # 1 - a dz / 2, and the rounding of um
+
+    def test_it_is_written_as_it_was_read(self):
+        written = {"silicon": ["0.4 um", "1.3 um"]}
+        spec = transmittance(written)
+        assert transmittance(spec.written()).factors == spec.factors
+        [factor] = spec.factors
+        assert factor.silicon == pytest.approx((0.4e-6, 1.3e-6), rel=1e-15)
+
+    def test_it_ends_where_silicon_is_known(self):
+        with pytest.raises(ValueError, match="covers 350-1100 nm"):
+            layer("0 um", "1 um", 1101)
+
+    def test_the_shipped_set_takes_the_light_of_five_micrometers_once(self):
+        filters = camera(array__pattern="stacked").array.filters
+        nm = np.arange(380, 781)
+        parts = {color: spec.resolve().at(nm * NM) for color, spec in filters.items()}
+        assert set(parts) == {"R", "G", "B"}
+        assert sum(parts.values()) == pytest.approx(layer("0 um", "5 um", nm), rel=1e-12)
+        most = {color: nm[part.argmax()] for color, part in parts.items()}
+        assert most["B"] < most["G"] < most["R"]  # blue light goes less deep
+
+    @pytest.mark.parametrize(
+        ("depths", "words"),
+        [
+            (["0.4 um", "0.4 um"], "do not rise"),
+            (["1 um", "0.4 um"], "do not rise"),
+            (["-1 um", "0.4 um"], "negative"),
+            (["0 um"], ""),
+            (["0 um", "1 um", "2 um"], ""),
+            (["0 um", "1 s"], ""),
+            ("1 um", ""),
+            ([0, 1], ""),
+        ],
+    )
+    def test_depths_that_are_none(self, depths, words):
+        found = mistakes({"optics.transmittance": {"silicon": depths}})
+        assert found and all("optics.transmittance" in line for line in found)
+        assert words in found[0]
+
+    def test_nothing_stands_beside_the_depths(self):
+        [line] = mistakes({"optics.transmittance": {"silicon": ["0 um", "1 um"], "file": "x.csv"}})
+        assert "optics.transmittance.file" in line
 
 
 class TestRefused:

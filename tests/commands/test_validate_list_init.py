@@ -243,11 +243,16 @@ class TestValidate:
             "validate", "starter", "--set", "adc.bit=12", code=2
         ).stderr  # fmt: skip
 
-    def test_a_study_is_refused_clearly(self):
+    def test_a_study_of_schedules_is_refused_clearly(self):
+        Path("study.yaml").write_text("kind: schedule\nname: captures\n")
+        text = vcam("validate", "study.yaml", code=2).stderr
+        assert text.startswith("study.yaml:1:7: kind: this is a study of capture schedules")
+        assert "not supported yet" in text
+
+    def test_what_is_missing_in_a_study(self):
         Path("study.yaml").write_text("kind: sweep\nname: pixel-size\n")
         text = vcam("validate", "study.yaml", code=2).stderr
-        assert text.startswith("study.yaml:1:7: kind: this is a study (kind: sweep)")
-        assert "not supported yet" in text
+        assert [line.split(": ")[1] for line in text.splitlines()] == ["camera", "vary", "metrics"]
 
     def test_a_machine_that_cannot_ends_with_3(self, monkeypatch):
         def refuse(*_):
@@ -322,7 +327,8 @@ class TestInit:
         assert "next: vcam run new/camera.yaml" in vcam("init", "new").stderr
         assert load("new/camera.yaml").array.rows * load("new/camera.yaml").array.columns < 200_000
         assert Path("new/camera.yaml").read_text().count("#") > 8
-        assert [path.name for path in (folder / "new").iterdir()] == ["camera.yaml"]
+        names = sorted(path.name for path in (folder / "new").iterdir())
+        assert names == ["camera.yaml", "study.yaml"]
 
     def test_the_current_folder_is_the_default(self):
         vcam("init", "-q")
@@ -330,7 +336,7 @@ class TestInit:
 
     def test_json(self):
         result = vcam("init", "new", "--json")
-        assert json.loads(result.stdout) == {"files": ["new/camera.yaml"]}
+        assert json.loads(result.stdout) == {"files": ["new/camera.yaml", "new/study.yaml"]}
         assert result.stderr == ""
 
     def test_nothing_is_overwritten(self):

@@ -23,6 +23,19 @@ def test_segments_fold_every_cosine_right(period, terms):
     assert sorted(seen) == sorted(set(range(terms)) - vanishing)
 
 
+@given(period=st.integers(1, 20), terms=st.integers(1, 120))
+def test_segments_fold_every_sine_right(period, terms):
+    i = np.arange(period)
+    seen = []
+    for basis, term, sign in segments(period, terms, odd=True):
+        for j, k in zip(i[basis] + 1, np.arange(terms)[term], strict=True):
+            folded = sign * np.sin(np.pi * j * (i + 0.5) / period)
+            np.testing.assert_allclose(np.sin(np.pi * k * (i + 0.5) / period), folded, atol=1e-11)
+            seen.append(k)
+    vanishing = {k for k in range(terms) if k % (2 * period) == 0}
+    assert sorted(seen) == sorted(set(range(terms)) - vanishing)
+
+
 @given(samples=st.integers(1, 12), count=st.integers(1, 90))
 def test_base_and_extend_agree_with_the_definition(samples, count):
     values = np.random.default_rng(samples).random((2, samples))
@@ -50,32 +63,35 @@ AXES = {
 
 
 @pytest.mark.parametrize("name", AXES)
+@pytest.mark.parametrize("odd", [False, True])
 @pytest.mark.parametrize("dtype", [np.float64, np.float32])
-def test_evaluation_equals_the_direct_sum(name, dtype):
+def test_evaluation_equals_the_direct_sum(name, dtype, odd):
     axis = AXES[name]
     rng = np.random.default_rng(0)
     terms = rng.standard_normal((3, axis.terms)) / (1 + np.arange(axis.terms))
     position = axis.first + np.arange(axis.pixels) * axis.pixel_pitch
     factor = np.where(np.arange(axis.terms) == 0, 1, 2)[:, None]
     k = np.arange(axis.terms)[:, None]
-    direct = terms @ (factor * np.cos(np.pi * k * position / axis.length))
-    got = axis.evaluate(axis.fold(terms.astype(dtype)), axis=1)
+    wave = np.sin if odd else np.cos
+    direct = terms @ (factor * wave(np.pi * k * position / axis.length))
+    got = axis.evaluate(axis.fold(terms.astype(dtype), odd), axis=1, odd=odd)
     assert got.dtype == dtype
     # float32: 24 bits through a transform of a few dozen terms
     np.testing.assert_allclose(got, direct, atol=1e-11 if dtype == np.float64 else 2e-5)
-    columns = axis.evaluate(axis.fold(terms.astype(dtype)).T.copy(), axis=0)
+    columns = axis.evaluate(axis.fold(terms.astype(dtype), odd).T.copy(), axis=0, odd=odd)
     np.testing.assert_allclose(columns, direct.T, atol=1e-11 if dtype == np.float64 else 2e-5)
 
 
+@pytest.mark.parametrize("odd", [False, True])
 @pytest.mark.parametrize("name", AXES)
-def test_sources_are_the_folding(name):
+def test_sources_are_the_folding(name, odd):
     axis = AXES[name]
     terms = np.random.default_rng(1).standard_normal(axis.terms)
-    expected = axis.fold(terms)
+    expected = axis.fold(terms, odd)
     got = np.zeros(axis.folded)
     for start in range(0, axis.folded, 4):
         piece = slice(start, min(start + 4, axis.folded))
-        for target, source, weights in axis.sources(piece):
+        for target, source, weights in axis.sources(piece, odd):
             got[target] += terms[source] * weights
     np.testing.assert_allclose(got, expected, atol=1e-12)
 

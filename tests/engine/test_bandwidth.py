@@ -206,28 +206,30 @@ def plain_geometry(folder, **changes) -> Geometry:
 def test_finer_stops_at_the_budget_and_the_knob(tmp_path):
     g = plain_geometry(tmp_path, array__rows=1000, array__columns=1000)
     most = STANDARD.most_oversampling
-    assert bandwidth.finer(2, 1.0, 1.0, g, STANDARD) == 2
+    assert bandwidth.finer(2, 1.0, 1.0, g.rows * g.columns, STANDARD) == 2
     # eightfold loss: fourfold sampling
-    assert bandwidth.finer(2, 8.0, 1.0, g, STANDARD) == 8
+    assert bandwidth.finer(2, 8.0, 1.0, g.rows * g.columns, STANDARD) == 8
     # 64 million samples allow 8 a pixel on a million pixels
-    assert bandwidth.finer(2, 1e9, 1.0, g, STANDARD) == 8
-    assert bandwidth.finer(2, 1.0, 0.0, g, STANDARD) == 8
-    assert bandwidth.finer(most + 2, 1e9, 1.0, g, STANDARD) == most + 2, "never coarser"
+    assert bandwidth.finer(2, 1e9, 1.0, g.rows * g.columns, STANDARD) == 8
+    assert bandwidth.finer(2, 1.0, 0.0, g.rows * g.columns, STANDARD) == 8
+    assert bandwidth.finer(most + 2, 1e9, 1.0, g.rows * g.columns, STANDARD) == most + 2, (
+        "never coarser"
+    )
 
 
 def test_small_arrays_may_be_sampled_more_finely_unless_the_user_says_how(tmp_path):
     small = plain_geometry(tmp_path, array__rows=40, array__columns=60)
-    assert bandwidth.most(small, STANDARD) == 64
+    assert bandwidth.most(small.rows * small.columns, STANDARD) == 64
     own = replace(STANDARD, oversampling=3, most_oversampling=3)
-    assert bandwidth.most(small, own) == 3
+    assert bandwidth.most(small.rows * small.columns, own) == 3
     large = plain_geometry(tmp_path, array__rows=3000, array__columns=4000)
-    assert bandwidth.most(large, STANDARD) == STANDARD.most_oversampling
+    assert bandwidth.most(large.rows * large.columns, STANDARD) == STANDARD.most_oversampling
 
 
 def test_large_arrays_are_sampled_no_finer_than_memory_allows(tmp_path):
     g = plain_geometry(tmp_path, array__rows=3000, array__columns=4000)
     assert bandwidth.first_guess(g, STANDARD) == STANDARD.oversampling
-    assert bandwidth.finer(2, 1e9, 1.0, g, STANDARD) == 2
+    assert bandwidth.finer(2, 1e9, 1.0, g.rows * g.columns, STANDARD) == 2
     assert bandwidth.first_guess(plain_geometry(tmp_path), STANDARD) == 4
 
 

@@ -34,14 +34,52 @@ NOISY = {
 }
 
 
-@pytest.mark.parametrize("pattern", ["monochrome", "bayer-grbg"])
-def test_same_bytes_for_any_number_of_workers(pattern, tmp_path):
-    made = camera(tmp_path, NOISY | {"array.pattern": pattern})
+LINES = {
+    "optics.stray_light": 0.02,
+    "pixel.readout.column_noise": "3 e",
+    "pixel.readout.row_noise": "2 e",
+    "pixel.fpn.dark": "10 %",
+    "pixel.defects": {"hot": 0.01, "dead": 0.01},
+}
+CCD = {"pixel.architecture": "ccd", "pixel.readout.charge_transfer": {"inefficiency": 1e-4}}
+
+
+@pytest.mark.parametrize(
+    "more",
+    [{}, {"array.pattern": "bayer-grbg"}, LINES, LINES | CCD | {"array.pattern": "bayer-rggb"}],
+    ids=["monochrome", "bayer", "lines and defects", "ccd"],
+)
+def test_same_bytes_for_any_number_of_workers(more, tmp_path):
+    made = camera(tmp_path, NOISY | more)
     frames = [simulate(made, workers=n) for n in (1, 2, 5)]
     assert len({r.mean_electrons.tobytes() for r in frames}) == 1
     assert len({r.electrons.tobytes() for r in frames}) == 1
     assert len({r.dn.tobytes() for r in frames}) == 1
     assert frames[0].electrons.std() > 0
+
+
+@dataclass(frozen=True)
+class Halved(ReadNoise):
+    """Takes half of the mean signal and writes down the dark one."""
+
+    def before_shot(self, mean, site):
+        mean *= 0.5
+        mean += site.dark
+        return mean
+
+
+def test_what_acts_on_the_mean_does_so_before_shot_noise():
+    """Half of 1000 electrons and 30 dark ones again; shot noise of what is left, a Poisson number.
+
+    The draw stands behind shot noise in the order, and its noise is added there: 0 here.
+    """
+    code = Quantization(0.0, 1.0, 16)
+    effects = (DarkCurrent(60.0), ShotNoise(), Halved(0.0))
+    taken, _ = capture.capture(np.full((64, 400), 1940.0), 0.5, effects, code, SEEDS, 1)
+    mean, n = (1940 * 0.5 + 30) / 2 + 30, taken.size
+    assert taken.mean() == pytest.approx(mean, abs=5 * np.sqrt(mean / n))
+    assert taken.var() == pytest.approx(mean, rel=5 * np.sqrt(2 / n))
+    assert np.array_equal(taken, np.rint(taken))
 
 
 def test_a_longer_array_begins_like_a_shorter_one():

@@ -64,6 +64,43 @@ CAMERAS = {
         "pixel.readout.reset_noise": "2 e",
         "pixel.fpn": {"offset_pixel": "1.5 e", "gain_pixel": "0.05 %"},
     },
+    "a ccd in stray light": {
+        "scene.radiance": radiance_for(6e4),
+        "accuracy": "standard",
+        DARK: "5 ke/s",
+        "optics.zernike": {4: "0.05 um"},
+        "optics.stray_light": 0.03,
+        "pixel.architecture": "ccd",
+        "pixel.readout.charge_transfer": {"inefficiency": 2e-4},
+        "pixel.readout.row_noise": "3 e",
+        "pixel.fpn": {"dark": "20 %"},
+        "pixel.defects": {"hot": 0.01, "dead": 0.02},
+        "pixel.microlens": {"gain": 1.5},
+        "pixel.stack": {
+            "passivation": {"thickness": "0.7 um", "index": 2.0},
+            "oxide": {"thickness": "2 um", "index": 1.46},
+        },
+        "pixel.photodetector.charge_diffusion": {
+            "diffusion_length": "20 um",
+            "depletion_width": "0.4 um",
+            "substrate_depth": "5 um",
+        },
+    }
+    | EDGE,
+    "a lamp in the picture, and a little stray light": {
+        "scene.source": {"kind": "chart", "chart": "hdr-patches"},
+        "scene.radiance": radiance_for(3e6),
+        "accuracy": "draft",
+        "optics.diffraction": False,
+        "optics.stray_light": 0.009,
+    },
+    "highlights far beyond the well, in a ccd": {
+        "scene.radiance": radiance_for(2e7),
+        "accuracy": "draft",
+        "pixel.architecture": "ccd",
+        "pixel.readout.charge_transfer": {"inefficiency": 1e-5},
+    }
+    | PATCHES,
 }
 EVERY = pytest.mark.parametrize("name", CAMERAS)
 
@@ -171,17 +208,28 @@ def test_noise_is_weighed_against_the_noise_that_runs(tmp_path):
 # --- on, off, all --------------------------------------------------------------------------------
 
 EVERYTHING = NOISE | {DARK: "100 e/s", "optics.off_axis": "exact"}
+IN_EVERYTHING = {
+    *("diffraction", "pixel_aperture", "off_axis", "dark_current", "shot_noise", "fpn"),
+    *("reset_noise", "read_noise", "saturation", "quantization"),
+}
 
 
 def test_all_is_on_for_everything_described(run):
-    result = run("all traces", effects="all")
-    assert [e.name for e in result.frame.plan.active] == NAMES
-    assert {d.by for d in result.frame.plan.decisions} == {"user"}
+    """No camera has all effects: a ccd, which transfers charge, has no reset noise."""
+    everything = set()
+    for name in ("all traces", "a ccd in stray light"):
+        result = run(name, effects="all")
+        described = [d.name for d in result.frame.plan.decisions if d.by != "camera"]
+        assert [e.name for e in result.frame.plan.active] == described
+        assert {d.by for d in result.frame.plan.decisions} == {"user", "camera"}
+        everything |= set(described)
+    assert everything == set(NAMES)
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_off_leaves_out_that_one_alone(name, tmp_path):
-    chosen = EVERYTHING | {"effects": {name: "off"}, "accuracy": "reference"}
+    described = EVERYTHING if name in IN_EVERYTHING else CAMERAS["a ccd in stray light"]
+    chosen = described | {"effects": {name: "off"}, "accuracy": "reference"}
     found = decisions(simulate(camera(tmp_path, chosen)))
     assert (found[name].state, found[name].by) == ("off", "user")
     assert {d.name for d in found.values() if d.state == "off" and d.by == "user"} == {name}

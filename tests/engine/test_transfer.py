@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from vcam_cli.effects.diffraction import Diffraction
-from vcam_cli.engine.transfer import Band, tabulate, transfer
+from vcam_cli.engine.transfer import Band, Fineness, tabulate, transfer
 from vcam_cli.spectra import PLANCK, SPEED_OF_LIGHT, Spectrum, illuminant
 
 LENS = Diffraction(f_number=4.0, magnification=-0.02)
@@ -66,7 +66,7 @@ def test_few_mixtures_stand_for_many_spectra():
     colors = [bell(600e-9), bell(540e-9), bell(460e-9)]
     exact = transfer(spectra, colors, 1.0, Band(400e-9, 700e-9, 10e-9), [LENS])
     for tolerance in (1e-2, 1e-4, 1e-7):
-        table = tabulate(exact, exact.cutoff, 2001, tolerance)
+        table = tabulate(exact, Fineness(exact.cutoff, 2001, tolerance))
         rebuilt = np.tensordot(table.mix.T, table.values, axes=1)
         truth = exact.at(np.linspace(0, exact.cutoff, 2001))
         error = np.abs(rebuilt - truth).max() / exact.level.max()
@@ -74,12 +74,12 @@ def test_few_mixtures_stand_for_many_spectra():
         # it is judged at 256 frequencies, this at 2001
         assert error == pytest.approx(table.error, rel=0.02, abs=1e-15)
     # three colors, blurred slightly differently at every wavelength: six mixtures do for 1 %
-    assert len(tabulate(exact, exact.cutoff, 2001, 1e-2).mix) <= 6
+    assert len(tabulate(exact, Fineness(exact.cutoff, 2001, 1e-2)).mix) <= 6
 
 
 def test_few_spectra_stay_as_they_are():
     exact = transfer([bell(5e-7), bell(6e-7)], [bell(5e-7)], 1.0, Band(4e-7, 7e-7, 1e-8), [LENS])
-    table = tabulate(exact, exact.cutoff, 101, 1e-3)
+    table = tabulate(exact, Fineness(exact.cutoff, 101, 1e-3))
     assert np.array_equal(table.mix, np.eye(2))
     assert table.error == 0
 

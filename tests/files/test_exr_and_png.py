@@ -40,6 +40,13 @@ def test_exr_round_trip_is_bit_exact(tmp_path):
         assert channels[name].tobytes() == values.tobytes()
 
 
+def test_a_row_of_more_than_a_million_pixels_comes_back(tmp_path):
+    """OpenImageIO takes it for a damaged file where it is not told otherwise."""
+    row = np.arange(1_100_000, dtype=np.float32)[np.newaxis]
+    write_exr(tmp_path / "row.exr", {"dn": row})
+    assert np.array_equal(read_exr(tmp_path / "row.exr")[0]["dn"], row)
+
+
 def test_exr_attributes_come_back(tmp_path):
     given = {"name": "tele é", "seed": 7, "big": 2**40, "exposure_time": 0.03, "flag": True,
              "cfa": "RGGB", "count": np.int64(3), "gain": np.float32(0.5)}  # fmt: skip

@@ -1,4 +1,4 @@
-"""The promises of the plan, measured on twelve cameras.
+"""The promises of the plan, measured on cameras with little in common.
 
     python -m tests.promise [--json FILE] [CAMERA...]
 

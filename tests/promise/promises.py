@@ -1,4 +1,4 @@
-"""Twelve cameras that have little in common, and what the plan promises of each, measured.
+"""Cameras that have little in common, and what the plan promises of each, measured.
 
 Small arrays, since nothing here depends on their size but time and memory.
 """
@@ -163,6 +163,96 @@ pixel:
 array: {rows: 130, columns: 90, pattern: bayer-bggr}
 exposure: {auto: {max: 1 s}}
 """,
+    "out of focus": """
+scene: {source: {kind: chart, chart: dead-leaves, seed: 5}}
+optics: {f_number: 2, defocus: 15 um, stray_light: 0.04, off_axis: cos4}
+pixel: {architecture: aps-4t, readout: {column_noise: 3 e, row_noise: 2 e}}
+array: {rows: 60, columns: 80, pattern: bayer-rggb}
+exposure: {auto: {max: 100 ms}}
+""",
+    "coma": """
+scene: {source: {kind: chart, chart: slanted-edge}}
+optics: {f_number: 2.8, zernike: {7: 30 nm, 8: 80 nm, 11: 40 nm}}
+array: {rows: 60, columns: 80}
+exposure: {auto: {max: 100 ms}}
+""",
+    "changing field": """
+scene:
+  source: {kind: image, file: color.png, model: laser}
+  illuminant: null
+  luminance: 200 cd/m2
+  wavelengths: {start: 440 nm, stop: 660 nm}
+optics:
+  f_number: 2.8
+  zernike: [{field: 0, 11: 30 nm}, {field: 0.7, 8: 50 nm, 7: 20 nm}, {field: 1, 8: 80 nm, 4: 50 nm}]
+array: {rows: 60, columns: 80, pattern: bayer-rggb}
+exposure: {auto: {max: 100 ms}}
+""",
+    "curved field": """
+scene: {source: {kind: chart, chart: dead-leaves, seed: 6}}
+optics: {f_number: 4, zernike: [{field: 0, 4: 0 nm}, {field: 1, 4: 120 nm}]}
+array: {rows: 60, columns: 80}
+exposure: {auto: {max: 100 ms}}
+""",
+    "nearly perfect": """
+scene: {source: {kind: chart, chart: dead-leaves, seed: 7}}
+optics: {f_number: 4, zernike: [{field: 0, 4: 0 nm}, {field: 1, 8: 6 nm}]}
+array: {rows: 60, columns: 80}
+exposure: {auto: {max: 100 ms}}
+""",
+    "measured spread": """
+scene: {source: {kind: image, file: gray.png, model: reflectance}}
+optics: {psf: {file: spread.png, pitch: 1 um}}
+array: {rows: 60, columns: 80}
+exposure: {auto: {max: 100 ms}}
+""",
+    "deep silicon": """
+scene: {source: {kind: chart, chart: dead-leaves, seed: 9}, illuminant: A}
+optics: {f_number: 2}
+pixel:
+  technology: cmos-0.35um
+  temperature: 320 K
+  width: 6.5 um
+  photodetector:
+    {kind: ndiff-psub, quantum_efficiency: null, fill_factor: null, charge_diffusion: junction}
+  readout: {reset_noise: ktc, conversion_gain: null, voltage_swing: null}
+  fpn: {dark: 10 %, offset_column: 2 e}
+array: {rows: 60, columns: 80}
+exposure: {auto: {max: 100 ms}}
+""",
+    "no lens, deep silicon": """
+scene: {source: {kind: chart, chart: dead-leaves, seed: 10}}
+optics: {diffraction: false}
+pixel:
+  photodetector:
+    charge_diffusion: {diffusion_length: 20 um, depletion_width: 0.5 um, substrate_depth: 8 um}
+array: {rows: 60, columns: 80}
+exposure: {auto: {max: 100 ms}}
+""",
+    "layers": """
+scene: {source: {kind: chart, chart: colorchecker}}
+optics: {f_number: 2.8, exit_pupil_distance: 3 mm}
+pixel:
+  architecture: ccd
+  stack: {passivation: {thickness: 0.5 um, index: 2.0}, oxide: {thickness: 3 um, index: 1.46}}
+  microlens: {gain: 1.6, shift: optimal}
+  readout: {charge_transfer: {inefficiency: 1e-4, phases: 3}, reset_noise: ktc}
+  photodetector: {capacitance: 5 fF, dark_current: 500 e/s}
+  fpn: {dark: 30 %, offset_pixel: 2 e}
+array: {rows: 60, columns: 80, pattern: bayer-rggb}
+exposure: {auto: {max: 100 ms}}
+""",
+    "defective": """
+scene: {source: {kind: chart, chart: slanted-edge}}
+pixel:
+  architecture: aps-3t
+  defects: {hot: 1e-3, dead: 1e-3}
+  photodetector: {dark_current: 2000 e/s}
+  readout: {column_noise: 4 e, row_noise: 4 e, reset_noise: 10 e}
+  fpn: {dark: 20 %, offset_column: 5 e, gain_column: 0.2 %}
+array: {rows: 60, columns: 80}
+exposure: {auto: {max: 100 ms}}
+""",
 }
 """Name -> what it has different from `COMMON`; null takes a key away."""
 
@@ -204,6 +294,9 @@ def _pictures(folder: Path) -> None:
     planes = (np.clip(field, 0, 1) * 65535).astype(np.uint16)
     write_png(folder / "color.png", np.ascontiguousarray(np.moveaxis(planes, 0, 2)))
     write_png(folder / "gray.png", planes[0])
+    y, x = np.indices((24, 32)) - np.array([10, 12])[:, None, None]
+    spot = np.exp(-(x**2 + y**2) / 8) + 0.2 * np.exp(-((x - 6) ** 2 + (y - 3) ** 2) / 18)
+    write_png(folder / "spread.png", (spot / spot.max() * 65535).astype(np.uint16))
 
 
 # --- what is measured ----------------------------------------------------------------------------

@@ -1,11 +1,12 @@
-"""The promises of `python -m tests.promise`, held on three of its cameras, without its clock."""
+"""The promises of `python -m tests.promise`, held on five of its cameras, without its clock."""
 
 import pytest
 from promises import CAMERAS, estimates, idle_work, kept, made, truth, worth_leaving_out
 
+from vcam_cli.effects.order import ORDER
 from vcam_cli.studies import ablation
 
-FAST = ("night", "color photograph", "aliasing")
+FAST = ("night", "color photograph", "aliasing", "measured spread", "layers")
 
 
 @pytest.fixture(scope="module", params=FAST)
@@ -39,5 +40,8 @@ def test_nobody_asks_for_nothing_is_done(case):
     assert all(left_out for _, left_out in idle_work(case[0]))
 
 
-def test_twelve_cameras():
-    assert len(CAMERAS) == 12
+def test_cameras_with_every_effect(tmp_path):
+    """Twelve at first, ten more for what lenses and pixels do beside."""
+    assert len(CAMERAS) == 22
+    named = {name for each in CAMERAS for name in ablation.wanted(made(each, tmp_path))}
+    assert named == {kind.name for kind in ORDER}

@@ -45,7 +45,10 @@ class Adc(Model):
         default=None,
     )
     gain: Annotated[float | None, Quantity("adc_gain", above=0)] = key(
-        "in place of full_scale", unit="DN/e", example="0.25 DN/e", default=None
+        "codes per electron (K of EMVA 1288), in place of full_scale",
+        unit="DN/e",
+        example="0.25 DN/e",
+        default=None,
     )
     reference: Annotated[float | None, Quantity("voltage", above=0)] = key(
         "of a logarithmic ADC: where its curve bends; default full_scale / 1000",

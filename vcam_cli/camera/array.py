@@ -24,6 +24,7 @@ PATTERNS: dict[str, tuple[str, ...]] = {
 CLEAR = ("Y", "W")
 """Colors that need no filter."""
 DEFAULT_FILTERS = "generic-rgb"
+STACKED_FILTERS = "silicon-layers"
 
 _FILTER = Spectral(most=1.0)
 _Count = Whole(least=1, most=10**7, example="512")
@@ -63,8 +64,16 @@ class Binning(Model):
     rows: Annotated[int, Whole(least=1, most=64, example="2")] = key("in a column", example=2)
     columns: Annotated[int, Whole(least=1, most=64, example="2")] = key("in a row", example=2)
     kind: Literal["charge", "voltage", "digital"] = key(
-        "where they are added", example="charge", default="charge"
+        "what is joined: charges (added before they are read), voltages (averaged, then read), or"
+        " digital codes (added)",
+        example="charge",
+        default="charge",
     )
+
+    @property
+    def count(self) -> int:
+        """Pixels that are read as one."""
+        return self.rows * self.columns
 
 
 def _pattern(given: Any) -> Any:
@@ -134,7 +143,6 @@ class Array(Model):
         "colors of the pixels, row 0 column 0 first",
         example="bayer-rggb",
         default="bayer-rggb",
-        not_yet=("quad-bayer", "rgbw", "honeycomb", "stacked", "block", "positions"),
     )
     filters: Annotated[
         dict[str, SpectrumSpec],
@@ -150,7 +158,7 @@ class Array(Model):
         default=None,
     )
     binning: Annotated[Binning | None, word_or(Binning, {"none": None})] = key(
-        "pixels that are read as one", example="none", default=None, not_yet=True
+        "pixels that are read as one", example="none", default=None
     )
 
     @property
@@ -165,6 +173,17 @@ class Array(Model):
         """Whether a pixel holds one color of several."""
         return len(self.colors) != 1 and self.pattern != "stacked"
 
+    @property
+    def scattered(self) -> bool:
+        """Whether the pixels fill no rows and columns of squares."""
+        return self.pattern == "honeycomb" or isinstance(self.pattern, Positions)
+
+    @property
+    def joined_charges(self) -> int:
+        """Pixels whose charge is counted as one."""
+        given = self.binning
+        return given.count if given is not None and given.kind == "charge" else 1
+
     @staticmethod
     def _size(given: Mapping[str, Any]) -> Iterator[InitErrorDetails]:
         """Rows and columns, or a die; nothing where every pixel has a place of its own."""
@@ -175,10 +194,20 @@ class Array(Model):
             yield fault((), "its size is missing", "add rows: 512 and columns: 512, or a die")
 
     @model_validator(mode="after")
+    def _joined(self) -> Self:
+        if self.binning is not None and self.binning.count > 1 and self.scattered:
+            message = "joins neighbors in rows and columns, and these pixels have none"
+            remedy = "write binning: none, or another pattern"
+            raise failure([fault(("binning",), message, remedy)])
+        return self
+
+    @model_validator(mode="after")
     def _complete_filters(self) -> Self:
         filters = self.filters or {}
-        if "filters" not in self.model_fields_set and set(self.colors) - set(CLEAR):
-            filters = filter_set(DEFAULT_FILTERS)
+        colored = set(self.colors) - set(CLEAR) or isinstance(self.pattern, Positions)
+        if "filters" not in self.model_fields_set and colored:
+            stacked = self.pattern == "stacked"
+            filters = filter_set(STACKED_FILTERS if stacked else DEFAULT_FILTERS)
         for color in self.colors:
             if color not in filters and color not in CLEAR:
                 message = f"has no filter for {color}, a color of {shown(written(self.pattern))}"

@@ -36,8 +36,6 @@ class Model(BaseModel):
         extra="forbid", frozen=True, allow_inf_nan=False, protected_namespaces=()
     )
     rules: ClassVar[tuple[Rule, ...]] = ()
-    not_yet: ClassVar[str] = ""
-    """Set on a choice that is not built yet: the key that names it."""
 
     @model_validator(mode="wrap")
     @classmethod

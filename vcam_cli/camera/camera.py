@@ -1,11 +1,13 @@
 """The whole camera file."""
 
+from collections.abc import Mapping
 from pathlib import Path as FilePath
 from typing import Annotated, Any, Literal, Protocol, Self
 
 from pydantic import PrivateAttr, model_validator
 
 from vcam_cli.camera.adc import Adc
+from vcam_cli.camera.architecture import ARCHITECTURES, article
 from vcam_cli.camera.array import Array
 from vcam_cli.camera.base import Model, key
 from vcam_cli.camera.display import Display
@@ -13,7 +15,13 @@ from vcam_cli.camera.explain import failure, fault, one_of, shown
 from vcam_cli.camera.exposure import Exposure
 from vcam_cli.camera.optics import Optics
 from vcam_cli.camera.pixel import Pixel
-from vcam_cli.camera.processing import STEP_LIST, Steps, default_steps, order_mistakes
+from vcam_cli.camera.processing import (
+    STEP_LIST,
+    Steps,
+    default_steps,
+    order_mistakes,
+    picture_mistakes,
+)
 from vcam_cli.camera.scene import Scene
 from vcam_cli.camera.settings import ACCURACY, Accuracy, Effects, Output, Seed
 from vcam_cli.camera.values import Either, Word
@@ -92,20 +100,27 @@ class Camera(Model):
     output: Output = key("what is written", example={"raw": ["dn"]}, default=Output)
 
     _origin: Origin | None = PrivateAttr(default=None)
+    _samples: Mapping[str, Any] = PrivateAttr(default_factory=dict)
 
     @model_validator(mode="after")
     def _steps(self) -> Self:
-        mosaic, colors = self.array.mosaic, len(self.array.colors)
+        array, colors = self.array, len(self.array.colors)
         if "processing" not in self.model_fields_set:
-            self._fill(processing=default_steps(monochrome=not mosaic))
-        mistakes = list(order_mistakes(self.processing, mosaic, colors))
-        if self.quality and mosaic and all(s.name != "demosaic" for s in self.processing):
-            message = "a mosaic without demosaic cannot be judged"
-            remedy = "add demosaic: bilinear to processing, or write quality: []"
-            mistakes.append(fault(("quality",), message, remedy))
-        if self.exposure.captures and self.pixel.architecture in ("aps-4t", "pps", "ccd"):
-            message = f"reading an {self.pixel.architecture} pixel destroys its charge"
-            remedy = "give one exposure time, or write architecture: aps-3t"
+            self._fill(processing=default_steps(array.mosaic, monochrome=colors == 1))
+        mistakes = list(order_mistakes(self.processing, array.mosaic, colors, array.scattered))
+        mistakes += picture_mistakes(
+            self.processing, array, bool(self.quality), self.output.render is not None
+        )
+        name = self.pixel.architecture
+        if self.exposure.captures and ARCHITECTURES[name].destructive:
+            message = f"reading {article(name)} {name} pixel destroys its charge"
+            others = [n for n, kind in ARCHITECTURES.items() if not kind.destructive]
+            remedy = f"give one exposure time, or write architecture: {' or '.join(others)}"
+            mistakes.append(fault(("exposure", "captures"), message, remedy))
+        joined = array.binning
+        if self.exposure.captures and joined and joined.count > 1 and joined.kind != "charge":
+            message = f"pixels joined by {joined.kind} binning are read once in an integration"
+            remedy = "write kind: charge in array.binning, or give one exposure time"
             mistakes.append(fault(("exposure", "captures"), message, remedy))
         if mistakes:
             raise failure(mistakes)
@@ -116,6 +131,19 @@ class Camera(Model):
         camera = self.model_copy()
         camera._origin = origin
         return camera
+
+    def with_samples(self, samples: Mapping[str, Any]) -> "Camera":
+        """The same camera with what some of its files hold: {"optics.psf": array, ...}.
+
+        Why so: effects are made of a camera, and only `files` reads images.
+        """
+        camera = self.model_copy()
+        camera._samples = dict(samples)
+        return camera
+
+    def samples(self, path: str) -> Any:
+        """What was read of the file at a dotted path; None before that."""
+        return self._samples.get(path)
 
     @property
     def origin(self) -> FilePath | None:

@@ -4,10 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from vcam_cli.camera import sense_node
+from vcam_cli.camera.architecture import ARCHITECTURES
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.geometry import AGREE
-from vcam_cli.errors import bad
+from vcam_cli.errors import BadInput, bad
 from vcam_cli.physics import readout
+
+NOMINAL_SWING = 1.0
+"""Volts of a full well where the file gives no voltage; nothing that is counted depends on it."""
 
 
 @dataclass(frozen=True)
@@ -20,8 +25,8 @@ class Electrical:
     """[V]"""
     full_well: float
     """[electrons]"""
-    capacitance: float
-    """Of the sense node [F]; decides kTC noise."""
+    capacitance: float | None
+    """Of the sense node [F]; decides kTC noise. None where the file gives no voltage."""
     analog_gain: float
     bits: int
     offset: float
@@ -30,6 +35,11 @@ class Electrical:
     """Voltage of the highest ADC code [V]"""
     reference: float | None = None
     """Voltage at which a logarithmic ADC's curve bends [V]; None for a linear one."""
+
+    @property
+    def in_volts(self) -> bool:
+        """Whether volts are volts; else they are parts of a nominal swing."""
+        return self.capacitance is not None
 
     @property
     def highest_code(self) -> int:
@@ -49,18 +59,25 @@ class Electrical:
 
 
 def electrical(camera: Camera) -> Electrical:
-    """Solves the readout of `camera` (eq 2.32; contract: any two of gain, swing and well).
+    """Solves the readout of `camera`: any two of gain, swing and well give the third.
 
-    Raises BadInput where the file leaves it open or contradicts itself.
+    The technology fills in what the file leaves open: the capacitance and with it the gain
+    (eq 2.32), then the swing (eq 2.33). A data sheet that counts in electrons and DN alone gives
+    the well and the ADC's gain; volts are then nominal. Raises BadInput where all together leave
+    it open or the file contradicts itself.
     """
     pixel, adc = camera.pixel, camera.adc
-    capacitance = _number(pixel.photodetector.capacitance)
-    gain, swing, well = _solve(
-        pixel.readout.conversion_gain,
-        pixel.readout.voltage_swing,
-        pixel.readout.full_well,
-        capacitance,
-    )
+    capacitance = sense_node.capacitance(camera)
+    given = pixel.readout
+    nominal = capacitance is None and _counts_only(camera)
+    swing = given.voltage_swing
+    if nominal:
+        swing = NOMINAL_SWING
+    elif swing is None and given.full_well is None:
+        swing = sense_node.voltage_swing(camera)
+    gain, swing, well = _solve(given.conversion_gain, swing, given.full_well, capacitance)
+    if capacitance is None and not nominal:
+        capacitance = float(readout.sense_capacitance(gain))
     if adc.offset >= 2**adc.bits - 1:
         raise bad(
             "adc.offset",
@@ -82,7 +99,7 @@ def electrical(camera: Camera) -> Electrical:
         conversion_gain=gain,
         voltage_swing=swing,
         full_well=well,
-        capacitance=capacitance or float(readout.sense_capacitance(gain)),
+        capacitance=capacitance,
         analog_gain=pixel.readout.gain,
         bits=adc.bits,
         offset=adc.offset,
@@ -91,14 +108,32 @@ def electrical(camera: Camera) -> Electrical:
     )
 
 
-def _number(value: float | str | None) -> float | None:
-    """The value, where the file gives one (`junction` stands for one that is computed)."""
-    return None if isinstance(value, str) else value
-
-
 def check(camera: Camera) -> None:
-    """Raises BadInput when the camera's readout is open or contradicts itself."""
-    electrical(camera)
+    """Raises BadInput when the readout is open, contradicts itself or lacks volts it needs."""
+    if electrical(camera).in_volts:
+        return
+    pixel = camera.pixel
+    of_what = ARCHITECTURES[pixel.architecture].reset_noise
+    if pixel.readout.reset_noise == "ktc" and of_what == "photodiode":
+        raise no_volts("pixel.readout.reset_noise", "ktc", "give it in electrons")
+    if "volts" in camera.output.raw:
+        raise no_volts("output.raw", "volts", "leave volts out")
+
+
+def no_volts(at: str, what: str, instead: str) -> BadInput:
+    """The error about `what` that the file asks for at `at` without giving a voltage."""
+    return bad(
+        at,
+        f"{what} needs a voltage, and the file counts in electrons and DN alone",
+        f"add pixel.readout.conversion_gain: 20 uV/e, or {instead}",
+    )
+
+
+def _counts_only(camera: Camera) -> bool:
+    """Whether the file gives the well and the codes per electron, and no volts."""
+    given = camera.pixel.readout
+    volts = given.conversion_gain is not None or given.voltage_swing is not None
+    return not volts and given.full_well is not None and camera.adc.gain is not None
 
 
 def _solve(
@@ -125,5 +160,6 @@ def _solve(
         "pixel.readout",
         "the readout is not determined",
         "give two of conversion_gain, voltage_swing and full_well"
-        " (photodetector.capacitance may stand for conversion_gain)",
+        " (photodetector.capacitance may stand for conversion_gain),"
+        " or full_well and adc.gain as data sheets do",
     )

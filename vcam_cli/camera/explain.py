@@ -15,6 +15,7 @@ from pydantic_core import InitErrorDetails, PydanticCustomError
 from vcam_cli.errors import Path, Problem, nearest
 
 KIND = "vcam"
+NO_SUCH_KEY = "there is no such key here"
 _LONGEST = 40
 
 
@@ -138,7 +139,7 @@ def _unknown(
     near = nearest(key, fields)
     allowed = ", ".join(fields) or "none"
     remedy = f"did you mean {near}?" if near else "remove it, or write one of the allowed keys"
-    return fault(loc, f"there is no such key here; allowed: {allowed}", remedy, given)
+    return fault(loc, f"{NO_SUCH_KEY}; allowed: {allowed}", remedy, given)
 
 
 def _example(field: Any) -> str:

@@ -93,14 +93,13 @@ class Exposure(Model):
         unit="ms",
         example=["5 ms", "15 ms", "30 ms", "200 ms"],
         default=None,
-        not_yet=True,
+        not_yet=("schedule",),
     )
     estimator: Literal["lsbs", "weighted"] = key(
         "how captures become one picture: the last sample before saturation, or the optimal "
         "weighted mean",
         example="lsbs",
         default="lsbs",
-        not_yet=("weighted",),
     )
 
     rules = (
@@ -112,3 +111,17 @@ class Exposure(Model):
             remedy="write for example time: 30 ms",
         ),
     )
+
+    @property
+    def samples(self) -> tuple[float, ...]:
+        """Times of the samples of one integration [s]; () where there is a single exposure."""
+        return self.captures if isinstance(self.captures, tuple) else ()
+
+    @property
+    def given(self) -> float | None:
+        """The exposure time, or the last sample's [s]; None where the camera chooses it."""
+        return self.samples[-1] if self.samples else self.time
+
+    def single(self, time: float) -> "Exposure":
+        """One exposure of that time [s] in place of whatever the file says."""
+        return self.model_copy(update={"auto": None, "captures": None, "time": time})

@@ -14,6 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.detector import detector
+from vcam_cli.camera.lattice import lattice
+from vcam_cli.camera.pixel_optics import Area, check_pupil, collecting_area, sampling_scale
 from vcam_cli.camera.scene import Extent
 from vcam_cli.errors import BadInput, Collector, bad
 from vcam_cli.physics import diffraction, radiometry
@@ -37,11 +40,22 @@ class Geometry:
     pixel_height: float
     pitch_x: float
     pitch_y: float
+    sensor_width: float
+    sensor_height: float
     detector_width: float
     detector_height: float
     detector_x: float
     """Center of the photodetector, right of its cell's center."""
     detector_y: float
+    collecting_width: float
+    """Of the area whose light reaches the photodetector: its own without a microlens."""
+    collecting_height: float
+    collecting_x: float
+    """Center of the collecting area, right of its cell's center, in a pixel on the axis."""
+    collecting_y: float
+    sampling_scale: float
+    """Pitch of the collecting areas over that of the pixels."""
+    exit_pupil_distance: float
     scene_width_on_sensor: float | None
     """Width of the scene's image where the file states the scene's extent."""
 
@@ -60,14 +74,6 @@ class Geometry:
         return float(radiometry.numerical_aperture(self.f_number, self.magnification))
 
     @property
-    def sensor_width(self) -> float:
-        return self.columns * self.pitch_x
-
-    @property
-    def sensor_height(self) -> float:
-        return self.rows * self.pitch_y
-
-    @property
     def detector_area(self) -> float:
         return self.detector_width * self.detector_height
 
@@ -75,6 +81,12 @@ class Geometry:
     def fill_factor(self) -> float:
         """Photodetector area over width x height of the pixel (gaps not counted)."""
         return self.detector_area / (self.pixel_width * self.pixel_height)
+
+    @property
+    def effective_fill_factor(self) -> float:
+        """Collecting area over width x height of the pixel."""
+        area = self.collecting_width * self.collecting_height
+        return area / (self.pixel_width * self.pixel_height)
 
     def report(self, oversampling: float) -> dict[str, float | int]:
         """The numbers of `run.json`'s `geometry`; a unit other than SI is in the name."""
@@ -89,6 +101,7 @@ class Geometry:
             "magnification": self.magnification,
             "object_distance": self.object_distance,
             "image_distance": si,
+            "exit_pupil_distance": self.exit_pupil_distance,
             "numerical_aperture": self.numerical_aperture,
             "aperture_diameter": self.aperture_diameter,
             "clear_aperture_area": math.pi / 4 * self.aperture_diameter**2,
@@ -105,6 +118,7 @@ class Geometry:
             "pixel_pitch_y": self.pitch_y,
             "photodetector_area": self.detector_area,
             "fill_factor": self.fill_factor,
+            "effective_fill_factor": self.effective_fill_factor,
             "nyquist_frequency": 0.5 / self.pitch_x,
             "diffraction_cutoff_550nm": float(
                 diffraction.cutoff_frequency(550e-9, self.f_number, self.magnification)
@@ -119,32 +133,45 @@ def geometry(camera: Camera) -> Geometry:
     """Solves the geometry of `camera`.
 
     Raises BadInput, with every contradiction found: an object at or inside the focal length,
-    optics that disagree, a photodetector that leaves its pixel, a die smaller than a pixel.
+    optics that disagree, a photodetector that leaves its pixel, a microlens that loses light, an
+    exit pupil within the stack, a die smaller than a pixel.
     """
     problems = Collector()
     lens = _attempt(problems, _lens, camera)
-    detector = _attempt(problems, _detector, camera)
-    counts = _attempt(problems, _counts, camera)
+    areas = _attempt(problems, _areas, camera)
+    pixels = _attempt(problems, lattice, camera)
     problems.raise_if_any()
-    assert lens and detector and counts
+    assert lens and areas and pixels
     focal_length, f_number, magnification = lens
-    pixel = camera.pixel
+    pixel, (detector, collecting) = camera.pixel, areas
+    pupil = camera.optics.exit_pupil_distance
+    if pupil is None:
+        pupil = float(radiometry.image_distance(focal_length, magnification))
+    check_pupil(camera, pupil)
     return Geometry(
         focal_length=focal_length,
         f_number=f_number,
         aperture_diameter=focal_length / f_number,
         object_distance=camera.scene.distance,
         magnification=magnification,
-        rows=counts[0],
-        columns=counts[1],
+        rows=pixels.rows,
+        columns=pixels.columns,
         pixel_width=pixel.width,
         pixel_height=pixel.height,
-        pitch_x=pixel.width + pixel.gap_x,
-        pitch_y=pixel.height + pixel.gap_y,
-        detector_width=detector[0],
-        detector_height=detector[1],
-        detector_x=detector[2],
-        detector_y=detector[3],
+        pitch_x=pixels.pitch_x,
+        pitch_y=pixels.pitch_y,
+        sensor_width=pixels.width,
+        sensor_height=pixels.height,
+        detector_width=detector.width,
+        detector_height=detector.height,
+        detector_x=detector.x,
+        detector_y=detector.y,
+        collecting_width=collecting.width,
+        collecting_height=collecting.height,
+        collecting_x=collecting.x,
+        collecting_y=collecting.y,
+        sampling_scale=sampling_scale(camera, pupil, pixels.width, pixels.height),
+        exit_pupil_distance=pupil,
         scene_width_on_sensor=_scene_width(camera, magnification),
     )
 
@@ -152,12 +179,15 @@ def geometry(camera: Camera) -> Geometry:
 def pixel_centers(geometry: Geometry, detector: bool = False) -> tuple[NDArray, NDArray]:
     """Centers of the columns (columns,) and rows (rows,) on the sensor [m].
 
-    detector: centers of the photodetectors instead of the pixels' cells.
+    detector: centers of the areas whose light is collected (the photodetectors where there is no
+    microlens) instead of the pixels' cells.
     """
     g = geometry
     x = (np.arange(g.columns) + 0.5 - g.columns / 2) * g.pitch_x
     y = (np.arange(g.rows) + 0.5 - g.rows / 2) * g.pitch_y
-    return (x + g.detector_x, y + g.detector_y) if detector else (x, y)
+    if not detector:
+        return x, y
+    return x * g.sampling_scale + g.collecting_x, y * g.sampling_scale + g.collecting_y
 
 
 def check(camera: Camera) -> None:
@@ -256,38 +286,21 @@ def _f_number_of(numerical_aperture: float | None, m: float) -> float | None:
 
 
 def _half_diagonal(camera: Camera) -> float:
-    rows, columns = _counts(camera)
-    pixel = camera.pixel
-    return 0.5 * math.hypot(
-        columns * (pixel.width + pixel.gap_x), rows * (pixel.height + pixel.gap_y)
-    )
+    found = lattice(camera)
+    return 0.5 * math.hypot(found.width, found.height)
 
 
-def _counts(camera: Camera) -> tuple[int, int]:
-    """Rows and columns, given or cut from the die."""
-    array, pixel = camera.array, camera.pixel
-    if array.die is None:
-        assert array.rows is not None and array.columns is not None
-        return array.rows, array.columns
-    rows = round(array.die.height / (pixel.height + pixel.gap_y))
-    columns = round(array.die.width / (pixel.width + pixel.gap_x))
-    if rows < 1 or columns < 1:
-        raise bad(
-            "array.die",
-            "the die is smaller than one pixel",
-            "give a larger die, or rows and columns",
-        )
-    return rows, columns
+def _areas(camera: Camera) -> tuple[Area, Area]:
+    """The photodetector, and the area whose light it receives."""
+    found = _detector(camera)
+    return found, collecting_area(camera, found)
 
 
-def _detector(camera: Camera) -> tuple[float, float, float, float]:
-    """Width, height and center offsets of the photodetector."""
+def _detector(camera: Camera) -> Area:
+    """The photodetector in its pixel."""
     pixel, pd = camera.pixel, camera.pixel.photodetector
-    if pd.width is not None and pd.height is not None:
-        w, h = pd.width, pd.height
-    else:
-        side = math.sqrt(pd.fill_factor if pd.fill_factor is not None else 1.0)
-        w, h = side * pixel.width, side * pixel.height
+    laid_out = detector(camera)
+    w, h = laid_out.width, laid_out.height
     x = pd.x if pd.x is not None else (pixel.width - w) / 2
     y = pd.y if pd.y is not None else (pixel.height - h) / 2
     slack = 1e-9
@@ -302,7 +315,7 @@ def _detector(camera: Camera) -> tuple[float, float, float, float]:
                 f" in a pixel of {full * 1e6:.6g} um",
                 "make it smaller, or move it with x and y (from the upper-left corner)",
             )
-    return w, h, x + w / 2 - pixel.width / 2, y + h / 2 - pixel.height / 2
+    return Area(w, h, x + w / 2 - pixel.width / 2, y + h / 2 - pixel.height / 2)
 
 
 def _scene_width(camera: Camera, m: float) -> float | None:

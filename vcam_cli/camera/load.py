@@ -9,12 +9,13 @@ are reported at once: what is wrong in one section keeps back only the checks th
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 
 from pydantic import ValidationError
 
 from vcam_cli import errors
-from vcam_cli.camera import electrical, explain, geometry, shipped, support
+from vcam_cli.camera import electrical, explain, falloff, geometry, photodiode, shipped, support
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.merge import merge
 from vcam_cli.camera.parts import Findings, Parts, existing, is_file, looks_like_path
@@ -31,7 +32,11 @@ _CHECKS: tuple[Check, ...] = (
     (support.check_spectra, "scene"),
     (geometry.check, "scene optics pixel array"),
 )
-_OF_WHAT_IS_BUILT: tuple[Check, ...] = ((electrical.check, "pixel adc"),)
+_OF_WHAT_IS_BUILT: tuple[Check, ...] = (
+    (electrical.check, "pixel adc"),
+    (falloff.check, "scene optics pixel array"),
+    (photodiode.check, "pixel"),
+)
 """Those that do not know the values that are not supported yet."""
 
 
@@ -44,13 +49,65 @@ class Origin:
 
     file: Path
     files: tuple[Path, ...]
-    places: dict[errors.Path, str]
+    tree: Node
+
+    @cached_property
+    def places(self) -> dict[errors.Path, str]:
+        """The place of every key that is written."""
+        return places(self.tree)
 
     def locate(self, path: errors.Path) -> str:
         """ "camera.yaml:12:10" of `path`, or of the nearest thing around it that is written."""
         while path not in self.places and path:
             path = path[:-1]
         return self.places.get(path, "")
+
+
+@dataclass(frozen=True)
+class Base:
+    """A camera file read once, of which any number of cameras are made, each with overrides."""
+
+    file: Path
+    tree: Node
+    files: tuple[Path, ...]
+    """The YAML files that went into it."""
+    findings: Findings
+    """What is wrong with it so far."""
+
+    def overlaid(self, over: Node) -> "Base":
+        """With a tree of overrides laid over it, and the parts that these name read in."""
+        found = Findings(list(self.findings.problems), set(self.findings.failed))
+        parts = Parts(list(self.files), found)
+        tree = merge(self.tree, parts.expand(over, (), ()))
+        return Base(self.file, tree, tuple(parts.files), found)
+
+    def camera(self, checks: Sequence[Check] = ()) -> Camera:
+        """The validated camera. Raises BadInput with every problem, see `load`."""
+        findings = Findings(list(self.findings.problems), set(self.findings.failed))
+        tree, named = _absolute_files(self._named(), findings)
+        origin = Origin(self.file, tuple(dict.fromkeys((*self.files, *named))), tree)
+        result, wrong = _validated(tree, origin, findings)
+        if result is not None:
+            _check(result, origin, findings, wrong, checks)
+        if findings.problems or result is None:
+            raise BadInput(dict.fromkeys(sorted(findings.problems, key=by_place)))
+        return result.with_origin(origin)
+
+    def _named(self) -> Node:
+        """The tree with a name, the file's where it has none of its own."""
+        tree = self.tree
+        if tree.get("name") is not None:
+            return tree
+        stem = re.sub(r"[^A-Za-z0-9._-]+", "-", self.file.stem)[:64] or "camera"
+        entries: dict[Key, Node] = {"name": Node(stem, tree.source, tree.line, tree.column)}
+        return replace(tree, value=entries | (tree.mapping or {}))
+
+
+def read(camera: str | Path, folder: Path) -> Base:
+    """A camera file, or a shipped camera's, with all its parts. Raises BadInput, CannotDo."""
+    parts = Parts()
+    file = find(camera, folder)
+    return Base(file, parts.file(file, "cameras"), tuple(parts.files), parts.findings)
 
 
 def load(
@@ -66,33 +123,25 @@ def load(
     `checks` are further ones, made where the sections that they need are valid and supported.
     Raises BadInput with every problem of the file, CannotDo where a file may not be read.
     """
-    start = folder or _current()
-    file = find(camera, start)
-    tree, parts = _read(file, sets, start)
-    findings = parts.findings
-    tree, named = _absolute_files(tree, findings)
-    origin = Origin(file, tuple(dict.fromkeys((*parts.files, *named))), places(tree))
-    result, wrong = _validated(tree, origin, findings)
-    if result is not None:
-        _check(result, origin, findings, wrong, checks)
-    if findings.problems or result is None:
-        raise BadInput(dict.fromkeys(sorted(findings.problems, key=_place)))
-    return result.with_origin(origin)
+    start = folder or current_folder()
+    return read(camera, start).overlaid(overlay(sets, start)).camera(checks)
 
 
-def find(camera: str | Path, folder: Path) -> Path:
-    """The camera file meant by a path or the name of a shipped one. Raises BadInput."""
+def find(camera: str | Path, folder: Path, kind: str = "cameras") -> Path:
+    """The file meant by a path or the name of a shipped one of that kind. Raises BadInput."""
     text = str(camera)
     path = folder / text
     if isinstance(camera, Path) or looks_like_path(text) or is_file(path):
         try:
             return existing(path, text)
         except BadInput as error:
-            near = nearest(path.stem, shipped.names("cameras"))
+            near = nearest(path.stem, shipped.names(kind))
             if near is None or (near != path.stem and "did you mean" in str(error)):
                 raise
-            raise bad((), error.problems[0].message, f"a camera {near!r} ships") from None
-    return shipped.find("cameras", text)
+            raise bad(
+                (), error.problems[0].message, f"a {shipped.KINDS[kind]} {near!r} ships"
+            ) from None
+    return shipped.find(kind, text)
 
 
 def overlay(sets: Sequence[str], folder: Path) -> Node:
@@ -108,14 +157,18 @@ def overlay(sets: Sequence[str], folder: Path) -> Node:
             problems.extend(BadInput([problem]))
             continue
         try:
-            node = read_text(text, source)
-            for key in reversed(keys):
-                node = Node({key: node}, source)
-            whole = merge(whole, node)
+            whole = merge(whole, nested(keys, read_text(text, source)))
         except BadInput as error:
             problems.extend(error)
     problems.raise_if_any()
     return whole
+
+
+def nested(path: errors.Path, node: Node) -> Node:
+    """The tree in which a node stands at a path, and nothing else."""
+    for key in reversed(path):
+        node = Node({key: node}, node.source, node.line, node.column)
+    return node
 
 
 def places(tree: Node) -> dict[errors.Path, str]:
@@ -131,25 +184,13 @@ def places(tree: Node) -> dict[errors.Path, str]:
     return found
 
 
-def _current() -> Path:
+def current_folder() -> Path:
     """The current folder. Raises CannotDo where it has been removed."""
     try:
         return Path.cwd()
     except OSError as error:
         reason = error.strerror or error
         raise CannotDo(f"the current folder is gone: {reason}", "go to another one") from error
-
-
-def _read(file: Path, sets: Sequence[str], folder: Path) -> tuple[Node, Parts]:
-    """The whole tree of a file, and the parts that went into it."""
-    parts = Parts()
-    tree = parts.file(file, "cameras")
-    tree = merge(tree, parts.expand(overlay(sets, folder), (), ()))
-    if tree.get("name") is None:
-        stem = re.sub(r"[^A-Za-z0-9._-]+", "-", file.stem)[:64] or "camera"
-        entries: dict[Key, Node] = {"name": Node(stem, tree.source, tree.line, tree.column)}
-        tree = replace(tree, value=entries | (tree.mapping or {}))
-    return tree, parts
 
 
 def _absolute_files(node: Node, findings: Findings) -> tuple[Node, list[Path]]:
@@ -222,7 +263,7 @@ def _check(
             findings.add(error.problems, origin.locate)
 
 
-def _place(problem: Problem) -> tuple[str, int, int]:
+def by_place(problem: Problem) -> tuple[str, int, int]:
     """File, line and column of a problem, to tell problems in the order of the file."""
     match = re.fullmatch(r"(.*?):(\d+):(\d+)", problem.where)
     return (match[1], int(match[2]), int(match[3])) if match else (problem.where, 0, 0)

@@ -32,19 +32,38 @@ class FalloffFile(Model):
     )
 
 
+def _channels_differ(given: Mapping[str, Any]) -> Iterator[InitErrorDetails]:
+    """Every wavelength of a point spread function has one channel."""
+    listed = given.get("wavelengths")
+    channels = listed if isinstance(listed, (list, tuple)) else ()
+    for i, item in enumerate(channels):
+        if item in channels[:i]:
+            yield fault(("wavelengths", i), f"{shown(item)} comes twice", "keep one of them", item)
+
+
 class Psf(Model):
     """A point spread function, measured or from a lens program."""
 
-    file: File = key("image file of the point spread function", example="psf.exr")
+    file: File = key(
+        "image file of the point spread function, in linear light; the middle of its grid is the "
+        "ideal image point",
+        example="psf.exr",
+    )
     pitch: Length = key("distance of its samples on the sensor", unit="um", example="0.5 um")
     wavelength: MaybeLength = key(
-        "the wavelength it holds for, where there is one", unit="nm", example="550 nm", default=None
+        "the wavelength it was taken at; it is used for all",
+        unit="nm",
+        example="550 nm",
+        default=None,
     )
     wavelengths: tuple[Length, ...] = key(
-        "the wavelengths of its channels", unit="nm", example=["450 nm", "550 nm"], default=()
+        "the wavelengths of its channels, in the file's order; straight in between",
+        unit="nm",
+        example=["450 nm", "550 nm"],
+        default=(),
     )
 
-    rules = (at_most_one("wavelength", "wavelengths"),)
+    rules = (at_most_one("wavelength", "wavelengths"), _channels_differ)
 
 
 Terms = tuple[tuple[int, float], ...]
@@ -70,6 +89,7 @@ class Wavefront:
 
 _COEFFICIENT = Quantity("length")
 _FIELD = Number(least=0, most=1)
+_ONE_PLACE = "put all terms of one place together"
 
 
 class Zernike:
@@ -103,7 +123,13 @@ class Zernike:
             return Wavefront(((None, terms),) if terms else ())
         if not isinstance(given, (list, tuple)):
             raise ValueError(f"{shown(given)} is no wavefront; write for example {{4: 0.05 um}}")
-        return Wavefront(tuple(self._placed(i, item) for i, item in enumerate(given)))
+        placed = [self._placed(i, item) for i, item in enumerate(given)]
+        fields = [field for field, _ in placed]
+        twice = [i for i, field in enumerate(fields) if field in fields[:i]]
+        if twice:
+            wrong = [fault((i, "field"), f"{fields[i]:g} comes twice", _ONE_PLACE) for i in twice]
+            raise failure(wrong)
+        return Wavefront(tuple(placed))
 
     def _placed(self, i: int, given: Any) -> tuple[float, Terms]:
         if not isinstance(given, Mapping) or "field" not in given:
@@ -117,12 +143,15 @@ class Zernike:
 
 
 def _terms(given: Mapping[Any, Any], loc: tuple[int, ...]) -> Terms:
-    found, mistakes = [], []
+    found: list[tuple[int, float]] = []
+    mistakes = []
     for name, item in given.items():
         try:
             index = int(name) if str(name).isascii() and str(name).isdigit() else 0
             if not 1 <= index <= 999:
                 raise ValueError(f"{shown(name)} is no Noll index; write for example 4 (defocus)")
+            if index in dict(found):
+                raise ValueError(f"Noll index {index} comes twice; keep one of them")
             found.append((index, _COEFFICIENT.read(item)))
         except ValueError as error:
             message, _, remedy = str(error).partition("; ")
@@ -149,6 +178,26 @@ def _determined(given: Mapping[str, Any]) -> Iterator[InitErrorDetails]:
             "needed (field_of_view may stand for focal_length, numerical_aperture for f_number)",
             "add for example focal_length: 3.2 mm" if known else "add f_number and focal_length",
         )
+
+
+def _psf_alone(given: Mapping[str, Any]) -> Iterator[InitErrorDetails]:
+    """A point spread function has defocus and aberrations in it."""
+    if given.get("psf") in (None, "none"):
+        return
+    for name in ("defocus", "zernike"):
+        if name in given and not _neutral(name, given[name]):
+            message = "cannot be given beside psf, which has all aberrations in it"
+            yield fault((name,), message, f"remove {name}, or write psf: none", given[name])
+
+
+def _neutral(name: str, given: Any) -> bool:
+    """Whether a defocus or a wavefront is that of a perfect lens; wrong ones are told elsewhere."""
+    if name == "zernike":
+        return not given or given == Wavefront()
+    try:
+        return Quantity("length").read(given) == 0
+    except ValueError:
+        return True
 
 
 class Optics(Model):
@@ -183,7 +232,6 @@ class Optics(Model):
         "measured",
         example="exact",
         default="exact",
-        not_yet=("file",),
     )
     exit_pupil_distance: Annotated[
         float | None, Quantity("length", above=0, words={"auto": None})
@@ -192,30 +240,29 @@ class Optics(Model):
         unit="mm",
         example="auto",
         default=None,
-        not_yet=True,
     )
     diffraction: Switch = key("whether the aperture diffracts", example=True, default=True)
     defocus: Shift = key(
-        "shift of the image plane", unit="um", example="0 um", default=0.0, not_yet=True
+        "shift of the image plane away from the lens, so that the sensor lies in front of it",
+        unit="um",
+        example="0 um",
+        default=0.0,
     )
     zernike: Annotated[Wavefront, Zernike()] = key(
-        "wavefront by Noll index; or a list of {field: 0.7, ...} (0 center, 1 corner)",
+        "wavefront by Noll index; or a list of {field: 0.7, ...} (0 center, 1 corner): what it is "
+        "to the right of the center, straight in between; the lens is symmetric about its axis, so "
+        "elsewhere it is turned",
         unit="um",
         example={"4": "0.05 um", "8": "0.1 um"},
         default=Wavefront(),
-        not_yet=True,
     )
     psf: Annotated[Psf | None, word_or(Psf, {"none": None})] = key(
         "a point spread function in place of aberrations and diffraction",
         example="none",
         default=None,
-        not_yet=True,
     )
     stray_light: Fraction = key(
-        "fraction of the mean irradiance that is spread evenly",
-        example=0.0,
-        default=0.0,
-        not_yet=True,
+        "fraction of the mean irradiance that is spread evenly", example=0.0, default=0.0
     )
 
-    rules = (_determined,)
+    rules = (_determined, _psf_alone)

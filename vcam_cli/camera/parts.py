@@ -4,6 +4,8 @@ A name is looked up beside the file that uses it, then in what ships; a text wit
 in `.yaml` is a path, relative to that file. Parts may use and extend further parts; a circle is
 an error.
 
+`pixel.technology: NAME` is read in as `{from: what its file says}`.
+
 Why a name never means the file it stands in (or another camera, for shipped ones): a camera
 `csf.yaml` may well say `scene: csf`.
 """
@@ -25,7 +27,9 @@ SECTIONS: dict[errors.Path, str] = {
     ("pixel",): "pixels",
     ("array",): "arrays",
     ("array", "filters"): "filters",
+    ("pixel", "technology", "from"): "technologies",
 }  # where a part file may stand -> what kind of part
+_TECHNOLOGY = ("pixel", "technology")
 _SUFFIXES = (".yaml", ".yml")
 
 
@@ -87,7 +91,11 @@ class Parts:
         entries: dict[Key, Node] = {}
         for key, child in node.mapping.items():
             there = below(at, key)
-            entries[key] = self._section(child, there, chain) if there in SECTIONS else child
+            if there in SECTIONS:
+                child = self._section(child, there, chain)
+            elif there == _TECHNOLOGY:
+                child = self.expand(_as_mapping(child), there, chain)
+            entries[key] = child
         return replace(node, value=entries)
 
     def _section(self, node: Node, at: errors.Path, chain: tuple[Path, ...]) -> Node:
@@ -169,17 +177,26 @@ def existing(path: Path, text: str) -> Path:
 
 
 def refuse_study(root: Node) -> None:
-    """Raises BadInput when the file is a study, which this version cannot run."""
+    """Raises BadInput when the file is a study and not a camera."""
     kind = root.get("kind")
     if kind is not None and kind.value in ("sweep", "schedule"):
-        message = f"this is a study (kind: {kind.value}), and studies are not supported yet"
-        raise BadInput([kind.problem(("kind",), message, "give a camera file")])
+        message, remedy = f"this is a study (kind: {kind.value})", "give a camera file"
+        if kind.value == "sweep":
+            remedy += ", or run the study with vcam sweep"
+        raise BadInput([kind.problem(("kind",), message, remedy)])
 
 
 def without(node: Node, key: Key) -> Node:
     """A mapping less one of its keys."""
     assert node.mapping is not None
     return replace(node, value={k: v for k, v in node.mapping.items() if k != key})
+
+
+def _as_mapping(technology: Node) -> Node:
+    """The name of a technology as {from: name}, so that keys beside it can be laid over it."""
+    if not isinstance(technology.value, str):
+        return technology
+    return replace(technology, value={"from": technology}, whole=True)
 
 
 def _under(at: errors.Path, problem: Problem) -> Problem:

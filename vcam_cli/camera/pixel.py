@@ -1,25 +1,23 @@
 """The pixel: photodetector, readout, fixed-pattern noise, and what lies above it."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import AliasChoices, model_validator
 from pydantic_core import InitErrorDetails
 
-from vcam_cli.camera.base import Model, at_most_one, exactly_one, key, needs, together
+from vcam_cli.camera.architecture import ARCHITECTURES, article
+from vcam_cli.camera.base import Model, at_most_one, exactly_one, key
 from vcam_cli.camera.explain import failure, fault
-from vcam_cli.camera.spectrum import Spectral, SpectrumSpec
-from vcam_cli.camera.technology import CHOICE, Junction, TechnologyChoice
+from vcam_cli.camera.photodetector import Photodetector
+from vcam_cli.camera.technology import CHOICE, TechnologyChoice
 from vcam_cli.camera.values import (
-    Either,
+    MOST_ELECTRONS,
     Electrons,
     Fraction,
     Gap,
     Length,
     MaybeFraction,
-    MaybeGap,
-    MaybeLength,
     Number,
     Positive,
     Quantity,
@@ -32,190 +30,23 @@ from vcam_cli.camera.values import (
 AGREE = 1e-3
 """Relative difference up to which redundant numbers of a file count as equal."""
 
-_EFFICIENCY = Spectral(most=1.0)
-
-
-@dataclass(frozen=True)
-class QuantumEfficiency:
-    """External QE at normal incidence; `given` is None where it follows from the junction."""
-
-    given: SpectrumSpec | None
-    per_pixel: bool = False
-    """Of the pixel's area, fill factor included, and not of the photodetector."""
-
-    @property
-    def spectrum(self) -> SpectrumSpec:
-        """The QE that the file gives. ValueError where it follows from the junction."""
-        if self.given is None:
-            raise ValueError("the quantum efficiency follows from the junction")
-        return self.given
-
-    def written(self) -> Any:
-        """The YAML form."""
-        if self.given is None:
-            return "junction"
-        return {"pixel": self.given.written()} if self.per_pixel else self.given.written()
-
-
-class PixelEfficiency(Model):
-    """QE per pixel area."""
-
-    pixel: Annotated[SpectrumSpec, _EFFICIENCY] = key(
-        "QE of the pixel's area, fill factor included: a spectrum", example=0.15
-    )
-
-
-def _efficiency(given: Any) -> QuantumEfficiency:
-    if isinstance(given, QuantumEfficiency):
-        return given
-    if given == "junction":
-        return QuantumEfficiency(None)
-    if isinstance(given, Mapping) and "pixel" in given:
-        return QuantumEfficiency(PixelEfficiency.model_validate(given).pixel, per_pixel=True)
-    return QuantumEfficiency(_EFFICIENCY.read(given))
-
-
-_EFFICIENCY_FORMS = Annotated[SpectrumSpec, _EFFICIENCY] | PixelEfficiency | Literal["junction"]
-
-
-class DarkCurrentDensity(Model):
-    """Dark current density of the photodetector, at a temperature."""
-
-    value: Annotated[float, Quantity("current_density", least=0)] = key(
-        "dark current density", unit="nA/cm2", example="1 nA/cm2"
-    )
-    temperature: Annotated[float | None, Quantity("temperature", above=0)] = key(
-        "at which it holds; default the pixel's", unit="K", example="300 K", default=None
-    )
-    doubling: Annotated[float, Quantity("temperature", above=0, difference=True)] = key(
-        "rise of temperature that doubles it", unit="K", example="8 K", default=8.0
-    )
-
-    rules = (needs("doubling", "temperature", "a doubling needs the temperature it starts from"),)
-
-    def written(self) -> Any:
-        """The YAML form: a bare density where no temperature is given."""
-        form = self.model_dump(mode="json")
-        return form if self.temperature is not None else form["value"]
-
-
-_DENSITY = Quantity("current_density", least=0, words={"junction": "junction"})
-
-
-def _dark_density(given: Any) -> Any:
-    if isinstance(given, (Mapping, DarkCurrentDensity)):
-        return DarkCurrentDensity.model_validate(given)
-    value = _DENSITY.read(given)
-    return value if value == "junction" else DarkCurrentDensity(value=_DENSITY.text(value))
-
-
-class ChargeDiffusion(Model):
-    """Diffusion of charge in the silicon before it is collected."""
-
-    diffusion_length: Length = key("of electrons", unit="um", example="50 um")
-    depletion_width: Length = key("width of the depletion region", unit="um", example="1 um")
-    substrate_depth: Length = key("depth of the neutral region", unit="um", example="10 um")
-
-
-class Photodetector(Model):
-    """What in a pixel collects light."""
-
-    kind: Literal["ndiff-psub", "nwell-psub", "photogate", "pinned"] = key(
-        "how it is built",
-        example="ndiff-psub",
-        default="ndiff-psub",
-        not_yet=("nwell-psub", "photogate", "pinned"),
-    )
-    fill_factor: Annotated[float | None, Number(above=0, most=1, example="0.3")] = key(
-        "photodetector area / (width x height of the pixel): centered, of the pixel's shape",
-        example=0.3,
-        default=None,
-    )
-    width: MaybeLength = key("width", unit="um", example="3.5 um", default=None)
-    height: MaybeLength = key("height", unit="um", example="3.5 um", default=None)
-    x: MaybeGap = key(
-        "left edge, from the pixel's left; default centered",
-        unit="um",
-        example="1.5 um",
-        default=None,
-    )
-    y: MaybeGap = key(
-        "upper edge, from the pixel's top; default centered",
-        unit="um",
-        example="1.5 um",
-        default=None,
-    )
-    quantum_efficiency: Annotated[
-        QuantumEfficiency,
-        Either(_efficiency, _EFFICIENCY_FORMS, write=QuantumEfficiency.written),
-    ] = key(
-        "external QE of the photodetector at normal incidence: a spectrum; {pixel: spectrum} = "
-        "per pixel area, fill factor included; junction = from the junction (internal)",
-        example=0.5,
-        default=QuantumEfficiency(None),
-        not_yet=("junction",),
-    )
-    dark_current_density: Annotated[
-        DarkCurrentDensity | Literal["junction"] | None,
-        Either(
-            _dark_density,
-            Annotated[float, _DENSITY] | DarkCurrentDensity,
-            write=lambda v: v.written() if isinstance(v, DarkCurrentDensity) else v,
-        ),
-    ] = key(
-        "of the photodetector, at the pixel's temperature; or {value, temperature, doubling}; or "
-        "junction",
-        unit="nA/cm2",
-        example="1 nA/cm2",
-        default=None,
-        not_yet=("junction",),
-    )
-    dark_current: Annotated[float | None, Quantity("rate", least=0)] = key(
-        "of the whole pixel, in place of a density", unit="e/s", example="12 e/s", default=None
-    )
-    dark_current_scale: Annotated[float, Number(least=0, example="1")] = key(
-        "multiplies the dark current", example=1.0, default=1.0
-    )
-    capacitance: Annotated[
-        float | Literal["junction"] | None,
-        Quantity("capacitance", above=0, words={"junction": "junction"}),
-    ] = key(
-        "of the sense node, or junction; sets kTC noise and, by default, the conversion gain",
-        unit="fF",
-        example="12 fF",
-        default=None,
-        not_yet=("junction",),
-    )
-    charge_diffusion: Annotated[
-        ChargeDiffusion | Literal["junction"] | None,
-        word_or(ChargeDiffusion, {"none": None, "junction": "junction"}),
-    ] = key(
-        "lateral diffusion of charge: none, junction, or its lengths",
-        example="none",
-        default=None,
-        not_yet=True,
-    )
-    junction: Junction = key(
-        "overrides of the technology's junction",
-        example={"depth": "0.2 um"},
-        default=Junction,
-        not_yet=True,
-    )
-
-    rules = (at_most_one("dark_current_density", "dark_current"), together("width", "height"))
-
 
 class ChargeTransfer(Model):
     """Transfer of charge in a CCD."""
 
-    inefficiency: Fraction = key("charge left behind at a stage", example=3e-5, default=3e-5)
+    inefficiency: Annotated[float, Number(least=0, below=1, example="3e-5")] = key(
+        "charge left behind at a stage", example=3e-5, default=3e-5
+    )
     phases: Annotated[int, Whole(least=1, most=8, example="3")] = key(
         "stages per pixel", example=3, default=3
     )
 
 
 class Readout(Model):
-    """From electrons to volts: two of conversion_gain, voltage_swing and full_well."""
+    """From electrons to volts: two of conversion_gain, voltage_swing and full_well.
+
+    Or full_well alone, with adc.gain, as data sheets count: then there are no volts.
+    """
 
     conversion_gain: Annotated[float | None, Quantity("conversion_gain", above=0)] = key(
         "volts per electron; default q / capacitance", unit="uV/e", example="20 uV/e", default=None
@@ -224,30 +55,42 @@ class Readout(Model):
         "at the full well", unit="V", example="1.38 V", default=None
     )
     full_well: Annotated[float | None, Quantity("charge", above=0)] = key(
-        "electrons a pixel can hold", unit="ke", example="69 ke", default=None
+        "electrons a pixel can hold; enough by itself beside adc.gain",
+        unit="ke",
+        example="69 ke",
+        default=None,
     )
     gain: Positive = key("analog gain (ISO)", example=1.0, default=1.0)
     read_noise: Electrons = key("temporal noise of a readout", unit="e", example="5 e", default=0.0)
     column_noise: Electrons = key(
-        "temporal, one draw a column and frame", unit="e", example="0 e", default=0.0, not_yet=True
+        "temporal, one draw a column and frame; none in dps and ccd",
+        unit="e",
+        example="0 e",
+        default=0.0,
     )
     row_noise: Electrons = key(
-        "temporal, one draw a row and frame", unit="e", example="0 e", default=0.0, not_yet=True
+        "temporal, one draw a row and frame", unit="e", example="0 e", default=0.0
     )
     reset_noise: Annotated[
         float | Literal["ktc", "none"],
-        Quantity("charge", least=0, words={"ktc": "ktc", "none": "none"}),
+        Quantity("charge", least=0, most=MOST_ELECTRONS, words={"ktc": "ktc", "none": "none"}),
     ] = key(
-        "ktc (from the capacitance), none, or electrons; correlated double sampling removes it",
+        "ktc (from the capacitance that is reset), none, or electrons; correlated double sampling "
+        "removes it in aps-4t and ccd",
         unit="e",
         example="ktc",
         default="none",
     )
+    bit_line_capacitance: Annotated[float | None, Quantity("capacitance", above=0)] = key(
+        "of a column's bit line; its kTC is the reset noise of a pps",
+        unit="fF",
+        example="2000 fF",
+        default=None,
+    )
     charge_transfer: Annotated[ChargeTransfer | None, mapping(ChargeTransfer)] = key(
-        "of a ccd",
+        "of a ccd; default the example's",
         example={"inefficiency": 3e-5, "phases": 3},
         default=None,
-        not_yet=True,
     )
 
     @model_validator(mode="after")
@@ -270,7 +113,10 @@ class FixedPattern(Model):
         validation_alias=AliasChoices("offset_pixel", "dsnu"),
     )
     offset_column: Electrons = key(
-        "spread of the columns' offsets", unit="e", example="1 e", default=0.0
+        "spread of the columns' offsets; none in dps and ccd",
+        unit="e",
+        example="1 e",
+        default=0.0,
     )
     gain_pixel: Fraction = key(
         "spread of the pixels' gains (also: prnu)",
@@ -280,10 +126,13 @@ class FixedPattern(Model):
         validation_alias=AliasChoices("gain_pixel", "prnu"),
     )
     gain_column: Fraction = key(
-        "spread of the columns' gains", unit="%", example="0 %", default=0.0
+        "spread of the columns' gains; none in dps and ccd",
+        unit="%",
+        example="0 %",
+        default=0.0,
     )
     dark: Fraction = key(
-        "spread of the pixels' dark currents", unit="%", example="0 %", default=0.0, not_yet=True
+        "spread of the pixels' dark currents", unit="%", example="0 %", default=0.0
     )
 
     rules = (at_most_one("offset_pixel", "dsnu"), at_most_one("gain_pixel", "prnu"))
@@ -292,10 +141,17 @@ class FixedPattern(Model):
 class Defects(Model):
     """Pixels that do not work."""
 
-    hot: Fraction = key("fraction of pixels that are hot", example=1e-4, default=0.0, not_yet=True)
-    dead: Fraction = key(
-        "fraction of pixels that are dead", example=1e-4, default=0.0, not_yet=True
+    hot: Fraction = key(
+        "fraction of pixels that read the full well whatever the light", example=1e-4, default=0.0
     )
+    dead: Fraction = key("fraction of pixels that collect nothing", example=1e-4, default=0.0)
+
+    @model_validator(mode="after")
+    def _at_most_all(self) -> Self:
+        if self.hot + self.dead > 1:
+            message = f"hot and dead pixels are {self.hot + self.dead:g} of all"
+            raise failure([fault((), message, "give fractions that add up to at most 1")])
+        return self
 
 
 class Layer(Model):
@@ -341,13 +197,11 @@ class Pixel(Model):
         "readout architecture",
         example="aps-3t",
         default="aps-3t",
-        not_yet=("aps-4t", "pps", "dps", "ccd"),
     )
     technology: Annotated[TechnologyChoice | None, CHOICE] = key(
         "fills in what is not given: a name, or {from: name, ...} with changes",
         example="cmos-0.35um",
         default=None,
-        not_yet=True,
     )
     width: Length = key("width of the pixel", unit="um", example="6.5 um")
     height: Annotated[float, Quantity("length", above=0)] = key(
@@ -373,10 +227,9 @@ class Pixel(Model):
         "layers above the photodetector, which shade it",
         example="none",
         default=None,
-        not_yet=True,
     )
     microlens: Annotated[Microlens | None, word_or(Microlens, {"none": None})] = key(
-        "a lens on every pixel", example="none", default=None, not_yet=True
+        "a lens on every pixel", example="none", default=None
     )
     temperature: Temperature = key("of the sensor", unit="K", example="300 K", default=300.0)
 
@@ -398,7 +251,7 @@ class Pixel(Model):
         known = [name for name in ("voltage_swing", "full_well") if name in readout]
         if "conversion_gain" in readout or "capacitance" in detector:
             known.append("conversion_gain")
-        if len(known) < 2:
+        if len(known) < 2 and known != ["full_well"]:  # beside it, adc.gain is enough
             yield fault(
                 ("readout",),
                 "the readout is not determined: two of conversion_gain, voltage_swing and "
@@ -428,10 +281,24 @@ class Pixel(Model):
 
     @model_validator(mode="after")
     def _transfer(self) -> Self:
-        if self.readout.charge_transfer is not None and self.architecture != "ccd":
+        name, readout = self.architecture, self.readout
+        if readout.charge_transfer is not None and not ARCHITECTURES[name].transfers:
             where = ("readout", "charge_transfer")
-            message = f"an {self.architecture} pixel transfers no charge"
+            message = f"{article(name)} {name} pixel transfers no charge"
             raise failure([fault(where, message, "remove it, or write architecture: ccd")])
+        of_bit_line = ARCHITECTURES[name].reset_noise == "bit line"
+        if of_bit_line and readout.reset_noise == "ktc" and readout.bit_line_capacitance is None:
+            where = ("readout", "bit_line_capacitance")
+            message = f"is missing: the reset noise of {article(name)} {name} is its bit line's"
+            remedy = "add bit_line_capacitance: 2000 fF, or give reset_noise in electrons"
+            raise failure([fault(where, message, remedy)])
+        return self
+
+    @model_validator(mode="after")
+    def _transfer_of_a_ccd(self) -> Self:
+        if ARCHITECTURES[self.architecture].transfers and self.readout.charge_transfer is None:
+            usual = {"charge_transfer": ChargeTransfer()}
+            self._fill(readout=self.readout.model_copy(update=usual))
         return self
 
 

@@ -5,6 +5,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic_core import InitErrorDetails
 
+from vcam_cli.camera.array import Array
 from vcam_cli.camera.base import Model, key
 from vcam_cli.camera.explain import failure, fault, one_of, shown
 from vcam_cli.camera.spectrum import moved
@@ -91,6 +92,8 @@ class Gamma(Step):
     ] = key("a number, or srgb", example="srgb")
 
 
+SHOWN = (0, 1, 3)
+"""Numbers of colors that make a picture as they are; 0 where only the file of positions knows."""
 STEPS: dict[str, type[Step]] = {
     "black_level": BlackLevel,
     "demosaic": Demosaic,
@@ -134,31 +137,57 @@ STEP_LIST = Either(_steps, list[_ANY])
 """The type of `processing`."""
 
 
-def default_steps(monochrome: bool) -> Steps:
+def default_steps(mosaic: bool, monochrome: bool) -> Steps:
     """What is done where the file does not say."""
     color = (
-        Demosaic(demosaic="bilinear"),
         WhiteBalance(white_balance="gray-world"),
         ColorCorrection.model_validate({"color_correction": "fit"}),
     )
     return (
         BlackLevel.model_validate({"black_level": "subtract"}),
+        *((Demosaic(demosaic="bilinear"),) if mosaic else ()),
         *(() if monochrome else color),
         Gamma.model_validate({"gamma": "srgb"}),
     )
 
 
-def order_mistakes(steps: Sequence[Step], mosaic: bool, colors: int) -> Iterator[InitErrorDetails]:
-    """Why these steps cannot work in this order on an array of so many colors."""
+def order_mistakes(
+    steps: Sequence[Step], mosaic: bool, colors: int, scattered: bool = False
+) -> Iterator[InitErrorDetails]:
+    """Why these steps cannot work in this order on an array of so many colors.
+
+    colors: 0 where only the file of positions knows. scattered: pixels are in no rows and columns.
+    """
     names = [step.name for step in steps]
     for i, step in enumerate(steps):
         before, name = names[:i], step.name
         for message, remedy in _reasons(name, step.value == "none", before, names, mosaic, colors):
             yield fault(("processing", i, name), message, remedy, written(step))
-        if isinstance(step.value, Matrix) and not step.value.suits(colors):
+        if scattered and step.value == "edge-aware":
+            message = "edge-aware needs pixels in rows and columns"
+            yield fault(("processing", i, name), message, "write bilinear", written(step))
+        if isinstance(step.value, Matrix) and colors and not step.value.suits(colors):
             message = f"is no matrix for {colors} colors"
             remedy = f"write three rows (display R, G, B) of {colors} numbers (the camera's colors)"
             yield fault(("processing", i, name, "matrix"), message, remedy, written(step.value))
+
+
+def picture_mistakes(
+    steps: Sequence[Step], array: Array, judged: bool, shown: bool
+) -> Iterator[InitErrorDetails]:
+    """Why these steps leave no picture that can be judged by `quality`, or shown as a render."""
+    done = [step.name for step in steps if step.value != "none"]
+    if array.mosaic and "demosaic" not in done:
+        add = "add demosaic: bilinear to processing, or write"
+        if judged:
+            message = "a mosaic without demosaic cannot be judged"
+            yield fault(("quality",), message, f"{add} quality: []")
+        if array.scattered and shown:
+            message = "scattered pixels without demosaic make no picture"
+            yield fault(("output", "render"), message, f"{add} render: none")
+    elif len(array.colors) not in SHOWN and "color_correction" not in done and (judged or shown):
+        message = f"{', '.join(array.colors)} are not the colors of a display"
+        yield fault(("processing",), message, "add color_correction: fit, behind the demosaic")
 
 
 def _reasons(

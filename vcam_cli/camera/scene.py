@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from pathlib import PurePath
-from typing import Annotated, Any, ClassVar, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import model_validator
 
@@ -204,8 +204,11 @@ class Hyperspectral(Model):
     """A file of spectra: spectral EXR, ENVI, ISETCam scene, npz, multichannel TIFF."""
 
     kind: Literal["hyperspectral"] = key("what kind of source this is", example="hyperspectral")
-    file: File = key("exr, hdr, mat, npz or tif file", example="scene.exr")
-    not_yet: ClassVar[str] = "kind"
+    file: File = key(
+        "radiances or reflectances: a spectral .exr, an ENVI .hdr, an ISETCam .mat, a .npz with "
+        "wavelength_nm and radiance or reflectance, a .tif with a table of its wavelengths",
+        example="scene.exr",
+    )
 
 
 CHARTS: dict[str, type[Chart]] = {
@@ -315,17 +318,18 @@ class Scene(Model):
         example={"kind": "chart", "chart": "colorchecker"},
     )
     illuminant: Annotated[IlluminantSpec | None, Lamp()] = key(
-        "the lamp; default D65; to be absent for images that emit (model laser or rgb-display)",
+        "the lamp; default D65; to be absent for images that emit (model laser or rgb-display) and "
+        "for files of radiances",
         example="D65",
         default=None,
     )
     luminance: Annotated[float | Literal["from-file"] | None, _LUMINANCE] = key(
-        "of a perfect white diffuser (of the display's white, for images that emit); "
-        "from-file where the file is in absolute radiance",
+        "of a perfect white diffuser (of the display's white, for images that emit; of the file's "
+        "white, or else its brightest samples, for files of radiances); from-file leaves such a "
+        "file as bright as it is",
         unit="cd/m2",
         example="100 cd/m2",
         default=None,
-        not_yet=("from-file",),
     )
     radiance: Annotated[float | None, Quantity("radiance", above=0)] = key(
         "of a perfect white diffuser, over the wavelengths simulated",
@@ -372,7 +376,9 @@ class Scene(Model):
         if self.emits and self.illuminant is not None:
             message = "an image that emits light has no lamp"
             raise failure([fault(("illuminant",), message, "remove it", written(self.illuminant))])
-        if not self.emits and self.illuminant is None:
+        # A hyperspectral file alone knows whether it holds light or is to be lit.
+        lit = not self.emits and not isinstance(self.source, Hyperspectral)
+        if lit and self.illuminant is None:
             self._fill(illuminant=IlluminantSpec("D65"))
         return self
 

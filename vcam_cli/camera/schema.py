@@ -17,6 +17,7 @@ from pydantic import AliasChoices, BaseModel
 from vcam_cli.camera import explain, support
 from vcam_cli.camera.base import Model
 from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.study import Sweep
 from vcam_cli.camera.technology import Technology
 from vcam_cli.camera.values import DEFINED
 
@@ -33,6 +34,7 @@ def schemas() -> dict[str, Schema]:
     """File name -> JSON Schema (draft 2020-12) of all files a user writes."""
     return {
         "camera.schema.json": camera_schema(),
+        "study.schema.json": _whole(_plain(Sweep), "Sweep", "a study file"),
         "technology.schema.json": _whole(_plain(Technology), "Technology", "a technology file"),
     }
 
@@ -150,8 +152,6 @@ def _dress(body: Schema, model: type[Model]) -> None:
                     properties[other] = one | {"title": one["title"].replace(key, other)}
     body["properties"] = properties
     body["description"] = (model.__doc__ or "").strip().partition("\n\n")[0]
-    if model.not_yet:
-        body["description"] += " Not supported yet."
 
 
 def _described(text: str, mark: bool | list[str]) -> str:

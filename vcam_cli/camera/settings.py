@@ -82,6 +82,11 @@ class Accuracy(Model):
     table_size: Annotated[int | None, Whole(least=16, most=2**20, example="4096")] = key(
         "entries of a table of transfer over spatial frequency", example=4096, default=None
     )
+    field_zones: Annotated[int | None, Whole(least=2, most=65, example="9")] = key(
+        "places from center to corner at which a blur that changes over the field is known",
+        example=9,
+        default=None,
+    )
     float_width: Annotated[int | None, Choice(32, 64)] = key(
         "bits of the numbers computed with", example=32, default=None
     )
@@ -113,7 +118,14 @@ class Accuracy(Model):
         return next(iter(form.values())) if len(form) == 1 else form
 
 
-KNOBS = ("wavelength_step", "oversampling", "table_size", "float_width", "shot_noise")
+KNOBS = (
+    "wavelength_step",
+    "oversampling",
+    "table_size",
+    "field_zones",
+    "float_width",
+    "shot_noise",
+)
 
 
 def _accuracy(given: Any) -> Accuracy:

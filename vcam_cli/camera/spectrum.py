@@ -5,24 +5,30 @@ A `SpectrumSpec` is what the file says: a product of numbers, names, files and t
 when the model is built, so that a model is no more than what was written.
 """
 
+import os
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal
+from functools import lru_cache
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
-from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler, ValidationError
+from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler, ValidationError, model_validator
 from pydantic_core import CoreSchema, core_schema
 
 from vcam_cli import spectra
 from vcam_cli.camera import shipped
 from vcam_cli.camera.base import Model, key
 from vcam_cli.camera.explain import failure, fault, shown
-from vcam_cli.camera.values import DEFINED, File, Number, Quantity, Temperature, written
+from vcam_cli.camera.values import DEFINED, File, Gap, Number, Quantity, Temperature, written
 from vcam_cli.errors import BadInput, Path, bad
+from vcam_cli.physics import silicon
 
 NAME = r"^[A-Za-z0-9._-]{1,64}$"
 _OUTSIDE = "what holds beyond the table: an error, zero, or the end values"
-_FORMS = "0.95, a shipped name, {file: x.csv}, {table: {400: 0.1, 700: 0.3}}, or a list of these"
+_FORMS = (
+    "0.95, a shipped name, {file: x.csv}, {table: {400: 0.1, 700: 0.3}}, {silicon: [0 um, 0.4 um]}"
+    ", or a list of these"
+)
 _SLACK = 1e-9  # a product of factors may exceed its limit by rounding
 
 
@@ -105,7 +111,22 @@ class SpectrumTable(Model):
     outside: Literal["error", "zero", "hold"] = key(_OUTSIDE, example="hold", default="error")
 
 
-Factor = float | str | SpectrumFile | SpectrumTable
+class SiliconLayer(Model):
+    """The share of the light that silicon absorbs between two depths: a filter of silicon."""
+
+    silicon: tuple[Gap, Gap] = key(
+        "two depths, the upper first", unit="um", example=["0 um", "0.4 um"]
+    )
+
+    @model_validator(mode="after")
+    def _downward(self) -> Self:
+        if self.silicon[0] >= self.silicon[1]:
+            remedy = "write the upper depth first, for example [0 um, 0.4 um]"
+            raise failure([fault(("silicon",), "its depths do not rise", remedy)])
+        return self
+
+
+Factor = float | str | SpectrumFile | SpectrumTable | SiliconLayer
 
 
 @dataclass(frozen=True)
@@ -150,19 +171,40 @@ def _resolved(factor: Factor, path: Path) -> spectra.Spectrum:
         return _from_file(str(shipped.find("spectra", factor, path)), "error", path)
     if isinstance(factor, SpectrumFile):
         return _from_file(factor.file, factor.outside, (*path, "file"))
+    if isinstance(factor, SiliconLayer):
+        return _absorbed(*factor.silicon)
     wavelength, value = np.array(factor.table).T
     return spectra.Spectrum.sampled(wavelength / 1e9, value, factor.outside)
+
+
+def _absorbed(top: float, bottom: float) -> spectra.Spectrum:
+    """The share absorbed between two depths [m], by Beer and Lambert's law, nanometer by nm."""
+    low, high = (round(edge * 1e9) for edge in silicon.ABSORPTION_RANGE)
+    wavelength = np.arange(low, high + 1) * 1e-9
+    absorption = silicon.absorption(np.clip(wavelength, *silicon.ABSORPTION_RANGE))
+    share = np.exp(-absorption * top) * -np.expm1(-absorption * (bottom - top))
+    return spectra.Spectrum.sampled(wavelength, share)
 
 
 def _from_file(
     file: str, outside: Literal["error", "zero", "hold"], path: Path
 ) -> spectra.Spectrum:
     try:
-        return spectra.Spectrum(tables=(spectra.read_csv(file, outside),))
+        state = os.stat(file)
+        table = _table(file, outside, state.st_mtime_ns, state.st_size, state.st_ino)
+        return spectra.Spectrum(tables=(table,))
     except ValueError as error:
         raise bad(path, str(error), "write the columns wavelength_nm,value, rising") from None
     except OSError as error:
         raise bad(path, f"{file} cannot be read: {error.strerror}", "check the file name") from None
+
+
+@lru_cache(256)
+def _table(
+    file: str, outside: Literal["error", "zero", "hold"], changed: int, size: int, node: int
+) -> spectra.Table:
+    """A table of a file, read once as long as the file does not change: sweeps ask often."""
+    return spectra.read_csv(file, outside)
 
 
 def _largest(spectrum: spectra.Spectrum) -> float:
@@ -185,7 +227,7 @@ class Spectral:
     def __get_pydantic_core_schema__(
         self, source: Any, handler: GetCoreSchemaHandler
     ) -> CoreSchema:
-        forms = handler.generate_schema(SpectrumFile | SpectrumTable)
+        forms = handler.generate_schema(SpectrumFile | SpectrumTable | SiliconLayer)
         return core_schema.no_info_plain_validator_function(
             self.read,
             json_schema_input_schema=forms,
@@ -252,8 +294,10 @@ def shipped_name(given: str) -> str:
     return given
 
 
-def table_or_file(given: Mapping[Any, Any]) -> SpectrumFile | SpectrumTable:
+def table_or_file(given: Mapping[Any, Any]) -> SpectrumFile | SpectrumTable | SiliconLayer:
     """The spectrum that a mapping describes."""
+    if "silicon" in given:
+        return SiliconLayer.model_validate(given)
     if "file" in given and "table" in given:
         raise failure(
             [fault(("table",), "file and table cannot both be given", "keep one of them")]

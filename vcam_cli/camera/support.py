@@ -15,10 +15,11 @@ from vcam_cli.camera.base import Model
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.explain import in_yaml
 from vcam_cli.camera.processing import Step
-from vcam_cli.camera.scene import CHARTS
 from vcam_cli.camera.spectrum import IlluminantSpec, SpectrumSpec
 from vcam_cli.camera.values import written
 from vcam_cli.errors import BadInput, Collector, Path, Problem, bad
+from vcam_cli.physics.silicon import ABSORPTION_RANGE
+from vcam_cli.spectra.spectrum import SAME_WAVELENGTH, nanometers
 
 _MESSAGE = "is not supported yet"
 
@@ -45,7 +46,24 @@ def check_spectra(camera: Camera) -> None:
                 raise bad(path, message, remedy) from None
         except BadInput as error:
             problems.extend(error)
+    if _asks_silicon(camera):
+        low, high = ABSORPTION_RANGE
+        if start < low * (1 - SAME_WAVELENGTH) or stop > high * (1 + SAME_WAVELENGTH):
+            problems.add(
+                "scene.wavelengths",
+                f"{nanometers(start, stop)} are simulated, but the absorption of silicon is known"
+                f" for {nanometers(low, high)}",
+                "narrow them, or give the quantum efficiency as a spectrum and no charge_diffusion",
+            )
     problems.raise_if_any()
+
+
+def _asks_silicon(camera: Camera) -> bool:
+    """Whether anything follows from how deep light goes in silicon."""
+    off = isinstance(camera.effects, dict) and camera.effects.get("charge_diffusion") == "off"
+    detector = camera.pixel.photodetector
+    diffuses = detector.charge_diffusion is not None and not off
+    return diffuses or detector.quantum_efficiency.given is None
 
 
 def spectra(camera: Model) -> Iterator[tuple[Path, SpectrumSpec | IlluminantSpec]]:
@@ -57,7 +75,7 @@ def spectra(camera: Model) -> Iterator[tuple[Path, SpectrumSpec | IlluminantSpec
 
 def _values(value: Any, path: Path) -> Iterator[tuple[Path, Any]]:
     """All values below a value that are no containers, with their paths."""
-    from vcam_cli.camera.pixel import QuantumEfficiency
+    from vcam_cli.camera.photodetector import QuantumEfficiency
 
     if isinstance(value, QuantumEfficiency):
         if value.given is not None:
@@ -76,12 +94,6 @@ def _values(value: Any, path: Path) -> Iterator[tuple[Path, Any]]:
 
 
 def _unsupported(model: Model, path: Path) -> Iterator[Problem]:
-    if model.not_yet:
-        word = getattr(model, model.not_yet)
-        built = [name for name, chart in CHARTS.items() if not chart.not_yet]
-        instead = "use a chart or an image" if model.not_yet == "kind" else _instead(built)
-        yield Problem((*path, model.not_yet), f"{word} {_MESSAGE}", instead)
-        return
     for name, field in type(model).model_fields.items():
         value, here = getattr(model, name), (*path, field.alias or name)
         mark = not_yet(field)

@@ -1,6 +1,7 @@
 """A process technology: what a pixel takes from it where the camera file says nothing.
 
-Files of `configs/technologies`, and `pixel.technology`. Every key may be overridden in a camera.
+Files of `configs/technologies`, and `pixel.technology`. Every key may be overridden in a camera;
+an override is a number of the process as it is used, after its scaling (see `process`).
 """
 
 from collections.abc import Mapping
@@ -11,6 +12,7 @@ from vcam_cli.camera.explain import shown
 from vcam_cli.camera.values import (
     Either,
     Length,
+    MaybeGap,
     MaybeLength,
     MaybeTime,
     Number,
@@ -24,21 +26,23 @@ from vcam_cli.camera.values import (
 _VOLTAGE = Quantity("voltage", above=0)
 _CONCENTRATION = Quantity("concentration", above=0)
 _DIFFUSIVITY = Quantity("diffusivity", above=0)
-_EXPONENT = Number(example="1")
+_EXPONENT = Number(least=-10, most=10, example="1")
 
 
 class Thresholds(Model):
     """Voltages that make the swing: (supply - reset - gate-source) - (bias - bias gate)."""
 
-    reset: Annotated[float, _VOLTAGE] = key(
-        "threshold of the reset transistor", unit="V", example="0.8 V"
+    reset: Annotated[float | None, _VOLTAGE] = key(
+        "threshold of the reset transistor", unit="V", example="0.8 V", default=None
     )
-    bias: Annotated[float, _VOLTAGE] = key("bias voltage", unit="V", example="0.9 V")
-    follower_gate_source: Annotated[float, _VOLTAGE] = key(
-        "gate-source voltage of the follower", unit="V", example="0.9 V"
+    bias: Annotated[float | None, _VOLTAGE] = key(
+        "bias voltage", unit="V", example="0.9 V", default=None
     )
-    bias_gate: Annotated[float, _VOLTAGE] = key(
-        "threshold of the bias transistor", unit="V", example="0.6 V"
+    follower_gate_source: Annotated[float | None, _VOLTAGE] = key(
+        "gate-source voltage of the follower", unit="V", example="0.9 V", default=None
+    )
+    bias_gate: Annotated[float | None, _VOLTAGE] = key(
+        "threshold of the bias transistor", unit="V", example="0.6 V", default=None
     )
 
 
@@ -75,6 +79,23 @@ class Junction(Model):
     electron_diffusivity: Annotated[float | None, _DIFFUSIVITY] = key(
         "of electrons", unit="cm2/s", example="36 cm2/s", default=None
     )
+
+
+class Well(Model):
+    """The n-well, which takes the place of the n-diffusion in a photodetector nwell-psub."""
+
+    depth: MaybeLength = key(
+        "depth of its junction with the substrate", unit="um", example="1.5 um", default=None
+    )
+    donors: Annotated[float | None, _CONCENTRATION] = key(
+        "donor concentration", unit="1/cm3", example="1e17 1/cm3", default=None
+    )
+
+
+class Gate(Model):
+    """The gate of polysilicon, through which the light of a photogate goes."""
+
+    thickness: MaybeGap = key("of the film", unit="um", example="0.25 um", default=None)
 
 
 class JunctionCapacitance(Model):
@@ -141,26 +162,31 @@ class Scaling(Model):
     """The power of the feature-size ratio by which a number goes when the process is scaled."""
 
     lengths: Annotated[float | None, _EXPONENT] = key(
-        "depths, widths, diffusion length", example=1.0, default=None
+        "depths, widths, diffusion length, capacitance of the follower's gate; default 1",
+        example=1.0,
+        default=None,
+    )
+    voltages: Annotated[float | None, _EXPONENT] = key(
+        "supply, thresholds, swing; default 1", example=1.0, default=None
+    )
+    concentrations: Annotated[float | None, _EXPONENT] = key(
+        "of donors and acceptors; default -1", example=-1.0, default=None
     )
     capacitance_area: Annotated[float | None, _EXPONENT] = key(
-        "capacitance per area", example=0.0, default=None
+        "capacitance per area; default -1", example=-1.0, default=None
     )
     capacitance_sidewall: Annotated[float | None, _EXPONENT] = key(
-        "capacitance per length", example=0.0, default=None
+        "capacitance per length; default 0", example=0.0, default=None
     )
     dark_current_area: Annotated[float | None, _EXPONENT] = key(
-        "dark current per area", example=0.0, default=None
+        "dark current per area; default 0", example=0.0, default=None
     )
     dark_current_perimeter: Annotated[float | None, _EXPONENT] = key(
-        "dark current per length", example=0.0, default=None
-    )
-    voltage_swing: Annotated[float | None, _EXPONENT] = key(
-        "voltage swing", example=0.0, default=None
+        "dark current per length; default 0", example=0.0, default=None
     )
 
 
-class _Process(Model):
+class Numbers(Model):
     """The numbers of a process; shared by technology files and overrides in a camera."""
 
     supply: Annotated[float | None, _VOLTAGE] = key(
@@ -169,8 +195,14 @@ class _Process(Model):
     voltage_swing: Annotated[float | None, _VOLTAGE] = key(
         "at the photodetector; or thresholds", unit="V", example="1.38 V", default=None
     )
+    reset_voltage: Annotated[float | None, _VOLTAGE] = key(
+        "to which the photodetector is reset; or thresholds",
+        unit="V",
+        example="2.5 V",
+        default=None,
+    )
     thresholds: Annotated[Thresholds | None, mapping(Thresholds)] = key(
-        "from which the swing follows",
+        "from which swing and reset voltage follow",
         example={
             "reset": "0.8 V",
             "bias": "0.9 V",
@@ -182,6 +214,12 @@ class _Process(Model):
     junction: Junction = key(
         "the photodiode's junction", example={"depth": "0.2 um"}, default=Junction
     )
+    well: Well = key(
+        "depth and donors of a photodetector nwell-psub",
+        example={"depth": "1.5 um", "donors": "1e17 1/cm3"},
+        default=Well,
+    )
+    gate: Gate = key("of a photogate", example={"thickness": "0.25 um"}, default=Gate)
     capacitance: JunctionCapacitance = key(
         "junction capacitance at zero bias",
         example={"area": "0.906 fF/um2", "sidewall": "0.297 fF/um"},
@@ -206,10 +244,10 @@ class _Process(Model):
         default=Scaling,
     )
 
-    rules = (at_most_one("voltage_swing", "thresholds"),)
+    rules = (at_most_one("voltage_swing", "thresholds"), at_most_one("reset_voltage", "thresholds"))
 
 
-class Technology(_Process):
+class Technology(Numbers):
     """A technology file."""
 
     name: Word = key("name of the technology", example="cmos-0.35um")
@@ -219,27 +257,44 @@ class Technology(_Process):
     )
 
 
-class TechnologyChoice(_Process):
-    """The technology of a camera's pixel: a name, and what is changed of it."""
+def _source(given: Any) -> Technology | str:
+    if isinstance(given, (Mapping, Technology)):
+        return Technology.model_validate(given)
+    if isinstance(given, str) and given:
+        return given
+    raise ValueError(f"{shown(given)} is not a technology; write for example cmos-0.35um")
 
-    from_: Text = key("name or path of a technology file", example="cmos-0.35um", alias="from")
+
+class TechnologyChoice(Numbers):
+    """The technology of a camera's pixel: which one, and what is changed of it."""
+
+    from_: Annotated[Technology | str, Either(_source, str | Technology)] = key(
+        "name or path of a technology file; once read, what it says",
+        example="cmos-0.35um",
+        alias="from",
+    )
     feature_size: MaybeLength = key(
         "scales the technology to this feature size", unit="um", example="0.13 um", default=None
     )
 
     def written(self) -> Any:
         """The YAML form: the bare name where nothing is changed."""
-        form = written(self)
-        changes = {k: v for k, v in form.items() if v != {}}
-        return changes["from"] if list(changes) == ["from"] else changes
+        changes = _without_empty(written(self))
+        bare = set(changes) == {"from"} and isinstance(self.from_, str)
+        return self.from_ if bare else changes
+
+
+def _without_empty(form: Any) -> Any:
+    if not isinstance(form, Mapping):
+        return form
+    full = {name: _without_empty(item) for name, item in form.items()}
+    return {name: item for name, item in full.items() if item != {}}
 
 
 def _choice(given: Any) -> TechnologyChoice:
     if isinstance(given, (Mapping, TechnologyChoice)):
         return TechnologyChoice.model_validate(given)
-    if isinstance(given, str) and given:
-        return TechnologyChoice.model_validate({"from": given})
-    raise ValueError(f"{shown(given)} is not a technology; write for example cmos-0.35um")
+    return TechnologyChoice.model_validate({"from": _source(given)})
 
 
 CHOICE = Either(

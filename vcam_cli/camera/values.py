@@ -336,7 +336,9 @@ Shift = Annotated[float, Quantity("length")]
 Time = Annotated[float, Quantity("time", above=0)]
 Temperature = Annotated[float, Quantity("temperature", above=0)]
 Angle = Annotated[float, Quantity("angle")]
-Electrons = Annotated[float, Quantity("charge", least=0)]
+MOST_ELECTRONS = 1e9
+"""Of a noise: beyond any well, and its square is still a number in 32 bits."""
+Electrons = Annotated[float, Quantity("charge", least=0, most=MOST_ELECTRONS)]
 Frequency = Annotated[float, Quantity("spatial_frequency", least=0)]
 Fraction = Annotated[float, Number(least=0, most=1)]
 Positive = Annotated[float, Number(above=0, example="1")]

@@ -1,4 +1,4 @@
-"""`vcam init`: a camera file to start from."""
+"""`vcam init`: a camera file and a study to start from."""
 
 from pathlib import Path
 from typing import Annotated
@@ -9,6 +9,8 @@ from vcam_cli.commands import options
 
 FILE = "camera.yaml"
 STARTER = "starter"  # the shipped camera that is copied
+STUDY = "study.yaml"
+STARTER_STUDY = "exposure-and-noise"  # the shipped study of that camera that is copied
 
 
 def init(
@@ -19,7 +21,7 @@ def init(
     as_json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
-    """Writes a small commented camera file that runs as it is.
+    """Writes a small commented camera file and a study of it, which run as they are.
 
     Existing files are never overwritten.
 
@@ -32,12 +34,16 @@ def init(
     from vcam_cli.errors import bad
     from vcam_cli.files import atomic
 
-    target = folder / FILE
-    if target.exists() or target.is_symlink():
-        raise bad((), f"{target} exists already", "give another folder, or remove the file")
+    camera, study = folder / FILE, folder / STUDY
+    for target in (camera, study):
+        if target.exists() or target.is_symlink():
+            raise bad((), f"{target} exists already", "give another folder, or remove the file")
     atomic.make_folder(folder)
-    atomic.write_text(target, shipped.find("cameras", STARTER).read_text("utf-8"))
+    atomic.write_text(camera, shipped.find("cameras", STARTER).read_text("utf-8"))
+    _, _, text = shipped.find("studies", STARTER_STUDY).read_text("utf-8").partition("\n")
+    atomic.write_text(study, text.replace(f"camera: {STARTER}", f"camera: {FILE}"))
     if as_json:
-        options.write_json({"files": [str(target)]})
+        options.write_json({"files": [str(camera), str(study)]})
     else:
-        options.say(f"wrote {target}; next: vcam run {target}", quiet)
+        options.say(f"wrote {camera}; next: vcam run {camera}", quiet)
+        options.say(f"wrote {study}; next: vcam sweep {study}", quiet)

@@ -128,7 +128,7 @@ def _filters() -> list[Item]:
 def _charts() -> list[Item]:
     from vcam_cli.camera.scene import CHARTS
 
-    return [Item(name, _first_line(c)) for name, c in CHARTS.items() if not c.not_yet]
+    return [Item(name, _first_line(c)) for name, c in CHARTS.items()]
 
 
 def _illuminants() -> list[Item]:
@@ -168,7 +168,11 @@ def _metrics() -> list[Item]:
         "cielab": "mean CIELAB Delta E (1976) on the `display`; ask for it in `quality`",
         "s-cielab": "mean S-CIELAB Delta E, as the eye sees it there; ask for it in `quality`",
     }
-    return [Item(name, about) for name, about in (always | asked).items()]
+    sampled = {
+        "hdr_saturated_fraction": "fraction of pixels full in all samples; with `captures`",
+        "hdr_dynamic_range_db": "dynamic range of the photocurrent [dB]; with `captures`",
+    }
+    return [Item(name, about) for name, about in (always | sampled | asked).items()]
 
 
 KINDS: dict[str, Callable[[], list[Item]]] = {

@@ -1,7 +1,7 @@
 """The program `vcam`: its commands, and how it ends.
 
-Exit codes: 0 done, 2 bad input or usage, 3 this machine cannot do it, 1 a bug (only then a
-traceback), 130 interrupted.
+Exit codes: 0 done, 2 bad input or usage, 3 this machine cannot do it, 4 some points of a sweep
+failed, 1 a bug (only then a traceback), 130 interrupted.
 
 Why commands are looked up by name: a command's module is imported when that command is asked
 for, and imports its physics when it runs, so `vcam --help` and shell completion are quick.
@@ -29,6 +29,8 @@ COMMANDS = {
     "run": "run:run",
     "plan": "plan:plan",
     "accuracy": "accuracy:accuracy",
+    "sweep": "sweep:sweep",
+    "characterize": "characterize:characterize",
     "compare": "compare:compare",
     "validate": "validate:validate",
     "list": "list_:list_",

@@ -16,10 +16,19 @@ PRESETS = ("draft", "standard", "reference")
 
 def complete_camera(incomplete: str) -> list[str]:
     """Shell completion: shipped cameras, YAML files and folders."""
+    return _complete("cameras", incomplete)
+
+
+def complete_study(incomplete: str) -> list[str]:
+    """Shell completion: shipped studies, YAML files and folders."""
+    return _complete("studies", incomplete)
+
+
+def _complete(kind: str, incomplete: str) -> list[str]:
     from vcam_cli.camera import shipped
 
     folder = Path(incomplete).parent if incomplete and not incomplete.endswith("/") else incomplete
-    found = [n for n in shipped.names("cameras") if n.startswith(incomplete)]
+    found = [n for n in shipped.names(kind) if n.startswith(incomplete)]
     for path in sorted(Path(folder or ".").glob("*")):
         text = str(path) + ("/" if path.is_dir() else "")
         if text.startswith(incomplete) and (path.is_dir() or path.suffix in (".yaml", ".yml")):

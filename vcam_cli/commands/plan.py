@@ -32,12 +32,12 @@ def plan(
     for note in notes:
         options.say(note, quiet)
     report = ready.plan.report()
-    geometry = ready.geometry.report(ready.spectrum.oversampling)
+    geometry = ready.layout.report(ready.spectrum.oversampling)
     if as_json:
         print(to_json({**report, "geometry": geometry}), end="")
     else:
         print(table(report))
-        print(facts(report, geometry, ready.exposure_time))
+        print(facts(report, geometry, ready.exposure_time, model.exposure.samples))
 
 
 def table(report: dict) -> str:
@@ -52,13 +52,16 @@ def table(report: dict) -> str:
     return "\n".join(lines)
 
 
-def facts(report: dict, geometry: dict, exposure_time: float) -> str:
+def facts(
+    report: dict, geometry: dict, exposure_time: float, samples: tuple[float, ...] = ()
+) -> str:
     """Settings, geometry and cost, a few lines."""
     from vcam_cli.units import render
 
     named = dict(report["settings"])
     named["wavelength_step"] = render(named["wavelength_step"], "length")
     knobs = ", ".join(f"{name} {value}" for name, value in named.items())
+    several = f", {len(samples)} samples from {samples[0]:.4g} s on" if samples else ""
     scene = f"{geometry['scene_width']:.4g} x {geometry['scene_height']:.4g} m"
     return "\n".join(
         (
@@ -66,7 +69,7 @@ def facts(report: dict, geometry: dict, exposure_time: float) -> str:
             f"settings   {knobs}",
             f"geometry   {geometry['rows']} x {geometry['columns']} pixels see {scene}"
             f" at magnification {geometry['magnification']:.4g}",
-            f"exposure   {exposure_time:.4g} s",
+            f"exposure   {exposure_time:.4g} s{several}",
             f"cost       about {report['seconds']:.2g} s and {report['memory_bytes'] / 1e6:.0f} MB",
         )
     )

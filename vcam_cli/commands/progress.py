@@ -6,6 +6,7 @@ that began it; the bar has a thread of its own, which loads the library that dra
 seconds are over, and not before.
 """
 
+import contextlib
 import os
 import sys
 import threading
@@ -23,12 +24,19 @@ WORDS = {
     "optics": "light through the lens",
     "exposure": "planning",
     "capture": "taking the frame",
+    "flats": "taking flat fields",
+    "darks": "taking dark frames",
+    "stacks": "taking stacks of frames",
+    "edge": "taking the slanted edge",
     "balance": "measuring colors",
     "processing": "processing",
     "ideal": "ideal image",
     "quality": "judging the picture",
     "files": "writing files",
     "irradiance": "spectral irradiance",
+    "points": "checking all points",
+    "sweep": "computing points",
+    "tables": "writing tables",
 }
 """What is said of a stage; of others, their name."""
 
@@ -37,6 +45,10 @@ def wanted(quiet: bool = False) -> bool:
     """Whether a bar may be drawn: stderr is a terminal, and nobody has asked for silence."""
     plain = os.environ.get("NO_COLOR") or os.environ.get("TERM") == "dumb"
     return not quiet and not plain and sys.stderr.isatty()
+
+
+LOG_EVERY = 60.0
+"""Seconds between two lines of a log."""
 
 
 class Progress:
@@ -112,6 +124,48 @@ class Progress:
         said = WORDS.get(self._stage, self._stage)
         total = done / 0.95 if left is None else done + left
         return {"description": said, "completed": done, "total": total, "left": in_words(left)}
+
+
+class Log:
+    """Context and observer of work of many steps, where no bar can be drawn: a line a minute."""
+
+    def __init__(self, what: str, every: float = LOG_EVERY) -> None:
+        self._what, self._every = what, every
+        self._steps, self._start = (0, 0), time.monotonic()
+        self._over = threading.Event()
+        self._thread = threading.Thread(target=self._write, daemon=True)
+
+    def __enter__(self) -> Self:
+        self._thread.start()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self._over.set()
+        self._thread.join()
+
+    def begin(self, stage: str) -> None:
+        self._steps, self._start = (0, 0), time.monotonic()
+
+    def expect(self, seconds: float) -> None:
+        pass
+
+    def step(self, done: int, total: int) -> None:
+        self._steps = (done, total)
+
+    def _write(self) -> None:
+        while not self._over.wait(self._every):
+            done, total = self._steps
+            if not total:
+                continue
+            left = (time.monotonic() - self._start) * (total - done) / done if done else None
+            said = f", {in_words(left)}" if done else ""
+            with contextlib.suppress(OSError):
+                print(f"{self._what}: {done} of {total}{said}", file=sys.stderr, flush=True)
 
 
 def in_words(left: float | None) -> str:

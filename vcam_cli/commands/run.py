@@ -77,6 +77,8 @@ FILES = {
     "ideal.exr": "ideal image",
     "delta_e.png": "error map",
     "irradiance.exr": "irradiance",
+    "captures/raw_001.exr": "first sample",
+    "hdr.exr": "photocurrent",
 }
 """Pictures a run may leave, and what they are."""
 

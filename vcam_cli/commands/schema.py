@@ -16,7 +16,7 @@ def schema(
     as_json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
-    """Writes the JSON Schemas of camera and technology files, for editors and programs.
+    """Writes the JSON Schemas of camera, study and technology files, for editors and programs.
 
     An editor that reads YAML schemas completes and checks a camera file whose first line is
     `# yaml-language-server: $schema=camera.schema.json`.

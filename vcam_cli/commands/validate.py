@@ -1,5 +1,6 @@
-"""`vcam validate`: checks camera files, runs nothing."""
+"""`vcam validate`: checks camera and study files, runs nothing."""
 
+from pathlib import Path
 from typing import Annotated, Any
 
 import typer
@@ -12,7 +13,7 @@ def validate(
         list[str],
         typer.Argument(
             metavar="FILE",
-            help="Camera files, or names of shipped cameras.",
+            help="Camera and study files, or names of shipped ones.",
             autocompletion=options.complete_camera,
             show_default=False,
         ),
@@ -21,7 +22,7 @@ def validate(
     as_json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
-    """Checks camera files and says everything that is wrong with them.
+    """Checks camera and study files and says everything that is wrong with them.
 
     \b
     Example:
@@ -43,11 +44,10 @@ def validate(
 def _check(file: str, sets: list[str]) -> dict[str, Any]:
     """What there is to say about one file."""
     from vcam_cli.errors import BadInput, CannotDo, dotted
-    from vcam_cli.studies.checks import load
 
     report: dict[str, Any] = {"file": file, "ok": False, "exit_code": 0, "problems": []}
     try:
-        camera = load(file, sets)
+        name = _checked_name(file, sets)
     except BadInput as error:
         report["problems"] = [
             {
@@ -63,4 +63,36 @@ def _check(file: str, sets: list[str]) -> dict[str, Any]:
     except CannotDo as error:
         problem = {"where": file, "path": "", "message": error.message, "remedy": error.remedy}
         return report | {"problems": [problem | {"text": str(error)}], "exit_code": error.exit_code}
-    return report | {"ok": True, "name": camera.name}
+    return report | {"ok": True, "name": name}
+
+
+def _checked_name(file: str, sets: list[str]) -> str:
+    """The name of a camera or study without mistakes. Raises BadInput, CannotDo."""
+    from vcam_cli.studies.checks import load
+
+    if not _is_study(file):
+        return load(file, sets).name
+    from vcam_cli.errors import BadInput
+    from vcam_cli.studies import study_file, sweep_points
+
+    grid = sweep_points.grid(study_file.read(file), sets)
+    if grid.refused:
+        raise BadInput(grid.refused)
+    return grid.study.model.name
+
+
+def _is_study(file: str) -> bool:
+    """Whether a file says that it is a study, or only a study of that name ships."""
+    from vcam_cli.camera import shipped
+    from vcam_cli.camera.parts import is_file
+    from vcam_cli.camera.study import KINDS
+    from vcam_cli.camera.yaml_tree import read_file
+    from vcam_cli.errors import VcamError
+
+    if not is_file(Path(file)):
+        return file in shipped.names("studies") and file not in shipped.names("cameras")
+    try:
+        kind = read_file(Path(file)).get("kind")
+    except VcamError:  # said when it is read as a camera
+        return False
+    return kind is not None and kind.value in KINDS

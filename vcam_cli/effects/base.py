@@ -5,7 +5,9 @@ kind says in mathematics what it does, and so where in the order it acts (`order
 
     Transfer   multiplies the spectrum of the image, H(f, wavelength)      no unit
     Gain       multiplies the signal, pixel by pixel                       no unit
+    Veil       spreads part of the light over the whole sensor             no unit
     Charge     adds electrons                                              electrons
+    Transport  moves charge to later pixels on its way out                 no unit
     Draw       adds randomness, of known variance                          electrons
     Limit      clamps                                                      electrons
     Code       turns electrons into digital numbers                        electrons -> DN
@@ -20,11 +22,12 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import ClassVar, Self
+from typing import ClassVar, Literal, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vcam_cli.camera.array import Binning
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.geometry import Geometry
 
@@ -37,6 +40,15 @@ class Outlook:
     """Largest noise-free mean signal on the array, at most the full well [electrons]."""
     time: float
     """Exposure time [s]."""
+    dark: float = 0.0
+    """Mean dark signal of a pixel [electrons]."""
+    binning: Binning | None = None
+    """How such pixels are read as one."""
+
+
+def switched_off(camera: Camera, name: str) -> bool:
+    """Whether the file leaves this effect out, whatever else it says."""
+    return isinstance(camera.effects, dict) and camera.effects.get(name) == "off"
 
 
 class Effect(ABC):
@@ -69,16 +81,65 @@ class Effect(ABC):
         return 0.0
 
 
-class RadialTransfer(Effect):
+class Blur(ABC):
+    """A transfer function of the spatial frequency and the wavelength, in one place of the field.
+
+    Three kinds differ in what they depend on: `RadialTransfer`, `PlaneTransfer`; and
+    `SeparableTransfer`, the same at all wavelengths.
+    """
+
+    @abstractmethod
+    def cutoff(self, wavelength: float) -> float:
+        """Frequency from which on it is zero [cycles/m]; inf where there is none."""
+
+
+class RadialTransfer(Effect, Blur):
     """A transfer function that depends on the length of the spatial frequency only."""
 
     @abstractmethod
     def otf(self, frequency: NDArray, wavelength: float) -> NDArray:
         """Transfer at `frequency` [cycles/m] and `wavelength` [m]; 1 at frequency 0."""
 
+
+class PlaneTransfer(Effect, Blur):
+    """A transfer function of both components of the spatial frequency.
+
+    Complex where it is not symmetric about a point: H(-f) = conj(H(f)), with the sign of
+    integral h(x, y) exp(-2 pi i (fx x + fy y)) dx dy, x to the right and y down.
+    """
+
+    @property
     @abstractmethod
-    def cutoff(self, wavelength: float) -> float:
-        """Frequency from which on it is zero [cycles/m]; inf where there is none."""
+    def reach(self) -> float:
+        """How far from its place it throws almost all of the light [m]."""
+
+    @property
+    def model(self) -> tuple[PlaneTransfer, int, bool]:
+        """A blur that this one is made of: it, by how many quarter turns from x to y it is turned,
+        and whether y is mirrored before. What many have in common is computed once."""
+        return self, 0, False
+
+    @abstractmethod
+    def otf_plane(self, fx: NDArray, fy: NDArray, wavelength: float) -> NDArray:
+        """Transfer at all pairs of fx (n,) and fy (m,) [cycles/m]: complex (m, n); 1 at 0."""
+
+
+@dataclass(frozen=True)
+class Zone:
+    """A blur, and how much of it there is in every place of the sensor."""
+
+    blur: RadialTransfer | PlaneTransfer
+    weight: Callable[[NDArray, NDArray], NDArray]
+    """At the positions x (columns,), y (rows,) [m]: (rows, columns)."""
+
+
+class FieldTransfer(Effect):
+    """A transfer function that changes slowly over the field: a sum of few, weighted by place."""
+
+    @abstractmethod
+    def zones(self, count: int) -> tuple[Zone, ...]:
+        """Blurs whose weights sum to 1 in every place; `count` places from center to corner, or
+        more where that is known not to be enough."""
 
 
 class SeparableTransfer(Effect):
@@ -98,7 +159,22 @@ class Gain(Effect):
 
     @abstractmethod
     def gain(self, x: NDArray, y: NDArray) -> NDArray:
-        """Factor at the positions x (columns,), y (rows,) [m]: (rows, columns)."""
+        """Factor at the positions x (columns,), y (rows,) [m]: (rows, columns).
+
+        (1, 1) where it is the same everywhere.
+        """
+
+    @property
+    def on_axis(self) -> float:
+        """The factor at the center of the sensor, where white is judged."""
+        return float(self.gain(np.zeros(1), np.zeros(1))[0, 0])
+
+
+class Veil(Effect):
+    """Light that goes astray on its way to the sensor and lies evenly over it."""
+
+    fraction: float
+    """Of the light of each color, averaged over the array."""
 
 
 class Charge(Effect):
@@ -107,6 +183,14 @@ class Charge(Effect):
     @abstractmethod
     def rate(self) -> float:
         """Mean electrons a pixel collects per second [e/s]."""
+
+
+class Transport(Effect):
+    """Charge that arrives late: every electron by its own chance, so means are enough."""
+
+    @abstractmethod
+    def moved(self, signal: NDArray) -> NDArray:
+        """What arrives of a mean signal (rows, columns), in its unit and float type."""
 
 
 @dataclass(frozen=True)
@@ -120,6 +204,8 @@ class Site:
     line_stream: Callable[[str], np.random.Generator]
     """Generator of a named stream shared by all blocks, for draws per column."""
     dtype: type
+    dark: float = 0.0
+    """Mean dark signal of a pixel [electrons]."""
 
     def normal(self, name: str) -> NDArray:
         """One standard normal a pixel, (rows, columns)."""
@@ -129,20 +215,40 @@ class Site:
         """One standard normal a column, the same for every block, (columns,)."""
         return self.line_stream(name).standard_normal(self.columns, dtype=self.dtype)
 
+    def normal_rows(self, name: str) -> NDArray:
+        """One standard normal a row, the same for every column, (rows, 1)."""
+        return self.stream(name).standard_normal((self.rows, 1), dtype=self.dtype)
+
 
 class Draw(Effect):
     """A random contribution. Whoever adds it also states its variance."""
 
     scope: ClassVar[str]
     """'frame': new in every frame; 'sensor': stays with the sensor."""
+    in_samples: ClassVar[Literal["new", "same", "accumulates"]] = "new"
+    """In several samples of one integration: drawn anew in each, the same in all, or drawn anew
+    for the charge of each step, which adds up."""
+    of_readout: ClassVar[bool] = False
+    """Whether it comes from what reads the pixels, and not from the pixels."""
+
+    def split(self) -> tuple[Self | None, Self | None, Self | None]:
+        """What of it every pixel has to itself, what a column's pixels share, what a row's."""
+        return self, None, None
+
+    def before_shot(self, mean: NDArray, site: Site) -> NDArray:
+        """The block's mean signal as this draw changes it [electrons]; may reuse the array."""
+        return mean
 
     @abstractmethod
     def apply(self, electrons: NDArray, site: Site) -> NDArray:
         """The block with this draw in it [electrons]; may reuse the array handed in."""
 
     @abstractmethod
-    def variance(self, mean: float) -> float:
-        """Variance it adds to a pixel of mean signal `mean` [electrons squared]."""
+    def variance(self, mean: float, dark: float = 0.0) -> float:
+        """Variance it adds to a pixel [electrons squared].
+
+        mean: its mean signal; dark: how much of that is dark signal [electrons].
+        """
 
 
 class Limit(Effect):

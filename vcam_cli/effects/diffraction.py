@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from vcam_cli.effects.base import RadialTransfer
+from vcam_cli.effects.base import RadialTransfer, switched_off
 from vcam_cli.physics import diffraction
 
 
@@ -17,12 +17,13 @@ class Diffraction(RadialTransfer):
 
     name = "diffraction"
     reference = "Chen 2003, section 2.2.1; Goodman, Introduction to Fourier Optics, section 6.3"
-    absent = "the file says optics.diffraction: false"
+    absent = "the file says optics.diffraction: false, or gives a point spread function instead"
     in_lens = True
 
     @classmethod
     def of(cls, camera, geometry):
-        if not camera.optics.diffraction:
+        replaced = camera.optics.psf is not None and not switched_off(camera, "aberration")
+        if replaced or not camera.optics.diffraction:
             return None
         return cls(geometry.f_number, geometry.magnification)
 

@@ -3,9 +3,13 @@
     in                      kind        effects                          out
     ----------------------  ----------  -------------------------------  ----------------------
     radiance of the scene   optics      eq 2.18, no choice               photons / (s m2 m)
-    spectrum of the image   Transfer    diffraction, pixel_aperture      electrons / s, blurred
+    spectrum of the image   Transfer    diffraction, aberration,         electrons / s, blurred
+                                        pixel_aperture, charge_diffusion
     electrons / s           Gain        off_axis                         electrons / s
+    electrons / s           Veil        stray_light                      electrons / s
+    electrons / s           Gain        pixel_vignetting, microlens      electrons / s
     electrons / s           Charge      dark_current                     electrons (mean signal)
+    electrons               Transport   charge_transfer                  electrons (mean signal)
     electrons               Draw        shot_noise, fpn, reset_noise,    electrons
                                         read_noise
     electrons               Limit       saturation                       electrons
@@ -16,23 +20,35 @@ Within a kind the order of this tuple is the order of action. It is written nowh
 
 from __future__ import annotations
 
+from vcam_cli.effects.aberration import Aberration
 from vcam_cli.effects.base import Effect
+from vcam_cli.effects.charge_diffusion import ChargeDiffusion
+from vcam_cli.effects.charge_transfer import ChargeTransfer
 from vcam_cli.effects.dark_current import DarkCurrent
 from vcam_cli.effects.diffraction import Diffraction
 from vcam_cli.effects.fpn import FixedPattern
+from vcam_cli.effects.microlens import Microlens
 from vcam_cli.effects.off_axis import OffAxis
 from vcam_cli.effects.pixel_aperture import PixelAperture
+from vcam_cli.effects.pixel_vignetting import PixelVignetting
 from vcam_cli.effects.quantization import Quantization
 from vcam_cli.effects.read_noise import ReadNoise
 from vcam_cli.effects.reset_noise import ResetNoise
 from vcam_cli.effects.saturation import Saturation
 from vcam_cli.effects.shot_noise import ShotNoise
+from vcam_cli.effects.stray_light import StrayLight
 
 ORDER: tuple[type[Effect], ...] = (
     Diffraction,
+    Aberration,
     PixelAperture,
+    ChargeDiffusion,
     OffAxis,
+    StrayLight,
+    PixelVignetting,
+    Microlens,
     DarkCurrent,
+    ChargeTransfer,
     ShotNoise,
     FixedPattern,
     ResetNoise,

@@ -1,4 +1,4 @@
-"""Blur by the photodetector, which averages over its own area."""
+"""Blur by the pixel, which averages over the area whose light it collects."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class PixelAperture(SeparableTransfer):
 
     @classmethod
     def of(cls, camera, geometry):
-        return cls(geometry.detector_width, geometry.detector_height)
+        return cls(geometry.collecting_width, geometry.collecting_height)
 
     def describe(self) -> str:
         return f"averages over {self.width * 1e6:.4g} x {self.height * 1e6:.4g} um"

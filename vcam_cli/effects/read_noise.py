@@ -1,37 +1,67 @@
-"""Noise of the readout chain."""
+"""Noise of the readout chain: of every pixel, of every column, of every row."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
+from vcam_cli.camera.architecture import ARCHITECTURES
 from vcam_cli.effects.base import Draw
 
 
 @dataclass(frozen=True)
 class ReadNoise(Draw):
-    """Input-referred noise of one readout [electrons rms]."""
+    """Input-referred noise of one readout [electrons rms], new in every frame.
+
+    A pixel has its own, that of its column and that of its row; the three are independent.
+    """
 
     electrons: float
+    column: float = 0.0
+    row: float = 0.0
+    no_columns: str = ""
+    """The architecture, where its columns have no noise though the file gives it."""
 
     name = "read_noise"
-    reference = "Chen 2003, eq 2.26 (Q_r)"
-    absent = "the file gives no pixel.readout.read_noise, or 0"
+    reference = "Chen 2003, eq 2.26 (Q_r); column and row parts: EMVA 1288 release 4.0, section 8"
+    absent = "the file gives no read, column or row noise that its architecture has, or 0"
     seconds_per_pixel = 9e-9
     scope = "frame"
+    of_readout = True
 
     @classmethod
     def of(cls, camera, geometry):
-        sigma = camera.pixel.readout.read_noise
-        return cls(sigma) if sigma > 0 else None
+        given, name = camera.pixel.readout, camera.pixel.architecture
+        missing = given.column_noise > 0 and not ARCHITECTURES[name].column_terms
+        column = 0.0 if missing else given.column_noise
+        if not any((given.read_noise, column, given.row_noise)):
+            return None
+        return cls(given.read_noise, column, given.row_noise, name if missing else "")
 
     def describe(self) -> str:
-        return f"{self.electrons:.4g} electrons rms"
+        said = f"{self.electrons:.4g} electrons rms"
+        if self.column:
+            said += f", {self.column:.4g} of every column"
+        if self.row:
+            said += f", {self.row:.4g} of every row"
+        if self.no_columns:
+            said += f" (columns have no noise in a {self.no_columns})"
+        return said
+
+    def split(self):
+        column = ReadNoise(0.0, column=self.column) if self.column else None
+        row = ReadNoise(0.0, row=self.row) if self.row else None
+        return ReadNoise(self.electrons), column, row
 
     def apply(self, electrons, site):
-        z = site.normal(self.name)
-        z *= self.electrons
-        electrons += z
+        if self.electrons:
+            z = site.normal(self.name)
+            z *= self.electrons
+            electrons += z
+        if self.column:
+            electrons += self.column * site.normal_columns("read_noise column")
+        if self.row:
+            electrons += self.row * site.normal_rows("read_noise row")
         return electrons
 
-    def variance(self, mean):
-        return self.electrons**2
+    def variance(self, mean, dark=0.0):
+        return self.electrons**2 + self.column**2 + self.row**2

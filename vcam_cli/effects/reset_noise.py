@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from vcam_cli.camera.architecture import ARCHITECTURES
 from vcam_cli.camera.electrical import electrical
 from vcam_cli.effects.base import Draw
 from vcam_cli.physics import readout
@@ -11,24 +12,37 @@ from vcam_cli.physics import readout
 
 @dataclass(frozen=True)
 class ResetNoise(Draw):
-    """Thermal noise of the reset photodiode, or a stated number [electrons rms]."""
+    """Thermal noise of what is reset, or a stated number [electrons rms].
+
+    What is reset is the architecture's: the photodiode, or the bit line of a passive pixel. Where
+    correlated double sampling takes the noise away there is none, stated or not.
+    """
 
     electrons: float
 
     name = "reset_noise"
     reference = "Chen 2003, section 2.2.3: kTC, sigma^2 = kTC/q^2"
-    absent = "the file says pixel.readout.reset_noise: none"
+    absent = (
+        "the file gives no pixel.readout.reset_noise, or correlated double sampling removes it"
+        " (aps-4t, ccd)"
+    )
     seconds_per_pixel = 9e-9
     scope = "frame"
+    in_samples = "same"
 
     @classmethod
     def of(cls, camera, geometry):
         given = camera.pixel.readout.reset_noise
-        if given == "none" or given == 0:
+        of_what = ARCHITECTURES[camera.pixel.architecture].reset_noise
+        if given == "none" or given == 0 or of_what == "none":
             return None
         if given != "ktc":
             return cls(float(given))
-        capacitance = electrical(camera).capacitance
+        if of_what == "bit line":
+            capacitance = camera.pixel.readout.bit_line_capacitance
+        else:
+            capacitance = electrical(camera).capacitance
+            assert capacitance is not None, "refused when the file was read"
         variance = readout.reset_noise_variance(capacitance, camera.pixel.temperature)
         return cls(float(variance) ** 0.5)
 
@@ -41,5 +55,5 @@ class ResetNoise(Draw):
         electrons += z
         return electrons
 
-    def variance(self, mean):
+    def variance(self, mean, dark=0.0):
         return self.electrons**2

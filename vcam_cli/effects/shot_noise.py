@@ -19,6 +19,7 @@ class ShotNoise(Draw):
     absent = "every pixel has it"
     seconds_per_pixel = 20e-9
     scope = "frame"
+    in_samples = "accumulates"
 
     @classmethod
     def of(cls, camera, geometry):
@@ -33,5 +34,5 @@ class ShotNoise(Draw):
             return noise.gaussian_shot(electrons, z)
         return noise.poisson_from_normal(electrons, z)
 
-    def variance(self, mean):
+    def variance(self, mean, dark=0.0):
         return mean

@@ -12,6 +12,9 @@ What lies between the samples:
 - 'averages' (a chart): samples are means over cells of a continuous scene. The series ends at
   k = N, and dividing by sinc(k / 2N) undoes the mean.
 
+A filter whose kernel is not even turns cosines into sines of the same frequencies; they have their
+own folding and transform (`odd=True`).
+
 Evaluation: where S is a whole number of pixel pitches, terms that the pixels cannot tell apart
 are folded onto each other and one DCT-III does it. Anywhere else (a crop that is no whole number
 of pixels, a photodetector off its pixel's center) it is a chirp-z transform, four times slower.
@@ -98,46 +101,54 @@ class Axis:
         out[..., self.samples :: 2 * self.samples] = 0
         return out
 
-    def sources(self, folded: slice) -> list[tuple[slice, NDArray, NDArray]]:
-        """Where a piece of the folded axis comes from: (its part, cosine terms, weights)."""
+    def sources(self, folded: slice, odd: bool = False) -> list[tuple[slice, NDArray, NDArray]]:
+        """Where a piece of the folded axis comes from: (its part, terms, weights)."""
         if self.virtual_pixels is None:
             terms = np.arange(folded.start, folded.stop)
             return [(folded, terms, np.ones(len(terms)))]
         out = []
         period = self.virtual_pixels
+        # The period's own terms: cosines 0 .. period - 1, sines 1 .. period.
+        own = np.arange(folded.start, folded.stop) + odd
+        alone = period if odd else 0
         for m in range(-(-self.terms // period)):
-            targets = np.arange(folded.start, folded.stop)
-            terms = m * period + targets if m % 2 == 0 else (m + 1) * period - targets
-            inside = (terms < self.terms) & ((m % 2 == 0) | (targets > 0))
+            terms = m * period + own if m % 2 == 0 else (m + 1) * period - own
+            inside = (terms < self.terms) & ((own != alone) | ((m % 2 == 0) != odd))
             if inside.any():
-                targets, terms = targets[inside], terms[inside]
-                # A DCT-III counts its constant once and every other term twice.
-                weights = _sign(m) * np.where((targets == 0) & (terms > 0), 2.0, 1.0)
-                out.append((slice(int(targets[0]), int(targets[-1]) + 1), terms, weights))
+                terms = terms[inside]
+                # The transforms count one term once and every other twice.
+                twice = (own[inside] == alone) & (terms > 0)
+                weights = _sign(m, odd) * np.where(twice, 2.0, 1.0)
+                at = np.flatnonzero(inside) + folded.start
+                out.append((slice(int(at[0]), int(at[-1]) + 1), terms, weights))
         return out
 
-    def fold(self, terms: NDArray) -> NDArray:
-        """Terms (..., n) folded onto the pixels' own cosines: (..., folded)."""
+    def fold(self, terms: NDArray, odd: bool = False) -> NDArray:
+        """Terms (..., n) folded onto the pixels' own cosines, or sines: (..., folded)."""
         n = terms.shape[-1]
         if self.virtual_pixels is None:
             out = np.zeros((*terms.shape[:-1], self.terms), terms.dtype)
             out[..., :n] = terms
             return out
         out = np.zeros((*terms.shape[:-1], self.virtual_pixels), terms.dtype)
-        for target, source, sign in segments(self.virtual_pixels, n):
+        for target, source, sign in segments(self.virtual_pixels, n, odd):
             if sign > 0:
                 out[..., target] += terms[..., source]
             else:
                 out[..., target] -= terms[..., source]
-        # A DCT-III counts its constant once and every other term twice.
-        out[..., 0] += out[..., 0] - terms[..., 0]
+        # A DCT-III counts its constant once and every other term twice, a DST-III its last term.
+        if odd:
+            out[..., -1] *= 2
+        else:
+            out[..., 0] += out[..., 0] - terms[..., 0]
         return out
 
-    def evaluate(self, values: NDArray, axis: int) -> NDArray:
+    def evaluate(self, values: NDArray, axis: int, odd: bool = False) -> NDArray:
         """Folded values -> values at the photodetectors along `axis` (0 or 1 of two)."""
         if self.virtual_pixels is None:
-            return self._chirp(values, axis)
-        full = scipy.fft.dct(values, type=3, axis=axis, overwrite_x=True)
+            return self._chirp(values, axis, odd)
+        transform = scipy.fft.dst if odd else scipy.fft.dct
+        full = transform(values, type=3, axis=axis)
         start = round(self.first / self.pixel_pitch - 0.5)
         window = slice(start, start + self.pixels)
         return full[window] if axis == 0 else full[:, window]
@@ -156,8 +167,8 @@ class Axis:
         after = 2 * np.exp(1j * half * i.astype(float) ** 2)
         return size, before, scipy.fft.fft(kernel), after
 
-    def _chirp(self, values: NDArray, axis: int) -> NDArray:
-        """Bluestein's algorithm, for the real part of a sum of exponentials."""
+    def _chirp(self, values: NDArray, axis: int, odd: bool) -> NDArray:
+        """Bluestein's algorithm, for the real or imaginary part of a sum of exponentials."""
         size, before, kernel, after = self._chirp_parts
         kind = np.complex64 if values.dtype == np.float32 else np.complex128
         shape = (-1, 1) if axis == 0 else (1, -1)
@@ -166,32 +177,35 @@ class Axis:
         work *= kernel.astype(kind).reshape(shape)
         work = scipy.fft.ifft(work, axis=axis, overwrite_x=True)
         work = work[: self.pixels] if axis == 0 else work[:, : self.pixels]
-        return (work * after.astype(kind).reshape(shape)).real
+        work *= after.astype(kind).reshape(shape)
+        return work.imag if odd else work.real
 
 
-def _sign(segment: int) -> int:
-    """Sign of the cosines of segment m, terms m L to (m + 1) L: + - - + + - - ..."""
-    return 1 if (segment + 1) // 2 % 2 == 0 else -1
+def _sign(segment: int, odd: bool = False) -> int:
+    """Sign of segment m, terms m L to (m + 1) L: cosines + - - + + - -, sines + + - - + + ..."""
+    return 1 if (segment + (not odd)) // 2 % 2 == 0 else -1
 
 
-def segments(period: int, terms: int) -> list[tuple[slice, slice, int]]:
-    """How cosine terms 0..terms-1 fold onto a basis of `period` samples.
+def segments(period: int, terms: int, odd: bool = False) -> list[tuple[slice, slice, int]]:
+    """How cosine terms 0..terms-1 (odd: sine terms) fold onto a basis of `period` samples.
 
     cos(pi k (i + 1/2) / L) repeats with k: k = 2L - j gives minus the cosine of j, k = 2L + j
-    likewise minus it, k = L vanishes. Returns (slice of the basis, slice of the terms, sign);
-    basis slices run backwards in odd segments, terms always forward.
+    likewise minus it, k = L vanishes. Of sines, whose basis is 1..L, k = 2L - j gives the sine of
+    j, k = 2L + j minus it, and k = 0 and 2L vanish. Returns (slice of the basis, slice of the
+    terms, sign); basis slices run backwards in odd segments, terms always forward.
     """
     out = []
     for m in range(-(-terms // period)):
-        sign = _sign(m)
+        # The segment's first term vanishes: of cosines in odd segments, of sines in even ones.
+        skipped = int((m % 2 == 1) != odd)
+        n = min(period - skipped, terms - m * period - skipped)
+        if n <= 0:
+            continue
+        first = m * period + skipped
         if m % 2 == 0:
-            n = min(period, terms - m * period)
-            out.append((slice(0, n), slice(m * period, m * period + n), sign))
+            basis = slice(0, n)
         else:
-            n = min(period - 1, terms - m * period - 1)
-            if n > 0:
-                first = m * period + 1
-                stop = period - 1 - n
-                backwards = slice(period - 1, stop if stop >= 0 else None, -1)
-                out.append((backwards, slice(first, first + n), sign))
+            stop = period - 1 - n
+            basis = slice(period - 1, stop if stop >= 0 else None, -1)
+        out.append((basis, slice(first, first + n), _sign(m, odd)))
     return out

@@ -86,11 +86,14 @@ def first_guess(geometry: Geometry, knobs: Settings) -> int:
     return max(knobs.oversampling, min(free, 4, knobs.most_oversampling))
 
 
-def most(geometry: Geometry, knobs: Settings) -> int:
-    """Highest oversampling to be tried: what the settings say, and more on a small array."""
+def most(pixels: float, knobs: Settings) -> int:
+    """Highest oversampling to be tried: what the settings say, and more on a small array.
+
+    pixels: of the scene, with the margin that a chart has.
+    """
     if knobs.most_oversampling <= knobs.oversampling:
         return knobs.most_oversampling  # the user's own
-    cheap = int(math.sqrt(CHEAP_SAMPLES / (geometry.rows * geometry.columns)))
+    cheap = int(math.sqrt(CHEAP_SAMPLES / pixels))
     return max(knobs.most_oversampling, min(cheap, 64))
 
 
@@ -105,7 +108,7 @@ def top(geometry: Geometry, oversampling: float, cutoff: float) -> float:
     return min(cutoff, oversampling * corner)
 
 
-def finer(now: int, lost: float, budget: float, geometry: Geometry, knobs: Settings) -> int:
+def finer(now: int, lost: float, budget: float, pixels: float, knobs: Settings) -> int:
     """Oversampling a chart needs when `now` loses `lost`; `now` itself where it will do.
 
     The power of an edge falls with the fourth power of the frequency (its own square and the
@@ -113,10 +116,9 @@ def finer(now: int, lost: float, budget: float, geometry: Geometry, knobs: Setti
     """
     if lost <= budget:
         return now
-    pixels = geometry.rows * geometry.columns
     affordable = max(now, int(math.sqrt(MOST_SAMPLES / pixels)))
-    needed = math.ceil(now * (lost / budget) ** (2 / 3)) if budget > 0 else most(geometry, knobs)
-    return max(now, min(max(needed, now + 1), most(geometry, knobs), affordable))
+    needed = math.ceil(now * (lost / budget) ** (2 / 3)) if budget > 0 else most(pixels, knobs)
+    return max(now, min(max(needed, now + 1), most(pixels, knobs), affordable))
 
 
 def brightest(planes: NDArray, tables: Tables) -> float:

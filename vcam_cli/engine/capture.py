@@ -16,11 +16,45 @@ from vcam_cli.effects.base import Charge, Code, Draw, Effect, Limit, Site
 from vcam_cli.engine.parallel import each
 from vcam_cli.rng import BLOCK_ROWS, blocks, stream
 
+LAYER = 32
+"""Bits of a block's number: those above are the layer's of stacked pixels."""
+
 
 def mean_electrons(rate: NDArray, time: float, effects: tuple[Effect, ...]) -> NDArray:
     """Noise-free signal before saturation, photo + dark: same shape as `rate` [electrons]."""
-    dark = sum(e.rate() for e in effects if isinstance(e, Charge))
-    return rate * rate.dtype.type(time) + rate.dtype.type(dark * time)
+    return rate * rate.dtype.type(time) + rate.dtype.type(mean_dark(time, effects))
+
+
+def mean_dark(time: float, effects: tuple[Effect, ...]) -> float:
+    """Mean dark signal of a pixel [electrons]."""
+    return time * sum(e.rate() for e in effects if isinstance(e, Charge))
+
+
+def sites(
+    tile: NDArray, dark: float, seeds: dict[str, int], layer: int, block: slice, sample: int = 0
+) -> dict[str, Site]:
+    """Where draws happen in a block of rows, by their scope.
+
+    tile: (rows, columns) of the block's shape and float type; dark: mean dark signal [electrons];
+    sample: index of the sample within one integration.
+    """
+    index = (layer << LAYER) + block.start // BLOCK_ROWS
+    return {
+        scope: Site(
+            rows=len(tile),
+            columns=tile.shape[1],
+            stream=partial(stream, seed, capture=sample, block=index),
+            line_stream=partial(stream, seed, capture=sample, block=layer << LAYER),
+            dtype=tile.dtype.type,
+            dark=dark,
+        )
+        for scope, seed in seeds.items()
+    }
+
+
+def codes_type(bits: int, count: int = 1) -> type[np.unsignedinteger]:
+    """The smallest whole numbers that hold all codes of an ADC, or sums of so many of them."""
+    return np.uint16 if count * (2**bits - 1) < 1 << 16 else np.uint32
 
 
 def capture(
@@ -31,32 +65,35 @@ def capture(
     seeds: dict[str, int],
     workers: int,
     done: Callable[[slice], None] | None = None,
+    layer: int = 0,
 ) -> tuple[NDArray, NDArray]:
     """One frame: (electrons, dn).
 
-    rate: (rows, columns) [e/s]; effects: those that run, in the order of action; code: the ADC;
+    rate: (rows, columns) [e/s], or (C, rows, columns) of stacked pixels, which are drawn one layer
+    after the other; effects: those that run, in the order of action; code: the ADC;
     seeds: of 'sensor' and 'frame'; done: called with every block of rows that is finished.
     electrons: same float type as `rate`, noisy, clipped above at the full well [electrons];
     dn: whole numbers, uint16, or uint32 from 17 bits on [DN].
     """
-    rows, columns = rate.shape
+    if rate.ndim == 3:
+        layers = [
+            capture(plane, time, effects, code, seeds, workers, layer=number)
+            for number, plane in enumerate(rate)
+        ]
+        return np.array([e for e, _ in layers]), np.array([dn for _, dn in layers])
+    draws = [e for e in effects if isinstance(e, Draw)]
+    dark = mean_dark(time, effects)
     electrons = np.empty_like(rate)
-    dn = np.empty(rate.shape, np.uint16 if code.bits <= 16 else np.uint32)
+    dn = np.empty(rate.shape, codes_type(code.bits))
 
     def shoot(block: slice) -> None:
         tile = mean_electrons(rate[block], time, effects)
-        index = block.start // BLOCK_ROWS
+        here = sites(tile, dark, seeds, layer, block)
+        for draw in draws:
+            tile = draw.before_shot(tile, here[draw.scope])
         for effect in effects:
             if isinstance(effect, Draw):
-                seed = seeds[effect.scope]
-                site = Site(
-                    rows=len(tile),
-                    columns=columns,
-                    stream=partial(stream, seed, block=index),
-                    line_stream=partial(stream, seed),
-                    dtype=rate.dtype.type,
-                )
-                tile = effect.apply(tile, site)
+                tile = effect.apply(tile, here[effect.scope])
             elif isinstance(effect, Limit):
                 tile = effect.apply(tile)
         electrons[block] = tile
@@ -64,5 +101,5 @@ def capture(
         if done is not None:
             done(block)
 
-    each(shoot, blocks(rows), workers)
+    each(shoot, blocks(len(rate)), workers)
     return electrons, dn

@@ -7,17 +7,20 @@ at the most common of these works, drawing normals; shared by the threads that r
 from __future__ import annotations
 
 import time
+from collections.abc import Sequence
 from functools import cache
 
 import numpy as np
 
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.geometry import Geometry
+from vcam_cli.effects.base import Code, Draw, Effect, Limit
 from vcam_cli.engine import bandwidth
 from vcam_cli.engine.mosaic import Mosaic
 from vcam_cli.engine.settings import Settings
 from vcam_cli.engine.transfer import Band
 from vcam_cli.engine.ways import Followed
+from vcam_cli.scheduling.estimators import PASSES
 
 NORMAL = 8.2e-9
 """Drawing one normal number, the unit of speed [s]."""
@@ -25,6 +28,8 @@ SAMPLE = 11e-9
 """Painting and transforming one sample of one plane of the scene [s]."""
 TERM = 5e-9
 """Filtering one term of the spectrum for one plane and color [s]."""
+TABLE = 1e-6
+"""One value of a transfer function of fx and fy, its part of the pupil's transforms too [s]."""
 EVALUATE = 9e-9
 """One pixel of one color from its spectrum [s]."""
 WAVE = 12e-9
@@ -35,6 +40,8 @@ JUDGE = 60e-9
 """One pixel of ideal image and metrics, per color [s]."""
 EXR = 28e-9
 """One noisy value into an EXR file [s]."""
+ESTIMATE = 25e-9
+"""One sample of a pixel into its photocurrent, once [s]."""
 BANDS_AT_ONCE = 4
 """Bands of the spectral irradiance that are computed together, as the colors of a frame are."""
 PNG = 14e-9
@@ -67,8 +74,9 @@ def linear(geometry: Geometry, mosaic: Mosaic, followed: Followed) -> float:
     terms = pixels * followed.oversampling**2
     return (
         SAMPLE * followed.samples * followed.planes
-        + TERM * terms * followed.planes * colors
-        + EVALUATE * pixels * colors
+        + TERM * terms * followed.planes * colors * followed.passes
+        + EVALUATE * pixels * colors * (1 + followed.modes)
+        + TABLE * followed.table_values
     )
 
 
@@ -81,6 +89,18 @@ def after(camera: Camera, geometry: Geometry, mosaic: Mosaic) -> float:
     if camera.quality:
         seconds += (JUDGE + EXR) * pixels * colors
     return seconds
+
+
+def samples(camera: Camera, geometry: Geometry, effects: Sequence[Effect]) -> float:
+    """Core seconds that several samples of one integration take more than a single exposure."""
+    count = len(camera.exposure.samples)
+    if not count:
+        return 0.0
+    again = sum(e.seconds_per_pixel for e in effects if isinstance(e, Draw | Limit | Code))
+    passes = PASSES if camera.exposure.estimator == "weighted" else 1
+    files = EXR * (count * len(camera.output.raw) + 1)
+    pixels = geometry.rows * geometry.columns
+    return pixels * ((count - 1) * again + count * passes * ESTIMATE + files)
 
 
 def irradiance(camera: Camera, geometry: Geometry, knobs: Settings, followed: Followed) -> float:

@@ -12,7 +12,7 @@ from vcam_cli.camera.exposure import AutoExposure
 def exposure_time(
     camera: Camera, rate: NDArray, white_rate: float, dark_rate: float, saturation: float
 ) -> float:
-    """Exposure time [s].
+    """Exposure time [s]; of several samples of one integration the last one's.
 
     rate: photo-electrons per second of every pixel; white_rate: of the scene's perfect white on
     the axis in its brightest color; dark_rate: of the dark [e/s]; saturation: electrons at which
@@ -21,8 +21,8 @@ def exposure_time(
     """
     auto = camera.exposure.auto
     if auto is None:
-        assert camera.exposure.time is not None
-        return camera.exposure.time
+        assert camera.exposure.given is not None
+        return camera.exposure.given
     return _reach(auto, _level(auto, rate, white_rate) + dark_rate, saturation)
 
 
@@ -38,12 +38,13 @@ def _level(auto: AutoExposure, rate: NDArray, white_rate: float) -> float:
 def ceiling(camera: Camera, white_rate: float, saturation: float) -> float:
     """Photo-electrons per second that fill a pixel, as far as it is known before the light is.
 
-    A given time tells. An automatic one will be about that of the perfect white, or the longest.
+    A given time tells; of several samples the last, which asks for the finest detail. An automatic
+    one will be about that of the perfect white, or the longest.
     """
     auto = camera.exposure.auto
     if auto is None:
-        assert camera.exposure.time is not None
-        return saturation / camera.exposure.time
+        assert camera.exposure.given is not None
+        return saturation / camera.exposure.given
     return max(white_rate / auto.target, saturation / auto.max)
 
 

@@ -5,36 +5,90 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vcam_cli.camera.camera import Camera
-from vcam_cli.camera.geometry import pixel_centers
-from vcam_cli.effects.base import Charge, Code, Draw
+from vcam_cli.effects.base import Charge, Code, Draw, Gain
 from vcam_cli.effects.quantization import Quantization
-from vcam_cli.engine import capture, optics, plan
+from vcam_cli.engine import binning, capture, captures, optics, plan
+from vcam_cli.engine.lights import Lights
 from vcam_cli.engine.parallel import available_workers
 from vcam_cli.engine.prepare import Prepared, prepare
 from vcam_cli.engine.stages import Stages
 from vcam_cli.physics import readout
+from vcam_cli.scheduling import estimators
 from vcam_cli.spectra import colorchecker
 
 
 @dataclass(frozen=True)
 class Frame(Prepared):
-    """A raw frame and all that is known of how it came about."""
+    """A raw frame and all that is known of how it came about.
+
+    Where the camera takes several samples of one integration, it is the last of them.
+    """
 
     electrons: NDArray
     """(rows, columns) noisy signal, clipped at the full well [electrons]"""
     dn: NDArray
     """(rows, columns) [DN]"""
+    times: tuple[float, ...] = ()
+    """(N,) of the samples [s]; none of a single exposure."""
+    samples_electrons: NDArray | None = None
+    """(N, rows, columns) as `electrons`; None of a single exposure."""
+    samples_dn: NDArray | None = None
+    """(N, rows, columns) as `dn`; None of a single exposure."""
+    photocurrent: NDArray | None = None
+    """(rows, columns) what the samples tell of the light [e/s]; None of a single exposure."""
+
+    def sample(self, number: int) -> Frame:
+        """One of the samples, from 0, as a frame of its own."""
+        assert self.samples_electrons is not None and self.samples_dn is not None
+        return replace(
+            self,
+            exposure_time=self.times[number],
+            electrons=self.samples_electrons[number],
+            dn=self.samples_dn[number],
+            times=(),
+            samples_electrons=None,
+            samples_dn=None,
+            photocurrent=None,
+        )
+
+    @cached_property
+    def picture_dn(self) -> NDArray:
+        """What is made into a picture, in the shape of `dn` [DN].
+
+        Of several samples: the codes of the photocurrent in the last one's time, as if neither
+        well nor ADC had an end, and without rounding. So the scale is that of the last sample.
+        """
+        if self.photocurrent is None:
+            return self.dn
+        return self._without_end(self.photocurrent)
+
+    @property
+    def picture_saturated_dn(self) -> float:
+        """From which on a pixel of `picture_dn` is saturated: in all its samples [DN]."""
+        if not self.times:
+            return self.saturated_dn
+        linear = float(self.code.linear(np.array([self.saturated_dn]))[0])
+        charge = (linear - self.electrical.offset) * self.electrical.electrons_per_dn
+        # Not all of it: the photocurrent is rounded to 32 bits, and so is its code.
+        least = charge / self.times[0] * (1 - 1e-6) - self.dark_rate
+        return float(self._without_end(np.array([least]))[0])
+
+    def _without_end(self, photocurrent: NDArray) -> NDArray:
+        """Codes of a photocurrent [e/s] in the exposure time, neither rounded nor clipped [DN]."""
+        return self.to_dn((photocurrent + self.dark_rate) * self.exposure_time)
 
     @property
     def mean_electrons(self) -> NDArray:
         """(rows, columns) noise-free signal before saturation, photo + dark [electrons]"""
-        return capture.mean_electrons(self.rate, self.exposure_time, self.plan.active)
+        mean = capture.mean_electrons(self.rate, self.exposure_time, self.plan.active)
+        return self.layout.joining.joined(mean)
 
     @property
     def code(self) -> Code:
@@ -44,77 +98,161 @@ class Frame(Prepared):
     @property
     def black_dn(self) -> float:
         """Code of the mean dark signal, offset included [DN]."""
-        return float(self.to_dn(np.array([self.dark_rate * self.exposure_time]))[0])
+        dark = self.dark_rate * self.exposure_time * self._summed
+        return float(self.to_dn(np.array([dark]))[0])
+
+    @property
+    def _summed(self) -> int:
+        """Pixels whose codes are added."""
+        return self.layout.joining.summed
 
     def to_dn(self, electrons: NDArray) -> NDArray:
-        """The ADC's curve before rounding and clipping [DN]."""
-        return self.code.line(electrons)
+        """The ADC's curve before rounding and clipping; codes that are added are equal [DN]."""
+        n = self._summed
+        return self.code.line(electrons) if n == 1 else n * self.code.line(electrons / n)
+
+    def linear(self, dn: NDArray) -> NDArray:
+        """What a linear ADC has for these codes, which are added where `to_dn` adds them [DN]."""
+        n = self._summed
+        return self.code.linear(dn) if n == 1 else n * self.code.linear(dn / n)
 
     @property
     def white_dn(self) -> NDArray:
         """(C,) perfect white on the axis, noise-free, dark included, not clipped [DN]."""
         electrons = (self.white_rate + self.dark_rate) * self.exposure_time
-        return np.asarray(self.to_dn(electrons))
+        return np.asarray(self.to_dn(electrons * self._summed))
 
     @property
     def saturated_dn(self) -> float:
-        """The lowest code of a saturated pixel: of a full well, or the ADC's highest [DN]."""
-        full = float(np.rint(self.to_dn(np.array([self.electrical.full_well], float))[0]))
-        return min(full, float(self.electrical.highest_code))
+        """The lowest code of a saturated pixel: of a full well, or the ADC's highest [DN].
+
+        Of pixels that are read as one, where all of them are.
+        """
+        well, highest = self.electrical.full_well, float(self.electrical.highest_code)
+        if self.layout.joining.binning.kind == "voltage":
+            well -= binning.SURE * self._noise_of_full
+        full = float(np.rint(self.code.line(np.array([well], float))[0]))
+        return self._summed * min(full, highest)
+
+    @property
+    def _noise_of_full(self) -> float:
+        """What is behind the full wells of joined voltages, and not clipped with them [e rms]."""
+        well = self.electrical.full_well
+        draws = [e for e in binning.read_together(self.plan.active) if isinstance(e, Draw)]
+        return float(np.sqrt(sum(e.variance(well) for e in draws)))
 
     def patches_dn(self) -> NDArray:
         """(C, 24) a ColorChecker in the light of the scene, on the axis, as `white_dn` [DN]."""
         lit = [self.scene.white.times(reflectance) for _, reflectance in colorchecker()]
+        gains = [e for e in self.plan.active if isinstance(e, Gain)]
         seen = optics.scene_transfer(
-            self.camera, self.geometry, self.settings, lit, self.mosaic, ()
+            self.camera, self.geometry, self.settings, lit, self.mosaic, gains
         )
-        return self.to_dn((seen.level.T + self.dark_rate) * self.exposure_time)
+        rate = seen.level.T * self.layout.joining.gathered + self.dark_rate * self._summed
+        return self.to_dn(rate * self.exposure_time)
 
     def ideal_dn(self) -> NDArray:
         """The scene point-sampled at the pixels' centers, all colors everywhere [DN].
 
-        (C, rows, columns); no blur, no falloff, no noise; black included.
+        (C, rows, columns) of the picture; no blur, no falloff, no noise; black included.
         """
-        x, y = pixel_centers(self.geometry)
-        photo = self.scene.at(x, y, self.transfer.level.T * self.exposure_time)
-        return self.to_dn(photo + self.dark_rate * self.exposure_time)
+        place = self.layout
+        level = self.transfer.level.T * self.exposure_time * place.joining.gathered
+        photo = self.scene.at(place.picture_x, place.picture_y, level)
+        return self.to_dn(photo + self.dark_rate * self.exposure_time * self._summed)
 
 
-def expose(camera: Camera, picture: NDArray | None, workers: int | None, stages: Stages) -> Frame:
+def expose(
+    camera: Camera,
+    picture: NDArray | None,
+    workers: int | None,
+    stages: Stages,
+    lights: Lights | None = None,
+) -> Frame:
     """Simulates one frame of `camera`.
 
     picture: samples of the scene's image file, (h, w, channels), linear light; None for charts.
+    lights: what keeps the light for further cameras, where there are any.
     Raises BadInput where the camera contradicts itself, CannotDo where memory does not suffice.
     """
     workers = workers or available_workers()
-    ready = prepare(camera, picture, workers, stages)
+    ready = prepare(camera, picture, workers, stages, lights)
     with stages("capture"):
         active = tuple(x for x in ready.plan.active if not isinstance(x, Code))
         code = Quantization.of(camera, ready.geometry)
         seeds = {"sensor": camera.seed.sensor, "frame": camera.seed.frame}
-        electrons, dn = capture.capture(
-            ready.rate, ready.exposure_time, active, code, seeds, workers
+        known = {field.name: getattr(ready, field.name) for field in fields(ready)}
+        times = camera.exposure.samples
+        if not times:
+            take = partial(capture.capture, code=code, seeds=seeds, workers=workers)
+            joins, time = ready.layout.joining, ready.exposure_time
+            electrons, dn = binning.read(joins, ready.rate, time, active, take, code.bits)
+            return Frame(**known, electrons=electrons, dn=dn)
+        electrons, dn = captures.samples(ready.rate, times, active, code, seeds, workers)
+    last = Frame(**known, electrons=electrons[-1], dn=dn[-1])
+    with stages("reconstruction"):
+        light = captures.photocurrent(
+            dn,
+            times,
+            camera.exposure.estimator,
+            active,
+            code,
+            ready.electrical,
+            last.saturated_dn,
+            workers,
         )
-    known = {field.name: getattr(ready, field.name) for field in fields(ready)}
-    return Frame(**known, electrons=electrons, dn=dn)
+    return replace(
+        last, times=times, samples_electrons=electrons, samples_dn=dn, photocurrent=light
+    )
 
 
 def figures(frame: Frame) -> list[tuple[str, float, str]]:
     """The metrics every run has: (metric, value, unit). Eqs 3.1 and 3.2 for DR and SNR.
 
     These two are of the camera that the file describes, whatever the plan left out of the frame.
+    Of pixels that are read as one they are of one such pixel in even light, SNR where each well is
+    a fifth full, and well capacity is in the unit of `electrons`: one node's well where charges
+    are joined, the mean of the wells of voltages, the sum of those whose codes are added.
+    Of several samples of one integration, all but the last two are of the last sample.
     """
     e = frame.electrical
     wanted = plan.wanted(frame.camera, frame.geometry)
     draws = [x for x in wanted if isinstance(x, Draw) and x.scope == "frame"]
-    floor = sum(x.variance(0.0) for x in draws)
+    joins = frame.layout.joining
+    # In electrons of all wells together, in which shot noise is Poisson's.
+    wells = joins.count // joins.charges
+    floor = sum(binning.variance(x, 0.0, 0.0, joins.binning) for x in draws) * wells**2
     dark = sum(x.rate() for x in wanted if isinstance(x, Charge)) * frame.exposure_time
-    saturated = (frame.electrons >= e.full_well) | (frame.dn >= e.highest_code)
-    return [
+    well, all_dark = e.full_well * wells, dark * wells
+    saturated = frame.dn >= frame.saturated_dn
+    if wells == 1:
+        saturated = (frame.electrons >= e.full_well) | (frame.dn >= e.highest_code)
+    listed = [
         ("exposure_time", frame.exposure_time, "s"),
         ("mean_electrons", float(frame.electrons.mean(dtype=np.float64)), "e"),
         ("saturated_fraction", float(saturated.mean()), ""),
-        ("snr_db", float(readout.snr_db(0.2 * e.full_well, dark, floor)), "dB"),
-        ("dynamic_range_db", float(readout.dynamic_range_db(e.full_well, dark, floor)), "dB"),
-        ("well_capacity", e.full_well, "e"),
+        ("snr_db", float(readout.snr_db(0.2 * well, all_dark, floor)), "dB"),
+        ("dynamic_range_db", float(readout.dynamic_range_db(well, all_dark, floor)), "dB"),
+        ("well_capacity", e.full_well * joins.summed, "e"),
+    ]
+    return listed + _of_samples(frame, dark, draws) if frame.times else listed
+
+
+def _of_samples(frame: Frame, dark: float, draws: list[Draw]) -> list[tuple[str, float, str]]:
+    """What several samples add: the dynamic range of the photocurrent, and where it is not known.
+
+    Eq 3.1 for the photocurrent: the largest that does not fill the first sample, over the noise
+    of the estimate in the dark. dark: of the last sample [electrons]; draws: new in every frame.
+    """
+    first, last = frame.times[0], frame.times[-1]
+    floor = sum(x.variance(0.0) for x in draws)
+    if frame.camera.exposure.estimator == "weighted":
+        read = sum(x.variance(0.0) for x in draws if x.in_samples == "new")
+        noise = estimators.variance(0.0, frame.times, dark / last, read, floor - read)
+        floor = float(noise) * last**2 - dark
+    well = frame.electrical.full_well * last / first
+    nowhere = frame.picture_dn >= frame.picture_saturated_dn
+    return [
+        ("hdr_saturated_fraction", float(nowhere.mean()), ""),
+        ("hdr_dynamic_range_db", float(readout.dynamic_range_db(well, dark, floor)), "dB"),
     ]

@@ -2,7 +2,8 @@
 
 The same linear part as the frame's, with one exchange: a pixel is its whole cell (pitch by pitch),
 sees one narrow band and counts watts. So every value is the mean spectral irradiance over one
-pixel's cell, after the lens's transmittance, falloff and blur (eqs 2.18 and 2.22).
+pixel's cell, after the lens's transmittance, falloff and blur (eqs 2.18 and 2.22). Where pixels
+form no rectangular array the cells are those of the picture.
 
 A band is a hat function on one wavelength of the camera's nodes, as wide as its neighbors are
 apart, and the value is the band's irradiance over the hat's area. So the sum of all values times
@@ -20,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcam_cli.camera.geometry import Geometry, pixel_centers
-from vcam_cli.effects.base import Gain, RadialTransfer
+from vcam_cli.effects.base import Blur, Gain, Veil
 from vcam_cli.effects.pixel_aperture import PixelAperture
 from vcam_cli.engine import optics, ways
 from vcam_cli.engine.cost import BANDS_AT_ONCE
@@ -62,7 +63,8 @@ def planes(ready: Prepared, workers: int) -> Iterator[NDArray]:
         if band in lit:
             yield next(found) * ready.settings.dtype(peak)
         else:
-            yield np.zeros((ready.geometry.rows, ready.geometry.columns), ready.settings.dtype)
+            g = ready.layout.grid
+            yield np.zeros((g.rows, g.columns), ready.settings.dtype)
 
 
 def _bands(
@@ -72,43 +74,50 @@ def _bands(
 
     level: (K, n) of the scene's components in every band. Yields (rows, columns) in its unit.
     """
-    g = _whole_cells(ready.geometry)
+    g = _whole_cells(ready.layout.grid)
     in_lens = [e for e in ready.plan.active if e.in_lens]
-    radial = tuple(e for e in in_lens if isinstance(e, RadialTransfer))
-    transfer = Transfer(wavelengths, level[:, :, None] * np.eye(len(wavelengths)), radial)
+    blurs = tuple(e for e in in_lens if isinstance(e, Blur))
+    transfer = Transfer(wavelengths, level[:, :, None] * np.eye(len(wavelengths)), blurs)
     bands = Mosaic((tuple(f"{w * 1e9:.6f}" for w in wavelengths),))
     effects = (*in_lens, PixelAperture(g.pitch_x, g.pitch_y))
     light = Optics(transfer, g, _as_fine(ready), bands, effects, workers)
     dtype = ready.settings.dtype
     x, y = pixel_centers(g)
     gains = [e.gain(x.astype(dtype), y.astype(dtype)) for e in in_lens if isinstance(e, Gain)]
-    rows, _ = ways.rows(light, lambda oversampling: _scene(ready, oversampling))
-    for values in rows:
-        out: NDArray = np.empty((g.rows, g.columns), dtype)
+    astray = sum(e.fraction for e in in_lens if isinstance(e, Veil))
+    out: NDArray = np.zeros((len(wavelengths), g.rows, g.columns), dtype)
+    layers, _ = ways.layers(light, lambda oversampling: _scene(ready, oversampling))
+    for layer in layers:
 
-        def fill(s: slice, values: ways.Rows = values, out: NDArray = out) -> None:
-            np.maximum(values(s), 0, out=out[s])
+        def add(s: slice, layer: ways.Layer = layer) -> None:
+            weight = 1 if layer.weight is None else layer.weight(x.astype(dtype), y[s])
+            for band, plane in enumerate(out):
+                plane[s] += weight * layer.values(band, s)
 
-        each(fill, blocks(g.rows), workers)
+        each(add, blocks(g.rows), workers)
+    for plane in out:
+        np.maximum(plane, 0, out=plane)
         for gain in gains:
-            out *= gain
-        yield out
+            plane *= gain
+        if astray:
+            plane += astray * (plane.mean(dtype=np.float64) - plane)
+        yield plane
 
 
 def _as_fine(ready: Prepared) -> Settings:
     """Settings that begin with the sampling at which the frame's chart ended."""
     if _sampled_once(ready.scene):
         return ready.settings
-    known = math.ceil(ready.spectrum.oversampling)
+    finer = ready.layout.grid.pitch_x / ready.layout.lattice.pitch_x
+    known = math.ceil(ready.spectrum.oversampling * finer)
     return replace(ready.settings, oversampling=max(known, ready.settings.oversampling))
 
 
 def _scene(ready: Prepared, oversampling: int) -> WaveScene | SampledScene:
     if _sampled_once(ready.scene):
         return ready.scene
-    return build(
-        ready.camera.scene, optics.view(ready.geometry, ready.settings, oversampling), None
-    )
+    view = optics.view(ready.layout.grid, ready.settings, oversampling)
+    return build(ready.camera.scene, view, None)
 
 
 def _sampled_once(scene: WaveScene | SampledScene) -> bool:
@@ -127,11 +136,12 @@ def levels(ready: Prepared, wavelengths: NDArray) -> NDArray:
 
 
 def _whole_cells(geometry: Geometry) -> Geometry:
-    """The same sensor with photodetectors that fill their pixels' cells, gaps included."""
+    """The same sensor collecting the light of whole cells, gaps included."""
     return replace(
         geometry,
-        detector_width=geometry.pitch_x,
-        detector_height=geometry.pitch_y,
-        detector_x=0.0,
-        detector_y=0.0,
+        collecting_width=geometry.pitch_x,
+        collecting_height=geometry.pitch_y,
+        collecting_x=0.0,
+        collecting_y=0.0,
+        sampling_scale=1.0,
     )

@@ -36,15 +36,20 @@ def available() -> int:
     return min(found)
 
 
-def of_frame(geometry: Geometry, knobs: Settings, colors: int, judged: bool) -> int:
+def of_frame(
+    geometry: Geometry, knobs: Settings, colors: int, judged: bool, samples: int = 0
+) -> int:
     """Peak memory of a frame without its scene [bytes]: spectra, signal, raw, render.
 
-    judged: whether an ideal image is made and compared.
+    judged: whether an ideal image is made and compared; samples: of one integration, of each color
+    that a pixel has; 0 for a single exposure.
     """
     pixels = geometry.rows * geometry.columns
     width = knobs.float_width // 8
     series = pixels * width * (2 * colors + 1)
     frame = pixels * (3 * width + 2 + colors)
+    if samples:  # their electrons and codes, the photocurrent and what is made into a picture
+        frame += pixels * (samples * (width + 4) + 8)
     return BASE + max(series, frame) + (16 * pixels * colors if judged else 0)
 
 
@@ -55,7 +60,10 @@ def of_planes(scene: SampledScene, planes: int, geometry: Geometry, knobs: Setti
 
 def of_followed(followed: Followed, geometry: Geometry, knobs: Settings) -> int:
     """Peak memory that a scene took while it was filtered [bytes]."""
-    return _filtering(followed.samples, followed.planes, geometry, knobs)
+    needed = _filtering(followed.samples, followed.planes, geometry, knobs)
+    if followed.passes > 1:  # a filter's signal beside the sum of those before, in three colors
+        needed += 3 * geometry.rows * geometry.columns * (knobs.float_width // 8)
+    return needed + 16 * followed.table_values
 
 
 def _filtering(samples: int, planes: int, geometry: Geometry, knobs: Settings) -> int:

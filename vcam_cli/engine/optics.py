@@ -6,6 +6,7 @@ three ways (`ways.py`); slowly varying factors multiply the result.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -14,7 +15,8 @@ from numpy.typing import NDArray
 
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.geometry import Geometry, pixel_centers
-from vcam_cli.effects.base import Effect, Gain, RadialTransfer
+from vcam_cli.camera.photodiode import quantum_efficiency
+from vcam_cli.effects.base import Blur, Effect, Gain, Veil
 from vcam_cli.engine import ways
 from vcam_cli.engine.mosaic import Mosaic
 from vcam_cli.engine.parallel import each
@@ -51,7 +53,8 @@ def _margin(geometry: Geometry) -> int:
     def slow(margin: int) -> int:
         return sum(_work(n + 2 * margin) for n in (geometry.rows, geometry.columns))
 
-    least = min(MARGIN, max(geometry.rows, geometry.columns))
+    per_pixel = max(1.0, geometry.pixel_width / geometry.pitch_x)
+    least = min(round(MARGIN * per_pixel), max(geometry.rows, geometry.columns))
     most = least + min(32, least)
     return min(range(least, most + 1), key=lambda m: (slow(m), m))
 
@@ -69,10 +72,7 @@ def _work(size: int) -> int:
 
 def responses(camera: Camera, mosaic: Mosaic) -> list[Spectrum]:
     """Electrons per photon for each color: transmittance x filter x QE."""
-    common = (
-        camera.optics.transmittance.resolve(),
-        (camera.pixel.photodetector.quantum_efficiency.spectrum.resolve()),
-    )
+    common = (camera.optics.transmittance.resolve(), quantum_efficiency(camera))
     out = []
     for color in mosaic.colors:
         spec = camera.array.filters.get(color)
@@ -89,10 +89,14 @@ def scene_transfer(
     mosaic: Mosaic,
     effects: Sequence[Effect],
 ) -> Transfer:
-    """H_kc of scene spectra [W / (sr m2 m)] in this camera, eq 2.18 and 2.23. [electrons / s]"""
+    """H_kc of scene spectra [W / (sr m2 m)] on the axis, eq 2.18 and 2.23. [electrons / s]
+
+    Of the effects: the blurs that are the same everywhere, and the gains as they are on the axis.
+    """
     area = geometry.detector_area
     if camera.pixel.photodetector.quantum_efficiency.per_pixel:
         area = geometry.pixel_width * geometry.pixel_height
+    area *= math.prod(e.on_axis for e in effects if isinstance(e, Gain))
     irradiance = float(
         radiometry.irradiance_per_radiance(geometry.f_number, geometry.magnification)
     )
@@ -102,7 +106,7 @@ def scene_transfer(
         responses(camera, mosaic),
         irradiance * area,
         Band(wavelengths.start, wavelengths.stop, settings.wavelength_step),
-        [e for e in effects if isinstance(e, RadialTransfer)],
+        [e for e in effects if isinstance(e, Blur)],
     )
 
 
@@ -111,39 +115,107 @@ class Rate:
     """What the linear part gives."""
 
     values: NDArray
-    """(rows, columns) [electrons / s]"""
+    """(rows, columns) of the lattice, or (C, rows, columns) with every color [electrons / s]"""
     spectrum: ways.Followed
     """How far the scene's spectrum was followed, and what each transfer does to the picture."""
 
 
-def photo_rate(optics: ways.Optics, scene_at: Callable[[int], WaveScene | SampledScene]) -> Rate:
-    """Photo-electrons per second in every pixel, noise-free.
+def photo_rate(
+    optics: ways.Optics,
+    scene_at: Callable[[int], WaveScene | SampledScene],
+    planes: bool = False,
+) -> Rate:
+    """Photo-electrons per second in every place of the lattice, noise-free.
 
-    scene_at: the scene with so many cells per pixel pitch, where it is a chart.
+    scene_at: the scene with so many cells per pixel pitch, where it is a chart. planes: every
+    color in every place, and not each place's own.
     Raises CannotDo where memory does not suffice.
     """
-    rows, followed = ways.rows(optics, scene_at)
-    g = optics.geometry
-    out: NDArray = np.empty((g.rows, g.columns), optics.settings.dtype)
-    gains = [e for e in optics.effects if isinstance(e, Gain)]
+    layers, followed = ways.layers(optics, scene_at)
+    g, mosaic = optics.geometry, optics.mosaic
+    count = len(mosaic.colors) if planes else 1
+    out: NDArray = np.zeros((count, g.rows, g.columns), optics.settings.dtype)
     x, y = (axis.astype(out.dtype) for axis in pixel_centers(g))
+    before, veil, after = _in_order(optics.effects)
+    on_axis = {e: out.dtype.type(1 / (e.on_axis or 1.0)) for e in (*before, *after)}
 
-    def compute(block: slice) -> None:
-        tile = out[block]
-        _assemble(rows, optics.mosaic, block, tile)
-        np.maximum(tile, 0, out=tile)
-        for effect in gains:
-            tile *= effect.gain(x, y[block])
+    def gain(effects: Sequence[Gain], block: slice) -> None:
+        for effect in effects:
+            factor = effect.gain(x, y[block])
+            # The light has the gain of the axis in it: see `scene_transfer`.
+            out[:, block] *= factor if on_axis[effect] == 1 else factor * on_axis[effect]
 
-    each(compute, blocks(g.rows), optics.workers)
-    return Rate(out, followed)
+    def finish(block: slice) -> None:
+        np.maximum(out[:, block], 0, out=out[:, block])
+        gain(before, block)
+        if veil is None:
+            gain(after, block)
+
+    for number, layer in enumerate(layers):
+
+        def compute(block: slice, layer: ways.Layer = layer, first: bool = number == 0) -> None:
+            tile = out[:, block] if first else np.zeros_like(out[:, block])
+            _fill(tile, layer, mosaic, block)
+            if layer.weight is not None:
+                tile *= layer.weight(x, y[block])
+            if not first:
+                out[:, block] += tile
+            if optics.field is None:
+                finish(block)
+
+        each(compute, blocks(g.rows), optics.workers)
+    if optics.field is not None:
+        each(finish, blocks(g.rows), optics.workers)
+    if veil is not None:
+        _spread(out, mosaic, veil)
+        each(lambda block: gain(after, block), blocks(g.rows), optics.workers)
+    return Rate(out if planes else out[0], followed)
 
 
-def _assemble(rows: Sequence[ways.Rows], mosaic: Mosaic, block: slice, tile: NDArray) -> None:
-    """Puts the values of each color where that color's pixels are."""
+def _in_order(effects: Sequence[Effect]) -> tuple[list[Gain], Veil | None, list[Gain]]:
+    """The gains before the veil, the veil, and the gains after it."""
+    veil = next((e for e in effects if isinstance(e, Veil)), None)
+    gains = [e for e in effects if isinstance(e, Gain)]
+    if veil is None:
+        return gains, None, []
+    early = [e for e in gains if effects.index(e) < effects.index(veil)]
+    return early, veil, [e for e in gains if e not in early]
+
+
+def _fill(tile: NDArray, layer: ways.Layer, mosaic: Mosaic, block: slice) -> None:
+    """Puts a layer's light where it belongs: every color in its plane, or each in its places."""
+    if len(tile) > 1:
+        for color, plane in enumerate(tile):
+            plane[:] = layer.values(color, block)
+        return
     period = len(mosaic.block)
-    for phase in range(min(period, len(tile))):
+    for phase in range(min(period, tile.shape[1])):
         row = block.start + phase
-        for color, columns in mosaic.in_row(row):
-            values = rows[color](slice(row, block.stop, period))
-            tile[phase::period, columns] = values[:, columns]
+        for color, places in mosaic.in_row(row):
+            found = layer.values(color, slice(row, block.stop, period))
+            for columns in places:
+                tile[0, phase::period, columns] = found[:, columns]
+
+
+def _spread(rate: NDArray, mosaic: Mosaic, veil: Veil) -> None:
+    """Takes the veil's share of the light and lays it evenly over the pixels of its color."""
+    if len(rate) > 1:
+        for plane in rate:
+            plane += veil.fraction * (plane.mean(dtype=np.float64) - plane)
+        return
+    light = rate[0]
+    period = len(mosaic.block)
+    sums, counts = np.zeros(len(mosaic.colors)), np.zeros(len(mosaic.colors))
+    sites = [
+        (row, color, columns)
+        for row in range(period)
+        for color, places in mosaic.in_row(row)
+        for columns in places
+    ]
+    for row, color, columns in sites:
+        here = light[row::period, columns]
+        sums[color] += here.sum(dtype=np.float64)
+        counts[color] += here.size
+    light *= light.dtype.type(1 - veil.fraction)
+    for row, color, columns in sites:
+        light[row::period, columns] += veil.fraction * sums[color] / max(counts[color], 1)

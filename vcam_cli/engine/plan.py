@@ -20,7 +20,7 @@ tenth: `vcam accuracy` shows the estimates beside the measurement.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 
 import numpy as np
@@ -33,15 +33,24 @@ from vcam_cli.effects.base import (
     Code,
     Draw,
     Effect,
+    FieldTransfer,
     Gain,
     Outlook,
+    PlaneTransfer,
+    Transport,
+    Veil,
 )
 from vcam_cli.effects.order import ORDER
+from vcam_cli.engine import binning
 from vcam_cli.engine.settings import Settings
 from vcam_cli.errors import BadInput, Collector
 
 MEAN_SHARE = 0.25
 """Part of the mean's tolerance for the gains that are left out."""
+COSTLY = (Gain, PlaneTransfer, FieldTransfer)
+"""Kinds that act on the mean signal and take time; charges are an addition, and other transfers
+multiply into one that is there anyway. Veils and transports cost less than a draw, and no bound is
+known before the light is: a lamp in the picture, far beyond its full well, lights all of it."""
 LEVELS = (0.01, 0.1, 1.0)
 """Shares of full signal at which the variance promise holds."""
 
@@ -119,16 +128,29 @@ def wanted(camera: Camera, geometry: Geometry) -> tuple[Effect, ...]:
 
 def optical(camera: Camera, geometry: Geometry) -> tuple[Effect, ...]:
     """Effects of the linear part that run, as far as no signal level is needed to decide it."""
-    here = [e for e in wanted(camera, geometry) if not isinstance(e, Charge | Draw)]
-    return tuple(e for e in here if _worth_its_cost(camera, e))
+    present = wanted(camera, geometry)
+    dropped = _negligible_light(camera, present)
+    return tuple(e for e in present if not isinstance(e, Charge | Draw) and e not in dropped)
 
 
-def _worth_its_cost(camera: Camera, effect: Effect) -> bool:
-    """Whether a gain is more than a quarter of the tolerance; whatever is no gain is worth it."""
-    if not isinstance(effect, Gain) or _wish(camera, effect) != "auto":
-        return True
-    relative = effect.mean_error(Outlook(full_signal=1.0, time=1.0))
-    return relative > MEAN_SHARE * camera.accuracy.tolerance
+def _negligible_light(camera: Camera, present: Sequence[Effect]) -> set[Effect]:
+    """Effects on the mean signal that cost time, and together change it by less than their share.
+
+    The smallest first, as many as fit into the share.
+    """
+    costly = [
+        e for e in present if isinstance(e, COSTLY) and e.removable and _wish(camera, e) == "auto"
+    ]
+    one = Outlook(full_signal=1.0, time=1.0)
+    errors = {e: e.mean_error(one) for e in costly}
+    left = MEAN_SHARE * camera.accuracy.tolerance
+    out: set[Effect] = set()
+    for effect in sorted(costly, key=errors.__getitem__):
+        left -= errors[effect]
+        if left < 0:
+            break
+        out.add(effect)
+    return out
 
 
 def make(
@@ -146,7 +168,7 @@ def make(
     found = described(camera, geometry)
     present = list(wanted(camera, geometry))
     tolerance = camera.accuracy.tolerance
-    dropped = {e for e in present if not _worth_its_cost(camera, e)}
+    dropped = _negligible_light(camera, present)
     candidates = [e for e in present if e.removable and _wish(camera, e) == "auto"]
     dropped |= _negligible_variance(candidates, present, outlook, tolerance)
     pixels = geometry.rows * geometry.columns
@@ -197,10 +219,17 @@ def _in(effect: Effect, scope: str) -> bool:
 
 
 def _variances(draws: list[Effect], outlook: Outlook) -> np.ndarray:
-    """Summed variance of draws at every level [electrons squared]."""
+    """Summed variance of draws at every level [electrons squared].
+
+    Of pixels that are read as one, of their mean.
+    """
     return np.array(
         [
-            sum(e.variance(level * outlook.full_signal) for e in draws if isinstance(e, Draw))
+            sum(
+                binning.variance(e, level * outlook.full_signal, outlook.dark, outlook.binning)
+                for e in draws
+                if isinstance(e, Draw)
+            )
             for level in LEVELS
         ],
         dtype=float,
@@ -247,8 +276,9 @@ def _contribution(
         return float(share.max()), f"of the {kind} variance"
     if isinstance(effect, Code):
         everything = _variances([e for e in present if _in(e, "frame")], outlook)
+        n = binning.conversions(outlook.binning)
         rounding = [
-            effect.rounding(level * outlook.full_signal, noise)
+            effect.rounding(level * outlook.full_signal, n * noise) / n
             for level, noise in zip(LEVELS, everything, strict=True)
         ]
         share = np.array(rounding) / np.maximum(everything + rounding, 1e-300)
@@ -256,6 +286,6 @@ def _contribution(
     if change is not None:
         # A pixel that is full shows no change beyond the well.
         return min(change / outlook.full_signal, 1.0), "of full signal"
-    if isinstance(effect, Gain | Charge):
+    if isinstance(effect, Gain | Charge | Veil | Transport | FieldTransfer | PlaneTransfer):
         return effect.mean_error(outlook) / outlook.full_signal, "of full signal"
     return None, ""

@@ -5,17 +5,21 @@ This is the linear half of the engine in one short function; each line is a modu
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, partial
 
+import numpy as np
 from numpy.typing import NDArray
 
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.electrical import Electrical, electrical
 from vcam_cli.camera.geometry import Geometry, geometry
-from vcam_cli.effects.base import Charge, Outlook
+from vcam_cli.effects.base import Charge, Effect, Outlook, Transport
 from vcam_cli.engine import bandwidth, cost, exposure, memory, optics, pixelwise, plan
-from vcam_cli.engine.mosaic import Mosaic, mosaic
+from vcam_cli.engine.layout import Layout, layout
+from vcam_cli.engine.lights import Lights
+from vcam_cli.engine.mosaic import Mosaic
 from vcam_cli.engine.settings import Settings, settings
 from vcam_cli.engine.stages import Stages
 from vcam_cli.engine.transfer import Transfer
@@ -34,13 +38,18 @@ class Prepared:
     electrical: Electrical
     settings: Settings
     mosaic: Mosaic
+    layout: Layout
     scene: WaveScene | SampledScene
     transfer: Transfer
-    """Of the scene's components."""
+    """Of the scene's components, to one pixel of the lattice."""
     white_rate: NDArray
     """(C,) Photo-electrons per second of the perfect white on the axis, in every color [e/s]."""
     rate: NDArray
-    """(rows, columns) Photo-electrons per second of every pixel [e/s]."""
+    """(rows, columns) Photo-electrons per second of every pixel, as they are read out [e/s].
+
+    (C, rows, columns) of stacked pixels. Of pixels that are read as one: where charges are joined,
+    this and the other rates are those of the sum; else of every pixel, before they are joined.
+    """
     spectrum: Followed
     """How far the scene's spectrum was followed."""
     exposure_time: float
@@ -53,47 +62,69 @@ class Prepared:
         return sum(e.rate() for e in self.plan.active if isinstance(e, Charge))
 
 
-def prepare(camera: Camera, picture: NDArray | None, workers: int, stages: Stages) -> Prepared:
+def prepare(
+    camera: Camera,
+    picture: NDArray | None,
+    workers: int,
+    stages: Stages,
+    lights: Lights | None = None,
+) -> Prepared:
     """Brings the light of the scene to the pixels, times the exposure, decides what will run.
 
     picture: samples of the scene's image file, (h, w, channels), linear light; None for charts.
+    lights: what keeps the light for further cameras, where there are any.
     Raises BadInput where the camera contradicts itself, CannotDo where memory does not suffice.
     """
     g, e = geometry(camera), electrical(camera)
     knobs = settings(camera)
-    colors = mosaic(camera)
-    needed = memory.of_frame(g, knobs, len(colors.colors), bool(camera.quality))
+    place = layout(camera, g)
+    colors, lattice, knobs = place.mosaic, place.lattice, place.settings(knobs)
+    joins = place.joining
+    count = len(camera.exposure.samples) * (len(colors.colors) if place.full_color else 1)
+    needed = memory.of_frame(lattice, knobs, len(colors.colors), bool(camera.quality), count)
     memory.require(needed, g)
     stages.watch.expect(cost.at_first_sight(camera, g, colors, knobs, workers))
 
     @cache
     def scene_at(oversampling: int) -> WaveScene | SampledScene:
-        view = optics.view(g, knobs, oversampling)
+        view = optics.view(lattice, knobs, oversampling)
         return build(camera.scene, view, picture, camera.display.primaries)
 
     with stages("scene"):
-        scene = scene_at(bandwidth.first_guess(g, knobs))
+        scene = scene_at(bandwidth.first_guess(lattice, knobs))
     with stages("optics"):
         effects = plan.optical(camera, g)
-        both = _transfer(camera, g, knobs, (*scene.spectra, scene.white), colors, effects)
+        spectra = (*scene.spectra, scene.white)
+        see = partial(_transfer, camera, g, knobs, spectra, colors, effects)
+        both = see() if lights is None else lights.transfer(camera, see)
         transfer = replace(both, weights=both.weights[:-1])
         white_rate = both.level[-1]
         _refuse_too_much(float(white_rate.max()))
-        ceiling = exposure.ceiling(camera, float(white_rate.max()), e.saturation)
-        light = Optics(transfer, g, knobs, colors, effects, workers, ceiling)
-        found = optics.photo_rate(light, scene_at)
+        ceiling = exposure.ceiling(camera, float(white_rate.max()), e.saturation / joins.charges)
+        white_rate = white_rate * joins.charges
+        light = Optics(transfer, lattice, knobs, colors, effects, workers, ceiling)
+        bring = partial(optics.photo_rate, light, scene_at, place.planes)
+        found = bring() if lights is None else lights.rate(camera, ceiling, bring)
+        taken = place.taken(found.values)
     with stages("exposure"):
-        rate, white = found.values, float(white_rate.max())
+        white = float(white_rate.max())
         dark = sum(x.rate() for x in plan.wanted(camera, g) if isinstance(x, Charge))
+        rate = joins.collected(_arriving(taken, dark / joins.charges, effects))
+        taken = joins.collected(taken)
         time = exposure.exposure_time(camera, rate, white, dark, e.saturation)
         peak = (float(rate.max()) + dark) * time
         _refuse_too_much(max(peak, white * time))
-        needed = max(needed, memory.of_followed(found.spectrum, g, knobs))
-        outlook = Outlook(full_signal=max(1.0, min(e.full_well, peak)), time=time)
-        here = pixelwise.changes(rate, g, plan.wanted(camera, g), effects, time)
+        needed = max(needed, memory.of_followed(found.spectrum, lattice, knobs))
+        full = max(1.0, min(e.full_well, peak))
+        outlook = Outlook(full, time, dark * time, camera.array.binning)
+        present = plan.wanted(camera, g)
+        here = _on_pixels(place, joins.collected(found.values), present, effects, time)
+        well = e.full_well / time - dark
+        moved = np.minimum(rate, well) - np.minimum(taken, well)
+        here |= {x.name: _rms(moved) for x in present if isinstance(x, Transport)}
         decided = plan.make(camera, g, knobs, outlook, needed, found.spectrum.changes | here)
-        core = decided.seconds + cost.linear(g, colors, found.spectrum)
-        core += cost.after(camera, g, colors)
+        core = decided.seconds + cost.linear(lattice, colors, found.spectrum)
+        core += cost.after(camera, g, colors) + cost.samples(camera, g, decided.active)
         core += cost.irradiance(camera, g, knobs, found.spectrum)
         decided = replace(decided, seconds=core * cost.slowness() / cost.threads(workers))
         stages.watch.expect(decided.seconds)
@@ -102,7 +133,8 @@ def prepare(camera: Camera, picture: NDArray | None, workers: int, stages: Stage
         geometry=g,
         electrical=e,
         settings=knobs,
-        mosaic=colors,
+        mosaic=place.raw_mosaic,
+        layout=place,
         scene=scene,
         transfer=transfer,
         white_rate=white_rate,
@@ -124,6 +156,40 @@ def _refuse_too_much(electrons: float) -> None:
             f"light and dark current would make {electrons:.3g} electrons in a pixel",
             "look for a wrong unit in the light level, the dark current or the exposure",
         )
+
+
+def _on_pixels(
+    place: Layout, light: NDArray, present: Sequence[Effect], running: Sequence[Effect], time: float
+) -> dict[str, float]:
+    """Rms change of the mean raw by what acts on pixels, in the color where it is most [e/s]."""
+    geometry, mosaic = place.counted
+    mosaics = [Mosaic(((color,),)) for color in mosaic.colors]
+    parts = zip(light, mosaics, strict=True) if place.planes else [(light, mosaic)]
+    found: dict[str, float] = {}
+    for plane, colors in parts:
+        here = pixelwise.changes(plane, geometry, colors, present, running, time)
+        found = {name: max(change, found.get(name, 0.0)) for name, change in here.items()}
+    return found
+
+
+def _rms(values: NDArray) -> float:
+    return float(np.sqrt(np.square(values, dtype=np.float64).mean()))
+
+
+def _arriving(rate: NDArray, dark: float, effects: Sequence[Effect]) -> NDArray:
+    """Photo-electrons per second that arrive where charge is transported [e/s].
+
+    Such that with the dark rate they are what arrives of both. Before the exposure is timed, since
+    transport is linear: what is automatic sees the picture as it is read.
+    """
+    for effect in effects:
+        if isinstance(effect, Transport):
+            signal = rate + rate.dtype.type(dark)
+            planes = signal.reshape(-1, *signal.shape[-2:])
+            signal = np.array([effect.moved(plane) for plane in planes]).reshape(rate.shape)
+            signal -= rate.dtype.type(dark)
+            rate = signal
+    return rate
 
 
 def _transfer(camera, g, knobs, spectra, colors, effects) -> Transfer:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from vcam_cli.effects.base import RadialTransfer, SeparableTransfer
 from vcam_cli.engine.axis import Axis
 from vcam_cli.engine.parallel import each, pieces
-from vcam_cli.engine.transfer import Tables, Transfer, entries
+from vcam_cli.engine.transfer import PARITIES, Fineness, Tables, Transfer, entries
 
 PIECE = 32
 """Rows or columns a thread takes at once: few enough for the cache."""
@@ -39,10 +39,29 @@ def spectrum(planes: NDArray, workers: int) -> NDArray:
 
 
 @dataclass(frozen=True)
+class Series:
+    """A signal that is known at the rows of photodetectors, and as a series along x."""
+
+    x: Axis
+    cosines: NDArray | None
+    """(C, rows, folded x)"""
+    sines: NDArray | None
+
+    def __call__(self, color: int, rows: slice) -> NDArray:
+        """The signal of a color at the photodetectors of some rows: (rows, columns)."""
+        parts = [
+            self.x.evaluate(part[color, rows], axis=1, odd=odd)
+            for part, odd in ((self.cosines, False), (self.sines, True))
+            if part is not None
+        ]
+        return parts[0] if len(parts) == 1 else parts[0] + parts[1]
+
+
+@dataclass(frozen=True)
 class Filter:
     """A transfer function acting on the cosine series of a scene.
 
-    tables: H over |f|; along_x, along_y: separable factors on every cosine term of the axes.
+    tables: H over the frequency; along_x, along_y: separable factors on every term of the axes.
     """
 
     x: Axis
@@ -51,19 +70,32 @@ class Filter:
     along_x: NDArray
     along_y: NDArray
 
-    def apply(self, coefficients: NDArray, workers: int) -> NDArray:
-        """Signal of every color at the rows of photodetectors, still a cosine series along x.
+    def apply(self, coefficients: NDArray, workers: int) -> Series:
+        """Signal of every color at the rows of photodetectors, still a series along x.
 
-        coefficients: (R, ny, nx) from `spectrum`. Returns (C, rows, folded x) [electrons / s],
-        for `Axis.evaluate` along x.
+        coefficients: (R, ny, nx) from `spectrum`.
         """
+        parts: dict[bool, NDArray] = {}
+        for parity in self.tables.parities:
+            more, odd_x = self._rows_of(parity, coefficients, workers), PARITIES[parity][0]
+            if odd_x in parts:
+                parts[odd_x] += more
+            else:
+                parts[odd_x] = more
+        return Series(self.x, parts.get(False), parts.get(True))
+
+    def _rows_of(self, parity: int, coefficients: NDArray, workers: int) -> NDArray:
+        """What one parity adds: (C, rows, folded x) [electrons / s]."""
+        odd_x, odd_y = PARITIES[parity]
         colors = self.tables.values.shape[1]
         folded = np.zeros((colors, self.y.folded, self.x.folded), coefficients.dtype)
-        lookup = _Lookup(self.tables, coefficients.dtype)
+        lookup = _Lookup(self.tables, parity, self.x.frequencies, coefficients.dtype)
 
         def multiply(rows: slice) -> None:
-            for target, terms, weights in self.y.sources(rows):
-                self._multiply(coefficients, lookup, terms, weights, folded[:, target])
+            for target, terms, weights in self.y.sources(rows, odd_y):
+                products = self._products(coefficients, lookup, terms, weights)
+                for color, product in zip(folded[:, target], products, strict=False):
+                    color += self.x.fold(product, odd_x)
 
         each(multiply, pieces(self.y.folded, PIECE), workers)
         out = np.empty((colors, self.y.pixels, self.x.folded), coefficients.dtype)
@@ -71,22 +103,10 @@ class Filter:
 
         def evaluate(task: tuple[int, slice]) -> None:
             c, columns = task
-            out[c, :, columns] = self.y.evaluate(folded[c, :, columns], axis=0)
+            out[c, :, columns] = self.y.evaluate(folded[c, :, columns], axis=0, odd=odd_y)
 
         each(evaluate, tasks, workers)
         return out
-
-    def _multiply(
-        self,
-        coefficients: NDArray,
-        lookup: _Lookup,
-        terms: NDArray,
-        weights: NDArray,
-        into: NDArray,
-    ) -> None:
-        """Adds the filtered terms (rows of the spectrum) to their folded rows, all colors."""
-        for c, product in enumerate(self._products(coefficients, lookup, terms, weights)):
-            into[c] += self.x.fold(product)
 
     def _products(
         self, coefficients: NDArray, lookup: _Lookup, terms: NDArray, weights: NDArray
@@ -106,7 +126,7 @@ class Filter:
             part = x.extend(plane[index], count) * by_column
             part *= by_row[:, None]
             rows.append(part)
-        position = lookup.position(x.frequencies[:count], fy)
+        position = lookup.position(fy, count)
         for c in range(self.tables.values.shape[1]):
             total = lookup(0, c, position)
             total *= rows[0]
@@ -127,31 +147,52 @@ class Filter:
         mean square that terms of such frequencies add to the signal: (n,) and (C, n), rising in
         frequency, by Parseval's theorem.
         """
-        lookup = _Lookup(self.tables, coefficients.dtype)
+        lookups = [
+            _Lookup(self.tables, p, self.x.frequencies, coefficients.dtype)
+            for p in self.tables.parities
+        ]
         frequency, power = [], []
-        for term, stands_for in _rows_to_sample(self.y.terms):
-            at = np.array([term])
-            parts = [p[0] for p in self._products(coefficients, lookup, at, np.ones(1))]
-            if not parts:
+        for rows, stands_for in _rows_to_sample(self.y.terms):
+            count = np.ones(len(rows))
+            parts = [list(self._products(coefficients, k, rows, count)) for k in lookups]
+            if not parts[0]:
                 break
-            square = np.array(parts, dtype=np.float64) ** 2
+            square = (np.array(parts, dtype=np.float64) ** 2).sum(axis=0)  # (C, rows, terms)
             if factor is not None:
-                square *= factor(term)[: square.shape[1]] ** 2
-            square[:, 1:] *= 2
-            frequency.append(
-                np.maximum(self.x.frequencies[: square.shape[1]], self.y.frequencies[term])
-            )
-            power.append(square * (stands_for * (2 if term else 1)))
+                square *= np.array([factor(term)[: square.shape[2]] for term in rows]) ** 2
+            square *= (stands_for * np.where(rows > 0, 2, 1))[:, None]
+            square[..., 1:] *= 2
+            along_x, along_y = self.x.frequencies[: square.shape[2]], self.y.frequencies[rows]
+            frequency.append(np.maximum(along_x, along_y[:, None]).ravel())
+            power.append(square.reshape(len(square), -1))
         order = np.argsort(together := np.concatenate(frequency), kind="stable")
         return together[order], np.concatenate(power, axis=1)[:, order]
 
     def without(self, effect: RadialTransfer, transfer: Transfer) -> Filter:
-        """What leaving out a radial transfer adds to this filter. `transfer`: the whole of it."""
+        """What leaving out a radial transfer adds to this filter. `transfer`: the whole of it.
+
+        Where there is more than radial transfers, what these would do alone: they do no more then.
+        """
         others = [e for e in transfer.effects if e is not effect]
         mixed = transfer.through(others).mixed(self.tables.mix)
-        size = self.tables.values.shape[-1]
-        values = entries(mixed, self.tables.top, size) - self.tables.values
+        values = entries(mixed, self._fineness) - self.tables.values
+        return replace(self, tables=replace(self.tables, values=values, planes=(None,) * 4))
+
+    def without_field(self, alone: Transfer) -> Filter:
+        """What leaving out a blur that changes over the field adds, on average.
+
+        alone: the transfer without it.
+        """
+        values = entries(alone.mixed(self.tables.mix), self._fineness) - self.tables.values
         return replace(self, tables=replace(self.tables, values=values))
+
+    @property
+    def _fineness(self) -> Fineness:
+        return Fineness(self.tables.top, self.tables.values.shape[-1], self.tables.error)
+
+    def only_planes(self) -> Filter:
+        """This filter without its radial part: what the other transfers add."""
+        return replace(self, tables=replace(self.tables, values=0 * self.tables.values))
 
     def without_separable(self, effect: SeparableTransfer, coefficients: NDArray) -> NDArray:
         """Mean squares (C, n) that leaving out a separable transfer adds to the signal."""
@@ -164,8 +205,12 @@ class Filter:
         return rest.power(coefficients, lambda term: 1 - x * y[term])[1]
 
 
-def _rows_to_sample(terms: int) -> list[tuple[int, float]]:
-    """(term, number of terms it stands for): all of the first few, then ever fewer.
+AT_ONCE = 16
+"""Rows of a sample that are filtered together."""
+
+
+def _rows_to_sample(terms: int) -> list[tuple[NDArray, NDArray]]:
+    """Rows, and the number of rows each stands for: all of the first few, then ever fewer.
 
     Straight edges along the array put their energy into the first rows and columns.
     """
@@ -174,27 +219,46 @@ def _rows_to_sample(terms: int) -> list[tuple[int, float]]:
     )
     sample = sample[sample < terms]
     edges = np.concatenate([[-0.5], (sample[1:] + sample[:-1]) / 2, [terms - 0.5]])
-    return list(zip(sample.tolist(), np.diff(edges).tolist(), strict=True))
+    stands_for = np.diff(edges)
+    parts = [slice(i, i + AT_ONCE) for i in range(0, len(sample), AT_ONCE)]
+    return [(sample[part], stands_for[part]) for part in parts]
+
+
+Position = tuple[NDArray | None, NDArray | None, NDArray, int]
+"""Of |f|: indices, fractions, where they are needed; fy; terms along x."""
 
 
 class _Lookup:
-    """Tables over |f|, read at a block of frequencies.
+    """Tables of one parity, read at a block of frequencies.
 
-    float32: the nearest of many entries, its error far below float32's own in the sum; float64:
-    linear interpolation.
+    Over |f|, float32: the nearest of many entries, its error far below float32's own in the sum;
+    float64: linear interpolation. Over fx and fy: linear interpolation along both, along x for
+    all `fx` at once, which are the same in all blocks.
     """
 
-    def __init__(self, tables: Tables, dtype: np.dtype) -> None:
-        zero = np.zeros((*tables.values.shape[:-1], 2))
-        self.values = np.concatenate([tables.values, zero], axis=-1).astype(dtype)
+    def __init__(self, tables: Tables, parity: int, fx: NDArray, dtype: np.dtype) -> None:
         self.linear = dtype == np.float64
-        self.scale = 1 / tables.step if tables.top else 0.0
-        self.last = tables.values.shape[-1]
         self.dtype = dtype
+        self.last = tables.values.shape[-1]
+        self.fx = fx
+        self.scale = 1 / tables.step if tables.top else 0.0
+        self.values = None
+        if parity == 0 and tables.has_values:
+            zero = np.zeros((*tables.values.shape[:-1], 2))
+            self.values = np.concatenate([tables.values, zero], axis=-1).astype(dtype)
+        self.planes = None
+        if (plane := tables.planes[parity]) is not None:
+            self.plane_scale = (plane.shape[-1] - 1) / tables.top
+            along = np.minimum(fx * self.plane_scale, plane.shape[-1] - 1)
+            self.planes = [
+                [between(part, along, 1).astype(dtype) for part in color] for color in plane
+            ]
 
-    def position(self, fx: NDArray, fy: NDArray) -> tuple[NDArray, NDArray | None]:
-        """Indices, and for linear interpolation fractions, at all pairs of fx and fy."""
-        u = ((fx * self.scale) ** 2).astype(self.dtype)
+    def position(self, fy: NDArray, count: int) -> Position:
+        """Where the tables are read, at all pairs of the first `count` fx and of fy."""
+        if self.values is None:
+            return None, None, fy, count
+        u = ((self.fx[:count] * self.scale) ** 2).astype(self.dtype)
         v = ((fy * self.scale) ** 2).astype(self.dtype)
         radius = u[None, :] + v[:, None]
         np.sqrt(radius, out=radius)
@@ -202,18 +266,35 @@ class _Lookup:
             np.minimum(radius, self.last, out=radius)
             index = radius.astype(np.int32)
             radius -= index
-            return index, radius
+            return index, radius, fy, count
         radius += 0.5
         np.minimum(radius, self.last, out=radius)
-        return radius.astype(np.int32), None
+        return radius.astype(np.int32), None, fy, count
 
-    def __call__(self, r: int, c: int, position: tuple[NDArray, NDArray | None]) -> NDArray:
-        index, fraction = position
+    def __call__(self, r: int, c: int, position: Position) -> NDArray:
+        index, fraction, fy, count = position
+        on_top = None
+        if self.planes is not None:
+            on_top = between(self.planes[r][c][:, :count], fy * self.plane_scale, 0)
+        if self.values is None or index is None:
+            return np.zeros((len(fy), count), self.dtype) if on_top is None else on_top
         table = self.values[r, c]
         value = np.take(table, index, mode="clip")
         if fraction is not None:
             value += fraction * np.take(np.diff(table, append=0), index, mode="clip")
-        return value
+        return value if on_top is None else np.add(value, on_top, out=value)
+
+
+def between(table: NDArray, position: NDArray, axis: int) -> NDArray:
+    """A table read between its entries along an axis; constant beyond its end."""
+    position = np.minimum(position, table.shape[axis] - 1)
+    index = np.minimum(position.astype(int), table.shape[axis] - 2)
+    fraction = (position - index).astype(table.dtype).reshape((-1, 1) if axis == 0 else (1, -1))
+    low, high = np.take(table, index, axis), np.take(table, index + 1, axis)
+    high -= low
+    high *= fraction
+    high += low
+    return high
 
 
 def boxes(plane: NDArray, x: Axis, y: Axis, width: float, height: float) -> NDArray:
@@ -231,11 +312,20 @@ def _box_means(plane: NDArray, axis: Axis, size: float, along: int) -> NDArray:
         sample = np.clip(np.floor(center + 1e-9), 0, axis.samples - 1).astype(int)
         return np.take(plane, sample, axis=along)
     half = size / axis.sample_pitch / 2
-    low = np.clip(center - half, 0, axis.samples)
-    high = np.clip(center + half, 0, axis.samples)
     sums = np.cumsum(plane, axis=along, dtype=np.float64)
-    difference = _read(sums, plane, high, along) - _read(sums, plane, low, along)
-    return difference / (2 * half)
+    low, high = (_up_to(sums, plane, center + edge, along) for edge in (-half, half))
+    return (high - low) / (2 * half)
+
+
+def _up_to(sums: NDArray, plane: NDArray, position: NDArray, along: int) -> NDArray:
+    """Integral of the samples, mirrored at both ends, from the edge to `position` (in samples)."""
+    count = plane.shape[along]
+    inside = count - np.abs(count - np.abs(position))
+    shape = (-1, 1) if along == 0 else (1, -1)
+    whole = 2 * np.take(sums, [-1], axis=along)
+    read = _read(sums, plane, np.clip(inside, 0, count), along)
+    beyond, before = (position > count).reshape(shape), (position < 0).reshape(shape)
+    return np.where(beyond, whole - read, np.where(before, -read, read))
 
 
 def _read(sums: NDArray, plane: NDArray, position: NDArray, along: int) -> NDArray:

@@ -29,6 +29,10 @@ class Settings:
     """Entries of the tables over |f|."""
     mixing_tolerance: float
     """Largest error of a transfer function by replacing many spectra by few."""
+    field_zones: int
+    """Places from center to corner at which a blur that changes over the field is known."""
+    plane_steps: float
+    """Steps of tables over fx and fy while light at a blur's reach turns once."""
     float_width: int
     """32 or 64 bits."""
     shot_noise: str = "exact"
@@ -44,10 +48,10 @@ class Settings:
         return asdict(self)
 
 
-DRAFT = Settings(20e-9, 1, 4, 1 << 14, 2e-3, 32)
-STANDARD = Settings(10e-9, 2, 12, 1 << 15, 5e-4, 32)
-FINE = Settings(10e-9, 2, 16, 1 << 16, 2e-4, 32)
-REFERENCE = Settings(2.5e-9, 4, 16, 1 << 15, 1e-5, 64)
+DRAFT = Settings(20e-9, 1, 4, 1 << 14, 2e-3, 3, 4, 32)
+STANDARD = Settings(10e-9, 2, 12, 1 << 15, 5e-4, 4, 8, 32)
+FINE = Settings(10e-9, 2, 16, 1 << 16, 2e-4, 5, 10, 32)
+REFERENCE = Settings(2.5e-9, 4, 16, 1 << 15, 1e-5, 6, 16, 64)
 
 LADDER = ((0.02, DRAFT), (0.005, STANDARD), (0.001, FINE), (0.0, REFERENCE))
 """Settings for tolerances from the first number of each rung up."""

@@ -7,26 +7,50 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
-from functools import partial
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vcam_cli.camera.geometry import Geometry, pixel_centers
-from vcam_cli.effects.base import Effect, RadialTransfer, SeparableTransfer
-from vcam_cli.engine import bandwidth, memory, sampling
+from vcam_cli.effects.base import (
+    Blur,
+    Effect,
+    FieldTransfer,
+    PlaneTransfer,
+    RadialTransfer,
+    SeparableTransfer,
+    Zone,
+)
+from vcam_cli.engine import bandwidth, field, memory, sampling
 from vcam_cli.engine.axis import Axis
 from vcam_cli.engine.mosaic import Mosaic
 from vcam_cli.engine.settings import Settings
-from vcam_cli.engine.transfer import EXACT_ENTRIES, Tables, Transfer, tabulate
+from vcam_cli.engine.transfer import EXACT_ENTRIES, FINER, Fineness, Tables, Transfer, tabulate
 from vcam_cli.scenes.base import SampledScene, Wave, WaveScene
 
+FIELD_SHARE = 0.2
+"""Part of the tolerance that modes of the field are left out for before the picture is asked: in a
+picture all of full contrast and detail of all sizes."""
 SINGLE = 5e-7
 """Error of transforms of 32-bit numbers, relative to the brightest sample."""
-Rows = Callable[[slice], NDArray]
-"""From array rows to one color's signal there, (rows, columns) [electrons / s]."""
+
+
+@dataclass(frozen=True)
+class Layer:
+    """A share of the light on the sensor; all layers together are the signal."""
+
+    values: Callable[[int, slice], NDArray]
+    """From a color and array rows to its signal there, (rows, columns) [electrons / s]."""
+    weight: Callable[[NDArray, NDArray], NDArray] | None = None
+    """A factor at the positions x (columns,), y (rows,) [m]: (rows, columns)."""
+
+
+Layers = Iterator[Layer]
+"""One is made when the one before is done with: each may take much memory."""
 
 
 @dataclass(frozen=True)
@@ -47,6 +71,16 @@ class Optics:
     def separable(self) -> list[SeparableTransfer]:
         return [e for e in self.effects if isinstance(e, SeparableTransfer)]
 
+    @property
+    def field(self) -> FieldTransfer | None:
+        """The blur that changes over the field, where there is one."""
+        return next((e for e in self.effects if isinstance(e, FieldTransfer)), None)
+
+    @cached_property
+    def zones(self) -> tuple[Zone, ...]:
+        """The zones of that blur; none where there is none."""
+        return () if self.field is None else self.field.zones(self.settings.field_zones)
+
 
 @dataclass(frozen=True)
 class Followed:
@@ -60,61 +94,112 @@ class Followed:
     """Samples of one plane of the scene; 0 where its waves are known."""
     planes: int = 0
     """Planes that were transformed."""
-    changes: dict[str, float] = field(default_factory=dict)
+    changes: dict[str, float] = dataclasses.field(default_factory=dict)
     """Transfer -> rms change of the signal by leaving it out [electrons / s]"""
+    modes: int = 0
+    """Filters beside the first that the change of the blur over the field took."""
+    passes: int = 1
+    """How often the spectrum was filtered: once for each parity of every filter."""
+    table_values: int = 0
+    """Values of transfer functions of fx and fy that were computed for the tables."""
 
 
-def rows(
+def layers(
     optics: Optics, scene_at: Callable[[int], WaveScene | SampledScene]
-) -> tuple[list[Rows], Followed]:
-    """For each color a function from array rows to its signal; and what the scene asked for."""
+) -> tuple[Layers, Followed]:
+    """The light at the photodetectors; and what the scene asked for."""
     scene = scene_at(bandwidth.first_guess(optics.geometry, optics.settings))
     if isinstance(scene, WaveScene):
         return waves(optics, scene)
-    if scene.samples == "squares" and not optics.transfer.effects:
+    blurred = optics.transfer.effects or optics.field
+    if scene.samples == "squares" and not blurred:
         return boxes(optics, scene)
     return cosines(optics, scene, scene_at)
 
 
-def waves(optics: Optics, scene: WaveScene) -> tuple[list[Rows], Followed]:
+def waves(optics: Optics, scene: WaveScene) -> tuple[Layers, Followed]:
     """The sum of waves at the photodetectors, each with its own transfer."""
     x, y = pixel_centers(optics.geometry, detector=True)
-    parts = []
-    for wave in scene.waves:
-        level = _wave_level(optics, wave, optics.effects)
-        ex = np.exp(1j * (2 * np.pi * wave.fx * x + wave.phase))
-        parts.append((level, ex, np.exp(2j * np.pi * wave.fy * y)))
+    shapes = [
+        (np.exp(1j * (2 * np.pi * w.fx * x + w.phase)), np.exp(2j * np.pi * w.fy * y))
+        for w in scene.waves
+    ]
+    whole = _wave_levels(optics, scene, optics.effects)
 
-    def values(color: int, s: slice) -> NDArray:
-        total = np.zeros((len(y[s]), len(x)))
-        for level, ex, ey in parts:
-            total += level[color] * (ey[s, None] * ex[None, :]).real
-        return total
+    def layer(levels: NDArray, weight: Callable | None) -> Layer:
+        def values(color: int, s: slice) -> NDArray:
+            total = np.zeros((len(y[s]), len(x)))
+            for level, (ex, ey) in zip(levels, shapes, strict=True):
+                total += (level[color] * ey[s, None] * ex[None, :]).real
+            return total
+
+        return Layer(values, weight)
 
     changes = {}
     some = slice(None, None, max(1, len(y) // 64))
     for effect in optics.effects:
-        if isinstance(effect, RadialTransfer | SeparableTransfer):
+        if isinstance(effect, Blur | SeparableTransfer | FieldTransfer):
             others = tuple(e for e in optics.effects if e is not effect)
-            total = np.zeros((len(optics.mosaic.colors), len(y[some]), len(x)))
-            for wave, (level, ex, ey) in zip(scene.waves, parts, strict=True):
-                difference = _wave_level(optics, wave, others) - level
-                total += difference[:, None, None] * (ey[some, None] * ex[None, :]).real
-            changes[effect.name] = float(np.sqrt(np.square(total).mean(axis=(1, 2)).max()))
-    return [partial(values, c) for c in range(len(optics.mosaic.colors))], Followed(changes=changes)
+            difference = [
+                (layer(levels, None), weight)
+                for levels, weight in _differences(optics, scene, whole, others)
+            ]
+            changes[effect.name] = _rms_of(difference, optics, some)
+    found = (layer(levels, weight) for levels, weight in whole)
+    return found, Followed(changes=changes)
 
 
-def _wave_level(optics: Optics, wave: Wave, effects: tuple[Effect, ...]) -> NDArray:
-    """Amplitude of a wave's signal in each color, (C,) [electrons / s]."""
-    frequency = np.array([np.hypot(wave.fx, wave.fy)])
-    level = np.asarray(wave.weights) @ optics.transfer.through(effects).at(frequency)[..., 0]
+Levels = list[tuple[NDArray, Callable | None]]
+"""Of each zone: complex amplitudes of the waves in every color (waves, C), and its weight."""
+
+
+def _wave_levels(optics: Optics, scene: WaveScene, effects: tuple[Effect, ...]) -> Levels:
+    """What the waves become through some of the effects [electrons / s]."""
+    through = optics.transfer.through(effects)
+    parts: list[tuple[Callable | None, tuple[Blur, ...]]] = [(None, through.effects)]
+    if optics.field in effects:
+        parts = [(zone.weight, (*through.effects, zone.blur)) for zone in optics.zones]
+    out: Levels = []
+    for weight, blurs in parts:
+        blurred = through.through(blurs)
+        out.append((np.array([_level(blurred, effects, w) for w in scene.waves]), weight))
+    return out
+
+
+def _level(blurred: Transfer, effects: tuple[Effect, ...], wave: Wave) -> NDArray:
+    """Complex amplitude of a wave's signal in each color, (C,) [electrons / s]."""
+    fx, fy = np.array([wave.fx]), np.array([wave.fy])
+    level: NDArray = np.asarray(wave.weights) @ blurred.at_plane(fx, fy)[..., 0, 0]
     for e in effects:
         if isinstance(e, SeparableTransfer):
-            level = level * e.along_x(np.array([wave.fx])) * e.along_y(np.array([wave.fy]))
-    return np.asarray(level)
+            level = level * e.along_x(fx) * e.along_y(fy)
+    return level
 
 
-def boxes(optics: Optics, scene: SampledScene) -> tuple[list[Rows], Followed]:
+def _differences(
+    optics: Optics, scene: WaveScene, whole: Levels, others: tuple[Effect, ...]
+) -> Levels:
+    """What the waves lose by the effects that are not among the others."""
+    rest = _wave_levels(optics, scene, others)
+    if len(rest) == len(whole):
+        return [(a - b, weight) for (a, _), (b, weight) in zip(rest, whole, strict=True)]
+    return [(rest[0][0] - levels, weight) for levels, weight in whole]
+
+
+def _rms_of(parts: list, optics: Optics, some: slice) -> float:
+    """Rms of weighted layers in the color where it is most, on some rows [electrons / s]."""
+    x, y = pixel_centers(optics.geometry)
+    squares = []
+    for color in range(len(optics.mosaic.colors)):
+        total = np.zeros((len(y[some]), len(x)))
+        for layer, weight in parts:
+            values = layer.values(color, some)
+            total += values if weight is None else values * weight(x, y[some])
+        squares.append(np.square(total).mean())
+    return float(np.sqrt(max(squares)))
+
+
+def boxes(optics: Optics, scene: SampledScene) -> tuple[Layers, Followed]:
     """Means over the photodetectors' boxes; points where the aperture is switched off."""
     g = optics.geometry
     x, y = _axes(optics, scene, 1.0)
@@ -122,26 +207,36 @@ def boxes(optics: Optics, scene: SampledScene) -> tuple[list[Rows], Followed]:
     planes = scene.planes(optics.transfer.level.T, optics.workers)
     points = [sampling.boxes(plane, x, y, 0.0, 0.0) for plane in planes]
     if not optics.separable:
-        return [point.__getitem__ for point in points], Followed()
-    means = [sampling.boxes(p, x, y, g.detector_width, g.detector_height) for p in planes]
+        return iter([Layer(lambda color, s: points[color][s])]), Followed()
+    size = g.collecting_width, g.collecting_height
+    means = [sampling.boxes(p, x, y, *size) for p in planes]
     change = max(
         float(np.sqrt(np.square(a - b).mean(dtype=np.float64)))
         for a, b in zip(means, points, strict=True)
     )
     changes = {e.name: change for e in optics.separable}
-    return [mean.__getitem__ for mean in means], Followed(changes=changes)
+    return iter([Layer(lambda color, s: means[color][s])]), Followed(changes=changes)
 
 
 def cosines(
     optics: Optics, scene: SampledScene, scene_at: Callable[[int], WaveScene | SampledScene]
-) -> tuple[list[Rows], Followed]:
+) -> tuple[Layers, Followed]:
     """Through the cosine spectrum, as far up as the tolerance asks."""
     knobs, g, cutoff = optics.settings, optics.geometry, optics.transfer.cutoff
-    widest = min(bandwidth.most(g, knobs), bandwidth.limit(g, cutoff))
+    oversampling = bandwidth.first_guess(g, knobs)
+    # A picture's spectrum is at hand as far as it goes; a chart has to be painted finer.
+    picture = scene.samples == "squares"
+    pixels = g.rows * g.columns if picture else scene.shape[0] * scene.shape[1] / oversampling**2
+    widest = min(bandwidth.most(pixels, knobs), bandwidth.limit(g, cutoff))
     top = bandwidth.top(g, widest, cutoff)
     computed = EXACT_ENTRIES if knobs.float_width == 32 else knobs.table_size
-    tables = tabulate(optics.transfer, top, knobs.table_size, knobs.mixing_tolerance, computed)
-    oversampling = bandwidth.first_guess(g, knobs)
+    fine = Fineness(top, knobs.table_size, knobs.mixing_tolerance, computed, knobs.plane_steps)
+    modes: tuple[field.Mode, ...] = ()
+    if zones := optics.zones:
+        fine = replace(fine, tolerance=max(fine.tolerance, FIELD_SHARE * knobs.tolerance))
+        tables, modes = field.tabulate(optics.transfer, zones, g, fine)
+    else:
+        tables = tabulate(optics.transfer, fine)
     while True:
         memory.require(memory.of_planes(scene, len(tables.mix), g, knobs), g)
         planes = scene.planes(tables.mix, optics.workers)
@@ -150,7 +245,7 @@ def cosines(
         if bandwidth.brightest(planes, tables) * SINGLE > budget:
             planes = planes.astype(np.float64)
         coefficients = sampling.spectrum(planes, optics.workers)
-        if scene.samples == "squares":
+        if picture:
             spread = _spread(optics, scene, _filter(optics, scene, tables, widest), coefficients)
             enough = max(spread.enough(budget), min(knobs.oversampling, widest))
             lost = spread.beyond(enough)
@@ -158,7 +253,7 @@ def cosines(
         enough = float(oversampling)
         spread = _spread(optics, scene, _filter(optics, scene, tables, enough), coefficients)
         lost = spread.of_sampling(enough, bandwidth.limit(g, cutoff), partial(_passes, optics))
-        finer = bandwidth.finer(oversampling, lost, budget, g, knobs)
+        finer = bandwidth.finer(oversampling, lost, budget, pixels, knobs)
         if finer == oversampling:
             break
         del planes, coefficients
@@ -166,15 +261,32 @@ def cosines(
         assert isinstance(again, SampledScene)
         scene = again
     chosen = _filter(optics, scene, tables, enough)
-    changes = dict(_changes(optics, scene, chosen, coefficients))
-    series = chosen.apply(coefficients, optics.workers)
-
-    def values(color: int, s: slice) -> NDArray:
-        return chosen.x.evaluate(series[color, s], axis=1)
-
+    modes, squares = _needed(optics, scene, chosen, coefficients, modes, budget)
+    # Without one of them the picture may reach further than it does with all of them.
+    whole = _filter(optics, scene, tables, widest) if picture else chosen
+    changes = dict(_changes(optics, scene, whole, coefficients, squares))
     samples, count = planes[0].size, len(planes)
-    followed = Followed(enough, lost, samples, count, changes)
-    return [partial(values, c) for c in range(len(series))], followed
+    passes = len(tables.parities) + len(modes)
+    values = _table_values(optics, tables)
+    followed = Followed(enough, lost, samples, count, changes, len(modes), passes, values)
+
+    def each() -> Layers:
+        yield Layer(chosen.apply(coefficients, optics.workers))
+        for mode in modes:
+            filter = replace(chosen, tables=mode.tables())
+            yield Layer(filter.apply(coefficients, optics.workers), mode.map)
+
+    return each(), followed
+
+
+def _table_values(optics: Optics, tables: Tables) -> int:
+    """At how many places, wavelengths and zones the transfer of fx and fy was computed."""
+    plane = next((plane for plane in tables.planes if plane is not None), None)
+    if plane is None:
+        return 0
+    steps = plane.shape[-1] // FINER + 1  # or up to twice as many
+    blurs = {zone.blur.model[0] for zone in optics.zones if isinstance(zone.blur, PlaneTransfer)}
+    return 2 * steps**2 * len(optics.transfer.thinned().wavelengths) * max(len(blurs), 1)
 
 
 def _axes(optics: Optics, scene: SampledScene, oversampling: float) -> tuple[Axis, Axis]:
@@ -188,8 +300,8 @@ def _axes(optics: Optics, scene: SampledScene, oversampling: float) -> tuple[Axi
         return Axis(samples, pitch, pixels, pixel, first, squares, bandwidth)
 
     return (
-        axis(nx, scene.pitch_x, g.columns, g.pitch_x, g.detector_x),
-        axis(ny, scene.pitch_y, g.rows, g.pitch_y, g.detector_y),
+        axis(nx, scene.pitch_x, g.columns, g.pitch_x * g.sampling_scale, g.collecting_x),
+        axis(ny, scene.pitch_y, g.rows, g.pitch_y * g.sampling_scale, g.collecting_y),
     )
 
 
@@ -221,11 +333,16 @@ def _density(optics: Optics, scene: SampledScene) -> float:
 
 
 def _changes(
-    optics: Optics, scene: SampledScene, chosen: sampling.Filter, coefficients: NDArray
+    optics: Optics,
+    scene: SampledScene,
+    chosen: sampling.Filter,
+    coefficients: NDArray,
+    modes: float,
 ) -> Iterator[tuple[str, float]]:
     """Rms change of the signal by leaving out each transfer, by Parseval's theorem.
 
-    As if all of it lay on the array and none in the margin: an upper bound.
+    As if all of it lay on the array and none in the margin: an upper bound. modes: mean square
+    that all modes of the field add to the signal.
     """
     density = _density(optics, scene)
     for effect in optics.effects:
@@ -233,9 +350,37 @@ def _changes(
             power = chosen.without(effect, optics.transfer).power(coefficients)[1]
         elif isinstance(effect, SeparableTransfer):
             power = chosen.without_separable(effect, coefficients)
+        elif isinstance(effect, PlaneTransfer):
+            power = chosen.only_planes().power(coefficients)[1]
+        elif isinstance(effect, FieldTransfer):
+            power = chosen.without_field(optics.transfer).power(coefficients)[1]
         else:
             continue
-        yield effect.name, float(np.sqrt(density * power.sum(axis=1).max()))
+        square = density * power.sum(axis=1).max()
+        square += modes if isinstance(effect, FieldTransfer) else 0.0
+        yield effect.name, float(np.sqrt(square))
+
+
+def _needed(
+    optics: Optics,
+    scene: SampledScene,
+    chosen: sampling.Filter,
+    coefficients: NDArray,
+    modes: tuple[field.Mode, ...],
+    budget: float,
+) -> tuple[tuple[field.Mode, ...], float]:
+    """Those modes of the field that this picture needs, and the mean square that all of them add.
+
+    budget: rms that may be lost with the others [electrons / s]
+    """
+    squares = np.zeros(len(modes))
+    for i, mode in enumerate(modes):
+        power = replace(chosen, tables=mode.tables(rough=True)).power(coefficients)[1]
+        squares[i] = _density(optics, scene) * mode.map.mean_square * power.sum(axis=1).max()
+    weakest = np.argsort(squares)
+    dropped = set(weakest[np.cumsum(squares[weakest]) <= budget**2].tolist())
+    kept = tuple(mode for i, mode in enumerate(modes) if i not in dropped)
+    return kept, float(squares.sum())
 
 
 def _passes(optics: Optics, frequency: NDArray) -> NDArray:
@@ -250,5 +395,5 @@ def _passes(optics: Optics, frequency: NDArray) -> NDArray:
     values = optics.transfer.at(table * per_meter).sum(axis=0)
     values = values / np.maximum(levels, 1e-300)[:, None]
     lens = np.interp(frequency, table, values.max(axis=0))
-    width = min(g.detector_width, g.detector_height) if optics.separable else 0.0
+    width = min(g.collecting_width, g.collecting_height) if optics.separable else 0.0
     return np.asarray(lens / np.hypot(1, np.pi * frequency * per_meter * width))

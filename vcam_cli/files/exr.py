@@ -18,6 +18,7 @@ from vcam_cli.errors import BadInput, bad
 from vcam_cli.files.rows import Attribute, RowWriter, image_spec, message, set_attributes
 
 ZIP, PIZ = "zip:1", "piz"  # lossless both
+oiio.attribute("limits:resolution", 1 << 28)  # a million by default; scattered pixels are one row
 _NOT_OURS = ("oiio:", "openexr:", "screenWindow", "compression", "PixelAspectRatio", "DateTime")
 
 

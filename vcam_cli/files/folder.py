@@ -29,7 +29,7 @@ from vcam_cli.files.report import to_json
 
 LOCK = ".vcam-lock"
 PROGRAM = "vcam"  # a record is vcam's when it says {"program": "vcam", "files": [...]}
-RECORDS = ("run.json", "accuracy.json", "study.json", "compare.json")
+RECORDS = ("run.json", "accuracy.json", "characterize.json", "study.json", "compare.json")
 """Records of vcam's commands: what one of them wrote, another may add to."""
 _LARGEST_RECORD = 1 << 26  # bytes
 _NO_LOCKS_HERE = {errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOSYS}
@@ -293,6 +293,22 @@ class OutputFolder:
             )
             return bad("--out", f"{self.path} {reason}", "choose another folder")
         return cannot_write(self.path, error)
+
+
+def is_foreign(folder: Path) -> bool:
+    """Whether a folder holds something, and nothing that says it is vcam's. Raises OSError."""
+    try:
+        present = set(os.listdir(folder))
+    except FileNotFoundError:
+        return False
+    ours = any(_claim(folder / name) for name in (*RECORDS, LOCK))
+    return bool(present - {LOCK, STAGING}) and not ours
+
+
+def previous_files(record: Path) -> list[str]:
+    """The names of the files that a record of vcam speaks of, none outside its folder."""
+    claim = _claim(record)
+    return [name for name in claim["files"] if _harmless(name)] if claim else []
 
 
 def _flock(lock: int, folder: Path) -> None:

@@ -48,10 +48,10 @@ class Picture:
     notes: tuple[str, ...]
 
 
-class _Unusable(Exception):
-    """Reason and remedy why a file cannot serve as a scene."""
+class Unusable(Exception):
+    """Reason why a file cannot serve as a scene, and remedy; "" = what helps with its kind."""
 
-    def __init__(self, reason: str, remedy: str = _CONVERT) -> None:
+    def __init__(self, reason: str, remedy: str = "") -> None:
         super().__init__(reason)
         self.reason, self.remedy = reason, remedy
 
@@ -80,9 +80,9 @@ def read_picture(
     if encoding not in ("srgb", "linear") or not white > 0:
         raise ValueError(f"encoding {encoding!r}, white {white!r}")
     path = Path(path)
-    with _told(path, yaml_path):
-        _check_file(path)
-        with _opened(path) as source:
+    with told(path, yaml_path):
+        check_file(path)
+        with opened(path) as source:
             return _read(source, encoding == "srgb", white, channels, signed)
 
 
@@ -91,23 +91,28 @@ def color_channels(
 ) -> int:
     """How many channels `read_picture` would give, by the header alone, and raising the same."""
     path = Path(path)
-    with _told(path, yaml_path):
-        _check_file(path)
-        with _opened(path) as source:
+    with told(path, yaml_path):
+        check_file(path)
+        with opened(path) as source:
             return len(_header(source.spec(), channels)[0])
 
 
 @contextmanager
-def _told(path: Path, yaml_path: tuple[str | int, ...] | str) -> Iterator[None]:
-    """Turns what can be wrong with a file into BadInput and CannotDo."""
+def told(
+    path: Path, yaml_path: tuple[str | int, ...] | str, remedy: str = _CONVERT
+) -> Iterator[None]:
+    """Turns what can be wrong with a file into BadInput and CannotDo.
+
+    remedy: for a file that is not of its kind.
+    """
     try:
         yield
-    except _Unusable as error:
-        raise bad(yaml_path, f"{path}: {error.reason}", error.remedy) from None
+    except Unusable as error:
+        raise bad(yaml_path, f"{path}: {error.reason}", error.remedy or remedy) from None
     except PermissionError:
         raise CannotDo(f"{path} may not be read", "give yourself read permission") from None
     except (OSError, UnicodeError, ValueError, RuntimeError) as error:
-        raise _unreadable(path, error, yaml_path) from error
+        raise _unreadable(path, error, yaml_path, remedy) from error
     except MemoryError:
         raise _too_large(f"{path} does not fit the memory") from None
 
@@ -119,22 +124,22 @@ def decode_srgb(code: np.ndarray) -> np.ndarray:
     return np.where(code <= 0.04045, code / 12.92, high)
 
 
-def _check_file(path: Path) -> None:
+def check_file(path: Path) -> None:
     """Refuses what is no whole regular file, before OpenImageIO sees it."""
     str(path).encode("utf-8")  # OpenImageIO takes no other names
     try:
         status = os.stat(path)
     except FileNotFoundError:
-        raise _Unusable("there is no such file", "check the name and the folder") from None
+        raise Unusable("there is no such file", "check the name and the folder") from None
     if stat.S_ISDIR(status.st_mode):
-        raise _Unusable("is a folder, not an image file", "give an image file")
+        raise Unusable("is a folder, not an image file", "give an image file")
     if not stat.S_ISREG(status.st_mode):
-        raise _Unusable("is a device, pipe or socket", "give a regular image file")
+        raise Unusable("is a device, pipe or socket", "give a regular image file")
     if status.st_size == 0:
-        raise _Unusable("the file is empty", "give a whole image file")
+        raise Unusable("the file is empty", "give a whole image file")
     with open(path, "rb") as file:
         if file.read(8) == _PNG_START and not _png_is_whole(file, status.st_size):
-            raise _truncated()
+            raise truncated()
 
 
 def _png_is_whole(file: Any, size: int) -> bool:
@@ -169,16 +174,17 @@ def _check_sum_holds(file: Any, name: bytes, length: int) -> bool:
 
 
 @contextmanager
-def _opened(path: Path) -> Iterator[Any]:
+def opened(path: Path) -> Iterator[Any]:
+    """OpenImageIO's reader of a file, colors not multiplied by alpha; raises Unusable."""
     config = oiio.ImageSpec()
     config.attribute("oiio:UnassociatedAlpha", 1)  # else colors come multiplied by alpha
     source = oiio.ImageInput.open(str(path.absolute()), config)
     if source is None:
         reason = message(oiio.geterror)
-        raise _Unusable(f"is no image that can be read ({_brief(reason, path)})")
+        raise Unusable(f"is no image that can be read ({_brief(reason, path)})")
     try:
         if source.format_name() == "null":
-            raise _Unusable("is no image")
+            raise Unusable("is no image")
         yield source
     finally:
         source.close()
@@ -188,12 +194,12 @@ def _opened(path: Path) -> Iterator[Any]:
 def _read(source: Any, srgb: bool, white: float, wanted: tuple[str, ...], signed: bool) -> Picture:
     spec = source.spec()
     chosen, notes = _header(spec, wanted)
-    data, more = _samples(source, spec, chosen)
+    data, more = samples(source, spec, chosen)
     if source.seek_subimage(1, 0):
         more.append("only the first of several images in the file is used")
     message(source.geterror)
     if source.format_name() == "openexr":
-        data = _on_display_window(data, spec, more)
+        data = on_display_window(data, spec, more)
     light = _linear(data, srgb, white, signed)
     light = np.ascontiguousarray(_upright(light, spec, more))
     names = tuple(spec.channelnames[index] for index in chosen)
@@ -201,26 +207,26 @@ def _read(source: Any, srgb: bool, white: float, wanted: tuple[str, ...], signed
 
 
 def _header(spec: Any, wanted: tuple[str, ...]) -> tuple[tuple[int, ...], tuple[str, ...]]:
-    """Indices of the channels to read, and notes; _Unusable for what is no picture of light."""
+    """Indices of the channels to read, and notes; Unusable for what is no picture of light."""
     _check_kind(spec)
     chosen, notes = _choose_channels(tuple(spec.channelnames), spec.alpha_channel, wanted)
-    _check_size(spec, len(chosen))
+    check_size(spec, len(chosen))
     return chosen, notes
 
 
 def _check_kind(spec: Any) -> None:
     if spec.deep:
-        raise _Unusable("is a deep image")
+        raise Unusable("is a deep image")
     if spec.depth > 1:
-        raise _Unusable("is a volume, not an image")
+        raise Unusable("is a volume, not an image")
     kind = spec.get_string_attribute("jpeg:ColorSpace")
     photometric = spec.get_int_attribute("tiff:PhotometricInterpretation", 1)
     if kind in ("CMYK", "YCCK") or photometric == 5:
-        raise _Unusable("holds printing inks (CMYK), not light", "convert it to RGB")
+        raise Unusable("holds printing inks (CMYK), not light", "convert it to RGB")
     if photometric not in _LIGHT:
-        raise _Unusable(f"is a TIFF of photometric kind {photometric}, not gray or RGB")
+        raise Unusable(f"is a TIFF of photometric kind {photometric}, not gray or RGB")
     if photometric == 0 and str(spec.format) != "uint8":
-        raise _Unusable("is a TIFF where white is 0, with more than 8 bits")  # not turned by OIIO
+        raise Unusable("is a TIFF where white is 0, with more than 8 bits")  # not turned by OIIO
 
 
 def _choose_channels(
@@ -233,7 +239,7 @@ def _choose_channels(
         chosen = tuple(upper.index(name) for name in wanted)
     elif wanted != _RGB:
         shown = ", ".join(names) or "none"
-        raise _Unusable(
+        raise Unusable(
             f"has no channels {', '.join(wanted)} but {shown}", "name the channels of the file so"
         )
     elif len(color) == 1:
@@ -242,9 +248,9 @@ def _choose_channels(
         chosen = (upper.index("Y"),)
     elif len(color) == 2:
         shown = ", ".join(names[i] for i in color)
-        raise _Unusable(f"has two color channels ({shown}); one or three are needed")
+        raise Unusable(f"has two color channels ({shown}); one or three are needed")
     else:
-        raise _Unusable(f"has no channels R, G, B but {', '.join(names) or 'none'}")
+        raise Unusable(f"has no channels R, G, B but {', '.join(names) or 'none'}")
     dropped = [names[i] for i in color if i not in chosen]
     notes = ["alpha channel dropped"] if len(color) < len(names) else []
     if dropped:
@@ -252,11 +258,11 @@ def _choose_channels(
     return chosen, tuple(notes)
 
 
-def _check_size(spec: Any, channels: int) -> None:
+def check_size(spec: Any, channels: int) -> None:
     """Refuses by the header alone, before a byte of the image is unpacked."""
     pixels = max(spec.width * spec.height, spec.full_width * spec.full_height)
     if pixels > MOST_PIXELS:
-        raise _Unusable(
+        raise Unusable(
             f"claims {spec.width} x {spec.height} pixels; at most {MOST_PIXELS:.0e} are read",
             "crop it or reduce its size",
         )
@@ -269,22 +275,27 @@ def _check_size(spec: Any, channels: int) -> None:
         )
 
 
-def _samples(source: Any, spec: Any, chosen: tuple[int, ...]) -> tuple[np.ndarray, list[str]]:
-    """The chosen channels as stored: integers as they are, anything else as float32."""
+def samples(
+    source: Any, spec: Any, chosen: tuple[int, ...], page: int = 0
+) -> tuple[np.ndarray, list[str]]:
+    """The chosen channels as stored: integers as they are, anything else as float32; and notes.
+
+    spec: of the page, the first of several images in the file unless told otherwise.
+    """
     kinds = {str(spec.channelformat(index)) for index in chosen}
     kind = _READ_AS.get(kinds.pop()) if len(kinds) == 1 else None
     name = "float" if kind is None else _OIIO_NAMES.get(kind, np.dtype(kind).name)
     first, last = min(chosen), max(chosen) + 1
-    data = source.read_image(0, 0, first, last, name)
+    data = source.read_image(page, 0, first, last, name)
     reason = message(source.geterror)
     if data is None or (reason and "extraneous bytes" not in reason):
-        raise _truncated(reason)
+        raise truncated(reason)
     order = [index - first for index in chosen]
     notes = ["the file has stray bytes in it"] if reason else []
     return (data if order == list(range(last - first)) else data[:, :, order]), notes
 
 
-def _on_display_window(data: np.ndarray, spec: Any, notes: list[str]) -> np.ndarray:
+def on_display_window(data: np.ndarray, spec: Any, notes: list[str]) -> np.ndarray:
     """An EXR's picture is its display window: black where the file holds no data."""
     left, top = spec.x - spec.full_x, spec.y - spec.full_y
     shape = (spec.full_height, spec.full_width)
@@ -293,7 +304,7 @@ def _on_display_window(data: np.ndarray, spec: Any, notes: list[str]) -> np.ndar
     rows = slice(max(top, 0), min(top + data.shape[0], shape[0]))
     columns = slice(max(left, 0), min(left + data.shape[1], shape[1]))
     if rows.start >= rows.stop or columns.start >= columns.stop:
-        raise _Unusable("holds no pixel inside its display window")
+        raise Unusable("holds no pixel inside its display window")
     notes.append("the data window differs from the display window; the latter is used")
     window = np.zeros((*shape, data.shape[2]), data.dtype)
     window[rows, columns] = data[
@@ -324,7 +335,7 @@ def _check_values(block: np.ndarray, row: int, signed: bool) -> None:
         y, x, channel = np.argwhere(wrong)[0]
         value = block[y, x, channel]
         kind = "a negative value" if value < 0 and np.isfinite(value) else "a value not finite"
-        raise _Unusable(
+        raise Unusable(
             f"holds {kind} ({value:g} at row {row + y}, column {x}); light is 0 or more",
             "replace such values, for example by 0",
         )
@@ -355,14 +366,17 @@ def _remarks(spec: Any) -> list[str]:
     return notes
 
 
-def _truncated(reason: str = "") -> _Unusable:
+def truncated(reason: str = "") -> Unusable:
+    """What to raise for a file that ends too early."""
     detail = f" ({reason[:100]})" if reason else ""
-    return _Unusable(f"is truncated or damaged{detail}", "copy or download the file again")
+    return Unusable(f"is truncated or damaged{detail}", "copy or download the file again")
 
 
-def _unreadable(path: Path, error: Exception, yaml_path: tuple[str | int, ...] | str) -> BadInput:
+def _unreadable(
+    path: Path, error: Exception, yaml_path: tuple[str | int, ...] | str, remedy: str
+) -> BadInput:
     reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-    return bad(yaml_path, f"{path}: cannot be read ({_brief(reason, path)})", _CONVERT)
+    return bad(yaml_path, f"{path}: cannot be read ({_brief(reason, path)})", remedy)
 
 
 def _too_large(text: str) -> CannotDo:

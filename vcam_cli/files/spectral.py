@@ -1,11 +1,15 @@
-"""Spectral images as OpenEXR files that other programs read.
+"""Spectral images as OpenEXR files, written for other programs and read from them.
 
 The layout is that of A. Fichet, R. Pacanowski, A. Wilkie, "An OpenEXR Layout for Spectral Images",
 Journal of Computer Graphics Techniques 10(3), 1-18, 2021: a channel a wavelength, named
-"S0.550,000000nm" (S0 for light that is emitted, not reflected), and the attributes
-spectralLayoutVersion and emissiveUnits.
+"S0.550,000000nm" for light that is emitted (S1 to S3: its polarization) and "T.550,000000nm" for
+reflectances, and the attributes spectralLayoutVersion and emissiveUnits.
+
+The layout's "W.m^-2.sr^-1" is a radiance per nanometer: the files that its authors publish carry
+RGB channels beside, and these are the integral of S0 over nanometers.
 """
 
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from tempfile import TemporaryFile
@@ -15,9 +19,19 @@ import numpy as np
 
 from vcam_cli.files.atomic import cannot_write
 from vcam_cli.files.exr import ExrWriter
+from vcam_cli.files.images import Unusable, check_size, on_display_window, opened, samples
 from vcam_cli.files.rows import Attribute
+from vcam_cli.files.stored import PER_NM, Stored
+from vcam_cli.spectra import SPEED_OF_LIGHT
 
 ROWS_AT_ONCE = 64
+RADIANCE = ("W.m^-2.sr^-1", "W.m^-2.sr^-1.nm^-1")
+"""Units of emissive channels, both per nanometer."""
+_CHANNEL = re.compile(r"(S[0-3]|T)\.(\d*,?\d*(?:[Ee][+-]?\d+)?)([EPTGMkhdcmunp]?)(m|Hz)")
+_PREFIX = {
+    "": 0, "E": 18, "P": 15, "T": 12, "G": 9, "M": 6, "k": 3, "h": 2, "d": -1, "c": -2, "m": -3,
+    "u": -6, "n": -9, "p": -12,
+}  # fmt: skip
 
 
 def channel_name(wavelength: float) -> str:
@@ -65,3 +79,70 @@ def _rows(
         data = np.frombuffer(waiting.read(4 * width * count), np.float32)
         found[name] = data.reshape(count, width)
     return found
+
+
+def open_spectral(path: Path) -> Stored:
+    """The header of a spectral EXR file. Raises Unusable."""
+    with opened(path) as source:
+        spec = source.spec()
+        if source.format_name() != "openexr" or spec.deep:
+            raise Unusable("is no flat OpenEXR file")
+        found, notes = _channels(spec.channelnames)
+        check_size(spec, len(found))
+        emits = spec.channelnames[found[0][1]].startswith("S")
+        if emits:
+            _check_units(spec.get_string_attribute("emissiveUnits"))
+        if spec.get_float_attribute("EV", 0.0) != 0.0:
+            notes.append("its exposure compensation (EV) is not used")
+        if source.seek_subimage(1, 0):
+            notes.append("only the first of several images in the file is used")
+    return Stored(
+        shape=(spec.full_height, spec.full_width),
+        wavelengths=np.array([wavelength for wavelength, _ in found]),
+        quantity="radiance" if emits else "reflectance",
+        read=lambda: _read(path, tuple(index for _, index in found)),
+        gain=PER_NM if emits else 1.0,
+        notes=tuple(notes),
+    )
+
+
+def _channels(names: Sequence[str]) -> tuple[list[tuple[float, int]], list[str]]:
+    """(wavelength [m], index) of the channels that hold light, by wavelength; and notes."""
+    by_kind: dict[str, list[tuple[float, int]]] = {}
+    for index, name in enumerate(names):
+        match = _CHANNEL.fullmatch(name)
+        if match:
+            by_kind.setdefault(match[1], []).append((_wavelength(match), index))
+    if "S0" in by_kind and "T" in by_kind:
+        raise Unusable("holds emitted light (S0) and reflectances (T)", "remove one of them")
+    found = by_kind.get("S0") or by_kind.get("T")
+    if not found:
+        raise Unusable("has no channels named like S0.550,000000nm or T.550,000000nm")
+    dark = {"S1", "S2", "S3"} & set(by_kind)
+    return sorted(found), ["its polarization is not used"] if dark else []
+
+
+def _wavelength(match: re.Match[str]) -> float:
+    """The wavelength [m] of a channel's name; a frequency is one as well."""
+    try:
+        value = float(match[2].replace(",", ".")) * 10.0 ** _PREFIX[match[3]]
+    except ValueError:
+        raise Unusable(f"has a channel {match[0]!r} without a wavelength") from None
+    if not value > 0:
+        raise Unusable(f"has a channel {match[0]!r} without a wavelength")
+    return value if match[4] == "m" else SPEED_OF_LIGHT / value
+
+
+def _check_units(units: str) -> None:
+    if units and "".join(units.split()) not in RADIANCE:
+        raise Unusable(
+            f"has emissiveUnits {units!r}, which is no radiance",
+            f"give radiances, and write emissiveUnits {RADIANCE[1]}",
+        )
+
+
+def _read(path: Path, chosen: tuple[int, ...]) -> np.ndarray:
+    notes: list[str] = []
+    with opened(path) as source:
+        spec = source.spec()
+        return on_display_window(samples(source, spec, chosen)[0], spec, notes)

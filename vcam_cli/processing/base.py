@@ -39,6 +39,29 @@ class Patches:
     stop: float
 
 
+class Layout(Protocol):
+    """Where the pixels of an array stand that has no rows and columns of squares.
+
+    Arrays of the frame's shape: x, y: centers [m]; color: index into the colors. The picture is
+    shown on a square grid, its columns at picture_x and its rows at picture_y [m].
+    """
+
+    @property
+    def x(self) -> np.ndarray: ...
+
+    @property
+    def y(self) -> np.ndarray: ...
+
+    @property
+    def color(self) -> np.ndarray: ...
+
+    @property
+    def picture_x(self) -> np.ndarray: ...
+
+    @property
+    def picture_y(self) -> np.ndarray: ...
+
+
 @dataclass(frozen=True)
 class Context:
     """What processing must know of the camera that took the frame.
@@ -51,6 +74,8 @@ class Context:
     linearize: the codes of a linear ADC [DN] for those of this one; None where it is linear.
     saturated_dn: [DN] from which on a pixel is saturated.
     patches: gives the ColorChecker as this camera sees it; called only where a step asks for it.
+    planes: every raw pixel has all its colors: the frame is (C, rows, columns), without a pattern.
+    layout: where pixels stand that are scattered; None where they fill rows and columns.
     """
 
     pattern: Pattern
@@ -60,11 +85,13 @@ class Context:
     linearize: Callable[[np.ndarray], np.ndarray] | None = None
     saturated_dn: float = np.inf
     patches: Callable[[], Patches] | None = None
+    planes: bool = False
+    layout: Layout | None = None
 
     @property
     def mosaic(self) -> bool:
         """Whether a raw pixel holds one color of several."""
-        return len(self.colors) > 1
+        return len(self.colors) > 1 and not self.planes
 
 
 @dataclass(frozen=True)
@@ -117,13 +144,18 @@ def mirror(index: np.ndarray, count: int) -> np.ndarray:
 
 
 def cut(dn: np.ndarray, start: int, stop: int, halo: int) -> Block:
-    """A copy of rows start - halo .. stop + halo of a raw frame, mirrored beyond its border."""
+    """A copy of rows start - halo .. stop + halo of a raw frame, mirrored beyond its border.
+
+    dn: (rows, columns), or (C, rows, columns) where every pixel has all its colors.
+    """
     first, last = start - halo, stop + halo
-    if first >= 0 and last <= dn.shape[0]:
-        rows = dn[first:last]
+    height = dn.shape[-2]
+    if first >= 0 and last <= height:
+        rows = dn[..., first:last, :]
     else:
-        rows = dn[mirror(np.arange(first, last), dn.shape[0])]
-    return Block(np.array(rows, dtype=np.float32)[np.newaxis], first)
+        rows = dn[..., mirror(np.arange(first, last), height), :]
+    block = np.array(rows, dtype=np.float32)
+    return Block(block if dn.ndim == 3 else block[np.newaxis], first)
 
 
 def flow(dn: np.ndarray, operations: tuple[Operation, ...], start: int, stop: int) -> Block:

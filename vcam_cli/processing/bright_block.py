@@ -35,16 +35,18 @@ def measure(block: Block, raw: np.ndarray, context: Context) -> Blocks:
     """The blocks of some rows of the picture.
 
     block: the rows after the steps before white balance, without a halo, a mosaic or full color;
-    raw: (rows, columns) [DN] the same rows of the raw frame, in which saturation shows.
+    raw: (rows, columns) [DN] the same rows of the raw frame, in which saturation shows;
+    (C, rows, columns) where a pixel has all its colors, and is saturated where one of them is.
     """
-    planes, (rows, columns) = block.planes, raw.shape
+    planes, (rows, columns) = block.planes, raw.shape[-2:]
     full = planes.shape[0] == len(context.colors)
     sums, counts = [], []
     for number, color in enumerate(context.colors):
         here = np.ones((rows, columns)) if full else _sites(color, block, context, columns)
         sums.append(_per_block(here * planes[number if full else 0]))
         counts.append(_per_block(here))
-    clean = _per_block(raw >= context.saturated_dn) == 0
+    highest = raw.max(axis=0) if raw.ndim == 3 else raw
+    clean = _per_block(highest >= context.saturated_dn) == 0
     return Blocks(np.array(sums), np.array(counts), clean)
 
 

@@ -7,7 +7,6 @@ import numpy as np
 
 from vcam_cli.errors import Collector, nearest
 from vcam_cli.processing.base import Pattern
-from vcam_cli.processing.demosaic import is_bayer
 
 CHOICES: dict[str, tuple[str, ...]] = {
     "black_level": ("subtract", "none"),
@@ -20,6 +19,10 @@ _NUMBER_TOO = ("black_level", "gamma")
 CANNOT_JUDGE = (
     "a mosaic without demosaic cannot be judged",
     "add `demosaic: bilinear` to processing, or write `quality: []`",
+)
+CANNOT_SHOW = (
+    "scattered pixels without demosaic make no picture",
+    "add `demosaic: bilinear` to processing, or write `output: {render: none}`",
 )
 
 
@@ -35,13 +38,21 @@ class Step(Protocol):
 
 
 def check(
-    steps: Sequence[Step], pattern: Pattern, colors: Sequence[str], quality: Sequence[str] = ()
+    steps: Sequence[Step],
+    pattern: Pattern,
+    colors: Sequence[str],
+    quality: Sequence[str] = (),
+    planes: bool = False,
+    scattered: bool = False,
 ) -> None:
     """Raises BadInput with every reason why these steps cannot work on this array.
 
-    `quality`: the metrics asked for; they need all colors at every pixel.
+    `quality`: the metrics asked for; they need all colors at every pixel. `planes`: every pixel
+    has them as it is; `scattered`: the pixels fill no rows and columns.
     """
     found = Collector()
+    mosaic = scattered or (len(colors) > 1 and not planes)
+    single = len(colors) == 1 and not scattered  # a file of positions decides late
     names = [step.name for step in steps]
     for index, step in enumerate(steps):
         path = ("processing", index, step.name)
@@ -64,16 +75,18 @@ def check(
                 f"black_level after {late[0]}: gains need black at zero",
                 f"put black_level before {late[0]}",
             )
-        if step.name == "demosaic" and not is_bayer(pattern):
-            found.add(path, "demosaic needs a Bayer pattern", "remove this step")
-        if step.name == "white_balance" and step.value != "none" and len(colors) == 1:
+        if step.name == "demosaic" and not mosaic:
+            found.add(path, "every pixel of this array has all its colors", "remove this step")
+        elif step.value == "edge-aware" and scattered:
+            found.add(path, "edge-aware needs pixels in rows and columns", "write `bilinear`")
+        if step.name == "white_balance" and step.value != "none" and single:
             found.add(path, "white_balance needs an array of several colors", "remove this step")
         if step.name == "color_correction" and step.value != "none":
-            if len(colors) == 1:
+            if single:
                 found.add(path, "a monochrome array has no colors to change", "remove this step")
-            elif "demosaic" not in before:
+            elif mosaic and "demosaic" not in before:
                 found.add(path, "a pixel of a mosaic has one color only", "put demosaic before it")
-    if quality and len(colors) > 1 and "demosaic" not in names:
+    if quality and mosaic and "demosaic" not in names:
         found.add(("quality",), *CANNOT_JUDGE)
     found.raise_if_any()
 

@@ -83,7 +83,7 @@ def _rows(
     other = (1 - green_at, green_at)  # column of the other color in even and odd rows
     names = tuple(pattern[i][other[i]] for i in (0, 1))
     green_name = pattern[0][green_at]
-    gain = [_gain(white[green_name], white[name]) for name in names]
+    gain = [matching_gain(white[green_name], white[name]) for name in names]
 
     halves = _parted(mosaic)
     for i in (0, 1):
@@ -117,8 +117,8 @@ def _rows(
     return planes
 
 
-def _gain(green: float, color: float) -> np.float32:
-    """What brings a color's white to green's; 1 where one of them holds next to nothing."""
+def matching_gain(green: float, color: float) -> np.float32:
+    """What brings a color's white to green's, or any other's; 1 where one holds next to nothing."""
     ratio = green / color if color > 0 < green else 1.0
     return np.float32(ratio if 1e-2 < ratio < 1e2 else 1.0)
 

@@ -16,10 +16,12 @@ class Linearize:
     """Applies `curve`, from codes to the codes of a linear ADC [DN]."""
 
     curve: Callable[[np.ndarray], np.ndarray]
+    done: bool = False
+    """The frame has been through it; only full-color values are still codes."""
     halo: int = 0
 
     def on_block(self, block: Block) -> Block:
-        return Block(self.curve(block.planes), block.first_row)
+        return block if self.done else Block(self.curve(block.planes), block.first_row)
 
     def on_colors(self, values: np.ndarray) -> np.ndarray:
         return self.curve(values)

@@ -9,12 +9,15 @@ import numpy as np
 from vcam_cli.errors import bad
 from vcam_cli.processing import tone
 from vcam_cli.processing.base import Context, Operation, flow, map_blocks
-from vcam_cli.processing.check import CANNOT_JUDGE
+from vcam_cli.processing.check import CANNOT_JUDGE, CANNOT_SHOW
 
 
 @dataclass(frozen=True)
 class Processed:
-    """A frame after processing: linear light, codes of the render, and the ideal image's scale."""
+    """A frame after processing: linear light, codes of the render, and the ideal image's scale.
+
+    dn: (rows, columns) [DN], or (C, rows, columns) where every pixel has all its colors.
+    """
 
     dn: np.ndarray
     context: Context
@@ -29,6 +32,14 @@ class Processed:
     def channels(self) -> int:
         return len(self.colors) if self.full_color else 1
 
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Rows and columns of the picture; BadInput where scattered pixels make none."""
+        if self.context.layout is not None and not self.full_color:
+            raise bad(("processing",), *CANNOT_SHOW)
+        rows, columns = self.dn.shape[-2:]
+        return rows, columns
+
     @cached_property
     def linear(self) -> np.ndarray:
         """(rows, columns, C) float32 linear light, perfect white = 1; C in the order of colors.
@@ -36,14 +47,14 @@ class Processed:
         (rows, columns, 1) for a monochrome array or a mosaic without demosaic. Neither clipped
         above 1 nor below 0.
         """
-        linear = np.empty((*self.dn.shape, self.channels), np.float32)
+        linear = np.empty((*self.shape, self.channels), np.float32)
 
         def fill(start: int, stop: int) -> None:
             planes = flow(self.dn, self.operations, start, stop).planes
             for channel, plane in enumerate(planes):
                 linear[start:stop, :, channel] = plane
 
-        map_blocks(fill, self.dn.shape[0], self.workers)
+        map_blocks(fill, len(linear), self.workers)
         return linear
 
     def encode(self, bits: int = 8) -> np.ndarray:
@@ -51,14 +62,14 @@ class Processed:
 
         (rows, columns, C), or (rows, columns) where `linear` has one channel.
         """
-        render = np.empty((*self.dn.shape, self.channels), np.uint8 if bits <= 8 else np.uint16)
+        render = np.empty((*self.shape, self.channels), np.uint8 if bits <= 8 else np.uint16)
 
         def fill(start: int, stop: int) -> None:
             planes = flow(self.dn, self.operations, start, stop).planes
             for channel, plane in enumerate(planes):
                 render[start:stop, :, channel] = tone.encode(plane, self.curve, bits)
 
-        map_blocks(fill, self.dn.shape[0], self.workers)
+        map_blocks(fill, len(render), self.workers)
         return render if self.channels > 1 else render[:, :, 0]
 
     def ideal(self, planes_dn: np.ndarray) -> np.ndarray:

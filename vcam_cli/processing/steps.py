@@ -1,5 +1,8 @@
 """Runs the steps of a camera's `processing` in the user's order.
 
+Scattered pixels are brought to the picture's grid before all other steps, wherever `demosaic`
+stands among them: the steps before it act on each color alone and commute with it.
+
 The steps become operations (see `base`) on blocks of rows; white balance looks at the picture as
 the steps before it left it. A last operation scales the picture so that the scene's perfect white
 under this exposure has luminance 1: the white passes through the same steps.
@@ -9,18 +12,27 @@ Nothing is computed before it is asked for: `Processed` holds the raw frame and 
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from vcam_cli.errors import bad
-from vcam_cli.processing import black_level, bright_block, color_correction, tone, white_balance
+from vcam_cli.processing import (
+    black_level,
+    bright_block,
+    color_correction,
+    scattered,
+    tone,
+    white_balance,
+)
 from vcam_cli.processing.base import Context, Operation, flow, map_blocks
 from vcam_cli.processing.check import Step, check
-from vcam_cli.processing.demosaic import Bilinear
+from vcam_cli.processing.demosaic import Bilinear, is_bayer
 from vcam_cli.processing.edge_aware import EdgeAware
+from vcam_cli.processing.guided import Guided
 from vcam_cli.processing.highlights import Highlights
 from vcam_cli.processing.linearize import Linearize
+from vcam_cli.processing.normalized import NormalizedConvolution, Sites, half_width
 from vcam_cli.processing.processed import Processed, through
 
 Path = tuple[str | int, ...]
@@ -39,6 +51,8 @@ class Draft:
     balanced: bool = False
     curve: tone.Curve = 1.0
     notes: tuple[str, ...] = ()
+    codes: np.ndarray = field(kw_only=True)
+    """Of the picture's pixels as they were measured: (rows, columns) or (C, rows, columns) [DN]."""
 
     def then(self, *operations: Operation) -> "Draft":
         return replace(self, operations=self.operations + operations)
@@ -49,16 +63,17 @@ class Draft:
 
 
 def process(dn: np.ndarray, context: Context, steps: Sequence[Step], workers: int = 1) -> Processed:
-    """A raw frame (rows, columns) [DN] made ready: gains measured, scale known.
+    """A raw frame [DN] made ready: gains measured, scale known.
 
+    dn: (rows, columns); (C, rows, columns) where every pixel has all its colors; scattered pixels
+    in the shape of their layout.
     Raises BadInput where the steps cannot work (see `check`), where the frame is too small to
     demosaic, and where a black level or a matrix given in numbers leaves nothing of the white.
     The bytes that come out are the same for any number of `workers` (threads).
     """
-    check(steps, context.pattern, context.colors)
-    draft = Draft(dn, context, workers, full_color=not context.mosaic)
-    if context.linearize is not None:
-        draft = draft.then(Linearize(context.linearize))
+    layout, colors = context.layout, context.colors
+    check(steps, context.pattern, colors, planes=context.planes, scattered=layout is not None)
+    draft = _draft(dn, context, workers, any(step.name == "demosaic" for step in steps))
     for index, step in enumerate(steps):
         if step.value != "none":
             draft = STEPS[step.name](draft, step, ("processing", index, step.name))
@@ -66,7 +81,7 @@ def process(dn: np.ndarray, context: Context, steps: Sequence[Step], workers: in
     scale = _scale(draft.seen(context.white_dn), colors)
     scaled = draft.then(white_balance.Gains((scale,) * len(colors), draft.context))
     return Processed(
-        dn,
+        draft.dn,
         context,
         scaled.operations,
         draft.curve,
@@ -75,6 +90,20 @@ def process(dn: np.ndarray, context: Context, steps: Sequence[Step], workers: in
         workers,
         draft.notes,
     )
+
+
+def _draft(dn: np.ndarray, context: Context, workers: int, demosaic: bool) -> Draft:
+    """The picture before all steps, in linear light."""
+    curve, layout = context.linearize, context.layout
+    if layout is None or not demosaic:
+        whole = not context.mosaic and layout is None
+        draft = Draft(dn, context, workers, full_color=whole, codes=dn)
+        return draft if curve is None else draft.then(Linearize(curve))
+    linear = dn if curve is None else curve(dn.astype(np.float32))
+    made = scattered.picture(linear, dn, layout, len(context.colors), workers)
+    context = replace(context, planes=True)
+    draft = Draft(made.planes, context, workers, full_color=True, codes=made.highest)
+    return draft if curve is None else draft.then(Linearize(curve, done=True))
 
 
 def _black_level(draft: Draft, step: Step, path: Path) -> Draft:
@@ -94,16 +123,26 @@ def _black_level(draft: Draft, step: Step, path: Path) -> Draft:
 
 def _demosaic(draft: Draft, step: Step, path: Path) -> Draft:
     context, shape = draft.context, draft.dn.shape
-    if min(shape) < 2:
+    if context.layout is not None:
+        return draft
+    pattern, colors = context.pattern, context.colors
+    bayer, edges = is_bayer(pattern), step.value == "edge-aware"
+    least = max(half_width(pattern, color) for color in colors)
+    if min(shape) < least:
         raise bad(
             path,
             f"{shape[0]} x {shape[1]} pixels cannot be demosaiced",
-            "use an array of at least 2 x 2 pixels",
+            f"use an array of at least {least} x {least} pixels",
         )
-    method: Operation = Bilinear(context.pattern, context.colors)
-    if step.value == "edge-aware":
-        white = draft.seen(context.white_dn) - draft.seen(_black(draft))
-        method = EdgeAware(context.pattern, context.colors, tuple(white.tolist()))
+    method: Operation
+    if edges:
+        white = tuple((draft.seen(context.white_dn) - draft.seen(_black(draft))).tolist())
+        aware = EdgeAware(pattern, colors, white)
+        method = aware if bayer else Guided(pattern, colors, white, Sites(pattern, shape))
+    elif bayer:
+        method = Bilinear(pattern, colors)
+    else:
+        method = NormalizedConvolution(pattern, colors, Sites(pattern, shape))
     return replace(draft.then(method), full_color=True)
 
 
@@ -127,7 +166,7 @@ def _all_means(draft: Draft) -> np.ndarray:
         block = flow(draft.dn, draft.operations, start, stop)
         return white_balance.color_sums(block, draft.context)
 
-    parts = map_blocks(sums, draft.dn.shape[0], draft.workers)
+    parts = map_blocks(sums, draft.dn.shape[-2], draft.workers)
     total, count = sum(parts, np.zeros((2, len(draft.context.colors))))
     return np.asarray(total / np.maximum(count, 1))
 
@@ -137,13 +176,15 @@ def _bright_means(draft: Draft) -> np.ndarray:
 
     def parts(start: int, stop: int) -> bright_block.Blocks:
         block = flow(draft.dn, draft.operations, start, stop)
-        return bright_block.measure(block, draft.dn[start:stop], draft.context)
+        return bright_block.measure(block, draft.codes[..., start:stop, :], draft.context)
 
-    return bright_block.white_means(map_blocks(parts, draft.dn.shape[0], draft.workers))
+    return bright_block.white_means(map_blocks(parts, draft.dn.shape[-2], draft.workers))
 
 
 def _color_correction(draft: Draft, step: Step, path: Path) -> Draft:
     context = draft.context
+    if len(context.colors) == 1:
+        return draft
     white = draft.seen(context.white_dn)
     note = ""
     if step.value == "fit":

@@ -25,6 +25,7 @@ from vcam_cli.scenes.base import (
     fills,
 )
 from vcam_cli.scenes.csf import Csf
+from vcam_cli.scenes.hyperspectral import Cube, cube_scene
 from vcam_cli.scenes.image import image_scene
 from vcam_cli.scenes.sinusoid import WaveChart
 from vcam_cli.scenes.slanted_edge import SlantedEdge
@@ -35,19 +36,27 @@ SOURCE = ("scene", "source")
 
 
 def build(
-    scene: models.Scene, view: View, picture: Array | None, primaries: str = "crt-brainard"
+    scene: models.Scene,
+    view: View,
+    picture: Array | Cube | None,
+    primaries: str = "crt-brainard",
 ) -> WaveScene | SampledScene:
     """The scene as the engine needs it.
 
-    picture: for an image source the decoded file, (h, w, channels), linear, 1 = its white.
+    picture: for an image source the decoded file, (h, w, channels), linear, 1 = its white; for a
+    hyperspectral source its cube.
     primaries: of the display that shows it (`display.primaries`), for the model rgb-display.
 
     Raises BadInput for a picture whose channels do not suit the model, for a light level that the
     lamp cannot give, and for sources that are not built.
     """
     source = scene.source
+    if isinstance(source, models.Hyperspectral):
+        if not isinstance(picture, Cube):
+            raise ValueError("a hyperspectral source needs its cube")
+        return cube_scene(scene, picture, view)
     if isinstance(source, models.ImageFile):
-        if picture is None:
+        if picture is None or isinstance(picture, Cube):
             raise ValueError("an image source needs its decoded picture")
         return _image(scene, source.model, view, picture, primaries)
     white = light.white_radiance(scene)

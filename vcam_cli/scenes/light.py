@@ -82,4 +82,5 @@ def _luminance(scene: Scene) -> float:
         return scene.luminance
     if scene.illuminance is not None:
         return scene.illuminance / math.pi
-    raise bad(("scene", "luminance"), "from-file is not supported yet", "write a luminance")
+    message = "only a file of radiances has a level of its own"
+    raise bad(("scene", "luminance"), message, "write for example 100 cd/m2")

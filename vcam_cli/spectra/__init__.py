@@ -26,6 +26,7 @@ from vcam_cli.spectra.standard import (
     illuminant,
     illuminant_names,
     luminance,
+    silicon_absorption,
     srgb_reflectances,
 )
 from vcam_cli.spectra.text import read_csv
@@ -49,5 +50,6 @@ __all__ = [
     "photons",
     "quadrature",
     "read_csv",
+    "silicon_absorption",
     "srgb_reflectances",
 ]

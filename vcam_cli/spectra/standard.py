@@ -1,6 +1,8 @@
-"""Standard spectra: CIE illuminants, the CIE 1931 observer, the ColorChecker, display primaries.
+"""Standard spectra: CIE illuminants, the CIE 1931 observer, the ColorChecker, display primaries;
+and silicon's absorption.
 
-They are small files in `vcam_cli/data`, written from colour-science by `scripts/make_tables.py`.
+They are small files in `vcam_cli/data`, all but the last written from colour-science by
+`scripts/make_tables.py`.
 An illuminant that does not ship is looked up in colour-science, which takes a second to import.
 
 Lamps and observers are zero outside their tables. CIE publishes illuminants A, C and D from 300
@@ -134,6 +136,18 @@ def _colors_and_sum(file: str, outside: Outside) -> tuple[Spectrum, ...]:
     colors = [columns[name] for name in ("red", "green", "blue")]
     every = (*colors, np.sum(colors, axis=0))
     return tuple(Spectrum(tables=(Table(wavelength, value, outside),)) for value in every)
+
+
+@cache
+def silicon_absorption() -> Table:
+    """Absorption coefficient of crystalline silicon at 300 K [1/m], 350 to 1100 nm.
+
+    Undefined outside. Source: M. A. Green, "Self-consistent optical parameters of intrinsic silicon
+    at 300 K including temperature coefficients", Solar Energy Materials and Solar Cells 92,
+    1305-1310 (2008). doi:10.1016/j.solmat.2008.06.009
+    """
+    wavelength, columns = _columns("silicon-absorption.csv")
+    return Table(wavelength, 100 * columns["absorption_per_cm"], "error")
 
 
 def luminance(spectral_radiance: Spectrum, start: float, stop: float) -> float:

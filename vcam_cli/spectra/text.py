@@ -12,11 +12,13 @@ HEADER = ("wavelength_nm", "value")
 MOST_ROWS = 200_000
 
 
-def read_rows(path: str | PathLike[str]) -> tuple[list[str], Floats]:
-    """The header's names and the numbers (rows, columns) of a CSV file.
+def read_table(
+    path: str | PathLike[str], most: int = MOST_ROWS
+) -> tuple[list[str], list[tuple[int, list[str]]]]:
+    """The header's names of a CSV file, and of every row its line number and cells.
 
     Raises ValueError that names the file and the line: not text, no header, a row of another
-    length, something that is no finite number. OSError as `open` raises it.
+    length, more than `most` rows. OSError as `open` raises it.
     """
     file = Path(path)
     try:
@@ -27,23 +29,35 @@ def read_rows(path: str | PathLike[str]) -> tuple[list[str], Floats]:
     rows = [(n, line) for n, line in rows if line and not line.startswith("#")]
     if not rows:
         raise ValueError(f"{file}: is empty; it needs a header and rows of numbers")
-    if len(rows) > MOST_ROWS:
-        raise ValueError(f"{file}: has {len(rows)} rows; at most {MOST_ROWS} are read")
+    if len(rows) > most:
+        raise ValueError(f"{file}: has {len(rows)} rows; at most {most} are read")
     header = [name.strip() for name in rows[0][1].split(",")]
-    numbers = [_row(file, n, line, len(header)) for n, line in rows[1:]]
+    cells = [(n, line.split(",")) for n, line in rows[1:]]
+    for n, row in cells:
+        if len(row) != len(header):
+            raise ValueError(f"{file}:{n}: has {len(row)} columns; the header has {len(header)}")
+    return header, cells
+
+
+def read_rows(path: str | PathLike[str]) -> tuple[list[str], Floats]:
+    """The header's names and the numbers (rows, columns) of a CSV file.
+
+    Raises ValueError as `read_table`, and for something that is no finite number.
+    """
+    header, cells = read_table(path)
+    numbers = [numbers_of(Path(path), n, row) for n, row in cells]
     return header, np.array(numbers, dtype=np.float64).reshape(len(numbers), len(header))
 
 
-def _row(file: Path, number: int, line: str, columns: int) -> list[float]:
-    cells = line.split(",")
-    if len(cells) != columns:
-        raise ValueError(f"{file}:{number}: has {len(cells)} columns; the header has {columns}")
+def numbers_of(file: Path, line: int, cells: list[str]) -> list[float]:
+    """Some cells of a line as numbers. Raises ValueError for what is no finite number."""
+    shown = ",".join(cells)
     try:
         values = [float(cell) for cell in cells]
     except ValueError:
-        raise ValueError(f"{file}:{number}: {line!r} is not a row of numbers") from None
+        raise ValueError(f"{file}:{line}: {shown!r} is not a row of numbers") from None
     if not all(math.isfinite(value) for value in values):
-        raise ValueError(f"{file}:{number}: {line!r} holds a value that is not finite")
+        raise ValueError(f"{file}:{line}: {shown!r} holds a value that is not finite")
     return values
 
 

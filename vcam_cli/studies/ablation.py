@@ -8,23 +8,27 @@ numbers of its own, so that the difference of two frames is the effect and nothi
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.geometry import geometry
-from vcam_cli.effects.base import Code, Draw
+from vcam_cli.effects.base import Charge, Code, Draw
 from vcam_cli.effects.order import ORDER
 from vcam_cli.effects.quantization import Quantization
+from vcam_cli.effects.read_noise import ReadNoise
 from vcam_cli.effects.saturation import Saturation
-from vcam_cli.engine import capture, plan
+from vcam_cli.engine import binning, capture, plan
 from vcam_cli.engine.prepare import Prepared
 
 FLAT = (4, 1 << 16)
 """Rows and columns of the fields that noise is measured on: many columns, since some of it is the
 same along a whole column. A variance is good to sqrt(2 / columns) = 0.6 % then."""
+SQUARE = (1 << 10, 1 << 10)
+"""The same where some of it is the same along a whole row too: good to 4 %."""
 
 
 @dataclass(frozen=True)
@@ -73,8 +77,7 @@ def wanted(camera: Camera) -> list[str]:
 
 def exposed_for(camera: Camera, time: float) -> Camera:
     """The camera with its exposure time fixed [s]: an effect left out must not change it."""
-    fixed = camera.exposure.model_copy(update={"auto": None, "time": time})
-    return camera.model_copy(update={"exposure": fixed})
+    return camera.model_copy(update={"exposure": camera.exposure.single(time)})
 
 
 def mean_raw(ready: Prepared) -> NDArray:
@@ -101,8 +104,11 @@ def variance_shares(ready: Prepared, full: float, workers: int) -> dict[str, flo
 
     ready: the camera with everything on; full: its full signal [electrons].
     """
-    fields = [np.full(FLAT, share * full) for share in plan.LEVELS]
     draws = [e for e in ready.plan.active if isinstance(e, Draw)]
+    shape = SQUARE if any(isinstance(e, ReadNoise) and e.row for e in draws) else FLAT
+    group = ready.layout.joining.binning
+    shape = (shape[0] + -shape[0] % group.rows, shape[1] + -shape[1] % group.columns)
+    fields = [np.full(shape, share * full) for share in plan.LEVELS]
     shares = {}
     for scope in ("frame", "sensor"):
         here = tuple(e for e in draws if e.scope == scope)
@@ -115,16 +121,17 @@ def variance_shares(ready: Prepared, full: float, workers: int) -> dict[str, flo
             )
         code = next((e for e in ready.plan.active if isinstance(e, Code)), None)
         if scope == "frame" and code is not None:
-            shares[code.name] = max(_rounding_share(code, taken) for taken in everything)
+            times = binning.conversions(group)
+            shares[code.name] = max(_rounding_share(code, taken, times) for taken in everything)
     return {name: float(share) for name, share in shares.items()}
 
 
-def _rounding_share(code: Code, electrons: NDArray) -> float:
-    """Mean square of the rounding error over the variance with it."""
+def _rounding_share(code: Code, electrons: NDArray, times: int) -> float:
+    """Mean square of the rounding error, a mean of so many, over the variance with it."""
     line = code.line(electrons.copy())
     ends = electrons.mean() * np.array([1.0, 1.001]) + np.array([0.0, 1.0])
     per_code = float(np.diff(ends)[0] / np.diff(code.line(ends.copy()))[0])
-    error = float(np.mean((np.rint(line) - line) ** 2)) * per_code**2
+    error = float(np.mean((np.rint(line) - line) ** 2)) * per_code**2 / times
     return error / max(error + float(np.var(electrons)), 1e-300)
 
 
@@ -133,7 +140,16 @@ def _variance(taken: NDArray) -> float:
 
 
 def _taken(ready: Prepared, field: NDArray, draws: tuple[Draw, ...], workers: int) -> NDArray:
-    """A flat field [electrons] with these draws in it, never clipped."""
+    """A flat field [electrons], dark signal included, with these draws in it, never clipped.
+
+    Of pixels that are read as one, their mean.
+    """
     seeds = {"sensor": ready.camera.seed.sensor, "frame": ready.camera.seed.frame}
     code = Quantization.of(ready.camera, ready.geometry)
-    return capture.capture(field, 1.0, draws, code, seeds, workers)[0]
+    charges = tuple(e for e in ready.plan.active if isinstance(e, Charge))
+    rate = field / ready.exposure_time - sum(e.rate() for e in charges)
+    effects = (*charges, *draws)
+    take = partial(capture.capture, code=code, seeds=seeds, workers=workers)
+    joins = replace(ready.layout.joining, step=(1, 1))  # all of its pixels are alike
+    time = ready.exposure_time
+    return binning.read(joins, rate, time, effects, take, code.bits)[0] / joins.summed

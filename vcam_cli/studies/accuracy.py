@@ -209,6 +209,7 @@ def converged(camera: Camera, coarse: Prepared, workers: int) -> Prepared:
     """
     everything = ablation.switched(camera, "all")
     knobs: dict[str, Any] = {"wavelength_step": "1 nm", "table_size": 1 << 16, "float_width": 64}
+    knobs["field_zones"] = 8
     reached = coarse.spectrum.oversampling
     if reached:
         samples = min(MOST_BYTES, memory.available() / 2) / 8 / max(1, coarse.spectrum.planes)

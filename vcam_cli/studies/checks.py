@@ -7,13 +7,22 @@ processing or the picture to know.
 from collections.abc import Sequence
 from pathlib import Path
 
+from numpy.typing import NDArray
+
 from vcam_cli.camera import load as files
 from vcam_cli.camera import shipped
+from vcam_cli.camera.array import Positions
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.geometry import geometry
+from vcam_cli.camera.lattice import places
+from vcam_cli.camera.processing import SHOWN
+from vcam_cli.effects import aberration
 from vcam_cli.engine import plan
-from vcam_cli.errors import bad
+from vcam_cli.engine.layout import layout
+from vcam_cli.errors import bad, split
+from vcam_cli.processing import check as check_steps
 from vcam_cli.scenes.build import SOURCE, check_channels
+from vcam_cli.scenes.hyperspectral import check as check_bands
 
 
 def load(camera: str | Path, sets: Sequence[str] = ()) -> Camera:
@@ -39,7 +48,9 @@ def check_effects(camera: Camera) -> None:
 
 def check_size(camera: Camera) -> None:
     """Raises BadInput for an array too small for the demosaicing of its processing."""
-    solved = geometry(camera)
+    if camera.array.scattered:
+        return
+    solved = layout(camera, geometry(camera)).geometry
     if any(step.name == "demosaic" for step in camera.processing):
         for name, count in (("rows", solved.rows), ("columns", solved.columns)):
             if count < 2:
@@ -48,18 +59,60 @@ def check_size(camera: Camera) -> None:
                 raise bad(path, message, "use an array of at least 2 x 2 pixels")
 
 
-def check_picture(camera: Camera) -> None:
-    """Raises BadInput for a picture that is none, or whose channels do not suit its model."""
-    source = camera.scene.source
-    if source.kind != "image":
-        return
-    from vcam_cli.files.images import color_channels
+def check_binning(camera: Camera) -> None:
+    """Raises BadInput for an array that is no whole number of the groups that are read as one."""
+    if not camera.array.scattered:
+        layout(camera, geometry(camera))
 
-    check_channels(source.model, color_channels(source.file, (*SOURCE, "file")))
+
+def check_positions(camera: Camera) -> None:
+    """Raises BadInput for positions of colors that the processing cannot make a picture of."""
+    if not isinstance(camera.array.pattern, Positions):
+        return
+    colors = tuple(dict.fromkeys(places(camera).colors))
+    check_steps(camera.processing, (), colors, camera.quality, scattered=True)
+    done = {step.name for step in camera.processing if step.value != "none"}
+    wanted = bool(camera.quality or camera.output.render) and "demosaic" in done
+    if wanted and len(colors) not in SHOWN and "color_correction" not in done:
+        message = f"{', '.join(colors)} are not the colors of a display"
+        raise bad(("processing",), message, "add color_correction: fit, behind the demosaic")
+
+
+def check_picture(camera: Camera) -> None:
+    """Raises BadInput for a picture that is none, or that does not suit what is said of it."""
+    source, path = camera.scene.source, (*SOURCE, "file")
+    if source.kind == "image":
+        from vcam_cli.files.images import color_channels
+
+        check_channels(source.model, color_channels(source.file, path))
+    if source.kind == "hyperspectral":
+        from vcam_cli.files.hyperspectral import read_bands
+
+        check_bands(camera.scene, read_bands(source.file, path))
+
+
+def check_lens(camera: Camera) -> None:
+    """Raises BadInput for a wavefront too steep, or a point spread function that is none."""
+    read_lens(camera)
+
+
+def read_lens(camera: Camera) -> dict[str, NDArray]:
+    """What the files of the camera's optics hold, for `Camera.with_samples`; raises BadInput."""
+    aberration.check(camera, geometry(camera))
+    psf = camera.optics.psf
+    if psf is None:
+        return {}
+    from vcam_cli.files.psf import read_psf
+
+    channels = max(len(psf.wavelengths), 1)
+    return {aberration.PSF: read_psf(psf.file, channels, (*split(aberration.PSF), "file"))}
 
 
 CHECKS: tuple[files.Check, ...] = (
     (check_effects, "optics pixel effects"),
+    (check_binning, "pixel array exposure adc"),
     (check_size, "pixel array processing"),
+    (check_positions, "pixel array processing"),
     (check_picture, "scene"),
+    (check_lens, "optics scene pixel array effects"),
 )

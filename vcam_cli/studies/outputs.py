@@ -1,6 +1,7 @@
 """What `vcam run` leaves in its folder: raw.exr, render.png, metrics.csv, ideal.exr, run.json.
 
-Raw and render are written by two threads at once; files are most of a frame's cost.
+Of several samples of one integration also captures/raw_001.exr and so on, and hdr.exr. Raw and
+render are written by two threads at once; files are most of a frame's cost.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ import resource
 import sys
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -19,28 +21,28 @@ import numpy as np
 import vcam_cli
 from vcam_cli.camera import shipped
 from vcam_cli.camera.camera import Camera
-from vcam_cli.camera.electrical import Electrical
 from vcam_cli.camera.load import FILE_KEYS
 from vcam_cli.camera.support import spectra
 from vcam_cli.engine import irradiance
+from vcam_cli.engine.frame import Frame
 from vcam_cli.files.exr import ExrWriter
 from vcam_cli.files.folder import OutputFolder
+from vcam_cli.files.hyperspectral import companions
 from vcam_cli.files.maps import write_map
 from vcam_cli.files.png import write_png
 from vcam_cli.files.report import hash_file, hash_text, to_json
 from vcam_cli.files.spectral import write_spectral
 from vcam_cli.files.tables import write_metrics
-from vcam_cli.rng import BLOCK_ROWS
+from vcam_cli.studies import raw_file
+from vcam_cli.studies.raw_file import ROWS_AT_ONCE
 from vcam_cli.studies.simulate import Result
-
-ROWS_AT_ONCE = 4 * BLOCK_ROWS
 
 
 def write(result: Result, folder: OutputFolder) -> None:
     """Writes the files of one run, all but the record `run.json`."""
     camera = result.frame.camera
     metrics = result.metrics
-    jobs: list[Callable[[], None]] = [lambda: _raw(result, folder.new("raw.exr"))]
+    jobs: list[Callable[[], None]] = [lambda: write_raw(result, folder.new("raw.exr"))]
     if camera.output.render:
         render = result.render
         jobs.append(lambda: write_png(folder.new("render.png"), render))
@@ -48,6 +50,7 @@ def write(result: Result, folder: OutputFolder) -> None:
         jobs.append(lambda: _ideal(result, folder.new("ideal.exr")))
     if "s-cielab" in camera.quality:
         jobs.append(lambda: write_map(folder.new("delta_e.png"), result.s_cielab))
+    jobs += _of_samples(result, folder)
     with result.stages("files"), ThreadPoolExecutor(2) as pool:
         for done in [pool.submit(job) for job in jobs]:
             done.result()
@@ -73,22 +76,40 @@ def _irradiance(result: Result, path: Path) -> None:
         "vcam:quantity": "spectral irradiance on the sensor, mean over each pixel's cell",
         "vcam:configHash": config_hash(frame.camera),
     }
-    write_spectral(path, nodes, planes(), frame.dn.shape, "W.m^-2.nm^-1", said)
+    g = frame.layout.geometry
+    write_spectral(path, nodes, planes(), (g.rows, g.columns), "W.m^-2.nm^-1", said)
 
 
-def _raw(result: Result, path: Path) -> None:
-    """Raw channels as `output.raw` asks, block by block."""
+def write_raw(result: Result, path: Path) -> None:
+    """Writes raw.exr."""
+    raw_file.write_raw(path, result.frame, config_hash(result.frame.camera))
+
+
+def _of_samples(result: Result, folder: OutputFolder) -> Iterator[Callable[[], None]]:
+    """Jobs that write every sample of one integration, and what they tell together."""
     frame = result.frame
-    sources = {"dn": frame.dn, "electrons": frame.electrons}
-    channels = frame.camera.output.raw
-    volts_per_electron = frame.electrical.conversion_gain * frame.electrical.analog_gain
-    with ExrWriter(path, frame.dn.shape, channels, _attributes(result)) as exr:
-        for row in range(0, frame.dn.shape[0], ROWS_AT_ONCE):
-            rows = slice(row, row + ROWS_AT_ONCE)
-            blocks = {name: array[rows] for name, array in sources.items() if name in channels}
-            if "volts" in channels:
-                blocks["volts"] = frame.electrons[rows] * np.float32(volts_per_electron)
-            exr.write_rows(row, blocks)
+    if not frame.times:
+        return
+    said = config_hash(frame.camera)
+    for number, name in enumerate(_sample_files(frame)):
+        path, sample = folder.new(name), frame.sample(number)
+        yield partial(raw_file.write_raw, path, sample, said)
+    yield partial(raw_file.write_hdr, folder.new("hdr.exr"), frame, said)
+
+
+def _sample_files(frame: Frame) -> list[str]:
+    """Names of the samples' files, in the order of time."""
+    return [f"captures/raw_{number:03d}.exr" for number in range(1, len(frame.times) + 1)]
+
+
+def _samples(frame: Frame) -> list[dict[str, Any]]:
+    """What `run.json` says of the samples of one integration."""
+    said = []
+    for number, name in enumerate(_sample_files(frame)):
+        sample = frame.sample(number)
+        full = float((sample.dn >= frame.saturated_dn).mean())
+        said.append({"file": name, "time": sample.exposure_time, "saturated_fraction": full})
+    return said
 
 
 def _ideal(result: Result, path: Path) -> None:
@@ -99,36 +120,6 @@ def _ideal(result: Result, path: Path) -> None:
         for row in range(0, len(ideal), ROWS_AT_ONCE):
             rows = slice(row, row + ROWS_AT_ONCE)
             exr.write_rows(row, {n: ideal[rows, :, i] for i, n in enumerate(names)})
-
-
-def _attributes(result: Result) -> dict[str, str | int | float]:
-    frame, e = result.frame, result.frame.electrical
-    block = "/".join("".join(row) for row in frame.mosaic.block)
-    return {
-        "name": frame.camera.name,
-        "vcam:version": vcam_cli.__version__,
-        "vcam:seedSensor": str(frame.camera.seed.sensor),
-        "vcam:seedFrame": str(frame.camera.seed.frame),
-        "vcam:exposureTime": frame.exposure_time,
-        "vcam:blackLevel": frame.black_dn,
-        "vcam:whiteLevel": float(e.highest_code),
-        "vcam:conversionGain": e.conversion_gain,
-        **_curve(e),
-        "vcam:cfa": "monochrome" if len(frame.mosaic.colors) == 1 else block,
-        "vcam:configHash": config_hash(frame.camera),
-    }
-
-
-def _curve(e: Electrical) -> dict[str, str | int | float]:
-    """What turns raw numbers back into electrons or volts."""
-    if e.reference is None:
-        return {"vcam:adc": "linear", "vcam:electronsPerDN": e.electrons_per_dn}
-    return {
-        "vcam:adc": "logarithmic",
-        "vcam:adcOffset": e.offset,
-        "vcam:adcFullScale": e.full_scale,
-        "vcam:adcReference": e.reference,
-    }
 
 
 def config_hash(camera: Camera) -> str:
@@ -144,7 +135,8 @@ def record(result: Result, inputs: tuple[Path, ...], seconds: float) -> dict[str
         "name": camera.name,
         "camera": camera.model_dump(mode="json"),
         "plan": frame.plan.report(),
-        "geometry": frame.geometry.report(frame.spectrum.oversampling),
+        "geometry": frame.layout.report(frame.spectrum.oversampling),
+        **({"captures": _samples(frame)} if frame.times else {}),
         "metrics": {name: value for name, value, _ in result.metrics},
         "stages": result.stages.seconds,
         "seconds": seconds,
@@ -161,6 +153,11 @@ def record(result: Result, inputs: tuple[Path, ...], seconds: float) -> dict[str
 
 def inputs(camera: Camera) -> tuple[Path, ...]:
     """Every file that a run reads: YAML files, and what they name."""
+    return tuple(sorted({*camera.files, *data_files(camera)}, key=str))
+
+
+def data_files(camera: Camera) -> tuple[Path, ...]:
+    """The files that a camera names: pictures, tables, spectra, those that ship among them."""
 
     def named(value: Any) -> Iterator[str]:
         if isinstance(value, dict):
@@ -179,8 +176,9 @@ def inputs(camera: Camera) -> tuple[Path, ...]:
         for factor in getattr(spec, "factors", ())
         if isinstance(factor, str)
     )
-    files = [str(path) for path in camera.files]
-    found = {*files, *named(camera.model_dump(mode="json")), *shipped_spectra}
+    found = {*named(camera.model_dump(mode="json")), *shipped_spectra}
+    if camera.scene.source.kind == "hyperspectral":
+        found |= {str(path) for path in companions(camera.scene.source.file)}
     return tuple(Path(name) for name in sorted(found))
 
 

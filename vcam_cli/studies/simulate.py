@@ -4,11 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
+import numpy as np
 from numpy.typing import NDArray
 
+from vcam_cli.camera import photodiode
+from vcam_cli.camera.array import Positions
 from vcam_cli.camera.camera import Camera
-from vcam_cli.camera.geometry import pixel_centers
+from vcam_cli.camera.electrical import no_volts
 from vcam_cli.engine.frame import Frame, expose, figures
 from vcam_cli.engine.parallel import available_workers
 from vcam_cli.engine.prepare import Prepared
@@ -19,11 +23,27 @@ from vcam_cli.processing import Context, Patches, Processed, process
 from vcam_cli.quality import display
 from vcam_cli.quality.mse import mse, psnr_db
 from vcam_cli.quality.scielab import cielab_map, s_cielab_map
+from vcam_cli.scenes.hyperspectral import CubeScene
+from vcam_cli.spectra import luminance
+from vcam_cli.studies.checks import read_lens
+from vcam_cli.studies.shared import Shared
 
 
 @dataclass(frozen=True)
 class Result:
-    """A simulated photograph. Arrays are (rows, columns) unless they say otherwise."""
+    """A simulated photograph.
+
+    Arrays of the raw frame are (rows, columns); of stacked pixels (rows, columns, C), colors in the
+    order of `colors`; of a honeycomb (rows, columns) with every second row half a column to the
+    right; of pixels at places of their own (N,). Those of the picture are on a grid of squares,
+    which is the raw frame's own but for the last two.
+
+    Where pixels are read as one, a pixel is what is read. Its electrons are those of the charges or
+    codes that are added, and the mean of voltages.
+
+    Of several samples of one integration, the raw frame is the last of them; the picture shows the
+    photocurrent that all of them tell, scaled as ever so that the perfect white is 1.
+    """
 
     frame: Frame
     processed: Processed
@@ -33,23 +53,25 @@ class Result:
     @property
     def dn(self) -> NDArray:
         """Raw digital numbers, whole. [DN]"""
-        return self.frame.dn
+        return self._of_raw(self.frame.dn)
 
     @property
     def electrons(self) -> NDArray:
         """Raw signal before the ADC, noisy, clipped above at the full well. [electrons]"""
-        return self.frame.electrons
+        return self._of_raw(self.frame.electrons)
 
     @property
     def volts(self) -> NDArray:
-        """Raw signal at the ADC's input. [V]"""
+        """Raw signal at the ADC's input. [V] Raises BadInput where the file gives no volts."""
         e = self.frame.electrical
+        if not e.in_volts:
+            raise no_volts("pixel.readout", "volts", "take electrons")
         return self.electrons * self.electrons.dtype.type(e.conversion_gain * e.analog_gain)
 
     @property
     def mean_electrons(self) -> NDArray:
         """Noise-free signal, photo + dark, before saturation. [electrons]"""
-        return self.frame.mean_electrons
+        return self._of_raw(self.frame.mean_electrons)
 
     @property
     def exposure_time(self) -> float:
@@ -57,18 +79,70 @@ class Result:
         return self.frame.exposure_time
 
     @property
+    def times(self) -> tuple[float, ...]:
+        """Of the samples of one integration (N,) [s]; () of a single exposure."""
+        return self.frame.times
+
+    @property
+    def samples_dn(self) -> NDArray | None:
+        """(N, ...) `dn` of every sample; None of a single exposure. [DN]"""
+        return self._of_samples(self.frame.samples_dn)
+
+    @property
+    def samples_electrons(self) -> NDArray | None:
+        """(N, ...) `electrons` of every sample; None of a single exposure. [electrons]"""
+        return self._of_samples(self.frame.samples_electrons)
+
+    @property
+    def photocurrent(self) -> NDArray | None:
+        """What the samples tell of the light, as `dn`; None of a single exposure. [e/s]"""
+        found = self.frame.photocurrent
+        return None if found is None else self._of_raw(found)
+
+    def _of_samples(self, values: NDArray | None) -> NDArray | None:
+        return None if values is None else np.stack([self._of_raw(sample) for sample in values])
+
+    @property
+    def colors(self) -> tuple[str, ...]:
+        """Names of the colors, in the order of planes."""
+        return self.frame.mosaic.colors
+
+    @property
+    def color(self) -> NDArray:
+        """Index of each raw pixel's color, in the shape of `dn`."""
+        place = self.frame.layout
+        if place.full_color:
+            return np.broadcast_to(np.arange(len(self.colors)), self.dn.shape)
+        return self._of_raw(place.color)
+
+    @property
     def x(self) -> NDArray:
-        """Centers of the columns, right of the array's center, (columns,) [m]."""
-        return pixel_centers(self.frame.geometry)[0]
+        """Centers of the raw frame's columns, right of the array's center, (columns,) [m].
+
+        Of a honeycomb and of pixels at places of their own: of every pixel, in the shape of `dn`.
+        """
+        place = self.frame.layout
+        return self._of_raw(place.x) if place.scattered else place.centers[0]
 
     @property
     def y(self) -> NDArray:
-        """Centers of the rows, below the array's center, (rows,) [m]."""
-        return pixel_centers(self.frame.geometry)[1]
+        """Centers of the raw frame's rows, below the array's center, (rows,) [m]; as `x`."""
+        place = self.frame.layout
+        return self._of_raw(place.y) if place.scattered else place.centers[1]
+
+    def _of_raw(self, values: NDArray) -> NDArray:
+        """Values of the raw frame in the shape that a user sees."""
+        if values.ndim == 3:
+            return np.moveaxis(values, 0, -1)
+        places = isinstance(self.frame.camera.array.pattern, Positions)
+        return values[0] if places else values
 
     @cached_property
     def render(self) -> NDArray:
-        """Codes of the render after `processing`: (rows, columns) or (rows, columns, 3)."""
+        """Codes of the render after `processing`: (rows, columns) or (rows, columns, 3).
+
+        Raises BadInput for scattered pixels without demosaic, and so do `linear` and `ideal`.
+        """
         with self.stages("processing"):
             return self.processed.encode(self.frame.camera.output.render or 8)
 
@@ -93,7 +167,7 @@ class Result:
 
     @property
     def _screen(self) -> display.Screen:
-        return display.screen(self.frame.camera.display, self.frame.geometry.columns)
+        return display.screen(self.frame.camera.display, len(self.frame.layout.picture_x))
 
     @cached_property
     def metrics(self) -> list[tuple[str, float, str]]:
@@ -114,16 +188,22 @@ class Result:
         return out
 
 
-def simulate(camera: Camera, workers: int | None = None, watch: Observer | None = None) -> Result:
+def simulate(
+    camera: Camera,
+    workers: int | None = None,
+    watch: Observer | None = None,
+    shared: Shared | None = None,
+) -> Result:
     """Simulates `camera` looking at its scene.
 
     workers: threads, default all processors; results do not depend on it. watch: told of stages,
-    here and while the result's properties are computed. Raises BadInput (with positions in the
+    here and while the result's properties are computed. shared: what cameras before this one had
+    in common with it; results do not depend on it either. Raises BadInput (with positions in the
     camera's file) and CannotDo.
     """
     try:
         stages = Stages(watch=watch or Silent())
-        return _simulate(camera, workers or available_workers(), stages)
+        return _simulate(camera, workers or available_workers(), stages, shared or Shared())
     except BadInput as error:
         raise error.located(camera.locate) from None
 
@@ -134,40 +214,73 @@ def prepare(
     """The camera ready to take its frame, and notes for the user: what `vcam plan` shows."""
     try:
         stages = Stages(watch=watch or Silent())
+        camera = _with_lens(camera, stages)
         picture, notes = _picture(camera, stages)
-        return bring_light(camera, picture, workers or available_workers(), stages), notes
+        ready = bring_light(camera, picture, workers or available_workers(), stages)
+        return ready, notes + _remarks(ready)
     except BadInput as error:
         raise error.located(camera.locate) from None
 
 
-def _picture(camera: Camera, stages: Stages) -> tuple[NDArray | None, tuple[str, ...]]:
-    """Samples of the scene's image file and notes about them; None where there is no file."""
-    source = camera.scene.source
-    if source.kind != "image":
-        return None, ()
-    from vcam_cli.files.images import read_picture
-
+def _with_lens(camera: Camera, stages: Stages) -> Camera:
+    """The camera with the samples of its point spread function, its wavefront checked."""
     with stages("read"):
-        path = ("scene", "source", "file")
-        read = read_picture(source.file, source.encoding, source.white, path)
-    return read.data, read.notes
+        samples = read_lens(camera)
+    return camera.with_samples(samples) if samples else camera
 
 
-def _simulate(camera: Camera, workers: int, stages: Stages) -> Result:
-    picture, notes = _picture(camera, stages)
-    frame = expose(camera, picture, workers, stages)
+def _picture(camera: Camera, stages: Stages) -> tuple[Any, tuple[str, ...]]:
+    """What the scene's file holds (samples, or a `Cube`) and notes; None where there is no file."""
+    source, path = camera.scene.source, ("scene", "source", "file")
+    if source.kind == "image":
+        from vcam_cli.files.images import read_picture
+
+        with stages("read"):
+            read = read_picture(source.file, source.encoding, source.white, path)
+        return read.data, read.notes
+    if source.kind == "hyperspectral":
+        from vcam_cli.files.hyperspectral import read_cube
+
+        with stages("read"):
+            return read_cube(source.file, path)
+    return None, ()
+
+
+def _remarks(ready: Prepared) -> tuple[str, ...]:
+    """What a user should know of the silicon, and of a scene of spectra: white and components."""
+    scene, band = ready.scene, ready.camera.scene.wavelengths
+    silicon = photodiode.remarks(ready.camera)
+    if not isinstance(scene, CubeScene):
+        return silicon
+    level = luminance(scene.white, band.start, band.stop)
+    notes = [f"white is taken to be {level:.4g} cd/m2"]
+    if 0 < ready.spectrum.planes < len(scene.spectra):
+        notes.append(
+            f"{len(scene.spectra)} bands are simulated as {ready.spectrum.planes} mixtures of them;"
+            f" no transfer function is off by more than {ready.settings.mixing_tolerance:g}"
+            " of the largest"
+        )
+    return silicon + tuple(notes)
+
+
+def _simulate(camera: Camera, workers: int, stages: Stages, shared: Shared) -> Result:
+    camera = _with_lens(camera, stages)
+    picture, notes = shared.picture(camera, lambda: _picture(camera, stages))
+    frame = expose(camera, picture, workers, stages, shared.lights)
     context = Context(
         pattern=frame.mosaic.block,
         colors=frame.mosaic.colors,
         white_dn=frame.white_dn,
         black_dn=frame.black_dn,
-        linearize=None if frame.electrical.reference is None else frame.code.linear,
-        saturated_dn=frame.saturated_dn,
+        linearize=None if frame.electrical.reference is None else frame.linear,
+        saturated_dn=frame.picture_saturated_dn,
         patches=lambda: _patches(frame),
+        planes=frame.layout.full_color,
+        layout=frame.layout if frame.layout.scattered else None,
     )
     with stages("balance"):
-        processed = process(frame.dn, context, camera.processing, workers=workers)
-    return Result(frame, processed, stages, notes + processed.notes)
+        processed = process(frame.picture_dn, context, camera.processing, workers=workers)
+    return Result(frame, processed, stages, notes + _remarks(frame) + processed.notes)
 
 
 def _patches(frame: Frame) -> Patches:

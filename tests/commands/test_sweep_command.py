@@ -1,0 +1,197 @@
+"""`vcam sweep`: what it says, how it ends; the shipped study; studies in the other commands."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+import yaml
+from making import tree
+from typer.testing import CliRunner
+
+from vcam_cli.commands import progress
+from vcam_cli.commands.main import app
+from vcam_cli.files import atomic
+from vcam_cli.studies import sweep as module
+
+STUDY = {
+    "kind": "sweep",
+    "camera": "camera.yaml",
+    "vary": {"pixel.width": {"start": "4 um", "stop": "6 um", "count": 3}},
+    "metrics": ["mean_electrons"],
+    "optimize": {"metric": "mean_electrons", "goal": "max"},
+}
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def write(changes=None, **study):
+    small = {"array.rows": 8, "array.columns": 12, "accuracy": "draft"}
+    Path("camera.yaml").write_text(yaml.safe_dump(tree({**small, **(changes or {})})))
+    Path("study.yaml").write_text(yaml.safe_dump(STUDY | study, sort_keys=False))
+
+
+def vcam(*args, code=0):
+    done = CliRunner().invoke(app, list(args), prog_name="vcam")
+    assert done.exit_code == code, done.output
+    return done
+
+
+def one(*args, code=0):
+    return vcam("sweep", "study.yaml", "--workers", "1", *args, code=code)
+
+
+def test_a_person_reads_the_optimum_and_where_it_all_is():
+    write()
+    text = one().stdout
+    assert "nominal: best pixel.width 6.0 (5.0 to 6.0) um, mean_electrons" in text
+    assert "at the high end of its range" in text
+    assert "3 of 3 points, 3 computed in" in text
+    assert text.endswith("study: out/study/\n")
+    assert "3 of 3 points, 0 computed in" in one().stdout
+    assert one("-q").output == ""
+
+
+def test_json_is_all_there_is_on_stdout():
+    write()
+    told = json.loads(one("--json").stdout)
+    assert (told["points"], told["computed"], told["failed"], told["missing"]) == (3, 3, 0, 0)
+    assert told["optimum"][0]["parameter"] == "pixel.width"
+    assert told["optimum"][0]["edge"] == "high"
+    assert json.loads(one("--json", "--shard", "1/3", "-o", "part").stdout)["missing"] == 2
+
+
+def test_failing_points_end_with_4():
+    write(vary={"optics.f_number": {"values": [4, -1]}})
+    done = one(code=4)
+    assert "study.yaml:7:7: " in done.stderr and "optics.f_number: -1 is negative" in done.stderr
+    assert "1 failed: see the column error of points.csv" in done.stdout
+
+
+def test_a_study_without_a_valid_point_ends_with_2():
+    write(vary={"optics.f_number": {"values": [-2, -1]}})
+    assert "-2 is negative" in one(code=2).stderr
+    write(cases={"a": {"pixel.widht": "4 um"}})
+    assert "did you mean width?" in one(code=2).stderr
+    assert not Path("out").exists()
+
+
+def test_many_messages_are_cut_short():
+    write(vary={"optics.f_number": {"values": [4, *range(-20, 0)]}})
+    said = one(code=4).stderr.splitlines()
+    assert len(said) == 13 and said[-1] == "and 8 more"
+
+
+@pytest.mark.parametrize("shard", ["0/2", "3/2", "1", "a/b", "1/0", "-1/2"])
+def test_shares_that_are_none(shard):
+    write()
+    assert "is not a share such as 2/8" in one("--shard", shard, code=2).stderr
+
+
+def test_the_seed_is_the_first_of_the_frames():
+    write(seeds=2)
+    one("--seed", "7")
+    rows = Path("out/study/points.csv").read_text().splitlines()[1:]
+    assert [row.split(",")[2] for row in rows] == ["7", "8"] * 3
+
+
+def test_a_full_disk_ends_with_3(monkeypatch):
+    write()
+
+    def full(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(atomic.os, "replace", full)
+    assert "the disk is full" in one(code=3).stderr
+
+
+def test_ctrl_c_says_that_points_are_kept():
+    write(vary={"pixel.width": {"start": "4 um", "stop": "6 um", "count": 200}})
+    command = [sys.executable, "-m", "vcam_cli.commands.main", "sweep", "study.yaml"]
+    root = str(Path(module.__file__).parents[2])
+    process = subprocess.Popen(
+        [*command, "--workers", "2"],
+        env=os.environ | {"PYTHONPATH": root},
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    until = time.monotonic() + 60
+    while len(list(Path("out/study/points").glob("*.json"))) < 3 and time.monotonic() < until:
+        time.sleep(0.005)
+    process.send_signal(signal.SIGINT)
+    out, err = process.communicate(timeout=60)
+    assert (process.returncode, out) == (130, "")
+    assert err == "interrupted; finished points are kept, the same command goes on with them\n"
+    assert not list(Path("out/study/points").glob("*.part"))
+
+
+def test_a_log_has_a_line_a_minute(capsys):
+    with progress.Log("sweep", every=0.01) as log:
+        log.begin("sweep")
+        time.sleep(0.03)
+        assert capsys.readouterr().err == ""  # nothing is known yet
+        log.step(3, 12)
+        time.sleep(0.05)
+    lines = capsys.readouterr().err.splitlines()
+    assert lines and all(line.startswith("sweep: 3 of 12, about ") for line in lines)
+    assert progress.LOG_EVERY == 60
+
+
+def test_plots_are_pictures_and_the_same_bytes():
+    write(cases={"a": {}, "b": {"scene.radiance": "0.2 W/(sr m2)"}}, seeds=2)
+    one()
+    first = Path("out/study/mean_electrons.png").read_bytes()
+    assert first.startswith(b"\x89PNG") and len(first) > 5000
+    one("-o", "other")
+    assert Path("other/mean_electrons.png").read_bytes() == first
+
+
+class TestStudiesElsewhere:
+    def test_validate(self):
+        write()
+        assert vcam("validate", "study.yaml", "camera.yaml").stdout == (
+            "study.yaml: ok (study)\ncamera.yaml: ok (made)\n"
+        )
+        assert vcam("validate", "exposure-and-noise").stdout.endswith("ok (exposure-and-noise)\n")
+
+    def test_validate_tells_every_point_that_is_refused(self):
+        write(vary={"optics.f_number": {"values": [4, -1, -2]}})
+        said = vcam("validate", "study.yaml", code=2).stderr.splitlines()
+        assert [line.partition(": ")[0] for line in said] == ["study.yaml:7:7", "study.yaml:8:7"]
+
+    def test_list(self):
+        assert "exposure-and-noise" in vcam("list", "studies").stdout
+        assert "kind: sweep" in vcam("list", "studies", "exposure-and-noise").stdout
+
+    def test_a_study_given_to_run(self):
+        write()
+        said = vcam("run", "study.yaml", code=2).stderr
+        assert "this is a study (kind: sweep); give a camera file, or run the study" in said
+
+    def test_init_writes_a_study_that_is_valid_beside_its_camera(self):
+        vcam("init", "new")
+        assert sorted(p.name for p in Path("new").iterdir()) == ["camera.yaml", "study.yaml"]
+        assert vcam("validate", "new/study.yaml").exit_code == 0
+        assert "camera: camera.yaml" in Path("new/study.yaml").read_text()
+
+
+def test_the_shipped_study():
+    """Noisier pixels want to be exposed longer; saturation ends it for both at about the same."""
+    sizes = ["--set", "array.rows=60", "--set", "array.columns=90", "--accuracy", "draft"]
+    small = [*sizes, "--set", "scene.source={kind: chart, chart: step-wedge}"]
+    told = json.loads(vcam("sweep", "exposure-and-noise", *small, "--json", "-q").stdout)
+    quiet, noisy = told["optimum"]
+    assert told["points"] == 72 and told["failed"] == 0
+    for found in (quiet, noisy):
+        assert found["edge"] == ""
+        assert 15 < found["low"] <= found["optimum"] <= found["high"] < 40
+    assert quiet["value"] < noisy["value"]

@@ -1,0 +1,184 @@
+"""Charge transfer against a register that is clocked stage by stage, in code of its own."""
+
+import math
+
+import numpy as np
+import pytest
+from making import QUIET, camera, radiance_for
+
+from vcam_cli import simulate
+from vcam_cli.effects.base import Outlook
+from vcam_cli.effects.charge_transfer import ChargeTransfer
+
+RNG = np.random.default_rng(4)
+
+
+def clocked(packets: np.ndarray, inefficiency: float, phases: int) -> np.ndarray:
+    """What leaves a register of `phases` stages a packet, packets (count, lanes), the first first.
+
+    From the far end to the exit every stage is passed by the packets that began before it, one
+    after the other; each leaves its share behind, and the next takes that along.
+    """
+    packets = packets.astype(float)
+    for stage in range(len(packets) * phases, 0, -1):
+        left = np.zeros(packets.shape[1])
+        for k in range(math.ceil(stage / phases) - 1, len(packets)):
+            whole = packets[k] + left
+            left = inefficiency * whole
+            packets[k] = whole - left
+    return packets
+
+
+def electrons_one_by_one(row: np.ndarray, inefficiency: float, phases: int) -> np.ndarray:
+    """Where each of many electrons arrives, every one failing by its own chance."""
+    out = np.zeros(len(row))
+    for k, count in enumerate(row.astype(int)):
+        late = RNG.negative_binomial((k + 1) * phases, 1 - inefficiency, count)
+        np.add.at(out, k + late[k + late < len(row)], 1)
+    return out
+
+
+CASES = [(1e-5, 3), (1e-3, 1), (1e-3, 3), (0.02, 2), (0.3, 3), (0.9, 8)]
+
+
+@pytest.mark.parametrize(("inefficiency", "phases"), CASES)
+@pytest.mark.parametrize(("dtype", "tolerance"), [(np.float64, 2e-9), (np.float32, 1e-6)])
+def test_is_the_register_clocked_stage_by_stage(inefficiency, phases, dtype, tolerance):
+    """More rows than are computed at once. 64 bits: what is left out, 1e-9, in both directions;
+    32 bits: sums of some tens of numbers rounded to 6e-8."""
+    signal = RNG.random((150, 21)).astype(dtype)
+    effect = ChargeTransfer(inefficiency, phases, *signal.shape)
+    found = effect.moved(signal)
+    expected = clocked(clocked(signal, inefficiency, phases).T, inefficiency, phases).T
+    assert found.dtype == dtype and found.shape == signal.shape
+    np.testing.assert_allclose(found, expected, rtol=0, atol=tolerance)
+
+
+def test_nothing_handed_in_is_changed():
+    signal = np.ones((9, 7))
+    ChargeTransfer(0.1, 3, 9, 7).moved(signal)
+    assert np.all(signal == 1)
+
+
+def test_a_single_packet_arrives_late_by_a_negative_binomial():
+    """In a far corner: n successes of a chance 1 - e, and k failures before, down and along."""
+    signal = np.zeros((60, 50))
+    signal[39, 29] = 1.0
+    found = ChargeTransfer(2e-3, 3, 60, 50).moved(signal)
+
+    def late(n: int, k: int) -> float:
+        return math.comb(n + k - 1, k) * 2e-3**k * (1 - 2e-3) ** n
+
+    for down, along in ((0, 0), (1, 0), (0, 1), (2, 3), (5, 4)):
+        expected = late(120, down) * late(90, along)
+        assert found[39 + down, 29 + along] == pytest.approx(expected, rel=1e-9)
+    assert not found[:39].any() and not found[:, :29].any()
+
+
+@pytest.mark.parametrize("inefficiency", [1e-5, 1e-3, 0.1])
+def test_charge_is_conserved_but_for_what_comes_after_the_picture(inefficiency):
+    """With enough dark rows and columns behind, all of it arrives; without, it is less."""
+    signal = np.zeros((90, 90))
+    signal[:8, :8] = RNG.random((8, 8))
+    effect = ChargeTransfer(inefficiency, 3, 90, 90)
+    assert effect.moved(signal).sum() == pytest.approx(signal.sum(), rel=1e-8)
+    full = np.ones((30, 30))
+    kept = ChargeTransfer(inefficiency, 3, 30, 30).moved(full)
+    assert kept.sum() < full.sum()
+    assert np.all(kept <= 1 + 1e-12) and np.all(kept > 0)
+
+
+@pytest.mark.parametrize("frequency", [1 / 32, 1 / 8, 1 / 4, 1 / 2])
+@pytest.mark.parametrize("inefficiency", [1e-5, 1e-4])
+def test_modulation_is_the_formula(frequency, inefficiency):
+    """exp(-n e (1 - cos 2 pi f p)) of a wave near n transfers, f p cycles a pixel.
+
+    Of the formula's next term, and of the change of n over the wave: both are n e^2 or less.
+    """
+    phases, at, width = 3, 3000, 64
+    k = np.arange(at + width)
+    wave = (1 + np.cos(2 * np.pi * frequency * k))[:, None]
+    found = ChargeTransfer(inefficiency, phases, len(k), 1).moved(wave)[at:, 0]
+    # the one column is passed in three transfers, which only take from it
+    found = found / (1 - inefficiency) ** phases
+
+    def modulation(row):
+        wave = np.exp(-2j * np.pi * frequency * k[at:])
+        scale = 1 if frequency == 1 / 2 else 2
+        return abs((row * wave).mean()) * scale
+
+    n = phases * (at + width / 2)
+    expected = math.exp(-n * inefficiency * (1 - math.cos(2 * math.pi * frequency)))
+    assert modulation(found) == pytest.approx(expected, rel=phases * width * inefficiency)
+
+
+def test_electrons_that_are_late_one_by_one_are_poisson_of_the_moved_mean():
+    """Why means are enough: counts of a row of Poisson packets, 4000 times.
+
+    Mean and variance are those of a Poisson number to five standard errors, sqrt(m / n) and
+    m sqrt((2 + 1 / m) / n), and neighbors are not correlated: 5 / sqrt(n).
+    """
+    mean = np.array([40.0, 2, 90, 5, 60, 0, 25])
+    taken = np.array([electrons_one_by_one(RNG.poisson(mean), 0.05, 3) for _ in range(4000)])
+    expected = ChargeTransfer(0.05, 3, 7, 1).moved(mean[:, None])[:, 0] / 0.95**3
+    n = len(taken)
+    np.testing.assert_array_less(abs(taken.mean(0) - expected), 5 * np.sqrt(expected / n))
+    error = 5 * expected * np.sqrt((2 + 1 / expected) / n)
+    np.testing.assert_array_less(abs(taken.var(0) - expected), error)
+    correlation = np.corrcoef(taken.T)[np.triu_indices(7, 1)]
+    assert np.abs(correlation).max() < 5 / math.sqrt(n)
+
+
+def test_bound_of_its_change():
+    """No picture changes by more, rms; a checkered one by half of it, for half of it is bright."""
+    effect = ChargeTransfer(1e-3, 3, 40, 60)
+    bound = effect.mean_error(Outlook(full_signal=1.0, time=1.0))
+
+    def change(signal: np.ndarray) -> float:
+        return math.sqrt(np.mean((effect.moved(signal) - signal) ** 2))
+
+    assert change(np.ones((40, 60))) <= bound
+    assert change(RNG.random((40, 60))) <= bound
+    assert 0.4 * bound < change(np.indices((40, 60)).sum(0) % 2.0) <= bound
+
+
+SPOT = {
+    "scene.source": {"kind": "chart", "chart": "slanted-edge"},
+    "scene.radiance": radiance_for(2000),
+    "pixel.architecture": "ccd",
+    "pixel.photodetector.dark_current": "20 ke/s",
+    "effects": QUIET,
+    "pixel.readout.charge_transfer": {"inefficiency": 0},
+}
+TRANSFER = {"pixel.readout.charge_transfer": {"inefficiency": 1e-3, "phases": 2}}
+
+
+def test_a_camera_moves_light_and_dark_together(tmp_path):
+    still = simulate(camera(tmp_path, SPOT)).mean_electrons
+    moved = simulate(camera(tmp_path, SPOT | TRANSFER)).mean_electrons
+    expected = clocked(clocked(still, 1e-3, 2).T, 1e-3, 2).T
+    np.testing.assert_allclose(moved, expected, atol=1e-5)  # 2200 electrons, 2e-9 of them
+
+
+def test_a_ccd_that_does_not_say_has_the_usual_inefficiency(tmp_path):
+    made = camera(tmp_path, {"pixel.architecture": "ccd"})
+    assert made.pixel.readout.charge_transfer is not None
+    assert made.pixel.readout.charge_transfer.inefficiency == 3e-5
+    assert camera(tmp_path).pixel.readout.charge_transfer is None
+
+
+def test_automatic_exposure_sees_what_is_read(tmp_path):
+    """The mean of the picture that arrives, dark signal included, is at its target."""
+    auto = {"exposure": {"auto": {"max": "1 s", "method": "mean", "target": 0.02}}}
+    result = simulate(camera(tmp_path, SPOT | TRANSFER | auto))
+    assert result.mean_electrons.mean() == pytest.approx(0.02 * 100e3, rel=1e-9)
+
+
+def test_the_plan_says_what_it_changes(tmp_path):
+    on = simulate(camera(tmp_path, SPOT | TRANSFER))
+    off = simulate(camera(tmp_path, SPOT))
+    change = math.sqrt(np.mean((on.mean_electrons - off.mean_electrons) ** 2))
+    [decision] = [d for d in on.frame.plan.decisions if d.name == "charge_transfer"]
+    full = on.mean_electrons.max()
+    assert decision.contribution == pytest.approx(change / full, rel=1e-6)
+    assert decision.unit == "of full signal" and "transfers" in decision.reason

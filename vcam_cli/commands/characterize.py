@@ -1,0 +1,102 @@
+"""`vcam characterize`: a camera measured by EMVA 1288 and ISO 12233."""
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from vcam_cli.commands import options
+from vcam_cli.commands.progress import Progress
+
+if TYPE_CHECKING:
+    from vcam_cli.studies.characterize import Characterization
+
+SHOWN = (
+    "system_gain",
+    "quantum_efficiency",
+    "temporal_dark_noise",
+    "read_noise",
+    "dark_current",
+    "full_well",
+    "saturation_capacity",
+    "threshold_photons",
+    "snr_max_db",
+    "emva_dynamic_range_db",
+    "dynamic_range_db",
+    "snr_db",
+    "linearity_error",
+    "dsnu",
+    "prnu",
+    "mtf50",
+)
+"""Numbers of the table; the others are in the files."""
+
+
+def characterize(
+    camera: options.Camera,
+    out: options.Out = None,
+    set_: options.Set = None,
+    seed: options.Seed = None,
+    accuracy: options.Accuracy = None,
+    as_json: options.Json = False,
+    quiet: options.Quiet = False,
+    workers: options.Workers = None,
+) -> None:
+    """Measures a camera on a simulated bench: photon transfer, noise, range, linearity, MTF.
+
+    By EMVA 1288 and ISO 12233, from raw frames, beside what the camera file says. Writes
+    characterize.csv, characterize.json, photon_transfer.png, snr.png, linearity.png and mtf.png.
+
+    \b
+    Example:
+      vcam characterize starter
+      vcam characterize camera.yaml --set scene.illuminant="{monochromatic: 525 nm}"
+    """
+    from vcam_cli.files import curves, report, tables
+    from vcam_cli.files.folder import OutputFolder
+    from vcam_cli.studies import characterize as study
+    from vcam_cli.studies import outputs
+    from vcam_cli.studies.bench_pictures import pictures
+    from vcam_cli.studies.checks import load
+
+    model = load(camera, options.overrides(set_, seed, accuracy))
+    inputs = outputs.inputs(model)
+    path = out or Path("out") / model.name
+    place = OutputFolder(path, record="characterize.json", inputs=inputs)
+    with place as folder, Progress(quiet) as progress:
+        found = study.characterize(model, workers, progress)
+        rows = (quantity.row for quantity in found.quantities)
+        tables.write_table(folder.new("characterize.csv"), study.COLUMNS, rows)
+        for name, (title, panels) in pictures(found).items():
+            curves.draw(folder.new(name), title, panels)
+        record = found.report() | {"camera": model.model_dump(mode="json")}
+        folder.finish(record | {"versions": outputs.versions()})
+    for note in found.notes:
+        options.say(note, quiet)
+    if as_json:
+        print(report.to_json({"out": str(path), **found.report()}), end="")
+    elif not quiet:
+        tell(found, path)
+
+
+def tell(found: "Characterization", path: Path) -> None:
+    """The table on stdout: measured and expected of every color side by side."""
+    from rich import box
+    from rich.console import Console
+    from rich.table import Table
+
+    width = None if sys.stdout.isatty() else 120
+    console = Console(width=width, soft_wrap=True, highlight=False)
+    table = Table(box=box.SIMPLE_HEAD if console.is_terminal else None, pad_edge=False)
+    colors = [channel.color for channel in found.channels]
+    table.add_column("quantity", no_wrap=True)
+    for color in colors:
+        measured = "measured" if len(colors) == 1 else color
+        table.add_column(measured, justify="right", no_wrap=True)
+        table.add_column("expected", justify="right", no_wrap=True)
+    table.add_column("unit", no_wrap=True)
+    for name in SHOWN:
+        told = [found.get(name, color) for color in colors]
+        cells = (f"{value:.4g}" for q in told for value in (q.measured, q.expected))
+        table.add_row(name, *cells, told[0].unit)
+    console.print(table)
+    console.print(f"{path}/characterize.csv, photon_transfer.png, snr.png, linearity.png, mtf.png")

@@ -1,0 +1,137 @@
+"""`vcam sweep`: a camera while its parameters change."""
+
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from vcam_cli.commands import options
+from vcam_cli.commands.progress import Log, Progress, wanted
+
+if TYPE_CHECKING:
+    from vcam_cli.studies.sweep import SweepResult
+
+LINES = 12
+"""Messages about points that are shown at most."""
+
+
+def _shard(value: str | None) -> str | None:
+    """ "2/8", the second of eight shares."""
+    if value is None:
+        return None
+    number, _, of = value.partition("/")
+    whole = all(part.isascii() and part.isdigit() for part in (number, of))
+    if not whole or not 1 <= int(number) <= int(of):
+        message = f"{value!r} is not a share such as 2/8, the second of eight"
+        raise typer.BadParameter(message)
+    return value
+
+
+Study = Annotated[
+    str,
+    typer.Argument(
+        metavar="STUDY",
+        help="A study file, or the name of a shipped study (see `vcam list studies`).",
+        autocompletion=options.complete_study,
+        show_default=False,
+    ),
+]
+Processes = Annotated[
+    int | None,
+    typer.Option(
+        "--workers", metavar="N", min=1, help="Processes; default all cores. Results do not change."
+    ),
+]
+Scheduler = Annotated[
+    str | None,
+    typer.Option("--scheduler", metavar="ADDRESS", help="Compute on this Dask scheduler."),
+]
+Shard = Annotated[
+    str | None,
+    typer.Option(
+        "--shard",
+        metavar="I/N",
+        callback=_shard,
+        help="Only the I-th of N shares; shares written to one --out add up.",
+    ),
+]
+Fresh = Annotated[bool, typer.Option("--fresh", help="Compute finished points again.")]
+
+
+def sweep(
+    study: Study,
+    out: options.Out = None,
+    set_: options.Set = None,
+    seed: options.Seed = None,
+    accuracy: options.Accuracy = None,
+    as_json: options.Json = False,
+    quiet: options.Quiet = False,
+    workers: Processes = None,
+    scheduler: Scheduler = None,
+    shard: Shard = None,
+    fresh: Fresh = False,
+) -> None:
+    """Runs a sweep study and writes points.csv, optimum.csv and a plot of every metric.
+
+    Finished points are kept: a sweep that was stopped goes on when it is started again.
+
+    \b
+    Example:
+      vcam sweep aperture-and-noise
+      vcam sweep study.yaml --workers 4 -o out/study
+    """
+    from vcam_cli.files.report import to_json
+    from vcam_cli.studies.sweep import sweep as run
+
+    said: list[str] = []
+
+    def tell(message: str) -> None:
+        said.append(message)
+        if len(said) <= LINES:
+            options.say(message, quiet)
+
+    number, of = (int(part) for part in (shard or "1/1").split("/"))
+    with Progress(quiet) if wanted(quiet) or quiet else Log("sweep") as progress:
+        try:
+            result = run(
+                study,
+                out,
+                options.overrides(set_, seed, accuracy),
+                workers,
+                scheduler,
+                (number, of) if shard else None,
+                fresh,
+                progress,
+                tell,
+            )
+        except KeyboardInterrupt as error:
+            options.say("interrupted; finished points are kept, the same command goes on with them")
+            raise typer.Exit(130) from error
+    if len(said) > LINES:
+        options.say(f"and {len(said) - LINES} more", quiet)
+    if as_json:
+        print(to_json(result.summary()), end="")
+    elif not quiet:
+        print(report(result))
+    raise typer.Exit(result.exit_code)
+
+
+def report(result: "SweepResult") -> str:
+    """What a person reads: the optima, how many points, where it all is."""
+    lines = []
+    for f in result.optima:
+        case, parameter, unit, at, low, high, metric, value = f.row
+        interval = f" ({low} to {high})" if low != "" else ""
+        lines.append(f"{case}: best {parameter} {at}{interval} {unit}".rstrip())
+        lines[-1] += f", {metric} {value}"
+        if f.edge:
+            end = "low" if f.edge == "low" else "high"
+            lines.append(f"  at the {end} end of its range: the optimum may lie beyond")
+    total = len(result.grid.points)
+    there = total - result.missing
+    lines.append(f"{there} of {total} points, {result.computed} computed in {result.seconds:.1f} s")
+    if result.failed:
+        lines.append(f"{result.failed} failed: see the column error of points.csv")
+    if result.missing:
+        lines.append(f"{result.missing} are left to other shares")
+    lines.append(f"{result.grid.study.model.name}: {result.out}/")
+    return "\n".join(lines)

@@ -1,0 +1,111 @@
+"""Charge that a ccd leaves behind on the way to its amplifier."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcam_cli.effects.base import Transport
+
+REST = 1e-9
+"""Share of a packet that may be deferred further than is followed; it is lost."""
+ROWS = 64
+"""Packets that are computed together, by one product of matrices."""
+
+
+@dataclass(frozen=True)
+class ChargeTransfer(Transport):
+    """Every stage leaves the share `inefficiency` of a packet to the packet that follows.
+
+    The amplifier is at row 0, column 0: a packet of row i, column j makes (i + 1) x phases
+    parallel transfers and then (j + 1) x phases serial ones. An electron arrives once it has made
+    all n of them, and every one that fails costs it a packet: it arrives k packets late (in a
+    larger row, or column) with the probability of k failures before n successes,
+        w_k = C(n + k - 1, k) inefficiency^k (1 - inefficiency)^n.
+    A wave of spatial frequency f keeps exp(-n inefficiency (1 - cos(2 pi f pitch))) of its
+    modulation. What is late beyond the last row or column has left the picture.
+
+    Why it acts on mean signals: where every electron takes its own chance, a Poisson number of
+    electrons splits into independent Poisson numbers by when they arrive (displacement theorem,
+    Kingman, Poisson Processes, 1993, section 5.5). So every pixel is Poisson again, independent
+    of its neighbors, and its mean is all that has changed. Transfer is linear: charge above the
+    full well travels as well, and is clipped where it is read.
+    """
+
+    inefficiency: float
+    phases: int
+    rows: int
+    columns: int
+
+    name = "charge_transfer"
+    reference = "Janesick, Scientific Charge-Coupled Devices, 2001, section 5.2.3"
+    absent = "the file gives no pixel.readout.charge_transfer, or an inefficiency of 0"
+    seconds_per_pixel = 4e-9
+
+    @classmethod
+    def of(cls, camera, geometry):
+        given = camera.pixel.readout.charge_transfer
+        if given is None or given.inefficiency == 0:
+            return None
+        return cls(given.inefficiency, given.phases, geometry.rows, geometry.columns)
+
+    def describe(self) -> str:
+        most = (self.rows + self.columns) * self.phases
+        lost = float(_late(self.inefficiency, most))
+        return f"the last pixel defers {lost:.3%} of its charge in {most} transfers"
+
+    def moved(self, signal: NDArray) -> NDArray:
+        along_columns = _transferred(signal, self.inefficiency, self.phases)
+        return _transferred(along_columns.T, self.inefficiency, self.phases).T
+
+    def mean_error(self, outlook) -> float:
+        # A pixel loses at most what it defers, and gains at most as much of others as bright.
+        down = _late(self.inefficiency, self.phases * np.arange(1, self.rows + 1))
+        along = _late(self.inefficiency, self.phases * np.arange(1, self.columns + 1))
+        square = np.mean(down**2) + 2 * down.mean() * along.mean() + np.mean(along**2)
+        return min(1.0, float(np.sqrt(square))) * outlook.full_signal
+
+
+def _late(inefficiency: float, transfers: NDArray | int) -> NDArray:
+    """Share of a packet that does not arrive in time."""
+    return -np.expm1(transfers * np.log1p(-inefficiency))
+
+
+def _transferred(signal: NDArray, inefficiency: float, phases: int) -> NDArray:
+    """What arrives of the packets in the rows of `signal`, the first of them nearest to the exit.
+
+    Same shape and float type. The shares are a triangular matrix with few diagonals; it is
+    multiplied in blocks, as many rows of it at once as a product of matrices is fast at.
+    """
+    count = len(signal)
+    reach = _reach(inefficiency, count * phases, count)
+    out = np.empty_like(signal)
+    for start in range(0, count, ROWS):
+        arriving = np.arange(start, min(start + ROWS, count))
+        leaving = np.arange(max(0, start - reach), arriving[-1] + 1)
+        shares = _shares(inefficiency, phases, arriving, leaving).astype(signal.dtype)
+        np.matmul(shares, signal[leaving[0] : leaving[-1] + 1], out=out[start : start + ROWS])
+    return out
+
+
+def _shares(inefficiency: float, phases: int, arriving: NDArray, leaving: NDArray) -> NDArray:
+    """Shares of the packets `leaving` that come with the packets `arriving`: a matrix."""
+    from scipy.special import gammaln
+
+    transfers = phases * (leaving + 1.0)
+    late = arriving[:, None] - leaving[None, :]
+    k = np.maximum(late, 0)
+    chosen = gammaln(transfers + k) - gammaln(k + 1) - gammaln(transfers)
+    chance = k * np.log(inefficiency) + transfers * np.log1p(-inefficiency)
+    return np.where(late >= 0, np.exp(chosen + chance), 0.0)
+
+
+def _reach(inefficiency: float, transfers: int, count: int) -> int:
+    """Packets by which all but `REST` of a charge that makes most transfers is late, at most."""
+    from scipy.special import nbdtrc
+
+    late = np.arange(count)
+    beyond = nbdtrc(late, transfers, 1 - inefficiency)
+    return int(np.argmax(beyond < REST)) if beyond[-1] < REST else count - 1

@@ -1,0 +1,51 @@
+"""A lens on every pixel, which collects light for its photodetector.
+
+It does two things. It gathers the light of a larger area, which is this effect: a factor on the
+signal, the same in all pixels. And the signal is an average over that larger area, which is
+`pixel_aperture`'s: see `camera.pixel_optics`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vcam_cli.effects.base import Gain
+
+
+@dataclass(frozen=True)
+class Microlens(Gain):
+    """Collecting area over area of the photodetector."""
+
+    ratio: float
+    share: float
+    """Of the pixel's area, what is collected: its effective fill factor."""
+
+    name = "microlens"
+    reference = (
+        "Chen 2003, section 3.5.4; Catrysse, Liu and El Gamal 2000, doi:10.1117/12.385460 (shift)"
+    )
+    absent = "the file gives no microlens"
+    # The collecting area is also the sampling aperture: without the gain the two would disagree.
+    removable = False
+
+    @classmethod
+    def of(cls, camera, geometry):
+        if camera.pixel.microlens is None:
+            return None
+        share = geometry.effective_fill_factor
+        # A quantum efficiency of the pixel, as makers print it, has the lens's light in it.
+        included = camera.pixel.photodetector.quantum_efficiency.per_pixel
+        return cls(1.0 if included else share / geometry.fill_factor, share)
+
+    def describe(self) -> str:
+        if self.ratio == 1:
+            return f"averages over {self.share:.3%} of the pixel; its light is in the pixel's QE"
+        return f"collects {self.ratio:.4g} times the light, that of {self.share:.3%} of the pixel"
+
+    def gain(self, x, y):
+        return np.full((1, 1), self.ratio, x.dtype)
+
+    def mean_error(self, outlook) -> float:
+        return (1 - 1 / self.ratio) * outlook.full_signal

@@ -1,0 +1,138 @@
+"""Light that the tunnel above each photodetector keeps from it: more of it toward the corners.
+
+The loss depends on where the pixel lies only, by the angle of its chief ray; it is the same in
+all four quadrants of the field, for photodetectors off their pixel's center as well, since the
+tunnel stands above the photodetector.
+
+Why a series: the pupil is integrated for few pixels, at Chebyshev points of a quadrant, and the
+product of polynomials through them costs a matrix product for all others. They stand close near the
+axis, where the loss bends most. Their number is doubled until the series has converged.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.polynomial import chebyshev
+from numpy.typing import NDArray
+
+from vcam_cli.camera import pixel_optics
+from vcam_cli.effects.base import Gain
+from vcam_cli.physics import vignetting
+
+POINTS = (17, 33, 65)
+"""Along each axis of the quadrant, as many as are needed."""
+OF_TOLERANCE = 1 / 20
+"""How much of the tolerance the last terms of the series may be."""
+ROWS = 8
+"""Of points, integrated at once: few enough for the cache."""
+LEAST = 1e-6
+"""Share of light below which a pixel counts as dark."""
+
+
+@dataclass(frozen=True)
+class PixelVignetting(Gain):
+    """Share of the light that reaches the photodetectors through their tunnels. Lengths in [m]."""
+
+    layers: tuple[tuple[float, float], ...]
+    """Thickness and refractive index, from the air down."""
+    width: float
+    height: float
+    """Of tunnel and photodetector."""
+    cone: float
+    """Tangent of the half-angle of the image-side cone."""
+    pupil_distance: float
+    half_width: float
+    half_height: float
+    """Half the sensor's width and height."""
+    follows: bool
+    """Whether microlenses send the chief ray to the photodetector's center."""
+    internal: bool
+    """Whether the quantum efficiency is that of light in the silicon, without reflection."""
+    tolerance: float
+    """Of the mean signal, relative to full signal."""
+
+    name = "pixel_vignetting"
+    reference = "Catrysse, Liu and El Gamal 2000, doi:10.1117/12.385460; Chen 2003, section 2.2.2"
+    absent = "the file gives no stack of layers above the photodetector"
+    seconds_per_pixel = 3e-9
+
+    @classmethod
+    def of(cls, camera, geometry):
+        layers = pixel_optics.layers(camera)
+        if not layers:
+            return None
+        return cls(
+            layers,
+            geometry.detector_width,
+            geometry.detector_height,
+            1 / (2 * geometry.working_f_number),
+            geometry.exit_pupil_distance,
+            geometry.sensor_width / 2,
+            geometry.sensor_height / 2,
+            pixel_optics.follows_chief_ray(camera),
+            camera.pixel.photodetector.quantum_efficiency.given is None,
+            camera.accuracy.tolerance,
+        )
+
+    def describe(self) -> str:
+        ends = np.array([0, self.half_width]), np.array([0, self.half_height])
+        loss = 1 - np.diag(self.gain(*ends))
+        return f"takes {loss[0]:.2%} of the light in the center, {loss[1]:.2%} in the corners"
+
+    def at(self, x: NDArray, y: NDArray) -> NDArray:
+        """The gain at the positions x, y (rows, columns) [m], from the whole pupil, no series."""
+        share = vignetting.collected_fraction(
+            x / self.pupil_distance,
+            y / self.pupil_distance,
+            self.cone,
+            self.layers,
+            self.width,
+            self.height,
+            self.follows,
+        )
+        return share if self.internal else share / vignetting.stack_transmission(1.0, self.layers)
+
+    def gain(self, x, y):
+        series = _series(self)
+        order = len(series) - 1
+        across, down = (
+            chebyshev.chebvander(2 * np.minimum(np.abs(at.astype(float)) / half, 1) - 1, order)
+            for at, half in ((x, self.half_width), (y, self.half_height))
+        )
+        rows, columns = (down @ series).astype(x.dtype), across.T.astype(x.dtype)
+        # No BLAS: its threads would wait for each other in the threads that compute blocks.
+        out = np.einsum("ik,kj->ij", rows, columns)
+        return np.maximum(out, 0, out=out)
+
+    def mean_error(self, outlook) -> float:
+        # A field at full signal everywhere, the brightest pixel at full signal behind its tunnel:
+        # rms of the loss over a quadrant by the midpoint rule.
+        at = (np.arange(64) + 0.5) / 64
+        gain = self.gain(at * self.half_width, at * self.half_height)
+        brightest = max(float(gain.max()), LEAST)
+        rms = float(np.sqrt(np.mean((1 - gain) ** 2)))
+        return 1.002 * rms / brightest * outlook.full_signal
+
+
+@lru_cache(maxsize=16)
+def _series(effect: PixelVignetting) -> NDArray:
+    """Coefficients (y, x) of T_i(2 |y| / half - 1) T_j(2 |x| / half - 1).
+
+    The gain is good to a few 1e-5 where the light fades slowly. In cones so narrow and tunnels so
+    deep that it ends within the field, to half of the tolerance, a tenth of it rms.
+    """
+    for count in POINTS:
+        points = chebyshev.chebpts1(count)
+        x, y = (half * (1 + points) / 2 for half in (effect.half_width, effect.half_height))
+        rows = (slice(i, i + ROWS) for i in range(0, count, ROWS))
+        values = np.concatenate([effect.at(x[None, :], y[some, None]) for some in rows])
+        invert = np.linalg.inv(chebyshev.chebvander(points, count - 1))
+        series = invert @ values @ invert.T
+        last = max(np.abs(series[-3:]).sum(0).max(), np.abs(series[:, -3:]).sum(1).max())
+        if last < OF_TOLERANCE * effect.tolerance:
+            break
+    series.flags.writeable = False
+    return np.asarray(series)

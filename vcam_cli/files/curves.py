@@ -1,0 +1,136 @@
+"""Curves with what was measured as points and what was expected as lines: PNG files.
+
+The look is that of `plots.py`: the same colors, the same bytes for the same numbers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcam_cli.files.atomic import write_whole
+from vcam_cli.files.plots import COLORS, MARKERS, STYLE
+
+Look = Literal["points", "line", "dashed"]
+
+
+@dataclass(frozen=True)
+class Curve:
+    """One curve; `color` counts the colors of the house, -1 is gray. No name: not in the legend."""
+
+    name: str
+    x: NDArray
+    y: NDArray
+    look: Look = "points"
+    color: int = 0
+
+
+@dataclass(frozen=True)
+class Mark:
+    """A place on the x axis worth a word."""
+
+    x: float
+    text: str
+    color: int = -1
+
+
+@dataclass(frozen=True)
+class Panel:
+    """One pair of axes."""
+
+    x_label: str
+    y_label: str
+    curves: Sequence[Curve]
+    marks: Sequence[Mark] = ()
+    log: bool = False
+    """Both axes."""
+    x_range: tuple[float, float] | None = None
+    y_range: tuple[float, float] | None = None
+    height: float = 1.0
+    """Relative to the other panels'."""
+    legend: str = "best"
+
+
+def draw(path: Path | str, title: str, panels: Sequence[Panel]) -> None:
+    """Panels one below the other, with one x axis. Raises CannotDo where it cannot be written."""
+    import matplotlib
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    style: Any = {**matplotlib.rcParamsDefault, **STYLE}
+    with matplotlib.rc_context(style):
+        heights = [panel.height for panel in panels]
+        figure = Figure(figsize=(6.6, 1.1 + 3.3 * sum(heights)), dpi=150, layout="constrained")
+        FigureCanvasAgg(figure)
+        grid = figure.add_gridspec(len(panels), 1, height_ratios=heights)
+        above = None
+        for row, panel in enumerate(panels):
+            axes = figure.add_subplot(grid[row, 0], sharex=above)
+            _panel(axes, panel, last=row == len(panels) - 1)
+            if above is None:
+                axes.set_title(title)
+                above = axes
+        with write_whole(path) as temporary:
+            figure.savefig(temporary, format="png", metadata={"Software": None})
+
+
+def _panel(axes: Any, panel: Panel, last: bool) -> None:
+    if panel.log:
+        axes.set_xscale("log")
+        axes.set_yscale("log")
+    for curve in panel.curves:
+        _curve(axes, curve, panel.log)
+    if panel.x_range:
+        axes.set_xlim(*panel.x_range)
+    if panel.y_range:
+        axes.set_ylim(*panel.y_range)
+    for number, mark in enumerate(panel.marks):
+        _mark(axes, mark, number)
+    axes.set_ylabel(panel.y_label)
+    if last:
+        axes.set_xlabel(panel.x_label)
+    else:
+        axes.tick_params(labelbottom=False)
+    if any(curve.name for curve in panel.curves):
+        axes.legend(loc=panel.legend, fontsize=7.5)
+
+
+def _curve(axes: Any, curve: Curve, log: bool) -> None:
+    keep = np.isfinite(curve.x) & np.isfinite(curve.y)
+    if log:
+        keep &= (curve.x > 0) & (curve.y > 0)
+    x, y = curve.x[keep], curve.y[keep]
+    color = _color(curve.color)
+    label = curve.name or "_nolegend_"
+    if curve.look == "points":
+        marker = MARKERS[curve.color % len(MARKERS)]
+        axes.plot(x, y, marker, ms=3, color=color, alpha=0.8, mew=0, label=label)
+        return
+    dashes = (0, (4, 3)) if curve.look == "dashed" else "-"
+    axes.plot(x, y, color=color, lw=1.0, ls=dashes, label=label)
+
+
+def _mark(axes: Any, mark: Mark, number: int) -> None:
+    """A vertical line with its word beside it, the words at different heights."""
+    color = _color(mark.color)
+    axes.axvline(mark.x, color=color, lw=0.8, ls=(0, (1, 2)))
+    axes.annotate(
+        mark.text,
+        (mark.x, 0.02 + 0.055 * number),
+        xycoords=("data", "axes fraction"),
+        xytext=(-3, 0),
+        textcoords="offset points",
+        ha="right",
+        fontsize=7.5,
+        color=color,
+        bbox={"fc": "white", "ec": "none", "pad": 0.6, "alpha": 0.8},
+    )
+
+
+def _color(number: int) -> str:
+    return "#777777" if number < 0 else COLORS[number % len(COLORS)]

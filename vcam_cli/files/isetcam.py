@@ -1,0 +1,138 @@
+"""Scenes of ISETCam: MATLAB files with photons, wavelengths and illuminant.
+
+Two kinds are in use (ISET/isetcam: sceneToFile.m, ieSaveMultiSpectralImage.m): a saved `scene`
+structure or its variables `photons` (h, w, bands) [photons/(s sr m2 nm)] and `wave` [nm]; and
+compressed ones, photons = mcCOEF x basis' + imgMean. The illuminant, where it is one spectrum, is
+the radiance of a perfect white. Field of view and distance are the camera file's, not this one's.
+
+Files of MATLAB 7.3 are HDF5, which h5py reads (pip install 'vcam-cli[hdf5]').
+"""
+
+import zlib
+from collections.abc import Callable
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from vcam_cli.files.images import Unusable
+from vcam_cli.files.stored import PER_NM, Stored, lengths, numbers
+from vcam_cli.spectra import PLANCK, SPEED_OF_LIGHT
+
+Lookup = Callable[..., Any]
+"""From the names of a variable and its fields to an array in MATLAB's order of axes, or None."""
+VARIABLES = ("scene", "photons", "wave", "illuminant", "mcCOEF", "basis", "imgMean")
+HDF5 = b"\x89HDF\r\n\x1a\n"
+_SAVE = "save it with ISETCam's sceneToFile, or with save(NAME, 'photons', 'wave')"
+
+
+def open_isetcam(path: Path) -> Stored:
+    """A scene of ISETCam; its samples are read at once. Raises Unusable."""
+    get = _hdf5(path) if _is_hdf5(path) else _matlab5(path)
+    photons, wave = _photons(get)
+    wavelengths = numbers(wave, "its wave") * 1e-9
+    if photons.ndim != 3:
+        raise Unusable(f"its photons have {photons.ndim} axes, not (h, w, bands)", _SAVE)
+    lengths(photons.shape[2], wavelengths)
+    per_photon = PER_NM * PLANCK * SPEED_OF_LIGHT / np.maximum(wavelengths, 1e-12)
+    white = _white(get, wavelengths, per_photon)
+    height, width = photons.shape[:2]
+    return Stored(
+        (height, width), wavelengths, "radiance", lambda: photons, per_photon, white=white
+    )
+
+
+def _photons(get: Lookup) -> tuple[np.ndarray, Any]:
+    for photons, wave in (
+        (get("photons"), get("wave")),
+        (get("scene", "data", "photons"), get("scene", "spectrum", "wave")),
+    ):
+        if photons is not None and wave is not None:
+            return _real(photons, "photons"), wave
+    coefficients, basis = get("mcCOEF"), get("basis", "basis")
+    wave = get("basis", "wave")
+    if coefficients is None or basis is None or wave is None:
+        raise Unusable("has no photons and wave", _SAVE)
+    coefficients, basis = _real(coefficients, "mcCOEF"), _real(basis, "basis")
+    if coefficients.ndim != 3 or basis.ndim != 2 or coefficients.shape[2] != basis.shape[1]:
+        raise Unusable("its mcCOEF and basis do not fit each other", _SAVE)
+    photons = coefficients @ basis.T
+    mean = get("imgMean")
+    if mean is not None:
+        mean = numbers(mean, "its imgMean")
+        lengths(len(basis), mean, "values of imgMean")
+        photons = photons + mean
+    return photons, wave
+
+
+def _white(get: Lookup, wavelengths: np.ndarray, per_photon: np.ndarray) -> np.ndarray | None:
+    """Radiance of a perfect white [W/(sr m2 m)]; None where the light differs from place to place.
+
+    Today's files hold its photons, older ones its energy [W/(sr m2 nm)].
+    """
+    for top in ((), ("scene",)):
+        for kind, unit in (("photons", per_photon), (None, PER_NM)):
+            values = get(*top, "illuminant", "data", *((kind,) if kind else ()))
+            if not isinstance(values, np.ndarray) or values.dtype.kind not in "uif":
+                continue
+            if values.size == len(wavelengths):
+                return numbers(values, "its illuminant") * unit
+    return None
+
+
+def _real(values: Any, what: str) -> np.ndarray:
+    if not isinstance(values, np.ndarray) or values.dtype.kind not in "uif":
+        raise Unusable(f"its {what} are no real numbers", _SAVE)
+    return values
+
+
+def _is_hdf5(path: Path) -> bool:
+    """HDF5 begins at byte 0, or after MATLAB's 512 bytes of its own."""
+    with open(path, "rb") as file:
+        start = file.read(512 + len(HDF5))
+    return start.startswith(HDF5) or start[512:] == HDF5
+
+
+def _matlab5(path: Path) -> Lookup:
+    from scipy.io import loadmat
+    from scipy.io.matlab import MatReadError
+
+    damaged = (MatReadError, ValueError, TypeError, EOFError, LookupError, OSError, zlib.error)
+    try:
+        found = loadmat(path, variable_names=VARIABLES)
+    except damaged as error:
+        raise Unusable(f"is no whole MATLAB file ({str(error)[:80]})", _SAVE) from None
+
+    def get(name: str, *fields: str) -> Any:
+        value = found.get(name)
+        for field in fields:
+            names = getattr(getattr(value, "dtype", None), "names", None)
+            if value is None or not names or field not in names or value.size != 1:
+                return None
+            value = value.flat[0][field]
+        return value
+
+    return get
+
+
+def _hdf5(path: Path) -> Lookup:
+    try:
+        h5py: Any = import_module("h5py")
+    except ImportError:
+        raise Unusable(
+            "is a MATLAB 7.3 file, which needs the library h5py",
+            "pip install 'vcam-cli[hdf5]', or save it with save(..., '-v7')",
+        ) from None
+
+    def get(*names: str) -> Any:
+        try:
+            with h5py.File(path, "r") as file:
+                found = file.get("/".join(names))
+                if isinstance(found, h5py.Dataset) and found.dtype.kind in "uif":
+                    return found[()].T
+        except (OSError, RuntimeError, KeyError) as error:
+            raise Unusable(f"is no whole MATLAB file ({str(error)[:80]})", _SAVE) from None
+        return None
+
+    return get

@@ -1,0 +1,114 @@
+"""NumPy's npz as a file of spectra.
+
+Arrays by name: `wavelength_nm` (bands,), and either `radiance` (h, w, bands) [W/(sr m2 nm)] or
+`reflectance` (h, w, bands), perfect white = 1. A file of radiances may hold `white` (bands,), the
+radiance of a perfect white diffuser in the scene [W/(sr m2 nm)].
+"""
+
+import struct
+import zipfile
+import zlib
+from pathlib import Path
+from typing import IO, Literal
+
+import numpy as np
+
+from vcam_cli.files.images import Unusable, truncated
+from vcam_cli.files.stored import PER_NM, Stored, lengths, numbers
+
+_WRITE = "write it with numpy.savez(NAME, wavelength_nm=..., radiance=...) or reflectance=..."
+MOST_WAVELENGTHS = 10**6
+
+
+def open_npz(path: Path) -> Stored:
+    """The header of an npz file. Raises Unusable."""
+    try:
+        with zipfile.ZipFile(path) as archive:
+            shapes = {
+                info.filename.removesuffix(".npy"): _header(archive, info)
+                for info in archive.infolist()
+                if info.filename.endswith(".npy")
+            }
+            quantity = _quantity(shapes)
+            wavelengths = _list(archive, shapes, "wavelength_nm") * 1e-9
+            white = None
+            if "white" in shapes and quantity == "radiance":
+                white = _list(archive, shapes, "white") * PER_NM
+    except (zipfile.BadZipFile, EOFError, zlib.error):
+        raise Unusable("is no whole npz file", _WRITE) from None
+    shape = shapes[quantity]
+    if len(shape) != 3:
+        raise Unusable(f"its {quantity} has {len(shape)} axes, not (h, w, bands)", _WRITE)
+    lengths(shape[2], wavelengths)
+    if white is not None:
+        lengths(shape[2], white, "values of white")
+    known = {"wavelength_nm", quantity, "white"}
+    spare = sorted(set(shapes) - known)
+    notes = (f"{', '.join(spare)} in the file not used",) if spare else ()
+    gain = PER_NM if quantity == "radiance" else 1.0
+    return Stored(
+        (shape[0], shape[1]), wavelengths, quantity, lambda: _read(path, quantity), gain,
+        white=white, notes=notes,
+    )  # fmt: skip
+
+
+def _quantity(shapes: dict[str, tuple[int, ...]]) -> Literal["radiance", "reflectance"]:
+    if ("radiance" in shapes) == ("reflectance" in shapes):
+        found = ", ".join(shapes) or "nothing"
+        raise Unusable(f"needs one of radiance and reflectance; it holds {found}", _WRITE)
+    if "wavelength_nm" not in shapes:
+        raise Unusable("has no wavelength_nm", _WRITE)
+    return "radiance" if "radiance" in shapes else "reflectance"
+
+
+def _header(archive: zipfile.ZipFile, info: zipfile.ZipInfo) -> tuple[int, ...]:
+    """The shape of a real array whose bytes are all there."""
+    with archive.open(info) as file:
+        try:
+            shape, _, kind = _array_header(file)
+            begins = file.tell()
+        except ValueError:
+            raise Unusable(f"{info.filename} in it is no array", _WRITE) from None
+    if kind.kind not in "uif":
+        raise Unusable(f"{info.filename} in it holds no real numbers", _WRITE)
+    if begins + int(np.prod(shape, dtype=object)) * kind.itemsize > info.file_size:
+        raise truncated(f"{info.filename} claims {' x '.join(map(str, shape))} values")
+    return tuple(shape)
+
+
+def _array_header(file: IO[bytes]) -> tuple[tuple[int, ...], bool, np.dtype]:
+    """Shape, order of axes and type of an array in NumPy's format."""
+    if np.lib.format.read_magic(file) == (1, 0):
+        return np.lib.format.read_array_header_1_0(file)
+    return np.lib.format.read_array_header_2_0(file)
+
+
+def _list(archive: zipfile.ZipFile, shapes: dict[str, tuple[int, ...]], name: str) -> np.ndarray:
+    if int(np.prod(shapes[name], dtype=object)) > MOST_WAVELENGTHS:
+        raise Unusable(f"its {name} has more than {MOST_WAVELENGTHS} values")
+    with archive.open(f"{name}.npy") as file:
+        return numbers(_whole(file), f"its {name}")
+
+
+def _read(path: Path, name: str) -> np.ndarray:
+    """An array of the archive; one that is not compressed stays on the disk until it is used."""
+    with zipfile.ZipFile(path) as archive:
+        info = archive.getinfo(f"{name}.npy")
+        with archive.open(info) as file:
+            shape, by_column, kind = _array_header(file)
+            begins = file.tell()
+            if info.compress_type != zipfile.ZIP_STORED:
+                file.seek(0)
+                return _whole(file)
+    with path.open("rb") as raw:  # a local header of 30 bytes, two of them lengths that follow
+        raw.seek(info.header_offset)
+        local = raw.read(30)
+    begins += info.header_offset + 30 + sum(struct.unpack("<HH", local[26:30]))
+    return np.memmap(path, kind, "r", begins, shape, "F" if by_column else "C")
+
+
+def _whole(file: IO[bytes]) -> np.ndarray:
+    try:
+        return np.asarray(np.lib.format.read_array(file, allow_pickle=False))
+    except (zipfile.BadZipFile, EOFError, ValueError, zlib.error):
+        raise truncated() from None

@@ -1,0 +1,209 @@
+"""The transfer function of any wavefront: a pupil on a grid, correlated with itself.
+
+Samples at the pupil's edge count by the part of their cell that lies inside, sharpened by a
+24th of the Laplacian, so that sums over the grid are integrals over the disk to fourth order.
+The same grid without aberrations divides the result, so that a perfect lens gives exactly 1.
+Between the lags of the grid cubic splines interpolate.
+
+Times the transfer of diffraction, the result was seen to err by at most 4e-5 for coma,
+astigmatism and trefoil of up to 1 wave rms (`tests` hold it to 1e-4).
+
+Why not an integral at each frequency: it costs a thousand times as much over a whole plane.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from vcam_cli.physics import zernike
+from vcam_cli.physics.zernike import Floats, Terms
+
+LEAST = 192
+"""Samples across the pupil, and 8 more for each order of the polynomials."""
+FINE = 3.4
+"""Samples for each radian of phase that a pupil radius holds at the steepest place: the OTF turns
+by 0.6 from lag to lag at most there, which cubic splines follow to 1e-4 of that light."""
+KINK = 45.0
+"""Samples for the square root of it: at the lag 0 the curvature jumps with the direction, which
+splines blur by 0.05 (radians x lag^2)."""
+FINE_UP_TO = 720
+"""Samples for which these are kept up."""
+COARSE = 1.36
+"""Samples a radian for steeper wavefronts; 0.64 would alias."""
+BEYOND = 12
+"""Lags kept on the far side of the axis, where the spline's coefficients have to settle."""
+EDGE = 2.0
+"""Lags before the cut-off where the overlap is too small for the grid and its limit is taken."""
+_EDGE_PLACES = np.cos(np.arange(1, 10) * np.pi / 10)
+"""Along the overlap's length, -1 .. 1; and what they count where its width is 1 - y^2: the sum of
+Gauss for that weight (Chebyshev polynomials of the second kind, times the root that is left)."""
+_EDGE_WEIGHTS = np.sin(np.arange(1, 10) * np.pi / 10) ** 3
+_EDGE_WEIGHTS = (_EDGE_WEIGHTS / _EDGE_WEIGHTS.sum()).astype(np.float32)
+
+
+@dataclass(frozen=True, eq=False)
+class Grid:
+    """The ratio of two transfer functions for lags to the right; the other half is conjugate."""
+
+    step: float
+    """Of the lag [pupil radii]"""
+    spline: NDArray
+    """(rows, columns) coefficients, complex; the lag 0 is at (rows // 2, BEYOND)"""
+
+    @property
+    def nbytes(self) -> int:
+        """What it takes [bytes]."""
+        return self.spline.nbytes
+
+    def at(self, sx: NDArray, sy: NDArray) -> NDArray:
+        """The ratio at lags [pupil radii] that broadcast; 0 from a lag of 2 on."""
+        from scipy.ndimage import map_coordinates
+
+        sx, sy = np.broadcast_arrays(np.atleast_1d(sx), sy)
+        inside = sx**2 + sy**2 < 4
+        left = (sx < 0) | ((sx == 0) & (sy < 0))
+        sign = np.where(left, -1, 1)
+        row = np.where(inside, sign * sy / self.step, 0) + self.spline.shape[0] // 2
+        column = np.where(inside, sign * sx / self.step, 0) + BEYOND
+        ratio = map_coordinates(self.spline, [row, column], order=3, prefilter=False)
+        ratio = np.where(left, ratio.conj(), ratio).astype(np.complex128)
+        ratio /= np.maximum(np.abs(ratio), 1.0)
+        ratio[(sx == 0) & (sy == 0)] = 1.0
+        return np.where(inside, ratio, 0)
+
+
+def correlate(terms: Terms, wavelength: float, steep: float) -> Grid:
+    """The ratio for a wavefront [m] whose steepest slope is `steep` [waves per pupil radius]."""
+    from scipy.ndimage import spline_filter
+
+    order = max(zernike.noll(index)[0] for index, _ in terms)
+    samples = samples_across(steep, order)
+    perfect = _perfect(samples)
+    inside = _weights(samples) != 0
+    pupil = np.zeros((samples, samples), np.complex64)
+    pupil[inside] = _weights(samples)[inside] * _waves(_paths(terms, samples), wavelength)
+    ratio = _correlation(pupil) / perfect
+    thin, none = _edge(samples)
+    in_thin, at_cutoff = _limits(terms, samples)
+    ratio[thin] = _EDGE_WEIGHTS @ _waves(in_thin, wavelength)
+    ratio[none] = _waves(at_cutoff, wavelength)
+    ratio /= np.maximum(np.abs(ratio), 1.0)
+    return Grid(_step(samples), spline_filter(_both_sides(ratio), 3, output=np.complex64))
+
+
+def _waves(paths: Floats, wavelength: float) -> NDArray[np.complex64]:
+    """exp(2 pi i path / wavelength), in 32 bits once whole turns are gone."""
+    turns = (paths / wavelength) % 1.0
+    return np.exp((2j * np.pi * turns).astype(np.complex64))
+
+
+def samples_across(steep: float, order: int) -> int:
+    """Samples across the pupil for a slope [waves per pupil radius] and an order of polynomials."""
+    radians = 2 * math.pi * steep
+    fine = min(max(FINE * radians, KINK * math.sqrt(radians)), FINE_UP_TO)
+    return 32 * math.ceil(max(LEAST + 8 * order, fine, COARSE * radians) / 32)
+
+
+def _step(samples: int) -> float:
+    """Distance of the samples [pupil radii]; a margin of two samples lies around the pupil."""
+    return 2 / (samples - 4)
+
+
+def _places(samples: int) -> Floats:
+    return (np.arange(samples, dtype=np.float64) - (samples - 1) / 2) * _step(samples)
+
+
+@lru_cache(maxsize=4)
+def _weights(samples: int) -> Floats:
+    """Part of every cell that lies inside the unit disk, sharpened: (samples, samples)."""
+    at, step = _places(samples), _step(samples)
+    part = np.zeros((samples, samples))
+    lines = 16
+    for k in range(lines):
+        y = at + ((k + 0.5) / lines - 0.5) * step
+        half = np.sqrt(np.maximum(1 - y**2, 0))[:, None]
+        right, left = np.minimum(at + step / 2, half), np.maximum(at - step / 2, -half)
+        part += np.maximum(right - left, 0) / (step * lines)
+    sharp = part.copy()
+    for axis in (0, 1):
+        sharp -= (np.roll(part, 1, axis) + np.roll(part, -1, axis) - 2 * part) / 24
+    return sharp
+
+
+@lru_cache(maxsize=4)
+def _paths(terms: Terms, samples: int) -> Floats:
+    """W [m] at the samples that count, (any number,)."""
+    at = _places(samples)
+    y, x = np.nonzero(_weights(samples))
+    return zernike.wavefront(terms, at[x], at[y])
+
+
+def _correlation(pupil: NDArray) -> NDArray:
+    """Sum of P(u) P*(u + s) over u, for lags s to the right: (2 samples + 1, samples + 1).
+
+    The lag 0 is at (samples, 0).
+    """
+    from scipy import fft
+
+    samples = len(pupil)
+    size = fft.next_fast_len(2 * samples + 2)
+    spectrum = fft.fft2(pupil, (size, size))
+    power = spectrum.real**2 + spectrum.imag**2
+    lags = fft.rfft2(power)[:, : samples + 1] / np.float32(size**2)
+    return np.concatenate([lags[-samples:], lags[: samples + 1]])
+
+
+@lru_cache(maxsize=4)
+def _perfect(samples: int) -> NDArray:
+    """The correlation of the pupil without aberrations; 1 where nothing overlaps."""
+    overlap = _correlation(_weights(samples).astype(np.complex64)).real
+    thin, none = _edge(samples)
+    overlap[thin | none] = 1
+    return overlap
+
+
+@lru_cache(maxsize=4)
+def _lags(samples: int) -> tuple[Floats, Floats]:
+    down = np.arange(-samples, samples + 1, dtype=np.float64) * _step(samples)
+    return down[samples:], down[:, None]
+
+
+@lru_cache(maxsize=4)
+def _edge(samples: int) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Lags where the overlap is thin, and those beyond the cut-off."""
+    length = np.hypot(*_lags(samples))
+    return (length > 2 - EDGE * _step(samples)) & (length < 2), length >= 2
+
+
+@lru_cache(maxsize=4)
+def _limits(terms: Terms, samples: int) -> tuple[Floats, Floats]:
+    """dW [m] along the thin overlaps, (places, number); and at the cut-off, in all directions.
+
+    Where nothing overlaps only the spline looks; directions between few are good enough.
+    """
+    thin, none = _edge(samples)
+    right, down = (np.broadcast_to(lag / 2, thin.shape) for lag in _lags(samples))
+    around = np.linspace(-np.pi / 2, np.pi / 2, 1025)
+    opposite = _between(terms, 0.0, 0.0, np.cos(around), np.sin(around))
+    at_cutoff = np.interp(np.arctan2(down[none], right[none]), around, opposite)
+    sx, sy = right[thin], down[thin]
+    h2 = sx**2 + sy**2
+    along = _EDGE_PLACES[:, None] * np.sqrt((1 - h2) / h2)
+    return _between(terms, -along * sy, along * sx, sx, sy), at_cutoff
+
+
+def _between(terms: Terms, x: ArrayLike, y: ArrayLike, sx: Floats, sy: Floats) -> Floats:
+    """W on one side of (x, y) less W on the other [m]."""
+    one = zernike.wavefront(terms, np.subtract(x, sx), np.subtract(y, sy))
+    return one - zernike.wavefront(terms, np.add(x, sx), np.add(y, sy))
+
+
+def _both_sides(ratio: NDArray) -> NDArray:
+    """With `BEYOND` lags of the left half, where the ratio is the conjugate of the opposite."""
+    left = ratio[::-1, BEYOND:0:-1].conj()
+    return np.concatenate([left, ratio], axis=1)

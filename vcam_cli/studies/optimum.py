@@ -1,0 +1,231 @@
+"""The best value of a parameter, and how well it is known.
+
+Every repeat and seed gives a curve of the metric over the parameter; they are averaged before the
+optimum is sought. Near the best point of the mean a cubic in ln(parameter) is fitted (in the
+parameter itself where it is not positive), to as many points as it can follow, and the optimum is
+the cubic's. The interval is that of the optima of curves drawn again with replacement (the
+bootstrap): repeats and seeds cannot tell these apart. Whole curves are drawn, so that what a repeat
+does to all values at once stays together.
+
+Where the mean departs from its cubic by more than its spread explains (a metric with a kink), or
+there is a single curve and the spread is not known, the cubic is not believed: what it leaves is
+drawn as well, and the interval reaches to the neighbors of the best point at least, between which
+the optimum of any curve with a single one lies.
+
+Reference: B. Efron, R. J. Tibshirani, An Introduction to the Bootstrap, Chapman & Hall, 1993,
+sections 6.2 and 13.3.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+DRAWS = 1000
+"""Means of curves that are drawn."""
+SEED = 1
+COVERED = 0.95
+"""Share of these within low..high."""
+ENOUGH = 4
+"""Curves from which on means are drawn from them."""
+DEGREE = 3
+FEWEST = 5
+"""Points below which a cubic would pass through all of them, whatever they say."""
+NEAR, MOST_NEAR, LEAST_NEAR = 0.2, 3, 2
+"""Points on either side of the best one that are fitted: a share of all or the second, whichever is
+more; down to the third where the cubic does not follow that many."""
+MISFIT = 4.0
+"""Mean square by which the mean may depart from its fit, over its own variance."""
+
+
+@dataclass(frozen=True)
+class Optimum:
+    """The best value of one parameter."""
+
+    at: float
+    low: float
+    high: float
+    """Interval of `at`; both nan where a single curve leaves it open."""
+    value: float
+    """Of the metric there."""
+    edge: str = ""
+    """low | high: the range ends there, and the metric may get better beyond it."""
+
+
+def find(parameter: NDArray, curves: NDArray, goal: str) -> Optimum:
+    """The optimum of curves (n, points) over a parameter (points,), for the goal min or max.
+
+    Raises ValueError for curves without points, or with what is not finite.
+    """
+    order = np.argsort(parameter)
+    x = np.asarray(parameter, float)[order]
+    y = np.asarray(curves, float)[:, order] * (1 if goal == "min" else -1)
+    if not y.size or not np.isfinite(y).all():
+        raise ValueError("an optimum needs finite numbers")
+    if len(x) < FEWEST:
+        return _of_the_points(x, y.mean(axis=0), goal)
+    scale = np.log(x) if x[0] > 0 else x
+    near, rest, follows = _nearness(scale, y)
+    best, value = (float(part[0]) for part in _least(scale, y.mean(axis=0)[None], near))
+    found = _least(scale, _drawn(y, rest), near)[0]
+    low, high = math.nan, math.nan
+    if found.size:
+        tail = (1 - COVERED) / 2
+        low, high = np.quantile(found, [tail, 1 - tail], method="inverted_cdf")
+        low, high = min(low, best), max(high, best)
+    if not follows and len(x) > 2:
+        i = int(y.mean(axis=0).argmin())
+        low = np.fmin(low, min(best, scale[max(0, i - 1)]))
+        high = np.fmax(high, max(best, scale[min(len(x) - 1, i + 1)]))
+    edge = ""
+    if len(x) > 1 and best in (scale[0], scale[-1]):
+        edge = "low" if best == scale[0] else "high"
+    back = np.exp if x[0] > 0 else np.asarray
+    at, low, high = (_on_range(float(back(v)), x) for v in (best, low, high))
+    return Optimum(at, low, high, value if goal == "min" else -value, edge)
+
+
+def _of_the_points(x: NDArray, mean: NDArray, goal: str) -> Optimum:
+    """The best point itself, and its neighbors as the interval: too few for a curve."""
+    i = int(mean.argmin())
+    low, high = x[max(0, i - 1)], x[min(len(x) - 1, i + 1)]
+    ends = {0: "low", len(x) - 1: "high"} if len(x) > 1 else {}
+    value = float(mean[i]) if goal == "min" else -float(mean[i])
+    return Optimum(float(x[i]), float(low), float(high), value, ends.get(i, ""))
+
+
+def _on_range(value: float, x: NDArray) -> float:
+    """The value, with what the logarithm did to values of the range undone."""
+    nearest = float(x[np.abs(x - value).argmin()]) if math.isfinite(value) else value
+    return nearest if math.isclose(value, nearest, rel_tol=1e-12) else value
+
+
+def _nearness(x: NDArray, curves: NDArray) -> tuple[int, float, bool]:
+    """Points on either side that are fitted, and how well the mean is followed.
+
+    The rms by which it departs from the fit, less what its own spread explains, where that is
+    known (nan where nothing is); and whether the spread explains it.
+    """
+    points = len(x)
+    mean, noise = curves.mean(axis=0)[None], _variance(curves)
+    near = max(MOST_NEAR, round(NEAR * points))
+    while True:
+        start, size = int(_starts(mean, near)[0]), _size(points, near)
+        powers = _powers(x[start : start + size])
+        y = mean[0, start : start + size]
+        free = size - powers.shape[1]
+        fit = powers @ np.linalg.lstsq(powers, y, rcond=None)[0]
+        square = float(np.square(y - fit).sum()) / free if free else math.nan
+        if near <= LEAST_NEAR or not square > MISFIT * noise:
+            break
+        near -= 1
+    if math.isnan(square):
+        return near, math.nan if math.isnan(noise) else 0.0, False
+    rest = math.sqrt(max(0.0, square - (0.0 if math.isnan(noise) else noise)))
+    return near, rest, square <= MISFIT * noise
+
+
+def _variance(curves: NDArray) -> float:
+    """Of the mean of curves, which differ by more than a shift of the whole; nan of a single one.
+
+    The same at all points, which makes it well known from few curves.
+    """
+    count, points = curves.shape
+    if count < 2 or points < 2:
+        return math.nan
+    rest = curves - curves.mean(axis=0)
+    rest = rest - rest.mean(axis=1, keepdims=True)
+    return float(np.square(rest).sum()) / ((count - 1) * (points - 1) * count)
+
+
+def _drawn(curves: NDArray, rest: float) -> NDArray:
+    """Means of curves drawn with replacement: (DRAWS, points).
+
+    The spread of n curves around their own mean is too small by (n - 1) / n, which is undone. Few
+    curves make too few means: normal errors of the same variance stand for them. rest: rms of what
+    the fit leaves beside the spread, all there is of a single curve. None where nothing is known.
+    """
+    rng = np.random.default_rng(SEED)
+    count, points = curves.shape
+    mean, variance = curves.mean(axis=0), _variance(curves)
+    if math.isnan(variance) and math.isnan(rest):
+        return np.empty((0, points))
+    if count >= ENOUGH:
+        chosen = rng.integers(count, size=(DRAWS, count))
+        weights = np.stack([(chosen == i).sum(axis=1) for i in range(count)], axis=1) / count
+        out = mean + math.sqrt(count / (count - 1)) * (weights @ (curves - mean))
+    else:
+        spread = 0.0 if math.isnan(variance) else math.sqrt(variance)
+        out = mean + spread * rng.standard_normal((DRAWS, points))
+    return np.asarray(out + rest * rng.standard_normal((DRAWS, points)))
+
+
+def _size(points: int, near: int) -> int:
+    """Points that are fitted."""
+    return min(points, 2 * near + 1)
+
+
+def _starts(curves: NDArray, near: int) -> NDArray:
+    """Of every curve, the first of the points around its best one that are fitted."""
+    points = curves.shape[1]
+    size = _size(points, near)
+    return np.clip(curves.argmin(axis=1) - size // 2, 0, points - size)
+
+
+def _powers(x: NDArray) -> NDArray:
+    """(points, degree + 1) powers of the parameter, from -1 to 1 over these points.
+
+    One point is left to smooth, where there are enough.
+    """
+    degree = min(DEGREE, len(x) - 1 if len(x) <= DEGREE else len(x) - 2)
+    middle, half = (x[0] + x[-1]) / 2, (x[-1] - x[0]) / 2 or 1.0
+    return np.vander((x - middle) / half, degree + 1, increasing=True)
+
+
+def _least(x: NDArray, curves: NDArray, near: int) -> tuple[NDArray, NDArray]:
+    """Where every curve is least, and how much it is there.
+
+    The minimum of the cubic, or an end of the range that is better; the best point itself where
+    the cubic has none.
+    """
+    best = curves.argmin(axis=1)
+    rows = np.arange(len(curves))
+    at, value = x[best], curves[rows, best]
+    starts, size = _starts(curves, near), _size(len(x), near)
+    if size < 3:
+        return at, value
+    for start in np.unique(starts):
+        these = rows[starts == start]
+        some = x[start : start + size]
+        powers = _powers(some)
+        c = np.zeros((DEGREE + 1, these.size))
+        c[: powers.shape[1]] = np.linalg.lstsq(
+            powers, curves[these, start : start + size].T, rcond=None
+        )[0]
+        t, found = _minimum(c)
+        here = np.polynomial.polynomial.polyval(t, c, tensor=False)
+        for end, side in ((0, -1.0), (len(x) - 1, 1.0)):
+            if start <= end < start + size:
+                found &= here <= np.polynomial.polynomial.polyval(side, c)
+                # A curve whose fit is best at the end of the range is best there.
+        place = (some[0] + some[-1]) / 2 + t * (some[-1] - some[0]) / 2
+        at[these] = np.where(found, place, at[these])
+        value[these] = np.where(found, here, value[these])
+    return at, value
+
+
+def _minimum(c: NDArray) -> tuple[NDArray, NDArray]:
+    """Where cubics c0 + c1 t + c2 t^2 + c3 t^3 have their minimum, and whether in -1..1.
+
+    The root of the derivative at which the curve bends upward, in the form that loses no digits.
+    """
+    square = c[2] ** 2 - 3 * c[1] * c[3]
+    root = np.sqrt(np.maximum(square, 0))
+    safe = c[2] + root > abs(c[2]) * 1e-3
+    with np.errstate(divide="ignore", invalid="ignore"):
+        t = np.where(safe, -c[1] / (c[2] + root), (root - c[2]) / (3 * c[3]))
+    found = (square > 0) & np.isfinite(t) & (abs(t) <= 1)
+    return np.where(found, t, 0.0), found
