@@ -2,7 +2,6 @@
 
 import csv
 import json
-import os
 import signal
 import subprocess
 import time
@@ -300,19 +299,26 @@ def test_the_best_of_words(tmp_path):
 
 
 class TestWorkers:
-    def test_one_that_dies_is_replaced_and_its_point_done_again(self, tmp_path):
+    def test_one_that_dies_is_replaced_and_its_point_done_again(self, tmp_path, monkeypatch):
         study = written(tmp_path, **LONG)
-        killed = []
+        crew = []
+
+        class Worker(run_on._Worker):
+            def __init__(self, *given):
+                super().__init__(*given)
+                crew.append(self)
 
         class Watch:
             def begin(self, stage): ...
             def expect(self, seconds): ...
             def step(self, done, total):
-                if done == 3:
-                    killed.extend(kill_workers())
+                if len(crew) == 2:
+                    crew[0].process.kill()
 
+        monkeypatch.setattr(run_on, "_Worker", Worker)
         result = sweep(study, tmp_path / "out", workers=2, watch=Watch())
-        assert killed and (result.computed, result.exit_code) == (48, 0)
+        assert (result.computed, result.exit_code) == (48, 0)
+        assert len(crew) == 3  # one more than the two that were asked for
 
     def test_a_point_that_kills_them_is_given_up(self, tmp_path, monkeypatch):
         """Each worker is told to end as soon as a point arrives."""
@@ -337,16 +343,6 @@ class TestWorkers:
             (8, 1), (1, 8), (2, 4), (3, 2), (8, 1), (20, 1),
         ]  # fmt: skip
         assert run_on.shares(None, 2) == (2, 4)
-
-
-def kill_workers():
-    """Kills the worker processes of this process; gives their numbers."""
-    found = subprocess.run(["ps", "-o", "pid,args", "--ppid", str(os.getpid())],
-                           capture_output=True, text=True).stdout  # fmt: skip
-    pids = [int(line.split()[0]) for line in found.splitlines() if "run_on import serve" in line]
-    for pid in pids[:1]:
-        os.kill(pid, signal.SIGKILL)
-    return pids[:1]
 
 
 def test_the_machinery_costs_little(tmp_path, monkeypatch):
