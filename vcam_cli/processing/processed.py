@@ -76,7 +76,9 @@ class Processed:
         """The ideal image in the colors and scale of `linear`: (rows, columns, C) float32.
 
         planes_dn: (C, rows, columns) [DN] all colors at every pixel, free of noise and blur,
-        black included. The gains are those found on the camera's picture.
+        black included. The gains are those found on the camera's picture. What black the steps
+        leave in that (dark signal, offset) is the camera's fault and no part of the scene: there
+        is none here.
         Raises BadInput for a mosaic without demosaic: it has no counterpart in full color.
         """
         if not self.full_color:
@@ -84,11 +86,12 @@ class Processed:
         if planes_dn.ndim != 3 or planes_dn.shape[0] != len(self.context.colors):
             raise ValueError(f"one plane for each of {self.context.colors}, got {planes_dn.shape}")
         ideal = np.empty((*planes_dn.shape[1:], self.channels), np.float32)
+        dark = through(self.operations, np.full(len(planes_dn), self.context.black_dn))
 
         def fill(start: int, stop: int) -> None:
             values = through(self.operations, planes_dn[:, start:stop])
             for channel, plane in enumerate(values):
-                ideal[start:stop, :, channel] = plane
+                np.subtract(plane, dark[channel], out=ideal[start:stop, :, channel])
 
         map_blocks(fill, planes_dn.shape[1], self.workers)
         return ideal
