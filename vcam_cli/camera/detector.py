@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 
 from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.once import once
 from vcam_cli.camera.process import Process, process
 from vcam_cli.errors import BadInput, bad
 from vcam_cli.physics import photodiode
@@ -28,6 +29,7 @@ class Detector:
         return self.width * self.height
 
 
+@once
 def detector(camera: Camera) -> Detector:
     """The photodetector of `camera`: the size that the file gives, else its technology's layout.
 

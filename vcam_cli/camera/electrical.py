@@ -8,6 +8,7 @@ from vcam_cli.camera import sense_node
 from vcam_cli.camera.architecture import ARCHITECTURES
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.geometry import AGREE
+from vcam_cli.camera.once import once
 from vcam_cli.errors import BadInput, bad
 from vcam_cli.physics import readout
 
@@ -58,6 +59,7 @@ class Electrical:
         return min(self.full_well, (self.highest_code - self.offset) * self.electrons_per_dn)
 
 
+@once
 def electrical(camera: Camera) -> Electrical:
     """Solves the readout of `camera`: any two of gain, swing and well give the third.
 

@@ -23,6 +23,7 @@ import numpy as np
 
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.detector import detector
+from vcam_cli.camera.once import once
 from vcam_cli.camera.photodetector import ChargeDiffusion, DarkCurrentDensity
 from vcam_cli.camera.process import process, require
 from vcam_cli.camera.sense_node import area_capacitance, capacitance
@@ -80,6 +81,7 @@ class Photodiode:
     """None where the file asks for no diffusion of charge."""
 
 
+@once
 def photodiode(camera: Camera) -> Photodiode:
     """The photodiode of `camera`. Raises BadInput where numbers are missing or impossible."""
     return Photodiode(
@@ -165,6 +167,7 @@ def dark_rate(camera: Camera) -> float:
     return current / readout.ELEMENTARY_CHARGE * own.dark_current_scale
 
 
+@once
 def diffusion(camera: Camera) -> Diffusion | None:
     """The lengths that decide the diffusion of charge, where the file asks for it."""
     at = f"{_HERE}.charge_diffusion"

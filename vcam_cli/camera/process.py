@@ -16,6 +16,7 @@ from typing import Any, TypeVar, cast, get_args
 
 from vcam_cli.camera.base import Model
 from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.once import once
 from vcam_cli.camera.technology import (
     Gate,
     Junction,
@@ -78,6 +79,7 @@ class Process:
     layout: Layout
 
 
+@once
 def process(camera: Camera) -> Process | None:
     """The process of a camera's pixel; None where the file says nothing of one.
 

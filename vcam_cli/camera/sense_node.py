@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.detector import detector
+from vcam_cli.camera.once import once
 from vcam_cli.camera.process import process, require
 from vcam_cli.errors import bad
 from vcam_cli.physics import photodiode, readout
@@ -104,6 +105,7 @@ def _reset_voltage(camera: Camera, at: str, what: str) -> float:
     return float(supply - threshold)
 
 
+@once
 def capacitance(camera: Camera) -> float | None:
     """Capacitance of the photodiode's node [F].
 
