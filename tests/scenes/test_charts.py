@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 from support import brute, scene, view
 
-from vcam_cli.scenes.base import ChartScene, WaveScene, cell_edges
+from vcam_cli.scenes import csf
+from vcam_cli.scenes.base import ChartScene, Frame, WaveScene, cell_edges
 from vcam_cli.scenes.build import build
 from vcam_cli.scenes.slanted_edge import half_plane
+from vcam_cli.spectra import illuminant, luminance
 
 CSF = {"kind": "chart", "chart": "csf", "max_frequency": "120 lp/mm", "phase": "40 deg"}
 EDGE = {"kind": "chart", "chart": "slanted-edge", "angle": "5 deg", "contrast": 0.8}
@@ -23,7 +25,9 @@ LETTERS = {"kind": "chart", "chart": "eye-chart", "rows": 3}
 PATCHES = {"kind": "chart", "chart": "hdr-patches", "patches": 7, "lamp": 2, "dynamic_range": 1000}
 FLAT = {"kind": "chart", "chart": "uniform", "reflectance": 0.4}
 
-SMOOTH = [CSF, WAVE, FLAT]
+COLORED = CSF | {"modulation": "red-green"}
+
+SMOOTH = [CSF, COLORED, WAVE, FLAT]
 SHARP = [WEDGE, STAR, POINTS, LETTERS, PATCHES]
 EDGED = [EDGE, EDGE | {"angle": "-60 deg"}, EDGE | {"angle": "0 deg"}, CHECKER, *SHARP]
 
@@ -458,3 +462,27 @@ def test_cells_that_hold_many_leaves_are_painted_in_parts():
     small = large.chart.averages(x, y, mix)
     shape = (len(mix), large.shape[0], parts, large.shape[1], parts)
     np.testing.assert_allclose(large.planes(mix), small.reshape(shape).mean((2, 4)), rtol=1e-9)
+
+
+@pytest.mark.parametrize("modulation", ["red-green", "blue-yellow"])
+class TestColorsOfTheContrastChart:
+    def test_their_sum_is_white_and_their_luminances_are_the_same(self, modulation):
+        first, second = csf.colors(modulation)
+        band = 400e-9, 700e-9
+        wavelength = np.linspace(*band, 61)
+        # The reflectances add up to 1 to 1e-5 where they are tabulated.
+        np.testing.assert_allclose(first.at(wavelength) + second.at(wavelength), 1, atol=2e-5)
+        assert first.at(wavelength).min() >= 0 and second.at(wavelength).min() >= 0
+        lamp = illuminant("D65")
+        one, two = (luminance(lamp.times(color), *band) for color in (first, second))
+        # The shares are those of sRGB's primaries, in four digits, over 380 to 780 nm.
+        assert one == pytest.approx(two, rel=2e-3)
+
+    def test_where_one_color_is_brightest_the_other_is_dark(self, modulation):
+        frame = Frame(1e-3, 1e-3)
+        chart = csf.Csf(frame, 1e4, 0.5, 1.0, 0.0)
+        x, y = np.array([-0.5e-3, -0.5e-3 + math.sqrt(1e-3 / 1e4)]), np.array([-0.5e-3])
+        of_each = chart.values(x, y, np.eye(2))
+        # Contrast 1, phases 0 and pi: all of the first color, then all of the second.
+        np.testing.assert_allclose(of_each[:, 0], [[1, 0], [0, 1]], atol=1e-9)
+        np.testing.assert_allclose(chart.values(x, -y, np.eye(2)), 0.5)

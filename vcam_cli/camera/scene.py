@@ -72,6 +72,11 @@ class Csf(Chart):
     mean: Fraction = key("mean reflectance", example=0.5, default=0.5)
     phase: Angle = key("phase at the left edge", unit="deg", example="0 deg", default=0.0)
     max_contrast: Fraction = key("contrast at the top", example=1.0, default=1.0)
+    modulation: Literal["luminance", "red-green", "blue-yellow"] = key(
+        "what the contrast is in: light and dark, or two colors of one luminance under D65",
+        example="luminance",
+        default="luminance",
+    )
 
     @model_validator(mode="after")
     def _is_a_reflectance(self) -> Self:

@@ -4,6 +4,7 @@ from vcam_cli.camera import scene as models
 from vcam_cli.errors import BadInput, bad
 from vcam_cli.scenes import (
     colorchecker,
+    csf,
     dead_leaves,
     eye_chart,
     hdr_patches,
@@ -89,7 +90,7 @@ def _chart(source: object, view: View) -> tuple[Chart, tuple[Spectrum, ...]]:
         case models.Csf():
             return (
                 Csf(frame, source.max_frequency, source.mean, source.max_contrast, source.phase),
-                gray,
+                csf.colors(source.modulation),
             )
         case models.SlantedEdge():
             return SlantedEdge(source.angle, source.contrast), gray

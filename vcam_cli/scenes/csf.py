@@ -8,6 +8,10 @@ Beyond the frame the chirp goes on (frequencies above F to the right; to the lef
 continuation, its own mirror image), and the contrast stays at 0 below and at max_contrast above,
 since a contrast above 1 would be negative light.
 
+Modulated in color, reflectance is mean ((1 + c cos) S_1 + (1 - c cos) S_2): two colors, whose sum
+is white and whose luminances under D65 are the same, take turns. They are mixtures of the
+reflectances that make sRGB's red, green and blue.
+
 Source: the test chart of chapter 3 of T. Chen, "Digital camera system simulator and
 applications", Stanford 2003, after Campbell and Robson, J. Physiol. 197 (1968) 551.
 """
@@ -18,6 +22,33 @@ from dataclasses import dataclass
 import numpy as np
 
 from vcam_cli.scenes.base import Array, Chart, Frame
+from vcam_cli.spectra import Spectrum, srgb_reflectances
+
+LUMINANCES = (0.2126, 0.7152, 0.0722)
+"""Of sRGB's red, green and blue; ITU-R BT.709."""
+FIRST = {"red-green": (1.0, None, 0.5), "blue-yellow": (None, None, 1.0)}
+"""How much of red, green and blue is in the first of two colors; None is what makes the luminances
+equal. The second color has the rest."""
+
+
+def colors(modulation: str) -> tuple[Spectrum, ...]:
+    """Reflectances of the parts of a chart: one of white, or two whose sum is white."""
+    if modulation == "luminance":
+        return (Spectrum.flat(1.0),)
+    known = FIRST[modulation]
+    missing = sum(y for y, share in zip(LUMINANCES, known, strict=True) if share is None)
+    there = sum(y * s for y, s in zip(LUMINANCES, known, strict=True) if s is not None)
+    rest = (sum(LUMINANCES) / 2 - there) / missing
+    first = [rest if share is None else share for share in known]
+    return tuple(_mixed(shares) for shares in (first, [1 - share for share in first]))
+
+
+def _mixed(shares: list[float]) -> Spectrum:
+    """A mixture of sRGB's red, green and blue, which share a table of wavelengths."""
+    pure = srgb_reflectances()
+    at = pure[0].tables[0].wavelength
+    values = (share * color.at(at) for share, color in zip(shares, pure, strict=True))
+    return Spectrum.sampled(at, sum(values, np.zeros_like(at)), "hold")
 
 
 @dataclass(frozen=True)
@@ -46,9 +77,14 @@ class Csf(Chart):
         return out
 
     def _mix(self, contrast: Array, chirp: Array, mix: Array, out: Array) -> None:
-        pattern = np.outer(contrast.astype(mix.dtype), chirp.astype(mix.dtype)) + 1
-        for plane, level in zip(out, mix[:, 0] * mix.dtype.type(self.mean), strict=True):
-            np.multiply(pattern, level, out=plane)
+        pattern = np.outer(contrast.astype(mix.dtype), chirp.astype(mix.dtype))
+        first, second = mix[:, 0], mix[:, 1] if mix.shape[1] > 1 else np.zeros(len(mix), mix.dtype)
+        mean = mix.dtype.type(self.mean)
+        for plane, level, swing in zip(
+            out, mean * (first + second), mean * (first - second), strict=True
+        ):
+            np.multiply(pattern, swing, out=plane)
+            plane += level
 
     def _chirp_integral(self, x: Array) -> Array:
         """Integral of cos(pi F x^2/W + phase) from the left edge to x [m]."""
