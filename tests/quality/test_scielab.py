@@ -1,10 +1,12 @@
 """S-CIELAB: maps of two other programs, brute force, and what a blur must and must not do."""
 
+import itertools
 import json
 from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.integrate import quad
 
 from vcam_cli.quality import scielab
 from vcam_cli.quality.display import D65, Screen, rgb_to_xyz
@@ -14,7 +16,7 @@ from vcam_cli.quality.scielab import cielab_map, s_cielab_map
 RESULTS = json.loads((Path(__file__).parent.parent / "data" / "scielab.json").read_text())[
     "results"
 ]
-READINGS = ("zhang-wandell-1996", "isetcam")
+READINGS = ("zhang-wandell-1996", "isetcam", "integrated")
 
 
 def screen(samples_per_degree: float = 23.0) -> Screen:
@@ -169,7 +171,7 @@ def test_float32_serves_and_what_is_bright_gets_more() -> None:
 def test_a_kernel_has_the_sum_one_and_the_stated_widths() -> None:
     """The light-dark plane's first Gaussian: half maximum at half of, and at, its spread."""
     fine = 2000.0
-    for filters, part in (("zhang-wandell-1996", 0.5), ("isetcam", 1.0)):
+    for filters, part in (("zhang-wandell-1996", 0.5), ("isetcam", 1.0), ("integrated", 0.5)):
         planes = kernels(filters, fine)
         for kernel in planes:
             assert kernel.weights @ kernel.taps.sum(axis=1) ** 2 == pytest.approx(1, abs=1e-14)
@@ -179,6 +181,30 @@ def test_a_kernel_has_the_sum_one_and_the_stated_widths() -> None:
         middle = taps.size // 2
         # the 1996 width is one sample less: 1 % of 100 samples
         assert taps[middle + half] / taps[middle] == pytest.approx(0.5, abs=0.01)
+
+
+@pytest.mark.parametrize("degree", [0.9, 8.1, 14.0, 22.62])
+def test_integrated_kernels_are_integrals(degree: float) -> None:
+    for plane, kernel in zip(GAUSSIANS, kernels("integrated", degree), strict=True):
+        for (spread, _), taps in zip(plane, kernel.taps, strict=True):
+            edges = (np.arange(-kernel.reach, kernel.reach + 2) - 0.5) / degree
+            edges = np.clip(edges, -0.5, 0.5)
+            parts = [
+                quad(lambda x, s=spread: 2 ** (-4 * (x / s) ** 2), low, high, epsabs=1e-13)[0]
+                for low, high in itertools.pairwise(edges)
+            ]
+            np.testing.assert_allclose(taps, np.array(parts) / sum(parts), atol=1e-11)
+
+
+def test_integrated_kernels_are_continuous_in_the_size_of_pixels() -> None:
+    """Where another pixel comes into a degree: the others jump by 1e-2 and more there."""
+    for edge in (13.0, 15.0, 21.0):
+        below, above = (kernels("integrated", edge + step) for step in (-1e-9, 1e-9))
+        for one, other in zip(below, above, strict=True):
+            # The next pixel comes in where a degree ends, with next to nothing.
+            outer = (other.taps.shape[1] - one.taps.shape[1]) // 2
+            padded = np.pad(one.taps, ((0, 0), (outer, outer)))
+            np.testing.assert_allclose(padded, other.taps, atol=1e-8)
 
 
 def test_what_cannot_be_compared() -> None:

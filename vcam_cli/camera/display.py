@@ -28,6 +28,11 @@ class Display(Model):
     white: Annotated[float, Quantity("luminance", above=0)] = key(
         "luminance of its white", unit="cd/m2", example="100 cd/m2", default=100.0
     )
+    filters: Literal["zhang-wandell-1996", "isetcam", "integrated"] = key(
+        "how S-CIELAB reads the eye's filters; integrated is smooth in the size of pixels",
+        example="integrated",
+        default="zhang-wandell-1996",
+    )
 
     rules = (at_most_one("dpi", "width"),)
 
