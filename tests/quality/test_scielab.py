@@ -16,7 +16,7 @@ from vcam_cli.quality.scielab import cielab_map, s_cielab_map
 RESULTS = json.loads((Path(__file__).parent.parent / "data" / "scielab.json").read_text())[
     "results"
 ]
-READINGS = ("zhang-wandell-1996", "isetcam", "integrated")
+READINGS = ("zhang-wandell-1996", "isetcam", "continuous")
 
 
 def screen(samples_per_degree: float = 23.0) -> Screen:
@@ -97,7 +97,7 @@ def test_uniform_fields_have_the_delta_e_of_cielab(filters: str, degree: float) 
     np.testing.assert_allclose(found, expected, rtol=1e-10)
 
 
-@pytest.mark.parametrize("filters", READINGS)
+@pytest.mark.parametrize("filters", READINGS[:2])  # the third averages over the pixel even there
 def test_a_blurring_eye_is_the_unblurred_one_where_a_degree_is_a_pixel(filters: str) -> None:
     one, other = np.random.default_rng(2).random((2, 20, 30, 3))
     found = s_cielab_map(one, other, screen(1.0), filters)
@@ -171,7 +171,7 @@ def test_float32_serves_and_what_is_bright_gets_more() -> None:
 def test_a_kernel_has_the_sum_one_and_the_stated_widths() -> None:
     """The light-dark plane's first Gaussian: half maximum at half of, and at, its spread."""
     fine = 2000.0
-    for filters, part in (("zhang-wandell-1996", 0.5), ("isetcam", 1.0), ("integrated", 0.5)):
+    for filters, part in (("zhang-wandell-1996", 0.5), ("isetcam", 1.0), ("continuous", 0.5)):
         planes = kernels(filters, fine)
         for kernel in planes:
             assert kernel.weights @ kernel.taps.sum(axis=1) ** 2 == pytest.approx(1, abs=1e-14)
@@ -184,22 +184,36 @@ def test_a_kernel_has_the_sum_one_and_the_stated_widths() -> None:
 
 
 @pytest.mark.parametrize("degree", [0.9, 8.1, 14.0, 22.62])
-def test_integrated_kernels_are_integrals(degree: float) -> None:
-    for plane, kernel in zip(GAUSSIANS, kernels("integrated", degree), strict=True):
+def test_continuous_kernels_are_integrals(degree: float) -> None:
+    """Of a Gaussian, cut to a degree, with the triangle of two squares as large as a pixel."""
+    for plane, kernel in zip(GAUSSIANS, kernels("continuous", degree), strict=True):
         for (spread, _), taps in zip(plane, kernel.taps, strict=True):
-            edges = (np.arange(-kernel.reach, kernel.reach + 2) - 0.5) / degree
-            edges = np.clip(edges, -0.5, 0.5)
-            parts = [
-                quad(lambda x, s=spread: 2 ** (-4 * (x / s) ** 2), low, high, epsabs=1e-13)[0]
-                for low, high in itertools.pairwise(edges)
-            ]
-            np.testing.assert_allclose(taps, np.array(parts) / sum(parts), atol=1e-11)
+            found = []
+            for pixel in range(-kernel.reach, kernel.reach + 1):
+                ends = np.clip((pixel + np.array([-1, 0, 1])) / degree, -0.5, 0.5)
+
+                def weighed(x, at=pixel, width=spread):
+                    return 2 ** (-4 * (x / width) ** 2) * max(0, 1 - abs(x * degree - at))
+
+                sides = [quad(weighed, a, b, epsabs=1e-13)[0] for a, b in itertools.pairwise(ends)]
+                found.append(sum(sides))
+            np.testing.assert_allclose(taps, np.array(found) / sum(found), atol=1e-11)
 
 
-def test_integrated_kernels_are_continuous_in_the_size_of_pixels() -> None:
+def test_the_1996_filters_tend_to_the_continuous_ones() -> None:
+    """Finely sampled they differ by their width, one sample less, and by what their end cuts."""
+    for old, new in zip(
+        kernels("zhang-wandell-1996", 400.0), kernels("continuous", 400.0), strict=True
+    ):
+        shorter = new.reach - old.reach
+        for one, other in zip(old.taps, new.taps[:, shorter:-shorter], strict=True):
+            assert abs(one - other).max() < 0.06 * other.max()
+
+
+def test_continuous_kernels_are_continuous_in_the_size_of_pixels() -> None:
     """Where another pixel comes into a degree: the others jump by 1e-2 and more there."""
     for edge in (13.0, 15.0, 21.0):
-        below, above = (kernels("integrated", edge + step) for step in (-1e-9, 1e-9))
+        below, above = (kernels("continuous", edge + step) for step in (-1e-9, 1e-9))
         for one, other in zip(below, above, strict=True):
             # The next pixel comes in where a degree ends, with next to nothing.
             outer = (other.taps.shape[1] - one.taps.shape[1]) // 2

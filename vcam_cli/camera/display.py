@@ -28,9 +28,9 @@ class Display(Model):
     white: Annotated[float, Quantity("luminance", above=0)] = key(
         "luminance of its white", unit="cd/m2", example="100 cd/m2", default=100.0
     )
-    filters: Literal["zhang-wandell-1996", "isetcam", "integrated"] = key(
-        "how S-CIELAB reads the eye's filters; integrated is smooth in the size of pixels",
-        example="integrated",
+    filters: Literal["zhang-wandell-1996", "isetcam", "continuous"] = key(
+        "how S-CIELAB reads the eye's filters; continuous is smooth in the size of pixels",
+        example="continuous",
         default="zhang-wandell-1996",
     )
 

@@ -107,7 +107,7 @@ def compare(
         Literal["1976", "1994", "2000"], typer.Option("--delta-e", help="Formula of Delta E.")
     ] = "1976",
     filters: Annotated[
-        Literal["zhang-wandell-1996", "isetcam", "integrated"],
+        Literal["zhang-wandell-1996", "isetcam", "continuous"],
         typer.Option("--filters", help="How the eye's filters of S-CIELAB are read."),
     ] = "zhang-wandell-1996",
     as_json: options.Json = False,

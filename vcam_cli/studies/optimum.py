@@ -19,7 +19,7 @@ sections 6.2 and 13.3.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,10 +33,10 @@ ENOUGH = 4
 """Curves from which on means are drawn from them."""
 DEGREE = 3
 FEWEST = 5
-"""Points below which a cubic would pass through all of them, whatever they say."""
-NEAR, MOST_NEAR, LEAST_NEAR = 0.2, 3, 2
-"""Points on either side of the best one that are fitted: a share of all or the second, whichever is
-more; down to the third where the cubic does not follow that many."""
+"""Points that are fitted at least: a cubic passes through fewer, whatever they say."""
+NEAR, MOST_NEAR = 0.2, 3
+"""Points on either side of the best one that are fitted at first: a share of all or the second,
+whichever is more."""
 MISFIT = 4.0
 """Mean square by which the mean may depart from its fit, over its own variance."""
 
@@ -68,9 +68,9 @@ def find(parameter: NDArray, curves: NDArray, goal: str) -> Optimum:
     if len(x) < FEWEST:
         return _of_the_points(x, y.mean(axis=0), goal)
     scale = np.log(x) if x[0] > 0 else x
-    near, rest, follows = _nearness(scale, y)
-    best, value = (float(part[0]) for part in _least(scale, y.mean(axis=0)[None], near))
-    found = _least(scale, _drawn(y, rest), near)[0]
+    window, rest, follows = _window(scale, y)
+    best, value = (float(part[0]) for part in _least(scale, y.mean(axis=0)[None], window))
+    found = _least(scale, _drawn(y, rest), window)[0]
     low, high = math.nan, math.nan
     if found.size:
         tail = (1 - COVERED) / 2
@@ -103,29 +103,62 @@ def _on_range(value: float, x: NDArray) -> float:
     return nearest if math.isclose(value, nearest, rel_tol=1e-12) else value
 
 
-def _nearness(x: NDArray, curves: NDArray) -> tuple[int, float, bool]:
-    """Points on either side that are fitted, and how well the mean is followed.
+@dataclass(frozen=True)
+class _Window:
+    """The points that are fitted: those from `start`, `size` of them."""
 
-    The rms by which it departs from the fit, less what its own spread explains, where that is
-    known (nan where nothing is); and whether the spread explains it.
+    start: int
+    size: int
+
+    @property
+    def points(self) -> slice:
+        return slice(self.start, self.start + self.size)
+
+    def around(self, best: int, points: int) -> _Window:
+        """Itself where it has the best point of a curve, moved there otherwise."""
+        if self.start <= best < self.start + self.size:
+            return self
+        return replace(self, start=min(max(0, best - self.size // 2), points - self.size))
+
+    def shorter(self, best: int) -> tuple[_Window, ...]:
+        """Without one of its ends, where a point is left on that side of the best one."""
+        last = self.start + self.size - 1
+        left = (_Window(self.start + 1, self.size - 1),) if self.start + 1 < best else ()
+        right = (_Window(self.start, self.size - 1),) if last - 1 > best else ()
+        return left + right
+
+
+def _window(x: NDArray, curves: NDArray) -> tuple[_Window, float, bool]:
+    """The points around the best one of the mean that a cubic follows.
+
+    Ends that it cannot follow are left out one by one: near a pole, only on its side. Also the rms
+    by which the mean departs from the fit, less what its own spread explains, where that is known
+    (nan where nothing is); and whether the spread explains it.
     """
     points = len(x)
-    mean, noise = curves.mean(axis=0)[None], _variance(curves)
-    near = max(MOST_NEAR, round(NEAR * points))
-    while True:
-        start, size = int(_starts(mean, near)[0]), _size(points, near)
-        powers = _powers(x[start : start + size])
-        y = mean[0, start : start + size]
-        free = size - powers.shape[1]
-        fit = powers @ np.linalg.lstsq(powers, y, rcond=None)[0]
-        square = float(np.square(y - fit).sum()) / free if free else math.nan
-        if near <= LEAST_NEAR or not square > MISFIT * noise:
+    mean, noise = curves.mean(axis=0), _variance(curves)
+    best, reach = int(mean.argmin()), max(MOST_NEAR, round(NEAR * points))
+    size = min(points, 2 * reach + 1)
+    window = _Window(min(max(0, best - reach), points - size), size)
+    square = _misfit(x, mean, window)
+    while square > MISFIT * noise and window.size > FEWEST:
+        shorter = window.shorter(best)
+        if not shorter:
             break
-        near -= 1
+        window = min(shorter, key=lambda w: _misfit(x, mean, w))
+        square = _misfit(x, mean, window)
     if math.isnan(square):
-        return near, math.nan if math.isnan(noise) else 0.0, False
+        return window, math.nan if math.isnan(noise) else 0.0, False
     rest = math.sqrt(max(0.0, square - (0.0 if math.isnan(noise) else noise)))
-    return near, rest, square <= MISFIT * noise
+    return window, rest, square <= MISFIT * noise
+
+
+def _misfit(x: NDArray, mean: NDArray, window: _Window) -> float:
+    """Mean square by which a curve departs from its cubic, by degree of freedom; nan without."""
+    powers, y = _powers(x[window.points]), mean[window.points]
+    free = window.size - powers.shape[1]
+    fit = powers @ np.linalg.lstsq(powers, y, rcond=None)[0]
+    return float(np.square(y - fit).sum()) / free if free else math.nan
 
 
 def _variance(curves: NDArray) -> float:
@@ -163,18 +196,6 @@ def _drawn(curves: NDArray, rest: float) -> NDArray:
     return np.asarray(out + rest * rng.standard_normal((DRAWS, points)))
 
 
-def _size(points: int, near: int) -> int:
-    """Points that are fitted."""
-    return min(points, 2 * near + 1)
-
-
-def _starts(curves: NDArray, near: int) -> NDArray:
-    """Of every curve, the first of the points around its best one that are fitted."""
-    points = curves.shape[1]
-    size = _size(points, near)
-    return np.clip(curves.argmin(axis=1) - size // 2, 0, points - size)
-
-
 def _powers(x: NDArray) -> NDArray:
     """(points, degree + 1) powers of the parameter, from -1 to 1 over these points.
 
@@ -185,7 +206,7 @@ def _powers(x: NDArray) -> NDArray:
     return np.vander((x - middle) / half, degree + 1, increasing=True)
 
 
-def _least(x: NDArray, curves: NDArray, near: int) -> tuple[NDArray, NDArray]:
+def _least(x: NDArray, curves: NDArray, window: _Window) -> tuple[NDArray, NDArray]:
     """Where every curve is least, and how much it is there.
 
     The minimum of the cubic, or an end of the range that is better; the best point itself where
@@ -194,21 +215,19 @@ def _least(x: NDArray, curves: NDArray, near: int) -> tuple[NDArray, NDArray]:
     best = curves.argmin(axis=1)
     rows = np.arange(len(curves))
     at, value = x[best], curves[rows, best]
-    starts, size = _starts(curves, near), _size(len(x), near)
-    if size < 3:
+    if window.size < 3:
         return at, value
-    for start in np.unique(starts):
-        these = rows[starts == start]
-        some = x[start : start + size]
+    windows = [window.around(int(i), len(x)) for i in best]
+    for own in dict.fromkeys(windows):
+        these = rows[[w == own for w in windows]]
+        some = x[own.points]
         powers = _powers(some)
         c = np.zeros((DEGREE + 1, these.size))
-        c[: powers.shape[1]] = np.linalg.lstsq(
-            powers, curves[these, start : start + size].T, rcond=None
-        )[0]
+        c[: powers.shape[1]] = np.linalg.lstsq(powers, curves[these, own.points].T, rcond=None)[0]
         t, found = _minimum(c)
         here = np.polynomial.polynomial.polyval(t, c, tensor=False)
         for end, side in ((0, -1.0), (len(x) - 1, 1.0)):
-            if start <= end < start + size:
+            if own.start <= end < own.start + own.size:
                 found &= here <= np.polynomial.polynomial.polyval(side, c)
                 # A curve whose fit is best at the end of the range is best there.
         place = (some[0] + some[-1]) / 2 + t * (some[-1] - some[0]) / 2
