@@ -157,9 +157,17 @@ case(
     says=[("8:12", "optics.f_number", "is empty", "write a number such as 2.8")],
 )
 case(
-    "what is not supported yet",
-    ("{time: 30 ms}", "{captures: {schedule: optimal, count: 8, max: 1 s}}"),
-    says=[("20:22", "exposure.captures", "schedule is not supported yet", "give numbers")],
+    "a schedule without captures",
+    ("{time: 30 ms}", "{captures: {schedule: optimal, count: 0, max: 1 s}}"),
+    says=[("20:49", "exposure.captures.count", "0 is out of range", "at least 1")],
+)
+case(
+    "a schedule of another kind",
+    ("{time: 30 ms}", "{captures: {schedule: best, count: 8, max: 1}}"),
+    says=[
+        ("20:33", "exposure.captures.schedule", "best", "optimal"),
+        ("20:54", "exposure.captures.max", "bare number", "30 ms"),
+    ],
 )
 
 # --- quantities and numbers
@@ -670,12 +678,12 @@ case(
 case(
     "mistakes of several kinds",
     ("1 m\n", "3 mm\n"),
-    ("time: 30 ms", "captures: {schedule: optimal, count: 2, max: 1 s}"),
+    ("time: 30 ms", "captures: {schedule: optimal, count: 2, max: -1 s}"),
     ("transmittance: 0.9", "transmittance: {file: short.csv}"),
     says=[
         ("6:13", "scene.distance", "lies within its focal length", "further away"),
         ("10:18", "optics.transmittance", "380-780 nm", "outside"),
-        ("20:22", "exposure.captures", "not supported yet", "give numbers"),
+        ("20:57", "exposure.captures.max", "is negative", "a positive time"),
     ],
 )
 case(

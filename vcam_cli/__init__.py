@@ -10,10 +10,11 @@ Names are imported when they are first used, so that `import vcam_cli` costs not
 from typing import TYPE_CHECKING, Any
 
 __version__ = "0.1.0"
-__all__ = ["__version__", "load", "simulate", "sweep"]
+__all__ = ["__version__", "load", "schedule", "simulate", "sweep"]
 
 if TYPE_CHECKING:
     from vcam_cli.camera.load import load
+    from vcam_cli.studies.schedule import schedule
     from vcam_cli.studies.simulate import simulate
     from vcam_cli.studies.sweep import sweep
 
@@ -23,6 +24,10 @@ def __getattr__(name: str) -> Any:
         from vcam_cli.camera.load import load
 
         return load
+    if name == "schedule":
+        from vcam_cli.studies.schedule import schedule
+
+        return schedule
     if name == "simulate":
         from vcam_cli.studies.simulate import simulate
 

@@ -151,12 +151,8 @@ class TestReadable:
         assert pixel["stack"]["default"] == "none"
         assert "default" not in pixel["width"]
 
-    def test_what_is_not_built_is_marked(self):
-        definitions = SCHEMAS["camera.schema.json"]["$defs"]
-        captures = definitions["Exposure"]["properties"]["captures"]["description"]
-        assert captures.endswith("Not supported yet: schedule.")
-        binning = definitions["Array"]["properties"]["binning"]["description"]
-        assert "Not supported" not in binning
+    def test_nothing_of_a_camera_is_marked_as_not_built(self):
+        assert "Not supported" not in json.dumps(SCHEMAS["camera.schema.json"])
 
     def test_no_marks_of_ours_are_left(self):
         text = json.dumps(SCHEMAS)

@@ -4,10 +4,18 @@ import pytest
 from camera_trees import camera, changed
 
 from vcam_cli.camera import support
+from vcam_cli.camera.base import Model, key
 from vcam_cli.camera.camera import Camera
 from vcam_cli.errors import BadInput
 
 SCHEDULE = {"schedule": "optimal", "count": 8, "max": "100 ms"}
+
+
+class Later(Model):
+    """A section of which not all is built."""
+
+    whole: int = key("a key that is not built", example=1, default=0, not_yet=True)
+    word: str = key("a word that is not built", example="old", default="old", not_yet=("new",))
 
 
 def refused(changes) -> list[str]:
@@ -20,15 +28,14 @@ def chart(name, **more):
     return {"scene.source": {"kind": "chart", "chart": name} | more}
 
 
-def test_refuses_captures_that_the_camera_schedules():
-    assert refused({"exposure": {"captures": SCHEDULE}}) == ["exposure.captures"]
-
-
-def test_says_what_to_write_instead():
-    changes = {"exposure": {"captures": SCHEDULE}}
-    (problem,) = support.unsupported(Camera.model_validate(changed(changes)))
-    assert problem.message == "schedule is not supported yet"
-    assert problem.remedy == "remove it, or give numbers"
+def test_refuses_what_is_marked():
+    """Nothing of a camera is, so a section of its own shows it."""
+    found = support.unsupported(Later.model_validate({"whole": 3, "word": "new"}))
+    assert [problem.path for problem in found] == [("whole",), ("word",)]
+    assert found[0].message == "is not supported yet" and found[0].remedy == "remove it"
+    assert found[1].message == "new is not supported yet"
+    assert found[1].remedy == "remove it, or give numbers"
+    assert support.unsupported(Later()) == []
 
 
 @pytest.mark.parametrize(
@@ -64,6 +71,7 @@ def test_says_what_to_write_instead():
         {"array.pattern": "monochrome", "processing": [{"color_correction": "none"}]},
         {"exposure": {"auto": {"method": "percentile"}}},
         {"exposure": {"captures": ["1 ms", "2 ms"]}},
+        {"exposure": {"captures": SCHEDULE}},
         {"exposure": {"captures": ["1 ms", "2 ms"], "estimator": "weighted"}},
         {"exposure": {"auto": {"method": "mean"}}, "adc": {"kind": "logarithmic"}},
         {"scene.source": {"kind": "image", "file": "a.png", "model": "laser"}},

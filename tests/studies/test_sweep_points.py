@@ -179,7 +179,7 @@ def test_every_mistake_of_a_study_at_once_with_its_place(tmp_path):
         ({"optimize": {"metric": "mse", "goal": "min"}}, "not among the metrics"),
         ({"repeat": {"pixel.width": ["4 um"]}}, "varied too"),
         ({"cases": {"a b": {}}}, "letters, digits"),
-        ({"kind": "schedule"}, "not supported yet"),
+        ({"kind": "schedule"}, "give it to vcam schedule"),
         ({"camera": "cammera.yaml"}, "camera.yaml"),
         ({"seeds": 0}, "at least 1"),
     ],

@@ -39,18 +39,23 @@ class AutoExposure(Model):
 
 
 class CaptureSchedule(Model):
-    """Capture times chosen by the camera."""
+    """Capture times chosen by the camera for its scene."""
 
     schedule: Literal["optimal"] = key("how they are chosen", example="optimal")
     count: Annotated[int, Whole(least=1, most=1000, example="8")] = key(
         "number of captures", example=8
     )
-    max: Time = key("the last capture's time", unit="ms", example="100 ms")
+    max: Time = key("the longest time a capture may have", unit="ms", example="100 ms")
 
 
 def _captures(given: Any) -> Any:
     if isinstance(given, (Mapping, CaptureSchedule)):
         return CaptureSchedule.model_validate(given)
+    return rising_times(given)
+
+
+def rising_times(given: Any) -> tuple[float, ...]:
+    """A list of rising times [s]; ValueError, or all mistakes at once, for anything else."""
     if not isinstance(given, (list, tuple)) or not given:
         raise ValueError(f"{shown(given)} is not a list of times; write for example [5 ms, 30 ms]")
     times: list[float] = []
@@ -70,6 +75,11 @@ def _captures(given: Any) -> Any:
     return tuple(times)
 
 
+def written_times(times: tuple[float, ...]) -> list[str]:
+    """The same as YAML has them."""
+    return [_TIME.text(time) for time in times]
+
+
 class Exposure(Model):
     """Exactly one of time, auto and captures."""
 
@@ -83,7 +93,7 @@ class Exposure(Model):
             _captures,
             list[Annotated[float, _TIME]] | CaptureSchedule,
             write=lambda value: (
-                [_TIME.text(t) for t in value]
+                written_times(value)
                 if isinstance(value, tuple)
                 else value and value.model_dump(mode="json")
             ),
@@ -93,7 +103,6 @@ class Exposure(Model):
         unit="ms",
         example=["5 ms", "15 ms", "30 ms", "200 ms"],
         default=None,
-        not_yet=("schedule",),
     )
     estimator: Literal["lsbs", "weighted"] = key(
         "how captures become one picture: the last sample before saturation, or the optimal "
@@ -114,12 +123,24 @@ class Exposure(Model):
 
     @property
     def samples(self) -> tuple[float, ...]:
-        """Times of the samples of one integration [s]; () where there is a single exposure."""
+        """Times that the file gives for samples of one integration [s]; () where it gives none."""
         return self.captures if isinstance(self.captures, tuple) else ()
 
     @property
-    def given(self) -> float | None:
-        """The exposure time, or the last sample's [s]; None where the camera chooses it."""
+    def schedule(self) -> CaptureSchedule | None:
+        """How the camera is to choose the times of its samples; None where it does not."""
+        return self.captures if isinstance(self.captures, CaptureSchedule) else None
+
+    @property
+    def count(self) -> int:
+        """Samples of one integration, at most; 0 where there is a single exposure."""
+        return self.schedule.count if self.schedule else len(self.samples)
+
+    @property
+    def longest(self) -> float | None:
+        """The longest time that the file allows an exposure or a sample [s]; None with `auto`."""
+        if self.schedule:
+            return self.schedule.max
         return self.samples[-1] if self.samples else self.time
 
     def single(self, time: float) -> "Exposure":

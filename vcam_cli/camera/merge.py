@@ -30,6 +30,7 @@ EXCLUSIVE: tuple[tuple[frozenset[Key], ...], ...] = tuple(
         "voltage_swing | thresholds",
         "blackbody | monochromatic | file | table | pixel",
         "block | positions",
+        "uniform | segments | histogram | levels | camera bins",
     )
 )
 

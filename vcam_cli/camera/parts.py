@@ -181,8 +181,7 @@ def refuse_study(root: Node) -> None:
     kind = root.get("kind")
     if kind is not None and kind.value in ("sweep", "schedule"):
         message, remedy = f"this is a study (kind: {kind.value})", "give a camera file"
-        if kind.value == "sweep":
-            remedy += ", or run the study with vcam sweep"
+        remedy += f", or run the study with vcam {kind.value}"
         raise BadInput([kind.problem(("kind",), message, remedy)])
 
 

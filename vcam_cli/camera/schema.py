@@ -17,7 +17,8 @@ from pydantic import AliasChoices, BaseModel
 from vcam_cli.camera import explain, support
 from vcam_cli.camera.base import Model
 from vcam_cli.camera.camera import Camera
-from vcam_cli.camera.study import Sweep
+from vcam_cli.camera.schedule_study import ScheduleStudy
+from vcam_cli.camera.study import KINDS, Sweep
 from vcam_cli.camera.technology import Technology
 from vcam_cli.camera.values import DEFINED
 
@@ -34,7 +35,7 @@ def schemas() -> dict[str, Schema]:
     """File name -> JSON Schema (draft 2020-12) of all files a user writes."""
     return {
         "camera.schema.json": camera_schema(),
-        "study.schema.json": _whole(_plain(Sweep), "Sweep", "a study file"),
+        "study.schema.json": study_schema(),
         "technology.schema.json": _whole(_plain(Technology), "Technology", "a technology file"),
     }
 
@@ -75,6 +76,23 @@ def camera_schema() -> Schema:
         "else": {"$ref": _ref("Camera")},
     }
     return _whole(whole, "Camera", "a camera file")
+
+
+def study_schema() -> Schema:
+    """The schema of a study file: of capture schedules where it says so, else a sweep."""
+    definitions: Schema = {}
+    for model in (Sweep, ScheduleStudy):
+        schema = _plain(model)
+        definitions |= schema.pop("$defs") | {model.__name__: schema}
+    whole: Schema = {
+        "$defs": definitions,
+        "type": "object",
+        "properties": {"kind": {"enum": list(KINDS)}},
+        "if": {"properties": {"kind": {"const": "schedule"}}, "required": ["kind"]},
+        "then": {"$ref": _ref(ScheduleStudy.__name__)},
+        "else": {"$ref": _ref(Sweep.__name__)},
+    }
+    return _whole(whole, "Study", "a study file")
 
 
 def _whole(schema: Schema, name: str, what: str) -> Schema:

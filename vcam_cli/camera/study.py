@@ -12,6 +12,10 @@ from pydantic_core import InitErrorDetails
 
 from vcam_cli.camera.base import Model, exactly_one, key, together
 from vcam_cli.camera.explain import failure, fault, one_of, shown
+from vcam_cli.camera.study_expect import Expectation
+from vcam_cli.camera.study_expect import mistakes as mistakes_of_expectations
+from vcam_cli.camera.study_figures import Figure
+from vcam_cli.camera.study_figures import mistakes as mistakes_of_figures
 from vcam_cli.camera.values import Either, Whole, Word, mapping
 
 METRICS = {
@@ -92,7 +96,7 @@ def _cameras(given: Any) -> tuple[str, ...]:
     return tuple(found)
 
 
-def _words(allowed: tuple[str, ...], least: int) -> Any:
+def words_of(allowed: tuple[str, ...], least: int) -> Any:
     """Reads a list of some of the words."""
 
     def pick(given: Any) -> tuple[str, ...]:
@@ -159,7 +163,7 @@ class Sweep(Model):
     seeds: Annotated[int, Whole(least=1, most=100_000, example="4")] = key(
         "number of frame seeds, from the camera's up, likewise averaged", example=4, default=1
     )
-    metrics: Annotated[tuple[str, ...], _words(tuple(METRICS), 1)] = key(
+    metrics: Annotated[tuple[str, ...], words_of(tuple(METRICS), 1)] = key(
         "what is measured", example=["snr_db"]
     )
     optimize: Annotated[Optimize | None, mapping(Optimize)] = key(
@@ -167,8 +171,19 @@ class Sweep(Model):
         example={"metric": "mean_s_cielab", "goal": "min"},
         default=None,
     )
-    keep: Annotated[tuple[str, ...], _words(KEPT, 0)] = key(
+    keep: Annotated[tuple[str, ...], words_of(KEPT, 0)] = key(
         "frames kept of every point: raw, render", example=[], default=()
+    )
+    figures: dict[Word, Figure] = key(
+        "name of a PNG and a CSV -> what they show",
+        example={"best": {"show": "lines", "metric": "snr_db"}},
+        default=dict,
+    )
+
+    expect: dict[Word, Expectation] = key(
+        "name -> a quantity, and between which values it is expected: expected.csv",
+        example={"best": {"quantity": "optimum", "between": ["6 um", "7 um"]}},
+        default=dict,
     )
 
     @model_validator(mode="after")
@@ -180,6 +195,9 @@ class Sweep(Model):
         if self.optimize is not None and self.optimize.metric not in self.metrics:
             message = f"{self.optimize.metric} is not among the metrics"
             mistakes.append(fault(("optimize", "metric"), message, "add it to metrics"))
+        sought = self.optimize is not None
+        mistakes += mistakes_of_figures(self.figures, self.metrics, sought)
+        mistakes += mistakes_of_expectations(self.expect, self.metrics, sought)
         if mistakes:
             raise failure(mistakes, "study")
         return self

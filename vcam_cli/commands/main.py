@@ -30,6 +30,7 @@ COMMANDS = {
     "plan": "plan:plan",
     "accuracy": "accuracy:accuracy",
     "sweep": "sweep:sweep",
+    "schedule": "schedule:schedule",
     "characterize": "characterize:characterize",
     "compare": "compare:compare",
     "validate": "validate:validate",

@@ -34,10 +34,11 @@ def plan(
     report = ready.plan.report()
     geometry = ready.layout.report(ready.spectrum.oversampling)
     if as_json:
-        print(to_json({**report, "geometry": geometry}), end="")
+        taken = {"captures": list(ready.times)} if ready.times else {}
+        print(to_json({**report, **taken, "geometry": geometry}), end="")
     else:
         print(table(report))
-        print(facts(report, geometry, ready.exposure_time, model.exposure.samples))
+        print(facts(report, geometry, ready.exposure_time, ready.times))
 
 
 def table(report: dict) -> str:

@@ -36,6 +36,7 @@ WORDS = {
     "irradiance": "spectral irradiance",
     "points": "checking all points",
     "sweep": "computing points",
+    "figures": "computing figures",
     "tables": "writing tables",
 }
 """What is said of a stage; of others, their name."""

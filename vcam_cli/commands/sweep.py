@@ -116,7 +116,9 @@ def sweep(
 
 
 def report(result: "SweepResult") -> str:
-    """What a person reads: the optima, how many points, where it all is."""
+    """What a person reads: the optima, how many points, what was expected, where it all is."""
+    from vcam_cli.studies import expectations
+
     lines = []
     for f in result.optima:
         case, parameter, unit, at, low, high, metric, value = f.row
@@ -133,5 +135,7 @@ def report(result: "SweepResult") -> str:
         lines.append(f"{result.failed} failed: see the column error of points.csv")
     if result.missing:
         lines.append(f"{result.missing} are left to other shares")
+    else:
+        lines += expectations.report(result.verdicts)
     lines.append(f"{result.grid.study.model.name}: {result.out}/")
     return "\n".join(lines)

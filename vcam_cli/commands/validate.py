@@ -70,29 +70,35 @@ def _checked_name(file: str, sets: list[str]) -> str:
     """The name of a camera or study without mistakes. Raises BadInput, CannotDo."""
     from vcam_cli.studies.checks import load
 
-    if not _is_study(file):
+    kind = _study_kind(file)
+    if kind is None:
         return load(file, sets).name
     from vcam_cli.errors import BadInput
-    from vcam_cli.studies import study_file, sweep_points
+    from vcam_cli.studies import schedule_file, study_file, sweep_points
 
+    if kind == "schedule":
+        return schedule_file.read(file, sets).model.name
     grid = sweep_points.grid(study_file.read(file), sets)
     if grid.refused:
         raise BadInput(grid.refused)
     return grid.study.model.name
 
 
-def _is_study(file: str) -> bool:
-    """Whether a file says that it is a study, or only a study of that name ships."""
+def _study_kind(file: str) -> str | None:
+    """The kind of study that a file says it is, or a shipped one of that name; None of a camera."""
     from vcam_cli.camera import shipped
     from vcam_cli.camera.parts import is_file
     from vcam_cli.camera.study import KINDS
     from vcam_cli.camera.yaml_tree import read_file
     from vcam_cli.errors import VcamError
 
-    if not is_file(Path(file)):
-        return file in shipped.names("studies") and file not in shipped.names("cameras")
+    path = Path(file)
+    if not is_file(path):
+        if file not in shipped.names("studies") or file in shipped.names("cameras"):
+            return None
+        path = shipped.find("studies", file)
     try:
-        kind = read_file(Path(file)).get("kind")
+        kind = read_file(path).get("kind")
     except VcamError:  # said when it is read as a camera
-        return False
-    return kind is not None and kind.value in KINDS
+        return None
+    return str(kind.value) if kind is not None and kind.value in KINDS else None

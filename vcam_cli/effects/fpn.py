@@ -138,6 +138,6 @@ class FixedPattern(Draw):
         top = 1 / self.dark
         below = math.erfc(top / math.sqrt(2)) / 2
         density = math.exp(-(top**2) / 2) / math.sqrt(2 * math.pi)
-        mean = (1 - below) + self.dark * density
-        square = (1 + self.dark**2) * (1 - below) + self.dark * density
-        return (square - mean**2) * dark**2
+        # Mean square less squared mean with the ones taken out: a small spread would drown in them.
+        spread = self.dark**2 * (1 - below - density**2)
+        return (below * (1 - below) + spread - self.dark * density * (1 - 2 * below)) * dark**2

@@ -174,7 +174,7 @@ def _neighbors_are_alike(block: Block, binning: Binning) -> bool:
 
 
 def _require_single(camera: Camera, binning: Binning) -> None:
-    if camera.exposure.samples and binning.kind != "charge":
+    if camera.exposure.captures and binning.kind != "charge":
         raise bad(
             "exposure.captures",
             f"several samples of one integration cannot be joined as {binning.kind}",

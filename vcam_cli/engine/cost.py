@@ -93,7 +93,7 @@ def after(camera: Camera, geometry: Geometry, mosaic: Mosaic) -> float:
 
 def samples(camera: Camera, geometry: Geometry, effects: Sequence[Effect]) -> float:
     """Core seconds that several samples of one integration take more than a single exposure."""
-    count = len(camera.exposure.samples)
+    count = camera.exposure.count
     if not count:
         return 0.0
     again = sum(e.seconds_per_pixel for e in effects if isinstance(e, Draw | Limit | Code))

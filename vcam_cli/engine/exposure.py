@@ -12,7 +12,7 @@ from vcam_cli.camera.exposure import AutoExposure
 def exposure_time(
     camera: Camera, rate: NDArray, white_rate: float, dark_rate: float, saturation: float
 ) -> float:
-    """Exposure time [s]; of several samples of one integration the last one's.
+    """Exposure time [s]; of several samples of one integration the last that the file gives.
 
     rate: photo-electrons per second of every pixel; white_rate: of the scene's perfect white on
     the axis in its brightest color; dark_rate: of the dark [e/s]; saturation: electrons at which
@@ -21,8 +21,8 @@ def exposure_time(
     """
     auto = camera.exposure.auto
     if auto is None:
-        assert camera.exposure.given is not None
-        return camera.exposure.given
+        assert camera.exposure.longest is not None
+        return camera.exposure.longest
     return _reach(auto, _level(auto, rate, white_rate) + dark_rate, saturation)
 
 
@@ -43,8 +43,8 @@ def ceiling(camera: Camera, white_rate: float, saturation: float) -> float:
     """
     auto = camera.exposure.auto
     if auto is None:
-        assert camera.exposure.given is not None
-        return saturation / camera.exposure.given
+        assert camera.exposure.longest is not None
+        return saturation / camera.exposure.longest
     return max(white_rate / auto.target, saturation / auto.max)
 
 

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property, partial
 
@@ -12,11 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcam_cli.camera.camera import Camera
-from vcam_cli.effects.base import Charge, Code, Draw, Gain
+from vcam_cli.effects.base import Code, Draw, Gain
 from vcam_cli.effects.quantization import Quantization
-from vcam_cli.engine import binning, capture, captures, optics, plan
+from vcam_cli.engine import binning, capture, captures, optics
 from vcam_cli.engine.lights import Lights
 from vcam_cli.engine.parallel import available_workers
+from vcam_cli.engine.pixel_figures import pixel_figures
 from vcam_cli.engine.prepare import Prepared, prepare
 from vcam_cli.engine.stages import Stages
 from vcam_cli.physics import readout
@@ -35,8 +37,6 @@ class Frame(Prepared):
     """(rows, columns) noisy signal, clipped at the full well [electrons]"""
     dn: NDArray
     """(rows, columns) [DN]"""
-    times: tuple[float, ...] = ()
-    """(N,) of the samples [s]; none of a single exposure."""
     samples_electrons: NDArray | None = None
     """(N, rows, columns) as `electrons`; None of a single exposure."""
     samples_dn: NDArray | None = None
@@ -169,20 +169,25 @@ def expose(
     stages: Stages,
     lights: Lights | None = None,
 ) -> Frame:
-    """Simulates one frame of `camera`.
+    """Simulates one frame of `camera`, from its scene on.
 
     picture: samples of the scene's image file, (h, w, channels), linear light; None for charts.
     lights: what keeps the light for further cameras, where there are any.
     Raises BadInput where the camera contradicts itself, CannotDo where memory does not suffice.
     """
     workers = workers or available_workers()
-    ready = prepare(camera, picture, workers, stages, lights)
+    return taken(prepare(camera, picture, workers, stages, lights), workers, stages)
+
+
+def taken(ready: Prepared, workers: int, stages: Stages | None = None) -> Frame:
+    """One frame of a camera that is ready for it."""
+    stages, camera = stages or Stages(), ready.camera
     with stages("capture"):
         active = tuple(x for x in ready.plan.active if not isinstance(x, Code))
         code = Quantization.of(camera, ready.geometry)
         seeds = {"sensor": camera.seed.sensor, "frame": camera.seed.frame}
         known = {field.name: getattr(ready, field.name) for field in fields(ready)}
-        times = camera.exposure.samples
+        times = ready.times
         if not times:
             take = partial(capture.capture, code=code, seeds=seeds, workers=workers)
             joins, time = ready.layout.joining, ready.exposure_time
@@ -201,44 +206,32 @@ def expose(
             last.saturated_dn,
             workers,
         )
-    return replace(
-        last, times=times, samples_electrons=electrons, samples_dn=dn, photocurrent=light
-    )
+    return replace(last, samples_electrons=electrons, samples_dn=dn, photocurrent=light)
 
 
 def figures(frame: Frame) -> list[tuple[str, float, str]]:
     """The metrics every run has: (metric, value, unit). Eqs 3.1 and 3.2 for DR and SNR.
 
-    These two are of the camera that the file describes, whatever the plan left out of the frame.
-    Of pixels that are read as one they are of one such pixel in even light, SNR where each well is
-    a fifth full, and well capacity is in the unit of `electrons`: one node's well where charges
-    are joined, the mean of the wells of voltages, the sum of those whose codes are added.
-    Of several samples of one integration, all but the last two are of the last sample.
+    These two, and the well capacity, are told in `pixel_figures`. Of several samples of one
+    integration, all but the last two are of the last sample.
     """
-    e = frame.electrical
-    wanted = plan.wanted(frame.camera, frame.geometry)
-    draws = [x for x in wanted if isinstance(x, Draw) and x.scope == "frame"]
-    joins = frame.layout.joining
-    # In electrons of all wells together, in which shot noise is Poisson's.
-    wells = joins.count // joins.charges
-    floor = sum(binning.variance(x, 0.0, 0.0, joins.binning) for x in draws) * wells**2
-    dark = sum(x.rate() for x in wanted if isinstance(x, Charge)) * frame.exposure_time
-    well, all_dark = e.full_well * wells, dark * wells
+    e, joins = frame.electrical, frame.layout.joining
+    known = pixel_figures(frame.camera, frame.geometry, e, joins, frame.exposure_time)
     saturated = frame.dn >= frame.saturated_dn
-    if wells == 1:
+    if joins.count == joins.charges:
         saturated = (frame.electrons >= e.full_well) | (frame.dn >= e.highest_code)
     listed = [
         ("exposure_time", frame.exposure_time, "s"),
         ("mean_electrons", float(frame.electrons.mean(dtype=np.float64)), "e"),
         ("saturated_fraction", float(saturated.mean()), ""),
-        ("snr_db", float(readout.snr_db(0.2 * well, all_dark, floor)), "dB"),
-        ("dynamic_range_db", float(readout.dynamic_range_db(well, all_dark, floor)), "dB"),
-        ("well_capacity", e.full_well * joins.summed, "e"),
+        ("snr_db", known.snr_db, "dB"),
+        ("dynamic_range_db", known.dynamic_range_db, "dB"),
+        ("well_capacity", known.well_capacity, "e"),
     ]
-    return listed + _of_samples(frame, dark, draws) if frame.times else listed
+    return listed + _of_samples(frame, known.dark, known.draws) if frame.times else listed
 
 
-def _of_samples(frame: Frame, dark: float, draws: list[Draw]) -> list[tuple[str, float, str]]:
+def _of_samples(frame: Frame, dark: float, draws: Sequence[Draw]) -> list[tuple[str, float, str]]:
     """What several samples add: the dynamic range of the photocurrent, and where it is not known.
 
     Eq 3.1 for the photocurrent: the largest that does not fill the first sample, over the noise

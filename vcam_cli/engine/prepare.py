@@ -16,7 +16,8 @@ from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.electrical import Electrical, electrical
 from vcam_cli.camera.geometry import Geometry, geometry
 from vcam_cli.effects.base import Charge, Effect, Outlook, Transport
-from vcam_cli.engine import bandwidth, cost, exposure, memory, optics, pixelwise, plan
+from vcam_cli.effects.quantization import Quantization
+from vcam_cli.engine import bandwidth, cost, exposure, memory, optics, pixelwise, plan, scheduled
 from vcam_cli.engine.layout import Layout, layout
 from vcam_cli.engine.lights import Lights
 from vcam_cli.engine.mosaic import Mosaic
@@ -54,6 +55,8 @@ class Prepared:
     """How far the scene's spectrum was followed."""
     exposure_time: float
     """[s]"""
+    times: tuple[float, ...]
+    """(N,) of the samples of one integration, rising [s]; () of a single exposure."""
     plan: plan.Plan
 
     @property
@@ -69,7 +72,8 @@ def prepare(
     stages: Stages,
     lights: Lights | None = None,
 ) -> Prepared:
-    """Brings the light of the scene to the pixels, times the exposure, decides what will run.
+    """Brings the light of the scene to the pixels, times the exposure or its samples, decides what
+    will run.
 
     picture: samples of the scene's image file, (h, w, channels), linear light; None for charts.
     lights: what keeps the light for further cameras, where there are any.
@@ -80,7 +84,7 @@ def prepare(
     place = layout(camera, g)
     colors, lattice, knobs = place.mosaic, place.lattice, place.settings(knobs)
     joins = place.joining
-    count = len(camera.exposure.samples) * (len(colors.colors) if place.full_color else 1)
+    count = camera.exposure.count * (len(colors.colors) if place.full_color else 1)
     needed = memory.of_frame(lattice, knobs, len(colors.colors), bool(camera.quality), count)
     memory.require(needed, g)
     stages.watch.expect(cost.at_first_sight(camera, g, colors, knobs, workers))
@@ -108,16 +112,19 @@ def prepare(
         taken = place.taken(found.values)
     with stages("exposure"):
         white = float(white_rate.max())
-        dark = sum(x.rate() for x in plan.wanted(camera, g) if isinstance(x, Charge))
+        present = plan.wanted(camera, g)
+        dark = sum(x.rate() for x in present if isinstance(x, Charge))
         rate = joins.collected(_arriving(taken, dark / joins.charges, effects))
         taken = joins.collected(taken)
-        time = exposure.exposure_time(camera, rate, white, dark, e.saturation)
+        times = scheduled.times_of(camera, rate, e, present, Quantization.of(camera, g))
+        time = (
+            times[-1] if times else exposure.exposure_time(camera, rate, white, dark, e.saturation)
+        )
         peak = (float(rate.max()) + dark) * time
         _refuse_too_much(max(peak, white * time))
         needed = max(needed, memory.of_followed(found.spectrum, lattice, knobs))
         full = max(1.0, min(e.full_well, peak))
         outlook = Outlook(full, time, dark * time, camera.array.binning)
-        present = plan.wanted(camera, g)
         here = _on_pixels(place, joins.collected(found.values), present, effects, time)
         well = e.full_well / time - dark
         moved = np.minimum(rate, well) - np.minimum(taken, well)
@@ -141,6 +148,7 @@ def prepare(
         rate=rate,
         spectrum=found.spectrum,
         exposure_time=time,
+        times=times,
         plan=decided,
     )
 

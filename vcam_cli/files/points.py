@@ -8,6 +8,7 @@ points are computed twice, and nothing else happens.
 """
 
 import fcntl
+import hashlib
 import json
 import os
 import re
@@ -26,8 +27,11 @@ from vcam_cli.files.report import hash_text, to_json
 POINTS = "points"
 RECORD = "study.json"
 _CLAIMS = ".claims"
-_OURS = re.compile(r"[0-9a-f]{32}\.(json|raw\.exr|render\.png)|\.claims|\..*\.part")
+_OURS = re.compile(
+    r"[0-9a-f]{32}\.(json|raw\.exr|render\.png|maps\.npz|figure\.png)|\.claims|\..*\.part"
+)
 """Names in the folder of points."""
+_PLOT = "figure.png"
 _LARGEST = 1 << 20  # bytes of a point's file
 
 
@@ -120,6 +124,28 @@ class SweepFolder:
         plain = json.loads(to_json(content))
         whole = {"program": PROGRAM, "id": point, "point": plain, "check": _check(point, plain)}
         atomic.write_text(self.path / POINTS / f"{point}.json", to_json(whole))
+
+    def frame(self, point: str, name: str) -> bytes:
+        """A frame that was kept beside a finished point. Raises CannotDo."""
+        path = self.path / POINTS / f"{point}.{name}"
+        try:
+            return path.read_bytes()
+        except OSError as error:
+            message = f"cannot read {path}: {error.strerror}"
+            raise CannotDo(message, "check its permissions, or choose another folder") from error
+
+    def plot(self, key: str, draw: Callable[[Path], None], path: Path) -> None:
+        """Writes a PNG that `draw` draws, or that was kept under a key: drawing takes its time.
+
+        Raises CannotDo.
+        """
+        content = self.read(key, (_PLOT,))
+        data = b"" if content is None else self.frame(key, _PLOT)
+        if content is None or content.get("digest") != hashlib.sha256(data).hexdigest():
+            data = as_bytes(_PLOT, draw)
+            self.write(key, {"digest": hashlib.sha256(data).hexdigest()}, {_PLOT: data})
+        with atomic.write_whole(path) as temporary:
+            temporary.write_bytes(data)
 
     def claim(self, point: str) -> bool:
         """Whether this process may compute the point; False while another one does."""

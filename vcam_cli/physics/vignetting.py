@@ -52,7 +52,8 @@ def refracted_cosine(cosine: ArrayLike, index: ArrayLike, below: ArrayLike) -> F
     """
     c = np.asarray(cosine, np.float64)
     ratio = np.asarray(index, np.float64) / np.asarray(below, np.float64)
-    square = 1 - ratio**2 * ((1 - c) * (1 + c))
+    # 1 - ratio^2 sin^2 as a sum, which at grazing incidence does not cancel
+    square = (1 - ratio) * (1 + ratio) + (ratio * c) ** 2
     if not (square >= 0).all():
         raise ValueError("the light is totally reflected")
     return np.sqrt(square)[()]

@@ -46,8 +46,7 @@ def pair(first: ArrayLike, second: ArrayLike) -> tuple[float, float]:
     if a.shape != b.shape or a.size == 0:
         raise ValueError(f"two frames of one shape are needed, not {a.shape} and {b.shape}")
     apart = a - b
-    variance = float(np.mean(apart**2) - apart.mean() ** 2) / 2
-    return float(a.mean() + b.mean()) / 2, max(variance, 0.0)
+    return float(a.mean() + b.mean()) / 2, float(np.var(apart)) / 2
 
 
 @dataclass(frozen=True)

@@ -9,14 +9,15 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vcam_cli.effects.base import SeparableTransfer
+from vcam_cli.effects.base import Effect, SeparableTransfer
 from vcam_cli.engine import plan
 from vcam_cli.engine.prepare import Prepared
+from vcam_cli.engine.transfer import Transfer
 
 NODES = 33
 """Of the integral over the pixels' differences."""
@@ -63,18 +64,31 @@ def system_mtf(
 
     frequency: (n,) along `direction`, a unit vector (x, y) [cycles/m].
     """
-    fx, fy = frequency * direction[0], frequency * direction[1]
     effects = plan.optical(ready.camera, ready.geometry)
+    return along(ready.transfer, effects, color, frequency, direction)
+
+
+def along(
+    transfer: Transfer,
+    effects: Sequence[Effect],
+    color: int,
+    frequency: NDArray,
+    direction: tuple[float, float],
+) -> NDArray:
+    """|H(f)| / H(0) of a transfer's first component with the apertures among the effects.
+
+    frequency: (n,) along `direction`, a unit vector (x, y) [cycles/m].
+    """
+    fx, fy = frequency * direction[0], frequency * direction[1]
     out = np.ones(len(frequency), np.complex128)
     for effect in effects:
         if isinstance(effect, SeparableTransfer):
             out *= effect.along_x(fx) * effect.along_y(fy)
-    return np.abs(out * _blur(ready, color, fx, fy)) / float(ready.transfer.level[0, color])
+    return np.abs(out * _blur(transfer, color, fx, fy)) / float(transfer.level[0, color])
 
 
-def _blur(ready: Prepared, color: int, fx: NDArray, fy: NDArray) -> NDArray:
+def _blur(transfer: Transfer, color: int, fx: NDArray, fy: NDArray) -> NDArray:
     """H of the lens and the silicon at pairs of fx and fy: (n,) [e/s]."""
-    transfer = ready.transfer
     if not transfer.plane:
         return transfer.at(np.hypot(fx, fy))[0, color]
     # All pairs of a few are quicker than pair by pair.

@@ -163,7 +163,8 @@ class Result:
         """S-CIELAB Delta E of the render from the ideal image on the camera's `display`."""
         image, ideal, screen = self.linear, self.ideal, self._screen
         with self.stages("quality"):
-            return s_cielab_map(image, ideal, screen, workers=self.processed.workers)
+            filters = self.frame.camera.display.filters
+            return s_cielab_map(image, ideal, screen, filters, workers=self.processed.workers)
 
     @property
     def _screen(self) -> display.Screen:
@@ -247,11 +248,12 @@ def _picture(camera: Camera, stages: Stages) -> tuple[Any, tuple[str, ...]]:
 
 
 def _remarks(ready: Prepared) -> tuple[str, ...]:
-    """What a user should know of the silicon, and of a scene of spectra: white and components."""
+    """What a user should know of the silicon, of times that the camera chose, and of a scene of
+    spectra: white and components."""
     scene, band = ready.scene, ready.camera.scene.wavelengths
-    silicon = photodiode.remarks(ready.camera)
+    before = photodiode.remarks(ready.camera) + _chosen(ready)
     if not isinstance(scene, CubeScene):
-        return silicon
+        return before
     level = luminance(scene.white, band.start, band.stop)
     notes = [f"white is taken to be {level:.4g} cd/m2"]
     if 0 < ready.spectrum.planes < len(scene.spectra):
@@ -260,7 +262,18 @@ def _remarks(ready: Prepared) -> tuple[str, ...]:
             f" no transfer function is off by more than {ready.settings.mixing_tolerance:g}"
             " of the largest"
         )
-    return silicon + tuple(notes)
+    return before + tuple(notes)
+
+
+def _chosen(ready: Prepared) -> tuple[str, ...]:
+    """The times of samples that the camera scheduled itself."""
+    asked = ready.camera.exposure.schedule
+    if asked is None:
+        return ()
+    listed = ", ".join(f"{1000 * time:.4g}" for time in ready.times)
+    fewer = asked.count - len(ready.times)
+    more = f"; {fewer} more of the {asked.count} would gain nothing" if fewer else ""
+    return (f"best times for this scene: {listed} ms{more}",)
 
 
 def _simulate(camera: Camera, workers: int, stages: Stages, shared: Shared) -> Result:

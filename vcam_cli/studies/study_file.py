@@ -24,6 +24,11 @@ from vcam_cli.camera.yaml_tree import Node, read_file
 from vcam_cli.errors import BadInput, Problem
 
 Cell = float | str
+OTHERS = {
+    "sweep": ("schedule", "this is a study of capture schedules"),
+    "schedule": ("sweep", "this is a study of a camera whose parameters change"),
+}
+"""Kind of study -> the other kind, and what such a one is."""
 
 
 @dataclass(frozen=True)
@@ -87,6 +92,18 @@ class StudyFile:
             for path, values in self.model.repeat.items()
         }
 
+    def values(self, path: str, unit: str, *at: str) -> Parameter:
+        """Values of a parameter, one or a list of them, that stand at a key of the study.
+
+        unit: of the cells, where the values are of its kind.
+        """
+        node = self.node(*at)
+        nodes = node if isinstance(node.value, list) else replace(node, value=[node])
+        plain = nodes.plain()
+        assert isinstance(plain, list)
+        found = _listed(path, nodes, tuple(plain))
+        return _in_unit(found, unit) if found.unit != unit else found
+
     def _parameters(self, vary: Mapping, *at: str) -> dict[str, Parameter]:
         out = {}
         for path, variation in vary.items():
@@ -113,7 +130,7 @@ def read(study: str | Path, folder: Path | None = None) -> StudyFile:
         raise BadInput(
             [tree.problem((), "a mapping is needed here", "write lines of `key: value`")]
         )
-    _refuse_others(tree)
+    refuse_others(tree, "sweep")
     value = tree.plain()
     assert isinstance(value, dict)
     if "name" not in value:
@@ -131,14 +148,15 @@ def read(study: str | Path, folder: Path | None = None) -> StudyFile:
     return found
 
 
-def _refuse_others(tree: Node) -> None:
+def refuse_others(tree: Node, wanted: str) -> None:
+    """Raises BadInput for a camera file, and for a study of another kind than is wanted."""
     kind = tree.get("kind")
     if kind is None and (tree.get("optics") or tree.get("scene") or tree.get("extends")):
         message, remedy = "this is a camera file, not a study", "give it to vcam run"
         raise BadInput([tree.problem((), message, remedy)])
-    if kind is not None and kind.value == "schedule":
-        message = "this is a study of capture schedules, which are not supported yet"
-        raise BadInput([kind.problem(("kind",), message, "give a study with kind: sweep")])
+    other, message = OTHERS[wanted]
+    if kind is not None and kind.value == other:
+        raise BadInput([kind.problem(("kind",), message, f"give it to vcam {other}")])
 
 
 def _without_key_mark(problem: Problem) -> Problem:

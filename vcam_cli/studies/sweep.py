@@ -10,7 +10,8 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,16 @@ from vcam_cli.engine.stages import Observer, Silent
 from vcam_cli.errors import bad
 from vcam_cli.files.points import POINTS, SweepFolder
 from vcam_cli.files.report import hash_file
-from vcam_cli.studies import outputs, run_on, study_file, sweep_points, sweep_tables
+from vcam_cli.studies import (
+    expectations,
+    figures,
+    figures_made,
+    outputs,
+    run_on,
+    study_file,
+    sweep_points,
+    sweep_tables,
+)
 from vcam_cli.studies.point_work import FRAMES, Job, Outcome, kept
 from vcam_cli.studies.run_on import Groups, Verdict
 from vcam_cli.studies.sweep_points import LIBRARIES, Grid
@@ -48,9 +58,13 @@ class SweepResult:
     outcomes: dict[str, Outcome]
     """Of the points of which something is known, by hash."""
     optima: tuple[sweep_tables.Found, ...]
+    verdicts: tuple[expectations.Verdict, ...]
+    """Of what the study expected."""
     computed: int
     """Points computed now; the others were there."""
     seconds: float
+    unmade: dict[str, str] = field(default_factory=dict)
+    """Figures that could not be made, and why."""
 
     @property
     def points(self) -> list[dict[str, Any]]:
@@ -71,12 +85,12 @@ class SweepResult:
 
     @property
     def exit_code(self) -> int:
-        """0; 4 where some points failed, 2 where every one was refused as bad input."""
+        """0; 4 where some points or figures failed, 2 where every point was refused."""
         wrong = [
             not p.id or (p.id in self.outcomes and self._is_bad_input(self.outcomes[p.id]))
             for p in self.grid.points
         ]
-        return 2 if all(wrong) else 4 if self.failed else 0
+        return 2 if all(wrong) else 4 if self.failed or self.unmade else 0
 
     @staticmethod
     def _is_bad_input(outcome: Outcome) -> bool:
@@ -92,7 +106,9 @@ class SweepResult:
             "failed": self.failed,
             "missing": self.missing,
             "optimum": [_plain(f) for f in self.optima],
+            "missed": [v.expected.name for v in self.verdicts if v.word == "missed"],
             "seconds": self.seconds,
+            "unmade": self.unmade,
         }
 
 
@@ -120,6 +136,8 @@ def sweep(
     watch, tell = watch or Silent(), tell or (lambda _: None)
     watch.begin("points")
     grid = sweep_points.grid(study_file.read(study), sets)
+    planner = figures.Planner(grid, sets)
+    planned, expected = figures.plan(grid, planner), expectations.plan(grid, planner)
     for problem in grid.refused:
         tell(str(problem))
     place = Path(out) if out is not None else Path("out") / grid.study.model.name
@@ -132,12 +150,18 @@ def sweep(
             tell(f"computed again, since corrupted: {POINTS}/{names}" + _more(folder.corrupted, 3))
         groups = run.left(_shared_out(run.groups(), share))
         computed = _compute(run, groups, workers, scheduler, watch, tell)
-        watch.begin("tables")
         found = tuple(sweep_tables.optima(grid, run.outcomes))
-        result = SweepResult(
-            grid, place, run.outcomes, found, computed, time.perf_counter() - start
-        )
+        verdicts = tuple(each.verdict(run.outcomes, found) for each in expected)
+        seconds = time.perf_counter() - start
+        result = SweepResult(grid, place, run.outcomes, found, verdicts, computed, seconds)
         files = sweep_tables.writers(grid, run.outcomes, found)
+        if verdicts:
+            files["expected.csv"] = partial(expectations.write, verdicts)
+        if not result.missing:
+            made = figures_made.make(planned, grid, run.outcomes, found, folder, fresh, watch, tell)
+            files |= made.writers
+            result = replace(result, unmade=made.unmade)
+        watch.begin("tables")
         folder.finish(files, _record(result), grid.inputs)
     return replace(result, seconds=time.perf_counter() - start)
 
@@ -280,6 +304,7 @@ def _record(result: SweepResult) -> dict[str, Any]:
         "points": [point.id for point in result.grid.points],
         "failed": result.failed,
         "missing": result.missing,
+        "unmade": result.unmade,
         "optimum": [_plain(f) for f in result.optima],
         "hashes": {str(path): hash_file(path) for path in result.grid.inputs},
         "versions": outputs.versions(),

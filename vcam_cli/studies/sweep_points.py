@@ -93,7 +93,7 @@ def grid(study: StudyFile, sets: Sequence[str] = (), folder: Path | None = None)
     """
     over = cameras.overlay(sets, folder or cameras.current_folder())
     repeated = study.repeated()
-    cases = {name: (base, case, study.varied(case)) for name, base, case in _cases(study, over)}
+    cases = {name: (base, case, study.varied(case)) for name, base, case in cases_of(study, over)}
     _refuse_taken(sets, {*repeated, *(p for _, _, varied in cases.values() for p in varied)})
     _refuse_too_many(study.model, repeated, [varied for _, _, varied in cases.values()])
     points: list[Point] = []
@@ -137,7 +137,7 @@ def _refuse_taken(sets: Sequence[str], grid_paths: Iterable[str]) -> None:
         raise BadInput(problems)
 
 
-def _cases(study: StudyFile, over: Node) -> Iterator[tuple[str, Base, str | None]]:
+def cases_of(study: StudyFile, over: Node) -> Iterator[tuple[str, Base, str | None]]:
     """Name, camera file with its overrides, and the study's name of every case."""
     model = study.model
     asked = sorted({QUALITY[m] for m in model.metrics if m in QUALITY})
@@ -238,11 +238,17 @@ def _content(camera: Camera, model: Sweep) -> str:
     for name in ("name", "quality") if model.keep else ("name", "quality", "output"):
         form.pop(name, None)
     form["seed"] = form["seed"]["sensor"]
-    whole = {
+    return hash_of(camera, form, {"metrics": sorted(model.metrics), "keep": sorted(model.keep)})
+
+
+def hash_of(camera: Camera, form: dict[str, Any], asked: dict[str, Any]) -> str:
+    """The hash of what is computed of a camera: wherever its files lie, whoever computes it.
+
+    form: what counts of its YAML form; asked: what is computed, by keys of its own.
+    """
+    whole = asked | {
         "camera": _with_contents(form),
         "files": sorted(_digest(path) for path in outputs.data_files(camera)),
-        "metrics": sorted(model.metrics),
-        "keep": sorted(model.keep),
         "versions": {name: _versions()[name] for name in LIBRARIES},
     }
     return hash_text(json.dumps(whole, sort_keys=True))

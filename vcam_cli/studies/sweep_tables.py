@@ -185,7 +185,7 @@ def _plot(grid: Grid, outcomes: Outcomes, found: Sequence[Found], metric: str, p
         line
         for case in grid.cases
         if drawn.path in grid.cases[case]
-        for line in _lines(grid, outcomes, case, metric, drawn.path, found)
+        for line in lines_of(grid, outcomes, case, metric, drawn.path, found)
     ]
     unit = METRICS[metric]
     label = LABELS.get(metric, metric.replace("_", " ")) + (f" [{unit}]" if unit else "")
@@ -193,9 +193,10 @@ def _plot(grid: Grid, outcomes: Outcomes, found: Sequence[Found], metric: str, p
     over_parameter(path, grid.study.model.name, drawn.column, label, lines[:MANY], text)
 
 
-def _lines(
+def lines_of(
     grid: Grid, outcomes: Outcomes, case: str, metric: str, path: str, found: Sequence[Found]
 ) -> Iterator[Line]:
+    """What was found of a metric in a case over a parameter: a line for each of the others."""
     here = surface(grid, case, metric, outcomes)
     axis = next(i for i, p in enumerate(here.parameters) if p.path == path)
     others = [p for i, p in enumerate(here.parameters) if i != axis]

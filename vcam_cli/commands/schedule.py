@@ -1,0 +1,158 @@
+"""`vcam schedule`: when to read a pixel that is read several times."""
+
+import math
+import sys
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from vcam_cli.commands import options
+from vcam_cli.commands.progress import Progress
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from vcam_cli.scheduling.targets import Fewest
+    from vcam_cli.studies.schedule import ScheduleResult
+
+MOST_TIMES = 10
+"""Captures whose times are shown."""
+
+Study = Annotated[
+    str,
+    typer.Argument(
+        metavar="STUDY",
+        help="A study file, or the name of a shipped study (see `vcam list studies`).",
+        autocompletion=options.complete_study,
+        show_default=False,
+    ),
+]
+Set = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--set",
+        metavar="PATH=VALUE",
+        help='Override a key of the study, as in --set sensor.read_noise="5 e". Repeatable.',
+    ),
+]
+Seed = Annotated[
+    int | None,
+    typer.Option("--seed", metavar="N", min=0, help="Of random starts and of simulated noise."),
+]
+
+
+def schedule(
+    study: Study,
+    out: options.Out = None,
+    set_: Set = None,
+    seed: Seed = None,
+    accuracy: options.Accuracy = None,
+    as_json: options.Json = False,
+    quiet: options.Quiet = False,
+    workers: options.Workers = None,
+) -> None:
+    """Finds when to read a pixel several times, and what that gains over reading it once.
+
+    Writes schedule.csv (the capture times), summary.csv (what they are worth, and how far from the
+    best they may be at most), plots and study.json.
+
+    \b
+    Example:
+      vcam schedule captures
+      vcam schedule study.yaml --set "counts=[4, 8]" -o out/study
+    """
+    from vcam_cli.files.report import to_json
+    from vcam_cli.studies.schedule import schedule as run
+
+    def tell(message: str) -> None:
+        options.say(message, quiet)
+
+    with Progress(quiet) as progress:
+        result = run(study, out, list(set_ or ()), seed or 0, accuracy, workers, progress, tell)
+    if as_json:
+        print(to_json(result.summary()), end="")
+    elif not quiet:
+        show(result)
+
+
+def show(result: "ScheduleResult") -> None:
+    """The tables and where the files are, on stdout."""
+    from rich import box
+    from rich.console import Console
+    from rich.table import Table
+
+    width = None if sys.stdout.isatty() else 120
+    console = Console(width=width, soft_wrap=True, highlight=False)
+    style = box.SIMPLE_HEAD if console.is_terminal else None
+    table = Table(box=style, pad_edge=False)
+    for i, name in enumerate(SUMMARY):
+        table.add_column(name, justify="left" if i == 0 else "right", no_wrap=True)
+    for row in summary(result):
+        table.add_row(*row)
+    console.print(table)
+    for line in times(result):
+        console.print(line)
+    for target in result.targets:
+        console.print(said(target, result.task.best / result.task.single))
+    console.print(f"{result.study.model.name}: {result.out}/")
+
+
+SUMMARY = ("method", "captures", "gain", "upper bound", "gap", "vs optimal", "used", "seconds")
+
+
+def summary(result: "ScheduleResult") -> list[tuple[str, ...]]:
+    """Rows of the first table."""
+    best = {row["count"]: row["gain"] for row in result.summary_rows if row["method"] == "optimal"}
+    return [
+        (
+            row["method"],
+            str(row["count"]),
+            f"{row['gain']:.6g}",
+            f"{row['upper_bound']:.6g}",
+            "-" if row["gap"] is None else f"{row['gap']:.1e}",
+            _beside(row["gain"], best.get(row["count"])),
+            str(row["used"]),
+            f"{row['seconds']:.2g}",
+        )
+        for row in result.summary_rows
+    ]
+
+
+def _beside(gain: float, best: float | None) -> str:
+    """How far a gain is from the optimal schedule's: above it only where samples are weighed."""
+    if best is None or not gain > 0:
+        return "-"
+    difference = 10 * math.log10(gain / best)
+    return "0.00 dB" if abs(difference) < 0.005 else f"{difference:+.2f} dB"
+
+
+def times(result: "ScheduleResult") -> list[str]:
+    """The best schedules, a line each; of other methods only where there are no better ones."""
+    plain, methods = result.study.model.sensor is None, result.study.model.methods
+    best = [m for m in methods if m in ("optimal", "weighted")] or methods[:1]
+    width = max(len(str(one.count)) for one in result.found)
+    lines = []
+    for method in best:
+        lines.append(f"{method} capture times, {'t_k / t_1' if plain else 'in ms'}:")
+        for one in result.found:
+            if one.method == method:
+                shown = "  ".join(_shown(one.schedule.times, plain))
+                lines.append(f"  {one.count:{width}}: {shown}")
+    return lines
+
+
+def _shown(times: "NDArray", plain: bool) -> list[str]:
+    """Capture times in words, those in the middle left out where they are many."""
+    shown = [f"{v:.4f}" for v in times / times[0]] if plain else [f"{v:.5g}" for v in times * 1e3]
+    return shown if len(shown) <= MOST_TIMES else [*shown[: MOST_TIMES - 2], "...", shown[-1]]
+
+
+def said(target: "Fewest", bound: float) -> str:
+    """A sentence about the captures that a gain takes."""
+    gain = f"a gain of {target.target:g}"
+    if not target.possible:
+        return f"{gain} is out of reach: no number of captures gains more than {bound:.6g}"
+    if target.count is None:
+        return f"{gain} takes more captures than were tried; the most gain {target.gain:.6g}"
+    captures = "1 capture" if target.count == 1 else f"{target.count} captures"
+    return f"{gain} takes {captures}, which gain {target.gain:.6g}"

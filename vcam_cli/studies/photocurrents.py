@@ -1,0 +1,84 @@
+"""What a schedule is found for: photocurrents of a simulated scene, a pdf in fewer segments."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcam_cli.camera.camera import Camera
+from vcam_cli.engine.stages import Observer
+from vcam_cli.scheduling import histogram_binning
+from vcam_cli.scheduling.pdf import Pdf
+from vcam_cli.studies.simulate import prepare
+
+DARKEST = 1e-9
+"""Of the brightest photocurrent: what is below lies in the first bin."""
+WHOLE = 1e-3
+"""By how much a count of pixels may miss a whole number: rounding of its share of all."""
+SAME = 1e-9
+"""Relative: photocurrents as close as this are one level."""
+
+
+def photocurrents(
+    camera: Camera, workers: int | None = None, watch: Observer | None = None
+) -> NDArray:
+    """Of every pixel that the camera reads, noise-free and without dark current, flat [e/s].
+
+    Raises BadInput and CannotDo as a simulation does.
+    """
+    ready, _ = prepare(camera, workers, watch)
+    return np.maximum(np.asarray(ready.rate, dtype=np.float64).ravel(), 0.0)
+
+
+def histogram(values: NDArray, bins: int) -> Pdf:
+    """The histogram of photocurrents in bins of equal ratio, from the darkest to the brightest.
+
+    Why equal ratio: where light spans five decades, the first of 4096 equal bins holds all that
+    the longest exposures are for. Raises ValueError where there is no light at all.
+    """
+    high = float(values.max(initial=0.0))
+    if high <= 0:
+        raise ValueError("no pixel of the camera sees any light; give the scene some")
+    lit = values[values > high * DARKEST]
+    low = float(lit.min())
+    if low >= high * (1 - SAME):
+        return Pdf.levels([0.0, high], [values.size - lit.size, lit.size])
+    edges = np.geomspace(low, high, bins + 1)
+    counts = np.histogram(np.clip(lit, edges[0], edges[-1]), edges)[0].astype(float)
+    if lit.size < values.size:
+        edges = np.concatenate([[0.0], edges])
+        counts = np.concatenate([[values.size - lit.size], counts])
+    return Pdf.histogram(edges, counts)
+
+
+class Approximation:
+    """A pdf on its way to few segments, by iterative histogram binning.
+
+    least: segments at the end; pixels: that the pdf counts, where it is of whole numbers of them:
+    equal merges are then told to be equal. Empty segments at either end are outside the scene's
+    range, and no part of it.
+    """
+
+    def __init__(self, pdf: Pdf, least: int, pixels: float = 0.0) -> None:
+        there = np.flatnonzero(pdf.probability > 0)
+        inside = slice(there[0], there[-1] + 1)
+        self._pdf = Pdf(pdf.low[inside], pdf.high[inside], pdf.probability[inside])
+        edges, shares = histogram_binning.bins(self._pdf)
+        whole = np.round(shares * pixels)
+        as_counts = pixels and np.allclose(shares * pixels, whole, rtol=0, atol=WHOLE)
+        self._histogram = (edges, whole if as_counts else shares)
+        self._few = not self._pdf.discrete and len(self._pdf.low) <= least
+        self._merges = () if self._few else histogram_binning.merged(self._histogram, least)[1]
+
+    @property
+    def most(self) -> int:
+        """Segments at the beginning."""
+        return len(self._pdf.low) if self._few else len(self._histogram[1])
+
+    def pdf(self, segments: int) -> Pdf:
+        """With at most so many segments, but with no fewer than at the end."""
+        if self._few or (not self._pdf.discrete and len(self._pdf.low) <= segments):
+            return self._pdf
+        merges = self._merges[: max(0, self.most - segments)]
+        edges, density = histogram_binning.approximation(self._histogram, merges)
+        return Pdf.histogram(edges, density * np.diff(edges))
