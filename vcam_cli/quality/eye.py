@@ -7,8 +7,8 @@ both in a way that jumps where another pixel comes into a degree; a third readin
 - `zhang-wandell-1996`, the authors' first code: the spread is the FULL width at half maximum, and
   kernels are sampled at 224 or more per degree, averaged over a pixel by a triangle, and decimated.
 - `isetcam`: the spread is HALF the width, and kernels are sampled at the pixels.
-- `continuous`: the limit of the first for infinitely fine samples. Pixels are squares of light, and
-  what is seen is averaged over each of them.
+- `continuous`: the spread is the full width, and pixels are squares of light: each counts with the
+  integral of the kernel over it.
 
 The first two are cut to about one degree, in whole pixels, the third to one degree exactly. Their
 sum is 1: a uniform field stays as it is. (The 1996 code leaves its sum up to 0.8 % off.)
@@ -120,21 +120,13 @@ def _sampled_isetcam(plane: tuple[Gaussian, ...], per_degree: float) -> NDArray[
 
 
 def _continuous(plane: tuple[Gaussian, ...], per_degree: float) -> NDArray[np.float64]:
-    """One row of taps a Gaussian: its integrals, over half a degree to either side, with triangles.
-
-    A triangle from the middle of the pixel before to that of the one behind: a square of light,
-    averaged over a pixel. Its straight sides times a Gaussian have integrals in closed form.
-    """
+    """One row of taps a Gaussian: its integrals over the pixels' parts within half a degree."""
     from scipy.special import erf
 
-    reach = math.ceil(per_degree / 2)
-    middles = np.arange(-reach - 1, reach + 2) / per_degree
-    x = np.clip(middles, -0.5, 0.5)
-    steep = 2 * math.sqrt(math.log(2)) / np.array([[spread] for spread, _ in plane])
-    area = np.diff(math.sqrt(math.pi) / 2 * erf(steep * x) / steep, axis=1)
-    moment = np.diff(-np.exp(-((steep * x) ** 2)) / (2 * steep**2), axis=1)
-    rising, falling = moment - middles[:-1] * area, middles[1:] * area - moment
-    return _unit_sum(rising[:, :-1] + falling[:, 1:])
+    reach = math.ceil(per_degree / 2 - 0.5)
+    edges = np.clip((np.arange(-reach, reach + 2) - 0.5) / per_degree, -0.5, 0.5)
+    widths = np.array([[spread] for spread, _ in plane])
+    return _unit_sum(np.diff(erf(2 * math.sqrt(math.log(2)) * edges / widths), axis=1))
 
 
 def _unit_sum(rows: NDArray[np.float64]) -> NDArray[np.float64]:
