@@ -100,8 +100,10 @@ def words_of(allowed: tuple[str, ...], least: int) -> Any:
     """Reads a list of some of the words."""
 
     def pick(given: Any) -> tuple[str, ...]:
-        if not isinstance(given, (list, tuple)) or len(given) < least:
+        if not isinstance(given, (list, tuple)):
             raise ValueError(f"{shown(given)} is not a list; write for example [{allowed[0]}]")
+        if len(given) < least:
+            raise ValueError(f"is an empty list; write for example [{allowed[0]}]")
         mistakes = []
         for i, item in enumerate(given):
             if item not in allowed:

@@ -86,6 +86,7 @@ def mistakes(
         place = ("expect", name)
         if item.quantity not in known:
             yield fault((*place, "quantity"), *one_of(item.quantity, known), given=item.quantity)
+            continue
         wants = OPTIMUM in (item.quantity, item.at, item.over, item.minus)
         if wants and not goal:
             remedy = "add optimize: {metric: ..., goal: min}"

@@ -29,6 +29,7 @@ PROPERTIES = {
     "dark_current_density": "nA/cm2",
     "nyquist_frequency": "lp/mm",
     "feature_size": "um",
+    "corner_vignetting": "",
     "dynamic_range_db": "dB",
     "snr_db": "dB",
 }

@@ -90,7 +90,11 @@ def mean_raw(ready: Prepared) -> NDArray:
 
 def full_signal(ready: Prepared) -> float:
     """Largest noise-free mean signal on the array, at most the full well, at least 1 electron."""
-    mean = capture.mean_electrons(ready.rate, ready.exposure_time, ready.plan.active)
+    return full_of(ready, mean_raw(ready))
+
+
+def full_of(ready: Prepared, mean: NDArray) -> float:
+    """The same of a camera and its `mean_raw`."""
     return max(1.0, min(ready.electrical.full_well, float(mean.max())))
 
 

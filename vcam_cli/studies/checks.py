@@ -38,7 +38,7 @@ def check_effects(camera: Camera) -> None:
     """
     if not isinstance(camera.effects, dict) or "on" not in camera.effects.values():
         return
-    good = files.load(shipped.find("cameras", files.EXAMPLE), folder=shipped.folder())
+    good = files.example()
     names = ("conversion_gain", "voltage_swing", "full_well")
     solved = {name: getattr(good.pixel.readout, name) for name in names}
     readout = camera.pixel.readout.model_copy(update=solved)

@@ -20,8 +20,9 @@ from vcam_cli.files import curves
 from vcam_cli.files.curves import Curve, Panel
 from vcam_cli.files.plots import COLORS
 from vcam_cli.scheduling import estimators, noisy
+from vcam_cli.scheduling.candidates import least_gap
 from vcam_cli.scheduling.levels import levels
-from vcam_cli.scheduling.objective import Constraints, Sensor, expected_snr, shortest
+from vcam_cli.scheduling.objective import SLACK, Constraints, Sensor, expected_snr, shortest
 from vcam_cli.scheduling.online import FREE, Start, plan
 from vcam_cli.scheduling.pdf import Pdf
 
@@ -31,6 +32,8 @@ PIXELS = 1 << 16
 """Drawn from a pdf; of more photocurrents as many are taken, evenly by brightness."""
 RUNS = 4
 """Integrations with noise of their own, of which the losses are averaged."""
+MOST_ELECTRONS = 1e18
+"""Of a step of an integration: more than fit into any well, and NumPy can still draw them."""
 FIRST = 1e-4
 """The first capture where nothing is known, over the longest exposure."""
 SWITCH_DB = 0.05
@@ -83,7 +86,8 @@ class Integration:
     def read(self, time: float) -> None:
         """Takes the capture at `time` [s], later than those before."""
         step = time - (self.times[-1] if self.times else 0.0)
-        self._charge = self._charge + self._random.poisson(self._rate * step)
+        mean = np.minimum(self._rate * step, MOST_ELECTRONS)
+        self._charge = self._charge + self._random.poisson(mean)
         noise = self._sensor.read * self._random.standard_normal(self._charge.shape)
         sample, before = self._charge + noise, self.saturated[-1] if self.saturated else False
         full = (sample >= self._sensor.well) | before
@@ -161,10 +165,11 @@ def schedules(
     at least one capture left for the plan. The last of the schedules is the fully online one.
     """
     pixels = Integration(light, sensor, np.random.default_rng(seed))
-    pixels.read(start.first if isinstance(start, Start) else start)
+    pixels.read(_admitted(start.first, 0.0, constraints) if isinstance(start, Start) else start)
     while isinstance(start, Start) and len(pixels.times) < count - 1:
-        following = start.next(pixels.samples[-1], pixels.times[-1], sensor)
-        if following is None:
+        wanted = start.next(pixels.samples[-1], pixels.times[-1], sensor)
+        following = wanted and _admitted(wanted, pixels.times[-1], constraints)
+        if not following or following > sensor.max_time * (1 + SLACK):
             break
         pixels.read(following)
     searching = len(pixels.times) if isinstance(start, Start) else 0
@@ -179,6 +184,15 @@ def schedules(
         found.append(np.concatenate([pixels.times, rest]))
         pixels.read(float(rest[0]))
     return searching, found
+
+
+def _admitted(time: float, before: float, constraints: Constraints) -> float:
+    """The time [s] of a capture that searches, as the readout allows it after the one before."""
+    frame, gap = constraints.frame_time, least_gap(constraints)
+    if frame:
+        time = max(float(np.floor(time / frame * (1 + SLACK))), 1.0) * frame
+    apart = max(gap, frame)
+    return max(time, before + apart) if before else time
 
 
 def _start(first: float, sensor: Sensor) -> Start:

@@ -81,6 +81,15 @@ class _Known:
         return rate * readout.ELEMENTARY_CHARGE / self.geometry.detector_area
 
     @property
+    def corner_vignetting(self) -> float:
+        """Share of the light that the tunnel takes in the corner of the sensor."""
+        tunnel = PixelVignetting.of(self.camera, self.geometry)
+        if tunnel is None:
+            return math.nan
+        corner = np.array([self.geometry.sensor_width]), np.array([self.geometry.sensor_height])
+        return 1 - float(_through(tunnel, *(at / 2 for at in corner))[0])
+
+    @property
     def feature_size(self) -> float:
         """[m]"""
         made = process(self.camera)
@@ -104,6 +113,7 @@ _VALUES: dict[str, Callable[[_Known], float]] = {
     "dark_current_density": lambda k: k.dark_current_density * 1e5,
     "nyquist_frequency": lambda k: 0.5e-3 / k.geometry.pitch_x,
     "feature_size": lambda k: k.feature_size * 1e6,
+    "corner_vignetting": lambda k: k.corner_vignetting,
     **{name: lambda k, name=name: k.noise(name) for name in TIMED},  # type: ignore[misc]
 }
 assert _VALUES.keys() == PROPERTIES.keys()

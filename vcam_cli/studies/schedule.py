@@ -39,6 +39,8 @@ from vcam_cli.studies.schedule_methods import (
     sensor_of,
 )
 
+LEAST_SNR = 1e-200
+"""Of a single capture: with less, products of what schedules are worth vanish in rounding."""
 WORTH_TELLING = 0.05
 """Relative loss by an approximation from which on a user is told."""
 
@@ -211,9 +213,14 @@ class _Run:
     def _task(self, plan: Pdf | None) -> Task:
         sensor, constraints = sensor_of(self.model), constraints_of(self.model)
         try:
-            return Task(self.pdf, sensor, constraints, plan, self.seed)
+            task = Task(self.pdf, sensor, constraints, plan, self.seed)
         except ValueError as error:
             raise self._wrong(("constraints", "frame_time"), error) from None
+        if not task.single > LEAST_SNR:
+            message = f"E[SNR] of a single capture is {task.single:.3g}: nothing to compare with"
+            path = ("pdf",) if self.model.sensor is None else ("sensor",)
+            raise self.study.wrong(path, message, "give it more light, or less noise")
+        return task
 
     def _wrong(self, path: tuple[str, ...], error: ValueError) -> BadInput:
         message, _, remedy = str(error).partition("; ")
@@ -285,7 +292,8 @@ def _notes(run: _Run) -> list[str]:
     lit = int((run.pdf.probability > 0).sum() - (run.pdf.discrete and run.pdf.low[0] == 0))
     if run.pdf.discrete and lit < max(run.counts) and not run.task.approximated:
         are = "there is 1 level" if lit == 1 else f"there are {lit} levels"
-        notes.append(f"{are} of light: of more captures than that, {lit} are used, the rest repeat")
+        used = "1 is" if lit == 1 else f"{lit} are"
+        notes.append(f"{are} of light: of more captures than that, {used} used, the rest repeat")
     return notes
 
 

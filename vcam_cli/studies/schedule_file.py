@@ -23,7 +23,7 @@ from vcam_cli.camera import load as cameras
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.merge import merge
 from vcam_cli.camera.parts import existing, locate
-from vcam_cli.camera.pdf_source import PdfSource
+from vcam_cli.camera.pdf_source import MOST_PHOTOCURRENT, PdfSource
 from vcam_cli.camera.schedule_study import ScheduleStudy
 from vcam_cli.camera.yaml_tree import Node, read_file, shown
 from vcam_cli.errors import BadInput, Problem
@@ -226,9 +226,20 @@ def _mistakes(
     values: NDArray, columns: tuple[str, ...]
 ) -> list[tuple[NDArray[np.bool_], str, str]]:
     """(rows, ) where a table is wrong, what is wrong, and what to do, of each possible mistake."""
-    counts = values[-1]
+    counts, light = values[-1], values[:-1]
+    lit = np.where(light > 0, light, MOST_PHOTOCURRENT).min(axis=0)
     found = [
         (values[0] < 0, f"a {columns[0]} is negative", "photocurrents are 0 or more"),
+        (
+            light.max(axis=0) > MOST_PHOTOCURRENT,
+            f"a photocurrent is above {MOST_PHOTOCURRENT:g}",
+            "write it in a larger unit",
+        ),
+        (
+            lit < 1 / MOST_PHOTOCURRENT,
+            f"a photocurrent is below {1 / MOST_PHOTOCURRENT:g}",
+            "write 0, or use a smaller unit",
+        ),
         (counts < 0, "a count is negative", "counts are 0 or more"),
         (np.full(len(counts), not counts.any()), "all counts are zero", "give one that is not"),
     ]

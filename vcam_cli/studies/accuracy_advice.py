@@ -1,0 +1,103 @@
+"""Which setting to take: the fastest that keeps what the file asks for, and what it loses."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.settings import PRESETS
+from vcam_cli.studies.accuracy_knobs import KNOBS
+from vcam_cli.studies.accuracy_points import Point
+
+WORTH = 0.9
+"""Part of the seconds below which another setting is recommended."""
+SMALL_SAVING = 0.05
+"""Part of the seconds that a knob has to save, beside the spread of its runs."""
+SHARES = {"oversampling": 0.5}
+"""Knob -> part of the tolerance that its own error may use up,"""
+OTHERS = 0.1
+"""and the same of the other knobs: all together stay within the tolerance."""
+
+
+@dataclass(frozen=True)
+class Recommendation:
+    """The fastest setting that keeps what the file asks for."""
+
+    line: str
+    """For the camera file."""
+    sentence: str
+
+
+def coarser(camera: Camera, points: tuple[Point, ...]) -> dict[str, Any]:
+    """Knobs that may be coarser than the file's accuracy has them, and save time: name -> value."""
+    own = next(p for p in points if p.knob == "file")
+    out: dict[str, Any] = {}
+    for knob in KNOBS:
+        if knob.name == "shot_noise":
+            continue  # another model, not a coarser one
+        allowed = SHARES.get(knob.name, OTHERS) * camera.accuracy.tolerance
+        here = [p for p in points if p.knob == knob.name and p.rms_error <= allowed]
+        best = min(here, key=lambda p: p.seconds, default=own)
+        if own.seconds - best.seconds > max(SMALL_SAVING * own.seconds, best.seconds_spread / 2):
+            out[knob.name] = knob.settings[best.setting]
+    return out
+
+
+def recommend(camera: Camera, points: tuple[Point, ...]) -> Recommendation:
+    """The fastest setting that keeps the tolerance T of the file, for mean and variance.
+
+    Something else than the file has is worth a change where it saves a tenth of the time. Where
+    nothing keeps T: what has the least error.
+    """
+    tolerance = camera.accuracy.tolerance
+    own = next(p for p in points if p.knob == "file")
+    others = [p for p in points if p.knob in ("preset", "tolerance", "combined")]
+    keeps = [
+        p for p in (own, *others) if p.rms_error <= tolerance and p.variance_lost <= 2 * tolerance
+    ]
+    best = min(keeps, key=lambda p: p.seconds, default=None)
+    if best is None:
+        best = min((own, *others), key=lambda p: p.rms_error)
+    elif own in keeps and best.seconds > WORTH * own.seconds:
+        best = own
+    line = _line(camera, best)
+    return Recommendation(line, _sentence(line, best, own, tolerance))
+
+
+def _sentence(line: str, best: Point, own: Point, tolerance: float) -> str:
+    """What it takes, and what it loses."""
+    within = "within" if best.rms_error <= tolerance else "beyond"
+    took = f"{_text(best.seconds)} s a frame"
+    start = f"keep `{line}`: {took}, and nothing much faster holds what it asks for"
+    if best is not own:
+        start = f"`{line}`: {took} instead of {_text(own.seconds)} s"
+    loses = (
+        f"it loses {best.rms_error:.2%} of full signal rms ({best.rms_electrons:.3g} electrons;"
+        f" {best.max_error:.2%} in the worst pixel)"
+    )
+    if best.mean_s_cielab is not None:
+        loses += f" and a mean S-CIELAB of {best.mean_s_cielab:.2g}"
+    loses += f", {within} the {tolerance:.3g} asked for"
+    if best.left_out:
+        noise = f", {best.variance_lost:.2%} of a variance" if best.variance_lost else ""
+        loses += f"; its plan leaves out {' and '.join(best.left_out)}{noise}"
+    return f"{start}; {loses}."
+
+
+def _line(camera: Camera, point: Point) -> str:
+    """The setting as a line of the camera file."""
+    if point.knob in ("preset", "tolerance"):
+        return f"accuracy: {point.setting}"
+    own = camera.accuracy.written()
+    if not isinstance(own, dict):
+        own = {"preset" if own in PRESETS else "tolerance": own}
+    if point.knob == "combined":
+        own = {**own, **dict(part.split(": ") for part in point.setting.split(", "))}
+    if set(own) <= {"preset"} or set(own) <= {"tolerance"}:
+        return f"accuracy: {next(iter(own.values()))}"
+    return f"accuracy: {{{', '.join(f'{k}: {v}' for k, v in own.items())}}}"
+
+
+def _text(seconds: float) -> str:
+    return f"{seconds:.2g}" if seconds < 9.95 else f"{seconds:.0f}"

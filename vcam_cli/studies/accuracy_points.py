@@ -1,0 +1,54 @@
+"""A row of accuracy.csv: what one setting loses, and what it takes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+COLUMNS = (
+    "knob",
+    "setting",
+    "rms_error",
+    "max_error",
+    "rms_electrons",
+    "seconds",
+    "seconds_spread",
+    "mean_s_cielab",
+)
+"""Of accuracy.csv."""
+
+
+@dataclass(frozen=True)
+class Point:
+    """One setting of one knob."""
+
+    knob: str
+    setting: str
+    rms_error: float
+    """Of the mean raw, relative to full signal."""
+    max_error: float
+    """Largest of any pixel, relative to full signal."""
+    rms_electrons: float
+    """[electrons]"""
+    seconds: float
+    """Median [s]"""
+    seconds_spread: float
+    """Slowest less fastest run [s]"""
+    mean_s_cielab: float | None = None
+    """Between the render and that which it is compared with; None without a render."""
+    predicted: float | None = None
+    """Rms of what the plan expects the settings to lose of the spectrum, relative."""
+    left_out: tuple[str, ...] = ()
+    """Effects that its plan leaves out."""
+    variance_lost: float = 0.0
+    """Largest share of the temporal or fixed-pattern variance that they had."""
+
+    @property
+    def row(self) -> tuple[str | float, ...]:
+        """As in accuracy.csv."""
+        values = (getattr(self, name) for name in COLUMNS)
+        return tuple("" if value is None else value for value in values)
+
+    @property
+    def effect(self) -> str:
+        """Name of the effect that is left out; empty where none is."""
+        return self.knob.removeprefix("effect:") if self.knob.startswith("effect:") else ""

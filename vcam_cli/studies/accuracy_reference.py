@@ -1,0 +1,123 @@
+"""What settings are compared with: the camera with everything on, converged.
+
+Why an estimate of its own error stands beside it: edges of a chart are good to the power 5/2 of the
+cells per pixel, and the last digit costs more memory than there is. What is left is told by the
+change of the last refinement; errors ten times larger are not changed by it.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcam_cli.camera.camera import Camera
+from vcam_cli.effects.base import Code, Draw
+from vcam_cli.engine import memory
+from vcam_cli.engine.optics import MARGIN
+from vcam_cli.engine.prepare import Prepared
+from vcam_cli.scenes.base import SampledScene
+from vcam_cli.studies import ablation
+from vcam_cli.studies.accuracy_knobs import FINEST, with_accuracy
+from vcam_cli.studies.simulate import prepare
+
+CONVERGED = 2e-5
+"""Tolerance of the reference."""
+FURTHER = 2.5
+"""How much further than `accuracy: reference` a spectrum is followed: its error falls tenfold."""
+ORDER = 2.5
+"""Power of the oversampling with which the error of a painted edge falls."""
+MOST_BYTES = 4e9
+"""Memory beyond which a chart is not sampled more finely for the reference."""
+
+
+@dataclass(frozen=True)
+class Reference:
+    """What everything is compared with."""
+
+    full_signal: float
+    """[electrons]"""
+    exposure_time: float
+    """[s]"""
+    oversampling: float
+    """Pixel Nyquist frequencies the spectrum was followed to; 0: closed form."""
+    lost: float
+    """Estimated rms that even the reference misses, relative to full signal."""
+    settings: dict[str, Any]
+
+
+def finest(camera: Camera, coarse: Prepared) -> Camera:
+    """The camera with everything on and every knob finer than its reference.
+
+    coarse: the camera at `accuracy: reference`. Where its scene has a spectrum, it is followed
+    two and a half times as far as there, as long as memory is not the limit.
+    """
+    knobs: dict[str, Any] = dict(FINEST)
+    reached = coarse.spectrum.oversampling
+    if reached:
+        samples = min(MOST_BYTES, memory.available() / 2) / 8 / max(1, coarse.spectrum.planes)
+        most = int(math.sqrt(samples / _pixels(coarse)))
+        wanted = min(math.ceil(FURTHER * reached), 64)
+        knobs["oversampling"] = max(math.ceil(reached), min(wanted, most))
+    return with_accuracy(ablation.switched(camera, "all"), tolerance=CONVERGED, **knobs)
+
+
+def converged(camera: Camera, coarse: Prepared, workers: int) -> Prepared:
+    """`finest`, with its light on the pixels."""
+    return prepare(finest(camera, coarse), workers)[0]
+
+
+def described(found: Prepared, coarse: Prepared, full: float, change: float) -> Reference:
+    """The reference, and how good it is itself.
+
+    found: the camera converged; coarse: at `accuracy: reference`; full: full signal; change: rms
+    of the difference of their signals [electrons].
+    """
+    left = found.spectrum.lost * found.exposure_time
+    chart = isinstance(found.scene, SampledScene) and found.scene.samples != "squares"
+    reached = coarse.spectrum.oversampling
+    if chart and reached and found.spectrum.oversampling > reached:
+        left = change / ((found.spectrum.oversampling / reached) ** ORDER - 1)
+    return Reference(
+        full_signal=full,
+        exposure_time=found.exposure_time,
+        oversampling=found.spectrum.oversampling,
+        lost=left / full,
+        settings=found.settings.report(),
+    )
+
+
+def changes(
+    camera: Camera, exposure_time: float, names: tuple[str, ...], workers: int
+) -> dict[str, NDArray]:
+    """What leaving out each effect does to the mean raw, everything else on: (rms, largest) [e].
+
+    In 64 bits, and as fine as most tolerances ask; what the settings still miss is missed with and
+    without the effect.
+    """
+    fixed = ablation.exposed_for(camera, exposure_time)
+    tolerance = min(max(camera.accuracy.tolerance, 0.001), 0.005)
+    fixed = with_accuracy(fixed, tolerance=tolerance, float_width=64)
+    whole = prepare(ablation.switched(fixed, "all"), workers)[0]
+    noise = {e.name for e in whole.plan.active if isinstance(e, Draw | Code)}
+    truth, out = ablation.mean_raw(whole), {}
+    for name in names:
+        if name in noise:  # drawn after the mean is known
+            out[name] = np.zeros(2)
+        else:
+            without = prepare(ablation.switched(fixed, "all", name), workers)[0]
+            out[name] = error(ablation.mean_raw(without) - truth)
+    return out
+
+
+def error(difference: NDArray) -> NDArray:
+    """(rms, largest) of a difference of signals [electrons]."""
+    return np.array([ablation.rms(difference), float(np.abs(difference).max())])
+
+
+def _pixels(ready: Prepared) -> int:
+    """Pixels, with the margin that charts have."""
+    return (ready.geometry.rows + 2 * MARGIN) * (ready.geometry.columns + 2 * MARGIN)
