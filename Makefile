@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 SOURCES := vcam_cli tests scripts
 CAMERA ?= still-life
 
-.PHONY: run test check bench promise schemas tables lock clean
+.PHONY: run test check bench promise stability fuzz schemas tables lock clean
 
 run: $(VENV)/.runtime  ## simulate the shipped still life: out/still-life/
 	$(BIN)/vcam run $(CAMERA)
@@ -22,8 +22,14 @@ check: $(VENV)/.dev  ## format, lint, types, tests
 bench: $(VENV)/.dev  ## speed, as ratios to the cost of the transforms and draws alone
 	$(BIN)/python -m tests.bench
 
-promise: $(VENV)/.dev  ## the plan's promises, measured on twenty-two cameras
+promise: $(VENV)/.dev  ## the plan's promises, measured on twenty-two cameras and forty random ones
 	$(BIN)/python -m tests.promise
+
+stability: $(VENV)/.dev  ## hard cases: our error beside that of the textbook form, as a table
+	$(BIN)/python -m tests.hard_cases
+
+fuzz: $(VENV)/.dev  ## twenty thousand camera and study files with something broken in them
+	$(BIN)/python -m tests.hostile
 
 schemas: $(VENV)/.dev  ## JSON Schemas of the files a user writes, from the models
 	$(BIN)/vcam schema schemas

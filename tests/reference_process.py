@@ -27,7 +27,7 @@ class Process:
     length: float = 20e-6
     film: float = 0.25e-6  # of polysilicon, over a photogate
     dark_area: float = 1e-4
-    dark_perimeter: float = 0.437e-10
+    dark_perimeter: float = 0.3e-10
     scale: float = 0.75  # of the quantum efficiency: reflection and stack
     border: float = 5.017
     transistors: float = 91.1

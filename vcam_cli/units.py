@@ -16,11 +16,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from decimal import Decimal
 from fractions import Fraction
+from functools import lru_cache
 from types import MappingProxyType
 
 _NUMBER = r"(?:\d+(?:\.\d*)?|\.\d+)(?:[eE][+-]?\d{1,3})?"
 _QUANTITY = re.compile(rf"([+-]?{_NUMBER})(?:\s*/\s*({_NUMBER}))?\s*(.*)", re.ASCII | re.DOTALL)
 _LONGEST = 80  # characters; keeps rational arithmetic small
+_LARGEST = 10**200  # in any unit it is a double
 _PI = Fraction("3.14159265358979323846264338327950288419716939937510")
 _PREFIXES = {
     "a": -18, "f": -15, "p": -12, "n": -9, "u": -6, "m": -3, "": 0, "k": 3, "M": 6, "G": 9,
@@ -67,6 +69,12 @@ def parse(text: object, dimension: str) -> float:
         raise ValueError(f"{text} is a bare number; {_needs(kind)}")
     if not isinstance(text, str):
         raise ValueError(f"{kind.title} is a number with its unit, for example {kind.example}")
+    return _parsed(text, dimension)
+
+
+@lru_cache(maxsize=4096)  # sweeps read the same texts for every point
+def _parsed(text: str, dimension: str) -> float:
+    kind = DIMENSIONS[dimension]
     plain = " ".join(text.translate(_SPELLINGS).split())
     if plain in kind.words:
         return kind.words[plain]
@@ -88,7 +96,7 @@ def parse_fraction(value: object) -> float:
         return float(value)
     match = _QUANTITY.fullmatch(value.strip()) if isinstance(value, str) else None
     if match is None or len(str(value)) > _LONGEST:
-        raise ValueError(f"{value!r} is not a number; write for example 0.05 or 5 %")
+        raise ValueError(f"{_brief(value)} is not a number; write for example 0.05 or 5 %")
     number, divisor, unit = match.groups()
     if unit not in ("", "%"):
         raise ValueError(f"{value!r} has the unit {unit!r}; write a bare number, or 5 %")
@@ -105,11 +113,14 @@ def split(text: object) -> tuple[Fraction, str]:
     plain = " ".join(text.translate(_SPELLINGS).split()) if isinstance(text, str) else ""
     match = _QUANTITY.fullmatch(plain)
     if match is None or len(plain) > _LONGEST:
-        raise ValueError(f"{text!r} is not a number with its unit; write for example 5.3 um")
+        raise ValueError(f"{_brief(text)} is not a number with its unit; write for example 5.3 um")
     number, divisor, unit = match.groups()
     if divisor is not None and Fraction(divisor) == 0:
         raise ValueError(f"{text!r} divides by zero; write for example 5.3 um")
-    return Fraction(number) / Fraction(divisor or 1), unit
+    value = Fraction(number) / Fraction(divisor or 1)
+    if abs(value) > _LARGEST:
+        raise ValueError(f"{text!r} is too large; write for example 5.3 um")
+    return value, unit
 
 
 def convert(number: Fraction, unit: str, other: str) -> Fraction:
@@ -127,6 +138,7 @@ def convert(number: Fraction, unit: str, other: str) -> Fraction:
     raise ValueError(f"{units} do not go together; write all of them in one unit")
 
 
+@lru_cache(maxsize=4096)
 def render(value: float, dimension: str) -> str:
     """The shortest text with `parse(text, dimension) == value`, in a readable unit."""
     kind = DIMENSIONS[dimension]
@@ -295,3 +307,9 @@ _FRACTION = Dimension(
     "fraction", "a number", "", {"": Fraction(1), "%": Fraction(1, 100)}, ("",), "0.05 or 5 %"
 )
 DIMENSIONS: Mapping[str, Dimension] = MappingProxyType(_dimensions())
+
+
+def _brief(given: object) -> str:
+    """What was given, for a message: its beginning where it is long."""
+    text = repr(given)
+    return text if len(text) <= _LONGEST else f"{text[: _LONGEST // 2]}..."

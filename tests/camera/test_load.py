@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 
-from vcam_cli.camera import shipped, support
+from vcam_cli.camera import shipped
 from vcam_cli.camera.load import load
-from vcam_cli.errors import BadInput, CannotDo, Problem, bad
+from vcam_cli.errors import BadInput, CannotDo, bad
 
 CAMERA = """\
 scene:
@@ -330,17 +330,6 @@ def test_all_mistakes_at_once(folder):
     paths = {text.split(": ")[1] for text in problems()}
     wrong = {"optics.f_nubmer", "pixel.width", "pixel.readout.conversion_gain", "array.rows"}
     assert wrong <= paths
-
-
-def test_what_is_not_supported_yet_and_bad_geometry_come_together(folder, monkeypatch):
-    late = [Problem(("exposure", "captures"), "is not supported yet", "remove it")]
-    monkeypatch.setattr(support, "unsupported", lambda camera: late)
-    change(folder, "{time: 30 ms}", "{captures: {schedule: optimal, count: 4, max: 30 ms}}")
-    change(folder, "  luminance: 100 cd/m2", "  luminance: 100 cd/m2\n  distance: 1 mm")
-    texts = problems()
-    assert any("exposure.captures" in t and "not supported yet" in t for t in texts)
-    assert any("scene.distance" in t for t in texts)
-    assert all(text.startswith("camera.yaml:") for text in texts)
 
 
 def test_a_wrong_section_hides_no_contradiction_of_others(folder):

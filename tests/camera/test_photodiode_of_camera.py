@@ -358,7 +358,7 @@ class TestKinds:
         size = detector(made(tmp_path))
         assert pinned.dark_rate * CHARGE == pytest.approx(size.area * 1e-4, rel=1e-12)
         more = (open_.dark_rate - pinned.dark_rate) * CHARGE
-        assert more == pytest.approx(size.perimeter * 0.437e-10, rel=1e-9)
+        assert more == pytest.approx(size.perimeter * 0.3e-10, rel=1e-9)
         assert (pinned.capacitance, pinned.diffusion) == (open_.capacitance, open_.diffusion)
 
     def test_so_does_that_of_four_transistors(self, tmp_path):
@@ -394,11 +394,11 @@ class TestKinds:
 
 class TestDarkCurrent:
     def test_of_the_technology(self, tmp_path):
-        """10 nA/cm2 and 0.437 pA/cm: more than half of it comes along the edge at 6.5 um."""
+        """10 nA/cm2 and 0.3 pA/cm: more than half of it comes along the edge at 6.5 um."""
         rate = photodiode(made(tmp_path)).dark_rate
         inner = 6.5e-6 - 5.017 * 0.35e-6
         area = inner**2 - 91.1 * (0.35e-6) ** 2
-        assert rate * CHARGE == pytest.approx(1e-4 * area + 0.437e-10 * 4 * inner, rel=1e-12)
+        assert rate * CHARGE == pytest.approx(1e-4 * area + 0.3e-10 * 4 * inner, rel=1e-12)
 
     @pytest.mark.parametrize(("kelvin", "factor"), [(308, 2), (292, 0.5), (324, 8)])
     def test_doubles(self, kelvin, factor, tmp_path):
@@ -432,7 +432,7 @@ class TestDarkCurrent:
         density = CHARGE * (diffusion + n_i / 2 * (x_n / 1e-7 + x_p / 1e-6))
         c = made(tmp_path, dark_current_density="junction")
         size = detector(c)
-        expected = density * size.area + 0.437e-10 * size.perimeter
+        expected = density * size.area + 0.3e-10 * size.perimeter
         assert photodiode(c).dark_rate * CHARGE == pytest.approx(expected, rel=1e-6)
         # Of the order of the technology's area term, 10 nA/cm2 = 1e-4 A/m2.
         assert 0.7e-4 < density < 1.5e-4

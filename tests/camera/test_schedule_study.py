@@ -116,6 +116,7 @@ def test_what_is_written_is_read_as_the_same_study(changes):
         ({"counts": [2, 2]}, "counts.1: 2 comes twice"),
         ({"counts": [2.5]}, "counts.0: 2.5 is not a whole number"),
         ({"methods": ["optimum"]}, "did you mean optimal?"),
+        ({"methods": []}, "methods: is an empty list; write for example [optimal]"),
         ({"methods": ["weighted"]}, "methods.0: weighted needs a sensor"),
         ({"constraints": {"min_gap": "1 ms"}}, "constraints.min_gap: is a time, and without a se"),
         ({"online": True}, "online: online needs a sensor"),

@@ -49,7 +49,7 @@ class TestWhatShips:
             c.built_in, c.grading, c.sidewall_built_in, c.sidewall_grading,
         )  # fmt: skip
         assert found == pytest.approx(SHIPPED[name], rel=1e-12)
-        assert (dark.area, dark.perimeter) == pytest.approx((1e-4, 0.437e-10), rel=1e-12)
+        assert (dark.area, dark.perimeter) == pytest.approx((1e-4, 0.3e-10), rel=1e-12)
         assert (dark.temperature, dark.doubling) == (300, 8)
         assert made.quantum_efficiency_scale == 0.75
         assert (made.layout.border, made.layout.transistors) == (5.017, 91.1)
@@ -105,7 +105,7 @@ class TestNaming:
         (tmp_path / "leaky.yaml").write_text(own, "utf-8")
         made = process(camera(tmp_path, TECHNOLOGY | {"pixel.technology": "leaky"}))
         assert made.dark_current.area == pytest.approx(1e-2)
-        assert made.dark_current.perimeter == pytest.approx(0.437e-10)
+        assert made.dark_current.perimeter == pytest.approx(0.3e-10)
 
     def test_places_are_those_of_the_technology_file(self, tmp_path):
         place = camera(tmp_path, TECHNOLOGY).locate(("pixel", "technology", "from", "supply"))

@@ -7,7 +7,7 @@ import pytest
 from typer.testing import CliRunner
 
 from vcam_cli.commands.main import app
-from vcam_cli.studies import accuracy as study
+from vcam_cli.studies import accuracy_shots
 
 SMALL = ("--set", "array.rows=12", "--set", "array.columns=16")
 UNIFORM = "scene.source={kind: chart, chart: uniform}"
@@ -17,7 +17,7 @@ UNIFORM = "scene.source={kind: chart, chart: uniform}"
 def ran(tmp_path_factory):
     out = tmp_path_factory.mktemp("accuracy") / "out"
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(study, "ROUNDS", 2)
+        patch.setattr(accuracy_shots, "TURNS", 1)
         arguments = ["accuracy", "slanted-edge-f8", *SMALL, "-o", str(out)]
         text = CliRunner().invoke(app, [*arguments, "--set", UNIFORM, "--workers", "1"])
         assert text.exit_code == 0, text.output
@@ -34,9 +34,11 @@ def test_files(ran):
         "accuracy.png",
     ]
     lines = (out / "accuracy.csv").read_text().splitlines()
-    assert lines[0] == "knob,setting,rms_error,max_error,rms_electrons,seconds,seconds_spread"
+    assert lines[0] == (
+        "knob,setting,rms_error,max_error,rms_electrons,seconds,seconds_spread,mean_s_cielab"
+    )
     rows = list(csv.reader(lines[1:]))
-    assert all(float(cell) >= 0 for row in rows for cell in row[2:])
+    assert all(float(cell) >= 0 for row in rows for cell in row[2:] if cell != "")
     assert {"preset", "effect:diffraction"} <= {row[0] for row in rows}
     record = json.loads((out / "accuracy.json").read_text())
     assert record["program"] == "vcam" and record["camera"] and record["effects"]
@@ -44,7 +46,15 @@ def test_files(ran):
 
 def test_a_person_reads_tables_and_a_recommendation(ran):
     _, text, _ = ran
-    for word in ("preset", "standard", "shot_noise", "expected", "measured", "recommended: "):
+    for word in (
+        "preset",
+        "standard",
+        "shot_noise",
+        "expected",
+        "measured",
+        "recommended: ",
+        "does not apply",
+    ):
         assert word in text
 
 
@@ -55,7 +65,7 @@ def test_json_has_the_measurement(ran):
 
 
 def test_it_stands_beside_a_run_in_the_same_folder(tmp_path, monkeypatch):
-    monkeypatch.setattr(study, "ROUNDS", 2)
+    monkeypatch.setattr(accuracy_shots, "TURNS", 1)
     arguments = ["slanted-edge-f8", *SMALL, "--set", UNIFORM, "-o", str(tmp_path / "out"), "-q"]
     for command in ("run", "accuracy", "run"):
         done = CliRunner().invoke(app, [command, *arguments])

@@ -9,7 +9,6 @@ from making import camera, radiance_for
 from typer.testing import CliRunner
 
 from vcam_cli import simulate
-from vcam_cli.camera import support
 from vcam_cli.commands.main import app
 from vcam_cli.engine import scheduled
 from vcam_cli.scheduling.objective import Sensor, expected_snr
@@ -143,8 +142,6 @@ def test_readout_and_reset_noise_count(tmp_path):
     assert pixel.well == frame.electrical.saturation
 
 
-def test_nothing_of_it_is_unsupported(tmp_path):
-    assert support.unsupported(camera(tmp_path, asked())) == []
 
 
 def test_a_run_says_the_times(tmp_path):

@@ -8,6 +8,7 @@ import copy
 import random
 import re
 from collections.abc import Iterator
+from functools import cache
 from typing import Any
 
 import yaml
@@ -55,7 +56,7 @@ def harmed(text: str, seed: int) -> bytes:
     chance = random.Random(seed)
     data = text
     if chance.random() < 0.85:
-        tree = yaml.load(text, yaml.BaseLoader)
+        tree = copy.deepcopy(_read(text))
         for _ in range(chance.choice((1, 1, 1, 2))):
             tree = _in_tree(tree, chance)
         data = _dumped(tree)
@@ -66,6 +67,11 @@ def harmed(text: str, seed: int) -> bytes:
     if chance.random() < 0.04:
         out = _in_bytes(out, chance)
     return out
+
+
+@cache
+def _read(text: str) -> Any:
+    return yaml.load(text, getattr(yaml, "CBaseLoader", yaml.BaseLoader))
 
 
 def _in_tree(tree: Any, chance: random.Random) -> Any:
@@ -132,7 +138,10 @@ def _dumped(tree: Any) -> str:
     return re.sub(r": '([-+.0-9][^'\n]*)'$", r": \1", text, flags=re.MULTILINE)
 
 
-class _Plain(yaml.SafeDumper):
+_DUMPER: Any = getattr(yaml, "CSafeDumper", yaml.SafeDumper)
+
+
+class _Plain(_DUMPER):
     def ignore_aliases(self, data: Any) -> bool:
         return True
 

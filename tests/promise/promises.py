@@ -22,7 +22,7 @@ from vcam_cli.engine import plan
 from vcam_cli.engine.prepare import Prepared
 from vcam_cli.files.png import write_png
 from vcam_cli.studies import ablation
-from vcam_cli.studies.accuracy import changes, converged
+from vcam_cli.studies.accuracy_reference import changes, converged
 from vcam_cli.studies.simulate import prepare
 
 PRESETS = ("draft", "standard", "reference")
@@ -261,7 +261,7 @@ def made(name: str, folder: Path, *sets: str) -> Camera:
     """One of the cameras, read from a file as a user's are."""
     import yaml
 
-    _pictures(folder)
+    picture_files(folder)
     tree = _merged(yaml.safe_load(COMMON), yaml.safe_load(CAMERAS[name]))
     if "auto" in tree["exposure"]:
         del tree["exposure"]["time"]
@@ -282,7 +282,7 @@ def _merged(base: dict, over: dict) -> dict:
     return out
 
 
-def _pictures(folder: Path) -> None:
+def picture_files(folder: Path) -> None:
     """Pictures with the spectrum of natural ones, 1 / f: color.png and gray.png."""
     if (folder / "color.png").exists():
         return
@@ -335,7 +335,7 @@ def kept(camera: Camera, true: Truth) -> Iterator[Kept]:
     for preset in PRESETS:
         auto = prepare(_at(camera, preset))[0]
         mean = ablation.rms(ablation.mean_raw(auto) - true.mean) / true.full
-        lost = max(_variance_lost(auto, true, scope) for scope in ("frame", "sensor"))
+        lost = variance_lost_of(auto, true.found, true.full)
         yield Kept(preset, auto.settings.tolerance, mean, lost)
 
 
@@ -343,13 +343,20 @@ def _at(camera: Camera, preset: str) -> Camera:
     return camera.model_copy(update={"accuracy": type(camera.accuracy)(preset=preset)})
 
 
-def _variance_lost(auto: Prepared, true: Truth, scope: str) -> float:
-    """Largest relative change of the variance, as the effects state it, with what is left out."""
+def variance_lost_of(auto: Prepared, found: Prepared, full: float) -> float:
+    """Largest relative change of a variance, as the effects state it, with what is left out.
+
+    found: the camera with everything on; full: its full signal [electrons].
+    """
+    return max(_variance_lost(auto, found, full, scope) for scope in ("frame", "sensor"))
+
+
+def _variance_lost(auto: Prepared, found: Prepared, full: float, scope: str) -> float:
     worst = 0.0
-    missing = (true.found.dark_rate - auto.dark_rate) * auto.exposure_time
+    missing = (found.dark_rate - auto.dark_rate) * auto.exposure_time
     for share in plan.LEVELS:
-        level = share * true.full
-        everything = _variance(true.found, scope, level)
+        level = share * full
+        everything = _variance(found, scope, level)
         change = _variance(auto, scope, max(0.0, level - missing)) - everything
         worst = max(worst, abs(change) / everything if everything else 0.0)
     return worst

@@ -3,6 +3,7 @@
 import pytest
 from promises import CAMERAS, estimates, idle_work, kept, made, truth, worth_leaving_out
 
+import random_cameras
 from vcam_cli.effects.order import ORDER
 from vcam_cli.studies import ablation
 
@@ -38,6 +39,16 @@ def test_draws_not_worth_their_cost_are_off(case):
 
 def test_nobody_asks_for_nothing_is_done(case):
     assert all(left_out for _, left_out in idle_work(case[0]))
+
+
+@pytest.mark.parametrize("number", [0, 4])
+def test_random_cameras_keep_every_tolerance(number, tmp_path):
+    """A chart and a photograph, of the forty of `make promise`."""
+    camera = random_cameras.made(number, tmp_path)
+    assert ablation.wanted(camera) == [kind.name for kind in ORDER]
+    for found in random_cameras.held(camera):
+        assert found.mean <= found.tolerance, found
+        assert found.variance <= 2 * found.tolerance, found
 
 
 def test_cameras_with_every_effect(tmp_path):

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from vcam_cli.scheduling import candidates, noisy, refine, rewards
 from vcam_cli.scheduling.chain import row_maxima
-from vcam_cli.scheduling.objective import SHOT, Constraints, Sensor, expected_snr
+from vcam_cli.scheduling.objective import SHOT, Constraints, Sensor, expected_snr, shortest
 from vcam_cli.scheduling.pdf import Pdf
 
 DATA = json.loads((Path(__file__).parents[1] / "data/capture_schedules_noise.json").read_text())
@@ -255,3 +255,37 @@ def test_mistakes_are_said():
     with pytest.raises(ValueError, match="frame"):
         noisy.optimal(THREE, [3], NOISY, Constraints(frame_time=2.0))
     assert noisy.optimal(THREE, [], NOISY) == {}
+
+
+HIDDEN = [
+    (Pdf.uniform(0, 1), Sensor(20000, dark=1e6)),
+    (Pdf.uniform(0, 1), Sensor(1e-3, read=1000)),
+    (Pdf.segments([0, 0.5], [0.1, 1], [0.9, 0.1]), Sensor(2000, dark=1e4, read=30)),
+]
+
+
+@pytest.mark.parametrize(("pdf", "sensor"), HIDDEN)
+@pytest.mark.parametrize("gap", [0.0, 0.1])
+def test_a_signal_that_noise_hides_keeps_its_certificate(pdf, sensor, gap):
+    """No larger than the candidates' ratio squared less 1, and no schedule tried exceeds it."""
+    start = shortest(pdf, sensor)
+    limits = Constraints(min_gap=gap * start)
+    found = noisy.optimal(pdf, [3], sensor, limits)[3]
+    # half of the candidates are geometric, and those near 0 are cut at 1e-9 of the pixels
+    assert found.gap <= (1e9 ** (2 * 2 / candidates.SIZE) - 1) * 1.05
+    last = sensor.well / max(sensor.dark, 1e-6)
+    tried = np.concatenate([np.geomspace(start, last, 15), np.linspace(start, last, 15)])
+    spaced = [start + gap * start, start + 2 * gap * start]
+    best = brute_force(pdf, np.unique([*tried, *spaced, *found.times]), 3, sensor, gap * start)
+    assert best <= found.expected_snr * (1 + found.gap + 1e-12)
+
+
+def test_segments_as_narrow_as_rounding_are_seen():
+    """well / t - dark falls short of the end of such a segment by more than its width."""
+    pdf = Pdf.histogram([0.5, np.nextafter(0.5, 1), 0.9, np.nextafter(0.9, 1)], [3, 0, 2])
+    found = noisy.optimal(pdf, [1, 2], NOISY)
+    chains = refine.best_chains(pdf, found[2].times, NOISY, Constraints(), 2)
+    for count in (1, 2):
+        assert chains.best(count) == pytest.approx(found[count].expected_snr, rel=1e-9)
+        levels = noisy.optimal(Pdf.levels([0.5, 0.9], [3, 2]), [count], NOISY)[count]
+        assert found[count].expected_snr == pytest.approx(levels.expected_snr, rel=1e-9)

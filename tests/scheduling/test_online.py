@@ -234,3 +234,32 @@ def test_levels_of_the_dark_and_of_even_light():
     assert (some.low.tolist(), some.probability.tolist()) == ([0.0, 5.0], [0.5, 0.5])
     huge = levels(np.array([1e-30, 1.0]))
     assert huge.low.tolist() == [1e-30, 1.0]
+
+
+@pytest.mark.parametrize(
+    "limits", [Constraints(0, 2e-3), Constraints(5e-3), Constraints(5e-3, 2e-3)]
+)
+def test_a_search_keeps_what_the_readout_demands(limits):
+    """The first guess, 1e-4 of the longest exposure, is shorter than a frame."""
+    light = scene(5000) / 1e3
+    assert 1e-4 * SENSOR.max_time < 2e-3
+    rows = online.online(light, SENSOR, [1, 5], constraints=limits, runs=1)
+    assert {row.start for row in rows} == {"known", "unknown"}
+    assert all(np.isfinite(row.loss_db) for row in rows)
+    start = Start(1e-4 * SENSOR.max_time)
+    searching, found = online.schedules(light, SENSOR, 5, start, 1, limits)
+    assert searching >= 1
+    for times in found:
+        if limits.frame_time:
+            frames = times / limits.frame_time
+            np.testing.assert_allclose(frames, np.round(frames), rtol=1e-9)
+            assert frames[0] >= 1
+        assert np.all(np.diff(times) >= limits.min_gap * (1 - 1e-9))
+        assert times[-1] <= SENSOR.max_time * (1 + 1e-12)
+
+
+def test_light_beyond_all_measure_saturates():
+    """More electrons than NumPy's Poisson numbers reach."""
+    pixels = online.Integration(np.array([1.0, 1e25]), SENSOR, np.random.default_rng(1))
+    pixels.read(1e-3)
+    assert pixels.saturated[0].tolist() == [False, True]

@@ -206,3 +206,26 @@ def test_mistakes_are_said():
     with pytest.raises(ValueError, match="above 0"):
         weighted.expected_snr(THREE, [0.0, 1.0], LOW_LIGHT)
     assert weighted.optimal(THREE, [], LOW_LIGHT) == {}
+
+
+@pytest.mark.parametrize("limits", [Constraints(), Constraints(frame_time=0.01)])
+def test_reset_noise_alone_has_a_bound(limits):
+    """A difference of two captures is free of it: the bound's noise is 0 but for the first."""
+    pdf, sensor = Pdf.uniform(0, 1e5), Sensor(20000, 0, 0, 15, 1.0)
+    found = weighted.optimal(pdf, [3], sensor, limits)[3]
+    assert 0 <= found.gap < 0.05
+    bound = weighted.upper_bound(pdf, 3, sensor, limits)
+    assert found.expected_snr <= bound
+    # as if there were no reset noise, and no less than what the last sample alone is worth
+    last = noisy.optimal(pdf, [3], sensor, limits)[3].expected_snr
+    free = noisy.optimal(pdf, [3], Sensor(20000, max_time=1.0), limits)[3].expected_snr
+    assert last < found.expected_snr < free
+
+
+def test_the_bound_sees_segments_as_narrow_as_rounding():
+    pdf = Pdf.segments([0.5, 0.9], [np.nextafter(0.5, 1), np.nextafter(0.9, 1)], [3, 2])
+    sensor = Sensor(20000, 20, 10, 15)
+    levels = Pdf.levels([0.5, 0.9], [3, 2])
+    for count in (1, 2):
+        expected = weighted.upper_bound(levels, count, sensor)
+        assert weighted.upper_bound(pdf, count, sensor) == pytest.approx(expected, rel=1e-3)

@@ -8,9 +8,11 @@ from making import camera, radiance_for
 
 from vcam_cli import simulate
 from vcam_cli.effects.order import ORDER
-from vcam_cli.studies import ablation
+from vcam_cli.studies import ablation, accuracy_reference, accuracy_shots
 from vcam_cli.studies import accuracy as study
-from vcam_cli.studies.accuracy import COLUMNS, Point, recommend
+from vcam_cli.studies.accuracy_advice import coarser, recommend
+from vcam_cli.studies.accuracy_knobs import KNOBS
+from vcam_cli.studies.accuracy_points import COLUMNS, Point
 from vcam_cli.studies.simulate import prepare
 
 DARK = "pixel.photodetector.dark_current"
@@ -34,8 +36,8 @@ NOISY = {
 def measured(tmp_path_factory):
     made = camera(tmp_path_factory.mktemp("study"), NOISY)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(study, "ROUNDS", 2)
-        patch.setattr(study, "MOST_BYTES", 5e7)
+        patch.setattr(accuracy_shots, "TURNS", 1)
+        patch.setattr(accuracy_reference, "MOST_BYTES", 5e7)
         return study.accuracy(made, workers=1)
 
 
@@ -45,12 +47,38 @@ def of(found, knob: str) -> dict[str, Point]:
 
 def test_every_preset_knob_and_effect_is_there(measured):
     knobs = {p.knob for p in measured.points}
-    assert {"preset", "effects", "wavelength_step", "oversampling", "float_width"} <= knobs
+    assert {"preset", "tolerance", "effects", "file"} <= knobs
+    assert {knob.name for knob in KNOBS} == (knobs | set(measured.absent)) & {
+        knob.name for knob in KNOBS
+    }
+    assert set(measured.absent) == {"vignetting_points", "spectral_rank", "field_zones"}
+    assert set(of(measured, "tolerance")) == {"1 %", "0.1 %"}
     assert set(of(measured, "preset")) == {"draft", "standard", "reference"}
-    assert set(of(measured, "effects")) == {"auto", "all"}
+    assert set(of(measured, "effects")) == {"all"}
     assert {k.removeprefix("effect:") for k in knobs if k.startswith("effect:")} == {
         kind.name for kind in ORDER if kind.name in {e.name for e in measured.effects}
     }
+
+
+def test_a_knob_at_its_finest_has_no_error_of_its_own(measured):
+    """And each coarser setting more; noise has no mean, so its model none at all."""
+    assert of(measured, "float_width")["64"].max_error == 0
+    assert 0 < of(measured, "float_width")["32"].rms_error < 1e-5
+    assert all(p.max_error == 0 for p in of(measured, "shot_noise").values())
+    for knob in ("oversampling", "table_size"):
+        errors = [p.rms_error for p in of(measured, knob).values()]
+        assert errors[-1] < errors[0] / 3
+
+
+def test_the_reference_says_how_good_it_is(measured):
+    """Its preset's tolerance is 2e-4, a tenth of which is what its spectrum may lose."""
+    assert 0 < measured.reference.lost < 2e-5
+
+
+def test_renders_are_compared_where_there_are_some(measured):
+    assert all(p.mean_s_cielab >= 0 for p in measured.points)
+    assert of(measured, "float_width")["64"].mean_s_cielab == 0
+    assert of(measured, "effect:shot_noise")["off"].mean_s_cielab > 0.1  # 1/sqrt(2000) of noise
 
 
 def test_presets_keep_their_tolerance_and_rise_in_accuracy(measured):
@@ -119,7 +147,7 @@ def test_variance_shares_are_what_frames_have(tmp_path):
 
 
 def point(knob: str, setting: str, error: float, seconds: float, variance: float = 0.0) -> Point:
-    return Point(knob, setting, error, error, error, seconds, 0.0, None, (), variance)
+    return Point(knob, setting, error, error, error, seconds, 0.0, variance_lost=variance)
 
 
 OWN = point("file", "as it is", 0.001, 1.0)
@@ -133,8 +161,20 @@ OWN = point("file", "as it is", 0.001, 1.0)
         ([OWN, point("preset", "draft", 0.001, 0.5, variance=0.02)], "accuracy: standard"),
         ([OWN, point("preset", "draft", 0.001, 0.95)], "accuracy: standard"),
         (
-            [OWN, point("preset", "draft", 0.004, 0.8), point("oversampling", "2", 0.003, 0.4)],
-            "accuracy: {preset: standard, oversampling: 2}",
+            [
+                OWN,
+                point("preset", "draft", 0.004, 0.8),
+                point("combined", "oversampling: 2, wavelength_step: 40 nm", 0.003, 0.4),
+            ],
+            "accuracy: {preset: standard, oversampling: 2, wavelength_step: 40 nm}",
+        ),
+        (  # alone its knob would do, but nothing is said of all of it
+            [OWN, point("oversampling", "2", 0.003, 0.4)],
+            "accuracy: standard",
+        ),
+        (
+            [OWN, point("tolerance", "1 %", 0.004, 0.5)],
+            "accuracy: 1 %",
         ),
         (
             [point("file", "as it is", 0.009, 1.0), point("preset", "reference", 1e-4, 9.0)],
@@ -147,7 +187,27 @@ def test_recommended_is_the_fastest_that_keeps_the_tolerance(points, line, tmp_p
     found = recommend(made, tuple(points))
     assert found.line == line and line in found.sentence
     pasted = camera(tmp_path, {"accuracy": _read(line)})
-    assert pasted.accuracy.tolerance in (0.02, 0.005, 0.0002)
+    assert pasted.accuracy.tolerance in (0.02, 0.01, 0.005, 0.0002)
+
+
+def test_knobs_are_made_coarser_where_they_save_time_and_lose_little(tmp_path):
+    made = camera(tmp_path, {"accuracy": "standard"})
+    points = (
+        OWN,
+        point("oversampling", "1", 0.004, 0.2),  # more than half of 0.5 %
+        point("oversampling", "2", 0.002, 0.5),
+        point("table_size", "64", 1e-4, 0.97),  # saves too little
+        point("wavelength_step", "80 nm", 0.001, 0.5),  # more than a tenth
+        point("wavelength_step", "20 nm", 1e-4, 0.8),
+        point("shot_noise", "gaussian", 0.0, 0.1),  # not the same noise
+    )
+    assert coarser(made, points) == {"wavelength_step": "20 nm", "oversampling": 2}
+
+
+def test_a_saving_within_the_spread_is_none(tmp_path):
+    made = camera(tmp_path, {"accuracy": "standard"})
+    shaky = Point("preset", "draft", 0.001, 0.001, 1.0, 0.8, 0.6)
+    assert recommend(made, (OWN, shaky)).line == "accuracy: standard"
 
 
 def _read(line: str):

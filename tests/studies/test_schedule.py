@@ -401,6 +401,10 @@ def test_hard_pdfs_have_plain_answers(pdf, sensor):
         ("histogram", "low,high,count\n0,1\n", "h.csv:2: has 2 columns"),
         ("levels", "level,count\n0,3\n", "no photocurrent is above 0"),
         ("levels", "level,count\n-1,3\n", "h.csv:2: '-1,3': a level is negative"),
+        ("levels", "level,count\n1,3\n1e300,3\n", "h.csv:3: '1e+300,3': a photocurrent is above"),
+        ("levels", "level,count\n1e-300,3\n1,3\n", "h.csv:2: '1e-300,3': a photocurrent is below"),
+        ("histogram", "low,high,count\n0,1e99,1\n", "a photocurrent is above 1e+30; write it in a"),
+        ("histogram", "low,high,count\n0,1e-99,1\n0.5,1,1\n", "write 0, or use a smaller unit"),
     ],
 )
 def test_mistakes_of_a_table(kind, text, said):
@@ -445,3 +449,53 @@ def test_plots_are_the_same_bytes_for_the_same_numbers(monkeypatch, folder):
     again = folder / "again.png"
     schedule_tables.writers(found)["captures.png"](again)
     assert again.read_bytes() == plots["captures.png"]
+
+
+def test_nothing_that_can_be_told_from_noise_is_an_error():
+    pdf = {"uniform": {"min": 0, "max": "1e-45 e/s"}}
+    sensor = {"well_capacity": "1e-40 e", "dark_current": "1e30 e/s", "read_noise": "1e9 e"}
+    assert "sensor: E[SNR] of a single capture is" in problem(pdf=pdf, sensor=sensor)
+
+
+def test_a_level_is_one():
+    (note,) = run(pdf={"levels": {"file": table("l.csv", "level,count\n0,4\n3,5\n")["file"]}}).notes
+    assert (
+        note == "there is 1 level of light: of more captures than that, 1 is used, the rest repeat"
+    )
+
+
+def test_a_readout_in_frames_may_be_planned_online():
+    """Nothing known: the first guess is shorter than a frame."""
+    limits = {"frame_time": "5 ms"}
+    changes = {"sensor": SENSOR | {"max_time": "1 s"}, "constraints": limits}
+    found = run(pdf={"uniform": LIT}, counts=[3], online=True, **changes)
+    assert {row.start for row in found.online} == {"known", "unknown"}
+
+
+@pytest.mark.parametrize(
+    ("pdf", "wide"),
+    [
+        (Pdf.uniform(0, 1), False),
+        (Pdf.segments(*np.array(THREE).T), False),
+        (Pdf.segments([0, 0.02, 0.9], [0.02, 0.03, 1], [0.6, 0.3, 0.1]), True),
+        (Pdf.levels([0.001, 1], [3, 2]), True),
+        (Pdf.levels([0.001, 1], [2, 3]), False),
+    ],
+)
+def test_an_axis_is_logarithmic_where_most_pixels_are_dark(pdf, wide):
+    assert pdf_plots.is_wide(pdf) is wide
+
+
+def test_an_outline_is_smooth_over_many_decades():
+    x, _ = pdf_plots.outline(Pdf.uniform(1e-6, 1), 1e-6, True)
+    assert np.max(x[2:-1] / x[1:-2]) < 10 ** (1 / 20)
+
+
+def test_what_real_pixels_lose_on_levels_is_told():
+    levels = {"levels": table("l.csv", "level,count\n500,1\n5000,1\n50000,1\n")}
+    (note,) = run(pdf=levels, counts=[3], sensor=SENSOR).notes
+    # two of three levels are read at a tenth of the time in one pixel of two, the third is lost
+    lost = float(note.split(" % off")[0].split()[-1])
+    assert lost == pytest.approx(100 * (1 - (2 / 5.5 + 1 / 2) / 3), rel=0.05)
+    assert run(pdf={"uniform": LIT}, counts=[3], sensor=SENSOR).notes == ()
+    assert run(pdf=levels, counts=[3]).notes == (), "without a sensor there are no electrons"

@@ -17,7 +17,8 @@ from vcam_cli.files import frames_plots
 from vcam_cli.files.exr import read_exr
 from vcam_cli.files.folder import OutputFolder
 from vcam_cli.files.images import read_picture
-from vcam_cli.studies import schedule_frames
+from vcam_cli.scheduling.objective import Sensor
+from vcam_cli.studies import photocurrents, schedule_frames
 from vcam_cli.studies.schedule import schedule
 from vcam_cli.studies.simulate import prepare
 
@@ -157,6 +158,31 @@ def test_a_camera_that_takes_one_sample_is_refused(asked, tmp_path):
     single = camera(tmp_path, SCENE | {"exposure": {"time": "5 ms"}})
     with pytest.raises(BadInput, match="single sample"):
         schedule_frames.frames(asked, single)
+
+
+def test_that_is_told_before_any_light_is_simulated(tmp_path, monkeypatch):
+    def simulated(*_):
+        raise AssertionError("light was simulated")
+
+    monkeypatch.setattr(photocurrents, "photocurrents", simulated)
+    study = tmp_path / "study.yaml"
+    study.write_text("kind: schedule\npdf: {camera: starter}\ncounts: [2]\nframes: {count: 2}\n")
+    with pytest.raises(BadInput, match=r"study.yaml:4:9: frames.camera: takes a single sample"):
+        schedule(study, tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.parametrize(
+    ("count", "longest"), [(1, 0.2), (4, 1e-6), (2, 1.0), (4, 1e-3 * (1 + 1e-9))]
+)
+def test_the_heuristic_takes_what_the_readout_allows(count, longest):
+    """One capture, or none that any pixel saturates, are as many as there is light for."""
+    rate = np.linspace(1e3, 2e7, 100, dtype=np.float32)[:, None]
+    sensor = Sensor(20e3 * (1 + 1e-9), max_time=longest)
+    times = schedule_frames._heuristic(rate, count, 3, sensor)
+    assert 1 <= times.size <= count
+    assert np.all(times <= longest) and np.all(np.isfinite(times))
+    assert times.min() == pytest.approx(min(1e-3, longest), rel=1e-6)
 
 
 def test_an_array_of_colors_is_refused(asked, tmp_path):

@@ -83,21 +83,12 @@ def key(
     example: Any,
     default: Any = ...,
     unit: str = "",
-    not_yet: bool | tuple[str, ...] = False,
     **more: Any,
 ) -> Any:
-    """A key of a camera file.
-
-    `unit` is the unit a user may write ("" = dimensionless or no number); `not_yet`: True where
-    any value but the default is not built yet, or the words that are not.
-    """
-    extra: dict[str, Any] = {"unit": unit}
-    if not_yet:
-        extra["not_yet"] = list(not_yet) if isinstance(not_yet, tuple) else True
+    """A key of a camera file; `unit` is the one a user may write ("" = none, or no number)."""
+    about: dict[str, Any] = {"description": description, "examples": [example]}
     make = {"default_factory": default} if callable(default) else {"default": default}
-    return Field(
-        **make, description=description, examples=[example], json_schema_extra=extra, **more
-    )
+    return Field(**make, **about, json_schema_extra={"unit": unit}, **more)
 
 
 def exactly_one(*keys: str, of: str, remedy: str, unless: tuple[str, ...] = ()) -> Rule:

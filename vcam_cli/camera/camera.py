@@ -11,7 +11,7 @@ from vcam_cli.camera.architecture import ARCHITECTURES, article
 from vcam_cli.camera.array import Array
 from vcam_cli.camera.base import Model, key
 from vcam_cli.camera.display import Display
-from vcam_cli.camera.explain import failure, fault, one_of, shown
+from vcam_cli.camera.explain import failure, fault, one_of, repeats, shown
 from vcam_cli.camera.exposure import Exposure
 from vcam_cli.camera.optics import Optics
 from vcam_cli.camera.pixel import Pixel
@@ -45,11 +45,11 @@ class Origin(Protocol):
 def _quality(given: Any) -> tuple[str, ...]:
     if not isinstance(given, (list, tuple)):
         raise ValueError(f"{shown(given)} is not a list of metrics; write for example [mse, psnr]")
-    mistakes = []
+    mistakes, twice = [], repeats(given)
     for i, item in enumerate(given):
         if item not in METRICS:
             mistakes.append(fault((i,), *one_of(item, METRICS), given=item))
-        elif item in given[:i]:
+        elif i in twice:
             mistakes.append(fault((i,), f"{item} comes twice", "keep one of them", item))
     if mistakes:
         raise failure(mistakes)

@@ -14,6 +14,8 @@ from vcam_cli.physics import readout
 
 NOMINAL_SWING = 1.0
 """Volts of a full well where the file gives no voltage; nothing that is counted depends on it."""
+LEAST_COUNT, MOST_COUNT = 1e-12, 1e12
+"""Electrons of a full well and of a step of the ADC: between them double precision tells codes."""
 
 
 @dataclass(frozen=True)
@@ -97,7 +99,7 @@ def electrical(camera: Camera) -> Electrical:
     reference = None
     if adc.kind == "logarithmic":
         reference = full_scale / 1000 if adc.reference is None else adc.reference
-    return Electrical(
+    found = Electrical(
         conversion_gain=gain,
         voltage_swing=swing,
         full_well=well,
@@ -108,6 +110,19 @@ def electrical(camera: Camera) -> Electrical:
         full_scale=full_scale,
         reference=reference,
     )
+    _check_counts(found)
+    return found
+
+
+def _check_counts(found: Electrical) -> None:
+    """Raises BadInput for a well, or a step of the ADC, of more or less than can be computed."""
+    for at, what, electrons in (
+        ("pixel.readout", "the full well is", found.full_well),
+        ("adc", "a step of the ADC is", found.electrons_per_dn),
+    ):
+        if not LEAST_COUNT <= electrons <= MOST_COUNT:
+            message = f"{what} {electrons:.3g} electrons"
+            raise bad(at, message, "look for a wrong unit in conversion_gain, swing or gain")
 
 
 def check(camera: Camera) -> None:

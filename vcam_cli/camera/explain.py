@@ -56,6 +56,22 @@ def sentences(error: ValidationError, model: type[BaseModel]) -> list[InitErrorD
     ]
 
 
+def repeats(items: Iterable[object]) -> frozenset[int]:
+    """Places of the items that came before, in a time that grows as their number does."""
+    seen: set[object] = set()
+    places = []
+    for place, item in enumerate(items):
+        try:
+            known = item in seen
+        except TypeError:  # a list or mapping of YAML
+            item = repr(item)
+            known = item in seen
+        if known:
+            places.append(place)
+        seen.add(item)
+    return frozenset(places)
+
+
 def shown(value: object) -> str:
     """What was given, short enough for a message."""
     if isinstance(value, bool):

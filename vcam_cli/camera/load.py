@@ -9,13 +9,21 @@ are reported at once: what is wrong in one section keeps back only the checks th
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cache, cached_property
 from pathlib import Path
 
 from pydantic import ValidationError
 
 from vcam_cli import errors
-from vcam_cli.camera import electrical, explain, falloff, geometry, photodiode, shipped, support
+from vcam_cli.camera import (
+    electrical,
+    explain,
+    falloff,
+    geometry,
+    named_spectra,
+    photodiode,
+    shipped,
+)
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.merge import merge
 from vcam_cli.camera.parts import Findings, Parts, existing, is_file, looks_like_path
@@ -29,15 +37,12 @@ EXAMPLE = "starter"
 Check = tuple[Callable[[Camera], None], str]
 """What raises BadInput for a camera that is wrong, and the sections that it needs to say so."""
 _CHECKS: tuple[Check, ...] = (
-    (support.check_spectra, "scene"),
+    (named_spectra.check_spectra, "scene"),
     (geometry.check, "scene optics pixel array"),
-)
-_OF_WHAT_IS_BUILT: tuple[Check, ...] = (
     (electrical.check, "pixel adc"),
     (falloff.check, "scene optics pixel array"),
     (photodiode.check, "pixel"),
 )
-"""Those that do not know the values that are not supported yet."""
 
 
 @dataclass(frozen=True)
@@ -125,6 +130,12 @@ def load(
     """
     start = folder or current_folder()
     return read(camera, start).overlaid(overlay(sets, start)).camera(checks)
+
+
+@cache
+def example() -> Camera:
+    """The shipped camera whose sections stand in for those that a file has wrong, read once."""
+    return load(shipped.find("cameras", EXAMPLE), folder=shipped.folder())
 
 
 def find(camera: str | Path, folder: Path, kind: str = "cameras") -> Path:
@@ -238,7 +249,7 @@ def _validated(tree: Node, origin: Origin, findings: Findings) -> tuple[Camera |
     wrong = {problem.path[0] for problem in problems if problem.path}
     findings.failed |= {(name,) for name in wrong}
     right = {name: section for name, section in value.items() if name not in wrong}
-    good = load(shipped.find("cameras", EXAMPLE), folder=shipped.folder())
+    good = example()
     needed = {n for n, field in Camera.model_fields.items() if field.is_required()} & wrong
     try:
         return Camera.model_validate(right | {name: getattr(good, name) for name in needed}), wrong
@@ -250,12 +261,7 @@ def _check(
     camera: Camera, origin: Origin, findings: Findings, wrong: set, more: Sequence[Check]
 ) -> None:
     """Finds all that a valid camera can still have wrong, but for its sections `wrong`."""
-    unsupported = support.unsupported(camera)
-    findings.add(unsupported, origin.locate)
-    unbuilt = wrong | {problem.path[0] for problem in unsupported}
-    checks = [check for check, needed in _CHECKS if not wrong & set(needed.split())]
-    for check, needed in (*_OF_WHAT_IS_BUILT, *more):
-        checks += [check] if not unbuilt & set(needed.split()) else []
+    checks = [check for check, needed in (*_CHECKS, *more) if not wrong & set(needed.split())]
     for check in checks:
         try:
             check(camera)

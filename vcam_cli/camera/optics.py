@@ -9,7 +9,7 @@ from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic_core import CoreSchema, InitErrorDetails, core_schema
 
 from vcam_cli.camera.base import Model, at_most_one, key
-from vcam_cli.camera.explain import failure, fault, shown
+from vcam_cli.camera.explain import failure, fault, repeats, shown
 from vcam_cli.camera.spectrum import Spectral, SpectrumSpec, flat
 from vcam_cli.camera.values import (
     File,
@@ -36,9 +36,9 @@ def _channels_differ(given: Mapping[str, Any]) -> Iterator[InitErrorDetails]:
     """Every wavelength of a point spread function has one channel."""
     listed = given.get("wavelengths")
     channels = listed if isinstance(listed, (list, tuple)) else ()
-    for i, item in enumerate(channels):
-        if item in channels[:i]:
-            yield fault(("wavelengths", i), f"{shown(item)} comes twice", "keep one of them", item)
+    for i in sorted(repeats(channels)):
+        message = f"{shown(channels[i])} comes twice"
+        yield fault(("wavelengths", i), message, "keep one of them", channels[i])
 
 
 class Psf(Model):
@@ -125,7 +125,7 @@ class Zernike:
             raise ValueError(f"{shown(given)} is no wavefront; write for example {{4: 0.05 um}}")
         placed = [self._placed(i, item) for i, item in enumerate(given)]
         fields = [field for field, _ in placed]
-        twice = [i for i, field in enumerate(fields) if field in fields[:i]]
+        twice = sorted(repeats(fields))
         if twice:
             wrong = [fault((i, "field"), f"{fields[i]:g} comes twice", _ONE_PLACE) for i in twice]
             raise failure(wrong)

@@ -67,13 +67,13 @@ def list_of(read: Callable[[Any], Any], example: str, least: int, what: str) -> 
             raise ValueError(f"{shown(given)} is not a list of {what}; write for example {example}")
         if len(given) < least:
             raise ValueError(f"is an empty list; write for example {example}")
-        found, mistakes = [], []
+        found, mistakes = {}, []  # a dict keeps the order and knows at once what it has
         for i, item in enumerate(given):
             try:
                 value = read(item)
                 if value in found:
                     raise ValueError(f"{shown(item)} comes twice; keep one of them")
-                found.append(value)
+                found[value] = i
             except ValidationError as error:
                 mistakes += [fault((i, *p.path), p.message, p.remedy) for p in problems(error)]
             except ValueError as error:

@@ -14,7 +14,7 @@ from typing import Any
 
 from pydantic import AliasChoices, BaseModel
 
-from vcam_cli.camera import explain, support
+from vcam_cli.camera import explain
 from vcam_cli.camera.base import Model
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.schedule_study import ScheduleStudy
@@ -146,22 +146,21 @@ def _models(model: type[BaseModel]) -> list[type[Model]]:
 
 
 def _dress(body: Schema, model: type[Model]) -> None:
-    """Titles with units, defaults as YAML writes them, second names, and what is not built yet."""
+    """Titles with units, defaults as YAML writes them, and second names."""
     defaults = model.model_construct().model_dump(mode="json")
     properties: Schema = {}
     for name, field in model.model_fields.items():
         key = str(field.alias or name)
         if key not in body["properties"]:
             key = name
-        one = {k: v for k, v in body["properties"][key].items() if k not in ("not_yet", "unit")}
+        one = {k: v for k, v in body["properties"][key].items() if k != "unit"}
         extra = field.json_schema_extra
         unit = extra.get("unit", "") if isinstance(extra, dict) else ""
         one["title"] = f"{key} [{unit}]" if unit else key
-        one["description"] = _described(field.description or "", support.not_yet(field))
+        one["description"] = _described(field.description or "")
         one.pop("default", None)  # an SI number; given again below, as YAML writes it
-        default, mark = defaults.get(key), support.not_yet(field)
-        unbuilt = isinstance(mark, list) and default in mark
-        if default is not None and not isinstance(default, dict) and not unbuilt:
+        default = defaults.get(key)
+        if default is not None and not isinstance(default, dict):
             one["default"] = default
         properties[key] = one
         if isinstance(field.validation_alias, AliasChoices):
@@ -172,11 +171,8 @@ def _dress(body: Schema, model: type[Model]) -> None:
     body["description"] = (model.__doc__ or "").strip().partition("\n\n")[0]
 
 
-def _described(text: str, mark: bool | list[str]) -> str:
-    text = text[:1].upper() + text[1:] + "."
-    if mark is True:
-        return f"{text} Not supported yet."
-    return f"{text} Not supported yet: {', '.join(mark)}." if mark else text
+def _described(text: str) -> str:
+    return text[:1].upper() + text[1:] + "."
 
 
 def _gather(node: Any, definitions: Schema) -> Any:

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Strict, create_model, model_validator
 
 from vcam_cli.camera.base import Model, at_most_one, key
-from vcam_cli.camera.explain import failure, fault, one_of, shown
+from vcam_cli.camera.explain import failure, fault, one_of, repeats, shown
 from vcam_cli.camera.values import Choice, Either, Number, Quantity, Whole
 
 EFFECTS = {
@@ -82,6 +82,14 @@ class Accuracy(Model):
     table_size: Annotated[int | None, Whole(least=16, most=2**20, example="4096")] = key(
         "entries of a table of transfer over spatial frequency", example=4096, default=None
     )
+    spectral_rank: Annotated[int | None, Whole(least=1, most=256, example="8")] = key(
+        "most mixtures that stand for the spectra of a scene", example=8, default=None
+    )
+    vignetting_points: Annotated[int | None, Whole(least=3, most=129, example="17")] = key(
+        "places along each half of the array at which a pixel's tunnel is integrated",
+        example=17,
+        default=None,
+    )
     field_zones: Annotated[int | None, Whole(least=2, most=65, example="9")] = key(
         "places from center to corner at which a blur that changes over the field is known",
         example=9,
@@ -122,6 +130,8 @@ KNOBS = (
     "wavelength_step",
     "oversampling",
     "table_size",
+    "spectral_rank",
+    "vignetting_points",
     "field_zones",
     "float_width",
     "shot_noise",
@@ -164,11 +174,11 @@ _CHANNELS = ("dn", "electrons", "volts")
 def _raw(given: Any) -> tuple[str, ...]:
     if not isinstance(given, (list, tuple)) or not given:
         raise ValueError(f"{shown(given)} is not a list of channels; write for example [dn]")
-    mistakes = []
+    mistakes, twice = [], repeats(given)
     for i, item in enumerate(given):
         if item not in _CHANNELS:
             mistakes.append(fault((i,), *one_of(item, _CHANNELS), given=item))
-        elif item in given[:i]:
+        elif i in twice:
             mistakes.append(fault((i,), f"{item} comes twice", "keep one of them", item))
     if mistakes:
         raise failure(mistakes)

@@ -29,6 +29,7 @@ _FORMS = (
     "0.95, a shipped name, {file: x.csv}, {table: {400: 0.1, 700: 0.3}}, {silicon: [0 um, 0.4 um]}"
     ", or a list of these"
 )
+MOST_FACTORS = 64
 _SLACK = 1e-9  # a product of factors may exceed its limit by rounding
 
 
@@ -213,7 +214,7 @@ def _largest(spectrum: spectra.Spectrum) -> float:
         return spectrum.scale
     start = max((t.start for t in spectrum.tables if t.outside == "error"), default=0.0)
     stop = min((t.stop for t in spectrum.tables if t.outside == "error"), default=1.0)
-    knots = np.concatenate([table.wavelength for table in spectrum.tables])
+    knots = np.unique(np.concatenate([table.wavelength for table in spectrum.tables]))
     knots = knots[(knots >= start) & (knots <= stop)]
     return float(spectrum.at(knots).max()) if knots.size else 0.0
 
@@ -262,6 +263,9 @@ class Spectral:
             return SpectrumSpec((self._factor(given),), self.most)
         if not given:
             raise ValueError(f"the list is empty; write {_FORMS}")
+        if len(given) > MOST_FACTORS:
+            message = f"{len(given)} spectra are multiplied, and at most {MOST_FACTORS} can be"
+            raise ValueError(f"{message}; write their product as one table")
         factors, mistakes = [], []
         for i, item in enumerate(given):
             try:

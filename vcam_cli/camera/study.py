@@ -11,7 +11,7 @@ from pydantic import model_validator
 from pydantic_core import InitErrorDetails
 
 from vcam_cli.camera.base import Model, exactly_one, key, together
-from vcam_cli.camera.explain import failure, fault, one_of, shown
+from vcam_cli.camera.explain import failure, fault, one_of, repeats, shown
 from vcam_cli.camera.study_expect import Expectation
 from vcam_cli.camera.study_expect import mistakes as mistakes_of_expectations
 from vcam_cli.camera.study_figures import Figure
@@ -72,7 +72,7 @@ def _list(given: Any) -> tuple[Any, ...]:
         raise ValueError(f"{shown(given)} is not a list of values; write for example [4 um, 6 um]")
     if not given:
         raise ValueError("is an empty list; give at least one value")
-    twice = [i for i, item in enumerate(given) if item in given[:i]]
+    twice = sorted(repeats(given))
     if twice:
         raise failure([fault((i,), f"{shown(given[i])} comes twice", "", given[i]) for i in twice])
     return tuple(given)
@@ -104,11 +104,11 @@ def words_of(allowed: tuple[str, ...], least: int) -> Any:
             raise ValueError(f"{shown(given)} is not a list; write for example [{allowed[0]}]")
         if len(given) < least:
             raise ValueError(f"is an empty list; write for example [{allowed[0]}]")
-        mistakes = []
+        mistakes, twice = [], repeats(given)
         for i, item in enumerate(given):
             if item not in allowed:
                 mistakes.append(fault((i,), *one_of(item, allowed), given=item))
-            elif item in given[:i]:
+            elif i in twice:
                 mistakes.append(fault((i,), f"{item} comes twice", "keep one of them", item))
         if mistakes:
             raise failure(mistakes)

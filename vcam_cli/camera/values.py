@@ -30,6 +30,12 @@ from vcam_cli.camera.explain import failure, fault, names, one_of, shown
 DEFINED = "x-definition"
 """In a JSON Schema: name, description and examples of a form that `schema` gathers."""
 NONE: Mapping[str, Any] = MappingProxyType({})
+LEAST_SIZE, MOST_SIZE = 1e-45, 1e45
+"""Sizes of numbers other than 0, in SI units: what is made of several of them stays a number.
+
+Nothing that a camera has comes near. What may be negative is added and not divided by, and may be
+as small as it likes.
+"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -89,6 +95,9 @@ class _Value(ABC):
             limit, how = (low, "more than") if value <= low else (self.least, "at least")
         elif (value >= high and high < math.inf) or value > self.most:
             limit, how = (high, "less than") if value >= high else (self.most, "at most")
+        elif MOST_SIZE < abs(value) < math.inf or (0 < value < LEAST_SIZE and not self.signed):
+            size = "large" if abs(value) > MOST_SIZE else "small"
+            raise ValueError(f"{shown(given)} is too {size} to compute with; write {self.hint}")
         else:
             return
         if limit == 0:

@@ -2,13 +2,14 @@
 
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from vcam_cli.commands import options
 from vcam_cli.commands.progress import Progress
 
 if TYPE_CHECKING:
     from vcam_cli.studies.accuracy import Study
+    from vcam_cli.studies.accuracy_points import Point
 
 SHARE_OF = {
     "of full signal": "full signal",
@@ -16,6 +17,14 @@ SHARE_OF = {
     "of the fixed-pattern variance": "fixed var.",
 }
 """Units of the plan, short enough for a table."""
+SETTINGS = (
+    "knob", "setting", "rms %", "largest %", "electrons", "S-CIELAB", "seconds", "spread",
+)  # fmt: skip
+EFFECTS = (
+    "effect", "state", "expected %", "measured %", "ratio", "share of", "S-CIELAB", "saves ms",
+)  # fmt: skip
+TOTAL = ("preset", "tolerance", "effects", "file", "combined")
+"""Rows whose error is that of all knobs together."""
 
 
 def accuracy(
@@ -38,7 +47,7 @@ def accuracy(
       vcam accuracy starter
       vcam accuracy camera.yaml -o out/knobs --set optics.f_number=8
     """
-    from vcam_cli.files import plots, report, tables
+    from vcam_cli.files import accuracy_plots, report, tables
     from vcam_cli.files.folder import OutputFolder
     from vcam_cli.studies import accuracy as study
     from vcam_cli.studies import outputs
@@ -52,7 +61,7 @@ def accuracy(
         found = study.accuracy(model, workers, progress)
         rows = (point.row for point in found.points)
         tables.write_table(folder.new("accuracy.csv"), study.COLUMNS, rows)
-        plots.pareto(folder.new("accuracy.png"), *pictured(found))
+        accuracy_plots.pareto(folder.new("accuracy.png"), *pictured(found))
         record = found.report() | {"camera": model.model_dump(mode="json")}
         folder.finish(record | {"versions": outputs.versions()})
     if as_json:
@@ -62,17 +71,16 @@ def accuracy(
 
 
 def pictured(found: "Study"):
-    """What `plots.pareto` takes: title, presets, curves, tolerance, panels."""
-    from vcam_cli.files.plots import Curve, Pair
+    """What `accuracy_plots.pareto` takes: title, presets, curves, tolerance, panels."""
+    from vcam_cli.files.accuracy_plots import Curve, Pair
 
-    def points(knob: str):
-        return tuple((p.seconds, p.rms_error, p.setting) for p in found.points if p.knob == knob)
+    def points(*knobs: str):
+        return tuple((p.seconds, p.rms_error, p.setting) for p in found.points if p.knob in knobs)
 
-    knobs = dict.fromkeys(p.knob for p in found.points if not p.knob.startswith("effect:"))
     curves = [
         Curve(knob.replace("_", " "), points(knob))
-        for knob in knobs
-        if knob not in ("preset", "file")
+        for knob in dict.fromkeys(p.knob for p in found.points if not p.effect)
+        if knob not in TOTAL and knob != "shot_noise"  # which changes no mean
     ]
     panels = []
     for label, wanted in (("of full signal", False), ("of the variance", True)):
@@ -84,71 +92,86 @@ def pictured(found: "Study"):
         if pairs:
             panels.append((f"change by leaving it out, {label}", pairs))
     tolerance = found.camera.accuracy.tolerance
-    return f"{found.camera.name}: error and time", points("preset"), curves, tolerance, panels
+    title = f"{found.camera.name}: what accuracy costs"
+    return title, points("preset", "tolerance"), curves, tolerance, panels
 
 
 def tell(found: "Study", path: Path) -> None:
     """The tables and the recommendation, on stdout."""
-    from rich import box
     from rich.console import Console
-    from rich.table import Table
 
     width = None if sys.stdout.isatty() else 120
     console = Console(width=width, soft_wrap=True, highlight=False)
-    style = box.SIMPLE_HEAD if console.is_terminal else None
-    for title, head, rows in (
-        ("", ("knob", "setting", "rms error", "largest", "electrons", "seconds", "spread"),
-         settings(found)),
-        ("what the plan expected of each effect, and what leaving it out did",
-         ("effect", "state", "expected", "measured", "ratio", "share of", "saves"), effects(found)),
-    ):  # fmt: skip
-        table = Table(title=title or None, title_justify="left", box=style, pad_edge=False)
-        for i, name in enumerate(head):
-            text = i < 2 or name == "share of"
-            table.add_column(name, justify="left" if text else "right", no_wrap=True)
-        for row in rows:
-            table.add_row(*row)
-        console.print(table)
-    expected = [p for p in found.points if p.knob == "file" and p.predicted is not None]
-    if expected:
-        p = expected[0]
-        console.print(
-            f"of the spectrum the plan expected to lose {p.predicted:.2e}; the file as it is"
-            f" is off by {p.rms_error:.2e} rms"
-        )
-    console.print(f"full signal: {found.reference.full_signal:.6g} electrons")
+    _table(console, "error against the converged reference; a knob's is its own", SETTINGS,
+           settings(found))  # fmt: skip
+    _table(console, "each effect left out: expected by the plan, and measured", EFFECTS,
+           effects(found))  # fmt: skip
+    for knob, why in found.absent.items():
+        console.print(f"{knob} does not apply: {why}")
+    reference = found.reference
+    console.print(
+        f"full signal: {reference.full_signal:.6g} electrons; the reference itself is good to"
+        f" {100 * reference.lost:.1g} % of it"
+    )
     console.print(f"recommended: {found.recommendation.sentence}")
     console.print(f"{path}/accuracy.csv, accuracy.png, accuracy.json")
 
 
+def _table(console: Any, title: str, head: tuple[str, ...], rows: list[tuple[str, ...]]) -> None:
+    from rich import box
+    from rich.table import Table
+
+    style = box.SIMPLE_HEAD if console.is_terminal else None
+    table = Table(title=title, title_justify="left", box=style, pad_edge=False)
+    for i, name in enumerate(head):
+        text = i < 2 or name == "share of"
+        table.add_column(name, justify="left" if text else "right", no_wrap=True)
+    for row in rows:
+        table.add_row(*row)
+    console.print(table)
+
+
 def settings(found: "Study") -> list[tuple[str, ...]]:
     """Rows of the first table."""
+    least = found.reference.lost
+
+    def rms(point: "Point") -> str:
+        unsure = point.knob in (*TOTAL, "oversampling") and point.rms_error < least
+        return f"<{100 * least:.1g}" if unsure else f"{100 * point.rms_error:.2g}"
+
     return [
         (
             p.knob,
             p.setting,
-            f"{p.rms_error:.2e}",
-            f"{p.max_error:.2e}",
-            f"{p.rms_electrons:.3g}",
-            f"{p.seconds:.3g}",
-            f"{p.seconds_spread:.2g}",
+            rms(p),
+            f"{100 * p.max_error:.2g}",
+            f"{p.rms_electrons:.2g}",
+            _looks(p.mean_s_cielab),
+            f"{p.seconds:.3f}",
+            f"{p.seconds_spread:.3f}",
         )
         for p in found.points
-        if not p.knob.startswith("effect:")
+        if not p.effect
     ]
 
 
 def effects(found: "Study") -> list[tuple[str, ...]]:
     """Rows of the second table."""
+    looks = {p.effect: p.mean_s_cielab for p in found.points if p.effect}
     return [
         (
             e.name,
             e.state,
-            "-" if e.predicted is None else f"{e.predicted:.2e}",
-            f"{e.measured:.2e}",
+            "-" if e.predicted is None else f"{100 * e.predicted:.2g}",
+            f"{100 * e.measured:.2g}",
             "-" if e.ratio is None else f"{e.ratio:.2f}",
             SHARE_OF.get(e.unit, e.unit),
-            f"{1000 * e.seconds_saved:.0f} ms",
+            _looks(looks[e.name]),
+            f"{1000 * e.seconds_saved:.0f}",
         )
         for e in found.effects
     ]
+
+
+def _looks(mean_s_cielab: float | None) -> str:
+    return "-" if mean_s_cielab is None else f"{mean_s_cielab:.2g}"

@@ -53,6 +53,8 @@ class PixelVignetting(Gain):
     """Whether the quantum efficiency is that of light in the silicon, without reflection."""
     tolerance: float
     """Of the mean signal, relative to full signal."""
+    points: int | None = None
+    """Along each axis of the quadrant; None: as many of `POINTS` as are needed."""
 
     name = "pixel_vignetting"
     reference = "Catrysse, Liu and El Gamal 2000, doi:10.1117/12.385460; Chen 2003, section 2.2.2"
@@ -75,6 +77,7 @@ class PixelVignetting(Gain):
             pixel_optics.follows_chief_ray(camera),
             camera.pixel.photodetector.quantum_efficiency.given is None,
             camera.accuracy.tolerance,
+            camera.accuracy.vignetting_points,
         )
 
     def describe(self) -> str:
@@ -124,7 +127,7 @@ def _series(effect: PixelVignetting) -> NDArray:
     The gain is good to a few 1e-5 where the light fades slowly. In cones so narrow and tunnels so
     deep that it ends within the field, to half of the tolerance, a tenth of it rms.
     """
-    for count in POINTS:
+    for count in (effect.points,) if effect.points else POINTS:
         points = chebyshev.chebpts1(count)
         x, y = (half * (1 + points) / 2 for half in (effect.half_width, effect.half_height))
         rows = (slice(i, i + ROWS) for i in range(0, count, ROWS))

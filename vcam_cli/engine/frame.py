@@ -131,8 +131,9 @@ class Frame(Prepared):
         well, highest = self.electrical.full_well, float(self.electrical.highest_code)
         if self.layout.joining.binning.kind == "voltage":
             well -= binning.SURE * self._noise_of_full
-        full = float(np.rint(self.code.line(np.array([well], float))[0]))
-        return self._summed * min(full, highest)
+        # In both float types: where the well lies half way between two codes they round apart.
+        codes = [self.code.apply(np.full(1, well, kind))[0] for kind in (np.float32, np.float64)]
+        return self._summed * float(min(*codes, highest))
 
     @property
     def _noise_of_full(self) -> float:

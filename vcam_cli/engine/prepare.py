@@ -126,7 +126,7 @@ def prepare(
         full = max(1.0, min(e.full_well, peak))
         outlook = Outlook(full, time, dark * time, camera.array.binning)
         here = _on_pixels(place, joins.collected(found.values), present, effects, time)
-        well = e.full_well / time - dark
+        well = min(e.full_well / time - dark, MOST_ELECTRONS)
         moved = np.minimum(rate, well) - np.minimum(taken, well)
         here |= {x.name: _rms(moved) for x in present if isinstance(x, Transport)}
         decided = plan.make(camera, g, knobs, outlook, needed, found.spectrum.changes | here)

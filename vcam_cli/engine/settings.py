@@ -37,6 +37,10 @@ class Settings:
     """32 or 64 bits."""
     shot_noise: str = "exact"
     """exact (Poisson) or gaussian (as the thesis has it)."""
+    spectral_rank: int | None = None
+    """Mixtures that stand for the scene's spectra, at most; None: as many as are needed."""
+    vignetting_points: int | None = None
+    """Places along each half of the array at which the tunnel is integrated; None: as needed."""
     tolerance: float = 0.005
     """What these settings are to keep, relative to full signal."""
 
@@ -44,7 +48,7 @@ class Settings:
     def dtype(self) -> type:
         return np.float64 if self.float_width == 64 else np.float32
 
-    def report(self) -> dict[str, float | int | str]:
+    def report(self) -> dict[str, float | int | str | None]:
         return asdict(self)
 
 

@@ -236,6 +236,8 @@ class Fineness:
     """of which so many are computed."""
     per_turn: float = PER_TURN
     """Steps over fx and fy computed while light at the blur's reach turns once."""
+    rank: int | None = None
+    """Mixtures at most, whatever the tolerance; None: as many as it takes."""
 
 
 def tabulate(exact: Transfer, fine: Fineness) -> Tables:
@@ -374,7 +376,8 @@ def mixtures(through: Sequence[Transfer], fine: Fineness) -> tuple[NDArray, floa
     exact = through[0]
     components, colors = exact.weights.shape[:2]
     every = np.eye(components)
-    if components <= max(colors, 3):
+    most = components if fine.rank is None else fine.rank
+    if components <= min(max(colors, 3), most):
         return every, 0.0
     table = np.concatenate([part for t in through for part in _samples(t, fine.top)], axis=1)
     directions = np.linalg.svd(table, full_matrices=False)[0].T
@@ -382,7 +385,7 @@ def mixtures(through: Sequence[Transfer], fine: Fineness) -> tuple[NDArray, floa
     for rank in range(1, components):
         mix = directions[:rank]
         error = float(np.abs(mix.T @ (mix @ table) - table).max() / peak)
-        if error <= fine.tolerance:
+        if error <= fine.tolerance or rank == most:
             return mix, error
     return every, 0.0
 

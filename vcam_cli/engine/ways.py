@@ -230,7 +230,8 @@ def cosines(
     widest = min(bandwidth.most(pixels, knobs), bandwidth.limit(g, cutoff))
     top = bandwidth.top(g, widest, cutoff)
     computed = EXACT_ENTRIES if knobs.float_width == 32 else knobs.table_size
-    fine = Fineness(top, knobs.table_size, knobs.mixing_tolerance, computed, knobs.plane_steps)
+    steps, rank = knobs.plane_steps, knobs.spectral_rank
+    fine = Fineness(top, knobs.table_size, knobs.mixing_tolerance, computed, steps, rank)
     modes: tuple[field.Mode, ...] = ()
     if zones := optics.zones:
         fine = replace(fine, tolerance=max(fine.tolerance, FIELD_SHARE * knobs.tolerance))

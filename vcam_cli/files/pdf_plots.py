@@ -19,7 +19,9 @@ from vcam_cli.files.plots import COLORS, STYLE
 from vcam_cli.scheduling.pdf import Pdf
 
 WIDE = 0.05
-"""Mean over largest photocurrent below which their axis is logarithmic."""
+"""Median over largest photocurrent below which their axis is logarithmic."""
+CURVE = 24
+"""Points of a segment's outline on a logarithmic axis, at least and for each decade."""
 DISPLAYED = 240
 """Bins of a pdf that is drawn, where it has more of its own."""
 FEW_LEVELS = 64
@@ -134,7 +136,11 @@ def write(path: Path | str, size: tuple[float, float], draw: Callable[[Any], Non
 
 def is_wide(pdf: Pdf) -> bool:
     """Whether photocurrents of a pdf want a logarithmic axis."""
-    return pdf.mean < WIDE * pdf.max
+    below = pdf.below(pdf.high)
+    middle = int(np.searchsorted(below, 0.5))
+    share = 1 - (below[middle] - 0.5) / pdf.probability[middle]
+    median = pdf.low[middle] + share * (pdf.high[middle] - pdf.low[middle])
+    return bool(median < WIDE * pdf.max)
 
 
 def ordinate(wide: bool) -> str:
@@ -190,7 +196,8 @@ def outline(pdf: Pdf, low: float, wide: bool) -> tuple[NDArray, NDArray]:
         start = max(float(start), low)
         if end <= start:
             continue
-        x = np.geomspace(start, end, 24) if wide else np.array([start, end])
+        points = int(CURVE * max(1.0, np.log10(end) - np.log10(start))) if wide and start else 2
+        x = np.geomspace(start, end, points) if wide else np.array([start, end])
         y = height * x * np.log(10) if wide else np.full(2, height)
         x_parts.append(np.concatenate([[start], x, [end]]))
         y_parts.append(np.concatenate([[0.0], y, [0.0]]))

@@ -50,10 +50,9 @@ def refracted_cosine(cosine: ArrayLike, index: ArrayLike, below: ArrayLike) -> F
     ValueError
         Total internal reflection; it cannot happen in layers that light enters from air.
     """
-    c = np.asarray(cosine, np.float64)
-    ratio = np.asarray(index, np.float64) / np.asarray(below, np.float64)
-    # 1 - ratio^2 sin^2 as a sum, which at grazing incidence does not cancel
-    square = (1 - ratio) * (1 + ratio) + (ratio * c) ** 2
+    c, n1, n2 = (np.asarray(v, np.float64) for v in (cosine, index, below))
+    # 1 - (n1 / n2)^2 sin^2 as a sum: at grazing incidence the difference would cancel.
+    square = ((n2 - n1) * (n2 + n1) + (n1 * c) ** 2) / n2**2
     if not (square >= 0).all():
         raise ValueError("the light is totally reflected")
     return np.sqrt(square)[()]

@@ -45,7 +45,7 @@ def psnr_of_mse(error: float, peak: float = 1.0) -> float:
     """
     if error == 0:
         return math.inf
-    return 10.0 * math.log10(peak**2 / error)
+    return 20.0 * math.log10(peak) - 10.0 * math.log10(error)  # the quotient may overflow
 
 
 def psnr_db(image: np.ndarray, ideal: np.ndarray, peak: float = 1.0) -> float:

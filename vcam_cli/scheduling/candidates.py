@@ -31,6 +31,7 @@ class Grid:
     begin: Floats  # (G,) earliest and latest time of a capture that is moved to this candidate,
     end: Floats  # where moving it costs at most `error` [s]
     error: float = 0.0  # mean SNR lost a capture
+    ratio: float = 1.0  # of neighboring times, at most; 1: moving a capture costs nothing
     tail: float = 0.0  # mean SNR of photocurrents that saturate in none of the candidates
     complete: bool = False  # a best schedule is among the candidates even under a least gap
 
@@ -151,7 +152,8 @@ def _cells(pdf: Pdf, sensor: Sensor, frame: float, times: Floats, tail: float) -
     begin[1:] = np.where(near, times[1:], times[:-1])
     end[:-1] = np.where(near, times[:-1], times[1:])
     error = float(lost.max(initial=0.0))
-    return Grid(times, begin, end, error, tail, complete=bool(near.all()))
+    ratio = float(np.max(np.where(near, 1.0, times[1:] / times[:-1]), initial=1.0))
+    return Grid(times, begin, end, error, ratio, tail, complete=bool(near.all()))
 
 
 def _darkest(pdf: Pdf, sensor: Sensor) -> tuple[float, float]:

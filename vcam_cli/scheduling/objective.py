@@ -106,7 +106,7 @@ def expected_snr(pdf: Pdf, times: ArrayLike, sensor: Sensor = SHOT) -> float:
     when = np.sort(np.atleast_1d(np.asarray(times, float)))
     if not (when[0] > 0 and np.isfinite(when[-1])):
         raise ValueError("capture times must be finite and above 0")
-    limits = _snapped(pdf, when, sensor)
+    limits = limits_of(pdf, when, sensor)
     low, high, probability = pieces(pdf, limits)
     last = np.searchsorted(-limits, -high, side="right") - 1
     seen = (last >= 0) & (high > 0)
@@ -158,7 +158,7 @@ def at(pdf: Pdf, times: ArrayLike, sensor: Sensor = SHOT, gap: float | None = No
     return Schedule(when, sensor.limit(when), expected_snr(pdf, when, sensor), gap)
 
 
-def _snapped(pdf: Pdf, times: Floats, sensor: Sensor) -> Floats:
+def limits_of(pdf: Pdf, times: Floats, sensor: Sensor) -> Floats:
     """The brightest photocurrent unsaturated in each time; an end that is `SLACK` above it is it.
 
     Where no end is near, the limit is exact: slack for all would add 1e-12 to every mean.

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from vcam_cli.scheduling.objective import SLACK, Sensor, mean_signal, pieces
+from vcam_cli.scheduling.objective import SLACK, TINY, Sensor, limits_of, mean_signal, pieces
 from vcam_cli.scheduling.pdf import Pdf
 
 Floats = NDArray[np.float64]
@@ -73,7 +73,7 @@ def _interpolation(noise: Floats) -> tuple[Floats, Indices, Floats]:
     """nodes (blocks, P), and for each of (M,) distinct c its block and weights (M, P)."""
     if len(noise) <= DEGREE:
         return noise[:, None], np.arange(len(noise)), np.ones((len(noise), 1))
-    depth = np.log(noise) / np.log(FACTOR)  # above 0: c = 0 only where no c depends on time
+    depth = np.log(np.maximum(noise, TINY)) / np.log(FACTOR)  # a bound may be free of noise
     blocks, block = np.unique(np.floor(depth), return_inverse=True)
     angles = np.pi * (np.arange(DEGREE) + 0.5) / DEGREE
     nodes = FACTOR ** (blocks[:, None] + (1 + np.cos(angles)) / 2)
@@ -89,7 +89,7 @@ def _cumulative(pdf: Pdf, times: Floats, sensor: Sensor, nodes: Floats) -> Float
 
     Summed from the dark end, where a schedule asks for the smallest differences.
     """
-    limits = sensor.limit(times)
+    limits = limits_of(pdf, times, sensor)
     low, high, probability = pieces(pdf, limits)
     if pdf.discrete:
         filled = sensor.well / times * (1 + SLACK)

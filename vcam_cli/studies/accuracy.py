@@ -68,7 +68,8 @@ class Study:
             "notes": [
                 "Errors are of the mean raw signal against the reference, relative to full signal.",
                 "A knob's error is its own, with all others converged.",
-                "mean_s_cielab is between the renders, noise included.",
+                "mean_s_cielab is between renders without noise; of an effect left out and of"
+                " shot_noise, with it.",
                 "Noise and rounding change no mean: their contribution is a share of the variance"
                 " at 1, 10 and 100 % of full signal, the largest of the three.",
                 "An effect left out is measured with everything else on.",
@@ -193,6 +194,7 @@ class _Measurement:
         """
         if moved is None:
             moved = error(shot.mean - other.mean)
+        noisy = knob.startswith("effect:") or knob == "shot_noise"
         return Point(
             knob=knob,
             setting=setting,
@@ -201,7 +203,7 @@ class _Measurement:
             rms_electrons=float(moved[0]),
             seconds=math.nan,
             seconds_spread=math.nan,
-            mean_s_cielab=shot.looks_from(other, self.workers),
+            mean_s_cielab=shot.looks_from(other, self.workers, noisy),
             predicted=shot.lost / self.full,
             left_out=shot.left_out,
             variance_lost=shot.variance_lost,

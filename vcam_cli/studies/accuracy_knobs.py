@@ -66,16 +66,16 @@ def _of(*values: Any) -> dict[str, Any]:
 
 
 KNOBS: tuple[Knob, ...] = (
-    Knob("wavelength_step", _of("80 nm", "40 nm", "20 nm", "10 nm", "5 nm"), "1 nm", _blurred),
-    Knob("oversampling", _of(1, 2, 3, 4, 6, 8), None, _spectrum),
-    Knob("table_size", _of(64, 256, 1024, 4096), 1 << 16, _table),
+    Knob("wavelength_step", _of("80 nm", "20 nm", "10 nm", "5 nm"), "1 nm", _blurred),
+    Knob("oversampling", _of(1, 2, 3, 4, 8), None, _spectrum),
+    Knob("table_size", _of(64, 512, 4096), 1 << 16, _table),
     Knob(
         "vignetting_points",
         _of(5, 9, 17, 33),
         65,
         _effect("pixel_vignetting", "no tunnel above the photodetector is described"),
     ),
-    Knob("spectral_rank", _of(1, 2, 3, 4, 6), None, _rank),
+    Knob("spectral_rank", _of(2, 3, 4, 6), None, _rank),
     Knob("field_zones", _of(2, 3, 4, 6), 8, _field),
     Knob(
         "shot_noise",

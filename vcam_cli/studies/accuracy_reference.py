@@ -49,25 +49,29 @@ class Reference:
     settings: dict[str, Any]
 
 
-def finest(camera: Camera, coarse: Prepared) -> Camera:
+def finest(camera: Camera, coarse: Prepared, most_bytes: float = 0) -> Camera:
     """The camera with everything on and every knob finer than its reference.
 
     coarse: the camera at `accuracy: reference`. Where its scene has a spectrum, it is followed
-    two and a half times as far as there, as long as memory is not the limit.
+    two and a half times as far as there, as long as so many bytes suffice; 0: `MOST_BYTES`.
     """
     knobs: dict[str, Any] = dict(FINEST)
     reached = coarse.spectrum.oversampling
     if reached:
-        samples = min(MOST_BYTES, memory.available() / 2) / 8 / max(1, coarse.spectrum.planes)
+        samples = (
+            min(most_bytes or MOST_BYTES, memory.available() / 2)
+            / 8
+            / max(1, coarse.spectrum.planes)
+        )
         most = int(math.sqrt(samples / _pixels(coarse)))
         wanted = min(math.ceil(FURTHER * reached), 64)
         knobs["oversampling"] = max(math.ceil(reached), min(wanted, most))
     return with_accuracy(ablation.switched(camera, "all"), tolerance=CONVERGED, **knobs)
 
 
-def converged(camera: Camera, coarse: Prepared, workers: int) -> Prepared:
+def converged(camera: Camera, coarse: Prepared, workers: int, most_bytes: float = 0) -> Prepared:
     """`finest`, with its light on the pixels."""
-    return prepare(finest(camera, coarse), workers)[0]
+    return prepare(finest(camera, coarse, most_bytes), workers)[0]
 
 
 def described(found: Prepared, coarse: Prepared, full: float, change: float) -> Reference:

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from vcam_cli.camera.camera import Camera
 from vcam_cli.engine.prepare import Prepared
 from vcam_cli.engine.stages import Observer
+from vcam_cli.processing import process
 from vcam_cli.quality import display
 from vcam_cli.quality.scielab import s_cielab_map
 from vcam_cli.studies import ablation
@@ -33,8 +34,10 @@ class Shot:
     ready: Prepared
     mean: NDArray
     """Noise-free raw signal [electrons]"""
-    render: NDArray | None
-    """(rows, columns, channels) linear light; None where there is no render to judge."""
+    clean: NDArray | None
+    """(rows, columns, channels) its render in linear light; None where there is none to judge."""
+    noisy: NDArray | None
+    """The same of the frame as it is, with its noise."""
 
     @property
     def lost(self) -> float:
@@ -56,13 +59,17 @@ class Shot:
                 by_scope[d.unit] = by_scope.get(d.unit, 0.0) + (d.contribution or 0.0)
         return max(by_scope.values(), default=0.0)
 
-    def looks_from(self, other: Shot, workers: int) -> float | None:
-        """Mean S-CIELAB between two renders, on the camera's display; None without renders."""
-        if self.render is None or other.render is None:
+    def looks_from(self, other: Shot, workers: int, noisy: bool = False) -> float | None:
+        """Mean S-CIELAB between two renders, on the camera's display; None without renders.
+
+        noisy: with their noise, which is alike only where both have as many bits.
+        """
+        one, two = (s.noisy if noisy else s.clean for s in (self, other))
+        if one is None or two is None:
             return None
         shown = self.ready.camera.display
-        screen = display.screen(shown, self.render.shape[1])
-        each = s_cielab_map(self.render, other.render, screen, shown.filters, workers=workers)
+        screen = display.screen(shown, one.shape[1])
+        each = s_cielab_map(one, two, screen, shown.filters, workers=workers)
         return float(each.mean(dtype=float))
 
 
@@ -126,7 +133,11 @@ def _shot(result: Result) -> Shot:
     """What is compared of a frame; its light and its noise are let go."""
     frame, processed = result.frame, result.processed
     shown = frame.camera.output.render and processed.full_color and processed.channels in (1, 3)
-    render = result.linear if shown else None
+    clean = None
+    if shown:
+        codes = np.minimum(frame.to_dn(frame.mean_electrons), frame.picture_saturated_dn)
+        steps = frame.camera.processing
+        clean = process(codes, processed.context, steps, workers=processed.workers).linear
     names = Prepared.__dataclass_fields__
     kept = {name: getattr(frame, name) for name in names} | {"rate": np.empty((0, 0))}
-    return Shot(Prepared(**kept), ablation.mean_raw(frame), render)
+    return Shot(Prepared(**kept), ablation.mean_raw(frame), clean, result.linear if shown else None)

@@ -10,7 +10,6 @@ from pathlib import Path
 from numpy.typing import NDArray
 
 from vcam_cli.camera import load as files
-from vcam_cli.camera import shipped
 from vcam_cli.camera.array import Positions
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.geometry import geometry

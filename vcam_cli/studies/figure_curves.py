@@ -253,7 +253,7 @@ def _nm(wavelength: float) -> float:
 
 
 def off_axis(planned: Planned) -> Made:
-    """What pixels along the diagonal collect, over the one on the axis."""
+    """What pixels along the diagonal collect, over pixels without a tunnel above them."""
     rows, curves = list[Row](), list[Curve]()
     falls, fades = False, False
     for number, view in enumerate(planned.views):
@@ -262,14 +262,14 @@ def off_axis(planned: Planned) -> Made:
         falls |= bool(np.ptp(found.falloff) > 0)
         fades |= bool(np.ptp(found.vignetting) > 0)
         label = called(planned, view)
-        curves.append(Curve(label, at, found.relative if fades else found.signal, number))
+        curves.append(Curve(label, at, found.vignetting if fades else found.falloff, number))
         if falls and fades:
-            curves.append(Curve("", at, found.signal, number, 1))
+            curves.append(Curve("", at, found.vignetting * found.falloff, number, 1))
         each = (at, found.relative, found.vignetting, found.falloff, found.signal)
         rows += [(*head(planned, view), *values) for values in zip(*each, strict=True)]
     panel = Panel(
         "distance from the center along the diagonal [mm]",
-        "relative quantum efficiency" if fades else "relative illumination",
+        "quantum efficiency / without tunnel" if fades else "relative illumination",
         tuple(curves),
         keys=("pixel vignetting", "with the lens's falloff") if falls and fades else (),
         ends=(float(curves[0].x[0]), float(curves[0].x[-1])),

@@ -238,7 +238,17 @@ class Planner:
         base = base.overlaid(tree).overlaid(self._over)
         for own in overrides:
             base = base.overlaid(nested(split(own), self._grid.study.node(*place, "set", own)))
-        return base.camera(CHECKS).model_copy(update={"name": case.replace("/", "-")})
+        try:
+            made = base.camera(CHECKS)
+        except BadInput as error:
+            raise BadInput(self._named(p, place) for p in error.problems) from None
+        return made.model_copy(update={"name": case.replace("/", "-")})
+
+    def _named(self, problem: Problem, place: tuple[str, ...]) -> Problem:
+        """With the key of the study that asks for the camera, where it stands in another file."""
+        if problem.where.startswith(f"{self._grid.study.file}:"):
+            return problem
+        return replace(problem, message=f"{problem.message} ({'.'.join(place)} of the study)")
 
     def _try(self, found: Planned) -> None:
         """Refuses what the closed forms do not know of the figure's cameras."""

@@ -22,7 +22,7 @@ import vcam_cli
 from vcam_cli.camera import shipped
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.load import FILE_KEYS
-from vcam_cli.camera.support import spectra
+from vcam_cli.camera.named_spectra import spectra
 from vcam_cli.engine import irradiance
 from vcam_cli.engine.frame import Frame
 from vcam_cli.files.exr import ExrWriter
@@ -156,8 +156,12 @@ def inputs(camera: Camera) -> tuple[Path, ...]:
     return tuple(sorted({*camera.files, *data_files(camera)}, key=str))
 
 
-def data_files(camera: Camera) -> tuple[Path, ...]:
-    """The files that a camera names: pictures, tables, spectra, those that ship among them."""
+def data_files(camera: Camera, form: dict[str, Any] | None = None) -> tuple[Path, ...]:
+    """The files that a camera names: pictures, tables, spectra, those that ship among them.
+
+    form: its YAML form, where it is at hand.
+    """
+    form = camera.model_dump(mode="json") if form is None else form
 
     def named(value: Any) -> Iterator[str]:
         if isinstance(value, dict):
@@ -176,7 +180,7 @@ def data_files(camera: Camera) -> tuple[Path, ...]:
         for factor in getattr(spec, "factors", ())
         if isinstance(factor, str)
     )
-    found = {*named(camera.model_dump(mode="json")), *shipped_spectra}
+    found = {*named(form), *shipped_spectra}
     if camera.scene.source.kind == "hyperspectral":
         found |= {str(path) for path in companions(camera.scene.source.file)}
     return tuple(Path(name) for name in sorted(found))

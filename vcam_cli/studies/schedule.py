@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -38,11 +37,10 @@ from vcam_cli.studies.schedule_methods import (
     find,
     sensor_of,
 )
+from vcam_cli.studies.schedule_notes import notes
 
 LEAST_SNR = 1e-200
 """Of a single capture: with less, products of what schedules are worth vanish in rounding."""
-WORTH_TELLING = 0.05
-"""Relative loss by an approximation from which on a user is told."""
 
 
 @dataclass(frozen=True)
@@ -130,6 +128,7 @@ def schedule(
     start = time.perf_counter()
     watch, tell = watch or Silent(), tell or (lambda _: None)
     read = schedule_file.read(study, sets, accuracy)
+    _check(read)
     place = Path(out) if out is not None else Path("out") / read.model.name
     with OutputFolder(place, RECORD, read.inputs) as folder:
         run = _Run(read, seed, workers, watch)
@@ -143,6 +142,16 @@ def schedule(
         result = replace(result, seconds=time.perf_counter() - start)
         folder.finish(_record(result))
     return result
+
+
+def _check(study: ScheduleFile) -> None:
+    """Says what the pictures lack before any light is simulated."""
+    if study.pictured is None:
+        return
+    try:
+        schedule_frames.check(study.pictured)
+    except BadInput as error:
+        raise error.located(study.locate) from None
 
 
 def _frames(
@@ -186,7 +195,7 @@ class _Run:
             steps=tuple(self._steps()),
             targets=self._targets(),
             online=self._online(),
-            notes=(*self.notes, *_of_approximation(self.task, found)),
+            notes=tuple(notes(self.model, self.task, found)),
         )
 
     @property
@@ -265,36 +274,6 @@ class _Run:
             return tuple(online.online(scene, sensor, self.counts, 1 + self.seed, constraints))
         except ValueError as error:
             raise self._wrong(("online",), error) from None
-
-    @cached_property
-    def notes(self) -> tuple[str, ...]:
-        """What a user should know beside the numbers."""
-        return tuple(_notes(self))
-
-
-def _of_approximation(task: Task, found: Sequence[Found]) -> list[str]:
-    """How much the approximation may cost, where that is more than rounding."""
-    gaps = [one.schedule.gap or 0.0 for one in found if one.method == "optimal"]
-    if not task.approximated or max(gaps, default=0.0) < WORTH_TELLING:
-        return []
-    few = "1 segment" if len(task.plan.low) == 1 else f"{len(task.plan.low)} segments"
-    told = f"found on {few}, `optimal` may be {max(gaps):.2g} of its E[SNR] below the best"
-    return [f"{told} for the pdf itself; give more segments, or none"]
-
-
-def _notes(run: _Run) -> list[str]:
-    notes = []
-    given = run.model.pdf.segments
-    if given is not None:
-        total = sum(segment.probability for segment in given)
-        if abs(total - 1) > 1e-6:
-            notes.append(f"probabilities add up to {total:.6g}; they are taken relative to that")
-    lit = int((run.pdf.probability > 0).sum() - (run.pdf.discrete and run.pdf.low[0] == 0))
-    if run.pdf.discrete and lit < max(run.counts) and not run.task.approximated:
-        are = "there is 1 level" if lit == 1 else f"there are {lit} levels"
-        used = "1 is" if lit == 1 else f"{lit} are"
-        notes.append(f"{are} of light: of more captures than that, {used} used, the rest repeat")
-    return notes
 
 
 def _record(result: ScheduleResult) -> dict[str, Any]:

@@ -144,7 +144,7 @@ def frames(
 ) -> Frames:
     """Takes the pictures of a study. Raises BadInput and CannotDo as a simulation does."""
     watch, workers = watch or Silent(), workers or available_workers()
-    _check(asked, camera)
+    check(camera)
     ready, _ = prepare(camera, workers, watch)
     if ready.rate.ndim != 2 or ready.layout.scattered or len(ready.mosaic.colors) > 1:
         raise bad("frames.camera", "has no monochrome array", "write pattern: monochrome there")
@@ -166,7 +166,8 @@ def frames(
     return Frames(ready.rate, sensor, tuple(shots))
 
 
-def _check(asked: ScheduleFrames, camera: Camera) -> None:
+def check(camera: Camera) -> None:
+    """Raises BadInput for a camera that takes no captures."""
     if not camera.exposure.captures:
         remedy = "give that camera exposure: {captures: {schedule: optimal, count: 8, max: 100 ms}}"
         raise bad("frames.camera", "takes a single sample of an exposure", remedy)
@@ -199,9 +200,10 @@ def _heuristic(rate: NDArray, count: int, segments: int, sensor: Sensor) -> Floa
     the others are spread over the brighter photocurrents, approximated by few segments.
     """
     dimmest, highest = float(sensor.limit(sensor.max_time)), float(rate.max())
-    counts, edges = np.histogram(rate[rate > dimmest], HISTOGRAM, (max(dimmest, 0.0), highest))
-    if count < 2 or not counts.any():
+    if count < 2 or highest <= dimmest * (1 + SLACK):  # nothing is brighter than the last capture
         return np.array([min(sensor.well / (highest + sensor.dark), sensor.max_time)])
+    bright = rate[rate > dimmest].astype(np.float64)
+    counts, edges = np.histogram(bright, HISTOGRAM, (max(dimmest, 0.0), highest))
     pdf = histogram_binning.merged((edges, counts), segments)[0]
     return np.append(sensor.well / (heuristic(pdf, count - 1) + sensor.dark), sensor.max_time)
 

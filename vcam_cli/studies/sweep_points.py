@@ -248,7 +248,7 @@ def hash_of(camera: Camera, form: dict[str, Any], asked: dict[str, Any]) -> str:
     """
     whole = asked | {
         "camera": _with_contents(form),
-        "files": sorted(_digest(path) for path in outputs.data_files(camera)),
+        "files": sorted(_digest(path) for path in outputs.data_files(camera, form)),
         "versions": {name: _versions()[name] for name in LIBRARIES},
     }
     return hash_text(json.dumps(whole, sort_keys=True))
