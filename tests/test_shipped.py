@@ -17,6 +17,7 @@ from vcam_cli.camera.electrical import electrical
 from vcam_cli.camera.geometry import geometry
 from vcam_cli.commands.list_ import first_comment
 from vcam_cli.commands.main import app
+from vcam_cli.studies import expectations, figures, schedule_file, study_file, sweep_points
 
 CAMERAS = shipped.names("cameras")
 YAMLS = sorted(shipped.folder().glob("*/*.yaml"))
@@ -193,3 +194,19 @@ def test_names_are_clear_across_kinds():
     """Spectra are looked up by name alone."""
     stems = [path.stem for path in TABLES]
     assert len(stems) == len(set(stems))
+
+
+@pytest.mark.parametrize("name", sorted(shipped.files("studies")))
+def test_studies_make_their_cameras_and_one_of_each_case_runs(name):
+    file = shipped.find("studies", name)
+    if "kind: schedule" in file.read_text(encoding="utf-8"):
+        assert schedule_file.read(name).model.name == name
+        return
+    grid = sweep_points.grid(study_file.read(name))
+    planner = figures.Planner(grid)
+    figures.plan(grid, planner)
+    expectations.plan(grid, planner)
+    assert grid.study.model.name == name and not grid.refused
+    for point in {p.case: p for p in grid.points}.values():
+        found = {metric: value for metric, value, _ in simulate(point.camera).metrics}
+        assert all(np.isfinite(found[metric]) for metric in grid.study.model.metrics)
