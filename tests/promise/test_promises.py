@@ -1,9 +1,9 @@
 """The promises of `python -m tests.promise`, held on five of its cameras, without its clock."""
 
 import pytest
+import random_cameras
 from promises import CAMERAS, estimates, idle_work, kept, made, truth, worth_leaving_out
 
-import random_cameras
 from vcam_cli.effects.order import ORDER
 from vcam_cli.studies import ablation
 
@@ -41,11 +41,12 @@ def test_nobody_asks_for_nothing_is_done(case):
     assert all(left_out for _, left_out in idle_work(case[0]))
 
 
-@pytest.mark.parametrize("number", [0, 4])
+@pytest.mark.parametrize("number", [1, 4, 7])
 def test_random_cameras_keep_every_tolerance(number, tmp_path):
-    """A chart and a photograph, of the forty of `make promise`."""
+    """Three of the forty of `make promise`: of pictures, which are quick."""
     camera = random_cameras.made(number, tmp_path)
-    assert ablation.wanted(camera) == [kind.name for kind in ORDER]
+    absent = {kind.name for kind in ORDER} - set(ablation.wanted(camera))
+    assert absent == {"reset_noise" if number % 2 == 0 else "charge_transfer"}
     for found in random_cameras.held(camera):
         assert found.mean <= found.tolerance, found
         assert found.variance <= 2 * found.tolerance, found

@@ -270,7 +270,8 @@ def _contribution(
     change: rms change of the mean signal by leaving it out [electrons], where it is known.
     """
     if isinstance(effect, Draw):
-        everything = _variances([e for e in present if _in(e, effect.scope)], outlook)
+        others = [e for e in present if _in(e, effect.scope) and e.name != effect.name]
+        everything = _variances([*others, effect], outlook)  # it may be switched off
         kind = "temporal" if effect.scope == "frame" else "fixed-pattern"
         share = _variances([effect], outlook) / np.maximum(everything, 1e-300)
         return float(share.max()), f"of the {kind} variance"
