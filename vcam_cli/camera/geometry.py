@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.detector import detector
 from vcam_cli.camera.lattice import lattice
+from vcam_cli.camera.once import once
 from vcam_cli.camera.pixel_optics import Area, check_pupil, collecting_area, sampling_scale
 from vcam_cli.camera.scene import Extent
 from vcam_cli.errors import BadInput, Collector, bad
@@ -129,6 +130,7 @@ class Geometry:
         }
 
 
+@once
 def geometry(camera: Camera) -> Geometry:
     """Solves the geometry of `camera`.
 

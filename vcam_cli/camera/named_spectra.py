@@ -1,6 +1,7 @@
 """The spectra that a camera names or gives, each with its place in the file."""
 
 from collections.abc import Iterator, Mapping
+from functools import cache
 from typing import Any
 
 from pydantic import BaseModel
@@ -61,6 +62,11 @@ def spectra(camera: Model) -> tuple[tuple[Path, SpectrumSpec | IlluminantSpec], 
 _SCALARS = (str, float, int)
 
 
+@cache
+def _fields(model: type[BaseModel]) -> tuple[str, ...]:
+    return tuple(model.model_fields)
+
+
 def _values(value: Any, path: Path) -> Iterator[tuple[Path, Any]]:
     """All values below a value that are no containers, with their paths."""
     from vcam_cli.camera.photodetector import QuantumEfficiency
@@ -71,7 +77,7 @@ def _values(value: Any, path: Path) -> Iterator[tuple[Path, Any]]:
         if value.given is not None:
             yield (*path, "pixel") if value.per_pixel else path, value.given
     elif isinstance(value, BaseModel):
-        for name in type(value).model_fields:
+        for name in _fields(type(value)):
             yield from _values(getattr(value, name), (*path, name))
     elif isinstance(value, Mapping):
         for name, item in value.items():
