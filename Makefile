@@ -19,7 +19,7 @@ check: $(VENV)/.dev  ## format, lint, types, tests
 	$(BIN)/mypy
 	$(MAKE) test
 
-bench: $(VENV)/.dev  ## speed, as ratios to the cost of the transforms and draws alone
+bench: $(VENV)/.dev  ## speed, as ratios: to bare transforms and draws, to plain NumPy, by stage and effect, growth
 	$(BIN)/python -m tests.bench
 
 promise: $(VENV)/.dev  ## the plan's promises, measured on twenty-two cameras and forty random ones
@@ -30,6 +30,7 @@ stability: $(VENV)/.dev  ## hard cases: our error beside that of the textbook fo
 
 fuzz: $(VENV)/.dev  ## twenty thousand camera and study files with something broken in them
 	$(BIN)/python -m tests.hostile
+	VCAM_FUZZ=20 $(BIN)/python -m pytest -q -n auto tests/hostile/test_random_cameras.py
 
 schemas: $(VENV)/.dev  ## JSON Schemas of the files a user writes, from the models
 	$(BIN)/vcam schema schemas

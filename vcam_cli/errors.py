@@ -13,6 +13,8 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 
 Path = tuple[str | int, ...]
+LONGEST = 2000
+"""Characters of a message: a file may hold megabytes where a word belongs."""
 
 
 @dataclass(frozen=True)
@@ -118,5 +120,10 @@ def _plain(word: str) -> str:
 
 
 def one_line(text: str) -> str:
-    """Control characters escaped: a message stays one line and cannot steer a terminal."""
+    """Control characters escaped: a message stays one line and cannot steer a terminal.
+
+    Of a very long one the beginning and the end.
+    """
+    if len(text) > LONGEST:
+        text = f"{text[: LONGEST // 2]} ... {text[-LONGEST // 2 :]}"
     return "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)

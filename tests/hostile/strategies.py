@@ -56,13 +56,15 @@ def chart(name: str, **keys: Any) -> st.SearchStrategy[Tree]:
 
 CHARTS = st.one_of(
     chart("uniform", reflectance=fractions()),
-    chart("sinusoid", contrast=fractions(), phase=st.just("90 deg"), mean=fractions(0, 0.5)).flatmap(
-        lambda c: between(1, 300, "lp/mm").map(lambda f: c | {"frequency": f})
+    st.builds(
+        lambda c, f: c | {"frequency": f},
+        chart("sinusoid", contrast=fractions(), phase=st.just("90 deg"), mean=fractions(0, 0.5)),
+        between(1, 300, "lp/mm"),
     ),
     between(1, 300, "lp/mm").map(
         lambda f: {"kind": "chart", "chart": "csf", "max_frequency": f}
     ),
-    chart("slanted-edge", angle=st.integers(-40, 40).map(lambda a: f"{a} deg"), contrast=fractions()),
+    chart("slanted-edge", angle=st.integers(-40, 40).map("{} deg".format), contrast=fractions()),
     chart("step-wedge", steps=st.integers(2, 30), density_range=between(0.1, 6)),
     chart("siemens-star", spokes=st.integers(2, 200), contrast=fractions()),
     chart("hdr-patches", patches=st.integers(2, 30), lamp=between(1, 1e6)),
@@ -80,7 +82,10 @@ def scenes(draw: st.DrawFn) -> Tree:
     if tree["distance"] != "infinity" and draw(st.booleans()):
         tree["extent"] = {"width": draw(between(0.01, 10, "m"))}
     if draw(st.booleans()):
-        tree["wavelengths"] = {"start": "400 nm", "stop": draw(st.sampled_from(["700 nm", "720 nm"]))}
+        tree["wavelengths"] = {
+            "start": "400 nm",
+            "stop": draw(st.sampled_from(["700 nm", "720 nm"])),
+        }
     return tree  # fmt: skip
 
 
@@ -196,7 +201,9 @@ def exposures(draw: st.DrawFn, nondestructive: bool) -> Tree:
         steps = st.lists(fractions(0.05, 0.9), min_size=1, max_size=3)
         forms.append(steps.map(lambda s: {"captures": _times(longest, s)}))
         counts = st.integers(1, 4)
-        scheduled = counts.map(lambda n: {"schedule": "optimal", "count": n, "max": f"{longest} ms"})
+        scheduled = counts.map(
+            lambda n: {"schedule": "optimal", "count": n, "max": f"{longest} ms"}
+        )
         forms.append(scheduled.map(lambda c: {"captures": c}))
     tree = draw(st.one_of(forms))
     if "captures" in tree:
@@ -233,7 +240,7 @@ def cameras(draw: st.DrawFn) -> Tree:
     """A camera file's tree."""
     pixel, array = draw(pixels()), draw(arrays())
     binned = array.get("binning", {}).get("kind") in ("voltage", "digital")
-    nondestructive = pixel.get("architecture") != "ccd" and not binned
+    nondestructive = pixel.get("architecture") not in ("aps-4t", "ccd") and not binned
     states = st.dictionaries(st.sampled_from(EFFECTS), st.sampled_from(["auto", "off"]))
     return {
         "name": "random",

@@ -41,7 +41,8 @@ def test_the_command_says_so_too(share, tmp_path):
         (tmp_path / name).write_bytes(made(kind, 5000 + seed)[1])
         names.append(name)
     done = subprocess.run(
-        [*VCAM, "validate", *names], cwd=tmp_path, env=environment(), capture_output=True, timeout=300
+        [*VCAM, "validate", *names], cwd=tmp_path, env=environment(), capture_output=True,
+        timeout=300,
     )  # fmt: skip
     said, good = done.stderr.decode(), done.stdout.decode()
     assert done.returncode in (0, 2, 3) and "Traceback" not in said

@@ -153,6 +153,8 @@ def _png_is_whole(file: Any, size: int) -> bool:
         head = file.read(8)
         if head[4:] == b"IEND":
             return True
+        if not head[4:].isalpha():
+            return False
         length = int.from_bytes(head[:4], "big")
         place += 12 + length
         if place > size:

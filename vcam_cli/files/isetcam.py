@@ -8,7 +8,6 @@ the radiance of a perfect white. Field of view and distance are the camera file'
 Files of MATLAB 7.3 are HDF5, which h5py reads (pip install 'vcam-cli[hdf5]').
 """
 
-import zlib
 from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
@@ -17,6 +16,7 @@ from typing import Any
 import numpy as np
 
 from vcam_cli.files.images import Unusable
+from vcam_cli.files.matlab import read_variables, refuse_too_much
 from vcam_cli.files.stored import PER_NM, Stored, lengths, numbers
 from vcam_cli.spectra import PLANCK, SPEED_OF_LIGHT
 
@@ -95,22 +95,15 @@ def _is_hdf5(path: Path) -> bool:
 
 
 def _matlab5(path: Path) -> Lookup:
-    from scipy.io import loadmat
-    from scipy.io.matlab import MatReadError
-
-    damaged = (MatReadError, ValueError, TypeError, EOFError, LookupError, OSError, zlib.error)
     try:
-        found = loadmat(path, variable_names=VARIABLES)
-    except damaged as error:
-        raise Unusable(f"is no whole MATLAB file ({str(error)[:80]})", _SAVE) from None
+        found = read_variables(path, VARIABLES)
+    except Unusable as error:
+        raise Unusable(error.reason, _SAVE) from None
 
     def get(name: str, *fields: str) -> Any:
-        value = found.get(name)
+        value: Any = found.get(name)
         for field in fields:
-            names = getattr(getattr(value, "dtype", None), "names", None)
-            if value is None or not names or field not in names or value.size != 1:
-                return None
-            value = value.flat[0][field]
+            value = value.get(field) if isinstance(value, dict) else None
         return value
 
     return get
@@ -130,6 +123,7 @@ def _hdf5(path: Path) -> Lookup:
             with h5py.File(path, "r") as file:
                 found = file.get("/".join(names))
                 if isinstance(found, h5py.Dataset) and found.dtype.kind in "uif":
+                    refuse_too_much(path, found.size * found.dtype.itemsize)
                     return found[()].T
         except (OSError, RuntimeError, KeyError) as error:
             raise Unusable(f"is no whole MATLAB file ({str(error)[:80]})", _SAVE) from None

@@ -1,6 +1,7 @@
 """Reading tables of spectra from CSV text: `#` comments, one header line, numbers in rows."""
 
 import math
+import stat
 from os import PathLike
 from pathlib import Path
 
@@ -10,6 +11,8 @@ from vcam_cli.spectra.spectrum import Floats, Outside, Table
 
 HEADER = ("wavelength_nm", "value")
 MOST_ROWS = 200_000
+MOST_BYTES = 1 << 26
+"""Of a file: a million rows have some 30 MB."""
 
 
 def read_table(
@@ -17,12 +20,18 @@ def read_table(
 ) -> tuple[list[str], list[tuple[int, list[str]]]]:
     """The header's names of a CSV file, and of every row its line number and cells.
 
-    Raises ValueError that names the file and the line: not text, no header, a row of another
-    length, more than `most` rows. OSError as `open` raises it.
+    Raises ValueError that names the file and the line: not text, too large, no header, a row of
+    another length, more than `most` rows. OSError as `open` raises it.
     """
     file = Path(path)
+    if not stat.S_ISREG(file.stat().st_mode):  # a pipe would keep us waiting
+        raise ValueError(f"{file}: is not a regular file")
+    with file.open("rb") as source:
+        data = source.read(MOST_BYTES + 1)
+    if len(data) > MOST_BYTES:
+        raise ValueError(f"{file}: is larger than {MOST_BYTES >> 20} MB")
     try:
-        lines = file.read_text(encoding="utf-8-sig").splitlines()
+        lines = data.decode("utf-8-sig").splitlines()
     except UnicodeDecodeError:
         raise ValueError(f"{file}: is not a text file") from None
     rows = [(n, line.strip()) for n, line in enumerate(lines, 1)]

@@ -1,0 +1,117 @@
+"""The cameras that are timed, and the picture that they look at: dead leaves on their own grid."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+from numpy.typing import NDArray
+
+from vcam_cli import load
+from vcam_cli.camera.camera import Camera
+from vcam_cli.files.png import write_png
+from vcam_cli.scenes.base import View
+from vcam_cli.scenes.build import build
+
+BAND = {"start": "400 nm", "stop": "700 nm"}
+"""31 wavelengths in steps of 10 nm, 301 in steps of 1 nm."""
+SOURCES: dict[str, dict[str, str]] = {
+    "gray": {"kind": "image", "file": "gray.png", "model": "reflectance"},
+    "color": {"kind": "image", "file": "leaves.png", "model": "mallett"},
+    "laser": {"kind": "image", "file": "leaves.png", "model": "laser"},
+    "chart": {"kind": "chart", "chart": "colorchecker"},
+}
+PLAIN: dict[str, Any] = {
+    "name": "bench",
+    "optics": {"use": "f2.8-normal", "focal_length": "8 mm"},
+    "pixel": {"use": "aps-4um", "width": "2 um"},
+    "exposure": {"auto": {"max": "100 ms"}},
+    "adc": {"bits": 10, "offset": "16 DN"},
+    "quality": [],
+    "effects": "all",
+}
+"""A lens without aberrations, and every noise."""
+BUSY: dict[str, Any] = {
+    **PLAIN,
+    "name": "busy",
+    "optics": {
+        "f_number": 2.8,
+        "focal_length": "8 mm",
+        "transmittance": [0.95, "ir-cut-650"],
+        "off_axis": "exact",
+        "stray_light": 0.01,
+        "zernike": {4: "30 nm", 7: "20 nm", 11: "20 nm"},
+    },
+    "pixel": {
+        "use": "aps-4um",
+        "width": "2 um",
+        "stack": {
+            "passivation": {"thickness": "0.7 um", "index": 2.0},
+            "oxide": {"thickness": "2 um", "index": 1.46},
+        },
+        "microlens": {"gain": 1.4, "shift": "optimal"},
+        "photodetector": {
+            "fill_factor": 0.4,
+            "charge_diffusion": {
+                "diffusion_length": "20 um",
+                "depletion_width": "1 um",
+                "substrate_depth": "5 um",
+            },
+        },
+    },
+}
+"""Fifteen of the sixteen effects: charge transfer is a ccd's, which has no reset noise."""
+
+
+@dataclass(frozen=True)
+class Studio:
+    """A folder with the picture, of one size."""
+
+    folder: Path
+    rows: int
+    columns: int
+    always: dict[str, Any] = field(default_factory=dict)
+    """Top-level keys laid over every camera."""
+
+    def tree(self, scene: str, base: dict[str, Any], **changes: Any) -> dict[str, Any]:
+        """A camera file as a mapping; changes are top-level keys laid over it."""
+        looked_at = {"source": SOURCES[scene], "luminance": "200 cd/m2", "wavelengths": BAND}
+        size = {"rows": self.rows, "columns": self.columns}
+        array = {"use": "12mp-bayer", **size}
+        return {**base, "scene": looked_at, "array": array, **self.always, **changes}
+
+    def write(self, tree: dict[str, Any], name: str = "camera.yaml") -> Path:
+        path = self.folder / name
+        path.write_text(yaml.safe_dump(tree, sort_keys=False), encoding="utf-8")
+        return path
+
+    def camera(self, scene: str = "gray", base: dict[str, Any] = PLAIN, **changes: Any) -> Camera:
+        """The camera looking at the picture (gray, color, laser) or at a chart."""
+        return load(self.write(self.tree(scene, base, **changes)))
+
+
+@lru_cache(maxsize=4)
+def _leaves(rows: int, columns: int) -> NDArray[np.uint16]:
+    """(3, rows, columns) Three mixtures of the leaves' colors."""
+    view = View(rows, columns, 1e-6, 1e-6, dtype=np.float32)
+    scene = build(load("still-life").scene, view, None)
+    mix = np.random.default_rng(0).dirichlet(np.ones(len(scene.spectra)), 3)
+    return np.clip(scene.planes(mix) * 4 * 65535, 0, 65535).astype(np.uint16)
+
+
+@contextmanager
+def studio(rows: int, columns: int, always: dict[str, Any] | None = None) -> Iterator[Studio]:
+    """A picture of dead leaves of that size in colors and in gray, for as long as it is needed."""
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        planes = _leaves(rows, columns)
+        write_png(folder / "leaves.png", np.ascontiguousarray(np.moveaxis(planes, 0, 2)))
+        write_png(folder / "gray.png", np.ascontiguousarray(planes[1]))
+        yield Studio(folder, rows, columns, always or {})

@@ -1,0 +1,183 @@
+"""Harmed pictures, spectra and tables, read one after the other: `python file_fuzz.py FROM TO`.
+
+A process of its own, as a library that reads pictures may take its process with it. It tells the
+name of a file before it reads it, so that the last one told is the one it died of.
+"""
+
+import random
+import resource
+import sys
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import OpenImageIO as oiio
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+
+import spectral_files as made
+
+from vcam_cli.camera.lattice import _read as read_positions
+from vcam_cli.errors import BadInput, CannotDo
+from vcam_cli.files.hyperspectral import read_bands, read_cube
+from vcam_cli.files.images import color_channels, read_picture
+from vcam_cli.files.psf import read_psf
+from vcam_cli.spectra.text import read_csv
+
+MEMORY = 8 << 30
+"""Address space [bytes]; a file claims far more."""
+PICTURES = ("png", "jpg", "tif", "exr", "ppm", "bmp", "hdr", "webp", "tga", "gif", "dpx")
+Reader = Callable[[Path], object]
+
+
+def pictures(folder: Path) -> dict[Path, Reader]:
+    """A small whole picture of every format that OpenImageIO writes here, in bits and layouts."""
+    rgb = np.random.default_rng(3).random((12, 10, 4), np.float32)
+    found = {}
+    for kind in PICTURES:
+        found |= _picture(folder / f"plain.{kind}", rgb[:, :, :3], "uint8")
+    for name, channels, sample, tile in (
+        ("gray-alpha.png", 2, "uint16", 0), ("sixteen.tif", 3, "uint16", 0),
+        ("tiled.tif", 3, "uint8", 16), ("tiled.exr", 4, "half", 16), ("float.tif", 1, "float", 0),
+    ):  # fmt: skip
+        found |= _picture(folder / name, rgb[:, :, :channels], sample, tile)
+    found |= _parts(folder / "parts.exr", rgb[:, :, :3])
+    return found
+
+
+def _picture(path: Path, data: np.ndarray, sample: str, tile: int = 0) -> dict[Path, Reader]:
+    height, width, channels = data.shape
+    spec = oiio.ImageSpec(width, height, channels, sample)
+    spec.tile_width = spec.tile_height = tile
+    out = oiio.ImageOutput.create(str(path))
+    if out is None or not out.open(str(path), spec):
+        return {}  # a format that this build does not write
+    write = out.write_tiles if tile else out.write_image
+    data = np.ascontiguousarray(data)
+    assert write(0, width, 0, height, 0, 1, data) if tile else write(data)
+    out.close()
+    return {path: _as_picture}
+
+
+def _parts(path: Path, data: np.ndarray) -> dict[Path, Reader]:
+    specs = [oiio.ImageSpec(data.shape[1], data.shape[0], 3, "float") for _ in range(2)]
+    for number, spec in enumerate(specs):
+        spec.attribute("oiio:subimagename", str(number))
+    out = oiio.ImageOutput.create(str(path))
+    assert out.open(str(path), specs) and out.write_image(np.ascontiguousarray(data))
+    assert out.open(str(path), specs[1], "AppendSubimage") and out.write_image(data)
+    assert out.close()
+    return {path: _as_picture}
+
+
+def _as_picture(path: Path) -> None:
+    count = color_channels(path, "file")
+    found = read_picture(path, "linear", 1.0, "file")
+    assert np.isfinite(found.data).all() and (found.data >= 0).all()
+    read_psf(str(path), count, ("file",))
+
+
+def spectra(folder: Path) -> dict[Path, Reader]:
+    """A small whole file of spectra of every format."""
+    made.isetcam(folder / "packed.mat", compress=True)
+    made.npz(folder / "packed.npz", True, wavelength_nm=made.NM, radiance=made.CUBE)
+    files = [
+        made.spectral_exr(folder / "spectral.exr"),
+        made.isetcam(folder / "plain.mat"),
+        folder / "packed.mat",
+        made.npz(folder / "plain.npz", wavelength_nm=made.NM, reflectance=made.CUBE),
+        folder / "packed.npz",
+        made.envi(folder / "envi.hdr", reflectance_scale_factor=1),
+        made.tiff(folder / "bands.tif", table=made.table()),
+        made.paged_tiff(folder / "pages.tif", np.moveaxis(made.CUBE, 2, 0), "float"),
+    ]
+    (folder / "pages.csv").write_text(made.table())
+    return dict.fromkeys(files, _as_spectra)
+
+
+def _as_spectra(path: Path) -> None:
+    read_bands(path, "file")
+    cube = read_cube(path, "file")[0]
+    assert np.isfinite(cube.data).all() and (cube.data >= 0).all()
+
+
+def tables(folder: Path) -> dict[Path, Reader]:
+    """Tables as CSV: a spectrum, pixels at places of their own."""
+    curve, places = folder / "curve.csv", folder / "places.csv"
+    curve.write_text("wavelength_nm,value\n# half\n400,0.5\n500,0.25\n700,1e-3\n")
+    places.write_text("x_um,y_um,color\n0,0,R\n4,0.5,G\n-4,3,B\n")
+    return {curve: _as_curve, places: _as_places}
+
+
+def _as_curve(path: Path) -> None:
+    try:
+        read_csv(path)
+    except ValueError as error:
+        raise told(error) from None
+
+
+def _as_places(path: Path) -> None:
+    read_positions.cache_clear()
+    read_positions(str(path), 0, ("R", "G", "B"))
+
+
+def told(error: ValueError) -> BadInput:
+    """What the camera's loader makes of a table that is none."""
+    assert str(error)
+    return BadInput([])
+
+
+def harmed(data: bytes, chance: random.Random) -> bytes:
+    """Cut short, bytes changed, numbers made enormous, pieces doubled, taken out or exchanged."""
+    out = bytearray(data)
+    for _ in range(chance.choice((1, 1, 2, 4))):
+        at, length = chance.randrange(len(out) or 1), chance.choice((1, 2, 4, 8, 64))
+        match chance.randrange(7):
+            case 0:
+                del out[at:]
+            case 1 | 2:
+                out[at : at + 1] = bytes([chance.randrange(256)])
+            case 3:
+                out[at : at + length] = b"\xff" * length
+            case 4:
+                out[at : at + length] = chance.choice(
+                    (b"\x7f\xff\xff\xff", b"\0\0\0\x80", b"\0" * 8)
+                )
+            case 5:
+                out[at:at] = out[at : at + 64]
+            case _:
+                del out[at : at + length]
+    return bytes(out)
+
+
+def main(first: int, last: int) -> None:
+    """Harms each file in `last` - `first` ways; prints the number read, refused."""
+    resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+    counts = {"read": 0, "refused": 0}
+    with tempfile.TemporaryDirectory() as folder:
+        readers = pictures(Path(folder)) | spectra(Path(folder)) | tables(Path(folder))
+        whole = {path: path.read_bytes() for path in readers}
+        for path, read in readers.items():
+            assert read_whole(path, read) == "read", path
+            for seed in range(first, last):
+                print(f"{path.name} {seed}", flush=True)
+                path.write_bytes(harmed(whole[path], random.Random(f"{path.name} {seed}")))
+                counts[read_whole(path, read)] += 1
+            path.write_bytes(whole[path])
+    print(f"read {counts['read']} refused {counts['refused']}")
+
+
+def read_whole(path: Path, read: Reader) -> str:
+    try:
+        read(path)
+    except BadInput:
+        return "refused"
+    except CannotDo as error:
+        assert "memory" in str(error), error
+        return "refused"
+    return "read"
+
+
+if __name__ == "__main__":
+    main(int(sys.argv[1]), int(sys.argv[2]))
