@@ -142,8 +142,6 @@ def test_readout_and_reset_noise_count(tmp_path):
     assert pixel.well == frame.electrical.saturation
 
 
-
-
 def test_a_run_says_the_times(tmp_path):
     made = camera(tmp_path, asked())
     out = tmp_path / "out"
