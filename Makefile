@@ -5,19 +5,22 @@ BIN := $(VENV)/bin
 SOURCES := vcam_cli tests scripts
 CAMERA ?= still-life
 
-.PHONY: run test check bench promise stability fuzz schemas tables lock clean
+.PHONY: run test test-all check bench promise stability fuzz schemas tables lock clean
 
 run: $(VENV)/.runtime  ## simulate the shipped still life: out/still-life/
 	$(BIN)/vcam run $(CAMERA)
 
-test: $(VENV)/.dev  ## all tests
+test: $(VENV)/.dev  ## the tests, but for those that take long
+	$(BIN)/python -m pytest -q -n auto -m "not long" tests
+
+test-all: $(VENV)/.dev  ## all tests
 	$(BIN)/python -m pytest -q -n auto tests
 
 check: $(VENV)/.dev  ## format, lint, types, tests
 	$(BIN)/ruff format --check $(SOURCES)
 	$(BIN)/ruff check $(SOURCES)
 	$(BIN)/mypy
-	$(MAKE) test
+	$(MAKE) test-all
 
 bench: $(VENV)/.dev  ## speed, as ratios: to bare transforms and draws, to plain NumPy, by stage and effect, growth
 	$(BIN)/python -m tests.bench

@@ -196,6 +196,7 @@ def test_names_are_clear_across_kinds():
     assert len(stems) == len(set(stems))
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("name", sorted(shipped.files("studies")))
 def test_studies_make_their_cameras_and_one_of_each_case_runs(name):
     file = shipped.find("studies", name)

@@ -13,6 +13,8 @@ from bench.whole import Size, measure
 
 from vcam_cli.studies import ablation
 
+pytestmark = pytest.mark.long
+
 TINY = Size(
     frame=(36, 48),
     part=(36, 48),

@@ -7,6 +7,8 @@ from promises import CAMERAS, estimates, idle_work, kept, made, truth, worth_lea
 from vcam_cli.effects.order import ORDER
 from vcam_cli.studies import ablation
 
+pytestmark = pytest.mark.long
+
 FAST = ("color photograph", "aliasing", "measured spread")
 
 

@@ -15,6 +15,8 @@ from vcam_cli.studies.accuracy_knobs import KNOBS
 from vcam_cli.studies.accuracy_points import COLUMNS, Point
 from vcam_cli.studies.simulate import prepare
 
+pytestmark = pytest.mark.long
+
 DARK = "pixel.photodetector.dark_current"
 NOISY = {
     "scene.radiance": radiance_for(2000),

@@ -18,6 +18,8 @@ from vcam_cli.camera import shipped
 from vcam_cli.studies import optimum
 from vcam_cli.studies.shared import Shared
 
+pytestmark = pytest.mark.long
+
 SMALL = (
     "array.die={width: 0.6784 mm, height: 0.6784 mm}",
     "display.width=128/72 in",

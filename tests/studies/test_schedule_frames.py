@@ -22,6 +22,8 @@ from vcam_cli.studies import photocurrents, schedule_frames
 from vcam_cli.studies.schedule import schedule
 from vcam_cli.studies.simulate import prepare
 
+pytestmark = pytest.mark.long
+
 SCENE = {
     "scene.source": {"kind": "chart", "chart": "step-wedge", "steps": 30, "density_range": 2.5},
     "effects": {"diffraction": "off"},
