@@ -65,7 +65,7 @@ def test_the_rows_are_what_a_run_of_each_camera_gives(tmp_path):
         assert float(row["snr_db"]) == metrics["snr_db"]
         assert row["error"] == ""
     kept = {p.name for p in (tmp_path / "out" / "points").iterdir()} - {".claims"}
-    ids = [point.id for point in result.grid.points]
+    ids = list(result.ids)
     assert kept == {f"{i}.{end}" for i in ids for end in ("json", "raw.exr", "render.png")}
     assert len(rows(tmp_path / "out", "timings.csv")) == 12
     record = json.loads((tmp_path / "out" / "study.json").read_text("utf-8"))

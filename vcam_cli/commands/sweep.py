@@ -8,7 +8,7 @@ from vcam_cli.commands import options
 from vcam_cli.commands.progress import Log, Progress, wanted
 
 if TYPE_CHECKING:
-    from vcam_cli.studies.sweep import SweepResult
+    from vcam_cli.studies.sweep_result import SweepResult
 
 LINES = 12
 """Messages about points that are shown at most."""
@@ -128,7 +128,7 @@ def report(result: "SweepResult") -> str:
         if f.edge:
             end = "low" if f.edge == "low" else "high"
             lines.append(f"  at the {end} end of its range: the optimum may lie beyond")
-    total = len(result.grid.points)
+    total = len(result.ids)
     there = total - result.missing
     lines.append(f"{there} of {total} points, {result.computed} computed in {result.seconds:.1f} s")
     if result.failed:
@@ -137,5 +137,5 @@ def report(result: "SweepResult") -> str:
         lines.append(f"{result.missing} are left to other shares")
     else:
         lines += expectations.report(result.verdicts)
-    lines.append(f"{result.grid.study.model.name}: {result.out}/")
+    lines.append(f"{result.name}: {result.out}/")
     return "\n".join(lines)

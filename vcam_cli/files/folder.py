@@ -305,6 +305,11 @@ def is_foreign(folder: Path) -> bool:
     return bool(present - {LOCK, STAGING}) and not ours
 
 
+def record_of(path: Path) -> dict[str, Any] | None:
+    """The record of a finished command in a file; None where the file is none of vcam's."""
+    return _claim(path)
+
+
 def previous_files(record: Path) -> list[str]:
     """The names of the files that a record of vcam speaks of, none outside its folder."""
     claim = _claim(record)

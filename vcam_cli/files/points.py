@@ -20,9 +20,9 @@ from types import TracebackType
 from typing import Any, Self
 
 from vcam_cli.errors import CannotDo, bad
-from vcam_cli.files import atomic
+from vcam_cli.files import atomic, map_store
 from vcam_cli.files.folder import PROGRAM, is_foreign, previous_files
-from vcam_cli.files.report import hash_text, to_json
+from vcam_cli.files.report import hash_file, hash_text, to_json
 
 POINTS = "points"
 RECORD = "study.json"
@@ -50,6 +50,7 @@ class SweepFolder:
         self.path = Path(path)
         self.corrupted: list[str] = []
         """Names of point files that were not as they had been written."""
+        self._used: set[str] = set()
         self._claims = -1
 
     def __enter__(self) -> Self:
@@ -112,7 +113,16 @@ class SweepFolder:
             self.corrupted += [path.name] if path.name not in self.corrupted else []
             return None
         whole = all((self.path / POINTS / f"{point}.{name}").is_file() for name in frames)
+        self._used.add(point)
         return found if whole else None
+
+    def is_whole(self, key: str, frames: tuple[str, ...] = ()) -> bool:
+        """Whether what was kept under a key is there as it was written, a map or plot included."""
+        content = self.read(key, frames)
+        if content is None or "digest" not in content:
+            return content is not None
+        beside = (self.path / POINTS / f"{key}.{name}" for name in (map_store.NAME, _PLOT))
+        return content["digest"] in (hash_file(path) for path in beside if path.is_file())
 
     def write(
         self, point: str, content: Mapping[str, Any], frames: Mapping[str, bytes] | None = None
@@ -124,6 +134,7 @@ class SweepFolder:
         plain = json.loads(to_json(content))
         whole = {"program": PROGRAM, "id": point, "point": plain, "check": _check(point, plain)}
         atomic.write_text(self.path / POINTS / f"{point}.json", to_json(whole))
+        self._used.add(point)
 
     def frame(self, point: str, name: str) -> bytes:
         """A frame that was kept beside a finished point. Raises CannotDo."""
@@ -188,7 +199,10 @@ class SweepFolder:
         self._write_record(record, sorted(writers))
 
     def _write_record(self, record: Mapping[str, Any], names: list[str]) -> None:
-        whole = {**record, "program": PROGRAM, "files": names}
+        kept = sorted(self._used.difference(record.get("points", ())))
+        written = {name: hash_file(self.path / name) for name in names}
+        about = {"program": PROGRAM, "files": names, "written": written, "kept": kept}
+        whole = {**record, **about}
         atomic.write_text(self.path / RECORD, to_json(whole))
 
 

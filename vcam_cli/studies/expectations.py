@@ -52,36 +52,40 @@ class Expected:
 
     def verdict(self, outcomes: Outcomes, found: Sequence[Found]) -> Verdict:
         """What became of it."""
-        return Verdict(self, float(f"{self.look(outcomes, found):.{sweep_tables.DIGITS}g}"))
+        value = float(f"{self.look(outcomes, found):.{sweep_tables.DIGITS}g}")
+        word = "inside" if self.least <= value <= self.most else "missed"
+        if math.isnan(value):
+            word = "unknown"
+        return Verdict(
+            self.name, word, self._said(value, word), self.item.calibrated, self._row(value, word)
+        )
+
+    def _row(self, value: float, word: str) -> tuple[Cell, ...]:
+        item = self.item
+        ends = ("" if math.isinf(end) else end for end in (self.least, self.most))
+        about = (item.calibrated, item.source, item.why)
+        known = "" if math.isnan(value) else value
+        return (self.name, self.case, item.quantity, known, self.unit, *ends, word, *about)
+
+    def _said(self, value: float, word: str) -> str:
+        said = f"{self.name}: {value:g}, expected {self.least:g} to {self.most:g} {self.unit}"
+        why = self.item.why
+        return said.rstrip() + (f" ({why})" if why and word == "missed" else "")
 
 
 @dataclass(frozen=True)
 class Verdict:
-    """An expectation and what was found; nan where points are missing."""
+    """What became of an expectation."""
 
-    expected: Expected
-    value: float
-
-    @property
-    def word(self) -> str:
-        """inside | missed | unknown."""
-        if math.isnan(self.value):
-            return "unknown"
-        return "inside" if self.expected.least <= self.value <= self.expected.most else "missed"
-
-    @property
-    def row(self) -> tuple[Cell, ...]:
-        """As in expected.csv."""
-        e, item = self.expected, self.expected.item
-        value = "" if math.isnan(self.value) else self.value
-        ends = ("" if math.isinf(end) else end for end in (e.least, e.most))
-        about = (item.calibrated, item.source, item.why)
-        return (e.name, e.case, item.quantity, value, e.unit, *ends, self.word, *about)
-
-    def __str__(self) -> str:
-        e = self.expected
-        said = f"{e.name}: {self.value:g}, expected {e.least:g} to {e.most:g} {e.unit}".rstrip()
-        return f"{said} ({e.item.why})" if e.item.why and self.word == "missed" else said
+    name: str
+    word: str
+    """inside | missed | unknown, where points are missing."""
+    said: str
+    """For a person."""
+    calibrated: str
+    """The parameter that was set so that it comes out, where one was."""
+    row: tuple[Cell, ...]
+    """As in expected.csv."""
 
 
 def plan(grid: Grid, planner: Planner) -> tuple[Expected, ...]:
@@ -106,10 +110,10 @@ def report(verdicts: Sequence[Verdict]) -> Iterator[str]:
     if not verdicts:
         return
     inside = [v for v in verdicts if v.word == "inside"]
-    made = sum(bool(v.expected.item.calibrated) for v in inside)
+    made = sum(bool(v.calibrated) for v in inside)
     also = f", {made} of them because it was set so" if made else ""
     yield f"expected.csv: {len(inside)} of {len(verdicts)} expectations come out{also}"
-    yield from (f"  {v.word}: {v}" for v in verdicts if v.word != "inside")
+    yield from (f"  {v.word}: {v.said}" for v in verdicts if v.word != "inside")
 
 
 class _Resolver:

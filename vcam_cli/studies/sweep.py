@@ -10,10 +10,9 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 from vcam_cli.camera.camera import Camera
 from vcam_cli.engine.lights import depends_on
@@ -29,11 +28,14 @@ from vcam_cli.studies import (
     run_on,
     study_file,
     sweep_points,
+    sweep_result,
     sweep_tables,
+    unchanged,
 )
 from vcam_cli.studies.point_work import FRAMES, Job, Outcome, kept
-from vcam_cli.studies.run_on import Groups, Verdict
+from vcam_cli.studies.run_on import Verdict
 from vcam_cli.studies.sweep_points import LIBRARIES, Grid
+from vcam_cli.studies.sweep_result import SweepResult
 
 
 @dataclass(frozen=True)
@@ -47,69 +49,6 @@ class Share:
         if not 1 <= self.number <= self.of:
             message = f"there is no share {self.number} of {self.of}"
             raise bad("--shard", message, f"write 1/{max(1, self.of)} to {self.of}/{self.of}")
-
-
-@dataclass(frozen=True)
-class SweepResult:
-    """What a sweep found."""
-
-    grid: Grid
-    out: Path
-    outcomes: dict[str, Outcome]
-    """Of the points of which something is known, by hash."""
-    optima: tuple[sweep_tables.Found, ...]
-    verdicts: tuple[expectations.Verdict, ...]
-    """Of what the study expected."""
-    computed: int
-    """Points computed now; the others were there."""
-    seconds: float
-    unmade: dict[str, str] = field(default_factory=dict)
-    """Figures that could not be made, and why."""
-
-    @property
-    def points(self) -> list[dict[str, Any]]:
-        """The rows of points.csv, with the names of its columns."""
-        names = (*sweep_tables.columns(self.grid), *self.grid.study.model.metrics, "error")
-        rows = sweep_tables.rows(self.grid, self.outcomes)
-        return [dict(zip(names, row, strict=True)) for row in rows]
-
-    @property
-    def failed(self) -> int:
-        """Rows with an error."""
-        return sum(1 for row in sweep_tables.rows(self.grid, self.outcomes) if row[-1])
-
-    @property
-    def missing(self) -> int:
-        """Points of which nothing is known yet: those of other shares."""
-        return sum(1 for p in self.grid.points if p.id and p.id not in self.outcomes)
-
-    @property
-    def exit_code(self) -> int:
-        """0; 4 where some points or figures failed, 2 where every point was refused."""
-        wrong = [
-            not p.id or (p.id in self.outcomes and self._is_bad_input(self.outcomes[p.id]))
-            for p in self.grid.points
-        ]
-        return 2 if all(wrong) else 4 if self.failed or self.unmade else 0
-
-    @staticmethod
-    def _is_bad_input(outcome: Outcome) -> bool:
-        return bool(outcome.error) and outcome.final
-
-    def summary(self) -> dict[str, Any]:
-        """What `--json` prints."""
-        return {
-            "name": self.grid.study.model.name,
-            "out": str(self.out),
-            "points": len(self.grid.points),
-            "computed": self.computed,
-            "failed": self.failed,
-            "missing": self.missing,
-            "optimum": [_plain(f) for f in self.optima],
-            "missed": [v.expected.name for v in self.verdicts if v.word == "missed"],
-            "seconds": self.seconds,
-            "unmade": self.unmade,
-        }
 
 
 def sweep(
@@ -135,35 +74,71 @@ def sweep(
     share = Share(*shard) if shard else None
     watch, tell = watch or Silent(), tell or (lambda _: None)
     watch.begin("points")
-    grid = sweep_points.grid(study_file.read(study), sets)
+    file = study_file.read(study)
+    place = Path(out) if out is not None else Path("out") / file.model.name
+    asked = unchanged.asked(file, sets)
+    result = None if fresh else unchanged.result(place, file, asked)
+    if result is None:
+        order = _Order(share, workers, scheduler, fresh, asked)
+        result = _swept(sweep_points.grid(file, sets), sets, place, order, watch, tell)
+    else:
+        for problem in result.refused:
+            tell(problem)
+    return replace(result, seconds=time.perf_counter() - start)
+
+
+@dataclass(frozen=True)
+class _Order:
+    """How a sweep is to be made."""
+
+    share: Share | None
+    workers: int | None
+    scheduler: str | None
+    fresh: bool
+    asked: str
+    """The hash of what is asked, see `unchanged`."""
+
+
+def _swept(
+    grid: Grid,
+    sets: Sequence[str],
+    place: Path,
+    order: _Order,
+    watch: Observer,
+    tell: Callable[[str], None],
+) -> SweepResult:
+    """Computes what is left and writes everything."""
     planner = figures.Planner(grid, sets)
     planned, expected = figures.plan(grid, planner), expectations.plan(grid, planner)
-    for problem in grid.refused:
-        tell(str(problem))
-    place = Path(out) if out is not None else Path("out") / grid.study.model.name
+    hashes = {str(path): hash_file(path) for path in grid.inputs}
+    for refused in grid.refused:
+        tell(str(refused))
     with SweepFolder(place) as folder:
         folder.begin({"name": grid.study.model.name})
-        run = _Run(grid, folder, fresh)
+        run = _Run(grid, folder, order.fresh)
         run.look()
         if folder.corrupted:
             names = ", ".join(folder.corrupted[:3])
             tell(f"computed again, since corrupted: {POINTS}/{names}" + _more(folder.corrupted, 3))
-        groups = run.left(_shared_out(run.groups(), share))
-        computed = _compute(run, groups, workers, scheduler, watch, tell)
+        computed = _compute(run, order, watch, tell)
         found = tuple(sweep_tables.optima(grid, run.outcomes))
         verdicts = tuple(each.verdict(run.outcomes, found) for each in expected)
-        seconds = time.perf_counter() - start
-        result = SweepResult(grid, place, run.outcomes, found, verdicts, computed, seconds)
+        result = sweep_result.of(grid, place, run.outcomes, found, verdicts, computed)
         files = sweep_tables.writers(grid, run.outcomes, found)
         if verdicts:
             files["expected.csv"] = partial(expectations.write, verdicts)
         if not result.missing:
-            made = figures_made.make(planned, grid, run.outcomes, found, folder, fresh, watch, tell)
+            made = figures_made.make(
+                planned, grid, run.outcomes, found, folder, order.fresh, watch, tell
+            )
             files |= made.writers
             result = replace(result, unmade=made.unmade)
         watch.begin("tables")
-        folder.finish(files, _record(result), grid.inputs)
-    return replace(result, seconds=time.perf_counter() - start)
+        asked = order.asked if run.lasting and not result.unmade else ""
+        study = grid.study.model.model_dump(mode="json")
+        record = result.record() | {"study": study, "hashes": hashes, "asked": asked}
+        folder.finish(files, record, grid.inputs)
+    return result
 
 
 class _Run:
@@ -194,6 +169,11 @@ class _Run:
             return False
         self.outcomes[point] = found
         return found.final
+
+    @property
+    def lasting(self) -> bool:
+        """Whether all is known, and nothing of it would end otherwise another time."""
+        return all(p in self.outcomes and self.outcomes[p].final for p in self._points)
 
     def groups(self) -> list[list[Job]]:
         """All points, those of the same light together, in the study's order."""
@@ -259,15 +239,11 @@ def _shared_out(groups: list[list[Job]], share: Share | None) -> list[list[Job]]
     ]
 
 
-def _compute(
-    run: _Run,
-    groups: Groups,
-    workers: int | None,
-    scheduler: str | None,
-    watch: Observer,
-    tell: Callable[[str], None],
-) -> int:
+def _compute(run: _Run, order: _Order, watch: Observer, tell: Callable[[str], None]) -> int:
     """Computes what is left; the number of points computed."""
+    if run.lasting:
+        return 0
+    groups = run.left(_shared_out(run.groups(), order.share))
     total = sum(len(group) for group in groups)
     if not total:
         return 0
@@ -275,10 +251,10 @@ def _compute(
     watch.step(0, total)
     computed, bugs = 0, 0
     outcomes: Iterator[Outcome]
-    if scheduler is not None:
-        outcomes = run_on.cluster(groups, run.ask, scheduler, tell)
+    if order.scheduler is not None:
+        outcomes = run_on.cluster(groups, run.ask, order.scheduler, tell)
     else:
-        processes, threads = run_on.shares(workers, total)
+        processes, threads = run_on.shares(order.workers, total)
         outcomes = (
             run_on.here(groups, run.ask, threads)
             if processes == 1
@@ -293,29 +269,6 @@ def _compute(
                 tell(outcome.trace)
             bugs += bool(outcome.trace)
     return computed
-
-
-def _record(result: SweepResult) -> dict[str, Any]:
-    """What study.json says, but for the names of the files."""
-    study = result.grid.study
-    return {
-        "name": study.model.name,
-        "study": study.model.model_dump(mode="json"),
-        "points": [point.id for point in result.grid.points],
-        "failed": result.failed,
-        "missing": result.missing,
-        "unmade": result.unmade,
-        "optimum": [_plain(f) for f in result.optima],
-        "hashes": {str(path): hash_file(path) for path in result.grid.inputs},
-        "versions": outputs.versions(),
-    }
-
-
-def _plain(found: sweep_tables.Found) -> dict[str, Any]:
-    """An optimum with what is not known as null."""
-    row = dict(zip(sweep_tables.OPTIMUM, found.row, strict=True))
-    known = {k: None if v == "" and k in ("low", "high") else v for k, v in row.items()}
-    return known | {"edge": found.edge}
 
 
 def _more(names: Sequence[str], shown: int) -> str:

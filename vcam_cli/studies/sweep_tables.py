@@ -41,7 +41,7 @@ Row = tuple[Cell, ...]
 
 @dataclass(frozen=True)
 class Found:
-    """The optimum of a parameter in a case."""
+    """The optimum of a parameter in a case, its numbers to `DIGITS` digits, nan where unknown."""
 
     case: str
     parameter: str
@@ -56,14 +56,17 @@ class Found:
     @property
     def row(self) -> Row:
         """As in optimum.csv; what is not known is empty."""
-        numbers = (_rounded(self.low), _rounded(self.high))
-        at = self.optimum if isinstance(self.optimum, str) else _rounded(self.optimum)
-        head = (self.case, self.parameter, self.unit, at)
-        return (*head, *numbers, self.metric, _rounded(self.value))
+        numbers = map(_known, (self.optimum, self.low, self.high))
+        head = (self.case, self.parameter, self.unit)
+        return (*head, *numbers, self.metric, _known(self.value))
 
 
-def _rounded(value: float) -> Cell:
-    return float(f"{value:.{DIGITS}g}") if math.isfinite(value) else ""
+def _known(value: float | str) -> Cell:
+    return value if isinstance(value, str) or math.isfinite(value) else ""
+
+
+def _rounded(value: float) -> float:
+    return float(f"{value:.{DIGITS}g}")
 
 
 def columns(grid: Grid) -> tuple[str, ...]:
@@ -150,9 +153,11 @@ def _optimum(case: str, parameter: Parameter, values: NDArray, metric: str, goal
     if any(isinstance(c, str) for c in cells):
         means = values[good].mean(axis=1)
         i = int(np.argmin(means) if goal == "min" else np.argmax(means))
-        return Found(*about, str(cells[i]), math.nan, math.nan, metric, float(means[i]), "")
+        mean = _rounded(float(means[i]))
+        return Found(*about, str(cells[i]), math.nan, math.nan, metric, mean, "")
     found = optimum.find(np.array(cells, float), values[good].T, goal)
-    return Found(*about, found.at, found.low, found.high, metric, found.value, found.edge)
+    at, low, high, value = map(_rounded, (found.at, found.low, found.high, found.value))
+    return Found(*about, at, low, high, metric, value, found.edge)
 
 
 Writers = dict[str, Callable[[Path], None]]

@@ -1,0 +1,141 @@
+"""A finished sweep of which nothing has changed is read; any change is noticed."""
+
+import json
+from dataclasses import replace
+
+import pytest
+from sweeping import written
+
+from vcam_cli import sweep
+from vcam_cli.studies import sweep as module
+from vcam_cli.studies import sweep_points
+
+STUDY = {
+    "optimize": {"metric": "mean_electrons", "goal": "max"},
+    "repeat": {"adc.bits": [10, 12]},
+    "seeds": 2,
+    "expect": {
+        "best": {"quantity": "optimum", "between": ["2 um", "9 um"], "calibrated": "nothing"},
+        "never": {"quantity": "optimum", "between": ["1 um", "2 um"], "why": "it is not so"},
+    },
+}
+
+
+@pytest.fixture
+def finished(tmp_path):
+    study = written(tmp_path, **STUDY)
+    return study, tmp_path / "out", sweep(study, tmp_path / "out", workers=1)
+
+
+@pytest.fixture
+def resolved(monkeypatch):
+    """How often the cameras of a study are resolved."""
+    times = []
+    grid = sweep_points.grid
+
+    def counted(*args):
+        times.append(args)
+        return grid(*args)
+
+    monkeypatch.setattr(module.sweep_points, "grid", counted)
+    return times
+
+
+def contents(folder):
+    return {p: p.read_bytes() for p in folder.rglob("*") if p.is_file()}
+
+
+def plain(result):
+    return replace(result, computed=0, seconds=0.0)
+
+
+def test_it_is_the_same_and_no_camera_is_resolved(finished, resolved):
+    study, out, first = finished
+    before = contents(out)
+    again = sweep(study, out, workers=1)
+    assert again.computed == 0 and not resolved
+    assert repr(plain(again)) == repr(plain(first))  # nan is not itself, but reads the same
+    assert [type(v) for row in again.points for v in row.values()] == [
+        type(v) for row in first.points for v in row.values()
+    ]
+    assert contents(out) == before
+
+
+def test_what_is_refused_is_told_again(tmp_path, resolved):
+    study = written(tmp_path, vary={"pixel.width": {"values": ["5 um", "-1 um"]}})
+    told = []
+    first = sweep(study, tmp_path / "out", workers=1, tell=told.append)
+    assert told and resolved
+    once, resolved[:] = list(told), []
+    again = sweep(study, tmp_path / "out", workers=1, tell=told.append)
+    assert told == once * 2 and not resolved
+    assert (again.exit_code, again.points) == (first.exit_code, first.points) and again.failed
+
+
+def damage(path):
+    path.write_bytes(path.read_bytes()[:-3])
+
+
+def edit_camera(folder):
+    path = folder / "camera.yaml"
+    path.write_text(path.read_text("utf-8") + "\n# another comment\n", "utf-8")
+
+
+def edit_study(folder):
+    path = folder / "study.yaml"
+    path.write_text(path.read_text("utf-8").replace("seeds: 2", "seeds: 1"), "utf-8")
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        edit_camera,
+        edit_study,
+        lambda folder: (folder / "out" / "points.csv").unlink(),
+        lambda folder: damage(folder / "out" / "optimum.csv"),
+        lambda folder: damage(folder / "out" / "mean_electrons.png"),
+        lambda folder: damage(next((folder / "out" / "points").glob("*.json"))),
+        lambda folder: next((folder / "out" / "points").glob("*.json")).unlink(),
+    ],
+)
+def test_every_change_is_noticed_and_mended(finished, resolved, tmp_path, change):
+    study, out, _ = finished
+    before = {p.name: p.read_bytes() for p in out.glob("*.csv")}
+    change(tmp_path)
+    sweep(study, out, workers=1)
+    assert len(resolved) == 1
+    if change is not edit_study:
+        before.pop("timings.csv")
+        assert before.items() <= {p.name: p.read_bytes() for p in out.glob("*.csv")}.items()
+    sweep(study, out, workers=1)
+    assert len(resolved) == 1
+
+
+def test_other_overrides_are_another_sweep(finished, resolved):
+    study, out, first = finished
+    other = sweep(study, out, ["pixel.readout.full_well=3000 e"], workers=1)
+    assert len(resolved) == 1 and other.computed == first.computed
+
+
+def test_a_version_that_computes_otherwise_is_asked_again(finished, resolved, monkeypatch):
+    study, out, _ = finished
+    versions = module.unchanged.outputs.versions()
+    monkeypatch.setattr(module.unchanged.outputs, "versions", lambda: versions | {"vcam": "0"})
+    sweep(study, out, workers=1)
+    assert len(resolved) == 1
+
+
+def test_the_record_of_a_sweep_that_only_began_is_no_seal(finished, resolved):
+    study, out, _ = finished
+    (out / "study.json").write_text('{"program": "vcam", "files": []}', "utf-8")
+    sweep(study, out, workers=1)
+    assert len(resolved) == 1
+
+
+def test_a_record_of_other_types_is_no_seal(finished, resolved):
+    study, out, _ = finished
+    record = json.loads((out / "study.json").read_text("utf-8"))
+    for key in ("hashes", "written", "points", "kept", "optimum", "expected"):
+        (out / "study.json").write_text(json.dumps(record | {key: [1]}), "utf-8")
+        sweep(study, out, workers=1)
+    assert len(resolved) == 6
