@@ -117,6 +117,14 @@ def test_other_overrides_are_another_sweep(finished, resolved):
     assert len(resolved) == 1 and other.computed == first.computed
 
 
+def test_keys_of_several_kinds(tmp_path, resolved):
+    over_field = [{"field": 0, 8: "0 um"}, {"field": 1, 8: "0.05 um"}]
+    study = written(tmp_path, cases={"plain": {}, "coma": {"optics.zernike": over_field}})
+    sweep(study, tmp_path / "out", workers=1)
+    sweep(study, tmp_path / "out", workers=1)
+    assert len(resolved) == 1
+
+
 def test_a_version_that_computes_otherwise_is_asked_again(finished, resolved, monkeypatch):
     study, out, _ = finished
     versions = module.unchanged.outputs.versions()

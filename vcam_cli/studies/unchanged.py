@@ -7,7 +7,6 @@ to do: no point or figure missing, none that might end otherwise tomorrow.
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from importlib.metadata import version
 from pathlib import Path
@@ -17,7 +16,7 @@ from vcam_cli.camera import load as cameras
 from vcam_cli.errors import CannotDo
 from vcam_cli.files.folder import record_of
 from vcam_cli.files.points import RECORD, SweepFolder
-from vcam_cli.files.report import hash_file, hash_text
+from vcam_cli.files.report import hash_file, hash_text, to_json
 from vcam_cli.studies import outputs, sweep_points, sweep_result
 from vcam_cli.studies.point_work import FRAMES
 from vcam_cli.studies.study_file import StudyFile
@@ -37,8 +36,7 @@ def asked(study: StudyFile, sets: Sequence[str], folder: Path | None = None) -> 
     ]
     places = [str(study.file), str(start) if sets else ""]
     versions = outputs.versions() | {"matplotlib": version("matplotlib")}
-    whole = [study.tree.plain(), over.plain(), cases, places, versions]
-    return hash_text(json.dumps(whole, sort_keys=True, default=str))
+    return hash_text(to_json([study.tree.plain(), over.plain(), cases, places, versions]))
 
 
 def result(place: Path, study: StudyFile, asked: str) -> SweepResult | None:
