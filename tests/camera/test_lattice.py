@@ -183,5 +183,5 @@ def test_a_file_that_is_gone(tmp_path):
 def test_more_pixels_than_are_read(tmp_path, monkeypatch):
     monkeypatch.setattr(module, "MOST", 4)
     places(scattered(tmp_path))  # the header is a row of them
-    with pytest.raises(BadInput, match="has 5 rows; at most 4 are read"):
+    with pytest.raises(BadInput, match="has more than 4 rows; no more are read"):
         scattered(tmp_path, GOOD + "1,1,R\n")

@@ -6,6 +6,7 @@ name of a file before it reads it, so that the last one told is the one it died 
 
 import random
 import resource
+import struct
 import sys
 import tempfile
 from collections.abc import Callable
@@ -27,23 +28,38 @@ from vcam_cli.spectra.text import read_csv
 
 MEMORY = 8 << 30
 """Address space [bytes]; a file claims far more."""
-PICTURES = ("png", "jpg", "tif", "exr", "ppm", "bmp", "hdr", "webp", "tga", "gif", "dpx")
+PICTURES = (
+    "png", "jpg", "tif", "exr", "ppm", "bmp", "hdr", "webp", "tga", "gif", "dpx", "sgi", "ico",
+    "iff", "rla", "fits", "jp2", "jxl",
+)  # fmt: skip
+PSD = (
+    b"8BPS" + struct.pack(">H6xHIIHHIIIH", 1, 3, 4, 5, 8, 3, 0, 0, 0, 0) + bytes(range(60))
+)  # fmt: skip
+"""Photoshop's, 5 x 4 pixels; which OpenImageIO reads and does not write."""
+DDS = b"DDS " + struct.pack(
+    "<7I44x8I5I", 124, 0x1007, 4, 5, 20, 0, 0, 32, 0x40, 0, 24, 0xFF0000, 0xFF00, 0xFF, 0,
+    0x1000, 0, 0, 0, 0,
+) + bytes(range(60))  # fmt: skip
 Reader = Callable[[Path], object]
 
 
 def pictures(folder: Path) -> dict[Path, Reader]:
     """A small whole picture of every format that OpenImageIO writes here, in bits and layouts."""
     rgb = np.random.default_rng(3).random((12, 10, 4), np.float32)
+    larger = np.tile(rgb[:, :, :3], (4, 4, 1))  # JPEG 2000 is written from 32 pixels on
     found = {}
     for kind in PICTURES:
-        found |= _picture(folder / f"plain.{kind}", rgb[:, :, :3], "uint8")
+        data = larger if kind == "jp2" else rgb[:, :, :3]
+        found |= _picture(folder / f"plain.{kind}", data, "uint8")
     for name, channels, sample, tile in (
         ("gray-alpha.png", 2, "uint16", 0), ("sixteen.tif", 3, "uint16", 0),
         ("tiled.tif", 3, "uint8", 16), ("tiled.exr", 4, "half", 16), ("float.tif", 1, "float", 0),
     ):  # fmt: skip
         found |= _picture(folder / name, rgb[:, :, :channels], sample, tile)
     found |= _parts(folder / "parts.exr", rgb[:, :, :3])
-    return found
+    (folder / "made.psd").write_bytes(PSD)
+    (folder / "made.dds").write_bytes(DDS)
+    return found | dict.fromkeys((folder / "made.psd", folder / "made.dds"), _as_picture)
 
 
 def _picture(path: Path, data: np.ndarray, sample: str, tile: int = 0) -> dict[Path, Reader]:
@@ -93,7 +109,23 @@ def spectra(folder: Path) -> dict[Path, Reader]:
         made.paged_tiff(folder / "pages.tif", np.moveaxis(made.CUBE, 2, 0), "float"),
     ]
     (folder / "pages.csv").write_text(made.table())
+    files += _hdf5(folder)
     return dict.fromkeys(files, _as_spectra)
+
+
+def _hdf5(folder: Path) -> list[Path]:
+    """Scenes of ISETCam in MATLAB 7.3: one as it is, one in packed pieces."""
+    try:
+        import h5py
+    except ImportError:
+        return []
+    packed = {"chunks": (2, 2, 2), "compression": "gzip", "shuffle": True}
+    files = [folder / "hdf5.mat", folder / "packed-hdf5.mat"]
+    for path, options in zip(files, ({}, packed), strict=True):
+        with h5py.File(path, "w", userblock_size=512) as file:
+            file.create_dataset("photons", data=made.photons().T, **options)
+            file["wave"] = made.NM[None]
+    return files
 
 
 def _as_spectra(path: Path) -> None:
@@ -151,8 +183,21 @@ def harmed(data: bytes, chance: random.Random) -> bytes:
     return bytes(out)
 
 
+def cuts(data: bytes, count: int) -> list[bytes]:
+    """Cut off at places all over, and at the first ones, where headers are."""
+    step = max(1, len(data) // count)
+    return [data[:at] for at in sorted({*range(0, 16, 3), *range(0, len(data), step)})]
+
+
+def versions(name: str, data: bytes, first: int, last: int) -> list[bytes]:
+    """What is made of a file: harmed with these seeds, and cut off at as many places."""
+    seeds = range(first, last)
+    return [*(harmed(data, random.Random(f"{name} {n}")) for n in seeds), *cuts(data, last - first)]
+
+
 def main(first: int, last: int) -> None:
-    """Harms each file in `last` - `first` ways; prints the number read, refused."""
+    """Harms each file in `last` - `first` ways, and cuts and misnames it; prints how many are
+    read, how many refused."""
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
     counts = {"read": 0, "refused": 0}
     with tempfile.TemporaryDirectory() as folder:
@@ -160,11 +205,18 @@ def main(first: int, last: int) -> None:
         whole = {path: path.read_bytes() for path in readers}
         for path, read in readers.items():
             assert read_whole(path, read) == "read", path
-            for seed in range(first, last):
-                print(f"{path.name} {seed}", flush=True)
-                path.write_bytes(harmed(whole[path], random.Random(f"{path.name} {seed}")))
+            for n, data in enumerate(versions(path.name, whole[path], first, last)):
+                print(f"{path.name} {n}", flush=True)
+                path.write_bytes(data)
                 counts[read_whole(path, read)] += 1
             path.write_bytes(whole[path])
+        for path, data in whole.items():
+            for other, read in readers.items():
+                if other.suffix != path.suffix:
+                    named = other.with_stem("misnamed")
+                    print(f"{path.name} as {named.name}", flush=True)
+                    named.write_bytes(data)
+                    counts[read_whole(named, read)] += 1
     print(f"read {counts['read']} refused {counts['refused']}")
 
 

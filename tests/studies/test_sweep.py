@@ -2,6 +2,7 @@
 
 import csv
 import json
+import os
 import signal
 import subprocess
 import time
@@ -272,6 +273,17 @@ def test_files_of_a_former_study_go(tmp_path):
     sweep(study, tmp_path / "out", workers=1)
     names = {p.name for p in (tmp_path / "out").iterdir()}
     assert names == {"points", "points.csv", "timings.csv", "well_capacity.png", "study.json"}
+
+
+def test_temporary_files_of_the_killed_go(tmp_path):
+    study, points = written(tmp_path), tmp_path / "out" / "points"
+    points.mkdir(parents=True)
+    old, new = points / ".a.json.12-ab.part", points / ".b.json.13-cd.part"
+    for path in (old, new):
+        path.touch()
+    os.utime(old, (0, time.time() - 4000))
+    sweep(study, tmp_path / "out", workers=1)
+    assert not old.exists() and new.exists()
 
 
 def test_the_optimum_of_a_case_and_its_row(tmp_path):

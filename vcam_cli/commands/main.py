@@ -9,21 +9,24 @@ for, and imports its physics when it runs, so `vcam --help` and shell completion
 
 import sys
 
+from vcam_cli.commands import interrupts
+
 try:
-    import errno
-    import io
-    import os
-    from collections.abc import Iterator
-    from contextlib import contextmanager, suppress
-    from importlib import import_module
-    from typing import Annotated, Any
+    with interrupts.at_once():  # most of the time until a command begins goes by here
+        import errno
+        import io
+        import os
+        from collections.abc import Iterator
+        from contextlib import contextmanager, suppress
+        from importlib import import_module
+        from typing import Annotated, Any
 
-    import typer
-    from typer.core import TyperGroup
+        import typer
+        from typer.core import TyperGroup
 
-    from vcam_cli.errors import CannotDo, VcamError
-except KeyboardInterrupt:  # most of the time until a command begins goes by here
-    sys.exit(130)
+        from vcam_cli.errors import CannotDo, VcamError
+except KeyboardInterrupt:
+    sys.exit(interrupts.INTERRUPTED)
 
 COMMANDS = {
     "run": "run:run",
@@ -130,6 +133,11 @@ def _tell(message: object) -> None:
 
 def main() -> None:
     """Runs `vcam` and leaves the process."""
+    with interrupts.waiting():
+        _main()
+
+
+def _main() -> None:
     _replace_closed()
     try:
         try:

@@ -6,6 +6,7 @@ from typing import Annotated, Any
 import typer
 
 from vcam_cli.commands import options
+from vcam_cli.errors import one_line
 
 
 def validate(
@@ -34,7 +35,7 @@ def validate(
         for problem in report["problems"]:
             options.say(problem["text"])
         if report["ok"] and not as_json and not quiet:
-            print(f"{report['file']}: ok ({report['name']})")
+            print(one_line(f"{report['file']}: ok ({report['name']})"))
     if as_json:
         options.write_json({"ok": all(report["ok"] for report in checked), "files": checked})
     codes = {report["exit_code"] for report in checked}

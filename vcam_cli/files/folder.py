@@ -9,6 +9,9 @@ lie in the folder that no record names. Their names stand in the lock file durin
 time, so that a run after a power cut knows what is vcam's and what is not.
 
 Why flock: the kernel drops it when its holder dies, however it dies.
+
+Why nothing here minds Ctrl-C: it waits while a function of this module runs (see
+`commands.interrupts`); none of them takes long.
 """
 
 import errno

@@ -135,7 +135,7 @@ def _order(wavelengths: np.ndarray) -> slice:
         return slice(None)
     if (step < 0).all():
         return slice(None, None, -1)
-    wrong = int(np.flatnonzero(np.sign(step) != np.sign(step[0]))[0])
+    wrong = int(np.flatnonzero(step <= 0 if step[0] >= 0 else step >= 0)[0])
     before, after = wavelengths[wrong : wrong + 2] * 1e9
     raise Unusable(
         f"has wavelengths that do not rise: {after:.6g} nm follows {before:.6g} nm",

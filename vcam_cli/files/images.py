@@ -23,6 +23,8 @@ from vcam_cli.errors import BadInput, CannotDo, bad
 from vcam_cli.files.rows import message
 
 MOST_PIXELS = 10**9
+MOST_LIGHT = 1e30
+"""Over `white`, as float32 ends at 3.4e38 and a camera's units take their share."""
 _PNG_START = b"\x89PNG\r\n\x1a\n"
 _ALPHA = {"A", "ALPHA"}
 _RGB = ("R", "G", "B")
@@ -319,16 +321,35 @@ def _linear(data: np.ndarray, srgb: bool, white: float, signed: bool) -> np.ndar
     """Samples -> linear light / white, float32: by table up to 16 bits, else block by block."""
     if data.dtype.kind == "u" and data.dtype.itemsize <= 2:
         code = np.arange(np.iinfo(data.dtype).max + 1) / np.iinfo(data.dtype).max
-        table = (decode_srgb(code) if srgb else code) / white
-        return table.astype(np.float32)[data]
+        light = _over_white(code, srgb, white)[data]
+        _check_light(light, data, 0)
+        return light
     full = 1.0 if data.dtype.kind == "f" else float(np.iinfo(data.dtype).max)
     light = np.empty(data.shape, np.float32)
     for row in range(0, len(data), _BLOCK):
         block = data[row : row + _BLOCK]
         _check_values(block, row, signed)
         code = block.astype(np.float64) / full
-        light[row : row + _BLOCK] = (decode_srgb(code) if srgb else code) / white
+        light[row : row + _BLOCK] = _over_white(code, srgb, white)
+        _check_light(light[row : row + _BLOCK], block, row)
     return light
+
+
+def _over_white(code: np.ndarray, srgb: bool, white: float) -> np.ndarray:
+    """Light of codes (full scale = 1) over `white`, float32; infinite where it is too much."""
+    with np.errstate(over="ignore"):
+        return ((decode_srgb(code) if srgb else code) / white).astype(np.float32)
+
+
+def _check_light(light: np.ndarray, stored: np.ndarray, row: int) -> None:
+    if light.max(initial=0.0) <= MOST_LIGHT and light.min(initial=0.0) >= -MOST_LIGHT:
+        return
+    y, x, channel = np.argwhere(~(np.abs(light) <= MOST_LIGHT))[0]
+    raise Unusable(
+        f"holds a value too large ({stored[y, x, channel]:g} at row {row + y}, column {x}): its "
+        f"light over `white` is beyond {MOST_LIGHT:g}",
+        "correct encoding and white, or scale the image",
+    )
 
 
 def _check_values(block: np.ndarray, row: int, signed: bool) -> None:

@@ -8,6 +8,7 @@ the radiance of a perfect white. Field of view and distance are the camera file'
 Files of MATLAB 7.3 are HDF5, which h5py reads (pip install 'vcam-cli[hdf5]').
 """
 
+import math
 from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
@@ -16,8 +17,8 @@ from typing import Any
 import numpy as np
 
 from vcam_cli.files.images import Unusable
-from vcam_cli.files.matlab import read_variables, refuse_too_much
-from vcam_cli.files.stored import PER_NM, Stored, lengths, numbers
+from vcam_cli.files.matlab import ASKED, MOST_RATIO, SUSPECT, read_variables, refuse_too_much
+from vcam_cli.files.stored import MOST_WAVELENGTHS, PER_NM, Stored, lengths, numbers
 from vcam_cli.spectra import PLANCK, SPEED_OF_LIGHT
 
 Lookup = Callable[..., Any]
@@ -30,7 +31,9 @@ _SAVE = "save it with ISETCam's sceneToFile, or with save(NAME, 'photons', 'wave
 def open_isetcam(path: Path) -> Stored:
     """A scene of ISETCam; its samples are read at once. Raises Unusable."""
     get = _hdf5(path) if _is_hdf5(path) else _matlab5(path)
-    photons, wave = _photons(get)
+    photons, wave = _photons(path, get)
+    if np.size(wave) > MOST_WAVELENGTHS:
+        raise Unusable(f"its wave has more than {MOST_WAVELENGTHS} values", _SAVE)
     wavelengths = numbers(wave, "its wave") * 1e-9
     if photons.ndim != 3:
         raise Unusable(f"its photons have {photons.ndim} axes, not (h, w, bands)", _SAVE)
@@ -43,7 +46,7 @@ def open_isetcam(path: Path) -> Stored:
     )
 
 
-def _photons(get: Lookup) -> tuple[np.ndarray, Any]:
+def _photons(path: Path, get: Lookup) -> tuple[np.ndarray, Any]:
     for photons, wave in (
         (get("photons"), get("wave")),
         (get("scene", "data", "photons"), get("scene", "spectrum", "wave")),
@@ -54,16 +57,21 @@ def _photons(get: Lookup) -> tuple[np.ndarray, Any]:
     wave = get("basis", "wave")
     if coefficients is None or basis is None or wave is None:
         raise Unusable("has no photons and wave", _SAVE)
-    coefficients, basis = _real(coefficients, "mcCOEF"), _real(basis, "basis")
+    return _product(path, get, _real(coefficients, "mcCOEF"), _real(basis, "basis")), wave
+
+
+def _product(path: Path, get: Lookup, coefficients: np.ndarray, basis: np.ndarray) -> np.ndarray:
+    """Photons (h, w, bands) of a scene that is stored as weights of a few spectra."""
     if coefficients.ndim != 3 or basis.ndim != 2 or coefficients.shape[2] != basis.shape[1]:
         raise Unusable("its mcCOEF and basis do not fit each other", _SAVE)
+    refuse_too_much(path, 8 * coefficients.shape[0] * coefficients.shape[1] * len(basis))
     photons = coefficients @ basis.T
     mean = get("imgMean")
     if mean is not None:
         mean = numbers(mean, "its imgMean")
         lengths(len(basis), mean, "values of imgMean")
         photons = photons + mean
-    return photons, wave
+    return photons
 
 
 def _white(get: Lookup, wavelengths: np.ndarray, per_photon: np.ndarray) -> np.ndarray | None:
@@ -85,6 +93,18 @@ def _real(values: Any, what: str) -> np.ndarray:
     if not isinstance(values, np.ndarray) or values.dtype.kind not in "uif":
         raise Unusable(f"its {what} are no real numbers", _SAVE)
     return values
+
+
+def _refuse_claims(path: Path, found: Any) -> None:
+    """Refuses a dataset of HDF5 that lies elsewhere, or is far larger than its file can hold."""
+    if found.is_virtual or found.external:
+        raise Unusable("its numbers lie in another file", _SAVE)
+    whole = found.size * found.dtype.itemsize
+    piece = math.prod(found.chunks or ()) * found.dtype.itemsize
+    most = max(SUSPECT, MOST_RATIO * path.stat().st_size)
+    if piece > max(whole, ASKED) or whole > most:
+        raise Unusable("claims more numbers than it can hold", _SAVE)
+    refuse_too_much(path, whole)
 
 
 def _is_hdf5(path: Path) -> bool:
@@ -110,6 +130,7 @@ def _matlab5(path: Path) -> Lookup:
 
 
 def _hdf5(path: Path) -> Lookup:
+    """Why links are told apart: HDF5 can say that its numbers lie in some other file."""
     try:
         h5py: Any = import_module("h5py")
     except ImportError:
@@ -121,9 +142,17 @@ def _hdf5(path: Path) -> Lookup:
     def get(*names: str) -> Any:
         try:
             with h5py.File(path, "r") as file:
-                found = file.get("/".join(names))
+                found: Any = file
+                for name in names:
+                    group = isinstance(found, h5py.Group)
+                    link = found.get(name, getlink=True) if group else None
+                    if link is None:
+                        return None
+                    if not isinstance(link, h5py.HardLink):
+                        raise Unusable(f"its {name} is a link", _SAVE)
+                    found = found[name]
                 if isinstance(found, h5py.Dataset) and found.dtype.kind in "uif":
-                    refuse_too_much(path, found.size * found.dtype.itemsize)
+                    _refuse_claims(path, found)
                     return found[()].T
         except (OSError, RuntimeError, KeyError) as error:
             raise Unusable(f"is no whole MATLAB file ({str(error)[:80]})", _SAVE) from None

@@ -14,10 +14,10 @@ from typing import IO, Literal
 import numpy as np
 
 from vcam_cli.files.images import Unusable, truncated
-from vcam_cli.files.stored import PER_NM, Stored, lengths, numbers
+from vcam_cli.files.stored import MOST_WAVELENGTHS, PER_NM, Stored, lengths, numbers
 
 _WRITE = "write it with numpy.savez(NAME, wavelength_nm=..., radiance=...) or reflectance=..."
-MOST_WAVELENGTHS = 10**6
+MOST_ARRAYS, LONGEST_HEADER = 1000, 10_000
 
 
 def open_npz(path: Path) -> Stored:
@@ -26,8 +26,7 @@ def open_npz(path: Path) -> Stored:
         with zipfile.ZipFile(path) as archive:
             shapes = {
                 info.filename.removesuffix(".npy"): _header(archive, info)
-                for info in archive.infolist()
-                if info.filename.endswith(".npy")
+                for info in _arrays(archive)
             }
             quantity = _quantity(shapes)
             wavelengths = _list(archive, shapes, "wavelength_nm") * 1e-9
@@ -61,6 +60,17 @@ def _quantity(shapes: dict[str, tuple[int, ...]]) -> Literal["radiance", "reflec
     return "radiance" if "radiance" in shapes else "reflectance"
 
 
+def _arrays(archive: zipfile.ZipFile) -> list[zipfile.ZipInfo]:
+    """The archive's arrays, packed in the ways that NumPy packs them."""
+    found = [info for info in archive.infolist() if info.filename.endswith(".npy")]
+    if len(found) > MOST_ARRAYS:
+        raise Unusable(f"holds more than {MOST_ARRAYS} arrays", _WRITE)
+    for info in found:
+        if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
+            raise Unusable(f"{info.filename} in it is not packed as NumPy does it", _WRITE)
+    return found
+
+
 def _header(archive: zipfile.ZipFile, info: zipfile.ZipInfo) -> tuple[int, ...]:
     """The shape of a real array whose bytes are all there."""
     with archive.open(info) as file:
@@ -78,7 +88,12 @@ def _header(archive: zipfile.ZipFile, info: zipfile.ZipInfo) -> tuple[int, ...]:
 
 def _array_header(file: IO[bytes]) -> tuple[tuple[int, ...], bool, np.dtype]:
     """Shape, order of axes and type of an array in NumPy's format."""
-    if np.lib.format.read_magic(file) == (1, 0):
+    version = np.lib.format.read_magic(file)
+    begins = file.tell()
+    if int.from_bytes(file.read(2 if version == (1, 0) else 4), "little") > LONGEST_HEADER:
+        raise ValueError("a header too long")  # which NumPy would read before it says so
+    file.seek(begins)
+    if version == (1, 0):
         return np.lib.format.read_array_header_1_0(file)
     return np.lib.format.read_array_header_2_0(file)
 

@@ -13,6 +13,7 @@ import json
 import os
 import re
 import tempfile
+import time
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
@@ -33,6 +34,8 @@ _OURS = re.compile(
 """Names in the folder of points."""
 _PLOT = "figure.png"
 _LARGEST = 1 << 20  # bytes of a point's file
+_ABANDONED = 3600.0
+"""Seconds after which nobody writes a temporary file any more."""
 
 
 class SweepFolder:
@@ -197,6 +200,14 @@ class SweepFolder:
                 with suppress(OSError):
                     (self.path / name).unlink(missing_ok=True)
         self._write_record(record, sorted(writers))
+        self._clear_abandoned()
+
+    def _clear_abandoned(self) -> None:
+        """Removes temporary files of processes that were killed."""
+        for path in (self.path / POINTS).glob(".*.part"):
+            with suppress(OSError):
+                if time.time() - path.lstat().st_mtime > _ABANDONED:
+                    path.unlink()
 
     def _write_record(self, record: Mapping[str, Any], names: list[str]) -> None:
         kept = sorted(self._used.difference(record.get("points", ())))

@@ -15,6 +15,8 @@ from vcam_cli.scenes.hyperspectral import Quantity
 
 PER_NM = 1e9
 """Radiance per nanometer as radiance per meter."""
+MOST_WAVELENGTHS = 10**6
+"""Of a file: more than these are not looked at."""
 
 
 @dataclass(frozen=True)

@@ -128,6 +128,17 @@ class SampledScene(ABC):
     def at(self, x: Array, y: Array, mix: Array) -> Array:
         """sum_k mix[r, k] B_k at the points (y[i], x[j]) [m], both rising: (R, m, n)."""
 
+    def runs(self) -> Array | None:
+        """Where runs of rows that are alike start, and the number of rows: (d + 1,).
+
+        None where nothing is known of them.
+        """
+        return None
+
+    def different(self, mix: Array) -> Array:
+        """The first row of every run, in all combinations: (R, d, nx). Only where `runs` are."""
+        raise NotImplementedError
+
 
 class Chart(ABC):
     """A picture on the plane; positions in metres from the array's centre, rising.
@@ -151,6 +162,13 @@ class Chart(ABC):
     def within(self, x_edges: Array, y_edges: Array) -> "Chart":
         """A chart that looks the same on these cells, if there is one that is faster there."""
         return self
+
+    def runs(self, y_edges: Array) -> Array | None:
+        """First rows of runs of rows of cells that are alike, and the number of rows: (d + 1,).
+
+        None where nothing is known of them.
+        """
+        return None
 
     def averages(self, x_edges: Array, y_edges: Array, mix: Array) -> Array:
         """The averages over the cells: (R, len(y_edges)-1, len(x_edges)-1)."""
@@ -185,6 +203,22 @@ class ChartScene(SampledScene):
             chart.paint(x_edges, y_edges[rows.start : rows.stop + 1], mix, out[:, rows])
 
         by_bands(paint, ny, nx, workers)
+        return out
+
+    def runs(self) -> Array | None:
+        if max(self.pitch_x, self.pitch_y) > self.chart.coarsest_cell:
+            return None
+        return self.chart.runs(cell_edges(self.shape[0], self.pitch_y))
+
+    def different(self, mix: Array) -> Array:
+        bounds, (ny, nx) = self.runs(), self.shape
+        if bounds is None:
+            raise ValueError("nothing is known of the rows of this chart")
+        x_edges, y_edges = cell_edges(nx, self.pitch_x), cell_edges(ny, self.pitch_y)
+        out = np.empty((len(mix), len(bounds) - 1, nx), self.dtype)
+        mix = np.asarray(mix, self.dtype)
+        for number, row in enumerate(bounds[:-1]):
+            self.chart.paint(x_edges, y_edges[row : row + 2], mix, out[:, number : number + 1])
         return out
 
     def at(self, x: Array, y: Array, mix: Array) -> Array:
@@ -287,6 +321,17 @@ class Framed(Chart):
             picture = self.chart.averages(inside_x, inside_y, mix)
             picture *= np.outer(cover_y, cover_x).astype(mix.dtype)
             out[:, rows, columns] = picture
+
+    def runs(self, y_edges: Array) -> Array | None:
+        rows, cover, inside = clip_cells(y_edges, self.frame.height / 2)
+        whole = [0, len(y_edges) - 1]
+        if not len(cover):
+            return np.array(whole)
+        within = self.chart.runs(inside)
+        if within is None:
+            return None
+        border = [rows.start, rows.start + 1, rows.stop - 1, rows.stop]  # cells cut by the frame
+        return np.unique([*whole, *border, *(within + rows.start)])
 
     def within(self, x_edges: Array, y_edges: Array) -> "Framed":
         _, _, inside_x = clip_cells(x_edges, self.frame.width / 2)

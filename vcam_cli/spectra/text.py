@@ -1,7 +1,9 @@
 """Reading tables of spectra from CSV text: `#` comments, one header line, numbers in rows."""
 
+import io
 import math
 import stat
+from collections.abc import Iterator
 from os import PathLike
 from pathlib import Path
 
@@ -13,6 +15,9 @@ HEADER = ("wavelength_nm", "value")
 MOST_ROWS = 200_000
 MOST_BYTES = 1 << 26
 """Of a file: a million rows have some 30 MB."""
+LONGEST_LINE = 10_000
+MOST_COLUMNS = 8
+"""Of a table with as many rows as are read; a shorter one may have more."""
 
 
 def read_table(
@@ -21,7 +26,7 @@ def read_table(
     """The header's names of a CSV file, and of every row its line number and cells.
 
     Raises ValueError that names the file and the line: not text, too large, no header, a row of
-    another length, more than `most` rows. OSError as `open` raises it.
+    another length, more than `most` rows or twice as many lines. OSError as `open` raises it.
     """
     file = Path(path)
     if not stat.S_ISREG(file.stat().st_mode):  # a pipe would keep us waiting
@@ -31,20 +36,43 @@ def read_table(
     if len(data) > MOST_BYTES:
         raise ValueError(f"{file}: is larger than {MOST_BYTES >> 20} MB")
     try:
-        lines = data.decode("utf-8-sig").splitlines()
+        return _cells(file, _lines(file, data, 2 * most), most)
     except UnicodeDecodeError:
         raise ValueError(f"{file}: is not a text file") from None
-    rows = [(n, line.strip()) for n, line in enumerate(lines, 1)]
-    rows = [(n, line) for n, line in rows if line and not line.startswith("#")]
-    if not rows:
+
+
+def _lines(file: Path, data: bytes, most: int) -> Iterator[tuple[int, str]]:
+    """The lines that say something, with their numbers.
+
+    One by one, as a list of all that a file can hold would take a hundred times its bytes.
+    """
+    text = io.TextIOWrapper(io.BytesIO(data), "utf-8-sig")
+    for n, line in enumerate(iter(lambda: text.readline(LONGEST_LINE + 1), ""), 1):
+        if len(line) > LONGEST_LINE:
+            raise ValueError(f"{file}:{n}: is longer than {LONGEST_LINE} characters")
+        if n > most:
+            raise ValueError(f"{file}: has more than {most} lines")
+        line = line.strip()
+        if line and not line.startswith("#"):
+            yield n, line
+
+
+def _cells(
+    file: Path, lines: Iterator[tuple[int, str]], most: int
+) -> tuple[list[str], list[tuple[int, list[str]]]]:
+    _, first = next(lines, (0, ""))
+    if not first:
         raise ValueError(f"{file}: is empty; it needs a header and rows of numbers")
-    if len(rows) > most:
-        raise ValueError(f"{file}: has {len(rows)} rows; at most {most} are read")
-    header = [name.strip() for name in rows[0][1].split(",")]
-    cells = [(n, line.split(",")) for n, line in rows[1:]]
-    for n, row in cells:
+    header = [name.strip() for name in first.split(",")]
+    cells: list[tuple[int, list[str]]] = []
+    for n, line in lines:
+        row = line.split(",")
         if len(row) != len(header):
             raise ValueError(f"{file}:{n}: has {len(row)} columns; the header has {len(header)}")
+        cells.append((n, row))
+        rows = len(cells) + 1  # the header is one
+        if rows > most or rows * len(header) > MOST_COLUMNS * most:
+            raise ValueError(f"{file}: has more than {rows - 1} rows; no more are read")
     return header, cells
 
 

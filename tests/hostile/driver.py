@@ -1,0 +1,149 @@
+"""vcam again and again: `Driver` runs it in forks of a process in which it is loaded already.
+
+`python driver.py` reads lines of JSON and answers with lines of JSON. A line is {"args": [...],
+"folder": "..."}, and may have "signal" and "after": the fork is sent the signal after so many
+seconds; and "largest": no file may grow beyond so many bytes. The answer has the exit code
+(negative for the signal it died of), what it printed, its seconds, and its peak of memory.
+
+Why forks: a run takes a tenth of a second, most of a process's second is the loading of libraries.
+A fork that hangs tells where, and ends.
+"""
+
+import contextlib
+import faulthandler
+import json
+import os
+import resource
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+import traceback
+from pathlib import Path
+from typing import Any, Self
+
+from processes import TIMEOUT, environment
+
+HANGS = TIMEOUT / 2
+"""Seconds after which a fork says where it is, and ends with exit code 1."""
+
+
+class Driver:
+    """Context of a process that runs vcam in forks.
+
+    before: a command that starts it, for example in a name space of its own.
+    """
+
+    def __init__(self, *before: str) -> None:
+        self._spare = tempfile.TemporaryDirectory(ignore_cleanup_errors=True)
+        self.process = subprocess.Popen(
+            [*before, sys.executable, __file__], env=environment({"TMPDIR": self._spare.name}),
+            stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
+        )  # fmt: skip
+
+    @property
+    def left(self) -> list[str]:
+        """What vcam left in the folder of temporary files."""
+        return [name for name in os.listdir(self._spare.name) if name.startswith("vcam-")]
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.process.stdin.close()
+        self.process.stdout.close()
+        self.process.wait(TIMEOUT)
+        self._spare.cleanup()
+
+    def __call__(self, folder: Path, *args: str, **more: float) -> dict[str, Any]:
+        """Runs `vcam ARGS` in a folder. more: signal, after, largest."""
+        self.begin(folder, *args, **more)
+        return self.end()
+
+    def begin(self, folder: Path, *args: str, **more: float) -> None:
+        """Begins to run `vcam ARGS`."""
+        order = {"args": args, "folder": str(folder), **more}
+        self.process.stdin.write(json.dumps(order) + "\n")
+        self.process.stdin.flush()
+
+    def end(self) -> dict[str, Any]:
+        """What came of what was begun."""
+        line = self.process.stdout.readline()
+        assert line, f"the driver ended: {self.process.wait(TIMEOUT)}"
+        return json.loads(line)
+
+
+def answer(order: dict[str, Any]) -> dict[str, Any]:
+    """Runs one command as told, and says what came of it."""
+    with tempfile.TemporaryFile("w+") as printed:
+        start = time.monotonic()
+        signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # Python's own part of a fork
+        process = os.fork()
+        if process == 0:
+            _child(order, printed.fileno())
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+        if "signal" in order:
+            time.sleep(order["after"])
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(process, order["signal"])
+        _, status, used = os.wait4(process, 0)
+        seconds = time.monotonic() - start
+        printed.seek(0)
+        said = printed.read()
+    code = os.waitstatus_to_exitcode(status)
+    return {"code": code, "said": said, "seconds": seconds, "peak": used.ru_maxrss * 1024}
+
+
+def _child(order: dict[str, Any], printed: int) -> None:
+    """Becomes `vcam`, and ends; a signal may come between any two of these lines."""
+    code = 130
+    try:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+        os.dup2(printed, 1)
+        os.dup2(printed, 2)
+        faulthandler.dump_traceback_later(HANGS, exit=True)
+        os.chdir(order["folder"])
+        if "largest" in order:
+            resource.setrlimit(resource.RLIMIT_FSIZE, (order["largest"],) * 2)
+        sys.argv = ["vcam", *order["args"]]
+        code = _ended()
+    except KeyboardInterrupt:
+        code = 130
+    finally:
+        os._exit(code)
+
+
+def _ended() -> int:
+    """The exit code of `vcam`."""
+    from vcam_cli.commands.main import main
+
+    try:
+        main()
+    except SystemExit as error:
+        return error.code or 0
+    except Exception:
+        traceback.print_exc()
+        return 1
+    finally:
+        sys.stdout.flush()
+        sys.stderr.flush()
+    return 0
+
+
+def _load() -> None:
+    """Imports what runs and sweeps import."""
+    from matplotlib import figure  # noqa: F401
+    from matplotlib.backends import backend_agg  # noqa: F401
+
+    from vcam_cli.commands import main, run, sweep  # noqa: F401
+    from vcam_cli.files import exr, folder, png, points, report, sweep_plots, tables  # noqa: F401
+    from vcam_cli.studies import checks, outputs, simulate  # noqa: F401
+    from vcam_cli.studies import sweep as study  # noqa: F401
+
+
+if __name__ == "__main__":
+    _load()
+    for line in sys.stdin:
+        print(json.dumps(answer(json.loads(line))), flush=True)
