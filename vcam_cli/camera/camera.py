@@ -61,7 +61,7 @@ class Camera(Model):
 
     name: Word = key(
         "name of the camera and of its output folder; default the file's",
-        example="example",
+        example="my-camera",
         default="camera",
     )
     scene: Scene = key(
