@@ -64,6 +64,29 @@ def test_it_waits_for_a_model_that_is_written():
         wait()
 
 
+def test_it_comes_again_where_python_drops_it(capfd):
+    class Gone:
+        def __del__(self):
+            signal.raise_signal(signal.SIGINT)
+
+    with pytest.raises(KeyboardInterrupt), interrupts.waiting():
+        gone = [Gone()]
+        gone.clear()  # nobody called what is interrupted here
+        wait()
+    assert "ignored" not in capfd.readouterr().err
+
+
+def test_other_losses_are_still_told(capfd):
+    class Gone:
+        def __del__(self):
+            raise ZeroDivisionError
+
+    with interrupts.waiting():
+        gone = [Gone()]
+        gone.clear()
+    assert "ZeroDivisionError" in capfd.readouterr().err
+
+
 def test_it_waits_for_a_module_that_is_loaded(tmp_path, monkeypatch):
     (tmp_path / "interrupted_module.py").write_text(
         "import signal\n"

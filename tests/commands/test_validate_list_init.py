@@ -141,6 +141,14 @@ class TestMain:
         result = subprocess.run(line, stderr=subprocess.PIPE, env=environment())
         assert (result.returncode, result.stderr) == (0, b"")
 
+    def test_what_an_encoding_lacks_is_escaped(self, tmp_path):
+        env = environment() | {"PYTHONIOENCODING": "ascii"}
+        (tmp_path / "caf\u00e9.yaml").write_text("extends: starter\n", "utf-8")
+        run = [*VCAM, "validate", "caf\u00e9.yaml"]
+        result = subprocess.run(run, cwd=tmp_path, capture_output=True, env=env)
+        assert (result.returncode, result.stderr) == (0, b"")
+        assert b"caf\\xe9.yaml" in result.stdout
+
     @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no /dev/full here")
     @pytest.mark.parametrize("args", [["--help"], ["validate", "starter"], ["list", "--json"]])
     @pytest.mark.parametrize("unbuffered", ["", "1"])

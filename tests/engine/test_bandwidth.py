@@ -89,8 +89,11 @@ def test_loss_of_a_chart_is_foretold(name, f_number, cells, sampled):
     """
     found = sampled(name, f_number, cells)
     lost = rms(found.values, sampled(name, f_number, 24).values)
-    assert found.spectrum.oversampling == cells
     foretold = found.spectrum.lost
+    if name == "patches" and foretold == 0:  # known as far as the lens goes
+        assert lost == 0 and found.spectrum.oversampling < cells
+        return
+    assert found.spectrum.oversampling == cells
     assert foretold > 0.5 * lost
     assert foretold < (700 if name == "diagonal edge" else 12) * lost
 
@@ -207,8 +210,8 @@ def test_finer_stops_at_the_budget_and_the_knob(tmp_path):
     g = plain_geometry(tmp_path, array__rows=1000, array__columns=1000)
     most = STANDARD.most_oversampling
     assert bandwidth.finer(2, 1.0, 1.0, g.rows * g.columns, STANDARD) == 2
-    # eightfold loss: fourfold sampling
-    assert bandwidth.finer(2, 8.0, 1.0, g.rows * g.columns, STANDARD) == 8
+    # nine times the loss: three times the sampling, and a twentieth of it
+    assert bandwidth.finer(2, 9.0, 1.0, g.rows * g.columns, STANDARD) == 7
     # 64 million samples allow 8 a pixel on a million pixels
     assert bandwidth.finer(2, 1e9, 1.0, g.rows * g.columns, STANDARD) == 8
     assert bandwidth.finer(2, 1.0, 0.0, g.rows * g.columns, STANDARD) == 8

@@ -68,6 +68,16 @@ class Halved(ReadNoise):
         return mean
 
 
+@pytest.mark.parametrize("more", [{}, LINES], ids=["plain", "lines and defects"])
+def test_same_bytes_however_few_pixels_flow_together(more, tmp_path, monkeypatch):
+    made = camera(tmp_path, NOISY | more)
+    whole = simulate(made, workers=1)
+    monkeypatch.setattr(capture, "AT_ONCE", 5 * 70)
+    parts = simulate(made, workers=1)
+    assert whole.electrons.tobytes() == parts.electrons.tobytes()
+    assert whole.dn.tobytes() == parts.dn.tobytes()
+
+
 def test_what_acts_on_the_mean_does_so_before_shot_noise():
     """Half of 1000 electrons and 30 dark ones again; shot noise of what is left, a Poisson number.
 

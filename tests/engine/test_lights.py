@@ -16,7 +16,7 @@ BASE = {
     "scene.wavelengths": {"start": "400 nm", "stop": "700 nm"},
     "pixel.photodetector.dark_current": "100 e/s",
     "pixel.architecture": "ccd",
-    "accuracy": "draft",
+    "accuracy": {"preset": "draft"},
     "effects": "auto",
     "processing": [{"demosaic": "bilinear"}],
 }
@@ -42,6 +42,7 @@ CHANGES = {
     "pixel.photodetector.dark_current": "900 e/s",
     "pixel.photodetector.dark_current_density": "5 nA/cm2",
     "pixel.photodetector.dark_current_scale": 3,
+    "accuracy.shot_noise": "gaussian",
     "array.binning": {"rows": 2, "columns": 2, "kind": "voltage"},
     "effects": {"shot_noise": "off", "dark_current": "off"},
 }

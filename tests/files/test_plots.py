@@ -1,6 +1,9 @@
 """Plots: readable PNG files, the same bytes for the same numbers."""
 
+import os
 import struct
+import subprocess
+import sys
 
 import pytest
 
@@ -37,3 +40,17 @@ def test_nothing_in_the_file_but_the_picture(tmp_path):
 @pytest.mark.parametrize(("panels", "curves"), [((), CURVES), (PANELS[:1], ()), (PANELS, CURVES)])
 def test_whatever_is_missing_it_draws(panels, curves, tmp_path):
     assert drawn(tmp_path / "a.png", panels or PANELS[1:], curves).startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize("place", ["", "home/matplotlib"])
+def test_no_settings_of_a_folder_or_of_a_user_are_read(place, tmp_path):
+    (tmp_path / place).mkdir(parents=True, exist_ok=True)
+    os.mkfifo(tmp_path / place / "matplotlibrc")  # whoever reads it waits
+    code = "from vcam_cli.files.plots import load; print(load().rcParams['font.size'], end='')"
+    paths = os.pathsep.join(path for path in sys.path if path)
+    home = os.environ | {"XDG_CONFIG_HOME": str(tmp_path / "home"), "PYTHONPATH": paths}
+    home.pop("MATPLOTLIBRC", None)
+    home.pop("MPLCONFIGDIR", None)
+    command = [sys.executable, "-c", code]
+    done = subprocess.run(command, cwd=tmp_path, env=home, capture_output=True, timeout=120)
+    assert (done.returncode, done.stdout) == (0, b"10.0"), done.stderr

@@ -125,3 +125,18 @@ def test_only_a_bayer_block_is_a_bayer_block():
     assert all(is_bayer(pattern_of(order)) for order in ORDERS)
     for rows in ("Y", ("RG", "BB"), ("RR", "GB"), ("GG", "GG"), ("RG", "GR"), ("RGB", "RGB")):
         assert not is_bayer(tuple(tuple(row) for row in rows))
+
+
+@pytest.mark.parametrize("order", ORDERS)
+@pytest.mark.parametrize("shape", [(2, 2), (2, 7), (5, 2), (8, 8), (9, 7)])
+def test_sums_of_colors_need_no_picture(order, shape):
+    mosaic = np.random.default_rng(4).random(shape)
+    method, middle = Bilinear(pattern_of(order), RGB), shape[0] // 2
+    parts = [
+        method.color_sums(Block(mosaic[np.newaxis, rows], rows.start), shape)
+        for rows in (slice(0, middle), slice(middle, shape[0]))
+    ]
+    expected = bilinear(mosaic, pattern_of(order), RGB).sum(axis=(1, 2), dtype=float)
+    # float32: each value to 6e-8
+    np.testing.assert_allclose(sum(parts)[0], expected, rtol=1e-6)
+    assert np.all(sum(parts)[1] == mosaic.size)

@@ -23,6 +23,7 @@ from vcam_cli.engine.prepare import Prepared
 from vcam_cli.files.png import write_png
 from vcam_cli.studies import ablation
 from vcam_cli.studies.accuracy_reference import changes, converged
+from vcam_cli.studies.accuracy_shots import enough
 from vcam_cli.studies.simulate import prepare
 
 PRESETS = ("draft", "standard", "reference")
@@ -321,19 +322,20 @@ class Truth:
     found: Prepared
     mean: np.ndarray
     full: float
+    auto: dict[str, Prepared]
+    """The camera as its file has it, at every preset."""
 
 
 def truth(camera: Camera) -> Truth:
     """The camera with everything on, and finer than its reference."""
-    coarse = prepare(_at(camera, "reference"))[0]
-    found = converged(camera, coarse, 2)
-    return Truth(found, ablation.mean_raw(found), ablation.full_signal(found))
+    auto = {preset: prepare(_at(camera, preset))[0] for preset in PRESETS}
+    found = converged(camera, auto["reference"], 2)
+    return Truth(found, ablation.mean_raw(found), ablation.full_signal(found), auto)
 
 
-def kept(camera: Camera, true: Truth) -> Iterator[Kept]:
+def kept(true: Truth) -> Iterator[Kept]:
     """Both promises, at every preset."""
-    for preset in PRESETS:
-        auto = prepare(_at(camera, preset))[0]
+    for preset, auto in true.auto.items():
         mean = ablation.rms(ablation.mean_raw(auto) - true.mean) / true.full
         lost = variance_lost_of(auto, true.found, true.full)
         yield Kept(preset, auto.settings.tolerance, mean, lost)
@@ -389,7 +391,7 @@ NOTHING = 1e-9
 
 def estimates(camera: Camera, true: Truth) -> list[Estimate]:
     """The plan's contribution of every effect at standard, beside its ablation."""
-    auto = prepare(_at(camera, "standard"))[0]
+    auto = true.auto["standard"]
     names = tuple(ablation.wanted(camera))
     changed = changes(camera, true.found.exposure_time, names, 2)
     shares = ablation.variance_shares(true.found, true.full, 2)
@@ -410,14 +412,12 @@ COSTLY = tuple(kind.name for kind in ORDER if issubclass(kind, Draw))
 """Effects whose draws cost a tenth of a second each at twelve megapixels."""
 
 
-def worth_leaving_out(
-    camera: Camera, preset: str, true: Truth, shares: dict[str, float]
-) -> list[tuple[str, bool]]:
+def worth_leaving_out(preset: str, true: Truth, shares: dict[str, float]) -> list[tuple[str, bool]]:
     """(effect, whether it is off) of costly ones with an ablation under a tenth of their share.
 
     Their share is what the promise lets go of a variance: 2 T.
     """
-    auto = prepare(_at(camera, preset))[0]
+    auto = true.auto[preset]
     limit = 0.1 * 2 * auto.settings.tolerance
     states = {d.name: d.state == "off" for d in auto.plan.decisions}
     return [(n, states[n]) for n in COSTLY if n in shares and shares[n] < limit]
@@ -438,17 +438,16 @@ def idle_work(camera: Camera) -> list[tuple[str, bool]]:
     return out
 
 
-def seconds(camera: Camera, repeats: int = 3) -> tuple[float, float]:
+def seconds(camera: Camera) -> tuple[float, float]:
     """Of a frame with its render: auto at standard, and everything on at reference, medians."""
     everything = ablation.switched(_at(camera, "reference"), "all")
-    return tuple(_timed(lambda c=c: simulate(c).render, repeats) for c in (camera, everything))
+    return _timed(lambda: simulate(camera).render), _timed(lambda: simulate(everything).render)
 
 
-def _timed(work: Callable[[], object], repeats: int) -> float:
-    work()
-    taken = []
-    for _ in range(repeats):
+def _timed(work: Callable[[], object]) -> float:
+    runs: list[float] = []
+    while not enough(runs):
         start = time.perf_counter()
         work()
-        taken.append(time.perf_counter() - start)
-    return statistics.median(taken)
+        runs.append(time.perf_counter() - start)
+    return statistics.median(runs)

@@ -19,7 +19,7 @@ def case(request, tmp_path_factory):
 
 
 def test_mean_and_variance_stay_within_the_tolerance(case):
-    for found in kept(*case):
+    for found in kept(case[1]):
         assert found.mean <= found.tolerance, found
         assert found.variance <= 2 * found.tolerance, found
 
@@ -34,7 +34,7 @@ def test_draws_not_worth_their_cost_are_off(case):
     """At draft the "aliasing" camera has one, at 1 e in a well of 200 ke."""
     camera, true = case
     shares = ablation.variance_shares(true.found, true.full, 1)
-    found = worth_leaving_out(camera, "draft", true, shares)
+    found = worth_leaving_out("draft", true, shares)
     assert all(off for _, off in found)
     assert bool(found) == (camera.name == "aliasing")
 

@@ -75,6 +75,9 @@ def test_a_knob_at_its_finest_has_no_error_of_its_own(measured):
 def test_the_reference_says_how_good_it_is(measured):
     """Its preset's tolerance is 2e-4, a tenth of which is what its spectrum may lose."""
     assert 0 < measured.reference.lost < 2e-5
+    assert set(measured.reference.changes) == {p.knob for p in measured.points} & {
+        knob.name for knob in KNOBS
+    } - {"oversampling"}
 
 
 def test_renders_are_compared_where_there_are_some(measured):

@@ -3,10 +3,13 @@
 import json
 from dataclasses import replace
 
+import numpy as np
 import pytest
+from spectral_files import tiff
 from sweeping import written
 
 from vcam_cli import sweep
+from vcam_cli.files.points import record_check
 from vcam_cli.studies import sweep as module
 from vcam_cli.studies import sweep_points
 
@@ -111,6 +114,107 @@ def test_every_change_is_noticed_and_mended(finished, resolved, tmp_path, change
     assert len(resolved) == 1
 
 
+def test_a_kept_frame_that_was_cut_is_made_again(tmp_path, resolved):
+    study = written(tmp_path, keep=["raw"])
+    sweep(study, tmp_path / "out", workers=1)
+    frame = next((tmp_path / "out" / "points").glob("*.raw.exr"))
+    whole = frame.read_bytes()
+    damage(frame)
+    again = sweep(study, tmp_path / "out", workers=1)
+    assert again.computed == 1 and frame.read_bytes() == whole and len(resolved) == 2
+
+
+PART = "f_number: {}\nfocal_length: 4.5 mm\n"
+
+
+def a_part_appears(folder):
+    yield "f8-landscape", {"optics": {"values": ["f2.8-normal", "f8-landscape"]}}
+    (folder / "f8-landscape.yaml").write_text(PART.format(4), "utf-8")
+
+
+def a_part_is_another(folder):
+    for number in (8, 4):
+        (folder / f"f{number}.yaml").write_text(PART.format(number), "utf-8")
+    (folder / "mine.yaml").symlink_to("f8.yaml")
+    yield "mine", {"optics": {"values": ["f2.8-normal", "mine"]}}
+    (folder / "mine.yaml").unlink()
+    (folder / "mine.yaml").symlink_to("f4.yaml")
+
+
+def a_part_is_mended(folder):
+    (folder / "mine.yaml").write_text("f_number: [\n", "utf-8")
+    yield "mine", {"optics": {"values": ["f2.8-normal", "mine"]}}
+    (folder / "mine.yaml").write_text(PART.format(4), "utf-8")
+
+
+def a_part_is_there_at_last(folder):
+    yield "{use: mine}", {"optics": {"values": ["f2.8-normal", {"use": "mine"}]}}
+    (folder / "mine.yaml").write_text(PART.format(4), "utf-8")
+
+
+def a_table_is_there_at_last(folder):
+    table = {"file": "mine.csv"}
+    yield "{file: mine.csv}", {"optics.transmittance": {"values": [0.5, table]}}
+    (folder / "mine.csv").write_text("wavelength_nm,value\n300,0.5\n900,0.25\n", "utf-8")
+
+
+def a_table_is_mended(folder):
+    (folder / "mine.csv").write_text("wavelength_nm,value\n900,0.5\n300,0.25\n", "utf-8")
+    table = {"file": "mine.csv"}
+    yield "{file: mine.csv}", {"optics.transmittance": {"values": [0.5, table]}}
+    (folder / "mine.csv").write_text("wavelength_nm,value\n300,0.5\n900,0.25\n", "utf-8")
+
+
+@pytest.mark.parametrize(
+    "change",
+    [
+        a_part_appears,
+        a_part_is_another,
+        a_part_is_mended,
+        a_part_is_there_at_last,
+        a_table_is_there_at_last,
+        a_table_is_mended,
+    ],
+)
+def test_what_a_value_names_is_looked_up_anew(tmp_path, resolved, change):
+    way = change(tmp_path)
+    value, vary = next(way)
+    study = written(tmp_path, vary=vary, metrics=["mean_electrons"])
+
+    def electrons():
+        rows = sweep(study, tmp_path / "out", workers=1).points
+        return next(row["mean_electrons"] for row in rows if value in row.values())
+
+    before = electrons()
+    assert electrons() == before and len(resolved) == 1
+    next(way, None)
+    after = electrons()
+    assert after != before and after != "" and len(resolved) == 2
+    assert electrons() == after and len(resolved) == 2
+
+
+def test_parts_that_overrides_name_are_looked_up_anew(tmp_path, resolved, monkeypatch):
+    study = written(tmp_path, metrics=["mean_electrons"])
+    monkeypatch.chdir(tmp_path)
+    first = sweep(study, "out", ["optics=f8-landscape"], workers=1)
+    a_part = tmp_path / "f8-landscape.yaml"
+    a_part.write_text(PART.format(4), "utf-8")
+    again = sweep(study, "out", ["optics=f8-landscape"], workers=1)
+    assert len(resolved) == 2 and again.points != first.points
+
+
+def test_a_table_that_appears_beside_a_picture(tmp_path, resolved):
+    table = "wavelength_nm,reflectance\n" + "".join(f"{nm},{{0}}\n" for nm in (300, 550, 900))
+    tiff(tmp_path / "a.tif", np.ones((8, 12, 3), np.float32), description=table.format(0.1))
+    source = {"kind": "hyperspectral", "file": "a.tif"}
+    vary = {"adc.bits": {"values": [10, 12]}}
+    study = written(tmp_path, {"scene.source": source}, vary=vary, metrics=["mean_electrons"])
+    first = sweep(study, tmp_path / "out", workers=1)
+    (tmp_path / "a.csv").write_text(table.format(0.2), "utf-8")
+    again = sweep(study, tmp_path / "out", workers=1)
+    assert len(resolved) == 2 and again.points != first.points
+
+
 def test_other_overrides_are_another_sweep(finished, resolved):
     study, out, first = finished
     other = sweep(study, out, ["pixel.readout.full_well=3000 e"], workers=1)
@@ -140,10 +244,20 @@ def test_the_record_of_a_sweep_that_only_began_is_no_seal(finished, resolved):
     assert len(resolved) == 1
 
 
+def test_an_edited_record_is_no_seal(finished, resolved):
+    study, out, first = finished
+    record = json.loads((out / "study.json").read_text("utf-8"))
+    (out / "study.json").write_text(json.dumps(record | {"expected": []}), "utf-8")
+    assert len(sweep(study, out, workers=1).verdicts) == len(first.verdicts) == 2
+    assert len(resolved) == 1
+
+
 def test_a_record_of_other_types_is_no_seal(finished, resolved):
     study, out, _ = finished
     record = json.loads((out / "study.json").read_text("utf-8"))
     for key in ("hashes", "written", "points", "kept", "optimum", "expected"):
-        (out / "study.json").write_text(json.dumps(record | {key: [1]}), "utf-8")
+        other = record | {key: [1]}
+        other["check"] = record_check(other)
+        (out / "study.json").write_text(json.dumps(other), "utf-8")
         sweep(study, out, workers=1)
     assert len(resolved) == 6

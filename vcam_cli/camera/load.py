@@ -98,6 +98,12 @@ class Base:
             raise BadInput(dict.fromkeys(sorted(findings.problems, key=by_place)))
         return result.with_origin(origin)
 
+    @property
+    def inputs(self) -> tuple[Path, ...]:
+        """The YAML files that went into it and the files that these name, of those there are."""
+        _, named = _absolute_files(self.tree, Findings())
+        return tuple(dict.fromkeys((*self.files, *named)))
+
     def _named(self) -> Node:
         """The tree with a name, the file's where it has none of its own."""
         tree = self.tree

@@ -70,8 +70,8 @@ class Parts:
         `kind` says which (cameras, optics ...), `at` where in the camera it stands, `chain`
         which files led here. Raises BadInput; what is wrong with a part inside is collected.
         """
-        root = read_file(path)
         self.files.append(path.resolve())
+        root = read_file(path)
         chain = (*chain, path.resolve())
         if root.mapping is None:
             remedy = "write lines of `key: value`"

@@ -108,13 +108,28 @@ def tell(found: "Study", path: Path) -> None:
            effects(found))  # fmt: skip
     for knob, why in found.absent.items():
         console.print(f"{knob} does not apply: {why}")
+    console.print(convergence(found))
+    console.print(f"recommended: {found.recommendation.sentence}")
+    console.print(f"{path}/accuracy.csv, accuracy.png, accuracy.json")
+
+
+def convergence(found: "Study") -> str:
+    """How good that is which errors are measured against."""
+    from vcam_cli.studies.accuracy_points import FLOOR
+
     reference = found.reference
-    console.print(
+    shown = [p for p in found.points if not p.effect]
+    unsure = sorted({p.knob for p in shown if not p.sure})
+    text = (
         f"full signal: {reference.full_signal:.6g} electrons; the reference itself is good to"
         f" {100 * reference.lost:.1g} % of it"
     )
-    console.print(f"recommended: {found.recommendation.sentence}")
-    console.print(f"{path}/accuracy.csv, accuracy.png, accuracy.json")
+    if unsure:
+        return f"{text}; <: at most so much, since of {', '.join(unsure)} it is not a tenth as much"
+    return (
+        f"{text}; each knob was refined until that changed a tenth of its least error, or less than"
+        f" {100 * FLOOR:.0e} %, which is rounding"
+    )
 
 
 def _table(console: Any, title: str, head: tuple[str, ...], rows: list[tuple[str, ...]]) -> None:
@@ -125,7 +140,8 @@ def _table(console: Any, title: str, head: tuple[str, ...], rows: list[tuple[str
     table = Table(title=title, title_justify="left", box=style, pad_edge=False)
     for i, name in enumerate(head):
         text = i < 2 or name == "share of"
-        table.add_column(name, justify="left" if text else "right", no_wrap=True)
+        # What takes several knobs is long: it goes on in the next line, and no number is cut.
+        table.add_column(name, justify="left" if text else "right", no_wrap=name != "setting")
     for row in rows:
         table.add_row(*row)
     console.print(table)
@@ -133,11 +149,11 @@ def _table(console: Any, title: str, head: tuple[str, ...], rows: list[tuple[str
 
 def settings(found: "Study") -> list[tuple[str, ...]]:
     """Rows of the first table."""
-    least = found.reference.lost
 
     def rms(point: "Point") -> str:
-        unsure = point.knob in (*TOTAL, "oversampling") and point.rms_error < least
-        return f"<{100 * least:.1g}" if unsure else f"{100 * point.rms_error:.2g}"
+        if point.sure:
+            return f"{100 * point.rms_error:.2g}"
+        return f"<{100 * (point.rms_error + point.unsure):.2g}"
 
     return [
         (

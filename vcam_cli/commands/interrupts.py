@@ -7,11 +7,13 @@ being made turns it into a RuntimeError; a module that is half loaded may keep i
 are moments in which nobody knows of a folder that has just been made, or of a thread that has
 just been started and writes on while its folder is cleared away. So while modules are loaded,
 models are read or written, folders come and go and threads begin or are waited for at their end,
-an interrupt waits.
+an interrupt waits. One that comes while Python clears away an object is lost, for nobody called
+that: it comes again.
 """
 
 import os
 import signal
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from types import FrameType
@@ -59,9 +61,11 @@ def waiting() -> Iterator[None]:
     with suppress(ValueError):
         signal.signal(signal.SIGALRM, _come)
         signal.signal(signal.SIGINT, _come)
+    tell, sys.unraisablehook = sys.unraisablehook, _come_again
     try:
         yield
     finally:
+        sys.unraisablehook = tell
         with suppress(ValueError):
             signal.signal(signal.SIGINT, signal.SIG_IGN)
             signal.setitimer(signal.ITIMER_REAL, 0)
@@ -72,6 +76,14 @@ def _come(number: int, frame: FrameType | None) -> None:
     if _may_come(frame):
         raise KeyboardInterrupt
     signal.setitimer(signal.ITIMER_REAL, AGAIN)
+
+
+def _come_again(lost: "sys.UnraisableHookArgs") -> None:
+    """Takes an exception that could not be raised, and sees to it that an interrupt still is."""
+    if lost.exc_type is KeyboardInterrupt:
+        signal.setitimer(signal.ITIMER_REAL, AGAIN)
+    else:
+        sys.__unraisablehook__(lost)
 
 
 def _may_come(frame: FrameType | None) -> bool:

@@ -139,6 +139,7 @@ def main() -> None:
 
 def _main() -> None:
     _replace_closed()
+    _write_anything()
     try:
         try:
             app(prog_name="vcam")
@@ -171,6 +172,12 @@ def _replace_closed() -> None:
         if getattr(sys, name) is None:
             os.open(os.devnull, os.O_WRONLY)
             setattr(sys, name, io.StringIO())
+
+
+def _write_anything() -> None:
+    """Lets stdout escape what its encoding lacks, as stderr does: a name is any text."""
+    if isinstance(sys.stdout, io.TextIOWrapper):
+        sys.stdout.reconfigure(errors="backslashreplace")
 
 
 def _drop_stdout() -> None:

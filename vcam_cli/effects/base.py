@@ -21,7 +21,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import ClassVar, Literal, Self
 
 import numpy as np
@@ -206,6 +206,8 @@ class Site:
     dtype: type
     dark: float = 0.0
     """Mean dark signal of a pixel [electrons]."""
+    columns_drawn: dict[str, NDArray] = field(default_factory=dict)
+    """Draws per column that are at hand."""
 
     def normal(self, name: str) -> NDArray:
         """One standard normal a pixel, (rows, columns)."""
@@ -213,7 +215,11 @@ class Site:
 
     def normal_columns(self, name: str) -> NDArray:
         """One standard normal a column, the same for every block, (columns,)."""
-        return self.line_stream(name).standard_normal(self.columns, dtype=self.dtype)
+        if name not in self.columns_drawn:
+            drawn = self.line_stream(name).standard_normal(self.columns, dtype=self.dtype)
+            drawn.setflags(write=False)
+            self.columns_drawn[name] = drawn
+        return self.columns_drawn[name]
 
     def normal_rows(self, name: str) -> NDArray:
         """One standard normal a row, the same for every column, (rows, 1)."""

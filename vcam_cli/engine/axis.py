@@ -123,15 +123,23 @@ class Axis:
                 out.append((slice(int(at[0]), int(at[-1]) + 1), terms, weights))
         return out
 
-    def fold(self, terms: NDArray, odd: bool = False) -> NDArray:
-        """Terms (..., n) folded onto the pixels' own cosines, or sines: (..., folded)."""
+    def fold(self, terms: NDArray, odd: bool = False, overwrite: bool = False) -> NDArray:
+        """Terms (..., n) folded onto the pixels' own cosines, or sines: (..., folded).
+
+        overwrite: whether it may be done where the terms are.
+        """
         n = terms.shape[-1]
         if self.virtual_pixels is None:
             out = np.zeros((*terms.shape[:-1], self.terms), terms.dtype)
             out[..., :n] = terms
             return out
-        out = np.zeros((*terms.shape[:-1], self.virtual_pixels), terms.dtype)
-        for target, source, sign in segments(self.virtual_pixels, n, odd):
+        parts, constant = segments(self.virtual_pixels, n, odd), terms[..., 0].copy()
+        if overwrite and not odd and n >= self.virtual_pixels:
+            out = terms[..., : self.virtual_pixels]  # the first part is where it belongs
+            parts = parts[1:]
+        else:
+            out = np.zeros((*terms.shape[:-1], self.virtual_pixels), terms.dtype)
+        for target, source, sign in parts:
             if sign > 0:
                 out[..., target] += terms[..., source]
             else:
@@ -140,18 +148,29 @@ class Axis:
         if odd:
             out[..., -1] *= 2
         else:
-            out[..., 0] += out[..., 0] - terms[..., 0]
+            out[..., 0] += out[..., 0] - constant
         return out
 
-    def evaluate(self, values: NDArray, axis: int, odd: bool = False) -> NDArray:
-        """Folded values -> values at the photodetectors along `axis` (0 or 1 of two)."""
+    @property
+    def window(self) -> slice | None:
+        """Which of the virtual pixels are pixels; None where there are none."""
         if self.virtual_pixels is None:
+            return None
+        start = round(self.first / self.pixel_pitch - 0.5)
+        return slice(start, start + self.pixels)
+
+    def evaluate(
+        self, values: NDArray, axis: int, odd: bool = False, overwrite: bool = False
+    ) -> NDArray:
+        """Folded values -> values at the photodetectors along `axis` (0 or 1 of two).
+
+        overwrite: whether what comes may be a view of what is given.
+        """
+        if self.window is None:
             return self._chirp(values, axis, odd)
         transform = scipy.fft.dst if odd else scipy.fft.dct
-        full = transform(values, type=3, axis=axis)
-        start = round(self.first / self.pixel_pitch - 0.5)
-        window = slice(start, start + self.pixels)
-        return full[window] if axis == 0 else full[:, window]
+        full = transform(values, type=3, axis=axis, overwrite_x=overwrite)
+        return full[self.window] if axis == 0 else full[:, self.window]
 
     @cached_property
     def _chirp_parts(self) -> tuple[int, NDArray, NDArray, NDArray]:

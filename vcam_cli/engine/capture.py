@@ -1,21 +1,24 @@
 """From the rate of electrons to a raw frame: charge, noise, saturation, codes.
 
-Blocks of 64 rows flow through all of it while they are in the cache. Every draw has its own
-stream per block, so the frame does not depend on the number of workers.
+Blocks of 64 rows flow through all of it, a few rows at a time, while they are in the cache. Every
+draw has its own stream per block, so the frame does not depend on the number of workers.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vcam_cli.effects.base import Charge, Code, Draw, Effect, Limit, Site
-from vcam_cli.engine.parallel import each
+from vcam_cli.engine.parallel import each, within
 from vcam_cli.rng import BLOCK_ROWS, blocks, stream
 
+AT_ONCE = 1 << 16
+"""Pixels that flow together, about: a draw is made for them in the same order as for more."""
 LAYER = 32
 """Bits of a block's number: those above are the layer's of stacked pixels."""
 
@@ -33,7 +36,7 @@ def mean_dark(time: float, effects: tuple[Effect, ...]) -> float:
 def sites(
     tile: NDArray, dark: float, seeds: dict[str, int], layer: int, block: slice, sample: int = 0
 ) -> dict[str, Site]:
-    """Where draws happen in a block of rows, by their scope.
+    """Where draws happen in a block of rows, by their scope. Streams that were opened go on.
 
     tile: (rows, columns) of the block's shape and float type; dark: mean dark signal [electrons];
     sample: index of the sample within one integration.
@@ -43,13 +46,26 @@ def sites(
         scope: Site(
             rows=len(tile),
             columns=tile.shape[1],
-            stream=partial(stream, seed, capture=sample, block=index),
+            stream=_Opened(partial(stream, seed, capture=sample, block=index)),
             line_stream=partial(stream, seed, capture=sample, block=layer << LAYER),
             dtype=tile.dtype.type,
             dark=dark,
         )
         for scope, seed in seeds.items()
     }
+
+
+@dataclass(frozen=True)
+class _Opened:
+    """The streams of a block: each is opened once and then goes on."""
+
+    make: Callable[[str], np.random.Generator]
+    known: dict[str, np.random.Generator] = field(default_factory=dict)
+
+    def __call__(self, name: str) -> np.random.Generator:
+        if name not in self.known:
+            self.known[name] = self.make(name)
+        return self.known[name]
 
 
 def codes_type(bits: int, count: int = 1) -> type[np.unsignedinteger]:
@@ -87,17 +103,19 @@ def capture(
     dn = np.empty(rate.shape, codes_type(code.bits))
 
     def shoot(block: slice) -> None:
-        tile = mean_electrons(rate[block], time, effects)
-        here = sites(tile, dark, seeds, layer, block)
-        for draw in draws:
-            tile = draw.before_shot(tile, here[draw.scope])
-        for effect in effects:
-            if isinstance(effect, Draw):
-                tile = effect.apply(tile, here[effect.scope])
-            elif isinstance(effect, Limit):
-                tile = effect.apply(tile)
-        electrons[block] = tile
-        dn[block] = code.apply(tile)
+        opened = sites(rate[block], dark, seeds, layer, block)
+        for rows in within(block, max(1, AT_ONCE // rate.shape[1])):
+            tile = mean_electrons(rate[rows], time, effects)
+            here = {scope: replace(site, rows=len(tile)) for scope, site in opened.items()}
+            for draw in draws:
+                tile = draw.before_shot(tile, here[draw.scope])
+            for effect in effects:
+                if isinstance(effect, Draw):
+                    tile = effect.apply(tile, here[effect.scope])
+                elif isinstance(effect, Limit):
+                    tile = effect.apply(tile)
+            electrons[rows] = tile
+            dn[rows] = code.apply(tile)
         if done is not None:
             done(block)
 

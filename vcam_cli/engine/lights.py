@@ -24,7 +24,8 @@ AFTER: tuple[tuple[str, ...], ...] = tuple(
     tuple(path.split("."))
     for path in (
         *("name", "seed", "adc", "exposure", "processing", "quality", "output"),
-        *("display.dpi", "display.width", "display.viewing_distance", "pixel.fpn", "pixel.defects"),
+        *("accuracy.shot_noise", "display.dpi", "display.width", "display.viewing_distance"),
+        *("pixel.fpn", "pixel.defects"),
         *(f"pixel.readout.{k}" for k in ("gain", "read_noise", "column_noise", "row_noise")),
         *(f"pixel.readout.{k}" for k in ("reset_noise", "charge_transfer")),
         *(f"pixel.photodetector.{k}" for k in ("dark_current", "dark_current_density")),

@@ -46,8 +46,8 @@ def of_frame(
     """
     pixels = geometry.rows * geometry.columns
     width = knobs.float_width // 8
-    series = pixels * width * (2 * colors + 1)
-    frame = pixels * (3 * width + 2 + colors)
+    series = pixels * width * (colors + 1)
+    frame = pixels * (2 * width + 2 + colors)
     if samples:  # their electrons and codes, the photocurrent and what is made into a picture
         frame += pixels * (samples * (width + 4) + 8)
     return BASE + max(series, frame) + (16 * pixels * colors if judged else 0)
@@ -60,7 +60,7 @@ def of_planes(scene: SampledScene, planes: int, geometry: Geometry, knobs: Setti
 
 def of_followed(followed: Followed, geometry: Geometry, knobs: Settings) -> int:
     """Peak memory that a scene took while it was filtered [bytes]."""
-    needed = _filtering(followed.samples, followed.planes, geometry, knobs)
+    needed = _filtering(followed.held, 1, geometry, knobs)
     if followed.passes > 1:  # a filter's signal beside the sum of those before, in three colors
         needed += 3 * geometry.rows * geometry.columns * (knobs.float_width // 8)
     return needed + 16 * followed.table_values

@@ -35,4 +35,9 @@ def each(work: Callable[[Item], object], items: Iterable[Item], workers: int) ->
 
 def pieces(count: int, size: int) -> list[slice]:
     """Consecutive slices of at most `size` that cover `count`."""
-    return [slice(i, min(i + size, count)) for i in range(0, count, size)]
+    return within(slice(0, count), size)
+
+
+def within(whole: slice, size: int) -> list[slice]:
+    """Consecutive slices of at most `size` that cover a slice."""
+    return [slice(i, min(i + size, whole.stop)) for i in range(whole.start, whole.stop, size)]

@@ -86,7 +86,8 @@ def prepare(
     joins = place.joining
     count = camera.exposure.count * (len(colors.colors) if place.full_color else 1)
     needed = memory.of_frame(lattice, knobs, len(colors.colors), bool(camera.quality), count)
-    memory.require(needed, g)
+    memory.require(needed, g)  # what was read of the scene is there already
+    read = getattr(picture, "nbytes", 0)
     stages.watch.expect(cost.at_first_sight(camera, g, colors, knobs, workers))
 
     @cache
@@ -122,13 +123,14 @@ def prepare(
         )
         peak = (float(rate.max()) + dark) * time
         _refuse_too_much(max(peak, white * time))
-        needed = max(needed, memory.of_followed(found.spectrum, lattice, knobs))
+        needed = max(needed, memory.of_followed(found.spectrum, lattice, knobs)) + read
         full = max(1.0, min(e.full_well, peak))
         outlook = Outlook(full, time, dark * time, camera.array.binning)
         here = _on_pixels(place, joins.collected(found.values), present, effects, time)
-        well = min(e.full_well / time - dark, MOST_ELECTRONS)
-        moved = np.minimum(rate, well) - np.minimum(taken, well)
-        here |= {x.name: _rms(moved) for x in present if isinstance(x, Transport)}
+        if transports := [x.name for x in present if isinstance(x, Transport)]:
+            well = min(e.full_well / time - dark, MOST_ELECTRONS)
+            moved = _rms(np.minimum(rate, well) - np.minimum(taken, well))
+            here |= dict.fromkeys(transports, moved)
         decided = plan.make(camera, g, knobs, outlook, needed, found.spectrum.changes | here)
         core = decided.seconds + cost.linear(lattice, colors, found.spectrum)
         core += cost.after(camera, g, colors) + cost.samples(camera, g, decided.active)

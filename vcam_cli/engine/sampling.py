@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from vcam_cli.effects.base import RadialTransfer, SeparableTransfer
 from vcam_cli.engine.axis import Axis
+from vcam_cli.engine.coefficients import Coefficients, Folded, Passing, rows_to_sample
 from vcam_cli.engine.parallel import each, pieces
 from vcam_cli.engine.transfer import PARITIES, Fineness, Tables, Transfer, entries
 
@@ -21,8 +22,12 @@ PIECE = 32
 """Rows or columns a thread takes at once: few enough for the cache."""
 
 
-def spectrum(planes: NDArray, workers: int) -> NDArray:
-    """DCT-II of every plane (R, ny, nx) along both axes, unnormalized; overwrites its argument."""
+def spectrum(planes: NDArray, workers: int, terms: tuple[int, int] | None = None) -> NDArray:
+    """DCT-II of every plane (R, ny, nx) along both axes, unnormalized; overwrites its argument.
+
+    terms: how many are wanted along y and x, default all: a view of (R, *terms).
+    """
+    down, across = terms or planes.shape[1:]
     for plane in planes:
 
         def along_rows(s: slice, plane: NDArray = plane) -> None:
@@ -31,11 +36,11 @@ def spectrum(planes: NDArray, workers: int) -> NDArray:
         def along_columns(s: slice, plane: NDArray = plane) -> None:
             # A copy first: columns of a plane whose rows are 2^n apart share few cache lines.
             columns = np.ascontiguousarray(plane[:, s])
-            plane[:, s] = scipy.fft.dct(columns, type=2, axis=0, overwrite_x=True)
+            plane[:down, s] = scipy.fft.dct(columns, type=2, axis=0, overwrite_x=True)[:down]
 
         each(along_rows, pieces(plane.shape[0], PIECE), workers)
-        each(along_columns, pieces(plane.shape[1], PIECE), workers)
-    return planes
+        each(along_columns, pieces(across, PIECE), workers)
+    return planes[:, :down, :across]
 
 
 @dataclass(frozen=True)
@@ -70,46 +75,77 @@ class Filter:
     along_x: NDArray
     along_y: NDArray
 
-    def apply(self, coefficients: NDArray, workers: int) -> Series:
+    def apply(self, coefficients: Coefficients, workers: int) -> Series:
         """Signal of every color at the rows of photodetectors, still a series along x.
 
         coefficients: (R, ny, nx) from `spectrum`.
         """
+        folded = coefficients.taken() if isinstance(coefficients, Passing) else {}
+        if isinstance(coefficients, Passing) and not folded:
+            folded = self.begun(coefficients.dtype)
+            for first, planes in coefficients.one_by_one():
+                self.add(planes, first, folded, workers)
+                del planes  # before the next ones are made
         parts: dict[bool, NDArray] = {}
         for parity in self.tables.parities:
-            more, odd_x = self._rows_of(parity, coefficients, workers), PARITIES[parity][0]
+            odd_x, odd_y = PARITIES[parity]
+            if not isinstance(coefficients, Passing):
+                folded = self.begun(coefficients.dtype, parity)
+                self.add(coefficients, 0, folded, workers)
+            more = self._evaluated(folded.pop(parity), odd_y, workers)
             if odd_x in parts:
                 parts[odd_x] += more
             else:
                 parts[odd_x] = more
         return Series(self.x, parts.get(False), parts.get(True))
 
-    def _rows_of(self, parity: int, coefficients: NDArray, workers: int) -> NDArray:
-        """What one parity adds: (C, rows, folded x) [electrons / s]."""
+    def begun(self, dtype: np.dtype, parity: int | None = None) -> Folded:
+        """What planes are added to, of all parities or of one."""
+        shape = self.tables.values.shape[1], self.y.folded, self.x.folded
+        parities = self.tables.parities if parity is None else [parity]
+        return {p: np.zeros(shape, dtype) for p in parities}
+
+    def add(self, planes: Coefficients, first: int, folded: Folded, workers: int) -> None:
+        """Adds what planes give, whose index is from `first` on."""
+        for parity, target in folded.items():
+            self._multiply(parity, planes, first, target, workers)
+
+    def _multiply(
+        self, parity: int, planes: Coefficients, first: int, folded: NDArray, workers: int
+    ) -> None:
+        """Adds what planes give through one parity of the tables."""
         odd_x, odd_y = PARITIES[parity]
-        colors = self.tables.values.shape[1]
-        folded = np.zeros((colors, self.y.folded, self.x.folded), coefficients.dtype)
-        lookup = _Lookup(self.tables, parity, self.x.frequencies, coefficients.dtype)
+        lookup = _Lookup(self.tables, parity, self.x.frequencies, planes.dtype, first)
 
         def multiply(rows: slice) -> None:
             for target, terms, weights in self.y.sources(rows, odd_y):
-                products = self._products(coefficients, lookup, terms, weights)
+                products = self._products(planes, lookup, terms, weights)
                 for color, product in zip(folded[:, target], products, strict=False):
-                    color += self.x.fold(product, odd_x)
+                    color += self.x.fold(product, odd_x, overwrite=True)
 
         each(multiply, pieces(self.y.folded, PIECE), workers)
-        out = np.empty((colors, self.y.pixels, self.x.folded), coefficients.dtype)
+
+    def _evaluated(self, folded: NDArray, odd_y: bool, workers: int) -> NDArray:
+        """What one parity adds: (C, rows, folded x) [electrons / s]; overwrites its argument."""
+        colors = len(folded)
+        # Where pixels are every virtual one or a window of them they take the place of the terms.
+        window = self.y.window
+        shape = (colors, self.y.pixels, self.x.folded)
+        out = np.empty(shape, folded.dtype) if window is None else folded[:, window]
         tasks = [(c, s) for c in range(colors) for s in pieces(self.x.folded, PIECE)]
 
         def evaluate(task: tuple[int, slice]) -> None:
             c, columns = task
-            out[c, :, columns] = self.y.evaluate(folded[c, :, columns], axis=0, odd=odd_y)
+            values = folded[c, :, columns]
+            found = self.y.evaluate(values, axis=0, odd=odd_y, overwrite=True)
+            if window is None or not np.may_share_memory(found, values):
+                out[c, :, columns] = found
 
         each(evaluate, tasks, workers)
         return out
 
     def _products(
-        self, coefficients: NDArray, lookup: _Lookup, terms: NDArray, weights: NDArray
+        self, coefficients: Coefficients, lookup: _Lookup, terms: NDArray, weights: NDArray
     ) -> Iterator[NDArray]:
         """For each color, rows of the filtered spectrum, (terms, as many as are not zero)."""
         x, y, dtype = self.x, self.y, coefficients.dtype
@@ -136,8 +172,14 @@ class Filter:
                 total += part
             yield total
 
+    @property
+    def sampled(self) -> NDArray:
+        """Rows of the coefficients that `power` looks at, rising."""
+        terms = np.concatenate([rows for rows, _ in rows_to_sample(self.y.terms)])
+        return np.unique(self.y.base(terms)[0])
+
     def power(
-        self, coefficients: NDArray, factor: Callable[[int], NDArray] | None = None
+        self, coefficients: Coefficients, factor: Callable[[int], NDArray] | None = None
     ) -> tuple[NDArray, NDArray]:
         """Mean squares of the signal by frequency, estimated from a sample of rows.
 
@@ -145,28 +187,56 @@ class Filter:
 
         Returns the frequency [cycles/m], the larger of |fx| and |fy|, and for each color the
         mean square that terms of such frequencies add to the signal: (n,) and (C, n), rising in
-        frequency, by Parseval's theorem.
+        frequency, by Parseval's theorem. Terms of the same frequency are added up.
         """
-        lookups = [
-            _Lookup(self.tables, p, self.x.frequencies, coefficients.dtype)
-            for p in self.tables.parities
-        ]
-        frequency, power = [], []
-        for rows, stands_for in _rows_to_sample(self.y.terms):
-            count = np.ones(len(rows))
-            parts = [list(self._products(coefficients, k, rows, count)) for k in lookups]
-            if not parts[0]:
-                break
-            square = (np.array(parts, dtype=np.float64) ** 2).sum(axis=0)  # (C, rows, terms)
-            if factor is not None:
-                square *= np.array([factor(term)[: square.shape[2]] for term in rows]) ** 2
-            square *= (stands_for * np.where(rows > 0, 2, 1))[:, None]
-            square[..., 1:] *= 2
-            along_x, along_y = self.x.frequencies[: square.shape[2]], self.y.frequencies[rows]
-            frequency.append(np.maximum(along_x, along_y[:, None]).ravel())
-            power.append(square.reshape(len(square), -1))
+        fx, colors = self.x.frequencies, self.tables.values.shape[1]
+        along_x = np.zeros((colors, self.x.terms))
+        frequency, power = [fx], [along_x]
+        for rows, squares in self._squares(coefficients, factor):
+            fy = self.y.frequencies[rows]
+            below = np.searchsorted(fx[: squares.shape[2]], fy, side="right")
+            along_y = np.zeros((colors, len(rows)))
+            for i, stop in enumerate(below):
+                along_y[:, i] = squares[:, i, :stop].sum(axis=1)
+                along_x[:, stop : squares.shape[2]] += squares[:, i, stop:]
+            frequency.append(fy)
+            power.append(along_y)
         order = np.argsort(together := np.concatenate(frequency), kind="stable")
         return together[order], np.concatenate(power, axis=1)[:, order]
+
+    def mean_square(
+        self, coefficients: Coefficients, factor: Callable[[int], NDArray] | None = None
+    ) -> NDArray:
+        """The sums of `power` over all frequencies: (C,)."""
+        parts = [s.sum(axis=(1, 2)) for _, s in self._squares(coefficients, factor)]
+        return np.sum(parts, axis=0) if parts else np.zeros(self.tables.values.shape[1])
+
+    def _squares(
+        self, coefficients: Coefficients, factor: Callable[[int], NDArray] | None
+    ) -> Iterator[tuple[NDArray, NDArray]]:
+        """Some rows' terms, and the mean squares they add for all rows that they stand for.
+
+        (n,) and (C, n, as many as are not zero)
+        """
+        sample = rows_to_sample(self.y.terms)
+        found: list[NDArray] = []
+        for number, parity in enumerate(self.tables.parities):
+            lookup = _Lookup(self.tables, parity, self.x.frequencies, coefficients.dtype)
+            for i, (rows, _) in enumerate(sample):
+                parts = self._products(coefficients, lookup, rows, np.ones(len(rows)))
+                here = np.array([np.square(part, dtype=np.float64) for part in parts])
+                if number == 0:
+                    found.append(here)
+                elif len(here):
+                    found[i] += here
+        for (rows, stands_for), squares in zip(sample, found, strict=True):
+            if not len(squares):
+                return
+            if factor is not None:
+                squares *= np.array([factor(term)[: squares.shape[2]] for term in rows]) ** 2
+            squares *= (stands_for * np.where(rows > 0, 2, 1))[:, None]
+            squares[..., 1:] *= 2
+            yield rows, squares
 
     def without(self, effect: RadialTransfer, transfer: Transfer) -> Filter:
         """What leaving out a radial transfer adds to this filter. `transfer`: the whole of it.
@@ -194,34 +264,15 @@ class Filter:
         """This filter without its radial part: what the other transfers add."""
         return replace(self, tables=replace(self.tables, values=0 * self.tables.values))
 
-    def without_separable(self, effect: SeparableTransfer, coefficients: NDArray) -> NDArray:
-        """Mean squares (C, n) that leaving out a separable transfer adds to the signal."""
+    def without_separable(self, effect: SeparableTransfer, coefficients: Coefficients) -> NDArray:
+        """Mean squares (C,) that leaving out a separable transfer adds to the signal."""
         x, y = effect.along_x(self.x.frequencies), effect.along_y(self.y.frequencies)
 
         def others(factors: NDArray, own: NDArray) -> NDArray:
             return np.divide(factors, own, out=np.ones_like(factors), where=np.abs(own) > 1e-12)
 
         rest = replace(self, along_x=others(self.along_x, x), along_y=others(self.along_y, y))
-        return rest.power(coefficients, lambda term: 1 - x * y[term])[1]
-
-
-AT_ONCE = 16
-"""Rows of a sample that are filtered together."""
-
-
-def _rows_to_sample(terms: int) -> list[tuple[NDArray, NDArray]]:
-    """Rows, and the number of rows each stands for: all of the first few, then ever fewer.
-
-    Straight edges along the array put their energy into the first rows and columns.
-    """
-    sample = np.unique(
-        np.concatenate([np.arange(min(24, terms)), np.geomspace(24, terms, 72)]).astype(int)
-    )
-    sample = sample[sample < terms]
-    edges = np.concatenate([[-0.5], (sample[1:] + sample[:-1]) / 2, [terms - 0.5]])
-    stands_for = np.diff(edges)
-    parts = [slice(i, i + AT_ONCE) for i in range(0, len(sample), AT_ONCE)]
-    return [(sample[part], stands_for[part]) for part in parts]
+        return rest.mean_square(coefficients, lambda term: 1 - x * y[term])
 
 
 Position = tuple[NDArray | None, NDArray | None, NDArray, int]
@@ -236,23 +287,30 @@ class _Lookup:
     all `fx` at once, which are the same in all blocks.
     """
 
-    def __init__(self, tables: Tables, parity: int, fx: NDArray, dtype: np.dtype) -> None:
+    def __init__(
+        self, tables: Tables, parity: int, fx: NDArray, dtype: np.dtype, first: int = 0
+    ) -> None:
+        """first: which of the tables' components is the first that is asked for."""
+        tables = replace(
+            tables,
+            values=tables.values[first:],
+            planes=tuple(None if plane is None else plane[first:] for plane in tables.planes),
+        )
         self.linear = dtype == np.float64
         self.dtype = dtype
         self.last = tables.values.shape[-1]
         self.fx = fx
         self.scale = 1 / tables.step if tables.top else 0.0
-        self.values = None
+        self.values = self.rises = None
         if parity == 0 and tables.has_values:
             zero = np.zeros((*tables.values.shape[:-1], 2))
             self.values = np.concatenate([tables.values, zero], axis=-1).astype(dtype)
+            self.rises = np.diff(self.values, append=0) if self.linear else None
         self.planes = None
         if (plane := tables.planes[parity]) is not None:
             self.plane_scale = (plane.shape[-1] - 1) / tables.top
             along = np.minimum(fx * self.plane_scale, plane.shape[-1] - 1)
-            self.planes = [
-                [between(part, along, 1).astype(dtype) for part in color] for color in plane
-            ]
+            self.planes = [[_along_x(part, along, dtype) for part in color] for color in plane]
 
     def position(self, fy: NDArray, count: int) -> Position:
         """Where the tables are read, at all pairs of the first `count` fx and of fy."""
@@ -264,12 +322,13 @@ class _Lookup:
         np.sqrt(radius, out=radius)
         if self.linear:
             np.minimum(radius, self.last, out=radius)
-            index = radius.astype(np.int32)
+            index = radius.astype(np.intp)
             radius -= index
             return index, radius, fy, count
         radius += 0.5
-        np.minimum(radius, self.last, out=radius)
-        return radius.astype(np.int32), None, fy, count
+        if radius[:, -1].max(initial=0) > self.last:  # it rises along x
+            np.minimum(radius, self.last, out=radius)
+        return radius.astype(np.intp), None, fy, count
 
     def __call__(self, r: int, c: int, position: Position) -> NDArray:
         index, fraction, fy, count = position
@@ -279,10 +338,21 @@ class _Lookup:
         if self.values is None or index is None:
             return np.zeros((len(fy), count), self.dtype) if on_top is None else on_top
         table = self.values[r, c]
-        value = np.take(table, index, mode="clip")
-        if fraction is not None:
-            value += fraction * np.take(np.diff(table, append=0), index, mode="clip")
+        # No index is outside: "wrap" is the mode that asks least.
+        value = np.take(table, index, mode="wrap")
+        if fraction is not None and self.rises is not None:
+            rise = np.take(self.rises[r, c], index, mode="wrap")
+            rise *= fraction
+            value += rise
         return value if on_top is None else np.add(value, on_top, out=value)
+
+
+def _along_x(table: NDArray, position: NDArray, dtype: np.dtype) -> NDArray:
+    """A table read between its columns; few rows at a time, since it is large in 64 bits."""
+    out = np.empty((len(table), len(position)), dtype)
+    for rows in pieces(len(table), PIECE):
+        out[rows] = between(table[rows], position, 1)
+    return out
 
 
 def between(table: NDArray, position: NDArray, axis: int) -> NDArray:

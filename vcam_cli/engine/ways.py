@@ -8,9 +8,11 @@
 from __future__ import annotations
 
 import dataclasses
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,8 +27,9 @@ from vcam_cli.effects.base import (
     SeparableTransfer,
     Zone,
 )
-from vcam_cli.engine import bandwidth, field, memory, sampling
+from vcam_cli.engine import bandwidth, field, memory, painted, sampling
 from vcam_cli.engine.axis import Axis
+from vcam_cli.engine.coefficients import Coefficients
 from vcam_cli.engine.mosaic import Mosaic
 from vcam_cli.engine.settings import Settings
 from vcam_cli.engine.transfer import EXACT_ENTRIES, FINER, Fineness, Tables, Transfer, tabulate
@@ -102,6 +105,8 @@ class Followed:
     """How often the spectrum was filtered: once for each parity of every filter."""
     table_values: int = 0
     """Values of transfer functions of fx and fy that were computed for the tables."""
+    held: int = 0
+    """Samples of all planes that were in memory together."""
 
 
 def layers(
@@ -224,11 +229,17 @@ def cosines(
     """Through the cosine spectrum, as far up as the tolerance asks."""
     knobs, g, cutoff = optics.settings, optics.geometry, optics.transfer.cutoff
     oversampling = bandwidth.first_guess(g, knobs)
-    # A picture's spectrum is at hand as far as it goes; a chart has to be painted finer.
-    picture = scene.samples == "squares"
+    # A spectrum that is at hand goes as far as the lens; other charts have to be painted finer.
+    picture, known = scene.samples == "squares", scene.is_known
+    at_hand = picture or known
     pixels = g.rows * g.columns if picture else scene.shape[0] * scene.shape[1] / oversampling**2
     widest = min(bandwidth.most(pixels, knobs), bandwidth.limit(g, cutoff))
-    top = bandwidth.top(g, widest, cutoff)
+    # What is known costs nothing to look at, where no tables over fx and fy are needed for it.
+    free = known and not optics.transfer.plane and optics.field is None
+    reach = min(bandwidth.KNOWN, bandwidth.limit(g, cutoff)) if free else widest
+    if known:
+        oversampling, scene = _again(scene_at, math.ceil(reach))
+    top = bandwidth.top(g, reach, cutoff)
     computed = EXACT_ENTRIES if knobs.float_width == 32 else knobs.table_size
     steps, rank = knobs.plane_steps, knobs.spectral_rank
     fine = Fineness(top, knobs.table_size, knobs.mixing_tolerance, computed, steps, rank)
@@ -239,45 +250,71 @@ def cosines(
     else:
         tables = tabulate(optics.transfer, fine)
     while True:
-        memory.require(memory.of_planes(scene, len(tables.mix), g, knobs), g)
-        planes = scene.planes(tables.mix, optics.workers)
-        peak = min(bandwidth.peak(planes, tables), optics.ceiling)
+        reach = reach if at_hand else float(oversampling)
+        terms = painted.wanted(scene, *_axes(optics, scene, reach))
+        rectangles = scene.rectangles(tables.mix)
+        samples = math.prod(terms if rectangles is not None else scene.shape)
+        held = painted.held(scene, rectangles, len(tables.mix), bool(zones))
+        memory.require(memory.of_followed(Followed(held=held), g, knobs), g)
+        light: painted.Known | painted.Painted | painted.InTurn
+        if rectangles is not None:
+            light = painted.Known(rectangles, scene.shape, knobs.dtype)
+        elif held < samples * len(tables.mix):
+            probe = _filter(optics, scene, tables, reach)
+            light = painted.InTurn(
+                scene, tables.mix, probe, not picture, terms, optics.workers, knobs.dtype
+            )
+        else:
+            light = painted.Painted(scene.planes(tables.mix, optics.workers))
+        peak = min(light.peak(tables), optics.ceiling)
         budget = bandwidth.SHARE * knobs.tolerance * peak
-        if bandwidth.brightest(planes, tables) * SINGLE > budget:
-            planes = planes.astype(np.float64)
-        coefficients = sampling.spectrum(planes, optics.workers)
-        if picture:
-            spread = _spread(optics, scene, _filter(optics, scene, tables, widest), coefficients)
-            enough = max(spread.enough(budget), min(knobs.oversampling, widest))
+        if light.brightest(tables) * SINGLE > budget:
+            light = light.doubled()
+        coefficients = light.spectrum(optics.workers, terms)
+        spread = _spread(optics, scene, _filter(optics, scene, tables, reach), coefficients)
+        if at_hand:
+            enough = min(max(spread.enough(budget), knobs.oversampling), widest)
             lost = spread.beyond(enough)
             break
-        enough = float(oversampling)
-        spread = _spread(optics, scene, _filter(optics, scene, tables, enough), coefficients)
+        enough = reach
         lost = spread.of_sampling(enough, bandwidth.limit(g, cutoff), partial(_passes, optics))
         finer = bandwidth.finer(oversampling, lost, budget, pixels, knobs)
         if finer == oversampling:
             break
-        del planes, coefficients
-        oversampling, again = finer, scene_at(finer)
-        assert isinstance(again, SampledScene)
-        scene = again
+        del light, coefficients
+        oversampling, scene = _again(scene_at, finer)
     chosen = _filter(optics, scene, tables, enough)
     modes, squares = _needed(optics, scene, chosen, coefficients, modes, budget)
     # Without one of them the picture may reach further than it does with all of them.
-    whole = _filter(optics, scene, tables, widest) if picture else chosen
+    whole = _filter(optics, scene, tables, reach) if at_hand else chosen
     changes = dict(_changes(optics, scene, whole, coefficients, squares))
-    samples, count = planes[0].size, len(planes)
-    passes = len(tables.parities) + len(modes)
+    count = len(tables.mix)
+    times = len(tables.parities) + len(modes)
     values = _table_values(optics, tables)
-    followed = Followed(enough, lost, samples, count, changes, len(modes), passes, values)
+    followed = Followed(enough, lost, samples, count, changes, len(modes), times, values, held)
+    del light
 
-    def each() -> Layers:
-        yield Layer(chosen.apply(coefficients, optics.workers))
-        for mode in modes:
-            filter = replace(chosen, tables=mode.tables())
-            yield Layer(filter.apply(coefficients, optics.workers), mode.map)
+    def each(coefficients: Coefficients) -> Layers:
+        filters: list[tuple[sampling.Filter, Any]] = [(chosen, None)]
+        filters += [(replace(chosen, tables=mode.tables()), mode.map) for mode in modes]
+        while filters:
+            filter, weight = filters.pop(0)
+            series = filter.apply(coefficients, optics.workers)
+            if not filters:
+                del coefficients  # memory for what comes
+            yield Layer(series, weight)
+            del series
 
-    return each(), followed
+    return each(coefficients), followed
+
+
+def _again(
+    scene_at: Callable[[int], WaveScene | SampledScene], oversampling: int
+) -> tuple[int, SampledScene]:
+    """The oversampling, and the scene painted so."""
+    scene = scene_at(oversampling)
+    assert isinstance(scene, SampledScene)
+    return oversampling, scene
 
 
 def _table_values(optics: Optics, tables: Tables) -> int:
@@ -318,7 +355,7 @@ def _filter(
 
 
 def _spread(
-    optics: Optics, scene: SampledScene, filter: sampling.Filter, coefficients: NDArray
+    optics: Optics, scene: SampledScene, filter: sampling.Filter, coefficients: Coefficients
 ) -> bandwidth.Spread:
     """The signal's spectrum, as if all of it lay on the array and none in the margin."""
     frequency, power = filter.power(coefficients)
@@ -337,7 +374,7 @@ def _changes(
     optics: Optics,
     scene: SampledScene,
     chosen: sampling.Filter,
-    coefficients: NDArray,
+    coefficients: Coefficients,
     modes: float,
 ) -> Iterator[tuple[str, float]]:
     """Rms change of the signal by leaving out each transfer, by Parseval's theorem.
@@ -348,16 +385,16 @@ def _changes(
     density = _density(optics, scene)
     for effect in optics.effects:
         if isinstance(effect, RadialTransfer):
-            power = chosen.without(effect, optics.transfer).power(coefficients)[1]
+            power = chosen.without(effect, optics.transfer).mean_square(coefficients)
         elif isinstance(effect, SeparableTransfer):
             power = chosen.without_separable(effect, coefficients)
         elif isinstance(effect, PlaneTransfer):
-            power = chosen.only_planes().power(coefficients)[1]
+            power = chosen.only_planes().mean_square(coefficients)
         elif isinstance(effect, FieldTransfer):
-            power = chosen.without_field(optics.transfer).power(coefficients)[1]
+            power = chosen.without_field(optics.transfer).mean_square(coefficients)
         else:
             continue
-        square = density * power.sum(axis=1).max()
+        square = density * power.max()
         square += modes if isinstance(effect, FieldTransfer) else 0.0
         yield effect.name, float(np.sqrt(square))
 
@@ -366,7 +403,7 @@ def _needed(
     optics: Optics,
     scene: SampledScene,
     chosen: sampling.Filter,
-    coefficients: NDArray,
+    coefficients: Coefficients,
     modes: tuple[field.Mode, ...],
     budget: float,
 ) -> tuple[tuple[field.Mode, ...], float]:
@@ -376,8 +413,8 @@ def _needed(
     """
     squares = np.zeros(len(modes))
     for i, mode in enumerate(modes):
-        power = replace(chosen, tables=mode.tables(rough=True)).power(coefficients)[1]
-        squares[i] = _density(optics, scene) * mode.map.mean_square * power.sum(axis=1).max()
+        power = replace(chosen, tables=mode.tables(rough=True)).mean_square(coefficients)
+        squares[i] = _density(optics, scene) * mode.map.mean_square * power.max()
     weakest = np.argsort(squares)
     dropped = set(weakest[np.cumsum(squares[weakest]) <= budget**2].tolist())
     kept = tuple(mode for i, mode in enumerate(modes) if i not in dropped)

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from vcam_cli.files.atomic import write_whole
-from vcam_cli.files.plots import COLORS, MARKERS, STYLE
+from vcam_cli.files.plots import COLORS, MARKERS, STYLE, load
 
 FLOOR = 1e-9
 """What is smaller is drawn here: an error of 0 has no place on a logarithmic axis."""
@@ -47,7 +47,7 @@ def pareto(
     presets: (seconds, error, name); tolerance: drawn as a line; panels: (label of the axis, pairs),
     one below the other. Errors relative to full signal. Raises CannotDo where it cannot be written.
     """
-    import matplotlib
+    matplotlib = load()
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 

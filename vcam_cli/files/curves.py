@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcam_cli.files.atomic import write_whole
-from vcam_cli.files.plots import COLORS, MARKERS, STYLE
+from vcam_cli.files.plots import COLORS, MARKERS, STYLE, load
 
 Look = Literal["points", "line", "dashed"]
 
@@ -58,7 +58,7 @@ class Panel:
 
 def draw(path: Path | str, title: str, panels: Sequence[Panel]) -> None:
     """Panels one below the other, with one x axis. Raises CannotDo where it cannot be written."""
-    import matplotlib
+    matplotlib = load()
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 

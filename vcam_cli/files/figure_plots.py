@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcam_cli.files.atomic import write_whole
-from vcam_cli.files.plots import COLORS, MARKERS, STYLE
+from vcam_cli.files.plots import COLORS, MARKERS, STYLE, load
 from vcam_cli.files.sweep_plots import WIDE_X, WIDE_Y
 from vcam_cli.quality import error_map
 
@@ -133,7 +133,7 @@ def _alike(one: Panel, other: Panel) -> bool:
 
 @contextmanager
 def _figure(path: Path | str, width: float, height: float) -> Any:
-    import matplotlib
+    matplotlib = load()
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcam_cli.files.atomic import write_whole
-from vcam_cli.files.plots import COLORS, STYLE
+from vcam_cli.files.plots import COLORS, STYLE, load
 from vcam_cli.files.png import write_png
 
 Square = tuple[slice, slice]
@@ -132,7 +132,7 @@ def _show(axes: Any, codes: NDArray, title: str, text: str, square: Square | Non
 
 
 def _figure(path: Path | str, title: str, size: tuple[float, float], draw: Any) -> None:
-    import matplotlib
+    matplotlib = load()
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcam_cli.files.atomic import write_whole
-from vcam_cli.files.plots import COLORS, STYLE
+from vcam_cli.files.plots import COLORS, STYLE, load
 from vcam_cli.scheduling.pdf import Pdf
 
 WIDE = 0.05
@@ -121,7 +121,7 @@ def _reach(steps: Sequence[tuple[str, Pdf]], wide: bool) -> float:
 
 def write(path: Path | str, size: tuple[float, float], draw: Callable[[Any], None]) -> None:
     """A figure as a PNG, the same bytes for the same numbers. Raises CannotDo."""
-    import matplotlib
+    matplotlib = load()
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 

@@ -100,7 +100,7 @@ class SweepFolder:
     def read(self, point: str, frames: tuple[str, ...] = ()) -> dict[str, Any] | None:
         """What was written of a finished point; None where it is to be computed.
 
-        frames: names of files that must be there beside it.
+        frames: names of files that must be there beside it, of the size in which they were kept.
         """
         path = self.path / POINTS / f"{point}.json"
         try:
@@ -115,9 +115,13 @@ class SweepFolder:
         if found is None:
             self.corrupted += [path.name] if path.name not in self.corrupted else []
             return None
-        whole = all((self.path / POINTS / f"{point}.{name}").is_file() for name in frames)
+        sizes = json.loads(data).get("sizes", {})
         self._used.add(point)
-        return found if whole else None
+        return found if all(self._is_kept(point, name, sizes) for name in frames) else None
+
+    def _is_kept(self, point: str, name: str, sizes: Mapping[str, int]) -> bool:
+        path = self.path / POINTS / f"{point}.{name}"
+        return path.is_file() and path.stat().st_size == sizes.get(name, path.stat().st_size)
 
     def is_whole(self, key: str, frames: tuple[str, ...] = ()) -> bool:
         """Whether what was kept under a key is there as it was written, a map or plot included."""
@@ -135,7 +139,9 @@ class SweepFolder:
             with atomic.write_whole(self.path / POINTS / f"{point}.{name}") as temporary:
                 temporary.write_bytes(data)
         plain = json.loads(to_json(content))
-        whole = {"program": PROGRAM, "id": point, "point": plain, "check": _check(point, plain)}
+        sizes = {name: len(data) for name, data in (frames or {}).items()}
+        check = _check(point, plain)
+        whole = {"program": PROGRAM, "id": point, "point": plain, "check": check, "sizes": sizes}
         atomic.write_text(self.path / POINTS / f"{point}.json", to_json(whole))
         self._used.add(point)
 
@@ -214,7 +220,12 @@ class SweepFolder:
         written = {name: hash_file(self.path / name) for name in names}
         about = {"program": PROGRAM, "files": names, "written": written, "kept": kept}
         whole = {**record, **about}
-        atomic.write_text(self.path / RECORD, to_json(whole))
+        atomic.write_text(self.path / RECORD, to_json({**whole, "check": record_check(whole)}))
+
+
+def record_check(record: Mapping[str, Any]) -> str:
+    """The check of a record: of all that it says but for the check itself."""
+    return hash_text(to_json({name: said for name, said in record.items() if name != "check"}))
 
 
 def as_bytes(name: str, write: Callable[[Path], None]) -> bytes:

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from vcam_cli.files.atomic import write_whole
-from vcam_cli.files.plots import COLORS, MARKERS, STYLE
+from vcam_cli.files.plots import COLORS, MARKERS, STYLE, load
 
 WIDE_X, WIDE_Y = 20.0, 50.0
 """Ratio of the largest to the smallest value from which on an axis is logarithmic."""
@@ -42,7 +42,7 @@ def over_parameter(
 
     words: the names of the values 0, 1, 2 ... of a parameter that is no number. Raises CannotDo.
     """
-    import matplotlib
+    matplotlib = load()
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 

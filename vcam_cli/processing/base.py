@@ -1,15 +1,15 @@
 """What flows through processing: a context, blocks of rows, operations on them.
 
-A frame is worked on in blocks of `BLOCK_ROWS` rows that pass through all operations while they
-are in the cache; an operation that looks at neighbors asks for a `halo` of rows above and below.
-Blocks are the same whatever the number of workers, and so are the bytes that come out.
+A frame is worked on in blocks of some rows that pass through all operations while they are in the
+cache; an operation that looks at neighbors asks for a `halo` of rows above and below. Blocks are
+the same whatever the number of workers, and so are the bytes that come out.
 
 Why an operation has two faces: the ideal image has all colors at every pixel and no mosaic, but
 must go through the very same color transform as the camera's picture. `on_block` acts on the
 picture, `on_colors` on full-color values: the ideal image, and the white that sets the scale.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Protocol, TypeVar
@@ -18,7 +18,10 @@ import numpy as np
 
 from vcam_cli.spectra import Spectrum
 
-BLOCK_ROWS = 64
+STEP, MOST = 16, 64
+"""Rows of a block: a multiple of the one, at most the other."""
+PIXELS = 1 << 17
+"""Of a block, about: three colors of them and what is made of them stay in the cache."""
 
 Pattern = tuple[tuple[str, ...], ...]
 Result = TypeVar("Result")
@@ -118,15 +121,21 @@ class Operation(Protocol):
         """The same transform of full-color values (C, ...) [as they come out of the last step]."""
 
 
-def blocks(rows: int) -> Iterator[tuple[int, int]]:
-    """(start, stop) of every block of a picture of `rows` rows."""
-    for start in range(0, rows, BLOCK_ROWS):
-        yield start, min(start + BLOCK_ROWS, rows)
+def blocks(rows: int, columns: int) -> Iterator[tuple[int, int]]:
+    """(start, stop) of every block of a picture of so many rows and columns."""
+    size = max(STEP, min(PIXELS // columns // STEP * STEP, MOST))
+    for start in range(0, rows, size):
+        yield start, min(start + size, rows)
 
 
-def map_blocks(work: Callable[[int, int], Result], rows: int, workers: int) -> list[Result]:
-    """work(start, stop) for every block, on `workers` threads; results in the order of rows."""
-    spans = list(blocks(rows))
+def map_blocks(
+    work: Callable[[int, int], Result], shape: Sequence[int], workers: int
+) -> list[Result]:
+    """work(start, stop) for every block of a picture, on `workers` threads.
+
+    shape: its rows and columns last. Returns the results in the order of rows.
+    """
+    spans = list(blocks(*shape[-2:]))
     if workers <= 1 or len(spans) == 1:
         return [work(*span) for span in spans]
     with ThreadPoolExecutor(min(workers, len(spans))) as pool:

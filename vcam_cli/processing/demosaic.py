@@ -87,3 +87,41 @@ class Bilinear:
 
     def on_colors(self, values: np.ndarray) -> np.ndarray:
         return values
+
+    def color_sums(self, block: Block, shape: tuple[int, ...]) -> np.ndarray:
+        """(2, C) float64: the sum of each color over the full-color picture, what the mosaic's
+        rows in this block (no halo) add to it, and the number of their pixels.
+
+        shape: rows and columns of the mosaic. Why: a mean needs no picture. Interpolation is
+        linear, so a measured value counts as often as it is used, with the weights of its uses.
+        """
+        rows = block.first_row + np.arange(block.planes.shape[1])
+        down, across = _uses(shape[0])[rows], _uses(shape[1])
+        sums = np.zeros((2, len(self.colors)))
+        sums[1] = block.planes[0].size
+        twice = [name for row in self.pattern for name in row]
+        for i, names in enumerate(self.pattern):
+            mine = rows % 2 == i
+            measured = block.planes[0][mine]
+            for j, name in enumerate(names):
+                values, along = measured[:, j::2], across[j::2]
+                if twice.count(name) == 2:  # itself, and its share of four neighbors
+                    plain, weighted = _sums(values, along)
+                    found = plain.sum() + (weighted.sum() + plain @ down[mine]) / 4
+                else:  # means of two, along both axes one after the other
+                    plain, weighted = _sums(values, along)
+                    found = (plain + weighted / 2) @ (1 + down[mine] / 2)
+                sums[0, self.colors.index(name)] += found
+        return sums
+
+
+def _sums(values: np.ndarray, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Sums of rows, and of rows times weights."""
+    values = values.astype(np.float64)
+    return values.sum(axis=1), np.einsum("ij,j->i", values, weights)
+
+
+def _uses(count: int) -> np.ndarray:
+    """How often each of so many pixels in a line is another's neighbor, mirrored ones too."""
+    beside = np.concatenate([mirror(np.arange(count) + d, count) for d in (-1, 1)])
+    return np.bincount(beside, minlength=count).astype(float)

@@ -54,7 +54,7 @@ class Processed:
             for channel, plane in enumerate(planes):
                 linear[start:stop, :, channel] = plane
 
-        map_blocks(fill, len(linear), self.workers)
+        map_blocks(fill, self.shape, self.workers)
         return linear
 
     def encode(self, bits: int = 8) -> np.ndarray:
@@ -69,7 +69,7 @@ class Processed:
             for channel, plane in enumerate(planes):
                 render[start:stop, :, channel] = tone.encode(plane, self.curve, bits)
 
-        map_blocks(fill, len(render), self.workers)
+        map_blocks(fill, self.shape, self.workers)
         return render if self.channels > 1 else render[:, :, 0]
 
     def ideal(self, planes_dn: np.ndarray) -> np.ndarray:
@@ -93,7 +93,7 @@ class Processed:
             for channel, plane in enumerate(values):
                 np.subtract(plane, dark[channel], out=ideal[start:stop, :, channel])
 
-        map_blocks(fill, planes_dn.shape[1], self.workers)
+        map_blocks(fill, planes_dn.shape, self.workers)
         return ideal
 
 

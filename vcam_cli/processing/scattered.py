@@ -83,7 +83,7 @@ def picture(
             counted = np.where(np.abs(weight) > SHARE, measured[index], 0)
             np.maximum(top, counted.max(axis=1).reshape(y.shape), out=top)
 
-    map_blocks(fill, grid[0], workers)
+    map_blocks(fill, grid, workers)
     return Picture(planes, highest)
 
 

@@ -34,6 +34,7 @@ from vcam_cli.processing.highlights import Highlights
 from vcam_cli.processing.linearize import Linearize
 from vcam_cli.processing.normalized import NormalizedConvolution, Sites, half_width
 from vcam_cli.processing.processed import Processed, through
+from vcam_cli.processing.white_balance import color_sums
 
 Path = tuple[str | int, ...]
 
@@ -162,11 +163,15 @@ def _white_balance(draft: Draft, step: Step, path: Path) -> Draft:
 def _all_means(draft: Draft) -> np.ndarray:
     """(C,) the means of the colors over all of the picture."""
 
-    def sums(start: int, stop: int) -> np.ndarray:
-        block = flow(draft.dn, draft.operations, start, stop)
-        return white_balance.color_sums(block, draft.context)
+    before, last = draft.operations[:-1], (draft.operations or (None,))[-1]
+    shape = draft.dn.shape
 
-    parts = map_blocks(sums, draft.dn.shape[-2], draft.workers)
+    def sums(start: int, stop: int) -> np.ndarray:
+        if isinstance(last, Bilinear):
+            return last.color_sums(flow(draft.dn, before, start, stop), shape)
+        return color_sums(flow(draft.dn, draft.operations, start, stop), draft.context)
+
+    parts = map_blocks(sums, shape, draft.workers)
     total, count = sum(parts, np.zeros((2, len(draft.context.colors))))
     return np.asarray(total / np.maximum(count, 1))
 
@@ -178,7 +183,7 @@ def _bright_means(draft: Draft) -> np.ndarray:
         block = flow(draft.dn, draft.operations, start, stop)
         return bright_block.measure(block, draft.codes[..., start:stop, :], draft.context)
 
-    return bright_block.white_means(map_blocks(parts, draft.dn.shape[-2], draft.workers))
+    return bright_block.white_means(map_blocks(parts, draft.dn.shape, draft.workers))
 
 
 def _color_correction(draft: Draft, step: Step, path: Path) -> Draft:

@@ -17,7 +17,7 @@ import numpy as np
 Curve = float | str  # a gamma, or "srgb"
 
 _ONE = int(np.float32(1).view(np.int32))
-_SHIFTS = range(14, 8, -1)  # bits of a float32 left out of the table's index: 65 k to 2 M entries
+_SHIFTS = range(16, 8, -1)  # bits of a float32 left out of the table's index: 16 k to 2 M entries
 
 
 def srgb(linear: np.ndarray) -> np.ndarray:
@@ -42,7 +42,7 @@ def codes(linear: np.ndarray, curve: Curve, bits: int) -> np.ndarray:
 class _Table:
     shift: int
     code: np.ndarray  # (n,) uint8: the code at the lower end of each interval of bits
-    level: np.ndarray  # (256,) float32: the smallest value with a code above k; last NaN
+    level: np.ndarray  # (n,) float32: the smallest value with a higher code; last NaN
 
 
 def encode(linear: np.ndarray, curve: Curve, bits: int) -> np.ndarray:
@@ -53,7 +53,8 @@ def encode(linear: np.ndarray, curve: Curve, bits: int) -> np.ndarray:
     linear = np.ascontiguousarray(linear, dtype=np.float32)
     index = np.right_shift(linear.view(np.int32), table.shift, dtype=np.int32).astype(np.intp)
     code = table.code.take(index, mode="clip")  # below 0 a float32 is a negative integer
-    return code + (linear >= table.level.take(code)).view(np.uint8)
+    code += (linear >= table.level.take(index, mode="clip")).view(np.uint8)
+    return code
 
 
 @lru_cache(maxsize=8)
@@ -65,7 +66,7 @@ def _table(curve: Curve) -> _Table | None:
         code = np.searchsorted(levels, edges, side="right")
         if np.diff(code).max() <= 1:
             level = np.append(levels.astype(np.int32).view(np.float32), np.float32(np.nan))
-            return _Table(shift, code.astype(np.uint8), level)
+            return _Table(shift, code.astype(np.uint8), level[code])
     return None
 
 

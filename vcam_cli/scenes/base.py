@@ -128,16 +128,26 @@ class SampledScene(ABC):
     def at(self, x: Array, y: Array, mix: Array) -> Array:
         """sum_k mix[r, k] B_k at the points (y[i], x[j]) [m], both rising: (R, m, n)."""
 
-    def runs(self) -> Array | None:
-        """Where runs of rows that are alike start, and the number of rows: (d + 1,).
+    @property
+    def is_known(self) -> bool:
+        """Whether it is made of even rectangles, and need not be sampled."""
+        return self.rectangles(np.zeros((1, len(self.spectra)))) is not None
 
-        None where nothing is known of them.
-        """
+    def rectangles(self, mix: Array) -> "Rectangles | None":
+        """The whole grid's area as even rectangles, exact; None where it is not made of them."""
         return None
 
-    def different(self, mix: Array) -> Array:
-        """The first row of every run, in all combinations: (R, d, nx). Only where `runs` are."""
-        raise NotImplementedError
+
+@dataclass(frozen=True)
+class Rectangles:
+    """Even light in rectangles that lie in rows and columns."""
+
+    x: Array
+    """(e + 1,) rising: left edges, and the last right one [m]"""
+    y: Array
+    """(d + 1,) the same from the top"""
+    values: Array
+    """(R, d, e) float64"""
 
 
 class Chart(ABC):
@@ -163,10 +173,10 @@ class Chart(ABC):
         """A chart that looks the same on these cells, if there is one that is faster there."""
         return self
 
-    def runs(self, y_edges: Array) -> Array | None:
-        """First rows of runs of rows of cells that are alike, and the number of rows: (d + 1,).
+    def edges(self) -> tuple[Array, Array] | None:
+        """Where the light may change, x and y rising [m], of a chart of even rectangles.
 
-        None where nothing is known of them.
+        None for all others: the light must be the same all over between neighboring edges.
         """
         return None
 
@@ -205,21 +215,14 @@ class ChartScene(SampledScene):
         by_bands(paint, ny, nx, workers)
         return out
 
-    def runs(self) -> Array | None:
-        if max(self.pitch_x, self.pitch_y) > self.chart.coarsest_cell:
+    def rectangles(self, mix: Array) -> Rectangles | None:
+        edges = self.chart.edges()
+        if edges is None:
             return None
-        return self.chart.runs(cell_edges(self.shape[0], self.pitch_y))
-
-    def different(self, mix: Array) -> Array:
-        bounds, (ny, nx) = self.runs(), self.shape
-        if bounds is None:
-            raise ValueError("nothing is known of the rows of this chart")
-        x_edges, y_edges = cell_edges(nx, self.pitch_x), cell_edges(ny, self.pitch_y)
-        out = np.empty((len(mix), len(bounds) - 1, nx), self.dtype)
-        mix = np.asarray(mix, self.dtype)
-        for number, row in enumerate(bounds[:-1]):
-            self.chart.paint(x_edges, y_edges[row : row + 2], mix, out[:, number : number + 1])
-        return out
+        extents = (self.pitch_x * self.shape[1] / 2, self.pitch_y * self.shape[0] / 2)
+        x, y = (_within(e, half) for e, half in zip(edges, extents, strict=True))
+        middle_x, middle_y = ((e[1:] + e[:-1]) / 2 for e in (x, y))
+        return Rectangles(x, y, self.chart.values(middle_x, middle_y, np.asarray(mix, float)))
 
     def at(self, x: Array, y: Array, mix: Array) -> Array:
         x, y = np.asarray(x, float), np.asarray(y, float)
@@ -322,16 +325,13 @@ class Framed(Chart):
             picture *= np.outer(cover_y, cover_x).astype(mix.dtype)
             out[:, rows, columns] = picture
 
-    def runs(self, y_edges: Array) -> Array | None:
-        rows, cover, inside = clip_cells(y_edges, self.frame.height / 2)
-        whole = [0, len(y_edges) - 1]
-        if not len(cover):
-            return np.array(whole)
-        within = self.chart.runs(inside)
-        if within is None:
+    def edges(self) -> tuple[Array, Array] | None:
+        inner = self.chart.edges()
+        if inner is None:
             return None
-        border = [rows.start, rows.start + 1, rows.stop - 1, rows.stop]  # cells cut by the frame
-        return np.unique([*whole, *border, *(within + rows.start)])
+        sides = (self.frame.width / 2, self.frame.height / 2)
+        x, y = (_within(e, half) for e, half in zip(inner, sides, strict=True))
+        return x, y
 
     def within(self, x_edges: Array, y_edges: Array) -> "Framed":
         _, _, inside_x = clip_cells(x_edges, self.frame.width / 2)
@@ -357,6 +357,12 @@ def clip_cells(edges: Array, half: float) -> tuple[slice, Array, Array]:
         return slice(0, 0), np.empty(0), np.empty(0)
     inside = np.clip(edges[first : last + 1], -half, half)
     return slice(first, last), np.diff(inside) / np.diff(edges[first : last + 1]), inside
+
+
+def _within(edges: Array, half: float) -> Array:
+    """The edges inside [-half, half], and these two."""
+    inside = edges[(edges > -half) & (edges < half)]
+    return np.concatenate([[-half], np.unique(inside), [half]])
 
 
 def overlap(edges: Array, low: float, high: float) -> Array:

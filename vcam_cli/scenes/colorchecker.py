@@ -94,6 +94,12 @@ class Card:
             np.stack([_within(y, *ends) for ends in self._patches(ROWS)]),
         )
 
+    def edges(self) -> tuple[Array, Array]:
+        """Where card and patches start and stop, x and y [m]."""
+        x = [-self.half_width, *sum(self._patches(COLUMNS), ()), self.half_width]
+        y = [-self.half_height, *sum(self._patches(ROWS), ()), self.half_height]
+        return np.array(x), np.array(y)
+
     def _patches(self, count: int) -> Iterator[tuple[float, float]]:
         """Where the patches of a row (count 6) or column (4) start and stop [m]."""
         for number in range(count):
@@ -135,6 +141,9 @@ class ColorChecker(Chart):
         light = self._before_surround(cover.of_rows([rows.start for rows in alike]), mix)
         for number, rows in enumerate(alike):
             out[:, rows] = light[:, number, None]
+
+    def edges(self) -> tuple[Array, Array]:
+        return self.card.edges()
 
     def values(self, x: Array, y: Array, mix: Array) -> Array:
         return self._before_surround(self.card.sampled(x, y), mix)

@@ -22,6 +22,9 @@ class StepWedge(Chart):
         """Exact."""
         out[:] = _times(mix, step_averages(self.levels, self.borders, x_edges))
 
+    def edges(self) -> tuple[Array, Array]:
+        return self.borders, np.empty(0)
+
     def values(self, x: Array, y: Array, mix: Array) -> Array:
         line = _times(mix, self.levels[self.borders.searchsorted(x, side="right")])
         return np.repeat(line, len(y), axis=1)

@@ -11,7 +11,7 @@ without files: of the file's camera with this one thing changed.
 from __future__ import annotations
 
 import math
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 from numpy.typing import NDArray
@@ -23,17 +23,26 @@ from vcam_cli.engine.stages import Observer, Silent
 from vcam_cli.studies import ablation, accuracy_advice
 from vcam_cli.studies.ablation import Ablation
 from vcam_cli.studies.accuracy_advice import Recommendation
-from vcam_cli.studies.accuracy_knobs import FINEST, Knob, applying, changed, tried, with_accuracy
+from vcam_cli.studies.accuracy_knobs import (
+    CONVERGED,
+    FINEST,
+    Knob,
+    applying,
+    changed,
+    tried,
+    with_accuracy,
+)
 from vcam_cli.studies.accuracy_points import COLUMNS, Point
 from vcam_cli.studies.accuracy_reference import (
-    CONVERGED,
     Reference,
     changes,
     described,
     error,
     finest,
 )
-from vcam_cli.studies.accuracy_shots import Clock, Shot
+from vcam_cli.studies.accuracy_refined import Refined, refined, same
+from vcam_cli.studies.accuracy_shots import Clock, Shot, resolved
+from vcam_cli.studies.shared import Shared
 
 __all__ = ["COLUMNS", "Point", "Study", "accuracy"]
 
@@ -97,6 +106,8 @@ class _Measurement:
 
     full: float = 1.0
     """Full signal [electrons]"""
+    changes: dict[str, float] = field(default_factory=dict)
+    """Knob -> what its last refinement changed, relative to full signal."""
 
     def study(self) -> Study:
         """All of it; the reference first, then what is compared with it."""
@@ -108,19 +119,22 @@ class _Measurement:
         reference = described(truth.ready, coarse.ready, self.full, change)
         self.watch.begin("errors of presets and tolerances")
         own = self.clock.timed(self.camera)
-        judged = self._settings(coarse, own, truth)
+        totals = self._settings(coarse, own, truth)
         del coarse
         self.watch.begin("errors of the knobs")
         knobs, absent = applying(truth.ready)
-        judged += self._knobs(knobs, own, truth)
+        judged = self._knobs(knobs, own, truth, reference)
+        reference = replace(reference, lost=math.hypot(reference.lost, *self.changes.values()))
+        reference = replace(reference, changes=self.changes)
+        judged = [(replace(p, unsure=reference.lost), c) for p, c in totals] + judged
         self.watch.begin("effects left out")
         effects = self._effects(own, truth, reference)
         self.watch.begin("seconds of the settings")
-        self.clock.go(self.watch)
+        self.clock.go(self.watch, self.camera)
         points = self._timed([*judged, *effects])
         shares = ablation.variance_shares(truth.ready, self.full, self.workers)
         ablations = tuple(self._ablation(own, point, shares) for point in points if point.effect)
-        points += self._combined(points, truth)
+        points += self._combined(points, truth, reference)
         advice = accuracy_advice.recommend(self.camera, points)
         return Study(self.camera, reference, points, ablations, absent, advice)
 
@@ -133,31 +147,44 @@ class _Measurement:
             cases.append(("tolerance", text, with_accuracy(self.camera, tolerance=value)))
         cases.append(("effects", "all", ablation.switched(self.camera, "all")))
         cases.append(("file", "as it is", self.camera))
-        known = {repr(with_accuracy(self.camera, preset="reference")): coarse}
-        known[repr(self.camera)] = own
+        known = {resolved(with_accuracy(self.camera, preset="reference")): coarse}
+        known[resolved(self.camera)] = own
         out = []
         for i, (knob, setting, case) in enumerate(cases):
             self.watch.step(i, len(cases))
-            shot = known.get(repr(case)) or self.clock.timed(case)
+            shot = known.get(resolved(case)) or self.clock.timed(case)
             out.append((self._point(knob, setting, shot, truth), case))
         return out
 
-    def _knobs(self, knobs: list[Knob], own: Shot, truth: Shot) -> list[Judged]:
+    def _knobs(
+        self, knobs: list[Knob], own: Shot, truth: Shot, reference: Reference
+    ) -> list[Judged]:
         """The knobs, each with its own error."""
         fixed: dict[str, Any] = {"tolerance": CONVERGED, **FINEST}
         if reached := own.ready.spectrum.oversampling:
             fixed["oversampling"] = math.ceil(reached)
         everything = ablation.switched(self.camera, "all")
-        base = self.clock.shot(with_accuracy(everything, **fixed))
+        shared = Shared()  # of models of noise the light is the same
+        base = self.clock.shot(with_accuracy(everything, **fixed), shared)
         out = []
         for i, knob in enumerate(knobs):
             self.watch.step(i, len(knobs))
-            against = truth if knob.name == "oversampling" else base
+            shots = {}
             for setting, value in tried(knob, truth.ready).items():
-                shot = self.clock.shot(with_accuracy(everything, **{**fixed, knob.name: value}))
+                beside = {} if value == knob.finest else knob.beside
+                case = with_accuracy(everything, **{**fixed, **beside, knob.name: value})
+                alike = same(knob, value, case, base.ready)
+                shots[setting] = base if alike else self.clock.shot(case, shared)
+            best = Refined(truth, reference.lost)
+            if knob.name != "oversampling":
+                again = [with_accuracy(everything, **{**fixed, **more}) for more in knob.further]
+                best = refined(base, list(shots.values()), again, self.full, self.workers)
+                self.changes[knob.name] = best.change
+            for setting, value in tried(knob, truth.ready).items():
                 case = changed(self.camera, **{knob.name: value})
                 self.clock.add(case)
-                out.append((self._point(knob.name, setting, shot, against), case))
+                point = self._point(knob.name, setting, shots[setting], best.shot)
+                out.append((replace(point, unsure=best.change), case))
         return out
 
     def _effects(self, own: Shot, truth: Shot, reference: Reference) -> list[Judged]:
@@ -172,7 +199,9 @@ class _Measurement:
             out.append((replace(point, predicted=None, left_out=(), variance_lost=0.0), case))
         return out
 
-    def _combined(self, points: tuple[Point, ...], truth: Shot) -> tuple[Point, ...]:
+    def _combined(
+        self, points: tuple[Point, ...], truth: Shot, reference: Reference
+    ) -> tuple[Point, ...]:
         """The camera with all knobs coarser that need not be finer, if there are any."""
         knobs = accuracy_advice.coarser(self.camera, points)
         if not knobs:
@@ -180,7 +209,8 @@ class _Measurement:
         case = changed(self.camera, **knobs)
         text = ", ".join(f"{name}: {value}" for name, value in knobs.items())
         point = self._point("combined", text, self.clock.timed(case), truth)
-        self.clock.go(self.watch)
+        point = replace(point, unsure=reference.lost)
+        self.clock.go(self.watch, self.camera)
         return self._timed([(point, case)])
 
     # --- as it is shown --------------------------------------------------------------------------

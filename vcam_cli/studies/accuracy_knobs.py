@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from vcam_cli.camera.camera import Camera
@@ -12,6 +12,8 @@ from vcam_cli.camera.settings import Accuracy
 from vcam_cli.effects.base import FieldTransfer
 from vcam_cli.engine.prepare import Prepared
 
+CONVERGED = 2e-5
+"""Tolerance of the reference."""
 MOST_SAMPLES = 1 << 24
 """Samples of a plane beyond which no setting of the oversampling is tried."""
 
@@ -27,6 +29,10 @@ class Knob:
     """What its own errors are measured against; None: what the engine takes by itself."""
     absent: Callable[[Prepared], str]
     """Why a camera has none of it; empty where it has."""
+    further: tuple[dict[str, Any], ...] = ()
+    """Keys of `accuracy`: refinements tried until their change is a tenth of its least error."""
+    beside: dict[str, Any] = field(default_factory=dict)
+    """Keys that a coarser setting needs finer than others do, for its error to be its own."""
 
 
 def _spectrum(ready: Prepared) -> str:
@@ -66,24 +72,39 @@ def _of(*values: Any) -> dict[str, Any]:
 
 
 KNOBS: tuple[Knob, ...] = (
-    Knob("wavelength_step", _of("80 nm", "20 nm", "10 nm", "5 nm"), "1 nm", _blurred),
+    Knob(
+        "wavelength_step",
+        _of("80 nm", "20 nm", "10 nm", "5 nm"),
+        "1 nm",
+        _blurred,
+        ({"wavelength_step": "0.5 nm"}, {"wavelength_step": "0.25 nm"}),
+    ),
     Knob("oversampling", _of(1, 2, 3, 4, 8), None, _spectrum),
-    Knob("table_size", _of(64, 512, 4096), 1 << 16, _table),
+    Knob(
+        "table_size",
+        _of(64, 512, 4096),
+        1 << 14,
+        _table,
+        ({"table_size": 1 << 15}, {"table_size": 1 << 17}),
+    ),
     Knob(
         "vignetting_points",
         _of(5, 9, 17, 33),
         65,
         _effect("pixel_vignetting", "no tunnel above the photodetector is described"),
+        ({"vignetting_points": 129},),
     ),
-    Knob("spectral_rank", _of(2, 3, 4, 6), None, _rank),
-    Knob("field_zones", _of(2, 3, 4, 6), 8, _field),
+    # As many as a tenth of the tolerance asks for.
+    Knob("spectral_rank", _of(2, 3, 4, 6), None, _rank, ({"tolerance": CONVERGED / 10},)),
+    Knob("field_zones", _of(2, 3, 4, 6), 8, _field, ({"field_zones": 16}, {"field_zones": 32})),
     Knob(
         "shot_noise",
         _of("gaussian", "exact"),
         "exact",
         _effect("shot_noise", "shot noise is not simulated"),
     ),
-    Knob("float_width", _of(32, 64), 64, lambda _: ""),
+    # 32 bits read the nearest entry of a table, which has to be fine for that to be rounding alone.
+    Knob("float_width", _of(32, 64), 64, lambda _: "", beside={"table_size": 1 << 18}),
 )
 """All of them, each from its coarsest setting to finer ones."""
 FINEST: dict[str, Any] = {k.name: k.finest for k in KNOBS if k.finest is not None}

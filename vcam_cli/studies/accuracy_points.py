@@ -16,6 +16,9 @@ COLUMNS = (
 )
 """Of accuracy.csv."""
 
+FLOOR = 1e-12
+"""Of full signal: smaller differences are rounding of 64-bit numbers."""
+
 
 @dataclass(frozen=True)
 class Point:
@@ -41,6 +44,13 @@ class Point:
     """Effects that its plan leaves out."""
     variance_lost: float = 0.0
     """Largest share of the temporal or fixed-pattern variance that they had."""
+    unsure: float = 0.0
+    """Rms by which that which it is compared with may itself be wrong, relative to full signal."""
+
+    @property
+    def sure(self) -> bool:
+        """Whether what it is compared with is ten times as good, or as good as 64 bits can be."""
+        return self.unsure <= max(self.rms_error / 10, FLOOR)
 
     @property
     def row(self) -> tuple[str | float, ...]:

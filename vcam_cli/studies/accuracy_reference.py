@@ -8,7 +8,7 @@ change of the last refinement; errors ten times larger are not changed by it.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -21,13 +21,13 @@ from vcam_cli.engine.optics import MARGIN
 from vcam_cli.engine.prepare import Prepared
 from vcam_cli.scenes.base import SampledScene
 from vcam_cli.studies import ablation
-from vcam_cli.studies.accuracy_knobs import FINEST, with_accuracy
+from vcam_cli.studies.accuracy_knobs import CONVERGED, FINEST, with_accuracy
 from vcam_cli.studies.simulate import prepare
 
-CONVERGED = 2e-5
-"""Tolerance of the reference."""
 FURTHER = 2.5
 """How much further than `accuracy: reference` a spectrum is followed: its error falls tenfold."""
+FINEST_CELLS = 64
+"""Largest oversampling that a camera file may ask for."""
 ORDER = 2.5
 """Power of the oversampling with which the error of a painted edge falls."""
 MOST_BYTES = 4e9
@@ -47,13 +47,16 @@ class Reference:
     lost: float
     """Estimated rms that even the reference misses, relative to full signal."""
     settings: dict[str, Any]
+    changes: dict[str, float] = field(default_factory=dict)
+    """Knob -> rms that its last refinement changed, relative to full signal."""
 
 
 def finest(camera: Camera, coarse: Prepared, most_bytes: float = 0) -> Camera:
     """The camera with everything on and every knob finer than its reference.
 
     coarse: the camera at `accuracy: reference`. Where its scene has a spectrum, it is followed
-    two and a half times as far as there, as long as so many bytes suffice; 0: `MOST_BYTES`.
+    two and a half times as far as there, as long as so many bytes suffice; 0: `MOST_BYTES`. A
+    chart whose spectrum is known is followed as far as the key goes.
     """
     knobs: dict[str, Any] = dict(FINEST)
     reached = coarse.spectrum.oversampling
@@ -64,7 +67,9 @@ def finest(camera: Camera, coarse: Prepared, most_bytes: float = 0) -> Camera:
             / max(1, coarse.spectrum.planes)
         )
         most = int(math.sqrt(samples / _pixels(coarse)))
-        wanted = min(math.ceil(FURTHER * reached), 64)
+        wanted = min(math.ceil(FURTHER * reached), FINEST_CELLS)
+        if isinstance(coarse.scene, SampledScene) and coarse.scene.is_known:
+            wanted = most = FINEST_CELLS
         knobs["oversampling"] = max(math.ceil(reached), min(wanted, most))
     return with_accuracy(ablation.switched(camera, "all"), tolerance=CONVERGED, **knobs)
 
@@ -81,7 +86,8 @@ def described(found: Prepared, coarse: Prepared, full: float, change: float) -> 
     of the difference of their signals [electrons].
     """
     left = found.spectrum.lost * found.exposure_time
-    chart = isinstance(found.scene, SampledScene) and found.scene.samples != "squares"
+    scene = found.scene
+    chart = isinstance(scene, SampledScene) and scene.samples != "squares" and not scene.is_known
     reached = coarse.spectrum.oversampling
     if chart and reached and found.spectrum.oversampling > reached:
         left = change / ((found.spectrum.oversampling / reached) ** ORDER - 1)

@@ -6,25 +6,30 @@ each counts with the median of its runs, and the spread of them is shown beside 
 
 from __future__ import annotations
 
+import hashlib
 import statistics
 import time
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vcam_cli.camera.camera import Camera
 from vcam_cli.engine.prepare import Prepared
+from vcam_cli.engine.settings import settings
 from vcam_cli.engine.stages import Observer
 from vcam_cli.processing import process
 from vcam_cli.quality import display
 from vcam_cli.quality.scielab import s_cielab_map
 from vcam_cli.studies import ablation
+from vcam_cli.studies.shared import Shared
 from vcam_cli.studies.simulate import Result, simulate
 
 TURNS, TWICE, THRICE = 5, 4.0, 0.6
 """Runs of a camera at most; two where they take more than the second [s], three where more than
-the third."""
+the third,"""
+KNOWN = 0.1
+"""and two where half their spread is no larger a part of the median."""
 
 
 @dataclass(frozen=True)
@@ -75,47 +80,88 @@ class Shot:
 
 @dataclass
 class Clock:
-    """Seconds of a frame of every camera that was taken: its text -> its runs."""
+    """Seconds of a frame of every camera that was taken.
+
+    Cameras that come to the same computation share their runs: those whose keys resolve to the same
+    settings, and those whose plans and light turn out to be the same to the last bit.
+    """
 
     workers: int
     runs: dict[str, list[float]] = field(default_factory=dict)
+    """By `resolved` camera [s]"""
     _cameras: dict[str, Camera] = field(default_factory=dict)
+    _found: dict[tuple, str] = field(default_factory=dict)
 
-    def shot(self, camera: Camera) -> Shot:
-        """A frame of the camera; its time does not count."""
-        return _shot(simulate(camera, self.workers))
+    def shot(self, camera: Camera, shared: Shared | None = None) -> Shot:
+        """A frame of the camera; its time does not count.
+
+        shared: what cameras before this one had in common with it.
+        """
+        return _shot(simulate(camera, self.workers, shared=shared))
 
     def timed(self, camera: Camera) -> Shot:
         """A frame of the camera, and its first run."""
-        start = time.perf_counter()
-        result = _whole(camera, self.workers)
-        self._cameras[repr(camera)] = camera
-        self.runs[repr(camera)] = [time.perf_counter() - start]
-        return _shot(result)
+        self.add(camera)
+        return _shot(self._run(resolved(camera)))
 
     def add(self, camera: Camera) -> None:
         """A camera to be timed with the others."""
-        self._cameras.setdefault(repr(camera), camera)
-        self.runs.setdefault(repr(camera), [])
+        self._cameras.setdefault(resolved(camera), camera)
+        self.runs.setdefault(resolved(camera), [])
 
-    def go(self, watch: Observer) -> None:
-        """Runs all cameras in turns."""
+    def go(self, watch: Observer, beside: Camera | None = None) -> None:
+        """Runs all cameras in turns.
+
+        beside: one that others are compared with; it runs in every turn that another does, so that
+        what slows the machine for a while slows it as well.
+        """
         total = TURNS * len(self._cameras)
+        always = "" if beside is None else resolved(beside)
         for turn in range(TURNS):
-            for i, (key, camera) in enumerate(self._cameras.items()):
+            due = [k for k, runs in self.runs.items() if not enough(runs) and len(runs) <= turn]
+            for i, key in enumerate(dict.fromkeys([always, *due]) if always and due else due):
                 watch.step(turn * len(self._cameras) + i, total)
-                if not _enough(self.runs[key]):
-                    start = time.perf_counter()
-                    _whole(camera, self.workers)
-                    self.runs[key].append(time.perf_counter() - start)
+                if key == always or not enough(self.runs[key]):  # it may share another's by now
+                    self._run(key)
 
     def seconds(self, camera: Camera) -> tuple[float, float]:
         """Median of the runs, and slowest less fastest. [s]"""
-        runs = self.runs[repr(camera)]
+        runs = self.runs[resolved(camera)]
         return statistics.median(runs), max(runs) - min(runs)
 
+    def _run(self, key: str) -> Result:
+        start = time.perf_counter()
+        result = _whole(self._cameras[key], self.workers)
+        self.runs[key].append(time.perf_counter() - start)
+        first = self._found.setdefault(_computation(result), key)
+        if self.runs[first] is not self.runs[key]:
+            self.runs[first] += self.runs[key]
+            self.runs[key] = self.runs[first]
+        return result
 
-def _enough(runs: list[float]) -> bool:
+
+def resolved(camera: Camera) -> str:
+    """The camera as a text, with the settings that its accuracy comes to."""
+    rest = camera.model_copy(update={"accuracy": None})
+    return f"{rest!r} {settings(camera)!r}"
+
+
+def _computation(result: Result) -> tuple:
+    """What two frames have in common of which each step is the same."""
+    frame = result.frame
+    chosen = replace(frame.settings, tolerance=0, oversampling=0, most_oversampling=0)
+    way = replace(frame.spectrum, lost=0, changes={})
+    effects = tuple(e.name for e in frame.plan.active)
+    light = hashlib.sha256(np.ascontiguousarray(frame.rate).data).digest()
+    return repr(chosen), repr(way), effects, light
+
+
+def enough(runs: list[float]) -> bool:
+    """Whether the median of so many runs [s] is known to a tenth, or has taken long enough."""
+    if len(runs) < 2:
+        return False
+    if (max(runs) - min(runs)) / 2 <= KNOWN * statistics.median(runs):
+        return True
     spent = sum(runs)
     return len(runs) >= (2 if spent > TWICE else 3 if spent > THRICE else TURNS)
 

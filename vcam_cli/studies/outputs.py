@@ -1,7 +1,8 @@
 """What `vcam run` leaves in its folder: raw.exr, render.png, metrics.csv, ideal.exr, run.json.
 
-Of several samples of one integration also captures/raw_001.exr and so on, and hdr.exr. Raw and
-render are written by two threads at once; files are most of a frame's cost.
+Of several samples of one integration also captures/raw_001.exr and so on, and hdr.exr. Raw files
+are written by a thread while metrics and render are computed, and the render while raw files are
+still being written; files are most of a frame's cost.
 """
 
 from __future__ import annotations
@@ -41,19 +42,26 @@ from vcam_cli.studies.simulate import Result
 def write(result: Result, folder: OutputFolder) -> None:
     """Writes the files of one run, all but the record `run.json`."""
     camera = result.frame.camera
-    metrics = result.metrics
-    jobs: list[Callable[[], None]] = [lambda: write_raw(result, folder.new("raw.exr"))]
-    if camera.output.render:
-        render = result.render
-        jobs.append(lambda: write_png(folder.new("render.png"), render))
-    if camera.quality:
-        jobs.append(lambda: _ideal(result, folder.new("ideal.exr")))
-    if "s-cielab" in camera.quality:
-        jobs.append(lambda: write_map(folder.new("delta_e.png"), result.s_cielab))
-    jobs += _of_samples(result, folder)
-    with result.stages("files"), ThreadPoolExecutor(2) as pool:
-        for done in [pool.submit(job) for job in jobs]:
-            done.result()
+    raw: list[Callable[[], None]] = [lambda: write_raw(result, folder.new("raw.exr"))]
+    with ThreadPoolExecutor(2) as pool:
+        jobs = [pool.submit(job) for job in (*raw, *_of_samples(result, folder))]
+        try:
+            if camera.output.render:
+                render = result.render
+                jobs.append(pool.submit(lambda: write_png(folder.new("render.png"), render)))
+            metrics = result.metrics
+            if camera.quality:
+                jobs.append(pool.submit(lambda: _ideal(result, folder.new("ideal.exr"))))
+            if "s-cielab" in camera.quality:
+                jobs.append(
+                    pool.submit(lambda: write_map(folder.new("delta_e.png"), result.s_cielab))
+                )
+        except BaseException:
+            pool.shutdown(cancel_futures=True)
+            raise
+        with result.stages("files"):
+            for done in jobs:
+                done.result()
     if camera.output.irradiance:
         with result.stages("irradiance"):
             _irradiance(result, folder.new("irradiance.exr"))

@@ -23,7 +23,7 @@ from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.explain import NO_SUCH_KEY
 from vcam_cli.camera.load import FILE_KEYS, Base, nested
 from vcam_cli.camera.merge import merge
-from vcam_cli.camera.parts import locate
+from vcam_cli.camera.parts import Findings, locate
 from vcam_cli.camera.settings import Seed
 from vcam_cli.camera.study import QUALITY, Sweep
 from vcam_cli.camera.yaml_tree import Node, Source
@@ -57,6 +57,8 @@ class Point:
     """The same for all seeds of a camera: the hash of all but the seed."""
     problems: tuple[Problem, ...] = ()
     """Why the camera is refused."""
+    inputs: tuple[Path, ...] = ()
+    """The files of a camera that is refused."""
 
     @property
     def label(self) -> str:
@@ -155,6 +157,21 @@ def cases_of(study: StudyFile, over: Node) -> Iterator[tuple[str, Base, str | No
             yield name, base.overlaid(own).overlaid(judged), case
 
 
+def values_of(study: StudyFile, over: Node) -> Iterator[Base]:
+    """What each word among the values of a study, and the overrides, lead to by themselves.
+
+    Names of parts are looked up anew for every camera, so what they lead to may change with no
+    change of a file.
+    """
+    nothing = Base(study.file, Node({}, Source("", study.file.parent)), (), Findings())
+    yield nothing.overlaid(over)
+    for case in (None, *study.model.cases):
+        for parameter in (study.varied(case) | study.repeated()).values():
+            if isinstance(parameter.cells[0], str):
+                for node in parameter.nodes:
+                    yield nothing.overlaid(nested(split(parameter.path), node))
+
+
 def _bases(study: StudyFile) -> Iterator[Base]:
     """The study's camera files. Raises BadInput for one that is none, or two of one name."""
     node = study.node("camera")
@@ -214,14 +231,16 @@ def _points(
             None,
             "",
         )
+        overlaid = base
         try:
             tree = Node({}, Source("", base.file.parent))
             for p, i in zip(parameters, chosen, strict=True):
                 tree = merge(tree, nested(split(p.path), p.nodes[i]))
-            camera = base.overlaid(tree).overlaid(over).camera(CHECKS)
+            overlaid = base.overlaid(tree).overlaid(over)
+            camera = overlaid.camera(CHECKS)
             camera = camera.model_copy(update={"name": case.replace("/", "-")})
         except BadInput as error:
-            refused = replace(here, problems=error.problems)
+            refused = replace(here, problems=error.problems, inputs=overlaid.inputs)
             yield from itertools.repeat(refused, model.seeds)
             continue
         content = _content(camera, model)
@@ -286,7 +305,9 @@ def _inputs(study: StudyFile, points: Sequence[Point]) -> tuple[Path, ...]:
     files = {study.file}
     seen: set[tuple[Path, ...]] = set()
     for point in points:
-        if point.camera is not None and point.camera.files not in seen:
+        if point.camera is None:
+            files.update(point.inputs)
+        elif point.camera.files not in seen:
             seen.add(point.camera.files)
             files |= {*point.camera.files, *outputs.data_files(point.camera)}
     return tuple(sorted(files))

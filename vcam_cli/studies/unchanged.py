@@ -13,9 +13,11 @@ from pathlib import Path
 from typing import Any
 
 from vcam_cli.camera import load as cameras
+from vcam_cli.camera.load import Base
 from vcam_cli.errors import CannotDo
 from vcam_cli.files.folder import record_of
-from vcam_cli.files.points import RECORD, SweepFolder
+from vcam_cli.files.hyperspectral import companions
+from vcam_cli.files.points import RECORD, SweepFolder, record_check
 from vcam_cli.files.report import hash_file, hash_text, to_json
 from vcam_cli.studies import outputs, sweep_points, sweep_result
 from vcam_cli.studies.point_work import FRAMES
@@ -30,20 +32,25 @@ def asked(study: StudyFile, sets: Sequence[str], folder: Path | None = None) -> 
     """
     start = folder or cameras.current_folder()
     over = cameras.overlay(sets, start)
-    cases = [
-        [name, base.tree.plain(), list(map(str, base.files))]
-        for name, base, _ in sweep_points.cases_of(study, over)
-    ]
+    cases = [[name, _found(base)] for name, base, _ in sweep_points.cases_of(study, over)]
+    values = [_found(base) for base in sweep_points.values_of(study, over)]
     places = [str(study.file), str(start) if sets else ""]
     versions = outputs.versions() | {"matplotlib": version("matplotlib")}
-    return hash_text(to_json([study.tree.plain(), over.plain(), cases, places, versions]))
+    return hash_text(to_json([study.tree.plain(), over.plain(), cases, values, places, versions]))
+
+
+def _found(base: Base) -> list[Any]:
+    """What names lead to: what the files say, and which there are, with those read beside them."""
+    named = base.inputs
+    beside = [companion for path in named for companion in companions(path)]
+    return [base.tree.plain(), [str(path) for path in (*named, *beside)]]
 
 
 def result(place: Path, study: StudyFile, asked: str) -> SweepResult | None:
     """What a finished sweep found of which nothing has changed; None where something has."""
     try:
         record = record_of(place / RECORD)
-        if record is None or record["asked"] != asked:
+        if record is None or record["asked"] != asked or record["check"] != record_check(record):
             return None
         files = {**record["hashes"], **{place / n: h for n, h in record["written"].items()}}
         if not _same(files) or not _kept(place, record, study):

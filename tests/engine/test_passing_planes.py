@@ -1,0 +1,46 @@
+"""Planes that pass one by one give the light of planes that are held together."""
+
+import numpy as np
+import pytest
+
+from vcam_cli import load
+from vcam_cli.engine import coefficients
+from vcam_cli.engine.coefficients import OfRuns, passes
+from vcam_cli.studies.simulate import prepare
+
+
+@pytest.fixture(scope="module")
+def still_life():
+    camera = load("still-life")
+    small = camera.array.model_copy(update={"rows": 48, "columns": 64})
+    return camera.model_copy(update={"array": small})
+
+
+def test_light_is_the_same_one_by_one(still_life, monkeypatch):
+    together, _ = prepare(still_life, workers=2)
+    assert together.spectrum.planes > 1
+    monkeypatch.setattr(coefficients, "HELD", 1)
+    alone, _ = prepare(still_life, workers=2)
+    again, _ = prepare(still_life, workers=1)
+    assert alone.spectrum.held * together.spectrum.planes == together.spectrum.held
+    # The same sums in another order: rounding of 32 bits, of the largest.
+    largest = together.rate.max()
+    np.testing.assert_allclose(alone.rate, together.rate, atol=1e-6 * largest, rtol=0)
+    np.testing.assert_array_equal(alone.rate, again.rate)
+    assert alone.spectrum.lost == pytest.approx(together.spectrum.lost, rel=1e-3)
+    assert alone.spectrum.changes == pytest.approx(together.spectrum.changes, rel=1e-3)
+
+
+def test_one_plane_has_nobody_to_wait_for():
+    assert not passes(1 << 40, 1, 4)
+    assert passes(1 << 26, 2, 4) and not passes(1 << 20, 2, 4)
+
+
+def test_rows_of_runs_are_those_of_all():
+    rng = np.random.default_rng(0)
+    along, values = rng.random((40, 7)), rng.random((2, 7, 33))
+    lazy, index = OfRuns(along, values), np.array([3, 0, 39])
+    expected = np.einsum("yd,rdx->ryx", along, values)
+    assert lazy.shape == expected.shape
+    np.testing.assert_allclose(np.array([plane[index] for plane in lazy]), expected[:, index])
+    np.testing.assert_allclose(np.asarray(lazy), expected)
