@@ -16,7 +16,7 @@ BASE = {
     "scene.wavelengths": {"start": "400 nm", "stop": "700 nm"},
     "pixel.photodetector.dark_current": "100 e/s",
     "pixel.architecture": "ccd",
-    "accuracy": {"preset": "draft"},
+    "accuracy": "draft",
     "effects": "auto",
     "processing": [{"demosaic": "bilinear"}],
 }
@@ -42,7 +42,7 @@ CHANGES = {
     "pixel.photodetector.dark_current": "900 e/s",
     "pixel.photodetector.dark_current_density": "5 nA/cm2",
     "pixel.photodetector.dark_current_scale": 3,
-    "accuracy.shot_noise": "gaussian",
+    "accuracy.shot_noise": {"preset": "draft", "shot_noise": "gaussian"},
     "array.binning": {"rows": 2, "columns": 2, "kind": "voltage"},
     "effects": {"shot_noise": "off", "dark_current": "off"},
 }
@@ -50,6 +50,8 @@ CHANGES = {
 
 
 def changed(path, value):
+    if path == "accuracy.shot_noise":  # of a mapping, in the place of a preset's name
+        return BASE | {"accuracy": value or "draft"}
     out = BASE | {path: value}
     if path in ("pixel.photodetector.dark_current_density",):
         out = {k: v for k, v in out.items() if k != "pixel.photodetector.dark_current"}

@@ -44,6 +44,9 @@ def depends_on(camera: Camera) -> str:
     form = camera.model_dump(mode="json")
     for path in AFTER:
         _drop(form, path)
+    accuracy = form["accuracy"]  # a preset by itself is written as its name
+    if isinstance(accuracy, dict) and set(accuracy) == {"preset"}:
+        form["accuracy"] = accuracy["preset"]
     if isinstance(form.get("effects"), dict):
         own = {name: state for name, state in form["effects"].items() if name not in _RANDOM}
         form["effects"] = own or "auto"
