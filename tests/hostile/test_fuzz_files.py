@@ -13,8 +13,6 @@ from fuzz import FILE, case, inside, made
 from mutations import harmed
 from processes import VCAM, environment
 
-pytestmark = pytest.mark.long
-
 BLOCKS, CAMERAS, STUDIES = 10, 150, 50
 """2000 files, in blocks that processes can share."""
 SIMULATED = 25  # every so manieth camera that is accepted

@@ -7,7 +7,6 @@ import math
 import os
 
 import numpy as np
-import pytest
 import yaml
 from hypothesis import HealthCheck, given, note, settings
 from hypothesis import strategies as st
@@ -19,8 +18,6 @@ from vcam_cli.engine.layout import layout
 from vcam_cli.engine.pixel_figures import pixel_figures
 from vcam_cli.studies import checks
 from vcam_cli.studies.simulate import Result, simulate
-
-pytestmark = pytest.mark.long
 
 SINGLE = np.finfo(np.float32).eps
 SLOW = [HealthCheck.too_slow, HealthCheck.data_too_large, HealthCheck.function_scoped_fixture]
