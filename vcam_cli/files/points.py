@@ -115,7 +115,8 @@ class SweepFolder:
         if found is None:
             self.corrupted += [path.name] if path.name not in self.corrupted else []
             return None
-        sizes = json.loads(data).get("sizes", {})
+        # What has a digest is compared with it by whoever reads it, who tells where it differs.
+        sizes = {} if "digest" in found else json.loads(data).get("sizes", {})
         self._used.add(point)
         return found if all(self._is_kept(point, name, sizes) for name in frames) else None
 
