@@ -48,12 +48,6 @@ def told(end: dict[str, Any], *words: str) -> None:
         assert word in end["said"], end["said"]
 
 
-@pytest.fixture(scope="module")
-def vcam():
-    with Driver() as driver:
-        yield driver
-
-
 @pytest.fixture
 def folder(tmp_path):
     written(tmp_path)

@@ -37,12 +37,6 @@ SIGNALS = pytest.mark.parametrize(
 MOMENTS = pytest.mark.parametrize("moments", [8, pytest.param(150, marks=pytest.mark.long)])
 
 
-@pytest.fixture(scope="module")
-def vcam():
-    with Driver() as driver:
-        yield driver
-
-
 @pytest.fixture
 def folder(tmp_path):
     (tmp_path / "camera.yaml").write_text(yaml.safe_dump(tree(SMALL)))

@@ -256,13 +256,13 @@ def cosines(
         samples = math.prod(terms if rectangles is not None else scene.shape)
         held = painted.held(scene, rectangles, len(tables.mix), bool(zones))
         memory.require(memory.of_followed(Followed(held=held), g, knobs), g)
+        looked = _filter(optics, scene, tables, reach)
         light: painted.Known | painted.Painted | painted.InTurn
         if rectangles is not None:
             light = painted.Known(rectangles, scene.shape, knobs.dtype)
         elif held < samples * len(tables.mix):
-            probe = _filter(optics, scene, tables, reach)
             light = painted.InTurn(
-                scene, tables.mix, probe, not picture, terms, optics.workers, knobs.dtype
+                scene, tables.mix, looked, not picture, terms, optics.workers, knobs.dtype
             )
         else:
             light = painted.Painted(scene.planes(tables.mix, optics.workers))
@@ -271,7 +271,7 @@ def cosines(
         if light.brightest(tables) * SINGLE > budget:
             light = light.doubled()
         coefficients = light.spectrum(optics.workers, terms)
-        spread = _spread(optics, scene, _filter(optics, scene, tables, reach), coefficients)
+        spread = _spread(optics, scene, looked, coefficients)
         if at_hand:
             enough = min(max(spread.enough(budget), knobs.oversampling), widest)
             lost = spread.beyond(enough)
@@ -283,11 +283,10 @@ def cosines(
             break
         del light, coefficients
         oversampling, scene = _again(scene_at, finer)
-    chosen = _filter(optics, scene, tables, enough)
+    chosen = looked if enough == reach else _filter(optics, scene, tables, enough)
     modes, squares = _needed(optics, scene, chosen, coefficients, modes, budget)
     # Without one of them the picture may reach further than it does with all of them.
-    whole = _filter(optics, scene, tables, reach) if at_hand else chosen
-    changes = dict(_changes(optics, scene, whole, coefficients, squares))
+    changes = dict(_changes(optics, scene, looked, coefficients, squares))
     count = len(tables.mix)
     times = len(tables.parities) + len(modes)
     values = _table_values(optics, tables)

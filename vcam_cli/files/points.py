@@ -111,12 +111,13 @@ class SweepFolder:
         except OSError as error:
             message = f"cannot read {path}: {error.strerror}"
             raise CannotDo(message, "check its permissions, or choose another folder") from error
-        found = _checked(point, data)
-        if found is None:
+        whole = _checked(point, data)
+        if whole is None:
             self.corrupted += [path.name] if path.name not in self.corrupted else []
             return None
+        found: dict[str, Any] = whole["point"]
         # What has a digest is compared with it by whoever reads it, who tells where it differs.
-        sizes = {} if "digest" in found else json.loads(data).get("sizes", {})
+        sizes = {} if "digest" in found else whole.get("sizes", {})
         self._used.add(point)
         return found if all(self._is_kept(point, name, sizes) for name in frames) else None
 
@@ -240,14 +241,14 @@ def as_bytes(name: str, write: Callable[[Path], None]) -> bytes:
 
 
 def _checked(point: str, data: bytes) -> dict[str, Any] | None:
-    """The content of a point's file; None where it is not what was once written."""
+    """What a point's file says; None where it is not what was once written."""
     try:
         whole = json.loads(data)
         content = whole["point"]
         right = whole["id"] == point and whole["check"] == _check(point, content)
     except (ValueError, TypeError, KeyError, RecursionError):
         return None
-    return content if right and isinstance(content, dict) else None
+    return whole if right and isinstance(content, dict) else None
 
 
 def _check(point: str, content: Any) -> str:
