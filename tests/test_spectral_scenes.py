@@ -12,7 +12,7 @@ from vcam_cli import simulate
 from vcam_cli.engine import irradiance
 from vcam_cli.errors import BadInput
 from vcam_cli.spectra import cmf, illuminant
-from vcam_cli.studies import outputs
+from vcam_cli.studies import provenance
 from vcam_cli.studies.checks import load
 from vcam_cli.studies.simulate import prepare
 
@@ -148,7 +148,7 @@ def test_the_record_names_the_files_beside_it(tmp_path):
     made = envi(tmp_path / "a.hdr", reflectance_scale_factor=1)
     said = {"scene.source": {"kind": "hyperspectral", "file": str(made)}}
     taken = camera(tmp_path, PLAIN | said | {"scene.luminance": "100 cd/m2"})
-    assert {made, tmp_path / "a.raw"} <= set(outputs.inputs(taken))
+    assert {made, tmp_path / "a.raw"} <= set(provenance.inputs(taken))
 
 
 def test_a_file_is_checked_before_anything_is_computed(tmp_path):

@@ -139,8 +139,7 @@ def _load() -> None:
 
     from vcam_cli.commands import main, run, sweep  # noqa: F401
     from vcam_cli.files import exr, folder, png, points, report, sweep_plots, tables  # noqa: F401
-    from vcam_cli.studies import checks, outputs, simulate  # noqa: F401
-    from vcam_cli.studies import sweep as study  # noqa: F401
+    from vcam_cli.studies import checks, outputs, simulate, sweep_run  # noqa: F401
 
 
 if __name__ == "__main__":

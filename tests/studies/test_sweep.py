@@ -15,8 +15,8 @@ from vcam_cli import load, simulate, sweep
 from vcam_cli.errors import BadInput, CannotDo
 from vcam_cli.files import atomic
 from vcam_cli.files.points import SweepFolder
-from vcam_cli.studies import point_work, run_on
-from vcam_cli.studies import sweep as module
+from vcam_cli.studies import point_work, run_on, sweep_run
+from vcam_cli.studies.sweep_order import Share
 
 TABLES = ("points.csv", "optimum.csv")
 OPTIMIZE = {"metric": "mean_electrons", "goal": "max"}
@@ -109,7 +109,7 @@ def test_points_of_other_machines_add_up_where_they_are_brought_together(long, t
 @pytest.mark.parametrize("of", [1, 2, 3, 8, 20])
 def test_every_point_is_in_one_share(groups, of):
     made = [[f"{g}-{i}" for i in range(n)] for g, n in enumerate(groups)]
-    shares = [module._shared_out(made, module.Share(i + 1, of)) for i in range(of)]
+    shares = [sweep_run._shared_out(made, Share(i + 1, of)) for i in range(of)]
     flat = [job for share in shares for group in share for job in group]
     assert sorted(flat) == sorted(job for group in made for job in group)
 

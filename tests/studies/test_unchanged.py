@@ -1,17 +1,18 @@
 """A finished sweep of which nothing has changed is read; any change is noticed."""
 
 import json
+import subprocess
+import sys
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from spectral_files import tiff
-from sweeping import written
+from sweeping import environment, written
 
 from vcam_cli import sweep
 from vcam_cli.files.points import record_check
-from vcam_cli.studies import sweep as module
-from vcam_cli.studies import sweep_points
+from vcam_cli.studies import sweep_points, unchanged
 
 STUDY = {
     "optimize": {"metric": "mean_electrons", "goal": "max"},
@@ -40,7 +41,7 @@ def resolved(monkeypatch):
         times.append(args)
         return grid(*args)
 
-    monkeypatch.setattr(module.sweep_points, "grid", counted)
+    monkeypatch.setattr(sweep_points, "grid", counted)
     return times
 
 
@@ -50,6 +51,20 @@ def contents(folder):
 
 def plain(result):
     return replace(result, computed=0, seconds=0.0)
+
+
+def test_no_engine_is_loaded_for_it(finished):
+    # Two thirds of what the command would take: every part of a second counts in a CI matrix.
+    study, out, _ = finished
+    script = (
+        "import sys; from vcam_cli import sweep;"
+        f"sweep({str(study)!r}, {str(out)!r});"
+        "print([m for m in sys.modules if m.startswith(('scipy', 'vcam_cli.engine.frame'))])"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script], env=environment(), capture_output=True, text=True
+    )
+    assert (done.stdout, done.stderr) == ("[]\n", "")
 
 
 def test_it_is_the_same_and_no_camera_is_resolved(finished, resolved):
@@ -231,8 +246,8 @@ def test_keys_of_several_kinds(tmp_path, resolved):
 
 def test_a_version_that_computes_otherwise_is_asked_again(finished, resolved, monkeypatch):
     study, out, _ = finished
-    versions = module.unchanged.outputs.versions()
-    monkeypatch.setattr(module.unchanged.outputs, "versions", lambda: versions | {"vcam": "0"})
+    versions = unchanged.provenance.versions()
+    monkeypatch.setattr(unchanged.provenance, "versions", lambda: versions | {"vcam": "0"})
     sweep(study, out, workers=1)
     assert len(resolved) == 1
 

@@ -50,11 +50,11 @@ def accuracy(
     from vcam_cli.files import accuracy_plots, report, tables
     from vcam_cli.files.folder import OutputFolder
     from vcam_cli.studies import accuracy as study
-    from vcam_cli.studies import outputs
+    from vcam_cli.studies import provenance
     from vcam_cli.studies.checks import load
 
     model = load(camera, options.overrides(set_, seed, level))
-    inputs = outputs.inputs(model)
+    inputs = provenance.inputs(model)
     path = out or Path("out") / model.name
     place = OutputFolder(path, record="accuracy.json", inputs=inputs)
     with place as folder, Progress(quiet) as progress:
@@ -63,7 +63,7 @@ def accuracy(
         tables.write_table(folder.new("accuracy.csv"), study.COLUMNS, rows)
         accuracy_plots.pareto(folder.new("accuracy.png"), *pictured(found))
         record = found.report() | {"camera": model.model_dump(mode="json")}
-        folder.finish(record | {"versions": outputs.versions()})
+        folder.finish(record | {"versions": provenance.versions()})
     if as_json:
         print(report.to_json({"out": str(path), **found.report()}), end="")
     elif not quiet:

@@ -54,12 +54,12 @@ def characterize(
     from vcam_cli.files import curves, report, tables
     from vcam_cli.files.folder import OutputFolder
     from vcam_cli.studies import characterize as study
-    from vcam_cli.studies import outputs
+    from vcam_cli.studies import provenance
     from vcam_cli.studies.bench_pictures import pictures
     from vcam_cli.studies.checks import load
 
     model = load(camera, options.overrides(set_, seed, accuracy))
-    inputs = outputs.inputs(model)
+    inputs = provenance.inputs(model)
     path = out or Path("out") / model.name
     place = OutputFolder(path, record="characterize.json", inputs=inputs)
     with place as folder, Progress(quiet) as progress:
@@ -69,7 +69,7 @@ def characterize(
         for name, (title, panels) in pictures(found).items():
             curves.draw(folder.new(name), title, panels)
         record = found.report() | {"camera": model.model_dump(mode="json")}
-        folder.finish(record | {"versions": outputs.versions()})
+        folder.finish(record | {"versions": provenance.versions()})
     for note in found.notes:
         options.say(note, quiet)
     if as_json:

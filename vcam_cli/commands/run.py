@@ -31,10 +31,10 @@ def run(
     model = load(camera, options.overrides(set_, seed, accuracy))
     from vcam_cli.files.folder import OutputFolder
     from vcam_cli.files.report import to_json
-    from vcam_cli.studies import outputs
+    from vcam_cli.studies import outputs, provenance
     from vcam_cli.studies.simulate import simulate
 
-    inputs = outputs.inputs(model)
+    inputs = provenance.inputs(model)
     place = OutputFolder(out or Path("out") / model.name, inputs=inputs)
     with place as folder, Progress(quiet) as progress:
         result = simulate(model, workers, progress)

@@ -1,5 +1,6 @@
 """`vcam sweep`: a camera while its parameters change."""
 
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -8,7 +9,7 @@ from vcam_cli.commands import options
 from vcam_cli.commands.progress import Log, Progress, wanted
 
 if TYPE_CHECKING:
-    from vcam_cli.studies.sweep_result import SweepResult
+    from vcam_cli.studies.sweep_result import SweepResult, Verdict
 
 LINES = 12
 """Messages about points that are shown at most."""
@@ -117,8 +118,6 @@ def sweep(
 
 def report(result: "SweepResult") -> str:
     """What a person reads: the optima, how many points, what was expected, where it all is."""
-    from vcam_cli.studies import expectations
-
     lines = []
     for f in result.optima:
         case, parameter, unit, at, low, high, metric, value = f.row
@@ -136,6 +135,17 @@ def report(result: "SweepResult") -> str:
     if result.missing:
         lines.append(f"{result.missing} are left to other shares")
     else:
-        lines += expectations.report(result.verdicts)
+        lines += _expected(result.verdicts)
     lines.append(f"{result.name}: {result.out}/")
     return "\n".join(lines)
+
+
+def _expected(verdicts: Sequence["Verdict"]) -> Iterator[str]:
+    """How many expectations come out, and those that do not."""
+    if not verdicts:
+        return
+    inside = [v for v in verdicts if v.word == "inside"]
+    made = sum(bool(v.calibrated) for v in inside)
+    also = f", {made} of them because it was set so" if made else ""
+    yield f"expected.csv: {len(inside)} of {len(verdicts)} expectations come out{also}"
+    yield from (f"  {v.word}: {v.said}" for v in verdicts if v.word != "inside")

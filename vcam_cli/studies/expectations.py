@@ -8,7 +8,7 @@ the tables and compare.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -23,7 +23,8 @@ from vcam_cli.studies import properties, sweep_tables
 from vcam_cli.studies.figures import Planner
 from vcam_cli.studies.study_file import Parameter
 from vcam_cli.studies.sweep_points import Grid
-from vcam_cli.studies.sweep_tables import Found, Outcomes
+from vcam_cli.studies.sweep_result import Found, Verdict
+from vcam_cli.studies.sweep_tables import Outcomes
 
 EXPECT = "expect"
 """The key of the study file."""
@@ -73,21 +74,6 @@ class Expected:
         return said.rstrip() + (f" ({why})" if why and word == "missed" else "")
 
 
-@dataclass(frozen=True)
-class Verdict:
-    """What became of an expectation."""
-
-    name: str
-    word: str
-    """inside | missed | unknown, where points are missing."""
-    said: str
-    """For a person."""
-    calibrated: str
-    """The parameter that was set so that it comes out, where one was."""
-    row: tuple[Cell, ...]
-    """As in expected.csv."""
-
-
 def plan(grid: Grid, planner: Planner) -> tuple[Expected, ...]:
     """The expectations of a study, in its order. Raises BadInput with everything wrong."""
     problems, out = Collector(), []
@@ -103,17 +89,6 @@ def plan(grid: Grid, planner: Planner) -> tuple[Expected, ...]:
 def write(verdicts: Sequence[Verdict], path: Path) -> None:
     """Writes expected.csv."""
     write_table(path, COLUMNS, (verdict.row for verdict in verdicts))
-
-
-def report(verdicts: Sequence[Verdict]) -> Iterator[str]:
-    """What a person reads: how many come out, and those that do not."""
-    if not verdicts:
-        return
-    inside = [v for v in verdicts if v.word == "inside"]
-    made = sum(bool(v.calibrated) for v in inside)
-    also = f", {made} of them because it was set so" if made else ""
-    yield f"expected.csv: {len(inside)} of {len(verdicts)} expectations come out{also}"
-    yield from (f"  {v.word}: {v.said}" for v in verdicts if v.word != "inside")
 
 
 class _Resolver:

@@ -25,7 +25,8 @@ from vcam_cli.studies.figures import Planned, View
 from vcam_cli.studies.properties import FREQUENCIES
 from vcam_cli.studies.study_file import Parameter
 from vcam_cli.studies.sweep_points import Grid
-from vcam_cli.studies.sweep_tables import LABELS, Found, Outcomes, lines_of
+from vcam_cli.studies.sweep_result import Found
+from vcam_cli.studies.sweep_tables import LABELS, Outcomes, lines_of
 
 Row = tuple[Cell, ...]
 

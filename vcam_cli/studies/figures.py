@@ -30,7 +30,8 @@ from vcam_cli.camera.study_figures import (
 )
 from vcam_cli.camera.yaml_tree import Node, Source
 from vcam_cli.errors import BadInput, Collector, Problem, split
-from vcam_cli.studies import properties, sweep_points
+from vcam_cli.studies import properties
+from vcam_cli.studies.cases import cases_of
 from vcam_cli.studies.checks import CHECKS
 from vcam_cli.studies.study_file import Cell, Parameter
 from vcam_cli.studies.sweep_points import Grid
@@ -97,7 +98,7 @@ class Planner:
         """sets and folder as for `sweep_points.grid`."""
         over = cameras.overlay(sets, folder or cameras.current_folder())
         self._grid, self._over = grid, over
-        self._bases = {name: base for name, base, _ in sweep_points.cases_of(grid.study, over)}
+        self._bases = {name: base for name, base, _ in cases_of(grid.study, over)}
         self._known: dict[tuple[str, str, Cell], Camera] = {}
         for point in grid.points:
             if point.camera is not None:

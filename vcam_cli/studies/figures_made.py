@@ -35,7 +35,8 @@ from vcam_cli.studies.figure_curves import Made
 from vcam_cli.studies.figure_maps import Store
 from vcam_cli.studies.figures import Planned, View
 from vcam_cli.studies.sweep_points import Grid
-from vcam_cli.studies.sweep_tables import Found, Outcomes, Writers
+from vcam_cli.studies.sweep_result import Found
+from vcam_cli.studies.sweep_tables import Outcomes, Writers
 
 
 @dataclass(frozen=True)

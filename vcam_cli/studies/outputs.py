@@ -7,34 +7,29 @@ still being written; files are most of a frame's cost.
 
 from __future__ import annotations
 
-import platform
 import resource
 import sys
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 import vcam_cli
-from vcam_cli.camera import shipped
 from vcam_cli.camera.camera import Camera
-from vcam_cli.camera.load import FILE_KEYS
-from vcam_cli.camera.named_spectra import spectra
 from vcam_cli.engine import irradiance
 from vcam_cli.engine.frame import Frame
 from vcam_cli.files.exr import ExrWriter
 from vcam_cli.files.folder import OutputFolder
-from vcam_cli.files.hyperspectral import companions
 from vcam_cli.files.maps import write_map
 from vcam_cli.files.png import write_png
 from vcam_cli.files.report import hash_file, hash_text, to_json
 from vcam_cli.files.spectral import write_spectral
 from vcam_cli.files.tables import write_metrics
 from vcam_cli.studies import raw_file
+from vcam_cli.studies.provenance import versions
 from vcam_cli.studies.raw_file import ROWS_AT_ONCE
 from vcam_cli.studies.simulate import Result
 
@@ -159,49 +154,7 @@ def record(result: Result, inputs: tuple[Path, ...], seconds: float) -> dict[str
     }
 
 
-def inputs(camera: Camera) -> tuple[Path, ...]:
-    """Every file that a run reads: YAML files, and what they name."""
-    return tuple(sorted({*camera.files, *data_files(camera)}, key=str))
-
-
-def data_files(camera: Camera, form: dict[str, Any] | None = None) -> tuple[Path, ...]:
-    """The files that a camera names: pictures, tables, spectra, those that ship among them.
-
-    form: its YAML form, where it is at hand.
-    """
-    form = camera.model_dump(mode="json") if form is None else form
-
-    def named(value: Any) -> Iterator[str]:
-        if isinstance(value, dict):
-            for key, item in value.items():
-                if key in FILE_KEYS and isinstance(item, str):
-                    yield item
-                else:
-                    yield from named(item)
-        elif isinstance(value, list):
-            for item in value:
-                yield from named(item)
-
-    shipped_spectra = (
-        str(shipped.find("spectra", factor))
-        for _, spec in spectra(camera)
-        for factor in getattr(spec, "factors", ())
-        if isinstance(factor, str)
-    )
-    found = {*named(form), *shipped_spectra}
-    if camera.scene.source.kind == "hyperspectral":
-        found |= {str(path) for path in companions(camera.scene.source.file)}
-    return tuple(Path(name) for name in sorted(found))
-
-
 def peak_memory() -> int:
     """Largest memory of this process so far [bytes]."""
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     return peak if sys.platform == "darwin" else peak * 1024
-
-
-def versions() -> dict[str, str]:
-    """Versions that decide the bytes of a frame."""
-    libraries = ("numpy", "scipy", "pydantic", "OpenImageIO")
-    found = {name: version(name) for name in libraries}
-    return {"vcam": vcam_cli.__version__, "python": platform.python_version(), **found}

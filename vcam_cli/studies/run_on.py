@@ -26,7 +26,8 @@ from typing import Any, Literal
 import vcam_cli
 from vcam_cli.engine.parallel import available_workers
 from vcam_cli.errors import BadInput, CannotDo, Problem
-from vcam_cli.studies.point_work import Job, Outcome, work, work_far
+from vcam_cli.studies.outcome import Outcome
+from vcam_cli.studies.point_work import Job, work, work_far
 from vcam_cli.studies.shared import Shared
 
 Verdict = Literal["go", "skip", "later"]

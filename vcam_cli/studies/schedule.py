@@ -21,8 +21,8 @@ from vcam_cli.scheduling.pdf import Pdf
 from vcam_cli.scheduling.targets import Fewest, fewest
 from vcam_cli.studies import (
     online,
-    outputs,
     photocurrents,
+    provenance,
     schedule_file,
     schedule_frames,
     schedule_tables,
@@ -282,5 +282,5 @@ def _record(result: ScheduleResult) -> dict[str, Any]:
         **result.summary(),
         "study": result.study.model.model_dump(mode="json"),
         "hashes": {str(path): hash_file(path) for path in result.study.inputs},
-        "versions": outputs.versions(),
+        "versions": provenance.versions(),
     }

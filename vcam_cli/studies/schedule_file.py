@@ -29,7 +29,7 @@ from vcam_cli.camera.yaml_tree import Node, read_file, shown
 from vcam_cli.errors import BadInput, Problem
 from vcam_cli.scheduling.pdf import Pdf
 from vcam_cli.spectra.text import numbers_of, read_table
-from vcam_cli.studies import checks, outputs
+from vcam_cli.studies import checks, provenance
 from vcam_cli.studies.study_file import refuse_others
 
 HISTOGRAM, LEVELS = ("low", "high", "count"), ("level", "count")
@@ -95,7 +95,7 @@ def read(
     files, known, camera, pixels = given.read(accuracy)
     pictured = given.pictured(accuracy, camera)
     if pictured is not None:
-        files = (*files, *pictured.files, *outputs.data_files(pictured))
+        files = (*files, *pictured.files, *provenance.data_files(pictured))
     inputs = tuple(dict.fromkeys((file, *files)))
     return ScheduleFile(file, tree, model, known, camera, pictured, pixels, inputs)
 
@@ -126,7 +126,7 @@ class _Sources:
         source: PdfSource = self.model.pdf
         if source.camera is not None:
             camera = self._camera(accuracy)
-            files = (*camera.files, *outputs.data_files(camera))
+            files = (*camera.files, *provenance.data_files(camera))
             return tuple(dict.fromkeys(files)), None, camera, 0.0
         if source.uniform is not None:
             return (), self._made(Pdf.uniform, source.uniform.min, source.uniform.max), None, 0.0

@@ -9,15 +9,54 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-from vcam_cli.studies import outputs, sweep_tables
-from vcam_cli.studies.expectations import Verdict
-from vcam_cli.studies.point_work import Outcome
+from vcam_cli.files.tables import Cell
+from vcam_cli.studies.provenance import versions
 from vcam_cli.studies.study_file import StudyFile
-from vcam_cli.studies.sweep_points import Grid
-from vcam_cli.studies.sweep_tables import Found
 
 Row = dict[str, Any]
+OPTIMUM = ("case", "parameter", "unit", "optimum", "low", "high", "metric", "value")
 _MAY_BE_UNKNOWN = ("optimum", "low", "high", "value")
+
+
+@dataclass(frozen=True)
+class Found:
+    """The optimum of a parameter in a case, its numbers rounded, nan where unknown."""
+
+    case: str
+    parameter: str
+    unit: str
+    optimum: float | str
+    low: float
+    high: float
+    metric: str
+    value: float
+    edge: str
+
+    @property
+    def row(self) -> tuple[Cell, ...]:
+        """As in optimum.csv; what is not known is empty."""
+        numbers = map(_known, (self.optimum, self.low, self.high))
+        head = (self.case, self.parameter, self.unit)
+        return (*head, *numbers, self.metric, _known(self.value))
+
+
+def _known(value: float | str) -> Cell:
+    return value if isinstance(value, str) or math.isfinite(value) else ""
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What became of an expectation."""
+
+    name: str
+    word: str
+    """inside | missed | unknown, where points are missing."""
+    said: str
+    """For a person."""
+    calibrated: str
+    """The parameter that was set so that it comes out, where one was."""
+    row: tuple[Cell, ...]
+    """As in expected.csv."""
 
 
 @dataclass(frozen=True)
@@ -82,38 +121,8 @@ class SweepResult:
             "all_refused": self.all_refused,
             "optimum": [_plain(f) for f in self.optima],
             "expected": [asdict(v) for v in self.verdicts],
-            "versions": outputs.versions(),
+            "versions": versions(),
         }
-
-
-def of(
-    grid: Grid,
-    out: Path,
-    outcomes: dict[str, Outcome],
-    optima: tuple[Found, ...],
-    verdicts: tuple[Verdict, ...],
-    computed: int,
-) -> SweepResult:
-    """The result of a sweep whose outcomes are known, by hash of the point."""
-    columns = (*sweep_tables.columns(grid), *grid.study.model.metrics, "error")
-    rows = sweep_tables.rows(grid, outcomes)
-    wrong = [not p.id or (p.id in outcomes and _refused(outcomes[p.id])) for p in grid.points]
-    return SweepResult(
-        name=grid.study.model.name,
-        out=out,
-        ids=tuple(point.id for point in grid.points),
-        points=[dict(zip(columns, row, strict=True)) for row in rows],
-        missing=sum(1 for p in grid.points if p.id and p.id not in outcomes),
-        refused=tuple(map(str, grid.refused)),
-        all_refused=all(wrong),
-        optima=optima,
-        verdicts=verdicts,
-        computed=computed,
-    )
-
-
-def _refused(outcome: Outcome) -> bool:
-    return bool(outcome.error) and outcome.final
 
 
 def read(record: dict[str, Any], out: Path, study: StudyFile) -> SweepResult:
@@ -155,7 +164,7 @@ def _numbers(study: StudyFile) -> dict[str, type]:
 
 def _plain(found: Found) -> dict[str, Any]:
     """An optimum with what is not known as null."""
-    row = dict(zip(sweep_tables.OPTIMUM, found.row, strict=True))
+    row = dict(zip(OPTIMUM, found.row, strict=True))
     known = {k: None if v == "" and k in _MAY_BE_UNKNOWN else v for k, v in row.items()}
     return known | {"edge": found.edge}
 

@@ -15,11 +15,11 @@ from vcam_cli.camera.study import METRICS
 from vcam_cli.files.sweep_plots import Line, over_parameter
 from vcam_cli.files.tables import Cell, write_table
 from vcam_cli.studies import optimum
-from vcam_cli.studies.point_work import Outcome, in_a_cell
+from vcam_cli.studies.outcome import Outcome, in_a_cell
 from vcam_cli.studies.study_file import Parameter
 from vcam_cli.studies.sweep_points import Grid, Point
+from vcam_cli.studies.sweep_result import OPTIMUM, Found, SweepResult, Verdict
 
-OPTIMUM = ("case", "parameter", "unit", "optimum", "low", "high", "metric", "value")
 DIGITS = 6
 """Of numbers in optimum.csv: more than any interval is worth."""
 MANY = 36
@@ -37,32 +37,6 @@ LABELS = {
 
 Outcomes = Mapping[str, Outcome]
 Row = tuple[Cell, ...]
-
-
-@dataclass(frozen=True)
-class Found:
-    """The optimum of a parameter in a case, its numbers to `DIGITS` digits, nan where unknown."""
-
-    case: str
-    parameter: str
-    unit: str
-    optimum: float | str
-    low: float
-    high: float
-    metric: str
-    value: float
-    edge: str
-
-    @property
-    def row(self) -> Row:
-        """As in optimum.csv; what is not known is empty."""
-        numbers = map(_known, (self.optimum, self.low, self.high))
-        head = (self.case, self.parameter, self.unit)
-        return (*head, *numbers, self.metric, _known(self.value))
-
-
-def _known(value: float | str) -> Cell:
-    return value if isinstance(value, str) or math.isfinite(value) else ""
 
 
 def _rounded(value: float) -> float:
@@ -158,6 +132,35 @@ def _optimum(case: str, parameter: Parameter, values: NDArray, metric: str, goal
     found = optimum.find(np.array(cells, float), values[good].T, goal)
     at, low, high, value = map(_rounded, (found.at, found.low, found.high, found.value))
     return Found(*about, at, low, high, metric, value, found.edge)
+
+
+def result(
+    grid: Grid,
+    out: Path,
+    outcomes: Outcomes,
+    best: tuple[Found, ...],
+    verdicts: tuple[Verdict, ...],
+    computed: int,
+) -> SweepResult:
+    """The result of a sweep whose outcomes are known, by hash of the point."""
+    names = (*columns(grid), *grid.study.model.metrics, "error")
+    wrong = [not p.id or (p.id in outcomes and _refused(outcomes[p.id])) for p in grid.points]
+    return SweepResult(
+        name=grid.study.model.name,
+        out=out,
+        ids=tuple(point.id for point in grid.points),
+        points=[dict(zip(names, row, strict=True)) for row in rows(grid, outcomes)],
+        missing=sum(1 for p in grid.points if p.id and p.id not in outcomes),
+        refused=tuple(map(str, grid.refused)),
+        all_refused=all(wrong),
+        optima=best,
+        verdicts=verdicts,
+        computed=computed,
+    )
+
+
+def _refused(outcome: Outcome) -> bool:
+    return bool(outcome.error) and outcome.final
 
 
 Writers = dict[str, Callable[[Path], None]]

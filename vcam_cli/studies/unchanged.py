@@ -19,8 +19,8 @@ from vcam_cli.files.folder import record_of
 from vcam_cli.files.hyperspectral import companions
 from vcam_cli.files.points import RECORD, SweepFolder, record_check
 from vcam_cli.files.report import hash_file, hash_text, to_json
-from vcam_cli.studies import outputs, sweep_points, sweep_result
-from vcam_cli.studies.point_work import FRAMES
+from vcam_cli.studies import cases, provenance, sweep_result
+from vcam_cli.studies.outcome import FRAMES
 from vcam_cli.studies.study_file import StudyFile
 from vcam_cli.studies.sweep_result import SweepResult
 
@@ -32,11 +32,11 @@ def asked(study: StudyFile, sets: Sequence[str], folder: Path | None = None) -> 
     """
     start = folder or cameras.current_folder()
     over = cameras.overlay(sets, start)
-    cases = [[name, _found(base)] for name, base, _ in sweep_points.cases_of(study, over)]
-    values = [_found(base) for base in sweep_points.values_of(study, over)]
+    bases = [[name, _found(base)] for name, base, _ in cases.cases_of(study, over)]
+    values = [_found(base) for base in cases.values_of(study, over)]
     places = [str(study.file), str(start) if sets else ""]
-    versions = outputs.versions() | {"matplotlib": version("matplotlib")}
-    return hash_text(to_json([study.tree.plain(), over.plain(), cases, values, places, versions]))
+    versions = provenance.versions() | {"matplotlib": version("matplotlib")}
+    return hash_text(to_json([study.tree.plain(), over.plain(), bases, values, places, versions]))
 
 
 def _found(base: Base) -> list[Any]:
