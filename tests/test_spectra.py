@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vcam_cli import spectra
-from vcam_cli.spectra import Spectrum, Table, hat_weights, integral, quadrature
+from vcam_cli.spectra import Spectrum, Table, hat_weights, integral, pair_weights, quadrature
 
 START, STOP = 380e-9, 780e-9
 NM = 1e-9
@@ -95,6 +95,36 @@ def test_hat_weights_share_the_integral(factors: list[Table], inner: set[int]) -
     # a straight line is its own interpolation
     slope = integral(spectrum.times(spectra.PHOTONS), START, STOP)
     assert weights @ spectra.PHOTONS.at(nodes) == pytest.approx(slope, rel=1e-12, abs=1e-5)
+
+
+@given(
+    st.lists(st.lists(tables(), max_size=2), min_size=1, max_size=4),
+    st.lists(st.lists(tables(), max_size=2), min_size=1, max_size=3),
+    st.sets(st.integers(381, 779), min_size=0, max_size=40),
+)
+def test_pairs_are_weighed_as_their_products(
+    first: list[list[Table]], second: list[list[Table]], inner: set[int]
+) -> None:
+    nodes = np.array([380, *sorted(inner), 780]) / 1e9
+    some = [Spectrum(scale=2.0, tables=tuple(factors)) for factors in first]
+    some.insert(1, Spectrum(lines=((650e-9, 1.0), (450e-9, 2.0), (900e-9, 50.0))))
+    others = [Spectrum(scale=3.0, tables=tuple(factors)) for factors in second]
+    found = pair_weights(some, others, nodes)
+    assert found.shape == (len(some), len(others), len(nodes))
+    for row, one in zip(found, some, strict=True):
+        for weights, other in zip(row, others, strict=True):
+            expected = hat_weights(one.times(other), nodes)
+            np.testing.assert_allclose(weights, expected, rtol=1e-11, atol=1e-20)
+
+
+def test_pairs_of_none_and_pairs_that_cannot_be() -> None:
+    nodes = [START, STOP]
+    assert pair_weights([], [Spectrum.flat(1)], nodes).shape == (0, 1, 2)
+    assert pair_weights([Spectrum.flat(1)], [], nodes).shape == (1, 0, 2)
+    with pytest.raises(ValueError, match="lines stand first"):
+        pair_weights([Spectrum.flat(1)], [Spectrum.line(500e-9)], nodes)
+    with pytest.raises(ValueError, match="380-780 nm is needed"):
+        pair_weights([Spectrum.flat(1), Spectrum.sampled([4e-7, 5e-7], [1, 1])], [], nodes)
 
 
 def test_no_result_depends_on_the_grid_of_a_fluorescent_lamp() -> None:

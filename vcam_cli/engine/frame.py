@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property, partial
@@ -146,9 +147,9 @@ class Frame(Prepared):
         """(C, 24) a ColorChecker in the light of the scene, on the axis, as `white_dn` [DN]."""
         lit = [self.scene.white.times(reflectance) for _, reflectance in colorchecker()]
         gains = [e for e in self.plan.active if isinstance(e, Gain)]
-        seen = optics.scene_transfer(
-            self.camera, self.geometry, self.settings, lit, self.mosaic, gains
-        )
+        # Levels are exact with any wavelengths: the first and the last are enough.
+        coarse = replace(self.settings, wavelength_step=math.inf)
+        seen = optics.scene_transfer(self.camera, self.geometry, coarse, lit, self.mosaic, gains)
         rate = seen.level.T * self.layout.joining.gathered + self.dark_rate * self._summed
         return self.to_dn(rate * self.exposure_time)
 

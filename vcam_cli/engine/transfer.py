@@ -16,13 +16,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vcam_cli.effects.base import Blur, PlaneTransfer, RadialTransfer
-from vcam_cli.spectra import Spectrum, hat_weights, photons
+from vcam_cli.spectra import Spectrum, pair_weights, photons
 
 
 @dataclass(frozen=True)
@@ -124,7 +124,7 @@ class Transfer:
         """H_kc at frequency 0, the signal of a uniform scene: (K, C) [electrons / s]."""
         return self.weights.sum(axis=-1)
 
-    @property
+    @cached_property
     def cutoff(self) -> float:
         """Frequency from which on every H_kc is zero [cycles/m]; inf where there is none."""
         used = self.wavelengths[np.abs(self.weights).sum(axis=(0, 1)) > 0]
@@ -154,18 +154,12 @@ def transfer(
     lines = sorted({w for s in spectra for w, _ in s.lines or () if band.start <= w <= band.stop})
     lines = [w for w in lines if not np.any(nodes == w)]
     wavelengths = np.sort(np.concatenate([nodes, lines])) if lines else nodes
-    weights = np.array(
-        [[_weights(s, r, wavelengths) for r in responses] for s in spectra], dtype=np.float64
-    )
+    # With every line among the nodes, the hat functions are 1 and 0 there: lines stay lines.
+    weights = pair_weights([photons(s) for s in spectra], responses, wavelengths)
     keep = np.abs(weights).sum(axis=(0, 1)) > 0
     if not keep.any():
         keep[0] = True
     return Transfer(wavelengths[keep], scale * weights[:, :, keep], tuple(effects))
-
-
-def _weights(spectrum: Spectrum, response: Spectrum, wavelengths: NDArray) -> NDArray:
-    # With every line among the nodes, the hat functions are 1 and 0 there: lines stay lines.
-    return hat_weights(photons(spectrum).times(response), wavelengths)
 
 
 PARITIES = ((False, False), (True, True), (True, False), (False, True))

@@ -68,8 +68,12 @@ def otf_circular(
 
 def _minus_sine(angle: Floats) -> Floats:
     """angle - sin(angle), by its series below 1, where the difference would cancel."""
-    square = np.minimum(angle, 1.0) ** 2
-    series = np.ones_like(square)
+    out = np.asarray(angle - np.sin(angle))
+    small = angle < 1
+    near = angle[small]
+    square = near**2
+    series = np.ones_like(near)
     for divisor in reversed(_DIVISORS):
         series = 1 - square / divisor * series
-    return np.where(angle < 1, angle**3 / 6 * series, angle - np.sin(angle))
+    out[small] = near**3 / 6 * series
+    return out

@@ -22,14 +22,13 @@ used by ICC.1:2022 annex E); G. D. Finlayson, M. S. Drew, "Constrained least-squ
 color spaces", J. Electronic Imaging 6(4), 1997, doi:10.1117/12.278080; CIE 015:2018.
 """
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 
 from vcam_cli.processing.base import Block, Patches
 from vcam_cli.processing.white_balance import FAINT
-from vcam_cli.spectra import Spectrum, cmf, colorchecker, integral
+from vcam_cli.spectra import Spectrum, cmf, colorchecker, pair_weights
 
 DISPLAY = ("R", "G", "B")
 """The colors that come out."""
@@ -133,19 +132,14 @@ def chart_colors(light: Spectrum, start: float, stop: float) -> np.ndarray | Non
     None where the light has no counterpart among display whites: adaptation would need a gain
     that is infinite or negative, as for deep red or violet light.
     """
-    white, *patches = _xyz((light, *(light.times(r) for _, r in colorchecker())), start, stop)
+    lit = [light, *(light.times(reflectance) for _, reflectance in colorchecker())]
+    observer = [Spectrum(tables=(table,)) for table in cmf()]
+    white, *patches = pair_weights(lit, observer, [start, stop]).sum(axis=-1)
     cones = BRADFORD @ white
     if cones.min() <= SAME * cones.max():
         return None
     adapted = (BRADFORD @ np.array(patches).T) * ((BRADFORD @ _D65) / cones)[:, np.newaxis]
     return np.asarray(np.linalg.solve(BRADFORD @ RGB_TO_XYZ, adapted).T)
-
-
-def _xyz(spectra: tuple[Spectrum, ...], start: float, stop: float) -> Iterator[np.ndarray]:
-    """(3,) XYZ of every spectrum, no unit."""
-    observer = [Spectrum(tables=(table,)) for table in cmf()]
-    for spectrum in spectra:
-        yield np.array([integral(spectrum.times(part), start, stop) for part in observer])
 
 
 _OPPONENT = np.array([[0.0, 116.0, 0.0], [500.0, -500.0, 0.0], [0.0, 200.0, -200.0]])

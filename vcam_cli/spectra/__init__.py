@@ -8,7 +8,7 @@ lamp, and which 4 % depends on where the grid happens to fall. Exact integration
 a millisecond and removes the question.
 """
 
-from vcam_cli.spectra.integration import hat_weights, integral, quadrature
+from vcam_cli.spectra.integration import hat_weights, integral, pair_weights, quadrature
 from vcam_cli.spectra.spectrum import (
     BOLTZMANN,
     PHOTONS,
@@ -47,6 +47,7 @@ __all__ = [
     "illuminant_names",
     "integral",
     "luminance",
+    "pair_weights",
     "photons",
     "quadrature",
     "read_csv",

@@ -5,7 +5,8 @@ the number of tables; Gauss-Legendre with n points integrates degree 2 n - 1 exa
 on every interval of the union of all knots gives the integral up to rounding.
 """
 
-from collections.abc import Iterable
+import math
+from collections.abc import Iterable, Sequence
 from functools import cache
 
 import numpy as np
@@ -97,11 +98,8 @@ def hat_weights(spectrum: Spectrum, nodes: ArrayLike) -> Floats:
     ValueError
         Nodes that do not rise, or a range the spectrum does not cover.
     """
-    grid = np.asarray(nodes, dtype=np.float64)
-    if grid.ndim != 1 or grid.size < 2 or not (np.diff(grid) > 0).all():
-        raise ValueError("hat functions need two or more rising wavelengths")
+    grid = _rising(nodes)
     start, stop = float(grid[0]), float(grid[-1])
-    _check_range(start, stop)
     if spectrum.lines is not None:
         inside = _lines_inside(spectrum, start, stop)
         wavelength = np.array([wl for wl, _ in inside])
@@ -114,12 +112,82 @@ def hat_weights(spectrum: Spectrum, nodes: ArrayLike) -> Floats:
     return _share(grid, wavelength, power)
 
 
+def _rising(nodes: ArrayLike) -> Floats:
+    grid = np.asarray(nodes, dtype=np.float64)
+    if grid.ndim != 1 or grid.size < 2 or not (np.diff(grid) > 0).all():
+        raise ValueError("hat functions need two or more rising wavelengths")
+    _check_range(grid[0], grid[-1])
+    return grid
+
+
+def pair_weights(
+    spectra: Sequence[Spectrum], others: Sequence[Spectrum], nodes: ArrayLike
+) -> Floats:
+    """`hat_weights` of the product of every one of some spectra with every one of others.
+
+    One rule for them all: each spectrum is looked up once, not once for each of its products.
+
+    Parameters
+    ----------
+    spectra : K of them, some with lines maybe
+    others : C of them, without lines
+    nodes : (J,) rising [m], at least two
+
+    Returns
+    -------
+    (K, C, J) in the unit of the product x m (lines: the unit of their powers)
+
+    Raises
+    ------
+    ValueError
+        Nodes that do not rise, a range that one of the spectra does not cover, others with lines.
+    """
+    grid = _rising(nodes)
+    if any(other.lines is not None for other in others):
+        raise ValueError("spectra with lines stand first")
+    out = np.zeros((len(spectra), len(others), grid.size))
+    smooth = [k for k, s in enumerate(spectra) if s.lines is None]
+    if smooth:
+        out[smooth] = _pairs([spectra[k] for k in smooth], others, grid)
+    for k, spectrum in enumerate(spectra):
+        if spectrum.lines is not None:
+            out[k] = [hat_weights(spectrum.times(other), grid) for other in others]
+    return out
+
+
+def _pairs(spectra: Sequence[Spectrum], others: Sequence[Spectrum], grid: Floats) -> Floats:
+    """`pair_weights` of spectra without lines."""
+    tables = {id(table): table for s in (*spectra, *others) for table in s.tables}
+    for table in tables.values():
+        table.require(grid[0], grid[-1])
+    bends = {id(table.wavelength): table.wavelength for table in tables.values()}
+    knots = merge_knots(np.concatenate([grid, *bends.values()]), grid[0], grid[-1])
+    degree = max(s.degree for s in spectra) + max((o.degree for o in others), default=0)
+    wavelength, weights = _rule(knots, degree + 1)
+    known = {name: table.at(wavelength) for name, table in tables.items()}
+
+    def values(spectrum: Spectrum) -> Floats:
+        factors = (known[id(table)] for table in spectrum.tables)
+        return np.asarray(math.prod(factors, start=np.full(wavelength.shape, spectrum.scale)))
+
+    first = np.array([values(s) * weights for s in spectra])
+    second = np.array([values(o) for o in others]).reshape(-1, wavelength.size)
+    return _share(grid, wavelength, first[:, np.newaxis] * second)
+
+
 def _share(grid: Floats, wavelength: Floats, power: Floats) -> Floats:
-    """Each power split between the two grid nodes beside its wavelength, by distance."""
+    """Each power (..., n) split between the two grid nodes beside its wavelength, by distance.
+
+    wavelength: (n,) rising, within the grid.
+    """
     left = np.clip(np.searchsorted(grid, wavelength, side="right") - 1, 0, grid.size - 2)
     part = np.clip((wavelength - grid[left]) / (grid[left + 1] - grid[left]), 0.0, 1.0)
-    low = np.bincount(left, power * (1 - part), minlength=grid.size)
-    return np.asarray(low + np.bincount(left + 1, power * part, minlength=grid.size))
+    out = np.zeros((*power.shape[:-1], grid.size))
+    starts = np.flatnonzero(np.diff(left, prepend=-1))
+    if len(starts):
+        out[..., left[starts] + 1] = np.add.reduceat(power * part, starts, axis=-1)
+        out[..., left[starts]] += np.add.reduceat(power * (1 - part), starts, axis=-1)
+    return out
 
 
 def _lines_inside(spectrum: Spectrum, start: float, stop: float) -> list[tuple[float, float]]:
