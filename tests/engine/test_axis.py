@@ -74,12 +74,32 @@ def test_evaluation_equals_the_direct_sum(name, dtype, odd):
     k = np.arange(axis.terms)[:, None]
     wave = np.sin if odd else np.cos
     direct = terms @ (factor * wave(np.pi * k * position / axis.length))
-    got = axis.evaluate(axis.fold(terms.astype(dtype), odd), axis=1, odd=odd)
+
+    def evaluated(along):
+        total = 0
+        for basis, turn in axis.bases(odd):
+            some = terms if turn is None else terms * turn
+            folded = axis.fold(some.astype(dtype), basis)
+            folded = folded if along else folded.T.copy()
+            total = total + axis.evaluate(folded, axis=along, odd=basis)
+        return total
+
+    got = evaluated(along=1)
     assert got.dtype == dtype
     # float32: 24 bits through a transform of a few dozen terms
     np.testing.assert_allclose(got, direct, atol=1e-11 if dtype == np.float64 else 2e-5)
-    columns = axis.evaluate(axis.fold(terms.astype(dtype), odd).T.copy(), axis=0, odd=odd)
+    columns = evaluated(along=0)
     np.testing.assert_allclose(columns, direct.T, atol=1e-11 if dtype == np.float64 else 2e-5)
+
+
+def test_photodetectors_off_center_need_no_chirp():
+    centered, off, cropped = (
+        AXES[name] for name in ("same pitch", "detector off center", "no common measure")
+    )
+    assert off.virtual_pixels == off.folded == 12 and off.shift == pytest.approx(-0.2)
+    assert len(off.bases()) == 2 and len(centered.bases()) == 1 and cropped.virtual_pixels == 12
+    chirped = AXES["irrational pitch"]
+    assert chirped.virtual_pixels is None and chirped.window is None and not chirped.shift
 
 
 @pytest.mark.parametrize("odd", [False, True])

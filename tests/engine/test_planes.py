@@ -9,7 +9,7 @@ from scipy.special import erf
 
 from vcam_cli.camera.geometry import geometry
 from vcam_cli.effects.base import FieldTransfer, PlaneTransfer, RadialTransfer, Zone
-from vcam_cli.engine import field, sampling, transfer, ways
+from vcam_cli.engine import field, parseval, sampling, transfer, ways
 from vcam_cli.engine.axis import Axis
 from vcam_cli.engine.mosaic import Mosaic
 from vcam_cli.engine.optics import photo_rate
@@ -185,7 +185,7 @@ def test_power_is_the_mean_square_of_the_picture():
     ]
     dense = replace(filter, x=fine[0], y=fine[1]).apply(coefficients, 1)(0, slice(None))
     # Sampled rows of the spectrum stand for their neighbors: all of them here, of 24 and more.
-    power = filter.power(coefficients)[1].sum()
+    power = parseval.Sample(filter, coefficients).power()[1].sum()
     assert power == pytest.approx(np.mean(dense**2), rel=0.05)
 
 

@@ -16,8 +16,10 @@ A filter whose kernel is not even turns cosines into sines of the same frequenci
 own folding and transform (`odd=True`).
 
 Evaluation: where S is a whole number of pixel pitches, terms that the pixels cannot tell apart
-are folded onto each other and one DCT-III does it. Anywhere else (a crop that is no whole number
-of pixels, a photodetector off its pixel's center) it is a chirp-z transform, four times slower.
+are folded onto each other and one DCT-III does it. Photodetectors off their pixels' centers see the
+cosines turned: each is some of the pixels' own cosine and some of the sine, folded by themselves
+(`bases`). Where S is no whole number of pixels it is a chirp-z transform, four times slower, and it
+takes as much memory as there are terms.
 """
 
 from __future__ import annotations
@@ -28,6 +30,9 @@ from functools import cached_property
 import numpy as np
 import scipy.fft
 from numpy.typing import NDArray
+
+NEAR = 1e-7
+"""Pixels that are no distance."""
 
 
 @dataclass(frozen=True)
@@ -70,12 +75,35 @@ class Axis:
     @cached_property
     def virtual_pixels(self) -> int | None:
         """Whole number of pixels in the scene's length, where folding is exact; else None."""
-        count = self.length / self.pixel_pitch
-        start = self.first / self.pixel_pitch - 0.5
-        near = 1e-7
-        if abs(count - round(count)) > near or abs(start - round(start)) > near:
-            return None
-        return round(count)
+        count, first = round(self.length / self.pixel_pitch), round(self._start)
+        whole = abs(self.length / self.pixel_pitch - count) <= NEAR
+        return count if whole and 0 <= first <= count - self.pixels else None
+
+    @property
+    def _start(self) -> float:
+        """Pixels before the first one, as its photodetector's center has it."""
+        return self.first / self.pixel_pitch - 0.5
+
+    @cached_property
+    def shift(self) -> float:
+        """How far photodetectors are off the virtual pixels' centers [pixel pitches].
+
+        0 where there are no virtual pixels: what is evaluated is the photodetectors' place then.
+        """
+        shift = self._start - round(self._start)
+        return 0.0 if self.virtual_pixels is None or abs(shift) <= NEAR else shift
+
+    def bases(self, odd: bool = False) -> list[tuple[bool, NDArray | None]]:
+        """Of which of the pixels' own waves the scene's cosines (odd: sines) are made.
+
+        [(whether they are sines, how much of them in every term (terms,); None for all), ...].
+        cos(a + b) = cos a cos b - sin a sin b, sin(a + b) = sin a cos b + cos a sin b.
+        """
+        if not self.shift:
+            return [(odd, None)]
+        angle = 2 * np.pi * self.frequencies * (self.shift * self.pixel_pitch)
+        sine = np.sin(angle)
+        return [(odd, np.cos(angle)), (not odd, sine if odd else -sine)]
 
     @property
     def folded(self) -> int:
@@ -156,7 +184,7 @@ class Axis:
         """Which of the virtual pixels are pixels; None where there are none."""
         if self.virtual_pixels is None:
             return None
-        start = round(self.first / self.pixel_pitch - 0.5)
+        start = round(self._start)
         return slice(start, start + self.pixels)
 
     def evaluate(
@@ -164,7 +192,8 @@ class Axis:
     ) -> NDArray:
         """Folded values -> values at the photodetectors along `axis` (0 or 1 of two).
 
-        overwrite: whether what comes may be a view of what is given.
+        Of each of their `bases` by itself; the sum is the signal. overwrite: whether what comes may
+        be a view of what is given.
         """
         if self.window is None:
             return self._chirp(values, axis, odd)

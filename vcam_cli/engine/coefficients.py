@@ -38,8 +38,10 @@ class Coefficients(Protocol):
     def __iter__(self) -> Iterator[Plane]: ...
 
 
-Folded = dict[int, NDArray]
-"""By the index of a parity, (C, folded y, folded x): what a filter makes of the planes so far."""
+Basis = tuple[bool, bool]
+"""Whether waves along x, and along y, are sines."""
+Folded = dict[Basis, NDArray]
+"""(C, folded y, folded x) of the pixels' own waves: what a filter makes of the planes so far."""
 
 
 def passes(samples: int, planes: int, itemsize: int) -> bool:
@@ -154,22 +156,3 @@ class Passing:
         """Every plane's index, and the plane by itself: (1, ny, nx)."""
         for number in range(len(self.some)):
             yield number, self.make(number)
-
-
-AT_ONCE = 16
-"""Rows of a sample that are filtered together."""
-
-
-def rows_to_sample(terms: int) -> list[tuple[NDArray, NDArray]]:
-    """Rows, and the number of rows each stands for: all of the first few, then ever fewer.
-
-    Straight edges along the array put their energy into the first rows and columns.
-    """
-    sample = np.unique(
-        np.concatenate([np.arange(min(24, terms)), np.geomspace(24, terms, 72)]).astype(int)
-    )
-    sample = sample[sample < terms]
-    edges = np.concatenate([[-0.5], (sample[1:] + sample[:-1]) / 2, [terms - 0.5]])
-    stands_for = np.diff(edges)
-    parts = [slice(i, i + AT_ONCE) for i in range(0, len(sample), AT_ONCE)]
-    return [(sample[part], stands_for[part]) for part in parts]

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from vcam_cli.engine import bandwidth, sampling
 from vcam_cli.engine.axis import Axis
 from vcam_cli.engine.coefficients import Coefficients, Folded, Passing, of_rectangles, passes
+from vcam_cli.engine.parseval import rows_to_sample
 from vcam_cli.engine.transfer import Tables
 from vcam_cli.scenes.base import Rectangles, SampledScene
 
@@ -101,13 +102,15 @@ class InTurn:
     def spectrum(self, workers: int, terms: tuple[int, int]) -> Coefficients:
         """DCT-II of every plane, some rows at once and all of them when they are asked for."""
         _, _, some, folded = self._seen
-        return Passing(self.filter.sampled, some, self._coefficients, [folded] if folded else [])
+        return Passing(
+            rows_to_sample(self.filter.y), some, self._coefficients, [folded] if folded else []
+        )
 
     @cached_property
     def _seen(self) -> tuple[NDArray, NDArray, NDArray, Folded]:
         """Every eighth sample, the extremes, and the rows at hand, of every plane; and what the
         filter made of them."""
-        thin, extremes, some, rows = [], [], [], self.filter.sampled
+        thin, extremes, some, rows = [], [], [], rows_to_sample(self.filter.y)
         folded = self.filter.begun(np.dtype(self.dtype)) if self.known else {}
         for number in range(len(self.mix)):
             plane = self._plane(number)

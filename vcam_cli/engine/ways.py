@@ -27,7 +27,7 @@ from vcam_cli.effects.base import (
     SeparableTransfer,
     Zone,
 )
-from vcam_cli.engine import bandwidth, field, memory, painted, sampling
+from vcam_cli.engine import bandwidth, field, memory, painted, parseval, sampling
 from vcam_cli.engine.axis import Axis
 from vcam_cli.engine.coefficients import Coefficients
 from vcam_cli.engine.mosaic import Mosaic
@@ -271,7 +271,8 @@ def cosines(
         if light.brightest(tables) * SINGLE > budget:
             light = light.doubled()
         coefficients = light.spectrum(optics.workers, terms)
-        spread = _spread(optics, scene, looked, coefficients)
+        sample = parseval.Sample(looked, coefficients)
+        spread = _spread(optics, scene, sample)
         if at_hand:
             enough = min(max(spread.enough(budget), knobs.oversampling), widest)
             lost = spread.beyond(enough)
@@ -281,12 +282,12 @@ def cosines(
         finer = bandwidth.finer(oversampling, lost, budget, pixels, knobs)
         if finer == oversampling:
             break
-        del light, coefficients
+        del light, coefficients, sample
         oversampling, scene = _again(scene_at, finer)
     chosen = looked if enough == reach else _filter(optics, scene, tables, enough)
-    modes, squares = _needed(optics, scene, chosen, coefficients, modes, budget)
+    modes, squares = _needed(optics, scene, sample, modes, budget)
     # Without one of them the picture may reach further than it does with all of them.
-    changes = dict(_changes(optics, scene, looked, coefficients, squares))
+    changes = dict(_changes(optics, scene, sample, squares))
     count = len(tables.mix)
     times = len(tables.parities) + len(modes)
     values = _table_values(optics, tables)
@@ -353,11 +354,9 @@ def _filter(
     return sampling.Filter(x, y, tables, along_x, along_y)
 
 
-def _spread(
-    optics: Optics, scene: SampledScene, filter: sampling.Filter, coefficients: Coefficients
-) -> bandwidth.Spread:
+def _spread(optics: Optics, scene: SampledScene, sample: parseval.Sample) -> bandwidth.Spread:
     """The signal's spectrum, as if all of it lay on the array and none in the margin."""
-    frequency, power = filter.power(coefficients)
+    frequency, power = sample.power()
     nyquist = 2 * optics.geometry.pitch_x
     return bandwidth.Spread(frequency * nyquist, power * _density(optics, scene))
 
@@ -372,8 +371,7 @@ def _density(optics: Optics, scene: SampledScene) -> float:
 def _changes(
     optics: Optics,
     scene: SampledScene,
-    chosen: sampling.Filter,
-    coefficients: Coefficients,
+    sample: parseval.Sample,
     modes: float,
 ) -> Iterator[tuple[str, float]]:
     """Rms change of the signal by leaving out each transfer, by Parseval's theorem.
@@ -384,13 +382,13 @@ def _changes(
     density = _density(optics, scene)
     for effect in optics.effects:
         if isinstance(effect, RadialTransfer):
-            power = chosen.without(effect, optics.transfer).mean_square(coefficients)
+            power = sample.without(effect, optics.transfer)
         elif isinstance(effect, SeparableTransfer):
-            power = chosen.without_separable(effect, coefficients)
+            power = sample.without_separable(effect)
         elif isinstance(effect, PlaneTransfer):
-            power = chosen.only_planes().mean_square(coefficients)
+            power = sample.without_planes()
         elif isinstance(effect, FieldTransfer):
-            power = chosen.without_field(optics.transfer).mean_square(coefficients)
+            power = sample.without_field(optics.transfer)
         else:
             continue
         square = density * power.max()
@@ -401,8 +399,7 @@ def _changes(
 def _needed(
     optics: Optics,
     scene: SampledScene,
-    chosen: sampling.Filter,
-    coefficients: Coefficients,
+    sample: parseval.Sample,
     modes: tuple[field.Mode, ...],
     budget: float,
 ) -> tuple[tuple[field.Mode, ...], float]:
@@ -412,7 +409,7 @@ def _needed(
     """
     squares = np.zeros(len(modes))
     for i, mode in enumerate(modes):
-        power = replace(chosen, tables=mode.tables(rough=True)).mean_square(coefficients)
+        power = sample.mean_square(mode.tables(rough=True))
         squares[i] = _density(optics, scene) * mode.map.mean_square * power.max()
     weakest = np.argsort(squares)
     dropped = set(weakest[np.cumsum(squares[weakest]) <= budget**2].tolist())

@@ -1,0 +1,135 @@
+"""Transfer tables, read at blocks of frequencies."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcam_cli.engine.parallel import pieces
+from vcam_cli.engine.transfer import Tables
+
+PIECE = 32
+"""Rows or columns a thread takes at once: few enough for the cache."""
+
+Position = tuple[NDArray | None, NDArray | None]
+"""In a table over |f|: indices and fractions, where they are needed."""
+
+
+@dataclass(frozen=True)
+class Rows:
+    """Some rows of a picture's spectrum."""
+
+    planes: list[NDArray]
+    """(n, count) of every plane"""
+    fy: NDArray
+    """(n,) [cycles/m]"""
+    count: int
+    """Terms along x, from 0 on."""
+
+
+class Lookup:
+    """Tables of one parity, read at a block of frequencies.
+
+    Over |f|, float32: the nearest of many entries, its error far below float32's own in the sum;
+    float64: linear interpolation. Over fx and fy: linear interpolation along both, along x for
+    all `fx` at once, which are the same in all blocks.
+    """
+
+    def __init__(
+        self, tables: Tables, parity: int, fx: NDArray, dtype: np.dtype, first: int = 0
+    ) -> None:
+        """first: which of the tables' components is the first that is asked for."""
+        tables = replace(
+            tables,
+            values=tables.values[first:],
+            planes=tuple(None if plane is None else plane[first:] for plane in tables.planes),
+        )
+        self.linear = dtype == np.float64
+        self.dtype = dtype
+        self.colors, self.last = tables.values.shape[1:]
+        self.fx = fx
+        self.scale = 1 / tables.step if tables.top else 0.0
+        self.values = self.rises = None
+        if parity == 0 and tables.has_values:
+            zero = np.zeros((*tables.values.shape[:-1], 2))
+            self.values = np.concatenate([tables.values, zero], axis=-1).astype(dtype)
+            self.rises = np.diff(self.values, append=0) if self.linear else None
+        self.planes = None
+        if (plane := tables.planes[parity]) is not None:
+            self.plane_scale = (plane.shape[-1] - 1) / tables.top
+            along = np.minimum(fx * self.plane_scale, plane.shape[-1] - 1)
+            self.planes = [[_along_x(part, along, dtype) for part in color] for color in plane]
+
+    @property
+    def places(self) -> tuple[float, int] | None:
+        """Two tables of the same are read at the same positions; None: at none over |f|."""
+        return None if self.values is None else (self.scale, self.last)
+
+    def position(self, rows: Rows) -> Position:
+        """Where the table over |f| is read, at all pairs of frequencies of the rows."""
+        if self.values is None:
+            return None, None
+        u = ((self.fx[: rows.count] * self.scale) ** 2).astype(self.dtype)
+        v = ((rows.fy * self.scale) ** 2).astype(self.dtype)
+        radius = u[None, :] + v[:, None]
+        np.sqrt(radius, out=radius)
+        if self.linear:
+            np.minimum(radius, self.last, out=radius)
+            index = radius.astype(np.intp)
+            radius -= index
+            return index, radius
+        radius += 0.5
+        if radius[:, -1].max(initial=0) > self.last:  # it rises along x
+            np.minimum(radius, self.last, out=radius)
+        return radius.astype(np.intp), None
+
+    def through(self, rows: Rows, position: Position | None = None) -> Iterator[NDArray]:
+        """For each color, what the planes' rows are together through the tables: (n, count)."""
+        position = position or self.position(rows)
+        for c in range(self.colors):
+            total = self._at(0, c, rows, position)
+            total *= rows.planes[0]
+            for r, plane in enumerate(rows.planes[1:], start=1):
+                part = self._at(r, c, rows, position)
+                part *= plane
+                total += part
+            yield total
+
+    def _at(self, r: int, c: int, rows: Rows, position: Position) -> NDArray:
+        index, fraction = position
+        on_top = None
+        if self.planes is not None:
+            on_top = between(self.planes[r][c][:, : rows.count], rows.fy * self.plane_scale, 0)
+        if self.values is None or index is None:
+            shape = len(rows.fy), rows.count
+            return np.zeros(shape, self.dtype) if on_top is None else on_top
+        # No index is outside: "wrap" is the mode that asks least.
+        value = np.take(self.values[r, c], index, mode="wrap")
+        if fraction is not None and self.rises is not None:
+            rise = np.take(self.rises[r, c], index, mode="wrap")
+            rise *= fraction
+            value += rise
+        return value if on_top is None else np.add(value, on_top, out=value)
+
+
+def _along_x(table: NDArray, position: NDArray, dtype: np.dtype) -> NDArray:
+    """A table read between its columns; few rows at a time, since it is large in 64 bits."""
+    out = np.empty((len(table), len(position)), dtype)
+    for rows in pieces(len(table), PIECE):
+        out[rows] = between(table[rows], position, 1)
+    return out
+
+
+def between(table: NDArray, position: NDArray, axis: int) -> NDArray:
+    """A table read between its entries along an axis; constant beyond its end."""
+    position = np.minimum(position, table.shape[axis] - 1)
+    index = np.minimum(position.astype(int), table.shape[axis] - 2)
+    fraction = (position - index).astype(table.dtype).reshape((-1, 1) if axis == 0 else (1, -1))
+    low, high = np.take(table, index, axis), np.take(table, index + 1, axis)
+    high -= low
+    high *= fraction
+    high += low
+    return high

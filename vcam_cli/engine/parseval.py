@@ -1,0 +1,179 @@
+"""What filters do to a picture, by Parseval's theorem, from a sample of rows of its spectrum.
+
+The rows are brought to the filter's terms once; each table that is asked about then costs a
+multiplication. Mean squares are those of the signal as a continuous function, before pixels.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcam_cli.effects.base import RadialTransfer, SeparableTransfer
+from vcam_cli.engine.axis import Axis
+from vcam_cli.engine.coefficients import Coefficients
+from vcam_cli.engine.lookup import Lookup, Position, Rows
+from vcam_cli.engine.sampling import Filter
+from vcam_cli.engine.transfer import Fineness, Tables, Transfer, entries
+
+AT_ONCE = 16
+"""Rows of a sample that are filtered together."""
+
+
+def _sampled(terms: int) -> list[tuple[NDArray, NDArray]]:
+    """Rows, and the number of rows each stands for: all of the first few, then ever fewer.
+
+    Straight edges along the array put their energy into the first rows and columns.
+    """
+    sample = np.unique(
+        np.concatenate([np.arange(min(24, terms)), np.geomspace(24, terms, 72)]).astype(int)
+    )
+    sample = sample[sample < terms]
+    edges = np.concatenate([[-0.5], (sample[1:] + sample[:-1]) / 2, [terms - 0.5]])
+    stands_for = np.diff(edges)
+    parts = [slice(i, i + AT_ONCE) for i in range(0, len(sample), AT_ONCE)]
+    return [(sample[part], stands_for[part]) for part in parts]
+
+
+def rows_to_sample(y: Axis) -> NDArray:
+    """Rows of the coefficients that a `Sample` looks at, rising."""
+    terms = np.concatenate([terms for terms, _ in _sampled(y.terms)])
+    return np.unique(y.base(terms)[0])
+
+
+@dataclass(frozen=True, eq=False)
+class _Block:
+    """Rows that are filtered together."""
+
+    terms: NDArray
+    """(n,) which they are"""
+    weights: NDArray
+    """(n,) how often the squares of their terms count"""
+    bare: Rows
+    """Without the separable factors."""
+    rows: Rows
+    positions: dict[tuple[float, int] | None, Position] = field(default_factory=dict)
+
+    def through(self, lookup: Lookup, rows: Rows) -> Iterator[NDArray]:
+        """The signal of each color: (n, count)."""
+        if lookup.places not in self.positions:
+            self.positions[lookup.places] = lookup.position(rows)
+        return lookup.through(rows, self.positions[lookup.places])
+
+
+class Sample:
+    """Some rows of a picture's spectrum, for tables that are like those of a filter."""
+
+    def __init__(self, filter: Filter, coefficients: Coefficients) -> None:
+        self._filter, self._dtype = filter, coefficients.dtype
+        self._blocks = tuple(self._taken(coefficients))
+
+    def _taken(self, coefficients: Coefficients) -> Iterator[_Block]:
+        along_x, along_y = self._filter.along_x, self._filter.along_y
+        for terms, stands_for in _sampled(self._filter.y.terms):
+            bare = self._filter.rows(coefficients, terms, np.ones(len(terms)), separable=False)
+            if bare is None:  # nor are there any of higher frequencies
+                return
+            weights = stands_for * np.where(terms > 0, 2, 1)
+            yield _Block(terms, weights, bare, _times(bare, along_x, along_y[terms]))
+
+    def power(self) -> tuple[NDArray, NDArray]:
+        """Mean squares of the filter's signal by frequency.
+
+        Returns the frequency [cycles/m], the larger of |fx| and |fy|, and for each color the
+        mean square that terms of such frequencies add to the signal: (n,) and (C, n), rising in
+        frequency. Terms of the same frequency are added up.
+        """
+        fx, fy = self._filter.x.frequencies, self._filter.y.frequencies
+        along_x = np.zeros((self._filter.tables.values.shape[1], len(fx)))
+        frequency, power = [fx], [along_x]
+        for block, squares in self._squares():
+            below = np.searchsorted(fx, fy[block.terms], side="right")
+            lower = np.arange(block.rows.count) < below[:, None]
+            along_x[:, : block.rows.count] += np.where(lower, 0, squares).sum(axis=1)
+            frequency.append(fy[block.terms])
+            power.append(np.where(lower, squares, 0).sum(axis=2))
+        order = np.argsort(together := np.concatenate(frequency), kind="stable")
+        return together[order], np.concatenate(power, axis=1)[:, order]
+
+    def _squares(self) -> Iterator[tuple[_Block, NDArray]]:
+        """Of the filter's signal, for all terms that each one stands for: (C, n, count)."""
+        tables, fx = self._filter.tables, self._filter.x.frequencies
+        lookups = [Lookup(tables, parity, fx, self._dtype) for parity in tables.parities]
+        for block in self._blocks:
+            squares: NDArray = np.zeros((tables.values.shape[1], *block.rows.planes[0].shape))
+            for lookup in lookups:
+                for total, part in zip(squares, block.through(lookup, block.rows), strict=True):
+                    total += np.square(part, dtype=np.float64)
+            squares *= block.weights[:, None]
+            squares[..., 1:] *= 2
+            yield block, squares
+
+    def mean_square(self, tables: Tables) -> NDArray:
+        """Of the signal through other tables in the place of the filter's: (C,)."""
+        return self._mean_square(tables, [block.rows for block in self._blocks])
+
+    def _mean_square(self, tables: Tables, rows: list[Rows]) -> NDArray:
+        total: NDArray = np.zeros(tables.values.shape[1])
+        for parity in tables.parities:
+            lookup = Lookup(tables, parity, self._filter.x.frequencies, self._dtype)
+            for block, own in zip(self._blocks, rows, strict=True):
+                for c, part in enumerate(block.through(lookup, own)):
+                    wide = part.astype(np.float64, copy=False)
+                    squares = 2 * np.einsum("ij,ij->i", wide, wide) - wide[:, 0] ** 2
+                    total[c] += block.weights @ squares
+        return total
+
+    def without(self, effect: RadialTransfer, transfer: Transfer) -> NDArray:
+        """What leaving out a radial transfer adds: (C,). transfer: the whole of it.
+
+        Where there is more than radial transfers, what these would do alone: they do no more then.
+        """
+        tables = self._filter.tables
+        alone = transfer.through([e for e in transfer.effects if e is not effect])
+        return self.mean_square(replace(tables, values=_rest(alone, tables), planes=(None,) * 4))
+
+    def without_field(self, alone: Transfer) -> NDArray:
+        """What leaving out a blur that changes over the field adds, on average: (C,).
+
+        alone: the transfer without it.
+        """
+        tables = self._filter.tables
+        return self.mean_square(replace(tables, values=_rest(alone, tables)))
+
+    def without_planes(self) -> NDArray:
+        """What leaving out all but the radial transfers adds: (C,)."""
+        tables = self._filter.tables
+        return self.mean_square(replace(tables, values=0 * tables.values))
+
+    def without_separable(self, effect: SeparableTransfer) -> NDArray:
+        """What leaving out a separable transfer adds: (C,)."""
+        filter = self._filter
+        own_x, own_y = effect.along_x(filter.x.frequencies), effect.along_y(filter.y.frequencies)
+        rest_x, rest_y = _others(filter.along_x, own_x), _others(filter.along_y, own_y)
+        rows = []
+        for block in self._blocks:
+            change = 1 - own_y[block.terms, None] * own_x[: block.bare.count]
+            rows.append(_times(block.bare, rest_x, rest_y[block.terms], change))
+        return self._mean_square(filter.tables, rows)
+
+
+def _times(rows: Rows, along_x: NDArray, along_y: NDArray, also: NDArray | float = 1.0) -> Rows:
+    """Rows with factors on them: along x (more terms than there are), y (n,), and at each term."""
+    factor = along_y[:, None] * along_x[: rows.count] * also
+    dtype = rows.planes[0].dtype
+    return replace(rows, planes=[plane * factor.astype(dtype) for plane in rows.planes])
+
+
+def _rest(transfer: Transfer, tables: Tables) -> NDArray:
+    """Another transfer's table over |f|, less the tables' own."""
+    fine = Fineness(tables.top, tables.values.shape[-1], tables.error)
+    return entries(transfer.mixed(tables.mix), fine) - tables.values
+
+
+def _others(factors: NDArray, own: NDArray) -> NDArray:
+    """A product without one of its factors; 1 where that is 0."""
+    return np.divide(factors, own, out=np.ones_like(factors), where=np.abs(own) > 1e-12)
