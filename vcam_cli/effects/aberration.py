@@ -184,15 +184,17 @@ class DirectedBlur(Aberration, PlaneTransfer):
         return self.lens.reach(self.terms)
 
     def otf_plane(self, fx, fy, wavelength):
-        working = self.lens.working_f_number
         if not self.lens.diffracts:
             return self._rays(fx, fy)
         # Turned frequencies rather than a turned wavefront: one grid serves all angles.
         cos, sin = math.cos(self.angle), math.sin(self.angle)
         x, y = fx[None, :], fy[:, None]
         return aberration.otf_ratio(
-            cos * x + sin * y, cos * y - sin * x, wavelength, working, self.terms
+            cos * x + sin * y, cos * y - sin * x, wavelength, self.lens.working_f_number, self.terms
         )
+
+    def keeps(self, wavelengths):
+        return aberration.keeps(self.terms, wavelengths) if self.lens.diffracts else {}
 
     def _rays(self, fx, fy):
         def compute():

@@ -20,7 +20,7 @@ Adding an effect is adding a file, and its class to the tuple in `order.py`.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field
 from typing import ClassVar, Literal, Self
 
@@ -118,6 +118,11 @@ class PlaneTransfer(Effect, Blur):
         """A blur that this one is made of: it, by how many quarter turns from x to y it is turned,
         and whether y is mirrored before. What many have in common is computed once."""
         return self, 0, False
+
+    def keeps(self, wavelengths: NDArray) -> dict[Hashable, int]:
+        """Tables that stay in memory for transfers at wavelengths (n,) [m]: what each is for, which
+        blurs may have in common, and its bytes."""
+        return {}
 
     @abstractmethod
     def otf_plane(self, fx: NDArray, fy: NDArray, wavelength: float) -> NDArray:

@@ -187,6 +187,13 @@ class Axis:
         start = round(self._start)
         return slice(start, start + self.pixels)
 
+    @property
+    def transform(self) -> int:
+        """Length of the transform that `evaluate` does."""
+        if self.virtual_pixels is not None:
+            return self.virtual_pixels
+        return int(scipy.fft.next_fast_len(self.terms + self.pixels - 1))
+
     def evaluate(
         self, values: NDArray, axis: int, odd: bool = False, overwrite: bool = False
     ) -> NDArray:
@@ -205,7 +212,7 @@ class Axis:
     def _chirp_parts(self) -> tuple[int, NDArray, NDArray, NDArray]:
         """Transform length, chirp on the terms, kernel spectrum, chirp on the pixels."""
         k, i = np.arange(self.terms), np.arange(self.pixels)
-        size = scipy.fft.next_fast_len(self.terms + self.pixels - 1)
+        size = self.transform
         half = np.pi * self.pixel_pitch / self.length / 2
         before = np.exp(1j * (np.pi * k * (self.first / self.length) + half * k.astype(float) ** 2))
         before[0] *= 0.5
@@ -220,8 +227,12 @@ class Axis:
         size, before, kernel, after = self._chirp_parts
         kind = np.complex64 if values.dtype == np.float32 else np.complex128
         shape = (-1, 1) if axis == 0 else (1, -1)
-        work: NDArray = values * np.asarray(before, kind).reshape(shape)
-        work = scipy.fft.fft(work, size, axis=axis)
+        count, padded = values.shape[axis], list(values.shape)
+        padded[axis] = size
+        work: NDArray = np.zeros(padded, kind)
+        inside = work[:count] if axis == 0 else work[:, :count]
+        np.multiply(values, np.asarray(before, kind).reshape(shape), out=inside)
+        work = scipy.fft.fft(work, axis=axis, overwrite_x=True)
         work *= kernel.astype(kind).reshape(shape)
         work = scipy.fft.ifft(work, axis=axis, overwrite_x=True)
         work = work[: self.pixels] if axis == 0 else work[:, : self.pixels]

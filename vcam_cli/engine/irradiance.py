@@ -91,8 +91,8 @@ def _bands(
 
         def add(s: slice, layer: ways.Layer = layer) -> None:
             weight = 1 if layer.weight is None else layer.weight(x.astype(dtype), y[s])
-            for band, plane in enumerate(out):
-                plane[s] += weight * layer.values(band, s)
+            for band in layer.of(len(out)):
+                out[band, s] += weight * layer.values(band, s)
 
         each(add, blocks(g.rows), workers)
     for plane in out:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -35,13 +35,21 @@ class Lookup:
 
     Over |f|, float32: the nearest of many entries, its error far below float32's own in the sum;
     float64: linear interpolation. Over fx and fy: linear interpolation along both, along x for
-    all `fx` at once, which are the same in all blocks.
+    all `fx` at once, which are the same in all blocks; of few rows when they are asked for, since
+    all of it takes as much memory as many rows of the picture.
     """
 
     def __init__(
-        self, tables: Tables, parity: int, fx: NDArray, dtype: np.dtype, first: int = 0
+        self,
+        tables: Tables,
+        parity: int,
+        fx: NDArray,
+        dtype: np.dtype,
+        first: int = 0,
+        few: bool = False,
     ) -> None:
-        """first: which of the tables' components is the first that is asked for."""
+        """first: which of the tables' components is the first that is asked for; few: whether it
+        is asked for few rows."""
         tables = replace(
             tables,
             values=tables.values[first:],
@@ -57,11 +65,15 @@ class Lookup:
             zero = np.zeros((*tables.values.shape[:-1], 2))
             self.values = np.concatenate([tables.values, zero], axis=-1).astype(dtype)
             self.rises = np.diff(self.values, append=0) if self.linear else None
-        self.planes = None
+        self.planes: Sequence[Sequence[NDArray]] | None = None
+        self.along = None
         if (plane := tables.planes[parity]) is not None:
             self.plane_scale = (plane.shape[-1] - 1) / tables.top
             along = np.minimum(fx * self.plane_scale, plane.shape[-1] - 1)
-            self.planes = [[_along_x(part, along, dtype) for part in color] for color in plane]
+            if few:
+                self.planes, self.along = list(plane), along
+            else:
+                self.planes = [[_along_x(part, along, dtype) for part in color] for color in plane]
 
     @property
     def places(self) -> tuple[float, int] | None:
@@ -100,9 +112,7 @@ class Lookup:
 
     def _at(self, r: int, c: int, rows: Rows, position: Position) -> NDArray:
         index, fraction = position
-        on_top = None
-        if self.planes is not None:
-            on_top = between(self.planes[r][c][:, : rows.count], rows.fy * self.plane_scale, 0)
+        on_top = self._on_top(r, c, rows)
         if self.values is None or index is None:
             shape = len(rows.fy), rows.count
             return np.zeros(shape, self.dtype) if on_top is None else on_top
@@ -113,6 +123,14 @@ class Lookup:
             rise *= fraction
             value += rise
         return value if on_top is None else np.add(value, on_top, out=value)
+
+    def _on_top(self, r: int, c: int, rows: Rows) -> NDArray | None:
+        if self.planes is None:
+            return None
+        plane, at = self.planes[r][c], rows.fy * self.plane_scale
+        if self.along is None:
+            return between(plane[:, : rows.count], at, 0)
+        return _along_x(between(plane, at, 0), self.along[: rows.count], self.dtype)
 
 
 def _along_x(table: NDArray, position: NDArray, dtype: np.dtype) -> NDArray:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import math
 import os
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,10 +14,15 @@ from vcam_cli.errors import CannotDo
 from vcam_cli.scenes.base import SampledScene
 
 if TYPE_CHECKING:
-    from vcam_cli.engine.ways import Followed
+    from vcam_cli.engine.room import Room
+    from vcam_cli.engine.sampling import Filter
 
 BASE = 150_000_000
 """Interpreter and libraries [bytes]."""
+SLACK = 1.1
+"""Of what is in use, what the process has: memory that was freed is not given back at once."""
+SAMPLED = 96
+"""Rows of a spectrum that are looked at, about."""
 
 
 def available() -> int:
@@ -53,21 +59,36 @@ def of_frame(
     return BASE + max(series, frame) + (16 * pixels * colors if judged else 0)
 
 
-def of_planes(scene: SampledScene, planes: int, geometry: Geometry, knobs: Settings) -> int:
-    """Peak memory while a sampled scene of so many planes is filtered [bytes]."""
-    return _filtering(scene.shape[0] * scene.shape[1], planes, geometry, knobs)
+def of_boxes(scene: SampledScene, planes: int, geometry: Geometry, knobs: Settings) -> int:
+    """Peak memory while a picture of so many planes is averaged over boxes [bytes].
+
+    The planes, points and means of each; running sums and what is read of them in 64 bits.
+    """
+    samples, pixels = math.prod(scene.shape), geometry.rows * geometry.columns
+    width = knobs.float_width // 8
+    kept = planes * (samples * width + pixels * (width + 8))
+    return BASE + kept + 5 * 8 * max(samples, pixels)
 
 
-def of_followed(followed: Followed, geometry: Geometry, knobs: Settings) -> int:
-    """Peak memory that a scene took while it was filtered [bytes]."""
-    needed = _filtering(followed.held, 1, geometry, knobs)
-    if followed.passes > 1:  # a filter's signal beside the sum of those before, in three colors
-        needed += 3 * geometry.rows * geometry.columns * (knobs.float_width // 8)
-    return needed + 16 * followed.table_values
+def of_looking(filter: Filter, held: int, width: int, tables: Room) -> int:
+    """Peak memory while a scene is transformed and rows of its spectrum are looked at [bytes].
+
+    held: samples of all its planes in memory together; width: bytes of one.
+    """
+    planes, colors, _ = filter.tables.values.shape
+    sample = SAMPLED * filter.x.terms * (2 * planes * width + 8 + 4 * colors)
+    return BASE + round(SLACK * max(tables.most, tables.kept + held * width + sample))
 
 
-def _filtering(samples: int, planes: int, geometry: Geometry, knobs: Settings) -> int:
-    return samples * planes * (knobs.float_width // 8) + of_frame(geometry, knobs, 3, False)
+def of_filtering(
+    filter: Filter, held: int, width: int, tables: Room, passing: bool, workers: int, signal: int
+) -> int:
+    """Peak memory while a scene's spectrum is filtered for colors that are filtered together.
+
+    [bytes]. passing: whether its planes pass one by one; signal: bytes of what other filters gave.
+    """
+    work = filter.takes(width, passing) + filter.beside(width, workers)
+    return BASE + round(SLACK * (tables.kept + held * width + signal + work))
 
 
 def require(needed: int, geometry: Geometry) -> None:

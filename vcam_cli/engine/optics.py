@@ -9,6 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -132,6 +133,7 @@ def photo_rate(
     Raises CannotDo where memory does not suffice.
     """
     layers, followed = ways.layers(optics, scene_at)
+    at_once = optics.field is None and not followed.by_color
     g, mosaic = optics.geometry, optics.mosaic
     count = len(mosaic.colors) if planes else 1
     out: NDArray = np.zeros((count, g.rows, g.columns), optics.settings.dtype)
@@ -151,20 +153,21 @@ def photo_rate(
         if veil is None:
             gain(after, block)
 
-    for number, layer in enumerate(layers):
-
-        def compute(block: slice, layer: ways.Layer = layer, first: bool = number == 0) -> None:
-            tile = out[:, block] if first else np.zeros_like(out[:, block])
+    def compute(layer: ways.Layer, block: slice) -> None:
+        if layer.weight is None:
+            _fill(out[:, block], layer, mosaic, block)
+        else:
+            tile = np.zeros_like(out[:, block])
             _fill(tile, layer, mosaic, block)
-            if layer.weight is not None:
-                tile *= layer.weight(x, y[block])
-            if not first:
-                out[:, block] += tile
-            if optics.field is None:
-                finish(block)
+            tile *= layer.weight(x, y[block])
+            out[:, block] += tile
+        if at_once:
+            finish(block)
 
-        each(compute, blocks(g.rows), optics.workers)
-    if optics.field is not None:
+    for layer in layers:
+        each(partial(compute, layer), blocks(g.rows), optics.workers)
+        del layer  # before the next one is made
+    if not at_once:
         each(finish, blocks(g.rows), optics.workers)
     if veil is not None:
         _spread(out, mosaic, veil)
@@ -185,13 +188,16 @@ def _in_order(effects: Sequence[Effect]) -> tuple[list[Gain], Veil | None, list[
 def _fill(tile: NDArray, layer: ways.Layer, mosaic: Mosaic, block: slice) -> None:
     """Puts a layer's light where it belongs: every color in its plane, or each in its places."""
     if len(tile) > 1:
-        for color, plane in enumerate(tile):
-            plane[:] = layer.values(color, block)
+        for color in layer.of(len(tile)):
+            tile[color] = layer.values(color, block)
         return
     period = len(mosaic.block)
     for phase in range(min(period, tile.shape[1])):
         row = block.start + phase
+        there = layer.of(len(mosaic.colors))
         for color, places in mosaic.in_row(row):
+            if color not in there:
+                continue
             found = layer.values(color, slice(row, block.stop, period))
             for columns in places:
                 tile[0, phase::period, columns] = found[:, columns]

@@ -102,7 +102,7 @@ class Sample:
     def _squares(self) -> Iterator[tuple[_Block, NDArray]]:
         """Of the filter's signal, for all terms that each one stands for: (C, n, count)."""
         tables, fx = self._filter.tables, self._filter.x.frequencies
-        lookups = [Lookup(tables, parity, fx, self._dtype) for parity in tables.parities]
+        lookups = [Lookup(tables, p, fx, self._dtype, few=True) for p in tables.parities]
         for block in self._blocks:
             squares: NDArray = np.zeros((tables.values.shape[1], *block.rows.planes[0].shape))
             for lookup in lookups:
@@ -119,7 +119,7 @@ class Sample:
     def _mean_square(self, tables: Tables, rows: list[Rows]) -> NDArray:
         total: NDArray = np.zeros(tables.values.shape[1])
         for parity in tables.parities:
-            lookup = Lookup(tables, parity, self._filter.x.frequencies, self._dtype)
+            lookup = Lookup(tables, parity, self._filter.x.frequencies, self._dtype, few=True)
             for block, own in zip(self._blocks, rows, strict=True):
                 for c, part in enumerate(block.through(lookup, own)):
                     wide = part.astype(np.float64, copy=False)

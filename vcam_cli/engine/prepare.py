@@ -123,7 +123,7 @@ def prepare(
         )
         peak = (float(rate.max()) + dark) * time
         _refuse_too_much(max(peak, white * time))
-        needed = max(needed, memory.of_followed(found.spectrum, lattice, knobs)) + read
+        needed = max(needed, found.spectrum.memory) + read
         full = max(1.0, min(e.full_well, peak))
         outlook = Outlook(full, time, dark * time, camera.array.binning)
         here = _on_pixels(place, joins.collected(found.values), present, effects, time)

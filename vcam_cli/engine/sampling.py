@@ -76,6 +76,8 @@ class Filter:
     tables: Tables
     along_x: NDArray
     along_y: NDArray
+    frugal: bool = False
+    """Whether it rather takes longer than much memory."""
 
     def apply(self, coefficients: Coefficients, workers: int) -> Series:
         """Signal of every color at the rows of photodetectors, still a series along x.
@@ -111,9 +113,10 @@ class Filter:
             for x, _ in self.x.bases(odd_x)
             for y, _ in self.y.bases(odd_y)
         }
+        even, odd = ([b for b in sorted(every) if b[1] == odd_y] for odd_y in (False, True))
         if not self.x.shift:
-            return [[basis] for basis in sorted(every)]
-        return [[b for b in sorted(every) if b[1] == odd] for odd in sorted({y for _, y in every})]
+            return [[basis] for basis in (*even, *odd)]
+        return [even, *([basis] for basis in odd)] if self.frugal else [even, odd]
 
     def begun(self, dtype: np.dtype, bases: Sequence[Basis] | None = None) -> Folded:
         """What planes are added to, of all of the pixels' waves or of some."""
@@ -201,6 +204,36 @@ class Filter:
         alone = sum(basis[0] == odd_x for group in self.groups for basis in group) == 1
         fits = self.y.pixels <= self.y.folded <= 2 * self.y.pixels
         return slice(self.y.pixels) if alone and fits else None
+
+    def takes(self, itemsize: int, passing: bool = False) -> int:
+        """Memory that `apply` takes at most for what it folds and evaluates [bytes].
+
+        passing: whether planes pass one by one, to be added to all of the pixels' waves at once.
+        """
+        colors = self.tables.values.shape[1]
+        folded = colors * self.y.folded * self.x.folded * itemsize
+        evaluated = colors * self.y.pixels * self.x.folded * itemsize
+        every = [basis for together in self.groups for basis in together]
+        kept: dict[bool, int] = {}
+        most = 0
+        for together in [every] if passing else self.groups:
+            for done, (odd_x, _) in enumerate(together):
+                waiting = (len(together) - done) * folded
+                if odd_x not in kept and self._place(odd_x) is not None:
+                    kept[odd_x], waiting = folded, waiting - folded
+                kept.setdefault(odd_x, evaluated)
+                most = max(most, sum(kept.values()) + waiting)
+        return most
+
+    def beside(self, itemsize: int, workers: int) -> int:
+        """Memory that `apply` takes for its tables and for pieces of work [bytes]."""
+        planes, colors, entries = self.tables.values.shape
+        terms = self.x.terms
+        sizes = [0, *(plane.shape[-1] for plane in self.tables.planes if plane is not None)]
+        tables = planes * colors * (2 * entries + max(sizes) * terms) * itemsize
+        rows = PIECE * terms * (2 * planes * itemsize + 8 + 6 * itemsize)
+        chirp = 6 * PIECE * itemsize * max(self.x.transform, self.y.transform)
+        return tables + workers * max(rows, chirp)
 
     def rows(
         self, coefficients: Coefficients, terms: NDArray, weights: NDArray, separable: bool = True

@@ -196,6 +196,12 @@ class Tables:
         there = [p for p, plane in enumerate(self.planes) if plane is not None]
         return there if 0 in there or (there and not self.has_values) else [0, *there]
 
+    def of(self, colors: range) -> Tables:
+        """Those of some colors, one after the other."""
+        some = slice(colors.start, colors.stop)
+        planes = tuple(None if plane is None else plane[:, some] for plane in self.planes)
+        return replace(self, values=self.values[:, some], planes=planes)
+
     @property
     def has_values(self) -> bool:
         """Whether there is anything in the part over |f|."""

@@ -12,7 +12,6 @@ import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,12 +26,13 @@ from vcam_cli.effects.base import (
     SeparableTransfer,
     Zone,
 )
-from vcam_cli.engine import bandwidth, field, memory, painted, parseval, sampling
+from vcam_cli.engine import bandwidth, field, memory, painted, parseval, sampling, turns
 from vcam_cli.engine.axis import Axis
 from vcam_cli.engine.coefficients import Coefficients
 from vcam_cli.engine.mosaic import Mosaic
+from vcam_cli.engine.room import of_tables, of_zones, table_values
 from vcam_cli.engine.settings import Settings
-from vcam_cli.engine.transfer import EXACT_ENTRIES, FINER, Fineness, Tables, Transfer, tabulate
+from vcam_cli.engine.transfer import EXACT_ENTRIES, Fineness, Tables, Transfer, tabulate
 from vcam_cli.scenes.base import SampledScene, Wave, WaveScene
 
 FIELD_SHARE = 0.2
@@ -49,7 +49,14 @@ class Layer:
     values: Callable[[int, slice], NDArray]
     """From a color and array rows to its signal there, (rows, columns) [electrons / s]."""
     weight: Callable[[NDArray, NDArray], NDArray] | None = None
-    """A factor at the positions x (columns,), y (rows,) [m]: (rows, columns)."""
+    """A factor at the positions x (columns,), y (rows,) [m]: (rows, columns). Of each color there
+    is one layer at most without."""
+    colors: range | None = None
+    """Those that are in it; None for all."""
+
+    def of(self, count: int) -> range:
+        """Which of so many colors are in it."""
+        return range(count) if self.colors is None else self.colors
 
 
 Layers = Iterator[Layer]
@@ -107,6 +114,10 @@ class Followed:
     """Values of transfer functions of fx and fy that were computed for the tables."""
     held: int = 0
     """Samples of all planes that were in memory together."""
+    by_color: bool = False
+    """Whether the layers have one color each."""
+    memory: int = 0
+    """That this takes at most [bytes]."""
 
 
 def layers(
@@ -208,11 +219,12 @@ def boxes(optics: Optics, scene: SampledScene) -> tuple[Layers, Followed]:
     """Means over the photodetectors' boxes; points where the aperture is switched off."""
     g = optics.geometry
     x, y = _axes(optics, scene, 1.0)
-    memory.require(memory.of_planes(scene, len(optics.mosaic.colors), g, optics.settings), g)
+    needed = memory.of_boxes(scene, len(optics.mosaic.colors), g, optics.settings)
+    memory.require(needed, g)
     planes = scene.planes(optics.transfer.level.T, optics.workers)
     points = [sampling.boxes(plane, x, y, 0.0, 0.0) for plane in planes]
     if not optics.separable:
-        return iter([Layer(lambda color, s: points[color][s])]), Followed()
+        return iter([Layer(lambda color, s: points[color][s])]), Followed(memory=needed)
     size = g.collecting_width, g.collecting_height
     means = [sampling.boxes(p, x, y, *size) for p in planes]
     change = max(
@@ -220,7 +232,8 @@ def boxes(optics: Optics, scene: SampledScene) -> tuple[Layers, Followed]:
         for a, b in zip(means, points, strict=True)
     )
     changes = {e.name: change for e in optics.separable}
-    return iter([Layer(lambda color, s: means[color][s])]), Followed(changes=changes)
+    followed = Followed(changes=changes, memory=needed)
+    return iter([Layer(lambda color, s: means[color][s])]), followed
 
 
 def cosines(
@@ -244,7 +257,10 @@ def cosines(
     steps, rank = knobs.plane_steps, knobs.spectral_rank
     fine = Fineness(top, knobs.table_size, knobs.mixing_tolerance, computed, steps, rank)
     modes: tuple[field.Mode, ...] = ()
-    if zones := optics.zones:
+    zones = optics.zones
+    room = of_zones(optics.transfer, zones, fine) if zones else of_tables(optics.transfer, fine)
+    memory.require(memory.BASE + room.most, g)
+    if zones:
         fine = replace(fine, tolerance=max(fine.tolerance, FIELD_SHARE * knobs.tolerance))
         tables, modes = field.tabulate(optics.transfer, zones, g, fine)
     else:
@@ -255,8 +271,9 @@ def cosines(
         rectangles = scene.rectangles(tables.mix)
         samples = math.prod(terms if rectangles is not None else scene.shape)
         held = painted.held(scene, rectangles, len(tables.mix), bool(zones))
-        memory.require(memory.of_followed(Followed(held=held), g, knobs), g)
         looked = _filter(optics, scene, tables, reach)
+        needed = memory.of_looking(looked, held, knobs.float_width // 8, room)
+        memory.require(needed, g)
         light: painted.Known | painted.Painted | painted.InTurn
         if rectangles is not None:
             light = painted.Known(rectangles, scene.shape, knobs.dtype)
@@ -290,20 +307,29 @@ def cosines(
     changes = dict(_changes(optics, scene, sample, squares))
     count = len(tables.mix)
     times = len(tables.parities) + len(modes)
-    values = _table_values(optics, tables)
-    followed = Followed(enough, lost, samples, count, changes, len(modes), times, values, held)
+    values = table_values(optics.transfer, zones, tables)
+    together = turns.together(chosen, coefficients, g)
+    needed = turns.needed(
+        looked, chosen, together, coefficients, held, len(modes), room, g, optics.workers
+    )
+    memory.require(needed, g)
+    looks = (enough, lost, samples, count, changes, len(modes), times, values, held)
+    followed = Followed(*looks, by_color=len(together) > 1, memory=needed)
     del light
 
     def each(coefficients: Coefficients) -> Layers:
-        filters: list[tuple[sampling.Filter, Any]] = [(chosen, None)]
-        filters += [(replace(chosen, tables=mode.tables()), mode.map) for mode in modes]
-        while filters:
-            filter, weight = filters.pop(0)
-            series = filter.apply(coefficients, optics.workers)
-            if not filters:
+        work = [(mode, colors) for mode in (None, *modes) for colors in together]
+        while work:
+            mode, colors = work.pop(0)
+            tables = (chosen.tables if mode is None else mode.tables()).of(colors)
+            some = replace(chosen, tables=tables, frugal=len(together) > 1)
+            series = some.apply(coefficients, optics.workers)
+            if not work:
                 del coefficients  # memory for what comes
-            yield Layer(series, weight)
+            values = partial(turns.of_color, series, colors.start)
             del series
+            yield Layer(values, None if mode is None else mode.map, colors)
+            del values
 
     return each(coefficients), followed
 
@@ -315,16 +341,6 @@ def _again(
     scene = scene_at(oversampling)
     assert isinstance(scene, SampledScene)
     return oversampling, scene
-
-
-def _table_values(optics: Optics, tables: Tables) -> int:
-    """At how many places, wavelengths and zones the transfer of fx and fy was computed."""
-    plane = next((plane for plane in tables.planes if plane is not None), None)
-    if plane is None:
-        return 0
-    steps = plane.shape[-1] // FINER + 1  # or up to twice as many
-    blurs = {zone.blur.model[0] for zone in optics.zones if isinstance(zone.blur, PlaneTransfer)}
-    return 2 * steps**2 * len(optics.transfer.thinned().wavelengths) * max(len(blurs), 1)
 
 
 def _axes(optics: Optics, scene: SampledScene, oversampling: float) -> tuple[Axis, Axis]:

@@ -33,7 +33,9 @@ STEEPEST = 200.0
 """Slope of the wavefront up to which it can be followed [wavelengths per pupil radius]."""
 
 _SERIES: ByteCache[Floats] = ByteCache(20_000_000)
-_GRIDS: ByteCache[pupil_grid.Grid] = ByteCache(500_000_000)
+MOST_GRIDS = 500_000_000
+"""Memory that grids of wavefronts are kept in [bytes]."""
+_GRIDS: ByteCache[pupil_grid.Grid] = ByteCache(MOST_GRIDS)
 
 
 def slope_in_waves(terms: Terms, wavelength: float) -> float:
@@ -111,6 +113,21 @@ def otf_ratio(
         turns = 2 * working_f_number * (fx * slope_x + fy * slope_y)
         ratio = ratio * np.where(ratio == 0, 0, np.exp(-2j * np.pi * turns))
     return ratio[()]
+
+
+def keeps(terms: Terms, wavelengths: Floats) -> dict[tuple[Terms, float], int]:
+    """Memory that `otf_ratio` keeps for a wavefront at wavelengths (n,) [m]: what for -> bytes.
+
+    No more than `MOST_GRIDS` of it all.
+    """
+    rest, _ = zernike.without_tilt(terms)
+    if zernike.is_symmetric(rest):
+        return {}
+    order = max(zernike.noll(index)[0] for index, _ in rest)
+    return {
+        (rest, w): pupil_grid.grid_bytes(slope_in_waves(rest, w), order)
+        for w in wavelengths.tolist()
+    }
 
 
 def _gentle(terms: Terms, wavelength: float) -> float:

@@ -109,6 +109,12 @@ def samples_across(steep: float, order: int) -> int:
     return 32 * math.ceil(max(LEAST + 8 * order, fine, COARSE * radians) / 32)
 
 
+def grid_bytes(steep: float, order: int) -> int:
+    """Memory that the grid of such a wavefront takes [bytes]."""
+    samples = samples_across(steep, order)
+    return 2 * samples * (samples + BEYOND) * 8
+
+
 def _step(samples: int) -> float:
     """Distance of the samples [pupil radii]; a margin of two samples lies around the pupil."""
     return 2 / (samples - 4)
