@@ -107,6 +107,8 @@ class Followed:
     """Values of transfer functions of fx and fy that were computed for the tables."""
     held: int = 0
     """Samples of all planes that were in memory together."""
+    peak: float = 0.0
+    """Bound on the signal before blur: a ceiling above it changes nothing [electrons / s]"""
 
 
 def layers(
@@ -249,6 +251,7 @@ def cosines(
         tables, modes = field.tabulate(optics.transfer, zones, g, fine)
     else:
         tables = tabulate(optics.transfer, fine)
+    highest = 0.0
     while True:
         reach = reach if at_hand else float(oversampling)
         terms = painted.wanted(scene, *_axes(optics, scene, reach))
@@ -266,8 +269,9 @@ def cosines(
             )
         else:
             light = painted.Painted(scene.planes(tables.mix, optics.workers))
-        peak = min(light.peak(tables), optics.ceiling)
-        budget = bandwidth.SHARE * knobs.tolerance * peak
+        peak = light.peak(tables)
+        highest = max(highest, peak)
+        budget = bandwidth.SHARE * knobs.tolerance * min(peak, optics.ceiling)
         if light.brightest(tables) * SINGLE > budget:
             light = light.doubled()
         coefficients = light.spectrum(optics.workers, terms)
@@ -291,7 +295,9 @@ def cosines(
     count = len(tables.mix)
     times = len(tables.parities) + len(modes)
     values = _table_values(optics, tables)
-    followed = Followed(enough, lost, samples, count, changes, len(modes), times, values, held)
+    followed = Followed(
+        enough, lost, samples, count, changes, len(modes), times, values, held, highest
+    )
     del light
 
     def each(coefficients: Coefficients) -> Layers:
