@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from typing import Any
@@ -27,10 +27,11 @@ from vcam_cli.effects.base import (
     SeparableTransfer,
     Zone,
 )
-from vcam_cli.engine import bandwidth, field, memory, painted, parseval, sampling
+from vcam_cli.engine import bandwidth, boxes, field, memory, painted, parseval, sampling
 from vcam_cli.engine.axis import Axis
-from vcam_cli.engine.coefficients import Coefficients
+from vcam_cli.engine.coefficients import Coefficients, PlaneOfRuns
 from vcam_cli.engine.mosaic import Mosaic
+from vcam_cli.engine.parallel import pieces
 from vcam_cli.engine.settings import Settings
 from vcam_cli.engine.transfer import EXACT_ENTRIES, FINER, Fineness, Tables, Transfer, tabulate
 from vcam_cli.scenes.base import SampledScene, Wave, WaveScene
@@ -40,6 +41,10 @@ FIELD_SHARE = 0.2
 picture all of full contrast and detail of all sizes."""
 SINGLE = 5e-7
 """Error of transforms of 32-bit numbers, relative to the brightest sample."""
+
+
+ROWS = 64
+"""That are looked at together."""
 
 
 @dataclass(frozen=True)
@@ -119,8 +124,8 @@ def layers(
     if isinstance(scene, WaveScene):
         return waves(optics, scene)
     blurred = optics.transfer.effects or optics.field
-    if scene.samples == "squares" and not blurred:
-        return boxes(optics, scene)
+    if not blurred and (scene.samples == "squares" or scene.is_known):
+        return overlaps(optics, scene)
     return cosines(optics, scene, scene_at)
 
 
@@ -206,23 +211,35 @@ def _rms_of(parts: list, optics: Optics, some: slice) -> float:
     return float(np.sqrt(max(squares)))
 
 
-def boxes(optics: Optics, scene: SampledScene) -> tuple[Layers, Followed]:
+def overlaps(optics: Optics, scene: SampledScene) -> tuple[Layers, Followed]:
     """Means over the photodetectors' boxes; points where the aperture is switched off."""
     g = optics.geometry
-    x, y = _axes(optics, scene, 1.0)
-    memory.require(memory.of_planes(scene, len(optics.mosaic.colors), g, optics.settings), g)
-    planes = scene.planes(optics.transfer.level.T, optics.workers)
-    points = [sampling.boxes(plane, x, y, 0.0, 0.0) for plane in planes]
+    over = _over(optics, scene)
+    points = over(0.0, 0.0)
     if not optics.separable:
         return iter([Layer(lambda color, s: points[color][s])]), Followed()
-    size = g.collecting_width, g.collecting_height
-    means = [sampling.boxes(p, x, y, *size) for p in planes]
-    change = max(
-        float(np.sqrt(np.square(a - b).mean(dtype=np.float64)))
-        for a, b in zip(means, points, strict=True)
-    )
+    means = over(g.collecting_width, g.collecting_height)
+    change = 0.0
+    for a, b in zip(means, points, strict=True):
+        squares = [np.square(a[s] - b[s]).sum(dtype=np.float64) for s in pieces(g.rows, ROWS)]
+        change = max(change, math.sqrt(math.fsum(squares) / (g.rows * g.columns)))
     changes = {e.name: change for e in optics.separable}
     return iter([Layer(lambda color, s: means[color][s])]), Followed(changes=changes)
+
+
+def _over(
+    optics: Optics, scene: SampledScene
+) -> Callable[[float, float], Sequence[NDArray | PlaneOfRuns]]:
+    """From the size of boxes to the means of every color over them."""
+    g, level = optics.geometry, optics.transfer.level.T
+    x, y = _axes(optics, scene, 1.0)
+    light = scene.rectangles(level)
+    if light is not None:
+        exact, dtype = partial(boxes.of_rectangles, light, x, y), optics.settings.dtype
+        return lambda width, height: list(exact(width, height, dtype))
+    memory.require(memory.of_planes(scene, len(optics.mosaic.colors), g, optics.settings), g)
+    planes = scene.planes(level, optics.workers)
+    return lambda width, height: [boxes.of_samples(plane, x, y, width, height) for plane in planes]
 
 
 def cosines(
