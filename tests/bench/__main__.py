@@ -3,10 +3,10 @@
     python -m tests.bench [--json FILE] [--quick]
 
 The yardstick is R_compute: what no camera simulator can do without. For a 12-megapixel Bayer
-frame: one real FFT of the scene, one back for each of three colors, and one standard normal per
-pixel for each of five noise sources. Beside it: a plain NumPy pipeline, wavelength by wavelength;
-the shares of the stages; what every effect costs; how time grows with pixels and wavelengths;
-sweeps over single frames; schedules.
+frame: one real FFT of each component of the scene, one back for each of three colors, and one
+standard normal per pixel for each of five noise sources. Beside it: a plain NumPy pipeline,
+wavelength by wavelength; the shares of the stages; what every effect costs; how time grows with
+pixels and wavelengths; sweeps over single frames; schedules.
 
 Figures are medians of repeated runs in one process, once by the wall clock and once by the time of
 all processors. --quick: small frames, one run each, fewer effects: to see that it works.

@@ -57,24 +57,39 @@ def timed(work: Callable[[], object], repeats: int, warm: bool = True) -> Cost:
     return median([once(work) for _ in range(repeats)])
 
 
-def yardstick(rows: int, columns: int, repeats: int) -> Cost:
-    """R_compute: one real FFT of the scene, one back for each of three colors, and one standard
-    normal per pixel for each of five noise sources. Transforms on all processors, draws from one
-    generator, all in 32 bits.
-    """
+@dataclass(frozen=True)
+class Yardstick:
+    """R_compute, what no simulator can do without, by the number of the scene's components."""
+
+    transform: Cost
+    """A real FFT of one component of the scene, on all processors."""
+    rest: Cost
+    """One back for each of three colors; a standard normal per pixel for each of five noise
+    sources, from one generator."""
+
+    def of(self, components: int) -> Cost:
+        """All of it, in 32 bits."""
+        return Cost(
+            self.rest.wall + components * self.transform.wall,
+            self.rest.cpu + components * self.transform.cpu,
+        )
+
+
+def yardstick(rows: int, columns: int, repeats: int) -> Yardstick:
+    """Measured for a frame of that size."""
     workers = available_workers()
     scene = np.random.default_rng(0).random((rows, columns), dtype=np.float32)
     spectrum = scipy.fft.rfft2(scene, workers=workers)
     generator = np.random.Generator(np.random.Philox(0))
 
-    def work() -> None:
-        scipy.fft.rfft2(scene, workers=workers)
+    def rest() -> None:
         for _ in range(3):
             scipy.fft.irfft2(spectrum, s=scene.shape, workers=workers)
         for _ in range(SOURCES):
             generator.standard_normal((rows, columns), dtype=np.float32)
 
-    return timed(work, repeats)
+    transform = timed(lambda: scipy.fft.rfft2(scene, workers=workers), repeats)
+    return Yardstick(transform, timed(rest, repeats))
 
 
 @dataclass
@@ -100,6 +115,8 @@ class Frames:
     camera: Camera
     costs: list[Cost] = field(default_factory=list)
     stages: list[dict[str, float]] = field(default_factory=list)
+    components: int = 1
+    """Planes of the scene that were transformed."""
 
     def take(self, repeats: int = 1, warm: bool = False) -> Frames:
         """Takes so many more; warm: and one before them that does not count."""
@@ -118,6 +135,7 @@ class Frames:
             results[0].render  # noqa: B018
 
         whole = once(work)
+        self.components = max(1, results[0].frame.spectrum.planes)
         stages = {k: v for k, v in results[0].stages.seconds.items() if k != READ}
         cost = Cost(max(whole.wall - reading.wall, 1e-9), max(whole.cpu - reading.cpu, 1e-9))
         return cost, stages

@@ -17,7 +17,7 @@ from vcam_cli.studies.accuracy import without
 
 from . import plain
 from .cameras import BUSY, PLAIN, Studio, studio
-from .measure import Cost, Frames, frames, timed
+from .measure import Cost, Frames, Yardstick, frames, timed
 
 Ratio = dict[str, float]
 CAPTURES = range(1, 21)
@@ -29,13 +29,15 @@ VARIED = {
 
 
 def against_yardstick(
-    place: Studio, unit: Cost, repeats: int, scenes: Sequence[str]
+    place: Studio, unit: Yardstick, repeats: int, scenes: Sequence[str]
 ) -> tuple[dict[str, Ratio], Frames]:
-    """Frames over R_compute; and those of the gray picture, for their stages."""
+    """Frames over R_compute of as many components; and those of the gray picture, for stages."""
     gray = frames(place.camera("gray"), repeats)
-    found = {"gray picture": gray.cost.over(unit)}
+    found = {"gray picture": gray.cost.over(unit.of(gray.components))}
     for scene in scenes:
-        found[scene] = frames(place.camera(scene), repeats).cost.over(unit)
+        taken = frames(place.camera(scene), repeats)
+        label = f"{scene}, {taken.components} components"
+        found[label] = taken.cost.over(unit.of(taken.components))
     return found, gray
 
 

@@ -45,7 +45,7 @@ class Size:
 WHOLE = Size(
     frame=(3000, 4000),
     part=(864, 1152),
-    growth=((432, 576), (864, 1152), (1728, 2304), (3000, 4000)),
+    growth=((432, 576), (864, 1152), (1728, 2304), (3000, 4000), (6144, 8192)),
     repeats=5,
 )
 QUICK = Size(
@@ -68,7 +68,7 @@ def measure(size: Size, tell: Callable[[str], None] = lambda _: None) -> dict[st
         "processors": available_workers(),
         "size": list(size.frame),
         "repeats": size.repeats,
-        "r_compute": asdict(unit),
+        "r_compute": asdict(unit.of(1)),
     }
     with studio(*size.frame, size.always) as place:
         tell("frames")
@@ -89,6 +89,6 @@ def measure(size: Size, tell: Callable[[str], None] = lambda _: None) -> dict[st
     tell("growth")
     out["growth"] = sections.growth(size.growth, size.repeats, size.always)
     tell("schedules")
-    large = unit.scaled(PIXELS / (size.frame[0] * size.frame[1]))
+    large = unit.of(1).scaled(PIXELS / (size.frame[0] * size.frame[1]))
     out["schedules"] = sections.schedules(large, size.repeats, size.levels)
     return out

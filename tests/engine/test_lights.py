@@ -116,15 +116,34 @@ def test_shared_light_gives_the_same_bytes(tmp_path, changes):
     assert kept.metrics == alone.metrics
 
 
-def test_light_is_brought_once(tmp_path, monkeypatch):
+@pytest.fixture
+def brought(monkeypatch):
+    """How often light is brought to the pixels."""
     calls = []
     true = prepare.optics.photo_rate
     monkeypatch.setattr(
         prepare.optics, "photo_rate", lambda *args: calls.append(args) or true(*args)
     )
+    return calls
+
+
+def test_light_is_brought_once(tmp_path, brought):
     shared = Shared()
     for seed in (1, 2, 3):
         made = camera(tmp_path, BASE | {"seed": {"frame": seed}})
         results = simulate(made, 1, shared=shared)
         assert np.isfinite(results.electrons).all()
-    assert len(calls) == 1
+    assert len(brought) == 1
+
+
+def test_exposures_that_do_not_fill_a_pixel_share_it(tmp_path, brought):
+    """Detail beyond saturation is not followed, and where it begins depends on the exposure."""
+    shared, times, full = Shared(), [], []
+    for time in ("1 ms", "10 ms", "100 ms", "10 s", "30 s"):
+        made = camera(tmp_path, BASE | {"exposure": {"time": time}, "quality": ["mse"]})
+        result, alone = simulate(made, 1, shared=shared), simulate(made, 1)
+        assert result.electrons.tobytes() == alone.electrons.tobytes()
+        full.append(bool((result.dn >= result.frame.saturated_dn).any()))
+        times.append(len(brought))
+    assert full == [False, False, False, True, True]
+    assert np.diff([0, *times]).tolist() == [2, 1, 1, 2, 2]

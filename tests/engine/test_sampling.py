@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from vcam_cli.engine import sampling
+from vcam_cli.engine import boxes, sampling
 from vcam_cli.engine.axis import Axis
 from vcam_cli.engine.transfer import Tables
 
@@ -101,37 +101,6 @@ def test_uniform_light_stays_uniform():
     np.testing.assert_allclose(got, 0.7, atol=1e-12)
 
 
-@pytest.mark.parametrize("grid", ["aligned", "coarse picture", "odd ratio", "off center"])
-@pytest.mark.parametrize("size", [0.3, 0.55, 1.0])
-def test_boxes_equal_summed_overlaps(grid, size):
-    x, y = GRIDS[grid]
-    plane = np.random.default_rng(4).random((y.samples, x.samples))
-    fits = all(
-        a.first - size / 2 >= 0 and a.first + (a.pixels - 1) * a.pixel_pitch + size / 2 <= a.length
-        for a in (x, y)
-    )
-
-    def overlaps(axis):
-        low = axis.first + np.arange(axis.pixels) * axis.pixel_pitch - size / 2
-        edge = np.arange(axis.samples) * axis.sample_pitch
-        shared = np.minimum(low[:, None] + size, edge + axis.sample_pitch) - np.maximum(
-            low[:, None], edge
-        )
-        return np.clip(shared, 0, None) / size
-
-    expected = overlaps(y) @ plane @ overlaps(x).T
-    got = sampling.boxes(plane, x, y, size, size)
-    inner = (slice(None), slice(None)) if fits else (slice(1, -1), slice(1, -1))
-    np.testing.assert_allclose(got[inner], expected[inner], atol=1e-12)
-
-
-def test_box_of_no_size_reads_the_sample_under_it():
-    x, y = GRIDS["coarse picture"]
-    plane = np.arange(48.0).reshape(6, 8)
-    got = sampling.boxes(plane, x, y, 0.0, 0.0)
-    assert np.array_equal(got, np.kron(plane, np.ones((3, 3))))
-
-
 def test_filter_approaches_boxes_as_the_bandwidth_grows():
     """Without optical blur the spectrum's way and the exact one meet, as 1 / bandwidth."""
     errors = []
@@ -143,6 +112,6 @@ def test_filter_approaches_boxes_as_the_bandwidth_grows():
         c = sampling.spectrum(plane[None].copy(), 1)
         f = sampling.Filter(x, y, flat, np.sinc(x.frequencies * 0.7), np.sinc(y.frequencies * 0.7))
         got = f.apply(c, 1)(0, slice(None))
-        errors.append(np.abs(got - sampling.boxes(plane, x, y, 0.7, 0.7)).max())
+        errors.append(np.abs(got - boxes.of_samples(plane, x, y, 0.7, 0.7)).max())
     assert errors[0] < 0.06
     assert errors[1] < errors[0] / 5

@@ -50,11 +50,13 @@ def passes(samples: int, planes: int, itemsize: int) -> bool:
 
 
 @dataclass(frozen=True)
-class _PlaneOfRuns:
+class PlaneOfRuns:
+    """Rows of one of those planes."""
+
     along: NDArray
     values: NDArray
 
-    def __getitem__(self, index: NDArray) -> NDArray:
+    def __getitem__(self, index: NDArray | slice) -> NDArray:
         some = self.along[index]
         out = np.empty((len(some), self.values.shape[1]), self.values.dtype)
         for c in pieces(out.shape[1], max(1, PRODUCT // max(1, some.size))):
@@ -79,8 +81,8 @@ class OfRuns:
     def shape(self) -> tuple[int, int, int]:
         return len(self.values), len(self.along), self.values.shape[2]
 
-    def __iter__(self) -> Iterator[Plane]:
-        return (_PlaneOfRuns(self.along, values) for values in self.values)
+    def __iter__(self) -> Iterator[PlaneOfRuns]:
+        return (PlaneOfRuns(self.along, values) for values in self.values)
 
     def __array__(self, dtype: type | None = None, copy: bool | None = None) -> NDArray:
         every = np.arange(len(self.along))

@@ -37,6 +37,8 @@ pixel is full, beyond which the light is not followed as exactly: see `Lights.ra
 _RANDOM = {kind.name for kind in ORDER if issubclass(kind, Draw | Charge)}
 _LIMIT = 1 << 28
 """Bytes of light that are kept."""
+_MOST = 64
+"""Cameras whose brightest light is remembered."""
 
 
 def depends_on(camera: Camera) -> str:
@@ -76,6 +78,7 @@ class Lights:
     def __init__(self, limit: int = _LIMIT) -> None:
         self._kept: ByteCache[_Kept] = ByteCache(limit)
         self._transfer: tuple[str, Transfer] | None = None
+        self._peaks: dict[str, float] = {}
 
     def transfer(self, camera: Camera, make: Callable[[], Transfer]) -> Transfer:
         """What `make` gives, or gave for the camera before where its light is the same."""
@@ -85,8 +88,17 @@ class Lights:
         return kept[1]
 
     def rate(self, camera: Camera, ceiling: float, make: Callable[[], Rate]) -> Rate:
-        """What `make` gives, or gave for a camera of the same light and the same ceiling.
+        """What `make` gives, or gave for a camera of the same light that fills pixels as fast.
 
-        ceiling: rate at which a pixel fills up [e/s], see `exposure.ceiling`.
+        ceiling: rate at which a pixel is full [e/s], see `exposure.ceiling`. All those are alike
+        that the light does not reach.
         """
-        return self._kept.get((depends_on(camera), ceiling), lambda: _Kept(make())).rate
+        key = depends_on(camera)
+        if key in self._peaks:
+            level = min(ceiling, self._peaks[key])
+            return self._kept.get((key, level), lambda: _Kept(make())).rate
+        if len(self._peaks) >= _MOST:
+            self._peaks.clear()
+        rate = make()
+        self._peaks[key] = rate.spectrum.peak
+        return self._kept.get((key, min(ceiling, rate.spectrum.peak)), lambda: _Kept(rate)).rate

@@ -16,32 +16,31 @@ from vcam_cli.effects.base import RadialTransfer, SeparableTransfer
 from vcam_cli.engine.axis import Axis
 from vcam_cli.engine.coefficients import Coefficients
 from vcam_cli.engine.lookup import Lookup, Position, Rows
+from vcam_cli.engine.parallel import pieces
 from vcam_cli.engine.sampling import Filter
 from vcam_cli.engine.transfer import Fineness, Tables, Transfer, entries
 
-AT_ONCE = 16
-"""Rows of a sample that are filtered together."""
+AT_ONCE = 1 << 17
+"""Terms of a sample that are filtered together, about; no fewer than 16 rows."""
 
 
-def _sampled(terms: int) -> list[tuple[NDArray, NDArray]]:
+def _sampled(y: Axis) -> tuple[NDArray, NDArray]:
     """Rows, and the number of rows each stands for: all of the first few, then ever fewer.
 
     Straight edges along the array put their energy into the first rows and columns.
     """
+    count = y.terms
     sample = np.unique(
-        np.concatenate([np.arange(min(24, terms)), np.geomspace(24, terms, 72)]).astype(int)
+        np.concatenate([np.arange(min(24, count)), np.geomspace(24, count, 72)]).astype(int)
     )
-    sample = sample[sample < terms]
-    edges = np.concatenate([[-0.5], (sample[1:] + sample[:-1]) / 2, [terms - 0.5]])
-    stands_for = np.diff(edges)
-    parts = [slice(i, i + AT_ONCE) for i in range(0, len(sample), AT_ONCE)]
-    return [(sample[part], stands_for[part]) for part in parts]
+    sample = sample[sample < count]
+    edges = np.concatenate([[-0.5], (sample[1:] + sample[:-1]) / 2, [count - 0.5]])
+    return sample, np.diff(edges)
 
 
 def rows_to_sample(y: Axis) -> NDArray:
     """Rows of the coefficients that a `Sample` looks at, rising."""
-    terms = np.concatenate([terms for terms, _ in _sampled(y.terms)])
-    return np.unique(y.base(terms)[0])
+    return np.unique(y.base(_sampled(y)[0])[0])
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +72,9 @@ class Sample:
 
     def _taken(self, coefficients: Coefficients) -> Iterator[_Block]:
         along_x, along_y = self._filter.along_x, self._filter.along_y
-        for terms, stands_for in _sampled(self._filter.y.terms):
+        every, stand_for = _sampled(self._filter.y)
+        for part in pieces(len(every), max(16, AT_ONCE // self._filter.x.terms)):
+            terms, stands_for = every[part], stand_for[part]
             bare = self._filter.rows(coefficients, terms, np.ones(len(terms)), separable=False)
             if bare is None:  # nor are there any of higher frequencies
                 return
@@ -92,10 +93,10 @@ class Sample:
         frequency, power = [fx], [along_x]
         for block, squares in self._squares():
             below = np.searchsorted(fx, fy[block.terms], side="right")
-            lower = np.arange(block.rows.count) < below[:, None]
-            along_x[:, : block.rows.count] += np.where(lower, 0, squares).sum(axis=1)
+            lower = (np.arange(block.rows.count) < below[:, None]).astype(np.float64)
+            along_x[:, : block.rows.count] += np.einsum("cnx,nx->cx", squares, 1 - lower)
             frequency.append(fy[block.terms])
-            power.append(np.where(lower, squares, 0).sum(axis=2))
+            power.append(np.einsum("cnx,nx->cn", squares, lower))
         order = np.argsort(together := np.concatenate(frequency), kind="stable")
         return together[order], np.concatenate(power, axis=1)[:, order]
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 
@@ -26,10 +26,11 @@ from vcam_cli.effects.base import (
     SeparableTransfer,
     Zone,
 )
-from vcam_cli.engine import bandwidth, field, memory, painted, parseval, sampling, turns
+from vcam_cli.engine import bandwidth, boxes, field, memory, painted, parseval, sampling, turns
 from vcam_cli.engine.axis import Axis
-from vcam_cli.engine.coefficients import Coefficients
+from vcam_cli.engine.coefficients import Coefficients, PlaneOfRuns
 from vcam_cli.engine.mosaic import Mosaic
+from vcam_cli.engine.parallel import pieces
 from vcam_cli.engine.room import of_tables, of_zones, table_values
 from vcam_cli.engine.settings import Settings
 from vcam_cli.engine.transfer import EXACT_ENTRIES, Fineness, Tables, Transfer, tabulate
@@ -40,6 +41,10 @@ FIELD_SHARE = 0.2
 picture all of full contrast and detail of all sizes."""
 SINGLE = 5e-7
 """Error of transforms of 32-bit numbers, relative to the brightest sample."""
+
+
+ROWS = 64
+"""That are looked at together."""
 
 
 @dataclass(frozen=True)
@@ -114,6 +119,8 @@ class Followed:
     """Values of transfer functions of fx and fy that were computed for the tables."""
     held: int = 0
     """Samples of all planes that were in memory together."""
+    peak: float = 0.0
+    """Bound on the signal before blur: a ceiling above it changes nothing [electrons / s]"""
     by_color: bool = False
     """Whether the layers have one color each."""
     memory: int = 0
@@ -128,8 +135,8 @@ def layers(
     if isinstance(scene, WaveScene):
         return waves(optics, scene)
     blurred = optics.transfer.effects or optics.field
-    if scene.samples == "squares" and not blurred:
-        return boxes(optics, scene)
+    if not blurred and (scene.samples == "squares" or scene.is_known):
+        return overlaps(optics, scene)
     return cosines(optics, scene, scene_at)
 
 
@@ -215,25 +222,38 @@ def _rms_of(parts: list, optics: Optics, some: slice) -> float:
     return float(np.sqrt(max(squares)))
 
 
-def boxes(optics: Optics, scene: SampledScene) -> tuple[Layers, Followed]:
+def overlaps(optics: Optics, scene: SampledScene) -> tuple[Layers, Followed]:
     """Means over the photodetectors' boxes; points where the aperture is switched off."""
     g = optics.geometry
-    x, y = _axes(optics, scene, 1.0)
-    needed = memory.of_boxes(scene, len(optics.mosaic.colors), g, optics.settings)
-    memory.require(needed, g)
-    planes = scene.planes(optics.transfer.level.T, optics.workers)
-    points = [sampling.boxes(plane, x, y, 0.0, 0.0) for plane in planes]
+    over, needed = _over(optics, scene)
+    points = over(0.0, 0.0)
     if not optics.separable:
         return iter([Layer(lambda color, s: points[color][s])]), Followed(memory=needed)
-    size = g.collecting_width, g.collecting_height
-    means = [sampling.boxes(p, x, y, *size) for p in planes]
-    change = max(
-        float(np.sqrt(np.square(a - b).mean(dtype=np.float64)))
-        for a, b in zip(means, points, strict=True)
-    )
+    means = over(g.collecting_width, g.collecting_height)
+    change = 0.0
+    for a, b in zip(means, points, strict=True):
+        squares = [np.square(a[s] - b[s]).sum(dtype=np.float64) for s in pieces(g.rows, ROWS)]
+        change = max(change, math.sqrt(math.fsum(squares) / (g.rows * g.columns)))
     changes = {e.name: change for e in optics.separable}
     followed = Followed(changes=changes, memory=needed)
     return iter([Layer(lambda color, s: means[color][s])]), followed
+
+
+def _over(
+    optics: Optics, scene: SampledScene
+) -> tuple[Callable[[float, float], Sequence[NDArray | PlaneOfRuns]], int]:
+    """From the size of boxes to the means of every color over them; and memory [bytes]."""
+    g, level = optics.geometry, optics.transfer.level.T
+    x, y = _axes(optics, scene, 1.0)
+    light = scene.rectangles(level)
+    if light is not None:
+        exact, dtype = partial(boxes.of_rectangles, light, x, y), optics.settings.dtype
+        return lambda width, height: list(exact(width, height, dtype)), 0
+    needed = memory.of_boxes(scene, len(optics.mosaic.colors), g, optics.settings)
+    memory.require(needed, g)
+    planes = scene.planes(level, optics.workers)
+    size = x, y
+    return lambda *box: [boxes.of_samples(plane, *size, *box) for plane in planes], needed
 
 
 def cosines(
@@ -265,6 +285,7 @@ def cosines(
         tables, modes = field.tabulate(optics.transfer, zones, g, fine)
     else:
         tables = tabulate(optics.transfer, fine)
+    highest = 0.0
     while True:
         reach = reach if at_hand else float(oversampling)
         terms = painted.wanted(scene, *_axes(optics, scene, reach))
@@ -283,8 +304,9 @@ def cosines(
             )
         else:
             light = painted.Painted(scene.planes(tables.mix, optics.workers))
-        peak = min(light.peak(tables), optics.ceiling)
-        budget = bandwidth.SHARE * knobs.tolerance * peak
+        peak = light.peak(tables)
+        highest = max(highest, peak)
+        budget = bandwidth.SHARE * knobs.tolerance * min(peak, optics.ceiling)
         if light.brightest(tables) * SINGLE > budget:
             light = light.doubled()
         coefficients = light.spectrum(optics.workers, terms)
@@ -313,7 +335,7 @@ def cosines(
         looked, chosen, together, coefficients, held, len(modes), room, g, optics.workers
     )
     memory.require(needed, g)
-    looks = (enough, lost, samples, count, changes, len(modes), times, values, held)
+    looks = (enough, lost, samples, count, changes, len(modes), times, values, held, highest)
     followed = Followed(*looks, by_color=len(together) > 1, memory=needed)
     del light
 

@@ -114,7 +114,7 @@ class _Run:
             camera = point.camera
             assert camera is not None
             if point.content not in lights:
-                lights[point.content] = _light(camera)
+                lights[point.content] = depends_on(camera)
             job = Job(point.id, _bare(camera), self._metrics, self._keep, versions)
             groups.setdefault(lights[point.content], []).append(job)
         return list(groups.values())
@@ -138,13 +138,6 @@ class _Run:
         self._folder.write(outcome.id, outcome.content(), outcome.frames)
         self._folder.release(outcome.id)
         self.outcomes[outcome.id] = replace(outcome, frames={})
-
-
-def _light(camera: Camera) -> str:
-    """What cameras of the same light have in common, the level of saturation included."""
-    form = camera.model_dump(mode="json")
-    level = [form["exposure"], form["adc"], form["pixel"]["readout"].get("gain")]
-    return f"{depends_on(camera)} {level}"
 
 
 def _bare(camera: Camera) -> Camera:
