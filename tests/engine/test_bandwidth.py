@@ -15,9 +15,9 @@ from making import camera
 
 from vcam_cli.camera.geometry import Geometry, geometry
 from vcam_cli.engine import bandwidth, optics, plan
+from vcam_cli.engine.layers import Optics
 from vcam_cli.engine.mosaic import mosaic
 from vcam_cli.engine.settings import STANDARD, settings
-from vcam_cli.engine.ways import Optics
 from vcam_cli.scenes.build import build
 
 

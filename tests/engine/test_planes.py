@@ -11,11 +11,11 @@ from vcam_cli.camera.geometry import geometry
 from vcam_cli.effects.base import FieldTransfer, PlaneTransfer, RadialTransfer, Zone
 from vcam_cli.engine import field, parseval, sampling, transfer, ways
 from vcam_cli.engine.axis import Axis
+from vcam_cli.engine.layers import Optics
 from vcam_cli.engine.mosaic import Mosaic
 from vcam_cli.engine.optics import photo_rate
 from vcam_cli.engine.settings import STANDARD
 from vcam_cli.engine.transfer import Fineness, Transfer
-from vcam_cli.engine.ways import Optics
 from vcam_cli.scenes.base import Wave, WaveScene
 from vcam_cli.spectra import Spectrum
 

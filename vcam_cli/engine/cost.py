@@ -16,10 +16,10 @@ from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.geometry import Geometry
 from vcam_cli.effects.base import Code, Draw, Effect, Limit
 from vcam_cli.engine import bandwidth
+from vcam_cli.engine.layers import Followed
 from vcam_cli.engine.mosaic import Mosaic
 from vcam_cli.engine.settings import Settings
 from vcam_cli.engine.transfer import Band
-from vcam_cli.engine.ways import Followed
 from vcam_cli.scheduling.estimators import PASSES
 
 NORMAL = 8.2e-9

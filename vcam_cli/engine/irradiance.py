@@ -25,12 +25,12 @@ from vcam_cli.effects.base import Blur, Gain, Veil
 from vcam_cli.effects.pixel_aperture import PixelAperture
 from vcam_cli.engine import optics, ways
 from vcam_cli.engine.cost import BANDS_AT_ONCE
+from vcam_cli.engine.layers import Layer, Optics
 from vcam_cli.engine.mosaic import Mosaic
 from vcam_cli.engine.parallel import each
 from vcam_cli.engine.prepare import Prepared
 from vcam_cli.engine.settings import Settings
 from vcam_cli.engine.transfer import Band, Transfer
-from vcam_cli.engine.ways import Optics
 from vcam_cli.physics import radiometry
 from vcam_cli.rng import blocks
 from vcam_cli.scenes.base import SampledScene, WaveScene
@@ -89,7 +89,7 @@ def _bands(
     layers, _ = ways.layers(light, lambda oversampling: _scene(ready, oversampling))
     for layer in layers:
 
-        def add(s: slice, layer: ways.Layer = layer) -> None:
+        def add(s: slice, layer: Layer = layer) -> None:
             weight = 1 if layer.weight is None else layer.weight(x.astype(dtype), y[s])
             for band in layer.of(len(out)):
                 out[band, s] += weight * layer.values(band, s)

@@ -19,6 +19,7 @@ from vcam_cli.camera.geometry import Geometry, pixel_centers
 from vcam_cli.camera.photodiode import quantum_efficiency
 from vcam_cli.effects.base import Blur, Effect, Gain, Veil
 from vcam_cli.engine import ways
+from vcam_cli.engine.layers import Followed, Layer, Optics
 from vcam_cli.engine.mosaic import Mosaic
 from vcam_cli.engine.parallel import each
 from vcam_cli.engine.settings import Settings
@@ -117,12 +118,12 @@ class Rate:
 
     values: NDArray
     """(rows, columns) of the lattice, or (C, rows, columns) with every color [electrons / s]"""
-    spectrum: ways.Followed
+    spectrum: Followed
     """How far the scene's spectrum was followed, and what each transfer does to the picture."""
 
 
 def photo_rate(
-    optics: ways.Optics,
+    optics: Optics,
     scene_at: Callable[[int], WaveScene | SampledScene],
     planes: bool = False,
 ) -> Rate:
@@ -153,7 +154,7 @@ def photo_rate(
         if veil is None:
             gain(after, block)
 
-    def compute(layer: ways.Layer, block: slice) -> None:
+    def compute(layer: Layer, block: slice) -> None:
         if layer.weight is None:
             _fill(out[:, block], layer, mosaic, block)
         else:
@@ -185,7 +186,7 @@ def _in_order(effects: Sequence[Effect]) -> tuple[list[Gain], Veil | None, list[
     return early, veil, [e for e in gains if e not in early]
 
 
-def _fill(tile: NDArray, layer: ways.Layer, mosaic: Mosaic, block: slice) -> None:
+def _fill(tile: NDArray, layer: Layer, mosaic: Mosaic, block: slice) -> None:
     """Puts a layer's light where it belongs: every color in its plane, or each in its places."""
     if len(tile) > 1:
         for color in layer.of(len(tile)):

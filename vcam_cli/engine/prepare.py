@@ -18,13 +18,13 @@ from vcam_cli.camera.geometry import Geometry, geometry
 from vcam_cli.effects.base import Charge, Effect, Outlook, Transport
 from vcam_cli.effects.quantization import Quantization
 from vcam_cli.engine import bandwidth, cost, exposure, memory, optics, pixelwise, plan, scheduled
+from vcam_cli.engine.layers import Followed, Optics
 from vcam_cli.engine.layout import Layout, layout
 from vcam_cli.engine.lights import Lights
 from vcam_cli.engine.mosaic import Mosaic
 from vcam_cli.engine.settings import Settings, settings
 from vcam_cli.engine.stages import Stages
 from vcam_cli.engine.transfer import Transfer
-from vcam_cli.engine.ways import Followed, Optics
 from vcam_cli.errors import bad
 from vcam_cli.scenes.base import SampledScene, WaveScene
 from vcam_cli.scenes.build import build

@@ -1,130 +1,53 @@
 """Three ways from a scene to its pixels' signal; each scene takes the one that suits it.
 
 - A scene known as waves: each keeps its shape, its transfer is a number per color. Exact.
-- A picture of uniform squares without any optical blur: means over boxes. Exact.
+- A picture of uniform squares, or a chart of even rectangles, without any optical blur: means over
+  boxes. Exact.
 - Everything else: through the cosine spectrum, as far up as the tolerance asks.
 """
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vcam_cli.camera.geometry import Geometry, pixel_centers
 from vcam_cli.effects.base import (
-    Blur,
-    Effect,
     FieldTransfer,
     PlaneTransfer,
     RadialTransfer,
     SeparableTransfer,
-    Zone,
 )
-from vcam_cli.engine import bandwidth, boxes, field, memory, painted, parseval, sampling, turns
+from vcam_cli.engine import (
+    bandwidth,
+    boxes,
+    field,
+    memory,
+    painted,
+    parseval,
+    sampling,
+    turns,
+    waves,
+)
 from vcam_cli.engine.axis import Axis
 from vcam_cli.engine.coefficients import Coefficients, PlaneOfRuns
-from vcam_cli.engine.mosaic import Mosaic
+from vcam_cli.engine.layers import Followed, Layer, Layers, Optics
 from vcam_cli.engine.parallel import pieces
 from vcam_cli.engine.room import of_tables, of_zones, table_values
-from vcam_cli.engine.settings import Settings
-from vcam_cli.engine.transfer import EXACT_ENTRIES, Fineness, Tables, Transfer, tabulate
-from vcam_cli.scenes.base import SampledScene, Wave, WaveScene
+from vcam_cli.engine.transfer import EXACT_ENTRIES, Fineness, Tables, tabulate
+from vcam_cli.scenes.base import SampledScene, WaveScene
 
 FIELD_SHARE = 0.2
 """Part of the tolerance that modes of the field are left out for before the picture is asked: in a
 picture all of full contrast and detail of all sizes."""
 SINGLE = 5e-7
 """Error of transforms of 32-bit numbers, relative to the brightest sample."""
-
-
 ROWS = 64
 """That are looked at together."""
-
-
-@dataclass(frozen=True)
-class Layer:
-    """A share of the light on the sensor; all layers together are the signal."""
-
-    values: Callable[[int, slice], NDArray]
-    """From a color and array rows to its signal there, (rows, columns) [electrons / s]."""
-    weight: Callable[[NDArray, NDArray], NDArray] | None = None
-    """A factor at the positions x (columns,), y (rows,) [m]: (rows, columns). Of each color there
-    is one layer at most without."""
-    colors: range | None = None
-    """Those that are in it; None for all."""
-
-    def of(self, count: int) -> range:
-        """Which of so many colors are in it."""
-        return range(count) if self.colors is None else self.colors
-
-
-Layers = Iterator[Layer]
-"""One is made when the one before is done with: each may take much memory."""
-
-
-@dataclass(frozen=True)
-class Optics:
-    """What the light passes between scene and electrons."""
-
-    transfer: Transfer
-    """Of the scene's components."""
-    geometry: Geometry
-    settings: Settings
-    mosaic: Mosaic
-    effects: tuple[Effect, ...]
-    workers: int
-    ceiling: float = np.inf
-    """Rate at which a pixel fills up, as far as it is known; brighter ones all look alike [e/s]."""
-
-    @property
-    def separable(self) -> list[SeparableTransfer]:
-        return [e for e in self.effects if isinstance(e, SeparableTransfer)]
-
-    @property
-    def field(self) -> FieldTransfer | None:
-        """The blur that changes over the field, where there is one."""
-        return next((e for e in self.effects if isinstance(e, FieldTransfer)), None)
-
-    @cached_property
-    def zones(self) -> tuple[Zone, ...]:
-        """The zones of that blur; none where there is none."""
-        return () if self.field is None else self.field.zones(self.settings.field_zones)
-
-
-@dataclass(frozen=True)
-class Followed:
-    """How far a scene's spectrum was followed, and what was in it."""
-
-    oversampling: float = 0.0
-    """Pixel Nyquist frequencies; 0 where the scene is known in closed form."""
-    lost: float = 0.0
-    """Estimated rms of the signal beyond [electrons / s]"""
-    samples: int = 0
-    """Samples of one plane of the scene; 0 where its waves are known."""
-    planes: int = 0
-    """Planes that were transformed."""
-    changes: dict[str, float] = dataclasses.field(default_factory=dict)
-    """Transfer -> rms change of the signal by leaving it out [electrons / s]"""
-    modes: int = 0
-    """Filters beside the first that the change of the blur over the field took."""
-    passes: int = 1
-    """How often the spectrum was filtered: once for each parity of every filter."""
-    table_values: int = 0
-    """Values of transfer functions of fx and fy that were computed for the tables."""
-    held: int = 0
-    """Samples of all planes that were in memory together."""
-    peak: float = 0.0
-    """Bound on the signal before blur: a ceiling above it changes nothing [electrons / s]"""
-    by_color: bool = False
-    """Whether the layers have one color each."""
-    memory: int = 0
-    """That this takes at most [bytes]."""
 
 
 def layers(
@@ -133,93 +56,11 @@ def layers(
     """The light at the photodetectors; and what the scene asked for."""
     scene = scene_at(bandwidth.first_guess(optics.geometry, optics.settings))
     if isinstance(scene, WaveScene):
-        return waves(optics, scene)
+        return waves.layers(optics, scene)
     blurred = optics.transfer.effects or optics.field
     if not blurred and (scene.samples == "squares" or scene.is_known):
         return overlaps(optics, scene)
     return cosines(optics, scene, scene_at)
-
-
-def waves(optics: Optics, scene: WaveScene) -> tuple[Layers, Followed]:
-    """The sum of waves at the photodetectors, each with its own transfer."""
-    x, y = pixel_centers(optics.geometry, detector=True)
-    shapes = [
-        (np.exp(1j * (2 * np.pi * w.fx * x + w.phase)), np.exp(2j * np.pi * w.fy * y))
-        for w in scene.waves
-    ]
-    whole = _wave_levels(optics, scene, optics.effects)
-
-    def layer(levels: NDArray, weight: Callable | None) -> Layer:
-        def values(color: int, s: slice) -> NDArray:
-            total = np.zeros((len(y[s]), len(x)))
-            for level, (ex, ey) in zip(levels, shapes, strict=True):
-                total += (level[color] * ey[s, None] * ex[None, :]).real
-            return total
-
-        return Layer(values, weight)
-
-    changes = {}
-    some = slice(None, None, max(1, len(y) // 64))
-    for effect in optics.effects:
-        if isinstance(effect, Blur | SeparableTransfer | FieldTransfer):
-            others = tuple(e for e in optics.effects if e is not effect)
-            difference = [
-                (layer(levels, None), weight)
-                for levels, weight in _differences(optics, scene, whole, others)
-            ]
-            changes[effect.name] = _rms_of(difference, optics, some)
-    found = (layer(levels, weight) for levels, weight in whole)
-    return found, Followed(changes=changes)
-
-
-Levels = list[tuple[NDArray, Callable | None]]
-"""Of each zone: complex amplitudes of the waves in every color (waves, C), and its weight."""
-
-
-def _wave_levels(optics: Optics, scene: WaveScene, effects: tuple[Effect, ...]) -> Levels:
-    """What the waves become through some of the effects [electrons / s]."""
-    through = optics.transfer.through(effects)
-    parts: list[tuple[Callable | None, tuple[Blur, ...]]] = [(None, through.effects)]
-    if optics.field in effects:
-        parts = [(zone.weight, (*through.effects, zone.blur)) for zone in optics.zones]
-    out: Levels = []
-    for weight, blurs in parts:
-        blurred = through.through(blurs)
-        out.append((np.array([_level(blurred, effects, w) for w in scene.waves]), weight))
-    return out
-
-
-def _level(blurred: Transfer, effects: tuple[Effect, ...], wave: Wave) -> NDArray:
-    """Complex amplitude of a wave's signal in each color, (C,) [electrons / s]."""
-    fx, fy = np.array([wave.fx]), np.array([wave.fy])
-    level: NDArray = np.asarray(wave.weights) @ blurred.at_plane(fx, fy)[..., 0, 0]
-    for e in effects:
-        if isinstance(e, SeparableTransfer):
-            level = level * e.along_x(fx) * e.along_y(fy)
-    return level
-
-
-def _differences(
-    optics: Optics, scene: WaveScene, whole: Levels, others: tuple[Effect, ...]
-) -> Levels:
-    """What the waves lose by the effects that are not among the others."""
-    rest = _wave_levels(optics, scene, others)
-    if len(rest) == len(whole):
-        return [(a - b, weight) for (a, _), (b, weight) in zip(rest, whole, strict=True)]
-    return [(rest[0][0] - levels, weight) for levels, weight in whole]
-
-
-def _rms_of(parts: list, optics: Optics, some: slice) -> float:
-    """Rms of weighted layers in the color where it is most, on some rows [electrons / s]."""
-    x, y = pixel_centers(optics.geometry)
-    squares = []
-    for color in range(len(optics.mosaic.colors)):
-        total = np.zeros((len(y[some]), len(x)))
-        for layer, weight in parts:
-            values = layer.values(color, some)
-            total += values if weight is None else values * weight(x, y[some])
-        squares.append(np.square(total).mean())
-    return float(np.sqrt(max(squares)))
 
 
 def overlaps(optics: Optics, scene: SampledScene) -> tuple[Layers, Followed]:
