@@ -9,7 +9,7 @@ import mpmath as mp
 import numpy as np
 import scipy.fft
 
-from vcam_cli.engine import sampling as of_engine
+from vcam_cli.engine import boxes
 from vcam_cli.engine.axis import Axis
 from vcam_cli.scenes.base import Frame
 from vcam_cli.scenes.csf import Csf
@@ -180,7 +180,7 @@ BOXES = Case(
     "a box of 1/16 sample is the difference of sums over 10007",
     "overlaps one by one",
     lambda: in_digits(_boxes_exact, ASKED),
-    lambda: of_engine.boxes(PICTURE[None], FINE, DOWN, DETECTOR, 1.0)[0, ASKED],
+    lambda: boxes.of_samples(PICTURE[None], FINE, DOWN, DETECTOR, 1.0)[0, ASKED],
     _boxes_by_float32_sums,
     "running sums in the picture's float32",
     1e-8,

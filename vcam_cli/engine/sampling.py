@@ -254,9 +254,21 @@ class Filter:
         by_column = x.weights[:count]
         if separable:
             by_row, by_column = by_row * self.along_y[terms], by_column * self.along_x[:count]
+        beyond = self._beyond(fy, count)
         parts = []
         for plane in coefficients:
             part = x.extend(plane[index], count) * by_column.astype(dtype)
             part *= by_row.astype(dtype)[:, None]
+            if beyond is not None:
+                part[beyond] = 0
             parts.append(part)
         return Rows(parts, fy, count)
+
+    def _beyond(self, fy: NDArray, count: int) -> NDArray | None:
+        """Where |f| is beyond the tables: (n, count); None where they are 0 there by themselves.
+
+        Those over fx and fy are square, and in their corners what takes away the part over |f|.
+        """
+        if all(plane is None for plane in self.tables.planes):
+            return None
+        return np.hypot(self.x.frequencies[:count], fy[:, None]) > self.tables.top * (1 + 1e-9)
