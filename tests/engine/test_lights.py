@@ -147,3 +147,11 @@ def test_exposures_that_do_not_fill_a_pixel_share_it(tmp_path, brought):
         times.append(len(brought))
     assert full == [False, False, False, True, True]
     assert np.diff([0, *times]).tolist() == [2, 1, 1, 2, 2]
+
+
+def test_what_an_effect_contributes_is_told_of_shared_light_too(tmp_path):
+    shared = Shared()
+    for time in ("1 ms", "10 s", "30 s"):  # of these pixels are full: the light is brought again
+        made = camera(tmp_path, BASE | {"exposure": {"time": time}})
+        kept, alone = simulate(made, 1, shared=shared), simulate(made, 1)
+        assert kept.frame.plan == alone.frame.plan

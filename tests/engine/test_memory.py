@@ -131,6 +131,23 @@ def test_tables_that_do_not_fit_are_not_computed(monkeypatch):
         simulate(camera)
 
 
+@pytest.mark.parametrize("columns", [300, 3000])
+def test_overlaps_with_many_rectangles_take_what_was_foretold(columns):
+    wedge = "scene.source={kind: chart, chart: step-wedge, steps: 1000}"
+    sharp = ["optics.diffraction=false", f"array.columns={columns}"]
+    camera = load("colorchecker-d65", [*SMALL, *sharp, wedge])
+    foretold = prepare(camera, 1)[0].spectrum.memory - memory.BASE
+    taken = peak_of(lambda: prepare(camera, 1))
+    assert 0.5 * foretold < taken < foretold + 10e6
+
+
+def test_rectangles_that_do_not_fit_are_not_laid_over(monkeypatch):
+    sharp = [*SMALL, "optics.diffraction=false"]
+    monkeypatch.setattr(memory, "of_overlaps", lambda *args: 1 << 62)
+    with pytest.raises(CannotDo, match="GB of memory"):
+        simulate(load("colorchecker-d65", sharp))
+
+
 def test_more_pixels_need_more():
     camera = load("colorchecker-d65", SMALL)
     few, many = (

@@ -173,6 +173,31 @@ def test_a_blur_without_direction_needs_no_sines():
     assert tables.parities == [0, 1, 2, 3]
 
 
+@pytest.mark.parametrize("dtype", [np.float64, np.float32])
+def test_what_a_sampled_spread_ends_stays_away(dtype):
+    # Zero from a square of frequencies on: its tables end at the square's corner, the spectrum goes
+    # further. Beyond the end there is no light to take away again.
+    half = 1e5
+
+    class Ends(Leaning):
+        def otf_plane(self, fx, fy, wavelength):
+            inside = (np.abs(fx) < half)[None, :] & (np.abs(fy) < half)[:, None]
+            return inside.astype(complex)
+
+    blur = Ends(0.0, 0.0, 3e-6, 3e-6)
+    top = np.hypot(half, half)
+    x = y = Axis(40, 0.5e-6, 5, 4e-6, 2.7e-6, True, top)
+    tables = transfer.tabulate(light(blur), Fineness(top, 1 << 14, 1e-6))
+    filter = sampling.Filter(x, y, tables, np.ones(x.terms), np.ones(y.terms))
+    coefficients = np.zeros((1, 40, 40), dtype)
+    beyond = np.hypot(x.frequencies[:, None], x.frequencies) > top
+    assert beyond.any()
+    coefficients[0, : y.terms, : x.terms][beyond] = 1
+    series = filter.apply(coefficients, 1)
+    assert np.all(series(0, slice(None)) == 0)
+    assert parseval.Sample(filter, coefficients).mean_square(tables).max() == 0
+
+
 def test_power_is_the_mean_square_of_the_picture():
     blur = BLURS["slanted"]
     x, y = AXES["folded"]

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from vcam_cli.camera.geometry import Geometry
 from vcam_cli.engine.settings import Settings
 from vcam_cli.errors import CannotDo
-from vcam_cli.scenes.base import SampledScene
+from vcam_cli.scenes.base import Rectangles, SampledScene
 
 if TYPE_CHECKING:
     from vcam_cli.engine.room import Room
@@ -68,6 +68,18 @@ def of_boxes(scene: SampledScene, planes: int, geometry: Geometry, knobs: Settin
     width = knobs.float_width // 8
     kept = planes * (samples * width + pixels * (width + 8))
     return BASE + kept + 5 * 8 * max(samples, pixels)
+
+
+def of_overlaps(light: Rectangles, geometry: Geometry, knobs: Settings) -> int:
+    """Peak memory while boxes of pixels are laid over even rectangles [bytes].
+
+    Shares of every run in every box, while they are computed in 64 bits; what is kept, of points
+    and of means.
+    """
+    planes, runs_y, runs_x = light.values.shape
+    shares = geometry.rows * runs_y, geometry.columns * runs_x
+    kept = shares[0] + planes * runs_y * geometry.columns
+    return BASE + round(SLACK * (6 * 8 * max(shares) + 2 * kept * knobs.float_width // 8))
 
 
 def of_looking(filter: Filter, held: int, width: int, tables: Room) -> int:

@@ -102,7 +102,8 @@ def prepare(
         spectra = (*scene.spectra, scene.white)
         see = partial(_transfer, camera, g, knobs, spectra, colors, effects)
         both = see() if lights is None else lights.transfer(camera, see)
-        transfer = replace(both, weights=both.weights[:-1])
+        # Kept light came with another camera's effects, which are equal but not the same.
+        transfer = replace(both.through(effects), weights=both.weights[:-1])
         white_rate = both.level[-1]
         _refuse_too_much(float(white_rate.max()))
         ceiling = exposure.ceiling(camera, float(white_rate.max()), e.saturation / joins.charges)

@@ -89,7 +89,9 @@ def _over(
     light = scene.rectangles(level)
     if light is not None:
         exact, dtype = partial(boxes.of_rectangles, light, x, y), optics.settings.dtype
-        return lambda width, height: list(exact(width, height, dtype)), 0
+        needed = memory.of_overlaps(light, g, optics.settings)
+        memory.require(needed, g)
+        return lambda width, height: list(exact(width, height, dtype)), needed
     needed = memory.of_boxes(scene, len(optics.mosaic.colors), g, optics.settings)
     memory.require(needed, g)
     planes = scene.planes(level, optics.workers)
