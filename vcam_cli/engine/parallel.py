@@ -13,12 +13,23 @@ from typing import TypeVar
 
 Item = TypeVar("Item")
 
+A_THREAD = 1 << 18
+"""Pixels that are worth a thread of their own."""
+
 
 def available_workers() -> int:
     """Processors this process may use."""
     if hasattr(os, "sched_getaffinity"):
         return len(os.sched_getaffinity(0))
     return os.cpu_count() or 1
+
+
+def suited(pixels: int) -> int:
+    """Threads for a frame of so many pixels: fewer than there are processors where it is small.
+
+    A quarter of a megapixel takes a fifth longer with two threads than with one.
+    """
+    return max(1, min(available_workers(), pixels // A_THREAD))
 
 
 def each(work: Callable[[Item], object], items: Iterable[Item], workers: int) -> None:

@@ -43,6 +43,7 @@ from vcam_cli.studies.accuracy_reference import (
 from vcam_cli.studies.accuracy_refined import Refined, refined, same
 from vcam_cli.studies.accuracy_shots import Clock, Shot, resolved
 from vcam_cli.studies.shared import Shared
+from vcam_cli.studies.simulate import threads
 
 __all__ = ["COLUMNS", "Point", "Study", "accuracy"]
 
@@ -89,10 +90,11 @@ class Study:
 def accuracy(camera: Camera, workers: int | None = None, watch: Observer | None = None) -> Study:
     """Measures `camera` along every knob, with every preset, without every effect.
 
-    workers: threads, default all processors. watch: told of stages. Raises BadInput, CannotDo.
+    workers: threads, default all processors, and for what is timed those that a frame takes.
+    watch: told of stages. Raises BadInput, CannotDo.
     """
-    workers = workers or available_workers()
-    return _Measurement(camera, Clock(workers), workers, watch or Silent()).study()
+    clock = Clock(workers or threads(camera))
+    return _Measurement(camera, clock, workers or available_workers(), watch or Silent()).study()
 
 
 @dataclass

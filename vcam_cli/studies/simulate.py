@@ -13,8 +13,9 @@ from vcam_cli.camera import photodiode
 from vcam_cli.camera.array import Positions
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.electrical import no_volts
+from vcam_cli.camera.geometry import geometry
 from vcam_cli.engine.frame import Frame, expose, figures
-from vcam_cli.engine.parallel import available_workers
+from vcam_cli.engine.parallel import suited
 from vcam_cli.engine.prepare import Prepared
 from vcam_cli.engine.prepare import prepare as bring_light
 from vcam_cli.engine.stages import Observer, Silent, Stages
@@ -189,6 +190,15 @@ class Result:
         return out
 
 
+def threads(camera: Camera) -> int:
+    """Those that a camera's frame is computed in: all processors, but for small frames.
+
+    Raises BadInput where the camera's size contradicts itself.
+    """
+    g = geometry(camera)
+    return suited(g.rows * g.columns)
+
+
 def simulate(
     camera: Camera,
     workers: int | None = None,
@@ -197,14 +207,14 @@ def simulate(
 ) -> Result:
     """Simulates `camera` looking at its scene.
 
-    workers: threads, default all processors; results do not depend on it. watch: told of stages,
+    workers: threads, default `threads`; results do not depend on it. watch: told of stages,
     here and while the result's properties are computed. shared: what cameras before this one had
     in common with it; results do not depend on it either. Raises BadInput (with positions in the
     camera's file) and CannotDo.
     """
     try:
         stages = Stages(watch=watch or Silent())
-        return _simulate(camera, workers or available_workers(), stages, shared or Shared())
+        return _simulate(camera, workers or threads(camera), stages, shared or Shared())
     except BadInput as error:
         raise error.located(camera.locate) from None
 
@@ -217,7 +227,7 @@ def prepare(
         stages = Stages(watch=watch or Silent())
         camera = _with_lens(camera, stages)
         picture, notes = _picture(camera, stages)
-        ready = bring_light(camera, picture, workers or available_workers(), stages)
+        ready = bring_light(camera, picture, workers or threads(camera), stages)
         return ready, notes + _remarks(ready)
     except BadInput as error:
         raise error.located(camera.locate) from None
