@@ -128,12 +128,16 @@ class Filter:
         """Adds what planes give, whose index is from `first` on."""
         for parity in self.tables.parities:
             odd_x, odd_y = PARITIES[parity]
-            ways = [(x, y) for y in self.y.bases(odd_y) for x in [self.x.bases(odd_x)]]
-            ways = [(x, y) for x, y in ways if any((to, y[0]) in folded for to, _ in x)]
-            if ways:
+            along_x = self.x.bases(odd_x)
+            wanted = [
+                turn
+                for turn in self.y.bases(odd_y)
+                if any((to_x, turn[0]) in folded for to_x, _ in along_x)
+            ]
+            if wanted:
                 lookup = Lookup(self.tables, parity, self.x.frequencies, planes.dtype, first)
-                for along_x, along_y in ways:
-                    self._multiply(planes, lookup, along_x, along_y, folded, workers)
+            for along_y in wanted:
+                self._multiply(planes, lookup, along_x, along_y, folded, workers)
 
     def _multiply(
         self,

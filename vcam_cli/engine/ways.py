@@ -170,16 +170,25 @@ def cosines(
     modes, squares = _needed(optics, scene, sample, modes, budget)
     # Without one of them the picture may reach further than it does with all of them.
     changes = dict(_changes(optics, scene, sample, squares))
-    count = len(tables.mix)
-    times = len(tables.parities) + len(modes)
-    values = table_values(optics.transfer, zones, tables)
     together = turns.together(chosen, coefficients, g)
     needed = turns.needed(
         looked, chosen, together, coefficients, held, len(modes), room, g, optics.workers
     )
     memory.require(needed, g)
-    looks = (enough, lost, samples, count, changes, len(modes), times, values, held, highest)
-    followed = Followed(*looks, by_color=len(together) > 1, memory=needed)
+    followed = Followed(
+        oversampling=enough,
+        lost=lost,
+        samples=samples,
+        planes=len(tables.mix),
+        changes=changes,
+        modes=len(modes),
+        passes=len(tables.parities) + len(modes),
+        table_values=table_values(optics.transfer, zones, tables),
+        held=held,
+        peak=highest,
+        by_color=len(together) > 1,
+        memory=needed,
+    )
     del light
 
     def each(coefficients: Coefficients) -> Layers:
