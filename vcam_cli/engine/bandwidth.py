@@ -20,13 +20,13 @@ from vcam_cli.camera.geometry import Geometry
 from vcam_cli.engine.settings import Settings
 from vcam_cli.engine.transfer import Tables
 
-SHARE = 0.1
-"""Part of the tolerance that the truncation of the spectrum may use up.
+SHARE = 0.3
+"""Part of the tolerance that the truncation of a spectrum at hand may use up."""
+GUESSED = 0.1
+"""The same of a chart that is painted, where the part beyond the sampling is a guess.
 
-Why no more: 0.3 takes a tenth of the time off where the spectrum is at hand and what is foretold is
-what is lost; but of other charts the part beyond the sampling is a guess. Where all edges lie along
-the rows and columns of a few dozen pixels it was found up to eleven times too low, for they do not
-add up at random.
+Where all edges lie along the rows and columns of a few dozen pixels it was found up to eleven times
+too low, for they do not add up at random.
 """
 KNOWN = 64.0
 """Pixel Nyquist frequencies up to which the spectrum of a chart of rectangles is looked at."""
@@ -96,13 +96,23 @@ def first_guess(geometry: Geometry, knobs: Settings) -> int:
     return max(knobs.oversampling, min(free, 4, knobs.most_oversampling))
 
 
+def least(knobs: Settings) -> int:
+    """Lowest frequency at which a spectrum at hand may end; above it the tolerance decides."""
+    return knobs.oversampling if _is_users(knobs) else 1
+
+
+def _is_users(knobs: Settings) -> bool:
+    """Whether the user has said how far a spectrum is followed."""
+    return knobs.most_oversampling <= knobs.oversampling
+
+
 def most(pixels: float, knobs: Settings) -> int:
     """Highest oversampling to be tried: what the settings say, and more on a small array.
 
     pixels: of the scene, with the margin that a chart has.
     """
-    if knobs.most_oversampling <= knobs.oversampling:
-        return knobs.most_oversampling  # the user's own
+    if _is_users(knobs):
+        return knobs.most_oversampling
     cheap = int(math.sqrt(CHEAP_SAMPLES / pixels))
     return max(knobs.most_oversampling, min(cheap, 64))
 

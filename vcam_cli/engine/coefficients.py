@@ -26,7 +26,7 @@ which on a busy machine wait for each other longer than they work."""
 class Plane(Protocol):
     """Rows of one plane's coefficients."""
 
-    def __getitem__(self, index: NDArray) -> NDArray: ...
+    def __getitem__(self, index: NDArray | slice) -> NDArray: ...
 
 
 class Coefficients(Protocol):
@@ -36,6 +36,8 @@ class Coefficients(Protocol):
     def dtype(self) -> np.dtype: ...
 
     def __iter__(self) -> Iterator[Plane]: ...
+
+    def __len__(self) -> int: ...
 
 
 Basis = tuple[bool, bool]
@@ -49,6 +51,14 @@ def passes(samples: int, planes: int, itemsize: int) -> bool:
     return planes > 1 and samples * planes * itemsize > HELD
 
 
+def product(left: NDArray, right: NDArray) -> NDArray:
+    """Of two matrices of the same float type, in one thread."""
+    out = np.empty((len(left), right.shape[1]), right.dtype)
+    for columns in pieces(out.shape[1], max(1, PRODUCT // max(1, left.size))):
+        np.matmul(left, right[:, columns], out=out[:, columns])
+    return out
+
+
 @dataclass(frozen=True)
 class PlaneOfRuns:
     """Rows of one of those planes."""
@@ -57,11 +67,7 @@ class PlaneOfRuns:
     values: NDArray
 
     def __getitem__(self, index: NDArray | slice) -> NDArray:
-        some = self.along[index]
-        out = np.empty((len(some), self.values.shape[1]), self.values.dtype)
-        for c in pieces(out.shape[1], max(1, PRODUCT // max(1, some.size))):
-            np.matmul(some, self.values[:, c], out=out[:, c])
-        return out
+        return product(self.along[index], self.values)
 
 
 @dataclass(frozen=True)
@@ -80,6 +86,9 @@ class OfRuns:
     @property
     def shape(self) -> tuple[int, int, int]:
         return len(self.values), len(self.along), self.values.shape[2]
+
+    def __len__(self) -> int:
+        return len(self.values)
 
     def __iter__(self) -> Iterator[PlaneOfRuns]:
         return (PlaneOfRuns(self.along, values) for values in self.values)
@@ -123,8 +132,8 @@ class _PlaneOfSome:
     rows: NDArray
     values: NDArray
 
-    def __getitem__(self, index: NDArray) -> NDArray:
-        return self.values[np.searchsorted(self.rows, index)]
+    def __getitem__(self, index: NDArray | slice) -> NDArray:
+        return self.values[np.searchsorted(self.rows, np.r_[index])]
 
 
 @dataclass(frozen=True)
@@ -146,6 +155,9 @@ class Passing:
     @property
     def dtype(self) -> np.dtype:
         return self.some.dtype
+
+    def __len__(self) -> int:
+        return len(self.some)
 
     def __iter__(self) -> Iterator[Plane]:
         return (_PlaneOfSome(self.rows, values) for values in self.some)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,11 +24,16 @@ class Rows:
     """Some rows of a picture's spectrum."""
 
     planes: list[NDArray]
-    """(n, count) of every plane"""
+    """(n, count) of every plane; may be views of it"""
     fy: NDArray
     """(n,) [cycles/m]"""
     count: int
     """Terms along x, from 0 on."""
+
+    def times(self, along_x: NDArray, along_y: NDArray, also: NDArray | float = 1.0) -> Rows:
+        """With factors on them: along x (more terms than there are), y (n,), and at each term."""
+        factor = along_y[:, None] * along_x[: self.count] * also
+        return replace(self, planes=[plane * factor.astype(plane.dtype) for plane in self.planes])
 
 
 class Lookup:
@@ -97,6 +103,32 @@ class Lookup:
         if radius[:, -1].max(initial=0) > self.last:  # it rises along x
             np.minimum(radius, self.last, out=radius)
         return radius.astype(np.intp), None
+
+    @property
+    def smooth(self) -> bool:
+        """Whether the tables are over |f| alone and need not be better than the nearest entry."""
+        return self.values is not None and self.planes is None and not self.linear
+
+    @cached_property
+    def errors(self) -> NDArray:
+        """(R, C) what the nearest entry errs by at most."""
+        assert self.values is not None
+        return np.abs(np.diff(self.values)).max(axis=-1) / 2
+
+    def between(self, fy: NDArray, count: int, planes: int) -> NDArray:
+        """Tables over |f| of so many planes by linear interpolation: (planes, C, n, count)."""
+        assert self.values is not None
+        radius = np.hypot(self.fx[:count] * self.scale, fy[:, None] * self.scale)
+        np.minimum(radius, self.last, out=radius)
+        index = radius.astype(np.intp)
+        fraction = (radius - index).astype(self.dtype)
+        out = np.empty((planes, self.colors, *radius.shape), self.dtype)
+        for r, c in np.ndindex(planes, self.colors):
+            low, high = (np.take(self.values[r, c], index + i, mode="wrap") for i in (0, 1))
+            high -= low
+            high *= fraction
+            np.add(low, high, out=out[r, c])
+        return out
 
     def through(self, rows: Rows, position: Position | None = None) -> Iterator[NDArray]:
         """For each color, what the planes' rows are together through the tables: (n, count)."""

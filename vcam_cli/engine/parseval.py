@@ -75,11 +75,13 @@ class Sample:
         every, stand_for = _sampled(self._filter.y)
         for part in pieces(len(every), max(16, AT_ONCE // self._filter.x.terms)):
             terms, stands_for = every[part], stand_for[part]
-            bare = self._filter.rows(coefficients, terms, np.ones(len(terms)), separable=False)
-            if bare is None:  # nor are there any of higher frequencies
+            found = self._filter.rows(coefficients, terms)
+            if found is None:  # nor are there any of higher frequencies
                 return
+            x, y = self._filter.x, self._filter.y
+            bare = found.times(x.weights, y.base(terms)[1] * y.weights[terms])
             weights = stands_for * np.where(terms > 0, 2, 1)
-            yield _Block(terms, weights, bare, _times(bare, along_x, along_y[terms]))
+            yield _Block(terms, weights, bare, bare.times(along_x, along_y[terms]))
 
     def power(self) -> tuple[NDArray, NDArray]:
         """Mean squares of the filter's signal by frequency.
@@ -158,15 +160,8 @@ class Sample:
         rows = []
         for block in self._blocks:
             change = 1 - own_y[block.terms, None] * own_x[: block.bare.count]
-            rows.append(_times(block.bare, rest_x, rest_y[block.terms], change))
+            rows.append(block.bare.times(rest_x, rest_y[block.terms], change))
         return self._mean_square(filter.tables, rows)
-
-
-def _times(rows: Rows, along_x: NDArray, along_y: NDArray, also: NDArray | float = 1.0) -> Rows:
-    """Rows with factors on them: along x (more terms than there are), y (n,), and at each term."""
-    factor = along_y[:, None] * along_x[: rows.count] * also
-    dtype = rows.planes[0].dtype
-    return replace(rows, planes=[plane * factor.astype(dtype) for plane in rows.planes])
 
 
 def _rest(transfer: Transfer, tables: Tables) -> NDArray:

@@ -5,7 +5,7 @@ The heart of the engine. Work is cut into fixed pieces of rows or columns that t
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from vcam_cli.engine.axis import Axis
 from vcam_cli.engine.coefficients import Basis, Coefficients, Folded, Passing
 from vcam_cli.engine.lookup import PIECE, Lookup, Rows
-from vcam_cli.engine.parallel import each, pieces
+from vcam_cli.engine.parallel import each, pieces, within
+from vcam_cli.engine.stretches import LONGEST, stretches
 from vcam_cli.engine.transfer import PARITIES, Tables
 
 
@@ -160,15 +161,31 @@ class Filter:
             for target, terms, weights in self.y.sources(rows, odd_y):
                 if turn_y is not None:
                     weights = weights * turn_y[terms]
-                found = self.rows(planes, terms, weights)
-                if found is None:
-                    continue
-                for color, product in enumerate(lookup.through(found)):
-                    for sums, odd, turn in targets:
-                        part = product if turn is None else product * turn[: product.shape[1]]
-                        sums[color, target] += self.x.fold(part, odd, overwrite=True)
+                for part, colors in self._through(planes, lookup, terms, weights):
+                    here = slice(target.start + part.start, target.start + part.stop)
+                    for color, product in enumerate(colors):
+                        for sums, odd, turn in targets:
+                            some = product if turn is None else product * turn[: product.shape[1]]
+                            sums[color, here] += self.x.fold(some, odd, overwrite=True)
 
-        each(multiply, pieces(self.y.folded, PIECE), workers)
+        each(multiply, pieces(self.y.folded, LONGEST), workers)
+
+    def _through(
+        self, planes: Coefficients, lookup: Lookup, terms: NDArray, weights: NDArray
+    ) -> Iterator[tuple[slice, Iterator[NDArray]]]:
+        """Rows of the spectrum, a few at a time: which they are, and each color's.
+
+        terms, weights: (n,) which rows, and factors on them.
+        """
+        fy = self.y.frequencies[terms]
+        count = self._count(fy)
+        along_x = (self.x.weights * self.along_x)[:count]
+        along_y = weights * self.y.base(terms)[1] * self.y.weights[terms] * self.along_y[terms]
+        for stretch in stretches(lookup, fy, along_x, len(planes)) if count else ():
+            for part in within(stretch.rows, PIECE):
+                found = self.rows(planes, terms[part])
+                if found is not None:
+                    yield part, stretch.through(found, along_y[part])
 
     def _evaluated(
         self, folded: NDArray, basis: Basis, parts: dict[bool, NDArray], workers: int
@@ -239,34 +256,23 @@ class Filter:
         chirp = 6 * PIECE * itemsize * max(self.x.transform, self.y.transform)
         return tables + workers * max(rows, chirp)
 
-    def rows(
-        self, coefficients: Coefficients, terms: NDArray, weights: NDArray, separable: bool = True
-    ) -> Rows | None:
-        """Rows of every plane's spectrum that a table is to be laid on; None where all are 0.
-
-        terms, weights: (n,) which rows, and factors on them; separable: whether the separable
-        factors are laid on.
-        """
-        x, y, dtype = self.x, self.y, coefficients.dtype
-        fy = y.frequencies[terms]
-        reach = self.tables.top**2 - fy.min() ** 2
-        if reach < 0:
+    def rows(self, coefficients: Coefficients, terms: NDArray) -> Rows | None:
+        """Rows (n,) of every plane's spectrum, without factors; None where all tables are 0."""
+        fy = self.y.frequencies[terms]
+        count = self._count(fy)
+        if not count:
             return None
-        count = min(x.terms, int(np.sqrt(reach) * 2 * x.length) + 1)
-        index, sign = y.base(terms)
-        by_row = sign * weights * y.weights[terms]
-        by_column = x.weights[:count]
-        if separable:
-            by_row, by_column = by_row * self.along_y[terms], by_column * self.along_x[:count]
+        index = _neighbors(self.y.base(terms)[0])
+        parts = [self.x.extend(plane[index], count) for plane in coefficients]
         beyond = self._beyond(fy, count)
-        parts = []
-        for plane in coefficients:
-            part = x.extend(plane[index], count) * by_column.astype(dtype)
-            part *= by_row.astype(dtype)[:, None]
-            if beyond is not None:
-                part[beyond] = 0
-            parts.append(part)
+        if beyond is not None:
+            parts = [np.where(beyond, part.dtype.type(0), part) for part in parts]
         return Rows(parts, fy, count)
+
+    def _count(self, fy: NDArray) -> int:
+        """Terms along x that tables reach at some of these frequencies (n,) along y."""
+        reach = self.tables.top**2 - fy.min() ** 2
+        return 0 if reach < 0 else min(self.x.terms, int(np.sqrt(reach) * 2 * self.x.length) + 1)
 
     def _beyond(self, fy: NDArray, count: int) -> NDArray | None:
         """Where |f| is beyond the tables: (n, count); None where they are 0 there by themselves.
@@ -276,3 +282,12 @@ class Filter:
         if all(plane is None for plane in self.tables.planes):
             return None
         return np.hypot(self.x.frequencies[:count], fy[:, None]) > self.tables.top * (1 + 1e-9)
+
+
+def _neighbors(index: NDArray) -> NDArray | slice:
+    """Consecutive indices, rising or falling, as a slice, of which numpy makes a view."""
+    steps = np.diff(index)
+    if not len(steps) or abs(steps[0]) != 1 or (steps != steps[0]).any():
+        return index
+    step, stop = int(steps[0]), int(index[-1] + steps[0])
+    return slice(int(index[0]), stop if stop >= 0 else None, step)

@@ -21,8 +21,8 @@ class Settings:
     wavelength_step: float
     """Spacing of the wavelengths at which the OTF is computed [m]; levels are exact anyway."""
     oversampling: int
-    """Spatial frequencies kept at least, in pixel Nyquist frequencies; cells a chart has per
-    pixel pitch."""
+    """Cells a chart has per pixel pitch, at least. Where it is most_oversampling: how far every
+    spectrum is followed, in pixel Nyquist frequencies."""
     most_oversampling: int
     """The same at most, where the scene's spectrum calls for it."""
     table_size: int

@@ -1,0 +1,123 @@
+"""Tables laid on stretches of neighbouring rows: read at four of them, interpolated between.
+
+Reading a table at every term of a spectrum is what filtering costs most. Over a few dozen rows a
+table is smooth along y: a cubic through four frequencies is as good, and a product of small
+matrices makes it. Factors along x and y are in the matrices, so they cost nothing. Every stretch
+is checked: where its cubic errs by more than reading the nearest entry may, as it does where the
+frequency is low or tables have corners, it is halved, and in the end read at every term.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcam_cli.engine.coefficients import product
+from vcam_cli.engine.lookup import Lookup, Rows
+
+LONGEST = 128
+"""Rows of a stretch, at most: a node costs as much as reading a row."""
+SHORTEST = 32
+"""Rows below which a stretch is read."""
+_NODES = np.cos(np.pi * (np.arange(4) + 0.5) / 4)
+"""Chebyshev's, from -1 to 1."""
+_CHECKED = np.array([1.0, np.cos(np.pi / 4)])
+"""Two of the five places where a cubic through them errs most."""
+
+
+class Stretch(Protocol):
+    """Rows that are filtered in the same way."""
+
+    @property
+    def rows(self) -> slice: ...
+
+    def through(self, found: Rows, along_y: NDArray) -> Iterator[NDArray]:
+        """For each color, what some of the rows of all planes are through the tables."""
+        ...
+
+
+@dataclass(frozen=True)
+class Read:
+    """A stretch whose tables are read at every term."""
+
+    rows: slice
+    lookup: Lookup
+    along_x: NDArray
+
+    def through(self, found: Rows, along_y: NDArray) -> Iterator[NDArray]:
+        """See `Stretch`."""
+        return self.lookup.through(found.times(self.along_x, along_y))
+
+
+@dataclass(frozen=True)
+class Interpolated:
+    """A stretch whose tables are known at four frequencies along y."""
+
+    rows: slice
+    middle: float
+    half: float
+    """Frequencies from `middle` - `half` to `middle` + `half` [cycles/m]."""
+    values: NDArray
+    """(R, C, 4, count) the tables there, with the factors along x."""
+
+    def through(self, found: Rows, along_y: NDArray) -> Iterator[NDArray]:
+        """See `Stretch`."""
+        cubic = _cubic((found.fy - self.middle) / self.half) * along_y[:, None]
+        left = cubic.astype(self.values.dtype)
+        for color in range(self.values.shape[1]):
+            total = product(left, self.values[0, color, :, : found.count])
+            total *= found.planes[0]
+            for r, plane in enumerate(found.planes[1:], start=1):
+                part = product(left, self.values[r, color, :, : found.count])
+                part *= plane
+                total += part
+            yield total
+
+
+def stretches(lookup: Lookup, fy: NDArray, along_x: NDArray, planes: int) -> Iterator[Stretch]:
+    """All rows, in stretches.
+
+    fy: (n,) their frequencies, rising or falling [cycles/m]; along_x: (count,) factors on the terms
+    that are asked for; planes: of how many tables are asked for.
+    """
+    waiting = [slice(0, len(fy))]
+    while waiting:
+        rows = waiting.pop()
+        found = None
+        if lookup.smooth and rows.stop - rows.start >= SHORTEST:
+            found = _interpolated(lookup, rows, fy[rows], along_x, planes)
+        if found is not None:
+            yield found
+        elif rows.stop - rows.start < 2 * SHORTEST or not lookup.smooth:
+            yield Read(rows, lookup, along_x)
+        else:
+            middle = (rows.start + rows.stop) // 2
+            waiting += [slice(middle, rows.stop), slice(rows.start, middle)]
+
+
+def _interpolated(
+    lookup: Lookup, rows: slice, fy: NDArray, along_x: NDArray, planes: int
+) -> Interpolated | None:
+    """A stretch by its cubic; None where that errs."""
+    middle, half = (fy[0] + fy[-1]) / 2, abs(fy[0] - fy[-1]) / 2
+    at = np.concatenate([_NODES, _CHECKED])
+    read = lookup.between(middle + half * at, len(along_x), planes)
+    values, checked = np.split(read, [len(_NODES)], axis=2)
+    cubic = _cubic(_CHECKED).astype(read.dtype)
+    error = np.abs(np.matmul(cubic, values) - checked).max(axis=(2, 3))
+    if (error > lookup.errors[:planes]).any():
+        return None
+    return Interpolated(rows, middle, half, values * along_x.astype(read.dtype))
+
+
+def _cubic(t: NDArray) -> NDArray:
+    """What each node adds to a cubic through all of them at t in -1 .. 1: (n, 4)."""
+    out = np.ones((len(t), len(_NODES)))
+    for j, node in enumerate(_NODES):
+        for other in np.delete(_NODES, j):
+            out[:, j] *= (t - other) / (node - other)
+    return out
