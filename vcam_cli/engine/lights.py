@@ -79,10 +79,17 @@ class Lights:
         self._kept: ByteCache[_Kept] = ByteCache(limit)
         self._transfer: tuple[str, Transfer] | None = None
         self._peaks: dict[str, float] = {}
+        self._told: tuple[Camera, str] | None = None
+
+    def _key(self, camera: Camera) -> str:
+        """What its light depends on, told once for the camera that is asked about again."""
+        if self._told is None or self._told[0] is not camera:
+            self._told = camera, depends_on(camera)
+        return self._told[1]
 
     def transfer(self, camera: Camera, make: Callable[[], Transfer]) -> Transfer:
         """What `make` gives, or gave for the camera before where its light is the same."""
-        key, kept = depends_on(camera), self._transfer
+        key, kept = self._key(camera), self._transfer
         if kept is None or kept[0] != key:
             kept = self._transfer = (key, make())
         return kept[1]
@@ -93,7 +100,7 @@ class Lights:
         ceiling: rate at which a pixel is full [e/s], see `exposure.ceiling`. All those are alike
         that the light does not reach.
         """
-        key = depends_on(camera)
+        key = self._key(camera)
         if key in self._peaks:
             level = min(ceiling, self._peaks[key])
             return self._kept.get((key, level), lambda: _Kept(make())).rate

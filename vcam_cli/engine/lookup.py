@@ -9,11 +9,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from vcam_cli.engine.parallel import pieces
+from vcam_cli.engine.parallel import at_once, pieces
 from vcam_cli.engine.transfer import Tables
-
-PIECE = 32
-"""Rows or columns a thread takes at once: few enough for the cache."""
 
 Position = tuple[NDArray | None, NDArray | None]
 """In a table over |f|: indices and fractions, where they are needed."""
@@ -30,10 +27,16 @@ class Rows:
     count: int
     """Terms along x, from 0 on."""
 
-    def times(self, along_x: NDArray, along_y: NDArray, also: NDArray | float = 1.0) -> Rows:
+    def times(self, along_x: NDArray, along_y: NDArray, also: NDArray | None = None) -> Rows:
         """With factors on them: along x (more terms than there are), y (n,), and at each term."""
-        factor = along_y[:, None] * along_x[: self.count] * also
-        return replace(self, planes=[plane * factor.astype(plane.dtype) for plane in self.planes])
+        dtype = self.planes[0].dtype
+        across, down = along_x[: self.count].astype(dtype), along_y.astype(dtype)[:, None]
+        planes = [plane * across for plane in self.planes]
+        for plane in planes:
+            plane *= down
+            if also is not None:
+                plane *= also.astype(dtype, copy=False)
+        return replace(self, planes=planes)
 
 
 class Lookup:
@@ -90,7 +93,7 @@ class Lookup:
         """Where the table over |f| is read, at all pairs of frequencies of the rows."""
         if self.values is None:
             return None, None
-        u = ((self.fx[: rows.count] * self.scale) ** 2).astype(self.dtype)
+        u = self._square[: rows.count].astype(self.dtype)
         v = ((rows.fy * self.scale) ** 2).astype(self.dtype)
         radius = u[None, :] + v[:, None]
         np.sqrt(radius, out=radius)
@@ -110,6 +113,11 @@ class Lookup:
         return self.values is not None and self.planes is None and not self.linear
 
     @cached_property
+    def _square(self) -> NDArray:
+        """Of every frequency along x, in entries."""
+        return np.square(self.fx * self.scale)
+
+    @cached_property
     def errors(self) -> NDArray:
         """(R, C) what the nearest entry errs by at most."""
         assert self.values is not None
@@ -118,8 +126,9 @@ class Lookup:
     def between(self, fy: NDArray, count: int, planes: int) -> NDArray:
         """Tables over |f| of so many planes by linear interpolation: (planes, C, n, count)."""
         assert self.values is not None
-        radius = np.hypot(self.fx[:count] * self.scale, fy[:, None] * self.scale)
-        np.minimum(radius, self.last, out=radius)
+        radius = np.sqrt(self._square[:count] + ((fy * self.scale) ** 2)[:, None])
+        if radius[:, -1].max(initial=0) > self.last:  # it rises along x
+            np.minimum(radius, self.last, out=radius)
         index = radius.astype(np.intp)
         fraction = (radius - index).astype(self.dtype)
         out = np.empty((planes, self.colors, *radius.shape), self.dtype)
@@ -168,7 +177,7 @@ class Lookup:
 def _along_x(table: NDArray, position: NDArray, dtype: np.dtype) -> NDArray:
     """A table read between its columns; few rows at a time, since it is large in 64 bits."""
     out = np.empty((len(table), len(position)), dtype)
-    for rows in pieces(len(table), PIECE):
+    for rows in pieces(len(table), at_once(len(position))):
         out[rows] = between(table[rows], position, 1)
     return out
 

@@ -6,6 +6,7 @@ multiplication. Mean squares are those of the signal as a continuous function, b
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 
@@ -22,6 +23,10 @@ from vcam_cli.engine.transfer import Fineness, Tables, Transfer, entries
 
 AT_ONCE = 1 << 17
 """Terms of a sample that are filtered together, about; no fewer than 16 rows."""
+FIRST = 24
+"""Rows that are all looked at."""
+STEP = 1.2
+"""Of the frequencies of the others, each over the one before."""
 
 
 def _sampled(y: Axis) -> tuple[NDArray, NDArray]:
@@ -30,9 +35,9 @@ def _sampled(y: Axis) -> tuple[NDArray, NDArray]:
     Straight edges along the array put their energy into the first rows and columns.
     """
     count = y.terms
-    sample = np.unique(
-        np.concatenate([np.arange(min(24, count)), np.geomspace(24, count, 72)]).astype(int)
-    )
+    others = math.ceil(math.log(max(1.0, count / FIRST)) / math.log(STEP))
+    first, last = np.arange(min(FIRST, count)), FIRST * STEP ** np.arange(others)
+    sample = np.unique(np.concatenate([first, last]).astype(int))
     sample = sample[sample < count]
     edges = np.concatenate([[-0.5], (sample[1:] + sample[:-1]) / 2, [count - 0.5]])
     return sample, np.diff(edges)
@@ -95,23 +100,29 @@ class Sample:
         frequency, power = [fx], [along_x]
         for block, squares in self._squares():
             below = np.searchsorted(fx, fy[block.terms], side="right")
-            lower = (np.arange(block.rows.count) < below[:, None]).astype(np.float64)
-            along_x[:, : block.rows.count] += np.einsum("cnx,nx->cx", squares, 1 - lower)
+            along_y = np.empty(squares.shape[:2])
+            for row, count in enumerate(below):
+                here = squares[:, row, :count]
+                along_y[:, row] = here.sum(axis=-1)
+                here[:] = 0
+            along_x[:, : block.rows.count] += block.weights @ squares
             frequency.append(fy[block.terms])
-            power.append(np.einsum("cnx,nx->cn", squares, lower))
+            power.append(along_y * block.weights)
         order = np.argsort(together := np.concatenate(frequency), kind="stable")
         return together[order], np.concatenate(power, axis=1)[:, order]
 
     def _squares(self) -> Iterator[tuple[_Block, NDArray]]:
-        """Of the filter's signal, for all terms that each one stands for: (C, n, count)."""
+        """Of the filter's signal, for the terms of every row: (C, n, count)."""
         tables, fx = self._filter.tables, self._filter.x.frequencies
         lookups = [Lookup(tables, p, fx, self._dtype, few=True) for p in tables.parities]
         for block in self._blocks:
-            squares: NDArray = np.zeros((tables.values.shape[1], *block.rows.planes[0].shape))
-            for lookup in lookups:
+            squares = np.empty((tables.values.shape[1], *block.rows.planes[0].shape))
+            for number, lookup in enumerate(lookups):
                 for total, part in zip(squares, block.through(lookup, block.rows), strict=True):
-                    total += np.square(part, dtype=np.float64)
-            squares *= block.weights[:, None]
+                    if number:
+                        total += np.square(part, dtype=np.float64)
+                    else:
+                        np.square(part, out=total, dtype=np.float64)
             squares[..., 1:] *= 2
             yield block, squares
 

@@ -16,7 +16,7 @@ from vcam_cli.effects.base import Charge, Effect, Gain, Veil
 from vcam_cli.effects.saturation import Saturation
 from vcam_cli.engine.mosaic import Mosaic
 
-SAMPLE = 1 << 16
+SAMPLE = 1 << 15
 """Pixels looked at, at most."""
 LEAST = 1e-6
 """Factor below which the light in front of an effect is no longer known."""

@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 
 from vcam_cli.engine.axis import Axis
 from vcam_cli.engine.coefficients import Basis, Coefficients, Folded, Passing
-from vcam_cli.engine.lookup import PIECE, Lookup, Rows
-from vcam_cli.engine.parallel import each, pieces, within
-from vcam_cli.engine.stretches import LONGEST, stretches
+from vcam_cli.engine.lookup import Lookup, Rows
+from vcam_cli.engine.parallel import at_once, each, pieces, within
+from vcam_cli.engine.stretches import AT_NODES, LONGEST, stretches
 from vcam_cli.engine.transfer import PARITIES, Tables
 
 
@@ -37,8 +37,9 @@ def spectrum(planes: NDArray, workers: int, terms: tuple[int, int] | None = None
             columns = np.ascontiguousarray(plane[:, s])
             plane[:down, s] = scipy.fft.dct(columns, type=2, axis=0, overwrite_x=True)[:down]
 
-        each(along_rows, pieces(plane.shape[0], PIECE), workers)
-        each(along_columns, pieces(across, PIECE), workers)
+        rows, columns = plane.shape
+        each(along_rows, pieces(rows, at_once(columns)), workers)
+        each(along_columns, pieces(across, at_once(rows)), workers)
     return planes[:, :down, :across]
 
 
@@ -182,7 +183,7 @@ class Filter:
         along_x = (self.x.weights * self.along_x)[:count]
         along_y = weights * self.y.base(terms)[1] * self.y.weights[terms] * self.along_y[terms]
         for stretch in stretches(lookup, fy, along_x, len(planes)) if count else ():
-            for part in within(stretch.rows, PIECE):
+            for part in within(stretch.rows, at_once(count)):
                 found = self.rows(planes, terms[part])
                 if found is not None:
                     yield part, stretch.through(found, along_y[part])
@@ -201,7 +202,8 @@ class Filter:
         if known is None:
             parts[odd_x] = np.empty(shape, folded.dtype) if place is None else folded[:, place]
         out = parts[odd_x]
-        tasks = [(c, s) for c in range(len(folded)) for s in pieces(self.x.folded, PIECE)]
+        columns = pieces(self.x.folded, at_once(self.y.transform))
+        tasks = [(c, s) for c in range(len(folded)) for s in columns]
 
         def evaluate(task: tuple[int, slice]) -> None:
             c, columns = task
@@ -252,9 +254,11 @@ class Filter:
         terms = self.x.terms
         sizes = [0, *(plane.shape[-1] for plane in self.tables.planes if plane is not None)]
         tables = planes * colors * (2 * entries + max(sizes) * terms) * itemsize
-        rows = PIECE * terms * (2 * planes * itemsize + 8 + 6 * itemsize)
-        chirp = 6 * PIECE * itemsize * max(self.x.transform, self.y.transform)
-        return tables + workers * max(rows, chirp)
+        rows = at_once(terms) * terms * (2 * planes * itemsize + 8 + 6 * itemsize)
+        nodes = AT_NODES * planes * colors * terms * itemsize
+        longest = max(self.x.transform, self.y.transform)
+        chirp = 6 * at_once(longest) * longest * itemsize
+        return tables + workers * max(rows + nodes, chirp)
 
     def rows(self, coefficients: Coefficients, terms: NDArray) -> Rows | None:
         """Rows (n,) of every plane's spectrum, without factors; None where all tables are 0."""

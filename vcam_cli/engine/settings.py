@@ -52,9 +52,10 @@ class Settings:
         return asdict(self)
 
 
-DRAFT = Settings(20e-9, 1, 4, 1 << 14, 2e-3, 3, 4, 32)
-STANDARD = Settings(10e-9, 2, 12, 1 << 15, 5e-4, 4, 8, 32)
-FINE = Settings(10e-9, 2, 16, 1 << 16, 2e-4, 5, 10, 32)
+# Sizes of tables: so that those of 32 bits have the entries that are computed among them.
+DRAFT = Settings(20e-9, 1, 4, (1 << 14) + 1, 2e-3, 3, 4, 32)
+STANDARD = Settings(10e-9, 2, 12, (1 << 15) + 1, 5e-4, 4, 8, 32)
+FINE = Settings(10e-9, 2, 16, (1 << 16) + 1, 2e-4, 5, 10, 32)
 REFERENCE = Settings(2.5e-9, 4, 16, 1 << 15, 1e-5, 6, 16, 64)
 
 LADDER = ((0.02, DRAFT), (0.005, STANDARD), (0.001, FINE), (0.0, REFERENCE))

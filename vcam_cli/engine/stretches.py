@@ -25,8 +25,12 @@ SHORTEST = 32
 """Rows below which a stretch is read."""
 _NODES = np.cos(np.pi * (np.arange(4) + 0.5) / 4)
 """Chebyshev's, from -1 to 1."""
+_CUBICS = np.linalg.inv(np.vander(_NODES))
+"""Of each node the cubic that is 1 there and 0 at the others, highest power first: (4, 4)."""
 _CHECKED = np.array([1.0, np.cos(np.pi / 4)])
 """Two of the five places where a cubic through them errs most."""
+AT_NODES = 2 * (len(_NODES) + len(_CHECKED))
+"""Rows of tables that a stretch takes while it is made."""
 
 
 class Stretch(Protocol):
@@ -116,8 +120,4 @@ def _interpolated(
 
 def _cubic(t: NDArray) -> NDArray:
     """What each node adds to a cubic through all of them at t in -1 .. 1: (n, 4)."""
-    out = np.ones((len(t), len(_NODES)))
-    for j, node in enumerate(_NODES):
-        for other in np.delete(_NODES, j):
-            out[:, j] *= (t - other) / (node - other)
-    return out
+    return np.vander(t, len(_NODES)) @ _CUBICS

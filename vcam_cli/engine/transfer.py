@@ -364,7 +364,12 @@ def entries(transfer: Transfer, fine: Fineness) -> NDArray:
         return transfer.at(grid)
     coarse = np.linspace(0, fine.top, fine.computed)
     values = transfer.at(coarse)
-    return np.array([[np.interp(grid, coarse, row) for row in color] for color in values])
+    finer, rest = divmod(fine.size - 1, fine.computed - 1)
+    if rest:
+        return np.array([[np.interp(grid, coarse, row) for row in color] for color in values])
+    steps = np.arange(finer) / finer
+    between = values[..., :-1, None] + np.diff(values)[..., None] * steps
+    return np.concatenate([between.reshape(*values.shape[:2], -1), values[..., -1:]], axis=-1)
 
 
 def mixtures(through: Sequence[Transfer], fine: Fineness) -> tuple[NDArray, float]:

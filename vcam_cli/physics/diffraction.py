@@ -62,18 +62,21 @@ def otf_circular(
     wavelength = np.asarray(wavelength, dtype=np.float64)
     scale = wavelength * effective_f_number(f_number, magnification)
     shift = np.minimum(np.abs(np.asarray(frequency, dtype=np.float64)) * scale, 1.0)
-    angle = 2 * np.arccos(shift)
-    return (_minus_sine(angle) / np.pi)[()]
+    return (2 / np.pi * _segment(shift))[()]
 
 
-def _minus_sine(angle: Floats) -> Floats:
-    """angle - sin(angle), by its series below 1, where the difference would cancel."""
-    out = np.asarray(angle - np.sin(angle))
-    small = angle < 1
-    near = angle[small]
+def _segment(shift: Floats) -> Floats:
+    """acos(nu) - nu sqrt(1 - nu^2) for nu in 0..1: (angle - sin(angle)) / 2 of angle = 2 acos(nu).
+
+    By its series in the angle below 1, where the difference would cancel.
+    """
+    half = np.arccos(shift)
+    out = np.asarray(half - shift * np.sqrt((1 - shift) * (1 + shift)))
+    small = half < 0.5
+    near = 2 * half[small]
     square = near**2
     series = np.ones_like(near)
     for divisor in reversed(_DIVISORS):
         series = 1 - square / divisor * series
-    out[small] = near**3 / 6 * series
+    out[small] = near**3 / 12 * series
     return out

@@ -23,6 +23,7 @@ color spaces", J. Electronic Imaging 6(4), 1997, doi:10.1117/12.278080; CIE 015:
 """
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -126,6 +127,7 @@ def fit_relative(signals: np.ndarray, target: np.ndarray) -> tuple[np.ndarray, i
     return matrix, 1 + int(np.count_nonzero(spread > SAME))
 
 
+@lru_cache(maxsize=16)
 def chart_colors(light: Spectrum, start: float, stop: float) -> np.ndarray | None:
     """(24, 3) linear display RGB of the patches under a light, seen adapted to it; white = 1.
 
@@ -139,7 +141,9 @@ def chart_colors(light: Spectrum, start: float, stop: float) -> np.ndarray | Non
     if cones.min() <= SAME * cones.max():
         return None
     adapted = (BRADFORD @ np.array(patches).T) * ((BRADFORD @ _D65) / cones)[:, np.newaxis]
-    return np.asarray(np.linalg.solve(BRADFORD @ RGB_TO_XYZ, adapted).T)
+    colors = np.linalg.solve(BRADFORD @ RGB_TO_XYZ, adapted).T
+    colors.flags.writeable = False  # it is kept
+    return colors
 
 
 _OPPONENT = np.array([[0.0, 116.0, 0.0], [500.0, -500.0, 0.0], [0.0, 200.0, -200.0]])

@@ -12,7 +12,7 @@ from functools import cache
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vcam_cli.spectra.spectrum import SAME_WAVELENGTH, Floats, Spectrum, merge_knots
+from vcam_cli.spectra.spectrum import SAME_WAVELENGTH, Floats, Spectrum, Table, merge_knots
 
 
 @cache
@@ -164,7 +164,7 @@ def _pairs(spectra: Sequence[Spectrum], others: Sequence[Spectrum], grid: Floats
     knots = merge_knots(np.concatenate([grid, *bends.values()]), grid[0], grid[-1])
     degree = max(s.degree for s in spectra) + max((o.degree for o in others), default=0)
     wavelength, weights = _rule(knots, degree + 1)
-    known = {name: table.at(wavelength) for name, table in tables.items()}
+    known = _looked_up(tables, wavelength)
 
     def values(spectrum: Spectrum) -> Floats:
         factors = (known[id(table)] for table in spectrum.tables)
@@ -173,6 +173,25 @@ def _pairs(spectra: Sequence[Spectrum], others: Sequence[Spectrum], grid: Floats
     first = np.array([values(s) * weights for s in spectra])
     second = np.array([values(o) for o in others]).reshape(-1, wavelength.size)
     return _share(grid, wavelength, first[:, np.newaxis] * second)
+
+
+def _looked_up(tables: dict[int, Table], wavelength: Floats) -> dict[int, Floats]:
+    """The values of tables at wavelengths that they cover; those of the same knots together."""
+    alike: dict[tuple[int, bool], list[int]] = {}
+    for name, table in tables.items():
+        alike.setdefault((id(table.wavelength), table.outside == "zero"), []).append(name)
+    out: dict[int, Floats] = {}
+    for (_, ends), names in alike.items():
+        knots = tables[names[0]].wavelength
+        if ends or len(names) == 1 or len(knots) == 1:
+            out |= {name: tables[name].at(wavelength) for name in names}
+            continue
+        right = np.clip(np.searchsorted(knots, wavelength), 1, len(knots) - 1)
+        part = np.clip((wavelength - knots[right - 1]) / (knots[right] - knots[right - 1]), 0, 1)
+        values = np.array([tables[name].value for name in names])
+        low = values[:, right - 1]
+        out |= dict(zip(names, low + part * (values[:, right] - low), strict=True))
+    return out
 
 
 def _share(grid: Floats, wavelength: Floats, power: Floats) -> Floats:
