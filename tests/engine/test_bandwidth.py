@@ -158,9 +158,23 @@ def test_loss_of_a_picture_is_within_the_tolerance(kind, preset, tmp_path):
 def test_no_further_than_the_lens(tmp_path):
     """f/8 passes nothing beyond 2.3 Nyquist frequencies of 5 um pixels at 550 nm."""
     changes, values = write_picture(tmp_path, "noise")
-    made = camera(tmp_path, changes | {"optics.f_number": 8})
-    cutoff = 1 / (550e-9 * 8 / (1 - 5e-3))
-    assert rate(made, values).spectrum.oversampling == pytest.approx(cutoff * 1e-5, rel=1e-6)
+    made = camera(tmp_path, changes | {"optics.f_number": 8, "accuracy": "reference"})
+    limit = 1e-5 / (550e-9 * 8 / (1 - 5e-3))
+    assert 0.98 * limit < rate(made, values).spectrum.oversampling <= limit * (1 + 1e-6)
+
+
+def test_no_further_than_the_tolerance_asks(tmp_path):
+    """A coarser tolerance ends lower, and what is lost there is what it allows at most."""
+    changes, values = write_picture(tmp_path, "noise")
+    found = {}
+    for accuracy in ("reference", "standard", "draft"):
+        made = camera(tmp_path, changes | {"optics.f_number": 8, "accuracy": accuracy})
+        found[accuracy] = rate(made, values)
+    reached = [one.spectrum.oversampling for one in found.values()]
+    assert reached == sorted(reached, reverse=True) and reached[0] > reached[-1] >= 1
+    for accuracy, tolerance in (("standard", 5e-3), ("draft", 2e-2)):
+        lost = rms(found[accuracy].values, found["reference"].values)
+        assert lost < bandwidth.SHARE * tolerance * found["reference"].values.max() * 1.1
 
 
 # --- the arithmetic ------------------------------------------------------------------------------

@@ -9,7 +9,7 @@ from vcam_cli.studies import simulate
 
 @pytest.mark.parametrize(
     ("rows", "columns", "expected"),
-    [(1, 1, 1), (432, 576, 1), (512, 1024, 2), (864, 1152, 3), (3000, 4000, 8)],
+    [(1, 1, 1), (432, 576, 1), (864, 1152, 1), (1024, 1024, 2), (3000, 4000, 8)],
 )
 def test_small_frames_are_not_shared(rows, columns, expected, tmp_path, monkeypatch):
     monkeypatch.setattr(parallel, "available_workers", lambda: 8)

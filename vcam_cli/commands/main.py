@@ -7,15 +7,21 @@ Why commands are looked up by name: a command's module is imported when that com
 for, and imports its physics when it runs, so `vcam --help` and shell completion are quick.
 """
 
+import gc
+import os
 import sys
 
 from vcam_cli.commands import interrupts
+
+# For a quick start. Loading makes 120,000 objects that stay: looking through them again and again
+# for garbage takes a tenth of it, and so does looking for plug-ins of pydantic in every package.
+gc.set_threshold(50_000, 10, 10)
+os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
 
 try:
     with interrupts.at_once():  # most of the time until a command begins goes by here
         import errno
         import io
-        import os
         from collections.abc import Iterator
         from contextlib import contextmanager, suppress
         from importlib import import_module

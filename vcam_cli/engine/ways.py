@@ -108,7 +108,6 @@ def cosines(
     # A spectrum that is at hand goes as far as the lens; other charts have to be painted finer.
     picture, known = scene.samples == "squares", scene.is_known
     at_hand = picture or known
-    share = bandwidth.SHARE if at_hand else bandwidth.GUESSED
     pixels = g.rows * g.columns if picture else scene.shape[0] * scene.shape[1] / oversampling**2
     widest = min(bandwidth.most(pixels, knobs), bandwidth.limit(g, cutoff))
     # What is known costs nothing to look at, where no tables over fx and fy are needed for it.
@@ -150,7 +149,7 @@ def cosines(
             light = painted.Painted(scene.planes(tables.mix, optics.workers))
         peak = light.peak(tables)
         highest = max(highest, peak)
-        budget = share * knobs.tolerance * min(peak, optics.ceiling)
+        budget = bandwidth.SHARE * knobs.tolerance * min(peak, optics.ceiling)
         if light.brightest(tables) * SINGLE > budget:
             light = light.doubled()
         coefficients = light.spectrum(optics.workers, terms)

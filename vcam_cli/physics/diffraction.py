@@ -72,7 +72,7 @@ def _segment(shift: Floats) -> Floats:
     """
     half = np.arccos(shift)
     out = np.asarray(half - shift * np.sqrt((1 - shift) * (1 + shift)))
-    small = half < 0.5
+    small = (half < 0.5) & (shift < 1)  # beyond the cut-off it is 0 as it is
     near = 2 * half[small]
     square = near**2
     series = np.ones_like(near)

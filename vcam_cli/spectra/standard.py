@@ -28,9 +28,12 @@ EQUAL_ENERGY = ("E", "equal-energy")
 
 @cache
 def _columns(name: str) -> tuple[Floats, dict[str, Floats]]:
-    """wavelength [m] and the columns by name of a shipped table."""
+    """wavelength [m] and the columns by name of a shipped table; not to be written to."""
     header, rows = read_rows(DATA / name)
-    return rows[:, 0] / 1e9, dict(zip(header[1:], rows.T[1:], strict=True))
+    wavelength = rows[:, 0] / 1e9
+    for values in (wavelength, rows):
+        values.flags.writeable = False
+    return wavelength, dict(zip(header[1:], rows.T[1:], strict=True))
 
 
 def _table(file: str, column: str) -> Table:

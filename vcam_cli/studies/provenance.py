@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import platform
+import sys
 from collections.abc import Iterator
 from importlib.metadata import version
 from pathlib import Path
@@ -54,5 +55,11 @@ def data_files(camera: Camera, form: dict[str, Any] | None = None) -> tuple[Path
 def versions() -> dict[str, str]:
     """Versions that decide the bytes of a frame."""
     libraries = ("numpy", "scipy", "pydantic", "OpenImageIO")
-    found = {name: version(name) for name in libraries}
+    found = {name: _version(name) for name in libraries}
     return {"vcam": vcam_cli.__version__, "python": platform.python_version(), **found}
+
+
+def _version(name: str) -> str:
+    """Of a library; from its files, which takes longer, where it is not loaded."""
+    known = None if name == "OpenImageIO" else getattr(sys.modules.get(name), "__version__", None)
+    return known or version(name)  # OpenImageIO numbers itself in its own way
