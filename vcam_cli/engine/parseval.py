@@ -6,7 +6,6 @@ multiplication. Mean squares are those of the signal as a continuous function, b
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 
@@ -25,8 +24,8 @@ AT_ONCE = 1 << 17
 """Terms of a sample that are filtered together, about; no fewer than 16 rows."""
 FIRST = 24
 """Rows that are all looked at."""
-STEP = 1.2
-"""Of the frequencies of the others, each over the one before."""
+OTHERS = 40
+"""Rows that are looked at beyond those, at most."""
 
 
 def _sampled(y: Axis) -> tuple[NDArray, NDArray]:
@@ -35,9 +34,8 @@ def _sampled(y: Axis) -> tuple[NDArray, NDArray]:
     Straight edges along the array put their energy into the first rows and columns.
     """
     count = y.terms
-    others = math.ceil(math.log(max(1.0, count / FIRST)) / math.log(STEP))
-    first, last = np.arange(min(FIRST, count)), FIRST * STEP ** np.arange(others)
-    sample = np.unique(np.concatenate([first, last]).astype(int))
+    first, others = np.arange(min(FIRST, count)), np.geomspace(FIRST, count, OTHERS)
+    sample = np.unique(np.concatenate([first, others]).astype(int))
     sample = sample[sample < count]
     edges = np.concatenate([[-0.5], (sample[1:] + sample[:-1]) / 2, [count - 0.5]])
     return sample, np.diff(edges)
