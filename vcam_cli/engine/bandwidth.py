@@ -30,6 +30,8 @@ do not add up at random.
 """
 KNOWN = 64.0
 """Pixel Nyquist frequencies up to which the spectrum of a chart of rectangles is looked at."""
+LOOKED = 1 << 14
+"""Terms along x that are looked at for little, where the spectrum costs nothing else."""
 FREE_SAMPLES = 1 << 22
 """Samples of a plane that cost little beside the rest of a run."""
 CHEAP_SAMPLES = 1 << 24

@@ -83,6 +83,10 @@ class OfRuns:
     def dtype(self) -> np.dtype:
         return self.values.dtype
 
+    def first(self, down: int, across: int) -> OfRuns:
+        """The first terms along y and x alone: rows of more take longer."""
+        return OfRuns(self.along[:down], self.values[..., :across])
+
     @property
     def shape(self) -> tuple[int, int, int]:
         return len(self.values), len(self.along), self.values.shape[2]

@@ -24,13 +24,17 @@ from vcam_cli.scheduling.estimators import PASSES
 
 NORMAL = 8.2e-9
 """Drawing one normal number, the unit of speed [s]."""
-SAMPLE = 11e-9
+SAMPLE = 6e-9
 """Painting and transforming one sample of one plane of the scene [s]."""
-TERM = 5e-9
+FIXED = 0.015
+"""What does not depend on the size: tables of transfer, a look at the spectrum, the plan [s]."""
+TERM = 1.3e-9
 """Filtering one term of the spectrum for one plane and color [s]."""
+TURNED = 5e-9
+"""The same by a transfer function of fx and fy, once for each of its parities [s]."""
 TABLE = 1e-6
 """One value of a transfer function of fx and fy, its part of the pupil's transforms too [s]."""
-EVALUATE = 9e-9
+EVALUATE = 5e-9
 """One pixel of one color from its spectrum [s]."""
 WAVE = 12e-9
 """One pixel of one wave, or of one box [s]."""
@@ -69,12 +73,13 @@ def threads(workers: int) -> float:
 def linear(geometry: Geometry, mosaic: Mosaic, followed: Followed) -> float:
     """Core seconds of the linear part."""
     pixels, colors = geometry.rows * geometry.columns, len(mosaic.colors)
-    if not followed.samples:
-        return WAVE * pixels * colors
-    terms = pixels * followed.oversampling**2
+    if not followed.terms:
+        return FIXED + WAVE * pixels * colors
+    term = TURNED * followed.passes if followed.table_values else TERM
     return (
-        SAMPLE * followed.samples * followed.planes
-        + TERM * terms * followed.planes * colors * followed.passes
+        FIXED
+        + SAMPLE * followed.samples * followed.planes
+        + term * followed.terms * followed.planes * colors
         + EVALUATE * pixels * colors * (1 + followed.modes)
         + TABLE * followed.table_values
     )
@@ -120,7 +125,7 @@ def at_first_sight(
     """Seconds of a whole run, before anything is known of its scene."""
     oversampling = bandwidth.first_guess(geometry, knobs)
     samples = geometry.rows * geometry.columns * oversampling**2
-    guess = Followed(oversampling=oversampling, samples=samples, planes=3)
+    guess = Followed(samples=samples, terms=samples, planes=3)
     core = linear(geometry, mosaic, guess) + after(camera, geometry, mosaic)
     core += irradiance(camera, geometry, knobs, guess)
     return core * slowness() / threads(workers)

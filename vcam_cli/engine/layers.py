@@ -76,7 +76,9 @@ class Followed:
     lost: float = 0.0
     """Estimated rms of the signal beyond [electrons / s]"""
     samples: int = 0
-    """Samples of one plane of the scene; 0 where its waves are known."""
+    """Samples of one plane of the scene that were transformed; 0 where its spectrum is known."""
+    terms: int = 0
+    """Terms of one plane's spectrum that were filtered; 0 where there was no need to."""
     planes: int = 0
     """Planes that were transformed."""
     changes: dict[str, float] = dataclasses.field(default_factory=dict)

@@ -273,6 +273,12 @@ class Filter:
             parts = [np.where(beyond, part.dtype.type(0), part) for part in parts]
         return Rows(parts, fy, count)
 
+    @property
+    def terms(self) -> int:
+        """Terms of a plane's spectrum that tables reach."""
+        reach = np.sqrt(np.maximum(self.tables.top**2 - self.y.frequencies**2, 0))
+        return int(np.minimum(reach * 2 * self.x.length + 1, self.x.terms).sum())
+
     def _count(self, fy: NDArray) -> int:
         """Terms along x that tables reach at some of these frequencies (n,) along y."""
         reach = self.tables.top**2 - fy.min() ** 2

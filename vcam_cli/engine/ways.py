@@ -34,7 +34,7 @@ from vcam_cli.engine import (
     waves,
 )
 from vcam_cli.engine.axis import Axis
-from vcam_cli.engine.coefficients import Coefficients, PlaneOfRuns
+from vcam_cli.engine.coefficients import Coefficients, OfRuns, PlaneOfRuns
 from vcam_cli.engine.layers import Followed, Layer, Layers, Optics
 from vcam_cli.engine.parallel import pieces
 from vcam_cli.engine.room import of_tables, of_zones, table_values
@@ -112,7 +112,8 @@ def cosines(
     widest = min(bandwidth.most(pixels, knobs), bandwidth.limit(g, cutoff))
     # What is known costs nothing to look at, where no tables over fx and fy are needed for it.
     free = known and not optics.transfer.plane and optics.field is None
-    reach = min(bandwidth.KNOWN, bandwidth.limit(g, cutoff)) if free else widest
+    far = max(widest, min(bandwidth.KNOWN, bandwidth.LOOKED / g.columns))
+    reach = min(far, bandwidth.limit(g, cutoff)) if free else widest
     if known:
         oversampling, scene = _again(scene_at, math.ceil(reach))
     top = bandwidth.top(g, reach, cutoff)
@@ -167,6 +168,8 @@ def cosines(
         del light, coefficients, sample
         oversampling, scene = _again(scene_at, finer)
     chosen = looked if enough == reach else _filter(optics, scene, tables, enough)
+    if isinstance(coefficients, OfRuns):
+        coefficients = coefficients.first(chosen.y.terms, chosen.x.terms)
     modes, squares = _needed(optics, scene, sample, modes, budget)
     # Without one of them the picture may reach further than it does with all of them.
     changes = dict(_changes(optics, scene, sample, squares))
@@ -178,7 +181,8 @@ def cosines(
     followed = Followed(
         oversampling=enough,
         lost=lost,
-        samples=samples,
+        samples=0 if known else samples,
+        terms=chosen.terms,
         planes=len(tables.mix),
         changes=changes,
         modes=len(modes),
