@@ -12,6 +12,8 @@ from numpy.typing import NDArray
 from vcam_cli.engine.parallel import at_once, pieces
 from vcam_cli.engine.transfer import Tables
 
+_BEYOND = 2
+"""Entries of 0 that go on beyond a table's end."""
 Position = tuple[NDArray | None, NDArray | None]
 """In a table over |f|: indices and fractions, where they are needed."""
 
@@ -71,7 +73,7 @@ class Lookup:
         self.scale = 1 / tables.step if tables.top else 0.0
         self.values = self.rises = None
         if parity == 0 and tables.has_values:
-            zero = np.zeros((*tables.values.shape[:-1], 2))
+            zero = np.zeros((*tables.values.shape[:-1], _BEYOND))
             self.values = np.concatenate([tables.values, zero], axis=-1).astype(dtype)
             self.rises = np.diff(self.values, append=0) if self.linear else None
         self.planes: Sequence[Sequence[NDArray]] | None = None
@@ -119,9 +121,9 @@ class Lookup:
 
     @cached_property
     def errors(self) -> NDArray:
-        """(R, C) what the nearest entry errs by at most."""
+        """(R, C) what the nearest entry errs by at most, up to the tables' end."""
         assert self.values is not None
-        return np.abs(np.diff(self.values)).max(axis=-1) / 2
+        return np.abs(np.diff(self.values[..., :-_BEYOND])).max(axis=-1, initial=0) / 2
 
     def between(self, fy: NDArray, count: int, planes: int) -> NDArray:
         """Tables over |f| of so many planes by linear interpolation: (planes, C, n, count)."""

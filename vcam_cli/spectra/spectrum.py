@@ -24,10 +24,14 @@ SAME_WAVELENGTH = 1e-9
 
 
 def _frozen(values: ArrayLike) -> Floats:
-    """A copy that stays as it is; of what does so already, itself: tables then share wavelengths."""
-    if isinstance(values, np.ndarray) and values.dtype == np.float64:
-        if values.base is None and not values.flags.writeable:
-            return values
+    """A copy that stays as it is; of what does so already, itself, so that tables can share it."""
+    if (
+        isinstance(values, np.ndarray)
+        and values.dtype == np.float64
+        and values.base is None
+        and not values.flags.writeable
+    ):
+        return values
     array = np.array(values, dtype=np.float64)
     array.setflags(write=False)
     return array
