@@ -25,9 +25,13 @@ from vcam_cli.scheduling.estimators import PASSES
 NORMAL = 8.2e-9
 """Drawing one normal number, the unit of speed [s]."""
 SAMPLE = 6e-9
-"""Painting and transforming one sample of one plane of the scene [s]."""
-FIXED = 0.015
-"""What does not depend on the size: tables of transfer, a look at the spectrum, the plan [s]."""
+"""Transforming one sample of one plane of the scene [s]."""
+PAINT = 22e-9
+"""Painting one sample of one plane of a chart [s]."""
+FIXED = 0.008
+"""What does not depend on the size: tables of transfer, colors of patches, the plan [s]."""
+LOOK = 7e-9
+"""Looking at one term of the spectrum, for one plane and color [s]."""
 TERM = 1.3e-9
 """Filtering one term of the spectrum for one plane and color [s]."""
 TURNED = 5e-9
@@ -78,7 +82,8 @@ def linear(geometry: Geometry, mosaic: Mosaic, followed: Followed) -> float:
     term = TURNED * followed.passes if followed.table_values else TERM
     return (
         FIXED
-        + SAMPLE * followed.samples * followed.planes
+        + (SAMPLE + PAINT * followed.painted) * followed.samples * followed.planes
+        + LOOK * followed.looked * followed.planes * colors
         + term * followed.terms * followed.planes * colors
         + EVALUATE * pixels * colors * (1 + followed.modes)
         + TABLE * followed.table_values

@@ -77,6 +77,10 @@ class Followed:
     """Estimated rms of the signal beyond [electrons / s]"""
     samples: int = 0
     """Samples of one plane of the scene that were transformed; 0 where its spectrum is known."""
+    painted: bool = False
+    """Whether they had to be painted first, as those of a chart."""
+    looked: int = 0
+    """Terms of one plane's spectrum that were looked at, to see what is in it."""
     terms: int = 0
     """Terms of one plane's spectrum that were filtered; 0 where there was no need to."""
     planes: int = 0

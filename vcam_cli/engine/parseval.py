@@ -73,6 +73,11 @@ class Sample:
         self._filter, self._dtype = filter, coefficients.dtype
         self._blocks = tuple(self._taken(coefficients))
 
+    @property
+    def size(self) -> int:
+        """Terms of a plane that are in it."""
+        return sum(block.rows.planes[0].size for block in self._blocks)
+
     def _taken(self, coefficients: Coefficients) -> Iterator[_Block]:
         along_x, along_y = self._filter.along_x, self._filter.along_y
         every, stand_for = _sampled(self._filter.y)

@@ -182,6 +182,8 @@ def cosines(
         oversampling=enough,
         lost=lost,
         samples=0 if known else samples,
+        painted=not at_hand,
+        looked=sample.size,
         terms=chosen.terms,
         planes=len(tables.mix),
         changes=changes,
