@@ -24,6 +24,7 @@ def lines(found: dict[str, Any]) -> Iterator[str]:
     yield from _section("wavelengths", found["wavelengths"])
     yield from _section("sweep over one frame", found["sweeps"])
     yield from _section("schedules over R_compute at 12 megapixels", found["schedules"])
+    yield from _section("whole command over R_compute at 12 megapixels", found["command"])
 
 
 def _section(title: str, rows: dict[str, dict[str, float]]) -> Iterator[str]:
@@ -42,12 +43,10 @@ def _stages(shares: dict[str, float]) -> Iterator[str]:
 def _growth(found: dict[str, Any]) -> Iterator[str]:
     sizes = found["megapixels"]
     yield "growth with pixels"
-    titles = {
-        "exponent": "exponent",
-        "a_pixel": f"a pixel at {sizes[-1]:.3g} MP over {sizes[0]:.3g}",
-    }
-    for key, title in titles.items():
-        yield f"  {title:<44}" + "".join(f"{found[c][key]:>9.3f}" for c in CLOCKS)
+    yield f"  {'exponent':<44}" + "".join(f"{found[c]['exponent']:>9.3f}" for c in CLOCKS)
+    for i, size in enumerate(sizes[:-1]):
+        title = f"a pixel at {size:.3g} MP over {sizes[-1]:.3g} MP"
+        yield f"  {title:<44}" + "".join(f"{found[c]['a_pixel'][i]:>9.3f}" for c in CLOCKS)
     for i, pair in enumerate(pairwise(sizes)):
         title = f"exponent from {pair[0]:.3g} to {pair[1]:.3g} MP"
         yield f"  {title:<44}" + "".join(f"{found[c]['between'][i]:>9.3f}" for c in CLOCKS)

@@ -3,7 +3,12 @@
 from __future__ import annotations
 
 import math
+import os
+import subprocess
+import sys
+import tempfile
 from collections.abc import Sequence
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +26,8 @@ from .measure import Cost, Frames, Yardstick, frames, timed
 
 Ratio = dict[str, float]
 CAPTURES = range(1, 21)
+IN_TURN = 2e6
+"""Pixels that small frames of a turn have together, about."""
 VARIED = {
     "exposure time": ("exposure.time", "10 ms", "50 ms"),
     "f-number": ("optics.f_number", "2.8", "8"),
@@ -90,13 +97,18 @@ def growth(
     """How time grows with pixels: time ~ pixels ** exponent. 1 is proportional.
 
     The exponent of a line through all sizes, those between neighbors, and the time a pixel takes
-    at the largest over that at the smallest.
+    at each size over that at the largest. Sizes take turns, small ones more than one at a time.
     """
-    costs, pixels = [], []
-    for rows, columns in sizes:
-        with studio(rows, columns, always) as place:
-            pixels.append(float(rows * columns))
-            costs.append(frames(place.camera("gray"), repeats).cost)
+    pixels = [float(rows * columns) for rows, columns in sizes]
+    with ExitStack() as studios:
+        taken = []
+        for rows, columns in sizes:
+            place = studios.enter_context(studio(rows, columns, always))
+            taken.append(Frames(place.camera("gray")).take(0, warm=True))
+        for _ in range(repeats):
+            for one, size in zip(taken, pixels, strict=True):
+                one.take(round(min(max(IN_TURN / size, 1), 8)))
+    costs = [one.cost for one in taken]
     out: dict[str, Any] = {"megapixels": [p / 1e6 for p in pixels]}
     for clock in ("wall", "cpu"):
         seconds = [getattr(cost, clock) for cost in costs]
@@ -104,7 +116,7 @@ def growth(
         out[clock] = {
             "exponent": float(np.polyfit(*logs, 1)[0]),
             "between": (np.diff(logs[1]) / np.diff(logs[0])).tolist(),
-            "a_pixel": seconds[-1] / seconds[0] * pixels[0] / pixels[-1],
+            "a_pixel": (np.divide(seconds, pixels) * pixels[-1] / seconds[-1]).tolist(),
         }
     return out
 
@@ -172,3 +184,42 @@ def schedules(unit: Cost, repeats: int, levels: int = 65_536) -> dict[str, Ratio
     scene = Pdf.levels(values, rng.random(levels) + 1e-3)
     cost = timed(lambda: optimal(scene, CAPTURES), repeats)
     return {f"{levels} levels, 1 to {CAPTURES[-1]} captures": cost.over(unit)}
+
+
+def command(unit: Cost, repeats: int, rows: int = 432, columns: int = 600) -> dict[str, Ratio]:
+    """`vcam run` of a small frame from start to end, and what loading takes of it.
+
+    unit: R_compute at 12 megapixels, whatever the size of this frame. As it is installed: compiled
+    once, which the first, uncounted run does.
+    """
+    size = [f"--set=array.rows={rows}", f"--set=array.columns={columns}"]
+    with tempfile.TemporaryDirectory() as folder:
+        run = ["-m", "vcam_cli.commands.main", "run", "starter", "-q", "-o", f"{folder}/out", *size]
+        loading = ["-c", f"import {', '.join(LOADED)}"]
+        works = {"vcam run": run, "of it Python and loading": loading}
+        return {
+            f"{name}, {rows} x {columns}": {"wall": _started(work, folder, repeats) / unit.wall}
+            for name, work in works.items()
+        }
+
+
+LOADED = (
+    "vcam_cli.commands.main",
+    "vcam_cli.commands.run",
+    "vcam_cli.studies.checks",
+    "vcam_cli.studies.outputs",
+    "vcam_cli.studies.simulate",
+    "vcam_cli.files.report",
+)
+"""What `vcam run` loads."""
+
+
+def _started(work: Sequence[str], folder: str, repeats: int) -> float:
+    """Seconds of a Python process: median, by the clock."""
+    kept = {k: v for k, v in os.environ.items() if k != "PYTHONDONTWRITEBYTECODE"}
+    kept["PYTHONPYCACHEPREFIX"] = f"{folder}/compiled"
+
+    def start() -> None:
+        subprocess.run([sys.executable, *work], env=kept, check=True)
+
+    return timed(start, repeats).wall

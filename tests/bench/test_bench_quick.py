@@ -2,6 +2,7 @@
 
 import json
 import math
+import subprocess
 
 import numpy as np
 import pytest
@@ -35,8 +36,9 @@ TINY = Size(
 @pytest.fixture(scope="module")
 def found():
     with pytest.MonkeyPatch.context() as patch:
-        # A sweep starts processes, which takes longer than all the rest.
+        # Those start processes, which takes longer than all the rest.
         patch.setattr(sections, "_swept", lambda study, out, points: 1.0)
+        patch.setattr(sections, "_started", lambda work, folder, repeats: 1.0)
         yield measure(TINY)
 
 
@@ -61,12 +63,13 @@ def figures(tree, path=()):
 def test_every_part_is_there(found):
     assert set(found) == {
         "processors", "size", "repeats", "r_compute", "yardstick", "stages", "plain",
-        "plain_apart", "wavelengths", "effects", "sweeps", "growth", "schedules",
+        "plain_apart", "wavelengths", "effects", "sweeps", "growth", "schedules", "command",
     }  # fmt: skip
     assert set(found["yardstick"]) == {"gray picture", *TINY.scenes}
     assert set(found["effects"]) == set(TINY.effects)
     assert set(found["sweeps"]) == set(sections.VARIED)
     assert len(found["growth"]["wall"]["between"]) == len(TINY.growth) - 1
+    assert len(found["growth"]["cpu"]["a_pixel"]) == len(TINY.growth)
 
 
 def test_figures_are_finite_and_positive(found):
@@ -110,3 +113,12 @@ def test_reading_is_taken_off_and_medians_are_by_clock(place):
     taken = Frames(place.camera("gray")).take(2)
     assert len(taken.costs) == 2
     assert "read" not in taken.shares
+
+
+def test_a_command_is_started_as_it_is_installed(tmp_path, monkeypatch):
+    """Compiled once, not anew at every start; one that fails is no figure."""
+    monkeypatch.setenv("PYTHONDONTWRITEBYTECODE", "1")
+    assert sections._started(["-c", "import vcam_cli.units"], str(tmp_path), 1) > 0
+    assert list((tmp_path / "compiled").rglob("units*.pyc"))
+    with pytest.raises(subprocess.CalledProcessError):
+        sections._started(["-c", "raise SystemExit(2)"], str(tmp_path), 1)

@@ -91,4 +91,6 @@ def measure(size: Size, tell: Callable[[str], None] = lambda _: None) -> dict[st
     tell("schedules")
     large = unit.of(1).scaled(PIXELS / (size.frame[0] * size.frame[1]))
     out["schedules"] = sections.schedules(large, size.repeats, size.levels)
+    tell("command")
+    out["command"] = sections.command(large, size.repeats)
     return out
