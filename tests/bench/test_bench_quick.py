@@ -33,6 +33,9 @@ TINY = Size(
 )
 
 
+_started = sections._started
+
+
 @pytest.fixture(scope="module")
 def found():
     with pytest.MonkeyPatch.context() as patch:
@@ -118,7 +121,7 @@ def test_reading_is_taken_off_and_medians_are_by_clock(place):
 def test_a_command_is_started_as_it_is_installed(tmp_path, monkeypatch):
     """Compiled once, not anew at every start; one that fails is no figure."""
     monkeypatch.setenv("PYTHONDONTWRITEBYTECODE", "1")
-    assert sections._started(["-c", "import vcam_cli.units"], str(tmp_path), 1) > 0
+    assert _started(["-c", "import vcam_cli.units"], str(tmp_path), 1) > 0
     assert list((tmp_path / "compiled").rglob("units*.pyc"))
     with pytest.raises(subprocess.CalledProcessError):
-        sections._started(["-c", "raise SystemExit(2)"], str(tmp_path), 1)
+        _started(["-c", "raise SystemExit(2)"], str(tmp_path), 1)
