@@ -181,6 +181,30 @@ def test_no_further_than_the_tolerance_asks(tmp_path):
     assert reached == sorted(reached, reverse=True) and reached[0] > reached[-1] >= 1
 
 
+@pytest.mark.parametrize("across", [True, False])
+@pytest.mark.parametrize("frequency", [1.13, 1.3, 1.7, 2.3])
+def test_a_grating_that_pixels_fold_is_not_missed(frequency, across, tmp_path):
+    """All of its light is in one row or column of the spectrum, beyond the pixels' Nyquist
+    frequency: it must not pass for nothing, between two rows that are looked at.
+
+    Half the tolerance: the samples' harmonics fall onto each other, so what is lost of them adds up
+    and is more than their mean squares tell.
+    """
+    shape = (400, 16) if across else (16, 400)
+    place = np.indices((4 * shape[0], 4 * shape[1]))[0 if across else 1]
+    values = 0.5 + 0.4 * np.cos(np.pi * frequency / 4 * (place + 0.5))[:, :, None]
+    (tmp_path / "picture.exr").touch()
+    source = {"kind": "image", "file": str(tmp_path / "picture.exr"), "encoding": "linear"}
+    lattice = {"array.rows": shape[0], "array.columns": shape[1], "optics.f_number": 2}
+    changes = {"scene.source": source, **lattice}
+    whole, some = (
+        rate(camera(tmp_path, changes | {"accuracy": how}), values.astype(np.float32))
+        for how in ({"preset": "standard", "oversampling": 4}, "standard")
+    )
+    assert np.ptp(whole.values) > 0.01 * whole.values.max()  # there is something to be missed
+    assert rms(some.values, whole.values) < 0.5 * 5e-3 * whole.values.max()
+
+
 # --- the arithmetic ------------------------------------------------------------------------------
 
 

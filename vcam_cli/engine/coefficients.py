@@ -147,6 +147,8 @@ class Passing:
     Why: a plane of a chart in color has four samples a pixel, and there are four of them or more.
     """
 
+    energy: NDArray
+    """(ny,) sums of squares of the first plane's rows"""
     rows: NDArray
     """(n,) rising: the rows at hand"""
     some: NDArray

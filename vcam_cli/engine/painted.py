@@ -12,10 +12,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from vcam_cli.engine import bandwidth, sampling
+from vcam_cli.engine import bandwidth, few_rows, sampling
 from vcam_cli.engine.axis import Axis
 from vcam_cli.engine.coefficients import Coefficients, Folded, Passing, of_rectangles, passes
-from vcam_cli.engine.parseval import rows_to_sample
 from vcam_cli.engine.transfer import Tables
 from vcam_cli.scenes.base import Rectangles, SampledScene
 
@@ -73,6 +72,24 @@ class Known:
 
 
 @dataclass(frozen=True)
+class _Seen:
+    """What is kept of planes that were let go."""
+
+    thin: NDArray
+    """Every eighth sample of every plane."""
+    extremes: NDArray
+    """(R, 2)"""
+    energy: NDArray
+    """(ny,) of the rows of the first plane's spectrum"""
+    rows: NDArray
+    """(n,) those at hand"""
+    some: NDArray
+    """(R, n, nx) the same of every plane"""
+    folded: Folded
+    """What the filter made of them."""
+
+
+@dataclass(frozen=True)
 class InTurn:
     """Planes too large to be held at once: each is painted, looked at and let go."""
 
@@ -88,12 +105,11 @@ class InTurn:
 
     def peak(self, tables: Tables) -> float:
         """Largest signal before blur, from every eighth sample [electrons / s]."""
-        thin = self._seen[0]
-        return bandwidth.peak(thin, tables)
+        return bandwidth.peak(self._seen.thin, tables)
 
     def brightest(self, tables: Tables) -> float:
         """Bound on the signal of the brightest sample [electrons / s]."""
-        return bandwidth.brightest(self._seen[1], tables)
+        return bandwidth.brightest(self._seen.extremes, tables)
 
     def doubled(self) -> InTurn:
         """The same in 64 bits."""
@@ -101,26 +117,27 @@ class InTurn:
 
     def spectrum(self, workers: int, terms: tuple[int, int]) -> Coefficients:
         """DCT-II of every plane, some rows at once and all of them when they are asked for."""
-        _, _, some, folded = self._seen
-        return Passing(
-            rows_to_sample(self.filter.y), some, self._coefficients, [folded] if folded else []
-        )
+        seen = self._seen
+        folded = [seen.folded] if seen.folded else []
+        return Passing(seen.energy, seen.rows, seen.some, self._coefficients, folded)
 
     @cached_property
-    def _seen(self) -> tuple[NDArray, NDArray, NDArray, Folded]:
-        """Every eighth sample, the extremes, and the rows at hand, of every plane; and what the
-        filter made of them."""
-        thin, extremes, some, rows = [], [], [], rows_to_sample(self.filter.y)
+    def _seen(self) -> _Seen:
+        thin, extremes, some = [], [], []
         folded = self.filter.begun(np.dtype(self.dtype)) if self.known else {}
         for number in range(len(self.mix)):
             plane = self._plane(number)
             thin.append(plane[0, ::8, ::8].astype(np.float64))
             extremes.append([plane.min(), plane.max()])
             plane = self._spectrum(plane)
+            if not number:
+                energy = few_rows.energy(plane)
+                terms, _ = few_rows.rows(self.filter.y, energy)
+                rows = np.unique(self.filter.y.base(terms)[0])
             some.append(plane[0, rows])
             self.filter.add(plane, number, folded, self.workers)
             del plane
-        return np.array(thin), np.array(extremes), np.array(some), folded
+        return _Seen(np.array(thin), np.array(extremes), energy, rows, np.array(some), folded)
 
     def _coefficients(self, number: int) -> NDArray:
         return self._spectrum(self._plane(number))

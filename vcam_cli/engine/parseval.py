@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcam_cli.effects.base import RadialTransfer, SeparableTransfer
-from vcam_cli.engine.axis import Axis
+from vcam_cli.engine import few_rows
 from vcam_cli.engine.coefficients import Coefficients
 from vcam_cli.engine.lookup import Lookup, Position, Rows
 from vcam_cli.engine.parallel import pieces
@@ -22,28 +22,6 @@ from vcam_cli.engine.transfer import Fineness, Tables, Transfer, entries
 
 AT_ONCE = 1 << 17
 """Terms of a sample that are filtered together, about; no fewer than 16 rows."""
-FIRST = 24
-"""Rows that are all looked at."""
-OTHERS = 40
-"""Rows that are looked at beyond those, at most."""
-
-
-def _sampled(y: Axis) -> tuple[NDArray, NDArray]:
-    """Rows, and the number of rows each stands for: all of the first few, then ever fewer.
-
-    Straight edges along the array put their energy into the first rows and columns.
-    """
-    count = y.terms
-    first, others = np.arange(min(FIRST, count)), np.geomspace(FIRST, count, OTHERS)
-    sample = np.unique(np.concatenate([first, others]).astype(int))
-    sample = sample[sample < count]
-    edges = np.concatenate([[-0.5], (sample[1:] + sample[:-1]) / 2, [count - 0.5]])
-    return sample, np.diff(edges)
-
-
-def rows_to_sample(y: Axis) -> NDArray:
-    """Rows of the coefficients that a `Sample` looks at, rising."""
-    return np.unique(y.base(_sampled(y)[0])[0])
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +58,7 @@ class Sample:
 
     def _taken(self, coefficients: Coefficients) -> Iterator[_Block]:
         along_x, along_y = self._filter.along_x, self._filter.along_y
-        every, stand_for = _sampled(self._filter.y)
+        every, stand_for = few_rows.rows(self._filter.y, few_rows.energy(coefficients))
         for part in pieces(len(every), max(16, AT_ONCE // self._filter.x.terms)):
             terms, stands_for = every[part], stand_for[part]
             found = self._filter.rows(coefficients, terms)

@@ -1,0 +1,71 @@
+"""Which rows of a picture's spectrum are looked at, to tell what is in all of it.
+
+All of the first, into which edges along the array put their energy, and ever fewer of the others;
+and those that stand out among the rows around them, as a grating's do: between two that are looked
+at they would be missed.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcam_cli.engine.axis import Axis
+from vcam_cli.engine.coefficients import Coefficients, OfRuns, Passing
+from vcam_cli.engine.parallel import at_once, pieces
+
+FIRST = 24
+"""Rows that are all looked at."""
+OTHERS = 40
+"""Rows that are looked at beyond those, at most."""
+OUTSTANDING = 32
+"""Rows that stand out, at most: those with most energy."""
+STANDS_OUT = 3.0
+"""Energy of such a row over the mean of those around it."""
+
+
+def energy(coefficients: Coefficients) -> NDArray:
+    """Sum of squares of every row of coefficients, all planes together; of planes that pass, of
+    the first: (ny,)."""
+    if isinstance(coefficients, Passing):
+        return coefficients.energy
+    if isinstance(coefficients, OfRuns):
+        alike = sum(values.astype(np.float64) @ values.T for values in coefficients.values)
+        return np.asarray(np.einsum("yd,yd->y", coefficients.along @ alike, coefficients.along))
+    planes = np.asarray(coefficients)
+    out = np.zeros(planes.shape[1])
+    for plane in planes:
+        for rows in pieces(len(plane), at_once(plane.shape[1])):
+            out[rows] += np.einsum("yx,yx->y", plane[rows], plane[rows])
+    return out
+
+
+def rows(y: Axis, energy: NDArray) -> tuple[NDArray, NDArray]:
+    """Terms along y that are looked at, rising, and the number of rows that each stands for.
+
+    energy: (ny,) of the coefficients' rows.
+    """
+    index, sign = y.base(np.arange(y.terms))
+    known = energy if np.isfinite(energy).all() else np.zeros_like(energy)
+    outstanding = _outstanding(known[index] * np.square(sign * y.weights))
+    rest = np.delete(np.arange(y.terms), outstanding)
+    count = len(rest)
+    first, others = np.arange(min(FIRST, count)), np.geomspace(FIRST, max(FIRST, count), OTHERS)
+    at = np.unique(np.concatenate([first, others]).astype(int))
+    at = at[at < count]
+    edges = np.concatenate([[-0.5], (at[1:] + at[:-1]) / 2, [count - 0.5]])
+    terms = np.concatenate([rest[at], outstanding])
+    stand_for = np.concatenate([np.diff(edges), np.ones(len(outstanding))])
+    order = np.argsort(terms)
+    return terms[order], stand_for[order]
+
+
+def _outstanding(energy: NDArray) -> NDArray:
+    """Terms far above the mean of those around them, the strongest: (n,)."""
+    if len(energy) <= FIRST + 1:
+        return np.zeros(0, int)
+    starts = np.unique(np.geomspace(FIRST, len(energy), OTHERS).astype(int))[:-1]
+    sizes = np.diff(starts, append=len(energy))
+    around = np.repeat(np.add.reduceat(energy, starts) / sizes, sizes)
+    found = FIRST + np.flatnonzero(energy[FIRST:] > STANDS_OUT * around)
+    return found[np.argsort(energy[found])[::-1][:OUTSTANDING]]
