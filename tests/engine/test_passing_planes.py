@@ -23,9 +23,10 @@ def test_light_is_the_same_one_by_one(still_life, monkeypatch):
     alone, _ = prepare(still_life, workers=2)
     again, _ = prepare(still_life, workers=1)
     assert alone.spectrum.held * together.spectrum.planes == together.spectrum.held
-    # The same sums in another order: rounding of 32 bits, of the largest.
+    # A stretch of rows is interpolated where all planes that are there allow it, and read where
+    # one does not: both are within half an entry of a table, 2e-5 of what a term adds.
     largest = together.rate.max()
-    np.testing.assert_allclose(alone.rate, together.rate, atol=1e-6 * largest, rtol=0)
+    np.testing.assert_allclose(alone.rate, together.rate, atol=5e-6 * largest, rtol=0)
     np.testing.assert_array_equal(alone.rate, again.rate)
     # Other rows are looked at beside the usual ones: those that stand out in the first plane.
     assert alone.spectrum.lost == pytest.approx(together.spectrum.lost, rel=0.1)

@@ -72,11 +72,11 @@ class Sample:
     def power(self) -> tuple[NDArray, NDArray]:
         """Mean squares of the filter's signal by frequency.
 
-        Returns the frequency [cycles/m], the larger of |fx| and |fy|, and for each color the
-        mean square that terms of such frequencies add to the signal: (n,) and (C, n), rising in
-        frequency. Terms of the same frequency are added up.
+        Returns the frequency in pixel Nyquist frequencies of its axis, the larger of those along x
+        and y, and for each color the mean square that terms of such frequencies add to the signal:
+        (n,) and (C, n), rising in frequency. Terms of the same frequency are added up.
         """
-        fx, fy = self._filter.x.frequencies, self._filter.y.frequencies
+        fx, fy = (2 * a.pixel_pitch * a.frequencies for a in (self._filter.x, self._filter.y))
         along_x = np.zeros((self._filter.tables.values.shape[1], len(fx)))
         frequency, power = [fx], [along_x]
         for block, squares in self._squares():

@@ -4,7 +4,8 @@ Reading a table at every term of a spectrum is what filtering costs most. Over a
 table is smooth along y: a cubic through four frequencies is as good, and a product of small
 matrices makes it. Factors along x and y are in the matrices, so they cost nothing. Every stretch
 is checked: where its cubic errs by more than reading the nearest entry may, as it does where the
-frequency is low or tables have corners, it is halved, and in the end read at every term.
+frequency is low or tables have corners, it is halved, and in the end read at every term. So are
+the lowest frequencies always, for the mean signal and most of a picture's light are there.
 """
 
 from __future__ import annotations
@@ -27,8 +28,8 @@ _NODES = np.cos(np.pi * (np.arange(4) + 0.5) / 4)
 """Chebyshev's, from -1 to 1."""
 _CUBICS = np.linalg.inv(np.vander(_NODES))
 """Of each node the cubic that is 1 there and 0 at the others, highest power first: (4, 4)."""
-_CHECKED = np.array([1.0, np.cos(np.pi / 4)])
-"""Two of the five places where a cubic through them errs most."""
+_CHECKED = np.cos(np.pi * np.arange(5) / 4)
+"""The places where a cubic through them errs most, both ends among them."""
 AT_NODES = 2 * (len(_NODES) + len(_CHECKED))
 """Rows of tables that a stretch takes while it is made."""
 
@@ -92,7 +93,7 @@ def stretches(lookup: Lookup, fy: NDArray, along_x: NDArray, planes: int) -> Ite
     while waiting:
         rows = waiting.pop()
         found = None
-        if lookup.smooth and rows.stop - rows.start >= SHORTEST:
+        if lookup.smooth and rows.stop - rows.start >= SHORTEST and fy[rows].min() > 0:
             found = _interpolated(lookup, rows, fy[rows], along_x, planes)
         if found is not None:
             yield found

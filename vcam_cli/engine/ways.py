@@ -253,8 +253,7 @@ def _filter(
 def _spread(optics: Optics, scene: SampledScene, sample: parseval.Sample) -> bandwidth.Spread:
     """The signal's spectrum, as if all of it lay on the array and none in the margin."""
     frequency, power = sample.power()
-    nyquist = 2 * optics.geometry.pitch_x
-    return bandwidth.Spread(frequency * nyquist, power * _density(optics, scene))
+    return bandwidth.Spread(frequency, power * _density(optics, scene))
 
 
 def _density(optics: Optics, scene: SampledScene) -> float:
