@@ -92,6 +92,11 @@ def yardstick(rows: int, columns: int, repeats: int) -> Yardstick:
     return Yardstick(transform, timed(rest, repeats))
 
 
+def middle(found: Sequence[Yardstick]) -> Yardstick:
+    """The median of several."""
+    return Yardstick(median([y.transform for y in found]), median([y.rest for y in found]))
+
+
 @dataclass
 class _Reading(Silent):
     """Adds up what reading files costs, to be taken off the rest."""

@@ -22,7 +22,7 @@ from vcam_cli.studies.accuracy import without
 
 from . import plain
 from .cameras import BUSY, PLAIN, Studio, studio
-from .measure import Cost, Frames, Yardstick, frames, timed
+from .measure import Cost, Frames, frames, middle, timed, yardstick
 
 Ratio = dict[str, float]
 CAPTURES = range(1, 21)
@@ -36,16 +36,23 @@ VARIED = {
 
 
 def against_yardstick(
-    place: Studio, unit: Yardstick, repeats: int, scenes: Sequence[str]
+    place: Studio, size: tuple[int, int], repeats: int, scenes: Sequence[str]
 ) -> tuple[dict[str, Ratio], Frames]:
-    """Frames over R_compute of as many components; and those of the gray picture, for stages."""
-    gray = frames(place.camera("gray"), repeats)
-    found = {"gray picture": gray.cost.over(unit.of(gray.components))}
-    for scene in scenes:
-        taken = frames(place.camera(scene), repeats)
-        label = f"{scene}, {taken.components} components"
-        found[label] = taken.cost.over(unit.of(taken.components))
-    return found, gray
+    """Frames over R_compute of as many components; and those of the gray picture, for stages.
+
+    Each takes turns with the yardstick, since machines are faster at one moment than at another.
+    """
+    found, kept = {}, []
+    for scene in ("gray", *scenes):
+        taken, units = Frames(place.camera(scene)).take(0, warm=True), []
+        for _ in range(repeats):
+            units.append(yardstick(*size, 1))
+            taken.take()
+        unit = middle(units).of(taken.components)
+        more = f", {taken.components} components" if taken.components > 1 else " picture"
+        found[f"{scene}{more}"] = taken.cost.over(unit)
+        kept.append(taken)
+    return found, kept[0]
 
 
 def against_plain(

@@ -72,7 +72,9 @@ def measure(size: Size, tell: Callable[[str], None] = lambda _: None) -> dict[st
     }
     with studio(*size.frame, size.always) as place:
         tell("frames")
-        out["yardstick"], gray = sections.against_yardstick(place, unit, size.repeats, size.scenes)
+        out["yardstick"], gray = sections.against_yardstick(
+            place, size.frame, size.repeats, size.scenes
+        )
         out["stages"] = gray.shares
         tell("plain pipeline")
         plain = sections.against_plain(
