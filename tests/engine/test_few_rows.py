@@ -16,8 +16,11 @@ def axis(samples: int, squares: bool = True) -> Axis:
 @pytest.mark.parametrize("samples", [1, 2, 7, 30, 500, 4001])
 def test_every_row_is_stood_for_once(samples):
     energy = np.random.default_rng(0).exponential(size=samples) ** 4
-    terms, stand_for = few_rows.rows(axis(samples), energy)
-    assert stand_for.sum() == pytest.approx(axis(samples).terms)
+    y = axis(samples)
+    terms, stand_for = few_rows.rows(y, energy)
+    index, sign = y.base(np.arange(y.terms))
+    own = energy[index] * np.square(sign * y.weights)
+    assert (stand_for * own[terms]).sum() == pytest.approx(own.sum())
     assert (np.diff(terms) > 0).all() and terms[0] == 0 and terms[-1] < axis(samples).terms
     most = few_rows.FIRST + few_rows.OTHERS + few_rows.OUTSTANDING
     assert len(terms) == len(stand_for) <= most

@@ -43,21 +43,35 @@ def energy(coefficients: Coefficients) -> NDArray:
 def rows(y: Axis, energy: NDArray) -> tuple[NDArray, NDArray]:
     """Terms along y that are looked at, rising, and the number of rows that each stands for.
 
-    energy: (ny,) of the coefficients' rows.
+    energy: (ny,) of the coefficients' rows. Of rows that are stood for the one with the most
+    usual energy is taken, as often as gives the energy of all: a chart's rise and fall from row to
+    row.
     """
     index, sign = y.base(np.arange(y.terms))
     known = energy if np.isfinite(energy).all() else np.zeros_like(energy)
-    outstanding = _outstanding(known[index] * np.square(sign * y.weights))
+    own = known[index] * np.square(sign * y.weights)
+    outstanding = _outstanding(own)
     rest = np.delete(np.arange(y.terms), outstanding)
     count = len(rest)
     first, others = np.arange(min(FIRST, count)), np.geomspace(FIRST, max(FIRST, count), OTHERS)
     at = np.unique(np.concatenate([first, others]).astype(int))
     at = at[at < count]
-    edges = np.concatenate([[-0.5], (at[1:] + at[:-1]) / 2, [count - 0.5]])
-    terms = np.concatenate([rest[at], outstanding])
-    stand_for = np.concatenate([np.diff(edges), np.ones(len(outstanding))])
+    groups = np.split(rest, np.ceil((at[1:] + at[:-1]) / 2).astype(int))
+    found = [_usual(group, own[group]) for group in groups]
+    terms = np.array([*(term for term, _ in found), *outstanding])
+    stand_for = np.array([*(times for _, times in found), *np.ones(len(outstanding))])
     order = np.argsort(terms)
     return terms[order], stand_for[order]
+
+
+def _usual(group: NDArray, energy: NDArray) -> tuple[int, float]:
+    """The row whose energy is nearest to the mean, the middle one of several, and how many times
+    it has the energy of all."""
+    mean = energy.mean()
+    away = np.abs(energy - mean) + 1e-9 * mean * np.abs(np.arange(len(group)) - len(group) // 2)
+    best = int(np.argmin(away))
+    usual = energy[best] if energy[best] > 0 else 0.0
+    return int(group[best]), float(energy.sum() / usual) if usual else float(len(group))
 
 
 def _outstanding(energy: NDArray) -> NDArray:
