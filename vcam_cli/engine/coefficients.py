@@ -148,7 +148,7 @@ class Passing:
     """
 
     energy: NDArray
-    """(ny,) sums of squares of the first plane's rows"""
+    """(R, ny) sums of squares of every plane's rows"""
     rows: NDArray
     """(n,) rising: the rows at hand"""
     some: NDArray

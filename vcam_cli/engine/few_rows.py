@@ -24,11 +24,18 @@ STANDS_OUT = 3.0
 """Energy of such a row over the mean of those around it."""
 
 
-def energy(coefficients: Coefficients) -> NDArray:
-    """Sum of squares of every row of coefficients, all planes together; of planes that pass, of
-    the first: (ny,)."""
+def of(y: Axis, coefficients: Coefficients) -> tuple[NDArray, NDArray]:
+    """Terms along y of a scene that are looked at, and what they stand for: see `rows`.
+
+    Planes that pass are let go before all are known: the first one says which rows are kept.
+    """
     if isinstance(coefficients, Passing):
-        return coefficients.energy
+        return rows(y, coefficients.energy[0], coefficients.energy.sum(axis=0))
+    return rows(y, energy(coefficients))
+
+
+def energy(coefficients: Coefficients) -> NDArray:
+    """Sum of squares of every row of coefficients, all planes together: (ny,)."""
     if isinstance(coefficients, OfRuns):
         alike = sum(values.astype(np.float64) @ values.T for values in coefficients.values)
         return np.asarray(np.einsum("yd,yd->y", coefficients.along @ alike, coefficients.along))
@@ -40,38 +47,47 @@ def energy(coefficients: Coefficients) -> NDArray:
     return out
 
 
-def rows(y: Axis, energy: NDArray) -> tuple[NDArray, NDArray]:
+def rows(y: Axis, energy: NDArray, every: NDArray | None = None) -> tuple[NDArray, NDArray]:
     """Terms along y that are looked at, rising, and the number of rows that each stands for.
 
     energy: (ny,) of the coefficients' rows. Of rows that are stood for the one with the most
     usual energy is taken, as often as gives the energy of all: a chart's rise and fall from row to
-    row.
+    row. every: the energy that is stood for, where another one tells rows apart.
     """
-    index, sign = y.base(np.arange(y.terms))
-    known = energy if np.isfinite(energy).all() else np.zeros_like(energy)
-    own = known[index] * np.square(sign * y.weights)
+    own = _on_axis(y, energy)
     outstanding = _outstanding(own)
     rest = np.delete(np.arange(y.terms), outstanding)
     count = len(rest)
     first, others = np.arange(min(FIRST, count)), np.geomspace(FIRST, max(FIRST, count), OTHERS)
     at = np.unique(np.concatenate([first, others]).astype(int))
     at = at[at < count]
-    groups = np.split(rest, np.ceil((at[1:] + at[:-1]) / 2).astype(int))
-    found = [_usual(group, own[group]) for group in groups]
-    terms = np.array([*(term for term, _ in found), *outstanding])
-    stand_for = np.array([*(times for _, times in found), *np.ones(len(outstanding))])
+    starts = np.append(0, np.ceil((at[1:] + at[:-1]) / 2).astype(int))
+    usual = _usual(own[rest], starts)
+    counted = (own if every is None else _on_axis(y, every))[rest]
+    sizes = np.diff(starts, append=count).astype(float)
+    total, one = np.add.reduceat(counted, starts), counted[usual]
+    times = np.divide(total, one, out=sizes, where=one > 0)
+    terms = np.concatenate([rest[usual], outstanding])
+    stand_for = np.concatenate([times, np.ones(len(outstanding))])
     order = np.argsort(terms)
     return terms[order], stand_for[order]
 
 
-def _usual(group: NDArray, energy: NDArray) -> tuple[int, float]:
-    """The row whose energy is nearest to the mean, the middle one of several, and how many times
-    it has the energy of all."""
-    mean = energy.mean()
-    away = np.abs(energy - mean) + 1e-9 * mean * np.abs(np.arange(len(group)) - len(group) // 2)
-    best = int(np.argmin(away))
-    usual = energy[best] if energy[best] > 0 else 0.0
-    return int(group[best]), float(energy.sum() / usual) if usual else float(len(group))
+def _on_axis(y: Axis, energy: NDArray) -> NDArray:
+    """Of every term along y; 0 where it is not known."""
+    index, sign = y.base(np.arange(y.terms))
+    known = energy if np.isfinite(energy).all() else np.zeros_like(energy)
+    return known[index] * np.square(sign * y.weights)
+
+
+def _usual(energy: NDArray, starts: NDArray) -> NDArray:
+    """Of every group of rows the one whose energy is nearest to the mean, the middle one of
+    several."""
+    sizes = np.diff(starts, append=len(energy))
+    group, mean = np.repeat(np.arange(len(starts)), sizes), np.add.reduceat(energy, starts) / sizes
+    mean, middle = mean[group], (starts + sizes // 2)[group]
+    away = np.abs(energy - mean) + 1e-9 * mean * np.abs(np.arange(len(energy)) - middle)
+    return np.lexsort((away, group))[starts]
 
 
 def _outstanding(energy: NDArray) -> NDArray:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, reduce
+from operator import iadd, imul
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,16 +30,18 @@ class Rows:
     count: int
     """Terms along x, from 0 on."""
 
-    def times(self, along_x: NDArray, along_y: NDArray, also: NDArray | None = None) -> Rows:
-        """With factors on them: along x (more terms than there are), y (n,), and at each term."""
+    def times(self, along_x: NDArray, along_y: NDArray) -> Rows:
+        """With factors on them: along x (more terms than there are), and y (n,)."""
         dtype = self.planes[0].dtype
         across, down = along_x[: self.count].astype(dtype), along_y.astype(dtype)[:, None]
         planes = [plane * across for plane in self.planes]
         for plane in planes:
             plane *= down
-            if also is not None:
-                plane *= also.astype(dtype, copy=False)
         return replace(self, planes=planes)
+
+    def through(self, tables: Iterable[NDArray]) -> NDArray:
+        """All planes together, each through its own table (n, count); overwrites the tables."""
+        return reduce(iadd, map(imul, tables, self.planes))
 
 
 class Lookup:
@@ -86,12 +89,7 @@ class Lookup:
             else:
                 self.planes = [[_along_x(part, along, dtype) for part in color] for color in plane]
 
-    @property
-    def places(self) -> tuple[float, int] | None:
-        """Two tables of the same are read at the same positions; None: at none over |f|."""
-        return None if self.values is None else (self.scale, self.last)
-
-    def position(self, rows: Rows) -> Position:
+    def _position(self, rows: Rows) -> Position:
         """Where the table over |f| is read, at all pairs of frequencies of the rows."""
         if self.values is None:
             return None, None
@@ -141,17 +139,14 @@ class Lookup:
             np.add(low, high, out=out[r, c])
         return out
 
-    def through(self, rows: Rows, position: Position | None = None) -> Iterator[NDArray]:
-        """For each color, what the planes' rows are together through the tables: (n, count)."""
-        position = position or self.position(rows)
-        for c in range(self.colors):
-            total = self._at(0, c, rows, position)
-            total *= rows.planes[0]
-            for r, plane in enumerate(rows.planes[1:], start=1):
-                part = self._at(r, c, rows, position)
-                part *= plane
-                total += part
-            yield total
+    def at(self, rows: Rows, planes: int) -> Iterator[Iterator[NDArray]]:
+        """For each color, the tables of so many planes at all frequencies of the rows: (n, count).
+
+        To be used, and overwritten, before the next is asked for.
+        """
+        position = self._position(rows)
+        for color in range(self.colors):
+            yield (self._at(r, color, rows, position) for r in range(planes))
 
     def _at(self, r: int, c: int, rows: Rows, position: Position) -> NDArray:
         index, fraction = position

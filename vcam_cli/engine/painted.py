@@ -80,7 +80,7 @@ class _Seen:
     extremes: NDArray
     """(R, 2)"""
     energy: NDArray
-    """(ny,) of the rows of the first plane's spectrum"""
+    """(R, ny) of the rows of every plane's spectrum"""
     rows: NDArray
     """(n,) those at hand"""
     some: NDArray
@@ -123,21 +123,22 @@ class InTurn:
 
     @cached_property
     def _seen(self) -> _Seen:
-        thin, extremes, some = [], [], []
+        thin, extremes, some, energy = [], [], [], []
         folded = self.filter.begun(np.dtype(self.dtype)) if self.known else {}
         for number in range(len(self.mix)):
             plane = self._plane(number)
             thin.append(plane[0, ::8, ::8].astype(np.float64))
             extremes.append([plane.min(), plane.max()])
             plane = self._spectrum(plane)
+            energy.append(few_rows.energy(plane))
             if not number:
-                energy = few_rows.energy(plane)
-                terms, _ = few_rows.rows(self.filter.y, energy)
+                terms, _ = few_rows.rows(self.filter.y, energy[0])
                 rows = np.unique(self.filter.y.base(terms)[0])
             some.append(plane[0, rows])
             self.filter.add(plane, number, folded, self.workers)
             del plane
-        return _Seen(np.array(thin), np.array(extremes), energy, rows, np.array(some), folded)
+        planes = np.array(some)
+        return _Seen(np.array(thin), np.array(extremes), np.array(energy), rows, planes, folded)
 
     def _coefficients(self, number: int) -> NDArray:
         return self._spectrum(self._plane(number))

@@ -1,13 +1,15 @@
 """What filters do to a picture, by Parseval's theorem, from a sample of rows of its spectrum.
 
-The rows are brought to the filter's terms once; each table that is asked about then costs a
-multiplication. Mean squares are those of the signal as a continuous function, before pixels.
+Of the rows only products of planes are kept, terms of neighbouring frequencies together: each table
+that is asked about then costs little. Mean squares are those of the signal as a continuous
+function, before pixels.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
+from functools import cache
+from itertools import combinations_with_replacement
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,112 +17,89 @@ from numpy.typing import NDArray
 from vcam_cli.effects.base import RadialTransfer, SeparableTransfer
 from vcam_cli.engine import few_rows
 from vcam_cli.engine.coefficients import Coefficients
-from vcam_cli.engine.lookup import Lookup, Position, Rows
+from vcam_cli.engine.lookup import Lookup, Rows
 from vcam_cli.engine.parallel import pieces
 from vcam_cli.engine.sampling import Filter
-from vcam_cli.engine.transfer import Fineness, Tables, Transfer, entries
+from vcam_cli.engine.transfer import EXACT_ENTRIES, Fineness, Tables, Transfer, entries
 
 AT_ONCE = 1 << 17
-"""Terms of a sample that are filtered together, about; no fewer than 16 rows."""
-
-
-@dataclass(frozen=True, eq=False)
-class _Block:
-    """Rows that are filtered together."""
-
-    terms: NDArray
-    """(n,) which they are"""
-    weights: NDArray
-    """(n,) how often the squares of their terms count"""
-    bare: Rows
-    """Without the separable factors."""
-    rows: Rows
-    positions: dict[tuple[float, int] | None, Position] = field(default_factory=dict)
-
-    def through(self, lookup: Lookup, rows: Rows) -> Iterator[NDArray]:
-        """The signal of each color: (n, count)."""
-        if lookup.places not in self.positions:
-            self.positions[lookup.places] = lookup.position(rows)
-        return lookup.through(rows, self.positions[lookup.places])
+"""Terms of a sample that are multiplied together, about; no fewer than 16 rows."""
+ALIKE = 1 / 64
+"""Width of frequencies along x whose terms are added up, relative to the frequency: over so little
+a transfer changes by its slope alone, which what is above and below the middle evens out."""
 
 
 class Sample:
     """Some rows of a picture's spectrum, for tables that are like those of a filter."""
 
     def __init__(self, filter: Filter, coefficients: Coefficients) -> None:
-        self._filter, self._dtype = filter, coefficients.dtype
-        self._blocks = tuple(self._taken(coefficients))
-
-    @property
-    def size(self) -> int:
+        self._filter = replace(filter, tables=_thin(filter.tables))
+        self._first = _pools(filter.x.terms)
+        self._last = np.append(self._first[1:], filter.x.terms) - 1
+        self._middle = (self._first + self._last) // 2
+        every, stand_for = few_rows.of(filter.y, coefficients)
+        self._terms = every
+        self._pairs = list(combinations_with_replacement(range(len(coefficients)), 2))
+        """Of planes, (r, s) with r up to s."""
+        self._bare = np.zeros((len(self._pairs), len(every), len(self._first)))
+        """(pairs, rows, pools) sums of products, without the separable factors, as often as they
+        count: rows for those that they stand for, cosines by their mean square."""
+        self.size = self._take(coefficients, stand_for)
         """Terms of a plane that are in it."""
-        return sum(block.rows.planes[0].size for block in self._blocks)
+        self._with = self._bare * _square(filter.along_y[every], filter.along_x[self._middle])
 
-    def _taken(self, coefficients: Coefficients) -> Iterator[_Block]:
-        along_x, along_y = self._filter.along_x, self._filter.along_y
-        every, stand_for = few_rows.rows(self._filter.y, few_rows.energy(coefficients))
-        for part in pieces(len(every), max(16, AT_ONCE // self._filter.x.terms)):
-            terms, stands_for = every[part], stand_for[part]
-            found = self._filter.rows(coefficients, terms)
+    def _take(self, coefficients: Coefficients, stand_for: NDArray) -> int:
+        filter, terms, taken = self._filter, self._terms, 0
+        along_x = filter.x.weights * np.where(np.arange(filter.x.terms) > 0, np.sqrt(2), 1)
+        along_y = filter.y.base(terms)[1] * filter.y.weights[terms]
+        along_y = along_y * np.sqrt(stand_for * np.where(terms > 0, 2, 1))
+        for part in pieces(len(terms), max(16, AT_ONCE // filter.x.terms)):
+            found = filter.rows(coefficients, terms[part])
             if found is None:  # nor are there any of higher frequencies
-                return
-            x, y = self._filter.x, self._filter.y
-            bare = found.times(x.weights, y.base(terms)[1] * y.weights[terms])
-            weights = stands_for * np.where(terms > 0, 2, 1)
-            yield _Block(terms, weights, bare, bare.times(along_x, along_y[terms]))
+                break
+            found = found.times(along_x, along_y[part])
+            first = self._first[: np.searchsorted(self._first, found.count)]
+            for sums, (r, s) in zip(self._bare, self._pairs, strict=True):
+                both = np.multiply(found.planes[r], found.planes[s], dtype=np.float64)
+                sums[part, : len(first)] = np.add.reduceat(both, first, axis=1)
+            taken += found.planes[0].size
+        self._bare *= np.array([1 if r == s else 2 for r, s in self._pairs])[:, None, None]
+        return taken
 
     def power(self) -> tuple[NDArray, NDArray]:
         """Mean squares of the filter's signal by frequency.
 
         Returns the frequency in pixel Nyquist frequencies of its axis, the larger of those along x
         and y, and for each color the mean square that terms of such frequencies add to the signal:
-        (n,) and (C, n), rising in frequency. Terms of the same frequency are added up.
+        (n,) and (C, n), rising in frequency. Of terms that are added up it is the highest.
         """
-        fx, fy = (2 * a.pixel_pitch * a.frequencies for a in (self._filter.x, self._filter.y))
-        along_x = np.zeros((self._filter.tables.values.shape[1], len(fx)))
-        frequency, power = [fx], [along_x]
-        for block, squares in self._squares():
-            below = np.searchsorted(fx, fy[block.terms], side="right")
-            along_y = np.empty(squares.shape[:2])
-            for row, count in enumerate(below):
-                here = squares[:, row, :count]
-                along_y[:, row] = here.sum(axis=-1)
-                here[:] = 0
-            along_x[:, : block.rows.count] += block.weights @ squares
-            frequency.append(fy[block.terms])
-            power.append(along_y * block.weights)
-        order = np.argsort(together := np.concatenate(frequency), kind="stable")
-        return together[order], np.concatenate(power, axis=1)[:, order]
-
-    def _squares(self) -> Iterator[tuple[_Block, NDArray]]:
-        """Of the filter's signal, for the terms of every row: (C, n, count)."""
-        tables, fx = self._filter.tables, self._filter.x.frequencies
-        lookups = [Lookup(tables, p, fx, self._dtype, few=True) for p in tables.parities]
-        for block in self._blocks:
-            squares = np.empty((tables.values.shape[1], *block.rows.planes[0].shape))
-            for number, lookup in enumerate(lookups):
-                for total, part in zip(squares, block.through(lookup, block.rows), strict=True):
-                    if number:
-                        total += np.square(part, dtype=np.float64)
-                    else:
-                        np.square(part, out=total, dtype=np.float64)
-            squares[..., 1:] *= 2
-            yield block, squares
+        filter = self._filter
+        fx = 2 * filter.x.pixel_pitch * filter.x.frequencies[self._last]
+        fy = 2 * filter.y.pixel_pitch * filter.y.frequencies[self._terms]
+        squares = self._squares(filter.tables, self._with)
+        below = fx <= fy[:, None]
+        along_y, along_x = (squares * below).sum(axis=2), (squares * ~below).sum(axis=1)
+        frequency = np.concatenate([fx, fy])
+        order = np.argsort(frequency, kind="stable")
+        return frequency[order], np.concatenate([along_x, along_y], axis=1)[:, order]
 
     def mean_square(self, tables: Tables) -> NDArray:
         """Of the signal through other tables in the place of the filter's: (C,)."""
-        return self._mean_square(tables, [block.rows for block in self._blocks])
+        return self._squares(tables, self._with).sum(axis=(1, 2))
 
-    def _mean_square(self, tables: Tables, rows: list[Rows]) -> NDArray:
-        total: NDArray = np.zeros(tables.values.shape[1])
+    def _squares(self, tables: Tables, products: NDArray) -> NDArray:
+        """Mean squares of every color's signal: (C, rows, pools)."""
+        fx, fy = self._filter.x.frequencies[self._middle], self._filter.y.frequencies[self._terms]
+        rows = Rows([], fy, len(fx))
+        tables = _thin(tables)
+        out = np.zeros((tables.values.shape[1], *products.shape[1:]))
         for parity in tables.parities:
-            lookup = Lookup(tables, parity, self._filter.x.frequencies, self._dtype, few=True)
-            for block, own in zip(self._blocks, rows, strict=True):
-                for c, part in enumerate(block.through(lookup, own)):
-                    wide = part.astype(np.float64, copy=False)
-                    squares = 2 * np.einsum("ij,ij->i", wide, wide) - wide[:, 0] ** 2
-                    total[c] += block.weights @ squares
-        return total
+            lookup = Lookup(tables, parity, fx, products.dtype, few=True)
+            for total, color in zip(out, lookup.at(rows, len(tables.mix)), strict=True):
+                values = list(color)
+                for (r, s), product in zip(self._pairs, products, strict=True):
+                    total += values[r] * values[s] * product
+        return np.maximum(out, 0, out=out)
 
     def without(self, effect: RadialTransfer, transfer: Transfer) -> NDArray:
         """What leaving out a radial transfer adds: (C,). transfer: the whole of it.
@@ -146,14 +125,33 @@ class Sample:
 
     def without_separable(self, effect: SeparableTransfer) -> NDArray:
         """What leaving out a separable transfer adds: (C,)."""
-        filter = self._filter
-        own_x, own_y = effect.along_x(filter.x.frequencies), effect.along_y(filter.y.frequencies)
-        rest_x, rest_y = _others(filter.along_x, own_x), _others(filter.along_y, own_y)
-        rows = []
-        for block in self._blocks:
-            change = 1 - own_y[block.terms, None] * own_x[: block.bare.count]
-            rows.append(block.bare.times(rest_x, rest_y[block.terms], change))
-        return self._mean_square(filter.tables, rows)
+        filter, x, y = self._filter, self._middle, self._terms
+        own_x = effect.along_x(filter.x.frequencies[x])
+        own_y = effect.along_y(filter.y.frequencies[y])
+        rest = _square(_others(filter.along_y[y], own_y), _others(filter.along_x[x], own_x))
+        products = self._bare * (rest * np.square(1 - own_y[:, None] * own_x))
+        return self._squares(filter.tables, products).sum(axis=(1, 2))
+
+
+def _thin(tables: Tables) -> Tables:
+    """Without the entries over |f| that were not computed, but lie straight between."""
+    step, rest = divmod(tables.values.shape[-1] - 1, EXACT_ENTRIES - 1)
+    return tables if rest or not step else replace(tables, values=tables.values[..., ::step])
+
+
+@cache
+def _pools(terms: int) -> NDArray:
+    """First terms of those that are added up, an odd number each, so that one is in the middle."""
+    first, out = 0, []
+    while first < terms:
+        out.append(first)
+        first += min(int(first * ALIKE) // 2 * 2 + 1, terms - first)
+    return np.array(out)
+
+
+def _square(along_y: NDArray, along_x: NDArray) -> NDArray:
+    """Of separable factors: (rows, pools)."""
+    return np.square(along_y[:, None] * along_x)
 
 
 def _rest(transfer: Transfer, tables: Tables) -> NDArray:

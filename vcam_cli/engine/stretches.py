@@ -55,7 +55,8 @@ class Read:
 
     def through(self, found: Rows, along_y: NDArray) -> Iterator[NDArray]:
         """See `Stretch`."""
-        return self.lookup.through(found.times(self.along_x, along_y))
+        found = found.times(self.along_x, along_y)
+        return map(found.through, self.lookup.at(found, len(found.planes)))
 
 
 @dataclass(frozen=True)
@@ -73,14 +74,8 @@ class Interpolated:
         """See `Stretch`."""
         cubic = _cubic((found.fy - self.middle) / self.half) * along_y[:, None]
         left = cubic.astype(self.values.dtype)
-        for color in range(self.values.shape[1]):
-            total = product(left, self.values[0, color, :, : found.count])
-            total *= found.planes[0]
-            for r, plane in enumerate(found.planes[1:], start=1):
-                part = product(left, self.values[r, color, :, : found.count])
-                part *= plane
-                total += part
-            yield total
+        for nodes in self.values.swapaxes(0, 1):
+            yield found.through(product(left, each[:, : found.count]) for each in nodes)
 
 
 def stretches(lookup: Lookup, fy: NDArray, along_x: NDArray, planes: int) -> Iterator[Stretch]:
