@@ -69,6 +69,7 @@ class Lookup:
             values=tables.values[first:],
             planes=tuple(None if plane is None else plane[first:] for plane in tables.planes),
         )
+        self._tables = tables
         self.linear = dtype == np.float64
         self.dtype = dtype
         self.colors, self.last = tables.values.shape[1:]
@@ -113,6 +114,12 @@ class Lookup:
         return self.values is not None and self.planes is None and not self.linear
 
     @cached_property
+    def _computed(self) -> Tables:
+        """The entries that are not known from others."""
+        thin = self._tables.thinned
+        return replace(thin, values=thin.values.astype(self.dtype))
+
+    @cached_property
     def _square(self) -> NDArray:
         """Of every frequency along x, in entries."""
         return np.square(self.fx * self.scale)
@@ -120,24 +127,20 @@ class Lookup:
     @cached_property
     def errors(self) -> NDArray:
         """(R, C) what the nearest entry errs by at most, up to the tables' end."""
-        assert self.values is not None
-        return np.abs(np.diff(self.values[..., :-_BEYOND])).max(axis=-1, initial=0) / 2
+        step = self._computed.step * self.scale
+        return np.abs(np.diff(self._computed.values)).max(axis=-1, initial=0) / (2 * step)
 
-    def between(self, fy: NDArray, count: int, planes: int) -> NDArray:
-        """Tables over |f| of so many planes by linear interpolation: (planes, C, n, count)."""
-        assert self.values is not None
-        radius = np.sqrt(self._square[:count] + ((fy * self.scale) ** 2)[:, None])
-        if radius[:, -1].max(initial=0) > self.last:  # it rises along x
-            np.minimum(radius, self.last, out=radius)
-        index = radius.astype(np.intp)
-        fraction = (radius - index).astype(self.dtype)
-        out = np.empty((planes, self.colors, *radius.shape), self.dtype)
-        for r, c in np.ndindex(planes, self.colors):
-            low, high = (np.take(self.values[r, c], index + i, mode="wrap") for i in (0, 1))
-            high -= low
-            high *= fraction
-            np.add(low, high, out=out[r, c])
-        return out
+    def between(self, fy: NDArray, terms: NDArray, planes: int) -> NDArray:
+        """Tables over |f| of so many planes by linear interpolation: (planes, C, n, terms)."""
+        table, scale = self._computed.values[:planes], 1 / self._computed.step
+        radius = np.hypot(self.fx[terms] * scale, fy[:, None] * scale)
+        np.minimum(radius, table.shape[-1] - 1, out=radius)
+        index = np.minimum(radius.astype(np.intp), table.shape[-1] - 2)
+        low, high = (np.take(table, index + i, axis=-1, mode="wrap") for i in (0, 1))
+        high -= low
+        high *= (radius - index).astype(table.dtype)
+        high += low
+        return high
 
     def at(self, rows: Rows, planes: int) -> Iterator[Iterator[NDArray]]:
         """For each color, the tables of so many planes at all frequencies of the rows: (n, count).

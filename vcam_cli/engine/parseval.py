@@ -20,7 +20,7 @@ from vcam_cli.engine.coefficients import Coefficients
 from vcam_cli.engine.lookup import Lookup, Rows
 from vcam_cli.engine.parallel import pieces
 from vcam_cli.engine.sampling import Filter
-from vcam_cli.engine.transfer import EXACT_ENTRIES, Fineness, Tables, Transfer, entries
+from vcam_cli.engine.transfer import Fineness, Tables, Transfer, entries
 
 AT_ONCE = 1 << 17
 """Terms of a sample that are multiplied together, about; no fewer than 16 rows."""
@@ -33,7 +33,7 @@ class Sample:
     """Some rows of a picture's spectrum, for tables that are like those of a filter."""
 
     def __init__(self, filter: Filter, coefficients: Coefficients) -> None:
-        self._filter = replace(filter, tables=_thin(filter.tables))
+        self._filter = replace(filter, tables=filter.tables.thinned)
         self._first = _pools(filter.x.terms)
         self._last = np.append(self._first[1:], filter.x.terms) - 1
         self._middle = (self._first + self._last) // 2
@@ -91,7 +91,7 @@ class Sample:
         """Mean squares of every color's signal: (C, rows, pools)."""
         fx, fy = self._filter.x.frequencies[self._middle], self._filter.y.frequencies[self._terms]
         rows = Rows([], fy, len(fx))
-        tables = _thin(tables)
+        tables = tables.thinned
         out = np.zeros((tables.values.shape[1], *products.shape[1:]))
         for parity in tables.parities:
             lookup = Lookup(tables, parity, fx, products.dtype, few=True)
@@ -131,12 +131,6 @@ class Sample:
         rest = _square(_others(filter.along_y[y], own_y), _others(filter.along_x[x], own_x))
         products = self._bare * (rest * np.square(1 - own_y[:, None] * own_x))
         return self._squares(filter.tables, products).sum(axis=(1, 2))
-
-
-def _thin(tables: Tables) -> Tables:
-    """Without the entries over |f| that were not computed, but lie straight between."""
-    step, rest = divmod(tables.values.shape[-1] - 1, EXACT_ENTRIES - 1)
-    return tables if rest or not step else replace(tables, values=tables.values[..., ::step])
 
 
 @cache

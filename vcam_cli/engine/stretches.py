@@ -30,6 +30,8 @@ _CUBICS = np.linalg.inv(np.vander(_NODES))
 """Of each node the cubic that is 1 there and 0 at the others, highest power first: (4, 4)."""
 _CHECKED = np.cos(np.pi * np.arange(5) / 4)
 """The places where a cubic through them errs most, both ends among them."""
+SPARSE = 4
+"""Terms along x for one that is checked: a corner of a table runs through many of a stretch."""
 AT_NODES = 2 * (len(_NODES) + len(_CHECKED))
 """Rows of tables that a stretch takes while it is made."""
 
@@ -104,14 +106,14 @@ def _interpolated(
 ) -> Interpolated | None:
     """A stretch by its cubic; None where that errs."""
     middle, half = (fy[0] + fy[-1]) / 2, abs(fy[0] - fy[-1]) / 2
-    at = np.concatenate([_NODES, _CHECKED])
-    read = lookup.between(middle + half * at, len(along_x), planes)
-    values, checked = np.split(read, [len(_NODES)], axis=2)
-    cubic = _cubic(_CHECKED).astype(read.dtype)
-    error = np.abs(np.matmul(cubic, values) - checked).max(axis=(2, 3))
+    terms = np.arange(len(along_x))
+    values = lookup.between(middle + half * _NODES, terms, planes)
+    checked = lookup.between(middle + half * _CHECKED, terms[::SPARSE], planes)
+    cubic = _cubic(_CHECKED).astype(values.dtype)
+    error = np.abs(np.matmul(cubic, values[..., ::SPARSE]) - checked).max(axis=(2, 3))
     if (error > lookup.errors[:planes]).any():
         return None
-    return Interpolated(rows, middle, half, values * along_x.astype(read.dtype))
+    return Interpolated(rows, middle, half, values * along_x.astype(values.dtype))
 
 
 def _cubic(t: NDArray) -> NDArray:

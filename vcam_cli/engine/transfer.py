@@ -196,6 +196,12 @@ class Tables:
         there = [p for p, plane in enumerate(self.planes) if plane is not None]
         return there if 0 in there or (there and not self.has_values) else [0, *there]
 
+    @property
+    def thinned(self) -> Tables:
+        """Without the entries over |f| that were not computed, but lie straight between."""
+        step, rest = divmod(self.values.shape[-1] - 1, EXACT_ENTRIES - 1)
+        return self if rest or not step else replace(self, values=self.values[..., ::step])
+
     def of(self, colors: range) -> Tables:
         """Those of some colors, one after the other."""
         some = slice(colors.start, colors.stop)
