@@ -89,7 +89,7 @@ def tabulate(
     def tables(share: NDArray, parity: int, rough: bool = False) -> Tables:
         found = stack.mixed(parity, share - share.mean())
         if not directed:
-            return Tables(mix, found, fine.top, 0.0)
+            return Tables(mix, found, fine.top, 0.0, finer=fine.finer)
         found = found if rough else tabulated.refined(found)
         planes = tuple(found if parity == p else None for p in range(len(PARITIES)))
         return Tables(mix, 0 * base[..., :2], fine.top, 0.0, planes)
@@ -102,12 +102,12 @@ def tabulate(
     even = np.full(len(zones), 1 / len(zones))
     means = [stack.mixed(p, even) for p in range(stack.parities)]
     if not directed:
-        return Tables(mix, means[0], fine.top, error), modes
+        return Tables(mix, means[0], fine.top, error, finer=fine.finer), modes
     small = SMALL * fine.tolerance * level
     planes = (
         tabulated.refined(mean) if _size(mean, importance) > small else None for mean in means
     )
-    return Tables(mix, base, fine.top, error, tuple(planes)), modes
+    return Tables(mix, base, fine.top, error, tuple(planes), fine.finer), modes
 
 
 @dataclass(frozen=True, eq=False)

@@ -69,16 +69,17 @@ class Lookup:
             values=tables.values[first:],
             planes=tuple(None if plane is None else plane[first:] for plane in tables.planes),
         )
-        self._tables = tables
         self.linear = dtype == np.float64
         self.dtype = dtype
-        self.colors, self.last = tables.values.shape[1:]
+        self.colors, computed = tables.values.shape[1:]
+        self.finer = 1 if self.linear else tables.finer
+        self.last = (computed - 1) * self.finer
         self.fx = fx
-        self.scale = 1 / tables.step if tables.top else 0.0
+        self.scale = self.finer / tables.step if tables.top else 0.0
         self.values = self.rises = None
         if parity == 0 and tables.has_values:
-            zero = np.zeros((*tables.values.shape[:-1], _BEYOND))
-            self.values = np.concatenate([tables.values, zero], axis=-1).astype(dtype)
+            self.computed = tables.values.astype(dtype)
+            self.values = _laid_out(self.computed, self.finer)
             self.rises = np.diff(self.values, append=0) if self.linear else None
         self.planes: Sequence[Sequence[NDArray]] | None = None
         self.along = None
@@ -114,12 +115,6 @@ class Lookup:
         return self.values is not None and self.planes is None and not self.linear
 
     @cached_property
-    def _computed(self) -> Tables:
-        """The entries that are not known from others."""
-        thin = self._tables.thinned
-        return replace(thin, values=thin.values.astype(self.dtype))
-
-    @cached_property
     def _square(self) -> NDArray:
         """Of every frequency along x, in entries."""
         return np.square(self.fx * self.scale)
@@ -127,12 +122,11 @@ class Lookup:
     @cached_property
     def errors(self) -> NDArray:
         """(R, C) what the nearest entry errs by at most, up to the tables' end."""
-        step = self._computed.step * self.scale
-        return np.abs(np.diff(self._computed.values)).max(axis=-1, initial=0) / (2 * step)
+        return np.abs(np.diff(self.computed)).max(axis=-1, initial=0) / (2 * self.finer)
 
     def between(self, fy: NDArray, terms: NDArray, planes: int) -> NDArray:
         """Tables over |f| of so many planes by linear interpolation: (planes, C, n, terms)."""
-        table, scale = self._computed.values[:planes], 1 / self._computed.step
+        table, scale = self.computed[:planes], self.scale / self.finer
         radius = np.hypot(self.fx[terms] * scale, fy[:, None] * scale)
         np.minimum(radius, table.shape[-1] - 1, out=radius)
         index = np.minimum(radius.astype(np.intp), table.shape[-1] - 2)
@@ -172,6 +166,18 @@ class Lookup:
         if self.along is None:
             return between(plane[:, : rows.count], at, 0)
         return _along_x(between(plane, at, 0), self.along[: rows.count], self.dtype)
+
+
+def _laid_out(values: NDArray, finer: int) -> NDArray:
+    """With so many entries for each, straight between them, and those beyond the end."""
+    out = np.zeros((*values.shape[:-1], (values.shape[-1] - 1) * finer + 1 + _BEYOND), values.dtype)
+    between = out[..., : -1 - _BEYOND].reshape(*values.shape[:-1], -1, finer)
+    np.multiply(
+        np.diff(values)[..., None], (np.arange(finer) / finer).astype(values.dtype), between
+    )
+    between += values[..., :-1, None]
+    out[..., -1 - _BEYOND] = values[..., -1]
+    return out
 
 
 def _along_x(table: NDArray, position: NDArray, dtype: np.dtype) -> NDArray:

@@ -22,7 +22,7 @@ from vcam_cli.engine.parallel import pieces
 from vcam_cli.engine.sampling import Filter
 from vcam_cli.engine.transfer import Fineness, Tables, Transfer, entries
 
-AT_ONCE = 1 << 17
+AT_ONCE = 1 << 15
 """Terms of a sample that are multiplied together, about; no fewer than 16 rows."""
 ALIKE = 1 / 64
 """Width of frequencies along x whose terms are added up, relative to the frequency: over so little
@@ -33,7 +33,7 @@ class Sample:
     """Some rows of a picture's spectrum, for tables that are like those of a filter."""
 
     def __init__(self, filter: Filter, coefficients: Coefficients) -> None:
-        self._filter = replace(filter, tables=filter.tables.thinned)
+        self._filter = filter
         self._first = _pools(filter.x.terms)
         self._last = np.append(self._first[1:], filter.x.terms) - 1
         self._middle = (self._first + self._last) // 2
@@ -51,19 +51,19 @@ class Sample:
     def _take(self, coefficients: Coefficients, stand_for: NDArray) -> int:
         filter, terms, taken = self._filter, self._terms, 0
         along_x = filter.x.weights * np.where(np.arange(filter.x.terms) > 0, np.sqrt(2), 1)
-        along_y = filter.y.base(terms)[1] * filter.y.weights[terms]
-        along_y = along_y * np.sqrt(stand_for * np.where(terms > 0, 2, 1))
         for part in pieces(len(terms), max(16, AT_ONCE // filter.x.terms)):
             found = filter.rows(coefficients, terms[part])
             if found is None:  # nor are there any of higher frequencies
                 break
-            found = found.times(along_x, along_y[part])
+            planes = [plane * along_x[: found.count] for plane in found.planes]
             first = self._first[: np.searchsorted(self._first, found.count)]
             for sums, (r, s) in zip(self._bare, self._pairs, strict=True):
-                both = np.multiply(found.planes[r], found.planes[s], dtype=np.float64)
-                sums[part, : len(first)] = np.add.reduceat(both, first, axis=1)
-            taken += found.planes[0].size
-        self._bare *= np.array([1 if r == s else 2 for r, s in self._pairs])[:, None, None]
+                sums[part, : len(first)] = np.add.reduceat(planes[r] * planes[s], first, axis=1)
+            taken += planes[0].size
+        along_y = np.square(filter.y.base(terms)[1] * filter.y.weights[terms])
+        along_y *= stand_for * np.where(terms > 0, 2, 1)
+        twice = np.array([1 if r == s else 2 for r, s in self._pairs])
+        self._bare *= twice[:, None, None] * along_y[:, None]
         return taken
 
     def power(self) -> tuple[NDArray, NDArray]:
@@ -91,7 +91,6 @@ class Sample:
         """Mean squares of every color's signal: (C, rows, pools)."""
         fx, fy = self._filter.x.frequencies[self._middle], self._filter.y.frequencies[self._terms]
         rows = Rows([], fy, len(fx))
-        tables = tables.thinned
         out = np.zeros((tables.values.shape[1], *products.shape[1:]))
         for parity in tables.parities:
             lookup = Lookup(tables, parity, fx, products.dtype, few=True)
@@ -150,7 +149,8 @@ def _square(along_y: NDArray, along_x: NDArray) -> NDArray:
 
 def _rest(transfer: Transfer, tables: Tables) -> NDArray:
     """Another transfer's table over |f|, less the tables' own."""
-    fine = Fineness(tables.top, tables.values.shape[-1], tables.error)
+    count = tables.values.shape[-1]
+    fine = Fineness(tables.top, count, tables.error, most=count)
     return entries(transfer.mixed(tables.mix), fine) - tables.values
 
 

@@ -55,7 +55,7 @@ def of_zones(exact: Transfer, zones: Sequence[Zone], fine: Fineness) -> Room:
     """Memory of what `field.tabulate` makes."""
     blurs = [zone.blur for zone in zones if isinstance(zone.blur, PlaneTransfer)]
     if not blurs:  # tables over |f| of every zone, and once more while they are compared
-        entries = len(zones) * exact.weights[..., 0].size * fine.size * DOUBLE
+        entries = len(zones) * exact.weights[..., 0].size * fine.computed * DOUBLE
         return Room(2 * entries, entries)
     models = list(dict.fromkeys(blur.model[0] for blur in blurs))
     size = plane_size(models, fine, MOST_OF_FIELD)

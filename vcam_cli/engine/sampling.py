@@ -253,7 +253,7 @@ class Filter:
         planes, colors, entries = self.tables.values.shape
         terms = self.x.terms
         sizes = [0, *(plane.shape[-1] for plane in self.tables.planes if plane is not None)]
-        tables = planes * colors * (2 * entries + max(sizes) * terms) * itemsize
+        tables = planes * colors * (2 * entries * self.tables.finer + max(sizes) * terms) * itemsize
         rows = at_once(terms) * terms * (2 * planes * itemsize + 8 + 6 * itemsize)
         nodes = AT_NODES * planes * colors * terms * itemsize
         longest = max(self.x.transform, self.y.transform)

@@ -14,6 +14,7 @@ aperture) are kept apart: they multiply along the axes (`Axis`).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
@@ -185,6 +186,8 @@ class Tables:
     """By `PARITIES`, (R, C, m, m) over fy and fx from 0 to `top`: what comes on top, where there
     is any. A wave cos(2 pi fx x) cos(2 pi fy y) becomes the sum of its cosines and sines times
     these."""
+    finer: int = 1
+    """Entries over |f| for each, straight between them, where the nearest one is to be read."""
 
     @property
     def step(self) -> float:
@@ -195,12 +198,6 @@ class Tables:
         """Which of `PARITIES` there are."""
         there = [p for p, plane in enumerate(self.planes) if plane is not None]
         return there if 0 in there or (there and not self.has_values) else [0, *there]
-
-    @property
-    def thinned(self) -> Tables:
-        """Without the entries over |f| that were not computed, but lie straight between."""
-        step, rest = divmod(self.values.shape[-1] - 1, EXACT_ENTRIES - 1)
-        return self if rest or not step else replace(self, values=self.values[..., ::step])
 
     def of(self, colors: range) -> Tables:
         """Those of some colors, one after the other."""
@@ -235,15 +232,25 @@ class Fineness:
     top: float
     """Frequency up to which they go [cycles/m]."""
     size: int
-    """Entries over |f|,"""
+    """Entries over |f| at least,"""
     tolerance: float
     """Largest relative error by dropping components."""
-    computed: int = EXACT_ENTRIES
-    """of which so many are computed."""
+    most: int = EXACT_ENTRIES
+    """of which so many are computed at most."""
     per_turn: float = PER_TURN
     """Steps over fx and fy computed while light at the blur's reach turns once."""
     rank: int | None = None
     """Mixtures at most, whatever the tolerance; None: as many as it takes."""
+
+    @property
+    def computed(self) -> int:
+        """Entries over |f| that are computed."""
+        return min(self.size, self.most)
+
+    @property
+    def finer(self) -> int:
+        """Entries for each of those, straight between them."""
+        return max(1, math.ceil((self.size - 1) / max(1, self.computed - 1)))
 
 
 def tabulate(exact: Transfer, fine: Fineness) -> Tables:
@@ -255,7 +262,7 @@ def tabulate(exact: Transfer, fine: Fineness) -> Tables:
     """
     mix, error = mixtures([exact], fine)
     mixed = exact.mixed(mix)
-    tables = Tables(mix, entries(mixed, fine), fine.top, error)
+    tables = Tables(mix, entries(mixed, fine), fine.top, error, finer=fine.finer)
     if exact.plane:
         parts = plane(mixed, fine.top, plane_size(mixed.plane, fine)).on_top(mixed.plane)
         planes = (refined(part) if np.any(part) else None for part in parts)
@@ -364,18 +371,8 @@ def _spline(count: int) -> NDArray:
 
 
 def entries(transfer: Transfer, fine: Fineness) -> NDArray:
-    """The radial part (K, C, fine.size) [electrons / s]."""
-    grid = np.linspace(0, fine.top, fine.size)
-    if fine.size <= fine.computed or not transfer.radial:
-        return transfer.at(grid)
-    coarse = np.linspace(0, fine.top, fine.computed)
-    values = transfer.at(coarse)
-    finer, rest = divmod(fine.size - 1, fine.computed - 1)
-    if rest:
-        return np.array([[np.interp(grid, coarse, row) for row in color] for color in values])
-    steps = np.arange(finer) / finer
-    between = values[..., :-1, None] + np.diff(values)[..., None] * steps
-    return np.concatenate([between.reshape(*values.shape[:2], -1), values[..., -1:]], axis=-1)
+    """The radial part (K, C, fine.computed) [electrons / s]."""
+    return transfer.at(np.linspace(0, fine.top, fine.computed))
 
 
 def mixtures(through: Sequence[Transfer], fine: Fineness) -> tuple[NDArray, float]:

@@ -117,9 +117,9 @@ def cosines(
     if known:
         oversampling, scene = _again(scene_at, math.ceil(reach))
     top = bandwidth.top(g, reach, cutoff)
-    computed = EXACT_ENTRIES if knobs.float_width == 32 else knobs.table_size
+    most = EXACT_ENTRIES if knobs.float_width == 32 else knobs.table_size
     steps, rank = knobs.plane_steps, knobs.spectral_rank
-    fine = Fineness(top, knobs.table_size, knobs.mixing_tolerance, computed, steps, rank)
+    fine = Fineness(top, knobs.table_size, knobs.mixing_tolerance, most, steps, rank)
     modes: tuple[field.Mode, ...] = ()
     zones = optics.zones
     room = of_zones(optics.transfer, zones, fine) if zones else of_tables(optics.transfer, fine)
