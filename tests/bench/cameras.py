@@ -107,11 +107,21 @@ def _leaves(rows: int, columns: int) -> NDArray[np.uint16]:
 
 
 @contextmanager
-def studio(rows: int, columns: int, always: dict[str, Any] | None = None) -> Iterator[Studio]:
-    """A picture of dead leaves of that size in colors and in gray, for as long as it is needed."""
+def studio(
+    rows: int,
+    columns: int,
+    always: dict[str, Any] | None = None,
+    of: tuple[int, int] | None = None,
+) -> Iterator[Studio]:
+    """A picture of dead leaves of that size in colors and in gray, for as long as it is needed.
+
+    of: size of the picture that it is the middle of, and so has the same detail as; itself.
+    """
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        planes = _leaves(rows, columns)
+        whole = _leaves(*(of or (rows, columns)))
+        top, left = ((n - m) // 2 for n, m in zip(whole.shape[1:], (rows, columns), strict=True))
+        planes = whole[:, top : top + rows, left : left + columns]
         write_png(folder / "leaves.png", np.ascontiguousarray(np.moveaxis(planes, 0, 2)))
         write_png(folder / "gray.png", np.ascontiguousarray(planes[1]))
         yield Studio(folder, rows, columns, always or {})

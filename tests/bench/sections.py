@@ -105,12 +105,14 @@ def growth(
 
     The exponent of a line through all sizes, those between neighbors, and the time a pixel takes
     at each size over that at the largest. Sizes take turns, small ones more than one at a time.
+    All pictures are the middle of the largest: the more detail, the further up spectra are
+    followed.
     """
     pixels = [float(rows * columns) for rows, columns in sizes]
     with ExitStack() as studios:
         taken = []
         for rows, columns in sizes:
-            place = studios.enter_context(studio(rows, columns, always))
+            place = studios.enter_context(studio(rows, columns, always, of=sizes[-1]))
             taken.append(Frames(place.camera("gray")).take(0, warm=True))
         for _ in range(repeats):
             for one, size in zip(taken, pixels, strict=True):
