@@ -24,7 +24,7 @@ from vcam_cli.engine.transfer import Fineness, Tables, Transfer, entries
 
 AT_ONCE = 1 << 15
 """Terms of a sample that are multiplied together, about; no fewer than 16 rows."""
-ALIKE = 1 / 64
+ALIKE = 1 / 32
 """Width of frequencies along x whose terms are added up, relative to the frequency: over so little
 a transfer changes by its slope alone, which what is above and below the middle evens out."""
 

@@ -16,7 +16,7 @@ from vcam_cli.effects.base import Charge, Effect, Gain, Veil
 from vcam_cli.effects.saturation import Saturation
 from vcam_cli.engine.mosaic import Mosaic
 
-SAMPLE = 1 << 15
+SAMPLE = 1 << 14
 """Pixels looked at, at most."""
 LEAST = 1e-6
 """Factor below which the light in front of an effect is no longer known."""
@@ -56,7 +56,8 @@ def changes(
         return np.minimum(signal, well)
 
     raw = clipped(photo + dark)
-    pixels = np.any(colors, axis=0)
+    seen = np.any(colors, axis=0)
+    pixels = slice(None) if seen.all() else seen
     others: dict[str, NDArray] = {}
     for effect in present:
         if isinstance(effect, Gain | Veil):
