@@ -77,10 +77,11 @@ class OffAxis(Gain):
         Why: the exact form costs ten passes in 64 bits over every pixel, this one a few in 32.
         """
         top = (self.corner / self.image_distance) ** 2 * 1.001
-        dense = np.linspace(0, top, 1001)
+        dense = np.linspace(0, top, 257)
+        exact = self._of_tan2(dense)
         for degree in range(1, 13):
             series = np.polynomial.Chebyshev.interpolate(self._of_tan2, degree, [0, top])
-            if np.abs(series(dense) - self._of_tan2(dense)).max() < 1e-7:
+            if np.abs(series(dense) - exact).max() < 1e-7:
                 return tuple(series.convert(kind=np.polynomial.Polynomial).coef.astype(np.float32))
         return None
 
