@@ -21,8 +21,10 @@ BASE = 150_000_000
 """Interpreter and libraries [bytes]."""
 SLACK = 1.1
 """Of what is in use, what the process has: memory that was freed is not given back at once."""
-SAMPLED = 96
-"""Rows of a spectrum that are looked at, about."""
+SAMPLED, POOLS = 96, 250
+"""Rows of a spectrum that are looked at, and terms along them that are told apart, about."""
+LOOKED_AT_ONCE = 16
+"""Rows that are looked at together, where they are long."""
 
 
 def available() -> int:
@@ -88,7 +90,9 @@ def of_looking(filter: Filter, held: int, width: int, tables: Room) -> int:
     held: samples of all its planes in memory together; width: bytes of one.
     """
     planes, colors, _ = filter.tables.values.shape
-    sample = SAMPLED * filter.x.terms * (2 * planes * width + 8 + 4 * colors)
+    pairs = planes * (planes + 1) // 2
+    taken = 2 * LOOKED_AT_ONCE * filter.x.terms * (planes * (width + 8) + 8)
+    sample = SAMPLED * POOLS * 8 * (2 * pairs + 2 * planes + colors) + taken
     return BASE + round(SLACK * max(tables.most, tables.kept + held * width + sample))
 
 

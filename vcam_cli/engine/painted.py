@@ -151,6 +151,10 @@ class InTurn:
         return sampling.spectrum(plane, self.workers, self.terms)
 
 
+Light = Painted | Known | InTurn
+"""A scene's planes, whichever way they go."""
+
+
 def wanted(scene: SampledScene, x: Axis, y: Axis) -> tuple[int, int]:
     """Terms of the spectrum, along y and x, that are read of it.
 

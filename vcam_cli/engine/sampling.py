@@ -276,13 +276,17 @@ class Filter:
     @property
     def terms(self) -> int:
         """Terms of a plane's spectrum that tables reach."""
-        reach = np.sqrt(np.maximum(self.tables.top**2 - self.y.frequencies**2, 0))
-        return int(np.minimum(reach * 2 * self.x.length + 1, self.x.terms).sum())
+        return int(self._counts(self.y.frequencies).sum())
 
     def _count(self, fy: NDArray) -> int:
         """Terms along x that tables reach at some of these frequencies (n,) along y."""
-        reach = self.tables.top**2 - fy.min() ** 2
-        return 0 if reach < 0 else min(self.x.terms, int(np.sqrt(reach) * 2 * self.x.length) + 1)
+        return int(self._counts(fy.min()))
+
+    def _counts(self, fy: NDArray) -> NDArray:
+        """Terms along x that tables reach at each of these frequencies along y."""
+        left = self.tables.top**2 - fy**2
+        count = (np.sqrt(np.maximum(left, 0)) * 2 * self.x.length).astype(int) + 1
+        return np.where(left < 0, 0, np.minimum(count, self.x.terms))
 
     def _beyond(self, fy: NDArray, count: int) -> NDArray | None:
         """Where |f| is beyond the tables: (n, count); None where they are 0 there by themselves.
