@@ -13,14 +13,11 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from vcam_cli.engine.parallel import pieces
+from vcam_cli.engine.parallel import product
 from vcam_cli.scenes.base import Rectangles
 
 HELD = 1 << 28
 """Bytes of coefficients that are held at once; planes that take more pass one by one."""
-PRODUCT = 1 << 18
-"""Multiplications of a product of matrices, at most: from more on a BLAS starts threads of its own,
-which on a busy machine wait for each other longer than they work."""
 
 
 class Plane(Protocol):
@@ -49,14 +46,6 @@ Folded = dict[Basis, NDArray]
 def passes(samples: int, planes: int, itemsize: int) -> bool:
     """Whether so many planes of so many samples are too much to be held at once."""
     return planes > 1 and samples * planes * itemsize > HELD
-
-
-def product(left: NDArray, right: NDArray) -> NDArray:
-    """Of two matrices of the same float type, in one thread."""
-    out = np.empty((len(left), right.shape[1]), right.dtype)
-    for columns in pieces(out.shape[1], max(1, PRODUCT // max(1, left.size))):
-        np.matmul(left, right[:, columns], out=out[:, columns])
-    return out
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ from vcam_cli.camera.geometry import Geometry
 from vcam_cli.effects.base import PlaneTransfer, RadialTransfer, Zone
 from vcam_cli.engine import transfer as tabulated
 from vcam_cli.engine.lookup import between
-from vcam_cli.engine.transfer import PARITIES, Fineness, Tables, Transfer
+from vcam_cli.engine.transfer import PARITIES, Fineness, Mixing, Tables, Transfer
 
 PLACES = 97
 """Points of a map along each side of the sensor; between them it is straight."""
@@ -62,15 +62,28 @@ class Mode:
     map: Map
 
 
+def mixtures(alone: Transfer, zones: Sequence[Zone], fine: Fineness) -> Mixing:
+    """Fewest mixtures of the components that serve all zones."""
+    return tabulated.mixtures(_through(alone, zones)[:: max(1, len(zones) // 6)], fine)
+
+
+def _through(alone: Transfer, zones: Sequence[Zone]) -> list[Transfer]:
+    return [replace(alone, effects=(*alone.effects, zone.blur)) for zone in zones]
+
+
 def tabulate(
-    alone: Transfer, zones: Sequence[Zone], geometry: Geometry, fine: Fineness
+    alone: Transfer,
+    zones: Sequence[Zone],
+    geometry: Geometry,
+    fine: Fineness,
+    mixing: Mixing | None = None,
 ) -> tuple[Tables, tuple[Mode, ...]]:
     """The mean transfer of all zones, and what differs from it from place to place.
 
-    alone: the transfer without the blur that has zones.
+    alone: the transfer without the blur that has zones; mixing: of its components, where it is
+    known.
     """
-    through = [replace(alone, effects=(*alone.effects, zone.blur)) for zone in zones]
-    mix, error = tabulated.mixtures(through[:: max(1, len(zones) // 6)], fine)
+    mix, error = mixing or mixtures(alone, zones, fine)
     alone = alone.mixed(mix)
     base = tabulated.entries(alone, fine)
     blurs = [zone.blur for zone in zones]
@@ -78,7 +91,7 @@ def tabulate(
     if directed:
         stack = _planes_of(alone, blurs, fine)
     else:
-        each = [tabulated.entries(t.mixed(mix), fine)[None] for t in through]
+        each = [tabulated.entries(t, fine)[None] for t in _through(alone, zones)]
         stack = Stack(each, [(i, 0, False) for i in range(len(each))])
     level = np.abs(alone.level).max() or 1.0
     importance = _importance(stack.known[0].shape, directed) / alone.weights.shape[1]

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -75,6 +75,22 @@ class Seen:
             coefficients = coefficients.first(chosen.y.terms, chosen.x.terms)
         return chosen, coefficients
 
+    def through(self, optics: Optics, tables: Tables) -> Seen:
+        """Looked at once more, through tables that let less pass and go as far as is `enough`."""
+        filter = filter_of(optics, self.scene, tables, self.enough)
+        sample = self.sample.through(filter)
+        spread = _spread(optics, self.scene, sample)
+        enough = max(spread.enough(self.budget), bandwidth.least(optics.settings))
+        enough = min(enough, self.enough)
+        return replace(
+            self,
+            filter=filter,
+            sample=sample,
+            looked=self.enough,
+            enough=enough,
+            lost=math.hypot(spread.beyond(enough), self.lost),
+        )
+
     def rms(self, optics: Optics, squares: NDArray) -> float:
         """Of the signal of most in any color, as if all of the scene lay on the array.
 
@@ -91,10 +107,9 @@ def reach(optics: Optics, scene: SampledScene) -> Reach:
     pixels = g.rows * g.columns if picture else scene.shape[0] * scene.shape[1] / first**2
     limit = bandwidth.limit(g, optics.transfer.cutoff)
     most = min(bandwidth.most(pixels, knobs), limit)
-    # What is known costs nothing to look at, where no tables over fx and fy are needed for it.
-    free = known and not optics.transfer.plane and optics.field is None
+    # What is known costs nothing to look at.
     far = max(most, min(bandwidth.KNOWN, bandwidth.LOOKED / g.columns))
-    looked = min(far, limit) if free else most
+    looked = min(far, limit) if known else most
     return Reach(looked, most, None if picture or known else first, pixels)
 
 
@@ -106,7 +121,7 @@ def look(
     tables: Tables,
     room: Room,
 ) -> Seen:
-    """Looks at the spectrum of a scene through tables that go as far as `reach`.
+    """Looks at the spectrum of a scene through tables that go as far as `reach`, or let more pass.
 
     room: of the tables. Raises CannotDo where memory does not suffice.
     """
@@ -122,8 +137,7 @@ def look(
             light = light.doubled()
         coefficients = light.spectrum(optics.workers, terms)
         sample = parseval.Sample(filter, coefficients)
-        frequency, power = sample.power()
-        spread = bandwidth.Spread(frequency, power * _density(optics, scene))
+        spread = _spread(optics, scene, sample)
         if cells is None:
             enough = min(max(spread.enough(budget), bandwidth.least(knobs)), reach.most)
             lost = spread.beyond(enough)
@@ -204,6 +218,12 @@ def filter_of(
         along_x *= e.along_x(x.frequencies)
         along_y *= e.along_y(y.frequencies)
     return sampling.Filter(x, y, tables, along_x, along_y)
+
+
+def _spread(optics: Optics, scene: SampledScene, sample: parseval.Sample) -> bandwidth.Spread:
+    """The signal's spectrum, as if all of it lay on the array and none in the margin."""
+    frequency, power = sample.power()
+    return bandwidth.Spread(frequency, power * _density(optics, scene))
 
 
 def _density(optics: Optics, scene: SampledScene) -> float:

@@ -84,6 +84,11 @@ def of_overlaps(light: Rectangles, geometry: Geometry, knobs: Settings) -> int:
     return BASE + round(SLACK * (6 * 8 * max(shares) + 2 * kept * knobs.float_width // 8))
 
 
+def of_tabulating(tables: Room, held: int, knobs: Settings) -> int:
+    """Peak memory while tables are computed, with samples of planes that are there already."""
+    return BASE + round(SLACK * (tables.most + held * knobs.float_width // 8))
+
+
 def of_looking(filter: Filter, held: int, width: int, tables: Room) -> int:
     """Peak memory while a scene is transformed and rows of its spectrum are looked at [bytes].
 

@@ -11,6 +11,9 @@ from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from typing import TypeVar
 
+import numpy as np
+from numpy.typing import NDArray
+
 Item = TypeVar("Item")
 
 A_THREAD = 1 << 19
@@ -19,6 +22,9 @@ LEAST = 32
 """Rows or columns of a piece of work."""
 AT_ONCE = 1 << 17
 """Values of a larger one, about."""
+PRODUCT = 1 << 18
+"""Multiplications of a product of matrices, at most: from more on a BLAS starts threads of its own,
+which on a busy machine wait for each other longer than they work."""
 
 
 def available_workers() -> int:
@@ -65,3 +71,11 @@ def pieces(count: int, size: int) -> list[slice]:
 def within(whole: slice, size: int) -> list[slice]:
     """Consecutive slices of at most `size` that cover a slice."""
     return [slice(i, min(i + size, whole.stop)) for i in range(whole.start, whole.stop, size)]
+
+
+def product(left: NDArray, right: NDArray) -> NDArray:
+    """Of two matrices of the same float type, in one thread."""
+    out = np.empty((len(left), right.shape[1]), right.dtype)
+    for columns in pieces(out.shape[1], max(1, PRODUCT // max(1, left.size))):
+        np.matmul(left, right[:, columns], out=out[:, columns])
+    return out

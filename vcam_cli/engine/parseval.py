@@ -7,6 +7,7 @@ function, before pixels.
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import replace
 from functools import cache
 from itertools import combinations_with_replacement
@@ -47,6 +48,21 @@ class Sample:
         self.size = self._take(coefficients, stand_for)
         """Terms of a plane that are in it."""
         self._with = self._bare * _square(filter.along_y[every], filter.along_x[self._middle])
+
+    def through(self, filter: Filter) -> Sample:
+        """The same rows for another filter, which does not reach as far."""
+        out = copy(self)
+        out._filter = filter
+        rows, pools = self._terms < filter.y.terms, self._last < filter.x.terms
+        out._terms = self._terms[rows]
+        out._first, out._last, out._middle = (
+            at[pools] for at in (self._first, self._last, self._middle)
+        )
+        fx, fy = filter.x.frequencies[out._middle], filter.y.frequencies[out._terms]
+        reached = np.hypot(fx, fy[:, None]) <= filter.tables.top
+        out._bare = self._bare[:, rows][:, :, pools] * reached
+        out._with = out._bare * _square(filter.along_y[out._terms], filter.along_x[out._middle])
+        return out
 
     def _take(self, coefficients: Coefficients, stand_for: NDArray) -> int:
         filter, terms, taken = self._filter, self._terms, 0

@@ -17,8 +17,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from vcam_cli.engine.coefficients import product
 from vcam_cli.engine.lookup import Lookup, Rows
+from vcam_cli.engine.parallel import product
 
 LONGEST = 128
 """Rows of a stretch, at most: a node costs as much as reading a row."""

@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcam_cli.effects.base import Blur, PlaneTransfer, RadialTransfer
+from vcam_cli.engine.parallel import product
 from vcam_cli.spectra import Spectrum, pair_weights, photons
 
 
@@ -253,14 +254,18 @@ class Fineness:
         return max(1, math.ceil((self.size - 1) / max(1, self.computed - 1)))
 
 
-def tabulate(exact: Transfer, fine: Fineness) -> Tables:
-    """Tables of `exact`.
+Mixing = tuple[NDArray, float]
+"""Mixtures (R, K) of a scene's components, and the largest relative error that they leave."""
+
+
+def tabulate(exact: Transfer, fine: Fineness, mixing: Mixing | None = None) -> Tables:
+    """Tables of `exact`; mixing: of its components, where it is known.
 
     Where the scene has more components than colors can tell apart, the components are replaced
     by the fewest mixtures (singular vectors of H_kc over all c and f) that keep every H_kc within
     `fine.tolerance` of the largest level.
     """
-    mix, error = mixtures([exact], fine)
+    mix, error = mixing or mixtures([exact], fine)
     mixed = exact.mixed(mix)
     tables = Tables(mix, entries(mixed, fine), fine.top, error, finer=fine.finer)
     if exact.plane:
@@ -356,8 +361,11 @@ def refined(planes: NDArray) -> NDArray:
 
     float32, whose rounding is far below what is left out between the entries.
     """
-    between = _spline(planes.shape[-1])
-    return np.ascontiguousarray(between @ planes.astype(np.float32) @ between.T)
+    count = planes.shape[-1]
+    between = _spline(count)
+    each = planes.reshape(-1, count, count).astype(np.float32)
+    finer = np.array([product(product(between, plane), between.T) for plane in each])
+    return finer.reshape(*planes.shape[:-2], *finer.shape[1:])
 
 
 @cache
@@ -375,8 +383,8 @@ def entries(transfer: Transfer, fine: Fineness) -> NDArray:
     return transfer.at(np.linspace(0, fine.top, fine.computed))
 
 
-def mixtures(through: Sequence[Transfer], fine: Fineness) -> tuple[NDArray, float]:
-    """Fewest mixtures (R, K) of the components, and the largest relative error they leave.
+def mixtures(through: Sequence[Transfer], fine: Fineness) -> Mixing:
+    """Fewest mixtures of the components.
 
     through: the transfers of the same light that they have to serve. Judged at 256 frequencies,
     and at some more over the plane: the functions are smooth.

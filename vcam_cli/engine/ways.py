@@ -25,12 +25,14 @@ from vcam_cli.effects.base import (
 from vcam_cli.engine import bandwidth, boxes, field, looking, memory, sampling, turns, waves
 from vcam_cli.engine.coefficients import Coefficients, PlaneOfRuns
 from vcam_cli.engine.layers import Followed, Layer, Layers, Optics
-from vcam_cli.engine.looking import SceneAt, Seen
+from vcam_cli.engine.looking import Reach, SceneAt, Seen
 from vcam_cli.engine.parallel import pieces
-from vcam_cli.engine.room import of_tables, of_zones, table_values
+from vcam_cli.engine.room import Room, of_tables, of_zones, table_values
 from vcam_cli.engine.settings import Settings
-from vcam_cli.engine.transfer import EXACT_ENTRIES, Fineness, tabulate
+from vcam_cli.engine.transfer import EXACT_ENTRIES, Fineness, mixtures, tabulate
 from vcam_cli.scenes.base import SampledScene, WaveScene
+
+Modes = tuple[field.Mode, ...]
 
 FIELD_SHARE = 0.2
 """Part of the tolerance that modes of the field are left out for before the picture is asked: in a
@@ -88,34 +90,17 @@ def _over(
 
 def cosines(optics: Optics, scene: SampledScene, scene_at: SceneAt) -> tuple[Layers, Followed]:
     """Through the cosine spectrum, as far up as the tolerance asks."""
-    g, knobs, zones = optics.geometry, optics.settings, optics.zones
-    reach = looking.reach(optics, scene)
+    g, reach = optics.geometry, looking.reach(optics, scene)
     if scene.is_known:
         scene = looking.again(scene_at, math.ceil(reach.looked))
-    fine = _fineness(knobs, bandwidth.top(g, reach.looked, optics.transfer.cutoff), bool(zones))
-    room = of_zones(optics.transfer, zones, fine) if zones else of_tables(optics.transfer, fine)
-    memory.require(memory.BASE + room.most, g)
-    modes: tuple[field.Mode, ...] = ()
-    if zones:
-        tables, modes = field.tabulate(optics.transfer, zones, g, fine)
-    else:
-        tables = tabulate(optics.transfer, fine)
-    seen = looking.look(optics, scene, scene_at, reach, tables, room)
+    seen, modes, room, tabulating = _seen(optics, scene, scene_at, reach)
     chosen, coefficients = seen.chosen(optics)
     modes, changed = _needed(optics, seen, modes)
     together = turns.together(chosen, coefficients, g)
-    needed = turns.needed(
-        seen.filter,
-        chosen,
-        together,
-        coefficients,
-        seen.held,
-        len(modes),
-        room,
-        g,
-        optics.workers,
-    )
+    work = seen.filter, chosen, together, coefficients, seen.held, len(modes), room
+    needed = max(tabulating, turns.needed(*work, g, optics.workers))
     memory.require(needed, g)
+    tables = chosen.tables
     followed = Followed(
         oversampling=seen.enough,
         lost=seen.lost,
@@ -128,13 +113,42 @@ def cosines(optics: Optics, scene: SampledScene, scene_at: SceneAt) -> tuple[Lay
         changes=dict(_changes(optics, seen, changed)),
         modes=len(modes),
         passes=len(tables.parities) + len(modes),
-        table_values=table_values(optics.transfer, zones, tables),
+        table_values=table_values(optics.transfer, optics.zones, tables),
         held=seen.held,
         peak=seen.peak,
         by_color=len(together) > 1,
         memory=needed,
     )
     return _filtered(chosen, coefficients, modes, together, optics.workers), followed
+
+
+def _seen(
+    optics: Optics, scene: SampledScene, scene_at: SceneAt, reach: Reach
+) -> tuple[Seen, Modes, Room, int]:
+    """The scene looked at through tables of all that the lens does.
+
+    Also the modes of its field, what the tables take, and peak memory while they are made [bytes].
+    """
+    g, zones, exact = optics.geometry, optics.zones, optics.transfer
+    fine = _fineness(optics.settings, bandwidth.top(g, reach.looked, exact.cutoff), bool(zones))
+    mixing = field.mixtures(exact, zones, fine) if zones else mixtures([exact], fine)
+    seen = None
+    if reach.cells is None and (exact.plane or zones):
+        # Aberrations only weaken a picture: without them it is found for little how far to go.
+        radial = tabulate(exact.through(exact.radial), fine, mixing)
+        seen = looking.look(optics, scene, scene_at, reach, radial, Room())
+        fine = replace(fine, top=bandwidth.top(g, seen.enough, exact.cutoff))
+    room = of_zones(exact, zones, fine) if zones else of_tables(exact, fine)
+    needed = memory.of_tabulating(room, seen.held if seen else 0, optics.settings)
+    memory.require(needed, g)
+    modes: Modes = ()
+    if zones:
+        tables, modes = field.tabulate(exact, zones, g, fine, mixing)
+    else:
+        tables = tabulate(exact, fine, mixing)
+    if seen:
+        return seen.through(optics, tables), modes, room, needed
+    return looking.look(optics, scene, scene_at, reach, tables, room), modes, room, needed
 
 
 def _fineness(knobs: Settings, top: float, zones: bool) -> Fineness:
@@ -149,7 +163,7 @@ def _fineness(knobs: Settings, top: float, zones: bool) -> Fineness:
 def _filtered(
     chosen: sampling.Filter,
     coefficients: Coefficients,
-    modes: Sequence[field.Mode],
+    modes: Modes,
     together: Sequence[range],
     workers: int,
 ) -> Layers:
@@ -186,9 +200,7 @@ def _changes(optics: Optics, seen: Seen, modes: float) -> Iterator[tuple[str, fl
             yield effect.name, math.hypot(mean, modes)
 
 
-def _needed(
-    optics: Optics, seen: Seen, modes: tuple[field.Mode, ...]
-) -> tuple[tuple[field.Mode, ...], float]:
+def _needed(optics: Optics, seen: Seen, modes: Modes) -> tuple[Modes, float]:
     """Those modes of the field that this picture needs, and the rms that all of them add."""
     squares = np.zeros(len(modes))
     for i, mode in enumerate(modes):
