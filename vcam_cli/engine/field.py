@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from vcam_cli.camera.geometry import Geometry
 from vcam_cli.effects.base import PlaneTransfer, RadialTransfer, Zone
 from vcam_cli.engine import transfer as tabulated
-from vcam_cli.engine.lookup import between
+from vcam_cli.engine.plane_lookup import between
 from vcam_cli.engine.transfer import PARITIES, Fineness, Mixing, Tables, Transfer
 
 PLACES = 97

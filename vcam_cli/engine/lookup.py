@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property, reduce
 from operator import iadd, imul
@@ -10,7 +10,7 @@ from operator import iadd, imul
 import numpy as np
 from numpy.typing import NDArray
 
-from vcam_cli.engine.parallel import at_once, pieces
+from vcam_cli.engine.plane_lookup import PlaneLookup, Where
 from vcam_cli.engine.transfer import Tables
 
 _BEYOND = 2
@@ -48,9 +48,7 @@ class Lookup:
     """Tables of one parity, read at a block of frequencies.
 
     Over |f|, float32: the nearest of many entries, its error far below float32's own in the sum;
-    float64: linear interpolation. Over fx and fy: linear interpolation along both, along x for
-    all `fx` at once, which are the same in all blocks; of few rows when they are asked for, since
-    all of it takes as much memory as many rows of the picture.
+    float64: linear interpolation.
     """
 
     def __init__(
@@ -73,7 +71,7 @@ class Lookup:
         self.dtype = dtype
         self.colors, computed = tables.values.shape[1:]
         self.finer = 1 if self.linear else tables.finer
-        self.last = (computed - 1) * self.finer
+        self.end = (computed - 1) * self.finer + 1  # the first entry that is 0
         self.fx = fx
         self.scale = self.finer / tables.step if tables.top else 0.0
         self.values = self.rises = None
@@ -81,15 +79,8 @@ class Lookup:
             self.computed = tables.values.astype(dtype)
             self.values = _laid_out(self.computed, self.finer)
             self.rises = np.diff(self.values, append=0) if self.linear else None
-        self.planes: Sequence[Sequence[NDArray]] | None = None
-        self.along = None
-        if (plane := tables.planes[parity]) is not None:
-            self.plane_scale = (plane.shape[-1] - 1) / tables.top
-            along = np.minimum(fx * self.plane_scale, plane.shape[-1] - 1)
-            if few:
-                self.planes, self.along = list(plane), along
-            else:
-                self.planes = [[_along_x(part, along, dtype) for part in color] for color in plane]
+        plane = tables.planes[parity]
+        self.plane = None if plane is None else PlaneLookup(plane, tables.top, fx, dtype, few)
 
     def _position(self, rows: Rows) -> Position:
         """Where the table over |f| is read, at all pairs of frequencies of the rows."""
@@ -100,19 +91,19 @@ class Lookup:
         radius = u[None, :] + v[:, None]
         np.sqrt(radius, out=radius)
         if self.linear:
-            np.minimum(radius, self.last, out=radius)
+            np.minimum(radius, self.end, out=radius)
             index = radius.astype(np.intp)
             radius -= index
             return index, radius
         radius += 0.5
-        if radius[:, -1].max(initial=0) > self.last:  # it rises along x
-            np.minimum(radius, self.last, out=radius)
+        if radius[:, -1].max(initial=0) > self.end:  # it rises along x
+            np.minimum(radius, self.end, out=radius)
         return radius.astype(np.intp), None
 
     @property
     def smooth(self) -> bool:
         """Whether the tables are over |f| alone and need not be better than the nearest entry."""
-        return self.values is not None and self.planes is None and not self.linear
+        return self.values is not None and self.plane is None and not self.linear
 
     @cached_property
     def _square(self) -> NDArray:
@@ -128,12 +119,16 @@ class Lookup:
         """Tables over |f| of so many planes by linear interpolation: (planes, C, n, terms)."""
         table, scale = self.computed[:planes], self.scale / self.finer
         radius = np.hypot(self.fx[terms] * scale, fy[:, None] * scale)
-        np.minimum(radius, table.shape[-1] - 1, out=radius)
-        index = np.minimum(radius.astype(np.intp), table.shape[-1] - 2)
+        last = table.shape[-1] - 1
+        beyond = radius > last * (1 + 1e-9)
+        np.minimum(radius, last, out=radius)
+        index = np.minimum(radius.astype(np.intp), last - 1)
         low, high = (np.take(table, index + i, axis=-1, mode="wrap") for i in (0, 1))
         high -= low
         high *= (radius - index).astype(table.dtype)
         high += low
+        if beyond[:, -1].any():  # it rises along x
+            high[..., beyond] = 0
         return high
 
     def at(self, rows: Rows, planes: int) -> Iterator[Iterator[NDArray]]:
@@ -142,12 +137,15 @@ class Lookup:
         To be used, and overwritten, before the next is asked for.
         """
         position = self._position(rows)
+        where = None if self.plane is None else self.plane.where(rows.fy)
         for color in range(self.colors):
-            yield (self._at(r, color, rows, position) for r in range(planes))
+            yield (self._at(r, color, rows, position, where) for r in range(planes))
 
-    def _at(self, r: int, c: int, rows: Rows, position: Position) -> NDArray:
+    def _at(self, r: int, c: int, rows: Rows, position: Position, where: Where | None) -> NDArray:
         index, fraction = position
-        on_top = self._on_top(r, c, rows)
+        on_top = None
+        if self.plane is not None and where is not None:
+            on_top = self.plane.read(r, c, where, rows.count)
         if self.values is None or index is None:
             shape = len(rows.fy), rows.count
             return np.zeros(shape, self.dtype) if on_top is None else on_top
@@ -158,14 +156,6 @@ class Lookup:
             rise *= fraction
             value += rise
         return value if on_top is None else np.add(value, on_top, out=value)
-
-    def _on_top(self, r: int, c: int, rows: Rows) -> NDArray | None:
-        if self.planes is None:
-            return None
-        plane, at = self.planes[r][c], rows.fy * self.plane_scale
-        if self.along is None:
-            return between(plane[:, : rows.count], at, 0)
-        return _along_x(between(plane, at, 0), self.along[: rows.count], self.dtype)
 
 
 def _laid_out(values: NDArray, finer: int) -> NDArray:
@@ -178,23 +168,3 @@ def _laid_out(values: NDArray, finer: int) -> NDArray:
     between += values[..., :-1, None]
     out[..., -1 - _BEYOND] = values[..., -1]
     return out
-
-
-def _along_x(table: NDArray, position: NDArray, dtype: np.dtype) -> NDArray:
-    """A table read between its columns; few rows at a time, since it is large in 64 bits."""
-    out = np.empty((len(table), len(position)), dtype)
-    for rows in pieces(len(table), at_once(len(position))):
-        out[rows] = between(table[rows], position, 1)
-    return out
-
-
-def between(table: NDArray, position: NDArray, axis: int) -> NDArray:
-    """A table read between its entries along an axis; constant beyond its end."""
-    position = np.minimum(position, table.shape[axis] - 1)
-    index = np.minimum(position.astype(int), table.shape[axis] - 2)
-    fraction = (position - index).astype(table.dtype).reshape((-1, 1) if axis == 0 else (1, -1))
-    low, high = np.take(table, index, axis), np.take(table, index + 1, axis)
-    high -= low
-    high *= fraction
-    high += low
-    return high

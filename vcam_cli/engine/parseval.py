@@ -58,9 +58,7 @@ class Sample:
         out._first, out._last, out._middle = (
             at[pools] for at in (self._first, self._last, self._middle)
         )
-        fx, fy = filter.x.frequencies[out._middle], filter.y.frequencies[out._terms]
-        reached = np.hypot(fx, fy[:, None]) <= filter.tables.top
-        out._bare = self._bare[:, rows][:, :, pools] * reached
+        out._bare = self._bare[:, rows][:, :, pools]
         out._with = out._bare * _square(filter.along_y[out._terms], filter.along_x[out._middle])
         return out
 

@@ -268,9 +268,6 @@ class Filter:
             return None
         index = _neighbors(self.y.base(terms)[0])
         parts = [self.x.extend(plane[index], count) for plane in coefficients]
-        beyond = self._beyond(fy, count)
-        if beyond is not None:
-            parts = [np.where(beyond, part.dtype.type(0), part) for part in parts]
         return Rows(parts, fy, count)
 
     @property
@@ -287,15 +284,6 @@ class Filter:
         left = self.tables.top**2 - fy**2
         count = (np.sqrt(np.maximum(left, 0)) * 2 * self.x.length).astype(int) + 1
         return np.where(left < 0, 0, np.minimum(count, self.x.terms))
-
-    def _beyond(self, fy: NDArray, count: int) -> NDArray | None:
-        """Where |f| is beyond the tables: (n, count); None where they are 0 there by themselves.
-
-        Those over fx and fy are square, and in their corners what takes away the part over |f|.
-        """
-        if all(plane is None for plane in self.tables.planes):
-            return None
-        return np.hypot(self.x.frequencies[:count], fy[:, None]) > self.tables.top * (1 + 1e-9)
 
 
 def _neighbors(index: NDArray) -> NDArray | slice:
