@@ -28,6 +28,10 @@ on, and there are other errors. And what is lost of a painted chart is a guess: 
 along the rows and columns of a few dozen pixels it was found up to eleven times too low, for they
 do not add up at random.
 """
+AT_HAND, MOST = 0.5, 5e-4
+"""The same of a spectrum that is at hand, of which it is known what is lost; and the part of full
+signal that it is at most. Of full signal as it is known to be behind the lens at least: beside that
+a tenth of the tolerance may be lost of the brightest light before it."""
 KNOWN = 64.0
 """Pixel Nyquist frequencies up to which the spectrum of a chart of rectangles is looked at."""
 LOOKED = 1 << 14
@@ -89,6 +93,11 @@ class Spread:
         tail = np.cumsum(self.power[:, ::-1], axis=1)[:, ::-1].max(axis=0)
         kept = np.flatnonzero(tail > budget**2)
         return float(self.frequency[kept[-1]]) if len(kept) else 0.0
+
+
+def at_hand(tolerance: float) -> float:
+    """Part of full signal that may be lost of a spectrum that is at hand."""
+    return min(AT_HAND * tolerance, MOST)
 
 
 def first_guess(geometry: Geometry, knobs: Settings) -> int:

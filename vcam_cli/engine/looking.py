@@ -14,7 +14,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from vcam_cli.engine import bandwidth, memory, painted, parseval, sampling
+from vcam_cli.engine import bandwidth, brightness, memory, painted, parseval, sampling
 from vcam_cli.engine.axis import Axis
 from vcam_cli.engine.coefficients import Coefficients, OfRuns
 from vcam_cli.engine.layers import Optics
@@ -58,7 +58,9 @@ class Seen:
     lost: float
     """Rms of the signal beyond [electrons / s]"""
     budget: float
-    """Rms of the signal that may be lost [electrons / s]"""
+    """Rms of the signal that may be lost with the frequencies beyond,"""
+    spare: float
+    """and with each of other things [electrons / s]"""
     samples: int
     """Of one plane, as far as they are wanted."""
     held: int
@@ -132,13 +134,17 @@ def look(
         light, terms, held = _light(optics, scene, filter, room)
         peak = light.peak(tables)
         highest = max(highest, peak)
-        budget = bandwidth.SHARE * knobs.tolerance * min(peak, optics.ceiling)
-        if light.brightest(tables) * SINGLE > budget:
+        bound = min(peak, optics.ceiling)
+        spare = bandwidth.SHARE * knobs.tolerance * bound
+        if light.brightest(tables) * SINGLE > spare:
             light = light.doubled()
         coefficients = light.spectrum(optics.workers, terms)
         sample = parseval.Sample(filter, coefficients)
         spread = _spread(optics, scene, sample)
+        budget = spare
         if cells is None:
+            least = min(brightness.least(filter, coefficients), optics.ceiling)
+            budget = max(spare, bandwidth.at_hand(knobs.tolerance) * least)
             enough = min(max(spread.enough(budget), bandwidth.least(knobs)), reach.most)
             lost = spread.beyond(enough)
             break
@@ -159,6 +165,7 @@ def look(
         enough=enough,
         lost=lost,
         budget=budget,
+        spare=spare,
         samples=samples,
         held=held,
         peak=highest,

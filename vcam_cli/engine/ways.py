@@ -207,6 +207,6 @@ def _needed(optics: Optics, seen: Seen, modes: Modes) -> tuple[Modes, float]:
         power = seen.sample.mean_square(mode.tables(rough=True))
         squares[i] = mode.map.mean_square * seen.rms(optics, power) ** 2
     weakest = np.argsort(squares)
-    dropped = set(weakest[np.cumsum(squares[weakest]) <= seen.budget**2].tolist())
+    dropped = set(weakest[np.cumsum(squares[weakest]) <= seen.spare**2].tolist())
     kept = tuple(mode for i, mode in enumerate(modes) if i not in dropped)
     return kept, math.sqrt(squares.sum())
