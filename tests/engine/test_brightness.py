@@ -5,9 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from vcam_cli import load
 from vcam_cli.engine import bandwidth, brightness, sampling
 from vcam_cli.engine.axis import Axis
 from vcam_cli.engine.transfer import Tables
+from vcam_cli.studies.simulate import prepare
 
 PITCH = 2e-6
 SIZE = 40, 56
@@ -58,12 +60,13 @@ def test_an_even_picture_is_its_level():
     assert brightness.least(filter_of(), coefficients) == pytest.approx(0.7 * 300, rel=1e-12)
 
 
-def test_nothing_is_known_where_a_lens_leans():
-    filter = filter_of()
-    leaning = np.ones((1, 2, 5, 5))
-    tables = replace(filter.tables, planes=(None, leaning, None, None))
-    coefficients = np.ones((1, *SIZE))
-    assert brightness.least(replace(filter, tables=tables), coefficients) == 0
+@pytest.mark.parametrize(("lens", "count"), [("{11: 30 nm}", 1), ("{7: 30 nm}", 0)])
+def test_lenses_that_lean_are_not_asked(lens, count, monkeypatch):
+    asked = []
+    monkeypatch.setattr(brightness, "least", lambda *a: asked.append(a) or 0.0)
+    small = ["array.rows=24", "array.columns=32", f"optics.zernike={lens}"]
+    prepare(load("colorchecker-d65", small), 1)
+    assert len(asked) == count
 
 
 @pytest.mark.parametrize("tolerance", [0.02, 0.005, 0.001, 0.0002])

@@ -24,11 +24,9 @@ PLACES = 2 * FIRST
 def least(filter: Filter, coefficients: Coefficients) -> float:
     """Signal of the brightest place on the array, at least [electrons / s].
 
-    Of a transfer over |f| alone; 0 where it has a direction. From the rows of the spectrum that are
-    looked at whatever the scene is.
+    Of a transfer over |f| alone. From the rows of the spectrum that are looked at whatever the
+    scene is.
     """
-    if any(plane is not None for plane in filter.tables.planes):
-        return 0.0
     terms = np.arange(min(FIRST, filter.y.terms))
     found = filter.rows(coefficients, terms)
     if found is None:

@@ -143,7 +143,7 @@ def look(
         spread = _spread(optics, scene, sample)
         budget = spare
         if cells is None:
-            least = min(brightness.least(filter, coefficients), optics.ceiling)
+            least = _least(optics, filter, coefficients)
             budget = max(spare, bandwidth.at_hand(knobs.tolerance) * least)
             enough = min(max(spread.enough(budget), bandwidth.least(knobs)), reach.most)
             lost = spread.beyond(enough)
@@ -189,6 +189,13 @@ def _light(
         light = painted.InTurn(scene, mix, filter, alone, terms, optics.workers, knobs.dtype)
         return light, terms, held
     return painted.Painted(scene.planes(mix, optics.workers)), terms, held
+
+
+def _least(optics: Optics, filter: sampling.Filter, coefficients: Coefficients) -> float:
+    """Full signal at least; 0 where the filter has not all in it that the lens does."""
+    if optics.transfer.plane or optics.field is not None:
+        return 0.0
+    return min(brightness.least(filter, coefficients), optics.ceiling)
 
 
 def again(scene_at: SceneAt, cells: int) -> SampledScene:

@@ -35,17 +35,17 @@ class Sample:
 
     def __init__(self, filter: Filter, coefficients: Coefficients) -> None:
         self._filter = filter
-        self._first = _pools(filter.x.terms)
-        self._last = np.append(self._first[1:], filter.x.terms) - 1
-        self._middle = (self._first + self._last) // 2
+        first = _pools(filter.x.terms)
+        self._last = np.append(first[1:], filter.x.terms) - 1
+        self._middle = (first + self._last) // 2
         every, stand_for = few_rows.of(filter.y, coefficients)
         self._terms = every
         self._pairs = list(combinations_with_replacement(range(len(coefficients)), 2))
         """Of planes, (r, s) with r up to s."""
-        self._bare = np.zeros((len(self._pairs), len(every), len(self._first)))
+        self._bare = np.zeros((len(self._pairs), len(every), len(first)))
         """(pairs, rows, pools) sums of products, without the separable factors, as often as they
         count: rows for those that they stand for, cosines by their mean square."""
-        self.size = self._take(coefficients, stand_for)
+        self.size = self._take(coefficients, stand_for, first)
         """Terms of a plane that are in it."""
         self._with = self._bare * _square(filter.along_y[every], filter.along_x[self._middle])
 
@@ -55,14 +55,12 @@ class Sample:
         out._filter = filter
         rows, pools = self._terms < filter.y.terms, self._last < filter.x.terms
         out._terms = self._terms[rows]
-        out._first, out._last, out._middle = (
-            at[pools] for at in (self._first, self._last, self._middle)
-        )
+        out._last, out._middle = self._last[pools], self._middle[pools]
         out._bare = self._bare[:, rows][:, :, pools]
         out._with = out._bare * _square(filter.along_y[out._terms], filter.along_x[out._middle])
         return out
 
-    def _take(self, coefficients: Coefficients, stand_for: NDArray) -> int:
+    def _take(self, coefficients: Coefficients, stand_for: NDArray, pools: NDArray) -> int:
         filter, terms, taken = self._filter, self._terms, 0
         along_x = filter.x.weights * np.where(np.arange(filter.x.terms) > 0, np.sqrt(2), 1)
         for part in pieces(len(terms), max(16, AT_ONCE // filter.x.terms)):
@@ -70,7 +68,7 @@ class Sample:
             if found is None:  # nor are there any of higher frequencies
                 break
             planes = [plane * along_x[: found.count] for plane in found.planes]
-            first = self._first[: np.searchsorted(self._first, found.count)]
+            first = pools[: np.searchsorted(pools, found.count)]
             for sums, (r, s) in zip(self._bare, self._pairs, strict=True):
                 sums[part, : len(first)] = np.add.reduceat(planes[r] * planes[s], first, axis=1)
             taken += planes[0].size
