@@ -5,11 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from vcam_cli import load
 from vcam_cli.engine import bandwidth, brightness, sampling
 from vcam_cli.engine.axis import Axis
 from vcam_cli.engine.transfer import Tables
-from vcam_cli.studies.simulate import prepare
 
 PITCH = 2e-6
 SIZE = 40, 56
@@ -60,20 +58,18 @@ def test_an_even_picture_is_its_level():
     assert brightness.least(filter_of(), coefficients) == pytest.approx(0.7 * 300, rel=1e-12)
 
 
-@pytest.mark.parametrize(("lens", "count"), [("{11: 30 nm}", 1), ("{7: 30 nm}", 0)])
-def test_lenses_that_lean_are_not_asked(lens, count, monkeypatch):
-    asked = []
-    monkeypatch.setattr(brightness, "least", lambda *a: asked.append(a) or 0.0)
-    small = ["array.rows=24", "array.columns=32", f"optics.zernike={lens}"]
-    prepare(load("colorchecker-d65", small), 1)
-    assert len(asked) == count
+def test_one_term_is_the_mean():
+    picture = np.random.default_rng(3).random((1, *SIZE))
+    coefficients = sampling.spectrum(picture.copy(), 1)
+    mean = 300 * picture.mean()
+    assert brightness.least(filter_of(), coefficients, 1) == pytest.approx(mean, rel=1e-12)
 
 
 @pytest.mark.parametrize("tolerance", [0.02, 0.005, 0.001, 0.0002])
-def test_half_of_the_tolerance_but_no_more_than_standard_accuracy_may(tolerance):
+def test_a_spectrum_at_hand_may_lose_half_of_what_is_asked(tolerance):
     part = bandwidth.at_hand(tolerance)
-    assert part <= tolerance / 2 and part <= 5e-4
-    assert part == tolerance / 2 or part == 5e-4
+    assert tolerance / 10 <= part <= tolerance / 2
+    assert part <= 8e-4 or tolerance > 0.005  # standard accuracy is to be within 0.1 %
 
 
 @pytest.mark.parametrize("seed", range(5))

@@ -28,10 +28,10 @@ on, and there are other errors. And what is lost of a painted chart is a guess: 
 along the rows and columns of a few dozen pixels it was found up to eleven times too low, for they
 do not add up at random.
 """
-AT_HAND, MOST = 0.5, 5e-4
+AT_HAND, MOST = 0.5, 8e-4
 """The same of a spectrum that is at hand, of which it is known what is lost; and the part of full
-signal that it is at most. Of full signal as it is known to be behind the lens at least: beside that
-a tenth of the tolerance may be lost of the brightest light before it."""
+signal that it is at most, unless `SHARE` is more. Of full signal as it is behind the lens: of
+sparse points that is much less than they were before it."""
 KNOWN = 64.0
 """Pixel Nyquist frequencies up to which the spectrum of a chart of rectangles is looked at."""
 LOOKED = 1 << 14
@@ -97,7 +97,7 @@ class Spread:
 
 def at_hand(tolerance: float) -> float:
     """Part of full signal that may be lost of a spectrum that is at hand."""
-    return min(AT_HAND * tolerance, MOST)
+    return max(SHARE * tolerance, min(AT_HAND * tolerance, MOST))
 
 
 def first_guess(geometry: Geometry, knobs: Settings) -> int:

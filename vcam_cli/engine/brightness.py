@@ -16,35 +16,41 @@ from vcam_cli.engine.coefficients import Coefficients
 from vcam_cli.engine.few_rows import FIRST
 from vcam_cli.engine.lookup import Lookup, Rows
 from vcam_cli.engine.sampling import Filter
+from vcam_cli.engine.transfer import PARITIES
 
-PLACES = 2 * FIRST
+TERMS = FIRST
+"""Along each axis: all of those rows are looked at, whatever the scene is."""
+PLACES = 2 * TERMS
 """Along each axis at which the means are known."""
 
 
-def least(filter: Filter, coefficients: Coefficients) -> float:
+def least(filter: Filter, coefficients: Coefficients, terms: int = TERMS) -> float:
     """Signal of the brightest place on the array, at least [electrons / s].
 
-    Of a transfer over |f| alone. From the rows of the spectrum that are looked at whatever the
-    scene is.
+    terms: along each axis, at most `TERMS`; of 1 it is the mean, which no lens changes.
     """
-    terms = np.arange(min(FIRST, filter.y.terms))
-    found = filter.rows(coefficients, terms)
+    rows = np.arange(min(terms, filter.y.terms))
+    found = filter.rows(coefficients, rows)
     if found is None:
         return 0.0
-    count = min(FIRST, found.count)
+    count = min(terms, found.count)
     planes = [plane[:, :count].astype(np.float64) for plane in found.planes]
-    rows = Rows(planes, found.fy, count)
-    along_x = _means(filter.x, count) * filter.along_x[:count]
-    along_y = _means(filter.y, len(terms)) * filter.along_y[: len(terms)]
-    lookup = Lookup(filter.tables, 0, filter.x.frequencies, np.dtype(np.float64), few=True)
-    signals = map(rows.through, lookup.at(rows, len(planes)))
-    return max(float((along_y @ signal @ along_x.T).max()) for signal in signals)
+    some = Rows(planes, found.fy, count)
+    signal = np.zeros((filter.tables.values.shape[1], PLACES, PLACES))
+    for parity in filter.tables.parities:
+        odd_x, odd_y = PARITIES[parity]
+        along_x = _means(filter.x, count, odd_x) * filter.along_x[:count]
+        along_y = _means(filter.y, len(rows), odd_y) * filter.along_y[: len(rows)]
+        lookup = Lookup(filter.tables, parity, filter.x.frequencies, np.dtype(np.float64), few=True)
+        for color, tables in zip(signal, lookup.at(some, len(planes)), strict=True):
+            color += along_y @ some.through(tables) @ along_x.T
+    return max(0.0, float(signal.max()))
 
 
-def _means(axis: Axis, count: int) -> NDArray:
+def _means(axis: Axis, count: int, odd: bool) -> NDArray:
     """What terms are at places on the array, weakened as Fejer has it: (places, count)."""
     k = np.arange(count)
     at = axis.first + np.linspace(0, axis.pixels - 1, PLACES) * axis.pixel_pitch
-    waves = np.cos(np.pi * np.outer(at / axis.length, k))
-    waves[:, 1:] *= 2  # a DCT-III counts its constant once
+    waves = (np.sin if odd else np.cos)(np.pi * np.outer(at / axis.length, k))
+    waves[:, 1:] *= 2  # a DCT-II's constant counts once
     return waves * (axis.weights[:count] * (1 - k / count))

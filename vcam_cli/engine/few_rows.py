@@ -55,7 +55,7 @@ def rows(y: Axis, energy: NDArray, every: NDArray | None = None) -> tuple[NDArra
     row. every: the energy that is stood for, where another one tells rows apart.
     """
     own = _on_axis(y, energy)
-    outstanding = _outstanding(own)
+    outstanding = standing_out(own)
     rest = np.delete(np.arange(y.terms), outstanding)
     count = len(rest)
     first, others = np.arange(min(FIRST, count)), np.geomspace(FIRST, max(FIRST, count), OTHERS)
@@ -90,8 +90,11 @@ def _usual(energy: NDArray, starts: NDArray) -> NDArray:
     return np.lexsort((away, group))[starts]
 
 
-def _outstanding(energy: NDArray) -> NDArray:
-    """Terms far above the mean of those around them, the strongest: (n,)."""
+def standing_out(energy: NDArray) -> NDArray:
+    """Terms far above the mean of those around them, the strongest: (n,).
+
+    energy: (terms,) along an axis.
+    """
     if len(energy) <= FIRST + 1:
         return np.zeros(0, int)
     starts = np.unique(np.geomspace(FIRST, len(energy), OTHERS).astype(int))[:-1]

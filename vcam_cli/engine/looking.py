@@ -51,6 +51,9 @@ class Seen:
     filter: sampling.Filter
     """With which rows of them were looked at."""
     sample: parseval.Sample
+    """Through all that the lens does,"""
+    alone: parseval.Sample
+    """and through what is the same in all directions, as far as the lens reaches."""
     looked: float
     """Pixel Nyquist frequencies up to which that was,"""
     enough: float
@@ -81,8 +84,9 @@ class Seen:
         """Looked at once more, through tables that let less pass and go as far as is `enough`."""
         filter = filter_of(optics, self.scene, tables, self.enough)
         sample = self.sample.through(filter)
-        spread = _spread(optics, self.scene, sample)
-        enough = max(spread.enough(self.budget), bandwidth.least(optics.settings))
+        budget = max(self.budget, _budget(optics, filter, self.coefficients))
+        spread = _spread(optics, self.scene, sample.power())
+        enough = max(spread.enough(budget), bandwidth.least(optics.settings))
         enough = min(enough, self.enough)
         return replace(
             self,
@@ -92,6 +96,23 @@ class Seen:
             enough=enough,
             lost=math.hypot(spread.beyond(enough), self.lost),
         )
+
+    def beyond(self, what: Callable[[parseval.Sample], NDArray]) -> NDArray:
+        """Of a mean square (C,), what is beyond the tables of all that the lens does.
+
+        As without what has a direction: that only weakens the light.
+        """
+        if self.alone is self.sample:
+            return np.zeros(1)
+        x, y = self.filter.x, self.filter.y
+        within = replace(
+            self.alone.filter,
+            x=x,
+            y=y,
+            along_x=self.filter.along_x,
+            along_y=self.filter.along_y,
+        )
+        return np.maximum(what(self.alone) - what(self.alone.through(within)), 0)
 
     def rms(self, optics: Optics, squares: NDArray) -> float:
         """Of the signal of most in any color, as if all of the scene lay on the array.
@@ -122,10 +143,12 @@ def look(
     reach: Reach,
     tables: Tables,
     room: Room,
+    most: Tables | None = None,
 ) -> Seen:
-    """Looks at the spectrum of a scene through tables that go as far as `reach`, or let more pass.
+    """Looks at the spectrum of a scene through tables that go as far as `reach`.
 
-    room: of the tables. Raises CannotDo where memory does not suffice.
+    room: of the tables; most: where the lens does more than that, tables of what passes at most.
+    Raises CannotDo where memory does not suffice.
     """
     knobs, cells, highest = optics.settings, reach.cells, 0.0
     while True:
@@ -134,17 +157,17 @@ def look(
         light, terms, held = _light(optics, scene, filter, room)
         peak = light.peak(tables)
         highest = max(highest, peak)
-        bound = min(peak, optics.ceiling)
-        spare = bandwidth.SHARE * knobs.tolerance * bound
+        spare = bandwidth.SHARE * knobs.tolerance * min(peak, optics.ceiling)
         if light.brightest(tables) * SINGLE > spare:
             light = light.doubled()
         coefficients = light.spectrum(optics.workers, terms)
         sample = parseval.Sample(filter, coefficients)
-        spread = _spread(optics, scene, sample)
+        power = sample.power() if most is None else sample.most(most)
+        spread = _spread(optics, scene, power)
         budget = spare
         if cells is None:
-            least = _least(optics, filter, coefficients)
-            budget = max(spare, bandwidth.at_hand(knobs.tolerance) * least)
+            # Of what the lens does more it is known that it keeps the mean.
+            budget = _budget(optics, filter, coefficients, least=most is not None)
             enough = min(max(spread.enough(budget), bandwidth.least(knobs)), reach.most)
             lost = spread.beyond(enough)
             break
@@ -161,6 +184,7 @@ def look(
         coefficients=coefficients,
         filter=filter,
         sample=sample,
+        alone=sample,
         looked=looked,
         enough=enough,
         lost=lost,
@@ -191,11 +215,15 @@ def _light(
     return painted.Painted(scene.planes(mix, optics.workers)), terms, held
 
 
-def _least(optics: Optics, filter: sampling.Filter, coefficients: Coefficients) -> float:
-    """Full signal at least; 0 where the filter has not all in it that the lens does."""
-    if optics.transfer.plane or optics.field is not None:
-        return 0.0
-    return min(brightness.least(filter, coefficients), optics.ceiling)
+def _budget(
+    optics: Optics, filter: sampling.Filter, coefficients: Coefficients, least: bool = False
+) -> float:
+    """Rms of the signal that may be lost of a spectrum at hand [electrons / s].
+
+    least: whether of full signal nothing is known but the mean.
+    """
+    full = brightness.least(filter, coefficients, 1 if least else brightness.TERMS)
+    return bandwidth.at_hand(optics.settings.tolerance) * min(full, optics.ceiling)
 
 
 def again(scene_at: SceneAt, cells: int) -> SampledScene:
@@ -234,10 +262,12 @@ def filter_of(
     return sampling.Filter(x, y, tables, along_x, along_y)
 
 
-def _spread(optics: Optics, scene: SampledScene, sample: parseval.Sample) -> bandwidth.Spread:
+def _spread(
+    optics: Optics, scene: SampledScene, power: tuple[NDArray, NDArray]
+) -> bandwidth.Spread:
     """The signal's spectrum, as if all of it lay on the array and none in the margin."""
-    frequency, power = sample.power()
-    return bandwidth.Spread(frequency, power * _density(optics, scene))
+    frequency, squares = power
+    return bandwidth.Spread(frequency, squares * _density(optics, scene))
 
 
 def _density(optics: Optics, scene: SampledScene) -> float:

@@ -121,6 +121,10 @@ class Transfer:
         """The transfer of mixtures of the components, mix: (R, K)."""
         return replace(self, weights=np.tensordot(mix, self.weights, axes=1))
 
+    def most(self) -> Transfer:
+        """What no lens exceeds that does more than the radial effects, as if no light canceled."""
+        return replace(self.through(self.radial), weights=np.abs(self.weights))
+
     @property
     def level(self) -> NDArray:
         """H_kc at frequency 0, the signal of a uniform scene: (K, C) [electrons / s]."""

@@ -27,9 +27,10 @@ from vcam_cli.engine.coefficients import Coefficients, PlaneOfRuns
 from vcam_cli.engine.layers import Followed, Layer, Layers, Optics
 from vcam_cli.engine.looking import Reach, SceneAt, Seen
 from vcam_cli.engine.parallel import pieces
+from vcam_cli.engine.parseval import Sample
 from vcam_cli.engine.room import Room, of_tables, of_zones, table_values
 from vcam_cli.engine.settings import Settings
-from vcam_cli.engine.transfer import EXACT_ENTRIES, Fineness, mixtures, tabulate
+from vcam_cli.engine.transfer import EXACT_ENTRIES, Fineness, entries, mixtures, tabulate
 from vcam_cli.scenes.base import SampledScene, WaveScene
 
 Modes = tuple[field.Mode, ...]
@@ -136,7 +137,8 @@ def _seen(
     if reach.cells is None and (exact.plane or zones):
         # Aberrations only weaken a picture: without them it is found for little how far to go.
         radial = tabulate(exact.through(exact.radial), fine, mixing)
-        seen = looking.look(optics, scene, scene_at, reach, radial, Room())
+        most = replace(radial, values=entries(exact.mixed(mixing[0]).most(), fine))
+        seen = looking.look(optics, scene, scene_at, reach, radial, Room(), most)
         fine = replace(fine, top=bandwidth.top(g, seen.enough, exact.cutoff))
     room = of_zones(exact, zones, fine) if zones else of_tables(exact, fine)
     needed = memory.of_tabulating(room, seen.held if seen else 0, optics.settings)
@@ -189,15 +191,20 @@ def _changes(optics: Optics, seen: Seen, modes: float) -> Iterator[tuple[str, fl
     """
     sample = seen.sample
     for effect in optics.effects:
+        beyond, also = np.zeros(1), 0.0
         if isinstance(effect, RadialTransfer):
-            yield effect.name, seen.rms(optics, sample.without(effect, optics.transfer))
+            power = seen.alone.without(effect, optics.transfer)
         elif isinstance(effect, SeparableTransfer):
-            yield effect.name, seen.rms(optics, sample.without_separable(effect))
+            power = sample.without_separable(effect)
+            beyond = seen.beyond(partial(Sample.without_separable, effect=effect))
         elif isinstance(effect, PlaneTransfer):
-            yield effect.name, seen.rms(optics, sample.without_planes())
+            power, beyond = sample.without_planes(), seen.beyond(Sample.signal)
         elif isinstance(effect, FieldTransfer):
-            mean = seen.rms(optics, sample.without_field(optics.transfer))
-            yield effect.name, math.hypot(mean, modes)
+            power, also = sample.without_field(optics.transfer), modes
+            beyond = seen.beyond(Sample.signal)
+        else:
+            continue
+        yield effect.name, math.hypot(seen.rms(optics, power + beyond), also)
 
 
 def _needed(optics: Optics, seen: Seen, modes: Modes) -> tuple[Modes, float]:
