@@ -23,8 +23,6 @@ SLACK = 1.1
 """Of what is in use, what the process has: memory that was freed is not given back at once."""
 SAMPLED, POOLS = 96, 250
 """Rows of a spectrum that are looked at, and terms along them that are told apart, about."""
-LOOKED_AT_ONCE = 16
-"""Rows that are looked at together, where they are long."""
 
 
 def available() -> int:
@@ -96,7 +94,7 @@ def of_looking(filter: Filter, held: int, width: int, tables: Room) -> int:
     """
     planes, colors, _ = filter.tables.values.shape
     pairs = planes * (planes + 1) // 2
-    taken = 2 * LOOKED_AT_ONCE * filter.x.terms * (planes * (width + 8) + 8)
+    taken = SAMPLED * filter.x.terms * planes * (8 + width)
     sample = SAMPLED * POOLS * 8 * (2 * pairs + 2 * planes + colors) + taken
     return BASE + round(SLACK * max(tables.most, tables.kept + held * width + sample))
 
