@@ -19,9 +19,9 @@ FIRST = 24
 OTHERS = 40
 """Rows that are looked at beyond those, at most."""
 OUTSTANDING = 32
-"""Rows that stand out, at most: those with most energy."""
+"""Terms along an axis that stand out, at most: those with most energy."""
 STANDS_OUT = 3.0
-"""Energy of such a row over the mean of those around it."""
+"""Energy of such a term over the mean of those around it."""
 
 
 def of(y: Axis, coefficients: Coefficients) -> tuple[NDArray, NDArray]:

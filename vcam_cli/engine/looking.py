@@ -55,7 +55,7 @@ class Seen:
     alone: parseval.Sample
     """and through what is the same in all directions, as far as the lens reaches."""
     looked: float
-    """Pixel Nyquist frequencies up to which that was,"""
+    """Pixel Nyquist frequencies up to which `sample` goes,"""
     enough: float
     """and up to which the spectrum is to be followed."""
     lost: float
@@ -104,14 +104,7 @@ class Seen:
         """
         if self.alone is self.sample:
             return np.zeros(1)
-        x, y = self.filter.x, self.filter.y
-        within = replace(
-            self.alone.filter,
-            x=x,
-            y=y,
-            along_x=self.filter.along_x,
-            along_y=self.filter.along_y,
-        )
+        within = replace(self.filter, tables=self.alone.filter.tables)
         return np.maximum(what(self.alone) - what(self.alone.through(within)), 0)
 
     def rms(self, optics: Optics, squares: NDArray) -> float:
