@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 SOURCES := vcam_cli tests scripts
 CAMERA ?= still-life
 
-.PHONY: run test test-all check bench promise stability fuzz schemas tables lock clean
+.PHONY: run test test-all lint check bench promise stability fuzz schemas tables lock clean
 
 run: $(VENV)/.runtime  ## simulate the shipped still life: out/still-life/
 	$(BIN)/vcam run $(CAMERA)
@@ -16,11 +16,13 @@ test: $(VENV)/.dev  ## the tests, but for those that take long
 test-all: $(VENV)/.dev  ## all tests
 	$(BIN)/python -m pytest -q -n auto tests
 
-check: $(VENV)/.dev  ## format, lint, types, tests
+lint: $(VENV)/.dev  ## format, lint, spelling, types
 	$(BIN)/ruff format --check $(SOURCES)
 	$(BIN)/ruff check $(SOURCES)
+	$(BIN)/typos
 	$(BIN)/mypy
-	$(MAKE) test-all
+
+check: lint test-all  ## format, lint, spelling, types, all tests
 
 bench: $(VENV)/.dev  ## speed, as ratios: to bare transforms and draws, to plain NumPy, by stage and effect, growth
 	$(BIN)/python -m tests.bench

@@ -24,17 +24,18 @@ Floats = NDArray[np.float64]
 
 
 def grid() -> tuple[Floats, Floats]:
-    """x to the right and y down, 0 to 1, of the samples."""
+    """Return x to the right and y down, 0 to 1, of the samples."""
     at = (np.arange(SIZE * FINE) + 0.5) / (SIZE * FINE)
     return at[None, :], at[:, None]
 
 
 def mean(fine: Floats) -> Floats:
-    """Of the samples in every pixel."""
+    """Return the mean of the samples in every pixel."""
     return fine.reshape(SIZE, FINE, SIZE, FINE).mean(axis=(1, 3))
 
 
 def box(x: Floats, y: Floats, left: float, top: float, right: float, bottom: float) -> NDArray:
+    """Return where samples lie in a rectangle."""
     return (x >= left) & (x < right) & (y >= top) & (y < bottom)
 
 
@@ -94,9 +95,9 @@ def _shelf(x: Floats, y: Floats, light: Floats, random: np.random.Generator) -> 
 
 
 def _card(x: Floats, y: Floats, light: Floats) -> Floats:
-    """A ColorChecker, tilted to the window, its patches by their reflectance in the green."""
+    """Add a ColorChecker, tilted to the window, its patches by their reflectance in the green."""
     left, top, pitch = 0.16, 0.53, 0.068
-    patches = [float(s.at(550e-9)) for _, s in colorchecker()]
+    patches = [float(s.evaluate(550e-9)) for _, s in colorchecker()]
     column, row = ((x - left) / pitch), ((y - top) / pitch)
     on_card = box(column, row, -0.12, -0.12, 6.0, 4.0)
     number = np.clip(row.astype(int), 0, 3) * 6 + np.clip(column.astype(int), 0, 5)
@@ -116,7 +117,7 @@ def _window(x: Floats, y: Floats, light: Floats, random: np.random.Generator) ->
 
 
 def _lamp(x: Floats, y: Floats, light: Floats) -> Floats:
-    """A bulb under a shade that light comes through."""
+    """Add a bulb under a shade that light comes through."""
     half = 0.06 + 0.05 * (y - 0.14) / 0.12
     shade = box(x, y, 0, 0.14, 1, 0.26) & (np.abs(x - 0.82) < half)
     light = np.where(shade, 0.12 + 0.2 * np.exp(-(((x - 0.82) / 0.05) ** 2)), light)

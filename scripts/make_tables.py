@@ -160,7 +160,7 @@ def _text(comments: list[str], wavelength: NDArray[np.float64], columns: Columns
 
 
 def _shortest(number: float) -> str:
-    """The shortest decimal text that reads back as the same number."""
+    """Return the shortest decimal text that reads back as the same number."""
     return repr(float(number)).removesuffix(".0")
 
 

@@ -273,7 +273,8 @@ class Patch:
 def patch_of(setup: Setup) -> Patch:
     """The scene's squares, cut into cells, times the relative illumination."""
     scene = setup.scene
-    assert isinstance(scene, Squares) and scene.outside == "mirror"
+    assert isinstance(scene, Squares)
+    assert scene.outside == "mirror"
     cut_x, cut_y = (math.ceil(s / setup.cell - 1e-6) for s in (scene.width, scene.height))
     fine = scene.planes.repeat(cut_y, axis=1).repeat(cut_x, axis=2)
     step_x, step_y = scene.width / cut_x, scene.height / cut_y

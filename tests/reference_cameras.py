@@ -124,9 +124,9 @@ def setup_of(
 def lens_of(camera) -> ref.Aberrated | ref.Rays | None:
     """The lens of a file's zernike and defocus, where they are the same everywhere."""
     optics = camera.optics
-    if not optics.zernike.at and not optics.defocus:
+    if not optics.zernike.terms and not optics.defocus:
         return None
-    terms = optics.zernike.at[0][1] if optics.zernike.at else ()
+    terms = optics.zernike.terms[0][1] if optics.zernike.terms else ()
     front = ref.Wavefront(terms, optics.defocus)
     return ref.Aberrated(front) if optics.diffraction else ref.Rays(front)
 
@@ -154,7 +154,8 @@ def write_picture(folder: Path, picture: np.ndarray) -> Path:
     spec = oiio.ImageSpec(picture.shape[1], picture.shape[0], picture.shape[2], "float")
     spec.channelnames = ("Y",) if picture.shape[2] == 1 else ("R", "G", "B")
     out = oiio.ImageOutput.create(str(path))
-    assert out.open(str(path), spec) and out.write_image(np.ascontiguousarray(picture))
+    assert out.open(str(path), spec)
+    assert out.write_image(np.ascontiguousarray(picture))
     assert out.close()
     return path
 

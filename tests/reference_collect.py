@@ -11,13 +11,13 @@ import numpy as np
 
 
 def centers(count: int, pitch: float) -> np.ndarray:
-    """Centers of `count` cells along an axis, the array centerd on 0 [m]."""
+    """Centers of `count` cells along an axis, the array centered on 0 [m]."""
     return (np.arange(count) + 0.5 - count / 2) * pitch
 
 
 @dataclass(frozen=True)
 class Squares:
-    """Squares of light, each uniform, centerd on the array: B_k = planes[k], shape (K, ny, nx)."""
+    """Squares of light, each uniform, centered on the array: B_k = planes[k], shape (K, ny, nx)."""
 
     planes: np.ndarray
     width: float  # of one square [m]
@@ -40,7 +40,7 @@ class Rectangle:
         return float(math.isinf(self.left))
 
     def inside(self, x: np.ndarray, y: np.ndarray, width: float, height: float) -> np.ndarray:
-        """Area common to the rectangle and those centerd at every (y, x): (m, n) [m2]."""
+        """Area common to the rectangle and those centered at every (y, x): (m, n) [m2]."""
         wide = np.minimum(x + width / 2, self.right) - np.maximum(x - width / 2, self.left)
         tall = np.minimum(y + height / 2, self.bottom) - np.maximum(y - height / 2, self.top)
         return np.maximum(tall, 0)[:, None] * np.maximum(wide, 0)
@@ -105,7 +105,7 @@ class Collector:
         return above * (1 - s) + below * s
 
     def inside(self, x: np.ndarray, y: np.ndarray, width: float, height: float) -> np.ndarray:
-        """Integral of B over the rectangles centerd at every (y, x): (m, n) [m2]."""
+        """Integral of B over the rectangles centered at every (y, x): (m, n) [m2]."""
         sides = np.concatenate([x - width / 2, x + width / 2])
         rows = np.concatenate([y - height / 2, y + height / 2])
         corner = self.up_to(sides, rows)

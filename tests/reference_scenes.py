@@ -56,7 +56,7 @@ def cropped(picture: np.ndarray, width: float, height: float) -> Squares:
     """An image (h, w, K) that exactly covers the array: never stretched, cropped to whole samples.
 
     The sample's side is max(width / w, height / h). Along the axis with too many samples those
-    from floor(a) to ceil(b) are kept, a..b what the array sees; the kept ones stay centerd.
+    from floor(a) to ceil(b) are kept, a..b what the array sees; the kept ones stay centered.
     """
     h, w = picture.shape[:2]
     side = max(width / w, height / h)

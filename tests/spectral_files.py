@@ -95,5 +95,6 @@ def _image(path: Path, cube, kind, names=None, **attributes) -> Path:
     out = oiio.ImageOutput.create(str(path))
     types = {"float": np.float32, "uint16": np.uint16, "half": np.float32}
     assert out.open(str(path), spec), out.geterror()
-    assert out.write_image(np.ascontiguousarray(cube, types[kind])) and out.close()
+    assert out.write_image(np.ascontiguousarray(cube, types[kind]))
+    assert out.close()
     return path

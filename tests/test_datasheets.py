@@ -9,10 +9,12 @@ import math
 import pytest
 
 from vcam_cli import load, simulate
-from vcam_cli.engine.stages import Stages
+from vcam_cli.characterization import bench, exposures
+from vcam_cli.characterization.characterize import characterize
 from vcam_cli.errors import BadInput
-from vcam_cli.studies import bench, exposures
-from vcam_cli.studies.characterize import characterize
+from vcam_cli.progress import Stages
+
+pytestmark = pytest.mark.long
 
 WITHIN = 0.02
 SMALL = {(bench, "FIELD"): 256, (exposures, "STACK"): 16, (exposures, "EDGES"): 4}
@@ -101,7 +103,7 @@ def test_all_colors_of_a_sensor_share_its_readout(measured):
 )
 def test_colors_are_as_efficient_as_printed_where_it_is_printed(wavelength, color, percent):
     line = f"scene.illuminant={{monochromatic: {wavelength} nm}}"
-    on = bench.bench(load("kac-12040", [line]), 2, Stages())
+    on = bench.prepare_bench(load("kac-12040", [line]), 2, Stages())
     assert 100 * on.efficiency(color) == pytest.approx(percent, rel=1e-3)
 
 

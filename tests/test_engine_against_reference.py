@@ -255,7 +255,13 @@ EXACT = {"sharp": SHARP, "flat": FLAT, "sinusoid": SINUSOID}
 # --- the comparison ------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", CAMERAS)
+@pytest.mark.parametrize(
+    "name",
+    [
+        name if name == "daylight" else pytest.param(name, marks=pytest.mark.long)
+        for name in CAMERAS
+    ],
+)
 def test_standard_accuracy(name, tmp_path):
     case = CAMERAS[name]
     everything = case.load(tmp_path, name, "all", "standard")

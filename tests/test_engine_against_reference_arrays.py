@@ -23,6 +23,8 @@ from reference_silicon import absorption
 import vcam_cli
 from vcam_cli.camera.camera import Camera
 
+pytestmark = pytest.mark.long
+
 # --- arrays --------------------------------------------------------------------------------------
 
 TURQUOISE = {400: 0.7, 480: 0.9, 550: 0.8, 640: 0.1, 700: 0.05}

@@ -59,7 +59,10 @@ LENSES = {
 }
 
 
-@pytest.mark.parametrize("lens", LENSES)
+@pytest.mark.parametrize(
+    "lens",
+    [lens if lens == "defocus" else pytest.param(lens, marks=pytest.mark.long) for lens in LENSES],
+)
 def test_wavefronts(lens, tmp_path):
     case = Case(lasers(LENSES[lens]), laser_setup, PICTURE)
     check(case, tmp_path)
@@ -98,7 +101,9 @@ def write_samples(folder: Path, samples: np.ndarray) -> Path:
     spec.channelnames = tuple(f"w{k}" for k in range(n)) if n > 1 else ("Y",)
     out = oiio.ImageOutput.create(str(path))
     pixels = np.ascontiguousarray(np.moveaxis(samples, 0, 2).astype(np.float32))
-    assert out.open(str(path), spec) and out.write_image(pixels) and out.close()
+    assert out.open(str(path), spec)
+    assert out.write_image(pixels)
+    assert out.close()
     return path
 
 
@@ -129,6 +134,7 @@ FIELDS = {
 }
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("field", FIELDS)
 def test_fields(field, tmp_path):
     # the diffraction integral of each pixel's own place, for every third pixel of a small array
@@ -138,7 +144,7 @@ def test_fields(field, tmp_path):
     )
     case = Case(yaml, None, leaves(24, 32, 1, seed=12))
     camera = case.load(tmp_path, "field", "all", "standard")
-    places, terms = zip(*camera.optics.zernike.at, strict=True)
+    places, terms = zip(*camera.optics.zernike.terms, strict=True)
     setup = setup_of(camera, scenes.image_of(camera, case.picture), lines(550), quantum=flat(0.5))
     corner = np.hypot(8 * 4e-6, 6 * 4e-6)
     setup = replace(setup, cell=0.5e-6, lens=Field(places, terms, corner))
@@ -201,5 +207,6 @@ def test_measured_falloff(tmp_path):
     check(case, tmp_path)
 
 
+@pytest.mark.long
 def test_stray_light(tmp_path):
     check(Case(lasers("stray_light: 0.06"), laser_setup, PICTURE), tmp_path)

@@ -260,6 +260,7 @@ LAYERED = layers.Stack((0.5e-6, 2.0), (3e-6, 1.46))
 WIDE = "f_number: 1.8, focal_length: 0.1 mm"  # chief rays of 22 degrees in the corners
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("pupil", [None, 0.06e-3])
 def test_tunnels(pupil, tmp_path):
     told = f", exit_pupil_distance: {pupil * 1e3} mm" if pupil else ""
@@ -268,6 +269,7 @@ def test_tunnels(pupil, tmp_path):
     check(Case(yaml, lambda c, p: laser_setup(c, p, **changes), PICTURE), tmp_path)
 
 
+@pytest.mark.long
 def test_tunnels_over_a_junction(tmp_path):
     # internal QE: all that the faces reflect is lost, and the technology's 0.75 is not
     technology = f"technology: cmos-0.35um\n  {STACK}"

@@ -310,7 +310,8 @@ def test_shot_noise(electrons, tmp_path):
     assert found.mean() == pytest.approx(electrons, abs=5 * math.sqrt(electrons / n))
     spread = 5 * math.sqrt((2 + 1 / electrons) / n)
     assert found.var() == pytest.approx(electrons, rel=spread)
-    assert np.array_equal(found, np.rint(found)) and found.min() >= 0
+    assert np.array_equal(found, np.rint(found))
+    assert found.min() >= 0
 
 
 def test_few_electrons_are_poisson(tmp_path):

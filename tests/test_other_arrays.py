@@ -60,7 +60,8 @@ def test_results_have_the_shapes_that_are_promised(name):
     assert result.render.shape == result.linear.shape == result.ideal.shape
     if name == "stacked":
         assert result.render.shape == shape
-    assert result.dn.dtype == np.uint16 and result.render.dtype == np.uint8
+    assert result.dn.dtype == np.uint16
+    assert result.render.dtype == np.uint8
 
 
 def test_pixels_are_where_the_file_of_positions_has_them(pixels):
@@ -75,7 +76,8 @@ def test_every_second_row_of_a_honeycomb_is_half_a_column_to_the_right():
     pitch = x[0, 1] - x[0, 0]
     np.testing.assert_allclose(x[1] - x[0], pitch / 2, rtol=1e-9)
     np.testing.assert_allclose(x[2], x[0], atol=1e-15)
-    assert np.ptp(y, axis=1).max() == 0 and np.all(np.diff(y[:, 0]) > 0)
+    assert np.ptp(y, axis=1).max() == 0
+    assert np.all(np.diff(y[:, 0]) > 0)
 
 
 @pytest.mark.parametrize("name", SETS)
@@ -86,7 +88,8 @@ def test_raw_frames_come_back_from_their_file(name):
     assert done.exit_code == 0, done.output
     result = result_of(name, *more)
     channels, said = read_exr("out/raw.exr")
-    assert said["vcam:colors"] == "R,G,B" and said["vcam:cfa"] == name
+    assert said["vcam:colors"] == "R,G,B"
+    assert said["vcam:cfa"] == name
     kinds = {"dn": result.dn, "electrons": result.electrons, "volts": result.volts}
     if name == "stacked":
         wanted = {f"{k}.{c}": v[..., i] for k, v in kinds.items() for i, c in enumerate("RGB")}
@@ -123,7 +126,8 @@ def test_finer_pixels_in_the_same_size_come_closer_to_the_ideal_image():
             "exposure.auto.max=10 s",
         )  # fmt: skip
         psnr.append(dict((m[0], m[1]) for m in result.metrics)["psnr_db"])
-    assert psnr[1] > psnr[0] + 2 and psnr[2] > psnr[1] + 2
+    assert psnr[1] > psnr[0] + 2
+    assert psnr[2] > psnr[1] + 2
 
 
 @pytest.fixture(scope="module")

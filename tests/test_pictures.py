@@ -20,9 +20,8 @@ def write(path: Path, rgb, kind: str = "float") -> str:
     spec = oiio.ImageSpec(8, 6, len(rgb), kind)
     out = oiio.ImageOutput.create(str(path))
     assert out.open(str(path), spec)
-    assert (
-        out.write_image(np.broadcast_to(np.float32(rgb), (6, 8, len(rgb))).copy()) and out.close()
-    )
+    assert out.write_image(np.broadcast_to(np.float32(rgb), (6, 8, len(rgb))).copy())
+    assert out.close()
     return str(path)
 
 

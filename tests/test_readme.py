@@ -5,6 +5,7 @@ import re
 import shlex
 from pathlib import Path
 
+import pytest
 from typer.testing import CliRunner
 
 from vcam_cli.commands.main import COMMANDS, app
@@ -20,6 +21,7 @@ def lines(language, start):
     return [line.removeprefix("$ ") for line in text if line.startswith(start)]
 
 
+@pytest.mark.long
 def test_vcam_commands_run_in_their_order(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     commands = lines("console", "$ vcam ")
@@ -34,7 +36,8 @@ def test_vcam_commands_run_in_their_order(tmp_path, monkeypatch):
 
 def test_make_targets_exist():
     named = {command.split()[1] for command in lines("console", "$ make ")}
-    assert named and named <= set(TARGETS)
+    assert named
+    assert named <= set(TARGETS)
 
 
 def test_the_camera_file_runs(tmp_path, monkeypatch):
@@ -47,6 +50,7 @@ def test_the_camera_file_runs(tmp_path, monkeypatch):
     assert Path("out/example/render.png").exists()
 
 
+@pytest.mark.long
 def test_the_python_lines_work():
     code = next(body for kind, body in BLOCKS if kind == "python")
     exec(code.replace('"still-life"', '"still-life", ["array.rows=48", "array.columns=64"]'), {})

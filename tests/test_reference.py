@@ -9,6 +9,8 @@ import reference as ref
 import reference_readout as readout
 import reference_scenes as scenes
 
+pytestmark = pytest.mark.long
+
 H, C = ref.PLANCK, ref.LIGHT
 
 

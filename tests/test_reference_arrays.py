@@ -10,6 +10,8 @@ import reference_arrays as arrays
 from reference_collect import Product, Rectangle
 from test_reference import camera, wave
 
+pytestmark = pytest.mark.long
+
 SQUARES = ref.Squares(np.random.default_rng(1).uniform(size=(1, 9, 11)), 6.1e-6, 6.9e-6)
 
 
@@ -39,7 +41,8 @@ def test_a_turned_mosaic_keeps_density_and_neighbors():
     for i in np.flatnonzero(inner):
         away = np.hypot(x - x[i], y - y[i])
         near = np.flatnonzero(abs(away - 3e-6) < 1e-9)  # as in the mosaic before it was turned
-        assert len(near) == 4 and away[away > 0].min() == pytest.approx(3e-6)
+        assert len(near) == 4
+        assert away[away > 0].min() == pytest.approx(3e-6)
         found = sorted(color[near])
         assert found == ([0, 0, 2, 2] if color[i] == 1 else [1, 1, 1, 1])
 

@@ -11,6 +11,8 @@ from reference_light import Aberrated, Field, Measured, Wavefront
 from scipy.special import j1
 from test_reference import camera, wave
 
+pytestmark = pytest.mark.long
+
 NOLL = {  # table I of Noll 1976: radial order and azimuthal order; even numbers are cosines
     1: (0, 0), 2: (1, 1), 3: (1, -1), 4: (2, 0), 5: (2, -2), 6: (2, 2), 7: (3, -1), 8: (3, 1),
     9: (3, -3), 10: (3, 3), 11: (4, 0), 12: (4, 2), 13: (4, -2), 14: (4, 4), 15: (4, -4),

@@ -14,6 +14,8 @@ from scipy.special import j0
 from test_reference import camera, wave
 from test_reference_light import random_squares
 
+pytestmark = pytest.mark.long
+
 PUBLISHED = json.loads((Path(__file__).parent / "data" / "photodiode.json").read_text("utf-8"))
 UM = 1e-6
 

@@ -12,12 +12,14 @@ import pytest
 from typer.testing import CliRunner
 
 from vcam_cli import load, simulate
-from vcam_cli.camera import shipped
-from vcam_cli.camera.electrical import electrical
-from vcam_cli.camera.geometry import geometry
+from vcam_cli.camera.derived.electrical import electrical
+from vcam_cli.camera.derived.geometry import geometry
+from vcam_cli.capture_schedules import schedule_file
 from vcam_cli.commands.list_ import first_comment
 from vcam_cli.commands.main import app
-from vcam_cli.studies import expectations, figures, schedule_file, study_file, sweep_points
+from vcam_cli.config import shipped
+from vcam_cli.sweeps import expectations, figures, sweep_file, sweep_points
+from vcam_cli.sweeps.study_cameras import StudyCameras
 
 CAMERAS = shipped.names("cameras")
 YAMLS = sorted(shipped.folder().glob("*/*.yaml"))
@@ -39,7 +41,8 @@ def small(name: str):
 
 def test_there_are_some():
     assert {"still-life", "12mp-bayer", "starter", "low-light"} <= set(CAMERAS)
-    assert YAMLS and TABLES
+    assert YAMLS
+    assert TABLES
 
 
 @pytest.mark.parametrize("name", CAMERAS)
@@ -59,6 +62,7 @@ class TestCameras:
         for file in ("raw.exr", "render.png", "metrics.csv"):
             assert (tmp_path / "out" / file).stat().st_size > 100
 
+    @pytest.mark.long
     def test_the_exposure_suits_the_scene(self, name):
         result = small(name)
         well = electrical(result.frame.camera).full_well
@@ -88,7 +92,8 @@ class TestCameras:
         assert 0.9 <= g.f_number <= 22
         assert 1e-3 <= g.focal_length <= 0.1
         assert math.radians(5) < 2 * math.atan(g.sensor_width / 2 / g.image_distance) < 2.1
-        assert 1e-6 <= g.pitch_x <= 20e-6 and 1e-6 <= g.pitch_y <= 20e-6
+        assert 1e-6 <= g.pitch_x <= 20e-6
+        assert 1e-6 <= g.pitch_y <= 20e-6
         assert 0.1 <= g.fill_factor <= 1 + 1e-9
         assert 5e-6 <= e.conversion_gain <= 300e-6
         assert 0.2 <= e.voltage_swing <= 3
@@ -176,9 +181,11 @@ class TestTables:
     def test_covers_every_wavelength_with_fractions(self, path):
         wavelength, value = np.array(read(path)[1], float).T
         # A camera's sensitivities end where they were measured; its infrared cut is in them.
-        assert wavelength[0] <= 380 and wavelength[-1] >= (780 if path in MEASURED else 1000)
+        assert wavelength[0] <= 380
+        assert wavelength[-1] >= (780 if path in MEASURED else 1000)
         assert np.all(np.diff(wavelength) > 0)
-        assert value.min() >= 0 and value.max() <= 1
+        assert value.min() >= 0
+        assert value.max() <= 1
 
 
 def read(path: Path) -> tuple[list[str], list[list[str]]]:
@@ -203,11 +210,12 @@ def test_studies_make_their_cameras_and_one_of_each_case_runs(name):
     if "kind: schedule" in file.read_text(encoding="utf-8"):
         assert schedule_file.read(name).model.name == name
         return
-    grid = sweep_points.grid(study_file.read(name))
-    planner = figures.Planner(grid)
-    figures.plan(grid, planner)
-    expectations.plan(grid, planner)
-    assert grid.study.model.name == name and not grid.refused
+    grid = sweep_points.grid(sweep_file.read(name))
+    cameras = StudyCameras(grid)
+    figures.plan(cameras)
+    expectations.plan(cameras)
+    assert grid.study.model.name == name
+    assert not grid.refused
     for point in {p.case: p for p in grid.points}.values():
         found = {metric: value for metric, value, _ in simulate(point.camera).metrics}
         assert all(np.isfinite(found[metric]) for metric in grid.study.model.metrics)

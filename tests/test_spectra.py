@@ -49,7 +49,7 @@ def test_integral_is_that_of_polynomial_algebra(factors: list[Table]) -> None:
 
 def test_integral_of_a_spike_narrower_than_any_grid() -> None:
     """A triangle 0.02 nm wide between the nanometers keeps its area exactly."""
-    spike = Spectrum.sampled(np.array([550.49, 550.5, 550.51]) * NM, [0.0, 5.0, 0.0], "zero")
+    spike = Spectrum.from_samples(np.array([550.49, 550.5, 550.51]) * NM, [0.0, 5.0, 0.0], "zero")
     assert integral(spike, START, STOP) == pytest.approx(5.0 * 0.01 * NM, rel=1e-9)
     assert integral(spike, START, 550.5 * NM) == pytest.approx(2.5 * 0.01 * NM, rel=1e-9)
     # lambda / (h c) averaged over a symmetric triangle is its value at the middle
@@ -69,12 +69,14 @@ def test_integral_adds_up_over_any_split(factors: list[Table], middle: float) ->
 def test_quadrature_serves_every_subset(factors: list[Table], last: int) -> None:
     parts = [Spectrum(tables=(table,)) for table in factors]
     nodes, weights = quadrature(parts, START, STOP)
-    assert (np.diff(nodes) > 0).all() and (weights > 0).all()
-    assert nodes[0] > START and nodes[-1] < STOP
+    assert (np.diff(nodes) > 0).all()
+    assert (weights > 0).all()
+    assert nodes[0] > START
+    assert nodes[-1] < STOP
     assert weights.sum() == pytest.approx(STOP - START, rel=1e-12)
     subset = parts[: last + 1]
-    value = np.prod([part.at(nodes) for part in subset], axis=0) @ weights
-    expected = integral(subset[0].times(*subset[1:]), START, STOP)
+    value = np.prod([part.evaluate(nodes) for part in subset], axis=0) @ weights
+    expected = integral(subset[0].multiply(*subset[1:]), START, STOP)
     assert value == pytest.approx(expected, rel=1e-12, abs=1e-25)
 
 
@@ -90,11 +92,11 @@ def test_hat_weights_share_the_integral(factors: list[Table], inner: set[int]) -
     assert weights.sum() == pytest.approx(whole, rel=1e-12, abs=1e-25)
     hat = np.zeros(len(nodes))
     hat[len(nodes) // 2] = 1.0  # one of them, as a table of its own
-    one = integral(spectrum.times(Spectrum.sampled(nodes, hat)), START, STOP)
+    one = integral(spectrum.multiply(Spectrum.from_samples(nodes, hat)), START, STOP)
     assert weights[len(nodes) // 2] == pytest.approx(one, rel=1e-11, abs=1e-25)
     # a straight line is its own interpolation
-    slope = integral(spectrum.times(spectra.PHOTONS), START, STOP)
-    assert weights @ spectra.PHOTONS.at(nodes) == pytest.approx(slope, rel=1e-12, abs=1e-5)
+    slope = integral(spectrum.multiply(spectra.PHOTONS), START, STOP)
+    assert weights @ spectra.PHOTONS.evaluate(nodes) == pytest.approx(slope, rel=1e-12, abs=1e-5)
 
 
 @given(
@@ -113,7 +115,7 @@ def test_pairs_are_weighed_as_their_products(
     assert found.shape == (len(some), len(others), len(nodes))
     for row, one in zip(found, some, strict=True):
         for weights, other in zip(row, others, strict=True):
-            expected = hat_weights(one.times(other), nodes)
+            expected = hat_weights(one.multiply(other), nodes)
             np.testing.assert_allclose(weights, expected, rtol=1e-11, atol=1e-20)
 
 
@@ -124,7 +126,7 @@ def test_pairs_of_none_and_pairs_that_cannot_be() -> None:
     with pytest.raises(ValueError, match="lines stand first"):
         pair_weights([Spectrum.flat(1)], [Spectrum.line(500e-9)], nodes)
     with pytest.raises(ValueError, match="380-780 nm is needed"):
-        pair_weights([Spectrum.flat(1), Spectrum.sampled([4e-7, 5e-7], [1, 1])], [], nodes)
+        pair_weights([Spectrum.flat(1), Spectrum.from_samples([4e-7, 5e-7], [1, 1])], [], nodes)
 
 
 def test_no_result_depends_on_the_grid_of_a_fluorescent_lamp() -> None:
@@ -134,27 +136,27 @@ def test_no_result_depends_on_the_grid_of_a_fluorescent_lamp() -> None:
         nodes = np.append(np.arange(380, 780, step), 780) / 1e9
         assert hat_weights(lamp, nodes).sum() == pytest.approx(whole, rel=1e-13)
     coarse = np.arange(380, 781, 10) / 1e9
-    trapezoid = np.trapezoid(lamp.at(coarse), coarse)
+    trapezoid = np.trapezoid(lamp.evaluate(coarse), coarse)
     assert abs(trapezoid / whole - 1) > 0.005, "a grid would have been visibly wrong"
 
 
 def test_lines_are_summed_as_lines() -> None:
     laser = Spectrum(lines=((650e-9, 1.0), (450e-9, 2.0), (900e-9, 50.0)))
     assert integral(laser, START, STOP) == 3.0
-    assert integral(laser.scaled(2), START, STOP) == 6.0
-    glass = Spectrum.sampled([400e-9, 1000e-9], [0.0, 0.6])
-    seen = glass.times(laser)
+    assert integral(laser.scale_by(2), START, STOP) == 6.0
+    glass = Spectrum.from_samples([400e-9, 1000e-9], [0.0, 0.6])
+    seen = glass.multiply(laser)
     np.testing.assert_allclose(
         seen.lines or (), [(450e-9, 0.1), (650e-9, 0.25), (900e-9, 25.0)], rtol=1e-12
     )
-    assert (laser.at(np.array([450e-9, 500e-9])) == 0).all()
+    assert (laser.evaluate(np.array([450e-9, 500e-9])) == 0).all()
     weights = hat_weights(laser, np.array([380e-9, 480e-9, 780e-9]))
     expected = [2 * 0.3, 2 * 0.7 + 130 / 300, 170 / 300]
     np.testing.assert_allclose(weights, expected, rtol=1e-12)
     with pytest.raises(ValueError, match="lines"):
-        laser.times(laser)
+        laser.multiply(laser)
     with pytest.raises(ValueError, match="needed"):
-        laser.times(Spectrum.sampled([400e-9, 700e-9], [1, 1]))
+        laser.multiply(Spectrum.from_samples([400e-9, 700e-9], [1, 1]))
 
 
 def test_lines_at_the_ends_of_the_range_count() -> None:
@@ -167,13 +169,15 @@ def test_lines_at_the_ends_of_the_range_count() -> None:
 def test_outside_says_what_holds_outside() -> None:
     wavelength, value = np.array([400e-9, 700e-9]), np.array([1.0, 2.0])
     asked = np.array([390e-9, 400e-9, 550e-9, 700e-9, 710e-9])
-    hold = Spectrum.sampled(wavelength, value, "hold")
-    zero = Spectrum.sampled(wavelength, value, "zero")
-    strict = Spectrum.sampled(wavelength, value)
-    np.testing.assert_allclose(hold.at(asked), [1, 1, 1.5, 2, 2])
-    np.testing.assert_allclose(zero.at(asked), [0, 1, 1.5, 2, 0])
-    assert hold.covers(START, STOP) and zero.covers(START, STOP)
-    assert not strict.covers(START, STOP) and strict.covers(400e-9 * (1 - 1e-12), 700e-9)
+    hold = Spectrum.from_samples(wavelength, value, "hold")
+    zero = Spectrum.from_samples(wavelength, value, "zero")
+    strict = Spectrum.from_samples(wavelength, value)
+    np.testing.assert_allclose(hold.evaluate(asked), [1, 1, 1.5, 2, 2])
+    np.testing.assert_allclose(zero.evaluate(asked), [0, 1, 1.5, 2, 0])
+    assert hold.covers(START, STOP)
+    assert zero.covers(START, STOP)
+    assert not strict.covers(START, STOP)
+    assert strict.covers(400e-9 * (1 - 1e-12), 700e-9)
     assert integral(zero, START, STOP) == pytest.approx(450e-9, rel=1e-12)
     assert integral(hold, START, STOP) == pytest.approx((20 + 450 + 160) * NM, rel=1e-12)
 
@@ -181,7 +185,7 @@ def test_outside_says_what_holds_outside() -> None:
 @pytest.mark.parametrize(
     "use",
     [
-        lambda s: s.at(np.array([390e-9])),
+        lambda s: s.evaluate(np.array([390e-9])),
         lambda s: integral(s, START, STOP),
         lambda s: hat_weights(s, [START, STOP]),
         lambda s: quadrature([Spectrum.flat(1), s], START, STOP),
@@ -191,7 +195,7 @@ def test_outside_says_what_holds_outside() -> None:
 )
 def test_what_is_not_covered_is_an_error(use) -> None:
     with pytest.raises(ValueError, match=r"covers 400-700 nm, but .* nm is needed") as caught:
-        use(Spectrum.sampled([400e-9, 700e-9], [1.0, 1.0]))
+        use(Spectrum.from_samples([400e-9, 700e-9], [1.0, 1.0]))
     assert "outside: hold" in str(caught.value)
 
 
@@ -229,18 +233,22 @@ def test_other_broken_values_are_refused() -> None:
 
 def test_values_are_frozen_and_compare() -> None:
     wavelength = np.array([400e-9, 700e-9])
-    one, two = (Spectrum.sampled(wavelength, [1.0, 2.0]) for _ in range(2))
+    one, two = (Spectrum.from_samples(wavelength, [1.0, 2.0]) for _ in range(2))
     wavelength[0] = 1.0
     assert one.tables[0].start == 400e-9, "a table must not follow the array it was made of"
-    assert one == two and hash(one) == hash(two) and one != two.scaled(2)
+    assert one == two
+    assert hash(one) == hash(two)
+    assert one != two.scale_by(2)
     with pytest.raises(ValueError, match="read-only"):
         one.tables[0].value[0] = 5.0
 
 
 def test_knots_of_a_product() -> None:
-    a = Spectrum.sampled(np.array([300, 500, 900]) * NM, [1, 2, 3])
-    b = Spectrum.sampled(np.array([300, 500 * (1 + 1e-14), 600, 780]) * NM, [1, 2, 3, 4])
-    np.testing.assert_allclose(a.times(b).knots(START, STOP), np.array([380, 500, 600, 780]) * NM)
+    a = Spectrum.from_samples(np.array([300, 500, 900]) * NM, [1, 2, 3])
+    b = Spectrum.from_samples(np.array([300, 500 * (1 + 1e-14), 600, 780]) * NM, [1, 2, 3, 4])
+    np.testing.assert_allclose(
+        a.multiply(b).knots(START, STOP), np.array([380, 500, 600, 780]) * NM
+    )
 
 
 @pytest.mark.parametrize(("temperature", "error"), [(2000, 3e-5), (2856, 1e-5), (6500, 1e-5)])
@@ -252,7 +260,9 @@ def test_blackbody_is_planck(temperature: float, error: float) -> None:
         return wl**-5 / np.expm1(x)
 
     lamp = Spectrum.blackbody(temperature)
-    np.testing.assert_allclose(lamp.at(wavelength), planck(wavelength) / planck(560e-9), rtol=error)
+    np.testing.assert_allclose(
+        lamp.evaluate(wavelength), planck(wavelength) / planck(560e-9), rtol=error
+    )
 
 
 def test_blackbody_of_2848_kelvin_is_illuminant_a() -> None:
@@ -260,7 +270,7 @@ def test_blackbody_of_2848_kelvin_is_illuminant_a() -> None:
     c2 = spectra.PLANCK * spectra.SPEED_OF_LIGHT / spectra.BOLTZMANN
     wavelength = np.arange(380, 781, 5) * NM
     lamp = Spectrum.blackbody(2848 * c2 / 14350e-6)
-    ratio = lamp.at(wavelength) / spectra.illuminant("A").at(wavelength)
+    ratio = lamp.evaluate(wavelength) / spectra.illuminant("A").evaluate(wavelength)
     np.testing.assert_allclose(ratio * 100, 1, rtol=2e-5)
 
 
@@ -294,8 +304,8 @@ def test_illuminants_by_name() -> None:
         assert integral(spectra.illuminant(name), START, STOP) > 0
     assert spectra.illuminant("F2") == spectra.illuminant("FL2")
     assert spectra.illuminant("equal-energy") == spectra.illuminant("E") == Spectrum.flat(100)
-    assert spectra.illuminant("D65").at(560e-9) == 100
-    assert spectra.illuminant("FL2").at(900e-9) == 0, "a lamp is zero outside its table"
+    assert spectra.illuminant("D65").evaluate(560e-9) == 100
+    assert spectra.illuminant("FL2").evaluate(900e-9) == 0, "a lamp is zero outside its table"
 
 
 def test_illuminants_that_do_not_ship_come_from_colour_science() -> None:

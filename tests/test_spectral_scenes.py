@@ -9,12 +9,11 @@ from making import GONE, LIGHT, PLANCK, QUIET, camera
 from spectral_files import envi
 
 from vcam_cli import simulate
-from vcam_cli.engine import irradiance
 from vcam_cli.errors import BadInput
+from vcam_cli.simulation import provenance, spectral_irradiance
+from vcam_cli.simulation.checks import load
+from vcam_cli.simulation.simulate import prepare
 from vcam_cli.spectra import cmf, illuminant
-from vcam_cli.studies import provenance
-from vcam_cli.studies.checks import load
-from vcam_cli.studies.simulate import prepare
 
 NM = np.linspace(400, 700, 31)
 BAND = {"start": "400 nm", "stop": "700 nm"}
@@ -84,7 +83,7 @@ def test_reflectance_times_d65_is_an_image_of_the_same_reflectance(tmp_path):
     """
     every_5 = np.arange(400.0, 700.1, 5)
     gray = np.random.default_rng(2).integers(1, 255, SHAPE) / 255
-    lamp = illuminant("D65").at(every_5 * 1e-9) * 1e-4
+    lamp = illuminant("D65").evaluate(every_5 * 1e-9) * 1e-4
     flat = gray[..., None] * np.ones(len(every_5))
     level = {"scene.luminance": "100 cd/m2"}
     found = {}
@@ -115,12 +114,12 @@ def test_level_from_file_by_hand(tmp_path):
     even = np.full((*SHAPE, 31), 0.01)
     changes = {"effects": QUIET, "scene.wavelengths": BAND | {"step": "50 nm"}}
     result = simulate(cube_camera(tmp_path, {"radiance": even}, changes))
-    planes = np.array(list(irradiance.planes(result.frame, 1)))
+    planes = np.array(list(spectral_irradiance.planes(result.frame, 1)))
     # 1e-6: the file has 32 bits
     np.testing.assert_allclose(planes, 1e7 * CONE, rtol=1e-6)
     np.testing.assert_allclose(result.mean_electrons, electrons(even), rtol=1e-6)
     fine = np.arange(400, 700.001, 0.01)
-    level = 683 * np.trapezoid(0.01 * cmf()[1].at(fine * 1e-9), fine)
+    level = 683 * np.trapezoid(0.01 * cmf()[1].evaluate(fine * 1e-9), fine)
     assert f"white is taken to be {level:.4g} cd/m2" in result.notes
     assert f"white is taken to be {level:.4g} cd/m2" in prepare(result.frame.camera)[1]
 
@@ -129,7 +128,7 @@ def test_a_stated_level_scales_the_file(tmp_path):
     plain = simulate(cube_camera(tmp_path, {"radiance": CUBE})).mean_electrons
     white = np.full(31, 0.05)
     fine = np.arange(400, 700.001, 0.01)
-    level = 683 * np.trapezoid(0.05 * cmf()[1].at(fine * 1e-9), fine)
+    level = 683 * np.trapezoid(0.05 * cmf()[1].evaluate(fine * 1e-9), fine)
     said = {"scene.luminance": f"{2 * float(level)!r} cd/m2"}
     scaled = simulate(cube_camera(tmp_path, {"radiance": CUBE, "white": white}, said))
     # 1e-8: V(wavelength) has knots every nm, and the sum by hand ends on 700 nm within rounding

@@ -33,7 +33,9 @@ def test_illuminants(colour: ModuleType) -> None:
             continue
         lamp = colour.SDS_ILLUMINANTS[name]
         ours = spectra.illuminant(name)
-        np.testing.assert_array_equal(ours.at(lamp.wavelengths / 1e9), lamp.values, err_msg=name)
+        np.testing.assert_array_equal(
+            ours.evaluate(lamp.wavelengths / 1e9), lamp.values, err_msg=name
+        )
 
 
 def test_observer(colour: ModuleType) -> None:
@@ -56,8 +58,10 @@ def test_display_primaries(colour: ModuleType) -> None:
     ours, white = spectra.display_primaries("crt-brainard")
     assert theirs.labels == ["red", "green", "blue"]
     for primary, values in zip(ours, theirs.values.T, strict=True):
-        np.testing.assert_array_equal(primary.at(theirs.wavelengths / 1e9), values)
-    np.testing.assert_allclose(white.at(theirs.wavelengths / 1e9), theirs.values.sum(1), rtol=1e-15)
+        np.testing.assert_array_equal(primary.evaluate(theirs.wavelengths / 1e9), values)
+    np.testing.assert_allclose(
+        white.evaluate(theirs.wavelengths / 1e9), theirs.values.sum(1), rtol=1e-15
+    )
     with pytest.raises(ValueError, match="crt-brainard, srgb"):
         spectra.display_primaries("p3")
 
@@ -66,17 +70,17 @@ def test_srgb_reflectances(colour: ModuleType) -> None:
     theirs = colour.recovery.MSDS_BASIS_FUNCTIONS_sRGB_MALLETT2019
     assert theirs.labels == ["red", "green", "blue"]
     for basis, values in zip(spectra.srgb_reflectances(), theirs.values.T, strict=True):
-        np.testing.assert_array_equal(basis.at(theirs.wavelengths / 1e9), values)
+        np.testing.assert_array_equal(basis.evaluate(theirs.wavelengths / 1e9), values)
 
 
 def test_colorchecker_under_d65_has_the_colors_of_colour_science(colour: ModuleType) -> None:
     """Within 0.05 % of white of colour-science's XYZ, which interpolates by splines."""
     d65 = spectra.illuminant("D65")
     cmf = [Spectrum(tables=(table,)) for table in spectra.cmf()]
-    norm = integral(d65.times(cmf[1]), 360e-9, 780e-9)
+    norm = integral(d65.multiply(cmf[1]), 360e-9, 780e-9)
     theirs = colour.SDS_COLOURCHECKERS["ColorChecker N Ohta"]
     for name, patch in spectra.colorchecker()[::5]:
-        ours = [integral(patch.times(d65, c), 360e-9, 780e-9) / norm for c in cmf]
+        ours = [integral(patch.multiply(d65, c), 360e-9, 780e-9) / norm for c in cmf]
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
             expected = colour.sd_to_XYZ(theirs[name], illuminant=colour.SDS_ILLUMINANTS["D65"])
@@ -85,7 +89,8 @@ def test_colorchecker_under_d65_has_the_colors_of_colour_science(colour: ModuleT
 
 def test_the_files_are_what_the_script_writes(colour: ModuleType) -> None:
     spec = importlib.util.spec_from_file_location("tables", ROOT / "scripts" / "make_tables.py")
-    assert spec is not None and spec.loader is not None
+    assert spec is not None
+    assert spec.loader is not None
     script = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(script)
     version = re.compile(r"colour-science [0-9.]+")
@@ -104,14 +109,16 @@ def test_silicon_absorbs_as_its_extinction_coefficient_says() -> None:
     np.testing.assert_array_equal(table.wavelength, nm / 1e9)
     np.testing.assert_array_equal(table.value, 100 * per_cm)
     np.testing.assert_allclose(table.value, 4 * np.pi * extinction / (nm * 1e-9), rtol=2e-3)
-    assert not table.covers(349e-9, 400e-9) and not table.covers(1000e-9, 1101e-9)
+    assert not table.covers(349e-9, 400e-9)
+    assert not table.covers(1000e-9, 1101e-9)
 
 
 @pytest.mark.parametrize("file", GENERIC, ids=lambda file: file.stem)
 def test_generic_curves_are_efficiencies(file: Path) -> None:
     table = spectra.read_csv(file)
     assert table.covers(300e-9, 1100e-9)
-    assert (table.value >= 0).all() and (table.value <= 1).all()
+    assert (table.value >= 0).all()
+    assert (table.value <= 1).all()
     assert np.abs(np.diff(table.value)).max() < 0.16, "smooth at 5 nm"
     assert "not a measurement" in file.read_text().splitlines()[0]
 
@@ -120,14 +127,15 @@ def test_the_measured_camera_is_that_of_colour_science(colour: ModuleType) -> No
     theirs = colour.MSDS_CAMERA_SENSITIVITIES["Nikon 5100 (NPL)"]
     for name, values in zip(theirs.labels, theirs.values.T, strict=True):
         ours = spectra.read_csv(ROOT / f"configs/filters/nikon-5100-{name}.csv")
-        np.testing.assert_array_equal(ours.at(theirs.wavelengths / 1e9), values, err_msg=name)
+        np.testing.assert_array_equal(ours.evaluate(theirs.wavelengths / 1e9), values, err_msg=name)
 
 
 def test_generic_filters_see_their_own_color() -> None:
     peaks = {
-        name: spectra.read_csv(ROOT / f"configs/filters/generic-{name}.csv").at(nm * 1e-9)
+        name: spectra.read_csv(ROOT / f"configs/filters/generic-{name}.csv").evaluate(nm * 1e-9)
         for name, nm in (("red", 610), ("green", 535), ("blue", 455))
     }
     assert peaks == pytest.approx({"red": 0.90, "green": 0.85, "blue": 0.82}, abs=0.005)
     cut = spectra.read_csv(ROOT / "configs/filters/ir-cut-650.csv")
-    assert cut.at(650e-9) == pytest.approx(0.485) and cut.at(750e-9) < 1e-4
+    assert cut.evaluate(650e-9) == pytest.approx(0.485)
+    assert cut.evaluate(750e-9) < 1e-4

@@ -57,7 +57,8 @@ def files(folder: Path, suffixes: tuple[str, ...]) -> set[str]:
 
 def test_all_of_configs_lies_in_the_package(installed):
     shipped = files(ROOT / "configs", (".yaml", ".csv"))
-    assert shipped and shipped == files(installed / "vcam_cli" / "configs", (".yaml", ".csv"))
+    assert shipped
+    assert shipped == files(installed / "vcam_cli" / "configs", (".yaml", ".csv"))
     for name in shipped:
         there = installed / "vcam_cli" / "configs" / name
         assert there.read_bytes() == (ROOT / "configs" / name).read_bytes()
@@ -65,7 +66,8 @@ def test_all_of_configs_lies_in_the_package(installed):
 
 def test_all_schemas_lie_where_the_shipped_files_look_for_them(installed):
     schemas = files(ROOT / "schemas", (".json",))
-    assert schemas and schemas == files(installed / "vcam_cli" / "schemas", (".json",))
+    assert schemas
+    assert schemas == files(installed / "vcam_cli" / "schemas", (".json",))
 
 
 def test_all_sources_and_data_tables(installed):
@@ -98,7 +100,7 @@ def test_shipped_cameras_load_from_the_unpacked_wheel(installed, tmp_path):
     code = (
         "import json, vcam_cli\n"
         "from vcam_cli import load\n"
-        "from vcam_cli.camera import shipped\n"
+        "from vcam_cli.config import shipped\n"
         "names = {n: load(n).name for n in shipped.names('cameras')}\n"
         "files = [str(f) for f in load('still-life').files]\n"
         "print(json.dumps({'from': vcam_cli.__file__, 'names': names, 'files': files}))"

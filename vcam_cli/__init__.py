@@ -14,9 +14,9 @@ __all__ = ["__version__", "load", "schedule", "simulate", "sweep"]
 
 if TYPE_CHECKING:
     from vcam_cli.camera.load import load
-    from vcam_cli.studies.schedule import schedule
-    from vcam_cli.studies.simulate import simulate
-    from vcam_cli.studies.sweep import sweep
+    from vcam_cli.capture_schedules.study import schedule
+    from vcam_cli.simulation.simulate import simulate
+    from vcam_cli.sweeps.sweep import sweep
 
 
 def __getattr__(name: str) -> Any:
@@ -25,15 +25,15 @@ def __getattr__(name: str) -> Any:
 
         return load
     if name == "schedule":
-        from vcam_cli.studies.schedule import schedule
+        from vcam_cli.capture_schedules.study import schedule
 
         return schedule
     if name == "simulate":
-        from vcam_cli.studies.simulate import simulate
+        from vcam_cli.simulation.simulate import simulate
 
         return simulate
     if name == "sweep":
-        from vcam_cli.studies.sweep import sweep
+        from vcam_cli.sweeps.sweep import sweep
 
         return sweep
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

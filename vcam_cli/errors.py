@@ -9,9 +9,13 @@ problems of a file before it raises (`Collector`).
 """
 
 import difflib
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from os import PathLike
+from typing import TypeVar
 
+T = TypeVar("T")
 Path = tuple[str | int, ...]
 LONGEST = 2000
 """Characters of a message: a file may hold megabytes where a word belongs."""
@@ -19,12 +23,16 @@ LONGEST = 2000
 
 @dataclass(frozen=True)
 class Problem:
-    """One mistake: `path` in the YAML file (() = the whole file), what is wrong, what to do."""
+    """One mistake in the user's input."""
 
     path: Path
+    """Keys that lead to it in the YAML file; () is the whole file."""
     message: str
+    """What is wrong."""
     remedy: str = ""
-    where: str = ""  # "camera.yaml:12:10" once known
+    """What to do about it."""
+    where: str = ""
+    """File, line and column once they are known: "camera.yaml:12:10"."""
 
     def __str__(self) -> str:
         parts = [part for part in (self.where, dotted(self.path), self.message) if part]
@@ -51,7 +59,7 @@ class BadInput(VcamError):
         return "\n".join(str(problem) for problem in self.problems)
 
     def located(self, locate: Callable[[Path], str]) -> "BadInput":
-        """The same error with every empty `where` filled in by `locate(path)`."""
+        """Return the same error with every empty `where` filled in by `locate(path)`."""
         return BadInput(
             problem if problem.where else replace(problem, where=locate(problem.path))
             for problem in self.problems
@@ -79,35 +87,67 @@ class Collector:
         self.problems: list[Problem] = []
 
     def add(self, path: Path | str, message: str, remedy: str = "") -> None:
+        """Add a mistake at a path, a tuple or dotted."""
         self.problems.append(Problem(split(path), message, remedy))
 
     def extend(self, error: BadInput) -> None:
+        """Add all the problems of an error."""
         self.problems.extend(error.problems)
 
+    def attempt(self, function: Callable[..., T], *arguments: object) -> T | None:
+        """Return what a function returns; add the problems of its BadInput and return None."""
+        try:
+            return function(*arguments)
+        except BadInput as error:
+            self.extend(error)
+            return None
+
     def raise_if_any(self) -> None:
+        """Raise BadInput where there are problems."""
         if self.problems:
             raise BadInput(self.problems)
 
 
 def bad(path: Path | str, message: str, remedy: str = "") -> BadInput:
-    """A `BadInput` with one problem; `path` is a tuple or dotted ("pixel.width")."""
+    """Return a `BadInput` with one problem; `path` is a tuple or dotted ("pixel.width")."""
     return BadInput([Problem(split(path), message, remedy)])
 
 
+@contextmanager
+def data_file_problems(file: str | PathLike[str], path: Path, remedy: str) -> Iterator[None]:
+    """Raise what goes wrong while a data file is read as BadInput about the key that names it.
+
+    Parameters
+    ----------
+    file : str or PathLike
+        The file.
+    path : tuple
+        The key that names it.
+    remedy : str
+        What to write, for a file whose content is wrong.
+    """
+    try:
+        yield
+    except ValueError as error:
+        raise bad(path, str(error), remedy) from None
+    except OSError as error:
+        raise bad(path, f"{file} cannot be read: {error.strerror}", "check the file name") from None
+
+
 def dotted(path: Path) -> str:
-    """("processing", 1, "gamma") -> "processing.1.gamma", the notation of `--set`."""
+    """Return a path as `--set` writes it: ("processing", 1, "gamma") is "processing.1.gamma"."""
     return ".".join(str(part) for part in path)
 
 
 def split(path: Path | str) -> Path:
-    """The inverse of `dotted`; parts that are whole numbers become int."""
+    """Return the path that `dotted` wrote; parts that are whole numbers become int."""
     if isinstance(path, tuple):
         return path
     return tuple(int(p) if p.isascii() and p.isdigit() else p for p in path.split(".") if p)
 
 
 def nearest(word: object, allowed: Iterable[object]) -> str | None:
-    """The allowed name closest to `word`, case, `-` and `_` aside; None when none is close."""
+    """Return the allowed name closest to `word`, case, `-` and `_` aside, or None."""
     if not isinstance(word, str):
         return None
     names = {_plain(name): name for name in allowed if isinstance(name, str)}
@@ -120,9 +160,9 @@ def _plain(word: str) -> str:
 
 
 def one_line(text: str) -> str:
-    """Control characters escaped: a message stays one line and cannot steer a terminal.
+    """Return a message as one line that cannot steer a terminal: control characters are escaped.
 
-    Of a very long one the beginning and the end.
+    Of a very long message the beginning and the end stay.
     """
     if len(text) > LONGEST:
         text = f"{text[: LONGEST // 2]} ... {text[-LONGEST // 2 :]}"

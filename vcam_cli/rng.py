@@ -20,12 +20,21 @@ BLOCK_ROWS = 64
 
 
 def stream(seed: int, effect: str, capture: int = 0, block: int = 0) -> np.random.Generator:
-    """Generator of one effect in one block of rows.
+    """Return the random generator of one effect in one block of rows.
 
-    seed: the sensor seed (what stays with the sensor) or the frame seed (what is new in each
-    frame), any non-negative integer; effect: its name; capture: index of the sample within one
-    integration; block: index of the block of `BLOCK_ROWS` rows.
     Equal arguments give equal numbers, on every machine that runs the same NumPy.
+
+    Parameters
+    ----------
+    seed : int
+        The sensor seed (what stays with the sensor) or the frame seed (what is new in each frame),
+        not negative.
+    effect : str
+        Name of the effect.
+    capture : int
+        Index of the sample within one integration.
+    block : int
+        Index of the block of `BLOCK_ROWS` rows.
     """
     digest = hashlib.blake2b(f"vcam {seed} {effect} {capture}".encode(), digest_size=16).digest()
     key = int.from_bytes(digest, "little")
@@ -33,5 +42,5 @@ def stream(seed: int, effect: str, capture: int = 0, block: int = 0) -> np.rando
 
 
 def blocks(rows: int) -> list[slice]:
-    """Consecutive slices of at most `BLOCK_ROWS` rows that cover `rows` rows."""
+    """Return consecutive slices of at most `BLOCK_ROWS` rows that cover `rows` rows."""
     return [slice(r, min(r + BLOCK_ROWS, rows)) for r in range(0, rows, BLOCK_ROWS)]

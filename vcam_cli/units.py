@@ -32,21 +32,23 @@ _SPELLINGS = str.maketrans({"µ": "u", "μ": "u", "²": "2", "³": "3", "°": "d
 
 @dataclass(frozen=True)
 class Dimension:
-    """A kind of quantity: its SI unit inside, its accepted units, and how it is shown.
-
-    `units` maps a unit to its size in SI; `shown` are the units `render` chooses from (all of
-    them powers of ten except where `render` checks), rising in size; `example` is a value a
-    user might write; `offsets` are added before the unit's size is applied (degC).
-    """
+    """A kind of quantity: its SI unit inside, its accepted units, and how it is shown."""
 
     name: str
-    title: str  # with its article: "a length"
+    title: str
+    """The name with its article: "a length"."""
     si: str
+    """SI unit in which values are kept."""
     units: Mapping[str, Fraction]
+    """Size of every accepted unit in SI."""
     shown: tuple[str, ...]
+    """Units that `render` chooses from, rising: powers of ten except where `render` checks."""
     example: str
+    """A value that a user might write."""
     offsets: Mapping[str, Fraction] = field(default_factory=dict)
+    """Numbers added before the unit's size is applied (degC)."""
     words: Mapping[str, float] = field(default_factory=dict)
+    """Values that are written as words (infinity)."""
 
     @property
     def pattern(self) -> str:
@@ -58,7 +60,7 @@ class Dimension:
 
 
 def parse(text: object, dimension: str) -> float:
-    """The quantity `text` in the SI unit of `dimension` (a key of `DIMENSIONS`).
+    """Return the quantity `text` in the SI unit of `dimension` (a key of `DIMENSIONS`).
 
     Raises ValueError, with a sentence that names the dimension and gives an example.
     """
@@ -89,7 +91,7 @@ def _parsed(text: str, dimension: str) -> float:
 
 
 def parse_fraction(value: object) -> float:
-    """A dimensionless number: bare (0.05) or in percent ("5 %"). Raises ValueError."""
+    """Return a dimensionless number, bare (0.05) or in percent ("5 %"). Raises ValueError."""
     if isinstance(value, (int, float)) and not isinstance(value, bool):
         if not math.isfinite(value):
             raise ValueError(f"{value} is not finite; write a finite number, for example 0.05")
@@ -104,7 +106,7 @@ def parse_fraction(value: object) -> float:
 
 
 def split(text: object) -> tuple[Fraction, str]:
-    """A quantity of any dimension as its number and its unit: "1/60 s" is (1/60, "s").
+    """Return a quantity of any dimension as its number and its unit: "1/60 s" is (1/60, "s").
 
     A bare number has the unit "". Raises ValueError for what is no number with a unit.
     """
@@ -124,9 +126,9 @@ def split(text: object) -> tuple[Fraction, str]:
 
 
 def convert(number: Fraction, unit: str, other: str) -> Fraction:
-    """A number of one unit in another one of its dimension. Raises ValueError for two dimensions.
+    """Return a number of one unit in another one of the same dimension.
 
-    Units whose zeros differ (degC and K) are refused as well.
+    Raises ValueError for units of two dimensions, and for those whose zeros differ (degC and K).
     """
     if unit == other:
         return number
@@ -140,7 +142,7 @@ def convert(number: Fraction, unit: str, other: str) -> Fraction:
 
 @lru_cache(maxsize=4096)
 def render(value: float, dimension: str) -> str:
-    """The shortest text with `parse(text, dimension) == value`, in a readable unit."""
+    """Return the shortest text with `parse(text, dimension) == value`, in a readable unit."""
     kind = DIMENSIONS[dimension]
     value = float(value)
     for word, meaning in kind.words.items():
@@ -163,7 +165,7 @@ def render(value: float, dimension: str) -> str:
 
 
 def _spellings(unit: str) -> str:
-    """A regular expression of the ways to write `unit`: um, µm; m2, m^2, m²."""
+    """Return a regular expression of the ways to write `unit`: um, µm; m2, m^2, m²."""
     unit = re.sub(r"([()])", r"\\\1", unit).replace("u", "[uµμ]").replace("deg", "(deg|°)")
     return re.sub(r"(?<=m)2", "\\^?[2²]", re.sub(r"(?<=m)3", "\\^?[3³]", unit))
 
@@ -173,7 +175,7 @@ def _needs(kind: Dimension) -> str:
 
 
 def _unit_size(kind: Dimension, text: str, unit: str) -> Fraction:
-    """The size of `unit` in SI, or a ValueError that says which units there are."""
+    """Return the size of `unit` in SI, or raise a ValueError that says which units there are."""
     key = unit.replace("^", "")
     if key in kind.units:
         return kind.units[key]
@@ -201,7 +203,7 @@ def _value(
     offset: Fraction | None,
     size: Fraction,
 ) -> float:
-    """number / divisor in SI as the nearest double; ValueError where there is none."""
+    """Return number / divisor in SI as the nearest double; ValueError where there is none."""
     if divisor is not None:
         if Fraction(divisor) == 0:
             raise ValueError(f"{text!r} divides by zero; write for example {kind.example}")
@@ -217,7 +219,7 @@ def _value(
 
 
 def _decimal(number: Decimal) -> str:
-    """The shortest spelling of a decimal number."""
+    """Return the shortest spelling of a decimal number."""
     if number == 0:
         return "0"
     digits = number.normalize()
@@ -310,6 +312,6 @@ DIMENSIONS: Mapping[str, Dimension] = MappingProxyType(_dimensions())
 
 
 def _brief(given: object) -> str:
-    """What was given, for a message: its beginning where it is long."""
+    """Return what was given, for a message: its beginning where it is long."""
     text = repr(given)
     return text if len(text) <= _LONGEST else f"{text[: _LONGEST // 2]}..."

@@ -12,8 +12,8 @@ import scipy.fft
 
 from vcam_cli import simulate
 from vcam_cli.camera.camera import Camera
-from vcam_cli.engine.parallel import available_workers
-from vcam_cli.engine.stages import Silent
+from vcam_cli.parallel import available_workers
+from vcam_cli.progress import Silent
 
 SOURCES = 5
 """Of noise in the yardstick."""

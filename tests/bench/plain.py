@@ -15,10 +15,10 @@ import scipy.fft
 from numpy.typing import NDArray
 
 from vcam_cli.camera.camera import Camera
-from vcam_cli.camera.geometry import pixel_centers
-from vcam_cli.engine.optics import responses
+from vcam_cli.camera.derived.geometry import pixel_centers
+from vcam_cli.image_formation.photon_rate import responses
 from vcam_cli.physics.radiometry import irradiance_per_radiance
-from vcam_cli.studies.simulate import prepare
+from vcam_cli.simulation.simulate import prepare
 
 PLANCK, LIGHT = 6.62607015e-34, 299792458.0
 
@@ -72,14 +72,14 @@ def setup(camera: Camera, count: int = 31) -> tuple[Setup, Floats]:
     step[[0, -1]] /= 2
     cone = float(irradiance_per_radiance(g.f_number, g.magnification))
     # The responses have the transmittance of the lens in them.
-    per_photon = np.array([r.at(w) for r in responses(camera, ready.mosaic)])
+    per_photon = np.array([r.evaluate(w) for r in responses(camera, ready.mosaic)])
     x, y = pixel_centers(g)
     names = np.array(ready.mosaic.block)
     place = np.vectorize(ready.mosaic.colors.index)(names)
     tiles = -(-g.rows // len(place)), -(-g.columns // place.shape[1])
     found = Setup(
         planes=ready.scene.at(x, y, np.eye(len(ready.scene.spectra))).astype(np.float64),
-        radiance=cone * np.array([s.at(w) for s in ready.scene.spectra]),
+        radiance=cone * np.array([s.evaluate(w) for s in ready.scene.spectra]),
         electrons=per_photon * w / (PLANCK * LIGHT) * step,
         wavelengths=w,
         color=np.tile(place, tiles)[: g.rows, : g.columns],

@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 
 from vcam_cli import load, simulate, sweep
-from vcam_cli.scheduling.optimal import optimal
+from vcam_cli.accuracy import ablation
+from vcam_cli.accuracy.study import without
 from vcam_cli.scheduling.pdf import Pdf
-from vcam_cli.studies import ablation
-from vcam_cli.studies.accuracy import without
+from vcam_cli.scheduling.shot_noise import optimal_schedules
 
 from . import plain
 from .cameras import BUSY, PLAIN, Studio, studio
@@ -84,9 +84,9 @@ def per_effect(
     does so for all.
     """
     free = place.camera("gray", base)
-    camera = ablation.exposed_for(free, simulate(free).exposure_time)
-    chosen = names or ablation.wanted(camera)
-    camera = ablation.switched(camera, "all")
+    camera = ablation.with_exposure_time(free, simulate(free).exposure_time)
+    chosen = names or ablation.wanted_effects(camera)
+    camera = ablation.with_effects(camera, "all")
     whole = Frames(camera).take(0, warm=True)
     others = {name: Frames(without(camera, name)) for name in chosen}
     for name in chosen:
@@ -191,7 +191,7 @@ def schedules(unit: Cost, repeats: int, levels: int = 65_536) -> dict[str, Ratio
     rng = np.random.default_rng(0)
     values = np.sort(np.exp(rng.uniform(0, np.log(1e6), levels)))
     scene = Pdf.levels(values, rng.random(levels) + 1e-3)
-    cost = timed(lambda: optimal(scene, CAPTURES), repeats)
+    cost = timed(lambda: optimal_schedules(scene, CAPTURES), repeats)
     return {f"{levels} levels, 1 to {CAPTURES[-1]} captures": cost.over(unit)}
 
 
@@ -215,9 +215,9 @@ def command(unit: Cost, repeats: int, rows: int = 432, columns: int = 600) -> di
 LOADED = (
     "vcam_cli.commands.main",
     "vcam_cli.commands.run",
-    "vcam_cli.studies.checks",
-    "vcam_cli.studies.outputs",
-    "vcam_cli.studies.simulate",
+    "vcam_cli.simulation.checks",
+    "vcam_cli.simulation.outputs",
+    "vcam_cli.simulation.simulate",
     "vcam_cli.files.report",
 )
 """What `vcam run` loads."""

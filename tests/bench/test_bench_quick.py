@@ -12,7 +12,7 @@ from bench.measure import Cost, Frames, median
 from bench.report import lines
 from bench.whole import Size, measure
 
-from vcam_cli.studies import ablation
+from vcam_cli.accuracy import ablation
 
 pytestmark = pytest.mark.long
 
@@ -106,7 +106,7 @@ def test_plain_pipeline_sees_the_light_that_vcam_sees(place):
 
 
 def test_the_busy_camera_has_nearly_all_effects(place):
-    names = ablation.wanted(place.camera("gray", BUSY))
+    names = ablation.wanted_effects(place.camera("gray", BUSY))
     assert len(names) == 15
     assert "charge_transfer" not in names
 

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
-from vcam_cli.engine.parallel import available_workers
+from vcam_cli.parallel import available_workers
 
 from . import sections
 from .cameras import BUSY, studio

@@ -9,7 +9,7 @@ from making import BOLTZMANN, CHARGE, GONE, QUIET, camera, radiance_for
 
 from vcam_cli import simulate
 from vcam_cli.camera.architecture import ARCHITECTURES
-from vcam_cli.camera.geometry import geometry
+from vcam_cli.camera.derived.geometry import geometry
 from vcam_cli.effects.fpn import FixedPattern
 from vcam_cli.effects.read_noise import ReadNoise
 from vcam_cli.effects.reset_noise import ResetNoise
@@ -83,6 +83,7 @@ def test_pairs_differ_where_the_table_says_so(one, other, draw, shot):
 PARTED = [(a, b) for a in NAMES for b in NAMES if COLUMNS[a] and not COLUMNS[b]]
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("one", "other"), PARTED)
 def test_what_differs_is_a_number_a_column(one, other, tmp_path):
     """Of offsets and of noise the difference is the same in all rows, of gains the ratio."""
@@ -111,7 +112,7 @@ def test_what_differs_is_a_number_a_column(one, other, tmp_path):
 @pytest.mark.parametrize("name", NAMES)
 def test_reset_noise_is_of_what_is_reset(name, tmp_path):
     made = camera(tmp_path, NUMBERS | {"pixel.architecture": name})
-    effect = ResetNoise.of(made, geometry(made))
+    effect = ResetNoise.from_camera(made, geometry(made))
     if not RESET[name]:
         assert effect is None
         return
@@ -123,19 +124,21 @@ def test_reset_noise_is_of_what_is_reset(name, tmp_path):
 def test_correlated_double_sampling_removes_a_stated_reset_noise_too(name, tmp_path):
     stated = {"pixel.architecture": name, "pixel.readout.reset_noise": "12 e"}
     made = camera(tmp_path, NUMBERS | stated)
-    assert ResetNoise.of(made, geometry(made)) == (ResetNoise(12.0) if RESET[name] else None)
+    assert ResetNoise.from_camera(made, geometry(made)) == (
+        ResetNoise(12.0) if RESET[name] else None
+    )
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_columns_that_are_not_simulated_are_told(name, tmp_path):
     made = camera(tmp_path, NUMBERS | {"pixel.architecture": name})
     for kind in (FixedPattern, ReadNoise):
-        said = kind.of(made, geometry(made)).describe()
+        said = kind.from_camera(made, geometry(made)).describe()
         assert (f"in a {name}" in said) == (not COLUMNS[name])
     silent = {"pixel.fpn": {"offset_column": "3 e"}, "pixel.readout.column_noise": "3 e"}
     made = camera(tmp_path, silent | {"pixel.architecture": name})
     for kind in (FixedPattern, ReadNoise):
-        assert (kind.of(made, geometry(made)) is None) == (not COLUMNS[name])
+        assert (kind.from_camera(made, geometry(made)) is None) == (not COLUMNS[name])
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -148,7 +151,8 @@ def test_captures_need_a_readout_that_destroys_nothing(name, tmp_path):
         camera(tmp_path, several)
     (problem,) = caught.value.problems
     assert problem.path == ("exposure", "captures")
-    assert "destroys its charge" in problem.message and f"{name} pixel" in problem.message
+    assert "destroys its charge" in problem.message
+    assert f"{name} pixel" in problem.message
     assert "architecture: aps-3t or dps" in problem.remedy
 
 
@@ -162,7 +166,8 @@ def test_only_a_ccd_transfers_charge(name, tmp_path):
         camera(tmp_path, moving)
     [problem] = caught.value.problems
     assert problem.path == ("pixel", "readout", "charge_transfer")
-    assert f"{name} pixel transfers no charge" in problem.message and "ccd" in problem.remedy
+    assert f"{name} pixel transfers no charge" in problem.message
+    assert "ccd" in problem.remedy
 
 
 def test_a_passive_pixel_needs_its_bit_line(tmp_path):
@@ -171,7 +176,8 @@ def test_a_passive_pixel_needs_its_bit_line(tmp_path):
         camera(tmp_path, passive)
     [problem] = caught.value.problems
     assert problem.path == ("pixel", "readout", "bit_line_capacitance")
-    assert "is missing" in problem.message and "bit_line_capacitance: 2000 fF" in problem.remedy
+    assert "is missing" in problem.message
+    assert "bit_line_capacitance: 2000 fF" in problem.remedy
     for enough in ("12 e", "none", GONE):
         changes = {"pixel.architecture": "pps"}
         camera(tmp_path, changes if enough is GONE else passive | {
@@ -199,7 +205,9 @@ def test_impossible_numbers_are_refused(changes, path, message, tmp_path):
     with pytest.raises(BadInput) as caught:
         camera(tmp_path, changes)
     [problem] = caught.value.problems
-    assert problem.path == path and message in problem.message and problem.remedy
+    assert problem.path == path
+    assert message in problem.message
+    assert problem.remedy
 
 
 def test_every_architecture_of_a_file_has_its_line():

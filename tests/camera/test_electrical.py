@@ -6,7 +6,7 @@ from itertools import combinations
 import pytest
 from making import BOLTZMANN, CHARGE, camera
 
-from vcam_cli.camera.electrical import Electrical, electrical
+from vcam_cli.camera.derived.electrical import Electrical, electrical
 from vcam_cli.errors import BadInput
 from vcam_cli.physics.readout import reset_noise_variance
 
@@ -44,8 +44,10 @@ def test_all_three_where_they_agree_to_a_part_in_a_thousand(tmp_path):
     assert near.full_well == pytest.approx(WELL, rel=1e-12), "swing / gain, as kTC and ADC take it"
     [problem] = refused(tmp_path, {"pixel.readout": THREE | {"full_well": "70 ke"}})
     assert problem.path == ("pixel", "readout", "full_well")
-    assert "69000 e" in problem.message and "70000 e" in problem.message
-    assert "give two of" in problem.remedy and "made.yaml:" in problem.where
+    assert "69000 e" in problem.message
+    assert "70000 e" in problem.message
+    assert "give two of" in problem.remedy
+    assert "made.yaml:" in problem.where
 
 
 @pytest.mark.parametrize("other", ["voltage_swing", "full_well"])
@@ -72,7 +74,8 @@ def test_a_capacitance_beside_a_gain_only_sets_reset_noise(tmp_path):
 def test_one_is_not_enough(only, tmp_path):
     [problem] = refused(tmp_path, {"pixel.readout": {only: THREE[only]}})
     assert problem.path == ("pixel", "readout")
-    assert "not determined" in problem.message and problem.remedy
+    assert "not determined" in problem.message
+    assert problem.remedy
 
 
 @pytest.mark.parametrize("gain", [1, 2])
@@ -80,7 +83,8 @@ def test_a_data_sheet_counts_in_electrons_and_numbers(gain, tmp_path):
     """0.399 DN/e over 12 bits above 240 DN: the ADC is full at 9662 e, whatever volts are."""
     adc = {"bits": 12, "offset": "240 DN", "gain": "0.399 DN/e"}
     e = solved(tmp_path, {"full_well": "12 ke", "gain": gain}, adc)
-    assert not e.in_volts and e.capacitance is None
+    assert not e.in_volts
+    assert e.capacitance is None
     assert e.full_well == pytest.approx(12_000, rel=1e-12)
     assert e.electrons_per_dn == pytest.approx(1 / 0.399, rel=1e-12)
     assert e.saturation == pytest.approx(3855 / 0.399, rel=1e-12)
@@ -111,7 +115,8 @@ def test_what_needs_volts_is_refused_without_them(changes, path, tmp_path):
     counted = {"pixel.readout": {"full_well": "9 ke"}, "adc": {"bits": 12, "gain": "0.4 DN/e"}}
     [problem] = refused(tmp_path, counted | changes)
     assert ".".join(problem.path) == path
-    assert "needs a voltage" in problem.message and "conversion_gain" in problem.remedy
+    assert "needs a voltage" in problem.message
+    assert "conversion_gain" in problem.remedy
     given = {"full_well": "9 ke", "voltage_swing": "1 V"}
     readout = changes.get("pixel.readout", {})
     camera(tmp_path, counted | changes | {"pixel.readout": readout | given})

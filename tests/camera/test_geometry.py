@@ -10,7 +10,7 @@ import pytest
 from making import GONE, camera, tree
 
 from vcam_cli import load
-from vcam_cli.camera.geometry import Geometry, geometry
+from vcam_cli.camera.derived.geometry import Geometry, geometry
 from vcam_cli.errors import BadInput
 
 
@@ -72,7 +72,8 @@ def test_every_pair_at_infinity(pair, tmp_path):
     optics = {name: far[name] for name in pair}
     g = solved(tmp_path, optics=optics, scene__distance="infinity")
     assert (g.focal_length, g.f_number) == pytest.approx((F, N), rel=1e-9)
-    assert g.magnification == 0 and g.image_distance == g.focal_length
+    assert g.magnification == 0
+    assert g.image_distance == g.focal_length
     assert g.object_distance == math.inf
 
 
@@ -103,7 +104,8 @@ def test_lenses_that_contradict_themselves(optics, path, tmp_path):
 def test_two_names_of_one_quantity_are_not_two(pair, tmp_path):
     [problem] = refused(tmp_path, lens(*sorted(pair)))
     assert problem.path == ("optics",)
-    assert "not determined" in problem.message and problem.remedy
+    assert "not determined" in problem.message
+    assert problem.remedy
 
 
 @pytest.mark.parametrize("distance", ["5 mm", "4 mm", "1 um"])
@@ -169,7 +171,8 @@ def test_a_die_smaller_than_a_pixel(tmp_path):
     changes = {k.replace("__", "."): v for k, v in die("2 um", "1 mm").items()}
     [problem] = refused(tmp_path, changes)
     assert problem.path == ("array", "die")
-    assert "smaller than one pixel" in problem.message and problem.remedy
+    assert "smaller than one pixel" in problem.message
+    assert problem.remedy
 
 
 # --- the photodetector ---------------------------------------------------------------------------
@@ -215,7 +218,8 @@ def test_a_place_counts_from_the_upper_left_corner(tmp_path):
 def test_a_photodetector_that_leaves_its_pixel(keys, side, tmp_path):
     [problem] = refused(tmp_path, detector(**keys))
     assert problem.path == ("pixel", "photodetector", side)
-    assert "5 um" in problem.message and "make it smaller" in problem.remedy
+    assert "5 um" in problem.message
+    assert "make it smaller" in problem.remedy
 
 
 def test_a_photodetector_that_fills_its_pixel(tmp_path):
@@ -242,7 +246,8 @@ def test_a_scene_at_infinity_has_no_width(tmp_path):
     changes = {"scene.extent": {"width": "10 cm"}, "scene.distance": "infinity"}
     [problem] = refused(tmp_path, changes)
     assert problem.path == ("scene", "extent")
-    assert "infinity" in problem.message and "extent: sensor" in problem.remedy
+    assert "infinity" in problem.message
+    assert "extent: sensor" in problem.remedy
     assert solved(tmp_path, scene__distance="infinity").report(1)["scene_width"] == math.inf
 
 

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from making import GONE, camera
 
-from vcam_cli.camera import lattice as module
-from vcam_cli.camera.lattice import lattice, places
+from vcam_cli.camera.derived import lattice as module
+from vcam_cli.camera.derived.lattice import lattice, places
 from vcam_cli.errors import BadInput
 
 OBLONG = {
@@ -60,7 +60,8 @@ def test_a_die_smaller_than_a_pixel(pattern, tmp_path):
     with pytest.raises(BadInput) as caught:
         made(tmp_path, array={"die": die, "pattern": pattern})
     [problem] = caught.value.problems
-    assert problem.path == ("array", "die") and "smaller than one pixel" in problem.message
+    assert problem.path == ("array", "die")
+    assert "smaller than one pixel" in problem.message
 
 
 # --- honeycomb -----------------------------------------------------------------------------------
@@ -160,7 +161,8 @@ def test_bad_files_are_told_where_they_are_named(name, tmp_path):
     [problem] = caught.value.problems
     assert problem.path == ("array", "pattern", "positions")
     assert "made.yaml:" in problem.where
-    assert "places.csv" in problem.message and says in problem.message
+    assert "places.csv" in problem.message
+    assert says in problem.message
     assert problem.remedy
     color = "color" in name.split()
     assert ("array.filters" if color else "x_um,y_um,color") in problem.remedy
@@ -170,7 +172,8 @@ def test_a_file_that_is_not_there(tmp_path):
     with pytest.raises(BadInput) as caught:
         camera(tmp_path, OBLONG | SIZE | {"array.pattern": {"positions": "nowhere.csv"}})
     [problem] = caught.value.problems
-    assert problem.path == ("array", "pattern", "positions") and "nowhere.csv" in problem.message
+    assert problem.path == ("array", "pattern", "positions")
+    assert "nowhere.csv" in problem.message
 
 
 def test_a_file_that_is_gone(tmp_path):
@@ -181,7 +184,7 @@ def test_a_file_that_is_gone(tmp_path):
 
 
 def test_more_pixels_than_are_read(tmp_path, monkeypatch):
-    monkeypatch.setattr(module, "MOST", 4)
+    monkeypatch.setattr(module, "MOST_PIXELS", 4)
     places(scattered(tmp_path))  # the header is a row of them
     with pytest.raises(BadInput, match="has more than 4 rows; no more are read"):
         scattered(tmp_path, GOOD + "1,1,R\n")

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from vcam_cli.camera import shipped
 from vcam_cli.camera.load import load
+from vcam_cli.config import shipped
 from vcam_cli.errors import BadInput, CannotDo, bad
 
 CAMERA = """\
@@ -366,7 +366,7 @@ def test_further_checks_are_made_with_the_others_where_their_sections_are_right(
     assert second == "camera.yaml:9:10: pixel.width: does not please; take another"
     with pytest.raises(BadInput):
         load("camera.yaml", ["pixel.width=3"], checks=[(check, "pixel")])
+    chosen = "exposure.captures={schedule: optimal, count: 4, max: 30}"
     with pytest.raises(BadInput):
-        chosen = "exposure.captures={schedule: optimal, count: 4, max: 30}"
         load("camera.yaml", [chosen], checks=[(check, "exposure")])
     assert seen == ["camera", "camera"]

@@ -3,7 +3,7 @@
 import pytest
 from camera_trees import camera
 
-from vcam_cli.camera import named_spectra
+from vcam_cli.camera.derived import named_spectra
 from vcam_cli.errors import BadInput
 
 

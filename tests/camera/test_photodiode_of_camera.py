@@ -5,17 +5,21 @@ the absorption of silicon at two wavelengths (Green 2008), constants written out
 """
 
 import math
+from types import SimpleNamespace
 from typing import ClassVar
 
 import numpy as np
 import pytest
 from making import BOLTZMANN, CHARGE, GONE, camera
 
-from vcam_cli.camera.detector import detector
-from vcam_cli.camera.electrical import electrical
-from vcam_cli.camera.geometry import geometry
-from vcam_cli.camera.photodiode import photodiode
-from vcam_cli.camera.sense_node import voltage_swing
+from vcam_cli.camera.derived.dark_current import dark_rate
+from vcam_cli.camera.derived.electrical import electrical
+from vcam_cli.camera.derived.geometry import geometry
+from vcam_cli.camera.derived.junction import depths
+from vcam_cli.camera.derived.photodiode import diffusion, quantum_efficiency
+from vcam_cli.camera.derived.pixel_layout import detector
+from vcam_cli.camera.derived.process import Need
+from vcam_cli.camera.derived.sense_node import capacitance, voltage_swing
 from vcam_cli.errors import BadInput
 
 EPSILON = 11.7 * 8.8541878128e-12
@@ -32,6 +36,19 @@ LEFT = {
     "pixel.width": "6.5 um",
 }
 """Changes of the plain camera that leave its pixel to a technology."""
+
+
+def photodiode(c):
+    """All that follows for the photodiode of a camera; depths where something asks for them."""
+    own = c.pixel.photodetector
+    asked = own.quantum_efficiency.given is None or own.dark_current_density == "junction"
+    return SimpleNamespace(
+        quantum_efficiency=quantum_efficiency(c),
+        capacitance=capacitance(c),
+        dark_rate=dark_rate(c),
+        depths=depths(c, Need("pixel", "the photodiode")) if asked else None,
+        diffusion=diffusion(c),
+    )
 
 
 def made(folder, *, technology="cmos-0.35um", pitch="6.5 um", readout=None, **detector):
@@ -102,7 +119,8 @@ def test_a_size_in_the_file_wins(given, width, tmp_path):
 
 def test_a_pixel_too_small_names_the_smallest_that_works(tmp_path):
     text = refused(tmp_path, pitch="5 um")
-    assert "too small for its transistors" in text and "5.097 um" in text
+    assert "too small for its transistors" in text
+    assert "5.097 um" in text
     assert geometry(made(tmp_path, pitch="5.097 um")).fill_factor > 0
     refused(tmp_path, pitch="5.096 um")
     # Both sides shorter than the border: their product would be positive.
@@ -241,13 +259,15 @@ class TestSwing:
 
     def test_more_than_the_reset_voltage(self, tmp_path):
         text = refused(tmp_path, readout={"voltage_swing": "2.3 V"})
-        assert "pixel.readout.voltage_swing" in text and "forward" in text
+        assert "pixel.readout.voltage_swing" in text
+        assert "forward" in text
         made(tmp_path, readout={"voltage_swing": "2.25 V"})
 
     @pytest.mark.parametrize("change", [{"supply": "2 V"}, {"reset_voltage": "3.4 V"}])
     def test_a_reset_voltage_above_the_supply(self, change, tmp_path):
         text = refused(tmp_path, technology={"from": "cmos-0.35um"} | change)
-        assert "lies above its supply" in text and "pixel.technology.reset_voltage" in text
+        assert "lies above its supply" in text
+        assert "pixel.technology.reset_voltage" in text
 
     def test_a_passive_pixel_swings_over_the_supply(self, tmp_path):
         """No follower: neither its threshold nor its gate."""
@@ -281,25 +301,25 @@ def test_efficiency_of_the_junction(wavelength, tmp_path):
     a, w = ALPHA[wavelength], depletion()
     x1, x2, x3 = 0.2e-6, 0.2e-6 + w, 5.2e-6 + w
     bracket = (1 - math.exp(-a * x1)) / x1 - (math.exp(-a * x2) - math.exp(-a * x3)) / (x3 - x2)
-    found = photodiode(made(tmp_path)).quantum_efficiency.at(wavelength)
+    found = photodiode(made(tmp_path)).quantum_efficiency.evaluate(wavelength)
     assert found == pytest.approx(0.75 * bracket / a, rel=3e-3)
 
 
 def test_a_given_efficiency_is_untouched(tmp_path):
     for kind in ("ndiff-psub", "nwell-psub", "photogate", "pinned"):
         c = made(tmp_path, quantum_efficiency=0.5, kind=kind)
-        assert photodiode(c).quantum_efficiency.at(550e-9) == 0.5
+        assert photodiode(c).quantum_efficiency.evaluate(550e-9) == 0.5
     per_pixel = made(tmp_path, quantum_efficiency={"pixel": 0.15})
-    assert photodiode(per_pixel).quantum_efficiency.at(550e-9) == 0.15
+    assert photodiode(per_pixel).quantum_efficiency.evaluate(550e-9) == 0.15
 
 
 def test_a_stack_takes_the_place_of_the_scale(tmp_path):
-    bare = photodiode(camera(tmp_path, LEFT)).quantum_efficiency.at(550e-9)
+    bare = photodiode(camera(tmp_path, LEFT)).quantum_efficiency.evaluate(550e-9)
     pixel = camera(tmp_path, LEFT).pixel
     covered = camera(tmp_path, LEFT).model_copy(
         update={"pixel": pixel.model_validate(pixel.model_dump(mode="json") | {"stack": STACK})}
     )
-    assert photodiode(covered).quantum_efficiency.at(550e-9) == pytest.approx(
+    assert photodiode(covered).quantum_efficiency.evaluate(550e-9) == pytest.approx(
         bare / 0.75, rel=1e-12
     )
 
@@ -313,7 +333,7 @@ def test_lines_between_its_wavelengths_follow_the_curve(tmp_path):
     wavelength = np.random.default_rng(1).uniform(350e-9, 1100e-9, 4000)
     d = diode.depths
     exact = 0.75 * physics.quantum_efficiency(silicon.absorption(wavelength), d.x1, d.x2, d.x3)
-    assert np.abs(diode.quantum_efficiency.at(wavelength) / exact - 1).max() < 1e-4
+    assert np.abs(diode.quantum_efficiency.evaluate(wavelength) / exact - 1).max() < 1e-4
 
 
 class TestKinds:
@@ -337,7 +357,9 @@ class TestKinds:
         well = photodiode(made(tmp_path, kind="nwell-psub", dark_current_density="junction"))
         diffusion = photodiode(made(tmp_path, dark_current_density="junction"))
         assert well.depths.x1 == 1.5e-6
-        assert well.quantum_efficiency.at(450e-9) < 0.6 * diffusion.quantum_efficiency.at(450e-9)
+        assert well.quantum_efficiency.evaluate(
+            450e-9
+        ) < 0.6 * diffusion.quantum_efficiency.evaluate(450e-9)
         assert well.depths.x2 - well.depths.x1 == pytest.approx(
             diffusion.depths.x2 - diffusion.depths.x1
         )
@@ -348,9 +370,9 @@ class TestKinds:
         for wavelength, a in ALPHA.items():
             x = 0.2e-6 * (np.arange(20000) + 0.5) / 20000
             surface = float(np.mean(a * np.exp(-a * x) * x / 0.2e-6) * 0.2e-6)
-            more = open_.quantum_efficiency.at(wavelength) - pinned.quantum_efficiency.at(
+            more = open_.quantum_efficiency.evaluate(
                 wavelength
-            )
+            ) - pinned.quantum_efficiency.evaluate(wavelength)
             assert more == pytest.approx(0.75 * surface, rel=3e-3)
 
     def test_the_surface_of_a_pinned_diode_stays_dark(self, tmp_path):
@@ -374,7 +396,7 @@ class TestKinds:
         for wavelength, a in ALPHA.items():
             below = (math.exp(-a * w) - math.exp(-a * (w + 5e-6))) / (a * 5e-6)
             expected = 0.75 * math.exp(-a * 0.25e-6) * (1 - below)
-            assert gate.quantum_efficiency.at(wavelength) == pytest.approx(expected, rel=3e-3)
+            assert gate.quantum_efficiency.evaluate(wavelength) == pytest.approx(expected, rel=3e-3)
         open_ = self.of(tmp_path, "ndiff-psub")
         assert (gate.dark_rate, gate.capacitance) == (open_.dark_rate, open_.capacitance)
         assert gate.diffusion == open_.diffusion
@@ -386,7 +408,8 @@ class TestKinds:
             tmp_path, technology={"from": own}, kind="photogate", junction=junction,
             fill_factor=0.5, capacitance="5 fF",
         )  # fmt: skip
-        assert "needs gate.thickness" in text and "pixel.technology.gate.thickness: 0.25 um" in text
+        assert "needs gate.thickness" in text
+        assert "pixel.technology.gate.thickness: 0.25 um" in text
 
 
 # --- dark current --------------------------------------------------------------------------------
@@ -421,7 +444,8 @@ class TestDarkCurrent:
     def test_its_scale_multiplies_whatever_there_is(self, given, tmp_path):
         once = photodiode(made(tmp_path, **given)).dark_rate
         tenfold = photodiode(made(tmp_path, dark_current_scale=10, **given)).dark_rate
-        assert once > 0 and tenfold == pytest.approx(10 * once, rel=1e-12)
+        assert once > 0
+        assert tenfold == pytest.approx(10 * once, rel=1e-12)
 
     def test_of_the_junction(self, tmp_path):
         """Eq 2.31 as printed, and the technology's edge."""
@@ -443,7 +467,8 @@ class TestDarkCurrent:
         with pytest.raises(BadInput) as caught:
             camera(tmp_path, LEFT | asked | {"pixel.temperature": "450 K"})
         (problem,) = caught.value.problems
-        assert problem.path == ("pixel", "temperature") and "400 K" in problem.message
+        assert problem.path == ("pixel", "temperature")
+        assert "400 K" in problem.message
         assert "as a number" in problem.remedy
         camera(tmp_path, LEFT | {"pixel.temperature": "450 K"})
         with pytest.raises(BadInput, match="doubles 75"):
@@ -492,8 +517,11 @@ def test_a_junction_needs_no_technology(tmp_path):
     }
     diode = photodiode(camera(tmp_path, changes))
     assert (diode.depths.x1, diode.depths.x3) == pytest.approx((0.3e-6, 9.3e-6))
-    assert diode.quantum_efficiency.at(650e-9) > 0.6, "nothing is lost by reflection: internal"
-    assert diode.dark_rate > 0 and diode.diffusion.neutral_depth == 8e-6
+    assert diode.quantum_efficiency.evaluate(650e-9) > 0.6, (
+        "nothing is lost by reflection: internal"
+    )
+    assert diode.dark_rate > 0
+    assert diode.diffusion.neutral_depth == 8e-6
     assert diode.capacitance is None
 
 
@@ -505,7 +533,7 @@ def test_of_a_plain_camera_nothing_follows(tmp_path):
         None,
         None,
     )
-    assert diode.quantum_efficiency.at(550e-9) == 0.5
+    assert diode.quantum_efficiency.evaluate(550e-9) == 0.5
 
 
 @pytest.mark.parametrize("word", ["quantum_efficiency", "dark_current_density", "charge_diffusion"])
@@ -549,7 +577,7 @@ def test_a_capacitance_of_the_junction_needs_a_technology(tmp_path):
 def test_half_a_technology(lacking, names, tmp_path):
     import yaml
 
-    from vcam_cli.camera import shipped
+    from vcam_cli.config import shipped
 
     own = yaml.safe_load(shipped.find("technologies", "cmos-0.35um").read_text("utf-8"))
     own.pop(lacking)
@@ -559,7 +587,8 @@ def test_half_a_technology(lacking, names, tmp_path):
 def test_no_capacitance_no_depletion_width(tmp_path):
     choice = {"from": "cmos-0.35um", "capacitance": {"area": "0 fF/um2"}}
     text = refused(tmp_path, technology=choice)
-    assert "without end" in text and "give junction.depletion_width" in text
+    assert "without end" in text
+    assert "give junction.depletion_width" in text
 
 
 def test_a_size_must_come_from_somewhere(tmp_path):

@@ -5,7 +5,7 @@ import yaml
 
 from tests.making import tree
 from vcam_cli.errors import BadInput
-from vcam_cli.studies.checks import load
+from vcam_cli.simulation.checks import load
 
 FULL = [{"black_level": "subtract"}, {"demosaic": "bilinear"}]
 RGBW = {"R": 0.3, "G": 0.3, "B": 0.3, "W": 0.9}

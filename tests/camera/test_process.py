@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from making import camera
 
 from vcam_cli.camera.camera import Camera
-from vcam_cli.camera.process import EXPONENTS, process
+from vcam_cli.camera.derived.process import EXPONENTS, process
 from vcam_cli.camera.technology import Technology
 from vcam_cli.errors import BadInput
 
@@ -53,16 +53,19 @@ def numbers(p) -> dict[str, float]:
 
 
 def test_none_where_the_file_says_nothing(tmp_path):
-    assert process(camera(tmp_path)) is None
+    nothing = process(camera(tmp_path))
+    assert (nothing.feature_size, nothing.supply, nothing.junction.depth) == (None, None, None)
     alone = process(camera(tmp_path, {"pixel.photodetector.junction": {"depth": "1 um"}}))
     assert alone.junction.depth == 1e-6
-    assert alone.feature_size is None and alone.layout.border is None
+    assert alone.feature_size is None
+    assert alone.layout.border is None
 
 
 def test_unscaled_the_numbers_are_those_of_the_file(tmp_path):
     p = made(tmp_path)
     assert (p.feature_size, p.supply, p.voltage_swing, p.reset_voltage) == (0.4e-6, 4, 1.5, 3)
-    assert p.junction.donors == 1e26 and p.capacitance.area == pytest.approx(1e-3)
+    assert p.junction.donors == 1e26
+    assert p.capacitance.area == pytest.approx(1e-3)
     assert p.dark_current.perimeter == pytest.approx(1e-10)
 
 
@@ -78,7 +81,8 @@ doping grows, junctions hold more per area; all that is not named stays."""
 
 def test_scales_as_with_a_constant_field(tmp_path):
     before, after = numbers(made(tmp_path)), numbers(made(tmp_path, {"feature_size": "0.1 um"}))
-    assert before.keys() == after.keys() and len(before) > 20
+    assert before.keys() == after.keys()
+    assert len(before) > 20
     for name, value in before.items():
         assert after[name] == pytest.approx(value * 0.25 ** POWERS.get(name, 0), rel=1e-12), name
 
@@ -130,7 +134,8 @@ def test_overrides_are_not_scaled(tmp_path):
     choice = {"feature_size": "0.1 um", "dark_current": {"area": "7 nA/cm2"}, "supply": "1.2 V"}
     p = made(tmp_path, choice | {"junction": {"depth": "0.07 um"}})
     assert p.dark_current.area == pytest.approx(7e-5)
-    assert p.supply == 1.2 and p.junction.depth == pytest.approx(0.07e-6)
+    assert p.supply == 1.2
+    assert p.junction.depth == pytest.approx(0.07e-6)
 
 
 def test_the_photodetectors_junction_wins_over_all(tmp_path):
@@ -148,7 +153,8 @@ class TestWell:
         well = made(tmp_path, pixel__photodetector__kind="nwell-psub").junction
         diffusion = made(tmp_path).junction
         assert (well.depth, well.donors) == pytest.approx((1.5e-6, 1e23))
-        assert well.depth > diffusion.depth and well.donors < diffusion.donors
+        assert well.depth > diffusion.depth
+        assert well.donors < diffusion.donors
         same = {"depth": diffusion.depth, "donors": diffusion.donors}
         assert well.model_copy(update=same) == diffusion
 
@@ -178,10 +184,12 @@ class TestWell:
 def test_thresholds_replace_what_follows_from_them(tmp_path):
     """That of the reset the reset voltage, the others the swing."""
     p = made(tmp_path, {"thresholds": {"reset": "0.8 V"}})
-    assert p.reset_voltage is None and p.voltage_swing == 1.5
+    assert p.reset_voltage is None
+    assert p.voltage_swing == 1.5
     four = {"reset": "0.8 V", "bias": "1 V", "bias_gate": "0.6 V", "follower_gate_source": "1 V"}
     p = made(tmp_path, {"thresholds": four})
-    assert p.reset_voltage is None and p.voltage_swing is None
+    assert p.reset_voltage is None
+    assert p.voltage_swing is None
     assert p.thresholds.bias_gate == 0.6
 
 
@@ -191,7 +199,8 @@ def test_a_process_is_scaled_only_so_far(size, tmp_path):
         made(tmp_path, {"feature_size": size})
     (problem,) = set(caught.value.problems)
     assert problem.path == ("pixel", "technology", "feature_size")
-    assert "0.4 um of made" in problem.message and "factor of 20" in problem.remedy
+    assert "0.4 um of made" in problem.message
+    assert "factor of 20" in problem.remedy
 
 
 @pytest.mark.parametrize("power", ["11", "-11", "nan"])

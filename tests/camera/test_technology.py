@@ -9,12 +9,12 @@ from making import camera
 from typer.testing import CliRunner
 
 from vcam_cli import load, simulate
-from vcam_cli.camera import shipped
-from vcam_cli.camera.process import process
+from vcam_cli.camera.derived.process import process
 from vcam_cli.camera.technology import Technology
 from vcam_cli.commands.main import app
+from vcam_cli.config import shipped
 from vcam_cli.errors import BadInput
-from vcam_cli.studies import outputs
+from vcam_cli.simulation import outputs
 
 TECHNOLOGY = {
     "pixel.technology": "cmos-0.35um",
@@ -72,8 +72,11 @@ class TestWhatShips:
 
     def test_says_where_every_number_comes_from(self, name):
         text = read(name).source
-        assert "Chen 2003" in text and "run T" in text
-        assert "CALIBRATED" in text and "typical" in text and "assumed" in text
+        assert "Chen 2003" in text
+        assert "run T" in text
+        assert "CALIBRATED" in text
+        assert "typical" in text
+        assert "assumed" in text
         for key in ("supply", "reset_voltage", "junction", "donors", "acceptors", "well",
                     "gate.thickness", "capacitance", "dark_current.area", "perimeter", "doubling",
                     "quantum_efficiency_scale", "layout"):  # fmt: skip
@@ -81,7 +84,8 @@ class TestWhatShips:
 
     def test_is_listed_and_printed(self, name):
         listed = CliRunner().invoke(app, ["list", "technologies"], prog_name="vcam")
-        assert listed.exit_code == 0 and name in listed.stdout
+        assert listed.exit_code == 0
+        assert name in listed.stdout
         shown = CliRunner().invoke(app, ["list", "technologies", name], prog_name="vcam")
         assert f"name: {name}" in shown.stdout
 
@@ -211,7 +215,8 @@ def test_a_misspelt_technology_has_the_nearest_name(tmp_path):
         camera(tmp_path, TECHNOLOGY | {"pixel.technology": "cmos-0.35"})
     (problem,) = caught.value.problems
     assert problem.path == ("pixel", "technology", "from")
-    assert "did you mean 'cmos-0.35um'?" in problem.remedy and "made.yaml:" in problem.where
+    assert "did you mean 'cmos-0.35um'?" in problem.remedy
+    assert "made.yaml:" in problem.where
 
 
 def test_from_process_to_picture(tmp_path):

@@ -6,8 +6,8 @@ import json
 import pytest
 from typer.testing import CliRunner
 
+from vcam_cli.accuracy import measurements
 from vcam_cli.commands.main import app
-from vcam_cli.studies import accuracy_shots
 
 SMALL = ("--set", "array.rows=12", "--set", "array.columns=16")
 UNIFORM = "scene.source={kind: chart, chart: uniform}"
@@ -17,7 +17,7 @@ UNIFORM = "scene.source={kind: chart, chart: uniform}"
 def ran(tmp_path_factory):
     out = tmp_path_factory.mktemp("accuracy") / "out"
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(accuracy_shots, "TURNS", 1)
+        patch.setattr(measurements, "TURNS", 1)
         arguments = ["accuracy", "slanted-edge-f8", *SMALL, "-o", str(out)]
         text = CliRunner().invoke(app, [*arguments, "--set", UNIFORM, "--workers", "1"])
         assert text.exit_code == 0, text.output
@@ -41,7 +41,9 @@ def test_files(ran):
     assert all(float(cell) >= 0 for row in rows for cell in row[2:] if cell != "")
     assert {"preset", "effect:diffraction"} <= {row[0] for row in rows}
     record = json.loads((out / "accuracy.json").read_text())
-    assert record["program"] == "vcam" and record["camera"] and record["effects"]
+    assert record["program"] == "vcam"
+    assert record["camera"]
+    assert record["effects"]
 
 
 def test_a_person_reads_tables_and_a_recommendation(ran):
@@ -65,7 +67,7 @@ def test_json_has_the_measurement(ran):
 
 
 def test_it_stands_beside_a_run_in_the_same_folder(tmp_path, monkeypatch):
-    monkeypatch.setattr(accuracy_shots, "TURNS", 1)
+    monkeypatch.setattr(measurements, "TURNS", 1)
     arguments = ["slanted-edge-f8", *SMALL, "--set", UNIFORM, "-o", str(tmp_path / "out"), "-q"]
     for command in ("run", "accuracy", "run"):
         done = CliRunner().invoke(app, [command, *arguments])

@@ -6,9 +6,9 @@ import json
 import pytest
 from typer.testing import CliRunner
 
+from vcam_cli.characterization import bench, exposures
 from vcam_cli.commands.characterize import SHOWN
 from vcam_cli.commands.main import app
-from vcam_cli.studies import bench, exposures
 
 FILES = {
     "characterize.csv",
@@ -60,7 +60,8 @@ def test_files(ran):
 def test_the_record(ran):
     out, _ = ran
     record = json.loads((out / "characterize.json").read_text())
-    assert record["program"] == "vcam" and set(record["files"]) == FILES - {"characterize.json"}
+    assert record["program"] == "vcam"
+    assert set(record["files"]) == FILES - {"characterize.json"}
     assert record["camera"]["array"]["rows"] == 240  # the user's camera, not the bench's
     assert set(record["channels"]) == {"R", "G", "B"}
     red = record["channels"]["R"]
@@ -72,20 +73,24 @@ def test_a_person_reads_a_table(ran):
     _, done = ran
     for word in (*SHOWN, "expected", "e/s", "lp/mm", "mtf.png"):
         assert word in done.stdout
-    assert "moved up" in done.stderr and "moved up" not in done.stdout
+    assert "moved up" in done.stderr
+    assert "moved up" not in done.stdout
     *table, files = done.stdout.splitlines()  # the last line has a path, as long as it is
-    assert max(map(len, table)) <= 100 and files.endswith("mtf.png")
+    assert max(map(len, table)) <= 100
+    assert files.endswith("mtf.png")
 
 
 def test_json_and_quiet(ran, tmp_path):
     told = call("starter", "-o", str(tmp_path / "a"), "--json", "-q")
     assert told.stderr == ""
     record = json.loads(told.stdout)
-    assert record["out"] == str(tmp_path / "a") and record["quantities"]
+    assert record["out"] == str(tmp_path / "a")
+    assert record["quantities"]
     for name in ("characterize.csv", "snr.png"):  # the same bytes again
         assert (tmp_path / "a" / name).read_bytes() == (ran[0] / name).read_bytes()
 
 
+@pytest.mark.long
 def test_set_and_seed_reach_the_bench(tmp_path):
     sets = ("--set", "pixel.readout.read_noise=40 e", "--set", "array.pattern=monochrome")
     sets += ("--set", "processing=[]", "--json", "-q")
@@ -102,6 +107,7 @@ def test_set_and_seed_reach_the_bench(tmp_path):
     assert noise[0]["measured"] == pytest.approx(40, rel=0.1)
 
 
+@pytest.mark.long
 def test_it_stands_beside_a_run_in_the_same_folder(tmp_path):
     out = tmp_path / "out"
     size = ("--set", "array.rows=16", "--set", "array.columns=16")
@@ -123,12 +129,14 @@ def test_it_stands_beside_a_run_in_the_same_folder(tmp_path):
 def test_bad_input_is_told_and_leaves_nothing(sets, words, tmp_path):
     done = call("starter", "-o", str(tmp_path / "out"), "--set", sets)
     assert done.exit_code == 2
-    assert words in done.stderr and "Traceback" not in done.output
+    assert words in done.stderr
+    assert "Traceback" not in done.output
     assert not (tmp_path / "out").exists()
 
 
 def test_a_foreign_folder_is_refused(tmp_path):
     (tmp_path / "mine.txt").write_text("mine")
     done = call("starter", "-o", str(tmp_path))
-    assert done.exit_code == 2 and "holds no characterize.json" in done.stderr
+    assert done.exit_code == 2
+    assert "holds no characterize.json" in done.stderr
     assert {path.name for path in tmp_path.iterdir()} == {"mine.txt"}

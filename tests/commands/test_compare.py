@@ -65,13 +65,15 @@ def test_what_is_written() -> None:
     write_png("a.png", (noise(1) * 255).astype(np.uint8))
     write_png("b.png", (noise(2) * 255).astype(np.uint8))
     out = vcam("a.png", "b.png", "-o", "out").stdout
-    assert "mean_s_cielab" in out and "out/" in out
+    assert "mean_s_cielab" in out
+    assert "out/" in out
     assert sorted(p.name for p in Path("out").iterdir()) == [
         "compare.csv", "compare.json", "s_cielab.exr", "s_cielab.png",
     ]  # fmt: skip
     with open("out/compare.csv", newline="") as file:
         rows = list(csv.reader(file))
-    assert rows[0] == ["metric", "value", "unit"] and [row[0] for row in rows[1:]] == METRICS
+    assert rows[0] == ["metric", "value", "unit"]
+    assert [row[0] for row in rows[1:]] == METRICS
     table = {name: float(value) for name, value, _ in rows[1:]}
     channels, _ = read_exr("out/s_cielab.exr")
     values = channels["delta_e"]
@@ -169,7 +171,8 @@ def test_gray_with_color_alpha_and_negative_values() -> None:
     result = vcam("alpha.exr", "gray.exr")
     assert "alpha" in result.stderr
     quiet = vcam("alpha.exr", "gray.exr", "-q")
-    assert quiet.stderr == "" and quiet.stdout == result.stdout
+    assert quiet.stderr == ""
+    assert quiet.stdout == result.stdout
 
 
 @pytest.mark.parametrize("size", [(1, 1), (3, 200), (200, 3)])
@@ -208,4 +211,5 @@ def test_what_is_refused() -> None:
     for args, says in refused:
         result = vcam(*args, code=2)
         assert says in " ".join(result.stderr.replace("│", " ").split()), args
-        assert not result.stdout and "Traceback" not in result.stderr
+        assert not result.stdout
+        assert "Traceback" not in result.stderr

@@ -1,4 +1,4 @@
-"""Interrupts come where they can be taken, and wait where they would break something."""
+"""Interrupts are raised at once, and deferred where they would leave something half done."""
 
 import os
 import signal
@@ -6,7 +6,7 @@ import subprocess
 import sys
 import threading
 import time
-from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
@@ -15,21 +15,21 @@ from making import tree
 from pydantic import BaseModel, field_serializer
 from pydantic_core import PydanticSerializationError
 
-from vcam_cli.commands import interrupts
+from vcam_cli import interrupts
+from vcam_cli.parallel import ThreadPool
 
 
 def environment():
-    return os.environ | {"PYTHONPATH": str(Path(interrupts.__file__).parents[2])}
+    return os.environ | {"PYTHONPATH": str(Path(interrupts.__file__).parents[1])}
 
 
 @pytest.fixture(autouse=True)
 def handlers():
     """Those of the tests' own process, put back."""
-    former = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGALRM)}
+    former = signal.getsignal(signal.SIGINT)
     signal.signal(signal.SIGINT, signal.default_int_handler)
     yield
-    for number, handler in former.items():
-        signal.signal(number, handler)
+    signal.signal(signal.SIGINT, former)
 
 
 class Model(BaseModel):
@@ -50,44 +50,44 @@ def wait():
         time.sleep(0.001)
 
 
-def test_it_comes_at_once_where_it_may():
-    with pytest.raises(KeyboardInterrupt), interrupts.waiting():
+def test_it_is_raised_at_once():
+    with pytest.raises(KeyboardInterrupt), interrupts.raise_interrupts():
         signal.raise_signal(signal.SIGINT)
         pytest.fail("it did not come")
 
 
-def test_it_waits_for_a_model_that_is_written():
+def test_it_is_no_error_of_a_model_that_is_written():
     with pytest.raises(PydanticSerializationError):  # what would be taken for a bug
         Model().model_dump(mode="json")
-    with pytest.raises(KeyboardInterrupt), interrupts.waiting():
+    with pytest.raises(KeyboardInterrupt), interrupts.raise_interrupts():
         assert Model().model_dump(mode="json") == {"width": "1.0 um"}
         wait()
 
 
-def test_it_comes_again_where_python_drops_it(capfd):
+def test_it_is_raised_again_where_python_drops_it(capfd):
     class Gone:
         def __del__(self):
             signal.raise_signal(signal.SIGINT)
 
-    with pytest.raises(KeyboardInterrupt), interrupts.waiting():
+    with pytest.raises(KeyboardInterrupt), interrupts.raise_interrupts():
         gone = [Gone()]
         gone.clear()  # nobody called what is interrupted here
         wait()
     assert "ignored" not in capfd.readouterr().err
 
 
-def test_other_losses_are_still_told(capfd):
+def test_other_errors_that_python_drops_are_reported(capfd):
     class Gone:
         def __del__(self):
             raise ZeroDivisionError
 
-    with interrupts.waiting():
+    with interrupts.raise_interrupts():
         gone = [Gone()]
         gone.clear()
     assert "ZeroDivisionError" in capfd.readouterr().err
 
 
-def test_it_waits_for_a_module_that_is_loaded(tmp_path, monkeypatch):
+def test_it_is_no_error_of_a_module_that_is_loaded(tmp_path, monkeypatch):
     (tmp_path / "interrupted_module.py").write_text(
         "import signal\n"
         "class Name:\n"
@@ -96,7 +96,7 @@ def test_it_waits_for_a_module_that_is_loaded(tmp_path, monkeypatch):
         "    name = Name()\n"
     )
     monkeypatch.syspath_prepend(tmp_path)
-    with pytest.raises(KeyboardInterrupt), interrupts.waiting():
+    with pytest.raises(KeyboardInterrupt), interrupts.raise_interrupts():
         import interrupted_module
 
         assert interrupted_module.Named
@@ -117,41 +117,85 @@ def test_threads_have_ended_before_it_is_handled(monkeypatch):
         done.set()
 
     monkeypatch.setattr(threading.Thread, "start", interrupted)
-    with pytest.raises(KeyboardInterrupt), interrupts.waiting():
-        with ThreadPoolExecutor(1) as pool:
+    with pytest.raises(KeyboardInterrupt), interrupts.raise_interrupts():
+        with ThreadPool(1) as pool:
             pool.submit(work).result()
         wait()
     assert done.is_set()
 
 
-@pytest.mark.parametrize("name", ["/x/vcam_cli/files/folder.py", "/x/tempfile.py", "/x/other.py"])
-def test_where_it_waits(name):
-    place = {"may": lambda: interrupts._may_come(sys._getframe())}
-    exec(compile("came = may()", name, "exec"), place)
-    assert place["came"] == name.endswith("other.py")
+def test_it_is_deferred_to_the_end_of_the_outer_context():
+    reached = []
+    with pytest.raises(KeyboardInterrupt), interrupts.raise_interrupts():
+        with interrupts.defer_interrupts():
+            with interrupts.defer_interrupts():
+                signal.raise_signal(signal.SIGINT)
+                reached.append("inner")
+            reached.append("outer")
+        reached.append("after")
+    assert reached == ["inner", "outer"]
 
 
-def test_none_comes_after_the_end():
-    with interrupts.waiting():
+def test_it_is_deferred_where_the_context_ends_with_an_error():
+    with (
+        pytest.raises(KeyboardInterrupt),
+        interrupts.raise_interrupts(),
+        interrupts.defer_interrupts(),
+    ):
+        signal.raise_signal(signal.SIGINT)
+        raise ZeroDivisionError
+
+
+def test_other_threads_defer_nothing():
+    with pytest.raises(KeyboardInterrupt), interrupts.raise_interrupts():
+        entered, leave = threading.Event(), threading.Event()
+
+        def deferring():
+            with interrupts.defer_interrupts():
+                entered.set()
+                leave.wait()
+
+        with ThreadPool(1) as pool:
+            pool.submit(deferring)
+            entered.wait()
+            try:
+                signal.raise_signal(signal.SIGINT)
+                pytest.fail("it was deferred")
+            finally:
+                leave.set()
+
+
+def test_errors_before_and_after_an_interrupt_stay_what_they_are():
+    with pytest.raises(ZeroDivisionError), interrupts.raise_interrupts():
+        raise ZeroDivisionError
+    signal.signal(signal.SIGINT, signal.default_int_handler)
+    with pytest.raises(ZeroDivisionError), interrupts.raise_interrupts():
+        with suppress(KeyboardInterrupt), interrupts.restore_interrupt():
+            signal.raise_signal(signal.SIGINT)
+        raise ZeroDivisionError
+
+
+def test_none_is_raised_after_the_end():
+    with interrupts.raise_interrupts():
         pass
     signal.raise_signal(signal.SIGINT)
 
 
-@pytest.mark.parametrize("context", [interrupts.waiting, interrupts.at_once])
-def test_a_job_in_the_background_stays_deaf(context):
+@pytest.mark.parametrize("context", [interrupts.raise_interrupts, interrupts.exit_on_interrupt])
+def test_a_job_in_the_background_ignores_it(context):
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     with context():
         signal.raise_signal(signal.SIGINT)
     assert signal.getsignal(signal.SIGINT) == signal.SIG_IGN
 
 
-def test_at_once_ends_the_process_and_its_end_puts_the_handler_back():
+def test_an_interrupted_start_ends_the_process_and_its_end_restores_the_handler():
     code = (
         "import signal\n"
-        "from vcam_cli.commands.interrupts import at_once\n"
-        "with at_once(): pass\n"
+        "from vcam_cli.interrupts import exit_on_interrupt\n"
+        "with exit_on_interrupt(): pass\n"
         "assert signal.getsignal(signal.SIGINT) is signal.default_int_handler\n"
-        "with at_once(): signal.raise_signal(signal.SIGINT)"
+        "with exit_on_interrupt(): signal.raise_signal(signal.SIGINT)"
     )
     line = [sys.executable, "-c", code]
     done = subprocess.run(line, env=environment(), capture_output=True)
@@ -175,5 +219,6 @@ def test_a_run_that_is_interrupted_while_it_loads_its_writers(tmp_path):
         line, env=environment(), cwd=tmp_path, capture_output=True, text=True, timeout=300
     )
     assert (done.returncode, done.stdout) == (130, ""), done
-    assert done.stderr.startswith("interrupted; ") and len(done.stderr.splitlines()) == 1
+    assert done.stderr.startswith("interrupted; ")
+    assert len(done.stderr.splitlines()) == 1
     assert [p.name for p in tmp_path.iterdir()] == ["camera.yaml"]

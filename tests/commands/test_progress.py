@@ -12,8 +12,8 @@ import pytest
 
 import vcam_cli
 from vcam_cli.commands import progress
-from vcam_cli.commands.progress import Progress, in_words
-from vcam_cli.engine.stages import Stages
+from vcam_cli.commands.progress import Progress, time_left_text
+from vcam_cli.progress import Stages
 
 AT_ONCE = "from vcam_cli.commands import main, progress; progress.AFTER = 0; main.main()"
 """vcam with a bar that does not wait two seconds."""
@@ -63,13 +63,17 @@ def on_a_terminal(folder: Path, *args: str, code: str = AT_ONCE, **env: str) -> 
     return out, said.decode()
 
 
+@pytest.mark.long
 def test_a_bar_on_the_terminal_and_results_in_the_pipe(tmp_path):
     out, said = on_a_terminal(tmp_path)
-    assert "\x1b[" in said and "━" in said
+    assert "\x1b[" in said
+    assert "━" in said
     assert any(words in said for words in progress.WORDS.values())
     assert "left" in said or "a little longer" in said
-    assert "\x1b" not in out and "━" not in out
-    assert "mean_electrons" in out and "out/small/render.png" in out
+    assert "\x1b" not in out
+    assert "━" not in out
+    assert "mean_electrons" in out
+    assert "out/small/render.png" in out
     assert said.rstrip().endswith("\x1b[2K"), "the bar is wiped away at the end"
 
 
@@ -79,6 +83,7 @@ def test_json_stays_one_document_beside_the_bar(tmp_path):
     assert "━" in said
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("args", "env"),
     [([], {"NO_COLOR": "1"}), ([], {"TERM": "dumb"}), (["-q"], {})],
@@ -97,27 +102,29 @@ def test_a_short_run_draws_nothing_and_does_not_load_what_draws(tmp_path):
         " import sys; main.main()",
     )
     out, said = on_a_terminal(tmp_path, code=code)
-    assert said == "" and out.splitlines()[-1] == "False"
+    assert said == ""
+    assert out.splitlines()[-1] == "False"
 
 
 def test_no_bar_without_a_terminal(monkeypatch):
     """stderr is a pipe or a file under test."""
     monkeypatch.setenv("TERM", "xterm")
     monkeypatch.delenv("NO_COLOR", raising=False)
-    assert not progress.wanted()
+    assert not progress.may_draw()
     monkeypatch.setattr(sys.stderr, "isatty", lambda: True, raising=False)
-    assert progress.wanted() and not progress.wanted(quiet=True)
+    assert progress.may_draw()
+    assert not progress.may_draw(quiet=True)
     monkeypatch.setenv("NO_COLOR", "")
-    assert progress.wanted(), "set but empty means nothing: https://no-color.org"
+    assert progress.may_draw(), "set but empty means nothing: https://no-color.org"
 
 
 def test_what_was_foretold_runs_down():
     bar = Progress(quiet=True)
     start = bar._start
-    assert bar.left(start + 1) is None, "nothing is known yet"
+    assert bar.seconds_left(start + 1) is None, "nothing is known yet"
     bar.expect(10)
-    assert bar.left(start + 4) == pytest.approx(6)
-    assert bar.left(start + 11) is None, "overdue"
+    assert bar.seconds_left(start + 4) == pytest.approx(6)
+    assert bar.seconds_left(start + 11) is None, "overdue"
 
 
 def test_steps_tell_more_than_what_was_foretold():
@@ -126,11 +133,11 @@ def test_steps_tell_more_than_what_was_foretold():
     bar.begin("irradiance")
     start = bar._stage_start
     bar.step(0, 41)
-    assert bar.left(start) == pytest.approx(1000, abs=1e-3)
+    assert bar.seconds_left(start) == pytest.approx(1000, abs=1e-3)
     bar.step(10, 40)
-    assert bar.left(start + 5) == pytest.approx(15)
+    assert bar.seconds_left(start + 5) == pytest.approx(15)
     bar.begin("files")
-    assert bar.left(bar._stage_start + 5) > 100, "the steps were of the stage before"
+    assert bar.seconds_left(bar._stage_start + 5) > 100, "the steps were of the stage before"
 
 
 def test_stages_tell_their_observer():
@@ -168,4 +175,4 @@ def test_stages_tell_their_observer():
     ],
 )
 def test_time_left_in_words(left, words):
-    assert in_words(left) == words
+    assert time_left_text(left) == words

@@ -21,12 +21,12 @@ import pytest
 from typer.testing import CliRunner
 
 import vcam_cli
-from vcam_cli.camera import shipped
 from vcam_cli.camera.load import load
 from vcam_cli.commands import main
+from vcam_cli.config import shipped
 from vcam_cli.errors import CannotDo
 from vcam_cli.files.folder import OutputFolder
-from vcam_cli.studies.simulate import simulate
+from vcam_cli.simulation.simulate import simulate
 
 VCAM = [sys.executable, "-m", "vcam_cli.commands.main"]
 
@@ -128,7 +128,8 @@ class TestFiles:
         data, spec = image("out/small/raw.exr")
         expected = simulate(load("small.yaml"))
         assert spec.channelnames == ("dn", "electrons", "volts")
-        assert spec.format == oiio.FLOAT and not spec.channelformats
+        assert spec.format == oiio.FLOAT
+        assert not spec.channelformats
         assert spec.get_string_attribute("compression") in ("zip", "zips", "piz", "rle", "none")
         assert data.shape == (150, 20, 3)
         assert np.array_equal(data[:, :, 0], expected.dn)
@@ -171,13 +172,15 @@ class TestFiles:
     def test_the_render_of_a_mosaic_is_rgb(self):
         vcam()
         data, spec = image("out/small/render.png")
-        assert spec.channelnames == ("R", "G", "B") and spec.format == oiio.UINT8
+        assert spec.channelnames == ("R", "G", "B")
+        assert spec.format == oiio.UINT8
         assert np.array_equal(data, simulate(load("small.yaml")).render)
 
     def test_the_render_of_a_monochrome_array_is_gray(self):
         vcam(*sets("array.pattern=monochrome"))
         data, spec = image("out/small/render.png")
-        assert spec.nchannels == 1 and spec.format == oiio.UINT8
+        assert spec.nchannels == 1
+        assert spec.format == oiio.UINT8
         camera = load("small.yaml", ["array.pattern=monochrome"])
         assert np.array_equal(data[:, :, 0], simulate(camera).render)
         assert {a.name: a.value for a in image("out/small/raw.exr")[1].extra_attribs}[
@@ -199,7 +202,7 @@ class TestFiles:
 
     def test_irradiance_in_the_spectral_layout(self):
         """A channel for every 10 nm, the wavelength in its name; the numbers of the engine."""
-        from vcam_cli.engine import irradiance
+        from vcam_cli.simulation import spectral_irradiance
 
         vcam(*sets("output.irradiance=true"))
         data, spec = image("out/small/irradiance.exr")
@@ -208,7 +211,7 @@ class TestFiles:
         assert said["emissiveUnits"] == "W.m^-2.nm^-1"
         assert spec.channelnames == tuple(f"S0.{w},000000nm" for w in range(380, 781, 10))
         frame = simulate(load("small.yaml")).frame
-        for channel, plane in enumerate(irradiance.planes(frame, 1)):
+        for channel, plane in enumerate(spectral_irradiance.planes(frame, 1)):
             np.testing.assert_allclose(data[:, :, channel], plane * 1e-9, rtol=2e-6)
         assert "irradiance.exr" in record()["files"]
         assert record()["stages"]["irradiance"] > 0
@@ -217,7 +220,8 @@ class TestFiles:
         options = sets("adc.kind=logarithmic", "output.raw=[dn, volts]")
         vcam(*options)
         said = {a.name: a.value for a in image("out/small/raw.exr")[1].extra_attribs}
-        assert said["vcam:adc"] == "logarithmic" and "vcam:electronsPerDN" not in said
+        assert said["vcam:adc"] == "logarithmic"
+        assert "vcam:electronsPerDN" not in said
         full, bend, offset = (said[f"vcam:adc{k}"] for k in ("FullScale", "Reference", "Offset"))
         assert (full, bend) == (pytest.approx(1.0), pytest.approx(1e-3))  # V
         volts = raw()["volts"].astype(float)
@@ -235,7 +239,8 @@ class TestFiles:
         data, spec = image("out/small/ideal.exr")
         expected = simulate(load("small.yaml", options))
         names = ("R", "G", "B") if pattern == "bayer-rggb" else ("Y",)
-        assert spec.channelnames == names and spec.format == oiio.FLOAT
+        assert spec.channelnames == names
+        assert spec.format == oiio.FLOAT
         assert np.array_equal(data, expected.ideal)
         found = {name: (float(value), unit) for name, value, unit in metrics()[1:]}
         error = np.mean((expected.linear.astype(float) - expected.ideal) ** 2)
@@ -319,7 +324,8 @@ class TestRecord:
             "reset_noise", "read_noise", "fpn", "saturation", "quantization",
         }  # fmt: skip
         assert set(run["plan"]) == {"effects", "settings", "seconds", "memory_bytes"}
-        assert run["plan"]["memory_bytes"] > 0 and run["plan"]["settings"]["tolerance"] == 0.005
+        assert run["plan"]["memory_bytes"] > 0
+        assert run["plan"]["settings"]["tolerance"] == 0.005
 
     def test_the_geometry(self, run):
         geometry = run["geometry"]
@@ -388,7 +394,7 @@ class TestSummary:
         for name in ("render.png", "raw.exr", "ideal.exr"):
             assert f"out/small/{name}" in said
         assert "delta_e.png" not in said
-        assert f"{plan['seconds']:.2f} s were foretold" in said
+        assert f"{plan['seconds']:.2f} s were estimated" in said
         took = sum(record()["stages"].values())
         assert f"{took:.2f} s" in said
         assert max(map(len, said.splitlines())) <= 100
@@ -503,7 +509,8 @@ class TestOptions:
         said = os.read(control, 1 << 16)
         os.close(control)
         assert run.returncode == 2
-        assert b"pixel.widht" in said and b"\x1b" not in said
+        assert b"pixel.widht" in said
+        assert b"\x1b" not in said
 
 
 class TestOutputFolder:
@@ -533,12 +540,13 @@ class TestOutputFolder:
         Path("out/small/raw.exr").mkdir()
         before = contents("out")
         assert "raw.exr is there already" in vcam("--seed", "2", code=2).stderr
-        assert contents("out") == before and "small/run.json" in before
+        assert contents("out") == before
+        assert "small/run.json" in before
 
     @pytest.mark.skipif(sys.platform == "darwin", reason="names are text there")
     def test_names_that_are_no_text(self, folder, monkeypatch):
         """Refused for results, which OpenImageIO could not write; all right around them."""
-        monkeypatch.setattr("vcam_cli.studies.simulate.simulate", pytest.fail)
+        monkeypatch.setattr("vcam_cli.simulation.simulate.simulate", pytest.fail)
         (line,) = vcam("-o", "o/b\udcffad", code=2).stderr.splitlines()
         assert "is no folder name: is not UTF-8; choose another folder" in line
         assert not Path("o").exists()
@@ -554,7 +562,8 @@ class TestOutputFolder:
         Path("mine").mkdir()
         Path("mine/raw.exr").write_text("mine")
         result = vcam("-o", "mine", code=2)
-        assert result.stdout == "" and "mine is not empty" in result.stderr
+        assert result.stdout == ""
+        assert "mine is not empty" in result.stderr
         assert contents("mine") == {"raw.exr": b"mine"}
 
     def test_a_folder_in_use_is_refused(self):
@@ -591,9 +600,10 @@ class TestFailures:
         def fail(*_):
             raise error
 
-        monkeypatch.setattr("vcam_cli.studies.outputs.write_metrics", fail)
+        monkeypatch.setattr("vcam_cli.simulation.outputs.write_metrics", fail)
         result = vcam("--seed", "2", code=code)
-        assert result.stdout == "" and len(result.stderr.splitlines()) == 1
+        assert result.stdout == ""
+        assert len(result.stderr.splitlines()) == 1
         assert contents() == before
         assert Path("out").exists() == (where == "old")
 
@@ -640,7 +650,9 @@ def picture(path: str, data: list, alpha: bool = False) -> None:
     if alpha:
         spec.alpha_channel = codes.shape[2] - 1
     out = oiio.ImageOutput.create(path)
-    assert out.open(path, spec) and out.write_image(codes) and out.close()
+    assert out.open(path, spec)
+    assert out.write_image(codes)
+    assert out.close()
 
 
 QUIET = sets(
@@ -726,7 +738,8 @@ class TestImageFiles:
         picture("color.png", [[[255, 0, 0]] * 4] * 4)
         still("{kind: image, file: color.png, model: reflectance}", "{rows: 4, columns: 4}")
         result = vcam(code=2)
-        assert result.stderr.startswith("small.yaml:3:") and "laser" in result.stderr
+        assert result.stderr.startswith("small.yaml:3:")
+        assert "laser" in result.stderr
         assert not Path("out").exists()
 
     def test_an_input_is_never_replaced(self):

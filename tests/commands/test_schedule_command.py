@@ -6,11 +6,11 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from vcam_cli.camera import shipped
+from vcam_cli.capture_schedules import study as module
 from vcam_cli.commands.main import app
+from vcam_cli.config import shipped
 from vcam_cli.errors import CannotDo
-from vcam_cli.files import pdf_plots, schedule_plots
-from vcam_cli.studies import schedule as module
+from vcam_cli.files import plots
 
 SHIPPED = [
     name
@@ -29,8 +29,7 @@ targets: [1.7, 3]
 @pytest.fixture(autouse=True)
 def folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    for plots in (schedule_plots, pdf_plots):
-        monkeypatch.setattr(plots, "write", lambda path, *_: Path(path).write_bytes(b"png"))
+    monkeypatch.setattr(plots, "save", lambda _, path: Path(path).write_bytes(b"png"))
     Path("study.yaml").write_text(STUDY, "utf-8")
     return tmp_path
 
@@ -44,11 +43,16 @@ def vcam(*args, code=0):
 def test_a_person_reads_gains_certificates_and_times():
     text = vcam("schedule", "study.yaml").stdout
     head, *lines = text.splitlines()
-    assert head.split("  ")[0] == "method" and "upper bound" in head and "gap" in head
+    assert head.split("  ")[0] == "method"
+    assert "upper bound" in head
+    assert "gap" in head
     optimal = next(line.split() for line in lines if line.startswith("optimal") and " 10 " in line)
-    assert optimal[1:4] == ["10", "1.7222", "2"] and float(optimal[4]) <= 1e-6
+    assert optimal[1:4] == ["10", "1.7222", "2"]
+    assert float(optimal[4]) <= 1e-6
     uniform = next(line for line in lines if line.startswith("uniform") and " 10 " in line)
-    assert " - " in uniform and "-0." in uniform and " dB" in uniform
+    assert " - " in uniform
+    assert "-0." in uniform
+    assert " dB" in uniform
     assert any(line.strip().startswith("2: 1.0000  2.0000") for line in lines)
     assert "a gain of 1.7 takes 10 captures, which gain 1.7222" in text
     assert "a gain of 3 is out of reach: no number of captures gains more than 2" in text
@@ -58,10 +62,12 @@ def test_a_person_reads_gains_certificates_and_times():
 
 def test_json_is_all_there_is_on_stdout():
     told = json.loads(vcam("schedule", "study.yaml", "--json", "-o", "x").stdout)
-    assert told["name"] == "study" and told["out"] == "x"
+    assert told["name"] == "study"
+    assert told["out"] == "x"
     assert [row["gap"] is None for row in told["summary"]] == [False, False, True, True]
     assert [row["capture"] for row in told["schedule"][:3]] == [1, 2, 1]
-    assert told["targets"][0]["count"] == 10 and told["targets"][1]["possible"] is False
+    assert told["targets"][0]["count"] == 10
+    assert told["targets"][1]["possible"] is False
 
 
 def test_times_of_a_sensor_are_in_ms():
@@ -100,16 +106,16 @@ def test_what_a_failed_study_finds_stays(monkeypatch):
     def interrupted(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(module, "find", interrupted)
+    monkeypatch.setattr(module, "find_schedules", interrupted)
     assert "interrupted" in vcam("schedule", "study.yaml", code=130).stderr
     assert {p.name: p.read_bytes() for p in Path("out/study").iterdir()} == before
 
 
 def test_a_full_disk_ends_with_3(monkeypatch):
-    def full(path, *_):
+    def full(_, path):
         raise CannotDo(f"cannot write {path}: the disk is full", "free some space")
 
-    monkeypatch.setattr(schedule_plots, "write", full)
+    monkeypatch.setattr(plots, "save", full)
     assert "the disk is full" in vcam("schedule", "study.yaml", code=3).stderr
     assert not Path("out").exists()
 
@@ -152,4 +158,5 @@ def test_each_without_frames_runs():
 
 
 def test_there_are_several():
-    assert "captures" in SHIPPED and len(SHIPPED) >= 4
+    assert "captures" in SHIPPED
+    assert len(SHIPPED) >= 4

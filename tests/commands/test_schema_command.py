@@ -5,8 +5,9 @@ import json
 import pytest
 from typer.testing import CliRunner
 
-from vcam_cli.camera.schema import schemas, text
 from vcam_cli.commands.main import app
+from vcam_cli.commands.schemas import schemas
+from vcam_cli.config.schema import text
 
 
 @pytest.fixture

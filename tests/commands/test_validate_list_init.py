@@ -10,9 +10,9 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from vcam_cli.camera import shipped
 from vcam_cli.camera.load import load
 from vcam_cli.commands import list_, main, options
+from vcam_cli.config import shipped
 from vcam_cli.errors import BadInput, CannotDo, bad
 
 VCAM = [sys.executable, "-m", "vcam_cli.commands.main"]
@@ -104,7 +104,7 @@ class TestMain:
         ],
     )
     def test_failures_become_messages_and_exit_codes(self, error, code, said, capsys):
-        with pytest.raises(typer.Exit) as caught, main.failures_told():
+        with pytest.raises(typer.Exit) as caught, main.report_failures():
             raise error
         assert caught.value.exit_code == code
         out, err = capsys.readouterr()
@@ -229,7 +229,8 @@ class TestValidate:
         result = vcam("validate", "a.yaml", "starter", "b.yaml", code=2)
         assert result.stdout == "starter: ok (starter)\n"
         first, second, third = result.stderr.splitlines()
-        assert first.startswith("a.yaml:2:16: pixel.widht: ") and "width" in first
+        assert first.startswith("a.yaml:2:16: pixel.widht: ")
+        assert "width" in first
         assert second.startswith("a.yaml:3:13: adc.bits: ")
         assert third.startswith("b.yaml:1:1: the file is empty")
 
@@ -265,7 +266,7 @@ class TestValidate:
         def refuse(*_):
             raise CannotDo("a.yaml: cannot be read: Permission denied", "check its permissions")
 
-        monkeypatch.setattr("vcam_cli.studies.checks.load", refuse)
+        monkeypatch.setattr("vcam_cli.simulation.checks.load", refuse)
         assert "Permission denied" in vcam("validate", "a.yaml", code=3).stderr
 
     def test_it_writes_nothing(self, folder):
@@ -283,7 +284,9 @@ class TestList:
     def test_all(self):
         text = vcam("list").stdout
         assert [line.partition(":")[0] for line in text.splitlines()] == list(list_.KINDS)
-        assert "starter" in text and "dead-leaves" in text and "shot_noise" in text
+        assert "starter" in text
+        assert "dead-leaves" in text
+        assert "shot_noise" in text
 
     @pytest.mark.parametrize(
         ("kind", "name"),

@@ -15,22 +15,17 @@ from hypothesis import strategies as st
 from making import QUIET, camera, tree
 
 from vcam_cli import simulate
-from vcam_cli.camera.geometry import geometry
+from vcam_cli.camera.derived.geometry import geometry
 from vcam_cli.effects import aberration
-from vcam_cli.effects.aberration import (
-    Aberration,
-    DirectedBlur,
-    FieldBlur,
-    Lens,
-    PointSpread,
-    Share,
-    SymmetricBlur,
-)
-from vcam_cli.effects.base import Outlook
+from vcam_cli.effects.aberration import Aberration
+from vcam_cli.effects.base import SignalLevels
 from vcam_cli.effects.diffraction import Diffraction
+from vcam_cli.effects.field_blur import FieldBlur, ZoneWeight
+from vcam_cli.effects.point_spread import PointSpread
+from vcam_cli.effects.wavefront_blur import DirectedBlur, Lens, SymmetricBlur
 from vcam_cli.errors import BadInput
 from vcam_cli.physics import zernike
-from vcam_cli.studies.checks import load, read_lens
+from vcam_cli.simulation.checks import load, read_lens
 
 WAVES = Lens(working_f_number=4.0, diffracts=True)
 RAYS = Lens(working_f_number=4.0, diffracts=False)
@@ -41,7 +36,7 @@ WAVE = {"kind": "chart", "chart": "sinusoid", "frequency": "50 lp/mm", "contrast
 
 def made(folder, **changes):
     c = camera(folder, changes)
-    return Aberration.of(c, geometry(c))
+    return Aberration.from_camera(c, geometry(c))
 
 
 def of_optics(folder, **changes):
@@ -57,7 +52,8 @@ def spread(path, planes):
     data = np.atleast_3d(np.asarray(planes, np.float32))
     spec = oiio.ImageSpec(data.shape[1], data.shape[0], data.shape[2], "float")
     output = oiio.ImageOutput.create(str(path))
-    assert output.open(str(path), spec) and output.write_image(np.ascontiguousarray(data))
+    assert output.open(str(path), spec)
+    assert output.write_image(np.ascontiguousarray(data))
     assert output.close()
     return str(path)
 
@@ -92,7 +88,8 @@ def test_defocus_adds_to_the_wavefront(tmp_path):
     shift = -16 * math.sqrt(3) * geometry(c).working_f_number ** 2 * 1e-7
     both = of_optics(tmp_path, zernike={4: "0.1 um", 11: "0.1 um"}, defocus=f"{shift!r} m")
     terms = dict(both.terms)
-    assert terms[11] == pytest.approx(1e-7) and abs(terms.get(4, 0.0)) < 1e-20
+    assert terms[11] == pytest.approx(1e-7)
+    assert abs(terms.get(4, 0.0)) < 1e-20
 
 
 def test_without_diffraction_rays_remain(tmp_path):
@@ -100,9 +97,10 @@ def test_without_diffraction_rays_remain(tmp_path):
     assert made(tmp_path, **defocus).lens.diffracts
     for off in ({"optics.diffraction": False}, {"effects": {"diffraction": "off"}}):
         blur = made(tmp_path, **defocus, **off)
-        assert not blur.lens.diffracts and blur.cutoff(GREEN) == math.inf
+        assert not blur.lens.diffracts
+        assert blur.cutoff(GREEN) == math.inf
     assert made(tmp_path, **defocus).cutoff(GREEN) == pytest.approx(
-        Diffraction.of(camera(tmp_path, {}), geometry(camera(tmp_path, {}))).cutoff(GREEN)
+        Diffraction.from_camera(camera(tmp_path, {}), geometry(camera(tmp_path, {}))).cutoff(GREEN)
     )
 
 
@@ -114,8 +112,9 @@ def test_effects_can_be_compared_and_kept_in_sets(tmp_path):
         {"psf": {"file": spread(tmp_path / "p.exr", gaussian(2)), "pitch": "1 um"}},
     ):
         one, other = of_optics(tmp_path, **changes), of_optics(tmp_path, **changes)
-        assert one == other and len({one, other}) == 1
-        assert one.mean_error(Outlook(2.0, 1.0)) > 0
+        assert one == other
+        assert len({one, other}) == 1
+        assert one.mean_error(SignalLevels(2.0, 1.0)) > 0
         assert one.describe()
 
 
@@ -138,7 +137,7 @@ def test_contribution_is_the_largest_loss_of_contrast():
     """A quarter of a wave of defocus costs 20 % at most, the criterion of Rayleigh."""
     blur = SymmetricBlur(WAVES, zernike.defocus(8 * 16 * GREEN / 4, 4.0))
     loss = 1 - blur.otf(np.linspace(0, 0.99 * blur.cutoff(GREEN), 300), GREEN).min()
-    assert blur.mean_error(Outlook(100.0, 1.0)) == pytest.approx(100 * loss, rel=1e-3)
+    assert blur.mean_error(SignalLevels(100.0, 1.0)) == pytest.approx(100 * loss, rel=1e-3)
 
 
 # --- over the field ------------------------------------------------------------------------------
@@ -148,12 +147,12 @@ COMA = ((0.0, ()), (0.5, ((4, 1e-7), (8, 1e-7))), (0.8, ((8, 3e-7),)))
 
 def test_between_places_the_terms_are_straight():
     field = FieldBlur(WAVES, COMA, 1e-3)
-    assert field.at(0) == ()
-    assert dict(field.at(0.25)) == pytest.approx({4: 5e-8, 8: 5e-8})
-    assert dict(field.at(0.65)) == pytest.approx({4: 5e-8, 8: 2e-7})
-    assert dict(field.at(1.0)) == pytest.approx({8: 3e-7})
+    assert field.wavefront(0) == ()
+    assert dict(field.wavefront(0.25)) == pytest.approx({4: 5e-8, 8: 5e-8})
+    assert dict(field.wavefront(0.65)) == pytest.approx({4: 5e-8, 8: 2e-7})
+    assert dict(field.wavefront(1.0)) == pytest.approx({8: 3e-7})
     held = FieldBlur(WAVES, ((0.5, ((4, 1e-7),)),), 1e-3)
-    assert held.at(0) == held.at(1) == ((4, 1e-7),)
+    assert held.wavefront(0) == held.wavefront(1) == ((4, 1e-7),)
 
 
 @given(
@@ -203,7 +202,7 @@ def test_zones_of_a_ring_are_one_wavefront_turned():
     outer = [zone for zone in zones if zone.weight.place == 1.0]
     assert len(outer) == outer[0].weight.around >= 12
     assert {zone.blur.terms for zone in outer} == {((8, 3e-7),)}
-    turned = DirectedBlur(WAVES, zernike.turned(((8, 3e-7),), math.pi / 2))
+    turned = DirectedBlur(WAVES, zernike.rotate(((8, 3e-7),), math.pi / 2))
     quarter = outer[len(outer) // 4].blur
     difference = turned.otf_plane(F, F, GREEN) - quarter.otf_plane(F, F, GREEN)
     assert np.abs(difference).max() < 1e-3  # two grids, each good to 1e-4 of full contrast
@@ -215,7 +214,7 @@ def test_zones_of_a_ring_are_one_wavefront_turned():
 def test_weights_keep_the_type_of_their_places():
     for kind in (np.float32, np.float64):
         at = np.linspace(-1e-3, 1e-3, 7, dtype=kind)
-        assert Share(((0.0, 0.5, 1.0),), 0.5, 2, 8, 1e-3)(at, at).dtype == kind
+        assert ZoneWeight(((0.0, 0.5, 1.0),), 0.5, 2, 8, 1e-3)(at, at).dtype == kind
 
 
 @given(st.integers(2, 7), st.floats(-math.pi, math.pi), st.floats(0, 1))
@@ -242,7 +241,8 @@ def test_a_blur_is_its_model_mirrored_and_turned(terms):
         expected = blur.otf_plane(F, F, GREEN)
         found = model.otf_plane(F, F, GREEN)
         if mirrored:
-            assert 7 not in dict(terms) and 9 not in dict(terms)
+            assert 7 not in dict(terms)
+            assert 9 not in dict(terms)
             found = found[::-1]
         for _ in range(quarters):
             found = found[::-1].T  # at (fx, fy) what was at (fy, -fx)
@@ -257,7 +257,7 @@ def psf_of(folder, planes, pitch="1 um", **more):
     file = spread(folder / "spread.exr", planes)
     c = camera(folder, {"optics.psf": {"file": file, "pitch": pitch, **more}})
     c = c.with_samples(read_lens(c))
-    return Aberration.of(c, geometry(c))
+    return Aberration.from_camera(c, geometry(c))
 
 
 def test_a_gaussian_spread_has_a_gaussian_transfer(tmp_path):
@@ -292,7 +292,9 @@ def test_nothing_beyond_the_nyquist_frequency_of_the_file(tmp_path):
     blur = psf_of(tmp_path, gaussian(0.3, 9), pitch="2 um")
     f = np.array([0, 0.2499e6, 0.25e6, 1e6])
     found = blur.otf_plane(f, f, GREEN)
-    assert found[:2, :2].all() and not found[2:].any() and not found[:, 2:].any()
+    assert found[:2, :2].all()
+    assert not found[2:].any()
+    assert not found[:, 2:].any()
     assert found[0, 0] == pytest.approx(1, rel=1e-12)
     assert blur.cutoff(GREEN) == pytest.approx(math.sqrt(2) * 0.25e6)
 
@@ -316,10 +318,12 @@ def test_it_takes_the_place_of_diffraction(tmp_path):
     file = spread(tmp_path / "p.exr", gaussian(2))
     given_ = {"optics.psf": {"file": file, "pitch": "1 um"}}
     c = camera(tmp_path, given_)
-    assert Diffraction.of(c, geometry(c)) is None
-    assert isinstance(Aberration.of(c, geometry(c)), PointSpread), "before its file is read"
+    assert Diffraction.from_camera(c, geometry(c)) is None
+    assert isinstance(Aberration.from_camera(c, geometry(c)), PointSpread), (
+        "before its file is read"
+    )
     c = camera(tmp_path, given_ | {"effects": {"aberration": "off"}})
-    assert Diffraction.of(c, geometry(c)) is not None
+    assert Diffraction.from_camera(c, geometry(c)) is not None
 
 
 # --- in a run ------------------------------------------------------------------------------------
@@ -386,18 +390,22 @@ def mistake(folder, **changes):
 
 def test_mistakes_are_told(tmp_path):
     problem = mistake(tmp_path, zernike={8: "50 um"})
-    assert problem.path == ("optics", "zernike") and "wavelengths" in problem.message
+    assert problem.path == ("optics", "zernike")
+    assert "wavelengths" in problem.message
     assert "diffraction: false" in problem.remedy
     assert mistake(tmp_path, defocus="1 m").path == ("optics", "defocus")
     problem = mistake(tmp_path, zernike=[{"field": 0.5, 4: "1 um"}, {"field": 0.5, 8: "1 um"}])
-    assert problem.path == ("optics", "zernike", 1, "field") and "twice" in problem.message
+    assert problem.path == ("optics", "zernike", 1, "field")
+    assert "twice" in problem.message
     file = spread(tmp_path / "p.exr", gaussian(2))
     psf = {"file": file, "pitch": "1 um"}
     problem = mistake(tmp_path, psf=psf, defocus="1 um")
-    assert problem.path == ("optics", "defocus") and "psf: none" in problem.remedy
+    assert problem.path == ("optics", "defocus")
+    assert "psf: none" in problem.remedy
     assert mistake(tmp_path, psf=psf, zernike={4: "1 um"}).path == ("optics", "zernike")
     problem = mistake(tmp_path, psf=psf | {"wavelengths": ["450 nm", "550 nm"]})
-    assert problem.path == ("optics", "psf", "file") and "lists 2" in problem.message
+    assert problem.path == ("optics", "psf", "file")
+    assert "lists 2" in problem.message
     problem = mistake(tmp_path, psf=psf | {"wavelengths": ["450 nm", "450 nm"]})
     assert problem.path == ("optics", "psf", "wavelengths", 1)
     bad = spread(tmp_path / "bad.exr", -gaussian(2))

@@ -17,20 +17,20 @@ import pytest
 from making import QUIET, camera, radiance_for
 
 from vcam_cli import simulate
-from vcam_cli.camera.geometry import geometry
-from vcam_cli.camera.settings import EFFECTS
+from vcam_cli.camera.derived.geometry import geometry
+from vcam_cli.camera.simulation import EFFECTS
 from vcam_cli.effects.base import (
     Charge,
-    Code,
-    Draw,
     Gain,
     Limit,
-    Outlook,
+    NoiseSource,
+    Quantizer,
     RadialTransfer,
     SeparableTransfer,
+    SignalLevels,
     Site,
     Transport,
-    Veil,
+    VeilingGlare,
 )
 from vcam_cli.effects.order import ORDER
 from vcam_cli.rng import stream
@@ -123,7 +123,7 @@ CASES: dict[str, Case] = {
     "quantization": Case({}, None),
 }
 
-DRAWS = [kind for kind in ORDER if issubclass(kind, Draw)]
+DRAWS = [kind for kind in ORDER if issubclass(kind, NoiseSource)]
 DARK = 40.0
 """Mean dark signal where noise is drawn [electrons]."""
 
@@ -137,7 +137,7 @@ def every(*bases: type) -> pytest.MarkDecorator:
 def effect_of(kind, folder, changes=None):
     """The effect with the numbers of the camera that has it (further changed)."""
     made = camera(folder, CASES[kind.name].has | (changes or {}))
-    return kind.of(made, geometry(made))
+    return kind.from_camera(made, geometry(made))
 
 
 def site(rows: int, columns: int, seed: int = 1, block: int = 0, dtype=np.float64) -> Site:
@@ -145,7 +145,7 @@ def site(rows: int, columns: int, seed: int = 1, block: int = 0, dtype=np.float6
     return Site(rows, columns, here, anywhere, dtype, DARK)
 
 
-def drawn(effect: Draw, mean: np.ndarray, where: Site) -> np.ndarray:
+def drawn(effect: NoiseSource, mean: np.ndarray, where: Site) -> np.ndarray:
     """A mean signal with a draw in it, before shot noise and after."""
     return effect.apply(effect.before_shot(mean, where), where)
 
@@ -160,14 +160,15 @@ def test_every_effect_is_in_the_battery():
 @every()
 def test_documented_with_a_reference(kind, tmp_path):
     module = sys.modules[kind.__module__]
-    assert module.__doc__ and kind.__doc__
+    assert module.__doc__
+    assert kind.__doc__
     assert module.__name__.endswith(f".{kind.name}"), "one effect, one file, one name"
     assert kind.name in EFFECTS, "the camera file can switch it"
     assert re.search(r"\d", kind.reference), "a reference names an equation, a section or a year"
     assert " " in kind.absent
     assert re.search(r"\d|equal", effect_of(kind, tmp_path).describe()), "a clause with numbers"
     # The aperture that a microlens makes stays, so its light must.
-    stays = issubclass(kind, Limit | Code) or kind.name == "microlens"
+    stays = issubclass(kind, Limit | Quantizer) or kind.name == "microlens"
     assert kind.removable == (not stays)
 
 
@@ -189,7 +190,9 @@ def test_switched_off_is_zero_strength_and_on_is_not(kind, tmp_path):
     scene = case.has | case.shows
     on = simulate(camera(tmp_path, scene))
     off = simulate(camera(tmp_path, scene | {"effects": {kind.name: "off"}}))
-    if not issubclass(kind, Code):  # the ADC makes codes of electrons, and leaves electrons alone
+    if not issubclass(
+        kind, Quantizer
+    ):  # the ADC makes codes of electrons, and leaves electrons alone
         assert on.electrons.tobytes() != off.electrons.tobytes()
     if case.none is not None:
         none = simulate(camera(tmp_path, scene | case.none))
@@ -239,7 +242,8 @@ def test_a_gain_is_a_pure_number_that_is_most_on_the_axis(kind, tmp_path):
         assert effect.on_axis == 1
     for dtype in (np.float32, np.float64):
         gain = effect.gain(np.linspace(-1e-4, 1e-4, 5, dtype=dtype), np.zeros(1, dtype))
-        assert gain.shape in ((1, 5), (1, 1)) and gain.dtype == dtype
+        assert gain.shape in ((1, 5), (1, 1))
+        assert gain.dtype == dtype
         # 32 bits: a polynomial good to 1e-7, in numbers good to 6e-8
         gain = np.broadcast_to(gain, (1, 5))
         assert gain[0, 2] == pytest.approx(effect.on_axis, abs=3e-7)
@@ -257,18 +261,19 @@ def test_charge_is_electrons_a_second(kind, tmp_path):
         np.testing.assert_allclose(on - off, rate * time, rtol=1e-9)
 
 
-@every(Draw, Limit, Code)
+@every(NoiseSource, Limit, Quantizer)
 def test_electrons_in_electrons_out(kind, tmp_path):
     """A draw, a limit or a code keeps shape and float type; a code gives whole numbers."""
     effect = effect_of(kind, tmp_path)
     for dtype in (np.float32, np.float64):
         electrons = np.full((3, 50), 500, dtype)
-        if issubclass(kind, Draw):
+        if issubclass(kind, NoiseSource):
             out = drawn(effect, electrons, site(3, 50, dtype=dtype))
         else:
             out = effect.apply(electrons)
-        assert out.shape == (3, 50) and out.dtype == dtype
-        if issubclass(kind, Code):
+        assert out.shape == (3, 50)
+        assert out.dtype == dtype
+        if issubclass(kind, Quantizer):
             assert np.array_equal(out, np.rint(out))
             # a step of the line is a step of the code
             step = np.array([0.0, effect.electrons_per_dn])
@@ -278,7 +283,7 @@ def test_electrons_in_electrons_out(kind, tmp_path):
 # --- variance ------------------------------------------------------------------------------------
 
 
-@every(Draw)
+@every(NoiseSource)
 @pytest.mark.parametrize("mean", [0.0, 0.4, 6.0, 30.0, 2e4])
 def test_stated_variance_is_the_measured_one(kind, mean, tmp_path):
     """One row of 200 000 pixels, so that draws per column are as many as those per pixel.
@@ -302,7 +307,7 @@ def test_stated_variance_is_the_measured_one(kind, mean, tmp_path):
 # --- contribution --------------------------------------------------------------------------------
 
 
-@every(RadialTransfer, SeparableTransfer, Gain, Veil, Charge, Transport, Draw)
+@every(RadialTransfer, SeparableTransfer, Gain, VeilingGlare, Charge, Transport, NoiseSource)
 def test_contribution_bounds_the_ablation(kind, tmp_path):
     """Leaving it out changes the mean raw by at most what the plan says it contributes.
 
@@ -318,11 +323,13 @@ def test_contribution_bounds_the_ablation(kind, tmp_path):
     change = np.minimum(on.mean_electrons, well) - np.minimum(off.mean_electrons, well)
     rms = float(np.sqrt(np.mean(np.square(change))))
     [decision] = [d for d in on.frame.plan.decisions if d.name == kind.name]
-    if issubclass(kind, Draw):
-        assert rms == 0 and decision.unit.endswith("variance")
+    if issubclass(kind, NoiseSource):
+        assert rms == 0
+        assert decision.unit.endswith("variance")
         return
     full = max(1.0, min(well, float(on.mean_electrons.max())))
-    assert decision.state == "on" and decision.unit == "of full signal"
+    assert decision.state == "on"
+    assert decision.unit == "of full signal"
     assert rms <= decision.contribution * full * (1 + 1e-6)
     assert rms >= decision.contribution * full / 3
 
@@ -330,7 +337,7 @@ def test_contribution_bounds_the_ablation(kind, tmp_path):
 # --- keys ----------------------------------------------------------------------------------------
 
 
-@every(Draw)
+@every(NoiseSource)
 def test_deterministic_under_its_key(kind, tmp_path):
     """Same seed and block, same bytes; another seed, or another block, other numbers."""
     effect = effect_of(kind, tmp_path)
@@ -344,7 +351,7 @@ def test_deterministic_under_its_key(kind, tmp_path):
     assert kind.scope in ("frame", "sensor")
 
 
-@every(Draw)
+@every(NoiseSource)
 def test_streams_carry_its_name(kind, tmp_path):
     """No two effects share a stream, so none can move another's numbers."""
     opened = []
@@ -355,7 +362,8 @@ def test_streams_carry_its_name(kind, tmp_path):
 
     where = Site(4, 8, recording, recording, np.float64, DARK)
     drawn(effect_of(kind, tmp_path), np.full((4, 8), 500.0), where)
-    assert opened and len(set(opened)) == len(opened)
+    assert opened
+    assert len(set(opened)) == len(opened)
     assert all(name.split()[0] == kind.name for name in opened)
 
 
@@ -377,7 +385,7 @@ def only(*names: str) -> dict[str, str]:
     return {kind.name: "on" if kind.name in names else "off" for kind in DRAWS}
 
 
-@every(Draw)
+@every(NoiseSource)
 def test_switching_one_off_leaves_the_draws_of_the_others(kind, tmp_path):
     """Each draw is what it is alone, added to the mean, in every block of rows of a whole frame.
 
@@ -401,7 +409,7 @@ def test_gain_noise_keeps_its_draws_when_light_is_noisy(tmp_path):
     np.testing.assert_allclose(both / light, quiet, rtol=1e-12)
 
 
-@every(Draw)
+@every(NoiseSource)
 def test_each_seed_moves_its_own_draws_only(kind, tmp_path):
     """Fixed patterns stay with the sensor when the frame changes; the rest is new."""
     alone = {"effects": only(kind.name)}
@@ -436,20 +444,22 @@ def test_finite_on_hostile_input(kind, dtype, tmp_path):
         results = [effect.gain(places, places)]
     elif isinstance(effect, Charge):
         results = [np.array(effect.rate())]
-    elif isinstance(effect, Veil):
+    elif isinstance(effect, VeilingGlare):
         results = [np.array(effect.fraction)]
         assert 0 < effect.fraction <= 1
     elif isinstance(effect, Transport):
-        results = [effect.moved(np.array([[-1e9, 0], [1e-30, 0.5], [1e6, 1e12]], dtype))]
+        results = [effect.transport(np.array([[-1e9, 0], [1e-30, 0.5], [1e6, 1e12]], dtype))]
     else:
         signal = np.array([[-1e9, -1.0, 0, 1e-30, 0.5, 7.9999, 8.0, 1e6, 1e12]], dtype)
-        if isinstance(effect, Draw):
+        if isinstance(effect, NoiseSource):
             results = [drawn(effect, signal, site(1, 9, dtype=dtype))]
         else:
             results = [effect.apply(signal)]
-        if isinstance(effect, Code):
-            assert results[0].min() >= 0 and results[0].max() <= 2**effect.bits - 1
+        if isinstance(effect, Quantizer):
+            assert results[0].min() >= 0
+            assert results[0].max() <= 2**effect.bits - 1
     for result in results:
         assert np.isfinite(result).all()
-    error = effect.mean_error(Outlook(full_signal=1.0, time=1e-12))
-    assert math.isfinite(error) and error >= 0
+    error = effect.mean_error(SignalLevels(full_signal=1.0, time=1e-12))
+    assert math.isfinite(error)
+    assert error >= 0

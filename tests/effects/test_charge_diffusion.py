@@ -10,7 +10,7 @@ import pytest
 from making import GONE, QUIET, camera
 
 from vcam_cli import simulate
-from vcam_cli.camera.geometry import geometry
+from vcam_cli.camera.derived.geometry import geometry
 from vcam_cli.effects.charge_diffusion import ChargeDiffusion
 from vcam_cli.errors import BadInput
 from vcam_cli.files.png import write_png

@@ -7,7 +7,7 @@ import pytest
 from making import QUIET, camera, radiance_for
 
 from vcam_cli import simulate
-from vcam_cli.effects.base import Outlook
+from vcam_cli.effects.base import SignalLevels
 from vcam_cli.effects.charge_transfer import ChargeTransfer
 
 RNG = np.random.default_rng(4)
@@ -48,15 +48,16 @@ def test_is_the_register_clocked_stage_by_stage(inefficiency, phases, dtype, tol
     32 bits: sums of some tens of numbers rounded to 6e-8."""
     signal = RNG.random((150, 21)).astype(dtype)
     effect = ChargeTransfer(inefficiency, phases, *signal.shape)
-    found = effect.moved(signal)
+    found = effect.transport(signal)
     expected = clocked(clocked(signal, inefficiency, phases).T, inefficiency, phases).T
-    assert found.dtype == dtype and found.shape == signal.shape
+    assert found.dtype == dtype
+    assert found.shape == signal.shape
     np.testing.assert_allclose(found, expected, rtol=0, atol=tolerance)
 
 
 def test_nothing_handed_in_is_changed():
     signal = np.ones((9, 7))
-    ChargeTransfer(0.1, 3, 9, 7).moved(signal)
+    ChargeTransfer(0.1, 3, 9, 7).transport(signal)
     assert np.all(signal == 1)
 
 
@@ -64,7 +65,7 @@ def test_a_single_packet_arrives_late_by_a_negative_binomial():
     """In a far corner: n successes of a chance 1 - e, and k failures before, down and along."""
     signal = np.zeros((60, 50))
     signal[39, 29] = 1.0
-    found = ChargeTransfer(2e-3, 3, 60, 50).moved(signal)
+    found = ChargeTransfer(2e-3, 3, 60, 50).transport(signal)
 
     def late(n: int, k: int) -> float:
         return math.comb(n + k - 1, k) * 2e-3**k * (1 - 2e-3) ** n
@@ -72,7 +73,8 @@ def test_a_single_packet_arrives_late_by_a_negative_binomial():
     for down, along in ((0, 0), (1, 0), (0, 1), (2, 3), (5, 4)):
         expected = late(120, down) * late(90, along)
         assert found[39 + down, 29 + along] == pytest.approx(expected, rel=1e-9)
-    assert not found[:39].any() and not found[:, :29].any()
+    assert not found[:39].any()
+    assert not found[:, :29].any()
 
 
 @pytest.mark.parametrize("inefficiency", [1e-5, 1e-3, 0.1])
@@ -81,11 +83,12 @@ def test_charge_is_conserved_but_for_what_comes_after_the_picture(inefficiency):
     signal = np.zeros((90, 90))
     signal[:8, :8] = RNG.random((8, 8))
     effect = ChargeTransfer(inefficiency, 3, 90, 90)
-    assert effect.moved(signal).sum() == pytest.approx(signal.sum(), rel=1e-8)
+    assert effect.transport(signal).sum() == pytest.approx(signal.sum(), rel=1e-8)
     full = np.ones((30, 30))
-    kept = ChargeTransfer(inefficiency, 3, 30, 30).moved(full)
+    kept = ChargeTransfer(inefficiency, 3, 30, 30).transport(full)
     assert kept.sum() < full.sum()
-    assert np.all(kept <= 1 + 1e-12) and np.all(kept > 0)
+    assert np.all(kept <= 1 + 1e-12)
+    assert np.all(kept > 0)
 
 
 @pytest.mark.parametrize("frequency", [1 / 32, 1 / 8, 1 / 4, 1 / 2])
@@ -98,7 +101,7 @@ def test_modulation_is_the_formula(frequency, inefficiency):
     phases, at, width = 3, 3000, 64
     k = np.arange(at + width)
     wave = (1 + np.cos(2 * np.pi * frequency * k))[:, None]
-    found = ChargeTransfer(inefficiency, phases, len(k), 1).moved(wave)[at:, 0]
+    found = ChargeTransfer(inefficiency, phases, len(k), 1).transport(wave)[at:, 0]
     # the one column is passed in three transfers, which only take from it
     found = found / (1 - inefficiency) ** phases
 
@@ -120,7 +123,7 @@ def test_electrons_that_are_late_one_by_one_are_poisson_of_the_moved_mean():
     """
     mean = np.array([40.0, 2, 90, 5, 60, 0, 25])
     taken = np.array([electrons_one_by_one(RNG.poisson(mean), 0.05, 3) for _ in range(4000)])
-    expected = ChargeTransfer(0.05, 3, 7, 1).moved(mean[:, None])[:, 0] / 0.95**3
+    expected = ChargeTransfer(0.05, 3, 7, 1).transport(mean[:, None])[:, 0] / 0.95**3
     n = len(taken)
     np.testing.assert_array_less(abs(taken.mean(0) - expected), 5 * np.sqrt(expected / n))
     error = 5 * expected * np.sqrt((2 + 1 / expected) / n)
@@ -132,10 +135,10 @@ def test_electrons_that_are_late_one_by_one_are_poisson_of_the_moved_mean():
 def test_bound_of_its_change():
     """No picture changes by more, rms; a checkered one by half of it, for half of it is bright."""
     effect = ChargeTransfer(1e-3, 3, 40, 60)
-    bound = effect.mean_error(Outlook(full_signal=1.0, time=1.0))
+    bound = effect.mean_error(SignalLevels(full_signal=1.0, time=1.0))
 
     def change(signal: np.ndarray) -> float:
-        return math.sqrt(np.mean((effect.moved(signal) - signal) ** 2))
+        return math.sqrt(np.mean((effect.transport(signal) - signal) ** 2))
 
     assert change(np.ones((40, 60))) <= bound
     assert change(RNG.random((40, 60))) <= bound
@@ -181,4 +184,5 @@ def test_the_plan_says_what_it_changes(tmp_path):
     [decision] = [d for d in on.frame.plan.decisions if d.name == "charge_transfer"]
     full = on.mean_electrons.max()
     assert decision.contribution == pytest.approx(change / full, rel=1e-6)
-    assert decision.unit == "of full signal" and "transfers" in decision.reason
+    assert decision.unit == "of full signal"
+    assert "transfers" in decision.reason

@@ -11,13 +11,13 @@ import pytest
 from making import BOLTZMANN, CHARGE, GONE, QUIET, camera, radiance_for
 
 from vcam_cli import simulate
-from vcam_cli.camera.geometry import geometry
-from vcam_cli.effects.base import Outlook
+from vcam_cli.camera.derived.geometry import geometry
+from vcam_cli.effects.base import SignalLevels
 from vcam_cli.effects.diffraction import Diffraction
 from vcam_cli.effects.fpn import FixedPattern
 from vcam_cli.effects.off_axis import OffAxis
 from vcam_cli.effects.pixel_aperture import PixelAperture
-from vcam_cli.effects.quantization import Logarithmic, Quantization
+from vcam_cli.effects.quantization import LogarithmicQuantization, Quantization
 from vcam_cli.effects.reset_noise import ResetNoise
 from vcam_cli.effects.saturation import Saturation
 
@@ -97,7 +97,7 @@ def test_a_photodetector_off_center_sees_the_wave_elsewhere(tmp_path):
 
 def test_aperture_has_the_size_of_the_photodetector(tmp_path):
     made = camera(tmp_path, {"pixel.height": "4 um", "pixel.photodetector.fill_factor": 0.25})
-    assert PixelAperture.of(made, geometry(made)) == PixelAperture(2.5e-6, 2e-6)
+    assert PixelAperture.from_camera(made, geometry(made)) == PixelAperture(2.5e-6, 2e-6)
 
 
 # --- off-axis ------------------------------------------------------------------------------------
@@ -163,7 +163,9 @@ def test_off_axis_bound_holds_for_wide_lenses(half_angle, tmp_path):
     falling = simulate(made).mean_electrons
     level = mean_of(tmp_path, **wide, **{"optics.off_axis": "none"})
     change = float(np.sqrt(np.mean((falling - level) ** 2)))
-    bound = OffAxis.of(made, geometry(made)).mean_error(Outlook(float(level.max()), 0.01))
+    bound = OffAxis.from_camera(made, geometry(made)).mean_error(
+        SignalLevels(float(level.max()), 0.01)
+    )
     assert 0.99 * bound <= change <= bound
 
 
@@ -308,7 +310,7 @@ def test_variance_of_the_fixed_pattern_adds_up():
 
 def reset(folder, **changes) -> ResetNoise:
     made = camera(folder, changes)
-    return ResetNoise.of(made, geometry(made))
+    return ResetNoise.from_camera(made, geometry(made))
 
 
 def test_reset_noise_of_five_femtofarads(tmp_path):
@@ -404,7 +406,7 @@ def by_hand(electrons: float, offset: float, bits: int) -> float:
 @pytest.mark.parametrize(("offset", "bits"), [(0.0, 8), (64.0, 12), (3.5, 10)])
 def test_a_logarithmic_code_is_the_formula(offset, bits, dtype):
     """Noise below zero included; float32 may round a half the other way, not more."""
-    adc = Logarithmic(offset, BEND, FULL, bits)
+    adc = LogarithmicQuantization(offset, BEND, FULL, bits)
     electrons = np.array([-49.0, -20.0, -0.3, 0.0, 0.3, 7.0, 50.0, 1234.5, 2e4, 3e4], dtype)
     exact = np.array([by_hand(float(e), offset, bits) for e in electrons])
     np.testing.assert_allclose(adc.line(electrons.copy()), exact, rtol=2e-6, atol=2e-3)
@@ -418,7 +420,7 @@ def test_a_logarithmic_code_is_the_formula(offset, bits, dtype):
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
 def test_a_logarithm_of_nothing_is_code_zero(dtype):
     """From -bend on the formula has no value; no warning, whatever the offset."""
-    adc = Logarithmic(254.0, BEND, FULL, 8)
+    adc = LogarithmicQuantization(254.0, BEND, FULL, 8)
     assert adc.apply(np.array([-50.0, -51.0, -1e9], dtype)).tolist() == [0, 0, 0]
     assert adc.apply(np.array([1e12, 1e30], dtype)).tolist() == [255, 255]
 
@@ -426,7 +428,10 @@ def test_a_logarithm_of_nothing_is_code_zero(dtype):
 @pytest.mark.parametrize("dtype", [np.float32, np.float64])
 def test_logarithmic_codes_are_made_linear_again(dtype):
     """The numbers of a linear ADC of the same offset and full scale."""
-    adc, straight = Logarithmic(16.0, BEND, FULL, 12), Quantization(16.0, FULL / (4095 - 16), 12)
+    adc, straight = (
+        LogarithmicQuantization(16.0, BEND, FULL, 12),
+        Quantization(16.0, FULL / (4095 - 16), 12),
+    )
     electrons = np.array([-40.0, 0.0, 1.0, 300.0, 2e4, 5e4], dtype)
     back = adc.linear(adc.line(electrons))
     assert back.dtype == dtype
@@ -437,7 +442,7 @@ def test_logarithmic_codes_are_made_linear_again(dtype):
 
 def test_a_bend_far_above_full_scale_is_a_linear_adc():
     """ln(1 + x) is x for small x: here to 1e-6 of it."""
-    bent = Logarithmic(10.0, 1e12, 1020.0, 8)
+    bent = LogarithmicQuantization(10.0, 1e12, 1020.0, 8)
     straight = Quantization(10.0, 1020 / 245, 8)
     electrons = np.linspace(-30.0, 1100, 500)
     np.testing.assert_allclose(bent.line(electrons), straight.line(electrons), rtol=1e-6)
@@ -446,13 +451,14 @@ def test_a_bend_far_above_full_scale_is_a_linear_adc():
 def test_which_adc_the_camera_has(tmp_path):
     """Full scale is the well; the bend is a thousandth of it, or where the file says."""
     adc = {"bits": 12, "kind": "logarithmic", "offset": "8 DN"}
-    found = Quantization.of(made := camera(tmp_path, {"adc": adc}), geometry(made))
-    assert isinstance(found, Logarithmic)
+    found = Quantization.from_camera(made := camera(tmp_path, {"adc": adc}), geometry(made))
+    assert isinstance(found, LogarithmicQuantization)
     assert (found.offset, found.bits) == (8, 12)
     assert found.full == pytest.approx(1e5, rel=1e-12)
     assert found.bend == pytest.approx(100, rel=1e-12)
     changes = {"adc": adc | {"reference": "4 mV", "full_scale": "1 V"}}
-    found = Quantization.of(made := camera(tmp_path, changes), geometry(made))
+    found = Quantization.from_camera(made := camera(tmp_path, changes), geometry(made))
     assert found.full == pytest.approx(1 / 20e-6, rel=1e-12)
     assert found.bend == pytest.approx(4e-3 / 20e-6, rel=1e-12)
-    assert "4096 codes" in found.describe() and "electrons a step" in found.describe()
+    assert "4096 codes" in found.describe()
+    assert "electrons a step" in found.describe()

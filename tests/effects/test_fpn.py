@@ -8,7 +8,7 @@ import pytest
 from making import QUIET, camera, radiance_for
 
 from vcam_cli import simulate
-from vcam_cli.camera.geometry import geometry
+from vcam_cli.camera.derived.geometry import geometry
 from vcam_cli.effects.base import Site
 from vcam_cli.effects.fpn import FixedPattern
 from vcam_cli.rng import stream
@@ -102,7 +102,8 @@ def within(count: int, fraction: float) -> bool:
 def test_hot_pixels_are_full_and_dead_ones_are_empty(tmp_path):
     found = frame(tmp_path, GRAY, DEFECTS, only("shot_noise", "fpn")).electrons
     hot, dead = found == WELL, found == 0
-    assert within(hot.sum(), 0.02) and within(dead.sum(), 0.05)
+    assert within(hot.sum(), 0.02)
+    assert within(dead.sum(), 0.05)
     rest = found[~hot & ~dead]
     assert rest.mean() == pytest.approx(5000, abs=5 * math.sqrt(5000 / len(rest)))
     assert rest.std() == pytest.approx(math.sqrt(5000), rel=5 / math.sqrt(2 * len(rest)))
@@ -193,7 +194,7 @@ def test_variance_of_defects_is_the_measured_one(hot, dead, mean):
 
 def test_defects_alone_are_a_fixed_pattern(tmp_path):
     made = camera(tmp_path, {"pixel.defects": {"hot": 1e-4}})
-    effect = FixedPattern.of(made, geometry(made))
+    effect = FixedPattern.from_camera(made, geometry(made))
     assert (effect.hot, effect.dead, effect.full_well) == (1e-4, 0, pytest.approx(WELL))
     assert "0.0100% of the pixels hot" in effect.describe()
 
@@ -218,5 +219,6 @@ def test_pictures_survive_defects(tmp_path):
             *({"white_balance": balance}, {"color_correction": "fit"}, {"gamma": "srgb"}),
         ]
         result = frame(tmp_path, scene, {"processing": steps})
-        assert np.isfinite(result.linear).all() and np.isfinite(result.electrons).all()
+        assert np.isfinite(result.linear).all()
+        assert np.isfinite(result.electrons).all()
         assert all(math.isfinite(value) for _, value, _ in result.metrics)

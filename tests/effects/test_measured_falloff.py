@@ -8,9 +8,9 @@ import pytest
 from making import QUIET, camera
 
 from vcam_cli import simulate
-from vcam_cli.camera.geometry import geometry
-from vcam_cli.effects.base import Outlook
-from vcam_cli.effects.off_axis import Measured, OffAxis
+from vcam_cli.camera.derived.geometry import geometry
+from vcam_cli.effects.base import SignalLevels
+from vcam_cli.effects.off_axis import MeasuredFalloff, OffAxis
 from vcam_cli.errors import BadInput
 
 ROWS = [(0.0, 2.0), (0.05, 1.9), (0.1, 1.2), (0.2, 0.8), (0.3, 0.0)]
@@ -35,10 +35,10 @@ def straight(height: float) -> float:
     raise ValueError(height)
 
 
-def effect_of(folder, rows=ROWS) -> Measured:
+def effect_of(folder, rows=ROWS) -> MeasuredFalloff:
     made = with_file(folder, table(rows))
-    effect = OffAxis.of(made, geometry(made))
-    assert isinstance(effect, Measured)
+    effect = OffAxis.from_camera(made, geometry(made))
+    assert isinstance(effect, MeasuredFalloff)
     return effect
 
 
@@ -50,7 +50,8 @@ def test_is_straight_between_the_points(dtype, tolerance, tmp_path):
     x = np.linspace(-1.6e-4, 1.6e-4, 41, dtype=dtype)
     y = np.linspace(-1.2e-4, 1.2e-4, 31, dtype=dtype)
     found = effect.gain(x, y)
-    assert found.dtype == dtype and found.shape == (31, 41)
+    assert found.dtype == dtype
+    assert found.shape == (31, 41)
     for i, j in ((0, 0), (15, 20), (15, 0), (3, 38), (30, 40), (7, 20)):
         height = 1e3 * math.hypot(float(x[j]), float(y[i]))
         assert found[i, j] == pytest.approx(straight(height), abs=tolerance)
@@ -85,7 +86,7 @@ def test_bound_of_its_change(tmp_path):
     effect = effect_of(tmp_path)
     x, y = (np.arange(64) - 31.5) * 5e-6, (np.arange(48) - 23.5) * 5e-6
     rms = math.sqrt(np.mean((effect.gain(x, y) - 1) ** 2))
-    bound = effect.mean_error(Outlook(full_signal=10.0, time=1.0))
+    bound = effect.mean_error(SignalLevels(full_signal=10.0, time=1.0))
     assert 10 * rms <= bound <= 10.1 * rms
 
 
@@ -111,7 +112,8 @@ def test_refuses_what_is_no_falloff(name, tmp_path):
         with_file(tmp_path, text)
     [problem] = caught.value.problems
     assert problem.path == ("optics", "off_axis", "file")
-    assert message in problem.message and remedy in problem.remedy
+    assert message in problem.message
+    assert remedy in problem.remedy
     assert "made.yaml:" in problem.where
 
 

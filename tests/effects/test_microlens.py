@@ -7,7 +7,7 @@ import pytest
 from making import QUIET, camera
 
 from vcam_cli import simulate
-from vcam_cli.camera.geometry import geometry, pixel_centers
+from vcam_cli.camera.derived.geometry import geometry, pixel_centers
 from vcam_cli.effects.microlens import Microlens
 
 STACK = {
@@ -145,6 +145,7 @@ def test_a_user_may_leave_it_out_and_the_plan_may_not(tmp_path):
 
 def test_what_it_says(tmp_path):
     made = camera(tmp_path, {"pixel.microlens": {"gain": 1.8}})
-    found = Microlens.of(made, geometry(made))
+    found = Microlens.from_camera(made, geometry(made))
     assert found.describe() == "collects 1.8 times the light, that of 90.000% of the pixel"
-    assert found.on_axis == pytest.approx(1.8) and math.isclose(found.share, 0.9)
+    assert found.on_axis == pytest.approx(1.8)
+    assert math.isclose(found.share, 0.9)

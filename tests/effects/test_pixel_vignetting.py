@@ -7,8 +7,8 @@ import pytest
 from making import QUIET, camera
 
 from vcam_cli import simulate
-from vcam_cli.camera.geometry import geometry, pixel_centers
-from vcam_cli.effects.base import Outlook
+from vcam_cli.camera.derived.geometry import geometry, pixel_centers
+from vcam_cli.effects.base import SignalLevels
 from vcam_cli.effects.pixel_vignetting import PixelVignetting, _series
 
 STACK = {
@@ -32,7 +32,7 @@ FIELDS = {
 
 def effect(folder, **changes) -> PixelVignetting:
     made = camera(folder, {key.replace("__", "."): value for key, value in changes.items()})
-    found = PixelVignetting.of(made, geometry(made))
+    found = PixelVignetting.from_camera(made, geometry(made))
     assert found is not None
     return found
 
@@ -61,7 +61,8 @@ def test_some_corners_are_dark(tmp_path):
     found = effect(tmp_path, **LARGE, **FIELDS["dark corners"])
     at = np.linspace(0, 1, 50)
     gain = found.gain(at * found.half_width, at * found.half_height)
-    assert np.mean(gain < 1e-3) > 0.1 and gain.min() >= 0
+    assert np.mean(gain < 1e-3) > 0.1
+    assert gain.min() >= 0
 
 
 def test_a_series_is_computed_once(tmp_path):
@@ -70,7 +71,7 @@ def test_a_series_is_computed_once(tmp_path):
     places = np.zeros(3)
     first.gain(places, places)
     again.gain(places, places)
-    again.mean_error(Outlook(1.0, 1.0))
+    again.mean_error(SignalLevels(1.0, 1.0))
     assert _series.cache_info().misses == 1
 
 
@@ -92,7 +93,7 @@ def test_a_quantum_efficiency_of_the_silicon_loses_the_reflected_light_as_well(i
 
 def test_nothing_but_a_stack_gives_it(tmp_path):
     made = camera(tmp_path, {"optics.exit_pupil_distance": "1 mm"})
-    assert PixelVignetting.of(made, geometry(made)) is None
+    assert PixelVignetting.from_camera(made, geometry(made)) is None
 
 
 def test_layers_like_air_without_depth_take_nothing(tmp_path):
@@ -100,7 +101,7 @@ def test_layers_like_air_without_depth_take_nothing(tmp_path):
     found = effect(tmp_path, pixel__stack={"passivation": layer, "oxide": layer})
     x = np.linspace(-1, 1, 9) * found.half_width
     np.testing.assert_allclose(found.gain(x, x), 1, atol=1e-9)
-    assert found.mean_error(Outlook(1.0, 1.0)) < 1e-9
+    assert found.mean_error(SignalLevels(1.0, 1.0)) < 1e-9
 
 
 def test_the_exit_pupil_sets_the_angles(tmp_path):
@@ -133,7 +134,7 @@ def test_a_frame_is_darker_by_the_gain(tmp_path):
     changes = {"pixel.stack": STACK, "optics.focal_length": "1 mm"}
     on = simulate(camera(tmp_path, changes | {"effects": QUIET}))
     off = simulate(camera(tmp_path, changes | {"effects": QUIET | {"pixel_vignetting": "off"}}))
-    found = PixelVignetting.of(on.frame.camera, on.frame.geometry)
+    found = PixelVignetting.from_camera(on.frame.camera, on.frame.geometry)
     x, y = pixel_centers(on.frame.geometry)
     expected = off.mean_electrons * found.at(x[None, :], y[:, None])
     np.testing.assert_allclose(on.mean_electrons, expected, rtol=1e-4)
@@ -148,7 +149,7 @@ def test_the_bound_is_the_loss_of_a_plain_field(tmp_path):
     gain = found.gain(x, y)
     change = (1 - gain) / gain.max()
     rms = float(np.sqrt(np.mean(change**2)))
-    assert rms <= found.mean_error(Outlook(1.0, 1.0)) * 1.01 <= rms * 1.02
+    assert rms <= found.mean_error(SignalLevels(1.0, 1.0)) * 1.01 <= rms * 1.02
 
 
 def test_it_says_what_is_lost_where(tmp_path):

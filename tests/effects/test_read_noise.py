@@ -81,7 +81,7 @@ def test_noise_of_pixels_has_the_stream_it_always_had(dtype):
 )
 def test_says_what_there_is(readout, said, tmp_path):
     made = camera(tmp_path, {f"pixel.readout.{name}": value for name, value in readout.items()})
-    assert ReadNoise.of(made, None).describe() == said
+    assert ReadNoise.from_camera(made, None).describe() == said
 
 
 def test_dynamic_range_has_all_noise_in_the_dark(tmp_path):

@@ -7,8 +7,8 @@ import pytest
 from making import QUIET, camera, radiance_for
 
 from vcam_cli import simulate
-from vcam_cli.camera.geometry import geometry
-from vcam_cli.effects.base import Outlook
+from vcam_cli.camera.derived.geometry import geometry
+from vcam_cli.effects.base import SignalLevels
 from vcam_cli.effects.stray_light import StrayLight
 
 EDGE = {
@@ -60,8 +60,8 @@ def test_comes_after_the_falloff_of_the_lens_and_before_the_dark(tmp_path):
 def test_bound_of_its_change(tmp_path):
     """Half bright, half dark is the most that a picture can lose, and it reaches the bound."""
     made = camera(tmp_path, {"optics.stray_light": 0.1})
-    effect = StrayLight.of(made, geometry(made))
-    bound = effect.mean_error(Outlook(full_signal=200.0, time=1.0))
+    effect = StrayLight.from_camera(made, geometry(made))
+    bound = effect.mean_error(SignalLevels(full_signal=200.0, time=1.0))
     half = np.repeat([0.0, 200.0], 50)
     change = 0.1 * (half - half.mean())
     assert math.sqrt(np.mean(change**2)) == pytest.approx(bound, rel=1e-12)

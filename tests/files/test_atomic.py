@@ -12,7 +12,7 @@ import pytest
 
 from vcam_cli.errors import CannotDo
 from vcam_cli.files import atomic
-from vcam_cli.files.atomic import shown, write_text, write_whole
+from vcam_cli.files.atomic import displayed_path, write_text, write_whole
 
 
 def test_the_name_appears_only_when_the_body_is_done(tmp_path):
@@ -73,7 +73,7 @@ def test_long_names_fit(tmp_path):
 
 
 def test_staging_folder_is_not_shown():
-    assert shown(f"out/{atomic.STAGING}/raw.exr") == os.path.join("out", "raw.exr")
+    assert displayed_path(f"out/{atomic.STAGING}/raw.exr") == os.path.join("out", "raw.exr")
 
 
 def test_kill_while_writing_leaves_no_file_under_the_name(tmp_path):

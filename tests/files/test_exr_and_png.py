@@ -128,14 +128,17 @@ def test_failure_in_the_middle_keeps_the_former_file(tmp_path, error):
 def test_misuse_is_an_error_and_leaves_nothing(tmp_path):
     blocks = {name: a[:16] for name, a in FRAME.items()}
     wrong = [
-        (0, {"dn": blocks["dn"]}),
-        (16, blocks),
-        (0, {**blocks, "dn": blocks["dn"][:, :5]}),
-        (0, {**blocks, "dn": blocks["dn"][:3]}),
+        (0, {"dn": blocks["dn"]}, "expected"),
+        (16, blocks, "row 0 comes next, not 16"),
+        (0, {**blocks, "dn": blocks["dn"][:, :5]}, "shape"),
+        (0, {**blocks, "dn": blocks["dn"][:3]}, "shape"),
     ]
-    for row, block in wrong:
-        with pytest.raises(ValueError), ExrWriter(tmp_path / "a.exr", (70, 41), list(FRAME)) as w:
-            w.write_rows(row, block)
+    for row, block, words in wrong:
+        with (
+            pytest.raises(ValueError, match=words),
+            ExrWriter(tmp_path / "a.exr", (70, 41), list(FRAME)) as writer,
+        ):
+            writer.write_rows(row, block)
     with (
         pytest.raises(ValueError, match="of 70 rows"),
         ExrWriter(tmp_path / "a.exr", (70, 41), list(FRAME)) as writer,

@@ -10,7 +10,7 @@ import pytest
 import spectral_files as made
 from spectral_files import CUBE, NM
 
-from vcam_cli.engine import memory
+from vcam_cli import memory
 from vcam_cli.errors import BadInput, CannotDo
 from vcam_cli.files.hyperspectral import companions, read_bands, read_cube
 from vcam_cli.files.spectral import write_spectral
@@ -24,7 +24,8 @@ def read(path):
     bands = read_bands(path, ())
     np.testing.assert_array_equal(bands.wavelengths, cube.bands.wavelengths)
     assert bands.quantity == cube.bands.quantity
-    assert cube.data.dtype == np.float32 and cube.data.flags.c_contiguous
+    assert cube.data.dtype == np.float32
+    assert cube.data.flags.c_contiguous
     return cube, notes
 
 
@@ -45,7 +46,8 @@ def refused(path, *words, kind=BadInput) -> str:
     text = str(caught.value)
     if kind is BadInput:
         (problem,) = caught.value.problems
-        assert problem.path == ("scene", "source", "file") and problem.remedy
+        assert problem.path == ("scene", "source", "file")
+        assert problem.remedy
     for word in (path.name, *words):
         assert word in text, text
     return text

@@ -147,7 +147,9 @@ def write_with_alpha(path, data, names):
     spec.channelnames, spec.alpha_channel = names, len(names) - 1
     spec.attribute("oiio:UnassociatedAlpha", 1)
     output = oiio.ImageOutput.create(str(path))
-    assert output.open(str(path), spec) and output.write_image(data) and output.close()
+    assert output.open(str(path), spec)
+    assert output.write_image(data)
+    assert output.close()
 
 
 @pytest.mark.parametrize("options", [{"tile": 16}, {"planarconfig": "separate"}])
@@ -192,7 +194,9 @@ def test_channels_of_several_kinds(tmp_path):
     data = RANDOM.integers(0, 2048, (6, 5, 4)).astype(np.float32) / 64
     output = oiio.ImageOutput.create("exr")
     path = tmp_path / "a.exr"
-    assert output.open(str(path), spec) and output.write_image(data) and output.close()
+    assert output.open(str(path), spec)
+    assert output.write_image(data)
+    assert output.close()
     found = read(path)
     np.testing.assert_array_equal(found.data, data[..., :3])
     assert found.notes == ("channels Z dropped",)
@@ -206,7 +210,9 @@ def test_gray_with_alpha_of_many_bits(tmp_path, kind, sample):
     spec.attribute("oiio:UnassociatedAlpha", 1)
     output = oiio.ImageOutput.create(kind)
     path = tmp_path / f"a.{kind}"
-    assert output.open(str(path), spec) and output.write_image(data) and output.close()
+    assert output.open(str(path), spec)
+    assert output.write_image(data)
+    assert output.close()
     found = read(path)
     # 16 bits: half a code
     np.testing.assert_allclose(found.data[..., 0], data[..., 0], atol=0.51 / 65535)
@@ -218,8 +224,10 @@ def test_pages_of_a_tiff(tmp_path):
     spec = oiio.ImageSpec(5, 6, 3, "uint8")
     output = oiio.ImageOutput.create("tif")
     path = str(tmp_path / "a.tif")
-    assert output.open(path, spec) and output.write_image(RGB8)
-    assert output.open(path, spec, "AppendSubimage") and output.write_image(255 - RGB8)
+    assert output.open(path, spec)
+    assert output.write_image(RGB8)
+    assert output.open(path, spec, "AppendSubimage")
+    assert output.write_image(255 - RGB8)
     assert output.close()
     found = read(tmp_path / "a.tif")
     np.testing.assert_allclose(found.data, RGB8 / 255, rtol=6e-8)
@@ -274,8 +282,10 @@ def test_first_of_several_parts_with_a_note(tmp_path):
     for index, spec in enumerate(specs):
         spec.attribute("oiio:subimagename", str(index))
     path = str(tmp_path / "a.exr")
-    assert output.open(path, specs) and output.write_image(FLOAT)
-    assert output.open(path, specs[1], "AppendSubimage") and output.write_image(2 * FLOAT)
+    assert output.open(path, specs)
+    assert output.write_image(FLOAT)
+    assert output.open(path, specs[1], "AppendSubimage")
+    assert output.write_image(2 * FLOAT)
     assert output.close()
     found = read(tmp_path / "a.exr")
     np.testing.assert_array_equal(found.data, FLOAT)

@@ -12,7 +12,7 @@ from scipy.io import loadmat, savemat
 
 from vcam_cli.errors import CannotDo
 from vcam_cli.files import matlab
-from vcam_cli.files.images import Unusable
+from vcam_cli.files.images import UnusableFile
 from vcam_cli.files.matlab import read_variables
 
 KINDS = ("f8", "f4", "i1", "u1", "i2", "u2", "i4", "u4", "i8", "u8")
@@ -42,7 +42,8 @@ def test_reads_what_scipy_reads(values, compress, tmp_path):
 
 def same(ours, theirs) -> None:
     if isinstance(ours, dict):
-        assert theirs.shape == (1, 1) and set(ours) == set(theirs.dtype.names)
+        assert theirs.shape == (1, 1)
+        assert set(ours) == set(theirs.dtype.names)
         for name, value in ours.items():
             same(value, theirs[0, 0][name])
     else:
@@ -89,7 +90,8 @@ def packed(variable: bytes) -> bytes:
 def test_either_order_of_bytes_and_small_numbers_of_large_type(order, mark, tmp_path):
     path = file(tmp_path, array(order=order), mark=mark)
     found = read_variables(path, ["photons"])["photons"]
-    assert found.dtype == np.float64 and found.tolist() == [[1, 2]]
+    assert found.dtype == np.float64
+    assert found.tolist() == [[1, 2]]
 
 
 LIES = {
@@ -113,7 +115,7 @@ LIES = {
 
 @pytest.mark.parametrize("lie", LIES)
 def test_refuses_what_is_not_so(lie, tmp_path):
-    with pytest.raises(Unusable, match="no whole MATLAB file"):
+    with pytest.raises(UnusableFile, match="no whole MATLAB file"):
         read_variables(file(tmp_path, LIES[lie]), ["photons"])
 
 
@@ -122,7 +124,7 @@ def test_a_variable_that_nobody_asks_for_is_not_unpacked(tmp_path, monkeypatch):
     bomb = packed(array(b"spare", (1, 1 << 24), b"\0" * (1 << 24)))
     path = file(tmp_path, bomb, array())
     assert read_variables(path, ["photons"])["photons"].tolist() == [[1, 2]]
-    with pytest.raises(Unusable, match="unpacks to more than 300 times"):
+    with pytest.raises(UnusableFile, match="unpacks to more than 300 times"):
         read_variables(path, ["spare"])
 
 
@@ -142,4 +144,5 @@ def test_structures_in_structures_have_an_end(tmp_path):
     value, depth = read_variables(tmp_path / "a.mat", ["photons"])["photons"], 0
     while isinstance(value, dict):
         value, depth = value["photons"], depth + 1
-    assert depth == matlab.DEEPEST and value.dtype == object
+    assert depth == matlab.DEEPEST
+    assert value.dtype == object

@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from vcam_cli.files.accuracy_plots import Curve, Pair, pareto
+from vcam_cli.accuracy.plots import Curve, Pair, pareto
 
 PRESETS = ((0.1, 1e-3, "draft"), (0.2, 2e-4, "standard"), (3.0, 0.0, "reference"))
 CURVES = (Curve("oversampling", ((0.1, 4e-3, "1"), (0.4, 1e-4, "8"))),)

@@ -28,14 +28,16 @@ def refused(path, words, channels=1):
     with pytest.raises(BadInput, match=words) as caught:
         read_psf(path, channels, PATH)
     (problem,) = caught.value.problems
-    assert problem.path == PATH and problem.remedy
+    assert problem.path == PATH
+    assert problem.remedy
     assert path.name in problem.message
 
 
 @pytest.mark.parametrize("kind", ["exr", "tif"])
 def test_is_scaled_to_the_sum_one(tmp_path, kind):
     found = read_psf(write(tmp_path / f"p.{kind}", 3e30 * SPOT), 1, PATH)
-    assert found.shape == (1, 3, 3) and found.dtype == np.float64
+    assert found.shape == (1, 3, 3)
+    assert found.dtype == np.float64
     # stored as 32 bits
     np.testing.assert_allclose(found[0], SPOT[..., 0] / 10, rtol=1e-6)
     assert found.sum() == pytest.approx(1, rel=1e-12)
@@ -58,7 +60,8 @@ def test_the_rounding_of_a_lens_program_is_nothing(tmp_path):
     data = SPOT.copy()
     data[0, 0] = -1e-4
     found = read_psf(write(tmp_path / "p.exr", data), 1, PATH)
-    assert found[0, 0, 0] == 0 and found.sum() == pytest.approx(1, rel=1e-12)
+    assert found[0, 0, 0] == 0
+    assert found.sum() == pytest.approx(1, rel=1e-12)
 
 
 def test_refuses_what_is_no_point_spread(tmp_path):

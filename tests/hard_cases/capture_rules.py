@@ -7,16 +7,11 @@ from fractions import Fraction
 import mpmath as mp
 import numpy as np
 
-from vcam_cli.scheduling import (
-    estimators,
-    heuristic,
-    histogram_binning,
-    objective,
-    rivals,
-    weighted,
-)
-from vcam_cli.scheduling.objective import Constraints, Sensor
+from vcam_cli.scheduling import comparison_schedules, histogram_binning, objective
+from vcam_cli.scheduling.estimators import weighted_variance
 from vcam_cli.scheduling.pdf import Pdf
+from vcam_cli.scheduling.sensor import Constraints, Sensor, first_capture_time
+from vcam_cli.scheduling.weighted_snr import weighted_expected_snr
 
 from .hard_case import Case
 
@@ -59,7 +54,7 @@ FRAME_TIMES = ((0.3, 0.1, 3), (0.6, 0.2, 3), (0.7, 0.1, 7), (1.1, 0.1, 11))
 def _whole_frames() -> list[float]:
     one = Pdf.levels([1.0], [1.0])
     return [
-        round(objective.shortest(one, Sensor(well=time), Constraints(frame_time=frame)) / frame, 9)
+        round(first_capture_time(one, Sensor(well=time), Constraints(frame_time=frame)) / frame, 9)
         for time, frame, _ in FRAME_TIMES
     ]
 
@@ -96,7 +91,7 @@ HEURISTIC = Case(
     "0.07 x 100 is 7.000000000000001",
     "exactly, in fractions",
     lambda: [_captures_exact(str(shares[0]), count) for shares, count in PARTS],
-    lambda: [heuristic.captures_per_segment(np.array(s), count) for s, count in PARTS],
+    lambda: [comparison_schedules.captures_per_segment(np.array(s), count) for s, count in PARTS],
     _ceilings,
     "ceil(p N)",
     0.0,
@@ -108,7 +103,7 @@ TIES = ([0.1, 0.2, 1.0, 0.3, 0.2], [0.4, 0.7, 3.0, 0.8, 0.5], [1.1, 1.3, 9.0, 0.
 
 
 def _first_merge(counts: list[float]) -> int:
-    _, merges = histogram_binning.merged((np.arange(6.0), counts), 4)
+    _, merges = histogram_binning.merge_bins((np.arange(6.0), counts), 4)
     return merges[0].first
 
 
@@ -144,7 +139,7 @@ DOUBLED = Case(
     "2^1999 is no float64",
     "exactly min(2^k t1, T)",
     lambda: [min(mp.mpf(2) ** k / 1024, mp.mpf(8)) for k in range(2000)],
-    lambda: rivals.exponential(1 / 1024, 8.0, 2000),
+    lambda: comparison_schedules.exponential_times(1 / 1024, 8.0, 2000),
     lambda: [min(2.0**k / 1024, 8.0) for k in range(2000)],
     "min(2.0**k t1, T)",
     0.0,
@@ -182,7 +177,7 @@ def _weighted_exact() -> list[mp.mpf]:
 
 def _weighted_ours() -> list[float]:
     return [
-        weighted.expected_snr(
+        weighted_expected_snr(
             Pdf.levels([rate], [1.0]), times, Sensor(well=1e30, read=read, reset=reset)
         )
         for times, read, reset, rate in SAMPLED
@@ -216,7 +211,7 @@ VARIANCE = Case(
     "1 / (t' C^-1 t)",
     lambda: [mp.mpf(s[3]) ** 2 / snr for s, snr in zip(SAMPLED, _weighted_exact(), strict=True)],
     lambda: [
-        estimators.variance(rate, times, 0.0, read**2, reset**2)
+        weighted_variance(rate, times, 0.0, read**2, reset**2)
         for times, read, reset, rate in SAMPLED
     ],
     lambda: [s[3] ** 2 / snr for s, snr in zip(SAMPLED, _weighted_by_matrix(), strict=True)],

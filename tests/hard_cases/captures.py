@@ -7,8 +7,9 @@ import itertools
 import mpmath as mp
 import numpy as np
 
-from vcam_cli.scheduling import objective, optimal
+from vcam_cli.scheduling import objective
 from vcam_cli.scheduling.pdf import Pdf
+from vcam_cli.scheduling.shot_noise import optimal_schedules
 
 from .hard_case import Case, in_digits, pairs
 
@@ -47,7 +48,7 @@ FAINT = Case(
     "x^2/2 - c x + c^2 ln(1 + x/c): all of it cancels where x << c",
     "the primitive, 150 digits",
     lambda: in_digits(_signal_exact, 0 * UP_TO, UP_TO, NOISE),
-    lambda: objective.mean_signal(0 * UP_TO, UP_TO, NOISE),
+    lambda: objective.mean_snr_rate(0 * UP_TO, UP_TO, NOISE),
     lambda: _signal_by_primitive(0 * UP_TO, UP_TO, NOISE),
     "the primitive",
     2e-15,
@@ -62,7 +63,7 @@ NARROW = Case(
     "the primitive is the same at both ends",
     "the primitive, 150 digits",
     lambda: in_digits(_signal_exact, START, END, np.ones(START.size)),
-    lambda: objective.mean_signal(START, END, np.ones(START.size)),
+    lambda: objective.mean_snr_rate(START, END, np.ones(START.size)),
     lambda: _signal_by_primitive(START, END, np.ones(START.size)),
     "the primitive",
     2e-15,
@@ -74,7 +75,7 @@ FILL = Case(
     "three terms that cancel to the third power of i/c",
     "the primitive, 150 digits",
     lambda: in_digits(_fill_exact, START, END),
-    lambda: objective.mean_fill(START, END, 1.0),
+    lambda: objective.mean_squared_signal_fraction(START, END, 1.0),
     lambda: _fill_by_primitive(START, END),
     "the primitive",
     4e-15,
@@ -154,7 +155,7 @@ def _worth(chosen: list[int]) -> mp.mpf:
 
 def _near_atomic() -> list[float]:
     pdf = Pdf.segments(ATOMS * (1 - THIN), ATOMS, CHANCES)
-    found = optimal.optimal(pdf, COUNTS)
+    found = optimal_schedules(pdf, COUNTS)
     return [found[count].expected_snr for count in COUNTS]
 
 

@@ -106,7 +106,7 @@ def _fit_exact(signals: np.ndarray) -> list[mp.mpf]:
                 for n in range(6):
                     left[m, n] += line[m] * line[n]
     for m in range(6):
-        left[m, m] += mp.mpf(color_correction.PULL) ** 2
+        left[m, m] += mp.mpf(color_correction.RIDGE) ** 2
     found = mp.lu_solve(left, right)
     weights = mp.matrix([[found[2 * i], found[2 * i + 1]] for i in range(3)])
     return list(mp.eye(3) + weights * free.T)
@@ -142,7 +142,7 @@ BALANCE = Case(
     "0/0; noise about black makes gains of any size and sign",
     "exactly 1 where it is dark",
     lambda: [gains for _, _, gains in FRAMES],
-    lambda: [white_balance.gray_world(means, white) for means, white, _ in FRAMES],
+    lambda: [white_balance.gray_world_gains(means, white) for means, white, _ in FRAMES],
     lambda: [means.max() / means for means, _, _ in FRAMES],
     "largest mean / mean",
     0.0,

@@ -171,7 +171,7 @@ TEMPORAL = Case(
     "the frames differ by 1e9 on average and by 1/8 about it",
     "exactly 1/128",
     lambda: [mp.mpf(1) / 128],
-    lambda: photon_transfer.pair(PATTERN, SECOND)[1],
+    lambda: photon_transfer.pair_statistics(PATTERN, SECOND)[1],
     lambda: (np.mean((SECOND - PATTERN) ** 2) - np.mean(SECOND - PATTERN) ** 2) / 2,
     "mean(d^2)/2 - mean(d)^2/2",
     1e-14,
@@ -188,7 +188,7 @@ def _stack() -> list[np.ndarray]:
 
 
 def _running() -> float:
-    running = nonuniformity.Running()
+    running = nonuniformity.RunningStack()
     for frame in _stack():
         running.add(frame)
     return running.result().variance
@@ -230,7 +230,7 @@ def _deferred_exact() -> list[mp.mpf]:
 def _deferred() -> np.ndarray:
     packet = np.zeros((ROWS, 1))
     packet[ROWS - 3] = 1.0
-    return ChargeTransfer(LOSS, PHASES, ROWS, 1).moved(packet)[-3:, 0]
+    return ChargeTransfer(LOSS, PHASES, ROWS, 1).transport(packet)[-3:, 0]
 
 
 def _deferred_by_gamma() -> np.ndarray:

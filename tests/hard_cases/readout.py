@@ -7,7 +7,7 @@ import math
 import mpmath as mp
 import numpy as np
 
-from vcam_cli.effects.quantization import Logarithmic, Quantization
+from vcam_cli.effects.quantization import LogarithmicQuantization, Quantization
 from vcam_cli.physics import readout as of_readout
 
 from .hard_case import Case, in_digits
@@ -61,7 +61,7 @@ LINEAR_CODES = Case(
     "codes beyond either end wrap around; halves go to the even code",
     "exactly clip(round(x))",
     lambda: in_digits(_code_exact, SIGNALS),
-    lambda: of_readout.code(SIGNALS, 1.0, 16),
+    lambda: of_readout.adc_code(SIGNALS, 1.0, 16),
     lambda: (SIGNALS + 0.5).astype(np.int64).astype(np.uint16),
     "(x + 0.5) as a 16-bit whole number",
     0.0,
@@ -88,7 +88,7 @@ FRAME_CODES = Case(
 # --- logarithmic ADC -----------------------------------------------------------------------------
 
 BEND, FULL, SPAN = 100.0, 1e5, 4095
-LOG_ADC = Logarithmic(0.0, BEND, FULL, 12)
+LOG_ADC = LogarithmicQuantization(0.0, BEND, FULL, 12)
 WEAK = np.concatenate([10.0 ** np.arange(-15, 6), -(10.0 ** np.arange(-15, 2))])
 
 
@@ -116,7 +116,7 @@ LOG_DARK = Case(
     "the logarithm has no value from -bend on; noise goes there",
     "64, both ends of the codes",
     lambda: [64, 64, 0, 0, 0, 0, 4095],
-    lambda: Logarithmic(64.0, BEND, FULL, 12).apply(DARKER.copy()),
+    lambda: LogarithmicQuantization(64.0, BEND, FULL, 12).apply(DARKER.copy()),
     lambda: np.rint(64 + (SPAN - 64) * np.log(1 + DARKER / BEND) / np.log(1 + FULL / BEND)),
     "round(offset + span ln(1 + x/b) / ln(1 + full/b))",
     0.0,
@@ -139,7 +139,7 @@ LOG_BACK = Case(
     "e^y - 1 and ln(1 + y) for y of 1e-10",
     "the curve's inverse",
     lambda: in_digits(_linear_exact, NUMBERS),
-    lambda: Logarithmic(0.0, 1.0, STRAIGHT, 12).linear(NUMBERS),
+    lambda: LogarithmicQuantization(0.0, 1.0, STRAIGHT, 12).linear(NUMBERS),
     lambda: (np.exp(NUMBERS / SPAN * np.log(1 + STRAIGHT)) - 1) / STRAIGHT * SPAN,
     "(e^(y ln(1 + full/b)) - 1) b",
     1e-15,

@@ -9,8 +9,8 @@ import mpmath as mp
 import numpy as np
 import scipy.fft
 
-from vcam_cli.engine import boxes
-from vcam_cli.engine.axis import Axis
+from vcam_cli.image_formation import box_average
+from vcam_cli.image_formation.cosine_series import Axis
 from vcam_cli.scenes.base import Frame
 from vcam_cli.scenes.csf import Csf
 from vcam_cli.scenes.slanted_edge import SlantedEdge
@@ -180,7 +180,7 @@ BOXES = Case(
     "a box of 1/16 sample is the difference of sums over 10007",
     "overlaps one by one",
     lambda: in_digits(_boxes_exact, ASKED),
-    lambda: boxes.of_samples(PICTURE[None], FINE, DOWN, DETECTOR, 1.0)[0, ASKED],
+    lambda: box_average.of_samples(PICTURE[None], FINE, DOWN, DETECTOR, 1.0)[0, ASKED],
     _boxes_by_float32_sums,
     "running sums in the picture's float32",
     1e-8,

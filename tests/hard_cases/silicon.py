@@ -5,7 +5,7 @@ from __future__ import annotations
 import mpmath as mp
 import numpy as np
 
-from vcam_cli.physics import photodiode
+from vcam_cli.physics import junction, photodiode
 from vcam_cli.physics import silicon as of_silicon
 from vcam_cli.physics.readout import ELEMENTARY_CHARGE
 
@@ -41,7 +41,7 @@ def _diffusion(name: str, hard: str, a: object, length: object, neutral: object)
         hard,
         "the printed form, 200 digits",
         lambda: in_digits(_diffusion_exact, a, length, neutral),
-        lambda: of_silicon.collected(0.0, a, length, DEPLETED, neutral),
+        lambda: of_silicon.collection_efficiency(0.0, a, length, DEPLETED, neutral),
         lambda: _printed(a, length, neutral, np.exp, np.sinh),
         "as printed",
         1e-14,
@@ -175,7 +175,7 @@ SPLIT = Case(
     "one side of the junction is 1e-20 of the whole",
     "50 digits",
     lambda: in_digits(lambda donors: _split_exact(donors, LIGHT), DONORS),
-    lambda: np.transpose(photodiode.depletion_split(WIDE, DONORS, LIGHT)),
+    lambda: np.transpose(junction.depletion_split(WIDE, DONORS, LIGHT)),
     lambda: np.transpose(_split_by_difference(LIGHT)),
     "x_p = w N_d / (N_d + N_a), x_n = w - x_p",
     1e-15,
@@ -195,7 +195,7 @@ def _dark_exact(donors: mp.mpf) -> mp.mpf:
 
 
 def _dark(x_n: np.ndarray, x_p: np.ndarray) -> np.ndarray:
-    return photodiode.dark_current_density(
+    return junction.dark_current_density(
         CARRIERS, HOLES, ELECTRONS, DONORS, ACCEPTORS, SURFACE, NEUTRAL, x_n, x_p,
         _lifetime(DONORS), LIVES,
     )  # fmt: skip
@@ -206,7 +206,7 @@ DARK_CURRENT = Case(
     "most of it is generated in the thin side of the junction, where lifetimes are short",
     "50 digits",
     lambda: in_digits(_dark_exact, DONORS),
-    lambda: _dark(*photodiode.depletion_split(WIDE, DONORS, ACCEPTORS)),
+    lambda: _dark(*junction.depletion_split(WIDE, DONORS, ACCEPTORS)),
     lambda: _dark(*_split_by_difference(ACCEPTORS)),
     "2.31 with x_n = w - x_p",
     2e-15,
@@ -237,7 +237,7 @@ CAPACITANCE = Case(
     "a difference of almost equal powers, over 1 - m",
     "the primitive, 120 digits",
     lambda: in_digits(_capacitance_exact, SWINGS, GRADINGS),
-    lambda: photodiode.mean_junction_capacitance(1.0, BIAS, BIAS + SWINGS, BUILT_IN, GRADINGS),
+    lambda: junction.mean_capacitance(1.0, BIAS, BIAS + SWINGS, BUILT_IN, GRADINGS),
     _capacitance_by_primitive,
     "difference of the primitive over the swing",
     1e-14,

@@ -138,8 +138,6 @@ def _load() -> None:
     from matplotlib.backends import backend_agg  # noqa: F401
 
     from vcam_cli.commands import main, run, sweep  # noqa: F401
-    from vcam_cli.files import exr, folder, png, points, report, sweep_plots, tables  # noqa: F401
-    from vcam_cli.studies import checks, outputs, simulate, sweep_run  # noqa: F401
 
 
 if __name__ == "__main__":

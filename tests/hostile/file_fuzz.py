@@ -19,7 +19,7 @@ sys.path.insert(0, str(Path(__file__).parents[1]))
 
 import spectral_files as made
 
-from vcam_cli.camera.lattice import _read as read_positions
+from vcam_cli.camera.derived.lattice import _read as read_positions
 from vcam_cli.errors import BadInput, CannotDo
 from vcam_cli.files.hyperspectral import read_bands, read_cube
 from vcam_cli.files.images import color_channels, read_picture
@@ -81,8 +81,10 @@ def _parts(path: Path, data: np.ndarray) -> dict[Path, Reader]:
     for number, spec in enumerate(specs):
         spec.attribute("oiio:subimagename", str(number))
     out = oiio.ImageOutput.create(str(path))
-    assert out.open(str(path), specs) and out.write_image(np.ascontiguousarray(data))
-    assert out.open(str(path), specs[1], "AppendSubimage") and out.write_image(data)
+    assert out.open(str(path), specs)
+    assert out.write_image(np.ascontiguousarray(data))
+    assert out.open(str(path), specs[1], "AppendSubimage")
+    assert out.write_image(data)
     assert out.close()
     return {path: _as_picture}
 
@@ -90,7 +92,8 @@ def _parts(path: Path, data: np.ndarray) -> dict[Path, Reader]:
 def _as_picture(path: Path) -> None:
     count = color_channels(path, "file")
     found = read_picture(path, "linear", 1.0, "file")
-    assert np.isfinite(found.data).all() and (found.data >= 0).all()
+    assert np.isfinite(found.data).all()
+    assert (found.data >= 0).all()
     read_psf(str(path), count, ("file",))
 
 
@@ -131,7 +134,8 @@ def _hdf5(folder: Path) -> list[Path]:
 def _as_spectra(path: Path) -> None:
     read_bands(path, "file")
     cube = read_cube(path, "file")[0]
-    assert np.isfinite(cube.data).all() and (cube.data >= 0).all()
+    assert np.isfinite(cube.data).all()
+    assert (cube.data >= 0).all()
 
 
 def tables(folder: Path) -> dict[Path, Reader]:

@@ -19,13 +19,14 @@ from unittest import mock
 import numpy as np
 from mutations import harmed
 
-from vcam_cli.camera import shipped
 from vcam_cli.camera.camera import Camera
+from vcam_cli.capture_schedules import schedule_file
 from vcam_cli.commands.validate import _study_kind
+from vcam_cli.config import shipped
 from vcam_cli.errors import VcamError
-from vcam_cli.studies import schedule_file, study_file, sweep_points
-from vcam_cli.studies.checks import load
-from vcam_cli.studies.simulate import simulate
+from vcam_cli.simulation.checks import load
+from vcam_cli.simulation.simulate import simulate
+from vcam_cli.sweeps import sweep_file, sweep_points
 
 LONGEST = 60
 """Seconds of a case, a thousand times what it takes."""
@@ -86,7 +87,7 @@ def checked() -> Camera | None:
         schedule_file.read(FILE)
     elif kind == "sweep":
         with mock.patch.object(sweep_points, "MOST_POINTS", MOST_POINTS):
-            sweep_points.grid(study_file.read(FILE))
+            sweep_points.grid(sweep_file.read(FILE))
     else:
         return load(FILE)
     return None

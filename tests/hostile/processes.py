@@ -82,6 +82,7 @@ def _ended(process: subprocess.Popen) -> Done:
 def refused(done: Done, *words: str, code: int = 2) -> None:
     """It ended as it does with what it cannot take: an exit code, words, no traceback."""
     assert done.code == code, done
-    assert "Traceback" not in done.said and done.out == "", done
+    assert "Traceback" not in done.said, done
+    assert done.out == "", done
     for word in words:
         assert word in done.said, (word, done.said)

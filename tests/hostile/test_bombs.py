@@ -16,7 +16,7 @@ import pytest
 import spectral_files as made
 from cameras import camera, image_of, spectra_of, validated
 
-from vcam_cli.engine import memory
+from vcam_cli import memory
 from vcam_cli.errors import CannotDo
 from vcam_cli.files.hyperspectral import read_bands
 

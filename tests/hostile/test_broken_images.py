@@ -46,7 +46,8 @@ def fuzzed(first: int, last: int) -> tuple[int, int]:
 def test_harmed_files_of_every_format_are_read_or_refused():
     """Some 2000 of them; what is read is finite light."""
     read, refused = fuzzed(0, 6)
-    assert read > 300 and refused > 1000
+    assert read > 300
+    assert refused > 1000
 
 
 @pytest.mark.long
@@ -54,7 +55,8 @@ def test_harmed_files_of_every_format_are_read_or_refused():
 def test_more_harmed_files(first):
     """Some 4000 files each."""
     read, refused = fuzzed(first, first + 40)
-    assert read > 300 and refused > 2000
+    assert read > 300
+    assert refused > 2000
 
 
 def run(folder: Path, changes: dict):
@@ -74,7 +76,8 @@ def image(path: Path, data: np.ndarray, sample: str, tile: int = 0, **attributes
     data = np.ascontiguousarray(data)
     height, width = data.shape[:2]
     good = out.write_tiles(0, width, 0, height, 0, 1, data) if tile else out.write_image(data)
-    assert good and out.close()
+    assert good
+    assert out.close()
     return path
 
 
@@ -175,7 +178,8 @@ def test_light_beyond_what_is_computed_with(sample, value, white, encoding, tmp_
     done = run(tmp_path, image_of(path.name, white=white, encoding=encoding))
     assert done.exit_code == 2, (done.stderr, done.exception)
     assert "a.tif: holds a value too large" in done.stderr
-    assert "row 0, column 0" in done.stderr and "correct encoding and white" in done.stderr
+    assert "row 0, column 0" in done.stderr
+    assert "correct encoding and white" in done.stderr
 
 
 @pytest.mark.parametrize("value", [1e-45, 1e-30, 6e4, 1e20])
@@ -190,7 +194,8 @@ def test_light_that_is_only_strange_is_taken(value, tmp_path):
 def test_light_of_too_many_electrons_is_refused(tmp_path):
     image(tmp_path / "a.exr", RGB * np.float32(1e29), "float")
     done = run(tmp_path, image_of("a.exr", encoding="linear"))
-    assert done.exit_code == 2 and "look for a wrong unit in the light level" in done.stderr
+    assert done.exit_code == 2
+    assert "look for a wrong unit in the light level" in done.stderr
 
 
 @pytest.mark.parametrize(("value", "said"), [
@@ -205,7 +210,9 @@ def test_spectra_that_are_no_light(value, said, tmp_path):
     cube[1, 2, 2] = value
     made.npz(tmp_path / "a.npz", wavelength_nm=made.NM, radiance=cube)
     done = run(tmp_path, spectra_of("a.npz"))
-    assert done.exit_code == 2 and "a.npz" in done.stderr and said in done.stderr, done.stderr
+    assert done.exit_code == 2, done.stderr
+    assert "a.npz" in done.stderr, done.stderr
+    assert said in done.stderr, done.stderr
 
 
 def test_spectra_slightly_negative_are_taken_with_a_note(tmp_path):
@@ -213,7 +220,8 @@ def test_spectra_slightly_negative_are_taken_with_a_note(tmp_path):
     cube[1, 2, 2] = -1e-3
     made.npz(tmp_path / "a.npz", wavelength_nm=made.NM, reflectance=cube)
     found, notes = read_cube(tmp_path / "a.npz", "file")
-    assert found.data.min() == 0 and "1 of 120 values are negative" in notes[0]
+    assert found.data.min() == 0
+    assert "1 of 120 values are negative" in notes[0]
 
 
 @pytest.mark.parametrize("nm", [[500, 500], [500, 500, 600], [600, 500, 500], [1e-300] * 3])

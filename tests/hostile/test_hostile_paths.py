@@ -82,7 +82,8 @@ def test_links_to_inputs_are_followed_and_told_apart_from_files(tmp_path, monkey
     (tmp_path / "half.csv").unlink()
     (tmp_path / "half.csv").symlink_to("half.csv")
     result = vcam("run", "camera.yaml", "-q", "-o", "out")
-    assert result.exit_code == 2 and "broken link" in result.stderr
+    assert result.exit_code == 2
+    assert "broken link" in result.stderr
 
 
 def test_an_output_folder_that_is_a_link(tmp_path, monkeypatch):
@@ -92,7 +93,8 @@ def test_an_output_folder_that_is_a_link(tmp_path, monkeypatch):
     (tmp_path / "out").symlink_to("disk")
     for _ in range(2):
         good("run", "camera.yaml", "-q", "-o", "out")
-        assert (tmp_path / "out").is_symlink() and (tmp_path / "disk" / "raw.exr").is_file()
+        assert (tmp_path / "out").is_symlink()
+        assert (tmp_path / "disk" / "raw.exr").is_file()
 
 
 def study(folder: Path) -> str:
@@ -149,7 +151,8 @@ def test_an_output_that_may_not_be_written(command, bound_by_permissions, tmp_pa
     (tmp_path / "locked").chmod(0o555)
     for place in ("locked", "locked/new"):
         done = processes.vcam([*line, place], tmp_path, before=bound_by_permissions)
-        assert done.code == 3 and done.out == "", done
+        assert done.code == 3, done
+        assert done.out == "", done
         assert "permission denied; choose a folder you may write to" in done.said, done
     assert not os.listdir(tmp_path / "locked")
 
@@ -169,7 +172,9 @@ def test_inputs_that_may_not_be_read(bound_by_permissions, tmp_path):
     names = {"own": "own.yaml", "table": "table.csv", "spectra": "a.npz", "based": "base.yaml"}
     line = ["validate", *(f"{name}.yaml" for name in names)]
     done = processes.vcam(line, tmp_path, before=bound_by_permissions)
-    assert done.code in (2, 3) and "Traceback" not in done.said and done.out == "", done
+    assert done.code in (2, 3), done
+    assert "Traceback" not in done.said, done
+    assert done.out == "", done
     for file in names.values():
         assert any(file in line and "ermission" in line for line in done.said.splitlines()), done
 
@@ -212,6 +217,7 @@ def test_an_output_that_is_no_folder(command, way, tmp_path, monkeypatch):
             os.mkfifo(out)
     before = sorted(os.listdir(tmp_path))
     result = vcam(*line, out / "below" if way == "below a file" else out)
-    assert result.exit_code in (2, 3) and "out" in result.stderr, result.output
+    assert result.exit_code in (2, 3), result.output
+    assert "out" in result.stderr, result.output
     assert sorted(os.listdir(tmp_path)) == before
     assert not out.is_file() or out.read_text() == "mine"

@@ -69,7 +69,8 @@ def whole(folder: Path) -> None:
             read_exr(path)
         elif path.suffix == ".png":
             image = oiio.ImageBuf(str(path))
-            assert image.read(force=True) and not image.has_error, path
+            assert image.read(force=True), path
+            assert not image.has_error, path
         elif path.suffix == ".csv":
             rows = list(csv.reader(path.read_text("utf-8").splitlines()))
             assert len({len(row) for row in rows}) == 1, path
@@ -87,7 +88,8 @@ def ended(done: dict[str, Any], number: int, vcam: Driver, out: Path) -> bool:
     if number == signal.SIGINT:
         assert done["code"] in (0, 130), done
         lines = done["said"].splitlines()
-        assert len(lines) <= 1 and all(line.startswith("interrupted; ") for line in lines), done
+        assert len(lines) <= 1, done
+        assert all(line.startswith("interrupted; ") for line in lines), done
         found = [str(p) for p in out.rglob(".*") if p.name != ".claims"]
         assert not found + vcam.left, done
     else:
@@ -104,7 +106,8 @@ def test_a_run_that_replaces_another(number, moments, vcam, folder):
         done = vcam(folder, *RUN, seed, "--seed", seed)
         assert done["code"] == 0, done
         expected[seed] = results(folder / seed)
-    assert expected["1"] != expected["2"] and set(contents(folder / "1")) == NAMES
+    assert expected["1"] != expected["2"]
+    assert set(contents(folder / "1")) == NAMES
     longest, out, chance, stops = done["seconds"], folder / "out", random.Random(int(number)), 0
     assert vcam(folder, *RUN, "out", "--seed", "1")["code"] == 0
     now = "1"
@@ -125,7 +128,8 @@ def test_a_run_that_replaces_another(number, moments, vcam, folder):
     assert stops, "nothing was interrupted"
     for seed in ("2", "1"):
         assert vcam(folder, *RUN, "out", "--seed", seed)["code"] == 0
-        assert set(contents(out)) == NAMES and results(out) == expected[seed]
+        assert set(contents(out)) == NAMES
+        assert results(out) == expected[seed]
 
 
 @SIGNALS

@@ -20,7 +20,7 @@ GROWTH = 16 << 20
 """Bytes by which the peak may grow; a hundredth of a frame kept for each point would be more."""
 SCRIPT = """
 import json, resource, sys
-from vcam_cli.studies.sweep import sweep
+from vcam_cli.sweeps.sweep import sweep
 
 resource.setrlimit(resource.RLIMIT_AS, (int(sys.argv[1]),) * 2)
 early, last, held = int(sys.argv[2]), int(sys.argv[3]), {}

@@ -12,12 +12,12 @@ from hypothesis import HealthCheck, given, note, settings
 from hypothesis import strategies as st
 from strategies import Tree, between, cameras, fractions
 
-from vcam_cli.camera.electrical import electrical
-from vcam_cli.camera.geometry import geometry
-from vcam_cli.engine.layout import layout
-from vcam_cli.engine.pixel_figures import pixel_figures
-from vcam_cli.studies import checks
-from vcam_cli.studies.simulate import Result, simulate
+from vcam_cli.camera.derived.electrical import electrical
+from vcam_cli.camera.derived.geometry import geometry
+from vcam_cli.readout.layout import layout
+from vcam_cli.simulation import checks
+from vcam_cli.simulation.pixel_figures import pixel_figures
+from vcam_cli.simulation.simulate import Result, simulate
 
 SINGLE = np.finfo(np.float32).eps
 SLOW = [HealthCheck.too_slow, HealthCheck.data_too_large, HealthCheck.function_scoped_fixture]
@@ -47,7 +47,7 @@ def held(result: Result) -> None:
     e = result.frame.electrical
     for values in (result.electrons, result.dn, result.mean_electrons, result.linear, result.ideal):
         assert np.isfinite(values).all()
-    joined = result.frame.layout.joining.count
+    joined = result.frame.layout.binning_groups.count
     assert (result.mean_electrons >= 0).all()
     assert (result.electrons <= e.full_well * joined * (1 + 4 * SINGLE)).all()
     assert ((result.dn >= 0) & (result.dn <= e.highest_code * joined)).all()
@@ -177,7 +177,7 @@ def test_the_signal_to_noise_ratio_falls_with_each_noise(tree, name, level, fact
 def figures(camera):
     """SNR and dynamic range by their closed forms."""
     solved = geometry(camera)
-    joins = layout(camera, solved).joining
+    joins = layout(camera, solved).binning_groups
     return pixel_figures(camera, solved, electrical(camera), joins, camera.exposure.time)
 
 

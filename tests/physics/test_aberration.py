@@ -242,7 +242,7 @@ def test_at_most_one_hermitian_and_zero_beyond(terms, fractions):
 @settings(max_examples=10, deadline=None)
 @given(small, st.floats(-4, 4), st.floats(0.02, 0.9), st.floats(-3, 3))
 def test_a_turned_wavefront_turns_the_transfer(terms, turn, fraction, angle):
-    turned = zernike.turned(terms, turn)
+    turned = zernike.rotate(terms, turn)
     perfect = otf_circular(fraction * CUTOFF, LAMBDA, N)
     difference = of(terms, fraction, angle) - of(turned, fraction, angle + turn)
     assert abs(difference) * perfect < 1e-4  # two grids, each good to half of it
@@ -292,7 +292,7 @@ def test_rays_of_defocus_fill_a_disk():
         v = np.pi * f * shift / N
         closed = 2 * special.j1(v) / v
         assert ray_blur.otf_symmetric(-f, N, terms) == pytest.approx(closed, rel=1e-9)
-    assert ray_blur.displacement(terms, N) == pytest.approx(shift / (2 * N), rel=1e-9)
+    assert ray_blur.blur_radius(terms, N) == pytest.approx(shift / (2 * N), rel=1e-9)
 
 
 @pytest.mark.parametrize("terms", [((11, 1e-6),), ((8, 1e-6), (5, 3e-7), (2, 4e-7)), ((9, 2e-6),)])

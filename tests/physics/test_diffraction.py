@@ -35,7 +35,9 @@ def test_agrees_with_40_digits(shift: float) -> None:
 def test_closed_forms() -> None:
     assert otf(0.0) == 1
     assert otf(0.5) == pytest.approx(2 / 3 - np.sqrt(3) / (2 * np.pi), rel=1e-15)
-    assert otf(1.0) == 0 and otf(7.0) == 0 and otf(np.inf) == 0
+    assert otf(1.0) == 0
+    assert otf(7.0) == 0
+    assert otf(np.inf) == 0
     assert (1 - otf(1e-6)) / 1e-6 == pytest.approx(4 / np.pi, rel=1e-9)  # slope at zero
     beside = 1e-12
     expected = 8 * np.sqrt(2) / (3 * np.pi) * beside**1.5  # leading term at the cut-off
@@ -101,5 +103,6 @@ def test_falls_all_the_way(one: float, other: float) -> None:
 def test_broadcasts() -> None:
     values = otf_circular(np.linspace(0, CUTOFF, 5)[:, None], np.array([450e-9, LAMBDA]), N)
     assert values.shape == (5, 2)
-    assert values[-1, 1] == pytest.approx(0, abs=1e-20) and values[-1, 0] > 0.05
+    assert values[-1, 1] == pytest.approx(0, abs=1e-20)
+    assert values[-1, 0] > 0.05
     assert np.isnan(otf_circular(np.nan, LAMBDA, N)), "a NaN must not become darkness"

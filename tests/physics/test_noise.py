@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
-from vcam_cli.physics.noise import CORNISH_FISHER_MEAN, gaussian_shot, poisson_from_normal
+from vcam_cli.physics.noise import CORNISH_FISHER_MEAN, gaussian_shot_noise, poisson_from_normal
 from vcam_cli.rng import stream
 
 
@@ -99,6 +99,6 @@ def test_seam_between_the_two_forms_is_smooth():
 
 def test_gaussian_has_the_stated_moments():
     z = stream(7, "test").standard_normal(200_000)
-    k = gaussian_shot(np.full(z.shape, 100.0), z)
+    k = gaussian_shot_noise(np.full(z.shape, 100.0), z)
     assert abs(k.mean() - 100) < 5 * np.sqrt(100 / z.size)
     assert abs(k.var() - 100) < 5 * np.sqrt(2 * 100**2 / z.size)

@@ -68,7 +68,8 @@ def test_illumination_is_finite_at_absurd_angles() -> None:
     values = r.relative_illumination_exact(
         np.array([1e-300, 1e300, 1.0, 1.0]), np.array([1e300, 1.0, 1e300, np.inf])
     )
-    assert np.isfinite(values).all() and (values >= 0).all()
+    assert np.isfinite(values).all()
+    assert (values >= 0).all()
 
 
 def test_magnification_of_the_thesis_lens_law() -> None:
@@ -90,7 +91,8 @@ def test_the_lens_equation_holds(focal_length: float, ratio: float) -> None:
 
 def test_a_scene_at_infinity_needs_no_special_case() -> None:
     m = r.magnification(0.05, math.inf)
-    assert m == 0 and not np.signbit(m)
+    assert m == 0
+    assert not np.signbit(m)
     assert r.image_distance(0.05, m) == 0.05
     assert r.irradiance_per_radiance(2.8, m) == pytest.approx(np.pi / (1 + 4 * 2.8**2), rel=1e-15)
 

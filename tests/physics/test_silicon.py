@@ -109,7 +109,7 @@ def printed(frequency, absorption, diffusion_length, depletion_width, neutral_de
 
 @pytest.mark.parametrize("case", DATA["diffusion"], ids=lambda case: case["why"])
 def test_collected_in_sixty_digits(case):
-    value = silicon.collected(
+    value = silicon.collection_efficiency(
         float(case["per_um"]) / UM,
         float(case["absorption_per_um"]) / UM,
         float(case["diffusion_length_um"]) * UM,
@@ -128,7 +128,9 @@ SILICON = st.tuples(positive, positive, positive, positive, positive)
 @settings(max_examples=150, deadline=None)
 def test_collected_as_printed(given):
     f, a, ln, w, d = given
-    assert silicon.collected(f, a, ln, w, d) == pytest.approx(printed(f, a, ln, w, d), rel=EXACT)
+    assert silicon.collection_efficiency(f, a, ln, w, d) == pytest.approx(
+        printed(f, a, ln, w, d), rel=EXACT
+    )
 
 
 @given(SILICON, st.integers(-40, 40))
@@ -137,7 +139,9 @@ def test_collected_knows_no_unit_of_length(given, power):
     """Scaled by a power of two every intermediate number is the same."""
     f, a, ln, w, d = given
     s = 2.0**power
-    assert silicon.collected(f / s, a / s, ln * s, w * s, d * s) == silicon.collected(*given)
+    assert silicon.collection_efficiency(
+        f / s, a / s, ln * s, w * s, d * s
+    ) == silicon.collection_efficiency(*given)
 
 
 @given(SILICON)
@@ -148,8 +152,9 @@ def test_mtf_falls_from_one_to_the_part_of_the_depletion_region(given):
     mtf = silicon.diffusion_mtf(f, a, ln, w, d)
     assert mtf[0] == 1
     assert np.all(np.diff(mtf) <= 4e-16), "up to a rounding"
-    floor = -np.expm1(-a * w) / silicon.collected(0.0, a, ln, w, d)
-    assert np.all(mtf >= floor * (1 - 1e-14)) and mtf[-1] == pytest.approx(floor, rel=1e-9)
+    floor = -np.expm1(-a * w) / silicon.collection_efficiency(0.0, a, ln, w, d)
+    assert np.all(mtf >= floor * (1 - 1e-14))
+    assert mtf[-1] == pytest.approx(floor, rel=1e-9)
     assert np.array_equal(silicon.diffusion_mtf(-f, a, ln, w, d), mtf)
 
 
@@ -187,7 +192,7 @@ def test_collected_solves_the_diffusion_equation(f, a, ln, w, d):
     fine = finite_differences(f, a, ln, w, d, columns=48, rows=200)
     expected = (4 * fine - coarse) / 3
     assert abs(fine - coarse) < 3e-3, "the grid resolves it"
-    assert silicon.collected(f, a, ln, w, d) == pytest.approx(expected, rel=5e-5)
+    assert silicon.collection_efficiency(f, a, ln, w, d) == pytest.approx(expected, rel=5e-5)
 
 
 def test_collected_is_the_integral_of_a_collection_probability():
@@ -203,7 +208,7 @@ def test_collected_is_the_integral_of_a_collection_probability():
         d / 80 * weight * a * np.exp(-a * (w + z)) * np.sinh((d - z) / ln) / np.sinh(d / ln)
     )
     expected = 1 - np.exp(-a * w) + below
-    assert silicon.collected(0.0, a, ln, w, d) == pytest.approx(expected, rel=1e-13)
+    assert silicon.collection_efficiency(0.0, a, ln, w, d) == pytest.approx(expected, rel=1e-13)
 
 
 def test_collected_where_the_closed_form_is_singular():
@@ -211,35 +216,40 @@ def test_collected_where_the_closed_form_is_singular():
     w, d = 0.3, 4.0
     limit = 1 - np.exp(-w) / 2 - np.exp(-w) * d * np.exp(-d) / (2 * np.sinh(d))
     for a in (1 - 1e-9, 1 - 1e-15, 1.0, 1 + 1e-15, 1 + 1e-9):
-        assert silicon.collected(0.0, a, 1.0, w, d) == pytest.approx(limit, rel=1e-8)
-    assert silicon.collected(0.0, 1.0, 1.0, w, d) == pytest.approx(limit, rel=1e-14)
+        assert silicon.collection_efficiency(0.0, a, 1.0, w, d) == pytest.approx(limit, rel=1e-8)
+    assert silicon.collection_efficiency(0.0, 1.0, 1.0, w, d) == pytest.approx(limit, rel=1e-14)
 
 
 def test_collected_at_its_ends():
     """No light, no silicon, everything collected, deep silicon: finite and right, no warnings."""
-    assert silicon.collected(0.0, 0.0, 1.0, 1.0, 1.0) == 0
-    assert silicon.collected(1.0, 2.0, 1.0, 0.0, 0.0) == 0
-    assert silicon.collected(0.0, 1e6, 1.0, 1.0, 1.0) == 1
+    assert silicon.collection_efficiency(0.0, 0.0, 1.0, 1.0, 1.0) == 0
+    assert silicon.collection_efficiency(1.0, 2.0, 1.0, 0.0, 0.0) == 0
+    assert silicon.collection_efficiency(0.0, 1e6, 1.0, 1.0, 1.0) == 1
     # infinitely deep: u / (1 + u); nothing recombines: a straight line of probability
-    assert silicon.collected(0.0, 3.0, 1.0, 0.0, 1e9) == pytest.approx(3 / 4, rel=1e-15)
+    assert silicon.collection_efficiency(0.0, 3.0, 1.0, 0.0, 1e9) == pytest.approx(3 / 4, rel=1e-15)
     straight = 1 - (1 - np.exp(-2.0)) / 2.0
-    assert silicon.collected(0.0, 2.0, np.inf, 0.0, 1.0) == pytest.approx(straight, rel=1e-14)
-    assert silicon.collected(0.0, 2.0, 1e300, 0.0, 1.0) == pytest.approx(straight, rel=1e-14)
-    huge = silicon.collected(1e300, 1.0, 1.0, 0.5, 1.0)
+    assert silicon.collection_efficiency(0.0, 2.0, np.inf, 0.0, 1.0) == pytest.approx(
+        straight, rel=1e-14
+    )
+    assert silicon.collection_efficiency(0.0, 2.0, 1e300, 0.0, 1.0) == pytest.approx(
+        straight, rel=1e-14
+    )
+    huge = silicon.collection_efficiency(1e300, 1.0, 1.0, 0.5, 1.0)
     assert huge == pytest.approx(-np.expm1(-0.5), rel=1e-15)
 
 
 def test_collected_broadcasts():
     f, a = np.linspace(0, 1, 4)[:, None, None], np.array([0.1, 1.0, 10.0])[:, None]
     d = np.array([0.5, 50.0])
-    together = silicon.collected(f, a, 5.0, 0.2, d)
+    together = silicon.collection_efficiency(f, a, 5.0, 0.2, d)
     assert together.shape == (4, 3, 2)
-    one = silicon.collected(float(f[2, 0, 0]), 1.0, 5.0, 0.2, 50.0)
-    assert together[2, 1, 1] == pytest.approx(one, rel=1e-14) and np.ndim(one) == 0
+    one = silicon.collection_efficiency(float(f[2, 0, 0]), 1.0, 5.0, 0.2, 50.0)
+    assert together[2, 1, 1] == pytest.approx(one, rel=1e-14)
+    assert np.ndim(one) == 0
 
 
 @pytest.mark.parametrize("wrong", [(1, -1, 1, 1, 1), (1, 1, 0, 1, 1), (1, 1, 1, -1, 1),
                                    (1, 1, 1, 1, -1), (1, np.nan, 1, 1, 1)])  # fmt: skip
 def test_collected_refuses_what_is_no_silicon(wrong):
     with pytest.raises(ValueError, match="diffusion length"):
-        silicon.collected(*wrong)
+        silicon.collection_efficiency(*wrong)

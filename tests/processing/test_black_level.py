@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from vcam_cli.processing.base import Block
-from vcam_cli.processing.black_level import BlackLevel, level
+from vcam_cli.processing.black_level import BlackLevel, subtracted_level
 
 
 @pytest.mark.parametrize(("value", "expected"), [("subtract", 33.5), ("none", 0.0), (12, 12.0)])
 def test_level_is_that_of_the_camera_none_or_the_number_given(value, expected):
-    assert level(value, 33.5) == expected
+    assert subtracted_level(value, 33.5) == expected
 
 
 def test_values_below_black_become_negative():

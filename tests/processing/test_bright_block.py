@@ -7,7 +7,7 @@ import pytest
 
 from vcam_cli.processing import Context, process
 from vcam_cli.processing.base import Block
-from vcam_cli.processing.bright_block import SIDE, measure, white_means
+from vcam_cli.processing.bright_block import BLOCK_SIDE, measure, white_means
 
 RGB = ("R", "G", "B")
 RGGB = (("R", "G"), ("G", "B"))
@@ -87,7 +87,7 @@ def test_a_mosaic_is_measured_color_by_color(first_row):
     found = measure(Block(values[np.newaxis], first_row), values, context())
     assert found.sums.shape == found.counts.shape == (3, 2 * 3)
     rows, columns = np.indices(values.shape)
-    number = (rows // SIDE) * 3 + columns // SIDE
+    number = (rows // BLOCK_SIDE) * 3 + columns // BLOCK_SIDE
     names = np.array(RGGB)[(rows + first_row) % 2, columns % 2]
     for c, name in enumerate(RGB):
         for n in range(6):
@@ -99,6 +99,6 @@ def test_a_mosaic_is_measured_color_by_color(first_row):
 
 def test_the_brightest_hundredth_counts():
     """200 blocks of which block n has the level n in every color: the two brightest count."""
-    levels = np.repeat(np.arange(200.0), SIDE)[np.newaxis].repeat(SIDE, axis=0)
+    levels = np.repeat(np.arange(200.0), BLOCK_SIDE)[np.newaxis].repeat(BLOCK_SIDE, axis=0)
     found = measure(Block(levels[np.newaxis].astype(np.float32), 0), levels, context())
     np.testing.assert_allclose(white_means([found]), 198.5)

@@ -12,7 +12,7 @@ from vcam_cli.processing.base import Block
 from vcam_cli.processing.color_correction import (
     ColorCorrection,
     chart_colors,
-    fit,
+    fit_matrix,
     fit_relative,
     lab_slope,
 )
@@ -106,7 +106,7 @@ def made(white, balanced=True, light="D65", mix=TRUE):
     target = chart_colors(illuminant("D65"), *RANGE)
     signals = (target @ mix.T).T * np.array(white)[:, None]
     patches = Patches(signals, illuminant(light), *RANGE)
-    return fit(signals, np.array(white), balanced, patches)
+    return fit_matrix(signals, np.array(white), balanced, patches)
 
 
 def test_an_unbalanced_white_is_balanced_by_the_matrix():
@@ -119,10 +119,12 @@ def test_an_unbalanced_white_is_balanced_by_the_matrix():
 def test_colors_that_are_alike_get_a_finite_matrix_near_the_identity():
     same = np.array([[0.5, 0.4, 0.1], [0.5, 0.4, 0.1], [0.1, 0.2, 0.7]])
     two = made([1.0, 1.0, 1.0], mix=same)
-    assert np.abs(two.matrix).max() < 3 and "too few colors" in two.note
+    assert np.abs(two.matrix).max() < 3
+    assert "too few colors" in two.note
     one = made([1.0, 1.0, 1.0], mix=np.full((3, 3), 1 / 3))
     np.testing.assert_allclose(one.matrix @ np.ones(3), 1, atol=1e-12)
-    assert np.isfinite(one.matrix).all() and one.note
+    assert np.isfinite(one.matrix).all()
+    assert one.note
     gray = np.linspace(0, 1, 24)[:, None] * np.ones(3)
     np.testing.assert_allclose(fit_relative(gray, gray)[0], np.eye(3), atol=1e-12)
 
@@ -137,7 +139,7 @@ def test_without_light_the_identity_is_left(white):
 @pytest.mark.parametrize("wavelength", [400e-9, 550e-9, 700e-9])
 def test_light_of_one_wavelength_is_left_alone(wavelength):
     patches = Patches(np.ones((3, 24)), Spectrum.line(wavelength, 1.0), *RANGE)
-    found = fit(np.ones((3, 24)), np.ones(3), True, patches)
+    found = fit_matrix(np.ones((3, 24)), np.ones(3), True, patches)
     np.testing.assert_allclose(found.matrix, np.eye(3), atol=1e-12)
     assert found.note
 
@@ -149,7 +151,8 @@ def test_a_block_is_multiplied_as_colors_are():
     expected = np.moveaxis(np.moveaxis(planes, 0, 2) @ matrix.T, 2, 0)
     np.testing.assert_allclose(step.on_colors(planes), expected, atol=1e-14)
     block = step.on_block(Block(planes.astype(np.float32), 3))
-    assert block.first_row == 3 and block.planes.dtype == np.float32
+    assert block.first_row == 3
+    assert block.planes.dtype == np.float32
     np.testing.assert_allclose(block.planes, expected, atol=2e-6)  # sums in float32
 
 
@@ -256,7 +259,8 @@ def test_clipped_white_is_white_and_colors_below_saturation_stay():
     for level in (1.2, 2.5, 8.0):
         clipped = np.minimum(flat_frame([level] * 3, here), 1000.0)
         linear = process(clipped, here, order).linear[4, 4]
-        assert linear.min() >= 0.98 and np.ptp(linear) < 1e-5 * linear.max(), level
+        assert linear.min() >= 0.98, level
+        assert np.ptp(linear) < 1e-5 * linear.max(), level
     plain = process(flat_frame([0.8] * 3, here), context(), order).linear
     np.testing.assert_array_equal(process(flat_frame([0.8] * 3, here), here, order).linear, plain)
 

@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from vcam_cli.processing.base import Block, mirror
+from vcam_cli.processing.base import Block, mirrored_index
 from vcam_cli.processing.demosaic import bilinear
 from vcam_cli.processing.edge_aware import REACH, EdgeAware, edge_aware
 
@@ -32,7 +32,7 @@ def by_loops(mosaic, pattern, white):
     rows, columns = mosaic.shape
 
     def at(y, x):  # the mosaic, mirrored, on the scale of green; and its color
-        y, x = int(mirror(np.array(y), rows)), int(mirror(np.array(x), columns))
+        y, x = int(mirrored_index(np.array(y), rows)), int(mirrored_index(np.array(x), columns))
         color = RGB.index(pattern[y % 2][x % 2])
         return mosaic[y, x] * white[1] / white[color], color
 
@@ -123,7 +123,7 @@ def test_measured_values_stay_and_all_are_finite(mosaic, white):
 @pytest.mark.parametrize("first_row", [-3, 0, 1, 61, 62])
 def test_a_block_knows_its_phase(first_row):
     frame = np.random.default_rng(6).random((70, 6)).astype(np.float32)
-    rows = frame[mirror(np.arange(first_row, first_row + 10), 70)]
+    rows = frame[mirrored_index(np.arange(first_row, first_row + 10), 70)]
     method = EdgeAware(pattern_of("GRBG"), RGB, (0.5, 1.0, 0.7))
     block = method.on_block(Block(rows[np.newaxis], first_row))
     assert block.first_row == first_row + REACH

@@ -47,7 +47,8 @@ def flat(reflectance, shape=(10, 12), context=CONTEXT):
 def test_white_is_one_and_gray_is_its_reflectance():
     for reflectance in (1.0, 0.18):
         done = process(mosaic_of(flat(reflectance)), CONTEXT, FULL)
-        assert done.linear.shape == (10, 12, 3) and done.linear.dtype == np.float32
+        assert done.linear.shape == (10, 12, 3)
+        assert done.linear.dtype == np.float32
         # a few float32 roundings
         np.testing.assert_allclose(done.linear, reflectance, rtol=5e-7)
         code = tone.codes(np.array(reflectance), "srgb", 8)
@@ -177,7 +178,8 @@ def test_the_ideal_image_of_a_flat_scene_is_the_picture(dtype):
     planes = flat(0.3, (80, 12)).astype(dtype)
     done = process(mosaic_of(planes), CONTEXT, FULL)
     ideal = done.ideal(planes)
-    assert ideal.dtype == np.float32 and ideal.shape == (80, 12, 3)
+    assert ideal.dtype == np.float32
+    assert ideal.shape == (80, 12, 3)
     # the same roundings in float32, fewer in float64
     np.testing.assert_allclose(ideal, done.linear, rtol=5e-7)
 
@@ -203,7 +205,8 @@ def test_monochrome_is_gray():
     done = process(raw, GRAY, steps(black_level="subtract", gamma="srgb"))
     assert done.linear.shape == (10, 12, 1)
     np.testing.assert_allclose(done.linear, 0.25, rtol=5e-7)
-    assert done.encode(8).shape == (10, 12) and done.encode(8)[0, 0] == 137
+    assert done.encode(8).shape == (10, 12)
+    assert done.encode(8)[0, 0] == 137
     np.testing.assert_array_equal(done.ideal(raw[np.newaxis]), done.linear)
 
 
@@ -217,7 +220,8 @@ def test_monochrome_may_be_one_pixel_wide(shape):
 def test_a_mosaic_without_demosaic_is_shown_gray_and_cannot_be_judged():
     raw = mosaic_of(flat(1.0))
     done = process(raw, CONTEXT, steps(black_level="subtract", white_balance="gray-world"))
-    assert done.linear.shape == (10, 12, 1) and done.encode().shape == (10, 12)
+    assert done.linear.shape == (10, 12, 1)
+    assert done.encode().shape == (10, 12)
     np.testing.assert_allclose(done.linear, 1.0, rtol=5e-7)
     with pytest.raises(BadInput) as caught:
         done.ideal(flat(1.0))
@@ -233,7 +237,8 @@ def test_no_steps_at_all_show_the_raw_frame():
 @pytest.mark.parametrize("level", [0.0, BLACK, BLACK + 0.05])
 def test_a_black_frame_is_black_and_finite(level):
     done = process(np.full((8, 8), level), CONTEXT, FULL)
-    assert np.all(np.isfinite(done.linear)) and done.encode().max() <= 1
+    assert np.all(np.isfinite(done.linear))
+    assert done.encode().max() <= 1
     white = (CONTEXT.white_dn - BLACK) @ BT709
     np.testing.assert_allclose(done.linear, (level - BLACK) / white, atol=1e-8)
 
@@ -242,7 +247,8 @@ def test_a_scene_without_light_is_black():
     dark = Context(RGGB, RGB, np.full(3, BLACK), BLACK)
     noise = np.random.default_rng(7).normal(BLACK, 2, (8, 8))
     done = process(noise, dark, FULL)
-    assert np.all(done.linear == 0) and done.encode().max() == 0
+    assert np.all(done.linear == 0)
+    assert done.encode().max() == 0
 
 
 def problems(*args, **kwargs):

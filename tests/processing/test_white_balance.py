@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vcam_cli.processing.base import Block, Context
-from vcam_cli.processing.white_balance import Gains, color_sums, gray_world, illuminant
+from vcam_cli.processing.white_balance import Gains, color_sums, gray_world_gains, illuminant_gains
 
 BAYER = Context((("R", "G"), ("G", "B")), ("R", "G", "B"), np.ones(3), 0.0)
 MEANS = st.lists(st.floats(1.0, 500.0), min_size=3, max_size=3)
@@ -14,7 +14,7 @@ MEANS = st.lists(st.floats(1.0, 500.0), min_size=3, max_size=3)
 
 @given(MEANS)
 def test_gains_make_the_means_equal_to_the_largest(means):
-    gains = gray_world(np.array(means), 500.0)
+    gains = gray_world_gains(np.array(means), 500.0)
     # a quotient times its divisor: two roundings
     np.testing.assert_allclose(gains * means, max(means), rtol=4e-16)
     assert gains.min() == 1.0
@@ -22,8 +22,8 @@ def test_gains_make_the_means_equal_to_the_largest(means):
 
 @given(MEANS, st.floats(0.01, 100.0))
 def test_gains_do_not_depend_on_the_exposure(means, factor):
-    once = gray_world(np.array(means), 500.0)
-    again = gray_world(np.array(means) * factor, 500.0 * factor)
+    once = gray_world_gains(np.array(means), 500.0)
+    again = gray_world_gains(np.array(means) * factor, 500.0 * factor)
     np.testing.assert_allclose(again, once, rtol=1e-14)
 
 
@@ -31,18 +31,18 @@ def test_gains_do_not_depend_on_the_exposure(means, factor):
     "means", [(0.0, 0.0, 0.0), (-0.2, 0.1, -3.0), (0.01, 0.03, 0.02), (-1.0, -1.0, -1.0)]
 )
 def test_a_black_frame_has_gains_of_one(means):
-    assert gray_world(np.array(means), 1000.0).tolist() == [1.0, 1.0, 1.0]
+    assert gray_world_gains(np.array(means), 1000.0).tolist() == [1.0, 1.0, 1.0]
 
 
 @pytest.mark.parametrize("white", [0.0, -5.0])
 def test_no_light_at_all_has_gains_of_one(white):
-    assert gray_world(np.zeros(3), white).tolist() == [1.0, 1.0, 1.0]
+    assert gray_world_gains(np.zeros(3), white).tolist() == [1.0, 1.0, 1.0]
 
 
 def test_a_color_that_sees_nothing_is_left_alone():
-    gains = gray_world(np.array([0.0, 200.0, 100.0]), 500.0)
+    gains = gray_world_gains(np.array([0.0, 200.0, 100.0]), 500.0)
     assert gains.tolist() == [1.0, 1.0, 2.0]
-    assert gray_world(np.array([0.1, 200.0, -1.0]), 500.0).tolist() == [1.0, 1.0, 1.0]
+    assert gray_world_gains(np.array([0.1, 200.0, -1.0]), 500.0).tolist() == [1.0, 1.0, 1.0]
 
 
 @pytest.mark.parametrize("first_row", [-1, 0, 1, 63, 64])
@@ -75,6 +75,6 @@ def test_full_color_is_summed_and_balanced_by_planes():
 
 
 def test_the_illuminant_makes_white_gray():
-    gains = illuminant(np.array([500.0, 1000.0, 250.0]))
+    gains = illuminant_gains(np.array([500.0, 1000.0, 250.0]))
     assert gains.tolist() == [2.0, 1.0, 4.0]
-    assert illuminant(np.zeros(3)).tolist() == [1.0, 1.0, 1.0]
+    assert illuminant_gains(np.zeros(3)).tolist() == [1.0, 1.0, 1.0]

@@ -1,9 +1,10 @@
 """The promises of the plan, measured on cameras with little in common.
 
-    python -m tests.promise [--json FILE] [--random] [CAMERA...]
+    python -m tests.promise [--json FILE] [--random | --exact] [CAMERA...]
 
-Without names: all of them, and forty cameras drawn at random with every effect in each; --random:
-these alone.
+Without names: all of them, forty cameras drawn at random with every effect in each, and cameras
+before lattices, charts and fine images whose mean signal is known exactly; --random, --exact: those
+alone.
 
 Prints what the mean signal and the variances lose beside what may be lost, what the plan expected
 of every effect beside its ablation, whether what is not worth its cost is left out, and the time
@@ -19,28 +20,37 @@ import sys
 import tempfile
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).parent))  # the tests find each other by their names
+# the tests find each other by their names
+sys.path.insert(0, str(Path(__file__).parent.parent))
+sys.path.insert(0, str(Path(__file__).parent))
 
+import exact_errors
 import promises
 import random_cameras
 
-from vcam_cli.studies import ablation
+from vcam_cli.accuracy import ablation
 
 
 def main() -> int:
     parser = argparse.ArgumentParser()
     parser.add_argument("cameras", nargs="*", help="some of them; default all")
     parser.add_argument("--random", action="store_true", help="only those drawn at random")
+    parser.add_argument("--exact", action="store_true", help="only those with an exact truth")
     parser.add_argument("--json", help="also write the figures to this file")
     options = parser.parse_args()
     out: dict[str, list] = {"kept": [], "estimates": [], "costly": [], "idle": [], "seconds": []}
     out["random"] = []
     with tempfile.TemporaryDirectory() as folder:
-        named = () if options.random else promises.CAMERAS
+        named = () if options.random or options.exact else promises.CAMERAS
         for name in options.cameras or named:
             _one(name, Path(folder), out)
-        for number in () if options.cameras else range(random_cameras.COUNT):
+        for number in () if options.cameras or options.exact else range(random_cameras.COUNT):
             _random(number, Path(folder), out)
+        exact = []
+        if not options.cameras and not options.random:
+            exact = list(exact_errors.mean_errors(Path(folder)))
+            print("", *exact_errors.table(exact), sep="\n")
+    out["exact"] = [(each.name, each.kind, each.over_tolerance) for each in exact]
     figures = _figures(out)
     print()
     for text, found, good in figures:
@@ -93,7 +103,15 @@ def _random(number: int, folder: Path, out: dict[str, list]) -> None:
 
 def _figures(out: dict[str, list]) -> list[tuple[str, str, bool]]:
     """(what is promised, what was found, whether it holds)"""
-    return [*_of_random(out), *(_of_named(out) if out["kept"] else ())]
+    return [*_of_random(out), *_of_exact(out), *(_of_named(out) if out["kept"] else ())]
+
+
+def _of_exact(out: dict[str, list]) -> list[tuple[str, str, bool]]:
+    worst = max((max(over.values()) for _, _, over in out["exact"]), default=None)
+    if worst is None:
+        return []
+    text = "exact truths: error of the mean raw over the tolerance; at most 1"
+    return [(text, f"{worst:.2f}", worst <= 1)]
 
 
 def _of_random(out: dict[str, list]) -> list[tuple[str, str, bool]]:

@@ -15,16 +15,16 @@ from pathlib import Path
 import numpy as np
 
 from vcam_cli import load, simulate
+from vcam_cli.accuracy import ablation
+from vcam_cli.accuracy.measurements import enough
+from vcam_cli.accuracy.reference import changes, converged
 from vcam_cli.camera.camera import Camera
-from vcam_cli.effects.base import Draw
+from vcam_cli.effects.base import NoiseSource
 from vcam_cli.effects.order import ORDER
-from vcam_cli.engine import plan
-from vcam_cli.engine.prepare import Prepared
 from vcam_cli.files.png import write_png
-from vcam_cli.studies import ablation
-from vcam_cli.studies.accuracy_reference import changes, converged
-from vcam_cli.studies.accuracy_shots import enough
-from vcam_cli.studies.simulate import prepare
+from vcam_cli.simulation import plan
+from vcam_cli.simulation.preparation import Prepared
+from vcam_cli.simulation.simulate import prepare
 
 PRESETS = ("draft", "standard", "reference")
 COMMON = """
@@ -365,7 +365,7 @@ def _variance_lost(auto: Prepared, found: Prepared, full: float, scope: str) -> 
 
 
 def _variance(ready: Prepared, scope: str, level: float) -> float:
-    draws = [e for e in ready.plan.active if isinstance(e, Draw) and e.scope == scope]
+    draws = [e for e in ready.plan.active if isinstance(e, NoiseSource) and e.scope == scope]
     return sum(e.variance(level) for e in draws)
 
 
@@ -392,7 +392,7 @@ NOTHING = 1e-9
 def estimates(camera: Camera, true: Truth) -> list[Estimate]:
     """The plan's contribution of every effect at standard, beside its ablation."""
     auto = true.auto["standard"]
-    names = tuple(ablation.wanted(camera))
+    names = tuple(ablation.wanted_effects(camera))
     changed = changes(camera, true.found.exposure_time, names, 2)
     shares = ablation.variance_shares(true.found, true.full, 2)
     out = []
@@ -408,7 +408,7 @@ def estimates(camera: Camera, true: Truth) -> list[Estimate]:
     return out
 
 
-COSTLY = tuple(kind.name for kind in ORDER if issubclass(kind, Draw))
+COSTLY = tuple(kind.name for kind in ORDER if issubclass(kind, NoiseSource))
 """Effects whose draws cost a tenth of a second each at twelve megapixels."""
 
 
@@ -440,7 +440,7 @@ def idle_work(camera: Camera) -> list[tuple[str, bool]]:
 
 def seconds(camera: Camera) -> tuple[float, float]:
     """Of a frame with its render: auto at standard, and everything on at reference, medians."""
-    everything = ablation.switched(_at(camera, "reference"), "all")
+    everything = ablation.with_effects(_at(camera, "reference"), "all")
     return _timed(lambda: simulate(camera).render), _timed(lambda: simulate(everything).render)
 
 

@@ -14,11 +14,11 @@ import numpy as np
 from promises import picture_files, variance_lost_of
 
 from vcam_cli import load
+from vcam_cli.accuracy import ablation
+from vcam_cli.accuracy.knobs import with_accuracy
+from vcam_cli.accuracy.reference import converged
 from vcam_cli.camera.camera import Camera
-from vcam_cli.studies import ablation
-from vcam_cli.studies.accuracy_knobs import with_accuracy
-from vcam_cli.studies.accuracy_reference import converged
-from vcam_cli.studies.simulate import prepare
+from vcam_cli.simulation.simulate import prepare
 
 COUNT = 40
 TOLERANCES = (0.02, 0.005, 0.001)

@@ -4,8 +4,8 @@ import pytest
 import random_cameras
 from promises import CAMERAS, estimates, idle_work, kept, made, truth, worth_leaving_out
 
+from vcam_cli.accuracy import ablation
 from vcam_cli.effects.order import ORDER
-from vcam_cli.studies import ablation
 
 pytestmark = pytest.mark.long
 
@@ -47,7 +47,7 @@ def test_nobody_asks_for_nothing_is_done(case):
 def test_random_cameras_keep_every_tolerance(number, tmp_path):
     """Three of the forty of `make promise`: of pictures, which are quick."""
     camera = random_cameras.made(number, tmp_path)
-    absent = {kind.name for kind in ORDER} - set(ablation.wanted(camera))
+    absent = {kind.name for kind in ORDER} - set(ablation.wanted_effects(camera))
     assert absent == {"reset_noise" if number % 2 == 0 else "charge_transfer"}
     for found in random_cameras.held(camera):
         assert found.mean <= found.tolerance, found
@@ -57,5 +57,5 @@ def test_random_cameras_keep_every_tolerance(number, tmp_path):
 def test_cameras_with_every_effect(tmp_path):
     """Twelve at first, ten more for what lenses and pixels do beside."""
     assert len(CAMERAS) == 22
-    named = {name for each in CAMERAS for name in ablation.wanted(made(each, tmp_path))}
+    named = {name for each in CAMERAS for name in ablation.wanted_effects(made(each, tmp_path))}
     assert named == {kind.name for kind in ORDER}

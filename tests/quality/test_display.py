@@ -6,8 +6,8 @@ import warnings
 import numpy as np
 import pytest
 
-from vcam_cli.camera.display import Display
-from vcam_cli.quality.display import D65, Screen, rgb_to_xyz, samples_per_degree, screen
+from vcam_cli.camera.quality import Display
+from vcam_cli.quality.display import D65, Screen, display_screen, rgb_to_xyz, samples_per_degree
 from vcam_cli.quality.scielab import cielab_map
 
 
@@ -55,15 +55,17 @@ def test_samples_per_degree() -> None:
 def test_a_picture_of_stated_width_has_finer_pixels_when_it_has_more() -> None:
     inch = 0.0254
     wide = Display.model_validate({"width": "7.11 in"})
-    assert screen(wide, 512).samples_per_degree == pytest.approx(
+    assert display_screen(wide, 512).samples_per_degree == pytest.approx(
         samples_per_degree(512 / 7.11, 18 * inch)
     )
-    assert screen(wide, 1024).samples_per_degree == pytest.approx(
-        2 * screen(wide, 512).samples_per_degree
+    assert display_screen(wide, 1024).samples_per_degree == pytest.approx(
+        2 * display_screen(wide, 512).samples_per_degree
     )
-    default = screen(Display(), 512)
+    default = display_screen(Display(), 512)
     assert default.samples_per_degree == pytest.approx(22.6218, abs=1e-4)
     assert default.white[1] == pytest.approx(100)
     far = Display.model_validate({"dpi": 100, "viewing_distance": "36 in", "primaries": "srgb"})
-    assert screen(far, 512).samples_per_degree == pytest.approx(22.6218 * 2 / 0.72, abs=1e-3)
-    np.testing.assert_allclose(screen(far, 9).white, D65, rtol=1e-14)
+    assert display_screen(far, 512).samples_per_degree == pytest.approx(
+        22.6218 * 2 / 0.72, abs=1e-3
+    )
+    np.testing.assert_allclose(display_screen(far, 9).white, D65, rtol=1e-14)

@@ -10,7 +10,7 @@ def test_running_means_are_integrals_over_their_windows():
     """Against the mean of the map drawn a hundred times finer."""
     rng = np.random.default_rng(1)
     values, widths = rng.random((3, 20)), rng.uniform(1, 7, 20)
-    found = iso_lines.smoothed(values, widths, 1)
+    found = iso_lines.moving_average(values, widths, 1)
     fine = np.repeat(values, 1000, axis=1)
     for column in range(20):
         half = min(widths[column] / 2, column + 0.5, 20 - column - 0.5)
@@ -22,7 +22,7 @@ def test_running_means_are_integrals_over_their_windows():
 
 def test_what_rises_steadily_stays_as_it_is():
     slope = np.add.outer(np.linspace(0, 3, 17), np.linspace(1, 2, 23))
-    np.testing.assert_allclose(iso_lines.smoothed(slope, 6.3, 4.4), slope, rtol=1e-12)
+    np.testing.assert_allclose(iso_lines.moving_average(slope, 6.3, 4.4), slope, rtol=1e-12)
 
 
 def test_the_envelope_of_bars_is_their_crest():
@@ -33,14 +33,14 @@ def test_the_envelope_of_bars_is_their_crest():
 
 
 def test_windows_are_a_period_within_limits():
-    widths = iso_lines.periods(np.array([0.0, 1e3, 10e3, 1e6]), 10e-6, 240)
+    widths = iso_lines.averaging_widths(np.array([0.0, 1e3, 10e3, 1e6]), 10e-6, 240)
     np.testing.assert_allclose(widths, [20, 20, 10, 7.5])
 
 
 def test_heights_are_where_the_level_is_first_reached():
     scale = np.linspace(0, 1, 101)
     columns = np.stack([4 * scale, 0 * scale, 5 + scale, 8 * scale * (1 - scale)], axis=1)
-    found = iso_lines.heights(columns, scale, 1.5)
+    found = iso_lines.level_heights(columns, scale, 1.5)
     assert found[0] == pytest.approx(0.375, abs=1e-12)
     assert np.isnan(found[1])
     assert found[2] == 0

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from vcam_cli.quality.modes import density, modes
+from vcam_cli.quality.modes import density, density_modes
 
 WIDTH = 0.01
 
@@ -17,13 +17,13 @@ def counted(*parts, count=20000):
 
 
 def test_one_and_two_modes():
-    one = modes(counted((1, 3, 0.5)), WIDTH, 20000)
-    assert one.places == pytest.approx([3.0], abs=0.02)
+    one = density_modes(counted((1, 3, 0.5)), WIDTH, 20000)
+    assert one.locations == pytest.approx([3.0], abs=0.02)
     assert one.spread == pytest.approx(0.5, rel=1e-3)
     assert one.bandwidth == pytest.approx(0.9 * 0.5 * 20000**-0.2, rel=0.02)
     assert one.critical_bandwidth == 2 * WIDTH
-    two = modes(counted((0.6, 3, 0.4), (0.4, 6, 0.4)), WIDTH, 20000)
-    assert two.places == pytest.approx([3.0, 6.0], abs=0.03)
+    two = density_modes(counted((0.6, 3, 0.4), (0.4, 6, 0.4)), WIDTH, 20000)
+    assert two.locations == pytest.approx([3.0, 6.0], abs=0.03)
     assert two.critical_bandwidth > 0.5 > two.bandwidth
 
 
@@ -32,7 +32,7 @@ def test_the_critical_width_is_where_two_modes_merge():
 
     A little less is found: two that stand out by less than a hundredth count as one.
     """
-    found = modes(counted((0.5, 4, 0.3), (0.5, 6, 0.3)), WIDTH, 20000)
+    found = density_modes(counted((0.5, 4, 0.3), (0.5, 6, 0.3)), WIDTH, 20000)
     exact = np.sqrt(1 - 0.3**2)
     assert 0.85 * exact < found.critical_bandwidth < exact
 
@@ -50,4 +50,4 @@ def test_density_is_one_in_all_and_smooth_at_zero():
 
 def test_no_values_are_refused():
     with pytest.raises(ValueError, match="no values"):
-        modes(np.zeros(10), WIDTH, 10)
+        density_modes(np.zeros(10), WIDTH, 10)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.special import erf
 
-from vcam_cli.quality.mtf import Lattice, crossing, slanted_edge, tukey
+from vcam_cli.quality.mtf import Lattice, crossing_frequency, slanted_edge_sfr, tukey_window
 
 PITCH = 4e-6
 
@@ -37,7 +37,7 @@ def closed_form(frequency, degrees, sigma):
 
 
 def seen(*lattices, reach=40):
-    return slanted_edge(lattices, PITCH, reach * PITCH)
+    return slanted_edge_sfr(lattices, PITCH, reach * PITCH)
 
 
 @pytest.mark.parametrize("sigma", [0.3, 0.6, 1.5, 4.0])
@@ -48,7 +48,7 @@ def test_transfer_and_angle(sigma, degrees):
     low = found.frequency < 0.5 / PITCH
     expected = closed_form(found.frequency, degrees, sigma)
     np.testing.assert_allclose(found.mtf[low], expected[low], atol=1e-3)
-    half = crossing(found.frequency, expected, 0.5)
+    half = crossing_frequency(found.frequency, expected, 0.5)
     assert found.mtf50 == pytest.approx(half, rel=1e-3)
     turned = math.degrees(found.angle) - degrees
     assert abs((turned + 90) % 180 - 90) < 0.01
@@ -56,7 +56,7 @@ def test_transfer_and_angle(sigma, degrees):
 
 def test_one_color_of_a_mosaic_sees_the_same():
     """A quarter of the pixels sample the edge unevenly: 0.5 % of MTF50."""
-    half = crossing(f := np.linspace(0, 0.5 / PITCH, 2000), closed_form(f, 5, 0.6), 0.5)
+    half = crossing_frequency(f := np.linspace(0, 0.5 / PITCH, 2000), closed_form(f, 5, 0.6), 0.5)
     red = lattice(5, 0.6, step=2)
     assert seen(red).mtf50 == pytest.approx(half, rel=5e-3)
     greens = [lattice(5, 0.6, step=2, start=start) for start in ((0, 1), (1, 0))]
@@ -85,7 +85,7 @@ def test_corrections_matter():
     found = seen(lattice(5, 0.3))
     f = found.frequency * PITCH / 4
     plain = found.mtf * np.sinc(2 * f) * np.sinc(f)
-    assert crossing(found.frequency, plain, 0.5) < 0.98 * found.mtf50
+    assert crossing_frequency(found.frequency, plain, 0.5) < 0.98 * found.mtf50
 
 
 def test_a_bent_edge_wants_a_curve():
@@ -95,7 +95,7 @@ def test_a_bent_edge_wants_a_curve():
     values = 0.5 + 0.5 * erf((x[None, :] - bend[:, None]) / 0.6 / math.sqrt(2))
     edge = [Lattice(values, PITCH * x, PITCH * x)]
     straight, curved = (
-        slanted_edge(edge, PITCH, 40 * PITCH, degree=degree).mtf50 for degree in (1, 2)
+        slanted_edge_sfr(edge, PITCH, 40 * PITCH, degree=degree).mtf50 for degree in (1, 2)
     )
     gauss = math.sqrt(math.log(2) / 2) / (math.pi * 0.6 * PITCH)
     assert curved == pytest.approx(gauss, rel=0.01)
@@ -123,13 +123,13 @@ def test_an_edge_along_the_pixels_is_refused():
 
 def test_crossing():
     f, m = np.array([0.0, 1, 2, 3]), np.array([1.0, 0.6, 0.4, 0.5])
-    assert crossing(f, m, 0.5) == pytest.approx(1.5)
-    assert crossing(f, m, 0.1) == math.inf
-    assert crossing(f, m - 1, 0.5) == 0
+    assert crossing_frequency(f, m, 0.5) == pytest.approx(1.5)
+    assert crossing_frequency(f, m, 0.1) == math.inf
+    assert crossing_frequency(f, m - 1, 0.5) == 0
 
 
 def test_window():
     for flat in (0.0, 0.5, 1.0):
-        window = tukey(1000, flat)
+        window = tukey_window(1000, flat)
         assert window.sum() == pytest.approx(1000 * (1 + flat) / 2, rel=1e-3)
         np.testing.assert_allclose(window, window[::-1], atol=1e-12)

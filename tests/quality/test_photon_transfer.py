@@ -12,7 +12,7 @@ from vcam_cli.quality.photon_transfer import (
     dark_signal,
     electrons_of_variance,
     linearity,
-    pair,
+    pair_statistics,
     photon_transfer,
     sensitivity_threshold,
 )
@@ -32,7 +32,7 @@ def measured(gain=GAIN, noise=DARK_NOISE, levels=None, fixed=0.0, offset=OFFSET)
     if levels is None:
         levels = WELL * np.concatenate([np.arange(1, 45) / 50, np.linspace(0.9, 1.06, 33)])
     told = [
-        pair(*(drawn(rng, level, gain, noise, fixed, offset) for _ in "ab"))
+        pair_statistics(*(drawn(rng, level, gain, noise, fixed, offset) for _ in "ab"))
         for level in (0, *levels)
     ]
     mean, variance = np.array(told).T
@@ -79,7 +79,7 @@ def test_signal_to_noise_is_that_of_the_model(found):
     assert np.abs(found.series.snr[inside] / model - 1).max() < 0.02
     assert float(found.snr_model(found.threshold_photons)) == pytest.approx(1, rel=1e-12)
     e = 0.25 * WELL
-    assert found.snr_at(e) == pytest.approx(e / math.sqrt(e + DARK_NOISE**2), rel=0.015)
+    assert found.measured_snr(e) == pytest.approx(e / math.sqrt(e + DARK_NOISE**2), rel=0.015)
 
 
 def test_pairs_know_no_fixed_pattern():
@@ -91,16 +91,16 @@ def test_pairs_know_no_fixed_pattern():
 
 
 def test_a_pair_by_hand():
-    mean, variance = pair([[1, 2], [3, 4]], [[2, 2], [3, 9]])
+    mean, variance = pair_statistics([[1, 2], [3, 4]], [[2, 2], [3, 9]])
     assert mean == (10 + 16) / 8
     assert variance == pytest.approx(((1 + 0 + 0 + 25) / 4 - (6 / 4) ** 2) / 2)
-    assert pair([[5]], [[7]]) == (6, 0)  # one pixel: all of it may be the lamp's
+    assert pair_statistics([[5]], [[7]]) == (6, 0)  # one pixel: all of it may be the lamp's
 
 
 @pytest.mark.parametrize("frames", [([[1, 2]], [[1], [2]]), ([], [])])
 def test_no_pair(frames):
     with pytest.raises(ValueError, match="two frames of one shape"):
-        pair(*frames)
+        pair_statistics(*frames)
 
 
 def test_without_noise_in_the_dark_the_gain_holds_on_a_coarse_adc():
@@ -151,14 +151,22 @@ def test_error_of_a_bent_response():
     slope, offset = np.linalg.solve(normal, [np.sum(w * x * y), np.sum(w * y)])
     off = (y - slope * x - offset) / (slope * x + offset)
     assert found.error == pytest.approx(np.abs(off).mean(), rel=1e-8)
-    assert (found.least, found.largest) == pytest.approx((off.min(), off.max()), rel=1e-8)
+    assert (found.min_deviation, found.max_deviation) == pytest.approx(
+        (off.min(), off.max()), rel=1e-8
+    )
 
 
 @pytest.mark.parametrize(
-    "bad", [series([1, 2]), series([10, 8, 6, 4, 2]), series(np.zeros(9)), series([1, 1, 1, 500])]
+    ("bad", "words"),
+    [
+        (series([1, 2]), "too few"),
+        (series([10, 8, 6, 4, 2]), "too few"),
+        (series(np.zeros(9)), "too few"),
+        (series([1, 1, 1, 500]), "do not rise"),
+    ],
 )
-def test_what_is_no_photon_transfer(bad):
-    with pytest.raises(ValueError):
+def test_what_is_no_photon_transfer(bad, words):
+    with pytest.raises(ValueError, match=words):
         photon_transfer(bad)
 
 
@@ -169,7 +177,7 @@ def test_linearity_needs_levels():
 
 def test_snr_outside_the_levels(found):
     with pytest.raises(ValueError, match="no frames"):
-        found.snr_at(10 * WELL)
+        found.measured_snr(10 * WELL)
 
 
 def test_dark_signal():

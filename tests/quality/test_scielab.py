@@ -135,9 +135,9 @@ def test_detail_too_fine_is_not_seen(filters: str) -> None:
 def test_blocks_and_workers_do_not_show(monkeypatch, workers: int) -> None:
     one, other = np.random.default_rng(4).random((2, 137, 41, 3))
     whole = s_cielab_map(one, other, screen(9))
-    assert scielab._block(137, 5) == (137, 0)
+    assert scielab._block_and_halo(137, 5) == (137, 0)
     monkeypatch.setattr(scielab, "BLOCK_ROWS", 16)
-    assert scielab._block(137, 5) == (16, 5)  # nine blocks, the last of nine rows
+    assert scielab._block_and_halo(137, 5) == (16, 5)  # nine blocks, the last of nine rows
     in_blocks = s_cielab_map(one, other, screen(9), workers=1)
     np.testing.assert_allclose(in_blocks, whole, rtol=1e-9, atol=1e-9)
     shared = s_cielab_map(one, other, screen(9), workers=workers)
@@ -203,7 +203,7 @@ def test_continuous_kernels_are_integrals(degree: float) -> None:
 def test_coarse_pixels_are_squares_of_light(shape: tuple[int, int], degree: float) -> None:
     """The same as the mean over as many finer pixels of the same light, in blocks of rows too."""
     one, other = np.random.default_rng(4).random((2, *shape, 3))
-    n = math.ceil(scielab.PLACES / degree)
+    n = math.ceil(scielab.MIN_SAMPLES_PER_DEGREE / degree)
     finer = [x.repeat(n, axis=0).repeat(n, axis=1) for x in (one, other)]
     expected = s_cielab_map(*finer, screen(degree * n), "continuous")
     expected = expected.reshape(shape[0], n, shape[1], n).mean(axis=(1, 3))

@@ -25,7 +25,7 @@ def on_sensor(data=DATA, quantity="radiance", white=None, seen=None, **others):
 def spectra_at(shown, wavelengths):
     """sum_k B_k S_k of every sample: (ny, nx, n)."""
     planes = shown.planes(np.eye(len(shown.spectra)))
-    values = np.array([s.at(wavelengths) for s in shown.spectra])
+    values = np.array([s.evaluate(wavelengths) for s in shown.spectra])
     return np.moveaxis(np.tensordot(planes, values, axes=(0, 0)), 2, -1)
 
 
@@ -47,14 +47,16 @@ def test_radiance_is_straight_between_the_bands():
 def test_reflectance_is_lit_by_the_lamp():
     shown = on_sensor(quantity="reflectance", illuminant="A", luminance="50 cd/m2")
     assert luminance(shown.white, START, STOP) == pytest.approx(50, rel=1e-12)
-    lamp = shown.white.at(ASKED)
-    np.testing.assert_allclose(lamp / lamp[0], illuminant("A").at(ASKED) / illuminant("A").at(4e-7))
+    lamp = shown.white.evaluate(ASKED)
+    np.testing.assert_allclose(
+        lamp / lamp[0], illuminant("A").evaluate(ASKED) / illuminant("A").evaluate(4e-7)
+    )
     np.testing.assert_allclose(spectra_at(shown, ASKED), lamp * between(ASKED), rtol=1e-6)
 
 
 def test_reflectance_without_a_lamp_is_lit_by_d65():
     shown, daylight = on_sensor(quantity="reflectance"), illuminant("D65")
-    ratio = shown.white.at(ASKED) / daylight.at(ASKED)
+    ratio = shown.white.evaluate(ASKED) / daylight.evaluate(ASKED)
     np.testing.assert_allclose(ratio, ratio[0], rtol=1e-12)
 
 
@@ -62,8 +64,8 @@ def test_components_are_1_for_white():
     """As in every scene: B = 1 everywhere is the perfect white."""
     for quantity in ("radiance", "reflectance"):
         shown = on_sensor(quantity=quantity)
-        total = sum(s.at(ASKED) for s in shown.spectra)
-        np.testing.assert_allclose(total, shown.white.at(ASKED), rtol=1e-12)
+        total = sum(s.evaluate(ASKED) for s in shown.spectra)
+        np.testing.assert_allclose(total, shown.white.evaluate(ASKED), rtol=1e-12)
 
 
 class TestWhite:
@@ -71,13 +73,13 @@ class TestWhite:
         """108 samples: a thousandth of them is none. V(wavelength) by a 0.01 nm sum."""
         shown = on_sensor(luminance="from-file")
         fine = np.arange(400, 700.001, 0.01) * 1e-9
-        eye = 683 * cmf()[1].at(fine)
+        eye = 683 * cmf()[1].evaluate(fine)
         levels = np.trapezoid(between(fine) * eye, fine)
         mean = DATA.mean((0, 1), dtype=float)
         level = np.trapezoid(np.interp(fine, WAVELENGTHS, mean) * eye, fine)
         expected = np.interp(ASKED, WAVELENGTHS, mean) * levels.max() / level
         # 1e-6: the cube has 32 bits
-        np.testing.assert_allclose(shown.white.at(ASKED), expected, rtol=1e-6)
+        np.testing.assert_allclose(shown.white.evaluate(ASKED), expected, rtol=1e-6)
 
     def test_a_thousandth_may_be_brighter(self):
         data = np.full((50, 60, 5), 2.0, np.float32)
@@ -95,12 +97,12 @@ class TestWhite:
         data = np.zeros((50, 60, 5), np.float32)
         data[7, 8] = 3
         white = on_sensor(data, luminance="from-file").white
-        np.testing.assert_allclose(white.at(ASKED), 3, rtol=1e-6)
+        np.testing.assert_allclose(white.evaluate(ASKED), 3, rtol=1e-6)
 
     def test_the_file_s_own(self):
         own = np.array([1.0, 2, 3, 2, 0])
         white = on_sensor(white=own, luminance="from-file").white
-        np.testing.assert_allclose(white.at(ASKED), np.interp(ASKED, WAVELENGTHS, own))
+        np.testing.assert_allclose(white.evaluate(ASKED), np.interp(ASKED, WAVELENGTHS, own))
 
     @pytest.mark.parametrize(
         ("level", "measure", "value"),
@@ -115,7 +117,7 @@ class TestWhite:
         shown = on_sensor(white=own, **level)
         assert measure(shown.white, START, STOP) == pytest.approx(value, rel=1e-12)
         plain = on_sensor(white=own, luminance="from-file")
-        factor = shown.white.at(ASKED)[0] / plain.white.at(ASKED)[0]
+        factor = shown.white.evaluate(ASKED)[0] / plain.white.evaluate(ASKED)[0]
         np.testing.assert_allclose(
             spectra_at(shown, ASKED), factor * spectra_at(plain, ASKED), rtol=1e-12
         )

@@ -77,7 +77,7 @@ def test_the_same_seed_is_the_same_picture_whatever_the_sampling():
 
 def test_the_first_leaves_of_a_seed_stay_what_they_are():
     # A guard against a change of generator or of the order of draws: pictures are reproducible.
-    leaves = dead_leaves.grow(1)
+    leaves = dead_leaves.generate_leaves(1)
     first = [leaves.discs.x[0], leaves.discs.y[0], leaves.discs.radius[0], leaves.factor[0]]
     np.testing.assert_allclose(first, FIRST, rtol=1e-12)
     assert leaves.pigment[:5].tolist() == PIGMENTS
@@ -88,7 +88,7 @@ PIGMENTS = [3, 1, 8, 3, 8]
 
 
 def test_radii_follow_the_inverse_cube():
-    radius = dead_leaves.grow(4).discs.radius
+    radius = dead_leaves.generate_leaves(4).discs.radius
     assert radius.min() >= dead_leaves.SMALLEST
     assert radius.max() <= dead_leaves.LARGEST
     # P(r > t) = (s/t)^2, the largest radius aside; 5 standard errors of a binomial share
@@ -99,6 +99,7 @@ def test_radii_follow_the_inverse_cube():
         assert (radius > t).mean() == pytest.approx(share, abs=error)
 
 
+@pytest.mark.long
 def test_far_margins_are_covered():
     # Leaves repeat with a period of 1.5 sides; 8 pixels around 4 are two sides more each way.
     chart = build(scene(LEAVES), view(rows=4, columns=4, margin=8), None)

@@ -10,7 +10,7 @@ from support import scene, view
 
 from vcam_cli.errors import BadInput
 from vcam_cli.scenes.build import build
-from vcam_cli.scenes.image import image_scene, place
+from vcam_cli.scenes.image import image_scene, placement
 from vcam_cli.spectra import Spectrum, cmf, integral, luminance, srgb_reflectances
 
 GRAY = {"kind": "image", "file": "/a.png", "model": "reflectance"}
@@ -63,7 +63,7 @@ def test_cropped_centrally_to_whole_samples(rows, columns, shape):
 )
 def test_samples_cover_the_array_with_less_than_one_to_spare(rows, columns, high, wide, width):
     seen = view(rows=high, columns=wide, scene_width=width)
-    placed = place(rows, columns, seen)
+    placed = placement(rows, columns, seen)
     for samples, cut, needed in [
         (columns, placed.cut_x, seen.width / placed.pitch),
         (rows, placed.cut_y, seen.height / placed.pitch),
@@ -72,7 +72,8 @@ def test_samples_cover_the_array_with_less_than_one_to_spare(rows, columns, high
         # parity is kept, so less than 2 samples (1 on a side) are too many
         assert needed - 3e-6 <= kept < needed + 2
     if width is None:
-        assert placed.cut_x >= 0 and placed.cut_y >= 0
+        assert placed.cut_x >= 0
+        assert placed.cut_y >= 0
         assert min(placed.cut_x, placed.cut_y) == 0
 
 
@@ -191,7 +192,7 @@ def test_laser_lines_outside_the_wavelengths_are_an_error():
 
 def color(spectrum) -> np.ndarray:
     """Chromaticity x, y."""
-    xyz = [integral(spectrum.times(Spectrum(tables=(c,))), START, STOP) for c in cmf()]
+    xyz = [integral(spectrum.multiply(Spectrum(tables=(c,))), START, STOP) for c in cmf()]
     return np.array(xyz[:2]) / sum(xyz)
 
 
@@ -237,8 +238,10 @@ def test_a_display_beyond_the_wavelengths_is_an_error():
 def test_mallett_white_is_a_perfect_diffuser():
     shown = build(scene(MALLETT, illuminant="FL2"), view(), picture(4, 4, 3))
     at = np.linspace(START, STOP, 201)
-    total = sum(s.at(at) for s in shown.spectra)
-    np.testing.assert_allclose(total, shown.white.at(at), rtol=1.1e-5)  # of the published basis
+    total = sum(s.evaluate(at) for s in shown.spectra)
+    np.testing.assert_allclose(
+        total, shown.white.evaluate(at), rtol=1.1e-5
+    )  # of the published basis
     assert luminance(shown.white, START, STOP) == pytest.approx(100, rel=1e-12)
 
 
@@ -246,16 +249,17 @@ def test_mallett_colors_under_d65_are_those_of_the_file():
     shown = build(scene(MALLETT), view(), picture(4, 4, 3))
     rgb = np.array([0.2, 0.5, 0.8])
     xyz = [
-        sum(v * integral(s.times(Spectrum(tables=(c,))), START, STOP)
+        sum(v * integral(s.multiply(Spectrum(tables=(c,))), START, STOP)
             for v, s in zip(rgb, shown.spectra, strict=True))
         for c in cmf()
     ]  # fmt: skip
     # IEC 61966-2-1, the matrix of linear sRGB; white has Y = 1. As above.
     matrix = [[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]]
-    white = integral(shown.white.times(Spectrum(tables=(cmf()[1],))), START, STOP)
+    white = integral(shown.white.multiply(Spectrum(tables=(cmf()[1],))), START, STOP)
     np.testing.assert_allclose(np.array(xyz) / white, matrix @ rgb, atol=8e-4)
 
 
 def test_mallett_reflectances_reflect_at_most_all():
     for basis in srgb_reflectances():
-        assert basis.tables[0].value.min() >= 0 and basis.tables[0].value.max() <= 1
+        assert basis.tables[0].value.min() >= 0
+        assert basis.tables[0].value.max() <= 1

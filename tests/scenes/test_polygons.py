@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vcam_cli.scenes import polygons
-from vcam_cli.scenes.slanted_edge import half_plane
+from vcam_cli.scenes.slanted_edge import half_plane_cover
 
 SQUARE = np.array([(0, 0), (0, 1), (1, 1), (1, 0)], float)  # y down: counterclockwise as seen
 
@@ -21,7 +21,7 @@ def test_one_long_side_is_a_half_plane(angle):
     corners = [side, -side, -side + along * normal, side + along * normal]
     found = polygons.cover(polygons.sides([np.array(corners)[::-1]]), edges_x, edges_y)
     x, y = (edges_x[1:] + edges_x[:-1]) / 2, (edges_y[1:] + edges_y[:-1]) / 2
-    expected = half_plane(
+    expected = half_plane_cover(
         np.add.outer(normal[1] * y, normal[0] * x),
         abs(normal[0]) * np.diff(edges_x),
         abs(normal[1]) * np.diff(edges_y)[:, None],
@@ -32,7 +32,7 @@ def test_one_long_side_is_a_half_plane(angle):
 
 @pytest.mark.parametrize(("x", "y"), [(0, 0), (-3, 0), (0, -3), (0.9, 0.9), (-0.5, 2), (3, 3)])
 def test_parts_beyond_the_grid_do_not_count(x, y):
-    square = polygons.sides([SQUARE]).scaled(2.0, x, y)
+    square = polygons.sides([SQUARE]).scale_and_move(2.0, x, y)
     edges = np.linspace(0, 1.5, 4)
     inside = [np.diff(np.clip(edges, low, low + 2)) / 0.5 for low in (y, x)]
     np.testing.assert_allclose(polygons.cover(square, edges, edges), np.outer(*inside), atol=1e-14)
@@ -44,7 +44,7 @@ def test_a_hole_is_taken_away():
     expected = np.ones((3, 3))
     expected[1, 1] = 0
     np.testing.assert_allclose(polygons.cover(frame, edges, edges), expected, atol=1e-15)
-    points = polygons.inside(frame, edges[:3] + 0.5, edges[:3] + 0.5)
+    points = polygons.contains_points(frame, edges[:3] + 0.5, edges[:3] + 0.5)
     np.testing.assert_array_equal(points, expected)
 
 
@@ -62,6 +62,6 @@ def test_triangles_have_their_area_and_cells_their_points(corners):
     points = 64
     at = (np.arange(points) + 0.5) / points
     x, y = ((e[:-1, None] + np.diff(e)[:, None] * at).ravel() for e in (edges_x, edges_y))
-    mean = polygons.inside(triangle, x, y).reshape(6, points, 6, points).mean((1, 3))
+    mean = polygons.contains_points(triangle, x, y).reshape(6, points, 6, points).mean((1, 3))
     # each of three sides crosses at most 2 x 64 of 64^2 parts of a cell, half of each in error
     np.testing.assert_allclose(cover, mean, atol=3 / points)

@@ -19,16 +19,16 @@ def test_the_largest_number_is_seen(line, at_once, monkeypatch):
     expected = np.zeros(line * lines, int)
     for first, last, new in zip(row + start, row + stop, number, strict=True):
         expected[first:last] = np.maximum(expected[first:last], new)
-    found = runs.topmost(row + start, row + stop, number, line * lines, line)
+    found = runs.topmost_numbers(row + start, row + stop, number, line * lines, line)
     np.testing.assert_array_equal(found, expected)
 
 
 def test_without_runs_nothing_is_seen():
     none = np.empty(0, int)
-    assert not runs.topmost(none, none, none, 6, 3).any()
+    assert not runs.topmost_numbers(none, none, none, 6, 3).any()
 
 
 def test_members_are_numbered_in_order():
-    item, number = runs.members(np.array([3, 5, 0]), np.array([5, 4, 1]))
+    item, number = runs.expand_ranges(np.array([3, 5, 0]), np.array([5, 4, 1]))
     assert item.tolist() == [0, 0, 2]
     assert number.tolist() == [3, 4, 0]

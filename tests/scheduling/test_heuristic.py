@@ -10,7 +10,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from vcam_cli.scheduling.heuristic import captures_per_segment, heuristic
+from vcam_cli.scheduling.comparison_schedules import (
+    captures_per_segment,
+    heuristic_photocurrents,
+)
 from vcam_cli.scheduling.objective import expected_snr
 from vcam_cli.scheduling.pdf import Pdf
 
@@ -25,7 +28,7 @@ def pdf_of(segments):
 @pytest.mark.parametrize("name", DATA["heuristic"])
 def test_examples(name):
     example = DATA["heuristic"][name]
-    found = heuristic(pdf_of(example["segments"]), example["count"])
+    found = heuristic_photocurrents(pdf_of(example["segments"]), example["count"])
     np.testing.assert_allclose(found, example["photocurrents"], rtol=1e-14)
     shares = np.array(example["segments"])[::-1, 2]
     assert captures_per_segment(shares, example["count"]) == example["captures"]
@@ -34,7 +37,7 @@ def test_examples(name):
 @pytest.mark.parametrize(("name", "row"), CASES, ids=lambda value: str(value)[:20])
 def test_schedules_of_whole_cases(name, row):
     pdf, expected = pdf_of(DATA["cases"][name]["segments"]), row["heuristic"]
-    found = heuristic(pdf, row["count"])
+    found = heuristic_photocurrents(pdf, row["count"])
     np.testing.assert_allclose(pdf.max / found, expected["t"], rtol=1e-12)
     # times a rounding error above 1 / i are not saturated: a slack of 1e-12
     assert expected_snr(pdf, 1 / found) == pytest.approx(expected["J"], rel=1e-11)
@@ -71,7 +74,7 @@ def test_every_schedule_is_one(shares, edges, count):
     if (np.diff(edges) < 1e-12).any():
         return
     pdf = Pdf.segments(edges[::2], edges[1::2], shares)
-    found = heuristic(pdf, count)
+    found = heuristic_photocurrents(pdf, count)
     assert found.shape == (count,)
     assert found[0] == pdf.max
     assert (np.diff(found) < 0).all()
@@ -82,17 +85,19 @@ def test_segments_without_probability_are_dropped():
     full = Pdf.segments([0, 0.1, 0.4, 0.8, 0.9], [0.1, 0.4, 0.5, 0.9, 1.0], [0.0, 1, 0, 1, 0])
     bare = Pdf.segments([0.1, 0.8], [0.4, 0.9], [1, 1])
     for count in range(1, 12):
-        np.testing.assert_array_equal(heuristic(full, count), heuristic(bare, count))
+        np.testing.assert_array_equal(
+            heuristic_photocurrents(full, count), heuristic_photocurrents(bare, count)
+        )
 
 
 def test_a_bright_segment_of_next_to_no_probability_still_has_the_first_capture():
     pdf = Pdf.segments([0, 0.9], [0.5, 1.0], [1.0, 1e-14])
-    np.testing.assert_allclose(heuristic(pdf, 1), [1.0])
-    np.testing.assert_allclose(heuristic(pdf, 3), [1.0, 0.5, 0.25])
+    np.testing.assert_allclose(heuristic_photocurrents(pdf, 1), [1.0])
+    np.testing.assert_allclose(heuristic_photocurrents(pdf, 3), [1.0, 0.5, 0.25])
 
 
 def test_what_it_cannot_do():
     with pytest.raises(ValueError, match="segments, not levels"):
-        heuristic(Pdf.levels([1, 2], [1, 1]), 2)
+        heuristic_photocurrents(Pdf.levels([1, 2], [1, 1]), 2)
     with pytest.raises(ValueError, match="at least one"):
-        heuristic(Pdf.uniform(0, 1), 0)
+        heuristic_photocurrents(Pdf.uniform(0, 1), 0)

@@ -9,7 +9,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from vcam_cli.scheduling.histogram_binning import _Pairs, approximation, bins, merged
+from vcam_cli.scheduling.histogram_binning import (
+    _Pairs,
+    histogram_of_pdf,
+    merge_bins,
+    merged_histogram,
+)
 from vcam_cli.scheduling.pdf import Pdf
 
 DATA = json.loads((Path(__file__).parents[1] / "data/capture_schedules_rules.json").read_text())
@@ -50,7 +55,7 @@ def found_merges(trace):
 
 
 def check(histogram, counts, widths, segments, scale=1.0):
-    pdf, trace = merged(histogram, segments)
+    pdf, trace = merge_bins(histogram, segments)
     groups, expected = naive(counts, widths, segments)
     assert found_merges(trace) == [merge[:3] for merge in expected]
     sads = [float(merge[3]) * scale for merge in expected]
@@ -70,11 +75,11 @@ def test_examples(name, scale):
     """Every step, tie and total; scaled counts are no whole numbers and have the same ties."""
     example = DATA["binning"][name]
     edges, counts = equal(example["counts"])
-    pdf, trace = merged((edges, counts * scale), len(example["segments"]))
+    pdf, trace = merge_bins((edges, counts * scale), len(example["segments"]))
     assert found_merges(trace) == [tuple(step["merged"]) for step in example["trace"]]
     sads = [step["sad"] * scale for step in example["trace"]]
     np.testing.assert_allclose([merge.sad for merge in trace], sads, rtol=1e-13, atol=1e-15)
-    shape, values = approximation((edges, counts * scale), trace)
+    shape, values = merged_histogram((edges, counts * scale), trace)
     np.testing.assert_array_equal(shape, edges[[0, *(end for _, end in example["segments"])]])
     np.testing.assert_allclose(values, np.array(example["values"]) * scale, rtol=1e-8)
     np.testing.assert_array_equal(pdf.low, shape[:-1])
@@ -128,11 +133,11 @@ def test_a_bin_split_in_two_changes_nothing():
     counts, widths = [4, 1, 9, 3, 3, 8], [1, 2, 1, 3, 2, 1]
     edges = np.concatenate([[0], np.cumsum(widths)])
     fine = np.repeat(np.array(counts) / widths, widths)
-    whole, _ = merged((edges, counts), 3)
-    split, trace = merged((np.arange(11), fine), 3)
+    whole, _ = merge_bins((edges, counts), 3)
+    split, trace = merge_bins((np.arange(11), fine), 3)
     np.testing.assert_array_equal(whole.low, split.low)
     np.testing.assert_allclose(whole.probability, split.probability, rtol=1e-14)
-    assert trace[-1].sad == pytest.approx(merged((edges, counts), 3)[1][-1].sad)
+    assert trace[-1].sad == pytest.approx(merge_bins((edges, counts), 3)[1][-1].sad)
 
 
 @settings(max_examples=20, deadline=None)
@@ -145,59 +150,59 @@ def test_a_merge_may_bring_bins_closer():
     """Means are not medians: 5 6 and 1 7 5 differ from theirs by more than all five together."""
     counts = [5, 6, 1, 7, 5]
     check(equal(counts), counts, [1] * 5, 1)
-    totals = [merge.sad for merge in merged(equal(counts), 1)[1]]
+    totals = [merge.sad for merge in merge_bins(equal(counts), 1)[1]]
     np.testing.assert_allclose(totals, [1, 3, 23 / 3, 7.6], rtol=1e-14)
 
 
 def test_many_bins_keep_their_probability_and_their_last_edge():
     counts = np.random.default_rng(5).poisson(1e3 * np.exp(-np.linspace(0, 8, 1024)))
-    pdf, trace = merged(equal(counts), 5)
+    pdf, trace = merge_bins(equal(counts), 5)
     assert len(trace) == 1019
     assert pdf.low.size == 5
     assert pdf.probability.sum() == pytest.approx(1)
     for low, high, share in zip(pdf.low, pdf.high, pdf.probability, strict=True):
         inside = Pdf.histogram(*equal(counts))
-        assert inside.below(high) - inside.below(low) == pytest.approx(share, abs=1e-12)
+        assert inside.cdf(high) - inside.cdf(low) == pytest.approx(share, abs=1e-12)
 
 
 def test_as_many_segments_as_bins_or_more_change_nothing():
-    pdf, trace = merged(equal([1, 2, 3]), 3)
+    pdf, trace = merge_bins(equal([1, 2, 3]), 3)
     assert trace == ()
     np.testing.assert_allclose(pdf.probability, np.array([1, 2, 3]) / 6)
     gaps = Pdf.segments([0, 0.5], [0.2, 1.0], [1, 1])
-    assert merged(gaps, 2) == (gaps, ())
+    assert merge_bins(gaps, 2) == (gaps, ())
 
 
 def test_a_gap_is_an_empty_bin():
     pdf = Pdf.segments([0.1, 0.5, 0.7], [0.2, 0.7, 1.0], [1, 2, 1])
-    edges, counts = bins(pdf)
+    edges, counts = histogram_of_pdf(pdf)
     np.testing.assert_allclose(edges, [0.1, 0.2, 0.5, 0.7, 1.0])
     np.testing.assert_allclose(counts, [0.25, 0, 0.5, 0.25])
     # widths in tenths 1 3 2 3: pairs add 2 |c w' - c' w| / (w + w') = 6/4, 12/5, 8/5
-    few, trace = merged(pdf, 2)
+    few, trace = merge_bins(pdf, 2)
     assert found_merges(trace)[0] == (0, 1, 2)
     assert few.low.size == 2
 
 
 def test_levels_become_bins_that_end_at_them():
-    edges, counts = bins(Pdf.levels([2, 3, 7], [1, 1, 2]))
+    edges, counts = histogram_of_pdf(Pdf.levels([2, 3, 7], [1, 1, 2]))
     assert edges.tolist() == [1, 2, 3, 7]
     assert counts.tolist() == [0.25, 0.25, 0.5]
-    edges, counts = bins(Pdf.levels([0, 3, 7], [1, 1, 2]))
+    edges, counts = histogram_of_pdf(Pdf.levels([0, 3, 7], [1, 1, 2]))
     assert edges.tolist() == [0, 3, 7]
     assert counts.tolist() == [0.5, 0.5]
-    assert bins(Pdf.levels([5], [1]))[0].tolist() == [0, 5]
-    few, _ = merged(Pdf.levels(np.arange(1, 257), np.arange(256, 0, -1)), 4)
+    assert histogram_of_pdf(Pdf.levels([5], [1]))[0].tolist() == [0, 5]
+    few, _ = merge_bins(Pdf.levels(np.arange(1, 257), np.arange(256, 0, -1)), 4)
     assert few.max == 256  # the brightest is not saturated, and not taken for brighter
     assert few.low.size == 4
 
 
 def test_approximation_of_no_merges_is_the_histogram():
     edges, counts = equal([3, 1, 4, 1, 5])
-    shape, values = approximation((edges, counts), ())
+    shape, values = merged_histogram((edges, counts), ())
     np.testing.assert_array_equal(shape, edges)
     np.testing.assert_allclose(values, counts, rtol=1e-12)
-    _, densities = approximation(([0, 1, 3], [3, 8]), ())
+    _, densities = merged_histogram(([0, 1, 3], [3, 8]), ())
     assert densities.tolist() == [3, 4]
 
 
@@ -207,11 +212,11 @@ def test_fractions_that_share_a_float_are_told_apart():
     for index, value in enumerate([Fraction(1), more, third, more, third]):
         pairs.put(index, value, 0.0)
     assert float(more) == float(third)
-    assert pairs.least() == 2
+    assert pairs.first_minimum() == 2
     pairs.drop(2)
-    assert pairs.least() == 4
+    assert pairs.first_minimum() == 4
     pairs.drop(4)
-    assert pairs.least() == 1
+    assert pairs.first_minimum() == 1
 
 
 @pytest.mark.parametrize(
@@ -227,4 +232,4 @@ def test_fractions_that_share_a_float_are_told_apart():
 )
 def test_nonsense_is_refused(edges, counts, segments, reason):
     with pytest.raises(ValueError, match=reason):
-        merged((edges, counts), segments)
+        merge_bins((edges, counts), segments)

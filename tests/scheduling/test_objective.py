@@ -10,15 +10,9 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from vcam_cli.scheduling import objective
-from vcam_cli.scheduling.objective import (
-    SHOT,
-    Constraints,
-    Sensor,
-    best_snr,
-    expected_snr,
-    shortest,
-)
+from vcam_cli.scheduling.objective import expected_snr, expected_snr_bound
 from vcam_cli.scheduling.pdf import Pdf
+from vcam_cli.scheduling.sensor import SHOT_NOISE, Constraints, Sensor, first_capture_time
 
 DATA = Path(__file__).parents[1] / "data" / "capture_schedules_shot_noise.json"
 FULL = json.loads(DATA.read_text("utf-8"))["full_noise"]
@@ -64,8 +58,12 @@ def test_the_mean_over_a_piece_is_that_of_the_primitive(low, width, noise):
         expected, filled = float(expected), float(filled)
     ends = np.array([low]), np.array([high])
     # a few roundings: all terms are positive
-    assert objective.mean_signal(*ends, np.array([noise]))[0] == pytest.approx(expected, rel=3e-14)
-    assert objective.mean_fill(*ends, noise)[0] == pytest.approx(filled, rel=3e-14)
+    assert objective.mean_snr_rate(*ends, np.array([noise]))[0] == pytest.approx(
+        expected, rel=3e-14
+    )
+    assert objective.mean_squared_signal_fraction(*ends, noise)[0] == pytest.approx(
+        filled, rel=3e-14
+    )
 
 
 @settings(max_examples=100, deadline=None)
@@ -137,7 +135,9 @@ def test_order_and_repeats_of_times_do_not_matter():
     assert expected_snr(pdf, [3.0, 0.5, 0.9, 0.9]) == expected
 
 
-@pytest.mark.parametrize("sensor", [SHOT, Sensor(1.0, 0.1, 0.2, 0.3), Sensor(1.0, 0.1, max_time=2)])
+@pytest.mark.parametrize(
+    "sensor", [SHOT_NOISE, Sensor(1.0, 0.1, 0.2, 0.3), Sensor(1.0, 0.1, max_time=2)]
+)
 @pytest.mark.parametrize(
     "pdf", [Pdf.uniform(0, 1), Pdf.levels([0, 0.1, 1], [1, 1, 1]), Pdf.uniform(0.5, 3)]
 )
@@ -147,29 +147,29 @@ def test_the_best_snr_is_approached_by_many_captures(pdf, sensor):
     own = sensor.well / np.maximum(pdf.high + sensor.dark, 1e-9)
     times = np.append(times, np.minimum(own, limit))
     many = expected_snr(pdf, times, sensor)
-    best = best_snr(pdf, sensor)
+    best = expected_snr_bound(pdf, sensor)
     assert many <= best * (1 + 1e-12)
-    # neighbouring times differ by 4e-4 at most, SNR by less than twice that
+    # neighboring times differ by 4e-4 at most, SNR by less than twice that
     assert many == pytest.approx(best, rel=1e-3)
 
 
 def test_without_noise_the_best_is_a_full_well_but_for_the_black():
-    assert best_snr(Pdf.uniform(0, 1)) == pytest.approx(1.0)
-    assert best_snr(Pdf.levels([0, 1], [3, 1])) == pytest.approx(0.25)
-    assert best_snr(Pdf.uniform(0, 1), Sensor(7.0)) == pytest.approx(7.0)
+    assert expected_snr_bound(Pdf.uniform(0, 1)) == pytest.approx(1.0)
+    assert expected_snr_bound(Pdf.levels([0, 1], [3, 1])) == pytest.approx(0.25)
+    assert expected_snr_bound(Pdf.uniform(0, 1), Sensor(7.0)) == pytest.approx(7.0)
 
 
 def test_the_first_capture_just_holds_the_brightest():
     pdf = Pdf.segments([0, 90, 200], [90, 100, 300], [1, 1, 0])
-    assert shortest(pdf, Sensor(2000.0, dark=25.0)) == pytest.approx(16.0)
-    assert shortest(pdf, Sensor(2000.0, max_time=3.0)) == 3.0
-    assert shortest(pdf, Sensor(2000.0), Constraints(frame_time=3.0)) == 18.0
+    assert first_capture_time(pdf, Sensor(2000.0, dark=25.0)) == pytest.approx(16.0)
+    assert first_capture_time(pdf, Sensor(2000.0, max_time=3.0)) == 3.0
+    assert first_capture_time(pdf, Sensor(2000.0), Constraints(frame_time=3.0)) == 18.0
     # 0.7 / 0.1 is 6.999999999999999 frames
-    assert shortest(Pdf.uniform(0, 1), Sensor(0.7), Constraints(frame_time=0.1)) == pytest.approx(
-        0.7
-    )
+    assert first_capture_time(
+        Pdf.uniform(0, 1), Sensor(0.7), Constraints(frame_time=0.1)
+    ) == pytest.approx(0.7)
     with pytest.raises(ValueError, match="saturates the brightest"):
-        shortest(pdf, Sensor(2000.0), Constraints(frame_time=21.0))
+        first_capture_time(pdf, Sensor(2000.0), Constraints(frame_time=21.0))
 
 
 @pytest.mark.parametrize("times", [[0.0], [-1.0, 1.0], [np.inf], [np.nan]])
@@ -190,7 +190,7 @@ def test_constraints_must_be_possible():
 
 
 def test_a_schedule_knows_its_captures_and_how_many_differ():
-    schedule = objective.at(Pdf.uniform(0, 1), [2.0, 1.0, 2.0])
+    schedule = objective.evaluate_schedule(Pdf.uniform(0, 1), [2.0, 1.0, 2.0])
     assert schedule.times.tolist() == [1, 2, 2]
     assert schedule.photocurrents.tolist() == [1, 0.5, 0.5]
     assert schedule.expected_snr == pytest.approx(0.625)

@@ -13,14 +13,14 @@ HALVES = Pdf.segments([0.0, 0.3, 0.6], [0.3, 0.6, 1.0], [4.0, 0.0, 1.0])
 def test_uniform_has_the_moments_of_the_square():
     pdf = Pdf.uniform(1, 3)
     at = np.array([0.0, 1.0, 2.0, 3.0, 9.0])
-    assert pdf.below(at) == pytest.approx([0, 0, 0.5, 1, 1], abs=1e-15)
+    assert pdf.cdf(at) == pytest.approx([0, 0, 0.5, 1, 1], abs=1e-15)
     assert pdf.first_moment(at) == pytest.approx([0, 0, 0.75, 2, 2], abs=1e-15)
     assert (pdf.min, pdf.max, pdf.mean, pdf.discrete) == (1, 3, 2, False)
 
 
 def test_probabilities_are_normalized_and_gaps_hold_nothing():
     assert HALVES.probability == pytest.approx([0.8, 0, 0.2])
-    assert HALVES.below([0.3, 0.45, 0.6, 0.8]) == pytest.approx([0.8, 0.8, 0.8, 0.9])
+    assert HALVES.cdf([0.3, 0.45, 0.6, 0.8]) == pytest.approx([0.8, 0.8, 0.8, 0.9])
     assert HALVES.mean == pytest.approx(0.8 * 0.15 + 0.2 * 0.8)
 
 
@@ -34,7 +34,7 @@ def test_levels_count_from_the_level_on():
     pdf = Pdf.levels([4.0, 1.0, 2.0, 1.0], [1, 1, 1, 1])  # any order, repeated
     assert pdf.discrete
     assert pdf.low.tolist() == [1, 2, 4]
-    assert pdf.below([0.9, 1, 1.9, 4, 5]) == pytest.approx([0, 0.5, 0.5, 1, 1])
+    assert pdf.cdf([0.9, 1, 1.9, 4, 5]) == pytest.approx([0, 0.5, 0.5, 1, 1])
     assert pdf.first_moment([0.9, 1, 2, 4]) == pytest.approx([0, 0.5, 1.0, 2.0])
 
 
@@ -57,7 +57,7 @@ def test_moments_are_the_integrals_of_the_density(parts):
     density = pdf.density[np.searchsorted(pdf.high, middle, side="right")]
     # of 20000 steps one or a few hold an edge, where the middle's density is not the mean's
     off = 6 * (x - 0.2) / 20000 * density.max() * x
-    assert pdf.below(x) == pytest.approx(np.sum(density) * (x - 0.2) / 20000, abs=off)
+    assert pdf.cdf(x) == pytest.approx(np.sum(density) * (x - 0.2) / 20000, abs=off)
     moment = np.sum(density * middle) * (x - 0.2) / 20000
     assert pdf.first_moment(x) == pytest.approx(moment, abs=off)
 

@@ -8,10 +8,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from vcam_cli.scheduling.heuristic import heuristic
+from vcam_cli.scheduling.comparison_schedules import (
+    heuristic_photocurrents,
+    objective_and_gradient,
+    sqp_schedule,
+)
 from vcam_cli.scheduling.objective import expected_snr
 from vcam_cli.scheduling.pdf import Pdf
-from vcam_cli.scheduling.sqp import sqp, value_and_gradient
 
 DATA = json.loads((Path(__file__).parents[1] / "data/capture_schedules_rules.json").read_text())
 THREE_SEGMENTS = "three_segment_fig45"
@@ -29,7 +32,7 @@ def case(name, count):
 @pytest.mark.parametrize("name", ["uniform_0_1", "uniform_0.1_1"])
 def test_one_start_is_enough_for_a_uniform_pdf(name, count):
     pdf, optimal = case(name, count)
-    found = sqp(pdf, count, seed=count)
+    found = sqp_schedule(pdf, count, seed=count)
     # the search ends where J rises by less than 1e-12; the optimum is flat
     assert found.expected_snr == pytest.approx(optimal["J"], rel=1e-9)
     np.testing.assert_allclose(found.times / found.times[0], optimal["t"], rtol=2e-3)
@@ -39,7 +42,7 @@ def test_ten_random_starts_miss_the_optimum_of_three_segments():
     """The optimum is 0.7863; the best of the thesis's ten starts stays 5 % below it."""
     pdf, optimal = case(THREE_SEGMENTS, 8)
     assert optimal["J"] == pytest.approx(0.7863380, abs=1e-7)
-    found = [sqp(pdf, 8, seed=seed).expected_snr for seed in TEN_STARTS]
+    found = [sqp_schedule(pdf, 8, seed=seed).expected_snr for seed in TEN_STARTS]
     assert max(found) < 0.95 * optimal["J"]
     assert max(found) - min(found) > 0.01  # nor do they agree
 
@@ -48,7 +51,7 @@ def test_a_bad_start_stays_with_its_captures():
     """All but the first in the dark segment: one leaves it, where the optimum has two."""
     pdf, optimal = case(THREE_SEGMENTS, 8)
     start = np.append(1.0, np.linspace(0.07, 0.004, 7))
-    found = sqp(pdf, 8, start=start)
+    found = sqp_schedule(pdf, 8, start=start)
     assert found.expected_snr < 0.99 * optimal["J"]
     for photocurrents, expected in ((found.photocurrents, 1), (1 / np.array(optimal["t"]), 2)):
         assert ((photocurrents > 0.0801) & (photocurrents < 0.4001)).sum() == expected
@@ -57,14 +60,14 @@ def test_a_bad_start_stays_with_its_captures():
 def test_from_the_heuristic_it_finds_the_optimum_of_three_segments():
     """The method is no worse than the thesis's: its start decides."""
     pdf, optimal = case(THREE_SEGMENTS, 8)
-    found = sqp(pdf, 8, start=heuristic(pdf, 8))
+    found = sqp_schedule(pdf, 8, start=heuristic_photocurrents(pdf, 8))
     assert found.expected_snr == pytest.approx(optimal["J"], rel=1e-8)
 
 
 def test_the_trap_of_two_segments():
     """Two captures: one local maximum in each segment, and starts that end in either."""
     pdf, optimal = case("trap_2seg_N2", 2)
-    found = np.array([sqp(pdf, 2, seed=seed).expected_snr for seed in TEN_STARTS])
+    found = np.array([sqp_schedule(pdf, 2, seed=seed).expected_snr for seed in TEN_STARTS])
     best = np.isclose(found, optimal["J"], rtol=1e-9)
     assert best.any()
     assert (found[~best] < 0.91 * optimal["J"]).all()
@@ -83,14 +86,16 @@ pdfs = st.builds(
 def test_gradient_is_that_of_the_objective(pdf, count, seed):
     rng = np.random.default_rng(seed)
     i = np.append(pdf.max, np.sort(rng.uniform(pdf.min + 0.1, pdf.max - 0.1, count - 1))[::-1])
-    value, gradient = value_and_gradient(pdf, i)
+    value, gradient = objective_and_gradient(pdf, i)
     assert value == pytest.approx(expected_snr(pdf, 1 / i), rel=1e-11)
     edges = np.concatenate([pdf.low, pdf.high])
     step = 1e-6
     for k in range(1, count):
         if np.abs(edges - i[k]).min() < step or np.diff(-i).min() < step:
             continue  # the derivative jumps there
-        moved = [value_and_gradient(pdf, i + side * step * np.eye(count)[k])[0] for side in (1, -1)]
+        moved = [
+            objective_and_gradient(pdf, i + side * step * np.eye(count)[k])[0] for side in (1, -1)
+        ]
         numeric = (moved[0] - moved[1]) / (2 * step)
         # differences of J of about 1 lose 1e-16 / 1e-6, and the curvature's share
         assert gradient[k] == pytest.approx(numeric, rel=1e-4, abs=1e-8)
@@ -102,7 +107,7 @@ def test_it_is_a_schedule_no_worse_than_its_start(pdf, count, seed):
     start = np.random.default_rng(seed).uniform(0, pdf.max, count)
     begin = np.maximum(np.sort(start)[::-1], pdf.min if pdf.min else 1e-3)
     begin[0] = pdf.max
-    found = sqp(pdf, count, start=start)
+    found = sqp_schedule(pdf, count, start=start)
     assert found.times.shape == (count,)
     assert found.photocurrents[0] == pytest.approx(pdf.max)
     assert (np.diff(found.times) >= 0).all()
@@ -112,22 +117,22 @@ def test_it_is_a_schedule_no_worse_than_its_start(pdf, count, seed):
 
 def test_wide_ranges_and_dark_ends():
     for pdf in (Pdf.uniform(1e-8, 1), Pdf.segments([0, 0.5], [1e-6, 1], [0.5, 0.5])):
-        found = sqp(pdf, 6, seed=3)
+        found = sqp_schedule(pdf, 6, seed=3)
         assert np.isfinite(found.times).all()
         assert 0 < found.expected_snr <= 1 + 1e-11
 
 
 def test_the_seed_decides():
     pdf, _ = case(THREE_SEGMENTS, 6)
-    first, again, other = (sqp(pdf, 6, seed=seed) for seed in (1, 1, 2))
+    first, again, other = (sqp_schedule(pdf, 6, seed=seed) for seed in (1, 1, 2))
     np.testing.assert_array_equal(first.times, again.times)
     assert not np.array_equal(first.times, other.times)
 
 
 def test_what_it_cannot_do():
     with pytest.raises(ValueError, match="segments, not levels"):
-        sqp(Pdf.levels([1, 2], [1, 1]), 2)
+        sqp_schedule(Pdf.levels([1, 2], [1, 1]), 2)
     with pytest.raises(ValueError, match="at least one"):
-        sqp(Pdf.uniform(0, 1), 0)
+        sqp_schedule(Pdf.uniform(0, 1), 0)
     with pytest.raises(ValueError, match="needs 3"):
-        sqp(Pdf.uniform(0, 1), 3, start=[1.0, 0.5])
+        sqp_schedule(Pdf.uniform(0, 1), 3, start=[1.0, 0.5])

@@ -6,9 +6,9 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import model_validator
 from pydantic_core import InitErrorDetails
 
-from vcam_cli.camera.base import Model, key
-from vcam_cli.camera.explain import failure, fault
-from vcam_cli.camera.values import Quantity, Whole
+from vcam_cli.config.model import Model, key
+from vcam_cli.config.quantities import Quantity, Whole
+from vcam_cli.config.validation_messages import fault, refusal
 
 
 def _one_scale(given: Mapping[str, Any]) -> Iterator[InitErrorDetails]:
@@ -31,12 +31,10 @@ class Adc(Model):
     ln(1 + v / reference) / ln(1 + full_scale / reference) x (2^bits - 1 - offset).
     """
 
-    bits: Annotated[int, Whole(least=1, most=24, example="10")] = key(
-        "resolution", example=10, default=10
-    )
-    kind: Literal["linear", "logarithmic"] = key("its curve", example="linear", default="linear")
+    bits: Annotated[int, Whole(least=1, most=24, example="10")] = key("resolution", default=10)
+    kind: Literal["linear", "logarithmic"] = key("its curve", default="linear")
     offset: Annotated[float, Quantity("dn", least=0)] = key(
-        "the number for no signal", unit="DN", example="0 DN", default=0.0
+        "the number for no signal", example="0 DN", default=0.0
     )
     full_scale: Annotated[float | None, Quantity("voltage", above=0, words={"auto": None})] = key(
         "volts at the highest number; auto = voltage_swing x readout.gain",
@@ -46,13 +44,11 @@ class Adc(Model):
     )
     gain: Annotated[float | None, Quantity("adc_gain", above=0)] = key(
         "codes per electron (K of EMVA 1288), in place of full_scale",
-        unit="DN/e",
         example="0.25 DN/e",
         default=None,
     )
     reference: Annotated[float | None, Quantity("voltage", above=0)] = key(
         "of a logarithmic ADC: where its curve bends; default full_scale / 1000",
-        unit="mV",
         example="1.38 mV",
         default=None,
     )
@@ -63,5 +59,5 @@ class Adc(Model):
     def _leaves_codes(self) -> Self:
         if self.offset >= 2**self.bits - 1:
             message = f"{self.offset:g} DN leaves no number for a signal in {self.bits} bits"
-            raise failure([fault(("offset",), message, "lower it, or give more bits")])
+            raise refusal(("offset",), message, "lower it, or give more bits")
         return self

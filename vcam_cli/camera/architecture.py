@@ -15,7 +15,7 @@ every frame, and a column's noise, new in every frame: they are of the amplifier
 shares. A dps has an ADC in every pixel, a ccd one amplifier for all.
 
 Two cameras with the same numbers in two architectures differ in just this, in `swing` (see
-`camera/electrical.py`), and in nothing else.
+`derived/electrical.py`), and in nothing else.
 
 References
 ----------
@@ -52,5 +52,5 @@ ARCHITECTURES: dict[str, Architecture] = {
 
 
 def article(name: str) -> str:
-    """The article before an architecture's name."""
+    """Return the article before an architecture's name."""
     return "an" if name.startswith("aps") else "a"

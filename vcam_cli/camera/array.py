@@ -6,10 +6,15 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import model_validator
 from pydantic_core import InitErrorDetails
 
-from vcam_cli.camera.base import Model, at_most_one, key, together
-from vcam_cli.camera.explain import failure, fault, one_of, shown
-from vcam_cli.camera.spectrum import Spectral, SpectrumSpec, moved
-from vcam_cli.camera.values import Either, File, Length, Whole, mapping, word_or, written
+from vcam_cli.camera.spectrum import Spectral, SpectrumSpec
+from vcam_cli.config import shipped, yaml_reader
+from vcam_cli.config.lists import read_items
+from vcam_cli.config.model import Model, all_or_none, at_most_one, key
+from vcam_cli.config.quantities import Whole
+from vcam_cli.config.validation_messages import describe, fault, one_of, refusal
+from vcam_cli.config.values import Either, File, Length, mapping, word_or
+from vcam_cli.config.yaml_type import to_yaml
+from vcam_cli.errors import BadInput
 
 BAYER = ("bayer-rggb", "bayer-grbg", "bayer-gbrg", "bayer-bggr")
 PATTERNS: dict[str, tuple[str, ...]] = {
@@ -33,8 +38,8 @@ _Count = Whole(least=1, most=10**7, example="512")
 class Die(Model):
     """A piece of silicon: count = round(die / pitch)."""
 
-    width: Length = key("width of the sensitive area", unit="mm", example="2.7 mm")
-    height: Length = key("height of the sensitive area", unit="mm", example="2.7 mm")
+    width: Length = key("width of the sensitive area", example="2.7 mm")
+    height: Length = key("height of the sensitive area", example="2.7 mm")
 
 
 class Block(Model):
@@ -48,7 +53,7 @@ class Block(Model):
     def _rectangular(self) -> Self:
         if not self.block or not self.block[0] or len({len(row) for row in self.block}) > 1:
             message = "its rows are not equally long"
-            raise failure([fault(("block",), message, "write for example [[R, G], [G, B]]")])
+            raise refusal(("block",), message, "write for example [[R, G], [G, B]]")
         return self
 
 
@@ -66,7 +71,6 @@ class Binning(Model):
     kind: Literal["charge", "voltage", "digital"] = key(
         "what is joined: charges (added before they are read), voltages (averaged, then read), or"
         " digital codes (added)",
-        example="charge",
         default="charge",
     )
 
@@ -82,7 +86,7 @@ def _pattern(given: Any) -> Any:
     if isinstance(given, Mapping):
         return (Positions if "positions" in given else Block).model_validate(given)
     also = "{block: [[R, G], [G, B]]} or {positions: file.csv}"
-    raise failure([fault((), *one_of(given, PATTERNS, also), given)])
+    raise refusal((), *one_of(given, PATTERNS, also), given)
 
 
 def _filters(given: Any) -> dict[str, SpectrumSpec]:
@@ -90,40 +94,40 @@ def _filters(given: Any) -> dict[str, SpectrumSpec]:
         return filter_set(given)
     if not isinstance(given, Mapping):
         raise ValueError(
-            f"{shown(given)} is not a set of filters; write for example {{R: 0.9, ...}}"
+            f"{describe(given)} is not a set of filters; write for example {{R: 0.9, ...}}"
         )
-    found, mistakes = {}, []
-    for color, item in given.items():
-        try:
-            if not isinstance(color, str) or not color.isidentifier():
-                raise ValueError(f"{shown(color)} is not the name of a color; write for example R")
-            found[color] = _FILTER.read(item)
-        except ValueError as error:
-            mistakes += moved(error, color, item)
-    if mistakes:
-        raise failure(mistakes)
-    return found
+
+    def read(color: Any) -> SpectrumSpec:
+        if not isinstance(color, str) or not color.isidentifier():
+            raise ValueError(f"{describe(color)} is not the name of a color; write for example R")
+        return _FILTER.read(given[color])
+
+    return dict(zip(given, read_items(((color, color) for color in given), read), strict=True))
 
 
 def filter_set(name: str) -> dict[str, SpectrumSpec]:
-    """The filters of a set that ships, by color. ValueError for a name that does not."""
-    from vcam_cli.camera import shipped, yaml_tree
-    from vcam_cli.errors import BadInput
-
+    """Return the filters of a set that ships, by color; raise ValueError for another name."""
     try:
         path = shipped.find("filters", name)
-        tree: Any = yaml_tree.read_file(path).plain()
+        tree: Any = yaml_reader.read_file(path).plain()
     except BadInput as error:
         problem = error.problems[0]
         raise ValueError(f"{problem.message}; {problem.remedy}") from None
-    beside = {
-        color: {**item, "file": str(path.parent / item["file"])}
-        if isinstance(item, Mapping) and "file" in item
-        else item
-        for color, item in tree.items()
-        if color != "name"
-    }
-    return _filters(beside)
+
+    def absolute_item(item: Any) -> Any:
+        named = isinstance(item, Mapping) and "file" in item
+        return {**item, "file": str(path.parent / item["file"])} if named else item
+
+    return _filters({color: absolute_item(item) for color, item in tree.items() if color != "name"})
+
+
+def _has_size(given: Mapping[str, Any]) -> Iterator[InitErrorDetails]:
+    """Require rows and columns, or a die, unless every pixel has a place of its own."""
+    pattern = given.get("pattern")
+    if isinstance(pattern, Mapping) and "positions" in pattern:
+        return
+    if not {"rows", "columns", "die"} & set(given):
+        yield fault((), "its size is missing", "add rows: 512 and columns: 512, or a die")
 
 
 class Array(Model):
@@ -137,19 +141,14 @@ class Array(Model):
         default=None,
     )
     pattern: Annotated[
-        str | Block | Positions,
-        Either(_pattern, Literal[tuple(PATTERNS)] | Block | Positions),
-    ] = key(
-        "colors of the pixels, row 0 column 0 first",
-        example="bayer-rggb",
-        default="bayer-rggb",
-    )
+        str | Block | Positions, Either(_pattern, Literal[tuple(PATTERNS)] | Block | Positions)
+    ] = key("colors of the pixels, row 0 column 0 first", default="bayer-rggb")
     filters: Annotated[
         dict[str, SpectrumSpec],
         Either(
             _filters,
             str | dict[str, Annotated[SpectrumSpec, _FILTER]],
-            write=lambda value: {color: spec.written() for color, spec in value.items()},
+            yaml_form=lambda value: {color: spec.to_yaml() for color, spec in value.items()},
         ),
     ] = key(
         "transmittance of each color's filter (a spectrum), or the name of a shipped set; "
@@ -161,9 +160,16 @@ class Array(Model):
         "pixels that are read as one", example="none", default=None
     )
 
+    rules = (
+        _has_size,
+        at_most_one("die", "rows"),
+        at_most_one("die", "columns"),
+        all_or_none("rows", "columns"),
+    )
+
     @property
     def colors(self) -> tuple[str, ...]:
-        """The colors of the pattern, in the order of color planes; () for positions from a file."""
+        """Colors of the pattern, in the order of color planes; () for positions from a file."""
         if isinstance(self.pattern, Block):
             return tuple(dict.fromkeys(color for row in self.pattern.block for color in row))
         return PATTERNS[self.pattern] if isinstance(self.pattern, str) else ()
@@ -184,21 +190,12 @@ class Array(Model):
         given = self.binning
         return given.count if given is not None and given.kind == "charge" else 1
 
-    @staticmethod
-    def _size(given: Mapping[str, Any]) -> Iterator[InitErrorDetails]:
-        """Rows and columns, or a die; nothing where every pixel has a place of its own."""
-        pattern = given.get("pattern")
-        if isinstance(pattern, Mapping) and "positions" in pattern:
-            return
-        if not {"rows", "columns", "die"} & set(given):
-            yield fault((), "its size is missing", "add rows: 512 and columns: 512, or a die")
-
     @model_validator(mode="after")
-    def _joined(self) -> Self:
+    def _binning_has_neighbors(self) -> Self:
         if self.binning is not None and self.binning.count > 1 and self.scattered:
             message = "joins neighbors in rows and columns, and these pixels have none"
             remedy = "write binning: none, or another pattern"
-            raise failure([fault(("binning",), message, remedy)])
+            raise refusal(("binning",), message, remedy)
         return self
 
     @model_validator(mode="after")
@@ -210,15 +207,7 @@ class Array(Model):
             filters = filter_set(STACKED_FILTERS if stacked else DEFAULT_FILTERS)
         for color in self.colors:
             if color not in filters and color not in CLEAR:
-                message = f"has no filter for {color}, a color of {shown(written(self.pattern))}"
-                raise failure([fault(("filters",), message, f"add {color}: and its spectrum")])
+                message = f"has no filter for {color}, a color of {describe(to_yaml(self.pattern))}"
+                raise refusal(("filters",), message, f"add {color}: and its spectrum")
         self._fill(filters={c: filters[c] for c in self.colors if c in filters} or filters)
         return self
-
-
-Array.rules = (
-    Array._size,
-    at_most_one("die", "rows"),
-    at_most_one("die", "columns"),
-    together("rows", "columns"),
-)

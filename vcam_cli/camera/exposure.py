@@ -1,13 +1,17 @@
 """Exposure: given, chosen by the camera, or several samples of one integration."""
 
+import math
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import model_validator
 
-from vcam_cli.camera.base import Model, exactly_one, key
-from vcam_cli.camera.explain import failure, fault, shown
-from vcam_cli.camera.values import Either, MaybeTime, Number, Quantity, Time, Whole, mapping
+from vcam_cli.config.lists import read_items
+from vcam_cli.config.model import Model, exactly_one, key
+from vcam_cli.config.quantities import Number, Quantity, Whole
+from vcam_cli.config.validation_messages import describe, refusal
+from vcam_cli.config.values import Either, MaybeTime, Time, mapping
+from vcam_cli.config.yaml_type import to_yaml
 
 _TIME = Quantity("time", above=0)
 
@@ -15,26 +19,24 @@ _TIME = Quantity("time", above=0)
 class AutoExposure(Model):
     """The exposure time that brings a chosen level to a fraction of the full well."""
 
-    max: Time = key("longest time", unit="ms", example="100 ms", default=0.1)
+    max: Time = key("longest time", example="100 ms", default=0.1)
     min: Annotated[float, Quantity("time", least=0)] = key(
         "shortest time", unit="ms", example="0 s", default=0.0
     )
     method: Literal["white", "percentile", "mean"] = key(
-        "the level: the perfect white's, a percentile of the picture, or its mean",
-        example="white",
-        default="white",
+        "the level: the perfect white's, a percentile of the picture, or its mean", default="white"
     )
     target: Annotated[float, Number(above=0, most=1, example="0.9")] = key(
-        "fraction of the full well", example=0.9, default=0.9
+        "fraction of the full well", default=0.9
     )
     percentile: Annotated[float, Number(least=0, most=100, example="99.9")] = key(
-        "which percentile, for that method", example=99.9, default=99.9
+        "which percentile, for that method", default=99.9
     )
 
     @model_validator(mode="after")
     def _in_order(self) -> Self:
         if self.min > self.max:
-            raise failure([fault(("min",), "is longer than max", "exchange the two")])
+            raise refusal(("min",), "is longer than max", "exchange the two")
         return self
 
 
@@ -45,7 +47,7 @@ class CaptureSchedule(Model):
     count: Annotated[int, Whole(least=1, most=1000, example="8")] = key(
         "number of captures", example=8
     )
-    max: Time = key("the longest time a capture may have", unit="ms", example="100 ms")
+    max: Time = key("the longest time a capture may have", example="100 ms")
 
 
 def _captures(given: Any) -> Any:
@@ -55,35 +57,33 @@ def _captures(given: Any) -> Any:
 
 
 def rising_times(given: Any) -> tuple[float, ...]:
-    """A list of rising times [s]; ValueError, or all mistakes at once, for anything else."""
+    """Return a list of rising times [s]; raise all mistakes at once."""
     if not isinstance(given, (list, tuple)) or not given:
-        raise ValueError(f"{shown(given)} is not a list of times; write for example [5 ms, 30 ms]")
-    times: list[float] = []
-    mistakes = []
-    for i, item in enumerate(given):
-        try:
-            time = _TIME.read(item)
-        except ValueError as error:
-            message, _, remedy = str(error).partition("; ")
-            mistakes.append(fault((i,), message, remedy, item))
-            continue
-        if times and time <= times[-1]:
-            mistakes.append(fault((i,), "the times must rise", "sort them", item))
-        times.append(time)
-    if mistakes:
-        raise failure(mistakes)
-    return tuple(times)
+        raise ValueError(
+            f"{describe(given)} is not a list of times; write for example [5 ms, 30 ms]"
+        )
+    latest = -math.inf
+
+    def read(item: Any) -> float:
+        nonlocal latest
+        time = _TIME.read(item)
+        before, latest = latest, time
+        if time <= before:
+            raise ValueError("the times must rise; sort them")
+        return time
+
+    return tuple(read_items(enumerate(given), read))
 
 
-def written_times(times: tuple[float, ...]) -> list[str]:
-    """The same as YAML has them."""
+def times_to_yaml(times: tuple[float, ...]) -> list[str]:
+    """Return times [s] as YAML has them."""
     return [_TIME.text(time) for time in times]
 
 
 class Exposure(Model):
     """Exactly one of time, auto and captures."""
 
-    time: MaybeTime = key("exposure time", unit="ms", example="30 ms", default=None)
+    time: MaybeTime = key("exposure time", example="30 ms", default=None)
     auto: Annotated[AutoExposure | None, mapping(AutoExposure)] = key(
         "automatic exposure", example={"max": "100 ms", "method": "white"}, default=None
     )
@@ -92,11 +92,7 @@ class Exposure(Model):
         Either(
             _captures,
             list[Annotated[float, _TIME]] | CaptureSchedule,
-            write=lambda value: (
-                written_times(value)
-                if isinstance(value, tuple)
-                else value and value.model_dump(mode="json")
-            ),
+            yaml_form=lambda v: times_to_yaml(v) if isinstance(v, tuple) else to_yaml(v),
         ),
     ] = key(
         "non-destructive samples of one integration, rising; or {schedule: optimal, count, max}",
@@ -107,17 +103,12 @@ class Exposure(Model):
     estimator: Literal["lsbs", "weighted"] = key(
         "how captures become one picture: the last sample before saturation, or the optimal "
         "weighted mean",
-        example="lsbs",
         default="lsbs",
     )
 
     rules = (
         exactly_one(
-            "time",
-            "auto",
-            "captures",
-            of="the exposure",
-            remedy="write for example time: 30 ms",
+            "time", "auto", "captures", of="the exposure", remedy="write for example time: 30 ms"
         ),
     )
 
@@ -133,16 +124,16 @@ class Exposure(Model):
 
     @property
     def count(self) -> int:
-        """Samples of one integration, at most; 0 where there is a single exposure."""
+        """Most samples of one integration; 0 where there is a single exposure."""
         return self.schedule.count if self.schedule else len(self.samples)
 
     @property
     def longest(self) -> float | None:
-        """The longest time that the file allows an exposure or a sample [s]; None with `auto`."""
+        """Longest time that the file allows an exposure or a sample [s]; None with `auto`."""
         if self.schedule:
             return self.schedule.max
         return self.samples[-1] if self.samples else self.time
 
     def single(self, time: float) -> "Exposure":
-        """One exposure of that time [s] in place of whatever the file says."""
+        """Return one exposure of that time [s] in place of whatever the file says."""
         return self.model_copy(update={"auto": None, "captures": None, "time": time})

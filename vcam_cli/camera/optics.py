@@ -5,23 +5,15 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
-from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
-from pydantic_core import CoreSchema, InitErrorDetails, core_schema
+from pydantic_core import InitErrorDetails
 
-from vcam_cli.camera.base import Model, at_most_one, key
-from vcam_cli.camera.explain import failure, fault, repeats, shown
 from vcam_cli.camera.spectrum import Spectral, SpectrumSpec, flat
-from vcam_cli.camera.values import (
-    File,
-    Fraction,
-    Length,
-    MaybeLength,
-    Number,
-    Quantity,
-    Shift,
-    Switch,
-    word_or,
-)
+from vcam_cli.config.lists import read_items, repeats
+from vcam_cli.config.model import Model, at_most_one, key
+from vcam_cli.config.quantities import Number, Quantity
+from vcam_cli.config.validation_messages import describe, failure, fault
+from vcam_cli.config.values import File, Fraction, Length, MaybeLength, Shift, Switch, word_or
+from vcam_cli.config.yaml_type import YamlType
 
 
 class FalloffFile(Model):
@@ -33,11 +25,11 @@ class FalloffFile(Model):
 
 
 def _channels_differ(given: Mapping[str, Any]) -> Iterator[InitErrorDetails]:
-    """Every wavelength of a point spread function has one channel."""
+    """Refuse two channels of one wavelength."""
     listed = given.get("wavelengths")
     channels = listed if isinstance(listed, (list, tuple)) else ()
     for i in sorted(repeats(channels)):
-        message = f"{shown(channels[i])} comes twice"
+        message = f"{describe(channels[i])} comes twice"
         yield fault(("wavelengths", i), message, "keep one of them", channels[i])
 
 
@@ -49,12 +41,9 @@ class Psf(Model):
         "ideal image point",
         example="psf.exr",
     )
-    pitch: Length = key("distance of its samples on the sensor", unit="um", example="0.5 um")
+    pitch: Length = key("distance of its samples on the sensor", example="0.5 um")
     wavelength: MaybeLength = key(
-        "the wavelength it was taken at; it is used for all",
-        unit="nm",
-        example="550 nm",
-        default=None,
+        "the wavelength it was taken at; it is used for all", example="550 nm", default=None
     )
     wavelengths: tuple[Length, ...] = key(
         "the wavelengths of its channels, in the file's order; straight in between",
@@ -68,6 +57,8 @@ class Psf(Model):
 
 Terms = tuple[tuple[int, float], ...]
 """((Noll index, coefficient [m]), ...)"""
+_COEFFICIENT = Quantity("length")
+_FIELD = Number(least=0, most=1)
 
 
 @dataclass(frozen=True)
@@ -77,88 +68,75 @@ class Wavefront:
     None as place: the same everywhere. Empty: a perfect lens.
     """
 
-    at: tuple[tuple[float | None, Terms], ...] = ()
+    terms: tuple[tuple[float | None, Terms], ...] = ()
 
-    def written(self) -> Any:
-        """The YAML form."""
-        terms = [{str(n): _COEFFICIENT.text(c) for n, c in terms} for _, terms in self.at]
-        if not self.at or self.at[0][0] is None:
-            return terms[0] if terms else {}
-        return [{"field": f, **t} for (f, _), t in zip(self.at, terms, strict=True)]
-
-
-_COEFFICIENT = Quantity("length")
-_FIELD = Number(least=0, most=1)
-_ONE_PLACE = "put all terms of one place together"
+    def to_yaml(self) -> Any:
+        """Return the YAML form."""
+        forms = [{str(n): _COEFFICIENT.text(c) for n, c in terms} for _, terms in self.terms]
+        if not forms or self.terms[0][0] is None:
+            return forms[0] if forms else {}
+        return [{"field": f, **form} for (f, _), form in zip(self.terms, forms, strict=True)]
 
 
-class Zernike:
+class Zernike(YamlType):
     """The type of a wavefront: {4: 0.05 um}, or a list of {field: 0.7, 4: 0.05 um}."""
 
-    def __get_pydantic_core_schema__(
-        self, source: Any, handler: GetCoreSchemaHandler
-    ) -> CoreSchema:
-        return core_schema.no_info_plain_validator_function(
-            self.read,
-            serialization=core_schema.plain_serializer_function_ser_schema(
-                Wavefront.written, when_used="json"
-            ),
-        )
-
-    def __get_pydantic_json_schema__(
-        self, schema: CoreSchema, handler: GetJsonSchemaHandler
-    ) -> dict[str, Any]:
-        terms = {r"^[1-9]\d{0,2}$": _COEFFICIENT.form()}
-        one = {"type": "object", "patternProperties": terms, "additionalProperties": False}
-        place = {"description": "where: 0 center, 1 corner", "examples": [0.7]} | _FIELD.form()
-        placed = one | {"properties": {"field": place}, "required": ["field"]}
-        return {"anyOf": [one, {"type": "array", "items": placed}]}
-
     def read(self, given: Any) -> Wavefront:
-        """The wavefront of what is written in YAML."""
+        """Return the wavefront of what is written in YAML; raise its mistakes."""
         if isinstance(given, Wavefront):
             return given
         if isinstance(given, Mapping):
-            terms = _terms(given, ())
+            terms = _terms(given)
             return Wavefront(((None, terms),) if terms else ())
         if not isinstance(given, (list, tuple)):
-            raise ValueError(f"{shown(given)} is no wavefront; write for example {{4: 0.05 um}}")
-        placed = [self._placed(i, item) for i, item in enumerate(given)]
+            raise ValueError(f"{describe(given)} is no wavefront; write for example {{4: 0.05 um}}")
+        placed = read_items(enumerate(given), _terms_at_place)
         fields = [field for field, _ in placed]
-        twice = sorted(repeats(fields))
-        if twice:
-            wrong = [fault((i, "field"), f"{fields[i]:g} comes twice", _ONE_PLACE) for i in twice]
+        message, remedy = "comes twice", "put all terms of one place together"
+        wrong = [
+            fault((i, "field"), f"{fields[i]:g} {message}", remedy) for i in sorted(repeats(fields))
+        ]
+        if wrong:
             raise failure(wrong)
         return Wavefront(tuple(placed))
 
-    def _placed(self, i: int, given: Any) -> tuple[float, Terms]:
-        if not isinstance(given, Mapping) or "field" not in given:
-            message = "has no field"
-            raise failure([fault((i,), message, "write for example {field: 0.7, 4: 0.05 um}")])
-        try:
-            place = _FIELD.read(given["field"])
-        except ValueError as error:
-            raise failure([fault((i, "field"), str(error))]) from None
-        return place, _terms({k: v for k, v in given.items() if k != "field"}, (i,))
+    def write(self, value: Wavefront) -> Any:
+        """Return the YAML form."""
+        return value.to_yaml()
+
+    def json_schema(self, forms: dict[str, Any]) -> dict[str, Any]:
+        """Return the JSON Schema of terms, and of a list of terms with their places."""
+        terms = {r"^[1-9]\d{0,2}$": _COEFFICIENT.number_schema()}
+        one = {"type": "object", "patternProperties": terms, "additionalProperties": False}
+        place = {"description": "where: 0 center, 1 corner", "examples": [0.7]}
+        placed = one | {
+            "properties": {"field": place | _FIELD.number_schema()},
+            "required": ["field"],
+        }
+        return {"anyOf": [one, {"type": "array", "items": placed}]}
 
 
-def _terms(given: Mapping[Any, Any], loc: tuple[int, ...]) -> Terms:
-    found: list[tuple[int, float]] = []
-    mistakes = []
-    for name, item in given.items():
-        try:
-            index = int(name) if str(name).isascii() and str(name).isdigit() else 0
-            if not 1 <= index <= 999:
-                raise ValueError(f"{shown(name)} is no Noll index; write for example 4 (defocus)")
-            if index in dict(found):
-                raise ValueError(f"Noll index {index} comes twice; keep one of them")
-            found.append((index, _COEFFICIENT.read(item)))
-        except ValueError as error:
-            message, _, remedy = str(error).partition("; ")
-            mistakes.append(fault((*loc, name), message, remedy, item))
-    if mistakes:
-        raise failure(mistakes)
-    return tuple(sorted(found))
+def _terms_at_place(given: Any) -> tuple[float, Terms]:
+    if not isinstance(given, Mapping) or "field" not in given:
+        raise ValueError("has no field; write for example {field: 0.7, 4: 0.05 um}")
+    (place,) = read_items([("field", given["field"])], _FIELD.read)
+    return place, _terms({k: v for k, v in given.items() if k != "field"})
+
+
+def _terms(given: Mapping[Any, Any]) -> Terms:
+    indices: set[int] = set()
+
+    def term(name: Any) -> tuple[int, float]:
+        index = int(name) if str(name).isascii() and str(name).isdigit() else 0
+        if not 1 <= index <= 999:
+            raise ValueError(f"{describe(name)} is no Noll index; write for example 4 (defocus)")
+        if index in indices:
+            raise ValueError(f"Noll index {index} comes twice; keep one of them")
+        coefficient = _COEFFICIENT.read(given[name])
+        indices.add(index)
+        return index, coefficient
+
+    return tuple(sorted(read_items(((name, name) for name in given), term)))
 
 
 _GROUPS = (
@@ -168,8 +146,8 @@ _GROUPS = (
 )
 
 
-def _determined(given: Mapping[str, Any]) -> Iterator[InitErrorDetails]:
-    """Two of focal length, f-number and aperture, or of what may stand for them."""
+def _is_determined(given: Mapping[str, Any]) -> Iterator[InitErrorDetails]:
+    """Require two of focal length, f-number and aperture, or of what may stand for them."""
     known = [group for group in _GROUPS if any(name in given for name in group)]
     if len(known) < 2:
         yield fault(
@@ -181,7 +159,7 @@ def _determined(given: Mapping[str, Any]) -> Iterator[InitErrorDetails]:
 
 
 def _psf_alone(given: Mapping[str, Any]) -> Iterator[InitErrorDetails]:
-    """A point spread function has defocus and aberrations in it."""
+    """Refuse defocus and aberrations beside a point spread function, which has them in it."""
     if given.get("psf") in (None, "none"):
         return
     for name in ("defocus", "zernike"):
@@ -191,7 +169,7 @@ def _psf_alone(given: Mapping[str, Any]) -> Iterator[InitErrorDetails]:
 
 
 def _neutral(name: str, given: Any) -> bool:
-    """Whether a defocus or a wavefront is that of a perfect lens; wrong ones are told elsewhere."""
+    """Return whether a defocus or a wavefront is that of a perfect lens."""
     if name == "zernike":
         return not given or given == Wavefront()
     try:
@@ -206,13 +184,12 @@ class Optics(Model):
     f_number: Annotated[float | None, Number(above=0, example="2.8")] = key(
         "focal length over diameter of the aperture", example=2.8, default=None
     )
-    focal_length: MaybeLength = key("focal length", unit="mm", example="3.2 mm", default=None)
+    focal_length: MaybeLength = key("focal length", example="3.2 mm", default=None)
     aperture_diameter: MaybeLength = key(
-        "diameter of the entrance pupil", unit="mm", example="1.14 mm", default=None
+        "diameter of the entrance pupil", example="1.14 mm", default=None
     )
     field_of_view: Annotated[float | None, Quantity("angle", above=0, below=math.pi)] = key(
         "full, over the array's diagonal; may stand for focal_length",
-        unit="deg",
         example="46 deg",
         default=None,
     )
@@ -220,9 +197,7 @@ class Optics(Model):
         "on the image side; may stand for f_number", example=0.18, default=None
     )
     transmittance: Annotated[SpectrumSpec, Spectral(most=1.0)] = key(
-        "of lens and filters in front of the sensor: a spectrum",
-        example=0.95,
-        default=flat(0.95),
+        "of lens and filters in front of the sensor: a spectrum", example=0.95, default=flat(0.95)
     )
     off_axis: Annotated[
         Literal["exact", "cos4", "none"] | FalloffFile,
@@ -230,7 +205,6 @@ class Optics(Model):
     ] = key(
         "falloff of light away from the axis: exact (uniform Lambertian disk), cos4, none, or "
         "measured",
-        example="exact",
         default="exact",
     )
     exit_pupil_distance: Annotated[
@@ -241,10 +215,9 @@ class Optics(Model):
         example="auto",
         default=None,
     )
-    diffraction: Switch = key("whether the aperture diffracts", example=True, default=True)
+    diffraction: Switch = key("whether the aperture diffracts", default=True)
     defocus: Shift = key(
         "shift of the image plane away from the lens, so that the sensor lies in front of it",
-        unit="um",
         example="0 um",
         default=0.0,
     )
@@ -262,7 +235,7 @@ class Optics(Model):
         default=None,
     )
     stray_light: Fraction = key(
-        "fraction of the mean irradiance that is spread evenly", example=0.0, default=0.0
+        "fraction of the mean irradiance that is spread evenly", default=0.0
     )
 
-    rules = (_determined, _psf_alone)
+    rules = (_is_determined, _psf_alone)

@@ -4,35 +4,29 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, Literal
 
-from vcam_cli.camera.base import Model, at_most_one, key, needs, together
 from vcam_cli.camera.spectrum import Spectral, SpectrumSpec
 from vcam_cli.camera.technology import Junction
-from vcam_cli.camera.values import (
-    Either,
-    Length,
-    MaybeGap,
-    MaybeLength,
-    Number,
-    Quantity,
-    word_or,
-)
+from vcam_cli.config.model import Model, all_or_none, at_most_one, key, needs
+from vcam_cli.config.quantities import Number, Quantity
+from vcam_cli.config.values import Either, Length, MaybeGap, MaybeLength, MaybeTemperature, word_or
 
 _EFFICIENCY = Spectral(most=1.0)
 
 
 @dataclass(frozen=True)
 class QuantumEfficiency:
-    """External QE at normal incidence; `given` is None where it follows from the junction."""
+    """External QE at normal incidence."""
 
     given: SpectrumSpec | None
+    """Spectrum of the file; None where the QE follows from the junction."""
     per_pixel: bool = False
-    """Of the pixel's area, fill factor included, and not of the photodetector."""
+    """Whether it is that of the pixel's area, fill factor included, and not the photodetector's."""
 
-    def written(self) -> Any:
-        """The YAML form."""
+    def to_yaml(self) -> Any:
+        """Return the YAML form."""
         if self.given is None:
             return "junction"
-        return {"pixel": self.given.written()} if self.per_pixel else self.given.written()
+        return {"pixel": self.given.to_yaml()} if self.per_pixel else self.given.to_yaml()
 
 
 class PixelEfficiency(Model):
@@ -60,19 +54,19 @@ class DarkCurrentDensity(Model):
     """Dark current density of the photodetector, at a temperature."""
 
     value: Annotated[float, Quantity("current_density", least=0)] = key(
-        "dark current density", unit="nA/cm2", example="1 nA/cm2"
+        "dark current density", example="1 nA/cm2"
     )
-    temperature: Annotated[float | None, Quantity("temperature", above=0)] = key(
-        "at which it holds; default the pixel's", unit="K", example="300 K", default=None
+    temperature: MaybeTemperature = key(
+        "at which it holds; default the pixel's", example="300 K", default=None
     )
     doubling: Annotated[float, Quantity("temperature", above=0, difference=True)] = key(
-        "rise of temperature that doubles it", unit="K", example="8 K", default=8.0
+        "rise of temperature that doubles it", example="8 K", default=8.0
     )
 
     rules = (needs("doubling", "temperature", "a doubling needs the temperature it starts from"),)
 
-    def written(self) -> Any:
-        """The YAML form: a bare density where no temperature is given."""
+    def to_yaml(self) -> Any:
+        """Return the YAML form: a bare density where no temperature is given."""
         form = self.model_dump(mode="json")
         return form if self.temperature is not None else form["value"]
 
@@ -90,18 +84,16 @@ def _dark_density(given: Any) -> Any:
 class ChargeDiffusion(Model):
     """Diffusion of charge in the silicon before it is collected."""
 
-    diffusion_length: Length = key("of electrons", unit="um", example="50 um")
-    depletion_width: Length = key("width of the depletion region", unit="um", example="1 um")
-    substrate_depth: Length = key("depth of the neutral region", unit="um", example="10 um")
+    diffusion_length: Length = key("of electrons", example="50 um")
+    depletion_width: Length = key("width of the depletion region", example="1 um")
+    substrate_depth: Length = key("depth of the neutral region", example="10 um")
 
 
 class Photodetector(Model):
     """What in a pixel collects light."""
 
     kind: Literal["ndiff-psub", "nwell-psub", "photogate", "pinned"] = key(
-        "how it is built",
-        example="ndiff-psub",
-        default="ndiff-psub",
+        "how it is built", default="ndiff-psub"
     )
     fill_factor: Annotated[float | None, Number(above=0, most=1, example="0.3")] = key(
         "photodetector area / (width x height of the pixel): centered, of the pixel's shape; "
@@ -109,23 +101,17 @@ class Photodetector(Model):
         example=0.3,
         default=None,
     )
-    width: MaybeLength = key("width", unit="um", example="3.5 um", default=None)
-    height: MaybeLength = key("height", unit="um", example="3.5 um", default=None)
+    width: MaybeLength = key("width", example="3.5 um", default=None)
+    height: MaybeLength = key("height", example="3.5 um", default=None)
     x: MaybeGap = key(
-        "left edge, from the pixel's left; default centered",
-        unit="um",
-        example="1.5 um",
-        default=None,
+        "left edge, from the pixel's left; default centered", example="1.5 um", default=None
     )
     y: MaybeGap = key(
-        "upper edge, from the pixel's top; default centered",
-        unit="um",
-        example="1.5 um",
-        default=None,
+        "upper edge, from the pixel's top; default centered", example="1.5 um", default=None
     )
     quantum_efficiency: Annotated[
         QuantumEfficiency,
-        Either(_efficiency, _EFFICIENCY_FORMS, write=QuantumEfficiency.written),
+        Either(_efficiency, _EFFICIENCY_FORMS, yaml_form=QuantumEfficiency.to_yaml),
     ] = key(
         "external QE of the photodetector at normal incidence: a spectrum; {pixel: spectrum} = "
         "per pixel area, fill factor included; junction = from the junction (internal; default "
@@ -138,20 +124,19 @@ class Photodetector(Model):
         Either(
             _dark_density,
             Annotated[float, _DENSITY] | DarkCurrentDensity,
-            write=lambda v: v.written() if isinstance(v, DarkCurrentDensity) else v,
+            yaml_form=lambda v: v.to_yaml() if isinstance(v, DarkCurrentDensity) else v,
         ),
     ] = key(
         "of the photodetector, at the pixel's temperature; or {value, temperature, doubling}; or "
         "junction; default the technology's, else none",
-        unit="nA/cm2",
         example="1 nA/cm2",
         default=None,
     )
     dark_current: Annotated[float | None, Quantity("rate", least=0)] = key(
-        "of the whole pixel, in place of a density", unit="e/s", example="12 e/s", default=None
+        "of the whole pixel, in place of a density", example="12 e/s", default=None
     )
     dark_current_scale: Annotated[float, Number(least=0, example="1")] = key(
-        "multiplies the dark current", example=1.0, default=1.0
+        "multiplies the dark current", default=1.0
     )
     capacitance: Annotated[
         float | Literal["junction"] | None,
@@ -159,7 +144,6 @@ class Photodetector(Model):
     ] = key(
         "of the sense node, or junction (default with a technology); sets kTC noise and, by "
         "default, the conversion gain",
-        unit="fF",
         example="12 fF",
         default=None,
     )
@@ -167,9 +151,7 @@ class Photodetector(Model):
         ChargeDiffusion | Literal["junction"] | None,
         word_or(ChargeDiffusion, {"none": None, "junction": "junction"}),
     ] = key(
-        "lateral diffusion of charge: none, junction, or its lengths",
-        example="none",
-        default=None,
+        "lateral diffusion of charge: none, junction, or its lengths", example="none", default=None
     )
     junction: Junction = key(
         "overrides of the technology's junction (or of its well)",
@@ -177,4 +159,4 @@ class Photodetector(Model):
         default=Junction,
     )
 
-    rules = (at_most_one("dark_current_density", "dark_current"), together("width", "height"))
+    rules = (at_most_one("dark_current_density", "dark_current"), all_or_none("width", "height"))

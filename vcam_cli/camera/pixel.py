@@ -7,22 +7,20 @@ from pydantic import AliasChoices, model_validator
 from pydantic_core import InitErrorDetails
 
 from vcam_cli.camera.architecture import ARCHITECTURES, article
-from vcam_cli.camera.base import Model, at_most_one, exactly_one, key
-from vcam_cli.camera.explain import failure, fault
 from vcam_cli.camera.photodetector import Photodetector
 from vcam_cli.camera.technology import CHOICE, TechnologyChoice
-from vcam_cli.camera.values import (
+from vcam_cli.config.model import Model, at_most_one, exactly_one, key
+from vcam_cli.config.quantities import Number, Quantity, Whole
+from vcam_cli.config.validation_messages import fault, refusal
+from vcam_cli.config.values import (
     MOST_ELECTRONS,
     Electrons,
     Fraction,
     Gap,
     Length,
     MaybeFraction,
-    Number,
     Positive,
-    Quantity,
     Temperature,
-    Whole,
     mapping,
     word_or,
 )
@@ -37,9 +35,7 @@ class ChargeTransfer(Model):
     inefficiency: Annotated[float, Number(least=0, below=1, example="3e-5")] = key(
         "charge left behind at a stage", example=3e-5, default=3e-5
     )
-    phases: Annotated[int, Whole(least=1, most=8, example="3")] = key(
-        "stages per pixel", example=3, default=3
-    )
+    phases: Annotated[int, Whole(least=1, most=8, example="3")] = key("stages per pixel", default=3)
 
 
 class Readout(Model):
@@ -49,28 +45,22 @@ class Readout(Model):
     """
 
     conversion_gain: Annotated[float | None, Quantity("conversion_gain", above=0)] = key(
-        "volts per electron; default q / capacitance", unit="uV/e", example="20 uV/e", default=None
+        "volts per electron; default q / capacitance", example="20 uV/e", default=None
     )
     voltage_swing: Annotated[float | None, Quantity("voltage", above=0)] = key(
-        "at the full well", unit="V", example="1.38 V", default=None
+        "at the full well", example="1.38 V", default=None
     )
     full_well: Annotated[float | None, Quantity("charge", above=0)] = key(
         "electrons a pixel can hold; enough by itself beside adc.gain",
-        unit="ke",
         example="69 ke",
         default=None,
     )
-    gain: Positive = key("analog gain (ISO)", example=1.0, default=1.0)
-    read_noise: Electrons = key("temporal noise of a readout", unit="e", example="5 e", default=0.0)
+    gain: Positive = key("analog gain (ISO)", default=1.0)
+    read_noise: Electrons = key("temporal noise of a readout", example="5 e", default=0.0)
     column_noise: Electrons = key(
-        "temporal, one draw a column and frame; none in dps and ccd",
-        unit="e",
-        example="0 e",
-        default=0.0,
+        "temporal, one draw a column and frame; none in dps and ccd", example="0 e", default=0.0
     )
-    row_noise: Electrons = key(
-        "temporal, one draw a row and frame", unit="e", example="0 e", default=0.0
-    )
+    row_noise: Electrons = key("temporal, one draw a row and frame", example="0 e", default=0.0)
     reset_noise: Annotated[
         float | Literal["ktc", "none"],
         Quantity("charge", least=0, most=MOST_ELECTRONS, words={"ktc": "ktc", "none": "none"}),
@@ -83,14 +73,11 @@ class Readout(Model):
     )
     bit_line_capacitance: Annotated[float | None, Quantity("capacitance", above=0)] = key(
         "of a column's bit line; its kTC is the reset noise of a pps",
-        unit="fF",
         example="2000 fF",
         default=None,
     )
     charge_transfer: Annotated[ChargeTransfer | None, mapping(ChargeTransfer)] = key(
-        "of a ccd; default the example's",
-        example={"inefficiency": 3e-5, "phases": 3},
-        default=None,
+        "of a ccd; default the example's", example={"inefficiency": 3e-5, "phases": 3}, default=None
     )
 
     @model_validator(mode="after")
@@ -98,7 +85,7 @@ class Readout(Model):
         g, v, well = self.conversion_gain, self.voltage_swing, self.full_well
         if g is not None and v is not None and well is not None and abs(v / g / well - 1) > AGREE:
             message = f"voltage_swing / conversion_gain is {v / g:.6g} e, not {well:.6g} e"
-            raise failure([fault(("full_well",), message, "give two of the three")])
+            raise refusal(("full_well",), message, "give two of the three")
         return self
 
 
@@ -107,33 +94,23 @@ class FixedPattern(Model):
 
     offset_pixel: Electrons = key(
         "spread of the pixels' offsets (also: dsnu)",
-        unit="e",
         example="2 e",
         default=0.0,
         validation_alias=AliasChoices("offset_pixel", "dsnu"),
     )
     offset_column: Electrons = key(
-        "spread of the columns' offsets; none in dps and ccd",
-        unit="e",
-        example="1 e",
-        default=0.0,
+        "spread of the columns' offsets; none in dps and ccd", example="1 e", default=0.0
     )
     gain_pixel: Fraction = key(
         "spread of the pixels' gains (also: prnu)",
-        unit="%",
         example="0.5 %",
         default=0.0,
         validation_alias=AliasChoices("gain_pixel", "prnu"),
     )
     gain_column: Fraction = key(
-        "spread of the columns' gains; none in dps and ccd",
-        unit="%",
-        example="0 %",
-        default=0.0,
+        "spread of the columns' gains; none in dps and ccd", example="0 %", default=0.0
     )
-    dark: Fraction = key(
-        "spread of the pixels' dark currents", unit="%", example="0 %", default=0.0
-    )
+    dark: Fraction = key("spread of the pixels' dark currents", example="0 %", default=0.0)
 
     rules = (at_most_one("offset_pixel", "dsnu"), at_most_one("gain_pixel", "prnu"))
 
@@ -150,14 +127,14 @@ class Defects(Model):
     def _at_most_all(self) -> Self:
         if self.hot + self.dead > 1:
             message = f"hot and dead pixels are {self.hot + self.dead:g} of all"
-            raise failure([fault((), message, "give fractions that add up to at most 1")])
+            raise refusal((), message, "give fractions that add up to at most 1")
         return self
 
 
 class Layer(Model):
     """A dielectric layer."""
 
-    thickness: Gap = key("thickness", unit="um", example="0.7 um")
+    thickness: Gap = key("thickness", example="0.7 um")
     index: Annotated[float, Number(least=1, most=10, example="1.46")] = key(
         "refractive index", example=1.46
     )
@@ -180,9 +157,7 @@ class Microlens(Model):
         "effective fill factor, in place of a gain", example=0.9, default=None
     )
     shift: Literal["optimal", "centered"] = key(
-        "optimal: shifted toward the axis to follow the chief ray",
-        example="optimal",
-        default="optimal",
+        "optimal: shifted toward the axis to follow the chief ray", default="optimal"
     )
 
     rules = (
@@ -190,27 +165,52 @@ class Microlens(Model):
     )
 
 
+def _is_determined(given: Mapping[str, Any]) -> Iterator[InitErrorDetails]:
+    """Require what a technology could have filled in, where there is none."""
+    if "technology" in given:
+        return
+    detector, readout = given.get("photodetector"), given.get("readout", {})
+    if not isinstance(detector, Mapping) or not isinstance(readout, Mapping):
+        return
+    here = ("photodetector",)
+    if not {"fill_factor", "width", "height"} & set(detector):
+        message = "the photodetector's size is missing"
+        yield fault(here, message, "add fill_factor: 0.3, or width and height")
+    if "quantum_efficiency" not in detector:
+        example = "add it, for example quantum_efficiency: 0.5"
+        yield fault((*here, "quantum_efficiency"), "is missing", example)
+    known = [name for name in ("voltage_swing", "full_well") if name in readout]
+    if "conversion_gain" in readout or "capacitance" in detector:
+        known.append("conversion_gain")
+    if len(known) >= 2 or known == ["full_well"]:  # beside a full well, adc.gain is enough
+        return
+    message = (
+        "the readout is not determined: two of conversion_gain, voltage_swing and full_well are "
+        "needed (photodetector.capacitance may stand for conversion_gain)"
+    )
+    remedy = "add conversion_gain: 20 uV/e" if known else "add two of them"
+    if "conversion_gain" in known:
+        remedy = "add voltage_swing: 1.38 V or full_well: 69 ke"
+    yield fault(("readout",), message, remedy)
+
+
 class Pixel(Model):
     """One pixel of the array."""
 
     architecture: Literal["aps-3t", "aps-4t", "pps", "dps", "ccd"] = key(
-        "readout architecture",
-        example="aps-3t",
-        default="aps-3t",
+        "readout architecture", default="aps-3t"
     )
     technology: Annotated[TechnologyChoice | None, CHOICE] = key(
         "fills in what is not given: a name, or {from: name, ...} with changes",
         example="cmos-0.35um",
         default=None,
     )
-    width: Length = key("width of the pixel", unit="um", example="6.5 um")
+    width: Length = key("width of the pixel", example="6.5 um")
     height: Annotated[float, Quantity("length", above=0)] = key(
-        "height of the pixel; default its width", unit="um", example="6.5 um", default=None
+        "height of the pixel; default its width", example="6.5 um", default=None
     )
-    gap_x: Gap = key(
-        "between pixels of a row; pitch = width + gap", unit="um", example="0 um", default=0.0
-    )
-    gap_y: Gap = key("between pixels of a column", unit="um", example="0 um", default=0.0)
+    gap_x: Gap = key("between pixels of a row; pitch = width + gap", example="0 um", default=0.0)
+    gap_y: Gap = key("between pixels of a column", example="0 um", default=0.0)
     photodetector: Photodetector = key(
         "what collects light", example={"fill_factor": 0.3, "quantum_efficiency": 0.5}
     )
@@ -224,42 +224,14 @@ class Pixel(Model):
     )
     defects: Defects = key("pixels that do not work", example={"hot": 0}, default=Defects)
     stack: Annotated[Stack | None, word_or(Stack, {"none": None})] = key(
-        "layers above the photodetector, which shade it",
-        example="none",
-        default=None,
+        "layers above the photodetector, which shade it", example="none", default=None
     )
     microlens: Annotated[Microlens | None, word_or(Microlens, {"none": None})] = key(
         "a lens on every pixel", example="none", default=None
     )
-    temperature: Temperature = key("of the sensor", unit="K", example="300 K", default=300.0)
+    temperature: Temperature = key("of the sensor", example="300 K", default=300.0)
 
-    @staticmethod
-    def _complete(given: Mapping[str, Any]) -> Iterator[InitErrorDetails]:
-        """What a technology could have filled in."""
-        if "technology" in given:
-            return
-        detector, readout = given.get("photodetector"), given.get("readout", {})
-        if not isinstance(detector, Mapping) or not isinstance(readout, Mapping):
-            return
-        here = ("photodetector",)
-        if not {"fill_factor", "width", "height"} & set(detector):
-            message = "the photodetector's size is missing"
-            yield fault(here, message, "add fill_factor: 0.3, or width and height")
-        if "quantum_efficiency" not in detector:
-            example = "add it, for example quantum_efficiency: 0.5"
-            yield fault((*here, "quantum_efficiency"), "is missing", example)
-        known = [name for name in ("voltage_swing", "full_well") if name in readout]
-        if "conversion_gain" in readout or "capacitance" in detector:
-            known.append("conversion_gain")
-        if len(known) < 2 and known != ["full_well"]:  # beside it, adc.gain is enough
-            yield fault(
-                ("readout",),
-                "the readout is not determined: two of conversion_gain, voltage_swing and "
-                "full_well are needed (photodetector.capacitance may stand for conversion_gain)",
-                f"add {'conversion_gain: 20 uV/e' if known else 'two of them'}"
-                if "conversion_gain" not in known
-                else "add voltage_swing: 1.38 V or full_well: 69 ke",
-            )
+    rules = (_is_determined,)
 
     @model_validator(mode="after")
     def _defaults(self) -> Self:
@@ -276,30 +248,24 @@ class Pixel(Model):
         if abs(actual / pd.fill_factor - 1) > AGREE:
             message = f"is {pd.fill_factor:g}, but width and height make it {actual:.6g}"
             where = ("photodetector", "fill_factor")
-            raise failure([fault(where, message, "give the fill factor or the size")])
+            raise refusal(where, message, "give the fill factor or the size")
         return self
 
     @model_validator(mode="after")
-    def _transfer(self) -> Self:
+    def _readout_suits(self) -> Self:
         name, readout = self.architecture, self.readout
-        if readout.charge_transfer is not None and not ARCHITECTURES[name].transfers:
+        kind = ARCHITECTURES[name]
+        if readout.charge_transfer is not None and not kind.transfers:
             where = ("readout", "charge_transfer")
             message = f"{article(name)} {name} pixel transfers no charge"
-            raise failure([fault(where, message, "remove it, or write architecture: ccd")])
-        of_bit_line = ARCHITECTURES[name].reset_noise == "bit line"
-        if of_bit_line and readout.reset_noise == "ktc" and readout.bit_line_capacitance is None:
+            raise refusal(where, message, "remove it, or write architecture: ccd")
+        of_bit_line = kind.reset_noise == "bit line" and readout.reset_noise == "ktc"
+        if of_bit_line and readout.bit_line_capacitance is None:
             where = ("readout", "bit_line_capacitance")
             message = f"is missing: the reset noise of {article(name)} {name} is its bit line's"
             remedy = "add bit_line_capacitance: 2000 fF, or give reset_noise in electrons"
-            raise failure([fault(where, message, remedy)])
-        return self
-
-    @model_validator(mode="after")
-    def _transfer_of_a_ccd(self) -> Self:
-        if ARCHITECTURES[self.architecture].transfers and self.readout.charge_transfer is None:
+            raise refusal(where, message, remedy)
+        if kind.transfers and readout.charge_transfer is None:
             usual = {"charge_transfer": ChargeTransfer()}
-            self._fill(readout=self.readout.model_copy(update=usual))
+            self._fill(readout=readout.model_copy(update=usual))
         return self
-
-
-Pixel.rules = (Pixel._complete,)

@@ -1,15 +1,17 @@
 """Processing: what is done to the raw frame, step by step, in the user's order."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_args
 
 from pydantic_core import InitErrorDetails
 
 from vcam_cli.camera.array import Array
-from vcam_cli.camera.base import Model, key
-from vcam_cli.camera.explain import failure, fault, one_of, shown
-from vcam_cli.camera.spectrum import moved
-from vcam_cli.camera.values import Either, Number, Quantity, word_or, written
+from vcam_cli.config.lists import read_items
+from vcam_cli.config.model import Model, key
+from vcam_cli.config.quantities import Number, Quantity
+from vcam_cli.config.validation_messages import describe, fault, one_of, refusal
+from vcam_cli.config.values import Either, word_or
+from vcam_cli.config.yaml_type import to_yaml
 
 
 class Step(Model):
@@ -17,10 +19,12 @@ class Step(Model):
 
     @property
     def name(self) -> str:
+        """Name of the step."""
         return next(iter(type(self).model_fields))
 
     @property
     def value(self) -> Any:
+        """What the file says of it."""
         return getattr(self, self.name)
 
 
@@ -29,7 +33,7 @@ _BARE = Number(least=0, example="64")
 
 
 def _black_level(given: Any) -> Any:
-    """A number of DN may be written with or without its unit."""
+    """Return the value of a word, or of a number of DN with or without its unit."""
     bare = isinstance(given, (int, float)) and not isinstance(given, bool)
     return _BARE.read(given) if bare else _DN.read(given)
 
@@ -39,7 +43,7 @@ class BlackLevel(Step):
 
     black_level: Annotated[
         float | Literal["subtract", "none"],
-        Either(_black_level, Annotated[float, _DN] | Annotated[float, _BARE], write=_DN.write),
+        Either(_black_level, Annotated[float, _DN] | Annotated[float, _BARE], yaml_form=_DN.write),
     ] = key(
         "subtract (mean dark signal and offset), none, or a number of DN",
         unit="DN",
@@ -72,7 +76,7 @@ class Matrix(Model):
     )
 
     def suits(self, colors: int) -> bool:
-        """Whether it has three rows of one number for each of the camera's colors."""
+        """Return whether it has three rows of one number for each of the camera's colors."""
         return len(self.matrix) == 3 and {len(row) for row in self.matrix} == {colors}
 
 
@@ -94,42 +98,29 @@ class Gamma(Step):
 
 SHOWN = (0, 1, 3)
 """Numbers of colors that make a picture as they are; 0 where only the file of positions knows."""
-STEPS: dict[str, type[Step]] = {
-    "black_level": BlackLevel,
-    "demosaic": Demosaic,
-    "white_balance": WhiteBalance,
-    "color_correction": ColorCorrection,
-    "gamma": Gamma,
-}
 Steps = tuple[Step, ...]
 _ANY = BlackLevel | Demosaic | WhiteBalance | ColorCorrection | Gamma
+STEPS: dict[str, type[Step]] = {next(iter(step.model_fields)): step for step in get_args(_ANY)}
+"""Name of a step -> its model."""
 
 
 def _steps(given: Any) -> Steps:
     if not isinstance(given, (list, tuple)):
-        message = f"{shown(given)} is not a list of steps"
-        raise failure([fault((), message, "write [] or a list such as [gamma: srgb]", given)])
-    found: list[Step] = []
-    mistakes: list[InitErrorDetails] = []
-    for i, item in enumerate(given):
-        try:
-            found.append(_step(item))
-        except ValueError as error:
-            mistakes += moved(error, i, item)
-    if mistakes:
-        raise failure(mistakes)
-    return tuple(found)
+        message = f"{describe(given)} is not a list of steps"
+        raise refusal((), message, "write [] or a list such as [gamma: srgb]", given)
+    return tuple(read_items(enumerate(given), _step))
 
 
 def _step(given: Any) -> Step:
     if isinstance(given, Step):
         return given
     if not isinstance(given, Mapping) or len(given) != 1:
-        raise ValueError(f"{shown(given)} is not a step; write one key, such as demosaic: bilinear")
+        raise ValueError(
+            f"{describe(given)} is not a step; write one key, such as demosaic: bilinear"
+        )
     name = next(iter(given))
     if name not in STEPS:
-        near = one_of(name, STEPS)
-        raise failure([fault((name,), *near, given=given)])
+        raise refusal((name,), *one_of(name, STEPS), given=given)
     return STEPS[name].model_validate(given)
 
 
@@ -138,7 +129,7 @@ STEP_LIST = Either(_steps, list[_ANY])
 
 
 def default_steps(mosaic: bool, monochrome: bool) -> Steps:
-    """What is done where the file does not say."""
+    """Return what is done where the file does not say."""
     color = (
         WhiteBalance(white_balance="gray-world"),
         ColorCorrection.model_validate({"color_correction": "fit"}),
@@ -154,28 +145,37 @@ def default_steps(mosaic: bool, monochrome: bool) -> Steps:
 def order_mistakes(
     steps: Sequence[Step], mosaic: bool, colors: int, scattered: bool = False
 ) -> Iterator[InitErrorDetails]:
-    """Why these steps cannot work in this order on an array of so many colors.
+    """Yield why these steps cannot work in this order.
 
-    colors: 0 where only the file of positions knows. scattered: pixels are in no rows and columns.
+    Parameters
+    ----------
+    steps : sequence of Step
+        The steps.
+    mosaic : bool
+        Whether a pixel of the array holds one color of several.
+    colors : int
+        Number of the array's colors; 0 where only the file of positions knows.
+    scattered : bool
+        Whether the pixels are in no rows and columns.
     """
     names = [step.name for step in steps]
     for i, step in enumerate(steps):
         before, name = names[:i], step.name
         for message, remedy in _reasons(name, step.value == "none", before, names, mosaic, colors):
-            yield fault(("processing", i, name), message, remedy, written(step))
+            yield fault(("processing", i, name), message, remedy, to_yaml(step))
         if scattered and step.value == "edge-aware":
             message = "edge-aware needs pixels in rows and columns"
-            yield fault(("processing", i, name), message, "write bilinear", written(step))
+            yield fault(("processing", i, name), message, "write bilinear", to_yaml(step))
         if isinstance(step.value, Matrix) and colors and not step.value.suits(colors):
             message = f"is no matrix for {colors} colors"
             remedy = f"write three rows (display R, G, B) of {colors} numbers (the camera's colors)"
-            yield fault(("processing", i, name, "matrix"), message, remedy, written(step.value))
+            yield fault(("processing", i, name, "matrix"), message, remedy, to_yaml(step.value))
 
 
 def picture_mistakes(
     steps: Sequence[Step], array: Array, judged: bool, shown: bool
 ) -> Iterator[InitErrorDetails]:
-    """Why these steps leave no picture that can be judged by `quality`, or shown as a render."""
+    """Yield why these steps leave no picture that can be judged, or shown as a render."""
     done = [step.name for step in steps if step.value != "none"]
     if array.mosaic and "demosaic" not in done:
         add = "add demosaic: bilinear to processing, or write"

@@ -2,14 +2,15 @@
 
 from collections.abc import Mapping
 from pathlib import PurePath
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal, Self, get_args
 
 from pydantic import model_validator
 
-from vcam_cli.camera.base import Model, exactly_one, key
-from vcam_cli.camera.explain import failure, fault, one_of, shown
-from vcam_cli.camera.spectrum import IlluminantSpec, Lamp
-from vcam_cli.camera.values import (
+from vcam_cli.camera.illuminant import Illuminant, IlluminantSpec
+from vcam_cli.config.model import Model, exactly_one, key
+from vcam_cli.config.quantities import Number, Quantity, Whole
+from vcam_cli.config.validation_messages import describe, failure, fault, one_of, refusal
+from vcam_cli.config.values import (
     Angle,
     Choice,
     Either,
@@ -17,13 +18,10 @@ from vcam_cli.camera.values import (
     Fraction,
     Frequency,
     Length,
-    Number,
     Positive,
-    Quantity,
-    Whole,
     word_or,
-    written,
 )
+from vcam_cli.config.yaml_type import to_yaml
 
 Seed = Annotated[int, Whole(least=0, most=2**63 - 1, example="1")]
 
@@ -38,24 +36,20 @@ class Uniform(Chart):
     """The same reflectance everywhere."""
 
     chart: Literal["uniform"] = key("which chart", example="uniform")
-    reflectance: Fraction = key("reflectance everywhere", example=1.0, default=1.0)
+    reflectance: Fraction = key("reflectance everywhere", default=1.0)
 
 
 class Sinusoid(Chart):
     """One spatial frequency: reflectance mean x (1 + contrast cos(2 pi f u + phase))."""
 
     chart: Literal["sinusoid"] = key("which chart", example="sinusoid")
-    frequency: Frequency = key(
-        "spatial frequency on the sensor plane", unit="lp/mm", example="50 lp/mm"
-    )
-    contrast: Fraction = key("modulation over mean", example=0.5, default=0.5)
-    mean: Fraction = key("mean reflectance", example=0.5, default=0.5)
+    frequency: Frequency = key("spatial frequency on the sensor plane", example="50 lp/mm")
+    contrast: Fraction = key("modulation over mean", default=0.5)
+    mean: Fraction = key("mean reflectance", default=0.5)
     orientation: Angle = key(
-        "direction of modulation; 0 deg = along a row", unit="deg", example="0 deg", default=0.0
+        "direction of modulation; 0 deg = along a row", example="0 deg", default=0.0
     )
-    phase: Angle = key(
-        "0 deg = a maximum at the image center", unit="deg", example="90 deg", default=0.0
-    )
+    phase: Angle = key("0 deg = a maximum at the image center", example="90 deg", default=0.0)
 
     @model_validator(mode="after")
     def _is_a_reflectance(self) -> Self:
@@ -67,14 +61,13 @@ class Csf(Chart):
 
     chart: Literal["csf"] = key("which chart", example="csf")
     max_frequency: Frequency = key(
-        "spatial frequency at the right edge, on the sensor plane", unit="lp/mm", example="33 lp/mm"
+        "spatial frequency at the right edge, on the sensor plane", example="33 lp/mm"
     )
-    mean: Fraction = key("mean reflectance", example=0.5, default=0.5)
-    phase: Angle = key("phase at the left edge", unit="deg", example="0 deg", default=0.0)
-    max_contrast: Fraction = key("contrast at the top", example=1.0, default=1.0)
+    mean: Fraction = key("mean reflectance", default=0.5)
+    phase: Angle = key("phase at the left edge", example="0 deg", default=0.0)
+    max_contrast: Fraction = key("contrast at the top", default=1.0)
     modulation: Literal["luminance", "red-green", "blue-yellow"] = key(
         "what the contrast is in: light and dark, or two colors of one luminance under D65",
-        example="luminance",
         default="luminance",
     )
 
@@ -88,10 +81,10 @@ class SlantedEdge(Chart):
 
     chart: Literal["slanted-edge"] = key("which chart", example="slanted-edge")
     angle: Annotated[float, Quantity("angle")] = key(
-        "between the edge and the columns", unit="deg", example="5 deg", default=0.08726646259971647
+        "between the edge and the columns", example="5 deg", default=0.08726646259971647
     )
     contrast: Fraction = key(
-        "(bright - dark) / (bright + dark); 0.6 is the 4:1 of ISO 12233", example=0.6, default=0.6
+        "(bright - dark) / (bright + dark); 0.6 is the 4:1 of ISO 12233", default=0.6
     )
 
 
@@ -100,10 +93,10 @@ class StepWedge(Chart):
 
     chart: Literal["step-wedge"] = key("which chart", example="step-wedge")
     steps: Annotated[int, Whole(least=2, most=1000, example="20")] = key(
-        "number of bars", example=20, default=20
+        "number of bars", default=20
     )
     density_range: Annotated[float, Number(above=0, most=10, example="2")] = key(
-        "density of the darkest bar over the brightest (log10)", example=2.0, default=2.0
+        "density of the darkest bar over the brightest (log10)", default=2.0
     )
 
 
@@ -118,25 +111,23 @@ class SiemensStar(Chart):
 
     chart: Literal["siemens-star"] = key("which chart", example="siemens-star")
     spokes: Annotated[int, Whole(least=2, most=1000, example="72")] = key(
-        "number of bright spokes", example=72, default=72
+        "number of bright spokes", default=72
     )
-    contrast: Fraction = key("modulation over mean", example=1.0, default=1.0)
+    contrast: Fraction = key("modulation over mean", default=1.0)
 
 
 class PointGrid(Chart):
     """Bright points on black, one of them at the center."""
 
     chart: Literal["point-grid"] = key("which chart", example="point-grid")
-    spacing: Length = key("between points, on the sensor plane", unit="um", example="200 um")
-    diameter: Length = key(
-        "of a point, on the sensor plane", unit="um", example="2 um", default=2e-6
-    )
+    spacing: Length = key("between points, on the sensor plane", example="200 um")
+    diameter: Length = key("of a point, on the sensor plane", example="2 um", default=2e-6)
 
     @model_validator(mode="after")
-    def _apart(self) -> Self:
+    def _points_are_apart(self) -> Self:
         if self.diameter > self.spacing:
             message = "is more than the spacing: the points would overlap"
-            raise failure([fault(("diameter",), message, "make it smaller, or the spacing larger")])
+            raise refusal(("diameter",), message, "make it smaller, or the spacing larger")
         return self
 
 
@@ -144,7 +135,7 @@ class DeadLeaves(Chart):
     """Overlapping disks of random size and reflectance: the statistics of natural images."""
 
     chart: Literal["dead-leaves"] = key("which chart", example="dead-leaves")
-    seed: Seed = key("which arrangement of leaves", example=1, default=1)
+    seed: Seed = key("which arrangement of leaves", default=1)
     colorchecker: Fraction = key(
         "height of a ColorChecker in the middle over the chart's height; 0 = none",
         example=0.4,
@@ -156,9 +147,7 @@ class EyeChart(Chart):
     """Rows of five Sloan letters, black on white, 10^0.1 times smaller from row to row."""
 
     chart: Literal["eye-chart"] = key("which chart", example="eye-chart")
-    rows: Annotated[int, Whole(least=1, most=20, example="8")] = key(
-        "rows of letters", example=8, default=8
-    )
+    rows: Annotated[int, Whole(least=1, most=20, example="8")] = key("rows of letters", default=8)
 
 
 class HdrPatches(Chart):
@@ -166,14 +155,12 @@ class HdrPatches(Chart):
 
     chart: Literal["hdr-patches"] = key("which chart", example="hdr-patches")
     dynamic_range: Annotated[float, Number(above=1, example="10000")] = key(
-        "brightest over darkest patch", example=10000.0, default=10000.0
+        "brightest over darkest patch", default=10000.0
     )
     patches: Annotated[int, Whole(least=2, most=1000, example="24")] = key(
-        "number of patches", example=24, default=24
+        "number of patches", default=24
     )
-    lamp: Positive = key(
-        "radiance of the lamp over that of the perfect white", example=100.0, default=100.0
-    )
+    lamp: Positive = key("radiance of the lamp over that of the perfect white", default=100.0)
 
 
 class ImageFile(Model):
@@ -186,14 +173,11 @@ class ImageFile(Model):
         example="srgb",
         default=None,
     )
-    white: Positive = key(
-        "value in the file that has the stated luminance", example=1.0, default=1.0
-    )
+    white: Positive = key("value in the file that has the stated luminance", default=1.0)
     model: Literal["reflectance", "laser", "rgb-display", "mallett"] = key(
         "what channels mean: reflectance (one channel), laser (450, 550 and 650 nm, equal planes "
         "= equal radiance in W), rgb-display (the primaries of the camera file's display), mallett "
         "(the smooth reflectances that have these sRGB colors under D65)",
-        example="reflectance",
         default="reflectance",
     )
 
@@ -216,24 +200,6 @@ class Hyperspectral(Model):
     )
 
 
-CHARTS: dict[str, type[Chart]] = {
-    "uniform": Uniform,
-    "sinusoid": Sinusoid,
-    "csf": Csf,
-    "slanted-edge": SlantedEdge,
-    "step-wedge": StepWedge,
-    "colorchecker": ColorChecker,
-    "siemens-star": SiemensStar,
-    "point-grid": PointGrid,
-    "dead-leaves": DeadLeaves,
-    "eye-chart": EyeChart,
-    "hdr-patches": HdrPatches,
-}
-KINDS: dict[str, type[Model] | None] = {
-    "chart": None,
-    "image": ImageFile,
-    "hyperspectral": Hyperspectral,
-}
 Source = (
     Uniform
     | Sinusoid
@@ -251,20 +217,35 @@ Source = (
 )
 
 
+CHARTS: dict[str, type[Chart]] = {
+    model.model_fields["chart"].examples[0]: model
+    for model in get_args(Source)
+    if issubclass(model, Chart)
+}
+"""Name of a chart -> its model."""
+KINDS: dict[str, type[Model] | None] = {
+    "chart": None,
+    "image": ImageFile,
+    "hyperspectral": Hyperspectral,
+}
+
+
 def _no_more_than_white(chart: Any, contrast: float, name: str) -> Any:
     brightest = chart.mean * (1 + contrast)
     if brightest > 1 + 1e-12:
         message = f"mean x (1 + {name}) is {brightest:.4g}, more than a reflectance can be"
-        raise failure([fault((name,), message, "make it at most 1")])
+        raise refusal((name,), message, "make it at most 1")
     return chart
 
 
 def _source(given: Any) -> Any:
-    """The source that a mapping describes, told apart by kind and chart."""
+    """Return the source that a mapping describes; its kind and chart tell which it is."""
     if isinstance(given, Model):
         return given
     if not isinstance(given, Mapping):
-        raise ValueError(f"{shown(given)} is not a source; write {{kind: chart, chart: uniform}}")
+        raise ValueError(
+            f"{describe(given)} is not a source; write {{kind: chart, chart: uniform}}"
+        )
     kind = given.get("kind")
     if not isinstance(kind, str) or kind not in KINDS:
         raise failure([_choice("kind", kind, KINDS, given)])
@@ -286,16 +267,14 @@ def _choice(name: str, word: object, allowed: Any, given: Mapping[Any, Any]) -> 
 class Extent(Model):
     """A scene of a given size."""
 
-    width: Length = key(
-        "width in the scene plane; the scene is centered", unit="m", example="0.5 m"
-    )
+    width: Length = key("width in the scene plane; the scene is centered", example="0.5 m")
 
 
 class Wavelengths(Model):
     """The part of the spectrum that is simulated."""
 
-    start: Length = key("shortest wavelength", unit="nm", example="380 nm", default=380e-9)
-    stop: Length = key("longest wavelength", unit="nm", example="780 nm", default=780e-9)
+    start: Length = key("shortest wavelength", example="380 nm", default=380e-9)
+    stop: Length = key("longest wavelength", example="780 nm", default=780e-9)
     step: Annotated[float | None, Quantity("length", least=1e-10, words={"auto": None})] = key(
         "spacing at which the lens's blur is evaluated; auto follows from the accuracy",
         unit="nm",
@@ -306,9 +285,9 @@ class Wavelengths(Model):
     @model_validator(mode="after")
     def _in_order(self) -> Self:
         if self.start >= self.stop:
-            raise failure([fault(("stop",), "must be longer than start", "exchange the two")])
+            raise refusal(("stop",), "must be longer than start", "exchange the two")
         if self.step is not None and self.step > self.stop - self.start:
-            raise failure([fault(("step",), "is longer than start..stop", "make it smaller")])
+            raise refusal(("step",), "is longer than start..stop", "make it smaller")
         return self
 
 
@@ -322,7 +301,7 @@ class Scene(Model):
         "a chart, an image file or a hyperspectral file",
         example={"kind": "chart", "chart": "colorchecker"},
     )
-    illuminant: Annotated[IlluminantSpec | None, Lamp()] = key(
+    illuminant: Annotated[IlluminantSpec | None, Illuminant()] = key(
         "the lamp; default D65; to be absent for images that emit (model laser or rgb-display) and "
         "for files of radiances",
         example="D65",
@@ -332,26 +311,23 @@ class Scene(Model):
         "of a perfect white diffuser (of the display's white, for images that emit; of the file's "
         "white, or else its brightest samples, for files of radiances); from-file leaves such a "
         "file as bright as it is",
-        unit="cd/m2",
         example="100 cd/m2",
         default=None,
     )
     radiance: Annotated[float | None, Quantity("radiance", above=0)] = key(
         "of a perfect white diffuser, over the wavelengths simulated",
-        unit="W/(sr m2)",
         example="0.4 W/(sr m2)",
         default=None,
     )
     illuminance: Annotated[float | None, Quantity("illuminance", above=0)] = key(
-        "on a perfect white diffuser", unit="lx", example="300 lx", default=None
+        "on a perfect white diffuser", example="300 lx", default=None
     )
     distance: Annotated[float, Quantity("distance", above=0)] = key(
-        "from lens to scene, or infinity", unit="m", example="1 m", default=1.0
+        "from lens to scene, or infinity", example="1 m", default=1.0
     )
     extent: Annotated[Literal["sensor"] | Extent, word_or(Extent, {"sensor": "sensor"})] = key(
         "sensor: the scene covers the array, cropped centrally to its aspect; or its width in "
         "the scene plane, black outside",
-        example="sensor",
         default="sensor",
     )
     wavelengths: Wavelengths = key(
@@ -362,9 +338,7 @@ class Scene(Model):
 
     rules = (
         exactly_one(
-            "luminance",
-            "radiance",
-            "illuminance",
+            *("luminance", "radiance", "illuminance"),
             of="the light level",
             remedy="write for example luminance: 100 cd/m2",
         ),
@@ -380,7 +354,7 @@ class Scene(Model):
     def _lamp(self) -> Self:
         if self.emits and self.illuminant is not None:
             message = "an image that emits light has no lamp"
-            raise failure([fault(("illuminant",), message, "remove it", written(self.illuminant))])
+            raise refusal(("illuminant",), message, "remove it", to_yaml(self.illuminant))
         # A hyperspectral file alone knows whether it holds light or is to be lit.
         lit = not self.emits and not isinstance(self.source, Hyperspectral)
         if lit and self.illuminant is None:
@@ -391,9 +365,9 @@ class Scene(Model):
     def _levels(self) -> Self:
         if self.luminance == "from-file" and not isinstance(self.source, Hyperspectral):
             message = "this source has no absolute radiance in a file"
-            raise failure([fault(("luminance",), message, "write for example 100 cd/m2")])
+            raise refusal(("luminance",), message, "write for example 100 cd/m2")
         line = self.illuminant.line if self.illuminant else None
         if line is not None and not self.wavelengths.start <= line <= self.wavelengths.stop:
             message = f"{line * 1e9:.6g} nm is outside the wavelengths simulated"
-            raise failure([fault(("illuminant", "monochromatic"), message, "widen wavelengths")])
+            raise refusal(("illuminant", "monochromatic"), message, "widen wavelengths")
         return self

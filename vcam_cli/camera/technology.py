@@ -7,49 +7,44 @@ an override is a number of the process as it is used, after its scaling (see `pr
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal
 
-from vcam_cli.camera.base import Model, at_most_one, key
-from vcam_cli.camera.explain import shown
-from vcam_cli.camera.values import (
+from vcam_cli.config.model import Model, at_most_one, key
+from vcam_cli.config.quantities import Number, Quantity
+from vcam_cli.config.validation_messages import describe
+from vcam_cli.config.values import (
     Either,
     Length,
+    MaybeFraction,
     MaybeGap,
     MaybeLength,
+    MaybeTemperature,
     MaybeTime,
-    Number,
-    Quantity,
     Text,
     Word,
     mapping,
-    written,
 )
+from vcam_cli.config.yaml_type import to_yaml
 
-_VOLTAGE = Quantity("voltage", above=0)
-_CONCENTRATION = Quantity("concentration", above=0)
-_DIFFUSIVITY = Quantity("diffusivity", above=0)
-_EXPONENT = Number(least=-10, most=10, example="1")
+_Voltage = Annotated[float | None, Quantity("voltage", above=0)]
+_Concentration = Annotated[float | None, Quantity("concentration", above=0)]
+_Diffusivity = Annotated[float | None, Quantity("diffusivity", above=0)]
+_Exponent = Annotated[float | None, Number(least=-10, most=10, example="1")]
 
 
 class Thresholds(Model):
     """Voltages that make the swing: (supply - reset - gate-source) - (bias - bias gate)."""
 
-    reset: Annotated[float | None, _VOLTAGE] = key(
-        "threshold of the reset transistor", unit="V", example="0.8 V", default=None
+    reset: _Voltage = key("threshold of the reset transistor", example="0.8 V", default=None)
+    bias: _Voltage = key("bias voltage", example="0.9 V", default=None)
+    follower_gate_source: _Voltage = key(
+        "gate-source voltage of the follower", example="0.9 V", default=None
     )
-    bias: Annotated[float | None, _VOLTAGE] = key(
-        "bias voltage", unit="V", example="0.9 V", default=None
-    )
-    follower_gate_source: Annotated[float | None, _VOLTAGE] = key(
-        "gate-source voltage of the follower", unit="V", example="0.9 V", default=None
-    )
-    bias_gate: Annotated[float | None, _VOLTAGE] = key(
-        "threshold of the bias transistor", unit="V", example="0.6 V", default=None
-    )
+    bias_gate: _Voltage = key("threshold of the bias transistor", example="0.6 V", default=None)
 
 
 class Junction(Model):
     """The photodiode's junction; in a camera, overrides of the technology's."""
 
-    depth: MaybeLength = key("depth of the junction", unit="um", example="0.2 um", default=None)
+    depth: MaybeLength = key("depth of the junction", example="0.2 um", default=None)
     depletion_width: Annotated[
         float | Literal["from-capacitance"] | None,
         Quantity("length", above=0, words={"from-capacitance": "from-capacitance"}),
@@ -60,68 +55,55 @@ class Junction(Model):
         default=None,
     )
     substrate_depth: MaybeLength = key(
-        "depth of the quasi-neutral region that collects", unit="um", example="5 um", default=None
+        "depth of the quasi-neutral region that collects", example="5 um", default=None
     )
     diffusion_length: MaybeLength = key(
-        "of electrons in the substrate", unit="um", example="20 um", default=None
+        "of electrons in the substrate", example="20 um", default=None
     )
-    donors: Annotated[float | None, _CONCENTRATION] = key(
-        "donor concentration", unit="1/cm3", example="1e17 1/cm3", default=None
-    )
-    acceptors: Annotated[float | None, _CONCENTRATION] = key(
-        "acceptor concentration", unit="1/cm3", example="1e15 1/cm3", default=None
-    )
-    hole_lifetime: MaybeTime = key("of holes", unit="us", example="1 us", default=None)
-    electron_lifetime: MaybeTime = key("of electrons", unit="us", example="1 us", default=None)
-    hole_diffusivity: Annotated[float | None, _DIFFUSIVITY] = key(
-        "of holes", unit="cm2/s", example="12 cm2/s", default=None
-    )
-    electron_diffusivity: Annotated[float | None, _DIFFUSIVITY] = key(
-        "of electrons", unit="cm2/s", example="36 cm2/s", default=None
-    )
+    donors: _Concentration = key("donor concentration", example="1e17 1/cm3", default=None)
+    acceptors: _Concentration = key("acceptor concentration", example="1e15 1/cm3", default=None)
+    hole_lifetime: MaybeTime = key("of holes", example="1 us", default=None)
+    electron_lifetime: MaybeTime = key("of electrons", example="1 us", default=None)
+    hole_diffusivity: _Diffusivity = key("of holes", example="12 cm2/s", default=None)
+    electron_diffusivity: _Diffusivity = key("of electrons", example="36 cm2/s", default=None)
 
 
 class Well(Model):
     """The n-well, which takes the place of the n-diffusion in a photodetector nwell-psub."""
 
     depth: MaybeLength = key(
-        "depth of its junction with the substrate", unit="um", example="1.5 um", default=None
+        "depth of its junction with the substrate", example="1.5 um", default=None
     )
-    donors: Annotated[float | None, _CONCENTRATION] = key(
-        "donor concentration", unit="1/cm3", example="1e17 1/cm3", default=None
-    )
+    donors: _Concentration = key("donor concentration", example="1e17 1/cm3", default=None)
 
 
 class Gate(Model):
     """The gate of polysilicon, through which the light of a photogate goes."""
 
-    thickness: MaybeGap = key("of the film", unit="um", example="0.25 um", default=None)
+    thickness: MaybeGap = key("of the film", example="0.25 um", default=None)
 
 
 class JunctionCapacitance(Model):
     """Capacitance of the photodiode's junction at zero bias."""
 
     area: Annotated[float | None, Quantity("capacitance_per_area", least=0)] = key(
-        "per area", unit="fF/um2", example="0.906 fF/um2", default=None
+        "per area", example="0.906 fF/um2", default=None
     )
     sidewall: Annotated[float | None, Quantity("capacitance_per_length", least=0)] = key(
-        "per length of perimeter", unit="fF/um", example="0.297 fF/um", default=None
+        "per length of perimeter", example="0.297 fF/um", default=None
     )
-    built_in: Annotated[float | None, _VOLTAGE] = key(
-        "built-in potential", unit="V", example="0.8 V", default=None
-    )
+    built_in: _Voltage = key("built-in potential", example="0.8 V", default=None)
     grading: Annotated[float | None, Number(above=0, below=1, example="0.36")] = key(
         "grading coefficient", example=0.36, default=None
     )
-    sidewall_built_in: Annotated[float | None, _VOLTAGE] = key(
-        "built-in potential of the sidewall", unit="V", example="0.8 V", default=None
+    sidewall_built_in: _Voltage = key(
+        "built-in potential of the sidewall", example="0.8 V", default=None
     )
     sidewall_grading: Annotated[float | None, Number(above=0, below=1, example="0.2")] = key(
         "grading coefficient of the sidewall", example=0.2, default=None
     )
     follower_gate: Annotated[
-        float | Literal["auto"] | None,
-        Quantity("capacitance", least=0, words={"auto": "auto"}),
+        float | Literal["auto"] | None, Quantity("capacitance", least=0, words={"auto": "auto"})
     ] = key(
         "of the follower's gate; auto scales with the feature size",
         unit="fF",
@@ -134,16 +116,14 @@ class TechnologyDarkCurrent(Model):
     """Dark current of the photodiode."""
 
     area: Annotated[float | None, Quantity("current_density", least=0)] = key(
-        "per area", unit="nA/cm2", example="10 nA/cm2", default=None
+        "per area", example="10 nA/cm2", default=None
     )
     perimeter: Annotated[float | None, Quantity("linear_current_density", least=0)] = key(
-        "per length of perimeter", unit="pA/cm", example="0.437 pA/cm", default=None
+        "per length of perimeter", example="0.437 pA/cm", default=None
     )
-    temperature: Annotated[float | None, Quantity("temperature", above=0)] = key(
-        "at which both hold", unit="K", example="300 K", default=None
-    )
+    temperature: MaybeTemperature = key("at which both hold", example="300 K", default=None)
     doubling: Annotated[float | None, Quantity("temperature", above=0, difference=True)] = key(
-        "rise of temperature that doubles them", unit="K", example="8 K", default=None
+        "rise of temperature that doubles them", example="8 K", default=None
     )
 
 
@@ -161,27 +141,25 @@ class Layout(Model):
 class Scaling(Model):
     """The power of the feature-size ratio by which a number goes when the process is scaled."""
 
-    lengths: Annotated[float | None, _EXPONENT] = key(
+    lengths: _Exponent = key(
         "depths, widths, diffusion length, capacitance of the follower's gate; default 1",
         example=1.0,
         default=None,
     )
-    voltages: Annotated[float | None, _EXPONENT] = key(
-        "supply, thresholds, swing; default 1", example=1.0, default=None
-    )
-    concentrations: Annotated[float | None, _EXPONENT] = key(
+    voltages: _Exponent = key("supply, thresholds, swing; default 1", example=1.0, default=None)
+    concentrations: _Exponent = key(
         "of donors and acceptors; default -1", example=-1.0, default=None
     )
-    capacitance_area: Annotated[float | None, _EXPONENT] = key(
+    capacitance_area: _Exponent = key(
         "capacitance per area; default -1", example=-1.0, default=None
     )
-    capacitance_sidewall: Annotated[float | None, _EXPONENT] = key(
+    capacitance_sidewall: _Exponent = key(
         "capacitance per length; default 0", example=0.0, default=None
     )
-    dark_current_area: Annotated[float | None, _EXPONENT] = key(
+    dark_current_area: _Exponent = key(
         "dark current per area; default 0", example=0.0, default=None
     )
-    dark_current_perimeter: Annotated[float | None, _EXPONENT] = key(
+    dark_current_perimeter: _Exponent = key(
         "dark current per length; default 0", example=0.0, default=None
     )
 
@@ -189,17 +167,12 @@ class Scaling(Model):
 class Numbers(Model):
     """The numbers of a process; shared by technology files and overrides in a camera."""
 
-    supply: Annotated[float | None, _VOLTAGE] = key(
-        "supply voltage", unit="V", example="3.3 V", default=None
+    supply: _Voltage = key("supply voltage", example="3.3 V", default=None)
+    voltage_swing: _Voltage = key(
+        "at the photodetector; or thresholds", example="1.38 V", default=None
     )
-    voltage_swing: Annotated[float | None, _VOLTAGE] = key(
-        "at the photodetector; or thresholds", unit="V", example="1.38 V", default=None
-    )
-    reset_voltage: Annotated[float | None, _VOLTAGE] = key(
-        "to which the photodetector is reset; or thresholds",
-        unit="V",
-        example="2.5 V",
-        default=None,
+    reset_voltage: _Voltage = key(
+        "to which the photodetector is reset; or thresholds", example="2.5 V", default=None
     )
     thresholds: Annotated[Thresholds | None, mapping(Thresholds)] = key(
         "from which swing and reset voltage follow",
@@ -230,7 +203,7 @@ class Numbers(Model):
         example={"area": "10 nA/cm2", "perimeter": "0.437 pA/cm"},
         default=TechnologyDarkCurrent,
     )
-    quantum_efficiency_scale: Annotated[float | None, Number(least=0, most=1)] = key(
+    quantum_efficiency_scale: MaybeFraction = key(
         "reflection and stack; 1 when the camera gives a stack", example=0.75, default=None
     )
     layout: Layout = key(
@@ -251,7 +224,7 @@ class Technology(Numbers):
     """A technology file."""
 
     name: Word = key("name of the technology", example="cmos-0.35um")
-    feature_size: Length = key("smallest feature", unit="um", example="0.35 um")
+    feature_size: Length = key("smallest feature", example="0.35 um")
     source: Text = key(
         "where each number comes from", example="MOSIS run T69H; layout of ...", default=""
     )
@@ -262,7 +235,7 @@ def _source(given: Any) -> Technology | str:
         return Technology.model_validate(given)
     if isinstance(given, str) and given:
         return given
-    raise ValueError(f"{shown(given)} is not a technology; write for example cmos-0.35um")
+    raise ValueError(f"{describe(given)} is not a technology; write for example cmos-0.35um")
 
 
 class TechnologyChoice(Numbers):
@@ -274,12 +247,12 @@ class TechnologyChoice(Numbers):
         alias="from",
     )
     feature_size: MaybeLength = key(
-        "scales the technology to this feature size", unit="um", example="0.13 um", default=None
+        "scales the technology to this feature size", example="0.13 um", default=None
     )
 
-    def written(self) -> Any:
-        """The YAML form: the bare name where nothing is changed."""
-        changes = _without_empty(written(self))
+    def to_yaml(self) -> Any:
+        """Return the YAML form: the bare name where nothing is changed."""
+        changes = _without_empty(to_yaml(self))
         bare = set(changes) == {"from"} and isinstance(self.from_, str)
         return self.from_ if bare else changes
 
@@ -297,9 +270,5 @@ def _choice(given: Any) -> TechnologyChoice:
     return TechnologyChoice.model_validate({"from": _source(given)})
 
 
-CHOICE = Either(
-    _choice,
-    str | TechnologyChoice,
-    write=lambda value: None if value is None else value.written(),
-)
+CHOICE = Either(_choice, str | TechnologyChoice, yaml_form=TechnologyChoice.to_yaml)
 """The type of `pixel.technology`."""

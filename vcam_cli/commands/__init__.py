@@ -1,0 +1,1 @@
+"""The commands of the program `vcam`: parse the command line, call a package, print."""

@@ -8,15 +8,15 @@ from vcam_cli.commands import options
 from vcam_cli.commands.progress import Progress
 
 if TYPE_CHECKING:
-    from vcam_cli.studies.accuracy import Study
-    from vcam_cli.studies.accuracy_points import Point
+    from vcam_cli.accuracy.setting_errors import Point
+    from vcam_cli.accuracy.study import Study
 
 SHARE_OF = {
     "of full signal": "full signal",
     "of the temporal variance": "temporal var.",
     "of the fixed-pattern variance": "fixed var.",
 }
-"""Units of the plan, short enough for a table."""
+"""The plan's units, short enough for a table."""
 SETTINGS = (
     "knob", "setting", "rms %", "largest %", "electrons", "S-CIELAB", "seconds", "spread",
 )  # fmt: skip
@@ -24,7 +24,7 @@ EFFECTS = (
     "effect", "state", "expected %", "measured %", "ratio", "share of", "S-CIELAB", "saves ms",
 )  # fmt: skip
 TOTAL = ("preset", "tolerance", "effects", "file", "combined")
-"""Rows whose error is that of all knobs together."""
+"""The rows whose error is that of all knobs together."""
 
 
 def accuracy(
@@ -37,21 +37,21 @@ def accuracy(
     quiet: options.Quiet = False,
     workers: options.Workers = None,
 ) -> None:
-    """Shows what accuracy costs: error and seconds of every preset, knob and effect.
+    """Show what accuracy costs: error and seconds of every preset, knob and effect.
 
-    Errors are of the mean raw against a converged reference. Writes accuracy.csv, accuracy.png and
-    accuracy.json, and recommends a setting for the camera file.
+    Errors are those of the mean raw frame against a converged reference. Write accuracy.csv,
+    accuracy.png and accuracy.json, and recommend a setting for the camera file.
 
     \b
     Example:
       vcam accuracy starter
       vcam accuracy camera.yaml -o out/knobs --set optics.f_number=8
     """
-    from vcam_cli.files import accuracy_plots, report, tables
+    from vcam_cli.accuracy import plots, study
+    from vcam_cli.files import report, tables
     from vcam_cli.files.folder import OutputFolder
-    from vcam_cli.studies import accuracy as study
-    from vcam_cli.studies import provenance
-    from vcam_cli.studies.checks import load
+    from vcam_cli.simulation import provenance
+    from vcam_cli.simulation.checks import load
 
     model = load(camera, options.overrides(set_, seed, level))
     inputs = provenance.inputs(model)
@@ -61,18 +61,18 @@ def accuracy(
         found = study.accuracy(model, workers, progress)
         rows = (point.row for point in found.points)
         tables.write_table(folder.new("accuracy.csv"), study.COLUMNS, rows)
-        accuracy_plots.pareto(folder.new("accuracy.png"), *pictured(found))
+        plots.pareto(folder.new("accuracy.png"), *pareto_arguments(found))
         record = found.report() | {"camera": model.model_dump(mode="json")}
         folder.finish(record | {"versions": provenance.versions()})
     if as_json:
         print(report.to_json({"out": str(path), **found.report()}), end="")
     elif not quiet:
-        tell(found, path)
+        print_report(found, path)
 
 
-def pictured(found: "Study"):
-    """What `accuracy_plots.pareto` takes: title, presets, curves, tolerance, panels."""
-    from vcam_cli.files.accuracy_plots import Curve, Pair
+def pareto_arguments(found: "Study"):
+    """Return the arguments of `plots.pareto`: title, presets, curves, tolerance, panels."""
+    from vcam_cli.accuracy.plots import Curve, Pair
 
     def points(*knobs: str):
         return tuple((p.seconds, p.rms_error, p.setting) for p in found.points if p.knob in knobs)
@@ -96,8 +96,8 @@ def pictured(found: "Study"):
     return title, points("preset", "tolerance"), curves, tolerance, panels
 
 
-def tell(found: "Study", path: Path) -> None:
-    """The tables and the recommendation, on stdout."""
+def print_report(found: "Study", path: Path) -> None:
+    """Print the tables and the recommendation."""
     from rich.console import Console
 
     width = None if sys.stdout.isatty() else 120
@@ -114,8 +114,8 @@ def tell(found: "Study", path: Path) -> None:
 
 
 def convergence(found: "Study") -> str:
-    """How good that is which errors are measured against."""
-    from vcam_cli.studies.accuracy_points import FLOOR
+    """Return how accurate the reference is against which errors are measured."""
+    from vcam_cli.accuracy.setting_errors import FLOOR
 
     reference = found.reference
     shown = [p for p in found.points if not p.effect]
@@ -140,7 +140,7 @@ def _table(console: Any, title: str, head: tuple[str, ...], rows: list[tuple[str
     table = Table(title=title, title_justify="left", box=style, pad_edge=False)
     for i, name in enumerate(head):
         text = i < 2 or name == "share of"
-        # What takes several knobs is long: it goes on in the next line, and no number is cut.
+        # A setting of several knobs is long: it goes on in the next line, and no number is cut.
         table.add_column(name, justify="left" if text else "right", no_wrap=name != "setting")
     for row in rows:
         table.add_row(*row)
@@ -148,7 +148,7 @@ def _table(console: Any, title: str, head: tuple[str, ...], rows: list[tuple[str
 
 
 def settings(found: "Study") -> list[tuple[str, ...]]:
-    """Rows of the first table."""
+    """Return the rows of the first table."""
 
     def rms(point: "Point") -> str:
         if point.sure:
@@ -162,7 +162,7 @@ def settings(found: "Study") -> list[tuple[str, ...]]:
             rms(p),
             f"{100 * p.max_error:.2g}",
             f"{p.rms_electrons:.2g}",
-            _looks(p.mean_s_cielab),
+            _delta_e(p.mean_s_cielab),
             f"{p.seconds:.3f}",
             f"{p.seconds_spread:.3f}",
         )
@@ -172,8 +172,8 @@ def settings(found: "Study") -> list[tuple[str, ...]]:
 
 
 def effects(found: "Study") -> list[tuple[str, ...]]:
-    """Rows of the second table."""
-    looks = {p.effect: p.mean_s_cielab for p in found.points if p.effect}
+    """Return the rows of the second table."""
+    delta_e = {p.effect: p.mean_s_cielab for p in found.points if p.effect}
     return [
         (
             e.name,
@@ -182,12 +182,12 @@ def effects(found: "Study") -> list[tuple[str, ...]]:
             f"{100 * e.measured:.2g}",
             "-" if e.ratio is None else f"{e.ratio:.2f}",
             SHARE_OF.get(e.unit, e.unit),
-            _looks(looks[e.name]),
+            _delta_e(delta_e[e.name]),
             f"{1000 * e.seconds_saved:.0f}",
         )
         for e in found.effects
     ]
 
 
-def _looks(mean_s_cielab: float | None) -> str:
+def _delta_e(mean_s_cielab: float | None) -> str:
     return "-" if mean_s_cielab is None else f"{mean_s_cielab:.2g}"

@@ -8,7 +8,7 @@ from vcam_cli.commands import options
 from vcam_cli.commands.progress import Progress
 
 if TYPE_CHECKING:
-    from vcam_cli.studies.characterize import Characterization
+    from vcam_cli.characterization.characterize import Characterization
 
 SHOWN = (
     "system_gain",
@@ -28,7 +28,7 @@ SHOWN = (
     "prnu",
     "mtf50",
 )
-"""Numbers of the table; the others are in the files."""
+"""The quantities of the table; the others are in the files."""
 
 
 def characterize(
@@ -41,22 +41,23 @@ def characterize(
     quiet: options.Quiet = False,
     workers: options.Workers = None,
 ) -> None:
-    """Measures a camera on a simulated bench: photon transfer, noise, range, linearity, MTF.
+    """Measure a camera on a simulated bench: photon transfer, noise, range, linearity, MTF.
 
-    By EMVA 1288 and ISO 12233, from raw frames, beside what the camera file says. Writes
-    characterize.csv, characterize.json, photon_transfer.png, snr.png, linearity.png and mtf.png.
+    The methods are those of EMVA 1288 and ISO 12233, applied to raw frames; each value is shown
+    beside the one expected of the camera file. Write characterize.csv, characterize.json,
+    photon_transfer.png, snr.png, linearity.png and mtf.png.
 
     \b
     Example:
       vcam characterize starter
       vcam characterize camera.yaml --set scene.illuminant="{monochromatic: 525 nm}"
     """
+    from vcam_cli.characterization import characterize as study
+    from vcam_cli.characterization.plots import characterization_panels
     from vcam_cli.files import curves, report, tables
     from vcam_cli.files.folder import OutputFolder
-    from vcam_cli.studies import characterize as study
-    from vcam_cli.studies import provenance
-    from vcam_cli.studies.bench_pictures import pictures
-    from vcam_cli.studies.checks import load
+    from vcam_cli.simulation import provenance
+    from vcam_cli.simulation.checks import load
 
     model = load(camera, options.overrides(set_, seed, accuracy))
     inputs = provenance.inputs(model)
@@ -66,7 +67,7 @@ def characterize(
         found = study.characterize(model, workers, progress)
         rows = (quantity.row for quantity in found.quantities)
         tables.write_table(folder.new("characterize.csv"), study.COLUMNS, rows)
-        for name, (title, panels) in pictures(found).items():
+        for name, (title, panels) in characterization_panels(found).items():
             curves.draw(folder.new(name), title, panels)
         record = found.report() | {"camera": model.model_dump(mode="json")}
         folder.finish(record | {"versions": provenance.versions()})
@@ -75,11 +76,11 @@ def characterize(
     if as_json:
         print(report.to_json({"out": str(path), **found.report()}), end="")
     elif not quiet:
-        tell(found, path)
+        print_report(found, path)
 
 
-def tell(found: "Characterization", path: Path) -> None:
-    """The table on stdout: measured and expected of every color side by side."""
+def print_report(found: "Characterization", path: Path) -> None:
+    """Print the table: measured and expected values of every color side by side."""
     from rich import box
     from rich.console import Console
     from rich.table import Table
@@ -95,8 +96,8 @@ def tell(found: "Characterization", path: Path) -> None:
         table.add_column("expected", justify="right", no_wrap=True)
     table.add_column("unit", no_wrap=True)
     for name in SHOWN:
-        told = [found.get(name, color) for color in colors]
-        cells = (f"{value:.4g}" for q in told for value in (q.measured, q.expected))
-        table.add_row(name, *cells, told[0].unit)
+        quantities = [found.get(name, color) for color in colors]
+        cells = (f"{value:.4g}" for q in quantities for value in (q.measured, q.expected))
+        table.add_row(name, *cells, quantities[0].unit)
     console.print(table)
     console.print(f"{path}/characterize.csv, photon_transfer.png, snr.png, linearity.png, mtf.png")

@@ -10,22 +10,22 @@ from vcam_cli.commands import options
 DPI, DISTANCE = 72.0, "18 in"
 
 
-def positive(value: float | None) -> float | None:
-    """A finite number above 0, or none."""
+def check_positive(value: float | None) -> float | None:
+    """Check that a number, if given, is positive and finite."""
     if value is not None and not 0 < value < float("inf"):
         raise typer.BadParameter(f"{value:g} is not a positive number")
     return value
 
 
 def check_white(value: str | None) -> str | None:
-    """Three positive numbers."""
+    """Check that a white, if given, is three positive numbers."""
     if value is not None:
-        three_numbers(value)
+        parse_white(value)
     return value
 
 
-def three_numbers(text: str) -> tuple[float, float, float]:
-    """ "95.047,100,108.883" as numbers."""
+def parse_white(text: str) -> tuple[float, float, float]:
+    """Parse a white such as "95.047,100,108.883"."""
     try:
         x, y, z = (float(part) for part in text.split(","))
     except ValueError:
@@ -37,7 +37,7 @@ def three_numbers(text: str) -> tuple[float, float, float]:
 
 
 def check_distance(value: str | None) -> str | None:
-    """A length, from the eye to the display."""
+    """Check that a distance from the eye to the display, if given, is a positive length."""
     from vcam_cli.units import parse
 
     if value is not None:
@@ -71,12 +71,14 @@ def compare(
     ] = None,
     ppd: Annotated[
         float | None,
-        typer.Option("--ppd", metavar="N", callback=positive, help="Pixels in a degree of vision."),
+        typer.Option(
+            "--ppd", metavar="N", callback=check_positive, help="Pixels in a degree of vision."
+        ),
     ] = None,
     dpi: Annotated[
         float | None,
         typer.Option(
-            "--dpi", metavar="N", callback=positive, help="In place of --ppd; default 72."
+            "--dpi", metavar="N", callback=check_positive, help="In place of --ppd; default 72."
         ),
     ] = None,
     distance: Annotated[
@@ -91,7 +93,7 @@ def compare(
     space: Annotated[
         Literal["srgb", "linear-srgb", "xyz"] | None,
         typer.Option(
-            "--space", help="What the values are; default linear-srgb for EXR, else srgb."
+            "--space", help="Color space of the values; default linear-srgb for EXR, else srgb."
         ),
     ] = None,
     white: Annotated[
@@ -108,29 +110,29 @@ def compare(
     ] = "1976",
     filters: Annotated[
         Literal["zhang-wandell-1996", "isetcam", "continuous"],
-        typer.Option("--filters", help="How the eye's filters of S-CIELAB are read."),
+        typer.Option("--filters", help="Variant of the eye's filters of S-CIELAB."),
     ] = "zhang-wandell-1996",
     as_json: options.Json = False,
     quiet: options.Quiet = False,
     workers: options.Workers = None,
 ) -> None:
-    """Compares two images: MSE, PSNR, CIELAB and S-CIELAB differences.
+    """Compare two images: MSE, PSNR, CIELAB and S-CIELAB differences.
 
     \b
     Example:
       vcam compare out/a/render.png out/b/render.png
       vcam compare a.exr b.exr --space xyz --ppd 23 --delta-e 2000 -o out/ab
     """
+    from vcam_cli.comparison import image_files as study
     from vcam_cli.files.folder import OutputFolder
     from vcam_cli.files.report import hash_file, to_json
-    from vcam_cli.studies import compare as study
 
     if white is not None and space != "xyz":
         raise typer.BadParameter("it is for --space xyz only", param_hint="--white")
     settings = study.Settings(
         samples_per_degree=_per_degree(ppd, dpi, distance),
         space=space,
-        white=study.D65 if white is None else three_numbers(white),
+        white=study.D65 if white is None else parse_white(white),
         formula=delta_e,
         filters=filters,
     )
@@ -163,7 +165,7 @@ def compare(
 
 
 def _per_degree(ppd: float | None, dpi: float | None, distance: str | None) -> float:
-    """Pixels in one degree of visual angle."""
+    """Return the pixels in one degree of visual angle."""
     from vcam_cli.quality.display import samples_per_degree
     from vcam_cli.units import parse
 

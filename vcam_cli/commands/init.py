@@ -21,7 +21,7 @@ def init(
     as_json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
-    """Writes a small commented camera file and a study of it, which run as they are.
+    """Write a small commented camera file and a study of it, which run as they are.
 
     Existing files are never overwritten.
 
@@ -30,7 +30,7 @@ def init(
       vcam init mycamera
       vcam run mycamera/camera.yaml
     """
-    from vcam_cli.camera import shipped
+    from vcam_cli.config import shipped
     from vcam_cli.errors import bad
     from vcam_cli.files import atomic
 

@@ -14,7 +14,7 @@ PARTS = ("scenes", "optics", "pixels", "arrays")
 
 @dataclass(frozen=True)
 class Item:
-    """Something that ships: its name, one line about it, and its file where it is one."""
+    """An item that ships: its name, a line about it, and its file if it has one."""
 
     name: str
     about: str
@@ -22,7 +22,7 @@ class Item:
 
 
 def complete_kind(incomplete: str) -> list[str]:
-    """Shell completion: kinds of things that ship."""
+    """Complete the kinds of things that ship, for the shell."""
     return [kind for kind in KINDS if kind.startswith(incomplete)]
 
 
@@ -36,7 +36,7 @@ def list_(
     ] = None,
     as_json: options.Json = False,
 ) -> None:
-    """Lists what ships; with a NAME prints the file.
+    """List what ships; with a NAME print the file.
 
     Kinds: cameras, parts, technologies, studies, charts, illuminants, filters, effects, metrics.
 
@@ -65,7 +65,7 @@ def list_(
 
 
 def _choose(kind: str, name: str, items: list[Item]) -> Item:
-    """The item of that name; a part may be named without its folder. Raises BadInput."""
+    """Return the item of a name; a part may be named without its folder. Raise BadInput."""
     from vcam_cli.errors import bad, nearest
 
     for item in items:
@@ -96,8 +96,8 @@ def _plain(item: Item) -> dict[str, str]:
 
 
 def _files(*kinds: str) -> list[Item]:
-    """Shipped YAML files; of several kinds, each is named with its folder."""
-    from vcam_cli.camera import shipped
+    """Return the shipped YAML files of some kinds; of several, each is named with its folder."""
+    from vcam_cli.config import shipped
 
     return [
         Item(name if len(kinds) == 1 else f"{kind}/{name}", first_comment(file), file)
@@ -107,7 +107,7 @@ def _files(*kinds: str) -> list[Item]:
 
 
 def first_comment(file: Path) -> str:
-    """What the first comment of a file says, up to the first full stop."""
+    """Return the first comment of a file, up to the first full stop."""
     words: list[str] = []
     with file.open(encoding="utf-8") as lines:
         for line in lines:
@@ -119,7 +119,7 @@ def first_comment(file: Path) -> str:
 
 
 def _filters() -> list[Item]:
-    from vcam_cli.camera import shipped
+    from vcam_cli.config import shipped
 
     spectra = [Item(name, first_comment(f), f) for name, f in shipped.files("spectra").items()]
     return _files("filters") + spectra

@@ -1,25 +1,25 @@
-"""The program `vcam`: its commands, and how it ends.
+"""The program `vcam`: its commands and its exit codes.
 
 Exit codes: 0 done, 2 bad input or usage, 3 this machine cannot do it, 4 some points of a sweep
 failed, 1 a bug (only then a traceback), 130 interrupted.
 
-Why commands are looked up by name: a command's module is imported when that command is asked
-for, and imports its physics when it runs, so `vcam --help` and shell completion are quick.
+Why commands are looked up by name: a command's module is imported when that command is called,
+and imports its physics when it runs, so `vcam --help` and shell completion are quick.
 """
 
 import gc
 import os
 import sys
 
-from vcam_cli.commands import interrupts
+from vcam_cli import interrupts
 
-# For a quick start. Loading makes 120,000 objects that stay: looking through them again and again
-# for garbage takes a tenth of it, and so does looking for plug-ins of pydantic in every package.
+# For a quick start. Imports make 120,000 objects that stay: collecting garbage among them again and
+# again takes a tenth of the time, and so does looking for plug-ins of pydantic in every package.
 gc.set_threshold(50_000, 10, 10)
 os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
 
 try:
-    with interrupts.at_once():  # most of the time until a command begins goes by here
+    with interrupts.exit_on_interrupt():  # most of the time until a command begins goes by here
         import errno
         import io
         from collections.abc import Iterator
@@ -53,9 +53,11 @@ class Commands(TyperGroup):
     """The commands of `COMMANDS`, each imported when it is wanted."""
 
     def list_commands(self, ctx: Any) -> list[str]:
+        """Return the names of all commands."""
         return list(COMMANDS)
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:
+        """Import the command of a name."""
         if cmd_name not in COMMANDS:
             return None
         if cmd_name not in self.commands:
@@ -66,17 +68,20 @@ class Commands(TyperGroup):
         return self.commands[cmd_name]
 
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """Find the command that the arguments call."""
         if args and args[0] not in COMMANDS:
             for name in COMMANDS:  # so that the nearest one can be suggested
                 self.get_command(ctx, name)
         return super().resolve_command(ctx, args)
 
     def make_context(self, *args: Any, **more: Any) -> Any:
-        with failures_told():
+        """Parse the arguments, and report failures."""
+        with report_failures():
             return super().make_context(*args, **more)
 
     def invoke(self, ctx: Any) -> Any:
-        with failures_told():
+        """Run the command, and report failures."""
+        with report_failures():
             return super().invoke(ctx)
 
 
@@ -104,7 +109,7 @@ def vcam(
         typer.Option("--version", callback=_version, is_eager=True, help="Print the version."),
     ] = False,
 ) -> None:
-    """Simulates digital cameras: from a scene to a raw frame, its render and its quality.
+    """Simulate digital cameras: from a scene to a raw frame, its render and its quality.
 
     \b
     Begin with:
@@ -114,65 +119,77 @@ def vcam(
 
 
 @contextmanager
-def failures_told() -> Iterator[None]:
-    """Turns what a user can cause into one-line messages on stderr and an exit code."""
+def report_failures() -> Iterator[None]:
+    """Report errors that a user can cause in one line on stderr, with an exit code."""
     try:
-        yield
+        with interrupts.restore_interrupt():
+            yield
     except VcamError as error:
-        _end(str(error), error.exit_code, error)
+        _exit(str(error), error.exit_code, error)
     except MemoryError as error:
-        _end("not enough memory; use a smaller array, or --accuracy draft", 3, error)
+        _exit("not enough memory; use a smaller array, or --accuracy draft", 3, error)
     except KeyboardInterrupt as error:
-        _end("interrupted; nothing unfinished was kept, run the same command again", 130, error)
+        _exit(
+            "interrupted; nothing unfinished was kept, run the same command again",
+            interrupts.INTERRUPTED,
+            error,
+        )
 
 
-def _end(message: str, code: int, error: BaseException) -> None:
-    _tell(message)
+def _exit(message: str, code: int, error: BaseException) -> None:
+    _print_error(message)
     raise typer.Exit(code) from error
 
 
-def _tell(message: object) -> None:
-    """A line on stderr; where that is lost too, the exit code has to do."""
+def _print_error(message: object) -> None:
+    """Print a line on stderr; where that is closed too, the exit code must suffice."""
     with suppress(OSError):
         print(message, file=sys.stderr, flush=True)
 
 
 def main() -> None:
-    """Runs `vcam` and leaves the process."""
-    with interrupts.waiting():
-        _main()
+    """Run `vcam` and leave the process."""
+    try:
+        with interrupts.raise_interrupts():
+            _main()
+    except SystemExit as end:
+        if end.code == interrupts.INTERRUPTED:
+            # Python itself would report the signal where it was running text (`exec`) meanwhile.
+            os._exit(interrupts.INTERRUPTED)
+        raise
 
 
 def _main() -> None:
-    _replace_closed()
-    _write_anything()
+    """Run the command line; end with its exit code."""
+    _replace_closed_streams()
+    _escape_stdout()
     try:
         try:
             app(prog_name="vcam")
         finally:
             sys.stdout.flush()
     except KeyboardInterrupt:
-        sys.exit(130)
+        sys.exit(interrupts.INTERRUPTED)
     except BrokenPipeError:  # the reader (head, less) has gone: nothing more to say
-        _drop_stdout()
+        _discard_stdout()
         sys.exit(1)
     except OSError as error:
-        if error.errno not in NOT_WRITTEN or error.filename is not None:
+        if error.errno not in WRITE_ERRORS or error.filename is not None:
             raise
-        _tell(CannotDo(f"cannot write to stdout: {error.strerror}", "send it elsewhere"))
-        _drop_stdout()
+        _print_error(CannotDo(f"cannot write to stdout: {error.strerror}", "send it elsewhere"))
+        _discard_stdout()
         sys.exit(3)
 
 
-NOT_WRITTEN = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO}
-"""What a write can end with. All but those to stdout are told where they happen."""
+WRITE_ERRORS = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO}
+"""Errors of a write. Those of files are reported where they happen, those of stdout here."""
 
 
-def _replace_closed() -> None:
-    """Gives a process that was started without stdout or stderr (`>&-`) ones that forget.
+def _replace_closed_streams() -> None:
+    """Replace a stdout or stderr that was closed at the start (`>&-`) by one that discards.
 
-    Their numbers are taken as well: a result opened next would get them, and all that libraries
-    print.
+    Its descriptor is occupied as well: else the next file that is opened gets it, with all that
+    libraries print.
     """
     for name in ("stdout", "stderr"):
         if getattr(sys, name) is None:
@@ -180,14 +197,14 @@ def _replace_closed() -> None:
             setattr(sys, name, io.StringIO())
 
 
-def _write_anything() -> None:
-    """Lets stdout escape what its encoding lacks, as stderr does: a name is any text."""
+def _escape_stdout() -> None:
+    """Let stdout escape what its encoding lacks, as stderr does: file names can hold anything."""
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(errors="backslashreplace")
 
 
-def _drop_stdout() -> None:
-    """What stdout still holds goes nowhere, else Python complains at its end."""
+def _discard_stdout() -> None:
+    """Discard what stdout still holds, since Python would report that it cannot be written."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 

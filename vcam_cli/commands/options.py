@@ -1,4 +1,4 @@
-"""Arguments and options that several commands share, and how commands speak.
+"""Arguments and options that several commands share, and the output of commands.
 
 Results go to stdout, everything else to stderr; with `--json` stdout carries one JSON document.
 """
@@ -15,17 +15,17 @@ PRESETS = ("draft", "standard", "reference")
 
 
 def complete_camera(incomplete: str) -> list[str]:
-    """Shell completion: shipped cameras, YAML files and folders."""
+    """Complete shipped cameras, YAML files and folders, for the shell."""
     return _complete("cameras", incomplete)
 
 
 def complete_study(incomplete: str) -> list[str]:
-    """Shell completion: shipped studies, YAML files and folders."""
+    """Complete shipped studies, YAML files and folders, for the shell."""
     return _complete("studies", incomplete)
 
 
 def _complete(kind: str, incomplete: str) -> list[str]:
-    from vcam_cli.camera import shipped
+    from vcam_cli.config import shipped
 
     folder = Path(incomplete).parent if incomplete and not incomplete.endswith("/") else incomplete
     found = [n for n in shipped.names(kind) if n.startswith(incomplete)]
@@ -37,7 +37,7 @@ def _complete(kind: str, incomplete: str) -> list[str]:
 
 
 def check_accuracy(value: str | None) -> str | None:
-    """draft, standard, reference, or a fraction ("0.01", "1 %")."""
+    """Check that a value is draft, standard, reference, or a fraction ("0.01", "1 %")."""
     if value is None or value in PRESETS:
         return value
     from vcam_cli.errors import nearest
@@ -106,7 +106,7 @@ Workers = Annotated[
 def overrides(
     sets: Sequence[str] | None, seed: int | None = None, accuracy: str | None = None
 ) -> list[str]:
-    """`--set`, `--seed` and `--accuracy` as one list of "PATH=VALUE"."""
+    """Return `--set`, `--seed` and `--accuracy` as one list of "PATH=VALUE"."""
     found = list(sets or ())
     if seed is not None:
         found.append(f"seed.frame={seed}")
@@ -116,11 +116,11 @@ def overrides(
 
 
 def say(message: object, quiet: bool = False) -> None:
-    """A line for the user, on stderr."""
+    """Print a line for the user on stderr."""
     if not quiet:
         print(message, file=sys.stderr, flush=True)
 
 
 def write_json(value: object) -> None:
-    """One JSON document on stdout."""
+    """Print one JSON document on stdout."""
     print(json.dumps(value, indent=2, allow_nan=False, ensure_ascii=False))

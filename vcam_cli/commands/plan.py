@@ -12,10 +12,10 @@ def plan(
     quiet: options.Quiet = False,
     workers: options.Workers = None,
 ) -> None:
-    """Says which effects will run, which will not and why, and what a run will cost.
+    """Show which effects a run simulates, which not and why, and what it costs.
 
-    The scene is brought to the pixels, since its spectrum decides what blur contributes; no frame
-    is taken and nothing is written.
+    The irradiance on the pixels is computed, since the scene's spectrum decides what blur
+    contributes; no frame is exposed and nothing is written.
 
     \b
     Example:
@@ -23,8 +23,8 @@ def plan(
       vcam plan camera.yaml --accuracy 0.001 --json
     """
     from vcam_cli.files.report import to_json
-    from vcam_cli.studies.checks import load
-    from vcam_cli.studies.simulate import prepare
+    from vcam_cli.simulation.checks import load
+    from vcam_cli.simulation.simulate import prepare
 
     model = load(camera, options.overrides(set_, accuracy=accuracy))
     with Progress(quiet) as progress:
@@ -34,15 +34,15 @@ def plan(
     report = ready.plan.report()
     geometry = ready.layout.report(ready.spectrum.oversampling)
     if as_json:
-        taken = {"captures": list(ready.times)} if ready.times else {}
-        print(to_json({**report, **taken, "geometry": geometry}), end="")
+        samples = {"captures": list(ready.times)} if ready.times else {}
+        print(to_json({**report, **samples, "geometry": geometry}), end="")
     else:
         print(table(report))
         print(facts(report, geometry, ready.exposure_time, ready.times))
 
 
 def table(report: dict) -> str:
-    """The decisions as text: one line an effect, its reason below it."""
+    """Return the decisions as text: one line an effect, its reason below it."""
     lines = []
     for effect in report["effects"]:
         share = effect["contribution"]
@@ -56,7 +56,7 @@ def table(report: dict) -> str:
 def facts(
     report: dict, geometry: dict, exposure_time: float, samples: tuple[float, ...] = ()
 ) -> str:
-    """Settings, geometry and cost, a few lines."""
+    """Return settings, geometry, exposure and cost as text, in a few lines."""
     from vcam_cli.units import render
 
     named = dict(report["settings"])

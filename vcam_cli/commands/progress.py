@@ -1,9 +1,8 @@
-"""A bar on the terminal, with the time left, for whatever takes longer than two seconds.
+"""Progress on stderr: a bar on a terminal after two seconds, a line a minute in the log of a sweep.
 
-It is drawn on stderr, and only when stderr is a terminal that takes it: NO_COLOR
-(https://no-color.org), a dumb terminal and --quiet are respected. The work goes on in the thread
-that began it; the bar has a thread of its own, which loads the library that draws it when the two
-seconds are over, and not before.
+The bar is drawn only on a terminal that takes it: NO_COLOR (https://no-color.org), a dumb terminal
+and --quiet are respected. The work goes on in the thread that began it; the display has a thread of
+its own, which loads the library that draws the bar when the two seconds are over, and not before.
 """
 
 import contextlib
@@ -11,13 +10,16 @@ import os
 import sys
 import threading
 import time
-from types import TracebackType
 from typing import Any, Self
+
+from vcam_cli.interrupts import defer_interrupts
 
 AFTER = 2.0
 """Seconds before the bar appears."""
-EVERY = 0.1
-"""Seconds between two looks at the clock."""
+BAR_INTERVAL = 0.1
+"""Seconds between two updates of the bar."""
+LOG_INTERVAL = 60.0
+"""Seconds between two lines of a log."""
 WORDS = {
     "read": "reading the image",
     "scene": "building the scene",
@@ -31,7 +33,7 @@ WORDS = {
     "balance": "measuring colors",
     "processing": "processing",
     "ideal": "ideal image",
-    "quality": "judging the picture",
+    "quality": "measuring image quality",
     "files": "writing files",
     "irradiance": "spectral irradiance",
     "points": "checking all points",
@@ -39,70 +41,67 @@ WORDS = {
     "figures": "computing figures",
     "tables": "writing tables",
 }
-"""What is said of a stage; of others, their name."""
+"""Stage -> its description; that of others is their name."""
 
 
-def wanted(quiet: bool = False) -> bool:
-    """Whether a bar may be drawn: stderr is a terminal, and nobody has asked for silence."""
+def may_draw(quiet: bool = False) -> bool:
+    """Tell whether a bar may be drawn: stderr is a terminal, and nobody has asked for silence."""
     plain = os.environ.get("NO_COLOR") or os.environ.get("TERM") == "dumb"
     return not quiet and not plain and sys.stderr.isatty()
 
 
-LOG_EVERY = 60.0
-"""Seconds between two lines of a log."""
-
-
 class Progress:
-    """Context around some work, and its observer (see `engine.stages.Observer`).
+    """Context around some work, and its observer (see `vcam_cli.progress.Observer`).
 
-    with Progress(quiet) as progress:
-        simulate(camera, watch=progress)
+        with Progress(quiet) as progress:
+            simulate(camera, watch=progress)
+
+    log: the name of the work in the lines that are written where no bar can be drawn; "" for none.
     """
 
-    def __init__(self, quiet: bool = False) -> None:
-        self._start = time.monotonic()
-        self._stage = ""
-        self._stage_start = self._start
+    def __init__(self, quiet: bool = False, log: str = "") -> None:
+        self._start = self._stage_start = time.monotonic()
+        self._stage, self._log = "", log
         self._expected = 0.0
         self._steps = (0, 0)
         self._over = threading.Event()
-        self._thread = threading.Thread(target=self._draw, daemon=True) if wanted(quiet) else None
+        show = self._draw_bar if may_draw(quiet) else self._write_log if log and not quiet else None
+        self._thread = threading.Thread(target=show, daemon=True) if show else None
 
     def __enter__(self) -> Self:
         if self._thread is not None:
             self._thread.start()
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self._over.set()
-        if self._thread is not None:
-            self._thread.join()
+    def __exit__(self, *_: object) -> None:
+        with defer_interrupts():  # else the terminal stays without its cursor
+            self._over.set()
+            if self._thread is not None:
+                self._thread.join()
 
     def begin(self, stage: str) -> None:
+        """Note that a stage begins."""
         self._stage, self._stage_start, self._steps = stage, time.monotonic(), (0, 0)
 
     def expect(self, seconds: float) -> None:
+        """Note how long all stages together will take [s]."""
         self._expected = seconds
 
     def step(self, done: int, total: int) -> None:
+        """Note how many of the stage's steps are done."""
         self._steps = (done, total)
 
-    def left(self, now: float) -> float | None:
-        """Seconds left at a time of the clock; None where nothing is known, or it is overdue.
+    def seconds_left(self, now: float) -> float | None:
+        """Return the seconds left at a time of the clock; None where they are unknown or overdue.
 
-        Steps that are done tell more than what was foretold.
+        Steps that are done say more than the time that was estimated.
         """
         done, total = self._steps
         if done:
             return (now - self._stage_start) * (total - done) / done
         return self._start + self._expected - now if now < self._start + self._expected else None
 
-    def _draw(self) -> None:
+    def _draw_bar(self) -> None:
         if self._over.wait(AFTER):
             return
         from rich.console import Console
@@ -110,67 +109,37 @@ class Progress:
         from rich.progress import Progress as Bar
 
         columns = (TextColumn("{task.description}"), BarColumn(), TextColumn("{task.fields[left]}"))
-        with Bar(
-            *columns, console=Console(stderr=True), transient=True, redirect_stdout=False
-        ) as bar:
+        console = Console(stderr=True)
+        with Bar(*columns, console=console, transient=True, redirect_stdout=False) as bar:
             task = bar.add_task("", left="")
             while True:
                 bar.update(task, **self._state(time.monotonic()))
-                if self._over.wait(EVERY):
+                if self._over.wait(BAR_INTERVAL):
                     return
 
     def _state(self, now: float) -> dict[str, Any]:
-        """What the bar shows; what is overdue is nearly done."""
-        left, done = self.left(now), now - self._start
-        said = WORDS.get(self._stage, self._stage)
+        """Return what the bar shows; work that is overdue is nearly done."""
+        left, done = self.seconds_left(now), now - self._start
+        description = WORDS.get(self._stage, self._stage)
         total = done / 0.95 if left is None else done + left
-        return {"description": said, "completed": done, "total": total, "left": in_words(left)}
+        return {
+            "description": description,
+            "completed": done,
+            "total": total,
+            "left": time_left_text(left),
+        }
 
-
-class Log:
-    """Context and observer of work of many steps, where no bar can be drawn: a line a minute."""
-
-    def __init__(self, what: str, every: float = LOG_EVERY) -> None:
-        self._what, self._every = what, every
-        self._steps, self._start = (0, 0), time.monotonic()
-        self._over = threading.Event()
-        self._thread = threading.Thread(target=self._write, daemon=True)
-
-    def __enter__(self) -> Self:
-        self._thread.start()
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self._over.set()
-        self._thread.join()
-
-    def begin(self, stage: str) -> None:
-        self._steps, self._start = (0, 0), time.monotonic()
-
-    def expect(self, seconds: float) -> None:
-        pass
-
-    def step(self, done: int, total: int) -> None:
-        self._steps = (done, total)
-
-    def _write(self) -> None:
-        while not self._over.wait(self._every):
+    def _write_log(self) -> None:
+        while not self._over.wait(LOG_INTERVAL):
             done, total = self._steps
-            if not total:
-                continue
-            left = (time.monotonic() - self._start) * (total - done) / done if done else None
-            said = f", {in_words(left)}" if done else ""
-            with contextlib.suppress(OSError):
-                print(f"{self._what}: {done} of {total}{said}", file=sys.stderr, flush=True)
+            if total:
+                left = f", {time_left_text(self.seconds_left(time.monotonic()))}" if done else ""
+                with contextlib.suppress(OSError):
+                    print(f"{self._log}: {done} of {total}{left}", file=sys.stderr, flush=True)
 
 
-def in_words(left: float | None) -> str:
-    """The time left as people say it."""
+def time_left_text(left: float | None) -> str:
+    """Return the time left [s] as people say it."""
     if left is None:
         return "a little longer"
     if left < 1.5:

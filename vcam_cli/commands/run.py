@@ -16,7 +16,7 @@ def run(
     quiet: options.Quiet = False,
     workers: options.Workers = None,
 ) -> None:
-    """Simulates a camera and writes raw.exr, render.png, metrics.csv and run.json.
+    """Simulate a camera and write raw.exr, render.png, metrics.csv and run.json.
 
     \b
     Example:
@@ -25,14 +25,14 @@ def run(
     """
     import time
 
-    from vcam_cli.studies.checks import load
+    from vcam_cli.simulation.checks import load
 
     start = time.perf_counter()
     model = load(camera, options.overrides(set_, seed, accuracy))
     from vcam_cli.files.folder import OutputFolder
     from vcam_cli.files.report import to_json
-    from vcam_cli.studies import outputs, provenance
-    from vcam_cli.studies.simulate import simulate
+    from vcam_cli.simulation import outputs, provenance
+    from vcam_cli.simulation.simulate import simulate
 
     inputs = provenance.inputs(model)
     place = OutputFolder(out or Path("out") / model.name, inputs=inputs)
@@ -50,7 +50,7 @@ def run(
 
 
 def summary(record: dict, path: Path) -> dict:
-    """What `--json` prints."""
+    """Return the summary that `--json` prints."""
     names = ("name", "metrics", "plan", "geometry", "stages", "seconds", "peak_memory_bytes")
     return {"out": str(path), **{name: record[name] for name in names}}
 
@@ -58,15 +58,15 @@ def summary(record: dict, path: Path) -> dict:
 def report(
     metrics: list[tuple[str, float, str]], record: dict, path: Path, files: tuple[str, ...]
 ) -> str:
-    """What a person reads after a run: figures, what was simulated, the time, where it all is."""
+    """Return the report of a run: metrics, effects, time and files."""
     lines = [f"{name:<20} {value:>12.6g} {unit}".rstrip() for name, value, unit in metrics]
-    lines += ["", *effects(record["plan"]["effects"])]
-    foretold, took = record["plan"]["seconds"], sum(record["stages"].values())
+    lines += ["", *effect_lines(record["plan"]["effects"])]
+    estimate, measured = record["plan"]["seconds"], sum(record["stages"].values())
     lines.append(
-        f"time         {took:.2f} s, {foretold:.2f} s were foretold"
+        f"time         {measured:.2f} s, {estimate:.2f} s were estimated"
         f" ({record['seconds']:.2f} s with start-up)"
     )
-    lines += [f"{said:<12} {path / name}" for name, said in FILES.items() if name in files]
+    lines += [f"{about:<12} {path / name}" for name, about in FILES.items() if name in files]
     lines.append(f"{record['name']}: {path}/")
     return "\n".join(lines)
 
@@ -80,26 +80,26 @@ FILES = {
     "captures/raw_001.exr": "first sample",
     "hdr.exr": "photocurrent",
 }
-"""Pictures a run may leave, and what they are."""
+"""Image files that a run may write -> their descriptions."""
 
 
-def effects(decisions: list[dict]) -> list[str]:
-    """What was simulated, and what the plan or the file left out."""
+def effect_lines(decisions: list[dict]) -> list[str]:
+    """Return the lines on effects: simulated, left out by the plan, switched off in the file."""
 
     def names(state: str, *by: str) -> list[str]:
         return [e["name"] for e in decisions if e["state"] == state and e["by"] in by]
 
-    lines = wrapped("simulated", ", ".join(names("on", "plan", "user")) or "nothing but light")
+    lines = wrap("simulated", ", ".join(names("on", "plan", "user")) or "nothing but light")
     for e in decisions:
         if e["state"] == "off" and e["by"] == "plan":
-            lines += wrapped("left out", f"{e['name']}: {e['reason']}")
+            lines += wrap("left out", f"{e['name']}: {e['reason']}")
     if names("off", "user"):
-        lines += wrapped("switched off", ", ".join(names("off", "user")))
+        lines += wrap("switched off", ", ".join(names("off", "user")))
     return lines
 
 
-def wrapped(label: str, text: str) -> list[str]:
-    """Lines of at most 100 characters, with a label before the first."""
+def wrap(label: str, text: str) -> list[str]:
+    """Return lines of at most 100 characters, with a label before the first."""
     import textwrap
 
     lines = textwrap.wrap(text, 100 - 12 - 1) or [""]

@@ -1,4 +1,4 @@
-"""`vcam schedule`: when to read a pixel that is read several times."""
+"""`vcam schedule`: the capture times of a pixel that is read several times."""
 
 import math
 import sys
@@ -12,11 +12,11 @@ from vcam_cli.commands.progress import Progress
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from vcam_cli.scheduling.targets import Fewest
-    from vcam_cli.studies.schedule import ScheduleResult
+    from vcam_cli.capture_schedules.fewest_captures import FewestCaptures
+    from vcam_cli.capture_schedules.study import ScheduleResult
 
 MOST_TIMES = 10
-"""Captures whose times are shown."""
+"""The number of captures whose times are shown."""
 
 Study = Annotated[
     str,
@@ -37,7 +37,9 @@ Set = Annotated[
 ]
 Seed = Annotated[
     int | None,
-    typer.Option("--seed", metavar="N", min=0, help="Of random starts and of simulated noise."),
+    typer.Option(
+        "--seed", metavar="N", min=0, help="Seed of random starts and of simulated noise."
+    ),
 ]
 
 
@@ -51,18 +53,18 @@ def schedule(
     quiet: options.Quiet = False,
     workers: options.Workers = None,
 ) -> None:
-    """Finds when to read a pixel several times, and what that gains over reading it once.
+    """Find the best times to read a pixel several times, and the gain over reading it once.
 
-    Writes schedule.csv (the capture times), summary.csv (what they are worth, and how far from the
-    best they may be at most), plots and study.json.
+    Write schedule.csv (the capture times), summary.csv (their gain, and its certified distance from
+    the best), plots and study.json.
 
     \b
     Example:
       vcam schedule captures
       vcam schedule study.yaml --set "counts=[4, 8]" -o out/study
     """
+    from vcam_cli.capture_schedules.study import schedule as run
     from vcam_cli.files.report import to_json
-    from vcam_cli.studies.schedule import schedule as run
 
     def tell(message: str) -> None:
         options.say(message, quiet)
@@ -72,11 +74,11 @@ def schedule(
     if as_json:
         print(to_json(result.summary()), end="")
     elif not quiet:
-        show(result)
+        print_report(result)
 
 
-def show(result: "ScheduleResult") -> None:
-    """The tables and where the files are, on stdout."""
+def print_report(result: "ScheduleResult") -> None:
+    """Print the tables, and where the files are."""
     from rich import box
     from rich.console import Console
     from rich.table import Table
@@ -90,10 +92,10 @@ def show(result: "ScheduleResult") -> None:
     for row in summary(result):
         table.add_row(*row)
     console.print(table)
-    for line in times(result):
+    for line in schedule_lines(result):
         console.print(line)
     for target in result.targets:
-        console.print(said(target, result.task.best / result.task.single))
+        console.print(target_sentence(target, result.task.largest_gain))
     console.print(f"{result.study.model.name}: {result.out}/")
 
 
@@ -101,7 +103,7 @@ SUMMARY = ("method", "captures", "gain", "upper bound", "gap", "vs optimal", "us
 
 
 def summary(result: "ScheduleResult") -> list[tuple[str, ...]]:
-    """Rows of the first table."""
+    """Return the rows of the first table."""
     best = {row["count"]: row["gain"] for row in result.summary_rows if row["method"] == "optimal"}
     return [
         (
@@ -110,7 +112,7 @@ def summary(result: "ScheduleResult") -> list[tuple[str, ...]]:
             f"{row['gain']:.6g}",
             f"{row['upper_bound']:.6g}",
             "-" if row["gap"] is None else f"{row['gap']:.1e}",
-            _beside(row["gain"], best.get(row["count"])),
+            _relative_gain(row["gain"], best.get(row["count"])),
             str(row["used"]),
             f"{row['seconds']:.2g}",
         )
@@ -118,16 +120,16 @@ def summary(result: "ScheduleResult") -> list[tuple[str, ...]]:
     ]
 
 
-def _beside(gain: float, best: float | None) -> str:
-    """How far a gain is from the optimal schedule's: above it only where samples are weighed."""
+def _relative_gain(gain: float, best: float | None) -> str:
+    """Return a gain relative to the optimal schedule's; only weighted samples exceed that."""
     if best is None or not gain > 0:
         return "-"
     difference = 10 * math.log10(gain / best)
     return "0.00 dB" if abs(difference) < 0.005 else f"{difference:+.2f} dB"
 
 
-def times(result: "ScheduleResult") -> list[str]:
-    """The best schedules, a line each; of other methods only where there are no better ones."""
+def schedule_lines(result: "ScheduleResult") -> list[str]:
+    """Return the best schedules, a line each; other methods only where there are no better ones."""
     plain, methods = result.study.model.sensor is None, result.study.model.methods
     best = [m for m in methods if m in ("optimal", "weighted")] or methods[:1]
     width = max(len(str(one.count)) for one in result.found)
@@ -142,13 +144,13 @@ def times(result: "ScheduleResult") -> list[str]:
 
 
 def _shown(times: "NDArray", plain: bool) -> list[str]:
-    """Capture times in words, those in the middle left out where they are many."""
+    """Return capture times as text, those in the middle left out where they are many."""
     shown = [f"{v:.4f}" for v in times / times[0]] if plain else [f"{v:.5g}" for v in times * 1e3]
     return shown if len(shown) <= MOST_TIMES else [*shown[: MOST_TIMES - 2], "...", shown[-1]]
 
 
-def said(target: "Fewest", bound: float) -> str:
-    """A sentence about the captures that a gain takes."""
+def target_sentence(target: "FewestCaptures", bound: float) -> str:
+    """Return a sentence about the captures that a gain takes."""
     gain = f"a gain of {target.target:g}"
     if not target.possible:
         return f"{gain} is out of reach: no number of captures gains more than {bound:.6g}"

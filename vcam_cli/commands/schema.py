@@ -16,7 +16,7 @@ def schema(
     as_json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
-    """Writes the JSON Schemas of camera, study and technology files, for editors and programs.
+    """Write the JSON Schemas of camera, study and technology files, for editors and programs.
 
     An editor that reads YAML schemas completes and checks a camera file whose first line is
     `# yaml-language-server: $schema=camera.schema.json`.
@@ -25,7 +25,8 @@ def schema(
     Example:
       vcam schema schemas
     """
-    from vcam_cli.camera.schema import schemas, text
+    from vcam_cli.commands.schemas import schemas
+    from vcam_cli.config.schema import text
     from vcam_cli.files import atomic
 
     atomic.make_folder(folder)

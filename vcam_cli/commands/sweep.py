@@ -1,4 +1,4 @@
-"""`vcam sweep`: a camera while its parameters change."""
+"""`vcam sweep`: metrics of a camera over varied parameters."""
 
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Annotated
@@ -6,22 +6,23 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from vcam_cli.commands import options
-from vcam_cli.commands.progress import Log, Progress, wanted
+from vcam_cli.commands.progress import Progress
+from vcam_cli.interrupts import INTERRUPTED, restore_interrupt
 
 if TYPE_CHECKING:
-    from vcam_cli.studies.sweep_result import SweepResult, Verdict
+    from vcam_cli.sweeps.sweep_result import ExpectationResult, SweepResult
 
-LINES = 12
-"""Messages about points that are shown at most."""
+MOST_MESSAGES = 12
+"""The number of messages about points that are shown at most."""
 
 
 def _shard(value: str | None) -> str | None:
-    """ "2/8", the second of eight shares."""
+    """Check that a share, if given, is written as 2/8, the second of eight."""
     if value is None:
         return None
-    number, _, of = value.partition("/")
-    whole = all(part.isascii() and part.isdigit() for part in (number, of))
-    if not whole or not 1 <= int(number) <= int(of):
+    number, _, count = value.partition("/")
+    whole = all(part.isascii() and part.isdigit() for part in (number, count))
+    if not whole or not 1 <= int(number) <= int(count):
         message = f"{value!r} is not a share such as 2/8, the second of eight"
         raise typer.BadParameter(message)
     return value
@@ -71,7 +72,7 @@ def sweep(
     shard: Shard = None,
     fresh: Fresh = False,
 ) -> None:
-    """Runs a sweep study and writes points.csv, optimum.csv and a plot of every metric.
+    """Run a sweep study and write points.csv, optimum.csv and a plot of every metric.
 
     Finished points are kept: a sweep that was stopped goes on when it is started again.
 
@@ -81,34 +82,35 @@ def sweep(
       vcam sweep study.yaml --workers 4 -o out/study
     """
     from vcam_cli.files.report import to_json
-    from vcam_cli.studies.sweep import sweep as run
+    from vcam_cli.sweeps.sweep import sweep as run
 
-    said: list[str] = []
+    messages: list[str] = []
 
     def tell(message: str) -> None:
-        said.append(message)
-        if len(said) <= LINES:
+        messages.append(message)
+        if len(messages) <= MOST_MESSAGES:
             options.say(message, quiet)
 
-    number, of = (int(part) for part in (shard or "1/1").split("/"))
-    with Progress(quiet) if wanted(quiet) or quiet else Log("sweep") as progress:
+    number, count = (int(part) for part in (shard or "1/1").split("/"))
+    with Progress(quiet, log="sweep") as progress:
         try:
-            result = run(
-                study,
-                out,
-                options.overrides(set_, seed, accuracy),
-                workers,
-                scheduler,
-                (number, of) if shard else None,
-                fresh,
-                progress,
-                tell,
-            )
+            with restore_interrupt():
+                result = run(
+                    study,
+                    out,
+                    options.overrides(set_, seed, accuracy),
+                    workers,
+                    scheduler,
+                    (number, count) if shard else None,
+                    fresh,
+                    progress,
+                    tell,
+                )
         except KeyboardInterrupt as error:
             options.say("interrupted; finished points are kept, the same command goes on with them")
-            raise typer.Exit(130) from error
-    if len(said) > LINES:
-        options.say(f"and {len(said) - LINES} more", quiet)
+            raise typer.Exit(INTERRUPTED) from error
+    if len(messages) > MOST_MESSAGES:
+        options.say(f"and {len(messages) - MOST_MESSAGES} more", quiet)
     if as_json:
         print(to_json(result.summary()), end="")
     elif not quiet:
@@ -117,12 +119,12 @@ def sweep(
 
 
 def report(result: "SweepResult") -> str:
-    """What a person reads: the optima, how many points, what was expected, where it all is."""
+    """Return the report of a sweep: optima, number of points, expectations and folder."""
     lines = []
     for f in result.optima:
-        case, parameter, unit, at, low, high, metric, value = f.row
+        case, parameter, unit, best, low, high, metric, value = f.row
         interval = f" ({low} to {high})" if low != "" else ""
-        lines.append(f"{case}: best {parameter} {at}{interval} {unit}".rstrip())
+        lines.append(f"{case}: best {parameter} {best}{interval} {unit}".rstrip())
         lines[-1] += f", {metric} {value}"
         if f.edge:
             end = "low" if f.edge == "low" else "high"
@@ -135,17 +137,17 @@ def report(result: "SweepResult") -> str:
     if result.missing:
         lines.append(f"{result.missing} are left to other shares")
     else:
-        lines += _expected(result.verdicts)
+        lines += _expected(result.expectations)
     lines.append(f"{result.name}: {result.out}/")
     return "\n".join(lines)
 
 
-def _expected(verdicts: Sequence["Verdict"]) -> Iterator[str]:
-    """How many expectations come out, and those that do not."""
+def _expected(verdicts: Sequence["ExpectationResult"]) -> Iterator[str]:
+    """Return how many expectations are met, and those that are not."""
     if not verdicts:
         return
-    inside = [v for v in verdicts if v.word == "inside"]
-    made = sum(bool(v.calibrated) for v in inside)
-    also = f", {made} of them because it was set so" if made else ""
-    yield f"expected.csv: {len(inside)} of {len(verdicts)} expectations come out{also}"
-    yield from (f"  {v.word}: {v.said}" for v in verdicts if v.word != "inside")
+    inside = [v for v in verdicts if v.verdict == "inside"]
+    calibrated = sum(bool(v.calibrated) for v in inside)
+    how = f", {calibrated} of them by calibration" if calibrated else ""
+    yield f"expected.csv: {len(inside)} of {len(verdicts)} expectations are met{how}"
+    yield from (f"  {v.verdict}: {v.summary}" for v in verdicts if v.verdict != "inside")

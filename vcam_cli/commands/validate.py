@@ -23,7 +23,7 @@ def validate(
     as_json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
-    """Checks camera and study files and says everything that is wrong with them.
+    """Check camera and study files and report everything that is wrong with them.
 
     \b
     Example:
@@ -43,7 +43,7 @@ def validate(
 
 
 def _check(file: str, sets: list[str]) -> dict[str, Any]:
-    """What there is to say about one file."""
+    """Return the report of one file."""
     from vcam_cli.errors import BadInput, CannotDo, dotted
 
     report: dict[str, Any] = {"file": file, "ok": False, "exit_code": 0, "problems": []}
@@ -68,30 +68,31 @@ def _check(file: str, sets: list[str]) -> dict[str, Any]:
 
 
 def _checked_name(file: str, sets: list[str]) -> str:
-    """The name of a camera or study without mistakes. Raises BadInput, CannotDo."""
-    from vcam_cli.studies.checks import load
+    """Return the name of a camera or study without mistakes. Raise BadInput, CannotDo."""
+    from vcam_cli.simulation.checks import load
 
     kind = _study_kind(file)
     if kind is None:
         return load(file, sets).name
+    from vcam_cli.capture_schedules import schedule_file
     from vcam_cli.errors import BadInput
-    from vcam_cli.studies import schedule_file, study_file, sweep_points
+    from vcam_cli.sweeps import sweep_file, sweep_points
 
     if kind == "schedule":
         return schedule_file.read(file, sets).model.name
-    grid = sweep_points.grid(study_file.read(file), sets)
+    grid = sweep_points.grid(sweep_file.read(file), sets)
     if grid.refused:
         raise BadInput(grid.refused)
     return grid.study.model.name
 
 
 def _study_kind(file: str) -> str | None:
-    """The kind of study that a file says it is, or a shipped one of that name; None of a camera."""
-    from vcam_cli.camera import shipped
-    from vcam_cli.camera.parts import is_file
-    from vcam_cli.camera.study import KINDS
-    from vcam_cli.camera.yaml_tree import read_file
+    """Return the kind of study that a file, or a shipped study, says it is; None for a camera."""
+    from vcam_cli.config import shipped
+    from vcam_cli.config.file_names import is_file
+    from vcam_cli.config.yaml_reader import read_file
     from vcam_cli.errors import VcamError
+    from vcam_cli.sweeps.model import KINDS
 
     path = Path(file)
     if not is_file(path):

@@ -5,14 +5,14 @@ kind says in mathematics what it does, and so where in the order it acts (`order
 
     Transfer   multiplies the spectrum of the image, H(f, wavelength)      no unit
     Gain       multiplies the signal, pixel by pixel                       no unit
-    Veil       spreads part of the light over the whole sensor             no unit
+    VeilingGlare spreads part of the light over the whole sensor             no unit
     Charge     adds electrons                                              electrons
     Transport  moves charge to later pixels on its way out                 no unit
-    Draw       adds randomness, of known variance                          electrons
+    NoiseSource adds randomness, of known variance                          electrons
     Limit      clamps                                                      electrons
-    Code       turns electrons into digital numbers                        electrons -> DN
+    Quantizer  turns electrons into digital numbers                        electrons -> DN
 
-Each effect lives in a file of its own and knows: whether a camera has it (`of`), what it
+Each effect lives in a file of its own and knows: whether a camera has it (`from_camera`), what it
 contributes (so that the plan can leave it out), what it costs, how it acts, where it comes from.
 Adding an effect is adding a file, and its class to the tuple in `order.py`.
 """
@@ -20,7 +20,7 @@ Adding an effect is adding a file, and its class to the tuple in `order.py`.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Hashable
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import ClassVar, Literal, Self
 
@@ -29,11 +29,11 @@ from numpy.typing import NDArray
 
 from vcam_cli.camera.array import Binning
 from vcam_cli.camera.camera import Camera
-from vcam_cli.camera.geometry import Geometry
+from vcam_cli.camera.derived.geometry import Geometry
 
 
 @dataclass(frozen=True)
-class Outlook:
+class SignalLevels:
     """What is known of the signal before a frame is computed; bounds refer to it."""
 
     full_signal: float
@@ -69,15 +69,15 @@ class Effect(ABC):
 
     @classmethod
     @abstractmethod
-    def of(cls, camera: Camera, geometry: Geometry) -> Self | None:
-        """The effect with this camera's numbers, or None where the camera does not have it."""
+    def from_camera(cls, camera: Camera, geometry: Geometry) -> Effect | None:
+        """Return the effect with this camera's numbers, or None where the camera has none."""
 
     @abstractmethod
     def describe(self) -> str:
-        """What it does in this camera: a short clause with numbers and units."""
+        """Return what the effect does in this camera: a short clause with numbers and units."""
 
-    def mean_error(self, outlook: Outlook) -> float:
-        """Largest rms change of the mean signal by leaving it out [electrons]."""
+    def mean_error(self, outlook: SignalLevels) -> float:
+        """Return the largest rms change of the mean signal by leaving it out [electrons]."""
         return 0.0
 
 
@@ -90,7 +90,15 @@ class Blur(ABC):
 
     @abstractmethod
     def cutoff(self, wavelength: float) -> float:
-        """Frequency from which on it is zero [cycles/m]; inf where there is none."""
+        """Return the frequency from which the transfer is zero, or inf [cycles/m]."""
+
+    @property
+    def reach(self) -> float:
+        """How far from its place it throws almost all of the light, diffraction aside [m].
+
+        Its transfer function is smooth over frequencies much smaller than the inverse of this.
+        """
+        return 0.0
 
 
 class RadialTransfer(Effect, Blur):
@@ -98,7 +106,7 @@ class RadialTransfer(Effect, Blur):
 
     @abstractmethod
     def otf(self, frequency: NDArray, wavelength: float) -> NDArray:
-        """Transfer at `frequency` [cycles/m] and `wavelength` [m]; 1 at frequency 0."""
+        """Return the transfer at `frequency` [cycles/m] and `wavelength` [m]; 1 at frequency 0."""
 
 
 class PlaneTransfer(Effect, Blur):
@@ -109,24 +117,20 @@ class PlaneTransfer(Effect, Blur):
     """
 
     @property
-    @abstractmethod
-    def reach(self) -> float:
-        """How far from its place it throws almost all of the light [m]."""
-
-    @property
     def model(self) -> tuple[PlaneTransfer, int, bool]:
-        """A blur that this one is made of: it, by how many quarter turns from x to y it is turned,
-        and whether y is mirrored before. What many have in common is computed once."""
-        return self, 0, False
+        """A blur that this one is made of, so that what many have in common is computed once.
 
-    def keeps(self, wavelengths: NDArray) -> dict[Hashable, int]:
-        """Tables that stay in memory for transfers at wavelengths (n,) [m]: what each is for, which
-        blurs may have in common, and its bytes."""
-        return {}
+        With it come the quarter turns from x to y by which it is turned, and whether y is mirrored
+        before.
+        """
+        return self, 0, False
 
     @abstractmethod
     def otf_plane(self, fx: NDArray, fy: NDArray, wavelength: float) -> NDArray:
-        """Transfer at all pairs of fx (n,) and fy (m,) [cycles/m]: complex (m, n); 1 at 0."""
+        """Return the transfer at all pairs of fx (n,) and fy (m,) [cycles/m]: complex (m, n).
+
+        It is 1 at frequency 0.
+        """
 
 
 @dataclass(frozen=True)
@@ -141,10 +145,18 @@ class Zone:
 class FieldTransfer(Effect):
     """A transfer function that changes slowly over the field: a sum of few, weighted by place."""
 
+    @property
+    @abstractmethod
+    def reach(self) -> float:
+        """How far from its place the blur throws almost all of the light, diffraction aside [m]."""
+
     @abstractmethod
     def zones(self, count: int) -> tuple[Zone, ...]:
-        """Blurs whose weights sum to 1 in every place; `count` places from center to corner, or
-        more where that is known not to be enough."""
+        """Return blurs whose weights sum to 1 in every place.
+
+        `count` is the number of places from center to corner; there are more where that is known
+        not to be enough.
+        """
 
 
 class SeparableTransfer(Effect):
@@ -152,11 +164,11 @@ class SeparableTransfer(Effect):
 
     @abstractmethod
     def along_x(self, frequency: NDArray) -> NDArray:
-        """Transfer along x at `frequency` [cycles/m]."""
+        """Return the transfer along x at `frequency` [cycles/m]."""
 
     @abstractmethod
     def along_y(self, frequency: NDArray) -> NDArray:
-        """Transfer along y at `frequency` [cycles/m]."""
+        """Return the transfer along y at `frequency` [cycles/m]."""
 
 
 class Gain(Effect):
@@ -164,9 +176,9 @@ class Gain(Effect):
 
     @abstractmethod
     def gain(self, x: NDArray, y: NDArray) -> NDArray:
-        """Factor at the positions x (columns,), y (rows,) [m]: (rows, columns).
+        """Return the factor at the positions x (columns,), y (rows,) [m]: (rows, columns).
 
-        (1, 1) where it is the same everywhere.
+        Its shape is (1, 1) where it is the same everywhere.
         """
 
     @property
@@ -175,7 +187,7 @@ class Gain(Effect):
         return float(self.gain(np.zeros(1), np.zeros(1))[0, 0])
 
 
-class Veil(Effect):
+class VeilingGlare(Effect):
     """Light that goes astray on its way to the sensor and lies evenly over it."""
 
     fraction: float
@@ -187,15 +199,15 @@ class Charge(Effect):
 
     @abstractmethod
     def rate(self) -> float:
-        """Mean electrons a pixel collects per second [e/s]."""
+        """Return the mean electrons that a pixel collects per second [e/s]."""
 
 
 class Transport(Effect):
     """Charge that arrives late: every electron by its own chance, so means are enough."""
 
     @abstractmethod
-    def moved(self, signal: NDArray) -> NDArray:
-        """What arrives of a mean signal (rows, columns), in its unit and float type."""
+    def transport(self, signal: NDArray) -> NDArray:
+        """Return what arrives of a mean signal (rows, columns), in its unit and float type."""
 
 
 @dataclass(frozen=True)
@@ -215,11 +227,11 @@ class Site:
     """Draws per column that are at hand."""
 
     def normal(self, name: str) -> NDArray:
-        """One standard normal a pixel, (rows, columns)."""
+        """Return one standard normal number a pixel, (rows, columns)."""
         return self.stream(name).standard_normal((self.rows, self.columns), dtype=self.dtype)
 
     def normal_columns(self, name: str) -> NDArray:
-        """One standard normal a column, the same for every block, (columns,)."""
+        """Return one standard normal number a column, the same for every block, (columns,)."""
         if name not in self.columns_drawn:
             drawn = self.line_stream(name).standard_normal(self.columns, dtype=self.dtype)
             drawn.setflags(write=False)
@@ -227,12 +239,12 @@ class Site:
         return self.columns_drawn[name]
 
     def normal_rows(self, name: str) -> NDArray:
-        """One standard normal a row, the same for every column, (rows, 1)."""
+        """Return one standard normal number a row, the same for every column, (rows, 1)."""
         return self.stream(name).standard_normal((self.rows, 1), dtype=self.dtype)
 
 
-class Draw(Effect):
-    """A random contribution. Whoever adds it also states its variance."""
+class NoiseSource(Effect):
+    """A random contribution; whoever adds it also states its variance."""
 
     scope: ClassVar[str]
     """'frame': new in every frame; 'sensor': stays with the sensor."""
@@ -243,22 +255,33 @@ class Draw(Effect):
     """Whether it comes from what reads the pixels, and not from the pixels."""
 
     def split(self) -> tuple[Self | None, Self | None, Self | None]:
-        """What of it every pixel has to itself, what a column's pixels share, what a row's."""
+        """Return the parts of each pixel by itself, of each column, and of each row."""
         return self, None, None
 
     def before_shot(self, mean: NDArray, site: Site) -> NDArray:
-        """The block's mean signal as this draw changes it [electrons]; may reuse the array."""
+        """Return the block's mean signal as this source changes it [electrons].
+
+        It may reuse the array.
+        """
         return mean
 
     @abstractmethod
     def apply(self, electrons: NDArray, site: Site) -> NDArray:
-        """The block with this draw in it [electrons]; may reuse the array handed in."""
+        """Return the block with this noise in it [electrons].
+
+        It may reuse the array.
+        """
 
     @abstractmethod
     def variance(self, mean: float, dark: float = 0.0) -> float:
-        """Variance it adds to a pixel [electrons squared].
+        """Return the variance that it adds to a pixel [electrons squared].
 
-        mean: its mean signal; dark: how much of that is dark signal [electrons].
+        Parameters
+        ----------
+        mean : float
+            Mean signal of the pixel [electrons].
+        dark : float, optional
+            How much of the mean signal is dark signal [electrons].
         """
 
 
@@ -269,10 +292,10 @@ class Limit(Effect):
 
     @abstractmethod
     def apply(self, electrons: NDArray) -> NDArray:
-        """The clamped block; may reuse the array handed in."""
+        """Return the clamped block, which may reuse the array."""
 
 
-class Code(Effect):
+class Quantizer(Effect):
     """Conversion to digital numbers."""
 
     removable = False
@@ -280,19 +303,29 @@ class Code(Effect):
 
     @abstractmethod
     def apply(self, electrons: NDArray) -> NDArray:
-        """Integer-valued digital numbers [DN] of `electrons`, same float type."""
+        """Return the digital numbers of `electrons`, whole and of the same float type [DN]."""
 
     @abstractmethod
     def line(self, electrons: NDArray) -> NDArray:
-        """The same relation before rounding and clipping [DN]."""
+        """Return the same relation before rounding and clipping [DN]."""
 
     def rounding(self, level: float, variance: float) -> float:
-        """Largest mean square of the rounding error at a signal `level` [electrons squared].
+        """Return the largest mean square of the rounding error at a level [electrons squared].
 
-        variance: of the noise in the signal. Of noise wider than half a step it is q^2 / 12; of
-        less it depends on where between two codes the signal lies, and is q^2 / 4 at most:
-        q^2 / 12 + (q / pi)^2 sum_k exp(-2 (pi k sigma / q)^2) / k^2, where cosines of the place
-        are set to 1. Widrow and Kollar, Quantization Noise, 2008, section 5.3.
+        Of noise wider than half a step it is q^2 / 12; of less it depends on where between two
+        codes the signal lies, and is q^2 / 4 at most: q^2 / 12 + (q / pi)^2 sum_k exp(-2 (pi k
+        sigma / q)^2) / k^2, where cosines of the place are set to 1.
+
+        Parameters
+        ----------
+        level : float
+            Mean signal [electrons].
+        variance : float
+            Variance of the noise in the signal [electrons squared].
+
+        References
+        ----------
+        B. Widrow and I. Kollar, Quantization Noise, 2008, section 5.3.
         """
         ends = np.array([level, level + max(1.0, 1e-3 * level)])
         below, above = self.line(ends)
@@ -302,8 +335,8 @@ class Code(Effect):
         return float(step**2 / 12 + (step / np.pi) ** 2 * dithered.sum())
 
     def linear(self, dn: NDArray) -> NDArray:
-        """What a linear ADC of the same offset and full scale has for these codes [DN].
+        """Return what a linear ADC of the same offset and full scale has for these codes [DN].
 
-        Same float type. A straight line of electrons whatever the curve is.
+        It is a straight line of electrons whatever the curve is, in the same float type.
         """
         return dn

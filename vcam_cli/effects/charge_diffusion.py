@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vcam_cli.camera.photodiode import diffusion
+from vcam_cli.camera.derived.photodiode import diffusion
 from vcam_cli.effects.base import RadialTransfer
 from vcam_cli.physics import silicon
 
@@ -37,18 +37,21 @@ class ChargeDiffusion(RadialTransfer):
     absent = "the file gives no diffusion of charge"
 
     @classmethod
-    def of(cls, camera, geometry):
+    def from_camera(cls, camera, geometry):
+        """Return the diffusion in the camera's silicon, or None where the file describes none."""
         lengths = diffusion(camera)
         if lengths is None:
             return None
         return cls(lengths.diffusion_length, lengths.depletion_width, lengths.neutral_depth)
 
     def describe(self) -> str:
+        """Return a short clause with this camera's numbers and units."""
         at = np.array([100e3])
         green, red = (100 * float(self.otf(at, w)[0]) for w in (550e-9, 650e-9))
         return f"leaves {green:.3g}% of the contrast at 100 lp/mm in 550 nm, {red:.3g}% in 650 nm"
 
     def otf(self, frequency, wavelength):
+        """Return the transfer at `frequency` [cycles/m] and `wavelength` [m]."""
         return silicon.diffusion_mtf(
             frequency,
             silicon.absorption(wavelength),
@@ -58,4 +61,5 @@ class ChargeDiffusion(RadialTransfer):
         )
 
     def cutoff(self, wavelength):
+        """Return the frequency from which the transfer is zero, or inf [cycles/m]."""
         return np.inf

@@ -45,22 +45,26 @@ class ChargeTransfer(Transport):
     seconds_per_pixel = 4e-9
 
     @classmethod
-    def of(cls, camera, geometry):
+    def from_camera(cls, camera, geometry):
+        """Return the transfer of a ccd that defers charge, or None where none is deferred."""
         given = camera.pixel.readout.charge_transfer
         if given is None or given.inefficiency == 0:
             return None
         return cls(given.inefficiency, given.phases, geometry.rows, geometry.columns)
 
     def describe(self) -> str:
+        """Return a short clause with this camera's numbers and units."""
         most = (self.rows + self.columns) * self.phases
         lost = float(_late(self.inefficiency, most))
         return f"the last pixel defers {lost:.3%} of its charge in {most} transfers"
 
-    def moved(self, signal: NDArray) -> NDArray:
+    def transport(self, signal: NDArray) -> NDArray:
+        """Return what arrives of a mean signal (rows, columns), in its unit and float type."""
         along_columns = _transferred(signal, self.inefficiency, self.phases)
         return _transferred(along_columns.T, self.inefficiency, self.phases).T
 
     def mean_error(self, outlook) -> float:
+        """Return a bound of the rms change of the mean signal by leaving it out [electrons]."""
         # A pixel loses at most what it defers, and gains at most as much of others as bright.
         down = _late(self.inefficiency, self.phases * np.arange(1, self.rows + 1))
         along = _late(self.inefficiency, self.phases * np.arange(1, self.columns + 1))
@@ -69,14 +73,14 @@ class ChargeTransfer(Transport):
 
 
 def _late(inefficiency: float, transfers: NDArray | int) -> NDArray:
-    """Share of a packet that does not arrive in time."""
+    """Return the share of a packet that does not arrive in time."""
     return -np.expm1(transfers * np.log1p(-inefficiency))
 
 
 def _transferred(signal: NDArray, inefficiency: float, phases: int) -> NDArray:
-    """What arrives of the packets in the rows of `signal`, the first of them nearest to the exit.
+    """Return what arrives of the packets in the rows of `signal`, the first at the exit.
 
-    Same shape and float type. The shares are a triangular matrix with few diagonals; it is
+    Shape and float type stay. The shares are a triangular matrix with few diagonals; it is
     multiplied in blocks, as many rows of it at once as a product of matrices is fast at.
     """
     count = len(signal)
@@ -91,7 +95,7 @@ def _transferred(signal: NDArray, inefficiency: float, phases: int) -> NDArray:
 
 
 def _shares(inefficiency: float, phases: int, arriving: NDArray, leaving: NDArray) -> NDArray:
-    """Shares of the packets `leaving` that come with the packets `arriving`: a matrix."""
+    """Return the shares of the packets `leaving` that come with those `arriving`: a matrix."""
     from scipy.special import gammaln
 
     transfers = phases * (leaving + 1.0)
@@ -103,7 +107,7 @@ def _shares(inefficiency: float, phases: int, arriving: NDArray, leaving: NDArra
 
 
 def _reach(inefficiency: float, transfers: int, count: int) -> int:
-    """Packets by which all but `REST` of a charge that makes most transfers is late, at most."""
+    """Return by how many packets at most all but `REST` of a charge is late."""
     from scipy.special import nbdtrc
 
     late = np.arange(count)

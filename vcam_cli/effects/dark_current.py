@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from vcam_cli.camera.photodiode import dark_rate
+from vcam_cli.camera.derived.dark_current import dark_rate
 from vcam_cli.effects.base import Charge
 
 
@@ -27,17 +27,21 @@ class DarkCurrent(Charge):
     seconds_per_pixel = 0.5e-9
 
     @classmethod
-    def of(cls, camera, geometry):
+    def from_camera(cls, camera, geometry):
+        """Return the dark current at the pixel's temperature, or None where it is 0."""
         joined = camera.array.joined_charges
         rate = dark_rate(camera) * joined
         return cls(rate, joined) if rate > 0 else None
 
     def describe(self) -> str:
+        """Return a short clause with this camera's numbers and units."""
         where = "every pixel" if self.joined == 1 else f"every {self.joined} pixels read as one"
         return f"{self.electrons_per_second:.4g} electrons a second in {where}"
 
     def rate(self) -> float:
+        """Return the mean electrons that a pixel collects per second [e/s]."""
         return self.electrons_per_second
 
     def mean_error(self, outlook) -> float:
+        """Return a bound of the rms change of the mean signal by leaving it out [electrons]."""
         return self.electrons_per_second * outlook.time

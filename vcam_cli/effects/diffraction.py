@@ -21,18 +21,22 @@ class Diffraction(RadialTransfer):
     in_lens = True
 
     @classmethod
-    def of(cls, camera, geometry):
+    def from_camera(cls, camera, geometry):
+        """Return the diffraction of the lens, or None where the file leaves it out."""
         replaced = camera.optics.psf is not None and not switched_off(camera, "aberration")
         if replaced or not camera.optics.diffraction:
             return None
         return cls(geometry.f_number, geometry.magnification)
 
     def describe(self) -> str:
+        """Return a short clause with this camera's numbers and units."""
         cutoff = self.cutoff(550e-9) / 1e3
         return f"cuts off at {cutoff:.4g} lp/mm at 550 nm"
 
     def otf(self, frequency, wavelength):
+        """Return the transfer at `frequency` [cycles/m] and `wavelength` [m]."""
         return diffraction.otf_circular(frequency, wavelength, self.f_number, self.magnification)
 
     def cutoff(self, wavelength):
+        """Return the frequency from which the transfer is zero, or inf [cycles/m]."""
         return diffraction.cutoff_frequency(wavelength, self.f_number, self.magnification)

@@ -9,15 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcam_cli.camera.architecture import ARCHITECTURES
-from vcam_cli.camera.electrical import electrical
-from vcam_cli.effects.base import Draw
+from vcam_cli.camera.derived.electrical import electrical
+from vcam_cli.effects.base import NoiseSource
 
 OVERFULL = 100
 """Full wells of charge in a hot pixel: more than the noise of any readout brings below one."""
 
 
 @dataclass(frozen=True)
-class FixedPattern(Draw):
+class FixedPattern(NoiseSource):
     """Offsets [electrons] and gains [1], per pixel and per column, drawn from the sensor seed.
 
     With them dark currents: a pixel's is the mean one times 1 + `dark` z, and never below zero; it
@@ -55,7 +55,8 @@ class FixedPattern(Draw):
         object.__setattr__(self, "removable", not (self.hot or self.dead))
 
     @classmethod
-    def of(cls, camera, geometry):
+    def from_camera(cls, camera, geometry):
+        """Return the fixed pattern that the pixel's architecture has, or None where it has none."""
         fpn, defects, name = camera.pixel.fpn, camera.pixel.defects, camera.pixel.architecture
         columns = fpn.offset_column, fpn.gain_column
         missing = any(columns) and not ARCHITECTURES[name].column_terms
@@ -67,6 +68,7 @@ class FixedPattern(Draw):
         return cls(*strengths, defects.hot, defects.dead, well, name if missing else "")
 
     def describe(self) -> str:
+        """Return a short clause with this camera's numbers and units."""
         said = (
             f"offsets of {self.offset_pixel:.4g} e a pixel and {self.offset_column:.4g} e a column,"
             f" gains of {self.gain_pixel:.3%} a pixel and {self.gain_column:.3%} a column"
@@ -83,12 +85,14 @@ class FixedPattern(Draw):
         return said
 
     def split(self):
+        """Return the pixels' own pattern, the columns' and None: rows are alike."""
         own = replace(self, offset_column=0.0, gain_column=0.0)
         if not (self.offset_column or self.gain_column):
             return own, None, None
         return own, FixedPattern(0.0, self.offset_column, 0.0, self.gain_column), None
 
     def before_shot(self, mean, site):
+        """Return the mean signal with dark currents and defects in it; it reuses the array."""
         if self.dark and site.dark:
             z = site.normal("fpn dark")
             z *= self.dark
@@ -103,6 +107,7 @@ class FixedPattern(Draw):
         return mean
 
     def apply(self, electrons, site):
+        """Return the block with gains and offsets in it; it reuses the array [electrons]."""
         if self.gain_pixel or self.gain_column:
             gain: NDArray = 1 + self.gain_column * site.normal_columns("fpn gain column")
             if self.gain_pixel:
@@ -120,6 +125,7 @@ class FixedPattern(Draw):
         return electrons
 
     def variance(self, mean, dark=0.0):
+        """Return the variance that it adds to a pixel [electrons squared]."""
         offsets = self.offset_pixel**2 + self.offset_column**2
         gains = (self.gain_pixel**2 + self.gain_column**2) * mean**2
         working = 1 - self.hot - self.dead

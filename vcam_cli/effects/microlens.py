@@ -31,7 +31,8 @@ class Microlens(Gain):
     removable = False
 
     @classmethod
-    def of(cls, camera, geometry):
+    def from_camera(cls, camera, geometry):
+        """Return the gain by a microlens, or None where the pixel has none."""
         if camera.pixel.microlens is None:
             return None
         share = geometry.effective_fill_factor
@@ -40,12 +41,15 @@ class Microlens(Gain):
         return cls(1.0 if included else share / geometry.fill_factor, share)
 
     def describe(self) -> str:
+        """Return a short clause with this camera's numbers and units."""
         if self.ratio == 1:
             return f"averages over {self.share:.3%} of the pixel; its light is in the pixel's QE"
         return f"collects {self.ratio:.4g} times the light, that of {self.share:.3%} of the pixel"
 
     def gain(self, x, y):
+        """Return the factor at the positions x (columns,), y (rows,) [m]: (rows, columns)."""
         return np.full((1, 1), self.ratio, x.dtype)
 
     def mean_error(self, outlook) -> float:
+        """Return a bound of the rms change of the mean signal by leaving it out [electrons]."""
         return (1 - 1 / self.ratio) * outlook.full_signal

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from vcam_cli.camera.falloff import falloff
+from vcam_cli.camera.derived.falloff import falloff
 from vcam_cli.effects.base import Gain
 from vcam_cli.physics import radiometry
 
@@ -35,12 +35,13 @@ class OffAxis(Gain):
     seconds_per_pixel = 8e-9
 
     @classmethod
-    def of(cls, camera, geometry):
+    def from_camera(cls, camera, geometry):
+        """Return the falloff, modeled or measured, or None where the file switches it off."""
         half = geometry.sensor_width / 2, geometry.sensor_height / 2
         if camera.optics.off_axis == "none":
             return None
         if measured := falloff(camera, geometry):
-            return Measured(measured.heights, measured.values, *half)
+            return MeasuredFalloff(measured.heights, measured.values, *half)
         tan2_cone = 1 / (4 * geometry.working_f_number**2)
         return cls(camera.optics.off_axis, tan2_cone, geometry.image_distance, *half)
 
@@ -50,6 +51,7 @@ class OffAxis(Gain):
         return float(np.hypot(self.half_width, self.half_height))
 
     def describe(self) -> str:
+        """Return a short clause with this camera's numbers and units."""
         loss = 1 - float(self._of_tan2((self.corner / self.image_distance) ** 2))
         return f"the corners receive {loss:.2%} less than the center"
 
@@ -59,6 +61,7 @@ class OffAxis(Gain):
         return radiometry.relative_illumination_exact(self.tan2_cone, tan2)
 
     def gain(self, x, y):
+        """Return the factor at the positions x (columns,), y (rows,) [m]: (rows, columns)."""
         x2 = ((x / self.image_distance) ** 2).astype(x.dtype)
         y2 = ((y / self.image_distance) ** 2).astype(y.dtype)
         tan2 = x2[None, :] + y2[:, None]
@@ -86,13 +89,14 @@ class OffAxis(Gain):
         return None
 
     def mean_error(self, outlook) -> float:
+        """Return a bound of the rms change of the mean signal by leaving it out [electrons]."""
         radius2 = _quadrant(self.half_width, self.half_height)
         loss = 1 - self._of_tan2(radius2 / self.image_distance**2)
         return 1.002 * float(np.sqrt(np.mean(loss**2))) * outlook.full_signal
 
 
 @dataclass(frozen=True)
-class Measured(Gain):
+class MeasuredFalloff(Gain):
     """Relative illumination over the distance from the axis, straight between measured points."""
 
     heights: tuple[float, ...]
@@ -110,11 +114,13 @@ class Measured(Gain):
     seconds_per_pixel = OffAxis.seconds_per_pixel
 
     @classmethod
-    def of(cls, camera, geometry):
-        found = OffAxis.of(camera, geometry)
+    def from_camera(cls, camera, geometry):
+        """Return the falloff where the file has measured points, else None."""
+        found = OffAxis.from_camera(camera, geometry)
         return found if isinstance(found, cls) else None
 
     def describe(self) -> str:
+        """Return a short clause with this camera's numbers and units."""
         corner = float(self._at(np.hypot(self.half_width, self.half_height)))
         kind = "less" if corner <= 1 else "more"
         return f"the corners receive {abs(1 - corner):.2%} {kind} than the center, as measured"
@@ -123,6 +129,7 @@ class Measured(Gain):
         return np.interp(radius, self.heights, self.values)
 
     def gain(self, x, y):
+        """Return the factor at the positions x (columns,), y (rows,) [m]: (rows, columns)."""
         x2, y2 = np.square(x), np.square(y)
         if x.dtype == np.float64:
             return self._at(np.sqrt(x2[None, :] + y2[:, None]))
@@ -145,12 +152,13 @@ class Measured(Gain):
         return self._at(np.linspace(0, self.heights[-1], ENTRIES)).astype(np.float32)
 
     def mean_error(self, outlook) -> float:
+        """Return a bound of the rms change of the mean signal by leaving it out [electrons]."""
         change = 1 - self._at(np.sqrt(_quadrant(self.half_width, self.half_height)))
         return 1.002 * float(np.sqrt(np.mean(change**2))) * outlook.full_signal
 
 
 def _quadrant(half_width: float, half_height: float) -> NDArray:
-    """Squared distances from the axis of points all over a quadrant of the sensor [m2].
+    """Return the squared distances from the axis of points all over a quadrant of the sensor [m2].
 
     A bound is the rms over a field at full signal everywhere, by the midpoint rule: 64 points a
     side give it to 1e-3 even at 160 degrees, which bounds are raised by.

@@ -6,14 +6,14 @@
     spectrum of the image   Transfer    diffraction, aberration,         electrons / s, blurred
                                         pixel_aperture, charge_diffusion
     electrons / s           Gain        off_axis                         electrons / s
-    electrons / s           Veil        stray_light                      electrons / s
+    electrons / s           VeilingGlare stray_light                      electrons / s
     electrons / s           Gain        pixel_vignetting, microlens      electrons / s
     electrons / s           Charge      dark_current                     electrons (mean signal)
     electrons               Transport   charge_transfer                  electrons (mean signal)
-    electrons               Draw        shot_noise, fpn, reset_noise,    electrons
+    electrons               NoiseSource shot_noise, fpn, reset_noise,    electrons
                                         read_noise
     electrons               Limit       saturation                       electrons
-    electrons               Code        quantization                     DN
+    electrons               Quantizer   quantization                     DN
 
 Within a kind the order of this tuple is the order of action. It is written nowhere else.
 """

@@ -11,7 +11,7 @@ from vcam_cli.effects.base import SeparableTransfer
 
 @dataclass(frozen=True)
 class PixelAperture(SeparableTransfer):
-    """Rectangular sampling aperture: sinc(f w) along each axis. [m]"""
+    """Rectangular sampling aperture [m]: sinc(f w) along each axis."""
 
     width: float
     height: float
@@ -21,14 +21,18 @@ class PixelAperture(SeparableTransfer):
     absent = "every pixel has one"
 
     @classmethod
-    def of(cls, camera, geometry):
+    def from_camera(cls, camera, geometry):
+        """Return the aperture that collects the pixel's light."""
         return cls(geometry.collecting_width, geometry.collecting_height)
 
     def describe(self) -> str:
+        """Return a short clause with this camera's numbers and units."""
         return f"averages over {self.width * 1e6:.4g} x {self.height * 1e6:.4g} um"
 
     def along_x(self, frequency):
+        """Return the transfer along x at `frequency` [cycles/m]."""
         return np.sinc(frequency * self.width)
 
     def along_y(self, frequency):
+        """Return the transfer along y at `frequency` [cycles/m]."""
         return np.sinc(frequency * self.height)

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
-from vcam_cli.camera import pixel_optics
+from vcam_cli.camera.derived import pixel_layout
 from vcam_cli.effects.base import Gain
 from vcam_cli.physics import vignetting
 
@@ -62,8 +62,9 @@ class PixelVignetting(Gain):
     seconds_per_pixel = 3e-9
 
     @classmethod
-    def of(cls, camera, geometry):
-        layers = pixel_optics.layers(camera)
+    def from_camera(cls, camera, geometry):
+        """Return the loss in the pixel's tunnel, or None where no layers are described."""
+        layers = pixel_layout.layers(camera)
         if not layers:
             return None
         return cls(
@@ -74,19 +75,20 @@ class PixelVignetting(Gain):
             geometry.exit_pupil_distance,
             geometry.sensor_width / 2,
             geometry.sensor_height / 2,
-            pixel_optics.follows_chief_ray(camera),
+            pixel_layout.follows_chief_ray(camera),
             camera.pixel.photodetector.quantum_efficiency.given is None,
             camera.accuracy.tolerance,
             camera.accuracy.vignetting_points,
         )
 
     def describe(self) -> str:
+        """Return a short clause with this camera's numbers and units."""
         ends = np.array([0, self.half_width]), np.array([0, self.half_height])
         loss = 1 - np.diag(self.gain(*ends))
         return f"takes {loss[0]:.2%} of the light in the center, {loss[1]:.2%} in the corners"
 
     def at(self, x: NDArray, y: NDArray) -> NDArray:
-        """The gain at the positions x, y (rows, columns) [m], from the whole pupil, no series."""
+        """Return the gain at x, y (rows, columns) [m], integrated over the whole pupil."""
         share = vignetting.collected_fraction(
             x / self.pupil_distance,
             y / self.pupil_distance,
@@ -99,6 +101,7 @@ class PixelVignetting(Gain):
         return share if self.internal else share / vignetting.stack_transmission(1.0, self.layers)
 
     def gain(self, x, y):
+        """Return the factor at the positions x (columns,), y (rows,) [m]: (rows, columns)."""
         series = _series(self)
         order = len(series) - 1
         across, down = (
@@ -111,6 +114,7 @@ class PixelVignetting(Gain):
         return np.maximum(out, 0, out=out)
 
     def mean_error(self, outlook) -> float:
+        """Return a bound of the rms change of the mean signal by leaving it out [electrons]."""
         # A field at full signal everywhere, the brightest pixel at full signal behind its tunnel:
         # rms of the loss over a quadrant by the midpoint rule.
         at = (np.arange(64) + 0.5) / 64

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vcam_cli.camera.electrical import electrical
-from vcam_cli.effects.base import Code
+from vcam_cli.camera.derived.electrical import electrical
+from vcam_cli.effects.base import Quantizer
 
 
 @dataclass(frozen=True)
-class Quantization(Code):
+class Quantization(Quantizer):
     """Linear ADC: dn = clip(round(offset + electrons / electrons_per_dn), 0, 2^bits - 1)."""
 
     offset: float
@@ -24,28 +24,32 @@ class Quantization(Code):
     seconds_per_pixel = 2e-9
 
     @classmethod
-    def of(cls, camera, geometry):
+    def from_camera(cls, camera, geometry):
+        """Return the camera's ADC, linear or logarithmic."""
         e = electrical(camera)
         if e.reference is None:
             return cls(e.offset, e.electrons_per_dn, e.bits)
         volts_per_electron = e.conversion_gain * e.analog_gain
         bend, full = e.reference / volts_per_electron, e.full_scale / volts_per_electron
-        return Logarithmic(e.offset, bend, full, e.bits)
+        return LogarithmicQuantization(e.offset, bend, full, e.bits)
 
     def describe(self) -> str:
+        """Return a short clause with this camera's numbers and units."""
         return f"{self.electrons_per_dn:.4g} electrons a step, {2**self.bits} codes"
 
     def line(self, electrons):
+        """Return the codes before rounding and clipping [DN]."""
         return electrons * (1 / self.electrons_per_dn) + self.offset
 
     def apply(self, electrons):
+        """Return the codes of `electrons`, rounded and clipped [DN]."""
         code = electrons * electrons.dtype.type(1 / self.electrons_per_dn)
         code += electrons.dtype.type(self.offset)
         return _whole(code, self.bits)
 
 
 @dataclass(frozen=True)
-class Logarithmic(Code):
+class LogarithmicQuantization(Quantizer):
     """Logarithmic ADC: equal ratios of light are equal steps, far above `bend`.
 
     dn = clip(round(offset + span ln(1 + electrons / bend) / ln(1 + full / bend)), 0, 2^bits - 1),
@@ -68,11 +72,13 @@ class Logarithmic(Code):
     seconds_per_pixel = 15e-9
 
     @classmethod
-    def of(cls, camera, geometry):
-        found = Quantization.of(camera, geometry)
+    def from_camera(cls, camera, geometry):
+        """Return the camera's ADC where it is logarithmic, else None."""
+        found = Quantization.from_camera(camera, geometry)
         return found if isinstance(found, cls) else None
 
     def describe(self) -> str:
+        """Return a short clause with this camera's numbers and units."""
         step = self.bend / self._slope
         return (
             f"{step:.4g} electrons a step in the dark and {step * (1 + self.full / self.bend):.4g}"
@@ -89,6 +95,7 @@ class Logarithmic(Code):
         return self._span / float(np.log1p(self.full / self.bend))
 
     def line(self, electrons):
+        """Return the codes before rounding and clipping [DN]."""
         signal = np.maximum(electrons * (1 / self.bend), -1)
         with np.errstate(divide="ignore"):  # ln(0) = -inf, which is clipped
             level = np.log1p(signal, out=signal)
@@ -97,9 +104,11 @@ class Logarithmic(Code):
         return level
 
     def apply(self, electrons):
+        """Return the codes of `electrons`, rounded and clipped [DN]."""
         return _whole(self.line(electrons), self.bits)
 
     def linear(self, dn):
+        """Return what a linear ADC of the same offset and full scale has for these codes [DN]."""
         signal = np.expm1((dn - self.offset) * (1 / self._slope))
         signal *= self._span * self.bend / self.full
         signal += self.offset
@@ -107,6 +116,6 @@ class Logarithmic(Code):
 
 
 def _whole(level, bits):
-    """The nearest codes, clipped; overwrites its argument."""
+    """Return the nearest codes, clipped; it overwrites its argument."""
     np.rint(level, out=level)
     return np.clip(level, 0, 2**bits - 1, out=level)

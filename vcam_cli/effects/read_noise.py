@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from vcam_cli.camera.architecture import ARCHITECTURES
-from vcam_cli.effects.base import Draw
+from vcam_cli.effects.base import NoiseSource
 
 
 @dataclass(frozen=True)
-class ReadNoise(Draw):
+class ReadNoise(NoiseSource):
     """Input-referred noise of one readout [electrons rms], new in every frame.
 
     A pixel has its own, that of its column and that of its row; the three are independent.
@@ -29,7 +29,8 @@ class ReadNoise(Draw):
     of_readout = True
 
     @classmethod
-    def of(cls, camera, geometry):
+    def from_camera(cls, camera, geometry):
+        """Return the noise of the readout, or None where pixel, column and row have none."""
         given, name = camera.pixel.readout, camera.pixel.architecture
         missing = given.column_noise > 0 and not ARCHITECTURES[name].column_terms
         column = 0.0 if missing else given.column_noise
@@ -38,6 +39,7 @@ class ReadNoise(Draw):
         return cls(given.read_noise, column, given.row_noise, name if missing else "")
 
     def describe(self) -> str:
+        """Return a short clause with this camera's numbers and units."""
         said = f"{self.electrons:.4g} electrons rms"
         if self.column:
             said += f", {self.column:.4g} of every column"
@@ -48,11 +50,13 @@ class ReadNoise(Draw):
         return said
 
     def split(self):
+        """Return the pixels' own noise, the columns' and the rows'."""
         column = ReadNoise(0.0, column=self.column) if self.column else None
         row = ReadNoise(0.0, row=self.row) if self.row else None
         return ReadNoise(self.electrons), column, row
 
     def apply(self, electrons, site):
+        """Return the block with the noise of one readout in it; it reuses the array [electrons]."""
         if self.electrons:
             z = site.normal(self.name)
             z *= self.electrons
@@ -64,4 +68,5 @@ class ReadNoise(Draw):
         return electrons
 
     def variance(self, mean, dark=0.0):
+        """Return the variance that it adds to a pixel [electrons squared]."""
         return self.electrons**2 + self.column**2 + self.row**2

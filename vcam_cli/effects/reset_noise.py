@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from vcam_cli.camera.architecture import ARCHITECTURES
-from vcam_cli.camera.electrical import electrical
-from vcam_cli.effects.base import Draw
+from vcam_cli.camera.derived.electrical import electrical
+from vcam_cli.effects.base import NoiseSource
 from vcam_cli.physics import readout
 
 
 @dataclass(frozen=True)
-class ResetNoise(Draw):
+class ResetNoise(NoiseSource):
     """Thermal noise of what is reset, or a stated number [electrons rms].
 
     What is reset is the architecture's: the photodiode, or the bit line of a passive pixel. Where
@@ -31,7 +31,8 @@ class ResetNoise(Draw):
     in_samples = "same"
 
     @classmethod
-    def of(cls, camera, geometry):
+    def from_camera(cls, camera, geometry):
+        """Return the noise of the reset, or None where the architecture removes it."""
         given = camera.pixel.readout.reset_noise
         of_what = ARCHITECTURES[camera.pixel.architecture].reset_noise
         if given == "none" or given == 0 or of_what == "none":
@@ -47,13 +48,16 @@ class ResetNoise(Draw):
         return cls(float(variance) ** 0.5)
 
     def describe(self) -> str:
+        """Return a short clause with this camera's numbers and units."""
         return f"{self.electrons:.4g} electrons rms"
 
     def apply(self, electrons, site):
+        """Return the block with the noise of a reset in it; it reuses the array [electrons]."""
         z = site.normal(self.name)
         z *= self.electrons
         electrons += z
         return electrons
 
     def variance(self, mean, dark=0.0):
+        """Return the variance that it adds to a pixel [electrons squared]."""
         return self.electrons**2

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vcam_cli.camera.electrical import electrical
+from vcam_cli.camera.derived.electrical import electrical
 from vcam_cli.effects.base import Limit
 
 
@@ -22,11 +22,14 @@ class Saturation(Limit):
     seconds_per_pixel = 0.5e-9
 
     @classmethod
-    def of(cls, camera, geometry):
+    def from_camera(cls, camera, geometry):
+        """Return the limit at the full well of the camera's pixel."""
         return cls(electrical(camera).full_well)
 
     def describe(self) -> str:
+        """Return a short clause with this camera's numbers and units."""
         return f"full well of {self.full_well:.6g} electrons"
 
     def apply(self, electrons):
+        """Return the block clipped at the full well; it reuses the array [electrons]."""
         return np.minimum(electrons, electrons.dtype.type(self.full_well), out=electrons)

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from vcam_cli.effects.base import Draw
+from vcam_cli.effects.base import NoiseSource
 from vcam_cli.physics import noise
 
 
 @dataclass(frozen=True)
-class ShotNoise(Draw):
+class ShotNoise(NoiseSource):
     """Poisson statistics of the collected electrons."""
 
     model: str = "exact"
@@ -22,17 +22,21 @@ class ShotNoise(Draw):
     in_samples = "accumulates"
 
     @classmethod
-    def of(cls, camera, geometry):
+    def from_camera(cls, camera, geometry):
+        """Return the shot noise in the model that the file's accuracy asks for."""
         return cls(camera.accuracy.knobs.get("shot_noise", "exact"))
 
     def describe(self) -> str:
+        """Return a short clause with this camera's numbers and units."""
         return "variance equal to the number of electrons collected"
 
     def apply(self, electrons, site):
+        """Return Poisson numbers of the block's means [electrons]."""
         z = site.normal(self.name)
         if self.model == "gaussian":
-            return noise.gaussian_shot(electrons, z)
+            return noise.gaussian_shot_noise(electrons, z)
         return noise.poisson_from_normal(electrons, z)
 
     def variance(self, mean, dark=0.0):
+        """Return the variance of a Poisson number, its mean [electrons squared]."""
         return mean

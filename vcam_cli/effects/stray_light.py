@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from vcam_cli.effects.base import Veil
+from vcam_cli.effects.base import VeilingGlare
 
 
 @dataclass(frozen=True)
-class StrayLight(Veil):
+class StrayLight(VeilingGlare):
     """Veiling glare: E becomes (1 - s) E + s mean(E), the mean of a color over the array.
 
     What lies beside the picture throws no light into it, and takes none.
@@ -23,13 +23,16 @@ class StrayLight(Veil):
     seconds_per_pixel = 1.5e-9
 
     @classmethod
-    def of(cls, camera, geometry):
+    def from_camera(cls, camera, geometry):
+        """Return the veiling glare of the lens, or None where it has none."""
         fraction = camera.optics.stray_light
         return cls(fraction) if fraction > 0 else None
 
     def describe(self) -> str:
+        """Return a short clause with this camera's numbers and units."""
         return f"{self.fraction:.3%} of the light lies evenly over the sensor"
 
     def mean_error(self, outlook) -> float:
+        """Return a bound of the rms change of the mean signal by leaving it out [electrons]."""
         # Numbers from 0 to full signal deviate from their mean by half of it rms, at most.
         return self.fraction * outlook.full_signal / 2

@@ -7,11 +7,13 @@ written costs about 0.02 s on a local disk, against half a second to compress th
 import errno
 import os
 import secrets
-from collections.abc import Iterator
+import tempfile
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from vcam_cli.errors import CannotDo, bad
+from vcam_cli.interrupts import defer_interrupts
 
 STAGING = ".vcam-new"  # folder where a run's files wait to appear together (see `folder`)
 
@@ -27,12 +29,12 @@ _REASONS = {
 
 @contextmanager
 def write_whole(path: Path | str) -> Iterator[Path]:
-    """Gives a temporary name in the folder of `path`; on success the file gets its own name.
+    """Yield a temporary name in the folder of `path`; on success the file gets its own name.
 
-    The body writes the file under the name given and closes it. When the body raises,
+    The body writes the file under the temporary name and closes it. When the body raises,
     whatever it raises, the temporary file is removed and a former `path` stays as it was.
 
-    Raises CannotDo: disk full, no permission, no such folder (any OSError of the body).
+    Raise CannotDo: disk full, no permission, no such folder (any OSError of the body).
     """
     path = Path(path)
     mark = f"{os.getpid()}-{secrets.token_hex(4)}"
@@ -50,7 +52,7 @@ def write_whole(path: Path | str) -> Iterator[Path]:
 
 
 def write_text(path: Path | str, text: str) -> None:
-    """Writes `text` as UTF-8 with line feeds, whole or not at all. Raises CannotDo.
+    """Write `text` as UTF-8 with line feeds, whole or not at all. Raise CannotDo.
 
     Bytes of a file's name that are no text become escapes, which JSON understands.
     """
@@ -58,10 +60,33 @@ def write_text(path: Path | str, text: str) -> None:
         temporary.write_text(text, "utf-8", "backslashreplace", newline="\n")
 
 
-def make_folder(folder: Path) -> None:
-    """Makes a folder and its parents where they are missing.
+def write_bytes(path: Path | str, data: bytes) -> None:
+    """Write bytes, whole or not at all. Raise CannotDo."""
+    with write_whole(path) as temporary:
+        temporary.write_bytes(data)
 
-    Raises BadInput where something else has its name, CannotDo where it cannot be made.
+
+def written_bytes(name: str, write: Callable[[Path], None]) -> bytes:
+    """Return what `write` writes into a file of some path that ends in `name`. Raise CannotDo."""
+    folder = None
+    try:
+        with defer_interrupts():
+            folder = tempfile.TemporaryDirectory(prefix="vcam-")
+        path = Path(folder.name) / name
+        write(path)
+        return path.read_bytes()
+    except OSError as error:
+        raise cannot_write(tempfile.gettempdir(), error) from error
+    finally:
+        with defer_interrupts():
+            if folder is not None:
+                folder.cleanup()
+
+
+def make_folder(folder: Path) -> None:
+    """Make a folder and its parents where they are missing.
+
+    Raise BadInput where something else has its name, CannotDo where it cannot be made.
     """
     if folder.exists() and not folder.is_dir():
         raise bad((), f"{folder} is not a folder", "give another one")
@@ -72,20 +97,20 @@ def make_folder(folder: Path) -> None:
 
 
 def flush_folder(folder: Path) -> None:
-    """Makes renames in `folder` lasting, where the file system knows how to."""
+    """Make renames in `folder` lasting, where the file system knows how to."""
     with suppress(OSError):
         _flush(folder)
 
 
 def cannot_write(path: Path | str, error: OSError) -> CannotDo:
-    """The CannotDo that tells why `path` cannot be written and what would help."""
+    """Return the error that tells why `path` cannot be written and what would help."""
     default = (error.strerror or str(error), "choose another folder")
     reason, remedy = _REASONS.get(error.errno or 0, default)
-    return CannotDo(f"cannot write {shown(path)}: {reason}", remedy)
+    return CannotDo(f"cannot write {displayed_path(path)}: {reason}", remedy)
 
 
-def shown(path: Path | str) -> str:
-    """`path` as the user knows it: without the folder where new files wait."""
+def displayed_path(path: Path | str) -> str:
+    """Return `path` as the user knows it: without the folder where new files wait."""
     path = Path(path)
     return str(Path(*(part for part in path.parts if part != STAGING)))
 

@@ -13,15 +13,26 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from vcam_cli.files.atomic import write_whole
-from vcam_cli.files.plots import COLORS, MARKERS, STYLE, load
+from vcam_cli.files.plots import COLORS, MARKERS, png_figure
 
 Look = Literal["points", "line", "dashed"]
 
 
 @dataclass(frozen=True)
 class Curve:
-    """One curve; `color` counts the colors of the house, -1 is gray. No name: not in the legend."""
+    """One curve of a panel.
+
+    Parameters
+    ----------
+    name : str
+        Name in the legend; an empty one leaves the curve out of it.
+    x, y : (n,) arrays
+        Points in the units of the axes; those that are not finite are left out.
+    look : {"points", "line", "dashed"}
+        How the points are drawn.
+    color : int
+        Index into `plots.COLORS`, which repeat; -1 is gray.
+    """
 
     name: str
     x: NDArray
@@ -32,7 +43,7 @@ class Curve:
 
 @dataclass(frozen=True)
 class Mark:
-    """A place on the x axis worth a word."""
+    """A vertical line at x with a text beside it, in a color as of `Curve`."""
 
     x: float
     text: str
@@ -41,32 +52,56 @@ class Mark:
 
 @dataclass(frozen=True)
 class Panel:
-    """One pair of axes."""
+    """One pair of axes.
+
+    Parameters
+    ----------
+    x_label, y_label : str
+        Labels of the axes.
+    curves : sequence of Curve
+        What is drawn.
+    marks : sequence of Mark
+        Vertical lines.
+    log : bool
+        Whether both axes are logarithmic.
+    x_range, y_range : tuple of float, optional
+        Ends of the axes; by default those of the curves.
+    height : float
+        Height relative to the other panels'.
+    legend : str
+        Place of the legend, as Matplotlib names it.
+    """
 
     x_label: str
     y_label: str
     curves: Sequence[Curve]
     marks: Sequence[Mark] = ()
     log: bool = False
-    """Both axes."""
     x_range: tuple[float, float] | None = None
     y_range: tuple[float, float] | None = None
     height: float = 1.0
-    """Relative to the other panels'."""
     legend: str = "best"
 
 
 def draw(path: Path | str, title: str, panels: Sequence[Panel]) -> None:
-    """Panels one below the other, with one x axis. Raises CannotDo where it cannot be written."""
-    matplotlib = load()
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
+    """Draw panels one below the other, with one x axis, as a PNG.
 
-    style: Any = {**matplotlib.rcParamsDefault, **STYLE}
-    with matplotlib.rc_context(style):
-        heights = [panel.height for panel in panels]
-        figure = Figure(figsize=(6.6, 1.1 + 3.3 * sum(heights)), dpi=150, layout="constrained")
-        FigureCanvasAgg(figure)
+    Parameters
+    ----------
+    path : Path or str
+        The file.
+    title : str
+        Title above the first panel.
+    panels : sequence of Panel
+        The panels, from the top.
+
+    Raises
+    ------
+    CannotDo
+        If the file cannot be written.
+    """
+    heights = [panel.height for panel in panels]
+    with png_figure(path, (6.6, 1.1 + 3.3 * sum(heights))) as figure:
         grid = figure.add_gridspec(len(panels), 1, height_ratios=heights)
         above = None
         for row, panel in enumerate(panels):
@@ -75,8 +110,6 @@ def draw(path: Path | str, title: str, panels: Sequence[Panel]) -> None:
             if above is None:
                 axes.set_title(title)
                 above = axes
-        with write_whole(path) as temporary:
-            figure.savefig(temporary, format="png", metadata={"Software": None})
 
 
 def _panel(axes: Any, panel: Panel, last: bool) -> None:
@@ -116,7 +149,7 @@ def _curve(axes: Any, curve: Curve, log: bool) -> None:
 
 
 def _mark(axes: Any, mark: Mark, number: int) -> None:
-    """A vertical line with its word beside it, the words at different heights."""
+    """Draw a vertical line with its text beside it, the texts at different heights."""
     color = _color(mark.color)
     axes.axvline(mark.x, color=color, lw=0.8, ls=(0, (1, 2)))
     axes.annotate(

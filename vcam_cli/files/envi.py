@@ -17,8 +17,8 @@ from typing import Any
 
 import numpy as np
 
-from vcam_cli.files.images import Unusable, truncated
-from vcam_cli.files.stored import PER_NM, Stored, lengths, numbers
+from vcam_cli.files.images import UnusableFile, truncated_file
+from vcam_cli.files.spectral_data import PER_NM, SpectralData, check_length, finite_numbers
 
 TYPES = {
     1: "u1", 2: "i2", 3: "i4", 4: "f4", 5: "f8", 12: "u2", 13: "u4", 14: "i8", 15: "u8",
@@ -32,31 +32,31 @@ UNITS = {
     "W/(m2nmsr)": PER_NM, "W/(m2umsr)": 1e6, "mW/(m2nmsr)": 1e-3 * PER_NM,
     "uW/(cm2nmsr)": 1e-2 * PER_NM, "W/(m2msr)": 1.0,
 }  # fmt: skip
-"""Radiance of 1 in the file [W/(sr m2 m)], by unit without spaces, the order of nm and sr aside."""
+"""Unit without spaces, nm before sr -> radiance of a value of 1 in the file [W/(sr m2 m)]."""
 INTERLEAVES = {"bsq": (1, 2, 0), "bil": (0, 2, 1), "bip": (0, 1, 2)}
-"""How the axes in the file become (h, w, bands)."""
+"""Interleave -> order of the file's axes that gives (h, w, bands)."""
 ENDINGS = ("", ".img", ".dat", ".raw", ".bin", ".bsq", ".bil", ".bip")
 LONGEST = 1 << 24  # bytes of a header
 
 
-def open_envi(path: Path) -> Stored:
-    """The header of an ENVI file. Raises Unusable."""
+def open_envi(path: Path) -> SpectralData:
+    """Return the header of an ENVI file. Raise UnusableFile."""
     keys = _keys(path)
-    height, width, bands = (_whole(keys, name) for name in ("lines", "samples", "bands"))
+    height, width, bands = (_whole_number(keys, name) for name in ("lines", "samples", "bands"))
     wavelengths = _wavelengths(keys)
-    lengths(bands, wavelengths)
+    check_length(bands, wavelengths)
     if keys.get("file compression", "0") != "0":
-        raise Unusable("is compressed, which is not read", "save it without compression")
+        raise UnusableFile("is compressed, which is not read", "save it without compression")
     kind, order = _sample(keys)
     interleave = keys.get("interleave", "bsq").lower()
     if interleave not in INTERLEAVES:
-        raise Unusable(f"has interleave {interleave!r}; known are {', '.join(INTERLEAVES)}")
+        raise UnusableFile(f"has interleave {interleave!r}; known are {', '.join(INTERLEAVES)}")
     raw = data_file(path)
-    offset = _whole(keys, "header offset", 0)
+    offset = _whole_number(keys, "header offset", 0)
     claimed = offset + height * width * bands * kind.itemsize
     length = raw.stat().st_size
     if length < claimed:
-        raise truncated(f"{raw.name} has {length} bytes, its header says {claimed}")
+        raise truncated_file(f"{raw.name} has {length} bytes, its header says {claimed}")
     notes = (f"{raw.name} is longer than its header says",) if length > claimed else ()
     sizes = {"bsq": (bands, height, width), "bil": (height, bands, width)}
     shape = sizes.get(interleave, (height, width, bands))
@@ -65,31 +65,31 @@ def open_envi(path: Path) -> Stored:
         mapped = np.memmap(raw, kind.newbyteorder(order), "r", offset, shape)
         return mapped.transpose(INTERLEAVES[interleave])
 
-    nothing = keys.get("data ignore value")
-    return Stored(
+    ignored = keys.get("data ignore value")
+    return SpectralData(
         (height, width), wavelengths, **_scale(keys, bands), read=read, notes=notes,
-        nothing=None if nothing is None else float(numbers(nothing, "its data ignore value")[0]),
+        no_data=None if ignored is None else _number(ignored, "its data ignore value"),
     )  # fmt: skip
 
 
 def data_file(path: Path) -> Path:
-    """The raw file that belongs to a header; Unusable where there is none."""
+    """Return the raw file of a header. Raise UnusableFile where there is none."""
     for ending in ENDINGS:
         for spelt in (ending, ending.upper()):
             found = path.with_suffix(spelt)
             if found.is_file():
                 return found
     tried = ", ".join(path.with_suffix(ending).name for ending in ENDINGS)
-    raise Unusable(f"has no raw file beside it; looked for {tried}", "put it beside the header")
+    raise UnusableFile(f"has no raw file beside it; looked for {tried}", "put it beside the header")
 
 
 def _keys(path: Path) -> dict[str, str]:
-    """The header's keys, lower case, and their values as text without braces."""
+    """Return the header's keys, in lower case, and their values as text without braces."""
     if path.stat().st_size > LONGEST:
-        raise Unusable("is too long for a header")
+        raise UnusableFile("is too long for a header")
     text = path.read_text("latin-1")
     if not text.lstrip().startswith("ENVI"):
-        raise Unusable("is no ENVI header: it does not begin with ENVI")
+        raise UnusableFile("is no ENVI header: it does not begin with ENVI")
     found = {}
     lines = iter(text.splitlines())
     for line in lines:
@@ -104,30 +104,34 @@ def _keys(path: Path) -> dict[str, str]:
     return found
 
 
-def _whole(keys: dict[str, str], name: str, default: int | None = None) -> int:
+def _whole_number(keys: dict[str, str], name: str, default: int | None = None) -> int:
     text = keys.get(name, "" if default is None else str(default))
     if not re.fullmatch(r"\d{1,15}", text):
         wrong = f"{name} is {text!r}, not a whole number" if text else f"has no {name}"
-        raise Unusable(f"its header: {wrong}", f"write {name} = ...")
+        raise UnusableFile(f"its header: {wrong}", f"write {name} = ...")
     return int(text)
 
 
+def _number(text: str, name: str) -> float:
+    return float(finite_numbers(text, name)[0])
+
+
 def _sample(keys: dict[str, str]) -> tuple[np.dtype, Any]:
-    """Type of a sample, and NumPy's letter of its byte order."""
-    number, big = _whole(keys, "data type"), _whole(keys, "byte order", 0)
+    """Return the type of a sample, and NumPy's letter of its byte order."""
+    number, big = _whole_number(keys, "data type"), _whole_number(keys, "byte order", 0)
     if number not in TYPES:
-        raise Unusable(f"has data type {number}; known are {', '.join(map(str, TYPES))}")
+        raise UnusableFile(f"has data type {number}; known are {', '.join(map(str, TYPES))}")
     if big not in (0, 1):
-        raise Unusable(f"has byte order {big}; it is 0 (little endian) or 1 (big endian)")
+        raise UnusableFile(f"has byte order {big}; it is 0 (little endian) or 1 (big endian)")
     return np.dtype(TYPES[number]), "><"[1 - big]
 
 
 def _wavelengths(keys: dict[str, str]) -> np.ndarray:
     if "wavelength" not in keys:
-        raise Unusable("its header has no wavelength", "write wavelength = {400, 410, ...}")
+        raise UnusableFile("its header has no wavelength", "write wavelength = {400, 410, ...}")
     unit = keys.get("wavelength units", "")
     if unit.lower() not in LENGTHS:
-        raise Unusable(
+        raise UnusableFile(
             f"has wavelength units {unit!r}, which say nothing",
             "write wavelength units = Nanometers, or Micrometers",
         )
@@ -136,15 +140,15 @@ def _wavelengths(keys: dict[str, str]) -> np.ndarray:
 
 def _list(keys: dict[str, str], name: str) -> np.ndarray:
     values = [part.strip() for part in keys[name].split(",") if part.strip()]
-    return numbers(values, f"its {name}")
+    return finite_numbers(values, f"its {name}")
 
 
 def _scale(keys: dict[str, str], bands: int) -> dict[str, Any]:
-    """Quantity, gain and offset; see the module."""
+    """Return quantity, gain and offset, see the module."""
     if "reflectance scale factor" in keys:
         factor = _list(keys, "reflectance scale factor")
         if factor.size != 1 or not factor[0] > 0:
-            raise Unusable("has a reflectance scale factor that is not positive")
+            raise UnusableFile("has a reflectance scale factor that is not positive")
         return {"quantity": "reflectance", "gain": 1 / float(factor[0])}
     for kind, quantity, unit in (
         ("data reflectance", "reflectance", 1.0),
@@ -155,12 +159,12 @@ def _scale(keys: dict[str, str], bands: int) -> dict[str, Any]:
             if f"{kind} offset values" in keys:
                 found["offset"] = _list(keys, f"{kind} offset values")
             for name, values in found.items():
-                lengths(bands, values, f"{kind} {name} values")
+                check_length(bands, values, f"{kind} {name} values")
             return {"quantity": quantity} | {name: unit * v for name, v in found.items()}
     unit_text = "".join(keys.get("data units", "").split()).replace("srnm", "nmsr")
     if unit_text.replace("srum", "umsr") not in UNITS:
         given = f"has data units {keys['data units']!r}" if "data units" in keys else "does not say"
-        raise Unusable(
+        raise UnusableFile(
             f"{given}: whether it holds radiance or reflectance, and in which unit, is not known",
             "write into the header reflectance scale factor = 1 (the value of a reflectance of 1), "
             "or data units = W/(m2 nm sr)",

@@ -12,10 +12,10 @@ from types import TracebackType
 from typing import Self
 
 import numpy as np
-import OpenImageIO as oiio
 
 from vcam_cli.errors import BadInput, bad
-from vcam_cli.files.rows import Attribute, RowWriter, image_spec, message, set_attributes
+from vcam_cli.files.image_library import oiio
+from vcam_cli.files.rows import Attribute, RowWriter, image_spec, pending_error, set_attributes
 
 ZIP, PIZ = "zip:1", "piz"  # lossless both
 oiio.attribute("limits:resolution", 1 << 28)  # a million by default; scattered pixels are one row
@@ -65,7 +65,7 @@ class ExrWriter:
         self._writer.__exit__(kind, error, trace)
 
     def write_rows(self, first_row: int, blocks: Mapping[str, np.ndarray]) -> None:
-        """Writes one block (n, width) of every channel, rows first_row .. first_row + n - 1."""
+        """Write a block (n, width) of every channel, rows first_row .. first_row + n - 1."""
         if set(blocks) != set(self._channels):
             raise ValueError(f"channels {sorted(blocks)} given, {self._channels} expected")
         rows = len(blocks[self._channels[0]])
@@ -83,7 +83,7 @@ def write_exr(
     attributes: Mapping[str, Attribute] | None = None,
     compression: str = ZIP,
 ) -> None:
-    """Writes arrays (h, w) as channels of an EXR file, as float32. See `ExrWriter`."""
+    """Write arrays (h, w) as channels of an EXR file, as float32, see `ExrWriter`."""
     shape = next(iter(channels.values())).shape
     with ExrWriter(path, shape, list(channels), attributes, compression) as writer:
         for row in range(0, shape[0], 256):
@@ -91,17 +91,17 @@ def write_exr(
 
 
 def read_exr(path: Path | str) -> tuple[dict[str, np.ndarray], dict[str, Attribute]]:
-    """The channels (h, w) float32 by name, and the attributes, of an EXR file's first part.
+    """Return the channels (h, w), float32, by name, and the attributes of an EXR file's first part.
 
-    Raises BadInput when it cannot be read whole.
+    Raise BadInput when it cannot be read whole.
     """
     source = oiio.ImageInput.open(str(path))
     if source is None:
-        raise _unreadable(path, message(oiio.geterror))
+        raise _unreadable(path, pending_error(oiio.geterror))
     try:
         spec = source.spec()
         data = source.read_image(0, 0, 0, spec.nchannels, "float")
-        reason = message(source.geterror)
+        reason = pending_error(source.geterror)
         if data is None or reason or source.format_name() != "openexr":
             raise _unreadable(path, reason or "it is no EXR file")
         names = spec.channelnames
@@ -121,15 +121,15 @@ def _attributes(spec: oiio.ImageSpec) -> dict[str, Attribute]:
 
 
 def _is_whole(path: Path) -> bool:
-    """Reads the last row back: it needs the header, the table of offsets and the last bytes."""
+    """Tell whether the last row can be read, which takes the header, all offsets and its bytes."""
     source = oiio.ImageInput.open(str(path))
     if source is None:
-        message(oiio.geterror)
+        pending_error(oiio.geterror)
         return False
     try:
         spec = source.spec()
         row = source.read_scanlines(0, 0, spec.height - 1, spec.height, 0, 0, 1, "float")
-        return row is not None and not message(source.geterror)
+        return row is not None and not pending_error(source.geterror)
     finally:
         source.close()
 

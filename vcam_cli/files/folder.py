@@ -1,17 +1,17 @@
 """The output folder of a run: its files appear together, or nothing changes.
 
-A run writes its files into a waiting folder beside their final place. `finish` removes what the
+A run writes its files into a staging folder beside their final place. `finish` removes what the
 previous run had named in its record (run.json), moves the new files in, and writes the record
 last: a folder with a record is complete, and a run that fails leaves the former results.
 
-Why a journal: between the removal of the old record and the writing of the new one, files
-lie in the folder that no record names. Their names stand in the lock file during that
-time, so that a run after a power cut knows what is vcam's and what is not.
+Why a journal: between the removal of the old record and the writing of the new one, no record names
+the files in the folder. Their names are in the lock file during that time, so that a run after a
+power cut knows which files are vcam's.
 
 Why flock: the kernel drops it when its holder dies, however it dies.
 
-Why nothing here minds Ctrl-C: it waits while a function of this module runs (see
-`commands.interrupts`); none of them takes long.
+Why an interrupt is deferred here: between two of these steps nobody would know what to undo. None
+of them takes long.
 """
 
 import errno
@@ -23,17 +23,18 @@ import stat
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from pathlib import Path, PurePosixPath
-from types import TracebackType
 from typing import Any, Self
 
 from vcam_cli.errors import BadInput, CannotDo, bad
 from vcam_cli.files.atomic import STAGING, cannot_write, flush_folder, write_text
 from vcam_cli.files.report import to_json
+from vcam_cli.interrupts import defer_interrupts
 
 LOCK = ".vcam-lock"
-PROGRAM = "vcam"  # a record is vcam's when it says {"program": "vcam", "files": [...]}
+PROGRAM = "vcam"
+"""A record is vcam's when it says {"program": "vcam", "files": [...]}."""
 RECORDS = ("run.json", "accuracy.json", "characterize.json", "study.json", "compare.json")
-"""Records of vcam's commands: what one of them wrote, another may add to."""
+"""The records of vcam's commands: each may add its files to the folder of another."""
 _LARGEST_RECORD = 1 << 26  # bytes
 _NO_LOCKS_HERE = {errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOSYS}
 _NOT_A_FOLDER = {errno.ENOTDIR, errno.EEXIST, errno.ENAMETOOLONG, errno.ELOOP, errno.EINVAL}
@@ -68,14 +69,11 @@ class OutputFolder:
 
     def __enter__(self) -> Self:
         try:
-            str(self.path).encode("utf-8")  # the libraries that write pictures take no other names
-            self._refuse_foreign(before_lock=True)
-            self._make_and_lock()
-            self._refuse_foreign()
-            self._take_over()
+            with defer_interrupts():
+                self._begin()
         except OSError as error:
             self._leave()
-            raise self._no_folder(error) from error
+            raise self._unusable(error) from error
         except ValueError as error:  # a NUL, or no text of this system
             reason = "is not UTF-8" if isinstance(error, UnicodeError) else f"({error})"
             message = f"{self.path} is no folder name: {reason}"
@@ -85,18 +83,14 @@ class OutputFolder:
             raise
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self._leave()
+    def __exit__(self, *_: object) -> None:
+        with defer_interrupts():
+            self._leave()
 
     def new(self, name: str) -> Path:
-        """Where to write the new file `name` ("raw.exr", "captures/raw_001.exr") for now.
+        """Return the temporary path of the new file `name`, as "captures/raw_001.exr".
 
-        Raises BadInput when a file of that name is there that no run of vcam wrote.
+        Raise BadInput when a file of that name is there that no run of vcam wrote.
         """
         self._check_new(name)
         path = self.path / STAGING / name
@@ -110,44 +104,57 @@ class OutputFolder:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """The new files' names, in the order in which they were asked for."""
+        """The names of the new files, in the order of the calls of `new`."""
         return tuple(self._new)
 
     def finish(self, report: Mapping[str, Any]) -> None:
-        """Replaces the previous run's files by the new ones, then writes the record.
+        """Replace the previous run's files by the new ones, then write the record.
 
-        The record is `report` with `program` and `files` (names of the new files) added.
-        Every name asked of `new` must have been written. Raises CannotDo, and BadInput when
-        something has come into the way of a file; then nothing is removed.
+        The record is `report` with `program` and `files` (names of the new files) added. The file
+        of every call of `new` must have been written. Raise CannotDo, and BadInput when the place
+        of a file was taken meanwhile; then nothing is removed.
         """
         names = sorted(self._new)
         for name in names:
             self._check_new(name)
         text = to_json({**report, "program": PROGRAM, "files": names})
         try:
-            record = self.path / STAGING / self._record
-            record.parent.mkdir(exist_ok=True)
-            write_text(record, text)
-            for name in names:  # all are there: else nothing is removed
-                (self.path / STAGING / name).stat()
-            self._write_journal(sorted({*names, *self._previous}))
-            self._remove([self._record, *sorted(self._previous - set(names))])
-            for name in [*names, self._record]:
-                self._move_in(name)
-            flush_folder(self.path)
-            self._finished = True
+            with defer_interrupts():
+                self._replace_previous(names, text)
         except OSError as error:
             raise cannot_write(self.path, error) from error
 
+    def _replace_previous(self, names: list[str], text: str) -> None:
+        """Move the new files in; see the module for the order."""
+        record = self.path / STAGING / self._record
+        record.parent.mkdir(exist_ok=True)
+        write_text(record, text)
+        for name in names:  # all are there: else nothing is removed
+            (self.path / STAGING / name).stat()
+        self._write_journal(sorted({*names, *self._previous}))
+        self._remove([self._record, *sorted(self._previous - set(names))])
+        for name in [*names, self._record]:
+            self._move_in(name)
+        flush_folder(self.path)
+        self._finished = True
+
+    def _begin(self) -> None:
+        """Make, lock and check the folder."""
+        str(self.path).encode("utf-8")  # the libraries that write pictures take no other names
+        self._refuse_foreign(before_lock=True)
+        self._make_and_lock()
+        self._refuse_foreign()
+        self._recover()
+
     def _refuse_foreign(self, before_lock: bool = False) -> None:
-        """Raises BadInput for a non-empty folder without a record or journal of vcam."""
+        """Raise BadInput for a non-empty folder without a record or journal of vcam."""
         try:
             present = set(os.listdir(self.path))
         except FileNotFoundError:
             return
         if before_lock and LOCK in present:
-            return  # perhaps in the middle of another run: judged under the lock
-        ours = self._recorded() or self._journal() or self._of_another()
+            return  # perhaps of a run at work: checked again under the lock
+        ours = self._own_record() or self._journal() or self._has_other_record()
         if present - {LOCK, STAGING} and not ours:
             raise bad(
                 "--out",
@@ -181,20 +188,19 @@ class OutputFolder:
             if not stat.S_ISREG(os.fstat(lock).st_mode):
                 raise OSError(errno.EINVAL, f"{LOCK} is not a regular file")
             _flock(lock, self.path)
-            there = os.stat(name, follow_symlinks=False)
-            if os.path.samestat(os.fstat(lock), there):
+            if os.path.samestat(os.fstat(lock), os.stat(name, follow_symlinks=False)):
                 self._lock, lock = lock, -1
         finally:
             if lock >= 0:
                 os.close(lock)
         return self._lock is not None
 
-    def _take_over(self) -> None:
-        """Learns what the previous run left; clears away what a killed one left half done."""
+    def _recover(self) -> None:
+        """Read what the previous run wrote, and remove what a killed one left unfinished."""
         self._clear_staging()
-        record = self._recorded()
+        record = self._own_record()
         names = record["files"] if record else self._journal()
-        self._previous = frozenset(filter(_harmless, names))
+        self._previous = frozenset(filter(_is_safe, names))
         self._protect_inputs([*self._previous, self._record])
         if not record:
             self._remove(sorted(self._previous))
@@ -212,29 +218,30 @@ class OutputFolder:
 
     def _check_new(self, name: str) -> None:
         parts = PurePosixPath(name).parts
-        if not _harmless(name) or parts[0] in (LOCK, STAGING) or name == self._record:
+        if not _is_safe(name) or parts[0] in (LOCK, STAGING) or name == self._record:
             raise ValueError(f"{name!r} is no name for a file of a run")
         self._protect_inputs([name])
         target = self.path / name
         ours = name in self._previous and (target.is_symlink() or not target.is_dir())
-        if (os.path.lexists(target) and not ours) or not _real_parents(self.path, name):
+        if (os.path.lexists(target) and not ours) or not _has_real_parents(self.path, name):
             raise bad(
                 "--out",
                 f"{target} is there already and was not written by vcam",
                 "move it away, or choose another folder",
             )
 
-    def _recorded(self) -> dict[str, Any] | None:
-        """The record of the previous run, when it is vcam's."""
-        return _claim(self.path / self._record)
+    def _own_record(self) -> dict[str, Any] | None:
+        """Return the record of the previous run, when it is vcam's."""
+        return read_record(self.path / self._record)
 
-    def _of_another(self) -> bool:
-        """Whether another command of vcam has finished here."""
-        return any(_claim(self.path / name) for name in RECORDS if name != self._record)
+    def _has_other_record(self) -> bool:
+        """Tell whether another command of vcam has finished here."""
+        return any(read_record(self.path / name) for name in RECORDS if name != self._record)
 
     def _journal(self) -> list[str]:
-        claim = _claim(self.path / LOCK)
-        return claim["files"] if claim else []
+        """Return the names that the lock file holds, see the module."""
+        journal = read_record(self.path / LOCK)
+        return journal["files"] if journal else []
 
     def _write_journal(self, names: list[str]) -> None:
         assert self._lock is not None
@@ -244,9 +251,9 @@ class OutputFolder:
         os.fsync(self._lock)
 
     def _remove(self, names: Iterable[str]) -> None:
-        """Removes these files of the folder and the subfolders left empty, nothing outside."""
+        """Remove these files of the folder and the subfolders left empty, nothing outside."""
         for name in names:
-            if not _harmless(name) or not _real_parents(self.path, name):
+            if not _is_safe(name) or not _has_real_parents(self.path, name):
                 continue
             path = self.path / name
             if path.is_dir() and not path.is_symlink():
@@ -269,12 +276,12 @@ class OutputFolder:
             shutil.rmtree(staging)
 
     def _leave(self) -> None:
-        """Removes all that is not a finished result and frees the lock; never raises."""
+        """Remove all that is not a finished result and free the lock; never raise."""
         if self._lock is not None:
             clean = True
             try:
                 self._clear_staging()
-                if not self._finished and not self._recorded():
+                if not self._finished and not self._own_record():
                     self._remove(self._journal())
             except OSError:
                 clean = False  # the journal stays for the next run
@@ -289,7 +296,8 @@ class OutputFolder:
                     folder.rmdir()
         self._made = []
 
-    def _no_folder(self, error: OSError) -> BadInput | CannotDo:
+    def _unusable(self, error: OSError) -> BadInput | CannotDo:
+        """Return the error that tells why the folder cannot be used."""
         if error.errno in _NOT_A_FOLDER:
             reason = (
                 "is a file" if os.path.isfile(self.path) else f"is no folder ({error.strerror})"
@@ -299,24 +307,19 @@ class OutputFolder:
 
 
 def is_foreign(folder: Path) -> bool:
-    """Whether a folder holds something, and nothing that says it is vcam's. Raises OSError."""
+    """Tell whether a folder holds files, and none that shows it is vcam's. Raise OSError."""
     try:
         present = set(os.listdir(folder))
     except FileNotFoundError:
         return False
-    ours = any(_claim(folder / name) for name in (*RECORDS, LOCK))
+    ours = any(read_record(folder / name) for name in (*RECORDS, LOCK))
     return bool(present - {LOCK, STAGING}) and not ours
 
 
-def record_of(path: Path) -> dict[str, Any] | None:
-    """The record of a finished command in a file; None where the file is none of vcam's."""
-    return _claim(path)
-
-
 def previous_files(record: Path) -> list[str]:
-    """The names of the files that a record of vcam speaks of, none outside its folder."""
-    claim = _claim(record)
-    return [name for name in claim["files"] if _harmless(name)] if claim else []
+    """Return the names of the files that a record of vcam lists, none outside its folder."""
+    found = read_record(record)
+    return [name for name in found["files"] if _is_safe(name)] if found else []
 
 
 def _flock(lock: int, folder: Path) -> None:
@@ -332,8 +335,8 @@ def _flock(lock: int, folder: Path) -> None:
             raise
 
 
-def _claim(path: Path) -> dict[str, Any] | None:
-    """The JSON object in `path` when it is a record or journal of vcam, else None."""
+def read_record(path: Path) -> dict[str, Any] | None:
+    """Return the JSON object in `path` when it is a record or journal of vcam, else None."""
     try:
         status = path.lstat()
         if not stat.S_ISREG(status.st_mode) or not 0 < status.st_size <= _LARGEST_RECORD:
@@ -349,8 +352,8 @@ def _claim(path: Path) -> dict[str, Any] | None:
     return value
 
 
-def _harmless(name: str) -> bool:
-    """A name that a file can have and that stays inside its folder."""
+def _is_safe(name: str) -> bool:
+    """Tell whether a file can have the name, and stays inside its folder with it."""
     path = PurePosixPath(name)
     try:
         short = all(len(os.fsencode(part)) <= 255 for part in path.parts)
@@ -360,8 +363,8 @@ def _harmless(name: str) -> bool:
     return short and inside and "\0" not in name
 
 
-def _real_parents(folder: Path, name: str) -> bool:
-    """Whether every folder on the way to `name` is missing or a folder itself, no link."""
+def _has_real_parents(folder: Path, name: str) -> bool:
+    """Tell whether every folder on the way to `name` is missing or a folder itself, no link."""
     for parent in PurePosixPath(name).parents[:-1]:
         path = folder / parent
         if os.path.lexists(path) and (path.is_symlink() or not path.is_dir()):

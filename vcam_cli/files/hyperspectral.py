@@ -11,53 +11,53 @@ from typing import Any
 
 import numpy as np
 
-from vcam_cli.engine import memory
+from vcam_cli import memory
 from vcam_cli.errors import CannotDo
-from vcam_cli.files.images import Unusable, check_file, told
-from vcam_cli.files.stored import Stored
+from vcam_cli.files.images import UnusableFile, check_file, convert_errors
+from vcam_cli.files.spectral_data import SpectralData
 from vcam_cli.scenes.hyperspectral import Bands, Cube
 
 MOST_SAMPLES = 10**11
 """Samples of all bands that are read."""
 MOST_NEGATIVE = 0.01
-"""Of the largest value: noise and dark frames go below zero, nothing else does so by more."""
+"""Part of the largest value that noise and dark frames may go below zero."""
 _BLOCK = 32  # rows
 _REMEDY = "give a whole spectral .exr, ENVI .hdr, ISETCam .mat, .npz or multichannel .tif"
 
 YamlPath = tuple[str | int, ...] | str
 
 
-def _exr(path: Path) -> Stored:
+def _exr(path: Path) -> SpectralData:
     from vcam_cli.files.spectral import open_spectral
 
     return open_spectral(path)
 
 
-def _envi(path: Path) -> Stored:
+def _envi(path: Path) -> SpectralData:
     from vcam_cli.files.envi import open_envi
 
     return open_envi(path)
 
 
-def _isetcam(path: Path) -> Stored:
+def _isetcam(path: Path) -> SpectralData:
     from vcam_cli.files.isetcam import open_isetcam
 
     return open_isetcam(path)
 
 
-def _npz(path: Path) -> Stored:
+def _npz(path: Path) -> SpectralData:
     from vcam_cli.files.npz import open_npz
 
     return open_npz(path)
 
 
-def _tiff(path: Path) -> Stored:
+def _tiff(path: Path) -> SpectralData:
     from vcam_cli.files.tiff import open_tiff
 
     return open_tiff(path)
 
 
-READERS: dict[str, Callable[[Path], Stored]] = {
+READERS: dict[str, Callable[[Path], SpectralData]] = {
     ".exr": _exr,
     ".hdr": _envi,
     ".mat": _isetcam,
@@ -68,31 +68,31 @@ READERS: dict[str, Callable[[Path], Stored]] = {
 
 
 def read_bands(path: Path | str, yaml_path: YamlPath) -> Bands:
-    """What a file of spectra holds, by its header. Raises as `read_cube` does."""
+    """Return what a file of spectra holds, by its header. Raise as `read_cube` does."""
     with _opened(Path(path), yaml_path) as (stored, order):
         return _bands(stored, order)
 
 
 def read_cube(path: Path | str, yaml_path: YamlPath) -> tuple[Cube, tuple[str, ...]]:
-    """A file of spectra, and notes for the user.
+    """Return a file of spectra, and notes for the user.
 
-    Values slightly below 0 become 0, with a note. Raises BadInput (with `yaml_path`) for a file
+    Values slightly below 0 become 0, with a note. Raise BadInput (with `yaml_path`) for a file
     that is missing, of no known format, truncated, whose wavelengths do not rise, or with values
     that are not finite or clearly negative; CannotDo when it may not be read or the memory does
     not suffice.
     """
     with _opened(Path(path), yaml_path) as (stored, order):
-        data, notes = _settled(stored, order)
+        data, notes = _si_samples(stored, order)
         return Cube(data, _bands(stored, order)), (*stored.notes, *notes)
 
 
 def companions(path: Path | str) -> tuple[Path, ...]:
-    """The files beside a file of spectra that are read with it, where they are there."""
+    """Return the files beside a file of spectra that are read with it, where there are any."""
     path = Path(path)
     if path.suffix.lower() == ".hdr":
         from vcam_cli.files.envi import data_file
 
-        with suppress(Unusable):
+        with suppress(UnusableFile):
             return (data_file(path),)
     table = path.with_suffix(".csv")
     if path.suffix.lower() in (".tif", ".tiff") and table.is_file():
@@ -101,13 +101,13 @@ def companions(path: Path | str) -> tuple[Path, ...]:
 
 
 @contextmanager
-def _opened(path: Path, yaml_path: YamlPath) -> Iterator[tuple[Stored, slice]]:
-    """The header of a file, and its bands in the order of wavelength."""
-    with told(path, yaml_path, _REMEDY):
+def _opened(path: Path, yaml_path: YamlPath) -> Iterator[tuple[SpectralData, slice]]:
+    """Open a file: its header, and its bands in the order of wavelength."""
+    with convert_errors(path, yaml_path, _REMEDY):
         reader = READERS.get(path.suffix.lower())
         if reader is None:
             known = ", ".join(READERS)
-            raise Unusable(f"has the ending {path.suffix or 'none'!r}; known are {known}")
+            raise UnusableFile(f"has the ending {path.suffix or 'none'!r}; known are {known}")
         check_file(path)
         stored = reader(path)
         order = _order(stored.wavelengths)
@@ -115,21 +115,21 @@ def _opened(path: Path, yaml_path: YamlPath) -> Iterator[tuple[Stored, slice]]:
         yield stored, order
 
 
-def _bands(stored: Stored, order: slice) -> Bands:
+def _bands(stored: SpectralData, order: slice) -> Bands:
     white = stored.white
     if white is not None:
         if white.min() < 0 or not white.max() > 0:
-            raise Unusable("its white is negative or black", "correct the white, or remove it")
+            raise UnusableFile("its white is negative or black", "correct the white, or remove it")
         white = white[order]
     return Bands(stored.wavelengths[order], stored.quantity, white)
 
 
 def _order(wavelengths: np.ndarray) -> slice:
-    """Brings the bands into the order of wavelength; a file may also begin with the longest."""
+    """Return the slice of bands by rising wavelength; a file may also begin with the longest."""
     if len(wavelengths) < 2:
-        raise Unusable(f"has {len(wavelengths)} band; spectra need at least two wavelengths")
+        raise UnusableFile(f"has {len(wavelengths)} band; spectra need at least two wavelengths")
     if not wavelengths.min() > 0:
-        raise Unusable("has a wavelength that is not positive", "correct its wavelengths")
+        raise UnusableFile("has a wavelength that is not positive", "correct its wavelengths")
     step = np.diff(wavelengths)
     if (step > 0).all():
         return slice(None)
@@ -137,18 +137,18 @@ def _order(wavelengths: np.ndarray) -> slice:
         return slice(None, None, -1)
     wrong = int(np.flatnonzero(step <= 0 if step[0] >= 0 else step >= 0)[0])
     before, after = wavelengths[wrong : wrong + 2] * 1e9
-    raise Unusable(
+    raise UnusableFile(
         f"has wavelengths that do not rise: {after:.6g} nm follows {before:.6g} nm",
         "sort its bands by wavelength",
     )
 
 
-def _check_size(path: Path, stored: Stored) -> None:
-    """Refuses by the header alone."""
+def _check_size(path: Path, stored: SpectralData) -> None:
+    """Refuse a file by its header alone."""
     height, width = stored.shape
     samples = height * width * len(stored.wavelengths)
     if not 0 < samples <= MOST_SAMPLES:
-        raise Unusable(f"claims {height} x {width} samples in {len(stored.wavelengths)} bands")
+        raise UnusableFile(f"claims {height} x {width} samples in {len(stored.wavelengths)} bands")
     need, free = 2 * 4 * samples, memory.available()
     if need > free:
         raise CannotDo(
@@ -158,18 +158,18 @@ def _check_size(path: Path, stored: Stored) -> None:
         )
 
 
-def _settled(stored: Stored, order: slice) -> tuple[np.ndarray, list[str]]:
-    """The samples in SI units, float32, checked block by block; and notes."""
+def _si_samples(stored: SpectralData, order: slice) -> tuple[np.ndarray, list[str]]:
+    """Return the samples in SI units, float32, checked block by block, and notes."""
     data = stored.read()
     shape = (*stored.shape, len(stored.wavelengths))
     if data.shape != shape:
-        raise Unusable(f"holds samples {data.shape} where its header says {shape}")
+        raise UnusableFile(f"holds samples {data.shape} where its header says {shape}")
     out = np.empty(shape, np.float32)
     wavelengths = stored.wavelengths[order]
     lowest, largest, below, missing = 0.0, 0.0, 0, 0
     for top in range(0, len(out), _BLOCK):
         rows = slice(top, top + _BLOCK)
-        block, gaps = _in_units(data[rows], stored)
+        block, gaps = _si_block(data[rows], stored)
         out[rows] = block[:, :, order]
         low, high = float(out[rows].min()), float(out[rows].max())
         if not (np.isfinite(low) and np.isfinite(high)):
@@ -179,7 +179,7 @@ def _settled(stored: Stored, order: slice) -> tuple[np.ndarray, list[str]]:
             np.maximum(out[rows], 0, out=out[rows])
         lowest, largest, missing = min(lowest, low), max(largest, high), missing + gaps
     if lowest < -MOST_NEGATIVE * largest:
-        raise Unusable(
+        raise UnusableFile(
             f"holds negative values, down to {lowest:.3g} (the largest is {largest:.3g}); "
             "light is 0 or more",
             "replace such values, for example by 0",
@@ -187,23 +187,23 @@ def _settled(stored: Stored, order: slice) -> tuple[np.ndarray, list[str]]:
     return out, list(_remarks(stored, lowest, largest, below, missing, out.size))
 
 
-def _in_units(block: Any, stored: Stored) -> tuple[np.ndarray, int]:
-    """Some rows in SI units, float32; and how many of their values are none, and become 0."""
+def _si_block(block: Any, stored: SpectralData) -> tuple[np.ndarray, int]:
+    """Return some rows in SI units, float32, and how many of their values are no data, now 0."""
     with np.errstate(over="ignore", invalid="ignore"):  # what overflows is not finite, and told
         values = np.asarray(block).astype(np.float32)
         values *= np.asarray(stored.gain, np.float32)
     if np.any(stored.offset):
         values += np.asarray(stored.offset, np.float32)
-    if stored.nothing is None:
+    if stored.no_data is None:
         return values, 0
-    nothing = np.asarray(block) == stored.nothing
-    values[nothing] = 0.0
-    return values, int(np.count_nonzero(nothing))
+    missing = np.asarray(block) == stored.no_data
+    values[missing] = 0.0
+    return values, int(np.count_nonzero(missing))
 
 
-def _not_finite(block: np.ndarray, top: int, wavelengths: np.ndarray) -> Unusable:
+def _not_finite(block: np.ndarray, top: int, wavelengths: np.ndarray) -> UnusableFile:
     y, x, band = np.argwhere(~np.isfinite(block))[0]
-    return Unusable(
+    return UnusableFile(
         f"holds a value not finite ({block[y, x, band]:g} at row {top + y}, column {x}, "
         f"{wavelengths[band] * 1e9:.6g} nm)",
         "replace such values, for example by 0",
@@ -211,7 +211,7 @@ def _not_finite(block: np.ndarray, top: int, wavelengths: np.ndarray) -> Unusabl
 
 
 def _remarks(
-    stored: Stored, lowest: float, largest: float, below: int, missing: int, samples: int
+    stored: SpectralData, lowest: float, largest: float, below: int, missing: int, samples: int
 ) -> Iterator[str]:
     if below:
         yield (

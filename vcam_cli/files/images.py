@@ -16,15 +16,15 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import OpenImageIO as oiio
 
-from vcam_cli.engine import memory
+from vcam_cli import memory
 from vcam_cli.errors import BadInput, CannotDo, bad
-from vcam_cli.files.rows import message
+from vcam_cli.files.image_library import oiio
+from vcam_cli.files.rows import pending_error
 
 MOST_PIXELS = 10**9
 MOST_LIGHT = 1e30
-"""Over `white`, as float32 ends at 3.4e38 and a camera's units take their share."""
+"""The largest light over `white`: float32 ends at 3.4e38, and a camera's units need some of it."""
 _PNG_START = b"\x89PNG\r\n\x1a\n"
 _ALPHA = {"A", "ALPHA"}
 _RGB = ("R", "G", "B")
@@ -42,16 +42,19 @@ _CONVERT = "convert it to a PNG, TIFF or EXR with one (gray) or three (R, G, B) 
 
 
 @dataclass(frozen=True)
-class Picture:
-    """`data`: (h, w, channels) float32, linear light / white; 1 or 3 channels (R, G, B)."""
+class LinearImage:
+    """The linear light of an image file."""
 
     data: np.ndarray
+    """Light over white (h, w, channels), float32; 1 or 3 channels (R, G, B), or those asked for."""
     channels: tuple[str, ...]
+    """The channels' names in the file."""
     notes: tuple[str, ...]
+    """What was left aside, for the user."""
 
 
-class Unusable(Exception):
-    """Reason why a file cannot serve as a scene, and remedy; "" = what helps with its kind."""
+class UnusableFile(Exception):
+    """A file that cannot be used: the reason, and a remedy where it is not that of its kind."""
 
     def __init__(self, reason: str, remedy: str = "") -> None:
         super().__init__(reason)
@@ -65,8 +68,8 @@ def read_picture(
     yaml_path: tuple[str | int, ...] | str,
     channels: tuple[str, ...] = _RGB,
     signed: bool = False,
-) -> Picture:
-    """Reads an image file as linear light divided by `white`.
+) -> LinearImage:
+    """Return an image file as linear light divided by `white`.
 
     `encoding` is "srgb" (decoded by IEC 61966-2-1) or "linear". Integer samples run from 0 to 1
     = the largest code; `white` is the linear value that becomes 1. Orientation tags are obeyed.
@@ -75,41 +78,41 @@ def read_picture(
     channels; others than R, G, B must be there by name. `signed`: values below 0 are allowed, as
     colors outside a display's gamut have them.
 
-    Raises BadInput (with `yaml_path`) for a file that is missing, no regular file, no image,
+    Raise BadInput (with `yaml_path`) for a file that is missing, no regular file, no image,
     truncated, of a kind that is no light, with two color channels, negative or not finite;
     CannotDo when it may not be read or the memory does not suffice.
     """
     if encoding not in ("srgb", "linear") or not white > 0:
         raise ValueError(f"encoding {encoding!r}, white {white!r}")
     path = Path(path)
-    with told(path, yaml_path):
+    with convert_errors(path, yaml_path):
         check_file(path)
-        with opened(path) as source:
+        with open_image(path) as source:
             return _read(source, encoding == "srgb", white, channels, signed)
 
 
 def color_channels(
     path: Path | str, yaml_path: tuple[str | int, ...] | str, channels: tuple[str, ...] = _RGB
 ) -> int:
-    """How many channels `read_picture` would give, by the header alone, and raising the same."""
+    """Return the number of channels that `read_picture` gives, by the header; raise the same."""
     path = Path(path)
-    with told(path, yaml_path):
+    with convert_errors(path, yaml_path):
         check_file(path)
-        with opened(path) as source:
+        with open_image(path) as source:
             return len(_header(source.spec(), channels)[0])
 
 
 @contextmanager
-def told(
+def convert_errors(
     path: Path, yaml_path: tuple[str | int, ...] | str, remedy: str = _CONVERT
 ) -> Iterator[None]:
-    """Turns what can be wrong with a file into BadInput and CannotDo.
+    """Convert what can be wrong with a file into BadInput and CannotDo.
 
-    remedy: for a file that is not of its kind.
+    remedy: the remedy for a file that is not of its kind.
     """
     try:
         yield
-    except Unusable as error:
+    except UnusableFile as error:
         raise bad(yaml_path, f"{path}: {error.reason}", error.remedy or remedy) from None
     except PermissionError:
         raise CannotDo(f"{path} may not be read", "give yourself read permission") from None
@@ -120,32 +123,32 @@ def told(
 
 
 def decode_srgb(code: np.ndarray) -> np.ndarray:
-    """Linear light of sRGB-coded values (1 = white), IEC 61966-2-1; float64 in, float64 out."""
+    """Return the linear light of sRGB-coded values (1 = white), IEC 61966-2-1, float64."""
     code = np.asarray(code)
     high = ((np.maximum(code, 0.04045) + 0.055) / 1.055) ** 2.4
     return np.where(code <= 0.04045, code / 12.92, high)
 
 
 def check_file(path: Path) -> None:
-    """Refuses what is no whole regular file, before OpenImageIO sees it."""
+    """Refuse what is no whole regular file, before OpenImageIO sees it."""
     str(path).encode("utf-8")  # OpenImageIO takes no other names
     try:
         status = os.stat(path)
     except FileNotFoundError:
-        raise Unusable("there is no such file", "check the name and the folder") from None
+        raise UnusableFile("there is no such file", "check the name and the folder") from None
     if stat.S_ISDIR(status.st_mode):
-        raise Unusable("is a folder, not an image file", "give an image file")
+        raise UnusableFile("is a folder, not an image file", "give an image file")
     if not stat.S_ISREG(status.st_mode):
-        raise Unusable("is a device, pipe or socket", "give a regular image file")
+        raise UnusableFile("is a device, pipe or socket", "give a regular image file")
     if status.st_size == 0:
-        raise Unusable("the file is empty", "give a whole image file")
+        raise UnusableFile("the file is empty", "give a whole image file")
     with open(path, "rb") as file:
         if file.read(8) == _PNG_START and not _png_is_whole(file, status.st_size):
-            raise truncated()
+            raise truncated_file()
 
 
 def _png_is_whole(file: Any, size: int) -> bool:
-    """Whether a PNG's chunks reach IEND unharmed (libpng would print its own complaint).
+    """Tell whether a PNG's chunks reach IEND unharmed (libpng would print its own complaint).
 
     Those that it can do without may be damaged: their name begins with a small letter.
     """
@@ -167,7 +170,7 @@ def _png_is_whole(file: Any, size: int) -> bool:
 
 
 def _check_sum_holds(file: Any, name: bytes, length: int) -> bool:
-    """Whether the CRC-32 of a PNG's chunk, whose data comes next in the file, is the one stored."""
+    """Tell whether the CRC-32 of a PNG's chunk, whose data comes next, is the one stored."""
     found = zlib.crc32(name)
     while length > 0:
         part = file.read(min(length, 1 << 20))
@@ -178,40 +181,42 @@ def _check_sum_holds(file: Any, name: bytes, length: int) -> bool:
 
 
 @contextmanager
-def opened(path: Path) -> Iterator[Any]:
-    """OpenImageIO's reader of a file, colors not multiplied by alpha; raises Unusable."""
+def open_image(path: Path) -> Iterator[Any]:
+    """Open a file with OpenImageIO, colors not multiplied by alpha. Raise UnusableFile."""
     config = oiio.ImageSpec()
     config.attribute("oiio:UnassociatedAlpha", 1)  # else colors come multiplied by alpha
     source = oiio.ImageInput.open(str(path.absolute()), config)
     if source is None:
-        reason = message(oiio.geterror)
-        raise Unusable(f"is no image that can be read ({_brief(reason, path)})")
+        reason = pending_error(oiio.geterror)
+        raise UnusableFile(f"is no image that can be read ({_brief(reason, path)})")
     try:
         if source.format_name() == "null":
-            raise Unusable("is no image")
+            raise UnusableFile("is no image")
         yield source
     finally:
         source.close()
-        message(source.geterror)
+        pending_error(source.geterror)
 
 
-def _read(source: Any, srgb: bool, white: float, wanted: tuple[str, ...], signed: bool) -> Picture:
+def _read(
+    source: Any, srgb: bool, white: float, wanted: tuple[str, ...], signed: bool
+) -> LinearImage:
     spec = source.spec()
     chosen, notes = _header(spec, wanted)
-    data, more = samples(source, spec, chosen)
+    data, more = read_samples(source, spec, chosen)
     if source.seek_subimage(1, 0):
         more.append("only the first of several images in the file is used")
-    message(source.geterror)
+    pending_error(source.geterror)
     if source.format_name() == "openexr":
-        data = on_display_window(data, spec, more)
+        data = extract_display_window(data, spec, more)
     light = _linear(data, srgb, white, signed)
     light = np.ascontiguousarray(_upright(light, spec, more))
     names = tuple(spec.channelnames[index] for index in chosen)
-    return Picture(light, names, (*notes, *more, *_remarks(spec)))
+    return LinearImage(light, names, (*notes, *more, *_remarks(spec)))
 
 
 def _header(spec: Any, wanted: tuple[str, ...]) -> tuple[tuple[int, ...], tuple[str, ...]]:
-    """Indices of the channels to read, and notes; Unusable for what is no picture of light."""
+    """Return the indices of the channels to read, and notes. Raise UnusableFile."""
     _check_kind(spec)
     chosen, notes = _choose_channels(tuple(spec.channelnames), spec.alpha_channel, wanted)
     check_size(spec, len(chosen))
@@ -220,30 +225,32 @@ def _header(spec: Any, wanted: tuple[str, ...]) -> tuple[tuple[int, ...], tuple[
 
 def _check_kind(spec: Any) -> None:
     if spec.deep:
-        raise Unusable("is a deep image")
+        raise UnusableFile("is a deep image")
     if spec.depth > 1:
-        raise Unusable("is a volume, not an image")
+        raise UnusableFile("is a volume, not an image")
     kind = spec.get_string_attribute("jpeg:ColorSpace")
     photometric = spec.get_int_attribute("tiff:PhotometricInterpretation", 1)
     if kind in ("CMYK", "YCCK") or photometric == 5:
-        raise Unusable("holds printing inks (CMYK), not light", "convert it to RGB")
+        raise UnusableFile("holds printing inks (CMYK), not light", "convert it to RGB")
     if photometric not in _LIGHT:
-        raise Unusable(f"is a TIFF of photometric kind {photometric}, not gray or RGB")
+        raise UnusableFile(f"is a TIFF of photometric kind {photometric}, not gray or RGB")
     if photometric == 0 and str(spec.format) != "uint8":
-        raise Unusable("is a TIFF where white is 0, with more than 8 bits")  # not turned by OIIO
+        raise UnusableFile(
+            "is a TIFF where white is 0, with more than 8 bits"
+        )  # not turned by OIIO
 
 
 def _choose_channels(
     names: tuple[str, ...], alpha: int, wanted: tuple[str, ...]
 ) -> tuple[tuple[int, ...], tuple[str, ...]]:
-    """Indices of the gray or the wanted channels, and notes on what is dropped."""
+    """Return the indices of the gray or the wanted channels, and notes on what is dropped."""
     upper = [name.upper() for name in names]
     color = [i for i, name in enumerate(upper) if name not in _ALPHA and i != alpha]
     if all(name in upper for name in wanted):
         chosen = tuple(upper.index(name) for name in wanted)
     elif wanted != _RGB:
         shown = ", ".join(names) or "none"
-        raise Unusable(
+        raise UnusableFile(
             f"has no channels {', '.join(wanted)} but {shown}", "name the channels of the file so"
         )
     elif len(color) == 1:
@@ -252,9 +259,9 @@ def _choose_channels(
         chosen = (upper.index("Y"),)
     elif len(color) == 2:
         shown = ", ".join(names[i] for i in color)
-        raise Unusable(f"has two color channels ({shown}); one or three are needed")
+        raise UnusableFile(f"has two color channels ({shown}); one or three are needed")
     else:
-        raise Unusable(f"has no channels R, G, B but {', '.join(names) or 'none'}")
+        raise UnusableFile(f"has no channels R, G, B but {', '.join(names) or 'none'}")
     dropped = [names[i] for i in color if i not in chosen]
     notes = ["alpha channel dropped"] if len(color) < len(names) else []
     if dropped:
@@ -263,10 +270,10 @@ def _choose_channels(
 
 
 def check_size(spec: Any, channels: int) -> None:
-    """Refuses by the header alone, before a byte of the image is unpacked."""
+    """Refuse a file by its header alone, before a byte of the image is unpacked."""
     pixels = max(spec.width * spec.height, spec.full_width * spec.full_height)
     if pixels > MOST_PIXELS:
-        raise Unusable(
+        raise UnusableFile(
             f"claims {spec.width} x {spec.height} pixels; at most {MOST_PIXELS:.0e} are read",
             "crop it or reduce its size",
         )
@@ -279,28 +286,28 @@ def check_size(spec: Any, channels: int) -> None:
         )
 
 
-def samples(
+def read_samples(
     source: Any, spec: Any, chosen: tuple[int, ...], page: int = 0
 ) -> tuple[np.ndarray, list[str]]:
-    """The chosen channels as stored: integers as they are, anything else as float32; and notes.
+    """Return the chosen channels as stored, integers as they are, else as float32; and notes.
 
-    spec: of the page, the first of several images in the file unless told otherwise.
+    spec: the header of the page, by default the first of several images in the file.
     """
     kinds = {str(spec.channelformat(index)) for index in chosen}
     kind = _READ_AS.get(kinds.pop()) if len(kinds) == 1 else None
     name = "float" if kind is None else _OIIO_NAMES.get(kind, np.dtype(kind).name)
     first, last = min(chosen), max(chosen) + 1
     data = source.read_image(page, 0, first, last, name)
-    reason = message(source.geterror)
+    reason = pending_error(source.geterror)
     if data is None or (reason and "extraneous bytes" not in reason):
-        raise truncated(reason)
+        raise truncated_file(reason)
     order = [index - first for index in chosen]
     notes = ["the file has stray bytes in it"] if reason else []
     return (data if order == list(range(last - first)) else data[:, :, order]), notes
 
 
-def on_display_window(data: np.ndarray, spec: Any, notes: list[str]) -> np.ndarray:
-    """An EXR's picture is its display window: black where the file holds no data."""
+def extract_display_window(data: np.ndarray, spec: Any, notes: list[str]) -> np.ndarray:
+    """Return an EXR's display window, black where the file holds no data."""
     left, top = spec.x - spec.full_x, spec.y - spec.full_y
     shape = (spec.full_height, spec.full_width)
     if (left, top) == (0, 0) and shape == data.shape[:2]:
@@ -308,7 +315,7 @@ def on_display_window(data: np.ndarray, spec: Any, notes: list[str]) -> np.ndarr
     rows = slice(max(top, 0), min(top + data.shape[0], shape[0]))
     columns = slice(max(left, 0), min(left + data.shape[1], shape[1]))
     if rows.start >= rows.stop or columns.start >= columns.stop:
-        raise Unusable("holds no pixel inside its display window")
+        raise UnusableFile("holds no pixel inside its display window")
     notes.append("the data window differs from the display window; the latter is used")
     window = np.zeros((*shape, data.shape[2]), data.dtype)
     window[rows, columns] = data[
@@ -318,7 +325,7 @@ def on_display_window(data: np.ndarray, spec: Any, notes: list[str]) -> np.ndarr
 
 
 def _linear(data: np.ndarray, srgb: bool, white: float, signed: bool) -> np.ndarray:
-    """Samples -> linear light / white, float32: by table up to 16 bits, else block by block."""
+    """Return linear light / white, float32: by table up to 16 bits, else block by block."""
     if data.dtype.kind == "u" and data.dtype.itemsize <= 2:
         code = np.arange(np.iinfo(data.dtype).max + 1) / np.iinfo(data.dtype).max
         light = _over_white(code, srgb, white)[data]
@@ -336,7 +343,7 @@ def _linear(data: np.ndarray, srgb: bool, white: float, signed: bool) -> np.ndar
 
 
 def _over_white(code: np.ndarray, srgb: bool, white: float) -> np.ndarray:
-    """Light of codes (full scale = 1) over `white`, float32; infinite where it is too much."""
+    """Return the light of codes (full scale = 1) over `white`, float32; infinite beyond that."""
     with np.errstate(over="ignore"):
         return ((decode_srgb(code) if srgb else code) / white).astype(np.float32)
 
@@ -345,7 +352,7 @@ def _check_light(light: np.ndarray, stored: np.ndarray, row: int) -> None:
     if light.max(initial=0.0) <= MOST_LIGHT and light.min(initial=0.0) >= -MOST_LIGHT:
         return
     y, x, channel = np.argwhere(~(np.abs(light) <= MOST_LIGHT))[0]
-    raise Unusable(
+    raise UnusableFile(
         f"holds a value too large ({stored[y, x, channel]:g} at row {row + y}, column {x}): its "
         f"light over `white` is beyond {MOST_LIGHT:g}",
         "correct encoding and white, or scale the image",
@@ -358,14 +365,14 @@ def _check_values(block: np.ndarray, row: int, signed: bool) -> None:
         y, x, channel = np.argwhere(wrong)[0]
         value = block[y, x, channel]
         kind = "a negative value" if value < 0 and np.isfinite(value) else "a value not finite"
-        raise Unusable(
+        raise UnusableFile(
             f"holds {kind} ({value:g} at row {row + y}, column {x}); light is 0 or more",
             "replace such values, for example by 0",
         )
 
 
 def _upright(data: np.ndarray, spec: Any, notes: list[str]) -> np.ndarray:
-    """The image as it is meant to be seen, by the EXIF / TIFF orientation 1 to 8."""
+    """Return the image turned upright, by the EXIF / TIFF orientation 1 to 8."""
     orientation = spec.get_int_attribute("Orientation", 1)
     if not 2 <= orientation <= 8:
         return data
@@ -389,10 +396,10 @@ def _remarks(spec: Any) -> list[str]:
     return notes
 
 
-def truncated(reason: str = "") -> Unusable:
-    """What to raise for a file that ends too early."""
+def truncated_file(reason: str = "") -> UnusableFile:
+    """Return the error for a file that ends too early."""
     detail = f" ({reason[:100]})" if reason else ""
-    return Unusable(f"is truncated or damaged{detail}", "copy or download the file again")
+    return UnusableFile(f"is truncated or damaged{detail}", "copy or download the file again")
 
 
 def _unreadable(

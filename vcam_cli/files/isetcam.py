@@ -16,32 +16,38 @@ from typing import Any
 
 import numpy as np
 
-from vcam_cli.files.images import Unusable
-from vcam_cli.files.matlab import ASKED, MOST_RATIO, SUSPECT, read_variables, refuse_too_much
-from vcam_cli.files.stored import MOST_WAVELENGTHS, PER_NM, Stored, lengths, numbers
+from vcam_cli.files.images import UnusableFile
+from vcam_cli.files.matlab import ASKED, MOST_RATIO, SUSPECT, check_memory, read_variables
+from vcam_cli.files.spectral_data import (
+    MOST_WAVELENGTHS,
+    PER_NM,
+    SpectralData,
+    check_length,
+    finite_numbers,
+)
 from vcam_cli.spectra import PLANCK, SPEED_OF_LIGHT
 
 Lookup = Callable[..., Any]
-"""From the names of a variable and its fields to an array in MATLAB's order of axes, or None."""
+"""Function of the names of a variable and its fields: an array in MATLAB's order, or None."""
 VARIABLES = ("scene", "photons", "wave", "illuminant", "mcCOEF", "basis", "imgMean")
 HDF5 = b"\x89HDF\r\n\x1a\n"
 _SAVE = "save it with ISETCam's sceneToFile, or with save(NAME, 'photons', 'wave')"
 
 
-def open_isetcam(path: Path) -> Stored:
-    """A scene of ISETCam; its samples are read at once. Raises Unusable."""
+def open_isetcam(path: Path) -> SpectralData:
+    """Return a scene of ISETCam, whose samples are read at once. Raise UnusableFile."""
     get = _hdf5(path) if _is_hdf5(path) else _matlab5(path)
     photons, wave = _photons(path, get)
     if np.size(wave) > MOST_WAVELENGTHS:
-        raise Unusable(f"its wave has more than {MOST_WAVELENGTHS} values", _SAVE)
-    wavelengths = numbers(wave, "its wave") * 1e-9
+        raise UnusableFile(f"its wave has more than {MOST_WAVELENGTHS} values", _SAVE)
+    wavelengths = finite_numbers(wave, "its wave") * 1e-9
     if photons.ndim != 3:
-        raise Unusable(f"its photons have {photons.ndim} axes, not (h, w, bands)", _SAVE)
-    lengths(photons.shape[2], wavelengths)
+        raise UnusableFile(f"its photons have {photons.ndim} axes, not (h, w, bands)", _SAVE)
+    check_length(photons.shape[2], wavelengths)
     per_photon = PER_NM * PLANCK * SPEED_OF_LIGHT / np.maximum(wavelengths, 1e-12)
     white = _white(get, wavelengths, per_photon)
     height, width = photons.shape[:2]
-    return Stored(
+    return SpectralData(
         (height, width), wavelengths, "radiance", lambda: photons, per_photon, white=white
     )
 
@@ -56,26 +62,26 @@ def _photons(path: Path, get: Lookup) -> tuple[np.ndarray, Any]:
     coefficients, basis = get("mcCOEF"), get("basis", "basis")
     wave = get("basis", "wave")
     if coefficients is None or basis is None or wave is None:
-        raise Unusable("has no photons and wave", _SAVE)
+        raise UnusableFile("has no photons and wave", _SAVE)
     return _product(path, get, _real(coefficients, "mcCOEF"), _real(basis, "basis")), wave
 
 
 def _product(path: Path, get: Lookup, coefficients: np.ndarray, basis: np.ndarray) -> np.ndarray:
-    """Photons (h, w, bands) of a scene that is stored as weights of a few spectra."""
+    """Return the photons (h, w, bands) of a scene that is stored as weights of a few spectra."""
     if coefficients.ndim != 3 or basis.ndim != 2 or coefficients.shape[2] != basis.shape[1]:
-        raise Unusable("its mcCOEF and basis do not fit each other", _SAVE)
-    refuse_too_much(path, 8 * coefficients.shape[0] * coefficients.shape[1] * len(basis))
+        raise UnusableFile("its mcCOEF and basis do not fit each other", _SAVE)
+    check_memory(path, 8 * coefficients.shape[0] * coefficients.shape[1] * len(basis))
     photons = coefficients @ basis.T
     mean = get("imgMean")
     if mean is not None:
-        mean = numbers(mean, "its imgMean")
-        lengths(len(basis), mean, "values of imgMean")
+        mean = finite_numbers(mean, "its imgMean")
+        check_length(len(basis), mean, "values of imgMean")
         photons = photons + mean
     return photons
 
 
 def _white(get: Lookup, wavelengths: np.ndarray, per_photon: np.ndarray) -> np.ndarray | None:
-    """Radiance of a perfect white [W/(sr m2 m)]; None where the light differs from place to place.
+    """Return the radiance of a perfect white [W/(sr m2 m)]; None where the light is not uniform.
 
     Today's files hold its photons, older ones its energy [W/(sr m2 nm)].
     """
@@ -85,30 +91,30 @@ def _white(get: Lookup, wavelengths: np.ndarray, per_photon: np.ndarray) -> np.n
             if not isinstance(values, np.ndarray) or values.dtype.kind not in "uif":
                 continue
             if values.size == len(wavelengths):
-                return numbers(values, "its illuminant") * unit
+                return finite_numbers(values, "its illuminant") * unit
     return None
 
 
 def _real(values: Any, what: str) -> np.ndarray:
     if not isinstance(values, np.ndarray) or values.dtype.kind not in "uif":
-        raise Unusable(f"its {what} are no real numbers", _SAVE)
+        raise UnusableFile(f"its {what} are no real numbers", _SAVE)
     return values
 
 
 def _refuse_claims(path: Path, found: Any) -> None:
-    """Refuses a dataset of HDF5 that lies elsewhere, or is far larger than its file can hold."""
+    """Refuse a dataset of HDF5 that lies elsewhere, or is far larger than its file can hold."""
     if found.is_virtual or found.external:
-        raise Unusable("its numbers lie in another file", _SAVE)
+        raise UnusableFile("its numbers lie in another file", _SAVE)
     whole = found.size * found.dtype.itemsize
     piece = math.prod(found.chunks or ()) * found.dtype.itemsize
     most = max(SUSPECT, MOST_RATIO * path.stat().st_size)
     if piece > max(whole, ASKED) or whole > most:
-        raise Unusable("claims more numbers than it can hold", _SAVE)
-    refuse_too_much(path, whole)
+        raise UnusableFile("claims more numbers than it can hold", _SAVE)
+    check_memory(path, whole)
 
 
 def _is_hdf5(path: Path) -> bool:
-    """HDF5 begins at byte 0, or after MATLAB's 512 bytes of its own."""
+    """Tell whether HDF5 begins at byte 0, or after MATLAB's own 512 bytes."""
     with open(path, "rb") as file:
         start = file.read(512 + len(HDF5))
     return start.startswith(HDF5) or start[512:] == HDF5
@@ -117,8 +123,8 @@ def _is_hdf5(path: Path) -> bool:
 def _matlab5(path: Path) -> Lookup:
     try:
         found = read_variables(path, VARIABLES)
-    except Unusable as error:
-        raise Unusable(error.reason, _SAVE) from None
+    except UnusableFile as error:
+        raise UnusableFile(error.reason, _SAVE) from None
 
     def get(name: str, *fields: str) -> Any:
         value: Any = found.get(name)
@@ -130,11 +136,11 @@ def _matlab5(path: Path) -> Lookup:
 
 
 def _hdf5(path: Path) -> Lookup:
-    """Why links are told apart: HDF5 can say that its numbers lie in some other file."""
+    """Return the lookup in an HDF5 file, which may not link to other files."""
     try:
         h5py: Any = import_module("h5py")
     except ImportError:
-        raise Unusable(
+        raise UnusableFile(
             "is a MATLAB 7.3 file, which needs the library h5py",
             "pip install 'vcam-cli[hdf5]', or save it with save(..., '-v7')",
         ) from None
@@ -149,13 +155,13 @@ def _hdf5(path: Path) -> Lookup:
                     if link is None:
                         return None
                     if not isinstance(link, h5py.HardLink):
-                        raise Unusable(f"its {name} is a link", _SAVE)
+                        raise UnusableFile(f"its {name} is a link", _SAVE)
                     found = found[name]
                 if isinstance(found, h5py.Dataset) and found.dtype.kind in "uif":
                     _refuse_claims(path, found)
                     return found[()].T
         except (OSError, RuntimeError, KeyError) as error:
-            raise Unusable(f"is no whole MATLAB file ({str(error)[:80]})", _SAVE) from None
+            raise UnusableFile(f"is no whole MATLAB file ({str(error)[:80]})", _SAVE) from None
         return None
 
     return get

@@ -1,4 +1,4 @@
-"""Maps of differences as pictures."""
+"""Maps of color differences as images."""
 
 from pathlib import Path
 
@@ -9,10 +9,10 @@ from vcam_cli.quality import error_map
 
 
 def write_map(path: Path | str, delta_e: np.ndarray) -> None:
-    """Writes the PNG of a map of Delta E (rows, columns); the file's description has its scale.
+    """Write a map of Delta E (rows, columns) as a PNG, whose description has its scale.
 
-    Raises CannotDo when the file cannot be written.
+    Raise CannotDo when the file cannot be written.
     """
-    upper = error_map.top(delta_e)
+    upper = error_map.scale_limit(delta_e)
     text = f"S-CIELAB Delta E: black is 0, light yellow {upper:g} or more"
-    write_png(path, error_map.picture(delta_e, upper), text)
+    write_png(path, error_map.false_color(delta_e, upper), text)

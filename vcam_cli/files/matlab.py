@@ -18,9 +18,9 @@ from typing import Any, Literal
 
 import numpy as np
 
-from vcam_cli.engine import memory
+from vcam_cli import memory
 from vcam_cli.errors import CannotDo
-from vcam_cli.files.images import Unusable
+from vcam_cli.files.images import UnusableFile
 
 HEADER = 128
 TYPES = {
@@ -34,87 +34,87 @@ NUMBERS = dict(enumerate(("f8", "f4", "i1", "u1", "i2", "u2", "i4", "u4", "i8", 
 COMPLEX = 0x0800
 DEEPEST, LONGEST_NAME = 8, 64
 PIECE, ASKED = 1 << 16, 1 << 26
-"""Bytes that are unpacked at once, and from which on it is asked whether memory is there."""
+"""Bytes that are unpacked at once, and above which the free memory is checked."""
 SUSPECT, MOST_RATIO = 1 << 30, 300
-"""A variable of more bytes is not that many times as large as its packed form."""
+"""A variable of more bytes may be so many times as large as its packed form, at most."""
 NO_NUMBERS = np.empty(0, object)
-"""Stands for text, cells and all else that is not read."""
+"""The value of text, cells and all else that is not read."""
 
 Order = Literal["<", ">"]
 Value = np.ndarray | dict[str, Any]
 
 
 def read_variables(path: Path, names: Collection[str]) -> dict[str, Value]:
-    """Some of a file's variables: arrays in MATLAB's order of axes, structures as dicts.
+    """Return some of a file's variables: arrays in MATLAB's order of axes, structures as dicts.
 
-    Raises Unusable for a file that is none or is damaged, CannotDo where memory does not suffice.
+    Raise UnusableFile for a file that is none or is damaged, CannotDo without enough memory.
     """
     with (
         open(path, "rb") as file,
         closing(mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)) as m,
     ):
         if m[126:128] not in (b"IM", b"MI"):
-            raise Unusable("is no whole MATLAB file of version 5 to 7")
+            raise UnusableFile("is no whole MATLAB file of version 5 to 7")
         order: Order = "<" if m[126:128] == b"IM" else ">"
         try:
             return _variables(_Bytes(m, order, HEADER, len(m)), names, path)
         except (_Damaged, zlib.error) as error:
-            raise Unusable(f"is no whole MATLAB file ({str(error)[:80]})") from None
+            raise UnusableFile(f"is no whole MATLAB file ({str(error)[:80]})") from None
 
 
 class _Damaged(Exception):
-    """What a file says of itself is not so."""
+    """A claim of a file that its bytes do not bear out."""
 
 
 class _Bytes:
-    """A run of elements in some bytes, read one after the other."""
+    """Consecutive elements in some bytes, read one after the other."""
 
     def __init__(self, data: Any, order: Order, start: int, stop: int) -> None:
-        self.data, self.order, self.at, self.stop = data, order, start, stop
+        self.data, self.order, self.position, self.stop = data, order, start, stop
 
     def element(self, padded: bool = True) -> tuple[int, "_Bytes"]:
-        """The next element: its type and its data."""
-        first, length = (int(v) for v in self._integers(self.at, 2))
-        start = self.at + 8
+        """Return the type and the data of the next element."""
+        first, length = (int(v) for v in self._integers(self.position, 2))
+        start = self.position + 8
         if first >> 16:  # small: type, length and data in eight bytes
-            first, length, start = first & 0xFFFF, first >> 16, self.at + 4
+            first, length, start = first & 0xFFFF, first >> 16, self.position + 4
             if length > 4:
                 raise _Damaged("a small element is too long")
-            self.at += 8
+            self.position += 8
         else:
-            self.at = start + length + (-length % 8 if padded else 0)
+            self.position = start + length + (-length % 8 if padded else 0)
         if start + length > self.stop:
             raise _Damaged("it ends too early")
-        self.at = min(self.at, self.stop)
+        self.position = min(self.position, self.stop)
         return first, _Bytes(self.data, self.order, start, start + length)
 
     def numbers(self, kind: int) -> np.ndarray:
-        """All of it as numbers of a type of the file, in memory of their own."""
+        """Return all of it as numbers of a type of the file, in memory of their own."""
         if kind not in TYPES:
             raise _Damaged(f"data of type {kind}")
         dtype = np.dtype(TYPES[kind])
-        if (self.stop - self.at) % dtype.itemsize:
+        if (self.stop - self.position) % dtype.itemsize:
             raise _Damaged("numbers are cut short")
-        stored = np.frombuffer(self.data[self.at : self.stop], dtype.newbyteorder(self.order))
+        stored = np.frombuffer(self.data[self.position : self.stop], dtype.newbyteorder(self.order))
         return stored.astype(dtype, copy=False)
 
-    def _integers(self, at: int, count: int) -> np.ndarray:
-        if at + 4 * count > self.stop:
+    def _integers(self, start: int, count: int) -> np.ndarray:
+        if start + 4 * count > self.stop:
             raise _Damaged("it ends too early")
-        return np.frombuffer(self.data[at : at + 4 * count], f"{self.order}u4")
+        return np.frombuffer(self.data[start : start + 4 * count], f"{self.order}u4")
 
 
 def _variables(bytes_: _Bytes, names: Collection[str], path: Path) -> dict[str, Value]:
-    """The variables that are asked for, by name."""
+    """Return the variables that are wanted, by name."""
     found: dict[str, Value] = {}
-    while bytes_.at < bytes_.stop:
+    while bytes_.position < bytes_.stop:
         kind, inside = bytes_.element(padded=False)
         if kind == PACKED:
             unpacked = _unpacked(inside, names, path)
             if unpacked is None:
                 continue
             kind, inside = unpacked.element(padded=False)
-        if kind == MATRIX and inside.at < inside.stop:
+        if kind == MATRIX and inside.position < inside.stop:
             name, value = _matrix(inside, path, names)
             if name in found:
                 raise _Damaged(f"it holds {name} twice")
@@ -124,51 +124,51 @@ def _variables(bytes_: _Bytes, names: Collection[str], path: Path) -> dict[str, 
 
 
 def _unpacked(packed: _Bytes, names: Collection[str], path: Path) -> _Bytes | None:
-    """The element that is packed; None for a variable that is not asked for."""
-    data = packed.data[packed.at : min(packed.at + PIECE, packed.stop)]
-    start = zlib.decompressobj().decompress(data, 4 * LONGEST_NAME + 512)
-    head = _Bytes(start, packed.order, 8, len(start))
+    """Return the element that is packed; None for a variable that is not wanted."""
+    data = packed.data[packed.position : min(packed.position + PIECE, packed.stop)]
+    begin = zlib.decompressobj().decompress(data, 4 * LONGEST_NAME + 512)
+    head = _Bytes(begin, packed.order, 8, len(begin))
     try:
         if _head(head)[2] not in names:
             return None
     except _Damaged:
         return None  # nothing of ours: it has so long a name, or so many axes
     unpack, out = zlib.decompressobj(), bytearray()
-    for at in range(packed.at, packed.stop, PIECE):
-        given = packed.data[at : min(at + PIECE, packed.stop)]
+    for start in range(packed.position, packed.stop, PIECE):
+        given = packed.data[start : min(start + PIECE, packed.stop)]
         while given and not unpack.eof:
             out += unpack.decompress(given, MOST_RATIO * PIECE)
             given = unpack.unconsumed_tail
-            if len(out) > max(SUSPECT, MOST_RATIO * (packed.stop - packed.at)):
+            if len(out) > max(SUSPECT, MOST_RATIO * (packed.stop - packed.position)):
                 raise _Damaged(f"it unpacks to more than {MOST_RATIO} times its size")
-            refuse_too_much(path, len(out))
+            check_memory(path, len(out))
     return _Bytes(memoryview(out), packed.order, 0, len(out))
 
 
-def refuse_too_much(path: Path, count: int) -> None:
-    """Raises CannotDo for more bytes than fit the memory, as they are and as they are used."""
+def check_memory(path: Path, count: int) -> None:
+    """Raise CannotDo for more bytes than fit the memory twice: as read, and as used."""
     if count > ASKED and 2 * count > memory.available():
         message = f"{path} needs {2 * count / 1e9:.1f} GB of memory, and less is free"
         raise CannotDo(message, "crop the scene, or use a machine with more memory")
 
 
 def _head(inside: _Bytes) -> tuple[int, tuple[int, ...], str]:
-    """Class with flags, shape and name of an array."""
+    """Return class with flags, shape and name of an array."""
     flags = inside.element()[1].numbers(6)
     shape = inside.element()[1].numbers(5)
     name = inside.element()[1]
     if len(flags) < 1 or not 2 <= len(shape) <= 32 or shape.min() < 0:
         raise _Damaged("an array without class or shape")
-    if name.stop - name.at > LONGEST_NAME:
+    if name.stop - name.position > LONGEST_NAME:
         raise _Damaged("a name is too long")
-    text = bytes(name.data[name.at : name.stop]).decode("latin-1")
+    text = bytes(name.data[name.position : name.stop]).decode("latin-1")
     return int(flags[0]), tuple(int(n) for n in shape), text
 
 
 def _matrix(
     inside: _Bytes, path: Path, names: Collection[str] | None = None, depth: int = 0
 ) -> tuple[str, Value | None]:
-    """Name and value of an array; the value is None for a name that is not asked for."""
+    """Return name and value of an array; the value is None for a name that is not wanted."""
     flags, shape, name = _head(inside)
     if names is not None and name not in names:
         return name, None
@@ -177,29 +177,29 @@ def _matrix(
         return name, _structure(inside, path, depth)
     if kind not in NUMBERS or flags & COMPLEX:
         return name, NO_NUMBERS
-    of, data = inside.element()
+    stored_type, data = inside.element()
     count, whole = math.prod(shape), np.dtype(NUMBERS[kind])
-    refuse_too_much(path, max(data.stop - data.at, min(count, data.stop) * whole.itemsize))
-    values = data.numbers(of)
+    check_memory(path, max(data.stop - data.position, min(count, data.stop) * whole.itemsize))
+    values = data.numbers(stored_type)
     if len(values) != count:
         raise _Damaged(f"{name[:20] or 'an array'} has {len(values)} numbers, not {count}")
     return name, values.astype(whole, copy=False).reshape(shape, order="F")
 
 
 def _structure(inside: _Bytes, path: Path, depth: int) -> dict[str, Any]:
-    """The fields of one structure."""
+    """Return the fields of one structure."""
     lengths = inside.element()[1].numbers(5)
     names = inside.element()[1]
     length = int(lengths[0]) if len(lengths) else 0
     if not 1 <= length <= LONGEST_NAME:
         raise _Damaged("a structure without names")
     found: dict[str, Any] = {}
-    for at in range(names.at, names.stop, length):
-        name = bytes(names.data[at : min(at + length, names.stop)]).split(b"\0")[0]
+    for start in range(names.position, names.stop, length):
+        name = bytes(names.data[start : min(start + length, names.stop)]).split(b"\0")[0]
         kind, value = inside.element()
         if kind != MATRIX:
             raise _Damaged("a field that is no array")
-        empty = value.at == value.stop
+        empty = value.position == value.stop
         read = NO_NUMBERS if empty else _matrix(value, path, None, depth + 1)[1]
         found[name.decode("latin-1")] = read
     return found

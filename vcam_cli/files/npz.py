@@ -13,15 +13,21 @@ from typing import IO, Literal
 
 import numpy as np
 
-from vcam_cli.files.images import Unusable, truncated
-from vcam_cli.files.stored import MOST_WAVELENGTHS, PER_NM, Stored, lengths, numbers
+from vcam_cli.files.images import UnusableFile, truncated_file
+from vcam_cli.files.spectral_data import (
+    MOST_WAVELENGTHS,
+    PER_NM,
+    SpectralData,
+    check_length,
+    finite_numbers,
+)
 
 _WRITE = "write it with numpy.savez(NAME, wavelength_nm=..., radiance=...) or reflectance=..."
 MOST_ARRAYS, LONGEST_HEADER = 1000, 10_000
 
 
-def open_npz(path: Path) -> Stored:
-    """The header of an npz file. Raises Unusable."""
+def open_npz(path: Path) -> SpectralData:
+    """Return the header of an npz file. Raise UnusableFile."""
     try:
         with zipfile.ZipFile(path) as archive:
             shapes = {
@@ -34,18 +40,18 @@ def open_npz(path: Path) -> Stored:
             if "white" in shapes and quantity == "radiance":
                 white = _list(archive, shapes, "white") * PER_NM
     except (zipfile.BadZipFile, EOFError, zlib.error):
-        raise Unusable("is no whole npz file", _WRITE) from None
+        raise UnusableFile("is no whole npz file", _WRITE) from None
     shape = shapes[quantity]
     if len(shape) != 3:
-        raise Unusable(f"its {quantity} has {len(shape)} axes, not (h, w, bands)", _WRITE)
-    lengths(shape[2], wavelengths)
+        raise UnusableFile(f"its {quantity} has {len(shape)} axes, not (h, w, bands)", _WRITE)
+    check_length(shape[2], wavelengths)
     if white is not None:
-        lengths(shape[2], white, "values of white")
+        check_length(shape[2], white, "values of white")
     known = {"wavelength_nm", quantity, "white"}
     spare = sorted(set(shapes) - known)
     notes = (f"{', '.join(spare)} in the file not used",) if spare else ()
     gain = PER_NM if quantity == "radiance" else 1.0
-    return Stored(
+    return SpectralData(
         (shape[0], shape[1]), wavelengths, quantity, lambda: _read(path, quantity), gain,
         white=white, notes=notes,
     )  # fmt: skip
@@ -54,40 +60,40 @@ def open_npz(path: Path) -> Stored:
 def _quantity(shapes: dict[str, tuple[int, ...]]) -> Literal["radiance", "reflectance"]:
     if ("radiance" in shapes) == ("reflectance" in shapes):
         found = ", ".join(shapes) or "nothing"
-        raise Unusable(f"needs one of radiance and reflectance; it holds {found}", _WRITE)
+        raise UnusableFile(f"needs one of radiance and reflectance; it holds {found}", _WRITE)
     if "wavelength_nm" not in shapes:
-        raise Unusable("has no wavelength_nm", _WRITE)
+        raise UnusableFile("has no wavelength_nm", _WRITE)
     return "radiance" if "radiance" in shapes else "reflectance"
 
 
 def _arrays(archive: zipfile.ZipFile) -> list[zipfile.ZipInfo]:
-    """The archive's arrays, packed in the ways that NumPy packs them."""
+    """Return the archive's arrays, packed in the ways that NumPy packs them."""
     found = [info for info in archive.infolist() if info.filename.endswith(".npy")]
     if len(found) > MOST_ARRAYS:
-        raise Unusable(f"holds more than {MOST_ARRAYS} arrays", _WRITE)
+        raise UnusableFile(f"holds more than {MOST_ARRAYS} arrays", _WRITE)
     for info in found:
         if info.compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
-            raise Unusable(f"{info.filename} in it is not packed as NumPy does it", _WRITE)
+            raise UnusableFile(f"{info.filename} in it is not packed as NumPy does it", _WRITE)
     return found
 
 
 def _header(archive: zipfile.ZipFile, info: zipfile.ZipInfo) -> tuple[int, ...]:
-    """The shape of a real array whose bytes are all there."""
+    """Return the shape of a real array whose bytes are all there."""
     with archive.open(info) as file:
         try:
             shape, _, kind = _array_header(file)
             begins = file.tell()
         except ValueError:
-            raise Unusable(f"{info.filename} in it is no array", _WRITE) from None
+            raise UnusableFile(f"{info.filename} in it is no array", _WRITE) from None
     if kind.kind not in "uif":
-        raise Unusable(f"{info.filename} in it holds no real numbers", _WRITE)
+        raise UnusableFile(f"{info.filename} in it holds no real numbers", _WRITE)
     if begins + int(np.prod(shape, dtype=object)) * kind.itemsize > info.file_size:
-        raise truncated(f"{info.filename} claims {' x '.join(map(str, shape))} values")
+        raise truncated_file(f"{info.filename} claims {' x '.join(map(str, shape))} values")
     return tuple(shape)
 
 
 def _array_header(file: IO[bytes]) -> tuple[tuple[int, ...], bool, np.dtype]:
-    """Shape, order of axes and type of an array in NumPy's format."""
+    """Return shape, order of axes and type of an array in NumPy's format."""
     version = np.lib.format.read_magic(file)
     begins = file.tell()
     if int.from_bytes(file.read(2 if version == (1, 0) else 4), "little") > LONGEST_HEADER:
@@ -100,13 +106,13 @@ def _array_header(file: IO[bytes]) -> tuple[tuple[int, ...], bool, np.dtype]:
 
 def _list(archive: zipfile.ZipFile, shapes: dict[str, tuple[int, ...]], name: str) -> np.ndarray:
     if int(np.prod(shapes[name], dtype=object)) > MOST_WAVELENGTHS:
-        raise Unusable(f"its {name} has more than {MOST_WAVELENGTHS} values")
+        raise UnusableFile(f"its {name} has more than {MOST_WAVELENGTHS} values")
     with archive.open(f"{name}.npy") as file:
-        return numbers(_whole(file), f"its {name}")
+        return finite_numbers(_whole(file), f"its {name}")
 
 
 def _read(path: Path, name: str) -> np.ndarray:
-    """An array of the archive; one that is not compressed stays on the disk until it is used."""
+    """Return an array of the archive; without compression, a map of the file."""
     with zipfile.ZipFile(path) as archive:
         info = archive.getinfo(f"{name}.npy")
         with archive.open(info) as file:
@@ -126,4 +132,4 @@ def _whole(file: IO[bytes]) -> np.ndarray:
     try:
         return np.asarray(np.lib.format.read_array(file, allow_pickle=False))
     except (zipfile.BadZipFile, EOFError, ValueError, zlib.error):
-        raise truncated() from None
+        raise truncated_file() from None

@@ -1,4 +1,4 @@
-"""How plots look: PNG files of the same bytes for the same numbers.
+"""Style of plots: PNG files of the same bytes for the same numbers.
 
 Matplotlib is imported where a plot is drawn and nowhere else: it takes longer to load than most
 commands take to run. Figures are made without pyplot, so that no state outlives them.
@@ -7,12 +7,16 @@ commands take to run. Figures are made without pyplot, so that no state outlives
 import importlib
 import importlib.util
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from vcam_cli.files.atomic import write_whole
+
 COLORS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#56b4e9", "#e69f00")
-"""Of Okabe and Ito: told apart by everybody."""
+"""The colors of Okabe and Ito, which everybody can tell apart."""
 MARKERS = ("o", "s", "D", "^", "v", "P")
 STYLE: dict[str, Any] = {
     "font.family": "DejaVu Sans",
@@ -34,10 +38,10 @@ STYLE: dict[str, Any] = {
 
 
 def load() -> ModuleType:
-    """Matplotlib, as it ships: with no settings of the current folder or of the user.
+    """Return Matplotlib as it ships: with no settings of the current folder or of the user.
 
-    While it is imported it reads a file `matplotlibrc` that lies in the current folder, whoever
-    put it there, before any that it is told to read; so it is told that there is none.
+    While it is imported it reads a file `matplotlibrc` of the current folder, whoever put it there,
+    before the one that MATPLOTLIBRC names; so the former is hidden from it.
     """
     spec = importlib.util.find_spec("matplotlib")
     assert spec is not None and spec.origin is not None
@@ -52,3 +56,39 @@ def load() -> ModuleType:
         os.environ.pop("MATPLOTLIBRC")
         if told is not None:
             os.environ["MATPLOTLIBRC"] = told
+
+
+def save(figure: Any, path: Path | str) -> None:
+    """Write a Matplotlib figure as a PNG file that is whole or not there."""
+    with write_whole(path) as temporary:
+        figure.savefig(temporary, format="png", metadata={"Software": None})
+
+
+@contextmanager
+def png_figure(path: Path | str, size: tuple[float, float], dpi: int = 150) -> Iterator[Any]:
+    """Yield a Matplotlib figure of the common style, and write it as a PNG when the block ends.
+
+    Parameters
+    ----------
+    path : Path or str
+        The file.
+    size : tuple of float
+        Width and height [inch].
+    dpi : int
+        Pixels per inch.
+
+    Raises
+    ------
+    CannotDo
+        If the file cannot be written.
+    """
+    matplotlib = load()
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    style: Any = {**matplotlib.rcParamsDefault, **STYLE}
+    with matplotlib.rc_context(style):
+        figure = Figure(figsize=size, dpi=dpi, layout="constrained")
+        FigureCanvasAgg(figure)
+        yield figure
+        save(figure, path)

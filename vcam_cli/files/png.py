@@ -63,20 +63,20 @@ class PngWriter:
         self._writer.__exit__(kind, error, trace)
 
     def write_rows(self, first_row: int, block: np.ndarray) -> None:
-        """Writes rows first_row .. first_row + n - 1 from a block (n, w) or (n, w, channels)."""
+        """Write rows first_row .. first_row + n - 1 from a block (n, w) or (n, w, channels)."""
         if block.dtype != self._dtype:
             raise ValueError(f"a block of {block.dtype} in a PNG of {self._dtype}")
         self._writer.write(first_row, block[:, :, None] if block.ndim == 2 else block)
 
 
 def write_png(path: Path | str, image: np.ndarray, description: str = "") -> None:
-    """Writes a uint8 or uint16 array (h, w) or (h, w, 3) of sRGB codes. See `PngWriter`."""
+    """Write a uint8 or uint16 array (h, w) or (h, w, 3) of sRGB codes, see `PngWriter`."""
     with PngWriter(path, image.shape, image.dtype, description) as writer:
         writer.write_rows(0, image)
 
 
 def _is_whole(path: Path) -> bool:
-    """Whether the file ends as a PNG must; OpenImageIO itself does not notice a full disk."""
+    """Tell whether the file ends as a PNG must: OpenImageIO itself does not notice a full disk."""
     with open(path, "rb") as file:
         file.seek(-min(len(_END), path.stat().st_size), 2)
         return file.read() == _END

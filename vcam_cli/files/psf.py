@@ -13,17 +13,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcam_cli.files.images import (
-    Unusable,
+    UnusableFile,
     check_file,
     check_size,
-    on_display_window,
-    opened,
-    samples,
-    told,
+    convert_errors,
+    extract_display_window,
+    open_image,
+    read_samples,
 )
 
 ROUNDING = 1e-3
-"""Negative values down to this part of the largest are the rounding of a lens program, and 0."""
+"""Part of the largest value below which a negative one is the rounding of a lens program."""
 _REMEDY = "give an EXR or TIFF file with one channel, or one for each of psf.wavelengths"
 _ALPHA = ("A", "ALPHA")
 
@@ -31,36 +31,36 @@ _ALPHA = ("A", "ALPHA")
 def read_psf(
     path: Path | str, channels: int, yaml_path: tuple[str | int, ...] | str
 ) -> NDArray[np.float64]:
-    """Samples of a point spread function: (channels, rows, columns), each channel of sum 1.
+    """Return a point spread function (channels, rows, columns), each channel of sum 1.
 
-    channels: as many as the file must have, alpha aside. Raises BadInput (with `yaml_path`) for a
+    channels: as many as the file must have, alpha aside. Raise BadInput (with `yaml_path`) for a
     file that is missing, no image, damaged, of another number of channels, with a value that is
     not finite or clearly negative, or all zero; CannotDo where it may not be read or does not fit
     the memory.
     """
     path = Path(path)
-    with told(path, yaml_path, _REMEDY):
+    with convert_errors(path, yaml_path, _REMEDY):
         check_file(path)
-        with opened(path) as source:
+        with open_image(path) as source:
             stored = _stored(source, channels)
         return np.array([_normalized(stored[:, :, k]) for k in range(channels)])
 
 
 def _stored(source: Any, channels: int) -> NDArray:
-    """The channels as they are in the file: (rows, columns, channels)."""
+    """Return the channels as they are in the file, (rows, columns, channels)."""
     spec = source.spec()
     if spec.deep or spec.depth > 1:
-        raise Unusable("is a deep image or a volume, not an image")
+        raise UnusableFile("is a deep image or a volume, not an image")
     names = spec.channelnames
     chosen = tuple(
         k for k, name in enumerate(names) if name.upper() not in _ALPHA and k != spec.alpha_channel
     )
     if len(chosen) != channels:
-        raise Unusable(_miscounted(len(chosen), channels))
+        raise UnusableFile(_miscounted(len(chosen), channels))
     check_size(spec, channels)
-    data, notes = samples(source, spec, chosen)
+    data, notes = read_samples(source, spec, chosen)
     if source.format_name() == "openexr":
-        data = on_display_window(data, spec, notes)
+        data = extract_display_window(data, spec, notes)
     return data
 
 
@@ -72,18 +72,18 @@ def _miscounted(found: int, wanted: int) -> str:
 
 
 def _normalized(plane: NDArray) -> NDArray[np.float64]:
-    """A plane of light with the sum 1."""
+    """Return a plane of light with the sum 1."""
     light = plane.astype(np.float64)
     if not np.isfinite(light).all():
-        raise Unusable("holds a value that is not finite; light is 0 or more")
+        raise UnusableFile("holds a value that is not finite; light is 0 or more")
     top, least = float(light.max()), float(light.min())
     if least < -ROUNDING * max(top, 0.0):
         row, column = np.unravel_index(np.argmin(light), light.shape)
-        raise Unusable(
+        raise UnusableFile(
             f"holds a negative value ({least:g} at row {row}, column {column}); light is 0 or more",
             "replace such values, for example by 0",
         )
     if not top > 0:
-        raise Unusable("is zero everywhere, which is no point spread function")
+        raise UnusableFile("is zero everywhere, which is no point spread function")
     light = np.maximum(light, 0.0) / top  # so that the sum of large numbers does not overflow
     return light / light.sum()

@@ -13,24 +13,24 @@ from vcam_cli.errors import CannotDo
 
 
 def to_json(value: Any) -> str:
-    """JSON text with sorted keys, indented by 2, one final line feed; equal in, equal out.
+    """Return JSON text with sorted keys, indented by 2, one final line feed; equal in, equal out.
 
     Accepts mappings, sequences, sets (sorted), numbers and arrays of NumPy, paths. Floats have
     their shortest exact form. JSON knows no infinity: it is written as the string
     "infinity" ("-infinity", "nan"), the word the camera file uses.
 
-    Raises TypeError for anything else.
+    Raise TypeError for anything else.
     """
     return json.dumps(_plain(value), indent=2, sort_keys=True, ensure_ascii=False) + "\n"
 
 
 def hash_text(text: str) -> str:
-    """SHA-256 of the text in UTF-8, hexadecimal."""
+    """Return the SHA-256 of the text in UTF-8, hexadecimal."""
     return hashlib.sha256(text.encode("utf-8", "surrogateescape")).hexdigest()
 
 
 def hash_file(path: Path | str) -> str:
-    """SHA-256 of the file's bytes, hexadecimal. Raises CannotDo when it cannot be read."""
+    """Return the SHA-256 of a file, hexadecimal. Raise CannotDo when it cannot be read."""
     try:
         with open(path, "rb") as file:
             return hashlib.file_digest(file, "sha256").hexdigest()

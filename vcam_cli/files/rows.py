@@ -16,10 +16,10 @@ from types import TracebackType
 from typing import Self
 
 import numpy as np
-import OpenImageIO as oiio
 
 from vcam_cli.errors import CannotDo
-from vcam_cli.files.atomic import cannot_write, shown, write_whole
+from vcam_cli.files.atomic import cannot_write, displayed_path, write_whole
+from vcam_cli.files.image_library import oiio
 
 Attribute = str | int | float
 _FULL = 1 << 16  # bytes: a failed write on a disk with less room is the disk's fault
@@ -49,9 +49,9 @@ class RowWriter:
             os.close(os.open(self._temporary, os.O_CREAT | os.O_WRONLY, 0o666))  # says why not
             output = oiio.ImageOutput.create(self._file_format)
             if output is None:
-                raise self._failed(message(oiio.geterror))
+                raise self._failed(pending_error(oiio.geterror))
             if not output.open(str(self._temporary), self._spec):
-                raise self._failed(message(output.geterror))
+                raise self._failed(pending_error(output.geterror))
             self._output = output
             self._stack = stack.pop_all()
         return self
@@ -70,9 +70,9 @@ class RowWriter:
             self._check_whole(closed)
 
     def write(self, first_row: int, block: np.ndarray) -> None:
-        """Writes the rows `block` (rows, width, channels), which start at `first_row`.
+        """Write the rows `block` (rows, width, channels), which start at `first_row`.
 
-        Raises CannotDo (disk full), ValueError for a block of the wrong place, shape or type.
+        Raise CannotDo (disk full), ValueError for a block of the wrong place, shape or type.
         """
         if first_row != self._next_row:
             raise ValueError(f"row {self._next_row} comes next, not {first_row}")
@@ -87,14 +87,14 @@ class RowWriter:
         if not block.shape[0]:
             return
         written = self._output.write_scanlines(first_row, last, 0, np.ascontiguousarray(block))
-        reason = message(self._output.geterror)
+        reason = pending_error(self._output.geterror)
         if not written or reason:
             self._broken = True
             raise self._failed(reason)
         self._next_row = last
 
     def _check_whole(self, closed: bool) -> None:
-        reason = message(self._output.geterror)
+        reason = pending_error(self._output.geterror)
         if self._next_row != self._spec.height:
             raise ValueError(f"{self._next_row} of {self._spec.height} rows were written")
         if not closed or reason or not self._is_whole(self._temporary):
@@ -104,12 +104,12 @@ class RowWriter:
         with suppress(OSError):
             if shutil.disk_usage(self._path.parent).free < _FULL:
                 return cannot_write(self._path, OSError(errno.ENOSPC, "disk full"))
-        text = f"cannot write {shown(self._path)}: {reason or 'the write failed'}"
+        text = f"cannot write {displayed_path(self._path)}: {reason or 'the write failed'}"
         return CannotDo(text, "free some disk space, or choose another folder")
 
 
 def image_spec(height: int, width: int, channels: int, sample: str) -> oiio.ImageSpec:
-    """An ImageSpec without time or host; `sample` is OpenImageIO's name of the sample type."""
+    """Return an ImageSpec without time or host; `sample` is OpenImageIO's name of the type."""
     if min(height, width, channels) < 1:
         raise ValueError(f"an image of {height} x {width} pixels, {channels} channels")
     spec = oiio.ImageSpec(width, height, channels, sample)
@@ -118,7 +118,7 @@ def image_spec(height: int, width: int, channels: int, sample: str) -> oiio.Imag
 
 
 def set_attributes(spec: oiio.ImageSpec, attributes: Mapping[str, Attribute]) -> None:
-    """Sets header attributes; whole numbers beyond 32 bits become text (EXR has none)."""
+    """Set header attributes; whole numbers beyond 32 bits become text (EXR has none)."""
     for name, value in attributes.items():
         if isinstance(value, bool | int | np.integer):
             small = -(2**31) <= value < 2**31
@@ -129,8 +129,8 @@ def set_attributes(spec: oiio.ImageSpec, attributes: Mapping[str, Attribute]) ->
             spec.attribute(name, str(value))
 
 
-def message(geterror: Callable[[], str]) -> str:
-    """OpenImageIO's pending error, fetched (and so cleared), or "" when there is none."""
+def pending_error(geterror: Callable[[], str]) -> str:
+    """Return OpenImageIO's pending error, which clears it; "" when there is none."""
     try:
         text = geterror()
     except UnicodeDecodeError:  # it quotes bytes of the file

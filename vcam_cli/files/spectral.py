@@ -19,14 +19,20 @@ import numpy as np
 
 from vcam_cli.files.atomic import cannot_write
 from vcam_cli.files.exr import ExrWriter
-from vcam_cli.files.images import Unusable, check_size, on_display_window, opened, samples
+from vcam_cli.files.images import (
+    UnusableFile,
+    check_size,
+    extract_display_window,
+    open_image,
+    read_samples,
+)
 from vcam_cli.files.rows import Attribute
-from vcam_cli.files.stored import PER_NM, Stored
+from vcam_cli.files.spectral_data import PER_NM, SpectralData
 from vcam_cli.spectra import SPEED_OF_LIGHT
 
 ROWS_AT_ONCE = 64
 RADIANCE = ("W.m^-2.sr^-1", "W.m^-2.sr^-1.nm^-1")
-"""Units of emissive channels, both per nanometer."""
+"""The units of emissive channels, both per nanometer."""
 _CHANNEL = re.compile(r"(S[0-3]|T)\.(\d*,?\d*(?:[Ee][+-]?\d+)?)([EPTGMkhdcmunp]?)(m|Hz)")
 _PREFIX = {
     "": 0, "E": 18, "P": 15, "T": 12, "G": 9, "M": 6, "k": 3, "h": 2, "d": -1, "c": -2, "m": -3,
@@ -35,7 +41,7 @@ _PREFIX = {
 
 
 def channel_name(wavelength: float) -> str:
-    """Name of the channel of a wavelength [m]."""
+    """Return the name of the channel of a wavelength [m]."""
     nanometers = f"{wavelength * 1e9:.6f}".replace(".", ",")
     return f"S0.{nanometers}nm"
 
@@ -48,19 +54,19 @@ def write_spectral(
     units: str,
     attributes: Mapping[str, Attribute] | None = None,
 ) -> None:
-    """Writes one plane (h, w) for each wavelength [m] as float32 channels.
+    """Write one plane (h, w) for each wavelength [m] as float32 channels.
 
-    units: of the values, as the layout has them ("W.m^-2.nm^-1"). The planes are asked for one by
-    one and wait in a nameless file beside `path`, since EXR wants all channels of a row together:
-    no more than one is in memory. Raises CannotDo (disk full, permission).
+    units: the unit of the values, as the layout has it ("W.m^-2.nm^-1"). The planes are computed
+    one by one and wait in a nameless file beside `path`, since EXR wants all channels of a row
+    together: no more than one is in memory. Raise CannotDo (disk full, permission).
     """
     names = [channel_name(float(w)) for w in wavelengths]
-    said = {"spectralLayoutVersion": "1.0", "emissiveUnits": units, **(attributes or {})}
+    layout = {"spectralLayoutVersion": "1.0", "emissiveUnits": units, **(attributes or {})}
     try:
         with TemporaryFile(dir=Path(path).parent) as waiting:
             for plane in planes:
                 waiting.write(np.ascontiguousarray(plane, np.float32).tobytes())
-            with ExrWriter(path, shape, names, said) as exr:
+            with ExrWriter(path, shape, names, layout) as exr:
                 for row in range(0, shape[0], ROWS_AT_ONCE):
                     count = min(ROWS_AT_ONCE, shape[0] - row)
                     exr.write_rows(row, _rows(waiting, names, shape, row, count))
@@ -71,7 +77,7 @@ def write_spectral(
 def _rows(
     waiting: BinaryIO, names: Sequence[str], shape: tuple[int, int], row: int, count: int
 ) -> dict[str, np.ndarray]:
-    """The same rows of all planes."""
+    """Return the same rows of all planes."""
     height, width = shape
     found = {}
     for index, name in enumerate(names):
@@ -81,12 +87,12 @@ def _rows(
     return found
 
 
-def open_spectral(path: Path) -> Stored:
-    """The header of a spectral EXR file. Raises Unusable."""
-    with opened(path) as source:
+def open_spectral(path: Path) -> SpectralData:
+    """Return the header of a spectral EXR file. Raise UnusableFile."""
+    with open_image(path) as source:
         spec = source.spec()
         if source.format_name() != "openexr" or spec.deep:
-            raise Unusable("is no flat OpenEXR file")
+            raise UnusableFile("is no flat OpenEXR file")
         found, notes = _channels(spec.channelnames)
         check_size(spec, len(found))
         emits = spec.channelnames[found[0][1]].startswith("S")
@@ -96,7 +102,7 @@ def open_spectral(path: Path) -> Stored:
             notes.append("its exposure compensation (EV) is not used")
         if source.seek_subimage(1, 0):
             notes.append("only the first of several images in the file is used")
-    return Stored(
+    return SpectralData(
         shape=(spec.full_height, spec.full_width),
         wavelengths=np.array([wavelength for wavelength, _ in found]),
         quantity="radiance" if emits else "reflectance",
@@ -107,35 +113,35 @@ def open_spectral(path: Path) -> Stored:
 
 
 def _channels(names: Sequence[str]) -> tuple[list[tuple[float, int]], list[str]]:
-    """(wavelength [m], index) of the channels that hold light, by wavelength; and notes."""
+    """Return (wavelength [m], index) of the channels of light, by wavelength, and notes."""
     by_kind: dict[str, list[tuple[float, int]]] = {}
     for index, name in enumerate(names):
         match = _CHANNEL.fullmatch(name)
         if match:
             by_kind.setdefault(match[1], []).append((_wavelength(match), index))
     if "S0" in by_kind and "T" in by_kind:
-        raise Unusable("holds emitted light (S0) and reflectances (T)", "remove one of them")
+        raise UnusableFile("holds emitted light (S0) and reflectances (T)", "remove one of them")
     found = by_kind.get("S0") or by_kind.get("T")
     if not found:
-        raise Unusable("has no channels named like S0.550,000000nm or T.550,000000nm")
+        raise UnusableFile("has no channels named like S0.550,000000nm or T.550,000000nm")
     dark = {"S1", "S2", "S3"} & set(by_kind)
     return sorted(found), ["its polarization is not used"] if dark else []
 
 
 def _wavelength(match: re.Match[str]) -> float:
-    """The wavelength [m] of a channel's name; a frequency is one as well."""
+    """Return the wavelength [m] of a channel's name, which may also have a frequency."""
     try:
         value = float(match[2].replace(",", ".")) * 10.0 ** _PREFIX[match[3]]
     except ValueError:
-        raise Unusable(f"has a channel {match[0]!r} without a wavelength") from None
+        raise UnusableFile(f"has a channel {match[0]!r} without a wavelength") from None
     if not value > 0:
-        raise Unusable(f"has a channel {match[0]!r} without a wavelength")
+        raise UnusableFile(f"has a channel {match[0]!r} without a wavelength")
     return value if match[4] == "m" else SPEED_OF_LIGHT / value
 
 
 def _check_units(units: str) -> None:
     if units and "".join(units.split()) not in RADIANCE:
-        raise Unusable(
+        raise UnusableFile(
             f"has emissiveUnits {units!r}, which is no radiance",
             f"give radiances, and write emissiveUnits {RADIANCE[1]}",
         )
@@ -143,6 +149,6 @@ def _check_units(units: str) -> None:
 
 def _read(path: Path, chosen: tuple[int, ...]) -> np.ndarray:
     notes: list[str] = []
-    with opened(path) as source:
+    with open_image(path) as source:
         spec = source.spec()
-        return on_display_window(samples(source, spec, chosen)[0], spec, notes)
+        return extract_display_window(read_samples(source, spec, chosen)[0], spec, notes)

@@ -15,20 +15,20 @@ Cell = str | int | float | np.number
 
 
 def write_metrics(path: Path | str, rows: Iterable[tuple[str, float, str]]) -> None:
-    """Writes metrics.csv: one row (metric, value, unit) each, in the order given.
+    """Write metrics.csv: a row (metric, value, unit) for each metric, in the given order.
 
-    Raises CannotDo when the file cannot be written.
+    Raise CannotDo when the file cannot be written.
     """
     write_table(path, METRIC_COLUMNS, rows)
 
 
 def write_table(path: Path | str, columns: Sequence[str], rows: Iterable[Sequence[Cell]]) -> None:
-    """Writes a CSV table with a header, UTF-8, line feeds, quotes only where needed."""
+    """Write a CSV table with a header, UTF-8, line feeds, quotes only where needed."""
     write_text(path, table(columns, rows))
 
 
 def table(columns: Sequence[str], rows: Iterable[Sequence[Cell]]) -> str:
-    """The CSV text of `write_table`. Raises ValueError for a row of the wrong length."""
+    """Return the CSV text of a table. Raise ValueError for a row of the wrong length."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(columns)
@@ -40,6 +40,6 @@ def table(columns: Sequence[str], rows: Iterable[Sequence[Cell]]) -> str:
 
 
 def _cell(value: Cell) -> str:
-    """Shortest text that reads back to the same number; inf and nan as Python reads them."""
+    """Return the shortest text that reads back to the same number; inf and nan as in Python."""
     plain = value.item() if isinstance(value, np.number) else value
     return repr(plain) if isinstance(plain, float) else str(plain)

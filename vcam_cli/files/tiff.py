@@ -17,71 +17,71 @@ from typing import Any, Literal
 
 import numpy as np
 
-from vcam_cli.files.images import Unusable, check_size, opened, samples
-from vcam_cli.files.rows import message
-from vcam_cli.files.stored import PER_NM, Stored, lengths, numbers
+from vcam_cli.files.images import UnusableFile, check_size, open_image, read_samples
+from vcam_cli.files.rows import pending_error
+from vcam_cli.files.spectral_data import PER_NM, SpectralData, check_length, finite_numbers
 
 LONGEST = 1 << 20  # bytes of a table
 
 
-def open_tiff(path: Path) -> Stored:
-    """The header of a multichannel TIFF. Raises Unusable."""
-    with opened(path) as source:
+def open_tiff(path: Path) -> SpectralData:
+    """Return the header of a multichannel TIFF. Raise UnusableFile."""
+    with open_image(path) as source:
         spec = source.spec()
         if spec.depth > 1 or spec.deep:
-            raise Unusable("is a volume, not an image")
+            raise UnusableFile("is a volume, not an image")
         pages = _pages(source, spec)
     bands = spec.nchannels if spec.nchannels > 1 else pages
     check_size(spec, bands)
     sidecar = path.with_suffix(".csv")
     wavelengths, quantity, gain = _table(sidecar, spec.get_string_attribute("ImageDescription"))
-    lengths(bands, wavelengths)
+    check_length(bands, wavelengths)
     several = pages > 1 and spec.nchannels > 1
     notes = ("only the first of several images in the file is used",) if several else ()
     unit = PER_NM if quantity == "radiance" else 1.0
-    return Stored(
+    return SpectralData(
         (spec.height, spec.width), wavelengths, quantity, lambda: _read(path, pages), gain * unit,
         notes=notes,
     )  # fmt: skip
 
 
 def _pages(source: Any, first: Any) -> int:
-    """How many pages a file has; Unusable where they are not of one size and kind."""
+    """Return the number of pages. Raise UnusableFile where they are not of one size and kind."""
     count = 1
     while source.seek_subimage(count, 0):
         spec = source.spec()
         same = (spec.width, spec.height, spec.nchannels) == (first.width, first.height, 1)
         if first.nchannels == 1 and not (same and str(spec.format) == str(first.format)):
-            raise Unusable(
+            raise UnusableFile(
                 "has pages of different sizes or kinds", "give one page a band, all alike"
             )
         count += 1
-    message(source.geterror)
+    pending_error(source.geterror)
     return count
 
 
 def _read(path: Path, pages: int) -> np.ndarray:
-    with opened(path) as source:
+    with open_image(path) as source:
         spec = source.spec()
         if spec.nchannels > 1:
-            return samples(source, spec, tuple(range(spec.nchannels)))[0]
-        first = samples(source, spec, (0,))[0]
+            return read_samples(source, spec, tuple(range(spec.nchannels)))[0]
+        first = read_samples(source, spec, (0,))[0]
         out = np.empty((spec.height, spec.width, pages), first.dtype)
         out[:, :, 0] = first[:, :, 0]
         for page in range(1, pages):
-            out[:, :, page] = samples(source, spec, (0,), page)[0][:, :, 0]
+            out[:, :, page] = read_samples(source, spec, (0,), page)[0][:, :, 0]
         return out
 
 
 def _table(
     sidecar: Path, description: str
 ) -> tuple[np.ndarray, Literal["radiance", "reflectance"], np.ndarray]:
-    """Wavelengths [m], what the values are, and what a stored 1 stands for."""
+    """Return the wavelengths [m], what the values are, and what a stored 1 stands for."""
     write = f"write {sidecar.name} with the lines wavelength_nm,reflectance and 400,1 and so on"
     text = description
     if sidecar.is_file():
         if sidecar.stat().st_size > LONGEST:
-            raise Unusable(f"{sidecar.name} beside it is too long", write)
+            raise UnusableFile(f"{sidecar.name} beside it is too long", write)
         text = sidecar.read_text("utf-8-sig", "replace")
     lines = [line.strip() for line in text.splitlines()]
     head, *rows = [x for x in lines if x and not x.startswith("#")] or [""]
@@ -89,11 +89,11 @@ def _table(
         if head.replace(" ", "") == f"wavelength_nm,{quantity}":
             cells = [row.split(",") for row in rows]
             if not cells or any(len(row) != 2 for row in cells):
-                raise Unusable("its table of wavelengths has rows without two numbers", write)
-            wavelengths = numbers([row[0] for row in cells], "its wavelength_nm")
+                raise UnusableFile("its table of wavelengths has rows without two numbers", write)
+            wavelengths = finite_numbers([row[0] for row in cells], "its wavelength_nm")
             return (
                 wavelengths * 1e-9,
                 quantity,
-                numbers([row[1] for row in cells], f"its {quantity}"),
+                finite_numbers([row[1] for row in cells], f"its {quantity}"),
             )
-    raise Unusable("has no table of wavelengths, beside it or in its ImageDescription", write)
+    raise UnusableFile("has no table of wavelengths, beside it or in its ImageDescription", write)

@@ -1,4 +1,4 @@
-"""Tables that are dear to compute and asked for again: kept while they fit a number of bytes."""
+"""A cache of computed tables that is bounded by the memory they take."""
 
 from collections import OrderedDict
 from collections.abc import Callable, Hashable
@@ -15,7 +15,7 @@ T = TypeVar("T", bound=_Sized)
 
 
 class ByteCache(Generic[T]):
-    """The results used last, at most `limit` bytes of them together (the newest always)."""
+    """Keeps the results used last, at most `limit` bytes of them together (the newest always)."""
 
     def __init__(self, limit: int) -> None:
         self._limit = limit
@@ -23,7 +23,10 @@ class ByteCache(Generic[T]):
         self._lock = Lock()
 
     def get(self, key: Hashable, compute: Callable[[], T]) -> T:
-        """What `compute` gives, or gave for the same key. Threads may compute it twice."""
+        """Return the result of `compute`, or the one that is kept for the same key.
+
+        Two threads may compute the same result at once; both get an equal one.
+        """
         with self._lock:
             if key in self._kept:
                 self._kept.move_to_end(key)
@@ -37,5 +40,5 @@ class ByteCache(Generic[T]):
 
     @property
     def nbytes(self) -> int:
-        """What is kept now [bytes]."""
+        """Memory that the results take [bytes]."""
         return sum(value.nbytes for value in self._kept.values())

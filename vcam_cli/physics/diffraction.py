@@ -1,10 +1,10 @@
-"""Blur by diffraction at a circular pupil, for incoherent light and a lens without aberrations.
+"""Diffraction at a circular pupil, for incoherent light and a lens without aberrations.
 
 References
 ----------
-[1] J. W. Goodman, "Introduction to Fourier Optics", 3rd edition, Roberts, 2005, section 6.3.
-[2] T. Chen, "Digital Camera System Simulator and Applications", PhD thesis, Stanford University,
-    2003, section 2.2.1 (the lens is diffraction-limited).
+.. [1] J. W. Goodman, "Introduction to Fourier Optics", 3rd edition, Roberts, 2005, section 6.3.
+.. [2] T. Chen, "Digital Camera System Simulator and Applications", PhD thesis, Stanford
+   University, 2003, section 2.2.1 (the lens is diffraction-limited).
 """
 
 import numpy as np
@@ -21,16 +21,23 @@ _DIVISORS = (20, 42, 72, 110, 156, 210, 272, 342)
 def cutoff_frequency(
     wavelength: ArrayLike, f_number: ArrayLike, magnification: ArrayLike = 0.0
 ) -> Floats:
-    """The highest spatial frequency on the sensor that passes, 1 / (wavelength N (1 - m)).
+    """Return the cut-off frequency of a circular pupil in incoherent light.
+
+    It is 1 / (wavelength N (1 - m)).
 
     Parameters
     ----------
-    wavelength : [m], positive
-    f_number, magnification : N and m (zero or negative) [dimensionless]
+    wavelength : array_like
+        Wavelength [m], positive.
+    f_number : array_like
+        F-number N [dimensionless].
+    magnification : array_like
+        Magnification m [dimensionless], zero or negative. All three broadcast.
 
     Returns
     -------
-    [cycles/m] on the sensor plane
+    ndarray
+        Spatial frequency on the sensor above which nothing passes [cycles/m].
     """
     wavelength = np.asarray(wavelength, dtype=np.float64)
     return (1 / (wavelength * effective_f_number(f_number, magnification)))[()]
@@ -42,22 +49,27 @@ def otf_circular(
     f_number: ArrayLike,
     magnification: ArrayLike = 0.0,
 ) -> Floats:
-    """Optical transfer function of a circular pupil in incoherent light [1].
+    """Return the optical transfer function of a circular pupil in incoherent light [1].
 
     OTF = (2/pi) (acos(nu) - nu sqrt(1 - nu^2)) for nu = |f| wavelength N (1 - m) below 1, else 0:
-    the overlap of two pupils shifted by nu diameters. Real, so it moves no light sideways.
+    the overlap of two pupils shifted by nu diameters. It is real: no light moves sideways.
 
     Parameters
     ----------
-    frequency : spatial frequency on the sensor [cycles/m], of either sign
-    wavelength : [m], positive
-    f_number, magnification : N and m (zero or negative) [dimensionless]
-        All four broadcast against each other.
+    frequency : array_like
+        Spatial frequency on the sensor [cycles/m], of either sign.
+    wavelength : array_like
+        Wavelength [m], positive.
+    f_number : array_like
+        F-number N [dimensionless].
+    magnification : array_like
+        Magnification m [dimensionless], zero or negative. All four broadcast.
 
     Returns
     -------
-    In 0..1 [dimensionless]; 1 at frequency 0. Near the cut-off it falls as (1 - nu)^1.5 and keeps
-    its relative accuracy there.
+    ndarray
+        OTF in 0..1 [dimensionless]; 1 at frequency 0. Near the cut-off it falls as (1 - nu)^1.5 and
+        keeps its relative accuracy there.
     """
     wavelength = np.asarray(wavelength, dtype=np.float64)
     scale = wavelength * effective_f_number(f_number, magnification)
@@ -66,9 +78,10 @@ def otf_circular(
 
 
 def _segment(shift: Floats) -> Floats:
-    """acos(nu) - nu sqrt(1 - nu^2) for nu in 0..1: (angle - sin(angle)) / 2 of angle = 2 acos(nu).
+    """Return acos(nu) - nu sqrt(1 - nu^2) for nu in 0..1.
 
-    By its series in the angle below 1, where the difference would cancel.
+    That is (angle - sin(angle)) / 2 of angle = 2 acos(nu), by its series in the angle below 1,
+    where the difference would cancel.
     """
     half = np.arccos(shift)
     out = np.asarray(half - shift * np.sqrt((1 - shift) * (1 + shift)))

@@ -1,11 +1,19 @@
-"""Photon and charge statistics.
+"""Shot noise: Poisson statistics of collected electrons, from one normal number a pixel.
 
-Shot noise: the number of electrons collected at a mean m is a Poisson variable (Chen, thesis,
-eq 2.26: variance of Q_s equals the number of electrons collected).
+The number of electrons collected at a mean m is a Poisson variable [1], eq 2.26: its variance
+equals the number of electrons collected.
 
 Why not `Generator.poisson`: it takes a variable number of draws a pixel, so a difference in the
 last bit of one mean moves every later pixel of the stream. Here each pixel takes exactly one
 normal number, whatever its mean.
+
+References
+----------
+.. [1] T. Chen, "Digital Camera System Simulator and Applications", PhD thesis, Stanford
+   University, 2003, section 2.2.3.
+.. [2] E. A. Cornish, R. A. Fisher, "Moments and cumulants in the specification of
+   distributions", Revue de l'Institut International de Statistique 5, 307-320, 1938,
+   doi:10.2307/1400905.
 """
 
 from __future__ import annotations
@@ -14,20 +22,31 @@ import numpy as np
 from numpy.typing import NDArray
 
 CORNISH_FISHER_MEAN = 8.0
-"""[electrons] Mean from which the expansion is used; exact inversion below."""
+"""Mean from which the expansion is used [electrons]; below, the distribution is inverted."""
 
 
 def poisson_from_normal(mean: NDArray[np.floating], z: NDArray[np.floating]) -> NDArray:
-    """Poisson variable of mean `mean` [electrons] made from one standard normal `z` a pixel.
+    """Return a Poisson variable made from one standard normal variable a pixel.
 
     Below `CORNISH_FISHER_MEAN` the Poisson distribution function is inverted at Phi(z): exact.
-    From there on the quantile's Cornish-Fisher expansion is rounded down,
-        floor(m + z sqrt(m) + 1/3 + z^2/6 - (z/36 + z^3/72)/sqrt(m)),
-    at a total-variation distance from the Poisson law of 8e-4 at m = 8 and 5e-5 at m = 50
-    (Cornish & Fisher, Rev. Inst. Int. Stat. 5, 1938, doi:10.2307/1400905, with the continuity
-    correction 1/2 of a lattice variable).
-    Same shape and float type as `mean`, whole numbers >= 0. `mean` < 0 counts as 0; not finite
-    means are the caller's error.
+    From there on the quantile's Cornish-Fisher expansion [2] is rounded down, with the continuity
+    correction 1/2 of a lattice variable:
+
+        floor(m + z sqrt(m) + 1/3 + z^2/6 - (z/36 + z^3/72)/sqrt(m))
+
+    Its total-variation distance from the Poisson law is 8e-4 at m = 8 and 5e-5 at m = 50.
+
+    Parameters
+    ----------
+    mean : ndarray
+        Mean m of the variable [electrons], of any shape; below 0 it counts as 0. It must be finite.
+    z : ndarray
+        Standard normal numbers [dimensionless], of the same shape.
+
+    Returns
+    -------
+    ndarray
+        Whole numbers, 0 or more [electrons], in the shape and float type of `mean`.
     """
     root = np.sqrt(np.maximum(mean, CORNISH_FISHER_MEAN))
     z2 = z * z
@@ -47,7 +66,7 @@ def poisson_from_normal(mean: NDArray[np.floating], z: NDArray[np.floating]) -> 
 
 
 def _invert(mean: NDArray, z: NDArray) -> NDArray:
-    """Smallest k with P(X <= k | mean) >= Phi(z), by summing the distribution upwards."""
+    """Return the smallest k with P(X <= k | mean) >= Phi(z), summing the distribution upwards."""
     from scipy.special import ndtr
 
     m = np.maximum(mean.astype(np.float64), 0.0)
@@ -67,6 +86,19 @@ def _invert(mean: NDArray, z: NDArray) -> NDArray:
     return count.astype(mean.dtype)
 
 
-def gaussian_shot(mean: NDArray[np.floating], z: NDArray[np.floating]) -> NDArray:
-    """Shot noise as the thesis has it (section 2.2.3): m + z sqrt(m), not rounded. [electrons]"""
+def gaussian_shot_noise(mean: NDArray[np.floating], z: NDArray[np.floating]) -> NDArray:
+    """Return electrons with the normal approximation of shot noise, m + z sqrt(m), not rounded [1].
+
+    Parameters
+    ----------
+    mean : ndarray
+        Mean m [electrons], of any shape; below 0 its variance counts as 0.
+    z : ndarray
+        Standard normal numbers [dimensionless], of the same shape.
+
+    Returns
+    -------
+    ndarray
+        Electrons with their noise [electrons], in the shape of `mean`.
+    """
     return mean + z * np.sqrt(np.maximum(mean, 0))

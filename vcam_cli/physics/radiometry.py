@@ -1,14 +1,14 @@
-"""How much of a scene's light arrives on the sensor plane: magnification, cone, falloff.
+"""Radiometry of a lens: magnification, image-side cone, irradiance, falloff off the axis.
 
 The lens is ideal and its pupil a uniform disk; the scene is Lambertian. Magnifications are
 negative (the image is upside down), zero for a scene at infinity.
 
 References
 ----------
-[1] T. Chen, "Digital Camera System Simulator and Applications", PhD thesis, Stanford University,
-    2003, section 2.2.1.
-[2] P. D. Foote, "Illumination from a radiating disk", Bulletin of the Bureau of Standards 12,
-    583-586, 1915 (the disk seen off its axis, 2.22).
+.. [1] T. Chen, "Digital Camera System Simulator and Applications", PhD thesis, Stanford
+   University, 2003, section 2.2.1.
+.. [2] P. D. Foote, "Illumination from a radiating disk", Bulletin of the Bureau of Standards 12,
+   583-586, 1915 (the disk seen off its axis, 2.22).
 """
 
 import numpy as np
@@ -24,21 +24,24 @@ def _float(value: ArrayLike) -> Floats:
 
 
 def magnification(focal_length: ArrayLike, object_distance: ArrayLike) -> Floats:
-    """Magnification m = -f / (s_o - f) of a thin lens, eq 2.15 of [1].
+    """Return the magnification of a thin lens, m = -f / (s_o - f), eq 2.15 of [1].
 
     Parameters
     ----------
-    focal_length : f [m], positive
-    object_distance : s_o, lens to scene [m]; infinity is allowed and gives 0
+    focal_length : array_like
+        Focal length f [m], positive.
+    object_distance : array_like
+        Distance s_o from the lens to the scene [m]; infinity is allowed and gives 0.
 
     Returns
     -------
-    m, negative or zero [dimensionless]
+    ndarray
+        Magnification m [dimensionless], negative or zero.
 
     Raises
     ------
     ValueError
-        A scene at or inside the focal length: it forms no real image.
+        A focal length is not positive, or a scene lies at or inside it and forms no real image.
     """
     f, distance = _float(focal_length), _float(object_distance)
     if not (f > 0).all():
@@ -49,19 +52,57 @@ def magnification(focal_length: ArrayLike, object_distance: ArrayLike) -> Floats
 
 
 def image_distance(focal_length: ArrayLike, magnification: ArrayLike) -> Floats:
-    """Lens to sensor, s_i = (1 - m) f [m], from f [m] and m; f itself for a scene at infinity."""
+    """Return the distance from the lens to the sensor, s_i = (1 - m) f.
+
+    Parameters
+    ----------
+    focal_length : array_like
+        Focal length f [m].
+    magnification : array_like
+        Magnification m [dimensionless], zero or negative.
+
+    Returns
+    -------
+    ndarray
+        Image distance [m]: the focal length itself for a scene at infinity.
+    """
     return ((1 - _float(magnification)) * _float(focal_length))[()]
 
 
 def effective_f_number(f_number: ArrayLike, magnification: ArrayLike = 0.0) -> Floats:
-    """Working f-number N (1 - m): image distance over aperture diameter [dimensionless]."""
+    """Return the working f-number N (1 - m): image distance over aperture diameter.
+
+    Parameters
+    ----------
+    f_number : array_like
+        F-number N [dimensionless].
+    magnification : array_like
+        Magnification m [dimensionless], zero or negative.
+
+    Returns
+    -------
+    ndarray
+        Working f-number [dimensionless].
+    """
     return (_float(f_number) * (1 - _float(magnification)))[()]
 
 
 def numerical_aperture(f_number: ArrayLike, magnification: ArrayLike = 0.0) -> Floats:
-    """Image-side numerical aperture, the sine of the cone's half-angle, eq 2.17 of [1].
+    """Return the image-side numerical aperture, the sine of the cone's half-angle, eq 2.17 of [1].
 
-    sin(theta) = 1 / sqrt(1 + 4 (N (1 - m))^2), in 0..1, for a flat pupil.
+    sin(theta) = 1 / sqrt(1 + 4 (N (1 - m))^2), for a flat pupil in air.
+
+    Parameters
+    ----------
+    f_number : array_like
+        F-number N [dimensionless], positive.
+    magnification : array_like
+        Magnification m [dimensionless], zero or negative.
+
+    Returns
+    -------
+    ndarray
+        Numerical aperture [dimensionless], in 0..1.
     """
     return (1 / np.hypot(1.0, 2 * effective_f_number(f_number, magnification)))[()]
 
@@ -69,9 +110,24 @@ def numerical_aperture(f_number: ArrayLike, magnification: ArrayLike = 0.0) -> F
 def f_number_of_numerical_aperture(
     numerical_aperture: ArrayLike, magnification: ArrayLike = 0.0
 ) -> Floats:
-    """The f-number N whose image-side numerical aperture is the given sine: 2.17 inverted.
+    """Return the f-number with an image-side numerical aperture: eq 2.17 of [1] inverted.
 
-    Valid for 0 < sine < 1; ValueError outside.
+    Parameters
+    ----------
+    numerical_aperture : array_like
+        Sine of the image-side cone's half-angle [dimensionless], in 0..1, ends excluded.
+    magnification : array_like
+        Magnification m [dimensionless], zero or negative.
+
+    Returns
+    -------
+    ndarray
+        F-number N [dimensionless].
+
+    Raises
+    ------
+    ValueError
+        A numerical aperture that does not lie between 0 and 1.
     """
     sine = _float(numerical_aperture)
     if not ((sine > 0) & (sine < 1)).all():
@@ -80,47 +136,80 @@ def f_number_of_numerical_aperture(
 
 
 def cone_tangent_squared(f_number: ArrayLike, magnification: ArrayLike = 0.0) -> Floats:
-    """tan^2(theta) of the image-side cone's half-angle: 1 / (2 N (1 - m))^2 [dimensionless]."""
+    """Return tan^2(theta) of the image-side cone's half-angle, 1 / (2 N (1 - m))^2.
+
+    Parameters
+    ----------
+    f_number : array_like
+        F-number N [dimensionless], positive.
+    magnification : array_like
+        Magnification m [dimensionless], zero or negative.
+
+    Returns
+    -------
+    ndarray
+        Squared tangent [dimensionless].
+    """
     return ((1 / (2 * effective_f_number(f_number, magnification))) ** 2)[()]
 
 
 def irradiance_per_radiance(f_number: ArrayLike, magnification: ArrayLike = 0.0) -> Floats:
-    """On-axis irradiance on the sensor per radiance of the scene, eq 2.18 of [1].
+    """Return the on-axis irradiance on the sensor per radiance of the scene, eq 2.18 of [1].
 
     E / L = pi sin^2(theta) = pi / (1 + 4 (N (1 - m))^2), before the optics' transmittance.
 
     Parameters
     ----------
-    f_number : N [dimensionless], positive
-    magnification : m, zero or negative; 0 for a scene at infinity
+    f_number : array_like
+        F-number N [dimensionless], positive.
+    magnification : array_like
+        Magnification m [dimensionless], zero or negative; 0 for a scene at infinity.
 
     Returns
     -------
-    projected solid angle [sr], at most pi
+    ndarray
+        Projected solid angle [sr], at most pi.
     """
     return (np.pi * numerical_aperture(f_number, magnification) ** 2)[()]
 
 
 def off_axis_tangent_squared(image_height: ArrayLike, image_distance: ArrayLike) -> Floats:
-    """tan^2(phi) at a distance [m] from the optical axis on the sensor, image distance in [m]."""
+    """Return tan^2(phi) of the off-axis angle of a place on the sensor.
+
+    Parameters
+    ----------
+    image_height : array_like
+        Distance from the optical axis on the sensor [m].
+    image_distance : array_like
+        Distance from the lens to the sensor [m].
+
+    Returns
+    -------
+    ndarray
+        Squared tangent [dimensionless].
+    """
     return ((_float(image_height) / _float(image_distance)) ** 2)[()]
 
 
 def relative_illumination_exact(tan2_theta: ArrayLike, tan2_phi: ArrayLike) -> Floats:
-    """Irradiance off the axis over that on it, for a uniform Lambertian disk: 2.22 of [1], [2].
+    """Return the irradiance off the axis over that on it, for a uniform Lambertian disk [1], [2].
 
-    E(phi) = (pi L / 2) (1 - A / B) with A = 1 - a + b and B = sqrt(A^2 + 4 a), where
-    a = tan^2(theta), b = tan^2(phi). As printed that cancels for a small aperture; as written here
-    the relative error stays at a few 1e-16 for every pair of angles.
+    Eq 2.22 of [1] is E(phi) = (pi L / 2) (1 - A / B) with A = 1 - a + b, B = sqrt(A^2 + 4 a),
+    a = tan^2(theta) and b = tan^2(phi). As printed that cancels for a small aperture; as written
+    here the relative error stays at a few 1e-16 for every pair of angles.
 
     Parameters
     ----------
-    tan2_theta : a, of the image-side cone's half-angle (see `cone_tangent_squared`), positive
-    tan2_phi : b, of the off-axis angle (see `off_axis_tangent_squared`), zero or more; broadcast
+    tan2_theta : array_like
+        a, of the image-side cone's half-angle [dimensionless], positive (`cone_tangent_squared`).
+    tan2_phi : array_like
+        b, of the off-axis angle [dimensionless], zero or more (`off_axis_tangent_squared`). Both
+        broadcast.
 
     Returns
     -------
-    E(phi) / E(0) [dimensionless], in 0..1. cos^4(phi) for a small aperture.
+    ndarray
+        E(phi) / E(0) [dimensionless], in 0..1; cos^4(phi) for a small aperture.
     """
     a, b = np.broadcast_arrays(_float(tan2_theta), _float(tan2_phi))
     tilt = 1 - a + b
@@ -132,27 +221,64 @@ def relative_illumination_exact(tan2_theta: ArrayLike, tan2_phi: ArrayLike) -> F
 
 
 def relative_illumination_cos4(tan2_phi: ArrayLike) -> Floats:
-    """cos^4(phi) from tan^2(phi): the falloff of a small aperture, eq 2.21 of [1]. In 0..1."""
+    """Return the relative illumination of a small aperture, cos^4(phi), eq 2.21 of [1].
+
+    Parameters
+    ----------
+    tan2_phi : array_like
+        Squared tangent of the off-axis angle [dimensionless] (`off_axis_tangent_squared`).
+
+    Returns
+    -------
+    ndarray
+        E(phi) / E(0) [dimensionless], in 0..1.
+    """
     return ((1 / (1 + _float(tan2_phi))) ** 2)[()]
 
 
 def field_of_view(extent: ArrayLike, image_distance: ArrayLike) -> Floats:
-    """Full angle [rad] that an extent of the sensor [m] sees: 2 atan(extent / (2 s_i))."""
+    """Return the full field of view of an extent of the sensor, 2 atan(extent / (2 s_i)).
+
+    Parameters
+    ----------
+    extent : array_like
+        Width, height or diagonal of the sensor [m].
+    image_distance : array_like
+        Distance s_i from the lens to the sensor [m].
+
+    Returns
+    -------
+    ndarray
+        Full angle [rad].
+    """
     return (2 * np.arctan(_float(extent) / (2 * _float(image_distance))))[()]
 
 
 def focal_length_of_field_of_view(
     field_of_view: ArrayLike, extent: ArrayLike, object_distance: ArrayLike = np.inf
 ) -> Floats:
-    """Focal length [m] that gives an extent of the sensor a field of view, focused on the scene.
+    """Return the focal length that gives the sensor a field of view, focused on the scene.
 
     The image distance is s_i = extent / (2 tan(angle / 2)), and 1/f = 1/s_i + 1/s_o.
 
     Parameters
     ----------
-    field_of_view : full angle [rad], between 0 and pi; ValueError outside
-    extent : of the sensor [m], its diagonal for a diagonal field of view
-    object_distance : s_o [m], or infinity
+    field_of_view : array_like
+        Full angle [rad], between 0 and pi.
+    extent : array_like
+        Extent of the sensor [m]: its diagonal for a diagonal field of view.
+    object_distance : array_like
+        Distance s_o from the lens to the scene [m], or infinity.
+
+    Returns
+    -------
+    ndarray
+        Focal length [m].
+
+    Raises
+    ------
+    ValueError
+        A field of view that does not lie between 0 and pi.
     """
     angle = _float(field_of_view)
     if not ((angle > 0) & (angle < np.pi)).all():
@@ -162,5 +288,16 @@ def focal_length_of_field_of_view(
 
 
 def photon_energy(wavelength: ArrayLike) -> Floats:
-    """Energy of a photon, h c / wavelength [J], from a wavelength [m]."""
+    """Return the energy of a photon, h c / wavelength.
+
+    Parameters
+    ----------
+    wavelength : array_like
+        Wavelength [m], positive.
+
+    Returns
+    -------
+    ndarray
+        Energy [J].
+    """
     return (PLANCK * SPEED_OF_LIGHT / _float(wavelength))[()]

@@ -1,16 +1,18 @@
-"""Silicon: how deep light goes, where its electrons wander, how many carriers are there anyway.
+"""Silicon: absorption of light, diffusion of charge, intrinsic carrier concentration.
 
 References
 ----------
-[1] T. Chen, "Digital Camera System Simulator and Applications", PhD thesis, Stanford University,
-    2003, section 2.2.2.
-[2] M. A. Green, "Self-consistent optical parameters of intrinsic silicon at 300 K including
-    temperature coefficients", Solar Energy Materials and Solar Cells 92, 1305-1310, 2008.
-    doi:10.1016/j.solmat.2008.06.009
-[3] K. Misiakos, D. Tsamakis, "Accurate measurements of the silicon intrinsic carrier density from
-    78 to 340 K", Journal of Applied Physics 74, 3293-3297, 1993. doi:10.1063/1.354551
-[4] D. H. Seib, "Carrier diffusion degradation of modulation transfer function in charge coupled
-    imagers", IEEE Transactions on Electron Devices 21, 210-217, 1974.
+.. [1] T. Chen, "Digital Camera System Simulator and Applications", PhD thesis, Stanford
+   University, 2003, section 2.2.2.
+.. [2] M. A. Green, "Self-consistent optical parameters of intrinsic silicon at 300 K including
+   temperature coefficients", Solar Energy Materials and Solar Cells 92, 1305-1310, 2008,
+   doi:10.1016/j.solmat.2008.06.009.
+.. [3] K. Misiakos, D. Tsamakis, "Accurate measurements of the silicon intrinsic carrier density
+   from 78 to 340 K", Journal of Applied Physics 74, 3293-3297, 1993, doi:10.1063/1.354551.
+.. [4] D. H. Seib, "Carrier diffusion degradation of modulation transfer function in charge
+   coupled imagers", IEEE Transactions on Electron Devices 21, 210-217, 1974.
+.. [5] A. B. Sproul, M. A. Green, "Improved value for the silicon intrinsic carrier concentration
+   from 275 to 375 K", Journal of Applied Physics 70, 846-854, 1991, doi:10.1063/1.349645.
 """
 
 from functools import cache
@@ -23,7 +25,7 @@ from vcam_cli.spectra import Table, silicon_absorption
 Floats = NDArray[np.float64]
 
 PERMITTIVITY = 11.7 * 8.8541878128e-12
-"""Of silicon [F/m]: relative permittivity x that of vacuum (CODATA 2018)."""
+"""Permittivity of silicon [F/m]: relative permittivity x that of vacuum (CODATA 2018)."""
 ABSORPTION_RANGE = (350e-9, 1100e-9)
 """Wavelengths for which the absorption is tabulated [m]."""
 TEMPERATURES = (77.0, 400.0)
@@ -31,7 +33,7 @@ TEMPERATURES = (77.0, 400.0)
 
 # Below this product of depth and 1 / length an integral is smooth enough for Gauss's rule, and the
 # closed form loses digits. 12 points: exp(-2 t) sinh(2 (1 - t)) is integrated to 1e-19.
-_THIN = 2.0
+_THIN_LAYER = 2.0
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(12)
 _NODES, _WEIGHTS = (_NODES + 1) / 2, _WEIGHTS / 2
 
@@ -47,13 +49,24 @@ def _log_absorption() -> Table:
 
 
 def absorption(wavelength: ArrayLike) -> Floats:
-    """Absorption coefficient of crystalline silicon at 300 K [1/m], from [2].
+    """Return the absorption coefficient of crystalline silicon at 300 K [2].
 
     Between the table's wavelengths, 10 nm apart, its logarithm is a straight line.
 
     Parameters
     ----------
-    wavelength : [m], within `ABSORPTION_RANGE`; ValueError outside
+    wavelength : array_like
+        Wavelength [m], within `ABSORPTION_RANGE`.
+
+    Returns
+    -------
+    ndarray
+        Absorption coefficient [1/m].
+
+    Raises
+    ------
+    ValueError
+        A wavelength outside the range.
     """
     asked = _float(wavelength)
     low, high = ABSORPTION_RANGE
@@ -63,18 +76,29 @@ def absorption(wavelength: ArrayLike) -> Floats:
             f"silicon's absorption is known from {low * 1e9:.0f} to {high * 1e9:.0f} nm, not at "
             f"{float(asked.min()) * 1e9:.6g} to {float(asked.max()) * 1e9:.6g} nm"
         )
-    return np.exp(table.at(asked))[()]
+    return np.exp(table.evaluate(asked))[()]
 
 
 def intrinsic_concentration(temperature: ArrayLike) -> Floats:
-    """Intrinsic carrier concentration of silicon [1/m3], from [3].
+    """Return the intrinsic carrier concentration of silicon [3].
 
     n_i = 5.29e19 (T / 300)^2.54 exp(-6726 / T) 1/cm3, measured from 78 to 340 K. It is 1 to 3.5 %
-    below the model of A. B. Sproul, M. A. Green, J. Appl. Phys. 70, 846 (1991), from 275 to 400 K.
+    below the model of [5] from 275 to 400 K.
 
     Parameters
     ----------
-    temperature : T [K], within `TEMPERATURES`; ValueError outside
+    temperature : array_like
+        Temperature T [K], within `TEMPERATURES`.
+
+    Returns
+    -------
+    ndarray
+        Concentration n_i [1/m3].
+
+    Raises
+    ------
+    ValueError
+        A temperature outside the range.
     """
     t = _float(temperature)
     low, high = TEMPERATURES
@@ -83,14 +107,14 @@ def intrinsic_concentration(temperature: ArrayLike) -> Floats:
     return (5.29e25 * (t / 300) ** 2.54 * np.exp(-6726 / t))[()]
 
 
-def collected(
+def collection_efficiency(
     frequency: ArrayLike,
     absorption: ArrayLike,
     diffusion_length: ArrayLike,
     depletion_width: ArrayLike,
     neutral_depth: ArrayLike,
 ) -> Floats:
-    """Electrons collected per photon from a sinusoid of light, D(f) of eq 2.28 in [1], [4].
+    """Return the electrons collected per photon of a sinusoid, D(f) of eq 2.28 in [1], [4].
 
     All that is absorbed in the depletion region is collected; what is absorbed in the neutral
     region below it diffuses, and is lost where it recombines or reaches the bottom:
@@ -104,16 +128,21 @@ def collected(
 
     Parameters
     ----------
-    frequency : spatial frequency f [cycles/m], of either sign
-    absorption : a [1/m], not negative
-    diffusion_length : of electrons in the neutral region, L_n [m], positive; may be infinite
-    depletion_width : L [m], not negative
-    neutral_depth : L_d [m], not negative
-        All five broadcast against each other.
+    frequency : array_like
+        Spatial frequency f [cycles/m], of either sign.
+    absorption : array_like
+        Absorption coefficient a [1/m], not negative.
+    diffusion_length : array_like
+        Diffusion length of electrons in the neutral region L_n [m], positive; may be infinite.
+    depletion_width : array_like
+        Depth L of the depletion region [m], not negative.
+    neutral_depth : array_like
+        Depth L_d of the neutral region [m], not negative. All five broadcast.
 
     Returns
     -------
-    In 0..1 [dimensionless]
+    ndarray
+        Electrons per photon [dimensionless], in 0..1.
 
     Raises
     ------
@@ -125,23 +154,23 @@ def collected(
         raise ValueError("silicon needs a positive diffusion length, and no negative depths")
     inverse = np.hypot(1 / _float(diffusion_length), 2 * np.pi * _float(frequency))  # 1 / L_f
     depleted, neutral, a, k = np.broadcast_arrays(*lengths, inverse)
-    thin = (k * neutral < _THIN) & (a * neutral < _THIN)
+    thin = (k * neutral < _THIN_LAYER) & (a * neutral < _THIN_LAYER)
     below = np.empty(thin.shape)
-    below[thin] = _from_thin(a[thin], k[thin], neutral[thin])
-    below[~thin] = _from_thick(a[~thin], k[~thin], neutral[~thin])
+    below[thin] = _neutral_region_by_quadrature(a[thin], k[thin], neutral[thin])
+    below[~thin] = _neutral_region_closed_form(a[~thin], k[~thin], neutral[~thin])
     return (-np.expm1(-a * depleted) + np.exp(-a * depleted) * below)[()]
 
 
-def _from_thin(a: Floats, k: Floats, depth: Floats) -> Floats:
-    """Part of the light entering the neutral region that is collected, by quadrature."""
+def _neutral_region_by_quadrature(a: Floats, k: Floats, depth: Floats) -> Floats:
+    """Return the part of the light entering the neutral region that is collected, by quadrature."""
     r, t = (k * depth)[:, None], (a * depth)[:, None]
     r = np.maximum(r, 1e-150)  # where nothing recombines the ratio is 1 - node
     values = np.exp(-t * _NODES) * np.sinh(r * (1 - _NODES)) / np.sinh(r)
     return np.asarray(t[:, 0] * (values @ _WEIGHTS))
 
 
-def _from_thick(a: Floats, k: Floats, depth: Floats) -> Floats:
-    """The same in closed form: a / (a + k) less what the bottom takes.
+def _neutral_region_closed_form(a: Floats, k: Floats, depth: Floats) -> Floats:
+    """Return the same part in closed form: a / (a + k) less what the bottom takes.
 
     a (1 - e^-r 2 r e^-min(r, t) w / (1 - e^-2r)) / (a + k), where r = L_d / L_f, t = a L_d,
     w = (1 - e^-|r - t|) / |r - t|, which is 1 at r = t.
@@ -160,11 +189,32 @@ def diffusion_mtf(
     depletion_width: ArrayLike,
     neutral_depth: ArrayLike,
 ) -> Floats:
-    """Modulation transfer by diffusion of charge, D(f) / D(0), eq 2.27 of [1].
+    """Return the modulation transfer function of charge diffusion, D(f) / D(0), eq 2.27 of [1].
 
-    Parameters as of `collected`; the absorption positive. In 0..1, 1 at frequency 0, and at high
-    frequency the part of what is collected that was absorbed in the depletion region.
+    Parameters
+    ----------
+    frequency : array_like
+        Spatial frequency f [cycles/m], of either sign.
+    absorption : array_like
+        Absorption coefficient a [1/m], positive.
+    diffusion_length : array_like
+        Diffusion length of electrons in the neutral region L_n [m], positive; may be infinite.
+    depletion_width : array_like
+        Depth L of the depletion region [m], not negative.
+    neutral_depth : array_like
+        Depth L_d of the neutral region [m], not negative. All five broadcast.
+
+    Returns
+    -------
+    ndarray
+        MTF in 0..1 [dimensionless]; 1 at frequency 0, and at high frequency the part of what is
+        collected that was absorbed in the depletion region.
+
+    Raises
+    ------
+    ValueError
+        A diffusion length that is not positive, a negative depth or absorption.
     """
     silicon = (absorption, diffusion_length, depletion_width, neutral_depth)
-    ratio = collected(frequency, *silicon) / collected(0.0, *silicon)
+    ratio = collection_efficiency(frequency, *silicon) / collection_efficiency(0.0, *silicon)
     return np.where(_float(frequency) == 0, 1.0, np.minimum(ratio, 1.0))[()]  # roundings aside

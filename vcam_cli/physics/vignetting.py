@@ -8,12 +8,12 @@ Angles of light are given by their tangents in air: (x, y) of the direction over
 
 References
 ----------
-[1] P. B. Catrysse, X. Liu, A. El Gamal, "QE reduction due to pixel vignetting in CMOS image
-    sensors", Proc. SPIE 3965, 420-430, 2000, doi:10.1117/12.385460.
-[2] T. Chen, "Digital Camera System Simulator and Applications", PhD thesis, Stanford University,
-    2003, section 2.2.2.
-[3] M. Born, E. Wolf, "Principles of Optics", 7th edition, 1999, section 1.5.2 and 1.5.3,
-    doi:10.1017/CBO9781139644181.
+.. [1] P. B. Catrysse, X. Liu, A. El Gamal, "QE reduction due to pixel vignetting in CMOS image
+   sensors", Proc. SPIE 3965, 420-430, 2000, doi:10.1117/12.385460.
+.. [2] T. Chen, "Digital Camera System Simulator and Applications", PhD thesis, Stanford
+   University, 2003, section 2.2.2.
+.. [3] M. Born, E. Wolf, "Principles of Optics", 7th edition, 1999, section 1.5.2 and 1.5.3,
+   doi:10.1017/CBO9781139644181.
 """
 
 from __future__ import annotations
@@ -29,21 +29,30 @@ Floats = NDArray[np.float64]
 Layers = Sequence[tuple[float, float]]
 """Dielectrics from the air down: (thickness [m], refractive index)."""
 
-ACROSS, ALONG = 12, 5
-"""Gauss points a panel, from chord to chord of the pupil and along each."""
-STEEPEST = 1e6
+POINTS_ACROSS, POINTS_ALONG = 12, 5
+"""Gauss points a panel: from chord to chord of the pupil, and along each."""
+MAX_TANGENT = 1e6
 """Tangents beyond count as this: no light comes so flat."""
-LEAST_DEPTH = 1e-100
-"""Stands for the depth of a tunnel that has none, where it is divided by [m]."""
+MIN_DEPTH = 1e-100
+"""Depth of a tunnel that has none, where it is divided by [m]."""
 
 
 def refracted_cosine(cosine: ArrayLike, index: ArrayLike, below: ArrayLike) -> Floats:
-    """Cosine of the angle of light after it passes from one medium to another, Snell's law.
+    """Return the cosine of the angle of refraction, by Snell's law.
 
     Parameters
     ----------
-    cosine : of the angle of incidence, 0..1
-    index, below : refractive indices of the medium it leaves and of the one it enters
+    cosine : array_like
+        Cosine of the angle of incidence [dimensionless], in 0..1.
+    index : array_like
+        Refractive index of the medium that the light leaves.
+    below : array_like
+        Refractive index of the medium that it enters. All three broadcast.
+
+    Returns
+    -------
+    ndarray
+        Cosine of the angle below [dimensionless], in 0..1.
 
     Raises
     ------
@@ -59,54 +68,115 @@ def refracted_cosine(cosine: ArrayLike, index: ArrayLike, below: ArrayLike) -> F
 
 
 def transmission_s(cosine: ArrayLike, index: ArrayLike, below: ArrayLike) -> Floats:
-    """Share of the power that passes a surface, polarized across the plane of incidence [3].
+    """Return the transmittance of a surface for light polarized across the plane of incidence [3].
 
-    T_s = 4 n1 cos1 n2 cos2 / (n1 cos1 + n2 cos2)^2; parameters as in `refracted_cosine`.
+    T_s = 4 n1 cos1 n2 cos2 / (n1 cos1 + n2 cos2)^2.
+
+    Parameters
+    ----------
+    cosine : array_like
+        Cosine of the angle of incidence [dimensionless], in 0..1.
+    index : array_like
+        Refractive index n1 of the medium that the light leaves.
+    below : array_like
+        Refractive index n2 of the medium that it enters. All three broadcast.
+
+    Returns
+    -------
+    ndarray
+        Share of the power that passes [dimensionless], in 0..1.
+
+    Raises
+    ------
+    ValueError
+        Total internal reflection.
     """
     c, n1, n2 = (np.asarray(v, np.float64) for v in (cosine, index, below))
-    return _passing(n1 * c, n2 * refracted_cosine(c, n1, n2))[()]
+    return _power_transmission(n1 * c, n2 * refracted_cosine(c, n1, n2))[()]
 
 
 def transmission_p(cosine: ArrayLike, index: ArrayLike, below: ArrayLike) -> Floats:
-    """Share of the power that passes a surface, polarized in the plane of incidence [3].
+    """Return the transmittance of a surface for light polarized in the plane of incidence [3].
 
     T_p = 4 n1 cos1 n2 cos2 / (n2 cos1 + n1 cos2)^2; 1 at Brewster's angle, tan = n2 / n1.
+
+    Parameters
+    ----------
+    cosine : array_like
+        Cosine of the angle of incidence [dimensionless], in 0..1.
+    index : array_like
+        Refractive index n1 of the medium that the light leaves.
+    below : array_like
+        Refractive index n2 of the medium that it enters. All three broadcast.
+
+    Returns
+    -------
+    ndarray
+        Share of the power that passes [dimensionless], in 0..1.
+
+    Raises
+    ------
+    ValueError
+        Total internal reflection.
     """
     c, n1, n2 = (np.asarray(v, np.float64) for v in (cosine, index, below))
-    return _passing(n2 * c, n1 * refracted_cosine(c, n1, n2))[()]
+    return _power_transmission(n2 * c, n1 * refracted_cosine(c, n1, n2))[()]
 
 
-def _passing(one: Floats, two: Floats) -> Floats:
-    """What passes between two admittances."""
+def _power_transmission(one: Floats, two: Floats) -> Floats:
+    """Return the share of the power that passes between two admittances."""
     return 4 * one * two / (one + two) ** 2
 
 
 def stack_transmission(cosine: ArrayLike, layers: Layers) -> Floats:
-    """Share of the power that passes the upper surfaces of all layers, T_p T_s of [2].
+    """Return the transmittance of the upper surfaces of all layers, T_p T_s of [2].
 
     Light is taken as unpolarized at each surface, and what is reflected between them as lost; no
     interference: layers are thicker than the light is coherent.
 
     Parameters
     ----------
-    cosine : of the angle in air, 0..1
-    layers : see `Layers`; one without thickness reflects all the same
+    cosine : array_like
+        Cosine of the angle in air [dimensionless], in 0..1.
+    layers : Layers
+        Thickness [m] and refractive index of each layer from the air down; one without thickness
+        reflects all the same.
+
+    Returns
+    -------
+    ndarray
+        Share of the power that passes [dimensionless], in the shape of `cosine`.
     """
     above, n1 = np.asarray(cosine, np.float64), 1.0
     total = np.ones_like(above)
     for _, n2 in layers:
         inside = refracted_cosine(above, n1, n2)
-        s, p = _passing(n1 * above, n2 * inside), _passing(n2 * above, n1 * inside)
+        s, p = (
+            _power_transmission(n1 * above, n2 * inside),
+            _power_transmission(n2 * above, n1 * inside),
+        )
         total = total * ((s + p) / 2)
         above, n1 = inside, n2
     return total[()]
 
 
 def depth_per_tangent(tangent_squared: ArrayLike, layers: Layers) -> Floats:
-    """How far light falls sideways, per tangent of its angle in air [m].
+    """Return how far light falls sideways in the layers, per tangent of its angle in air.
 
     The sum of t tan(theta_i) over the layers is tan(theta) times this: with sin(theta_i) =
     sin(theta) / n it is the sum of t / sqrt(n^2 + (n^2 - 1) tan^2(theta)).
+
+    Parameters
+    ----------
+    tangent_squared : array_like
+        tan^2(theta) of the angle in air [dimensionless].
+    layers : Layers
+        Thickness [m] and refractive index of each layer from the air down.
+
+    Returns
+    -------
+    ndarray
+        Lateral shift per tangent [m], in the shape of `tangent_squared`.
     """
     u2 = np.asarray(tangent_squared, np.float64)
     return sum((t / np.sqrt(n**2 + (n**2 - 1) * u2) for t, n in layers), start=np.zeros_like(u2))[
@@ -115,13 +185,39 @@ def depth_per_tangent(tangent_squared: ArrayLike, layers: Layers) -> Floats:
 
 
 def lateral_shift(tangent: ArrayLike, layers: Layers) -> Floats:
-    """How far light falls sideways on its way down [m], along its azimuth, from tan(theta)."""
+    """Return how far light falls sideways on its way down, along its azimuth.
+
+    Parameters
+    ----------
+    tangent : array_like
+        tan(theta) of the angle in air [dimensionless].
+    layers : Layers
+        Thickness [m] and refractive index of each layer from the air down.
+
+    Returns
+    -------
+    ndarray
+        Lateral shift [m], in the shape of `tangent`.
+    """
     u = np.asarray(tangent, np.float64)
     return (u * depth_per_tangent(u**2, layers))[()]
 
 
 def overlap(dx: ArrayLike, dy: ArrayLike, width: float, height: float) -> Floats:
-    """Share that two equal rectangles have in common when one is shifted by (dx, dy) [m]."""
+    """Return the share that two equal rectangles have in common when one is shifted.
+
+    Parameters
+    ----------
+    dx, dy : array_like
+        Shift along the width and the height [m]; they broadcast.
+    width, height : float
+        Sides of the rectangles [m].
+
+    Returns
+    -------
+    ndarray
+        Share of the area [dimensionless], in 0..1.
+    """
     x = np.maximum(0, 1 - np.abs(dx) / width)
     return (x * np.maximum(0, 1 - np.abs(dy) / height))[()]
 
@@ -135,7 +231,7 @@ def collected_fraction(
     height: float,
     chief_centered: bool = False,
 ) -> Floats:
-    """Share of the light on a tunnel's mouth that reaches the photodetector at its bottom.
+    """Return the share of the light on a tunnel's mouth that reaches the photodetector below [1].
 
     The mean of overlap x T over the exit pupil, a uniform Lambertian disk, by the irradiance that
     its parts cause (cos^4 of the angle). Relative to the light without a tunnel and without
@@ -144,12 +240,23 @@ def collected_fraction(
 
     Parameters
     ----------
-    x, y : tangents of the chief ray at the pixel, position over distance of the exit pupil
-    cone : tangent of the image-side cone's half-angle on the axis, 1 / (2 N (1 - m))
-    layers : in the tunnel, see `Layers`; indices at least 1
-    width, height : of the tunnel and the photodetector [m]
-    chief_centered : whether the chief ray hits the center of the photodetector, as microlenses
-        make it that follow the chief ray; the tunnel then only sees the spread of the cone
+    x, y : array_like
+        Tangents of the chief ray at the pixel [dimensionless]: position over distance of the exit
+        pupil; they broadcast.
+    cone : float
+        Tangent of the image-side cone's half-angle on the axis, 1 / (2 N (1 - m)) [dimensionless].
+    layers : Layers
+        Thickness [m] and refractive index, at least 1, of each layer in the tunnel.
+    width, height : float
+        Sides of the tunnel and of the photodetector [m].
+    chief_centered : bool
+        Whether the chief ray hits the center of the photodetector, as microlenses make it that
+        follow the chief ray; the tunnel then only sees the spread of the cone.
+
+    Returns
+    -------
+    ndarray
+        Share of the light [dimensionless], in the shape to which x and y broadcast.
 
     Notes
     -----
@@ -168,7 +275,7 @@ def collected_fraction(
     tx, chord, across = tx[lit][:, None], chord[lit][:, None], across[lit]
     cy, ox, oy = cy[pixel], offset[0][pixel], offset[1][pixel]
     kinks = np.concatenate([_tangent(oy + s * height, tx**2, layers) for s in (-1, 0, 1)], -1)
-    ty, along = _panels(np.clip(kinks, cy - chord, cy + chord), ALONG)
+    ty, along = _panels(np.clip(kinks, cy - chord, cy + chord), POINTS_ALONG)
     u2 = tx**2 + ty**2
     depth = depth_per_tangent(u2, layers)
     light = overlap(depth * tx - ox, depth * ty - oy, width, height)
@@ -183,7 +290,7 @@ def collected_fraction(
 def _chords(
     cx: Floats, cy: Floats, cone: float, layers: Layers, offset: tuple[Floats, Floats], width: float
 ) -> tuple[Floats, Floats, Floats]:
-    """Chords x = constant of the pupil: x, half of their length, and quadrature weights.
+    """Return chords x = constant of the pupil: x, half of their length, quadrature weights.
 
     They are spaced as cone x sin(v), which makes the length cone x cos(v) a smooth function.
     Panels end where x is a kink or the light vanishes, and where the pupil's rim meets the kink
@@ -201,26 +308,27 @@ def _chords(
     v = np.arcsin(np.clip((np.concatenate(ends, -1) - cx) / cone, -1, 1))
     rim = np.arccos(np.clip(np.abs(_tangent(oy, cx**2, layers) - cy) / cone, 0, 1))
     inside = [np.clip(at, v[..., :1], v[..., 2:]) for at in (-rim, rim)]
-    v, weight = _panels(np.sort(np.concatenate([v, *inside], -1), axis=-1), ACROSS)
+    v, weight = _panels(np.sort(np.concatenate([v, *inside], -1), axis=-1), POINTS_ACROSS)
     chord = cone * np.cos(v)
     return cx + cone * np.sin(v), chord, weight * chord
 
 
 def _tangent(shift: Floats, other_squared: Floats, layers: Layers) -> Floats:
-    """The tangent along one axis at which light falls `shift` sideways, that along the other given.
+    """Return the tangent along one axis at which light falls `shift` sideways.
 
-    By fixed point: depth hardly depends on the angle (2e-4 of it are left at 45 degrees).
+    The tangent along the other axis is given. By fixed point: depth hardly depends on the angle
+    (2e-4 of it are left at 45 degrees).
     """
     depth = depth_per_tangent(other_squared, layers)
     tangent = np.zeros_like(shift * depth)
     for _ in range(5):
-        tangent = np.clip(shift / np.maximum(depth, LEAST_DEPTH), -STEEPEST, STEEPEST)
+        tangent = np.clip(shift / np.maximum(depth, MIN_DEPTH), -MAX_TANGENT, MAX_TANGENT)
         depth = depth_per_tangent(other_squared + tangent**2, layers)
     return tangent
 
 
 def _panels(ends: Floats, count: int) -> tuple[Floats, Floats]:
-    """Gauss points and weights in all panels between consecutive `ends` (..., n)."""
+    """Return Gauss points and weights in all panels between consecutive `ends` (..., n)."""
     node, weight = np.polynomial.legendre.leggauss(count)
     half = (np.diff(ends) / 2)[..., None]
     middle = ((ends[..., 1:] + ends[..., :-1]) / 2)[..., None]

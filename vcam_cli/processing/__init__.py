@@ -1,4 +1,4 @@
-"""From raw numbers to a picture: the steps of a camera's `processing`, in the user's order.
+"""Processing of raw frames to pictures: the steps of a camera's `processing`, in the user's order.
 
 A raw frame (rows, columns) [DN] goes in; linear display RGB, in which the scene's perfect white
 is 1, comes out, and from it the codes of the render.
@@ -6,7 +6,7 @@ is 1, comes out, and from it the codes of the render.
 
 from vcam_cli.processing.base import Context, Patches
 from vcam_cli.processing.check import check
-from vcam_cli.processing.processed import Processed
+from vcam_cli.processing.picture import ProcessedPicture
 from vcam_cli.processing.steps import process
 
-__all__ = ["Context", "Patches", "Processed", "check", "process"]
+__all__ = ["Context", "Patches", "ProcessedPicture", "check", "process"]

@@ -1,4 +1,4 @@
-"""What flows through processing: a context, blocks of rows, operations on them.
+"""What processing works on: the context of a frame, blocks of its rows, operations on them.
 
 A frame is worked on in blocks of some rows that pass through all operations while they are in the
 cache; an operation that looks at neighbors asks for a `halo` of rows above and below. Blocks are
@@ -18,10 +18,10 @@ import numpy as np
 
 from vcam_cli.spectra import Spectrum
 
-STEP, MOST = 16, 64
+ROW_STEP, MAX_BLOCK_ROWS = 16, 64
 """Rows of a block: a multiple of the one, at most the other."""
-PIXELS = 1 << 17
-"""Of a block, about: three colors of them and what is made of them stay in the cache."""
+BLOCK_PIXELS = 1 << 17
+"""Pixels of a block, about: three colors of them and temporary arrays stay in the cache."""
 
 Pattern = tuple[tuple[str, ...], ...]
 Result = TypeVar("Result")
@@ -29,67 +29,70 @@ Result = TypeVar("Result")
 
 @dataclass(frozen=True)
 class Patches:
-    """A ColorChecker in the light of the scene.
-
-    dn: (C, 24) [DN] what each patch would give on axis in each color, as `Context.white_dn`.
-    light: spectral radiance of the scene's perfect white, any scale; start, stop: the wavelengths
-        simulated [m].
-    """
+    """A ColorChecker in the light of the scene."""
 
     dn: np.ndarray
+    """Signal of each patch on axis in each color (C, 24) [DN], as `Context.white_dn`."""
     light: Spectrum
+    """Spectral radiance of the scene's perfect white, in any scale."""
     start: float
+    """First wavelength that is simulated [m]."""
     stop: float
+    """Last wavelength that is simulated [m]."""
 
 
 class Layout(Protocol):
-    """Where the pixels of an array stand that has no rows and columns of squares.
+    """Positions of pixels that fill no rows and columns of squares.
 
-    Arrays of the frame's shape: x, y: centers [m]; color: index into the colors. The picture is
-    shown on a square grid, its columns at picture_x and its rows at picture_y [m].
+    Arrays have the frame's shape; the picture is shown on a square grid.
     """
 
     @property
-    def x(self) -> np.ndarray: ...
+    def x(self) -> np.ndarray:
+        """Centers of the pixels to the right [m]."""
 
     @property
-    def y(self) -> np.ndarray: ...
+    def y(self) -> np.ndarray:
+        """Centers of the pixels down [m]."""
 
     @property
-    def color(self) -> np.ndarray: ...
+    def color(self) -> np.ndarray:
+        """Index of each pixel's color."""
 
     @property
-    def picture_x(self) -> np.ndarray: ...
+    def picture_x(self) -> np.ndarray:
+        """Places of the picture's columns [m]."""
 
     @property
-    def picture_y(self) -> np.ndarray: ...
+    def picture_y(self) -> np.ndarray:
+        """Places of the picture's rows [m]."""
 
 
 @dataclass(frozen=True)
 class Context:
-    """What processing must know of the camera that took the frame.
-
-    pattern: the repeating block of colors, e.g. (("R", "G"), ("G", "B")), row 0 first.
-    colors: the order of the color planes, e.g. ("R", "G", "B"); ("Y",) for monochrome.
-    white_dn: (C,) [DN] what the scene's perfect white would give on axis in each color, free
-        of noise, black included, not clipped.
-    black_dn: [DN] mean dark signal and offset.
-    linearize: the codes of a linear ADC [DN] for those of this one; None where it is linear.
-    saturated_dn: [DN] from which on a pixel is saturated.
-    patches: gives the ColorChecker as this camera sees it; called only where a step asks for it.
-    planes: every raw pixel has all its colors: the frame is (C, rows, columns), without a pattern.
-    layout: where pixels stand that are scattered; None where they fill rows and columns.
-    """
+    """What processing must know of the camera that took the frame."""
 
     pattern: Pattern
+    """Repeating block of colors, e.g. (("R", "G"), ("G", "B")), row 0 first."""
     colors: tuple[str, ...]
+    """Order of the color planes, e.g. ("R", "G", "B"); ("Y",) for monochrome."""
     white_dn: np.ndarray
+    """Signal of the scene's perfect white on axis in each color (C,) [DN].
+
+    It is free of noise and not clipped, and black is included.
+    """
     black_dn: float
+    """Mean dark signal and offset [DN]."""
     linearize: Callable[[np.ndarray], np.ndarray] | None = None
+    """Gives the codes of a linear ADC [DN] for those of this one; None where it is linear."""
     saturated_dn: float = np.inf
+    """Code from which on a pixel is saturated [DN]."""
     patches: Callable[[], Patches] | None = None
+    """Gives the ColorChecker as this camera sees it; called only where a step asks for it."""
     planes: bool = False
+    """Whether every raw pixel has all its colors: the frame is (C, rows, columns), no mosaic."""
     layout: Layout | None = None
+    """Positions of pixels that are scattered; None where they fill rows and columns."""
 
     @property
     def mosaic(self) -> bool:
@@ -99,13 +102,12 @@ class Context:
 
 @dataclass(frozen=True)
 class Block:
-    """Some rows of a picture: planes (C, rows, columns) float32, (1, rows, columns) for a mosaic.
-
-    `first_row` is the array's row that planes[:, 0] belongs to; -1 is the mirror of row 1.
-    """
+    """Some rows of a picture."""
 
     planes: np.ndarray
+    """Values (C, rows, columns) float32; (1, rows, columns) for a mosaic."""
     first_row: int
+    """Row of the array that planes[:, 0] belongs to; -1 is the mirror of row 1."""
 
 
 class Operation(Protocol):
@@ -113,17 +115,29 @@ class Operation(Protocol):
 
     @property
     def halo(self) -> int:
-        """Rows it needs above and below, and takes away."""
+        """Rows that the operation needs above and below, and takes away."""
 
-    def on_block(self, block: Block) -> Block: ...
+    def on_block(self, block: Block) -> Block:
+        """Return the block after this step."""
 
     def on_colors(self, values: np.ndarray) -> np.ndarray:
-        """The same transform of full-color values (C, ...) [as they come out of the last step]."""
+        """Return full-color values (C, ...) of the last step after the same transform."""
 
 
 def blocks(rows: int, columns: int) -> Iterator[tuple[int, int]]:
-    """(start, stop) of every block of a picture of so many rows and columns."""
-    size = max(STEP, min(PIXELS // columns // STEP * STEP, MOST))
+    """Yield the first row and the end of every block of a picture.
+
+    Parameters
+    ----------
+    rows, columns : int
+        Size of the picture [pixels].
+
+    Yields
+    ------
+    start, stop : int
+        Rows of the block.
+    """
+    size = max(ROW_STEP, min(BLOCK_PIXELS // columns // ROW_STEP * ROW_STEP, MAX_BLOCK_ROWS))
     for start in range(0, rows, size):
         yield start, min(start + size, rows)
 
@@ -131,9 +145,21 @@ def blocks(rows: int, columns: int) -> Iterator[tuple[int, int]]:
 def map_blocks(
     work: Callable[[int, int], Result], shape: Sequence[int], workers: int
 ) -> list[Result]:
-    """work(start, stop) for every block of a picture, on `workers` threads.
+    """Return work(start, stop) for every block of a picture.
 
-    shape: its rows and columns last. Returns the results in the order of rows.
+    Parameters
+    ----------
+    work : callable
+        Function of the first row and the end of a block.
+    shape : sequence of int
+        Shape of the picture, with its rows and columns last.
+    workers : int
+        Number of threads.
+
+    Returns
+    -------
+    list
+        Results in the order of rows.
     """
     spans = list(blocks(*shape[-2:]))
     if workers <= 1 or len(spans) == 1:
@@ -142,34 +168,73 @@ def map_blocks(
         return list(pool.map(lambda span: work(*span), spans))
 
 
-def mirror(index: np.ndarray, count: int) -> np.ndarray:
-    """Indices beyond 0 .. count-1 reflected about the first and last element: -1 -> 1.
+def mirrored_index(index: np.ndarray, count: int) -> np.ndarray:
+    """Return indices reflected about the first and last element: -1 becomes 1.
 
     Two elements of the same parity stay so: a mirrored Bayer mosaic is a Bayer mosaic.
+
+    Parameters
+    ----------
+    index : ndarray of int
+        Indices, some beyond 0 .. count - 1.
+    count : int
+        Number of elements.
+
+    Returns
+    -------
+    ndarray of int
+        Indices in 0 .. count - 1, in the same shape.
     """
     period = max(2 * (count - 1), 1)
     folded = np.abs(index) % period
     return np.minimum(folded, period - folded)
 
 
-def cut(dn: np.ndarray, start: int, stop: int, halo: int) -> Block:
-    """A copy of rows start - halo .. stop + halo of a raw frame, mirrored beyond its border.
+def padded_block(dn: np.ndarray, start: int, stop: int, halo: int) -> Block:
+    """Return a copy of some rows of a raw frame with their halo, mirrored beyond its border.
 
-    dn: (rows, columns), or (C, rows, columns) where every pixel has all its colors.
+    Parameters
+    ----------
+    dn : ndarray
+        Raw frame (rows, columns) [DN], or (C, rows, columns) where every pixel has all its colors.
+    start, stop : int
+        Rows of the block.
+    halo : int
+        Rows added above and below.
+
+    Returns
+    -------
+    Block
+        Rows start - halo .. stop + halo.
     """
     first, last = start - halo, stop + halo
     height = dn.shape[-2]
     if first >= 0 and last <= height:
         rows = dn[..., first:last, :]
     else:
-        rows = dn[..., mirror(np.arange(first, last), height), :]
+        rows = dn[..., mirrored_index(np.arange(first, last), height), :]
     block = np.array(rows, dtype=np.float32)
     return Block(block if dn.ndim == 3 else block[np.newaxis], first)
 
 
-def flow(dn: np.ndarray, operations: tuple[Operation, ...], start: int, stop: int) -> Block:
-    """Rows start .. stop of a raw frame after all `operations`."""
-    block = cut(dn, start, stop, sum(operation.halo for operation in operations))
+def process_rows(dn: np.ndarray, operations: tuple[Operation, ...], start: int, stop: int) -> Block:
+    """Return some rows of a raw frame after all operations.
+
+    Parameters
+    ----------
+    dn : ndarray
+        Raw frame (rows, columns) [DN], or (C, rows, columns) where every pixel has all its colors.
+    operations : tuple of Operation
+        What is applied, in this order.
+    start, stop : int
+        Rows of the block.
+
+    Returns
+    -------
+    Block
+        Rows start .. stop.
+    """
+    block = padded_block(dn, start, stop, sum(operation.halo for operation in operations))
     for operation in operations:
         block = operation.on_block(block)
     return block

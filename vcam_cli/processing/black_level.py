@@ -10,8 +10,21 @@ import numpy as np
 from vcam_cli.processing.base import Block
 
 
-def level(value: str | float, black_dn: float) -> float:
-    """The level [DN] to take off: `black_dn` for "subtract", 0 for "none", or the number given."""
+def subtracted_level(value: str | float, black_dn: float) -> float:
+    """Return the level that the step takes off.
+
+    Parameters
+    ----------
+    value : {"subtract", "none"} or float
+        Value of the step, a number in [DN].
+    black_dn : float
+        Mean dark signal and offset [DN].
+
+    Returns
+    -------
+    float
+        `black_dn` for "subtract", 0 for "none", or the number given [DN].
+    """
     if value == "subtract":
         return black_dn
     return 0.0 if value == "none" else float(value)
@@ -19,14 +32,17 @@ def level(value: str | float, black_dn: float) -> float:
 
 @dataclass(frozen=True)
 class BlackLevel:
-    """Subtracts `level` [DN]."""
+    """Subtracts a level."""
 
     level: float
+    """Level that is taken off [DN]."""
     halo: int = 0
 
     def on_block(self, block: Block) -> Block:
+        """Return the block less the level."""
         np.subtract(block.planes, np.float32(self.level), out=block.planes)
         return block
 
     def on_colors(self, values: np.ndarray) -> np.ndarray:
+        """Return the values less the level."""
         return values - self.level

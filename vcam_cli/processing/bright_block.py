@@ -18,42 +18,66 @@ import numpy as np
 
 from vcam_cli.processing.base import Block, Context
 
-SIDE = 16  # pixels; divides the rows that processing works on at a time
-SHARE = 0.01  # of the blocks that count
+BLOCK_SIDE = 16
+"""Side of a block [pixels]; divides the rows that processing works on at a time."""
+BRIGHT_SHARE = 0.01
+"""Share of the blocks without saturation that counts as white."""
 
 
 @dataclass(frozen=True)
 class Blocks:
-    """Blocks of a picture. sums, counts: (C, n) float64, color by color; clean: (n,) bool."""
+    """Sums over blocks of a picture."""
 
     sums: np.ndarray
+    """Sum of each color in each block (C, n), float64."""
     counts: np.ndarray
+    """Number of pixels of each color in each block (C, n), float64."""
     clean: np.ndarray
+    """Whether no pixel of a block is saturated (n,)."""
 
 
 def measure(block: Block, raw: np.ndarray, context: Context) -> Blocks:
-    """The blocks of some rows of the picture.
+    """Return the sums over the blocks of some rows of the picture.
 
-    block: the rows after the steps before white balance, without a halo, a mosaic or full color;
-    raw: (rows, columns) [DN] the same rows of the raw frame, in which saturation shows;
-    (C, rows, columns) where a pixel has all its colors, and is saturated where one of them is.
+    Parameters
+    ----------
+    block : Block
+        The rows after the steps before white balance, without a halo, a mosaic or full color.
+    raw : ndarray
+        The same rows of the raw frame (rows, columns) [DN], in which saturation shows;
+        (C, rows, columns) where a pixel has all its colors, and is saturated where one of them is.
+    context : Context
+        Pattern, colors and saturation of the camera.
+
+    Returns
+    -------
+    Blocks
+        Sums, counts and saturation.
     """
     planes, (rows, columns) = block.planes, raw.shape[-2:]
     full = planes.shape[0] == len(context.colors)
     sums, counts = [], []
     for number, color in enumerate(context.colors):
         here = np.ones((rows, columns)) if full else _sites(color, block, context, columns)
-        sums.append(_per_block(here * planes[number if full else 0]))
-        counts.append(_per_block(here))
+        sums.append(_block_sums(here * planes[number if full else 0]))
+        counts.append(_block_sums(here))
     highest = raw.max(axis=0) if raw.ndim == 3 else raw
-    clean = _per_block(highest >= context.saturated_dn) == 0
+    clean = _block_sums(highest >= context.saturated_dn) == 0
     return Blocks(np.array(sums), np.array(counts), clean)
 
 
 def white_means(parts: list[Blocks]) -> np.ndarray:
-    """(C,) the means of the colors over the blocks that are taken to be white.
+    """Return the means of the colors over the blocks that are taken to be white.
 
-    All parts of one picture, in any order of rows.
+    Parameters
+    ----------
+    parts : list of Blocks
+        All parts of one picture, in any order of rows.
+
+    Returns
+    -------
+    ndarray
+        Mean of each color (C,), in the unit of the blocks.
     """
     sums = np.concatenate([part.sums for part in parts], axis=1)
     counts = np.concatenate([part.counts for part in parts], axis=1)
@@ -61,19 +85,21 @@ def white_means(parts: list[Blocks]) -> np.ndarray:
     if not clean.any():
         return np.asarray(sums.sum(axis=1) / np.maximum(counts.sum(axis=1), 1))
     brightness = np.where(clean, (sums / np.maximum(counts, 1)).sum(axis=0), -np.inf)
-    number = max(1, round(SHARE * np.count_nonzero(clean)))
+    number = max(1, round(BRIGHT_SHARE * np.count_nonzero(clean)))
     brightest = np.argsort(-brightness, kind="stable")[:number]
     return np.asarray(sums[:, brightest].sum(axis=1) / counts[:, brightest].sum(axis=1))
 
 
 def _sites(color: str, block: Block, context: Context, columns: int) -> np.ndarray:
-    """(rows, columns) 1 where a mosaic measures a color, else 0."""
+    """Return 1 where a mosaic measures a color, else 0: (rows, columns)."""
     names = np.array(context.pattern)
     rows = (block.first_row + np.arange(block.planes.shape[1])) % len(names)
     return (names[rows][:, np.arange(columns) % names.shape[1]] == color).astype(float)
 
 
-def _per_block(values: np.ndarray) -> np.ndarray:
-    """Sums over blocks of 16 x 16, smaller ones at the right and lower border: (n,) float64."""
-    across = np.add.reduceat(values, np.arange(0, values.shape[1], SIDE), axis=1, dtype=np.float64)
-    return np.add.reduceat(across, np.arange(0, values.shape[0], SIDE), axis=0).ravel()
+def _block_sums(values: np.ndarray) -> np.ndarray:
+    """Return sums over blocks of 16 x 16, smaller ones at the right and lower border: (n,)."""
+    across = np.add.reduceat(
+        values, np.arange(0, values.shape[1], BLOCK_SIDE), axis=1, dtype=np.float64
+    )
+    return np.add.reduceat(across, np.arange(0, values.shape[0], BLOCK_SIDE), axis=0).ravel()

@@ -1,4 +1,4 @@
-"""Whether the steps of a camera's `processing` can work, in their order, on its array."""
+"""Checks whether the steps of a camera's `processing` can work, in their order, on its array."""
 
 from collections.abc import Sequence
 from typing import Any, Protocol
@@ -30,7 +30,8 @@ class Step(Protocol):
     """One entry of `processing`, such as `gamma: 2.2`."""
 
     @property
-    def name(self) -> str: ...
+    def name(self) -> str:
+        """Name of the step."""
 
     @property
     def value(self) -> Any:
@@ -45,10 +46,27 @@ def check(
     planes: bool = False,
     scattered: bool = False,
 ) -> None:
-    """Raises BadInput with every reason why these steps cannot work on this array.
+    """Raise BadInput with every reason why steps cannot work on an array.
 
-    `quality`: the metrics asked for; they need all colors at every pixel. `planes`: every pixel
-    has them as it is; `scattered`: the pixels fill no rows and columns.
+    Parameters
+    ----------
+    steps : sequence of Step
+        The steps in the user's order.
+    pattern : Pattern
+        Repeating block of colors.
+    colors : sequence of str
+        Colors of the array.
+    quality : sequence of str
+        Metrics asked for; they need all colors at every pixel.
+    planes : bool
+        Whether every pixel has all its colors.
+    scattered : bool
+        Whether the pixels fill no rows and columns.
+
+    Raises
+    ------
+    BadInput
+        Steps that are not known, do not suit the array, or stand in an order that cannot work.
     """
     found = Collector()
     mosaic = scattered or (len(colors) > 1 and not planes)
@@ -117,7 +135,18 @@ def _one_of(allowed: Sequence[str] | dict[str, tuple[str, ...]]) -> str:
 
 
 def matrix_shape(colors: int) -> tuple[str, str]:
-    """Why a matrix is refused, and what to write."""
+    """Return why a matrix is refused, and what to write.
+
+    Parameters
+    ----------
+    colors : int
+        Number of the camera's colors.
+
+    Returns
+    -------
+    message, remedy : str
+        The two parts of the message.
+    """
     return (
         "the matrix does not suit this array",
         f"write three rows, for display R, G and B, of {colors} numbers, one for each of the "

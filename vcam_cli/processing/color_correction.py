@@ -1,14 +1,14 @@
 """Color correction: a matrix from the camera's colors to linear display RGB (ITU-R BT.709).
 
-`fit` finds the matrix that brings the 24 patches of a ColorChecker, as this camera sees them under
-the light of this scene, closest to their colors: free of noise and blur, above black, and with
-white balanced. Their colors are those a CIE 1931 observer sees under the same light, adapted to
-the display's white D65 by the linear Bradford transform.
+`fit_matrix` finds the matrix that brings the 24 patches of a ColorChecker, as this camera sees them
+under the light of this scene, closest to their colors: free of noise and blur, above black, and
+with white balanced. Their colors are those a CIE 1931 observer sees under the same light, adapted
+to the display's white D65 by the linear Bradford transform [1].
 
 White stays neutral exactly: every row maps the camera's white to 1, and least squares runs over
-what is left free. What is squared is the difference in CIELAB, by its slope at each patch's color:
-a linear problem, solved at once. Why not in linear light: there bright patches count most. Over
-seven lights and the two filter sets that ship, the mean CIEDE2000 is 0.85 (largest of a patch,
+what is left free [2]. What is squared is the difference in CIELAB [3], by its slope at each patch's
+color: a linear problem, solved at once. Why not in linear light: there bright patches count most.
+Over seven lights and the two filter sets that ship, the mean CIEDE2000 is 0.85 (largest of a patch,
 mean over these: 2.8), against 0.88 (3.2) in linear light; iterating to the least CIELAB
 differences themselves gives 0.85 (2.8) again.
 
@@ -17,9 +17,13 @@ about some of the matrix. A weak pull towards the identity, worth half a unit of
 decides there and nowhere else, and keeps the coefficients, which amplify noise, from growing
 without bound. Where a color sees no light at all, the identity is all there is.
 
-References: K. M. Lam, Metamerism and colour constancy, thesis, University of Bradford, 1985 (as
-used by ICC.1:2022 annex E); G. D. Finlayson, M. S. Drew, "Constrained least-squares regression in
-color spaces", J. Electronic Imaging 6(4), 1997, doi:10.1117/12.278080; CIE 015:2018.
+References
+----------
+.. [1] K. M. Lam, "Metamerism and colour constancy", thesis, University of Bradford, 1985 (as used
+   by ICC.1:2022 annex E).
+.. [2] G. D. Finlayson, M. S. Drew, "Constrained least-squares regression in color spaces",
+   Journal of Electronic Imaging 6(4), 1997, doi:10.1117/12.278080.
+.. [3] CIE 015:2018, Colorimetry, 4th edition, doi:10.25039/TR.015.2018.
 """
 
 from dataclasses import dataclass
@@ -28,36 +32,38 @@ from functools import lru_cache
 import numpy as np
 
 from vcam_cli.processing.base import Block, Patches
-from vcam_cli.processing.white_balance import FAINT
+from vcam_cli.processing.white_balance import MIN_COLOR_SHARE
 from vcam_cli.spectra import Spectrum, cmf, colorchecker, pair_weights
 
 DISPLAY = ("R", "G", "B")
-"""The colors that come out."""
-PULL = 0.5
-"""What a coefficient that is 1 off the identity costs [Delta E of one patch]."""
-SAME = 1e-3
-"""Colors are the same where their patches differ by less than this fraction of white, rms."""
+"""Colors of the display, which come out."""
+RIDGE = 0.5
+"""Cost of a coefficient that is 1 off the identity [Delta E of one patch]."""
+MIN_COLOR_DIFFERENCE = 1e-3
+"""Rms difference of patches, as a fraction of white, below which two colors are the same."""
 
 _XY = np.array([[0.64, 0.33], [0.30, 0.60], [0.15, 0.06]])  # BT.709 primaries, and white D65
 _D65 = np.array([0.3127 / 0.3290, 1.0, (1 - 0.3127 - 0.3290) / 0.3290])
 _PRIMARIES = np.array([_XY[:, 0] / _XY[:, 1], np.ones(3), (1 - _XY.sum(axis=1)) / _XY[:, 1]])
 RGB_TO_XYZ = _PRIMARIES * np.linalg.solve(_PRIMARIES, _D65)
-"""XYZ of linear BT.709, white (1, 1, 1) having Y = 1."""
+"""Matrix from linear BT.709 to XYZ; white (1, 1, 1) has Y = 1."""
 BRADFORD = np.array(
     [[0.8951, 0.2664, -0.1614], [-0.7502, 1.7135, 0.0367], [0.0389, -0.0685, 1.0296]]
 )
-"""XYZ to the sharpened cone responses in which adaptation is a gain for each."""
+"""Matrix from XYZ to the sharpened cone responses in which adaptation is a gain for each."""
 
 
 @dataclass(frozen=True)
 class ColorCorrection:
-    """Multiplies full color by a matrix, rows for display R, G, B, columns for the colors."""
+    """Multiplies full color by a matrix."""
 
     matrix: tuple[tuple[float, ...], ...]
+    """Coefficients: rows for display R, G, B, columns for the camera's colors."""
     halo: int = 0
 
     def on_block(self, block: Block) -> Block:
         # Sums written out: a product of matrices would start threads of its own in every block.
+        """Return the block in the display's colors."""
         planes = block.planes
         out = np.empty((len(self.matrix), *planes.shape[1:]), np.float32)
         term = np.empty(planes.shape[1:], np.float32)
@@ -68,47 +74,76 @@ class ColorCorrection:
         return Block(out, block.first_row)
 
     def on_colors(self, values: np.ndarray) -> np.ndarray:
+        """Return the values in the display's colors."""
         matrix = np.asarray(self.matrix, dtype=values.dtype)
         return np.einsum("ij,j...->i...", matrix, values)
 
 
 @dataclass(frozen=True)
 class Fit:
-    """A matrix (3, C), and what a user should know of it ("" where all is well)."""
+    """A fitted matrix, and what a user should know of it."""
 
     matrix: np.ndarray
+    """Coefficients (3, C)."""
     note: str = ""
+    """Warning for the user; "" where all is well."""
 
     @property
     def operation(self) -> ColorCorrection:
+        """The step that applies the matrix."""
         return ColorCorrection(tuple(tuple(row) for row in self.matrix.tolist()))
 
 
-def fit(signals: np.ndarray, white: np.ndarray, balanced: bool, patches: Patches) -> Fit:
-    """The matrix for a camera that sees the patches as `signals` and the perfect white as `white`.
+def fit_matrix(signals: np.ndarray, white: np.ndarray, balanced: bool, patches: Patches) -> Fit:
+    """Return the matrix that brings a camera's ColorChecker closest to its colors [2], [3].
 
-    signals: (C, 24) above black, as the steps before leave them; white: (C,) in the same unit.
-    balanced: a step before has balanced white, well or not. The matrix is then made for a white
-    that is balanced well, so that a wrong balance shows; else it balances `white` itself.
+    Parameters
+    ----------
+    signals : ndarray
+        Patches (C, 24) above black, as the steps before leave them.
+    white : ndarray
+        Perfect white (C,) above black, in the same unit.
+    balanced : bool
+        Whether a step before has balanced white, well or not. The matrix is then made for a white
+        that is balanced well, so that a wrong balance shows; else it balances `white` itself.
+    patches : Patches
+        The light under which the patches are seen.
+
+    Returns
+    -------
+    Fit
+        The matrix; the identity where the light gives a color no signal or is too far from white.
     """
     identity = np.eye(3, len(white))
-    if not white.max() > 0 or white.min() <= FAINT * white.max():
+    if not white.max() > 0 or white.min() <= MIN_COLOR_SHARE * white.max():
         return Fit(identity, "color correction left out: not every color sees this light")
     target = chart_colors(patches.light, patches.start, patches.stop)
     if target is None:
         return Fit(identity, "color correction left out: this light is too far from white")
     matrix, rank = fit_relative((signals / white[:, np.newaxis]).T, target)
-    note = "" if rank == len(white) else "color correction is weak: " + _ALIKE
+    note = "" if rank == len(white) else "color correction is weak: " + _FILTERS_ALIKE
     return Fit(matrix if balanced else matrix * (white.max() / white), note)
 
 
-_ALIKE = "under this light these filters tell too few colors apart"
+_FILTERS_ALIKE = "under this light these filters tell too few colors apart"
 
 
 def fit_relative(signals: np.ndarray, target: np.ndarray) -> tuple[np.ndarray, int]:
-    """The matrix (3, C) with rows that sum to 1, and the number of colors that can be told apart.
+    """Return the matrix that maps white to white and patches closest to their colors.
 
-    signals: (24, C) as fractions of white; target: (24, 3) linear display RGB, white = 1.
+    Parameters
+    ----------
+    signals : ndarray
+        Patches (24, C) as fractions of white.
+    target : ndarray
+        Their linear display RGB (24, 3), white = 1.
+
+    Returns
+    -------
+    matrix : ndarray
+        Coefficients (3, C) with rows that sum to 1.
+    rank : int
+        Number of colors that can be told apart.
     """
     count = signals.shape[1]
     start = np.eye(3, count)
@@ -121,24 +156,35 @@ def fit_relative(signals: np.ndarray, target: np.ndarray) -> tuple[np.ndarray, i
     wanted = np.einsum("pai,pi->pa", slope, target - signals @ start.T).ravel()
     unknown = 3 * (count - 1)
     design = np.einsum("pai,pk->paik", slope, chroma).reshape(-1, unknown)
-    pulled = np.vstack([design, PULL * np.eye(unknown)])
+    pulled = np.vstack([design, RIDGE * np.eye(unknown)])
     weights = np.linalg.lstsq(pulled, np.append(wanted, np.zeros(unknown)), rcond=None)[0]
     matrix = start + weights.reshape(3, count - 1) @ free.T
-    return matrix, 1 + int(np.count_nonzero(spread > SAME))
+    return matrix, 1 + int(np.count_nonzero(spread > MIN_COLOR_DIFFERENCE))
 
 
 @lru_cache(maxsize=16)
 def chart_colors(light: Spectrum, start: float, stop: float) -> np.ndarray | None:
-    """(24, 3) linear display RGB of the patches under a light, seen adapted to it; white = 1.
+    """Return the display colors of a ColorChecker under a light, seen adapted to it [1].
 
-    None where the light has no counterpart among display whites: adaptation would need a gain
-    that is infinite or negative, as for deep red or violet light.
+    Parameters
+    ----------
+    light : Spectrum
+        Spectral radiance of the light, in any scale.
+    start, stop : float
+        Range of wavelengths [m].
+
+    Returns
+    -------
+    ndarray or None
+        Linear display RGB (24, 3), white = 1; read-only. None where the light has no counterpart
+        among display whites: adaptation would need a gain that is infinite or negative, as for deep
+        red or violet light.
     """
-    lit = [light, *(light.times(reflectance) for _, reflectance in colorchecker())]
+    lit = [light, *(light.multiply(reflectance) for _, reflectance in colorchecker())]
     observer = [Spectrum(tables=(table,)) for table in cmf()]
     white, *patches = pair_weights(lit, observer, [start, stop]).sum(axis=-1)
     cones = BRADFORD @ white
-    if cones.min() <= SAME * cones.max():
+    if cones.min() <= MIN_COLOR_DIFFERENCE * cones.max():
         return None
     adapted = (BRADFORD @ np.array(patches).T) * ((BRADFORD @ _D65) / cones)[:, np.newaxis]
     colors = np.linalg.solve(BRADFORD @ RGB_TO_XYZ, adapted).T
@@ -152,9 +198,19 @@ _LINEAR_BELOW = (6 / 29) ** 3
 
 
 def lab_slope(rgb: np.ndarray) -> np.ndarray:
-    """(n, 3, 3) derivative of L*, a*, b* by linear R, G, B (n, 3), white D65.
+    """Return the derivative of CIELAB by linear display RGB, white D65.
 
     CIE 015:2018, eqs 8.3 to 8.11; straight below 216/24389 of white, as the standard has it.
+
+    Parameters
+    ----------
+    rgb : ndarray
+        Linear R, G, B (n, 3).
+
+    Returns
+    -------
+    ndarray
+        Derivative (n, 3, 3) of L*, a*, b*.
     """
     t = np.maximum(rgb @ _TO_RELATIVE.T, _LINEAR_BELOW)
     slope = np.cbrt(t) ** -2 / 3

@@ -1,11 +1,12 @@
 """Edge-aware demosaicing: green is found along edges, not across them; red and blue follow it.
 
-Green at a red or blue pixel is guessed twice, from its row and from its column: the mean of the
-two green neighbors plus a quarter of the second difference of the pixel's own color. Where the
-picture is smooth along the row, the row's guess is the better one. The two are mixed with weights
-that fall with the square of the roughness |green difference| + |second difference| along each,
-so there is no hard choice that noise could flip. Red and blue are then interpolated as differences
-from green, which vary less than the colors themselves. Measured values are left as they are.
+Green at a red or blue pixel is estimated twice, from its row and from its column: the mean of the
+two green neighbors plus a quarter of the second difference of the pixel's own color [1]. Where the
+picture is smooth along the row, the row's estimate is the better one. The two are mixed with
+weights that fall with the square of the roughness |green difference| + |second difference| along
+each, so there is no hard choice that noise could flip. Red and blue are then interpolated as
+differences from green, which vary less than the colors themselves. Measured values are left as
+they are.
 
 Colors are compared as shares of the perfect white, whose ratios are known of the exposure: a
 step from gray to white is then no step in color. The mosaic is mirrored at its border, as in
@@ -13,69 +14,88 @@ step from gray to white is then no step in color. The mosaic is mirrored at its 
 
 Why this one: PSNR over all of the picture [dB], against the charts sampled at the pixels' centers
 and as the lens and pixels of the shipped cameras blur them, noise included. Malvar is the linear
-5 x 5 filter of Malvar et al. 2004; hard is the choice of one direction by Hamilton and Adams.
+5 x 5 filter of [2]; hard is the choice of one direction by Hamilton and Adams.
 
     chart, sampled / photographed      bilinear      Malvar        hard          this
     still-life                         26.3 / 25.5   29.5 / 27.4   30.8 / 27.7   31.6 / 27.7
     colorchecker-d65                   32.6 / 28.9   35.2 / 29.8   40.7 / 30.2   40.8 / 30.2
 
-References: J. F. Hamilton Jr., J. E. Adams Jr., US patent 5,629,734 (1997), whose guesses and
-roughness these are. H. S. Malvar, L. He, R. Cutler, "High-quality linear interpolation for
-demosaicing of Bayer-patterned color images", ICASSP 2004, doi:10.1109/ICASSP.2004.1326587.
+References
+----------
+.. [1] J. F. Hamilton Jr., J. E. Adams Jr., US patent 5,629,734, 1997, whose estimates and
+   roughness these are.
+.. [2] H. S. Malvar, L. He, R. Cutler, "High-quality linear interpolation for demosaicing of
+   Bayer-patterned color images", ICASSP 2004, doi:10.1109/ICASSP.2004.1326587.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from vcam_cli.processing.base import Block, Pattern, mirror
+from vcam_cli.processing.base import Block, Pattern, mirrored_index
 
 REACH = 3
 """Rows and columns that a pixel's colors depend on, each way."""
-SMOOTH = 1e-3
+FLAT_ROUGHNESS = 1e-3
 """Roughness, as a share of white, below which a direction is not smooth but flat."""
 
 
 def edge_aware(
     mosaic: np.ndarray, pattern: Pattern, colors: tuple[str, ...], white: np.ndarray
 ) -> np.ndarray:
-    """All colors of a Bayer mosaic (rows, columns), at least 2 x 2: (C, rows, columns) float32.
+    """Return all colors of a Bayer mosaic, interpolated along edges.
 
-    `pattern` is the 2 x 2 block of color names that starts at pixel (0, 0), `colors` the order
-    of the planes, `white` (C,) the signal of a perfect white in each, in the unit of the mosaic.
+    Parameters
+    ----------
+    mosaic : ndarray
+        Values (rows, columns), at least 2 x 2.
+    pattern : Pattern
+        Block of 2 x 2 color names that starts at pixel (0, 0).
+    colors : tuple of str
+        Order of the planes.
+    white : ndarray
+        Signal of a perfect white in each color (C,), in the unit of the mosaic.
+
+    Returns
+    -------
+    ndarray
+        Planes (C, rows, columns), float32.
     """
-    rows = mirror(np.arange(-REACH, mosaic.shape[0] + REACH), mosaic.shape[0])
+    rows = mirrored_index(np.arange(-REACH, mosaic.shape[0] + REACH), mosaic.shape[0])
     method = EdgeAware(pattern, colors, tuple(float(w) for w in white))
     return method.on_block(Block(mosaic[rows].astype(np.float32)[np.newaxis], -REACH)).planes
 
 
 @dataclass(frozen=True)
 class EdgeAware:
-    """Mosaic blocks become full-color blocks. `white`: signal of a perfect white in each color."""
+    """Takes blocks of a Bayer mosaic to full color along edges."""
 
     pattern: Pattern
     colors: tuple[str, ...]
     white: tuple[float, ...]
+    """Signal of a perfect white in each color."""
     halo: int = REACH
 
     def on_block(self, block: Block) -> Block:
+        """Return the block in full color."""
         first = block.first_row + REACH
         inside = self.pattern if first % 2 == 0 else self.pattern[::-1]
         level = dict(zip(self.colors, self.white, strict=True))
-        return Block(_rows(block.planes[0], inside, self.colors, level), first)
+        return Block(_demosaic_rows(block.planes[0], inside, self.colors, level), first)
 
     def on_colors(self, values: np.ndarray) -> np.ndarray:
+        """Return the values as they are: they have all their colors."""
         return values
 
 
-def _rows(
+def _demosaic_rows(
     mosaic: np.ndarray, pattern: Pattern, colors: tuple[str, ...], white: dict[str, float]
 ) -> np.ndarray:
-    """Full color of all rows but the first and the last three.
+    """Return full color (C, rows, columns) of all rows but the first and the last three.
 
-    mosaic: (rows + 6, columns); `pattern` starts at pixel (3, 0). Returns (C, rows, columns).
+    The mosaic is (rows + 6, columns); the pattern starts at pixel (3, 0).
 
-    Why columns are parted into even and odd ones first: everything after is arithmetic on whole
+    Why columns are split into even and odd ones first: everything after is arithmetic on whole
     contiguous rows, and only on the pixels that need it.
     """
     height, width = mosaic.shape[0] - 2 * REACH, mosaic.shape[1]
@@ -85,13 +105,13 @@ def _rows(
     green_name = pattern[0][green_at]
     gain = [matching_gain(white[green_name], white[name]) for name in names]
 
-    halves = _parted(mosaic)
+    halves = _split_columns(mosaic)
     for i in (0, 1):
         if gain[i] != 1.0:
             halves[other[i]][(i + REACH) % 2 :: 2] *= gain[i]
-    flat = np.float32(max((SMOOTH * white[green_name]) ** 2, 1e-12))
+    flat = np.float32(max((FLAT_ROUGHNESS * white[green_name]) ** 2, 1e-12))
     ends = height + REACH + 1
-    found = [_green(halves, other[i], slice(REACH - i, ends, 2), flat) for i in (0, 1)]
+    found = [_interpolate_green(halves, other[i], slice(REACH - i, ends, 2), flat) for i in (0, 1)]
 
     planes = np.empty((len(colors), height, width), np.float32)
     plane = dict(zip(colors, planes, strict=True))
@@ -106,37 +126,50 @@ def _rows(
         own = plane[green_name][site].shape
         plane[this][site] = mosaic[REACH + i : REACH + height : 2, j::2]
         plane[green_name][site] = green[:count, : own[1]]
-        about = green[:count] + np.float32(0.25) * _pairs(upright, j)
-        _put(plane[that], site, about, gain[1 - i])
+        about = green[:count] + np.float32(0.25) * _neighbor_sums(upright, j)
+        _store(plane[that], site, about, gain[1 - i])
 
         site = _site(i, 1 - j)
         plane[green_name][site] = measured[:, : plane[green_name][site].shape[1]]
-        along = measured + np.float32(0.5) * _pairs(difference[:count], 1 - j)
-        _put(plane[this], site, along, gain[i])
-        _put(plane[that], site, measured + np.float32(0.5) * upright[:, 1:-1], gain[1 - i])
+        along = measured + np.float32(0.5) * _neighbor_sums(difference[:count], 1 - j)
+        _store(plane[this], site, along, gain[i])
+        _store(plane[that], site, measured + np.float32(0.5) * upright[:, 1:-1], gain[1 - i])
     return planes
 
 
 def matching_gain(green: float, color: float) -> np.float32:
-    """What brings a color's white to green's, or any other's; 1 where one holds next to nothing."""
+    """Return the gain that brings one color's white to another's.
+
+    Parameters
+    ----------
+    green : float
+        White in the color that is matched, most often green.
+    color : float
+        White in the color that gets the gain.
+
+    Returns
+    -------
+    float32
+        Ratio of the two; 1 where one holds next to nothing.
+    """
     ratio = green / color if color > 0 < green else 1.0
     return np.float32(ratio if 1e-2 < ratio < 1e2 else 1.0)
 
 
-def _parted(mosaic: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Even and odd columns, each with two more on either side; of equal width."""
+def _split_columns(mosaic: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return even and odd columns, each with two more on either side; of equal width."""
     width = mosaic.shape[1]
-    padded = mosaic[:, mirror(np.arange(-4, width + 4 + width % 2), width)]
+    padded = mosaic[:, mirrored_index(np.arange(-4, width + 4 + width % 2), width)]
     return np.ascontiguousarray(padded[:, 0::2]), np.ascontiguousarray(padded[:, 1::2])
 
 
-def _green(
+def _interpolate_green(
     halves: tuple[np.ndarray, np.ndarray], j: int, rows: slice, flat: np.float32
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Green at the pixels of another color, and that color less green: (n, columns / 2 + 2) each.
+    """Return green at the pixels of another color, and that color less green.
 
-    j: parity of their columns; rows: their rows, every second one. flat: added to the squares of
-    both roughnesses, so that neither is zero.
+    Both are (n, columns / 2 + 2). j: parity of the pixels' columns; rows: their rows, every second
+    one. flat: added to the squares of both roughnesses, so that neither is zero.
     """
     own, beside = halves[j], halves[1 - j]
 
@@ -146,9 +179,11 @@ def _green(
     center = down(0)[:, 1:-1]
     twice = center + center
     left, right = (beside[rows][:, j + k : beside.shape[1] - 2 + j + k] for k in (0, 1))
-    guess_h, rough_h = _guess(left, right, twice - down(0)[:, :-2] - down(0)[:, 2:])
+    guess_h, rough_h = _directional_estimate(left, right, twice - down(0)[:, :-2] - down(0)[:, 2:])
     upper, lower = down(-1)[:, 1:-1], down(1)[:, 1:-1]
-    guess_v, rough_v = _guess(upper, lower, twice - down(-2)[:, 1:-1] - down(2)[:, 1:-1])
+    guess_v, rough_v = _directional_estimate(
+        upper, lower, twice - down(-2)[:, 1:-1] - down(2)[:, 1:-1]
+    )
 
     rough_h *= rough_h
     rough_v *= rough_v
@@ -162,8 +197,10 @@ def _green(
     return guess_h, center - guess_h
 
 
-def _guess(one: np.ndarray, two: np.ndarray, second: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Green between two green neighbors, and how rough the picture is along them."""
+def _directional_estimate(
+    one: np.ndarray, two: np.ndarray, second: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return green between two green neighbors, and how rough the picture is along them."""
     rough = np.abs(one - two)
     rough += np.abs(second)
     guess = one + two
@@ -173,8 +210,11 @@ def _guess(one: np.ndarray, two: np.ndarray, second: np.ndarray) -> tuple[np.nda
     return guess, rough
 
 
-def _pairs(values: np.ndarray, parity: int) -> np.ndarray:
-    """Sums of the neighbors left and right of columns of a parity; values: of the other parity."""
+def _neighbor_sums(values: np.ndarray, parity: int) -> np.ndarray:
+    """Return sums of the neighbors left and right of columns of a parity.
+
+    The values are of columns of the other parity.
+    """
     return (
         values[:, parity : values.shape[1] - 2 + parity]
         + values[:, 1 + parity :][:, : values.shape[1] - 2]
@@ -185,9 +225,9 @@ def _site(i: int, j: int) -> tuple[slice, slice]:
     return slice(i, None, 2), slice(j, None, 2)
 
 
-def _put(
+def _store(
     plane: np.ndarray, site: tuple[slice, slice], values: np.ndarray, gain: np.float32
 ) -> None:
-    """Values on the scale of green, put back on their color's own."""
+    """Store values on the scale of green on their color's own scale."""
     place = plane[site]
     np.multiply(values[:, : place.shape[1]], np.float32(1 / gain), out=place)

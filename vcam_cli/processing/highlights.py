@@ -21,12 +21,14 @@ KNEE = 0.95
 
 @dataclass(frozen=True)
 class Highlights:
-    """Acts on full color; `ceilings`: where each color saturates, black being 0."""
+    """Raises saturated colors to the brightest of their pixel, in full color."""
 
     ceilings: tuple[float, ...]
+    """Signal at which each color saturates, black being 0."""
     halo: int = 0
 
     def on_block(self, block: Block) -> Block:
+        """Return the block with its saturated colors raised."""
         planes = block.planes
         knees = [KNEE * ceiling if ceiling > 0 else np.inf for ceiling in self.ceilings]
         reached = [plane.max() > knee for plane, knee in zip(planes, knees, strict=True)]
@@ -40,5 +42,5 @@ class Highlights:
         return block
 
     def on_colors(self, values: np.ndarray) -> np.ndarray:
-        """Nothing: the ideal camera does not saturate."""
+        """Return the values as they are: the ideal camera does not saturate."""
         return values

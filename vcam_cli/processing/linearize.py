@@ -13,15 +13,18 @@ from vcam_cli.processing.base import Block
 
 @dataclass(frozen=True)
 class Linearize:
-    """Applies `curve`, from codes to the codes of a linear ADC [DN]."""
+    """Takes codes of the ADC to codes of a linear one."""
 
     curve: Callable[[np.ndarray], np.ndarray]
-    done: bool = False
-    """The frame has been through it; only full-color values are still codes."""
+    """Function from codes to the codes of a linear ADC [DN]."""
+    frame_is_linear: bool = False
+    """Whether the frame has been through it; only full-color values are still codes."""
     halo: int = 0
 
     def on_block(self, block: Block) -> Block:
-        return block if self.done else Block(self.curve(block.planes), block.first_row)
+        """Return the block in linear light."""
+        return block if self.frame_is_linear else Block(self.curve(block.planes), block.first_row)
 
     def on_colors(self, values: np.ndarray) -> np.ndarray:
+        """Return the values in linear light."""
         return self.curve(values)

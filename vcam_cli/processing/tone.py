@@ -21,18 +21,57 @@ _SHIFTS = range(16, 8, -1)  # bits of a float32 left out of the table's index: 1
 
 
 def srgb(linear: np.ndarray) -> np.ndarray:
-    """sRGB encoding of linear light, clipped to [0, 1]; float64 in, float64 out."""
+    """Return the encoding of linear light by sRGB.
+
+    Parameters
+    ----------
+    linear : array_like
+        Linear light, white = 1; clipped to 0..1.
+
+    Returns
+    -------
+    ndarray
+        Encoded values in 0..1, float64.
+    """
     linear = np.clip(np.asarray(linear, dtype=np.float64), 0.0, 1.0)
     return np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * np.power(linear, 1 / 2.4) - 0.055)
 
 
 def power_law(linear: np.ndarray, gamma: float) -> np.ndarray:
-    """linear^(1/gamma), clipped to [0, 1]; float64."""
+    """Return the encoding of linear light by a power law, linear^(1/gamma).
+
+    Parameters
+    ----------
+    linear : array_like
+        Linear light, white = 1; clipped to 0..1.
+    gamma : float
+        Exponent of the display.
+
+    Returns
+    -------
+    ndarray
+        Encoded values in 0..1, float64.
+    """
     return np.power(np.clip(np.asarray(linear, dtype=np.float64), 0.0, 1.0), 1.0 / gamma)
 
 
 def codes(linear: np.ndarray, curve: Curve, bits: int) -> np.ndarray:
-    """Codes 0 .. 2^bits - 1 by the formula in double precision: uint8 up to 8 bits, else uint16."""
+    """Return the codes of linear light by the formula in double precision.
+
+    Parameters
+    ----------
+    linear : array_like
+        Linear light, white = 1.
+    curve : float or "srgb"
+        Exponent of a power law, or sRGB.
+    bits : int
+        Resolution of the codes [bits].
+
+    Returns
+    -------
+    ndarray
+        Codes 0 .. 2^bits - 1: uint8 up to 8 bits, else uint16.
+    """
     encoded = srgb(linear) if curve == "srgb" else power_law(linear, float(curve))
     dtype = np.uint8 if bits <= 8 else np.uint16
     return np.floor(encoded * (2**bits - 1) + 0.5).astype(dtype)
@@ -40,13 +79,33 @@ def codes(linear: np.ndarray, curve: Curve, bits: int) -> np.ndarray:
 
 @dataclass(frozen=True)
 class _Table:
+    """Table from the upper bits of a float32 to codes."""
+
     shift: int
-    code: np.ndarray  # (n,) uint8: the code at the lower end of each interval of bits
-    level: np.ndarray  # (n,) float32: the smallest value with a higher code; last NaN
+    """Bits that the index leaves out."""
+    code: np.ndarray
+    """Code at the lower end of each interval of bits (n,), uint8."""
+    level: np.ndarray
+    """Smallest value with a higher code (n,), float32; the last is NaN."""
 
 
 def encode(linear: np.ndarray, curve: Curve, bits: int) -> np.ndarray:
-    """`codes` of float32 values, of the same shape; by table for 8 bits."""
+    """Return the codes of float32 values, by a table for 8 bits.
+
+    Parameters
+    ----------
+    linear : ndarray
+        Linear light of any shape, white = 1, float32.
+    curve : float or "srgb"
+        Exponent of a power law, or sRGB.
+    bits : int
+        Resolution of the codes [bits].
+
+    Returns
+    -------
+    ndarray
+        The same as `codes`.
+    """
     table = _table(curve) if bits == 8 else None
     if table is None:
         return codes(linear, curve, bits)
@@ -59,7 +118,7 @@ def encode(linear: np.ndarray, curve: Curve, bits: int) -> np.ndarray:
 
 @lru_cache(maxsize=8)
 def _table(curve: Curve) -> _Table | None:
-    """The smallest table whose intervals hold at most one decision level; None if there is none."""
+    """Return the smallest table whose intervals hold at most one decision level, or None."""
     levels = _decision_levels(curve)
     for shift in _SHIFTS:
         edges = np.arange((_ONE >> shift) + 1) << shift
@@ -71,7 +130,7 @@ def _table(curve: Curve) -> _Table | None:
 
 
 def _decision_levels(curve: Curve) -> np.ndarray:
-    """(255,) the bits of the smallest float32 whose 8-bit code is above 0, 1, .. 254: bisection."""
+    """Return the bits of the smallest float32 whose 8-bit code is above 0, 1, .. 254."""
     wanted = np.arange(255)
     low, high = np.zeros(255, np.int64), np.full(255, _ONE)
     while np.any(high - low > 1):

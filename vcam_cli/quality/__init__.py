@@ -1,4 +1,4 @@
-"""How good a picture is: comparisons of linear display RGB with the ideal image."""
+"""Image quality: comparisons of pictures, and measurements of cameras by their standards."""
 
 from vcam_cli.quality.mse import mse, psnr_db, psnr_of_mse
 

@@ -7,10 +7,10 @@ than black (noise after the black level) count with their error.
 
 References
 ----------
-.. [1] CIE 015:2018, Colorimetry, 4th edition, sections 8.2.1 and 8.3.
+.. [1] CIE 015:2018, Colorimetry, 4th edition, sections 8.2.1 and 8.3, doi:10.25039/TR.015.2018.
 .. [2] G. Sharma, W. Wu, E. Dalal, "The CIEDE2000 color-difference formula: implementation notes,
    supplementary test data, and mathematical observations", Color Research and Application 30,
-   21-30 (2005), DOI 10.1002/col.20070.
+   21-30, 2005, doi:10.1002/col.20070.
 """
 
 import math
@@ -22,17 +22,27 @@ from numpy.typing import NDArray
 
 Formula = Literal["1976", "1994", "2000"]
 THRESHOLD = 0.008856
-"""Of X/Xn, Y/Yn, Z/Zn: above it a cube root, below it a straight line."""
+"""X/Xn, Y/Yn or Z/Zn above which the function is a cube root; below, a straight line."""
 DIM_LIGHTNESS = 903.3
 """L* per Y/Yn below the threshold."""
 _SLOPE, _OFFSET = 7.787, 16.0 / 116.0
 
 
 def lab(relative: NDArray) -> NDArray:
-    """L*, a*, b* of X/Xn, Y/Yn, Z/Zn, all (3, ...).
+    """Return CIELAB of colors relative to white [1].
 
     L* = 116 f(Y/Yn) - 16, a* = 500 (f(X/Xn) - f(Y/Yn)), b* = 200 (f(Y/Yn) - f(Z/Zn)) with
-    f(t) = t^(1/3) above t = 0.008856, else 7.787 t + 16/116; there L* = 903.3 Y/Yn. [1]_
+    f(t) = t^(1/3) above t = 0.008856, else 7.787 t + 16/116; there L* = 903.3 Y/Yn.
+
+    Parameters
+    ----------
+    relative : ndarray
+        X/Xn, Y/Yn, Z/Zn (3, ...) [dimensionless].
+
+    Returns
+    -------
+    ndarray
+        L*, a*, b* (3, ...) [dimensionless], of the same float type.
     """
     f = np.cbrt(relative)
     dim = np.less_equal(relative, THRESHOLD)
@@ -49,11 +59,27 @@ def lab(relative: NDArray) -> NDArray:
 
 
 def delta_e(color: NDArray, reference: NDArray, formula: Formula = "1976") -> NDArray:
-    """Delta E of L*, a*, b* (3, ...) from a reference of the same shape: (...), 0 or more.
+    """Return the color difference Delta E of colors from a reference [1].
 
-    formula: "1976", the distance; "1994", for graphic arts, with weights from the reference's
-    chroma; "2000", CIEDE2000. All parametric factors k are 1. [1]_
-    Raises ValueError where shapes differ or the formula is none of these.
+    Parameters
+    ----------
+    color : ndarray
+        L*, a*, b* (3, ...) [dimensionless].
+    reference : ndarray
+        L*, a*, b* of the same shape.
+    formula : {"1976", "1994", "2000"}
+        "1976" is the distance; "1994", for graphic arts, has weights from the reference's chroma;
+        "2000" is CIEDE2000. All parametric factors k are 1.
+
+    Returns
+    -------
+    ndarray
+        Delta E (...) [dimensionless], 0 or more.
+
+    Raises
+    ------
+    ValueError
+        The shapes differ, or the formula is none of these.
     """
     if color.shape != reference.shape or color.shape[:1] != (3,):
         raise ValueError(f"two arrays (3, ...) of one shape, not {color.shape}, {reference.shape}")
@@ -63,14 +89,38 @@ def delta_e(color: NDArray, reference: NDArray, formula: Formula = "1976") -> ND
 
 
 def delta_e_1976(color: NDArray, reference: NDArray) -> NDArray:
-    """The Euclidean distance of two colors (3, ...) in CIELAB."""
+    """Return the CIE 1976 color difference: the Euclidean distance in CIELAB [1].
+
+    Parameters
+    ----------
+    color, reference : ndarray
+        L*, a*, b* (3, ...) [dimensionless], of one shape.
+
+    Returns
+    -------
+    ndarray
+        Delta E (...) [dimensionless].
+    """
     change = color - reference
     np.square(change, out=change)
     return np.sqrt(change[0] + change[1] + change[2])
 
 
 def delta_e_1994(color: NDArray, reference: NDArray) -> NDArray:
-    """CIE94 of two colors (3, ...): 1, 1 + 0.045 C, 1 + 0.015 C with the reference's chroma C."""
+    """Return the CIE94 color difference for graphic arts [1].
+
+    The weights are 1, 1 + 0.045 C, 1 + 0.015 C with the reference's chroma C.
+
+    Parameters
+    ----------
+    color, reference : ndarray
+        L*, a*, b* (3, ...) [dimensionless], of one shape.
+
+    Returns
+    -------
+    ndarray
+        Delta E (...) [dimensionless].
+    """
     light, a, b = color - reference
     of_color, of_reference = np.hypot(color[1], color[2]), np.hypot(reference[1], reference[2])
     chroma = of_color - of_reference
@@ -80,7 +130,18 @@ def delta_e_1994(color: NDArray, reference: NDArray) -> NDArray:
 
 
 def delta_e_2000(color: NDArray, reference: NDArray) -> NDArray:
-    """CIEDE2000 of two colors (3, ...), as [2]_ writes it (equation numbers of that paper)."""
+    """Return the CIEDE2000 color difference, as [2] writes it (equation numbers of that paper).
+
+    Parameters
+    ----------
+    color, reference : ndarray
+        L*, a*, b* (3, ...) [dimensionless], of one shape.
+
+    Returns
+    -------
+    ndarray
+        Delta E (...) [dimensionless].
+    """
     (l1, a1, b1), (l2, a2, b2) = color, reference
     mean_chroma = (np.hypot(a1, b1) + np.hypot(a2, b2)) / 2  # 3
     stretch = 1.5 - 0.5 * _toward_one(mean_chroma)  # 4, 5
@@ -110,7 +171,7 @@ def delta_e_2000(color: NDArray, reference: NDArray) -> NDArray:
 
 
 def _toward_one(chroma: NDArray) -> NDArray:
-    """sqrt(C^7 / (C^7 + 25^7)), which does not overflow for any C."""
+    """Return sqrt(C^7 / (C^7 + 25^7)), which does not overflow for any C."""
     seventh = (25.0 / np.maximum(chroma, 1e-3)) ** 7
     return 1.0 / np.sqrt(1.0 + seventh)
 

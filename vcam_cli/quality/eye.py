@@ -19,8 +19,8 @@ At 14 pixels in a degree the jumps of the other two are 5 % of a mean Delta E.
 References
 ----------
 .. [1] X. Zhang, B. Wandell, "A spatial extension of CIELAB for digital color image reproduction",
-   SID Symposium Digest 27, 731-734 (1996); Journal of the SID 5, 61-63 (1997),
-   DOI 10.1889/1.1985127.
+   SID Symposium Digest 27, 731-734, 1996; Journal of the SID 5, 61-63, 1997,
+   doi:10.1889/1.1985127.
 """
 
 import math
@@ -38,7 +38,7 @@ GAUSSIANS: tuple[tuple[Gaussian, ...], ...] = (
     ((0.0685, 0.616725), (0.826, 0.383275)),
     ((0.092, 0.567885), (0.6451, 0.432115)),
 )
-"""(spread [degrees], weight) of every Gaussian of the light-dark, red-green, blue-yellow plane."""
+"""Spread [degrees] and weight of every Gaussian of the light-dark, red-green, blue-yellow plane."""
 
 _TWO_DEGREES = (
     (0.2787336, 0.7218031, -0.106552),
@@ -54,39 +54,69 @@ OPPONENT: dict[str, tuple[tuple[float, float, float], ...]] = {
         (0.0798787, -0.5547976, 0.4814746),
     ),
 }
-"""XYZ -> opponent planes: for the 2 degree observer, and for the 10 degree one."""
+"""Matrices from XYZ to opponent planes: for the 2 degree observer, and for the 10 degree one."""
 
-FINEST = 224.0
+MIN_1996_SAMPLES_PER_DEGREE = 224.0
 """Samples per degree at which the 1996 kernels are sampled, at least."""
 
 
 @dataclass(frozen=True)
 class Kernel:
-    """weights[i] x the outer product of taps[i] with itself, summed; its own sum is 1."""
+    """A sum of separable kernels: weights[i] x the outer product of taps[i] with itself."""
 
     weights: NDArray[np.float64]
+    """Weight of every Gaussian; they make the kernel's sum 1."""
     taps: NDArray[np.float64]
-    """(Gaussians, 2 reach + 1), symmetric."""
+    """Symmetric samples of every Gaussian (Gaussians, 2 reach + 1)."""
 
     @property
     def reach(self) -> int:
-        """Pixels to either side."""
+        """Pixels that the kernel covers on either side."""
         return self.taps.shape[1] // 2
 
     def response(self, rows: int, columns: int) -> NDArray[np.float64]:
-        """(rows, columns) factors of the DCT-II of a picture, mirrored at its borders for ever."""
+        """Return the kernel's factors on the DCT-II of a picture that is mirrored at its borders.
+
+        Parameters
+        ----------
+        rows, columns : int
+            Size of the picture [pixels].
+
+        Returns
+        -------
+        ndarray
+            Factors (rows, columns) [dimensionless].
+        """
         down, across = (_cosines(self.taps, count) for count in (rows, columns))
         return np.einsum("i,ir,ic->rc", self.weights, down, across)
 
 
 def kernels(filters: Filters, samples_per_degree: float) -> tuple[Kernel, ...]:
-    """The kernels of the three planes. Raises ValueError for filters that are not known."""
+    """Return the kernels of the light-dark, red-green and blue-yellow planes [1].
+
+    Parameters
+    ----------
+    filters : {"zhang-wandell-1996", "isetcam", "continuous"}
+        How the spreads are read.
+    samples_per_degree : float
+        Pixels in one degree of visual angle.
+
+    Returns
+    -------
+    tuple of Kernel
+        One kernel a plane.
+
+    Raises
+    ------
+    ValueError
+        Filters that are not known.
+    """
     if filters not in OPPONENT:
         raise ValueError(f"filters {filters!r}; they must be one of {', '.join(OPPONENT)}")
     sampled = {
-        "zhang-wandell-1996": _sampled_1996,
-        "isetcam": _sampled_isetcam,
-        "continuous": _continuous,
+        "zhang-wandell-1996": _taps_1996,
+        "isetcam": _taps_isetcam,
+        "continuous": _taps_continuous,
     }[filters]
     return tuple(_kernel(plane, sampled(plane, samples_per_degree)) for plane in GAUSSIANS)
 
@@ -96,9 +126,9 @@ def _kernel(plane: tuple[Gaussian, ...], taps: NDArray[np.float64]) -> Kernel:
     return Kernel(weights / (weights @ taps.sum(axis=1) ** 2), taps)
 
 
-def _sampled_1996(plane: tuple[Gaussian, ...], per_degree: float) -> NDArray[np.float64]:
-    """One row of taps a Gaussian, as the 1996 code makes them."""
-    finer = max(1, math.ceil(FINEST / per_degree))
+def _taps_1996(plane: tuple[Gaussian, ...], per_degree: float) -> NDArray[np.float64]:
+    """Return one row of taps a Gaussian, as the 1996 code makes them."""
+    finer = max(1, math.ceil(MIN_1996_SAMPLES_PER_DEGREE / per_degree))
     fine = finer * per_degree
     half = math.ceil(fine / 2) - 1
     if half < finer:  # a pixel is half a degree or more: one tap is left
@@ -111,16 +141,16 @@ def _sampled_1996(plane: tuple[Gaussian, ...], per_degree: float) -> NDArray[np.
     return np.array(averaged)[:, half % finer :: finer]
 
 
-def _sampled_isetcam(plane: tuple[Gaussian, ...], per_degree: float) -> NDArray[np.float64]:
-    """One row of taps a Gaussian, as ISETCam makes them."""
+def _taps_isetcam(plane: tuple[Gaussian, ...], per_degree: float) -> NDArray[np.float64]:
+    """Return one row of taps a Gaussian, as ISETCam makes them."""
     half = (math.ceil(per_degree) - 1) // 2
     place = np.arange(-half, half + 1)
     widths = np.array([spread for spread, _ in plane]) * per_degree  # half, at half maximum
     return _unit_sum(np.exp(-math.log(2) * (place / widths[:, None]) ** 2))
 
 
-def _continuous(plane: tuple[Gaussian, ...], per_degree: float) -> NDArray[np.float64]:
-    """One row of taps a Gaussian: its integrals over the pixels' parts within half a degree."""
+def _taps_continuous(plane: tuple[Gaussian, ...], per_degree: float) -> NDArray[np.float64]:
+    """Return one row of taps a Gaussian: its integrals over pixels within half a degree."""
     from scipy.special import erf
 
     reach = math.ceil(per_degree / 2 - 0.5)
@@ -134,7 +164,7 @@ def _unit_sum(rows: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _cosines(taps: NDArray[np.float64], count: int) -> NDArray[np.float64]:
-    """(Gaussians, count): sum over n of taps[n] cos(pi k n / count) for k = 0 .. count - 1.
+    """Return the sum over n of taps[n] cos(pi k n / count), k = 0 .. count - 1: (Gaussians, count).
 
     Taps beyond a period of the mirrored picture fold onto it: no kernel is too large.
     """

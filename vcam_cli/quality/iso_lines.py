@@ -5,8 +5,10 @@ pixels, and with noise. A line through it would wind around every bar. The diffe
 an error tolerance is the largest on a bar of a frequency and contrast: so of a chart the largest
 within a period of its bars is taken first, then what swings still is averaged.
 
-Reference: T. Chen, "Digital Camera System Simulator and Applications", PhD thesis, Stanford
-University, 2003, section 3.5, figures 3.6 and 3.7.
+References
+----------
+.. [1] T. Chen, "Digital Camera System Simulator and Applications", PhD thesis, Stanford
+   University, 2003, section 3.5, figures 3.6 and 3.7.
 """
 
 from __future__ import annotations
@@ -14,19 +16,32 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-WIDEST = 1 / 12
-"""Of a map's width: the widest mean along it, where bars are wider than that or there are none."""
-NARROWEST = 1 / 32
-"""Of a map's width: the narrowest mean along it; beats of the bars against the pixels are slower
-than the bars."""
-TALL = 1 / 32
-"""Of a map's height: what is averaged over down it."""
+MAX_WIDTH = 1 / 12
+"""Widest mean along a map, as a part of its width: where bars are wider or there are none."""
+MIN_WIDTH = 1 / 32
+"""Narrowest mean along a map, as a part of its width.
+
+Beats of the bars against the pixels are slower than the bars.
+"""
+HEIGHT = 1 / 32
+"""Height of the means down a map, as a part of its height."""
 
 
 def envelope(values: NDArray, widths: NDArray) -> NDArray:
-    """The largest of a map (rows, columns) within windows around every column.
+    """Return the largest value of a map within a window around every column.
 
-    widths: of the windows (columns,) [pixels]; at the borders they lie beside the column.
+    Parameters
+    ----------
+    values : ndarray
+        Map (rows, columns).
+    widths : ndarray
+        Width of the window of every column (columns,) [pixels]; at the borders a window lies beside
+        its column.
+
+    Returns
+    -------
+    ndarray
+        Map (rows, columns) of the largest values.
     """
     n = values.shape[1]
     reach = np.asarray(widths, float) / 2
@@ -38,71 +53,166 @@ def envelope(values: NDArray, widths: NDArray) -> NDArray:
     return np.stack(parts, axis=1)
 
 
-def smoothed(values: NDArray, widths: NDArray | float, height: float) -> NDArray:
-    """Running means of a map (rows, columns) over windows around every pixel, float64.
+def moving_average(values: NDArray, widths: NDArray | float, height: float) -> NDArray:
+    """Return the moving average of a map over windows around every pixel.
 
-    widths: of the windows, of every column (columns,) or of all [pixels]; height: of all [pixels].
     Parts of pixels count in part. At the borders windows shrink on both sides alike, so that what
     rises steadily stays as it is.
+
+    Parameters
+    ----------
+    values : ndarray
+        Map (rows, columns).
+    widths : ndarray or float
+        Width of the window of every column (columns,), or of all [pixels].
+    height : float
+        Height of all windows [pixels].
+
+    Returns
+    -------
+    ndarray
+        Averages (rows, columns), float64.
     """
     out = np.asarray(values, np.float64)
-    out = _means(out, np.broadcast_to(np.asarray(widths, float), (out.shape[1],)))
-    return _means(out.T, np.full(out.shape[0], float(height))).T
+    out = _row_means(out, np.broadcast_to(np.asarray(widths, float), (out.shape[1],)))
+    return _row_means(out.T, np.full(out.shape[0], float(height))).T
 
 
-def _means(values: NDArray, widths: NDArray) -> NDArray:
-    """Means along the rows of values (rows, n) over windows of widths (n,) [pixels]."""
+def _row_means(values: NDArray, widths: NDArray) -> NDArray:
+    """Return means along the rows of values (rows, n) over windows of widths (n,) [pixels]."""
     n = values.shape[1]
     center = np.arange(n) + 0.5
     half = np.minimum(np.maximum(widths, 1.0) / 2, np.minimum(center, n - center))
     total = np.concatenate([np.zeros((len(values), 1)), np.cumsum(values, axis=1)], axis=1)
-    return (_read(total, center + half) - _read(total, center - half)) / (2 * half)
+    return (_interpolate_rows(total, center + half) - _interpolate_rows(total, center - half)) / (
+        2 * half
+    )
 
 
-def _read(total: NDArray, at: NDArray) -> NDArray:
-    """Values along rows between their points, straight: (rows, n)."""
+def _interpolate_rows(total: NDArray, at: NDArray) -> NDArray:
+    """Return values along rows between their points, straight: (rows, n)."""
     left = np.minimum(at.astype(int), total.shape[1] - 2)
     part = at - left
     return (1 - part) * total[:, left] + part * total[:, left + 1]
 
 
-def periods(frequency: NDArray, pitch: float, columns: int) -> NDArray:
-    """Widths to average a chart's columns over: a period of its bars, within limits [pixels].
+def averaging_widths(frequency: NDArray, pitch: float, columns: int) -> NDArray:
+    """Return the widths to average a chart's columns over: a period of its bars, within limits.
 
-    frequency: of the bars at every column (columns,) [cycles/m]; pitch: of the columns [m].
+    Parameters
+    ----------
+    frequency : ndarray
+        Frequency of the bars at every column (columns,) [cycles/m].
+    pitch : float
+        Pitch of the columns [m].
+    columns : int
+        Number of columns.
+
+    Returns
+    -------
+    ndarray
+        Widths (columns,) [pixels].
     """
     with np.errstate(divide="ignore"):
         bars = 1 / (np.abs(frequency) * pitch)
-    return np.clip(bars, NARROWEST * columns, WIDEST * columns)
+    return np.clip(bars, MIN_WIDTH * columns, MAX_WIDTH * columns)
 
 
-def heights(values: NDArray, scale: NDArray, level: float) -> NDArray:
-    """How far each column stays below a level: where it first reaches it, (columns,).
+def level_heights(values: NDArray, scale: NDArray, level: float) -> NDArray:
+    """Return where each column of a map first reaches a level.
 
-    values: a smoothed map (rows, columns); scale: what the rows stand for, rising (rows,). Straight
-    between rows. The lowest of the scale where the column begins above the level, nan where it
-    never gets there.
+    Parameters
+    ----------
+    values : ndarray
+        Averaged map (rows, columns).
+    scale : ndarray
+        What the rows stand for, rising (rows,); straight between them.
+    level : float
+        Level in the unit of the map.
+
+    Returns
+    -------
+    ndarray
+        Place on the scale (columns,): its lowest where the column begins above the level, NaN where
+        the column never gets there.
     """
-    above = values >= level
-    first = above.argmax(axis=0)
-    found = np.full(values.shape[1], np.nan)
-    for column in np.flatnonzero(above.any(axis=0)):
-        k = int(first[column])
-        if k == 0:
-            found[column] = scale[0]
-            continue
-        low, high = values[k - 1, column], values[k, column]
-        part = (level - low) / (high - low)
-        found[column] = scale[k - 1] + part * (scale[k] - scale[k - 1])
-    return found
+    above, columns = values >= level, np.arange(values.shape[1])
+    k = np.maximum(above.argmax(axis=0), 1)
+    low, high = values[k - 1, columns], values[k, columns]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        found = scale[k - 1] + (level - low) / (high - low) * (scale[k] - scale[k - 1])
+    found = np.where(above[0], scale[0], found)
+    return np.where(above.any(axis=0), found, np.nan)
 
 
 def contours(values: NDArray, x: NDArray, y: NDArray, level: float) -> list[NDArray]:
-    """Lines along which a map (rows, columns) is at a level: each (n, 2), x and y.
+    """Return the lines along which a map is at a level.
 
-    x: (columns,), y: (rows,) places of the pixels. From the longest to the shortest.
+    Parameters
+    ----------
+    values : ndarray
+        Map (rows, columns).
+    x, y : ndarray
+        Places of the columns (columns,) and of the rows (rows,).
+    level : float
+        Level in the unit of the map.
+
+    Returns
+    -------
+    list of ndarray
+        Lines (n, 2) of x and y, from the longest to the shortest.
     """
     from contourpy import contour_generator
 
     lines = contour_generator(x, y, values).lines(level)
     return sorted((np.asarray(line) for line in lines), key=lambda line: -len(line))
+
+
+def map_lines(values: NDArray, x: NDArray, y: NDArray, level: float) -> list[NDArray]:
+    """Return the lines along which an averaged map of any scene is at a level.
+
+    Parameters
+    ----------
+    values : ndarray
+        Map (rows, columns).
+    x, y : ndarray
+        Places of the columns (columns,) and of the rows (rows,).
+    level : float
+        Level in the unit of the map.
+
+    Returns
+    -------
+    list of ndarray
+        Lines (n, 2) of x and y, from the longest to the shortest.
+    """
+    rows, columns = values.shape
+    return contours(moving_average(values, columns * HEIGHT, rows * HEIGHT), x, y, level)
+
+
+def chart_line(
+    values: NDArray, frequency: NDArray, contrast: NDArray, pitch: float, level: float
+) -> NDArray:
+    """Return the contrast up to which the map of a chart of bars stays below a level [1].
+
+    Parameters
+    ----------
+    values : ndarray
+        Map (rows, columns).
+    frequency : ndarray
+        Frequency of the bars at every column (columns,) [cycles/m].
+    contrast : ndarray
+        Contrast of the bars at every row (rows,), falling from the top; NaN beside the chart.
+    pitch : float
+        Pitch of the columns [m].
+    level : float
+        Level in the unit of the map.
+
+    Returns
+    -------
+    ndarray
+        Contrast (columns,); NaN where the level is never reached.
+    """
+    widths = averaging_widths(frequency, pitch, values.shape[1])
+    means = moving_average(envelope(values, widths), widths, len(values) * HEIGHT)
+    chart = np.isfinite(contrast)
+    return level_heights(means[chart][::-1], contrast[chart][::-1], level)

@@ -1,4 +1,4 @@
-"""How values are distributed, and whether around a single one.
+"""Modes of a distribution: how many maxima its density has, and how surely it has one.
 
 A mean stands for a distribution that has one mode. How many a density has depends on how finely
 one looks: it is smoothed by a Gaussian, whose width is Silverman's rule of thumb, and its maxima
@@ -7,10 +7,10 @@ distribution is the more surely unimodal the less of its spread that is.
 
 References
 ----------
-[1] B. W. Silverman, "Using kernel density estimates to investigate multimodality", J. R. Statist.
-    Soc. B 43, 97-99, 1981.
-[2] B. W. Silverman, "Density Estimation for Statistics and Data Analysis", Chapman & Hall, 1986,
-    section 3.4.2.
+.. [1] B. W. Silverman, "Using kernel density estimates to investigate multimodality", Journal of
+   the Royal Statistical Society B 43, 97-99, 1981, doi:10.1111/j.2517-6161.1981.tb01155.x.
+.. [2] B. W. Silverman, "Density Estimation for Statistics and Data Analysis", Chapman & Hall,
+   1986, section 3.4.2.
 """
 
 from __future__ import annotations
@@ -21,36 +21,56 @@ import numpy as np
 import scipy.fft
 from numpy.typing import NDArray
 
-LEAST = 0.01
-"""Of the highest maximum: what another must rise above the dip beside it to count."""
-FINEST = 2.0
-"""Bins: the narrowest Gaussian."""
-STEPS = 24
+MIN_PROMINENCE = 0.01
+"""Part of the highest maximum that another must rise above the dip beside it to count."""
+MIN_BANDWIDTH_BINS = 2.0
+"""Standard deviation of the narrowest Gaussian [bins]."""
+BISECTIONS = 24
 """Halvings of the search for the critical width."""
-RULE = 0.9
-"""Of the smaller of standard deviation and quartile range / 1.34, times count^-1/5, [2]."""
+SILVERMAN_FACTOR = 0.9
+"""Factor of the rule of thumb [2].
+
+The bandwidth is this times count^-1/5 times the smaller of standard deviation and quartile
+range / 1.34.
+"""
 
 
 @dataclass(frozen=True)
 class Modes:
-    """Of a density."""
+    """Maxima of a density, and how surely there is a single one."""
 
-    places: tuple[float, ...]
-    """Of its maxima, in the values' unit."""
+    locations: tuple[float, ...]
+    """Places of the maxima, in the values' unit."""
     bandwidth: float
-    """Standard deviation of the Gaussian by which it was smoothed."""
+    """Standard deviation of the Gaussian by which the density was smoothed."""
     critical_bandwidth: float
-    """The least that leaves a single maximum; not less than two bins."""
+    """Least bandwidth that leaves a single maximum; not less than two bins."""
     spread: float
     """Standard deviation of the values."""
 
 
-def modes(counts: NDArray, width: float, independent: float) -> Modes:
-    """The maxima of the density of values that are not negative.
+def density_modes(counts: NDArray, width: float, independent: float) -> Modes:
+    """Return the maxima of the density of values that are not negative [1], [2].
 
-    counts: (n,) values in bins of a width, from 0; independent: number of values that are
-    independent of each other, which decides how finely the density is known. Raises ValueError
-    where there are no values.
+    Parameters
+    ----------
+    counts : ndarray
+        Number of values (n,) in bins of equal width, from 0.
+    width : float
+        Width of a bin, in the values' unit.
+    independent : float
+        Number of values that are independent of each other, which decides how finely the density
+        is known.
+
+    Returns
+    -------
+    Modes
+        The maxima, and the bandwidths.
+
+    Raises
+    ------
+    ValueError
+        There are no values.
     """
     counts = np.asarray(counts, np.float64)
     total = counts.sum()
@@ -62,20 +82,40 @@ def modes(counts: NDArray, width: float, independent: float) -> Modes:
     below = np.cumsum(counts) / total
     quartiles = center[np.searchsorted(below, 0.75)] - center[np.searchsorted(below, 0.25)]
     scale = min(spread, quartiles / 1.34) or spread
-    least = FINEST * width
-    bandwidth = max(RULE * scale * independent**-0.2, least)
+    least = MIN_BANDWIDTH_BINS * width
+    bandwidth = max(SILVERMAN_FACTOR * scale * independent**-0.2, least)
     smoother = _Smoother(counts, width)
-    places = tuple(float(center[i]) for i in _maxima(smoother(bandwidth)))
-    return Modes(places, bandwidth, _critical(smoother, least, len(counts) * width), spread)
+    locations = tuple(float(center[i]) for i in _maxima(smoother(bandwidth)))
+    return Modes(
+        locations, bandwidth, _critical_bandwidth(smoother, least, len(counts) * width), spread
+    )
 
 
 def density(counts: NDArray, width: float, bandwidth: float) -> NDArray:
-    """Density (n,) of counted values (n,), smoothed; what would fall below 0 is folded back."""
+    """Return the smoothed density of counted values; what would fall below 0 is folded back.
+
+    Parameters
+    ----------
+    counts : ndarray
+        Number of values (n,) in bins of equal width, from 0.
+    width : float
+        Width of a bin, in the values' unit.
+    bandwidth : float
+        Standard deviation of the Gaussian, in the values' unit.
+
+    Returns
+    -------
+    ndarray
+        Density (n,) [1 / unit of the values].
+    """
     return _Smoother(counts, width)(bandwidth)
 
 
 class _Smoother:
-    """A density by any Gaussian: in cosines, whose ends are mirrors, it is a factor on each."""
+    """Smooths a density by any Gaussian.
+
+    In cosines, whose ends are mirrors, the Gaussian is a factor on each.
+    """
 
     def __init__(self, counts: NDArray, width: float) -> None:
         self._count, self._width = len(counts), width
@@ -90,34 +130,19 @@ class _Smoother:
         return np.asarray(scipy.fft.idct(self._cosines * factor)[: self._count])
 
 
-def _maxima(values: NDArray, least: float = LEAST) -> list[int]:
-    """Indices of the maxima that stand out by a part of the highest, from left to right."""
-    threshold = least * values.max()
-    found: list[int] = []
-    highest, lowest = 0, 0.0
-    rising = True
-    for i, value in enumerate(values):
-        if rising:
-            if value > values[highest]:
-                highest = i
-            elif value < values[highest] - threshold:
-                found.append(highest)
-                rising, lowest = False, value
-        elif value < lowest:
-            lowest = value
-        elif value > lowest + threshold:
-            rising, highest = True, i
-    if rising and values[highest] > 0 and (not found or values[highest] > lowest + threshold):
-        found.append(highest)
-    return found
+def _maxima(values: NDArray) -> NDArray:
+    """Return the indices of the maxima of enough prominence, from left to right."""
+    from scipy.signal import find_peaks
+
+    return find_peaks(np.pad(values, 1), prominence=MIN_PROMINENCE * values.max())[0] - 1
 
 
-def _critical(smoother: _Smoother, least: float, most: float) -> float:
-    """The least bandwidth with one maximum: fewer never come of more smoothing, [1]."""
+def _critical_bandwidth(smoother: _Smoother, least: float, most: float) -> float:
+    """Return the least bandwidth with one maximum: fewer never come of more smoothing [1]."""
     if len(_maxima(smoother(least))) == 1:
         return least
     low, high = least, most
-    for _ in range(STEPS):
+    for _ in range(BISECTIONS):
         middle = (low + high) / 2
         one = len(_maxima(smoother(middle))) == 1
         low, high = (low, middle) if one else (middle, high)

@@ -11,24 +11,38 @@ import math
 
 import numpy as np
 
-_BLOCK = 64  # rows
+_BLOCK = 64
+"""Rows that are summed at once."""
 
 
 def mse(image: np.ndarray, ideal: np.ndarray) -> float:
-    """Mean of (image - ideal)^2 over all pixels and channels [white^2].
+    """Return the mean squared error over all pixels and channels.
 
-    image, ideal: the same shape, (rows, columns) or (rows, columns, C), any real dtype.
-    Raises ValueError where shapes differ or there is nothing to compare. NaN gives NaN.
+    Parameters
+    ----------
+    image, ideal : ndarray
+        Linear values, white = 1, of one shape (rows, columns) or (rows, columns, C), of any real
+        dtype.
+
+    Returns
+    -------
+    float
+        Mean of (image - ideal)^2 [white^2]; NaN where a value is.
+
+    Raises
+    ------
+    ValueError
+        The shapes differ, or there is nothing to compare.
     """
     if image.shape != ideal.shape:
         raise ValueError(f"shapes differ: {image.shape} and {ideal.shape}")
     if image.size == 0:
         raise ValueError("no pixels to compare")
-    return math.fsum(_squares(image, ideal)) / image.size
+    return math.fsum(_squared_differences(image, ideal)) / image.size
 
 
-def _squares(image: np.ndarray, ideal: np.ndarray) -> list[float]:
-    """The sum of squared differences of every block of rows."""
+def _squared_differences(image: np.ndarray, ideal: np.ndarray) -> list[float]:
+    """Return the sum of squared differences of every block of rows."""
     sums = []
     for start in range(0, image.shape[0], _BLOCK):
         rows = slice(start, start + _BLOCK)
@@ -39,9 +53,20 @@ def _squares(image: np.ndarray, ideal: np.ndarray) -> list[float]:
 
 
 def psnr_of_mse(error: float, peak: float = 1.0) -> float:
-    """Peak signal-to-noise ratio [dB] 10 log10(peak^2 / error); `inf` where the error is 0.
+    """Return the peak signal-to-noise ratio of a mean squared error, 10 log10(peak^2 / error).
 
-    `inf` is also what the metrics file says of two identical pictures.
+    Parameters
+    ----------
+    error : float
+        Mean squared error [white^2].
+    peak : float
+        Value of white.
+
+    Returns
+    -------
+    float
+        Ratio [dB]; inf where the error is 0, which is also what the metrics file says of two
+        identical pictures.
     """
     if error == 0:
         return math.inf
@@ -49,5 +74,23 @@ def psnr_of_mse(error: float, peak: float = 1.0) -> float:
 
 
 def psnr_db(image: np.ndarray, ideal: np.ndarray, peak: float = 1.0) -> float:
-    """Peak signal-to-noise ratio [dB] of `image`; `peak` is the value of white."""
+    """Return the peak signal-to-noise ratio of an image.
+
+    Parameters
+    ----------
+    image, ideal : ndarray
+        Linear values of one shape (rows, columns) or (rows, columns, C).
+    peak : float
+        Value of white.
+
+    Returns
+    -------
+    float
+        Ratio [dB]; inf where the images are the same.
+
+    Raises
+    ------
+    ValueError
+        The shapes differ, or there is nothing to compare.
+    """
     return psnr_of_mse(mse(image, ideal), peak)

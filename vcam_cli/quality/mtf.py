@@ -5,7 +5,7 @@ lines together sample it many times finer than one. The steps are those of the s
 the edge in every line by the centroid of its derivative, fit a line through the places, sort all
 pixels by their distance from it into bins a quarter of a pixel wide, take the derivative of the
 edge, window it, and transform. What averaging over a bin and the derivative's filter take from
-the result is given back: without that MTF50 comes out some percent too low [2].
+the result is given back: without that MTF50 comes out some percent too low [2], [3].
 
 Pixels come as lattices with their true positions, so that one color of a mosaic is measured from
 its own sites and nothing is interpolated.
@@ -16,10 +16,12 @@ the bin; what averaging does then depends on the bin's width alone.
 
 References
 ----------
-[1] ISO 12233:2017, Photography - Electronic still picture imaging - Resolution and spatial
-    frequency responses, annex D (e-SFR).
-[2] P. Burns, "Slanted-edge MTF for digital camera and scanner analysis", Proc. IS&T PICS, 2000,
-    135-138; K. Masaoka et al., Optics Express 22, 6040 (2014), DOI 10.1364/OE.22.006040.
+.. [1] ISO 12233:2017, Photography - Electronic still picture imaging - Resolution and spatial
+   frequency responses, annex D (e-SFR).
+.. [2] P. Burns, "Slanted-edge MTF for digital camera and scanner analysis", Proc. IS&T PICS,
+   135-138, 2000.
+.. [3] K. Masaoka et al., "Modified slanted-edge method and multidirectional modulation transfer
+   function estimation", Optics Express 22, 6040-6046, 2014, doi:10.1364/OE.22.006040.
 """
 
 from __future__ import annotations
@@ -34,12 +36,12 @@ from numpy.typing import NDArray
 Floats = NDArray[np.floating]
 
 BINS_PER_PIXEL = 4
-"""Times that the edge is sampled finer than the pixels, [1]."""
-HIGHEST = 0.45
-"""Frequency up to which the transfer is told [cycles/bin]."""
-FLAT = 0.5
+"""Sampling of the edge over that of the pixels [1]."""
+MAX_FREQUENCY = 0.45
+"""Frequency up to which the transfer is given [cycles/bin]."""
+WINDOW_FLAT_PART = 0.5
 """Part of the window that does not fall off: wide tails of a lens keep their weight there."""
-ROUNDS = 3
+FIT_ITERATIONS = 3
 """Times that the line is fitted: each time windows lie around the line of the time before."""
 
 
@@ -48,45 +50,60 @@ class Lattice:
     """Pixels on straight rows and columns, all of one color."""
 
     values: NDArray
-    """(rows, columns) any unit."""
+    """Values (rows, columns) in any unit."""
     x: Floats
-    """(columns,) rising [m]"""
+    """Positions of the columns (columns,), rising [m]."""
     y: Floats
-    """(rows,) rising [m]"""
+    """Positions of the rows (rows,), rising [m]."""
 
     @property
-    def turned(self) -> Lattice:
-        """Rows for columns."""
+    def transpose(self) -> Lattice:
+        """The same pixels with rows for columns."""
         return Lattice(self.values.T, self.y, self.x)
 
 
 @dataclass(frozen=True)
 class EdgeResponse:
-    """What one edge tells."""
+    """Spatial frequency response of one edge, and where the edge lies."""
 
     frequency: Floats
-    """(n,) Across the edge, from 0 [cycles/m]."""
+    """Spatial frequencies across the edge (n,), from 0 [cycles/m]."""
     mtf: Floats
-    """(n,) 1 at frequency 0."""
+    """Transfer at those frequencies (n,) [dimensionless]; 1 at frequency 0."""
     angle: float
-    """Of the edge's normal to the x axis, y down [rad]."""
-    place: float
-    """Of the edge along its normal, from the origin [m]."""
+    """Angle of the edge's normal to the x axis, y down [rad]."""
+    offset: float
+    """Distance of the edge from the origin, along its normal [m]."""
     distance: Floats
-    """(bins,) Centers of the bins, from the edge [m]."""
+    """Centers of the bins (bins,), from the edge [m]."""
     profile: Floats
-    """(bins,) The edge, in the unit of the values."""
+    """Edge spread function (bins,) in the unit of the values."""
     pitch: float
-    """Of the pixels [m]."""
+    """Pitch of the pixels [m]."""
 
     @property
     def mtf50(self) -> float:
         """First frequency at which the transfer is one half [cycles/m]; inf where it never is."""
-        return crossing(self.frequency, self.mtf, 0.5)
+        return crossing_frequency(self.frequency, self.mtf, 0.5)
 
 
-def crossing(frequency: Floats, mtf: Floats, level: float) -> float:
-    """First frequency at which a curve falls to `level`, by straight lines; inf where never."""
+def crossing_frequency(frequency: Floats, mtf: Floats, level: float) -> float:
+    """Return the first frequency at which a transfer function falls to a level.
+
+    Parameters
+    ----------
+    frequency : ndarray
+        Spatial frequencies (n,), rising [cycles/m].
+    mtf : ndarray
+        Transfer at those frequencies (n,) [dimensionless]; straight between them.
+    level : float
+        Level [dimensionless].
+
+    Returns
+    -------
+    float
+        Frequency [cycles/m]; inf where the level is never reached.
+    """
     below = np.flatnonzero(mtf <= level)
     if not len(below):
         return math.inf
@@ -97,33 +114,50 @@ def crossing(frequency: Floats, mtf: Floats, level: float) -> float:
     return float(frequency[k - 1] + part * (frequency[k] - frequency[k - 1]))
 
 
-def slanted_edge(
+def slanted_edge_sfr(
     lattices: Sequence[Lattice], pitch: float, reach: float, degree: int = 1
 ) -> EdgeResponse:
-    """The transfer across a slanted edge, e-SFR of ISO 12233.
+    """Return the spatial frequency response of a slanted edge, e-SFR of ISO 12233 [1].
 
-    lattices: all pixels of one color; pitch: between the array's pixels, of which the bins are a
-    quarter [m]; reach: half the width of the window around the edge [m]; degree: of the curve
-    through the edge's places, 1 for a lens without distortion. The edge may be near the vertical
-    or the horizontal and either side may be bright. Raises ValueError where no edge is found, or
-    where the edge does not cross the lines of pixels.
+    The edge may be near the vertical or the horizontal, and either side may be bright.
+
+    Parameters
+    ----------
+    lattices : sequence of Lattice
+        All pixels of one color.
+    pitch : float
+        Pitch of the array's pixels, of which the bins are a quarter [m].
+    reach : float
+        Half the width of the window around the edge [m].
+    degree : int
+        Degree of the curve through the edge's places: 1 for a lens without distortion.
+
+    Returns
+    -------
+    EdgeResponse
+        The response, and the edge's place.
+
+    Raises
+    ------
+    ValueError
+        No edge is found, or the edge does not cross the lines of pixels.
     """
-    upright = _upright(lattices)
-    seen = lattices if upright else [lattice.turned for lattice in lattices]
-    curve = _fitted(seen, reach, degree)
+    upright = _is_upright(lattices)
+    seen = lattices if upright else [lattice.transpose for lattice in lattices]
+    curve = _fit_edge(seen, reach, degree)
     slope = float(np.polyval(np.polyder(curve), 0.0)) if degree else 0.0
     cosine = math.cos(math.atan(slope))
     width = pitch / BINS_PER_PIXEL
-    distance, value = _by_distance(seen, curve, cosine)
-    centers, profile = _binned(distance, value, width, reach)
-    frequency, mtf = _transformed(profile, width)
+    distance, value = _edge_distances(seen, curve, cosine)
+    centers, profile = _bin_means(distance, value, width, reach)
+    frequency, mtf = _sfr_of_profile(profile, width)
     angle = -math.atan(slope) if upright else math.pi / 2 + math.atan(slope)
-    place = float(np.polyval(curve, 0.0)) * cosine
-    return EdgeResponse(frequency, mtf, angle, place, centers, profile, pitch)
+    offset = float(np.polyval(curve, 0.0)) * cosine
+    return EdgeResponse(frequency, mtf, angle, offset, centers, profile, pitch)
 
 
-def _upright(lattices: Sequence[Lattice]) -> bool:
-    """Whether the edge is nearer to the columns than to the rows."""
+def _is_upright(lattices: Sequence[Lattice]) -> bool:
+    """Return whether the edge is nearer to the columns than to the rows."""
     across = down = 0.0
     for lattice in lattices:
         v = lattice.values.astype(np.float64)
@@ -136,23 +170,26 @@ def _upright(lattices: Sequence[Lattice]) -> bool:
     return across >= down
 
 
-def _fitted(lattices: Sequence[Lattice], reach: float, degree: int) -> Floats:
-    """Coefficients of the curve x(y) through the edge, highest power first."""
+def _fit_edge(lattices: Sequence[Lattice], reach: float, degree: int) -> Floats:
+    """Return the coefficients of the curve x(y) through the edge, highest power first."""
     curve: Floats = np.zeros(degree + 1)
-    for number in range(ROUNDS):
+    for number in range(FIT_ITERATIONS):
         found = [
-            _places(lattice, None if number == 0 else curve, reach / 2**number)
+            _edge_centroids(lattice, None if number == 0 else curve, reach / 2**number)
             for lattice in lattices
         ]
         y, x = (np.concatenate(parts) for parts in zip(*found, strict=True))
         if len(y) < max(4, 2 * degree + 2):
             raise ValueError("the edge is found in too few lines")
-        curve = _polyfit_without_strays(y, x, degree)
+        curve = _polyfit_without_outliers(y, x, degree)
     return curve
 
 
-def _polyfit_without_strays(y: Floats, x: Floats, degree: int) -> Floats:
-    """Least squares, once more without what lies 3 deviations off: noise moves some centroids."""
+def _polyfit_without_outliers(y: Floats, x: Floats, degree: int) -> Floats:
+    """Fit by least squares, once more without what lies 3 deviations off.
+
+    Noise moves some centroids far away.
+    """
     scale = float(np.abs(y).max()) or 1.0
     powers = scale ** -np.arange(degree, -1, -1.0)
     curve = np.polyfit(y / scale, x, degree) * powers
@@ -163,8 +200,8 @@ def _polyfit_without_strays(y: Floats, x: Floats, degree: int) -> Floats:
     return np.asarray(curve, dtype=np.float64)
 
 
-def _places(lattice: Lattice, curve: Floats | None, reach: float) -> tuple[Floats, Floats]:
-    """(y, x) of the edge in every line: the centroid of the derivative, in a cosine window.
+def _edge_centroids(lattice: Lattice, curve: Floats | None, reach: float) -> tuple[Floats, Floats]:
+    """Return y and x of the edge in every line: the centroid of the derivative, in a cosine window.
 
     Without a curve the window lies around each line's middle of the rise: smoothed, since noise
     has steep places anywhere.
@@ -172,7 +209,7 @@ def _places(lattice: Lattice, curve: Floats | None, reach: float) -> tuple[Float
     slopes = np.diff(lattice.values.astype(np.float64), axis=1)
     between = (lattice.x[1:] + lattice.x[:-1]) / 2
     if curve is None:
-        middle = np.full(len(lattice.y), _steepest(slopes, between))
+        middle = np.full(len(lattice.y), _half_rise(slopes, between))
         reach = max(float(np.ptp(lattice.x)), reach)
     else:
         middle = np.polyval(curve, lattice.y)
@@ -188,16 +225,16 @@ def _places(lattice: Lattice, curve: Floats | None, reach: float) -> tuple[Float
     return lattice.y[good][inside], x[inside]
 
 
-def _steepest(slopes: Floats, between: Floats) -> float:
-    """Where the mean of all lines rises or falls by half [m]."""
+def _half_rise(slopes: Floats, between: Floats) -> float:
+    """Return where the mean of all lines rises or falls by half [m]."""
     rise = np.cumsum(slopes.mean(axis=0))
     return float(between[np.argmin(np.abs(rise - rise[-1] / 2))])
 
 
-def _by_distance(
+def _edge_distances(
     lattices: Sequence[Lattice], curve: Floats, cosine: float
 ) -> tuple[Floats, Floats]:
-    """Distance from the edge, along its normal [m], and value of every pixel."""
+    """Return the distance from the edge, along its normal [m], and the value of every pixel."""
     distances, values = [], []
     for lattice in lattices:
         edge = np.polyval(curve, lattice.y)
@@ -206,8 +243,10 @@ def _by_distance(
     return np.concatenate(distances), np.concatenate(values)
 
 
-def _binned(distance: Floats, value: Floats, width: float, reach: float) -> tuple[Floats, Floats]:
-    """Means over bins of a width, out to `reach`, moved to the bins' middles: (centers, means).
+def _bin_means(
+    distance: Floats, value: Floats, width: float, reach: float
+) -> tuple[Floats, Floats]:
+    """Return the centers of bins out to `reach`, and means moved to these centers.
 
     All lengths in [m]. Empty bins take the straight line between their neighbors. Raises
     ValueError where they are too many: an edge along the pixels is sampled no finer than they are.
@@ -230,24 +269,37 @@ def _binned(distance: Floats, value: Floats, width: float, reach: float) -> tupl
     return centers, np.interp(centers, centers[full], moved)
 
 
-def _transformed(profile: Floats, width: float) -> tuple[Floats, Floats]:
-    """Frequencies [cycles/m] and transfer of an edge profile, corrections included.
+def _sfr_of_profile(profile: Floats, width: float) -> tuple[Floats, Floats]:
+    """Return frequencies [cycles/m] and transfer of an edge profile, corrections included.
 
     The derivative over two bins passes sinc(2 f w), the bins' average sinc(f w); both are
     divided out. At two cycles a pixel the derivative passes nothing; the result ends before.
     """
     spread = (profile[2:] - profile[:-2]) / 2
-    spectrum = np.abs(np.fft.rfft(spread * tukey(len(spread), FLAT)))
+    spectrum = np.abs(np.fft.rfft(spread * tukey_window(len(spread), WINDOW_FLAT_PART)))
     frequency = np.fft.rfftfreq(len(spread), width)
-    used = frequency * width < HIGHEST
+    used = frequency * width < MAX_FREQUENCY
     f = frequency[used] * width
     if not spectrum[0] > 0:
         raise ValueError("there is no edge: both sides are alike")
     return frequency[used], spectrum[used] / spectrum[0] / (np.sinc(2 * f) * np.sinc(f))
 
 
-def tukey(count: int, flat: float) -> Floats:
-    """Window that is 1 over the middle part `flat` and falls to 0 as a cosine on both sides."""
+def tukey_window(count: int, flat: float) -> Floats:
+    """Return a Tukey window: 1 over its middle part, falling to 0 as a cosine on both sides.
+
+    Parameters
+    ----------
+    count : int
+        Number of samples.
+    flat : float
+        Part of the window that is 1, in 0..1.
+
+    Returns
+    -------
+    ndarray
+        Window (count,) [dimensionless].
+    """
     at = np.abs(2 * (np.arange(count) + 0.5) / count - 1)
     fall = np.clip((at - flat) / (1 - flat), 0, 1) if flat < 1 else np.zeros(count)
     return np.cos(np.pi / 2 * fall) ** 2

@@ -1,4 +1,4 @@
-"""How unequal pixels are: the fixed pattern of a stack of frames, and its rows and columns.
+"""Nonuniformity of pixels: the fixed pattern of a stack of frames, and its rows and columns.
 
 The mean of many frames of equal light still holds some temporal noise; what the frames' own
 scatter says of it is subtracted, so that the numbers do not depend on how many frames there were.
@@ -8,8 +8,8 @@ here is even, and the filter would take part of the pattern with it.
 
 References
 ----------
-[1] EMVA Standard 1288, Release 4.0 Linear, European Machine Vision Association, 2021,
-    sections 4.2, 4.3 and 8.
+.. [1] EMVA Standard 1288, Release 4.0 Linear, European Machine Vision Association, 2021,
+   sections 4.2, 4.3 and 8.
 """
 
 from __future__ import annotations
@@ -28,18 +28,22 @@ class Stack:
     """Mean and scatter of frames of equal light."""
 
     frames: int
+    """Number of frames."""
     average: Floats
-    """(..., rows, columns) <y>, eq 33 of [1] [DN]; leading axes: separate lattices of pixels."""
+    """Mean of the frames <y> (..., rows, columns), eq 33 of [1] [DN].
+
+    Leading axes are separate lattices of pixels.
+    """
     variance: float
-    """sigma^2_y.stack, temporal variance averaged over the pixels, eq 65 of [1] [DN^2]."""
+    """Temporal variance sigma^2_y.stack averaged over the pixels, eq 65 of [1] [DN^2]."""
 
     @property
     def mean(self) -> float:
-        """mu_y, eq 34 of [1] [DN]."""
+        """Mean mu_y of all pixels, eq 34 of [1] [DN]."""
         return float(self.average.mean())
 
 
-class Running:
+class RunningStack:
     """Statistics of a stack that grows: no frame is kept.
 
     Why Welford's recurrence: it takes no difference of large squares.
@@ -51,14 +55,31 @@ class Running:
         self._scatter: Floats = np.zeros(())
 
     def add(self, frame: NDArray) -> None:
-        """One more frame, (..., rows, columns) [DN]."""
+        """Add one more frame.
+
+        Parameters
+        ----------
+        frame : ndarray
+            Numbers (..., rows, columns) [DN].
+        """
         self._count += 1
         apart = frame - self._average
         self._average = self._average + apart / self._count
         self._scatter = self._scatter + apart * (frame - self._average)
 
     def result(self) -> Stack:
-        """Of all frames. Raises ValueError for fewer than two."""
+        """Return the statistics of all frames.
+
+        Returns
+        -------
+        Stack
+            Mean and scatter.
+
+        Raises
+        ------
+        ValueError
+            Fewer than two frames.
+        """
         if self._count < 2:
             raise ValueError("two frames of equal light are needed at least")
         variance = float(self._scatter.mean()) / (self._count - 1)
@@ -66,24 +87,40 @@ class Running:
 
 
 @dataclass(frozen=True)
-class Spatial:
+class SpatialVariance:
     """Spatial variance and its parts [DN^2]; near 0 statistics may make one negative."""
 
     total: float
-    """s^2_y, eq 36 of [1]."""
+    """Variance s^2_y over all pixels, eq 36 of [1]."""
     row: float
-    """Of differences between rows, eq 42 of [1]."""
+    """Variance of differences between rows, eq 42 of [1]."""
     column: float
+    """Variance of differences between columns, eq 42 of [1]."""
     pixel: float
-    """What belongs to no row and no column."""
+    """Variance of what belongs to no row and no column."""
 
 
-def spatial(stack: Stack) -> Spatial:
-    """Spatial variances of a stack, eqs 33 to 42 of [1].
+def spatial_variance(stack: Stack) -> SpatialVariance:
+    """Return the spatial variances of a stack, eqs 33 to 42 of [1].
 
     The means over columns and over rows hold a share of the pixels' own variance:
     s^2_cav = s^2_col + s^2_pixel / M, s^2_rav = s^2_row + s^2_pixel / N, s^2 = the sum of all,
-    for M rows and N columns; solved for the three. Raises ValueError for fewer than 2 x 2 pixels.
+    for M rows and N columns; solved for the three.
+
+    Parameters
+    ----------
+    stack : Stack
+        Mean and scatter of frames of equal light.
+
+    Returns
+    -------
+    SpatialVariance
+        Variance of the pixels, and of rows and columns [DN^2].
+
+    Raises
+    ------
+    ValueError
+        Fewer than 2 x 2 pixels.
     """
     rows, columns = stack.average.shape[-2:]
     if min(rows, columns) < 2:
@@ -95,31 +132,60 @@ def spatial(stack: Stack) -> Spatial:
     by_row = float((each.mean(axis=-1) ** 2).mean()) - left / columns
     parts = np.array([[1, 0, 1 / rows], [0, 1, 1 / columns], [1, 1, 1]])
     if rows == columns == 2:
-        return Spatial(total, 0.0, 0.0, total)  # 3 unknowns, of which 2 are left
+        return SpatialVariance(total, 0.0, 0.0, total)  # 3 unknowns, of which 2 are left
     column, row, pixel = np.linalg.solve(parts, [by_column, by_row, total])
-    return Spatial(total, float(row), float(column), float(pixel))
+    return SpatialVariance(total, float(row), float(column), float(pixel))
 
 
 @dataclass(frozen=True)
 class Nonuniformity:
-    """A standard deviation over the pixels and its parts; 0 where it drowns in statistics."""
+    """A standard deviation over the pixels and its parts; 0 where statistics mask it."""
 
     total: float
+    """Standard deviation over all pixels."""
     row: float
+    """Standard deviation of differences between rows."""
     column: float
+    """Standard deviation of differences between columns."""
     pixel: float
+    """Standard deviation of what belongs to no row and no column."""
 
 
-def dsnu(dark: Spatial, gain: float) -> Nonuniformity:
-    """DSNU1288: nonuniformity of the dark signal [e], eq 66 of [1]; gain: K [DN/e]."""
+def dsnu(dark: SpatialVariance, gain: float) -> Nonuniformity:
+    """Return DSNU1288, the nonuniformity of the dark signal, eq 66 of [1].
+
+    Parameters
+    ----------
+    dark : SpatialVariance
+        Spatial variance without light [DN^2].
+    gain : float
+        Overall system gain K [DN/e].
+
+    Returns
+    -------
+    Nonuniformity
+        Standard deviations [e].
+    """
     parts = (dark.total, dark.row, dark.column, dark.pixel)
     return Nonuniformity(*(_root(part) / gain for part in parts))
 
 
-def prnu(bright: Spatial, dark: Spatial, signal: float) -> Nonuniformity:
-    """PRNU1288: nonuniformity of the response, relative to the signal, eq 67 of [1].
+def prnu(bright: SpatialVariance, dark: SpatialVariance, signal: float) -> Nonuniformity:
+    """Return PRNU1288, the nonuniformity of the response, eq 67 of [1].
 
-    bright: at half of saturation; signal: mean of bright above that of dark [DN].
+    Parameters
+    ----------
+    bright : SpatialVariance
+        Spatial variance at half of saturation [DN^2].
+    dark : SpatialVariance
+        Spatial variance without light [DN^2].
+    signal : float
+        Mean of the bright frames above that of the dark ones [DN].
+
+    Returns
+    -------
+    Nonuniformity
+        Standard deviations relative to the signal [dimensionless].
     """
     parts = (
         (bright.total, dark.total),

@@ -1,1 +1,1 @@
-"""What stands in front of the camera: charts and image files as light on the sensor plane."""
+"""Scenes: charts, image files and files of spectra as components B_k(x) with spectra S_k."""

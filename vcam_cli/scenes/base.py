@@ -1,7 +1,7 @@
 """What a scene is to the camera: a few spatial parts B_k(x, y), each with one spectrum S_k.
 
 Spectral radiance on the sensor plane: L(x, y, wavelength) = sum_k B_k(x, y) S_k(wavelength)
-[W/(sr m2 m)], with x to the right, y down, in metres on the sensor from the array's centre, and
+[W/(sr m2 m)], with x to the right, y down, in meters on the sensor from the array's center, and
 upright: magnification's two reversals are left out, the top of the scene is row 0.
 
 Why two kinds of scene: a sinusoid is known in closed form and stays exact through the whole
@@ -15,7 +15,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Any, Literal, Protocol
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
@@ -29,11 +29,12 @@ CELLS_A_BAND = 1 << 19  # cells painted at once: bounds the memory of temporarie
 
 @dataclass(frozen=True)
 class View:
-    """The rectangle of the sensor plane a scene must fill, centred on the array's centre.
+    """The rectangle of the sensor plane a scene must fill, centered on the array's center.
 
     rows, columns: pixels; pitch_x, pitch_y: [m]; oversampling: chart samples per pixel pitch;
-    margin: pixels a chart goes on beyond the array on every side; scene_width: [m] on the sensor
-    when the scene's extent has a width, None when the scene covers the array; dtype of planes.
+    margin: pixels that a chart goes on beyond the array on every side;
+    scene_width: [m] on the sensor when the scene's extent has a width, None when the scene covers
+    the array; dtype of planes.
     """
 
     rows: int
@@ -71,7 +72,7 @@ class View:
 
 @dataclass(frozen=True)
 class Frame:
-    """A rectangle centred on the array's centre: width and height [m]."""
+    """A rectangle centered on the array's center: width and height [m]."""
 
     width: float
     height: float
@@ -100,9 +101,37 @@ class WaveScene:
         return wave_values(self.waves, x, y, mix)
 
 
+class Harmonics(Protocol):
+    """A pattern that repeats along x and y, symmetric about the array's center along both."""
+
+    @property
+    def period(self) -> tuple[float, float]:
+        """Along x and y [m]."""
+
+    def amplitudes(self, count_x: int, count_y: int) -> Array:
+        """Of cos(2 pi k x / p_x) cos(2 pi l y / p_y), from k = l = 0 on: (count_y, count_x)."""
+
+
+@dataclass(frozen=True)
+class HarmonicScene:
+    """A chart that repeats without end: its cosine series is known, and no cell samples it.
+
+    Where the lens passes too many of its harmonics, `chart` is sampled as any other.
+    """
+
+    spectra: tuple[Spectrum, ...]
+    harmonics: Harmonics
+    white: Spectrum
+    chart: "ChartScene"
+
+    def at(self, x: Array, y: Array, mix: Array) -> Array:
+        """sum_k mix[r, k] B_k at the points (y[i], x[j]) [m]: (R, m, n)."""
+        return self.chart.at(x, y, mix)
+
+
 @dataclass(frozen=True)
 class SampledScene(ABC):
-    """A grid of samples centred on the array's centre.
+    """A grid of samples centered on the array's center.
 
     samples = "squares": an image, every sample a uniform square of light, mirrored at the border;
     "averages": averages of a continuous chart over the cells. `shape` (ny, nx); pitches [m].
@@ -128,11 +157,6 @@ class SampledScene(ABC):
     def at(self, x: Array, y: Array, mix: Array) -> Array:
         """sum_k mix[r, k] B_k at the points (y[i], x[j]) [m], both rising: (R, m, n)."""
 
-    @property
-    def is_known(self) -> bool:
-        """Whether it is made of even rectangles, and need not be sampled."""
-        return self.rectangles(np.zeros((1, len(self.spectra)))) is not None
-
     def rectangles(self, mix: Array) -> "Rectangles | None":
         """The whole grid's area as even rectangles, exact; None where it is not made of them."""
         return None
@@ -151,7 +175,7 @@ class Rectangles:
 
 
 class Chart(ABC):
-    """A picture on the plane; positions in metres from the array's centre, rising.
+    """A picture on the plane; positions in meters from the array's center, rising.
 
     `mix` is (R, K), and its dtype is that of the result.
     """
@@ -159,6 +183,13 @@ class Chart(ABC):
     @property
     def coarsest_cell(self) -> float:
         """Largest cells [m] that it is painted on; larger ones are painted in parts."""
+        return math.inf
+
+    def highest_frequency(self, half_width: float) -> float:
+        """Frequency beyond which there is no detail within so much of the center [cycles/m].
+
+        inf where edges are sharp.
+        """
         return math.inf
 
     @abstractmethod
@@ -192,19 +223,27 @@ class ChartScene(SampledScene):
     """A chart as cell averages over the view (array and margin), painted in bands of rows."""
 
     chart: Chart
+    center: tuple[float, float] = (0.0, 0.0)
+    """Of the cells, x and y from the array's center [m]."""
+
+    def on_cells(self, shape: tuple[int, int]) -> "ChartScene":
+        """The same part of the chart on a grid of so many cells (ny, nx)."""
+        ny, nx = shape
+        width, height = self.pitch_x * self.shape[1], self.pitch_y * self.shape[0]
+        return replace(self, shape=shape, pitch_x=width / nx, pitch_y=height / ny)
+
+    def cropped(self, center: tuple[float, float], width: float, height: float) -> "ChartScene":
+        """A rectangle of the chart around a place (x, y) [m], as a single cell."""
+        return replace(self, shape=(1, 1), pitch_x=width, pitch_y=height, center=center)
 
     def planes(self, mix: Array, workers: int = 1) -> Array:
         ny, nx = self.shape
         parts = math.ceil(max(self.pitch_x, self.pitch_y) / self.chart.coarsest_cell)
         if parts > 1:
-            finer = replace(
-                self,
-                shape=(ny * parts, nx * parts),
-                pitch_x=self.pitch_x / parts,
-                pitch_y=self.pitch_y / parts,
-            ).planes(mix, workers)
+            finer = self.on_cells((ny * parts, nx * parts)).planes(mix, workers)
             return finer.reshape(len(mix), ny, parts, nx, parts).mean(axis=(2, 4))
-        x_edges, y_edges = cell_edges(nx, self.pitch_x), cell_edges(ny, self.pitch_y)
+        x_edges = self.center[0] + cell_edges(nx, self.pitch_x)
+        y_edges = self.center[1] + cell_edges(ny, self.pitch_y)
         out = np.empty((len(mix), ny, nx), self.dtype)
         mix = np.asarray(mix, self.dtype)
         chart = self.chart.within(x_edges, y_edges)
@@ -265,6 +304,10 @@ def chart_scene(
     )
 
 
+Scene = WaveScene | HarmonicScene | SampledScene
+"""Whatever stands before the lens."""
+
+
 def fills(view: View) -> bool:
     """Whether the chart's frame covers array and margin, so that no black edge is seen."""
     if view.scene_width is None:
@@ -275,7 +318,7 @@ def fills(view: View) -> bool:
 
 
 def cell_edges(count: int, pitch: float) -> Array:
-    """The count + 1 edges [m] of cells centred on 0."""
+    """The count + 1 edges [m] of cells centered on 0."""
     return (np.arange(count + 1) - count / 2) * pitch
 
 
@@ -285,7 +328,7 @@ def wave_values(waves: tuple[Wave, ...], x: Array, y: Array, mix: Array) -> Arra
 
 
 def wave_averages(waves: tuple[Wave, ...], x_edges: Array, y_edges: Array, mix: Array) -> Array:
-    """Cell averages of a sum of waves, exact: the centre's value times sinc(f width) per axis."""
+    """Cell averages of a sum of waves, exact: the center's value times sinc(f width) per axis."""
     return _waves(waves, _cells(x_edges), _cells(y_edges), mix)
 
 

@@ -9,7 +9,6 @@ from vcam_cli.scenes import (
     eye_chart,
     hdr_patches,
     light,
-    point_grid,
     siemens_star,
     sinusoid,
     step_wedge,
@@ -18,7 +17,9 @@ from vcam_cli.scenes import (
 from vcam_cli.scenes.base import (
     Array,
     Chart,
+    HarmonicScene,
     SampledScene,
+    Scene,
     View,
     Wave,
     WaveScene,
@@ -28,9 +29,10 @@ from vcam_cli.scenes.base import (
 from vcam_cli.scenes.csf import Csf
 from vcam_cli.scenes.hyperspectral import Cube, cube_scene
 from vcam_cli.scenes.image import image_scene
+from vcam_cli.scenes.point_grid import PointGrid
 from vcam_cli.scenes.sinusoid import WaveChart
 from vcam_cli.scenes.slanted_edge import SlantedEdge
-from vcam_cli.scenes.still_life import WithColorChecker
+from vcam_cli.scenes.still_life import LeavesWithColorChecker
 from vcam_cli.spectra import Spectrum, srgb_reflectances
 
 SOURCE = ("scene", "source")
@@ -41,8 +43,8 @@ def build(
     view: View,
     picture: Array | Cube | None,
     primaries: str = "crt-brainard",
-) -> WaveScene | SampledScene:
-    """The scene as the engine needs it.
+) -> Scene:
+    """The scene as image formation needs it.
 
     picture: for an image source the decoded file, (h, w, channels), linear, 1 = its white; for a
     hyperspectral source its cube.
@@ -67,7 +69,11 @@ def build(
             return WaveScene((white,), waves, white)
         return chart_scene(WaveChart(waves), (white,), white, view)
     chart, reflectances = _chart(source, view)
-    return chart_scene(chart, tuple(white.times(r) for r in reflectances), white, view)
+    spectra = tuple(white.multiply(r) for r in reflectances)
+    sampled = chart_scene(chart, spectra, white, view)
+    if isinstance(chart, PointGrid) and fills(view):
+        return HarmonicScene(spectra, chart, white, sampled)
+    return sampled
 
 
 def _waves(source: object) -> tuple[Wave, ...] | None:
@@ -90,25 +96,25 @@ def _chart(source: object, view: View) -> tuple[Chart, tuple[Spectrum, ...]]:
         case models.Csf():
             return (
                 Csf(frame, source.max_frequency, source.mean, source.max_contrast, source.phase),
-                csf.colors(source.modulation),
+                csf.modulation_colors(source.modulation),
             )
         case models.SlantedEdge():
             return SlantedEdge(source.angle, source.contrast), gray
         case models.ColorChecker():
-            card = colorchecker.largest(frame)
+            card = colorchecker.largest_card(frame)
             return colorchecker.ColorChecker(card), colorchecker.reflectances()
         case models.DeadLeaves():
             leaves = dead_leaves.dead_leaves(source.seed, frame)
             if source.colorchecker == 0.0:
                 return leaves, dead_leaves.reflectances()
-            card = colorchecker.of_height(source.colorchecker, frame)
-            return WithColorChecker(leaves, card), colorchecker.reflectances()
+            card = colorchecker.card_of_height(source.colorchecker, frame)
+            return LeavesWithColorChecker(leaves, card), colorchecker.reflectances()
         case models.StepWedge():
             return step_wedge.step_wedge(source.steps, source.density_range, frame), gray
         case models.SiemensStar():
             return siemens_star.SiemensStar(source.spokes, source.contrast), gray
         case models.PointGrid():
-            return point_grid.PointGrid(source.spacing, source.diameter), gray
+            return PointGrid(source.spacing, source.diameter), gray
         case models.EyeChart():
             return eye_chart.eye_chart(source.rows, frame), gray
         case models.HdrPatches():
@@ -137,7 +143,7 @@ def _model(
             return light.display_white(scene, primaries)
     white = light.white_radiance(scene)
     if model == "mallett":
-        return tuple(white.times(color) for color in srgb_reflectances()), white
+        return tuple(white.multiply(color) for color in srgb_reflectances()), white
     return (white,), white
 
 

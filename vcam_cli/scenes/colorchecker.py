@@ -19,46 +19,52 @@ PATCH, GAP, BORDER = 40.0, 5.0, 7.5
 WIDTH = COLUMNS * PATCH + (COLUMNS - 1) * GAP + 2 * BORDER
 HEIGHT = ROWS * PATCH + (ROWS - 1) * GAP + 2 * BORDER
 
-CARD = 0.03  # reflectance of the black card
-SURROUND = 0.08  # of what is behind it
+CARD = 0.03
+"""Reflectance of the black card."""
+SURROUND = 0.08
+"""Reflectance of what is behind the card."""
 
-BLACK = 24  # index of the flat spectrum, after the 24 patches
+BLACK = 24
+"""Index of the flat spectrum, after the 24 patches."""
 
 
 def reflectances() -> tuple[Spectrum, ...]:
-    """The 24 patches row by row, then the flat spectrum that card and surround share."""
+    """Return the 24 patches row by row, then the flat spectrum that card and surround share."""
     return (*(spectrum for _, spectrum in colorchecker()), Spectrum.flat(1.0))
 
 
-def largest(frame: Frame) -> "Card":
-    """The card as large as it fits, in the middle of the frame."""
+def largest_card(frame: Frame) -> "Card":
+    """Return the largest card that fits, in the middle of the frame."""
     return Card(min(frame.width / WIDTH, frame.height / HEIGHT))
 
 
-def of_height(part: float, frame: Frame) -> "Card":
-    """The card with a part (0..1) of the frame's height, or what fits its width, in the middle."""
+def card_of_height(part: float, frame: Frame) -> "Card":
+    """Return a card of a part (0..1) of the frame's height, or what fits its width."""
     return Card(min(part * frame.height / HEIGHT, frame.width / WIDTH))
 
 
 @dataclass(frozen=True)
 class Card:
-    """The card centred on the array; `scale` is the metres on the sensor of one millimetre of it.
-
-    `mix` is (R, 25) in the order of `reflectances`.
-    """
+    """A card centered on the array; `mix` is (R, 25) in the order of `reflectances`."""
 
     scale: float
+    """Length on the sensor of one millimeter of the card [m]."""
 
     @property
     def half_width(self) -> float:
+        """Half the width on the sensor [m]."""
         return self.scale * WIDTH / 2
 
     @property
     def half_height(self) -> float:
+        """Half the height on the sensor [m]."""
         return self.scale * HEIGHT / 2
 
     def light(self, cover: "Cover", mix: Array) -> Array:
-        """Light of card and patches, 0 around them; times the card's cover, since x and y part."""
+        """Return the light of card and patches times their cover, 0 around them.
+
+        It is a product of matrices, since x and y separate.
+        """
         card = CARD * mix[:, BLACK]
         patches = mix[:, :BLACK].reshape(-1, ROWS, COLUMNS) - card[:, None, None]
         # the card as one more row and column of patches: one product for all
@@ -70,14 +76,14 @@ class Card:
         return np.asarray((down.T @ block) @ across)
 
     def add_light(self, cover: "Cover", mix: Array, out: Array) -> None:
-        """The same, added to out."""
-        alike = cover.alike()
-        light = self.light(cover.of_rows([rows.start for rows in alike]), mix)
+        """Add the light of card and patches to `out`."""
+        alike = cover.row_runs()
+        light = self.light(cover.select_rows([rows.start for rows in alike]), mix)
         for number, rows in enumerate(alike):
             out[:, rows] += light[:, number, None]
 
-    def averaged(self, x_edges: Array, y_edges: Array) -> "Cover":
-        """The parts of cells that card and patches cover: exact, for they are rectangles."""
+    def cell_cover(self, x_edges: Array, y_edges: Array) -> "Cover":
+        """Return the parts of cells that card and patches cover: exact, for they are rectangles."""
         return Cover(
             overlap(x_edges, -self.half_width, self.half_width),
             overlap(y_edges, -self.half_height, self.half_height),
@@ -85,23 +91,23 @@ class Card:
             np.stack([overlap(y_edges, *ends) for ends in self._patches(ROWS)]),
         )
 
-    def sampled(self, x: Array, y: Array) -> "Cover":
-        """The same at points: 0 or 1."""
+    def point_cover(self, x: Array, y: Array) -> "Cover":
+        """Return whether card and patches cover points: 0 or 1."""
         return Cover(
-            _within(x, -self.half_width, self.half_width),
-            _within(y, -self.half_height, self.half_height),
-            np.stack([_within(x, *ends) for ends in self._patches(COLUMNS)]),
-            np.stack([_within(y, *ends) for ends in self._patches(ROWS)]),
+            _is_between(x, -self.half_width, self.half_width),
+            _is_between(y, -self.half_height, self.half_height),
+            np.stack([_is_between(x, *ends) for ends in self._patches(COLUMNS)]),
+            np.stack([_is_between(y, *ends) for ends in self._patches(ROWS)]),
         )
 
     def edges(self) -> tuple[Array, Array]:
-        """Where card and patches start and stop, x and y [m]."""
+        """Return where card and patches start and stop, x and y [m]."""
         x = [-self.half_width, *sum(self._patches(COLUMNS), ()), self.half_width]
         y = [-self.half_height, *sum(self._patches(ROWS), ()), self.half_height]
         return np.array(x), np.array(y)
 
     def _patches(self, count: int) -> Iterator[tuple[float, float]]:
-        """Where the patches of a row (count 6) or column (4) start and stop [m]."""
+        """Yield where the patches of a row (count 6) or column (4) start and stop [m]."""
         for number in range(count):
             start = (number - count / 2) * (PATCH + GAP) + GAP / 2
             yield start * self.scale, (start + PATCH) * self.scale
@@ -109,23 +115,26 @@ class Card:
 
 @dataclass(frozen=True)
 class Cover:
-    """How much of each column and row the card covers: across (n,), down (m,); and each of the
-    columns and rows of patches: columns (6, n), rows (4, m). A cell's cover is their product."""
+    """Parts of columns and rows that the card covers; a cell's cover is their product."""
 
     across: Array
+    """Part of each column that the card covers (n,)."""
     down: Array
+    """Part of each row that the card covers (m,)."""
     columns: Array
+    """Part of each column that each column of patches covers (6, n)."""
     rows: Array
+    """Part of each row that each row of patches covers (4, m)."""
 
-    def alike(self) -> list[slice]:
-        """Runs of rows that are covered alike: few, for what lies on them are rectangles."""
+    def row_runs(self) -> list[slice]:
+        """Return runs of rows that are covered alike: few, for what lies on them are rectangles."""
         last = np.diff(self.down) != 0
         last |= np.diff(self.rows).any(axis=0)
         bounds = [0, *(np.flatnonzero(last) + 1).tolist(), len(self.down)]
         return [slice(*ends) for ends in pairwise(bounds)]
 
-    def of_rows(self, index: list[int]) -> "Cover":
-        """That of some rows alone."""
+    def select_rows(self, index: list[int]) -> "Cover":
+        """Return the cover of some rows alone."""
         return replace(self, down=self.down[index], rows=self.rows[:, index])
 
 
@@ -136,19 +145,22 @@ class ColorChecker(Chart):
     card: Card
 
     def paint(self, x_edges: Array, y_edges: Array, mix: Array, out: Array) -> None:
-        cover = self.card.averaged(x_edges, y_edges)
-        alike = cover.alike()
-        light = self._before_surround(cover.of_rows([rows.start for rows in alike]), mix)
+        """Write the exact averages over the cells into `out`."""
+        cover = self.card.cell_cover(x_edges, y_edges)
+        alike = cover.row_runs()
+        light = self._with_surround(cover.select_rows([rows.start for rows in alike]), mix)
         for number, rows in enumerate(alike):
             out[:, rows] = light[:, number, None]
 
     def edges(self) -> tuple[Array, Array]:
+        """Return where card and patches start and stop, x and y [m]."""
         return self.card.edges()
 
     def values(self, x: Array, y: Array, mix: Array) -> Array:
-        return self._before_surround(self.card.sampled(x, y), mix)
+        """Return the values at points."""
+        return self._with_surround(self.card.point_cover(x, y), mix)
 
-    def _before_surround(self, cover: Cover, mix: Array) -> Array:
+    def _with_surround(self, cover: Cover, mix: Array) -> Array:
         surround = SURROUND * mix[:, BLACK, None, None]
         out = self.card.light(cover, mix)
         covered = np.outer(cover.down, cover.across).astype(mix.dtype)
@@ -157,5 +169,5 @@ class ColorChecker(Chart):
         return out
 
 
-def _within(position: Array, low: float, high: float) -> Array:
+def _is_between(position: Array, low: float, high: float) -> Array:
     return ((position >= low) & (position <= high)).astype(float)

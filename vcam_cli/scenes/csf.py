@@ -9,11 +9,15 @@ continuation, its own mirror image), and the contrast stays at 0 below and at ma
 since a contrast above 1 would be negative light.
 
 Modulated in color, reflectance is mean ((1 + c cos) S_1 + (1 - c cos) S_2): two colors, whose sum
-is white and whose luminances under D65 are the same, take turns. They are mixtures of the
+is white and whose luminances under D65 are the same, alternate. They are mixtures of the
 reflectances that make sRGB's red, green and blue.
 
-Source: the test chart of chapter 3 of T. Chen, "Digital camera system simulator and
-applications", Stanford 2003, after Campbell and Robson, J. Physiol. 197 (1968) 551.
+References
+----------
+.. [1] T. Chen, "Digital Camera System Simulator and Applications", PhD thesis, Stanford
+   University, 2003, chapter 3 (the test chart).
+.. [2] F. W. Campbell, J. G. Robson, "Application of Fourier analysis to the visibility of
+   gratings", Journal of Physiology 197, 551-566, 1968, doi:10.1113/jphysiol.1968.sp008574.
 """
 
 import math
@@ -25,49 +29,64 @@ from vcam_cli.scenes.base import Array, Chart, Frame
 from vcam_cli.spectra import Spectrum, srgb_reflectances
 
 LUMINANCES = (0.2126, 0.7152, 0.0722)
-"""Of sRGB's red, green and blue; ITU-R BT.709."""
-FIRST = {"red-green": (1.0, None, 0.5), "blue-yellow": (None, None, 1.0)}
-"""How much of red, green and blue is in the first of two colors; None is what makes the luminances
-equal. The second color has the rest."""
+"""Relative luminances of sRGB's red, green and blue, ITU-R BT.709."""
+FIRST_COLOR_SHARES = {"red-green": (1.0, None, 0.5), "blue-yellow": (None, None, 1.0)}
+"""Shares of red, green and blue in the first of two colors; the second has the rest.
+
+None stands for what makes the luminances equal.
+"""
 
 
-def colors(modulation: str) -> tuple[Spectrum, ...]:
-    """Reflectances of the parts of a chart: one of white, or two whose sum is white."""
+def modulation_colors(modulation: str) -> tuple[Spectrum, ...]:
+    """Return the reflectances of the parts of a chart: one of white, or two whose sum is white."""
     if modulation == "luminance":
         return (Spectrum.flat(1.0),)
-    known = FIRST[modulation]
+    known = FIRST_COLOR_SHARES[modulation]
     missing = sum(y for y, share in zip(LUMINANCES, known, strict=True) if share is None)
     there = sum(y * s for y, s in zip(LUMINANCES, known, strict=True) if s is not None)
     rest = (sum(LUMINANCES) / 2 - there) / missing
     first = [rest if share is None else share for share in known]
-    return tuple(_mixed(shares) for shares in (first, [1 - share for share in first]))
+    return tuple(_primary_mixture(shares) for shares in (first, [1 - share for share in first]))
 
 
-def _mixed(shares: list[float]) -> Spectrum:
-    """A mixture of sRGB's red, green and blue, which share a table of wavelengths."""
+def _primary_mixture(shares: list[float]) -> Spectrum:
+    """Return a mixture of sRGB's red, green and blue, which share a table of wavelengths."""
     pure = srgb_reflectances()
     at = pure[0].tables[0].wavelength
-    values = (share * color.at(at) for share, color in zip(shares, pure, strict=True))
-    return Spectrum.sampled(at, sum(values, np.zeros_like(at)), "hold")
+    values = (share * color.evaluate(at) for share, color in zip(shares, pure, strict=True))
+    return Spectrum.from_samples(at, sum(values, np.zeros_like(at)), "hold")
 
 
 @dataclass(frozen=True)
 class Csf(Chart):
-    """max_frequency [cycles/m], mean 0..1, max_contrast 0..1, phase [rad], on `frame`."""
+    """The contrast sensitivity chart on a frame."""
 
     frame: Frame
     max_frequency: float
+    """Frequency at the right edge [cycles/m]."""
     mean: float
+    """Mean reflectance, 0..1."""
     max_contrast: float
+    """Contrast at the upper edge, 0..1."""
     phase: float
+    """Phase of the chirp at the left edge [rad]."""
+
+    def highest_frequency(self, half_width: float) -> float:
+        """Twice that of the chirp at the edge, which leaves room for what its window adds."""
+        at_edge = self.max_frequency * (0.5 + half_width / self.frame.width)
+        return 2 * at_edge + 8 / min(self.frame.width, self.frame.height)
 
     def paint(self, x_edges: Array, y_edges: Array, mix: Array, out: Array) -> None:
-        """Exact: the chirp is separable, its integral along x is a pair of Fresnel integrals."""
+        """Write the exact averages over the cells into `out`.
+
+        The chirp is separable, and its integral along x is a pair of Fresnel integrals.
+        """
         chirp = np.diff(self._chirp_integral(x_edges)) / np.diff(x_edges)
         contrast = np.diff(self._contrast_integral(y_edges)) / np.diff(y_edges)
         self._mix(contrast, chirp, mix, out)
 
     def values(self, x: Array, y: Array, mix: Array) -> Array:
+        """Return the values at points."""
         from_left = x + self.frame.width / 2
         rate = self.max_frequency / self.frame.width
         chirp = np.cos(math.pi * rate * from_left**2 + self.phase)
@@ -87,7 +106,7 @@ class Csf(Chart):
             plane += level
 
     def _chirp_integral(self, x: Array) -> Array:
-        """Integral of cos(pi F x^2/W + phase) from the left edge to x [m]."""
+        """Return the integral of cos(pi F x^2/W + phase) from the left edge to x [m]."""
         from scipy.special import fresnel
 
         from_left = x + self.frame.width / 2
@@ -99,7 +118,7 @@ class Csf(Chart):
         return (math.cos(self.phase) * cosine - math.sin(self.phase) * sine) / scale
 
     def _contrast_integral(self, y: Array) -> Array:
-        """Integral [m] over y (down) of max_contrast clip(1/2 - y/H, 0, 1), up to a constant."""
+        """Return an integral over y (down) of max_contrast clip(1/2 - y/H, 0, 1) [m]."""
         up = 0.5 - y / self.frame.height
         ramp = np.clip(up, 0.0, 1.0)
         return -self.max_contrast * self.frame.height * (ramp**2 / 2 + np.maximum(up - 1.0, 0.0))

@@ -2,17 +2,20 @@
 
 Radii follow the power law r^-3 between two bounds, the only one that looks the same at every
 distance; occlusion then makes sharp edges and a power spectrum near 1/f^2, as photographs have
-(measured exponents of six seeds: -2.0 in the mean, with a spread of 0.14).
+(measured exponents of six seeds: -2.0 in the mean, with a spread of 0.14) [1], [2].
 Every leaf has the reflectance of one of a few natural pigments (patches of the ColorChecker),
 darkened by a factor of its own.
 
 The picture belongs to the seed alone: leaves are placed in units of the frame's longer side, so
 that another array, sampling or aspect shows the same leaves, cropped centrally. Beyond 3/4 of a
-side from the centre the leaves repeat.
+side from the center the leaves repeat.
 
-Sources: A. B. Lee, D. Mumford, J. Huang, "Occlusion models for natural images", International
-Journal of Computer Vision 41 (2001) 35-59; as a test chart: F. Cao, F. Guichard, H. Hornung,
-"Measuring texture sharpness of a digital camera", Proc. SPIE 7250 (2009).
+References
+----------
+.. [1] A. B. Lee, D. Mumford, J. Huang, "Occlusion models for natural images", International
+   Journal of Computer Vision 41, 35-59, 2001, doi:10.1023/A:1011109015675.
+.. [2] F. Cao, F. Guichard, H. Hornung, "Measuring texture sharpness of a digital camera", Proc.
+   SPIE 7250, 2009, doi:10.1117/12.805853 (dead leaves as a test chart).
 """
 
 import math
@@ -27,12 +30,15 @@ from vcam_cli.scenes.disc_edges import Discs
 from vcam_cli.scenes.discs import Cells
 from vcam_cli.spectra import Spectrum, colorchecker
 
-SMALLEST, LARGEST = 1 / 400, 1 / 4  # radii, in units of the frame's longer side
-LAYERS = 5.0  # mean number of leaves over a point; exp(-5) of the ground shows
-PERIOD = 1.5  # the leaves repeat after this, in the same unit
-DARKEST = 0.25  # a leaf's own factor is uniform between this and 1
+SMALLEST, LARGEST = 1 / 400, 1 / 4
+"""Radii, in units of the frame's longer side."""
+LAYERS = 5.0
+"""Mean number of leaves over a point; exp(-5) of the ground shows."""
+PERIOD = 1.5
+"""Distance after which the leaves repeat, in units of the frame's longer side."""
+DARKEST = 0.25
+"""Lower bound of a leaf's own factor, which is uniform between this and 1."""
 
-# How often each pigment occurs: the soil, plants, skin, sky and flowers of a landscape.
 PIGMENTS = {
     "dark skin": 4,
     "light skin": 3,
@@ -47,37 +53,42 @@ PIGMENTS = {
     "neutral 6.5 (.44 D)": 2,
     "neutral 5 (.70 D)": 2,
 }
-GROUND = 0.5  # the ground is the first pigment, darkened by this
+"""Frequency of each pigment: the soil, plants, skin, sky and flowers of a landscape."""
+GROUND = 0.5
+"""Factor of the ground, which is the first pigment."""
 
 
 def reflectances() -> tuple[Spectrum, ...]:
-    """The pigments' reflectances, in the order of `PIGMENTS`."""
+    """Return the pigments' reflectances, in the order of `PIGMENTS`."""
     known = dict(colorchecker())
     return tuple(known[name] for name in PIGMENTS)
 
 
 @dataclass(frozen=True)
 class Leaves:
-    """Discs, and the pigment (an index) and factor of each."""
+    """Discs, and the pigment and factor of each."""
 
     discs: Discs
     pigment: Array
+    """Index of each leaf's pigment (n,)."""
     factor: Array
+    """Factor of each leaf's reflectance (n,)."""
 
-    def take(self, index: Array) -> "Leaves":
-        return Leaves(self.discs.take(index), self.pigment[index], self.factor[index])
+    def select(self, index: Array) -> "Leaves":
+        """Return some of the leaves."""
+        return Leaves(self.discs.select(index), self.pigment[index], self.factor[index])
 
     def color(self, mix: Array) -> Array:
-        """The color of the ground and of every leaf: (R, n + 1)."""
+        """Return the color of the ground and of every leaf (R, n + 1)."""
         ground = GROUND * mix[:, :1]
         return np.concatenate([ground, mix[:, self.pigment] * self.factor], axis=1)
 
 
 @lru_cache(maxsize=4)
-def grow(seed: int) -> Leaves:
-    """The leaves of a seed (a whole number from 0 up), about 60 000; a later one lies in front.
+def generate_leaves(seed: int) -> Leaves:
+    """Return the leaves of a seed, about 60 000; a later one lies in front.
 
-    They lie on the torus of side `PERIOD`.
+    They lie on the torus of side `PERIOD`. The seed is a whole number, 0 or more.
     """
     smallest, largest = SMALLEST, LARGEST
     ratio = (smallest / largest) ** 2
@@ -94,12 +105,12 @@ def grow(seed: int) -> Leaves:
 
 
 @dataclass(frozen=True)
-class Laid(Chart):
-    """Leaves as they lie; `mix` is (R, 12) in the order of `PIGMENTS`. unit [m]: that of their
-    places."""
+class PlacedLeaves(Chart):
+    """Leaves at given places; `mix` is (R, 12) in the order of `PIGMENTS`."""
 
     leaves: Leaves
     unit: float
+    """Unit of the leaves' places [m]."""
 
     def paint(
         self,
@@ -109,42 +120,54 @@ class Laid(Chart):
         out: Array,
         hidden: Cells | None = None,
     ) -> None:
-        """The averages; 0 in the cells that are hidden."""
+        """Write the averages over the cells into `out`; 0 in the cells that are hidden."""
         color = self.leaves.color(mix).astype(mix.dtype, copy=False)
         x, y = x_edges / self.unit, y_edges / self.unit
         discs.paint(self.leaves.discs, color, x, y, out, hidden)
 
     def values(self, x: Array, y: Array, mix: Array) -> Array:
+        """Return the values at points."""
         color = self.leaves.color(mix)
         return discs.values(self.leaves.discs, color, x / self.unit, y / self.unit)
 
 
 @dataclass(frozen=True)
 class DeadLeaves(Chart):
-    """The chart: leaves that repeat with `PERIOD`. unit [m]: the frame's longer side."""
+    """The chart: leaves that repeat with `PERIOD`."""
 
     leaves: Leaves
     unit: float
+    """Longer side of the frame [m]."""
 
     @property
     def coarsest_cell(self) -> float:
-        """Where many leaves share a cell, telling which is seen where takes time and gigabytes."""
+        """Largest cell that is painted directly [m].
+
+        Where many leaves share a cell, telling which is seen where takes time and gigabytes.
+        """
         return self.unit / 1000
 
-    def within(self, x_edges: Array, y_edges: Array, hidden: Cells | None = None) -> Laid:
-        """The leaves that may be seen on the cells; those of `hidden` are not looked at.
+    def within(self, x_edges: Array, y_edges: Array, hidden: Cells | None = None) -> PlacedLeaves:
+        """Return the leaves that may be seen on the cells; those of `hidden` are not looked at.
 
         What is not seen is found on cells of `step` times `step`: a leaf behind one that covers
         such a cell is behind it in all of its cells, so that no cell changes.
         """
-        laid = self._laid(x_edges, y_edges)
+        laid = self._placed_leaves(x_edges, y_edges)
         step = int(2 * SMALLEST * self.unit * (len(x_edges) - 1) / (x_edges[-1] - x_edges[0]))
         if step < 4:
             return laid
-        x, y = _every(step, x_edges) / self.unit, _every(step, y_edges) / self.unit
-        behind = None if hidden is None else (_whole(step, hidden[0]), _whole(step, hidden[1]))
-        seen = discs.visible(laid.leaves.discs, x, y, behind)
-        return replace(laid, leaves=laid.leaves.take(seen))
+        x, y = (
+            _every_nth_edge(step, x_edges) / self.unit,
+            _every_nth_edge(step, y_edges) / self.unit,
+        )
+        behind = (
+            None
+            if hidden is None
+            else (_coarse_cells(step, hidden[0]), _coarse_cells(step, hidden[1]))
+        )
+        seen = discs.visible_discs(laid.leaves.discs, x, y, behind)
+        return replace(laid, leaves=laid.leaves.select(seen))
 
     def paint(
         self,
@@ -154,33 +177,37 @@ class DeadLeaves(Chart):
         out: Array,
         hidden: Cells | None = None,
     ) -> None:
-        self._laid(x_edges, y_edges).paint(x_edges, y_edges, mix, out, hidden)
+        """Write the averages over the cells into `out`; 0 in the cells that are hidden."""
+        self._placed_leaves(x_edges, y_edges).paint(x_edges, y_edges, mix, out, hidden)
 
     def values(self, x: Array, y: Array, mix: Array) -> Array:
-        return self._laid(x, y).values(x, y, mix)
+        """Return the values at points."""
+        return self._placed_leaves(x, y).values(x, y, mix)
 
-    def _laid(self, x: Array, y: Array) -> Laid:
+    def _placed_leaves(self, x: Array, y: Array) -> PlacedLeaves:
         left, right, top, bottom = (end / self.unit for end in (x[0], x[-1], y[0], y[-1]))
-        return Laid(_spread(self.leaves, left, right, top, bottom), self.unit)
+        return PlacedLeaves(_periodic_copies(self.leaves, left, right, top, bottom), self.unit)
 
 
 def dead_leaves(seed: int, frame: Frame) -> DeadLeaves:
-    """The leaves of a seed, spread over a frame."""
-    return DeadLeaves(grow(seed), max(frame.width, frame.height))
+    """Return the leaves of a seed, spread over a frame."""
+    return DeadLeaves(generate_leaves(seed), max(frame.width, frame.height))
 
 
-def _every(step: int, edges: Array) -> Array:
-    """Every step-th edge, and the last."""
+def _every_nth_edge(step: int, edges: Array) -> Array:
+    """Return every step-th edge, and the last."""
     return np.append(edges[:-1:step], edges[-1])
 
 
-def _whole(step: int, cells: slice) -> slice:
-    """Of the cells between every step-th edge, those that lie within a range of cells."""
+def _coarse_cells(step: int, cells: slice) -> slice:
+    """Return those of the cells between every step-th edge that lie within a range of cells."""
     return slice(-(-cells.start // step), cells.stop // step)
 
 
-def _spread(leaves: Leaves, left: float, right: float, top: float, bottom: float) -> Leaves:
-    """All copies of the periodic leaves that meet a rectangle, in their order."""
+def _periodic_copies(
+    leaves: Leaves, left: float, right: float, top: float, bottom: float
+) -> Leaves:
+    """Return all copies of the periodic leaves that meet a rectangle, in their order."""
     reach = LARGEST / PERIOD
     across = range(math.ceil(left / PERIOD - 0.5 - reach), math.floor(right / PERIOD + 1.5 + reach))
     down = range(math.ceil(top / PERIOD - 0.5 - reach), math.floor(bottom / PERIOD + 1.5 + reach))
@@ -188,12 +215,12 @@ def _spread(leaves: Leaves, left: float, right: float, top: float, bottom: float
     for column in across:
         for row in down:
             dx, dy = column * PERIOD, row * PERIOD
-            here = leaves.discs.touching(left - dx, right - dx, top - dy, bottom - dy)
+            here = leaves.discs.find_near(left - dx, right - dx, top - dy, bottom - dy)
             index.append(here)
             x.append(leaves.discs.x[here] + dx)
             y.append(leaves.discs.y[here] + dy)
     every = np.concatenate(index)
     order = np.argsort(every, kind="stable")
-    spread = leaves.take(every[order])
+    spread = leaves.select(every[order])
     there = replace(spread.discs, x=np.concatenate(x)[order], y=np.concatenate(y)[order])
     return replace(spread, discs=there)

@@ -13,24 +13,30 @@ import numpy as np
 from vcam_cli.scenes.base import Array
 
 DEPTH = 5
+"""Divisions of a cell that several edges cross."""
 
 
 @dataclass(frozen=True)
 class Discs:
-    """Centres x, y and radii, (n,) each, in one unit of length; a later disc hides an earlier."""
+    """Opaque discs in one unit of length; a later disc hides an earlier."""
 
     x: Array
+    """Centers to the right (n,)."""
     y: Array
+    """Centers down (n,)."""
     radius: Array
+    """Radii (n,)."""
 
     def __len__(self) -> int:
+        """Return the number of discs."""
         return len(self.x)
 
-    def take(self, index: Array) -> "Discs":
+    def select(self, index: Array) -> "Discs":
+        """Return some of the discs."""
         return Discs(self.x[index], self.y[index], self.radius[index])
 
-    def touching(self, left: float, right: float, top: float, bottom: float) -> Array:
-        """Indices, in order, of the discs whose bounding box meets a rectangle."""
+    def find_near(self, left: float, right: float, top: float, bottom: float) -> Array:
+        """Return indices, in order, of the discs whose bounding box meets a rectangle."""
         return np.flatnonzero(
             (self.x + self.radius > left)
             & (self.x - self.radius < right)
@@ -40,20 +46,21 @@ class Discs:
 
 
 @dataclass(frozen=True)
-class Crossed:
-    """Cells crossed by edges: box (4, m): left, right, top, bottom; back (m,): the label of what
-    lies behind the edges; count (m,), at least 1: how many edges cross each; and front (sum of
-    count,): whose they are, cell by cell and falling within a cell. The label of disc i is i + 1.
-    """
+class CrossedCells:
+    """Cells that edges of discs cross. The label of disc i is i + 1."""
 
     box: Array
+    """Left, right, top and bottom of each cell (4, m)."""
     back: Array
+    """Label of what lies behind the edges of each cell (m,)."""
     count: Array
+    """Number of edges that cross each cell (m,), at least 1."""
     front: Array
+    """Labels of the edges (sum of count,), cell by cell and falling within a cell."""
 
 
-def colored(discs: Discs, cells: Crossed, color: Array) -> Array:
-    """Average colors (R, m) of the cells; color (R, labels)."""
+def average_colors(discs: Discs, cells: CrossedCells, color: Array) -> Array:
+    """Return the average colors (R, m) of crossed cells; `color` is (R, labels)."""
     out = np.empty((len(color), len(cells.back)))
     several = cells.count > 1
     single = ~several
@@ -77,22 +84,22 @@ def colored(discs: Discs, cells: Crossed, color: Array) -> Array:
 
 @dataclass(frozen=True)
 class _Parts:
-    """Rectangles still to be judged, equal shares of their cells at one depth.
-
-    box (4, m): left, right, top, bottom; back (m,): what lies behind the edges; cell (m,): whose
-    part it is; and the edges that cross them as pairs: of_part (p,) rising,
-    front (p,) falling within a part.
-    """
+    """Rectangles still to be divided, equal shares of their cells at one depth."""
 
     box: Array
+    """Left, right, top and bottom of each rectangle (4, m)."""
     back: Array
+    """Label of what lies behind the edges of each rectangle (m,)."""
     cell: Array
+    """Cell that each rectangle is a part of (m,)."""
     of_part: Array
+    """Rectangle of each edge that crosses one (p,), rising."""
     front: Array
+    """Label of each such edge (p,), falling within a rectangle."""
 
 
 def _resolve(discs: Discs, parts: _Parts, color: Array) -> Array:
-    """Average colors (R, cells) of the cells the parts belong to, one part each at first."""
+    """Return average colors (R, cells) of the cells the parts belong to, one part each at first."""
     count = len(parts.cell)
     found: list[tuple[Array, Array, Array]] = []  # cell, label, how much of the cell
     for depth in range(1, DEPTH + 1):
@@ -106,15 +113,16 @@ def _resolve(discs: Discs, parts: _Parts, color: Array) -> Array:
         inside = share * cover(discs, front - 1, parts.box[:, part])
         found.append((parts.cell[part], front, inside))
         found.append((parts.cell[part], parts.back[part], share - inside))
-        parts = _keep(parts, crossings > 1)
-    seen, behind = _layered(discs, parts)
+        parts = _select_parts(parts, crossings > 1)
+    seen, behind = _layer_shares(discs, parts)
     found.append((parts.cell[parts.of_part], parts.front, share * seen))
     found.append((parts.cell, parts.back, share * behind))
     cell, label, weight = (np.concatenate(each) for each in zip(*found, strict=True))
     return np.stack([np.bincount(cell, row[label] * weight, minlength=count) for row in color])
 
 
-def _keep(parts: _Parts, wanted: Array) -> _Parts:
+def _select_parts(parts: _Parts, wanted: Array) -> _Parts:
+    """Return some of the parts, with the edges that cross them."""
     number = np.cumsum(wanted) - 1
     pair = wanted[parts.of_part]
     return _Parts(
@@ -127,7 +135,7 @@ def _keep(parts: _Parts, wanted: Array) -> _Parts:
 
 
 def _divide(discs: Discs, parts: _Parts) -> _Parts:
-    """Each part in four; edges that hide behind a disc that covers the quarter are dropped."""
+    """Divide each part in four; edges hidden behind a disc that covers the quarter are dropped."""
     left, right, top, bottom = parts.box
     x, y = (left + right) / 2, (top + bottom) / 2
     quarters = [(left, x, top, y), (x, right, top, y), (left, x, y, bottom), (x, right, y, bottom)]
@@ -144,27 +152,29 @@ def _divide(discs: Discs, parts: _Parts) -> _Parts:
 
 
 def _distances(discs: Discs, parts: _Parts) -> tuple[Array, Array]:
-    """Nearest and farthest points of the parts' quarters from the edges' centres: squared
-    distances less the squared radius, quarter by quarter."""
+    """Return the nearest and farthest squared distances of the parts' quarters from edges' centers.
+
+    They are less the squared radius, and stand quarter by quarter.
+    """
     index = parts.front - 1
     left, right, top, bottom = parts.box[:, parts.of_part]
     middle_x, middle_y = (left + right) / 2, (top + bottom) / 2
     x, y, limit = discs.x[index], discs.y[index], discs.radius[index] ** 2
-    across = _reach(left - x, middle_x - x), _reach(middle_x - x, right - x)
-    down = _reach(top - y, middle_y - y), _reach(middle_y - y, bottom - y)
+    across = _squared_distances(left - x, middle_x - x), _squared_distances(middle_x - x, right - x)
+    down = _squared_distances(top - y, middle_y - y), _squared_distances(middle_y - y, bottom - y)
     near, far = (
         np.concatenate([v[end] + (h[end] - limit) for v in down for h in across]) for end in (0, 1)
     )
     return near, far
 
 
-def _reach(low: Array, high: Array) -> tuple[Array, Array]:
-    """Squares of the least and the largest distance of an interval from 0."""
+def _squared_distances(low: Array, high: Array) -> tuple[Array, Array]:
+    """Return the squares of the least and the largest distance of an interval from 0."""
     return np.maximum(np.maximum(low, -high), 0.0) ** 2, np.maximum(-low, high) ** 2
 
 
-def _layered(discs: Discs, parts: _Parts) -> tuple[Array, Array]:
-    """What is seen of each edge's disc, and of what lies behind all, as parts of 1.
+def _layer_shares(discs: Discs, parts: _Parts) -> tuple[Array, Array]:
+    """Return what is seen of each edge's disc, and of what lies behind all, as parts of 1.
 
     From the front, a disc is seen in its own share of what those before it leave free: exact
     where the edges are independent. Pairs (p,) and parts (m,).
@@ -179,7 +189,7 @@ def _layered(discs: Discs, parts: _Parts) -> tuple[Array, Array]:
 
 
 def cover(discs: Discs, index: Array, box: Array) -> Array:
-    """The part of each rectangle, 0..1, that lies in its disc: exact."""
+    """Return the part of each rectangle, 0..1, that lies in its disc: exact."""
     left, right, top, bottom = box
     radius, x, y = discs.radius[index], discs.x[index], discs.y[index]
     sides = [_side((left - x) / radius), _side((right - x) / radius)]
@@ -194,13 +204,13 @@ def cover(discs: Discs, index: Array, box: Array) -> Array:
 
 
 def _side(t: Array) -> tuple[Array, Array]:
-    """t cut to -1..1, and twice the area under the unit circle's quarter up to |t|."""
+    """Return `t` cut to -1..1, and twice the area under the unit circle's quarter up to |t|."""
     t = np.clip(t, -1.0, 1.0)
     return t, np.abs(t) * np.sqrt(1.0 - t * t) + np.arcsin(np.abs(t))
 
 
 def _corner(side: tuple[Array, Array], end: tuple[Array, Array]) -> Array:
-    """Signed area of the unit disc within [0, x] x [0, y]."""
+    """Return the signed area of the unit disc within [0, x] x [0, y]."""
     (x, area_x), (y, area_y) = side, end
     outside = (area_x + area_y - np.pi / 2) / 2
     return np.where(x * x + y * y <= 1.0, x * y, np.sign(x) * np.sign(y) * outside)

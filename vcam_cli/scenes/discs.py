@@ -13,10 +13,11 @@ import numpy as np
 
 from vcam_cli.scenes import disc_edges
 from vcam_cli.scenes.base import Array
-from vcam_cli.scenes.disc_edges import Crossed, Discs
-from vcam_cli.scenes.runs import members, ragged, topmost
+from vcam_cli.scenes.disc_edges import CrossedCells, Discs
+from vcam_cli.scenes.runs import concatenate_ranges, expand_ranges, topmost_numbers
 
-Cells = tuple[slice, slice]  # rows and columns
+Cells = tuple[slice, slice]
+"""Rows and columns of cells."""
 
 
 def paint(
@@ -27,13 +28,23 @@ def paint(
     out: Array,
     hidden: Cells | None = None,
 ) -> None:
-    """Writes the cell averages of discs on a ground into out (R, ny, nx).
+    """Write the cell averages of discs on a ground into `out` (R, ny, nx).
 
-    color: (R, n + 1), column 0 the ground's, column i + 1 that of disc i. Edges rise. hidden:
-    cells of which nothing is seen; they become 0.
+    Parameters
+    ----------
+    discs : Discs
+        Centers and radii, in the unit of the edges; a later disc hides an earlier.
+    color : ndarray
+        Colors (R, n + 1): column 0 is the ground's, column i + 1 that of disc i.
+    x_edges, y_edges : ndarray
+        Edges of the cells, rising.
+    out : ndarray
+        Averages (R, ny, nx).
+    hidden : Cells, optional
+        Cells of which nothing is seen; they become 0.
     """
-    near = discs.touching(x_edges[0], x_edges[-1], y_edges[0], y_edges[-1])
-    discs = discs.take(near)
+    near = discs.find_near(x_edges[0], x_edges[-1], y_edges[0], y_edges[-1])
+    discs = discs.select(near)
     nothing = np.zeros((len(color), 1), color.dtype)
     color = np.concatenate([color[:, :1], color[:, near + 1], nothing], axis=1)
     spans = _spans(discs, x_edges, y_edges)
@@ -41,45 +52,47 @@ def paint(
     index = label.astype(np.intp)
     for plane, row in zip(out, color, strict=True):
         np.take(row, index, out=plane, mode="clip")
-    cell, front = _crossed(spans, label)
+    cell, front = _crossed_cells(spans, label)
     if len(cell):
         starts = np.flatnonzero(np.diff(cell, prepend=-1))
         count = np.diff(starts, append=len(cell))
         row, column = np.divmod(cell[starts], label.shape[1])
         box = np.stack([x_edges[column], x_edges[column + 1], y_edges[row], y_edges[row + 1]])
-        crossed = Crossed(box, label[row, column], count, front)
-        for plane, light in zip(out, disc_edges.colored(discs, crossed, color), strict=True):
+        crossed = CrossedCells(box, label[row, column], count, front)
+        for plane, light in zip(out, disc_edges.average_colors(discs, crossed, color), strict=True):
             plane[row, column] = light
 
 
 def averages(discs: Discs, color: Array, x_edges: Array, y_edges: Array) -> Array:
-    """What `paint` writes, in the dtype of `color`."""
+    """Return what `paint` writes, in the dtype of `color`."""
     out = np.empty((len(color), len(y_edges) - 1, len(x_edges) - 1), color.dtype)
     paint(discs, color, x_edges, y_edges, out)
     return out
 
 
 def values(discs: Discs, color: Array, x: Array, y: Array) -> Array:
-    """Point values at (y[i], x[j]), both rising: (R, len(y), len(x))."""
-    near = discs.touching(x[0], x[-1], y[0], y[-1])
-    discs = discs.take(near)
+    """Return point values at (y[i], x[j]), both rising: (R, len(y), len(x))."""
+    near = discs.find_near(x[0], x[-1], y[0], y[-1])
+    discs = discs.select(near)
     color = np.concatenate([color[:, :1], color[:, near + 1]], axis=1)
-    disc, row = members(
+    disc, row = expand_ranges(
         y.searchsorted(discs.y - discs.radius), y.searchsorted(discs.y + discs.radius)
     )
     half = _half_chord(discs.radius[disc], y[row] - discs.y[disc])
     column = _Columns(x)
-    start = column.holding(discs.x[disc] - half) + 1
-    stop = np.minimum(column.holding(discs.x[disc] + half) + 1, len(x))
+    start = column.index_of(discs.x[disc] - half) + 1
+    stop = np.minimum(column.index_of(discs.x[disc] + half) + 1, len(x))
     some = np.flatnonzero(stop > start)
     row = row[some] * len(x)
-    label = topmost(row + start[some], row + stop[some], disc[some] + 1, len(x) * len(y), len(x))
+    label = topmost_numbers(
+        row + start[some], row + stop[some], disc[some] + 1, len(x) * len(y), len(x)
+    )
     index = label.astype(np.intp)
     return np.stack([np.take(plane, index) for plane in color]).reshape(-1, len(y), len(x))
 
 
-def cover_of_separate(discs: Discs, x_edges: Array, y_edges: Array) -> Array:
-    """The part of every cell that discs cover which do not overlap, exact: (ny, nx)."""
+def separate_cover(discs: Discs, x_edges: Array, y_edges: Array) -> Array:
+    """Return the part of every cell that discs cover which do not overlap, exact: (ny, nx)."""
     shape = len(y_edges) - 1, len(x_edges) - 1
     spans = _spans(discs, x_edges, y_edges)
     # whole cells: 1 at the first of a run, -1 behind its last, summed from the left
@@ -91,7 +104,7 @@ def cover_of_separate(discs: Discs, x_edges: Array, y_edges: Array) -> Array:
         (spans.touch_start, spans.full_start),
         (spans.full_stop, spans.touch_stop),
     ):
-        span, column = members(start, stop)
+        span, column = expand_ranges(start, stop)
         row, disc = spans.row[span], spans.disc[span]
         box = np.stack([x_edges[column], x_edges[column + 1], y_edges[row], y_edges[row + 1]])
         part = disc_edges.cover(discs, disc, box)
@@ -99,8 +112,10 @@ def cover_of_separate(discs: Discs, x_edges: Array, y_edges: Array) -> Array:
     return cover
 
 
-def visible(discs: Discs, x_edges: Array, y_edges: Array, hidden: Cells | None = None) -> Array:
-    """Indices, in order, of the discs that may be seen on a grid: hardly more than are seen.
+def visible_discs(
+    discs: Discs, x_edges: Array, y_edges: Array, hidden: Cells | None = None
+) -> Array:
+    """Return indices, in order, of the discs that may be seen on a grid: hardly more than are seen.
 
     Left out are those that touch no cell but such as are covered whole by a disc before them.
     """
@@ -109,39 +124,44 @@ def visible(discs: Discs, x_edges: Array, y_edges: Array, hidden: Cells | None =
     count = spans.touch_stop - spans.touch_start
     front = np.repeat(spans.disc, count)
     seen = np.zeros(len(discs), bool)
-    cell = ragged(spans.row * label.shape[1] + spans.touch_start, count)
+    cell = concatenate_ranges(spans.row * label.shape[1] + spans.touch_start, count)
     seen[front[front >= label.ravel()[cell] - 1]] = True
     return np.flatnonzero(seen)
 
 
 @dataclass(frozen=True)
 class _Spans:
-    """For every disc and every row of cells it meets, in the order of discs: the cells touched
-    [touch_start, touch_stop) and, among them, those wholly inside [full_start, full_stop)."""
+    """Cells that every disc meets in every row, in the order of discs."""
 
     disc: Array
+    """Index of the disc."""
     row: Array
+    """Row of cells."""
     touch_start: Array
+    """First cell that the disc touches."""
     touch_stop: Array
+    """End of the cells that the disc touches."""
     full_start: Array
+    """First cell that lies wholly inside the disc."""
     full_stop: Array
+    """End of the cells that lie wholly inside the disc."""
 
 
 def _spans(discs: Discs, x_edges: Array, y_edges: Array) -> _Spans:
     nx, ny = len(x_edges) - 1, len(y_edges) - 1
     first = np.clip(y_edges.searchsorted(discs.y - discs.radius, side="right") - 1, 0, ny)
     last = np.clip(y_edges.searchsorted(discs.y + discs.radius, side="left"), 0, ny)
-    disc, row = members(first, last)
+    disc, row = expand_ranges(first, last)
     x, y, radius = discs.x[disc], discs.y[disc], discs.radius[disc]
     above, below = y_edges[row] - y, y_edges[row + 1] - y
     nearest = np.maximum(np.maximum(above, -below), 0.0)
     farthest = np.maximum(-above, below)
     column = _Columns(x_edges)
     wide, narrow = _half_chord(radius, nearest), _half_chord(radius, farthest)
-    touch_start = np.maximum(column.holding(x - wide), 0)
-    touch_stop = np.minimum(column.holding(x + wide) + 1, nx)
-    full_start = np.clip(column.holding(x - narrow) + 1, touch_start, touch_stop)
-    full_stop = np.clip(column.holding(x + narrow), full_start, touch_stop)
+    touch_start = np.maximum(column.index_of(x - wide), 0)
+    touch_stop = np.minimum(column.index_of(x + wide) + 1, nx)
+    full_start = np.clip(column.index_of(x - narrow) + 1, touch_start, touch_stop)
+    full_stop = np.clip(column.index_of(x + narrow), full_start, touch_stop)
     none = farthest >= radius
     full_start = np.where(none, touch_stop, full_start)
     full_stop = np.where(none, touch_stop, full_stop)
@@ -151,8 +171,11 @@ def _spans(discs: Discs, x_edges: Array, y_edges: Array) -> _Spans:
 
 
 class _Columns:
-    """Which cell holds a position: -1 left of all, nx right of all. Faster than a search where
-    the inner edges are evenly spaced (the two outermost cells may be cut)."""
+    """Finds the cell that holds a position: -1 left of all, nx right of all.
+
+    This is faster than a search where the inner edges are evenly spaced (the two outermost cells
+    may be cut).
+    """
 
     def __init__(self, edges: Array) -> None:
         self.edges = edges
@@ -161,7 +184,7 @@ class _Columns:
         even = step > 0 and np.allclose(np.diff(inner), step, rtol=1e-6, atol=0.0)
         self.step = step if even else None
 
-    def holding(self, position: Array) -> Array:
+    def index_of(self, position: Array) -> Array:
         if self.step is None:
             return self.edges.searchsorted(position, side="right") - 1
         inner = np.floor((position - self.edges[1]) / self.step)
@@ -172,30 +195,30 @@ class _Columns:
 
 
 def _half_chord(radius: Array, distance: Array) -> Array:
-    """Half the length of the chord at a distance from the centre; 0 outside."""
+    """Return half the length of the chord at a distance from the center; 0 outside."""
     return np.sqrt(np.maximum((radius - distance) * (radius + distance), 0.0))
 
 
 def _labels(spans: _Spans, discs: int, shape: tuple[int, int], hidden: Cells | None) -> Array:
-    """Per cell the frontmost disc that covers it whole, plus 1; 0 where none does."""
+    """Return per cell the frontmost disc that covers it whole, plus 1; 0 where none does."""
     some = np.flatnonzero(spans.full_stop > spans.full_start)
     row = spans.row[some] * shape[1]
     start, stop = row + spans.full_start[some], row + spans.full_stop[some]
-    label = topmost(start, stop, spans.disc[some] + 1, shape[0] * shape[1], shape[1])
+    label = topmost_numbers(start, stop, spans.disc[some] + 1, shape[0] * shape[1], shape[1])
     label = label.reshape(shape)
     if hidden is not None:
         label[hidden] = discs + 1
     return label
 
 
-def _crossed(spans: _Spans, label: Array) -> tuple[Array, Array]:
-    """Cells crossed by edges that may be seen, and whose edge (label): pairs, front first."""
+def _crossed_cells(spans: _Spans, label: Array) -> tuple[Array, Array]:
+    """Return pairs of a cell and the label of a visible edge that crosses it, front first."""
     row = spans.row * label.shape[1]
     start = np.concatenate([row + spans.touch_start, row + spans.full_stop])
     count = np.concatenate(
         [spans.full_start - spans.touch_start, spans.touch_stop - spans.full_stop]
     )
-    cell = ragged(start, count)
+    cell = concatenate_ranges(start, count)
     front = np.repeat(np.concatenate([spans.disc, spans.disc]) + 1, count)
     seen = np.flatnonzero(front > label.ravel()[cell])
     key = np.sort((cell[seen] << 31) - front[seen].astype(np.int64))

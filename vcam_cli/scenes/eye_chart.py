@@ -1,13 +1,17 @@
 """An eye chart: rows of five letters, each row 10^0.1 times smaller than the one above.
 
-Letters are those of Sloan: C D H K N O R S V Z, black on white, each five strokes wide and five
-high, drawn here as polygons. As on the ETDRS chart, letters stand a letter's width apart, and rows
-the height of the lower one. As large as fits the frame; white paper goes on beyond it.
+Letters are those of Sloan [1]: C D H K N O R S V Z, black on white, each five strokes wide and five
+high, drawn here as polygons. As on the ETDRS chart [2], letters stand a letter's width apart, and
+rows the height of the lower one. As large as fits the frame; white paper goes on beyond it.
 
-Sources: L. L. Sloan, "New test charts for the measurement of visual acuity at far and near
-distances", Am. J. Ophthalmol. 48 (1959) 807-813, doi:10.1016/0002-9394(59)90626-9; F. L. Ferris,
-A. Kassoff, G. H. Bresnick, I. Bailey, "New visual acuity charts for clinical research", Am. J.
-Ophthalmol. 94 (1982) 91-96, doi:10.1016/0002-9394(82)90197-0.
+References
+----------
+.. [1] L. L. Sloan, "New test charts for the measurement of visual acuity at far and near
+   distances", American Journal of Ophthalmology 48, 807-813, 1959,
+   doi:10.1016/0002-9394(59)90626-9.
+.. [2] F. L. Ferris, A. Kassoff, G. H. Bresnick, I. Bailey, "New visual acuity charts for clinical
+   research", American Journal of Ophthalmology 94, 91-96, 1982,
+   doi:10.1016/0002-9394(82)90197-0.
 """
 
 import math
@@ -20,19 +24,26 @@ import numpy as np
 from vcam_cli.scenes import polygons
 from vcam_cli.scenes.base import Array, Chart, Frame
 
-PAPER, INK = 0.9, 0.04  # reflectances
-RATIO = 10**-0.1  # of a row's letters to those above
-FILLED = 0.92  # of the frame, by the letters
-STROKES = 5  # a letter is that many strokes wide and high
-CHORDS = 720  # of a whole turn: 1e-5 of the radius from the circle
+PAPER, INK = 0.9, 0.04
+"""Reflectances of paper and ink."""
+RATIO = 10**-0.1
+"""Size of a row's letters over that of the row above."""
+FILL_FACTOR = 0.92
+"""Part of the frame that the letters fill."""
+STROKES = 5
+"""Strokes that a letter is wide and high."""
+CHORDS = 720
+"""Chords of a whole circle: they stay within 1e-5 of the radius."""
 
-# No letter is in two rows that follow each other.
 ROWS = ("NCKZO", "RHSDV", "KOZCN", "DSRVH", "ZNOKC", "HVDRS", "CKNOZ", "SRHVD", "OZCNK", "VDSHR")
+"""Letters of the rows; no letter is in two rows that follow each other."""
 
 
-def _turn(x: float, y: float, radius: float, start: float, stop: float) -> list[Array]:
-    """Points of an arc about (x, y) from angle start to stop [degrees], counterclockwise as y is
-    up where stop is larger."""
+def _arc(x: float, y: float, radius: float, start: float, stop: float) -> list[Array]:
+    """Return points of an arc about (x, y) from angle start to stop [degrees].
+
+    It runs counterclockwise, as y is up, where stop is larger.
+    """
     count = max(2, round(CHORDS * abs(stop - start) / 360) + 1)
     angle = np.radians(np.linspace(start, stop, count))
     return list(np.stack([x + radius * np.cos(angle), y + radius * np.sin(angle)], axis=1))
@@ -45,13 +56,13 @@ def _turn(x: float, y: float, radius: float, start: float, stop: float) -> list[
 def _c() -> list[list]:
     gap = (math.degrees(math.asin(0.5 / radius)) for radius in (2.5, 1.5))
     outer, inner = gap
-    ring = _turn(2.5, 2.5, 2.5, outer, 360 - outer) + _turn(2.5, 2.5, 1.5, 360 - inner, inner)
+    ring = _arc(2.5, 2.5, 2.5, outer, 360 - outer) + _arc(2.5, 2.5, 1.5, 360 - inner, inner)
     return [ring]
 
 
 def _d() -> list[list]:
-    outer = [(0, 0), *_turn(2.5, 2.5, 2.5, -90, 90), (0, 5)]
-    return [outer, [(1, 1), (1, 4), *_turn(2.5, 2.5, 1.5, 90, -90)]]
+    outer = [(0, 0), *_arc(2.5, 2.5, 2.5, -90, 90), (0, 5)]
+    return [outer, [(1, 1), (1, 4), *_arc(2.5, 2.5, 1.5, 90, -90)]]
 
 
 def _h() -> list[list]:
@@ -73,20 +84,20 @@ def _n() -> list[list]:
 
 
 def _o() -> list[list]:
-    return [_turn(2.5, 2.5, 2.5, 0, 360)[:-1], _turn(2.5, 2.5, 1.5, 360, 0)[:-1]]
+    return [_arc(2.5, 2.5, 2.5, 0, 360)[:-1], _arc(2.5, 2.5, 1.5, 360, 0)[:-1]]
 
 
 def _r() -> list[list]:
     leg = [(2.25, 2), (3.75, 0), (5, 0)]  # slopes 3 : 4, so 5/4 strokes along the row
-    outer = [(0, 0), (1, 0), (1, 2), *leg, *_turn(3.5, 3.5, 1.5, -90, 90), (0, 5)]
-    return [outer, [(1, 3), (1, 4), *_turn(3.5, 3.5, 0.5, 90, -90)]]
+    outer = [(0, 0), (1, 0), (1, 2), *leg, *_arc(3.5, 3.5, 1.5, -90, 90), (0, 5)]
+    return [outer, [(1, 3), (1, 4), *_arc(3.5, 3.5, 0.5, 90, -90)]]
 
 
 def _s() -> list[list]:
     def edge(beyond: float) -> list:
-        """The stroke's edge, from the lower left end to the upper right one; beyond its middle."""
-        low = _turn(1.5, 1.5, 1 + beyond, 180, 270) + _turn(3.5, 1.5, 1 + beyond, -90, 90)
-        high = _turn(1.5, 3.5, 1 - beyond, 270, 90) + _turn(3.5, 3.5, 1 - beyond, 90, 0)
+        """Return the stroke's edge from the lower left end to the upper right one."""
+        low = _arc(1.5, 1.5, 1 + beyond, 180, 270) + _arc(3.5, 1.5, 1 + beyond, -90, 90)
+        high = _arc(1.5, 3.5, 1 - beyond, 270, 90) + _arc(3.5, 3.5, 1 - beyond, 90, 0)
         return low + high
 
     return [[*edge(0.5), *reversed(edge(-0.5))]]
@@ -111,24 +122,26 @@ LETTERS: dict[str, Callable[[], list[list]]] = {
 
 @cache
 def letter(name: str) -> polygons.Sides:
-    """A letter of height 1, its upper left corner at (0, 0), y down."""
+    """Return a letter of height 1, its upper left corner at (0, 0), y down."""
     turned = [np.array([1, -1]) * np.array(outline) + [0, STROKES] for outline in LETTERS[name]()]
-    return polygons.sides(turned).scaled(1 / STROKES, 0, 0)
+    return polygons.sides(turned).scale_and_move(1 / STROKES, 0, 0)
 
 
 @dataclass(frozen=True)
 class EyeChart(Chart):
-    """letters: the sides of all [m]."""
+    """Letters on white paper."""
 
     letters: polygons.Sides
+    """Sides of all letters [m]."""
 
     def paint(self, x_edges: Array, y_edges: Array, mix: Array, out: Array) -> None:
-        """Exact."""
+        """Write the exact averages over the cells into `out`."""
         self._mixed(polygons.cover(self.letters, x_edges, y_edges), mix, out)
 
     def values(self, x: Array, y: Array, mix: Array) -> Array:
+        """Return the values at points."""
         out = np.empty((len(mix), len(y), len(x)), mix.dtype)
-        self._mixed(polygons.inside(self.letters, np.asarray(x), np.asarray(y)), mix, out)
+        self._mixed(polygons.contains_points(self.letters, np.asarray(x), np.asarray(y)), mix, out)
         return out
 
     def _mixed(self, ink: Array, mix: Array, out: Array) -> None:
@@ -138,15 +151,15 @@ class EyeChart(Chart):
 
 
 def eye_chart(rows: int, frame: Frame) -> EyeChart:
-    """So many rows, centered, as large as fits."""
+    """Return a chart of so many rows, centered, as large as fits."""
     sizes = RATIO ** np.arange(rows)
     tops = np.concatenate([[0], np.cumsum(sizes[:-1] + sizes[1:])])
     count = len(ROWS[0])
     height, width = tops[-1] + sizes[-1], 2 * count - 1
-    scale = FILLED * min(frame.width / width, frame.height / height)
+    scale = FILL_FACTOR * min(frame.width / width, frame.height / height)
     parts = []
     for number, (size, top) in enumerate(zip(sizes * scale, tops * scale, strict=True)):
         y = top - height * scale / 2
         for place, name in enumerate(ROWS[number % len(ROWS)]):
-            parts.append(letter(name).scaled(size, (2 * place - width / 2) * size, y))
-    return EyeChart(polygons.together(parts))
+            parts.append(letter(name).scale_and_move(size, (2 * place - width / 2) * size, y))
+    return EyeChart(polygons.join_sides(parts))

@@ -15,29 +15,44 @@ from vcam_cli.scenes import discs
 from vcam_cli.scenes.base import Array, Chart, Frame, clip_cells, overlap
 from vcam_cli.scenes.disc_edges import Discs
 
-CLOTH = 0.5  # over the darkest patch
-HEADROOM = 0.22  # of the frame's height, above the patches
-LAMP_AT = 0.11  # of the frame's height, below its upper edge
-LAMP_RADIUS = 0.05  # over the frame's shorter side
-FILLED = 0.8  # side of a patch over the distance of patches
+CLOTH = 0.5
+"""Reflectance of the cloth over that of the darkest patch."""
+HEADROOM = 0.22
+"""Part of the frame's height above the patches."""
+LAMP_HEIGHT = 0.11
+"""Part of the frame's height between its upper edge and the lamp's center."""
+LAMP_RADIUS = 0.05
+"""Radius of the lamp over the frame's shorter side."""
+FILL_FACTOR = 0.8
+"""Side of a patch over the distance of patches."""
 
 
 @dataclass(frozen=True)
 class HdrPatches(Chart):
-    """levels (rows, columns): of the patches, 0 where there is none; left (columns,), top (rows,)
-    and side: of the patches; lamp: its level; lamp_y, radius: its place; lengths in m."""
+    """Patches on cloth, and a lamp above them."""
 
     levels: Array
+    """Level of each patch (rows, columns), 0 where there is none."""
     left: Array
+    """Left edges of the patches (columns,) [m]."""
     top: Array
+    """Upper edges of the patches (rows,) [m]."""
     side: float
+    """Side of the patches [m]."""
     cloth: float
+    """Level of the cloth."""
     lamp: float
+    """Level of the lamp."""
     lamp_y: float
+    """Center of the lamp down from that of the array [m]."""
     radius: float
+    """Radius of the lamp [m]."""
 
     def paint(self, x_edges: Array, y_edges: Array, mix: Array, out: Array) -> None:
-        """Exact: rectangles, and the area of a circle within the cells."""
+        """Write the averages over the cells into `out`.
+
+        Exact: rectangles, and the area of a circle within the cells.
+        """
         columns, rows = (
             np.stack([overlap(edges, start, start + self.side) for start in starts])
             for edges, starts in ((x_edges, self.left), (y_edges, self.top))
@@ -50,12 +65,13 @@ class HdrPatches(Chart):
                 edges[part.start : part.stop + 1]
                 for edges, part in ((x_edges, across), (y_edges, down))
             )
-            light[down, across] += (self.lamp - self.cloth) * discs.cover_of_separate(
+            light[down, across] += (self.lamp - self.cloth) * discs.separate_cover(
                 self._disc(), *cells
             )
         self._mixed(light, mix, out)
 
     def values(self, x: Array, y: Array, mix: Array) -> Array:
+        """Return the values at points."""
         x, y = np.asarray(x), np.asarray(y)
         columns, rows = (
             np.array([(at >= start) & (at <= start + self.side) for start in starts], float)
@@ -68,7 +84,7 @@ class HdrPatches(Chart):
         return out
 
     def _patches(self, columns: Array, rows: Array) -> Array:
-        """Light of cloth and patches; columns (c, nx), rows (r, ny): the parts they cover."""
+        """Return the light of cloth and patches from the parts they cover: (c, nx) and (r, ny)."""
         above = np.where(self.levels > 0, self.levels - self.cloth, 0.0)
         return rows.T @ (above @ columns) + self.cloth
 
@@ -81,7 +97,7 @@ class HdrPatches(Chart):
 
 
 def hdr_patches(patches: int, dynamic_range: float, lamp: float, frame: Frame) -> HdrPatches:
-    """The patches as large as they fit below the lamp."""
+    """Return the patches as large as they fit below the lamp."""
     height = (1 - HEADROOM) * frame.height
     columns = max(range(1, patches + 1), key=lambda n: _pitch(n, patches, frame.width, height))
     rows = math.ceil(patches / columns)
@@ -89,19 +105,19 @@ def hdr_patches(patches: int, dynamic_range: float, lamp: float, frame: Frame) -
     levels = np.zeros(rows * columns)
     levels[:patches] = dynamic_range ** (-np.arange(patches) / (patches - 1))
     middle = frame.height / 2 - height / 2
-    gap = (1 - FILLED) * pitch / 2
+    gap = (1 - FILL_FACTOR) * pitch / 2
     return HdrPatches(
         levels=levels.reshape(rows, columns),
         left=(np.arange(columns) - columns / 2) * pitch + gap,
         top=middle + (np.arange(rows) - rows / 2) * pitch + gap,
-        side=FILLED * pitch,
+        side=FILL_FACTOR * pitch,
         cloth=CLOTH * float(levels[:patches].min()),
         lamp=lamp,
-        lamp_y=(LAMP_AT - 0.5) * frame.height,
+        lamp_y=(LAMP_HEIGHT - 0.5) * frame.height,
         radius=LAMP_RADIUS * min(frame.width, frame.height),
     )
 
 
 def _pitch(columns: int, patches: int, width: float, height: float) -> float:
-    """Distance of patches that many in a row [m]."""
+    """Return the distance of patches that many in a row [m]."""
     return min(width / columns, height / math.ceil(patches / columns))

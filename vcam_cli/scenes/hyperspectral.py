@@ -23,8 +23,8 @@ from typing import Literal
 
 import numpy as np
 
+from vcam_cli.camera.illuminant import IlluminantSpec
 from vcam_cli.camera.scene import Scene
-from vcam_cli.camera.spectrum import IlluminantSpec
 from vcam_cli.errors import bad
 from vcam_cli.scenes import light
 from vcam_cli.scenes.base import Array, View, by_bands
@@ -33,43 +33,53 @@ from vcam_cli.spectra import Spectrum, integral, luminance
 
 Quantity = Literal["radiance", "reflectance"]
 FILE = ("scene", "source", "file")
-LAMP = "D65"
-"""What lights reflectances where the camera file names no lamp."""
-SET_ASIDE = 1e-3
+DEFAULT_ILLUMINANT = "D65"
+"""Light of reflectances where the camera file names no lamp."""
+HIGHLIGHT_SHARE = 1e-3
 """Share of the brightest samples that may be brighter than white."""
-LEAST_UNIT = 1e-3
-"""Of the white's brightest band: bands are painted in units of white, and none in units of 0."""
+MIN_UNIT = 1e-3
+"""Smallest unit of a band over that of the white's brightest band.
+
+Bands are painted in units of white, and none in units of 0.
+"""
 ROWS = 64
+"""Rows that are read at once."""
 
 
 @dataclass(frozen=True)
 class Bands:
-    """What a file of spectra holds: the wavelengths of its bands, rising [m], and what they are.
-
-    white: (bands,) radiance of a perfect white [W/(sr m2 m)], where a file of radiances says it.
-    """
+    """Bands of a file of spectra."""
 
     wavelengths: Array
+    """Wavelengths of the bands (bands,), rising [m]."""
     quantity: Quantity
+    """Whether the values are radiances or reflectances."""
     white: Array | None = None
+    """Radiance of a perfect white (bands,) [W/(sr m2 m)], where a file of radiances has it."""
 
 
 @dataclass(frozen=True)
 class Cube:
-    """A file of spectra: data (h, w, bands) float32, radiance [W/(sr m2 m)] or reflectance."""
+    """A file of spectra."""
 
     data: Array
+    """Radiance [W/(sr m2 m)] or reflectance (h, w, bands), float32."""
     bands: Bands
+    """What the bands are."""
 
 
 @dataclass(frozen=True)
 class CubeScene(ImageScene):
-    """A cube on the sensor plane; component k is 1 where band k has the value `units[k]`."""
+    """A cube on the sensor plane."""
 
     units: Array
+    """Value of band k at which component k is 1 (bands,)."""
 
     def planes(self, mix: Array, workers: int = 1) -> Array:
-        """As a product of matrices: it reads the cube once, however many planes there are."""
+        """Return the linear combinations of the bands (R, ny, nx).
+
+        A product of matrices reads the cube once, however many planes there are.
+        """
         height, width, bands = self.picture.shape
         down, across = self.black
         weights = np.asarray(mix / self.units, self.dtype).T
@@ -84,19 +94,20 @@ class CubeScene(ImageScene):
         return out
 
     def at(self, x: Array, y: Array, mix: Array) -> Array:
+        """Return the values at points."""
         planes, (down, across) = self.planes(mix), self.black  # few planes, instead of all bands
-        rows, lit_rows = self._under(y, self.pitch_y, 0)
-        columns, lit_columns = self._under(x, self.pitch_x, 1)
+        rows, lit_rows = self._samples_at(y, self.pitch_y, 0)
+        columns, lit_columns = self._samples_at(x, self.pitch_x, 1)
         found = planes[:, (rows + down)[:, None], columns + across]
         found *= np.outer(lit_rows, lit_columns)
         return found
 
 
-def check(scene: Scene, bands: Bands) -> None:
-    """Raises BadInput where the scene asks for what a file with these bands does not give."""
+def check_bands(scene: Scene, bands: Bands) -> None:
+    """Raise BadInput where the scene asks for what a file with these bands does not give."""
     start, stop = scene.wavelengths.start, scene.wavelengths.stop
     try:
-        Spectrum.sampled(bands.wavelengths, bands.wavelengths).require(start, stop)
+        Spectrum.from_samples(bands.wavelengths, bands.wavelengths).require(start, stop)
     except ValueError:
         low, high = (f"{w * 1e9:.6g} nm" for w in bands.wavelengths[[0, -1]])
         raise bad(
@@ -120,40 +131,40 @@ def check(scene: Scene, bands: Bands) -> None:
 
 
 def cube_scene(scene: Scene, cube: Cube, view: View) -> CubeScene:
-    """The cube on the sensor plane, in the light that the scene says or its own.
+    """Return the cube on the sensor plane, in the light that the scene names or its own.
 
-    Raises BadInput as `check` does, and for a file without light.
+    Raises BadInput as `check_bands` does, and for a file without light.
     """
-    check(scene, cube.bands)
-    hats = _hats(cube.bands.wavelengths)
+    check_bands(scene, cube.bands)
+    hats = _hat_functions(cube.bands.wavelengths)
     if cube.bands.quantity == "reflectance":
-        white, units = _lit(scene), np.ones(len(hats))
-        spectra = tuple(white.times(hat) for hat in hats)
+        white, units = _white_of_lamp(scene), np.ones(len(hats))
+        spectra = tuple(white.multiply(hat) for hat in hats)
     else:
-        values = white_of(scene, cube)
-        white = _at_level(Spectrum.sampled(cube.bands.wavelengths, values), scene)
-        units = np.maximum(values, LEAST_UNIT * values.max())
+        values = file_white(scene, cube)
+        white = _scale_to_scene(Spectrum.from_samples(cube.bands.wavelengths, values), scene)
+        units = np.maximum(values, MIN_UNIT * values.max())
         spectra = tuple(
-            hat.scaled(unit * white.scale) for hat, unit in zip(hats, units, strict=True)
+            hat.scale_by(unit * white.scale) for hat, unit in zip(hats, units, strict=True)
         )
     placed = image_scene(cube.data, spectra, white, view)
     return CubeScene(**{f.name: getattr(placed, f.name) for f in fields(placed)}, units=units)
 
 
-def white_of(scene: Scene, cube: Cube) -> Array:
-    """Radiance of the perfect white in a file of radiances, band by band [W/(sr m2 m)].
+def file_white(scene: Scene, cube: Cube) -> Array:
+    """Return the radiance of the perfect white in a file of radiances (bands,) [W/(sr m2 m)].
 
-    As the file has it, before the scene's level; see the module.
+    It is as the file has it, before the scene's level; the module says what counts as white.
     """
     if cube.bands.white is not None:
         return cube.bands.white
     start, stop = scene.wavelengths.start, scene.wavelengths.stop
-    hats = _hats(cube.bands.wavelengths)
+    hats = _hat_functions(cube.bands.wavelengths)
     for measure in (luminance, integral):
         weights = np.array([measure(hat, start, stop) for hat in hats])
-        levels, mean = _levels(cube.data, weights)
+        levels, mean = _sample_levels(cube.data, weights)
         if levels.max() > 0:
-            brightest = np.quantile(levels, 1 - SET_ASIDE, method="higher")
+            brightest = np.quantile(levels, 1 - HIGHLIGHT_SHARE, method="higher")
             level = brightest if brightest > 0 else levels.max()
             return np.asarray(mean * (float(level) / float(mean @ weights)))
     raise bad(
@@ -163,8 +174,8 @@ def white_of(scene: Scene, cube: Cube) -> Array:
     )
 
 
-def _levels(data: Array, weights: Array) -> tuple[Array, Array]:
-    """The weighted sum over the bands of every sample, and the mean of all samples (bands,)."""
+def _sample_levels(data: Array, weights: Array) -> tuple[Array, Array]:
+    """Return the weighted sum over the bands of every sample, and the mean of all samples."""
     levels = np.empty(data.shape[:2], np.float32)
     total = np.zeros(data.shape[2])
     for top in range(0, len(data), ROWS):
@@ -174,29 +185,29 @@ def _levels(data: Array, weights: Array) -> tuple[Array, Array]:
     return levels, total / levels.size
 
 
-def _hats(wavelengths: Array) -> list[Spectrum]:
-    """1 at one wavelength, 0 at its neighbors, straight between, nothing beyond them."""
+def _hat_functions(wavelengths: Array) -> list[Spectrum]:
+    """Return spectra that are 1 at one wavelength, 0 at its neighbors, and straight between."""
     found = []
     for k in range(len(wavelengths)):
         near = slice(max(0, k - 1), k + 2)
         value = np.zeros(len(wavelengths))
         value[k] = 1.0
-        found.append(Spectrum.sampled(wavelengths[near], value[near], "zero"))
+        found.append(Spectrum.from_samples(wavelengths[near], value[near], "zero"))
     return found
 
 
-def _lit(scene: Scene) -> Spectrum:
-    """A perfect white in the light of the scene's lamp."""
+def _white_of_lamp(scene: Scene) -> Spectrum:
+    """Return a perfect white in the light of the scene's lamp."""
     if scene.illuminant is None:
-        scene = scene.model_copy(update={"illuminant": IlluminantSpec(LAMP)})
+        scene = scene.model_copy(update={"illuminant": IlluminantSpec(DEFAULT_ILLUMINANT)})
     return light.white_radiance(scene)
 
 
-def _at_level(white: Spectrum, scene: Scene) -> Spectrum:
-    """The file's white at the scene's level; as it is where that is the file's."""
+def _scale_to_scene(white: Spectrum, scene: Scene) -> Spectrum:
+    """Return the file's white at the scene's level; as it is where that is the file's."""
     if scene.luminance == "from-file":
         return white
     try:
-        return light.at_level(white, scene)
+        return light.scale_to_level(white, scene)
     except ValueError as error:
         raise bad(FILE, str(error), "state a radiance, or other wavelengths") from None

@@ -2,7 +2,7 @@
 
 A scene that covers the sensor is scaled by one factor until it does (never stretched), and cropped
 centrally to the whole samples that the array touches. A scene with a width of its own is scaled to
-that width and centred, with black samples around it until array and margin are covered.
+that width and centered, with black samples around it until array and margin are covered.
 """
 
 import math
@@ -13,22 +13,24 @@ import numpy as np
 from vcam_cli.scenes.base import Array, SampledScene, View, by_bands
 from vcam_cli.spectra import Spectrum
 
-# A sample of which less than this is needed is a rounding error, not a sample.
 SLIVER = 1e-6
+"""Part of a sample below which it counts as a rounding error and not as a sample."""
 
 
 @dataclass(frozen=True)
 class Placement:
-    """Where a picture of (rows, columns) samples comes to lie: `pitch` [m] of a sample on the
-    sensor, and how many samples are cut from every side (negative: black ones added)."""
+    """Place of a picture on the sensor."""
 
     pitch: float
+    """Pitch of the samples on the sensor [m]."""
     cut_x: int
+    """Samples that are cut on the left and on the right; negative where black ones are added."""
     cut_y: int
+    """Samples that are cut above and below; negative where black ones are added."""
 
 
-def place(rows: int, columns: int, view: View) -> Placement:
-    """Scale and crop of a picture of rows x columns samples; see the module."""
+def placement(rows: int, columns: int, view: View) -> Placement:
+    """Return scale and crop of a picture of rows x columns samples; the module says how."""
     if view.scene_width is None:
         pitch = max(view.width / columns, view.height / rows)
         while pitch * columns < view.width or pitch * rows < view.height:  # a rounding error
@@ -36,18 +38,18 @@ def place(rows: int, columns: int, view: View) -> Placement:
         return Placement(pitch, _cut(columns, view.width / pitch), _cut(rows, view.height / pitch))
     # A stated size: what lies beyond the array, black or not, is there and is blurred into it.
     pitch = view.scene_width / columns
-    width, height = _reach(view)
+    width, height = _extent_with_margin(view)
     return Placement(pitch, _cut(columns, width / pitch), _cut(rows, height / pitch))
 
 
-def _reach(view: View) -> tuple[float, float]:
-    """Width and height of the array and its margin [m]."""
+def _extent_with_margin(view: View) -> tuple[float, float]:
+    """Return width and height of the array and its margin [m]."""
     width = view.width + 2 * view.margin * view.pitch_x
     return width, view.height + 2 * view.margin * view.pitch_y
 
 
-def _middle(pitch: float, samples: int, needed: float) -> float:
-    """The pitch of what is needed of the samples kept.
+def _visible_pitch(pitch: float, samples: int, needed: float) -> float:
+    """Return the pitch of what is needed of the samples kept.
 
     One or two samples may be far larger than what is needed; they meet in its middle, and all
     that it sees of them are parts of equal size.
@@ -56,20 +58,24 @@ def _middle(pitch: float, samples: int, needed: float) -> float:
 
 
 def _cut(samples: int, needed: float) -> int:
-    """Whole samples beyond `needed` on either side, rounded toward keeping; never all of them."""
+    """Return the whole samples beyond `needed` on either side; never all of them.
+
+    They are rounded so that a sample is rather kept.
+    """
     return min(math.floor((samples - needed) / 2 + SLIVER), (samples - 1) // 2)
 
 
 @dataclass(frozen=True)
 class ImageScene(SampledScene):
-    """A picture (h, w, K), linear, 1 = the scene's white, already placed; `picture` is a view of
-    what was read, `black` (y, x) the samples of black on every side of it."""
+    """A picture on the sensor plane, linear, where 1 is the scene's white."""
 
     picture: Array
+    """Values (h, w, K) of the samples that are kept; a view of what was read."""
     black: tuple[int, int]
+    """Samples of black on every side, down and across."""
 
     def planes(self, mix: Array, workers: int = 1) -> Array:
-        """The linear combinations of the channels: (R, ny, nx)."""
+        """Return the linear combinations of the channels (R, ny, nx)."""
         height, width, _ = self.picture.shape
         down, across = self.black
         mix = np.asarray(mix, self.dtype)
@@ -85,16 +91,16 @@ class ImageScene(SampledScene):
         return out
 
     def at(self, x: Array, y: Array, mix: Array) -> Array:
-        """The sample under each point; beyond the last sample, the picture is mirrored."""
-        rows, lit_rows = self._under(y, self.pitch_y, 0)
-        columns, lit_columns = self._under(x, self.pitch_x, 1)
+        """Return the sample under each point; beyond the last sample, the picture is mirrored."""
+        rows, lit_rows = self._samples_at(y, self.pitch_y, 0)
+        columns, lit_columns = self._samples_at(x, self.pitch_x, 1)
         light = self.picture[np.ix_(rows, columns)].astype(self.dtype, copy=False)
         light = light * np.outer(lit_rows, lit_columns)[:, :, None]
         mixed = np.asarray(mix, self.dtype) @ light.reshape(-1, light.shape[2]).T
         return np.asarray(mixed.reshape(len(mix), len(rows), len(columns)))
 
-    def _under(self, position: Array, pitch: float, axis: int) -> tuple[Array, Array]:
-        """Index into the picture along an axis, and 1 where there is a sample, 0 where black."""
+    def _samples_at(self, position: Array, pitch: float, axis: int) -> tuple[Array, Array]:
+        """Return the index into the picture along an axis, and 1 where it has a sample, else 0."""
         count, size = self.shape[axis], self.picture.shape[axis]
         index = np.floor(np.asarray(position) / pitch + count / 2).astype(int) % (2 * count)
         index = np.minimum(index, 2 * count - 1 - index) - self.black[axis]
@@ -105,16 +111,16 @@ class ImageScene(SampledScene):
 def image_scene(
     picture: Array, spectra: tuple[Spectrum, ...], white: Spectrum, view: View
 ) -> ImageScene:
-    """The picture (h, w, K) on the sensor plane, channel k with spectrum k."""
+    """Return the picture (h, w, K) on the sensor plane, channel k with spectrum k."""
     rows, columns, _ = picture.shape
-    placed = place(rows, columns, view)
+    placed = placement(rows, columns, view)
     top, left = max(placed.cut_y, 0), max(placed.cut_x, 0)
     shape = rows - 2 * placed.cut_y, columns - 2 * placed.cut_x
     pitch_x = pitch_y = placed.pitch
     if view.scene_width is not None:
-        width, height = _reach(view)
-        pitch_x = _middle(pitch_x, shape[1], width)
-        pitch_y = _middle(pitch_y, shape[0], height)
+        width, height = _extent_with_margin(view)
+        pitch_x = _visible_pitch(pitch_x, shape[1], width)
+        pitch_y = _visible_pitch(pitch_y, shape[0], height)
     return ImageScene(
         spectra=spectra,
         white=white,

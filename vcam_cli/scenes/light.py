@@ -1,9 +1,14 @@
-"""How bright the scene is: the spectral radiance of the scene's perfect white.
+"""The level of a scene: the spectral radiance of its perfect white.
 
 A camera file states one level, for a perfect white diffuser under the illuminant (or the display
 white of an image that emits): luminance [cd/m2], radiance [W/(sr m2)], or illuminance [lx] on the
 diffuser, which is pi times its luminance. Luminance is 683 lm/W times the integral with V(lambda),
 radiance the plain integral, both over the scene's wavelengths: light outside them is not there.
+
+References
+----------
+.. [1] T. Chen, "Digital Camera System Simulator and Applications", PhD thesis, Stanford
+   University, 2003, section 2.3.1.
 """
 
 import math
@@ -12,12 +17,12 @@ from vcam_cli.camera.scene import Scene
 from vcam_cli.errors import bad
 from vcam_cli.spectra import Spectrum, display_primaries, integral, luminance
 
-# Dissertation section 2.3.1: an RGB image as three laser lines, in the order of its channels.
 LASER_LINES = (650e-9, 550e-9, 450e-9)
+"""Wavelengths of red, green and blue of an image that is shown by three lasers [1] [m]."""
 
 
 def white_radiance(scene: Scene) -> Spectrum:
-    """Spectral radiance [W/(sr m2 m)] of a perfect white diffuser under the illuminant.
+    """Return the spectral radiance of a perfect white diffuser under the illuminant [W/(sr m2 m)].
 
     Raises BadInput where the illuminant does not cover the scene's wavelengths, or emits nothing
     there that the stated level could measure.
@@ -26,15 +31,15 @@ def white_radiance(scene: Scene) -> Spectrum:
     if scene.illuminant is None:
         raise bad(path, "this scene needs an illuminant", "write for example illuminant: D65")
     try:
-        return at_level(scene.illuminant.resolve(path), scene)
+        return scale_to_level(scene.illuminant.resolve(path), scene)
     except ValueError as error:
         raise bad(path, str(error)) from None
 
 
 def laser_white(scene: Scene) -> tuple[tuple[Spectrum, ...], Spectrum]:
-    """The radiances of full red, green and blue planes, and their sum, the display white.
+    """Return the radiances of full red, green and blue laser light, and of their sum, white.
 
-    Equal planes are equal radiances in watts; their sum has the stated level.
+    Equal planes are equal radiances in watts; their sum has the stated level [1].
     """
     start, stop = scene.wavelengths.start, scene.wavelengths.stop
     if min(LASER_LINES) < start or max(LASER_LINES) > stop:
@@ -43,27 +48,27 @@ def laser_white(scene: Scene) -> tuple[tuple[Spectrum, ...], Spectrum]:
             "the laser model emits at 450, 550 and 650 nm, and not all of these are simulated",
             "let the wavelengths start at or below 450 nm and stop at or above 650 nm",
         )
-    white = at_level(Spectrum(lines=tuple((line, 1.0) for line in LASER_LINES)), scene)
+    white = scale_to_level(Spectrum(lines=tuple((line, 1.0) for line in LASER_LINES)), scene)
     power = dict(white.lines or ())
     return tuple(Spectrum.line(line, power[line]) for line in LASER_LINES), white
 
 
 def display_white(scene: Scene, primaries: str) -> tuple[tuple[Spectrum, ...], Spectrum]:
-    """The radiances of a display's full red, green and blue, and their sum, the display white.
+    """Return the radiances of a display's full red, green and blue, and of their sum, white.
 
-    primaries: as in `spectra.display_primaries`. The white has the stated level; the share of each
-    primary in it is the display's own.
+    The white has the stated level; the share of each primary in it is the display's own.
+    `primaries` is as in `spectra.display_primaries`.
     """
     colors, relative = display_primaries(primaries)
     try:
-        white = at_level(relative, scene)
+        white = scale_to_level(relative, scene)
     except ValueError as error:
         raise bad(("scene", "wavelengths"), str(error), "let them cover 400 to 700 nm") from None
-    return tuple(color.scaled(white.scale / relative.scale) for color in colors), white
+    return tuple(color.scale_by(white.scale / relative.scale) for color in colors), white
 
 
-def at_level(relative: Spectrum, scene: Scene) -> Spectrum:
-    """The spectrum scaled to the scene's stated level; ValueError where that cannot be."""
+def scale_to_level(relative: Spectrum, scene: Scene) -> Spectrum:
+    """Return a spectrum at the scene's stated level; ValueError where that cannot be."""
     start, stop = scene.wavelengths.start, scene.wavelengths.stop
     if scene.radiance is not None:
         level, measured, what = scene.radiance, integral(relative, start, stop), "power"
@@ -74,10 +79,11 @@ def at_level(relative: Spectrum, scene: Scene) -> Spectrum:
             f"the light has no {what} within the simulated {start * 1e9:g}-{stop * 1e9:g} nm, "
             "so the stated level cannot be reached"
         )
-    return relative.scaled(level / measured)
+    return relative.scale_by(level / measured)
 
 
 def _luminance(scene: Scene) -> float:
+    """Return the luminance that the scene states [cd/m2]."""
     if isinstance(scene.luminance, float):
         return scene.luminance
     if scene.illuminance is not None:

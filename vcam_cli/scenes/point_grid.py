@@ -23,7 +23,7 @@ class PointGrid(Chart):
     def paint(self, x_edges: Array, y_edges: Array, mix: Array, out: Array) -> None:
         """Exact: the area of circles within the cells."""
         points = self._points(x_edges[[0, -1]], y_edges[[0, -1]])
-        light = discs.cover_of_separate(points, x_edges, y_edges).astype(mix.dtype)
+        light = discs.separate_cover(points, x_edges, y_edges).astype(mix.dtype)
         for plane, level in zip(out, mix[:, 0], strict=True):
             np.multiply(light, level, out=plane)
 
@@ -34,6 +34,24 @@ class PointGrid(Chart):
         )
         light = np.add.outer(down**2, across**2) <= (self.diameter / 2) ** 2
         return np.asarray(np.multiply.outer(mix[:, 0], light.astype(mix.dtype)))
+
+    @property
+    def period(self) -> tuple[float, float]:
+        return self.spacing, self.spacing
+
+    def amplitudes(self, count_x: int, count_y: int) -> Array:
+        """Return the Fourier series of a lattice of discs.
+
+        It is pi d^2 / 4 p^2 times 2 J1(x) / x, with x = pi d sqrt(k^2 + l^2) / p; a cosine with
+        k > 0 stands for k and -k.
+        """
+        from scipy.special import j1
+
+        k, m = np.arange(count_x), np.arange(count_y)
+        x = math.pi * self.diameter / self.spacing * np.hypot(k, m[:, None])
+        shape = np.divide(2 * j1(x), x, out=np.ones_like(x), where=x > 0)
+        twice = np.outer(np.where(m > 0, 2, 1), np.where(k > 0, 2, 1))
+        return np.asarray(math.pi / 4 * (self.diameter / self.spacing) ** 2 * shape * twice)
 
     def _points(self, x: Array, y: Array) -> Discs:
         """Those that may reach into a rectangle between two x and two y, row by row."""

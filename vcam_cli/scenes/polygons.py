@@ -1,11 +1,13 @@
 """Polygons averaged over the cells of a grid, exactly, and at points.
 
 Every side adds to the cells right of it the area between them and itself, signed by its direction;
-the sums from left to right are the covers. A side is cut where it crosses the edges of rows, then
-of columns, so the work is the number of cells that sides cross, whatever the area.
+the sums from left to right are the covers: Green's theorem, with the sums of font rasterizers [1].
+A side is cut where it crosses the edges of rows, then of columns, so the work is the number of
+cells that sides cross, whatever the area.
 
-Sources: the trapezoids of Green's theorem; the same sums in the font rasterizers of R. Levien
-(font-rs, 2016) and FreeType.
+References
+----------
+.. [1] R. Levien, "font-rs", 2016; and FreeType's rasterizer.
 """
 
 from collections.abc import Iterable
@@ -14,44 +16,48 @@ from dataclasses import dataclass
 import numpy as np
 
 from vcam_cli.scenes.base import Array
-from vcam_cli.scenes.runs import members
+from vcam_cli.scenes.runs import expand_ranges
 
 
 @dataclass(frozen=True)
 class Sides:
-    """Sides from (x0, y0) to (x1, y1), (n,) each, of closed polygons; x to the right, y down.
+    """Sides from (x0, y0) to (x1, y1) of closed polygons; x to the right, y down.
 
     Polygons run counterclockwise as seen, their holes clockwise, and do not overlap.
     """
 
     x0: Array
+    """Starts to the right (n,)."""
     y0: Array
+    """Starts down (n,)."""
     x1: Array
+    """Ends to the right (n,)."""
     y1: Array
+    """Ends down (n,)."""
 
-    def scaled(self, scale: float, x: float, y: float) -> "Sides":
-        """The same, `scale` times as large, then moved by x and y."""
+    def scale_and_move(self, scale: float, x: float, y: float) -> "Sides":
+        """Return the sides `scale` times as large, then moved by x and y."""
         return Sides(
             self.x0 * scale + x, self.y0 * scale + y, self.x1 * scale + x, self.y1 * scale + y
         )
 
 
 def sides(outlines: Iterable[Array]) -> Sides:
-    """The sides of outlines, each the corners (n, 2) of a closed polygon."""
+    """Return the sides of outlines, each the corners (n, 2) of a closed polygon."""
     starts = [np.asarray(outline, float) for outline in outlines]
     stops = [np.roll(start, -1, axis=0) for start in starts]
     return Sides(*np.concatenate(starts).T, *np.concatenate(stops).T)
 
 
-def together(parts: Iterable[Sides]) -> Sides:
-    """All the sides of several."""
+def join_sides(parts: Iterable[Sides]) -> Sides:
+    """Return all the sides of several polygons."""
     rows = [np.stack([p.x0, p.y0, p.x1, p.y1]) for p in parts]
     return Sides(*np.concatenate(rows, axis=1))
 
 
 def cover(polygons: Sides, x_edges: Array, y_edges: Array) -> Array:
-    """The part of every cell that the polygons cover: (len(y_edges) - 1, len(x_edges) - 1)."""
-    row, xa, xb, ya, yb = _by_rows(polygons, y_edges)
+    """Return the part of every cell that polygons cover: (len(y_edges) - 1, len(x_edges) - 1)."""
+    row, xa, xb, ya, yb = _cut_at_rows(polygons, y_edges)
     rise = (yb - ya) / np.diff(y_edges)[row]
     low, high = np.minimum(xa, xb), np.maximum(xa, xb)
     # one column more on either side, for what lies beyond the grid
@@ -60,7 +66,7 @@ def cover(polygons: Sides, x_edges: Array, y_edges: Array) -> Array:
     right = max(x_edges[-1], float(high.max(initial=x_edges[-1]))) + step
     columns = np.concatenate([[left], x_edges, [right]])
     first = columns.searchsorted(low, side="right") - 1
-    piece, column = members(first, np.maximum(columns.searchsorted(high), first + 1))
+    piece, column = expand_ranges(first, np.maximum(columns.searchsorted(high), first + 1))
     start = np.maximum(low[piece], columns[column])
     stop = np.minimum(high[piece], columns[column + 1])
     length = (high - low)[piece]
@@ -75,10 +81,10 @@ def cover(polygons: Sides, x_edges: Array, y_edges: Array) -> Array:
     return np.cumsum(total.reshape(shape), axis=1)[:, 1:-2]
 
 
-def inside(polygons: Sides, x: Array, y: Array) -> Array:
-    """1 where the points (y[i], x[j]), both rising, lie in a polygon, else 0: (len(y), len(x))."""
+def contains_points(polygons: Sides, x: Array, y: Array) -> Array:
+    """Return 1 where the points (y[i], x[j]), both rising, lie in a polygon: (len(y), len(x))."""
     low, high = np.minimum(polygons.y0, polygons.y1), np.maximum(polygons.y0, polygons.y1)
-    side, row = members(y.searchsorted(low), y.searchsorted(high))
+    side, row = expand_ranges(y.searchsorted(low), y.searchsorted(high))
     x0, y0, x1, y1 = (each[side] for each in _fields(polygons))
     crossing = x0 + (x1 - x0) * ((y[row] - y0) / (y1 - y0))
     cell = row * (len(x) + 1) + x.searchsorted(crossing)
@@ -90,14 +96,14 @@ def _fields(polygons: Sides) -> tuple[Array, Array, Array, Array]:
     return polygons.x0, polygons.y0, polygons.x1, polygons.y1
 
 
-def _by_rows(polygons: Sides, y_edges: Array) -> tuple[Array, Array, Array, Array, Array]:
-    """The sides cut at the edges of rows: row, then x at both ends and y at both ends."""
+def _cut_at_rows(polygons: Sides, y_edges: Array) -> tuple[Array, Array, Array, Array, Array]:
+    """Return the sides cut at the edges of rows: row, then x at both ends and y at both ends."""
     x0, y0, x1, y1 = _fields(polygons)
     low, high = np.minimum(y0, y1), np.maximum(y0, y1)
     last = len(y_edges) - 1
     first = np.clip(y_edges.searchsorted(low, side="right") - 1, 0, last)
     stop = np.clip(y_edges.searchsorted(high), 0, last)
-    side, row = members(first, np.where(high > low, stop, 0))
+    side, row = expand_ranges(first, np.where(high > low, stop, 0))
     x0, y0, x1, y1 = x0[side], y0[side], x1[side], y1[side]
     top, bottom = y_edges[row], y_edges[row + 1]
     ya, yb = np.clip(y0, top, bottom), np.clip(y1, top, bottom)

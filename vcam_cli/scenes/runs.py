@@ -9,12 +9,14 @@ import numpy as np
 
 from vcam_cli.scenes.base import Array
 
-CELLS_AT_ONCE = 1 << 17  # the passes want to stay in the processor's cache
+CELLS_AT_ONCE = 1 << 17
+"""Cells of a pass, which are to stay in the processor's cache."""
 LEVELS = 32
+"""Powers of two that the length of a run may have."""
 
 
-def topmost(start: Array, stop: Array, number: Array, size: int, line: int) -> Array:
-    """Per cell of `size`, the largest number of the runs [start, stop) that hold it, else 0.
+def topmost_numbers(start: Array, stop: Array, number: Array, size: int, line: int) -> Array:
+    """Return per cell of `size` the largest number of the runs [start, stop) that hold it, else 0.
 
     No run is empty or leaves its line, the cells [k line, (k + 1) line). Numbers are positive.
     """
@@ -27,12 +29,12 @@ def topmost(start: Array, stop: Array, number: Array, size: int, line: int) -> A
     bounds = np.searchsorted(group[order], np.arange(LEVELS * -(-size // piece) + 1))
     for index, first in enumerate(range(0, size, piece)):
         here = bounds[LEVELS * index : LEVELS * (index + 1) + 1]
-        _hand_down(label[first : first + piece], start - first, stop - first, number, here)
+        _propagate_marks(label[first : first + piece], start - first, stop - first, number, here)
     return label
 
 
-def _hand_down(label: Array, start: Array, stop: Array, number: Array, bounds: Array) -> None:
-    """The same for one piece; its runs of level k are [bounds[k], bounds[k + 1])."""
+def _propagate_marks(label: Array, start: Array, stop: Array, number: Array, bounds: Array) -> None:
+    """Write the numbers of one piece; its runs of level k are [bounds[k], bounds[k + 1])."""
     levels = np.flatnonzero(np.diff(bounds))
     above, here = np.zeros_like(label), np.empty_like(label)
     for level in range(int(levels.max(initial=-1)), -1, -1):
@@ -46,14 +48,14 @@ def _hand_down(label: Array, start: Array, stop: Array, number: Array, bounds: A
     label[:] = above
 
 
-def members(first: Array, last: Array) -> tuple[Array, Array]:
-    """Every (item, number) with first[item] <= number < last[item], in the order of items."""
+def expand_ranges(first: Array, last: Array) -> tuple[Array, Array]:
+    """Return every (item, number) with first[item] <= number < last[item], item by item."""
     count = np.maximum(last - first, 0)
     item = np.repeat(np.arange(len(count), dtype=np.int32), count)
-    return item, ragged(first, count)
+    return item, concatenate_ranges(first, count)
 
 
-def ragged(first: Array, count: Array) -> Array:
-    """first[0], first[0]+1, ... (count[0] numbers), first[1], ... concatenated."""
+def concatenate_ranges(first: Array, count: Array) -> Array:
+    """Return first[0], first[0]+1, ... (count[0] numbers), first[1], ... concatenated."""
     before = np.cumsum(count) - count
     return np.arange(int(count.sum())) + np.repeat(first - before, count)

@@ -14,22 +14,29 @@ from vcam_cli.scenes import polygons
 from vcam_cli.scenes.base import Array, Chart
 
 MEAN = 0.5
+"""Mean reflectance."""
 
 
 @dataclass(frozen=True)
 class SiemensStar(Chart):
-    """spokes: bright ones, at least 2; contrast 0..1 (Michelson)."""
+    """Bright and dark spokes of equal width."""
 
     spokes: int
+    """Number of bright spokes, at least 2."""
     contrast: float
+    """Michelson contrast, 0..1."""
 
     def paint(self, x_edges: Array, y_edges: Array, mix: Array, out: Array) -> None:
-        """Exact: bright spokes are triangles that reach beyond the cells."""
+        """Write the averages over the cells into `out`.
+
+        Exact: bright spokes are triangles that reach beyond the cells.
+        """
         corner = math.hypot(abs(x_edges[[0, -1]]).max(), abs(y_edges[[0, -1]]).max())
         reach = 1.01 * corner / math.cos(math.pi / (2 * self.spokes))
         self._mixed(polygons.cover(self._triangles(reach), x_edges, y_edges), mix, out)
 
     def values(self, x: Array, y: Array, mix: Array) -> Array:
+        """Return the values at points."""
         angle = np.arctan2(np.asarray(y)[:, None], np.asarray(x)[None, :])
         out = np.empty((len(mix), len(y), len(x)), mix.dtype)
         bright = np.heaviside(np.cos(self.spokes * angle), 0.5)
@@ -38,7 +45,7 @@ class SiemensStar(Chart):
         return out
 
     def _triangles(self, reach: float) -> polygons.Sides:
-        """The bright spokes up to a distance [m]."""
+        """Return the bright spokes up to a distance [m]."""
         middle = 2 * math.pi * np.arange(self.spokes) / self.spokes
         half = math.pi / (2 * self.spokes)
         # y is down: counterclockwise as seen is toward falling angles

@@ -1,7 +1,7 @@
 """A sinusoidal grating of one frequency, exact everywhere on the plane.
 
 Reflectance mean (1 + contrast cos(2 pi f u + phase)), with u the distance [m] on the sensor from
-the array's centre along the direction of modulation: along a row for orientation 0, turning
+the array's center along the direction of modulation: along a row for orientation 0, turning
 counterclockwise as seen, so that at 90 degrees it runs up a column.
 """
 
@@ -14,14 +14,33 @@ from vcam_cli.scenes.base import Array, Chart, Wave, wave_averages, wave_values
 def waves(
     frequency: float, contrast: float, mean: float, orientation: float, phase: float
 ) -> tuple[Wave, ...]:
-    """Mean and modulation; frequency [cycles/m] on the sensor, orientation and phase [rad]."""
-    fx = frequency * _clean(math.cos(orientation))
-    fy = -frequency * _clean(math.sin(orientation))
+    """Return mean and modulation of a grating.
+
+    Parameters
+    ----------
+    frequency : float
+        Frequency on the sensor [cycles/m].
+    contrast : float
+        Michelson contrast, 0..1.
+    mean : float
+        Mean reflectance.
+    orientation : float
+        Direction of modulation, counterclockwise from the rows [rad].
+    phase : float
+        Phase at the array's center [rad].
+
+    Returns
+    -------
+    tuple of Wave
+        A constant, and a cosine.
+    """
+    fx = frequency * _without_rounding(math.cos(orientation))
+    fy = -frequency * _without_rounding(math.sin(orientation))
     return (Wave((mean,)), Wave((mean * contrast,), fx, fy, phase))
 
 
-def _clean(value: float) -> float:
-    """0 where a multiple of 90 degrees leaves a rounding error (cos 90 degrees = 6e-17)."""
+def _without_rounding(value: float) -> float:
+    """Return 0 for the rounding error that a multiple of 90 degrees leaves (cos 90 = 6e-17)."""
     return 0.0 if abs(value) < 1e-15 else value
 
 
@@ -32,7 +51,9 @@ class WaveChart(Chart):
     waves: tuple[Wave, ...]
 
     def paint(self, x_edges: Array, y_edges: Array, mix: Array, out: Array) -> None:
+        """Write the exact averages over the cells into `out`."""
         out[:] = wave_averages(self.waves, x_edges, y_edges, mix)
 
     def values(self, x: Array, y: Array, mix: Array) -> Array:
+        """Return the values at points."""
         return wave_values(self.waves, x, y, mix)

@@ -1,6 +1,6 @@
 """A straight edge, dark to the left and bright to the right, turned a little from the vertical.
 
-It passes through the array's centre and goes on without end. The angle is that of ISO 12233,
+It passes through the array's center and goes on without end. The angle is that of ISO 12233,
 between the edge and the columns; a positive one turns the edge clockwise as seen (its upper end
 to the right). Reflectances mean (1 - contrast) and mean (1 + contrast) with mean 1/2, so that a
 contrast of 1 is black against white.
@@ -12,20 +12,26 @@ from dataclasses import dataclass
 import numpy as np
 
 from vcam_cli.scenes.base import Array, Chart
-from vcam_cli.scenes.runs import members
+from vcam_cli.scenes.runs import expand_ranges
 
 MEAN = 0.5
+"""Mean reflectance."""
 
 
 @dataclass(frozen=True)
 class SlantedEdge(Chart):
-    """angle [rad], contrast 0..1 (Michelson)."""
+    """A straight edge through the array's center."""
 
     angle: float
+    """Angle between the edge and the columns [rad]."""
     contrast: float
+    """Michelson contrast, 0..1."""
 
     def paint(self, x_edges: Array, y_edges: Array, mix: Array, out: Array) -> None:
-        """Exact: the bright half plane's area in every cell."""
+        """Write the averages over the cells into `out`.
+
+        Exact: the bright half plane's area in every cell.
+        """
         x, y = (x_edges[1:] + x_edges[:-1]) / 2, (y_edges[1:] + y_edges[:-1]) / 2
         across, down = self._normal()
         widths = abs(across) * np.diff(x_edges), abs(down) * np.diff(y_edges)
@@ -35,20 +41,21 @@ class SlantedEdge(Chart):
         reach = (widths[0].max() + widths[1].max()) / 2
         start = np.searchsorted(along, -offset - reach)
         stop = np.searchsorted(along, -offset + reach, side="right")
-        row, column = members(start, stop)
-        part = half_plane(offset[row] + along[column], widths[0][column], widths[1][row])
+        row, column = expand_ranges(start, stop)
+        part = half_plane_cover(offset[row] + along[column], widths[0][column], widths[1][row])
         plain = self._mixed((np.arange(len(x)) >= start[:, None]), mix)
         for plane, edge, field in zip(out, self._mixed(part, mix), plain, strict=True):
             plane[:] = field
             plane[row, column] = edge
 
     def values(self, x: Array, y: Array, mix: Array) -> Array:
+        """Return the values at points."""
         across, down = self._normal()
         distance = np.add.outer(down * np.asarray(y), across * np.asarray(x))
         return self._mixed(np.heaviside(distance, 0.5), mix)
 
     def _normal(self) -> tuple[float, float]:
-        """Unit vector (x, y down) toward the bright side."""
+        """Return the unit vector (x, y down) toward the bright side."""
         return math.cos(self.angle), math.sin(self.angle)
 
     def _mixed(self, bright: Array, mix: Array) -> Array:
@@ -57,13 +64,23 @@ class SlantedEdge(Chart):
         return np.asarray(np.multiply.outer(mix[:, 0], light))
 
 
-def half_plane(distance: Array, width_x: Array, width_y: Array) -> Array:
-    """The part of a rectangle that lies in a half plane, 0..1.
+def half_plane_cover(distance: Array, width_x: Array, width_y: Array) -> Array:
+    """Return the part of a rectangle that lies in a half plane.
 
-    distance [m]: of the rectangle's centre from the border, positive inside. width_x, width_y
-    [m]: the rectangle's sides times |cos|, |sin| of the border normal. The part is the chance
-    that distance + U_x + U_y > 0 for U uniform on these widths: linear while the border crosses
-    two opposite sides, quadratic where it cuts a corner.
+    The part is the chance that distance + U_x + U_y > 0 for U uniform on the widths: linear while
+    the border crosses two opposite sides, quadratic where it cuts a corner.
+
+    Parameters
+    ----------
+    distance : ndarray
+        Distance of the rectangle's center from the border [m], positive inside.
+    width_x, width_y : ndarray
+        Sides of the rectangle times |cos| and |sin| of the border's normal [m]. All broadcast.
+
+    Returns
+    -------
+    ndarray
+        Part in 0..1 [dimensionless].
     """
     large = np.maximum(width_x, width_y)
     small = np.minimum(width_x, width_y)

@@ -13,33 +13,37 @@ from vcam_cli.scenes.base import Array, Chart, Frame
 
 @dataclass(frozen=True)
 class StepWedge(Chart):
-    """Levels (n,) from left to right, 0..1, and the borders (n - 1,) between them [m]."""
+    """Vertical bars of constant reflectance."""
 
     levels: Array
+    """Reflectances from left to right (n,), 0..1."""
     borders: Array
+    """Borders between the bars (n - 1,) [m]."""
 
     def paint(self, x_edges: Array, y_edges: Array, mix: Array, out: Array) -> None:
-        """Exact."""
-        out[:] = _times(mix, step_averages(self.levels, self.borders, x_edges))
+        """Write the exact averages over the cells into `out`."""
+        out[:] = _times_mix(mix, step_averages(self.levels, self.borders, x_edges))
 
     def edges(self) -> tuple[Array, Array]:
+        """Return where bars start and stop, x and y [m]."""
         return self.borders, np.empty(0)
 
     def values(self, x: Array, y: Array, mix: Array) -> Array:
-        line = _times(mix, self.levels[self.borders.searchsorted(x, side="right")])
+        """Return the values at points."""
+        line = _times_mix(mix, self.levels[self.borders.searchsorted(x, side="right")])
         return np.repeat(line, len(y), axis=1)
 
 
 def step_wedge(steps: int, density_range: float, frame: Frame) -> StepWedge:
-    """Bars of equal width over the frame."""
+    """Return bars of equal width over the frame."""
     density = density_range * np.arange(steps) / (steps - 1)
     return StepWedge(10.0**-density, (np.arange(1, steps) / steps - 0.5) * frame.width)
 
 
 def step_averages(levels: Array, borders: Array, edges: Array) -> Array:
-    """Averages (n,) between rising edges of a function that is constant between borders.
+    """Return averages (n,) between rising edges of a function that is constant between borders.
 
-    Sums of positive parts: a dark bar keeps all its digits beside a bright one.
+    They are sums of positive parts: a dark bar keeps all its digits beside a bright one.
     """
     within = borders[(borders > edges[0]) & (borders < edges[-1])]
     ends = np.sort(np.concatenate([edges, within]))
@@ -47,5 +51,6 @@ def step_averages(levels: Array, borders: Array, edges: Array) -> Array:
     return np.add.reduceat(light, ends.searchsorted(edges[:-1])) / np.diff(edges)
 
 
-def _times(mix: Array, line: Array) -> Array:
+def _times_mix(mix: Array, line: Array) -> Array:
+    """Return the light (R, 1, n) of a line of reflectances (n,)."""
     return np.asarray(np.multiply.outer(mix[:, 0], line.astype(mix.dtype))[:, None, :])

@@ -10,31 +10,39 @@ import numpy as np
 
 from vcam_cli.scenes.base import Array, Chart, clip_cells
 from vcam_cli.scenes.colorchecker import Card
-from vcam_cli.scenes.dead_leaves import PIGMENTS, DeadLeaves, Laid
+from vcam_cli.scenes.dead_leaves import PIGMENTS, DeadLeaves, PlacedLeaves
 from vcam_cli.spectra import colorchecker
 
 
 @dataclass(frozen=True)
-class WithColorChecker(Chart):
+class LeavesWithColorChecker(Chart):
     """The chart; `mix` is (R, 25), as for the card."""
 
-    leaves: DeadLeaves | Laid
+    leaves: DeadLeaves | PlacedLeaves
     card: Card
 
     @property
     def coarsest_cell(self) -> float:
+        """Largest cell that is painted directly [m]."""
         return self.leaves.coarsest_cell
 
-    def within(self, x_edges: Array, y_edges: Array) -> "WithColorChecker":
-        """The same with only those leaves that may be seen beside the card."""
-        if isinstance(self.leaves, Laid):
+    def within(self, x_edges: Array, y_edges: Array) -> "LeavesWithColorChecker":
+        """Return the chart with only those leaves that may be seen beside the card."""
+        if isinstance(self.leaves, PlacedLeaves):
             return self
-        across, down = _Under(self.card.half_width, x_edges), _Under(self.card.half_height, y_edges)
+        across, down = (
+            _CardCells(self.card.half_width, x_edges),
+            _CardCells(self.card.half_height, y_edges),
+        )
         hidden = (down.whole, across.whole)
         return replace(self, leaves=self.leaves.within(x_edges, y_edges, hidden))
 
     def paint(self, x_edges: Array, y_edges: Array, mix: Array, out: Array) -> None:
-        across, down = _Under(self.card.half_width, x_edges), _Under(self.card.half_height, y_edges)
+        """Write the averages over the cells into `out`."""
+        across, down = (
+            _CardCells(self.card.half_width, x_edges),
+            _CardCells(self.card.half_height, y_edges),
+        )
         of_leaves = mix[:, _patches_of_pigments()]
         self.leaves.paint(x_edges, y_edges, of_leaves, out, (down.whole, across.whole))
         if not (across.any and down.any):
@@ -46,11 +54,12 @@ class WithColorChecker(Chart):
             if len(cover_x) and len(cover_y):
                 under = self.leaves.averages(x, y, of_leaves) * np.outer(cover_y, cover_x)
                 out[:, rows, columns] = np.maximum(out[:, rows, columns] - under, 0.0)
-        cover = self.card.averaged(across.edges, down.edges)
+        cover = self.card.cell_cover(across.edges, down.edges)
         self.card.add_light(cover, mix, out[:, down.cells, across.cells])
 
     def values(self, x: Array, y: Array, mix: Array) -> Array:
-        cover = self.card.sampled(x, y)
+        """Return the values at points."""
+        cover = self.card.point_cover(x, y)
         leaves = self.leaves.values(x, y, mix[:, _patches_of_pigments()])
         return leaves * (1 - np.outer(cover.down, cover.across)) + self.card.light(cover, mix)
 
@@ -60,23 +69,29 @@ def _patches_of_pigments() -> list[int]:
     return [names.index(name) for name in PIGMENTS]
 
 
-class _Under:
-    """Along one axis: the cells that the card reaches into, those wholly under it, and the first
-    and last where they are not; the edges [m] of the first."""
+class _CardCells:
+    """Cells that the card reaches into, along one axis."""
 
     def __init__(self, half: float, edges: Array) -> None:
+        """Find the cells between `edges` that lie within `half` of 0.
+
+        `cells` are those that the card reaches into, between `edges` [m]; `whole` those wholly
+        under it, and `ends` the first and last where they are not.
+        """
         self.cells, self._cover, self._inside = clip_cells(edges, half)
         start, stop = self.cells.start, self.cells.stop
         self.any = stop > start
         self.edges = edges[start : stop + 1]
-        partial = {number for number in (start, stop - 1) if self.any and self._of(number) < 1.0}
+        partial = {
+            number for number in (start, stop - 1) if self.any and self._cover_of(number) < 1.0
+        }
         self.ends = [slice(number, number + 1) for number in sorted(partial)]
         self.whole = slice(start + (start in partial), stop - (stop - 1 in partial))
 
     def part(self, cells: slice) -> tuple[Array, Array]:
-        """Edges of some of the cells, cut to the card, and how much of each lies under it."""
+        """Return edges of some cells, cut to the card, and how much of each cell lies under it."""
         start, stop = (number - self.cells.start for number in (cells.start, cells.stop))
         return self._inside[start : stop + 1], self._cover[start:stop]
 
-    def _of(self, number: int) -> float:
+    def _cover_of(self, number: int) -> float:
         return float(self._cover[number - self.cells.start])

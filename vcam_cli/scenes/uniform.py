@@ -4,5 +4,5 @@ from vcam_cli.scenes.base import Wave
 
 
 def waves(reflectance: float) -> tuple[Wave, ...]:
-    """One wave of frequency zero; reflectance 0..1, 1 the perfect white diffuser."""
+    """Return one wave of frequency zero of a reflectance 0..1, where 1 is the perfect diffuser."""
     return (Wave((reflectance,)),)

@@ -7,26 +7,34 @@ accumulates, reset noise common to all samples and readout noise new in each [el
 
 References
 ----------
-[1] T. Chen, "Digital Camera System Simulator and Applications", PhD thesis, Stanford University,
-    2003, sections 4.2 and 4.6 (last sample before saturation).
-[2] X. Liu and A. El Gamal, "Synthesis of high dynamic range motion blur free image from multiple
-    captures", IEEE Trans. Circuits Syst. I 50(4), 2003, doi:10.1109/TCSI.2003.809815 (optimal
-    linear estimate).
+.. [1] T. Chen, "Digital Camera System Simulator and Applications", PhD thesis, Stanford
+   University, 2003, sections 4.2 and 4.6 (last sample before saturation).
+.. [2] X. Liu and A. El Gamal, "Synthesis of high dynamic range motion blur free image from multiple
+   captures", IEEE Trans. Circuits Syst. I 50(4), 2003, doi:10.1109/TCSI.2003.809815 (optimal
+   linear estimate).
 """
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-Floats = NDArray[np.float64]
+from vcam_cli.scheduling.pdf import Floats, Indices
 
 PASSES = 3
-"""Times the weights are found again from the estimate they gave: they depend on it weakly."""
+"""Times that the weights are computed again from the estimate, on which they depend weakly."""
 
 
-def last_usable(saturated: NDArray[np.bool_]) -> NDArray[np.intp]:
-    """Index of the last sample before the first saturated one: (...), -1 where there is none.
+def last_usable_sample(saturated: NDArray[np.bool_]) -> Indices:
+    """Return the index of the last sample before the first saturated one.
 
-    saturated: (N, ...) of samples in the order of time.
+    Parameters
+    ----------
+    saturated : (N, ...) array
+        Whether each sample is saturated, in the order of time.
+
+    Returns
+    -------
+    (...) array
+        Indices; -1 where there is no such sample.
     """
     clean = np.logical_and.accumulate(~saturated, axis=0)
     return clean.sum(axis=0) - 1
@@ -35,27 +43,39 @@ def last_usable(saturated: NDArray[np.bool_]) -> NDArray[np.intp]:
 def last_sample_before_saturation(
     samples: ArrayLike, times: ArrayLike, saturated: NDArray[np.bool_], dark_rate: float = 0.0
 ) -> Floats:
-    """Each pixel's last sample before saturation, less its dark charge, over its time [1].
+    """Estimate photocurrents from the last samples before saturation, section 4.2 of [1]_.
+
+    The estimate is the sample less its dark charge, over its time.
 
     Parameters
     ----------
-    samples : (N, ...) charge at each of the times [e]
-    times : (N,) rising [s]
-    saturated : (N, ...) whether a sample has reached the well or the ADC's end
-    dark_rate : i_dc, mean dark current of a pixel [e/s]
+    samples : (N, ...) array_like
+        Charge at each of the times [e].
+    times : (N,) array_like
+        Rising sample times [s].
+    saturated : (N, ...) array
+        Whether a sample has reached the well or the ADC's end.
+    dark_rate : float
+        Mean dark current of a pixel, i_dc [e/s].
 
     Returns
     -------
-    (...) photocurrent [e/s]; of a pixel that is full in the first sample what that one says, a
-    lower bound
+    (...) array
+        Photocurrents [e/s]. That of a pixel that is saturated in the first sample is taken from
+        this sample, a lower bound.
+
+    References
+    ----------
+    .. [1] T. Chen, "Digital Camera System Simulator and Applications", PhD thesis, Stanford
+       University, 2003.
     """
     values, when = np.asarray(samples, dtype=np.float64), np.asarray(times, dtype=np.float64)
-    index = np.maximum(last_usable(saturated), 0)
+    index = np.maximum(last_usable_sample(saturated), 0)
     last = np.take_along_axis(values, index[None], axis=0)[0]
     return last / when[index] - dark_rate
 
 
-def weighted(
+def weighted_estimate(
     samples: ArrayLike,
     times: ArrayLike,
     saturated: NDArray[np.bool_],
@@ -63,59 +83,90 @@ def weighted(
     read_variance: float,
     reset_variance: float,
 ) -> Floats:
-    """The best linear unbiased estimate from all samples before saturation [2].
+    """Estimate photocurrents by the best linear unbiased estimate from all samples, [1]_.
 
-    i = t' C^-1 (Q - i_dc t) / t' C^-1 t, C the covariance above for the pixel's own i, which is
-    found from the estimate itself, begun with the last sample before saturation. Differences of
-    samples have a tridiagonal covariance, so that each pixel takes one pass over its samples.
+    i = t' C^-1 (Q - i_dc t) / t' C^-1 t, over the samples before saturation, C their covariance for
+    the pixel's own i. That is taken from the estimate itself, which begins with the last sample
+    before saturation. Differences of samples have a tridiagonal covariance, so that each pixel
+    takes one pass over its samples.
 
     Parameters
     ----------
-    samples, times, saturated, dark_rate : as for `last_sample_before_saturation`
-    read_variance : of one readout [e^2]
-    reset_variance : of the reset, common to all samples [e^2]
+    samples : (N, ...) array_like
+        Charge at each of the times [e].
+    times : (N,) array_like
+        Rising sample times [s].
+    saturated : (N, ...) array
+        Whether a sample has reached the well or the ADC's end.
+    dark_rate : float
+        Mean dark current of a pixel, i_dc [e/s].
+    read_variance : float
+        Variance of one readout [e^2].
+    reset_variance : float
+        Variance of the reset, common to all samples [e^2].
 
     Returns
     -------
-    (...) photocurrent [e/s]; of a pixel that is full in the first sample a lower bound
+    (...) array
+        Photocurrents [e/s]; of a pixel that is saturated in the first sample a lower bound.
+
+    References
+    ----------
+    .. [1] X. Liu and A. El Gamal, "Synthesis of high dynamic range motion blur free image from
+       multiple captures", IEEE Trans. Circuits Syst. I 50(4), 2003,
+       doi:10.1109/TCSI.2003.809815.
     """
     values, when = np.asarray(samples, dtype=np.float64), np.asarray(times, dtype=np.float64)
     clean = np.logical_and.accumulate(~saturated, axis=0)
     clean[0] = True
-    found = last_sample_before_saturation(values, when, saturated, dark_rate)
+    estimate = last_sample_before_saturation(values, when, saturated, dark_rate)
     if read_variance == 0 and reset_variance == 0:
-        return found  # the last sample holds all there is to know
+        return estimate  # the last sample holds all there is to know
     for _ in range(PASSES):
-        rate = np.maximum(found, 0) + dark_rate
-        precision, signal = _sums(
+        rate = np.maximum(estimate, 0) + dark_rate
+        precision, signal = _precision_and_signal(
             values, when, clean, rate, dark_rate, read_variance, reset_variance
         )
-        found = signal / precision
-    return found
+        estimate = signal / precision
+    return estimate
 
 
-def variance(
+def weighted_variance(
     photocurrent: ArrayLike,
     times: ArrayLike,
     dark_rate: float,
     read_variance: float,
     reset_variance: float,
 ) -> Floats:
-    """Variance of the weighted estimate from samples at all of the times, 1 / (t' C^-1 t).
+    """Return the variance of the weighted estimate from samples at all times, 1 / (t' C^-1 t).
 
-    photocurrent: (...) [e/s]; the rest as for `weighted`. Returns (...) [(e/s)^2].
+    Parameters
+    ----------
+    photocurrent : (...) array_like
+        Photocurrents of the pixels [e/s].
+    times : (N,) array_like
+        Rising sample times [s].
+    dark_rate : float
+        Mean dark current of a pixel [e/s].
+    read_variance, reset_variance : float
+        Variances of one readout and of the reset [e^2].
+
+    Returns
+    -------
+    (...) array
+        Variances [(e/s)^2].
     """
     when = np.asarray(times, dtype=np.float64)
     rate = np.asarray(photocurrent, dtype=np.float64) + dark_rate
     shape = (len(when), *rate.shape)
     clean = np.ones(shape, bool)
-    precision, _ = _sums(
+    precision, _ = _precision_and_signal(
         np.zeros(shape), when, clean, rate, dark_rate, read_variance, reset_variance
     )
     return 1 / precision
 
 
-def _sums(
+def _precision_and_signal(
     values: Floats,
     when: Floats,
     clean: NDArray[np.bool_],
@@ -124,7 +175,7 @@ def _sums(
     read_variance: float,
     reset_variance: float,
 ) -> tuple[Floats, Floats]:
-    """t' C^-1 t and t' C^-1 (Q - i_dc t), by elimination in the tridiagonal covariance.
+    """Return t' C^-1 t and t' C^-1 (Q - i_dc t), by elimination in the tridiagonal covariance.
 
     Of differences, sample 1 and then each less the one before: variances rate dt + 2 read, the
     first rate t + read + reset; covariance of neighbors -read.

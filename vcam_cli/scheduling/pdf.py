@@ -1,12 +1,16 @@
 """The distribution of photocurrents over a scene, which a capture schedule is planned for.
 
 A pdf is either a set of levels (a histogram of a scene with discrete photocurrents) or piecewise
-uniform over segments (a histogram of anything else), as in Chen, "Digital Camera System Simulator
-and Applications", PhD thesis, Stanford University, 2003, section 4.3. Photocurrents have any
-unit; the schedule for shot noise alone depends on their ratios only.
+uniform over segments (a histogram of anything else), as in [1]_, section 4.3. Photocurrents have
+any unit; the schedule for shot noise alone depends on their ratios only.
 
-Why sums from the dark end: a schedule that captures a range of 1e8 asks for differences of the
+Why sums start at the dark end: a schedule that captures a range of 1e8 asks for differences of the
 first moment at its dark end, where a sum from the bright end has lost all digits.
+
+References
+----------
+.. [1] T. Chen, "Digital Camera System Simulator and Applications", PhD thesis, Stanford
+   University, 2003.
 """
 
 from collections.abc import Sequence
@@ -17,14 +21,29 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 Floats = NDArray[np.float64]
+Indices = NDArray[np.intp]
+
+BINS = 4096
+"""Levels that pixels are gathered in: six decades of light in steps of a third of a percent."""
+DARKEST = 1e-9
+"""Fraction of the brightest photocurrent below which pixels share one level."""
 
 
 @dataclass(frozen=True, eq=False)
 class Pdf:
     """Probability over photocurrents: K ascending segments, or K ascending levels (low == high).
 
-    low, high, probability : (K,); the last is normalized to sum 1. Segments may touch but not
-    overlap. Raises ValueError, with the reason, for anything that is no such pdf.
+    Parameters
+    ----------
+    low, high : (K,) array
+        Ends of each segment, in any unit of photocurrent. Segments may touch but not overlap.
+    probability : (K,) array
+        Weight of each segment, of any sum; it is normalized to sum 1.
+
+    Raises
+    ------
+    ValueError
+        If the arrays make no such pdf; the message gives the reason.
     """
 
     low: Floats
@@ -32,6 +51,7 @@ class Pdf:
     probability: Floats
 
     def __post_init__(self) -> None:
+        """Copy, check and normalize the arrays."""
         for name in ("low", "high", "probability"):
             values = np.array(getattr(self, name), dtype=np.float64, ndmin=1)  # our own copy
             object.__setattr__(self, name, values)
@@ -46,12 +66,12 @@ class Pdf:
 
     @staticmethod
     def uniform(min: float, max: float) -> "Pdf":
-        """Uniform between two photocurrents."""
+        """Return the uniform pdf between two photocurrents."""
         return Pdf.segments([min], [max], [1.0])
 
     @staticmethod
     def segments(low: ArrayLike, high: ArrayLike, probability: ArrayLike) -> "Pdf":
-        """Piecewise uniform: (K,) lower ends, upper ends and probabilities (of any sum)."""
+        """Return the piecewise uniform pdf of K segments with these ends and weights, (K,) each."""
         starts, ends = (np.atleast_1d(np.asarray(end, float)) for end in (low, high))
         if ends.shape == starts.shape and np.any(ends == starts):
             raise ValueError("a segment's max must be above its min")
@@ -59,7 +79,7 @@ class Pdf:
 
     @staticmethod
     def levels(values: ArrayLike, weights: ArrayLike) -> "Pdf":
-        """Discrete photocurrents in any order and their weights, added up where values repeat."""
+        """Return the pdf of discrete photocurrents in any order; weights of equal ones add up."""
         where, weight = (np.atleast_1d(np.asarray(v, float)) for v in (values, weights))
         if where.ndim != 1 or where.shape != weight.shape:
             raise ValueError("as many weights as levels are needed")
@@ -70,7 +90,7 @@ class Pdf:
 
     @staticmethod
     def histogram(edges: ArrayLike, counts: Sequence[float] | ArrayLike) -> "Pdf":
-        """Piecewise uniform between (K + 1,) edges with (K,) counts."""
+        """Return the piecewise uniform pdf of (K,) counts between (K + 1,) edges."""
         ends = np.asarray(edges, float)
         if ends.ndim != 1 or ends.size < 2:
             raise ValueError("a histogram needs at least two edges")
@@ -93,12 +113,12 @@ class Pdf:
 
     @property
     def mean(self) -> float:
-        """E(I)."""
+        """The mean photocurrent, E(I)."""
         return float(self._moments[-1])
 
     @cached_property
     def density(self) -> Floats:
-        """(K,) probability a unit of photocurrent; infinite at levels that occur."""
+        """(K,) probability per unit of photocurrent; infinite at levels that occur."""
         if self.discrete:
             return np.where(self.probability > 0, np.inf, 0.0)
         return self.probability / (self.high - self.low)
@@ -114,14 +134,14 @@ class Pdf:
         centers = self.low + (self.high - self.low) / 2
         return np.concatenate([[0.0], np.cumsum(self.probability * centers)])
 
-    def below(self, x: ArrayLike) -> Floats:
-        """P(i <= x), shape of `x`."""
-        segment, share, _ = self._place(np.asarray(x, float))
+    def cdf(self, x: ArrayLike) -> Floats:
+        """Return P(i <= x), the cumulative distribution function, in the shape of `x`."""
+        segment, share, _ = self._position(np.asarray(x, float))
         return self._cumulative[segment] + self._padded[segment] * share
 
     def first_moment(self, x: ArrayLike) -> Floats:
-        """The integral of i f(i) up to and including x, shape of `x`."""
-        segment, share, center = self._place(np.asarray(x, float))
+        """Return the integral of i f(i) up to and including `x`, in the shape of `x`."""
+        segment, share, center = self._position(np.asarray(x, float))
         return self._moments[segment] + self._padded[segment] * share * center
 
     @cached_property
@@ -129,14 +149,54 @@ class Pdf:
         """(K + 1,) probabilities, and 0 above the last."""
         return np.append(self.probability, 0.0)
 
-    def _place(self, x: Floats) -> tuple[NDArray[np.intp], Floats, Floats]:
-        """The first segment that ends above x, the share of it up to x and the middle of that."""
+    def _position(self, x: Floats) -> tuple[Indices, Floats, Floats]:
+        """Return the first segment that ends above x, its share up to x and the middle of that."""
         segment = np.searchsorted(self.high, x, side="right")
         if self.discrete:  # x lies below that level
             return segment, np.zeros(x.shape), np.zeros(x.shape)
         low, high = np.append(self.low, self.high[-1])[segment], np.append(self.high, np.inf)
         reach = np.maximum(x - low, 0.0)
         return segment, reach / (high[segment] - low), low + reach / 2
+
+
+def photocurrent_levels(
+    photocurrents: NDArray, bins: int = BINS, darkest: float = DARKEST
+) -> Pdf | None:
+    """Gather the photocurrents of many pixels in levels of equal ratio.
+
+    Why equal ratio: a histogram of equal bins that resolves the bright holds all of the dark in one
+    bin, and captures are as much for the dark. Each bin stands for its brightest pixel, so that a
+    capture that is chosen for a bin saturates no pixel of it.
+
+    Parameters
+    ----------
+    photocurrents : array
+        Photocurrents of the pixels, of any shape. Pixels at 0 or below are a level of their own, 0.
+    bins : int
+        The most levels above 0, from the darkest pixel to the brightest.
+    darkest : float
+        Fraction of the brightest photocurrent; the pixels below it are one level.
+
+    Returns
+    -------
+    Pdf or None
+        The levels; None where no photocurrent is above 0.
+    """
+    light = np.asarray(photocurrents)[np.asarray(photocurrents) > 0].astype(np.float64)
+    if light.size == 0:
+        return None
+    high = float(light.max())
+    low = max(float(light.min()), darkest * high)
+    scale = bins / np.log(high / low) if high > low else 0.0
+    index = np.clip((np.log(light / low) * scale).astype(int), 0, bins - 1)
+    brightest = np.zeros(bins)
+    np.maximum.at(brightest, index, light)
+    counts = np.bincount(index, minlength=bins)
+    occupied = counts > 0
+    unlit = np.size(photocurrents) - light.size
+    if not unlit:
+        return Pdf.levels(brightest[occupied], counts[occupied])
+    return Pdf.levels([0.0, *brightest[occupied]], [unlit, *counts[occupied]])
 
 
 def _check_values(low: Floats, high: Floats, probability: Floats) -> None:

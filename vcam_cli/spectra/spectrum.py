@@ -1,5 +1,4 @@
-"""The two values of this package: `Table`, a piecewise-linear function of wavelength, and
-`Spectrum`, a product of tables and a scale, or a set of lines.
+"""Tables and spectra: piecewise-linear functions of wavelength, and products or sets of lines.
 
 Wavelengths are in meters. What the values mean (a radiance per meter, a transmittance, a quantum
 efficiency) is the caller's: a product of spectra has the product of their units.
@@ -24,7 +23,7 @@ SAME_WAVELENGTH = 1e-9
 
 
 def _frozen(values: ArrayLike) -> Floats:
-    """A copy that stays as it is; of what does so already, itself, so that tables can share it."""
+    """Return a copy that cannot be written to; an array that cannot be is shared."""
     if (
         isinstance(values, np.ndarray)
         and values.dtype == np.float64
@@ -37,8 +36,8 @@ def _frozen(values: ArrayLike) -> Floats:
     return array
 
 
-def nanometers(start: float, stop: float) -> str:
-    """The text of a wavelength range given in meters, such as "380-780 nm"."""
+def range_text(start: float, stop: float) -> str:
+    """Return the text of a wavelength range given in meters, such as "380-780 nm"."""
     return f"{start * 1e9:.6g}-{stop * 1e9:.6g} nm"
 
 
@@ -48,10 +47,13 @@ class Table:
 
     Parameters
     ----------
-    wavelength : (n,) strictly rising [m]
-    value : (n,) finite, in whatever unit the spectrum has
-    outside : what holds beyond the first and last wavelength: "error" (asking is an error),
-        "zero" (a lamp or an observer: nothing there) or "hold" (the end values go on).
+    wavelength : array_like
+        Wavelengths (n,), strictly rising [m].
+    value : array_like
+        Values (n,), finite, in whatever unit the spectrum has.
+    outside : {"error", "zero", "hold"}
+        What holds beyond the first and last wavelength: "error" (asking is an error), "zero" (a
+        lamp or an observer: nothing there) or "hold" (the end values go on).
 
     Raises
     ------
@@ -64,6 +66,7 @@ class Table:
     outside: Outside = "error"
 
     def __post_init__(self) -> None:
+        """Check the table, and keep copies that cannot be written to."""
         object.__setattr__(self, "wavelength", _frozen(self.wavelength))
         object.__setattr__(self, "value", _frozen(self.value))
         if self.outside not in ("error", "zero", "hold"):
@@ -84,6 +87,7 @@ class Table:
             )
 
     def __eq__(self, other: object) -> bool:
+        """Return whether both have the same numbers and go on in the same way."""
         return (
             isinstance(other, Table)
             and self.outside == other.outside
@@ -92,20 +96,21 @@ class Table:
         )
 
     def __hash__(self) -> int:
+        """Return a hash of the numbers."""
         return hash((self.outside, self.wavelength.tobytes(), self.value.tobytes()))
 
     @property
     def start(self) -> float:
-        """The first wavelength [m]."""
+        """First wavelength [m]."""
         return float(self.wavelength[0])
 
     @property
     def stop(self) -> float:
-        """The last wavelength [m]."""
+        """Last wavelength [m]."""
         return float(self.wavelength[-1])
 
     def covers(self, start: float, stop: float) -> bool:
-        """Whether the table says something for all of start..stop [m]."""
+        """Return whether the table says something for all of start..stop [m]."""
         low, high = self.start * (1 - SAME_WAVELENGTH), self.stop * (1 + SAME_WAVELENGTH)
         return self.outside != "error" or (low <= start and stop <= high)
 
@@ -113,13 +118,29 @@ class Table:
         """Raise ValueError, naming both ranges, unless the table covers start..stop [m]."""
         if not self.covers(start, stop):
             raise ValueError(
-                f"the spectrum covers {nanometers(self.start, self.stop)}, but "
-                f"{nanometers(start, stop)} is needed; extend the table, "
+                f"the spectrum covers {range_text(self.start, self.stop)}, but "
+                f"{range_text(start, stop)} is needed; extend the table, "
                 "or say outside: zero or outside: hold"
             )
 
-    def at(self, wavelength: ArrayLike) -> Floats:
-        """The values at some wavelengths [m], in their shape; ValueError where undefined."""
+    def evaluate(self, wavelength: ArrayLike) -> Floats:
+        """Return the values at some wavelengths.
+
+        Parameters
+        ----------
+        wavelength : array_like
+            Wavelengths of any shape [m].
+
+        Returns
+        -------
+        ndarray
+            Values in that shape, in the unit of the table.
+
+        Raises
+        ------
+        ValueError
+            A wavelength at which the table is undefined.
+        """
         asked = np.asarray(wavelength, dtype=np.float64)
         if asked.size:
             self.require(float(asked.min()), float(asked.max()))
@@ -132,16 +153,26 @@ class Table:
 
 @dataclass(frozen=True)
 class Spectrum:
-    """scale x the product of the tables; or lines, and then nothing between them.
+    """A scale times the product of tables; or lines, and then nothing between them.
+
+    Two spectra with the same parts in the same order are equal and have the same hash.
 
     Parameters
     ----------
-    scale : factor on everything; may carry a unit
-    tables : the factors; none of them means a flat spectrum
-    lines : ((wavelength [m], power), ...): delta functions, powers in the unit of the integral.
-        A spectrum with lines has no continuous part and no tables; its scale goes into the powers.
+    scale : float
+        Factor on everything; may carry a unit.
+    tables : tuple of Table
+        The factors; none of them means a flat spectrum.
+    lines : tuple of (float, float), optional
+        Wavelength [m] and power of each line: delta functions, with powers in the unit of the
+        integral. A spectrum with lines has no continuous part and no tables; its scale goes into
+        the powers.
 
-    Two spectra with the same parts in the same order are equal and have the same hash.
+    Raises
+    ------
+    ValueError
+        A scale that is not finite, lines beside tables, or lines without positive wavelengths and
+        finite powers.
     """
 
     scale: float = 1.0
@@ -149,12 +180,13 @@ class Spectrum:
     lines: tuple[tuple[float, float], ...] | None = field(default=None)
 
     def __post_init__(self) -> None:
+        """Check the spectrum, and sort its lines."""
         if not np.isfinite(self.scale):
             raise ValueError("a spectrum's scale must be a finite number")
         if self.lines is None:
             return
         if self.tables:
-            raise ValueError("a spectrum has lines or tables, not both; use times()")
+            raise ValueError("a spectrum has lines or tables, not both; use multiply()")
         powers = tuple((float(wl), float(p) * self.scale) for wl, p in sorted(self.lines))
         if not all(np.isfinite(wl) and wl > 0 and np.isfinite(p) for wl, p in powers):
             raise ValueError("lines need positive wavelengths and finite powers")
@@ -163,64 +195,108 @@ class Spectrum:
 
     @classmethod
     def flat(cls, value: float) -> Self:
-        """The same value at every wavelength."""
+        """Return a spectrum with the same value at every wavelength."""
         return cls(scale=float(value))
 
     @classmethod
-    def sampled(cls, wavelength: ArrayLike, value: ArrayLike, outside: Outside = "error") -> Self:
-        """Straight lines between the values at rising wavelengths [m]; see `Table`."""
+    def from_samples(
+        cls, wavelength: ArrayLike, value: ArrayLike, outside: Outside = "error"
+    ) -> Self:
+        """Return straight lines between the values at rising wavelengths [m]; see `Table`."""
         return cls(tables=(Table(np.asarray(wavelength), np.asarray(value), outside),))
 
     @classmethod
     def line(cls, wavelength: float, power: float = 1.0) -> Self:
-        """One line: all the power at one wavelength [m]."""
+        """Return one line: all the power at one wavelength [m]."""
         return cls(lines=((wavelength, power),))
 
     @classmethod
     def blackbody(cls, temperature: float) -> Self:
-        """Planck's radiance per wavelength at `temperature` [K], relative: 1 at 560 nm.
+        """Return Planck's radiance per wavelength, relative: 1 at 560 nm.
 
         A table of 100 nm to 10 um with knots a thousandth of the wavelength apart: at every
         visible wavelength within 1e-5 of Planck's law for 2856 K and more, 3e-5 for 2000 K.
 
-        Raises ValueError below 100 K or for a temperature that is not finite.
+        Parameters
+        ----------
+        temperature : float
+            Temperature [K], 100 or more.
+
+        Returns
+        -------
+        Spectrum
+            Relative spectral radiance.
+
+        Raises
+        ------
+        ValueError
+            A temperature below 100 K, or one that is not finite.
         """
         if not (np.isfinite(temperature) and temperature >= 100):
             raise ValueError(f"a blackbody needs 100 K or more, not {temperature:g} K")
         wavelength = np.geomspace(100e-9, 10e-6, 4607)
         log = _log_planck(wavelength, temperature) - _log_planck(np.array(560e-9), temperature)
-        return cls.sampled(wavelength, np.exp(log))
+        return cls.from_samples(wavelength, np.exp(log))
 
     @property
     def degree(self) -> int:
-        """The polynomial degree in wavelength between knots: the number of tables."""
+        """Polynomial degree in wavelength between knots: the number of tables."""
         return len(self.tables)
 
     def covers(self, start: float, stop: float) -> bool:
-        """Whether every factor says something for all of start..stop [m]."""
+        """Return whether every factor says something for all of start..stop [m]."""
         return all(table.covers(start, stop) for table in self.tables)
 
     def require(self, start: float, stop: float) -> None:
-        """Raise ValueError, naming covered and needed range, unless it covers start..stop [m]."""
+        """Raise ValueError, naming both ranges, unless the spectrum covers start..stop [m]."""
         for table in self.tables:
             table.require(start, stop)
 
-    def at(self, wavelength: ArrayLike) -> Floats:
-        """The continuous part at some wavelengths [m], in their shape; 0 for a line spectrum."""
+    def evaluate(self, wavelength: ArrayLike) -> Floats:
+        """Return the continuous part at some wavelengths; 0 for a line spectrum.
+
+        Parameters
+        ----------
+        wavelength : array_like
+            Wavelengths of any shape [m].
+
+        Returns
+        -------
+        ndarray
+            Values in that shape, in the unit of the spectrum.
+
+        Raises
+        ------
+        ValueError
+            A wavelength at which a factor is undefined.
+        """
         asked = np.asarray(wavelength, dtype=np.float64)
         value = np.full(asked.shape, 0.0 if self.lines is not None else self.scale)
         for table in self.tables:
-            value = value * table.at(asked)
+            value = value * table.evaluate(asked)
         return np.asarray(value)
 
-    def scaled(self, factor: float) -> Self:
-        """The same spectrum times a number."""
+    def scale_by(self, factor: float) -> Self:
+        """Return the same spectrum times a number."""
         return replace(self, scale=self.scale * float(factor))
 
-    def times(self, *others: "Spectrum") -> "Spectrum":
-        """The product with other spectra. Lines are multiplied by the others' value there.
+    def multiply(self, *others: "Spectrum") -> "Spectrum":
+        """Return the product with other spectra; lines are multiplied by the others' value there.
 
-        Raises ValueError where two of them have lines, or a line falls where a factor is undefined.
+        Parameters
+        ----------
+        *others : Spectrum
+            The other factors.
+
+        Returns
+        -------
+        Spectrum
+            The product, in the product of the units.
+
+        Raises
+        ------
+        ValueError
+            Two of them have lines, or a line falls where a factor is undefined.
         """
         factors = (self, *others)
         emitting = [s for s in factors if s.lines is not None]
@@ -234,17 +310,30 @@ class Spectrum:
         if not emitting:
             return smooth
         lines = emitting[0].lines or ()
-        values = smooth.at(np.array([wavelength for wavelength, _ in lines]))
+        values = smooth.evaluate(np.array([wavelength for wavelength, _ in lines]))
         return Spectrum(lines=tuple((wl, p * v) for (wl, p), v in zip(lines, values, strict=True)))
 
     def knots(self, start: float, stop: float) -> Floats:
-        """start, stop and every wavelength [m] between them where a table bends, rising."""
+        """Return start, stop and every wavelength between them where a table bends, rising [m]."""
         inner = np.concatenate([[start, stop], *(table.wavelength for table in self.tables)])
         return merge_knots(inner, start, stop)
 
 
 def merge_knots(wavelength: Floats, start: float, stop: float) -> Floats:
-    """start, the wavelengths strictly inside (start, stop), stop; sorted, near-doubles dropped."""
+    """Return sorted knots of a range, without near-doubles.
+
+    Parameters
+    ----------
+    wavelength : ndarray
+        Wavelengths (n,) in any order [m].
+    start, stop : float
+        The range [m].
+
+    Returns
+    -------
+    ndarray
+        `start`, the wavelengths strictly inside the range, `stop` [m].
+    """
     tolerance = SAME_WAVELENGTH * stop * 1e-3
     inner = np.unique(wavelength)
     inner = inner[(inner > start + tolerance) & (inner < stop - tolerance)]
@@ -253,16 +342,17 @@ def merge_knots(wavelength: Floats, start: float, stop: float) -> Floats:
 
 
 def _log_planck(wavelength: Floats, temperature: float) -> Floats:
+    """Return the logarithm of Planck's radiance per wavelength, but for a constant."""
     x = PLANCK * SPEED_OF_LIGHT / (wavelength * BOLTZMANN * temperature)
     return np.asarray(-5 * np.log(wavelength) - x - np.log(-np.expm1(-x)))
 
 
-PHOTONS = Spectrum(scale=1 / (PLANCK * SPEED_OF_LIGHT)).times(
-    Spectrum.sampled([0.0, 1.0], [0.0, 1.0])
+PHOTONS = Spectrum(scale=1 / (PLANCK * SPEED_OF_LIGHT)).multiply(
+    Spectrum.from_samples([0.0, 1.0], [0.0, 1.0])
 )
 """Photons per joule, wavelength / (h c) [1/J]: a straight line, so products with it stay exact."""
 
 
 def photons(spectrum: Spectrum) -> Spectrum:
-    """A spectrum in watts as the same one in photons per second: times wavelength / (h c)."""
-    return spectrum.times(PHOTONS)
+    """Return a spectrum in watts as one in photons per second: times wavelength / (h c)."""
+    return spectrum.multiply(PHOTONS)

@@ -1,4 +1,4 @@
-"""Reading tables of spectra from CSV text: `#` comments, one header line, numbers in rows."""
+"""Tables of spectra as CSV text: `#` comments, one header line, numbers in rows."""
 
 import io
 import math
@@ -12,29 +12,48 @@ import numpy as np
 from vcam_cli.spectra.spectrum import Floats, Outside, Table
 
 HEADER = ("wavelength_nm", "value")
-MOST_ROWS = 200_000
-MOST_BYTES = 1 << 26
-"""Of a file: a million rows have some 30 MB."""
-LONGEST_LINE = 10_000
-MOST_COLUMNS = 8
-"""Of a table with as many rows as are read; a shorter one may have more."""
+MAX_ROWS = 200_000
+MAX_BYTES = 1 << 26
+"""Largest file that is read; a million rows have some 30 MB."""
+MAX_LINE_LENGTH = 10_000
+MAX_COLUMNS = 8
+"""Columns of a table with as many rows as are read; a shorter one may have more."""
 
 
 def read_table(
-    path: str | PathLike[str], most: int = MOST_ROWS
+    path: str | PathLike[str], most: int = MAX_ROWS
 ) -> tuple[list[str], list[tuple[int, list[str]]]]:
-    """The header's names of a CSV file, and of every row its line number and cells.
+    """Return the header's names of a CSV file, and of every row its line number and cells.
 
-    Raises ValueError that names the file and the line: not text, too large, no header, a row of
-    another length, more than `most` rows or twice as many lines. OSError as `open` raises it.
+    Parameters
+    ----------
+    path : str or path
+        The file.
+    most : int
+        Largest number of rows.
+
+    Returns
+    -------
+    header : list of str
+        Names of the columns.
+    cells : list of (int, list of str)
+        Line number and cells of every row.
+
+    Raises
+    ------
+    ValueError
+        Not text, too large, no header, a row of another length, more than `most` rows or twice as
+        many lines; the message names the file and the line.
+    OSError
+        The file cannot be read.
     """
     file = Path(path)
     if not stat.S_ISREG(file.stat().st_mode):  # a pipe would keep us waiting
         raise ValueError(f"{file}: is not a regular file")
     with file.open("rb") as source:
-        data = source.read(MOST_BYTES + 1)
-    if len(data) > MOST_BYTES:
-        raise ValueError(f"{file}: is larger than {MOST_BYTES >> 20} MB")
+        data = source.read(MAX_BYTES + 1)
+    if len(data) > MAX_BYTES:
+        raise ValueError(f"{file}: is larger than {MAX_BYTES >> 20} MB")
     try:
         return _cells(file, _lines(file, data, 2 * most), most)
     except UnicodeDecodeError:
@@ -42,14 +61,14 @@ def read_table(
 
 
 def _lines(file: Path, data: bytes, most: int) -> Iterator[tuple[int, str]]:
-    """The lines that say something, with their numbers.
+    """Yield the lines that say something, with their numbers.
 
     One by one, as a list of all that a file can hold would take a hundred times its bytes.
     """
     text = io.TextIOWrapper(io.BytesIO(data), "utf-8-sig")
-    for n, line in enumerate(iter(lambda: text.readline(LONGEST_LINE + 1), ""), 1):
-        if len(line) > LONGEST_LINE:
-            raise ValueError(f"{file}:{n}: is longer than {LONGEST_LINE} characters")
+    for n, line in enumerate(iter(lambda: text.readline(MAX_LINE_LENGTH + 1), ""), 1):
+        if len(line) > MAX_LINE_LENGTH:
+            raise ValueError(f"{file}:{n}: is longer than {MAX_LINE_LENGTH} characters")
         if n > most:
             raise ValueError(f"{file}: has more than {most} lines")
         line = line.strip()
@@ -60,6 +79,7 @@ def _lines(file: Path, data: bytes, most: int) -> Iterator[tuple[int, str]]:
 def _cells(
     file: Path, lines: Iterator[tuple[int, str]], most: int
 ) -> tuple[list[str], list[tuple[int, list[str]]]]:
+    """Return the header, and line number and cells of every row."""
     _, first = next(lines, (0, ""))
     if not first:
         raise ValueError(f"{file}: is empty; it needs a header and rows of numbers")
@@ -71,23 +91,60 @@ def _cells(
             raise ValueError(f"{file}:{n}: has {len(row)} columns; the header has {len(header)}")
         cells.append((n, row))
         rows = len(cells) + 1  # the header is one
-        if rows > most or rows * len(header) > MOST_COLUMNS * most:
+        if rows > most or rows * len(header) > MAX_COLUMNS * most:
             raise ValueError(f"{file}: has more than {rows - 1} rows; no more are read")
     return header, cells
 
 
 def read_rows(path: str | PathLike[str]) -> tuple[list[str], Floats]:
-    """The header's names and the numbers (rows, columns) of a CSV file.
+    """Return the header's names and the numbers of a CSV file.
 
-    Raises ValueError as `read_table`, and for something that is no finite number.
+    Parameters
+    ----------
+    path : str or path
+        The file.
+
+    Returns
+    -------
+    header : list of str
+        Names of the columns.
+    rows : ndarray
+        Numbers (rows, columns).
+
+    Raises
+    ------
+    ValueError
+        As `read_table`, or something is no finite number.
+    OSError
+        The file cannot be read.
     """
     header, cells = read_table(path)
-    numbers = [numbers_of(Path(path), n, row) for n, row in cells]
+    numbers = [parse_numbers(Path(path), n, row) for n, row in cells]
     return header, np.array(numbers, dtype=np.float64).reshape(len(numbers), len(header))
 
 
-def numbers_of(file: Path, line: int, cells: list[str]) -> list[float]:
-    """Some cells of a line as numbers. Raises ValueError for what is no finite number."""
+def parse_numbers(file: Path, line: int, cells: list[str]) -> list[float]:
+    """Return some cells of a line as numbers.
+
+    Parameters
+    ----------
+    file : Path
+        File of the line, for messages.
+    line : int
+        Number of the line.
+    cells : list of str
+        Text of the cells.
+
+    Returns
+    -------
+    list of float
+        One number a cell.
+
+    Raises
+    ------
+    ValueError
+        Something is no finite number.
+    """
     shown = ",".join(cells)
     try:
         values = [float(cell) for cell in cells]
@@ -99,10 +156,27 @@ def numbers_of(file: Path, line: int, cells: list[str]) -> list[float]:
 
 
 def read_csv(path: str | PathLike[str], outside: Outside = "error") -> Table:
-    """A spectrum from a CSV file with the columns wavelength_nm,value.
+    """Return a spectrum from a CSV file with the columns wavelength_nm,value.
 
-    Wavelengths in nm, rising; values not negative, dimensionless (or relative, for a lamp).
-    Raises ValueError that names file and line for anything else, OSError where it cannot be read.
+    Parameters
+    ----------
+    path : str or path
+        The file: wavelengths in nm, rising; values not negative, dimensionless (or relative, for a
+        lamp).
+    outside : {"error", "zero", "hold"}
+        What holds beyond the first and last wavelength.
+
+    Returns
+    -------
+    Table
+        The spectrum, with wavelengths in m.
+
+    Raises
+    ------
+    ValueError
+        Anything else stands in the file; the message names file and line.
+    OSError
+        The file cannot be read.
     """
     header, rows = read_rows(path)
     if tuple(header) != HEADER:

@@ -1,0 +1,223 @@
+"""The accuracy study: what it measures, and what it recommends."""
+
+import math
+
+import numpy as np
+import pytest
+from making import camera, radiance_for
+
+from vcam_cli import simulate
+from vcam_cli.accuracy import ablation, measurements, reference, study
+from vcam_cli.accuracy.knobs import KNOBS
+from vcam_cli.accuracy.recommendation import coarser, recommend
+from vcam_cli.accuracy.setting_errors import COLUMNS, Point
+from vcam_cli.effects.order import ORDER
+from vcam_cli.simulation.simulate import prepare
+
+pytestmark = pytest.mark.long
+
+DARK = "pixel.photodetector.dark_current"
+NOISY = {
+    "scene.radiance": radiance_for(2000),
+    "scene.source": {"kind": "chart", "chart": "slanted-edge"},
+    "optics.off_axis": "exact",
+    "optics.focal_length": "0.6 mm",
+    DARK: "3 ke/s",
+    "pixel.readout.read_noise": "9 e",
+    "pixel.readout.reset_noise": "12 e",
+    "pixel.fpn": {"offset_pixel": "4 e", "offset_column": "2 e", "gain_pixel": "1 %"},
+    "array.rows": 20,
+    "array.columns": 24,
+    "effects": "auto",
+    "accuracy": "standard",
+}
+
+
+@pytest.fixture(scope="module")
+def measured(tmp_path_factory):
+    made = camera(tmp_path_factory.mktemp("study"), NOISY)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(measurements, "TURNS", 1)
+        patch.setattr(reference, "MOST_BYTES", 5e7)
+        return study.accuracy(made, workers=1)
+
+
+def of(found, knob: str) -> dict[str, Point]:
+    return {p.setting: p for p in found.points if p.knob == knob}
+
+
+def test_every_preset_knob_and_effect_is_there(measured):
+    knobs = {p.knob for p in measured.points}
+    assert {"preset", "tolerance", "effects", "file"} <= knobs
+    assert {knob.name for knob in KNOBS} == (knobs | set(measured.absent)) & {
+        knob.name for knob in KNOBS
+    }
+    assert set(measured.absent) == {"vignetting_points", "spectral_rank", "field_zones"}
+    assert set(of(measured, "tolerance")) == {"1 %", "0.1 %"}
+    assert set(of(measured, "preset")) == {"draft", "standard", "reference"}
+    assert set(of(measured, "effects")) == {"all"}
+    assert {k.removeprefix("effect:") for k in knobs if k.startswith("effect:")} == {
+        kind.name for kind in ORDER if kind.name in {e.name for e in measured.effects}
+    }
+
+
+def test_a_knob_at_its_finest_has_no_error_of_its_own(measured):
+    """And each coarser setting more; noise has no mean, so its model none at all."""
+    assert of(measured, "float_width")["64"].max_error == 0
+    assert 0 < of(measured, "float_width")["32"].rms_error < 1e-5
+    assert all(p.max_error == 0 for p in of(measured, "shot_noise").values())
+    for knob in ("oversampling", "table_size"):
+        errors = [p.rms_error for p in of(measured, knob).values()]
+        assert errors[-1] < errors[0] / 3
+
+
+def test_the_reference_says_how_good_it_is(measured):
+    """Its preset's tolerance is 2e-4, a tenth of which is what its spectrum may lose."""
+    assert 0 < measured.reference.lost < 2e-5
+    assert set(measured.reference.changes) == {p.knob for p in measured.points} & {
+        knob.name for knob in KNOBS
+    } - {"oversampling"}
+
+
+def test_renders_are_compared_where_there_are_some(measured):
+    assert all(p.mean_s_cielab >= 0 for p in measured.points)
+    assert of(measured, "float_width")["64"].mean_s_cielab == 0
+    assert of(measured, "effect:shot_noise")["off"].mean_s_cielab > 0.1  # 1/sqrt(2000) of noise
+
+
+def test_presets_keep_their_tolerance_and_rise_in_accuracy(measured):
+    presets = of(measured, "preset")
+    for name, tolerance in (("draft", 0.02), ("standard", 0.005), ("reference", 2e-4)):
+        assert presets[name].rms_error <= tolerance
+    assert presets["reference"].rms_error < presets["standard"].rms_error
+
+
+def test_numbers_of_a_point_belong_together(measured):
+    full = measured.reference.full_signal
+    for p in measured.points:
+        assert p.rms_electrons == pytest.approx(p.rms_error * full, rel=1e-12)
+        assert p.max_error >= p.rms_error
+        assert p.seconds > 0
+        assert p.seconds_spread >= 0
+        assert len(p.row) == len(COLUMNS)
+
+
+def test_dark_current_left_out_is_its_electrons(measured):
+    """3 ke/s for 10 ms are 30 electrons in every pixel."""
+    left_out = of(measured, "effect:dark_current")["off"]
+    assert left_out.rms_electrons == pytest.approx(30, rel=1e-6)
+    assert left_out.max_error == pytest.approx(left_out.rms_error, rel=1e-6)
+
+
+def test_noise_left_out_changes_no_mean(measured):
+    for name in ("shot_noise", "fpn", "reset_noise", "read_noise", "quantization"):
+        assert of(measured, f"effect:{name}")["off"].max_error == 0
+
+
+def test_expected_stands_beside_measured(measured):
+    """From 10 % too little to ten times too much; of variances, to the 2 % they are sampled to."""
+    for e in measured.effects:
+        assert e.predicted is not None
+        assert e.ratio is None or 0.9 <= e.ratio <= 10
+        if e.unit.endswith("variance"):
+            assert e.predicted == pytest.approx(e.measured, rel=0.02)
+
+
+def test_report_is_plain(measured):
+    report = measured.report()
+    assert {"points", "effects", "reference", "recommendation", "tolerance"} <= set(report)
+    assert all(math.isfinite(p["rms_error"]) for p in report["points"])
+
+
+def test_an_effect_the_user_switched_off_is_off_everywhere(tmp_path):
+    made = camera(tmp_path, NOISY | {"effects": {"off_axis": "off", "read_noise": "on"}})
+    for every in ("auto", "all"):
+        found = ablation.with_effects(made, every)
+        states = {d.name: d.state for d in prepare(found)[0].plan.decisions}
+        assert states["off_axis"] == "off"
+    assert states["read_noise"] == "on"
+    assert "off_axis" not in ablation.wanted_effects(made)
+
+
+def test_variance_shares_are_what_frames_have(tmp_path):
+    """On a uniform field at full signal, whose share of read noise is its largest in the dark."""
+    quiet = {"pixel.readout.read_noise": "30 e", "scene.radiance": radiance_for(900)}
+    made = camera(tmp_path, quiet | {"array.rows": 256, "array.columns": 256, "effects": "all"})
+    ready = prepare(made)[0]
+    shares = ablation.variance_shares(ready, 900.0, 1)
+    assert shares["read_noise"] == pytest.approx(900 / 909, rel=0.02)  # at 1 % of full signal
+    frame = simulate(made)
+    noise = np.var(frame.electrons - frame.mean_electrons)
+    assert noise == pytest.approx(900 + 900, rel=0.03)  # five standard errors of 65536 pixels
+    assert shares["shot_noise"] == pytest.approx(0.5, rel=0.03)  # at full signal
+
+
+def point(knob: str, setting: str, error: float, seconds: float, variance: float = 0.0) -> Point:
+    return Point(knob, setting, error, error, error, seconds, 0.0, variance_lost=variance)
+
+
+OWN = point("file", "as it is", 0.001, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("points", "line"),
+    [
+        ([OWN, point("preset", "draft", 0.004, 0.5)], "accuracy: draft"),
+        ([OWN, point("preset", "draft", 0.006, 0.5)], "accuracy: standard"),
+        ([OWN, point("preset", "draft", 0.001, 0.5, variance=0.02)], "accuracy: standard"),
+        ([OWN, point("preset", "draft", 0.001, 0.95)], "accuracy: standard"),
+        (
+            [
+                OWN,
+                point("preset", "draft", 0.004, 0.8),
+                point("combined", "oversampling: 2, wavelength_step: 40 nm", 0.003, 0.4),
+            ],
+            "accuracy: {preset: standard, oversampling: 2, wavelength_step: 40 nm}",
+        ),
+        (  # alone its knob would do, but nothing is said of all of it
+            [OWN, point("oversampling", "2", 0.003, 0.4)],
+            "accuracy: standard",
+        ),
+        (
+            [OWN, point("tolerance", "1 %", 0.004, 0.5)],
+            "accuracy: 1 %",
+        ),
+        (
+            [point("file", "as it is", 0.009, 1.0), point("preset", "reference", 1e-4, 9.0)],
+            "accuracy: reference",
+        ),
+    ],
+)
+def test_recommended_is_the_fastest_that_keeps_the_tolerance(points, line, tmp_path):
+    made = camera(tmp_path, {"accuracy": "standard"})
+    found = recommend(made, tuple(points))
+    assert found.line == line
+    assert line in found.sentence
+    pasted = camera(tmp_path, {"accuracy": _read(line)})
+    assert pasted.accuracy.tolerance in (0.02, 0.01, 0.005, 0.0002)
+
+
+def test_knobs_are_made_coarser_where_they_save_time_and_lose_little(tmp_path):
+    made = camera(tmp_path, {"accuracy": "standard"})
+    points = (
+        OWN,
+        point("oversampling", "1", 0.004, 0.2),  # more than half of 0.5 %
+        point("oversampling", "2", 0.002, 0.5),
+        point("table_size", "64", 1e-4, 0.97),  # saves too little
+        point("wavelength_step", "80 nm", 0.001, 0.5),  # more than a tenth
+        point("wavelength_step", "20 nm", 1e-4, 0.8),
+        point("shot_noise", "gaussian", 0.0, 0.1),  # not the same noise
+    )
+    assert coarser(made, points) == {"wavelength_step": "20 nm", "oversampling": 2}
+
+
+def test_a_saving_within_the_spread_is_none(tmp_path):
+    made = camera(tmp_path, {"accuracy": "standard"})
+    shaky = Point("preset", "draft", 0.001, 0.001, 1.0, 0.8, 0.6)
+    assert recommend(made, (OWN, shaky)).line == "accuracy: standard"
+
+
+def _read(line: str):
+    import yaml
+
+    return yaml.safe_load(line)["accuracy"]

@@ -1,0 +1,175 @@
+"""What a frame will take of memory is known before it is taken."""
+
+import json
+import os
+import subprocess
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from optical_paths import Leaning, aperture, of_picture, on_chart, path, sensor
+
+from vcam_cli import load, memory
+from vcam_cli.camera.derived.geometry import geometry
+from vcam_cli.effects.diffraction import Diffraction
+from vcam_cli.errors import CannotDo
+from vcam_cli.image_formation import memory_model, strategies
+from vcam_cli.image_formation.bandwidth import table_size
+from vcam_cli.image_formation.settings import STANDARD, settings
+from vcam_cli.image_formation.transfer_tables import TableSize
+from vcam_cli.scenes.siemens_star import SiemensStar
+from vcam_cli.simulation.simulate import simulate
+
+SMALL = ["array.rows=24", "array.columns=32", "quality=[]", "accuracy=draft"]
+LARGE = ["array.rows=1200", "array.columns=1600"]
+LARGER = ["array.rows=2000", "array.columns=3000"]
+STAR = "scene.source={kind: chart, chart: siemens-star}"
+COMA = "optics.zernike={4: 30 nm, 7: 60 nm}"
+STRONG_COMA = "optics.zernike={4: 30 nm, 7: 1200 nm}"
+OFF_CENTER = "pixel.photodetector={fill_factor: 0.4, x: 0.1 um, y: 0.13 um}"
+OVER_THE_FIELD = "optics.zernike=[{field: 0, 4: 30 nm}, {field: 1, 4: 60 nm, 7: 60 nm}]"
+
+MEASURE = """
+import json, sys
+from vcam_cli import load, simulate
+result = simulate(load(sys.argv[1], sys.argv[2:]), 1)
+result.render, result.metrics
+# Not ru_maxrss, which begins with that of the process that started this one.
+lines = open("/proc/self/status").read().splitlines()
+peak = 1024 * int(next(line for line in lines if line.startswith("VmHWM")).split()[1])
+print(json.dumps([result.frame.plan.memory_bytes, peak]))
+"""
+
+
+def measured(name: str, sets: list[str]) -> tuple[int, int]:
+    """The estimated memory of a frame, and the peak of a process that makes it [bytes]."""
+    root = Path(memory.__file__).parents[1]
+    found = subprocess.run(
+        [sys.executable, "-c", MEASURE, name, *sets],
+        env=os.environ | {"PYTHONPATH": str(root), "OMP_NUM_THREADS": "1"},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    estimated, peak = json.loads(found.stdout)
+    return estimated, peak
+
+
+CAMERAS = {
+    "rectangles": ("colorchecker-d65", LARGE),
+    "photodetectors off center": ("colorchecker-d65", [*LARGE, OFF_CENTER]),
+    "a painted chart": ("colorchecker-d65", [*LARGE, STAR]),
+    "no blur": ("colorchecker-d65", [*LARGE, STAR, "optics.diffraction=false"]),
+    "leaves": ("still-life", ["array.rows=400", "array.columns=600"]),
+    "coma": ("colorchecker-d65", [*LARGER, COMA]),
+    "strong coma": ("colorchecker-d65", [*SMALL, STRONG_COMA]),
+    "a field": ("colorchecker-d65", [*LARGER, OVER_THE_FIELD]),
+    "64 bits": ("colorchecker-d65", [*LARGE, STAR, "accuracy=reference"]),
+}
+QUICK = ("rectangles", "a painted chart")
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="peaks of processes are read as on POSIX")
+@pytest.mark.parametrize(
+    "name", [n if n in QUICK else pytest.param(n, marks=pytest.mark.long) for n in CAMERAS]
+)
+def test_a_process_takes_no_more_than_estimated(name):
+    """And not much less: what does not fit by the estimate would hardly have fitted."""
+    estimated, peak = measured(*CAMERAS[name])
+    assert peak <= estimated <= 2.5 * peak, (estimated, peak)
+
+
+@pytest.mark.parametrize("lens", [[], [COMA], [OVER_THE_FIELD]], ids=["plain", "coma", "field"])
+def test_what_does_not_fit_is_refused_before_it_is_taken(lens, monkeypatch):
+    camera = load("colorchecker-d65", [*SMALL, *lens])
+    needed = simulate(camera).frame.plan.memory_bytes
+    monkeypatch.setattr(memory, "available", lambda: needed - 1_000_000)
+    with pytest.raises(CannotDo, match="GB of memory") as told:
+        simulate(camera)
+    assert "fewer pixels" in str(told.value)
+    monkeypatch.setattr(memory, "available", lambda: needed)
+    simulate(camera)
+
+
+@pytest.mark.parametrize("work", ["sampled_image", "tabulate", "tabulate_field"])
+def test_nothing_is_computed_that_does_not_fit(work, monkeypatch):
+    """Neither scenes nor tables."""
+
+    def compute(*args, **kwargs):
+        raise AssertionError("computed")
+
+    monkeypatch.setattr(strategies, work, compute)
+    monkeypatch.setattr(memory, "available", lambda: memory_model.BASE // 2)
+    lens = OVER_THE_FIELD if work == "tabulate_field" else COMA
+    with pytest.raises(CannotDo):
+        simulate(load("colorchecker-d65", [*SMALL, lens]))
+
+
+def test_charts_that_do_not_fit_are_not_painted(monkeypatch):
+    monkeypatch.setattr(memory_model, "of_box_averages", lambda *args: 1 << 62)
+    with pytest.raises(CannotDo, match="GB of memory"):
+        simulate(load("colorchecker-d65", [*SMALL, "optics.diffraction=false"]))
+
+
+def test_more_pixels_need_more():
+    camera = load("colorchecker-d65", SMALL)
+    few, many = (
+        memory_model.of_frame(replace(geometry(camera), rows=n), settings(camera), 3, False)
+        for n in (1000, 2000)
+    )
+    assert few < many
+
+
+@pytest.mark.parametrize("samples", [0, 8])
+@pytest.mark.parametrize("judged", [False, True])
+def test_more_of_everything_needs_more(judged, samples):
+    """Samples of an integration, an ideal picture to be compared with, colors, 64 bits."""
+    g = sensor(1000, 1500)
+    least = memory_model.of_frame(g, STANDARD, 1, judged, samples)
+    assert memory_model.of_frame(g, STANDARD, 3, judged, samples) > least
+    assert memory_model.of_frame(g, STANDARD, 1, judged, samples + 5) > least
+    wide = replace(STANDARD, float_width=64)
+    assert memory_model.of_frame(g, wide, 1, judged, samples) > least
+    assert judged or memory_model.of_frame(g, STANDARD, 1, True, samples) > least
+
+
+def test_an_image_needs_more_for_planes_cells_and_directions():
+    g = sensor(1000, 1500, (0.5, 0.5))
+    lens = Diffraction(4.0, 0.0), aperture(g)
+    seen = path(g, *lens)
+    size = table_size(seen, 2.0)
+    scene = on_chart(seen, SiemensStar(9, 1.0), margin=20)
+
+    def needed(seen=seen, scene=scene, planes=1):
+        return memory_model.of_image(seen, scene, planes, size)
+
+    least = needed()
+    shape = 2 * scene.shape[0], 2 * scene.shape[1]
+    assert needed(planes=3) > least
+    assert needed(scene=scene.on_cells(shape)) > least
+    assert needed(path(sensor(1000, 1500, (0.5, 0.5), (0.1, 0.1)), *lens)) > least
+    assert needed(path(g, *lens, Leaning(1e-6, 0, 1e-6, 1e-6))) > least
+    assert needed(path(g, *lens, knobs=replace(STANDARD, float_width=64))) > least
+
+
+def test_tables_of_strong_blurs_are_as_large_as_they_get():
+    """Their entries end somewhere, however far a blur throws light."""
+    g = sensor(100, 150)
+    scene = on_chart(path(g), SiemensStar(9, 1.0), margin=20)
+    size = TableSize(5e5, 2049, 1e-3, 8)
+    strong, absurd = (
+        path(g, Diffraction(2.0, 0.0), Leaning(reach, 0, 1e-6, 1e-6)) for reach in (1e-3, 1.0)
+    )
+    needed = [memory_model.of_image(p, scene, 1, size) for p in (strong, absurd)]
+    assert needed[0] == needed[1] < 2e9
+
+
+def test_the_estimate_of_a_picture_counts_its_samples():
+    g = sensor(100, 150)
+    seen = path(g, Diffraction(2.0, 0.0))
+    size = table_size(seen, 2.0)
+    few, many = (
+        memory_model.of_image(seen, of_picture([[0.5] * n] * n, 1e-6), 1, size) for n in (400, 800)
+    )
+    assert many - few >= (800**2 - 400**2) * 4

@@ -1,0 +1,157 @@
+"""The light that is kept: the same bytes as without, for every key said not to change it."""
+
+import numpy as np
+import pytest
+from making import camera
+
+from vcam_cli import simulate
+from vcam_cli.image_formation.rate_cache import AFTER, depends_on
+from vcam_cli.simulation import preparation
+from vcam_cli.simulation.shared import Shared
+
+BASE = {
+    "array": {"rows": 20, "columns": 24, "pattern": "bayer-rggb"},
+    "scene.source": {"kind": "chart", "chart": "colorchecker"},
+    "scene.illuminant": "D65",
+    "scene.wavelengths": {"start": "400 nm", "stop": "700 nm"},
+    "pixel.photodetector.dark_current": "100 e/s",
+    "pixel.architecture": "ccd",
+    "accuracy": "draft",
+    "effects": "auto",
+    "processing": [{"demosaic": "bilinear"}],
+}
+CHANGES = {
+    "name": "other",
+    "seed": {"sensor": 5, "frame": 7},
+    "adc": {"bits": 14},
+    "exposure": {"time": "10.5 ms"},
+    "processing": [{"black_level": "subtract"}, {"demosaic": "bilinear"}],
+    "quality": ["mse"],
+    "output": {"raw": ["dn"]},
+    "display.dpi": 90,
+    "display.width": "5 in",
+    "display.viewing_distance": "20 in",
+    "pixel.fpn": {"offset_pixel": "3 e"},
+    "pixel.defects": {"hot": 0.01, "dead": 0.01},
+    "pixel.readout.gain": 2,
+    "pixel.readout.read_noise": "9 e",
+    "pixel.readout.column_noise": "9 e",
+    "pixel.readout.row_noise": "9 e",
+    "pixel.readout.reset_noise": "9 e",
+    "pixel.readout.charge_transfer": {"inefficiency": 1e-3},
+    "pixel.photodetector.dark_current": "900 e/s",
+    "pixel.photodetector.dark_current_density": "5 nA/cm2",
+    "pixel.photodetector.dark_current_scale": 3,
+    "accuracy.shot_noise": {"preset": "draft", "shot_noise": "gaussian"},
+    "array.binning": {"rows": 2, "columns": 2, "kind": "voltage"},
+    "effects": {"shot_noise": "off", "dark_current": "off"},
+}
+"""Another value of every key on which the light does not depend."""
+
+
+def changed(path, value):
+    if path == "accuracy.shot_noise":  # of a mapping, in the place of a preset's name
+        return BASE | {"accuracy": value or "draft"}
+    out = BASE | {path: value}
+    if path in ("pixel.photodetector.dark_current_density",):
+        out = {k: v for k, v in out.items() if k != "pixel.photodetector.dark_current"}
+    if path == "pixel.readout.column_noise":
+        out |= {"pixel.architecture": "aps-3t"}
+    return out
+
+
+def test_every_key_that_is_left_out_is_tried():
+    assert {".".join(path) for path in AFTER} | {"effects"} == set(CHANGES)
+
+
+@pytest.mark.parametrize("path", CHANGES)
+def test_the_light_does_not_depend_on_it(tmp_path, path, monkeypatch):
+    made = camera(tmp_path, changed(path, CHANGES[path]))
+    before = {k: v for k, v in changed(path, 0).items() if k != path}
+    plain = camera(tmp_path, before | ({path: BASE[path]} if path in BASE else {}))
+    assert depends_on(made) == depends_on(plain)
+    found = []
+    true = preparation.photon_rate.photo_rate
+    monkeypatch.setattr(
+        preparation.photon_rate, "photo_rate", lambda *args: found.append(true(*args)) or found[-1]
+    )
+    for each in (plain, made):
+        simulate(each, 1)
+    a, b = found
+    assert a.values.tobytes() == b.values.tobytes()
+    assert a.spectrum == b.spectrum
+
+
+@pytest.mark.parametrize(
+    ("path", "value"),
+    [
+        ("optics.f_number", 2), ("optics.transmittance", 0.5), ("pixel.width", "6 um"),
+        ("pixel.photodetector", {"fill_factor": 0.6, "quantum_efficiency": 0.5}),
+        ("array", {"rows": 22, "columns": 24, "pattern": "bayer-rggb"}),
+        ("scene.radiance", "0.2 W/(sr m2)"), ("accuracy", "standard"),
+        ("effects", {"diffraction": "off"}), ("display.primaries", "srgb"),
+        ("pixel.readout.full_well", "50 ke"),
+    ],
+)  # fmt: skip
+def test_what_may_change_the_light_is_told_apart(tmp_path, path, value):
+    a, b = camera(tmp_path, BASE), camera(tmp_path, BASE | {path: value})
+    assert depends_on(a) != depends_on(b)
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [{}, {"seed": {"frame": 3}}, {"pixel.readout.read_noise": "9 e"}, {"optics.f_number": 2},
+     {"exposure": {"time": "1 s"}}, {"exposure": {"auto": {"max": "1 s"}}},
+     {"scene.source": {"kind": "chart", "chart": "siemens-star"}}],
+)  # fmt: skip
+def test_shared_light_gives_the_same_bytes(tmp_path, changes):
+    """After a camera of the same light, and after one of another."""
+    shared = Shared()
+    made = camera(tmp_path, BASE | {"quality": ["mse"]})
+    simulate(made, 1, shared=shared)
+    other = camera(tmp_path, BASE | {"quality": ["mse"]} | changes)
+    kept, alone = simulate(other, 1, shared=shared), simulate(other, 1)
+    assert kept.dn.tobytes() == alone.dn.tobytes()
+    assert kept.electrons.tobytes() == alone.electrons.tobytes()
+    assert kept.metrics == alone.metrics
+
+
+@pytest.fixture
+def brought(monkeypatch):
+    """How often light is brought to the pixels."""
+    calls = []
+    true = preparation.photon_rate.photo_rate
+    monkeypatch.setattr(
+        preparation.photon_rate, "photo_rate", lambda *args: calls.append(args) or true(*args)
+    )
+    return calls
+
+
+def test_light_is_brought_once(tmp_path, brought):
+    shared = Shared()
+    for seed in (1, 2, 3):
+        made = camera(tmp_path, BASE | {"seed": {"frame": seed}})
+        results = simulate(made, 1, shared=shared)
+        assert np.isfinite(results.electrons).all()
+    assert len(brought) == 1
+
+
+def test_exposures_that_do_not_fill_a_pixel_share_it(tmp_path, brought):
+    """Detail beyond saturation is not followed, and where it begins depends on the exposure."""
+    shared, times, full = Shared(), [], []
+    for time in ("1 ms", "10 ms", "100 ms", "10 s", "30 s"):
+        made = camera(tmp_path, BASE | {"exposure": {"time": time}, "quality": ["mse"]})
+        result, alone = simulate(made, 1, shared=shared), simulate(made, 1)
+        assert result.electrons.tobytes() == alone.electrons.tobytes()
+        full.append(bool((result.dn >= result.frame.saturated_dn).any()))
+        times.append(len(brought))
+    assert full == [False, False, False, True, True]
+    assert np.diff([0, *times]).tolist() == [2, 1, 1, 2, 2]
+
+
+def test_what_an_effect_contributes_is_told_of_shared_light_too(tmp_path):
+    shared = Shared()
+    for time in ("1 ms", "10 s", "30 s"):  # of these pixels are full: the light is brought again
+        made = camera(tmp_path, BASE | {"exposure": {"time": time}})
+        kept, alone = simulate(made, 1, shared=shared), simulate(made, 1)
+        assert kept.frame.plan == alone.frame.plan

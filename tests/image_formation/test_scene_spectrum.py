@@ -1,0 +1,217 @@
+"""Cosine spectra of samples and of even rectangles, against each other and against integrals."""
+
+from itertools import pairwise
+
+import mpmath
+import numpy as np
+import pytest
+import scipy.fft
+from making import camera, radiance_for
+from optical_paths import rms
+
+from vcam_cli.image_formation.cosine_series import Axis
+from vcam_cli.image_formation.scene_spectrum import (
+    RectangleSpectrum,
+    SampledSpectrum,
+    of_rectangles,
+    terms_of_runs,
+    transformed,
+)
+from vcam_cli.scenes.base import Frame, Framed, Rectangles, View, chart_scene
+from vcam_cli.scenes.colorchecker import ColorChecker, largest_card, reflectances
+from vcam_cli.scenes.slanted_edge import SlantedEdge
+from vcam_cli.scenes.step_wedge import step_wedge
+from vcam_cli.simulation.simulate import prepare
+
+MIX = np.random.default_rng(1).uniform(-1, 1, (3, 25))
+
+
+def scene(chart="colorchecker", oversampling=4, scene_width=None, margin=5):
+    view = View(31, 40, 4e-6, 3e-6, oversampling, margin, scene_width, np.float64)
+    spectra = reflectances()
+    charts = {
+        "colorchecker": ColorChecker(largest_card(view.frame)),
+        "step wedge": step_wedge(7, 2.0, view.frame),
+        "slanted edge": SlantedEdge(0.1, 0.6),
+    }
+    return chart_scene(charts[chart], spectra, spectra[0], view)
+
+
+@pytest.mark.parametrize("chart", ["colorchecker", "step wedge"])
+@pytest.mark.parametrize("scene_width", [None, 71.3e-6, 1e-7, 1.0])
+def test_rectangles_have_the_light_of_the_cells(chart, scene_width):
+    """Averaged over the cells, by overlaps worked out here."""
+    painted = scene(chart, scene_width=scene_width)
+    found = painted.rectangles(MIX)
+    ny, nx = painted.shape
+    down, across = (
+        covers(edges, (np.arange(n + 1) - n / 2) * pitch)
+        for edges, n, pitch in ((found.y, ny, painted.pitch_y), (found.x, nx, painted.pitch_x))
+    )
+    averages = np.einsum("yd,rde,xe->ryx", down, found.values, across)
+    np.testing.assert_allclose(averages, painted.planes(MIX), atol=2e-13)
+
+
+def covers(edges, cells):
+    """The part of each cell that lies between each pair of edges: (cells, runs)."""
+    low = np.maximum.outer(cells[:-1], edges[:-1])
+    high = np.minimum.outer(cells[1:], edges[1:])
+    return np.maximum(high - low, 0) / np.diff(cells)[:, None]
+
+
+def test_others_are_painted():
+    assert scene("slanted edge").rectangles(MIX) is None
+    assert Framed(SlantedEdge(0.1, 0.6), Frame(1e-5, 1e-5)).edges() is None
+
+
+def test_terms_against_integrals():
+    """c_k = 2N/S times the integral of cos(pi k x / S) over a run, times sinc(k / 2N)."""
+    cells, edges = 9, np.array([-1.0, -0.3, 0.25, 2.0])
+    found = terms_of_runs(edges, cells, 40)
+    with mpmath.workdps(30):
+        for k in (0, 1, 2, 9, 17, 39):
+            for run in range(3):
+                a, b = (mpmath.mpf(edges[run + i]) + 1 for i in (0, 1))
+                part = mpmath.quad(lambda x, k=k: mpmath.cos(mpmath.pi * k * x / 3), [a, b])
+                expected = 2 * cells * part / 3 * mpmath.sincpi(mpmath.mpf(k) / (2 * cells))
+                # the sines of angles up to 40 pi are good to 40 pi times the rounding unit
+                assert found[k, run] == pytest.approx(float(expected), abs=2e-14 * cells)
+
+
+def axis_of(cells: int, terms: int) -> Axis:
+    """An axis of so many cells of 1 m, followed for so many terms."""
+    axis = Axis(cells, 1.0, cells, 1.0, 0.5, False, (terms - 0.5) / (2 * cells))
+    assert axis.terms == terms
+    return axis
+
+
+def runs(known):
+    return (len(known.y) - 1, known.y.astype(int)), (len(known.x) - 1, known.x.astype(int))
+
+
+@pytest.mark.parametrize(("dtype", "within"), [(np.float64, 1e-13), (np.float32, 1e-6)])
+def test_spectrum_is_that_of_cells_but_for_what_they_fold(dtype, within):
+    """Edges that lie on the borders of fine cells: a sum over the frequencies that these fold."""
+    rng, shape, terms = np.random.default_rng(4), (12, 10), (8, 9)
+    values = rng.random((2, 3, 2))
+    known = Rectangles(np.array([-5.0, 1, 5]), np.array([-6.0, -2, 3, 6]), values)
+    axes = [axis_of(cells, count) for cells, count in zip(shape, terms, strict=True)]
+    spectrum = of_rectangles(known, shape, axes, dtype)
+    found = np.array([spectrum.rows(plane, slice(None)) for plane in range(2)])
+    assert found.dtype == spectrum.dtype == dtype
+    assert found.shape == (2, *terms)
+    fine = 2**13  # cells of the fine painting for each of the coarse: folded parts fall as 1 / f
+    one = [np.repeat(np.eye(n), np.diff(e) * fine, axis=1) for n, e in runs(known)]
+    exact = []
+    for runs_of_one, n, count in zip(one, shape, terms, strict=True):
+        k = np.arange(count)
+        small = scipy.fft.dct(runs_of_one, type=2, axis=1)[:, :count] / fine
+        exact.append(small * np.sinc(k / (2 * n)) / np.sinc(k / (2 * n * fine)))
+    expected = np.einsum("dy,rde,ex->ryx", exact[0], values, exact[1])
+    scale = np.abs(expected).max()
+    np.testing.assert_allclose(found, expected, atol=max(within, 1e-7) * scale, rtol=0)
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+@pytest.mark.parametrize("shape", [(1, 1), (1, 9), (130, 1), (37, 50), (200, 140)])
+def test_samples_are_transformed_along_both_axes(shape, dtype):
+    planes = np.random.default_rng(3).standard_normal((2, *shape))
+    expected = np.array([scipy.fft.dctn(plane, type=2) for plane in planes])
+    for workers in (1, 3):
+        found = transformed(planes.astype(dtype), workers)
+        assert found.dtype == dtype
+        assert len(found) == 2
+        tolerance = 1e-12 if dtype == np.float64 else 1e-5
+        np.testing.assert_allclose(
+            found.coefficients, expected, atol=tolerance * abs(expected).max()
+        )
+
+
+INDICES = (slice(None), slice(30, 8, -1), slice(4, None, 3), np.array([3, 0, 30]))
+
+
+def both_kinds():
+    """The same spectrum of rectangles, as what it is made of and as its numbers."""
+    rng = np.random.default_rng(0)
+    known = RectangleSpectrum(rng.random((31, 7)), rng.random((3, 7, 33)))
+    numbers = np.einsum("yd,rdx->ryx", known.along_y, known.along_x)
+    return known, SampledSpectrum(numbers)
+
+
+@pytest.mark.parametrize("index", INDICES, ids=str)
+def test_rows_of_both_kinds_agree(index):
+    known, sampled = both_kinds()
+    assert len(known) == len(sampled) == 3
+    for plane in range(3):
+        np.testing.assert_allclose(known.rows(plane, index), sampled.rows(plane, index))
+
+
+@pytest.mark.parametrize("pair", [(0, 0), (0, 2), (1, 2)])
+def test_products_of_both_kinds_agree(pair):
+    """And are the sums over blocks of the product of the coefficients."""
+    known, sampled = both_kinds()
+    y, x = [0, 1, 5, 22, 31], [0, 3, 4, 33]
+    both = sampled.coefficients[pair[0]] * sampled.coefficients[pair[1]]
+    expected = [[both[a:b, c:d].sum() for c, d in pairwise(x)] for a, b in pairwise(y)]
+    y, x = np.array(y), np.array(x)
+    for spectrum in (known, sampled):
+        for workers in (1, 3):
+            found = spectrum.products(pair, y, x, workers)
+            assert found.dtype == np.float64
+            np.testing.assert_allclose(found, expected, rtol=1e-12)
+
+
+def test_products_of_32_bits_are_added_up_in_64():
+    rng = np.random.default_rng(5)
+    planes = rng.standard_normal((2, 500, 300))
+    y, x = np.array([0, 100, 500]), np.array([0, 7, 300])
+    exact = SampledSpectrum(planes).products((0, 1), y, x, 1)
+    short = SampledSpectrum(planes.astype(np.float32)).products((0, 1), y, x, 1)
+    own = SampledSpectrum(planes).products((0, 0), y, x, 1).max()
+    np.testing.assert_allclose(short, exact, atol=3e-7 * own)
+
+
+WEDGE = {"kind": "chart", "chart": "step-wedge", "steps": 5}
+CARD = {"kind": "chart", "chart": "colorchecker"}
+
+
+def rate(folder, source, **accuracy):
+    tree = {
+        "scene.radiance": radiance_for(2000), "scene.source": source,
+        "array.rows": 20, "array.columns": 24,
+        "accuracy": {"preset": "standard", "float_width": 64, **accuracy},
+    }  # fmt: skip
+    found, _ = prepare(camera(folder, tree), 1)
+    return found
+
+
+@pytest.mark.parametrize("source", [WEDGE, CARD], ids=["step wedge", "colorchecker"])
+def test_finer_and_finer_cells_come_to_it(source, tmp_path, monkeypatch):
+    """More or less quickly, as the edges happen to lie within the cells."""
+    exact = rate(tmp_path, source, oversampling=64)
+    assert exact.spectrum.lost == 0
+    assert exact.spectrum.cells == 0
+    monkeypatch.setattr("vcam_cli.scenes.base.ChartScene.rectangles", lambda *_: None)
+    for kind in (ColorChecker, type(step_wedge(2, 1.0, Frame(1.0, 1.0)))):
+        monkeypatch.setattr(kind, "edges", lambda *_: None)
+    errors = []
+    for cells in (6, 24, 48):
+        painted = rate(tmp_path, source, oversampling=cells)
+        assert painted.spectrum.cells > 0
+        errors.append(rms(painted.rate, exact.rate) / exact.rate.max())
+    assert errors[0] < 1e-3
+    assert errors[1] < errors[0] / 3
+    # What the far field leaves stays as it is: at standard accuracy 1e-5 of white.
+    assert errors[2] < max(errors[1] / 3, 1e-5)
+
+
+@pytest.mark.parametrize("source", [WEDGE, CARD], ids=["step wedge", "colorchecker"])
+@pytest.mark.parametrize("kept", [2, 4])
+def test_what_is_lost_is_estimated(source, kept, tmp_path):
+    """By Parseval's theorem over the scene, as if all of its light fell on the array."""
+    exact, found = (
+        rate(tmp_path, source, oversampling=64),
+        rate(tmp_path, source, oversampling=kept),
+    )
+    ratio = found.spectrum.lost / rms(found.rate, exact.rate)
+    assert 0.5 < ratio < 3, ratio

@@ -1,0 +1,96 @@
+"""Effective transfer functions against direct sums over wavelength."""
+
+import numpy as np
+import pytest
+
+from vcam_cli.effects.diffraction import Diffraction
+from vcam_cli.image_formation.transfer_functions import Band, transfer
+from vcam_cli.image_formation.transfer_tables import TableSize, mixtures, tabulate
+from vcam_cli.spectra import PLANCK, SPEED_OF_LIGHT, Spectrum, illuminant
+
+LENS = Diffraction(f_number=4.0, magnification=-0.02)
+F = np.linspace(0, 500e3, 41)
+
+
+def tables_of(exact, entries, tolerance):
+    """Tables of as few mixtures of the spectra as the tolerance allows."""
+    size = TableSize(exact.cutoff, entries, tolerance, 8)
+    return tabulate(exact, size, mixtures([exact], size))
+
+
+def bell(center, width=40e-9):
+    nodes = np.linspace(400e-9, 700e-9, 301)
+    return Spectrum.from_samples(nodes, np.exp(-(((nodes - center) / width) ** 2)))
+
+
+def test_a_line_is_its_own_otf():
+    """Monochromatic light: H is the OTF at that wavelength, no grid in between."""
+    wavelength = 553.7e-9
+    h = transfer(
+        [Spectrum.line(wavelength, 2.0)], [bell(540e-9)], 3.0, Band(400e-9, 700e-9, 50e-9), [LENS]
+    )
+    photons = 2.0 * wavelength / (PLANCK * SPEED_OF_LIGHT)
+    level = 3.0 * photons * bell(540e-9).evaluate(np.array([wavelength]))[0]
+    np.testing.assert_allclose(h.at(F)[0, 0], level * LENS.otf(F, wavelength), rtol=1e-12)
+
+
+@pytest.mark.parametrize(("step", "tolerance"), [(20e-9, 5e-4), (10e-9, 1.3e-4), (2.5e-9, 8e-6)])
+@pytest.mark.parametrize("lamp", ["D65", "FL2", "A"])
+def test_many_wavelengths_by_brute_force(lamp, step, tolerance):
+    """A 0.05 nm sum, OTF at every wavelength.
+
+    Linear interpolation between the nodes errs by step^2 / 8 times the second derivative of the
+    OTF: (4 / pi) (f N (1 - m))^2 nu / sqrt(1 - nu^2), 8e12 / m^2 at 425 lp/mm: 1e-4 at 10 nm.
+    """
+    light, green = illuminant(lamp), bell(540e-9)
+    h = transfer([light], [green], 1.0, Band(400e-9, 700e-9, step), [LENS])
+    # midpoints of a grid that has every table's knots among its edges
+    edges = np.linspace(400e-9, 700e-9, 6001)
+    mid = (edges[1:] + edges[:-1]) / 2
+    density = light.evaluate(mid) * green.evaluate(mid) * mid / (PLANCK * SPEED_OF_LIGHT)
+    direct = sum(d * LENS.otf(F, w) for d, w in zip(density * np.diff(edges), mid, strict=True))
+    got = h.at(F)[0, 0]
+    np.testing.assert_allclose(got, direct, atol=tolerance * direct[0])
+    # the level does not depend on the step at all
+    np.testing.assert_allclose(got[0], direct[0], rtol=1e-6)
+
+
+def test_cutoff_is_that_of_the_shortest_wavelength_in_use():
+    h = transfer(
+        [Spectrum.line(500e-9)], [Spectrum.flat(1.0)], 1.0, Band(400e-9, 700e-9, 10e-9), [LENS]
+    )
+    assert h.cutoff == pytest.approx(LENS.cutoff(500e-9), rel=1e-12)
+    assert (
+        transfer([bell(5e-7)], [bell(5e-7)], 1.0, Band(400e-9, 700e-9, 1e-8), []).cutoff == np.inf
+    )
+
+
+def test_few_mixtures_stand_for_many_spectra():
+    """24 random spectra through 3 colors: a handful of mixtures, within the tolerance asked for."""
+    rng = np.random.default_rng(0)
+    nodes = np.linspace(400e-9, 700e-9, 31)
+    spectra = [Spectrum.from_samples(nodes, rng.random(31)) for _ in range(24)]
+    colors = [bell(600e-9), bell(540e-9), bell(460e-9)]
+    exact = transfer(spectra, colors, 1.0, Band(400e-9, 700e-9, 10e-9), [LENS])
+    for tolerance in (1e-2, 1e-4, 1e-7):
+        table = tables_of(exact, 2001, tolerance)
+        rebuilt = np.tensordot(table.mix.T, table.radial, axes=1)
+        truth = exact.at(np.linspace(0, exact.cutoff, 2001))
+        error = np.abs(rebuilt - truth).max() / exact.level.max()
+        assert error <= 1.02 * tolerance
+        # it is judged at 256 frequencies, this at 2001
+        assert error == pytest.approx(table.error, rel=0.02, abs=1e-15)
+    # three colors, blurred slightly differently at every wavelength: six mixtures do for 1 %
+    assert len(tables_of(exact, 2001, 1e-2).mix) <= 6
+
+
+def test_few_spectra_stay_as_they_are():
+    exact = transfer([bell(5e-7), bell(6e-7)], [bell(5e-7)], 1.0, Band(4e-7, 7e-7, 1e-8), [LENS])
+    table = tables_of(exact, 101, 1e-3)
+    assert np.array_equal(table.mix, np.eye(2))
+    assert table.error == 0
+
+
+def test_spectra_that_do_not_cover_the_band_are_refused():
+    with pytest.raises(ValueError, match="nm"):
+        transfer([bell(5e-7)], [Spectrum.flat(1.0)], 1.0, Band(380e-9, 780e-9, 1e-8), [LENS])

@@ -1,0 +1,224 @@
+"""Tables of transfer functions against the functions that they hold."""
+
+import numpy as np
+import pytest
+from optical_paths import Gaussian, Leaning, light
+from scipy.interpolate import CubicSpline
+
+from vcam_cli.effects.diffraction import Diffraction
+from vcam_cli.effects.wavefront_blur import DirectedBlur, Lens, SymmetricBlur
+from vcam_cli.image_formation.transfer_functions import Transfer
+from vcam_cli.image_formation.transfer_tables import (
+    LARGEST_PLANE,
+    PARITIES,
+    SMALLEST_PLANE,
+    Tables,
+    TableSize,
+    bound,
+    by_parity,
+    mixtures,
+    plane_grid,
+    reader,
+    spline_weights,
+    tabulate,
+    turned,
+)
+
+WAVELENGTHS = np.linspace(420e-9, 660e-9, 7)
+F = np.linspace(0, 2.1e5, 37)
+G = np.linspace(0, 1.9e5, 29)
+COMA = ((7, 50e-9),)
+MIXED = ((4, 40e-9), (5, 25e-9), (8, 45e-9), (9, -20e-9))
+
+
+def spectral(*blurs, components=2, colors=3, seed=0) -> Transfer:
+    """Light of several spectra in several colors, at seven wavelengths."""
+    weights = np.random.default_rng(seed).random((components, colors, 7))
+    return light(*blurs, weights=weights, wavelengths=WAVELENGTHS)
+
+
+def size_of(exact: Transfer, entries: int = 8193, steps: float = 8.0) -> TableSize:
+    return TableSize(min(exact.cutoff, 4e5), entries, 0.0, steps)
+
+
+def tables_of(exact: Transfer, **sizes) -> Tables:
+    size = size_of(exact, **sizes)
+    return tabulate(exact, size, (np.eye(len(exact.weights)), 0.0))
+
+
+@pytest.mark.parametrize("blurs", ["none", "diffraction", "defocus", "gaussian"])
+def test_radial_tables_are_the_transfer_functions(blurs):
+    """Linear between 8193 entries: they err by the second difference over 8, but for the ends."""
+    lens = {
+        "none": (),
+        "diffraction": (Diffraction(2.8, 0.0),),
+        "defocus": (Diffraction(2.8, 0.0), SymmetricBlur(Lens(2.8, True), ((4, 60e-9),))),
+        "gaussian": (Gaussian(2e-6), Gaussian(1e-6)),
+    }[blurs]
+    exact = spectral(*lens)
+    tables = tables_of(exact)
+    assert tables.parities == [0]
+    assert tables.colors == 3
+    found = reader(tables, 0, F).values(G)
+    expected = exact.at(np.hypot(F, G[:, None]))
+    np.testing.assert_allclose(found, expected, atol=2e-7 * exact.level.max())
+
+
+def combined(tables: Tables, fx, fy) -> np.ndarray:
+    """What the tables say of H at (fx, fy) in the quadrant: (R, C, m, n), complex.
+
+    cos becomes cos and sines of the same frequencies; so H of a half-plane is put together again.
+    """
+    total = np.zeros((len(tables.mix), tables.colors, len(fy), len(fx)), complex)
+    # cos cos -> H0 cos cos + H1 sin sin + H2 sin cos + H3 cos sin: see `by_parity`
+    factors = {0: 1, 1: -1, 2: -1j, 3: -1j}
+    for parity in tables.parities:
+        total = total + factors[parity] * reader(tables, parity, fx).values(fy)
+    return total
+
+
+@pytest.mark.parametrize("terms", [COMA, MIXED, ((2, 30e-9),)], ids=["coma", "several", "tilt"])
+def test_plane_tables_are_the_transfer_functions(terms):
+    """Thinned to every second wavelength, which the radial part is not: 2e-3 of the light.
+
+    To its second order a transfer is linear between neighboring wavelengths.
+    """
+    exact = spectral(Diffraction(2.8, 0.0), DirectedBlur(Lens(2.8, True), terms))
+    tables = tables_of(exact)
+    found = combined(tables, F, G)
+    expected = exact.at_plane(F, G)
+    level = exact.level[..., None, None]
+    assert np.abs((found - expected) / level).max() < 2e-3
+    # along the axes of the quadrant's mirror image, which the parities have in them too
+    mirrored = exact.at_plane(F, -G)
+    sine = {1: 1, 3: 1j}
+    other = sum(
+        sine.get(p, {0: 1, 2: -1j}.get(p)) * reader(tables, p, F).values(G) for p in tables.parities
+    )
+    assert np.abs((other - mirrored) / level).max() < 2e-3
+
+
+@pytest.mark.parametrize("steps", [4.0, 8.0, 16.0])
+def test_plane_tables_follow_the_phase_of_a_blur(steps):
+    """A Gaussian beside its place, at one wavelength: only the spline's error is left."""
+    blur = Leaning(6e-6, -4e-6, 1.5e-6, 2e-6)
+    exact = light(blur)
+    found = combined(tables_of(exact, steps=steps), F, G)
+    worst = np.abs(found - exact.at_plane(F, G)).max()
+    # a cubic spline with n steps in a period errs by about (2 pi / n)^4 / 384
+    assert worst < 2 * (2 * np.pi / steps) ** 4 / 384
+
+
+def test_entries_follow_the_reach_within_limits():
+    size = TableSize(4e5, 100, 0.0, 8)
+    assert size.plane_entries((Leaning(0, 0, 1e-9, 1e-9),)) == SMALLEST_PLANE
+    assert size.plane_entries((Leaning(0, 0, 1e-2, 1e-2),)) == LARGEST_PLANE
+    assert size.plane_entries((Leaning(0, 0, 1e-2, 1e-2),), 77) == 77
+    assert size.plane_entries((Leaning(0, 0, 1e-5, 1e-6), Leaning(0, 0, 1e-6, 1e-6))) == 97
+
+
+def test_a_reader_of_fewer_columns_is_the_same():
+    exact = spectral(Diffraction(2.8, 0.0), DirectedBlur(Lens(2.8, True), MIXED))
+    tables = tables_of(exact)
+    for parity in range(4):
+        whole = reader(tables, parity, F)
+        np.testing.assert_array_equal(whole.values(G[3:5], 9), whole.values(G)[:, :, 3:5, :9])
+
+
+def test_a_spline_by_weights_is_the_spline():
+    rng = np.random.default_rng(1)
+    table, at = rng.random(23), np.sort(rng.random(50))
+    spline = CubicSpline(np.linspace(0, 1, 23), table, bc_type="not-a-knot")
+    np.testing.assert_allclose(spline_weights(23, at) @ table, spline(at), atol=1e-12)
+
+
+def test_weights_of_a_spline():
+    at = np.linspace(0, 1, 23)
+    np.testing.assert_allclose(spline_weights(23, at), np.eye(23), atol=1e-12)
+    beyond = spline_weights(23, np.array([1.0, 1.0 + 1e-9, 2.0]))
+    np.testing.assert_allclose(beyond[0], np.eye(23)[-1], atol=1e-12)
+    assert not beyond[1:].any()
+    places = np.random.default_rng(0).random(40)
+    weights = spline_weights(23, places)
+    for power in range(4):  # cubics are their own splines, the constant among them
+        np.testing.assert_allclose(weights @ at**power, places**power, atol=1e-12)
+
+
+@pytest.mark.parametrize("fx", [3e4, 0.0])
+@pytest.mark.parametrize("fy", [5e4, 0.0])
+def test_parities_turn_a_cosine_into_what_a_blur_makes_of_it(fx, fy):
+    """Against the light of a wave that a blur moves and weakens, in space."""
+    blur = Leaning(2.5e-6, -1.3e-6, 1.6e-6, 2.4e-6)
+    at = np.array([[fx]]), np.array([[fy]])
+    plus, minus = (blur.otf_plane(at[0][0], sign * at[1][0], 550e-9) for sign in (1, -1))
+    parts = by_parity(plus, minus)[:, 0, 0]
+    x, y = np.linspace(-9e-6, 9e-6, 13), np.linspace(-7e-6, 7e-6, 11)[:, None]
+    size = np.exp(-2 * np.pi**2 * ((1.6e-6 * fx) ** 2 + (2.4e-6 * fy) ** 2))
+    moved = np.cos(2 * np.pi * fx * (x - 2.5e-6)) * np.cos(2 * np.pi * fy * (y + 1.3e-6))
+    wave = [(np.cos(2 * np.pi * f * p), np.sin(2 * np.pi * f * p)) for f, p in ((fx, x), (fy, y))]
+    found = sum(
+        part * wave[0][odd_x] * wave[1][odd_y]
+        for part, (odd_x, odd_y) in zip(parts, PARITIES, strict=True)
+    )
+    np.testing.assert_allclose(found, size * moved, atol=1e-12)
+
+
+@pytest.mark.parametrize("mirrored", [False, True])
+@pytest.mark.parametrize("quarters", [0, 1, 2, 3])
+def test_tables_of_a_turned_blur_are_those_of_its_model_turned(quarters, mirrored):
+    """A blur with y mirrored, then turned from x to y: T'(fx, fy) = T(fy, -fx) for each quarter."""
+    f = np.linspace(0, 2e5, 11)
+    own = Leaning(2.5e-6, 1.3e-6, 1.6e-6, 2.4e-6)
+    right, down, along_x, along_y = 2.5e-6, 1.3e-6, 1.6e-6, 2.4e-6
+    if mirrored:
+        down = -down
+    for _ in range(quarters):
+        right, down, along_x, along_y = -down, right, along_y, along_x
+    there = Leaning(right, down, along_x, along_y)
+    parts, expected = (
+        by_parity(blur.otf_plane(f, f, 0.0), blur.otf_plane(f, -f, 0.0)) for blur in (own, there)
+    )
+    for parity in range(4):
+        found = turned(parts, parity, quarters, mirrored)
+        np.testing.assert_allclose(found, expected[parity], atol=1e-12)
+
+
+def test_what_is_added_to_the_radial_part_is_zero_for_round_blurs():
+    """By a grid of two halves of the plane, of a blur known over |f|: parity 0 alone."""
+    exact = spectral(Diffraction(2.8, 0.0))
+    grid = plane_grid(exact, 3e5, 17)
+    parts = grid.change([Gaussian(1e-6)])
+    length = np.hypot(grid.frequency, grid.frequency[:, None])
+    added = exact.thinned().at(length) * (np.exp(-2 * (np.pi * 1e-6 * length) ** 2) - 1)
+    np.testing.assert_allclose(parts[0], added, atol=1e-12 * exact.level.max())
+    assert np.abs(parts[1:]).max() < 1e-12 * exact.level.max()
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_no_lens_exceeds_the_bound(sign):
+    """Weights of both signs, and any blur with a direction."""
+    weights = np.random.default_rng(3).random((2, 2, 7))
+    weights[1] *= sign
+    weights[1, :, ::2] *= -1
+    blurs = Diffraction(2.8, 0.0), DirectedBlur(Lens(2.8, True), MIXED)
+    exact = light(*blurs, weights=weights, wavelengths=WAVELENGTHS)
+    size = size_of(exact)
+    limit = reader(bound(exact, size, (np.eye(2), 0.0)), 0, F).values(G)
+    assert (np.abs(exact.at_plane(F, G)) <= limit + 1e-6 * limit.max()).all()
+
+
+def test_mixtures_serve_every_place_of_a_field():
+    """Two lenses of the same spectra: what is kept for both keeps each within the tolerance."""
+    one = spectral(Diffraction(2.8, 0.0), components=12)
+    two = one.through((*one.effects, SymmetricBlur(Lens(2.8, True), ((4, 120e-9),))))
+    size = TableSize(3e5, 2049, 1e-3, 8)
+    mix, error = mixtures([one, two], size)
+    assert len(mix) < 12
+    assert error <= 1e-3
+    f = np.linspace(0, 3e5, 999)
+    for exact in (one, two):
+        rebuilt = np.tensordot(mix.T, exact.mixed(mix).at(f), axes=1)
+        assert np.abs(rebuilt - exact.at(f)).max() <= 1.05e-3 * np.abs(exact.level).max()
+    limited, worse = mixtures([one, two], TableSize(3e5, 2049, 1e-9, 8, rank=2))
+    assert len(limited) == 2
+    assert worse > error

@@ -1,0 +1,117 @@
+"""What a study expects beside what it finds: expected.csv, the words for it, mistakes in it."""
+
+import csv
+import math
+
+import pytest
+from sweeping import written
+
+from vcam_cli import sweep
+from vcam_cli.commands.sweep import report
+from vcam_cli.errors import BadInput
+
+VARY = {"pixel.width": {"start": "4 um", "stop": "6 um", "count": 5}}
+OPTIMIZE = {"metric": "mean_electrons", "goal": "max"}
+CASES = {"small": {}, "wide": {"vary": {"pixel.width": {"values": ["7 um", "9 um"]}}}}
+
+
+def study(folder, **expect):
+    return written(folder, vary=VARY, cases=CASES, optimize=OPTIMIZE, expect=expect)
+
+
+def rows(folder):
+    with open(folder / "expected.csv", newline="", encoding="utf-8") as file:
+        return {row["expectation"]: row for row in csv.DictReader(file)}
+
+
+def test_every_kind_of_quantity(tmp_path):
+    path = study(
+        tmp_path,
+        best={"quantity": "optimum", "between": ["5.9 um", "6100 nm"], "source": "by hand"},
+        apart={
+            "quantity": "optimum",
+            "case": "wide",
+            "minus": "small",
+            "between": ["3 um", "3 um"],
+        },
+        most={"quantity": "mean_electrons", "at": "optimum", "between": [0, math.inf]},
+        ratio={
+            "quantity": "mean_electrons",
+            "at": "4 um",
+            "over": "6 um",
+            "between": [0.40, 0.49],
+        },
+        step={"quantity": "mean_electrons", "at": "4 um", "minus": "5 um", "between": [1, 2]},
+        pitch={"quantity": "nyquist_frequency", "at": "8 um", "between": ["62.5 lp/mm", 62.5]},
+        other={
+            "quantity": "nyquist_frequency",
+            "at": "8 um",
+            "set": {"pixel.gap_x": "2 um"},
+            "between": [49.9, 50.1],
+            "calibrated": "the gap",
+        },
+    )
+    result = sweep(path, tmp_path / "out", workers=1)
+    found = rows(tmp_path / "out")
+    assert list(found) == ["best", "apart", "most", "ratio", "step", "pitch", "other"]
+    assert found["best"] == {
+        "expectation": "best", "case": "small", "quantity": "optimum", "found": "6.0",
+        "unit": "um", "least": "5.9", "most": "6.1", "verdict": "inside", "calibrated": "",
+        "source": "by hand", "why": "",
+    }  # fmt: skip
+    assert (found["apart"]["found"], found["apart"]["verdict"]) == ("3.0", "inside")
+    assert (found["pitch"]["found"], found["other"]["found"]) == ("62.5", "50.0")
+    # Areas: 16 / 36, of pixels of one fill factor.
+    assert float(found["ratio"]["found"]) == pytest.approx(16 / 36, rel=0.02)
+    assert float(found["step"]["found"]) < 0
+    assert found["step"]["verdict"] == "missed"
+    assert found["most"]["most"] == ""
+    means = {r["pixel.width [um]"]: r["mean_electrons"] for r in result.points[:5]}
+    assert float(found["ratio"]["found"]) == pytest.approx(means[4.0] / means[6.0], rel=1e-5)
+    said = report(result)
+    assert "expected.csv: 6 of 7 expectations are met, 1 of them by calibration" in said
+    assert "  missed: step: -" in said
+    assert ", expected 1 to 2 e" in said
+    assert result.summary()["missed"] == ["step"]
+
+
+def test_a_point_that_failed_leaves_it_unknown(tmp_path):
+    bright = {"4": {}, "5": {"scene.radiance": "1e30 W/(sr m2)"}}
+    expect = {"x": {"quantity": "snr_db", "case": "5", "at": "4 um", "between": [1, 2]}}
+    path = written(tmp_path, vary=VARY, cases=bright, metrics=["snr_db"], expect=expect)
+    result = sweep(path, tmp_path / "out", workers=1)
+    (row,) = rows(tmp_path / "out").values()
+    assert (row["found"], row["verdict"]) == ("", "unknown")
+    assert "unknown: x" in report(result)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "place", "said"),
+    [
+        ({"quantity": "optimun"}, "quantity", "optimum"),
+        ({"quantity": "optimum", "at": "4 um"}, "at", "no place of its own"),
+        ({"quantity": "optimum", "case": "big"}, "case", "big"),
+        ({"quantity": "optimum", "minus": "big"}, "minus", "big"),
+        ({"quantity": "mean_electrons"}, "at", "missing"),
+        ({"quantity": "mean_electrons", "at": "4.1 um"}, "at", "no point at 4.1 um"),
+        ({"quantity": "snr_db", "at": "optimum"}, "at", "not what the optimum is of"),
+        ({"quantity": "fill_factor", "at": "optimum"}, "at", "before the optimum is known"),
+        ({"quantity": "optimum", "between": ["1 s", "2 um"]}, "between", "do not go together"),
+        ({"quantity": "optimum", "between": ["3 um", "2 um"]}, "between", "3 is more than 2"),
+        ({"quantity": "optimum", "between": ["3 um"]}, "between", "not two values"),
+        ({"quantity": "optimum", "set": {"adc.bits": 8}}, "set", "no such overrides"),
+        ({"quantity": "mean_electrons", "at": "4 um", "over": "5 um", "minus": "6 um"}, "minus",
+         "cannot both be given"),
+    ],
+)  # fmt: skip
+def test_mistakes(tmp_path, wrong, place, said):
+    given = {"between": ["1 um", "2 um"] if wrong["quantity"] == "optimum" else [1, 2]} | wrong
+    path = study(tmp_path, x=given)
+    with pytest.raises(BadInput) as caught:
+        sweep(path, tmp_path / "out")
+    (problem,) = caught.value.problems
+    assert problem.path[:3] == ("expect", "x", place)
+    assert problem.where
+    assert problem.remedy
+    assert said in f"{problem.message} {problem.remedy}"
+    assert not (tmp_path / "out").exists()

@@ -1,0 +1,134 @@
+"""A sweep on a Dask scheduler and two workers in processes of their own, one of them killed."""
+
+import json
+import re
+import subprocess
+import sys
+import time
+
+import pytest
+from sweeping import VCAM, environment, written
+
+from vcam_cli import sweep
+from vcam_cli.errors import BadInput, CannotDo
+from vcam_cli.sweeps import workers
+from vcam_cli.sweeps.point_work import Job
+
+STUDY = {
+    "vary": {"pixel.width": {"start": "4 um", "stop": "6 um", "count": 10}},
+    "cases": {"a": {}, "b": {"optics.f_number": 5}},
+    "seeds": 2,
+    "optimize": {"metric": "mean_electrons", "goal": "max"},
+}
+
+
+def without_dask(monkeypatch):
+    monkeypatch.setitem(sys.modules, "distributed", None)
+
+
+def test_without_dask_the_message_has_the_command(tmp_path, monkeypatch):
+    without_dask(monkeypatch)
+    with pytest.raises(CannotDo, match=r"pip install 'vcam-cli\[dask\]'"):
+        sweep(written(tmp_path), tmp_path / "out", scheduler="tcp://127.0.0.1:8786")
+
+
+class FakeFuture:
+    """What a cluster gives back of a task."""
+
+    def __init__(self, error=None, cancelled=False):
+        self._error, self._cancelled = error, cancelled
+
+    def cancelled(self):
+        return self._cancelled
+
+    def exception(self):
+        return self._error
+
+    def result(self):
+        return "outcome"
+
+
+def test_what_becomes_of_a_task():
+    job = Job("ab", None, (), (), {})
+    assert workers._outcome(job, FakeFuture(), "lost") == "outcome"
+    given_up = workers._outcome(job, FakeFuture(RuntimeError("killed")), "lost")
+    assert given_up.id == "ab"
+    assert given_up.error
+    assert not given_up.final
+    with pytest.raises(CannotDo, match="lost"):
+        workers._outcome(job, FakeFuture(cancelled=True), "lost")
+    with pytest.raises(CannotDo, match="install vcam"):
+        workers._outcome(job, FakeFuture(ModuleNotFoundError("vcam_cli")), "lost")
+
+
+class Cluster:
+    """A scheduler and workers, each a process."""
+
+    def __init__(self, folder):
+        self.folder, self.address = folder, ""
+        self.workers = []
+        self.scheduler = self._start(
+            "scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard"
+        )
+        log = folder / "scheduler.log"
+        until = time.monotonic() + 30
+        while not self.address and time.monotonic() < until:
+            found = re.search(r"tcp://127\.0\.0\.1:\d+", log.read_text())
+            self.address = found[0] if found else ""
+            time.sleep(0.02)
+
+    def add_worker(self):
+        name = f"worker{len(self.workers)}"
+        options = ("--nthreads", "1", "--no-nanny", "--no-dashboard", "--name", name)
+        local = ("--local-directory", str(self.folder))
+        self.workers.append(self._start("worker", self.address, *options, *local, name=name))
+
+    def _start(self, what, *arguments, name=""):
+        command = [sys.executable, "-m", f"distributed.cli.dask_{what}", *arguments]
+        with open(self.folder / f"{name or what}.log", "wb") as log:
+            return subprocess.Popen(command, stdout=log, stderr=log, env=environment())
+
+    def close(self):
+        for process in (*self.workers, self.scheduler):
+            process.kill()
+            process.wait()
+
+
+@pytest.mark.long
+def test_a_killed_worker_changes_nothing(tmp_path):
+    pytest.importorskip("distributed")
+    study = written(tmp_path, **STUDY)
+    sweep(study, tmp_path / "here", workers=1)
+    cluster = Cluster(tmp_path)
+    try:
+        cluster.add_worker()
+        cluster.add_worker()
+        command = [*VCAM, "sweep", str(study), "--scheduler", cluster.address, "--json"]
+        process = subprocess.Popen(
+            [*command, "-o", str(tmp_path / "far")],
+            env=environment(), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        )  # fmt: skip
+        until = time.monotonic() + 60
+        points = tmp_path / "far" / "points"
+        while len(list(points.glob("*.json"))) < 5 and time.monotonic() < until:
+            time.sleep(0.002)
+        cluster.workers[0].kill()
+        told, said = process.communicate(timeout=120)
+        assert process.returncode == 0, said
+        assert json.loads(told)["computed"] == 40
+        for name in ("points.csv", "optimum.csv"):
+            assert (tmp_path / "far" / name).read_bytes() == (tmp_path / "here" / name).read_bytes()
+    finally:
+        cluster.close()
+
+
+@pytest.mark.filterwarnings("ignore::ResourceWarning", "ignore::DeprecationWarning")
+def test_a_scheduler_that_does_not_answer(tmp_path, monkeypatch):
+    pytest.importorskip("distributed")
+    monkeypatch.setattr(workers, "CONNECT_TIMEOUT", 0.5)
+    start = time.monotonic()
+    with pytest.raises(CannotDo, match="no Dask scheduler answers at"):
+        sweep(written(tmp_path), tmp_path / "out", scheduler="tcp://127.0.0.1:1")
+    assert time.monotonic() - start < 10
+    with pytest.raises(BadInput, match="--scheduler"):
+        sweep(written(tmp_path), tmp_path / "out", scheduler="nonsense://x")

@@ -1,0 +1,1 @@
+"""Accuracy: what each setting of the computation loses against a converged reference."""

@@ -1,0 +1,162 @@
+"""What each effect does, measured: the plan's estimates are held to this.
+
+Of an effect that changes the mean signal: rms over the array of (mean raw with everything on -
+mean raw without it), relative to full signal. Of noise, which changes no mean: its share of the
+variance, from draws at 1, 10 and 100 % of full signal with and without it. Every draw has random
+numbers of its own, so that the difference of two frames is the effect and nothing else.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.derived.geometry import geometry
+from vcam_cli.effects.base import Charge, NoiseSource, Quantizer
+from vcam_cli.effects.order import ORDER
+from vcam_cli.effects.quantization import Quantization
+from vcam_cli.effects.read_noise import ReadNoise
+from vcam_cli.effects.saturation import Saturation
+from vcam_cli.readout import binned_readout, exposure
+from vcam_cli.simulation import plan
+from vcam_cli.simulation.preparation import Prepared
+
+FLAT = (4, 1 << 16)
+"""Rows and columns of the fields that noise is measured on: many columns, since some of it is the
+same along a whole column. A variance is good to sqrt(2 / columns) = 0.6 % then."""
+SQUARE = (1 << 10, 1 << 10)
+"""The same where some of it is the same along a whole row too: good to 4 %."""
+
+
+@dataclass(frozen=True)
+class Ablation:
+    """One effect: what the plan expected of leaving it out, and what that did."""
+
+    name: str
+    state: str
+    """on | off, in the camera as its file has it"""
+    by: str
+    """user | plan"""
+    predicted: float | None
+    measured: float
+    unit: str
+    """What both are relative to."""
+    seconds_saved: float
+    """Time a frame takes less without it [s]; below 0: more."""
+
+    @property
+    def ratio(self) -> float | None:
+        """Predicted over measured; None where there is nothing to compare."""
+        if self.predicted is None or self.measured <= 0:
+            return None
+        return self.predicted / self.measured
+
+
+def with_effects(camera: Camera, every: str, *left_out: str) -> Camera:
+    """Return the camera with what its file wants on `auto` or `on`, but for what is left out.
+
+    What the file itself switches off stays off.
+    """
+    own = camera.effects if isinstance(camera.effects, dict) else {}
+    off = {*left_out, *(name for name, wish in own.items() if wish == "off")}
+    if every == "auto":
+        return camera.model_copy(update={"effects": dict.fromkeys(sorted(off), "off") or "auto"})
+    found = {n for n, effect in plan.described(camera, geometry(camera)).items() if effect}
+    states = {name: "off" if name in off else "on" for name in sorted(found | off)}
+    return camera.model_copy(update={"effects": states})
+
+
+def wanted_effects(camera: Camera) -> list[str]:
+    """Names of the effects that the file describes and does not switch off, in their order."""
+    names = {e.name for e in plan.wanted(camera, geometry(camera))}
+    return [kind.name for kind in ORDER if kind.name in names]
+
+
+def with_exposure_time(camera: Camera, time: float) -> Camera:
+    """Return the camera with its exposure time fixed [s]: an effect left out must not change it."""
+    return camera.model_copy(update={"exposure": camera.exposure.single(time)})
+
+
+def mean_raw(ready: Prepared) -> NDArray:
+    """Noise-free raw signal of every pixel, clipped where the well is full, float64 [electrons]."""
+    mean = exposure.mean_electrons(ready.rate, ready.exposure_time, ready.plan.active)
+    mean = mean.astype(np.float64)
+    well = next((e.full_well for e in ready.plan.active if isinstance(e, Saturation)), np.inf)
+    return np.minimum(mean, well, out=mean)
+
+
+def full_signal(ready: Prepared) -> float:
+    """Largest noise-free mean signal on the array, at most the full well, at least 1 electron."""
+    return full_signal_of(ready, mean_raw(ready))
+
+
+def full_signal_of(ready: Prepared, mean: NDArray) -> float:
+    """Return the full signal of a camera whose `mean_raw` is known [electrons]."""
+    return max(1.0, min(ready.electrical.full_well, float(mean.max())))
+
+
+def rms(values: NDArray) -> float:
+    """Root of the mean square."""
+    return float(np.sqrt(np.mean(np.square(values))))
+
+
+def variance_shares(ready: Prepared, full: float, workers: int) -> dict[str, float]:
+    """Of every draw, and of the ADC's rounding: its largest share of the variance of its scope.
+
+    ready: the camera with everything on; full: its full signal [electrons].
+    """
+    draws = [e for e in ready.plan.active if isinstance(e, NoiseSource)]
+    shape = SQUARE if any(isinstance(e, ReadNoise) and e.row for e in draws) else FLAT
+    group = ready.layout.binning_groups.binning
+    shape = (shape[0] + -shape[0] % group.rows, shape[1] + -shape[1] % group.columns)
+    fields = [np.full(shape, share * full) for share in plan.LEVELS]
+    shares = {}
+    for scope in ("frame", "sensor"):
+        here = tuple(e for e in draws if e.scope == scope)
+        everything = [_taken(ready, field, here, workers) for field in fields]
+        for effect in here:
+            others = tuple(e for e in here if e is not effect)
+            shares[effect.name] = max(
+                np.mean((taken - _taken(ready, field, others, workers)) ** 2) / _variance(taken)
+                for taken, field in zip(everything, fields, strict=True)
+            )
+        code = next((e for e in ready.plan.active if isinstance(e, Quantizer)), None)
+        if scope == "frame" and code is not None:
+            times = binned_readout.conversions(group)
+            shares[code.name] = max(_rounding_share(code, taken, times) for taken in everything)
+    return {name: float(share) for name, share in shares.items()}
+
+
+def _rounding_share(code: Quantizer, electrons: NDArray, times: int) -> float:
+    """Mean square of the rounding error, a mean of so many, over the variance with it."""
+    line = code.line(electrons.copy())
+    ends = electrons.mean() * np.array([1.0, 1.001]) + np.array([0.0, 1.0])
+    per_code = float(np.diff(ends)[0] / np.diff(code.line(ends.copy()))[0])
+    error = float(np.mean((np.rint(line) - line) ** 2)) * per_code**2 / times
+    return error / max(error + float(np.var(electrons)), 1e-300)
+
+
+def _variance(taken: NDArray) -> float:
+    return max(float(np.var(taken)), 1e-300)
+
+
+def _taken(
+    ready: Prepared, field: NDArray, draws: tuple[NoiseSource, ...], workers: int
+) -> NDArray:
+    """Return a flat field [electrons], dark signal included, with these draws in it, never clipped.
+
+    Of pixels that are read as one, their mean.
+    """
+    seeds = {"sensor": ready.camera.seed.sensor, "frame": ready.camera.seed.frame}
+    code = Quantization.from_camera(ready.camera, ready.geometry)
+    charges = tuple(e for e in ready.plan.active if isinstance(e, Charge))
+    rate = field / ready.exposure_time - sum(e.rate() for e in charges)
+    effects = (*charges, *draws)
+    take = partial(exposure.capture, code=code, seeds=seeds, workers=workers)
+    joins = replace(ready.layout.binning_groups, step=(1, 1))  # all of its pixels are alike
+    time = ready.exposure_time
+    return binned_readout.read(joins, rate, time, effects, take, code.bits)[0] / joins.summed_codes

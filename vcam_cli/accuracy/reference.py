@@ -1,0 +1,140 @@
+"""What settings are compared with: the camera with everything on, converged.
+
+Why an estimate of its own error stands beside it: edges of a chart are good to the power 5/2 of the
+cells per pixel, and the last digit costs more memory than there is. What is left is told by the
+change of the last refinement; errors ten times larger are not changed by it.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcam_cli import memory
+from vcam_cli.accuracy import ablation
+from vcam_cli.accuracy.knobs import CONVERGED, FINEST, with_accuracy
+from vcam_cli.camera.camera import Camera
+from vcam_cli.effects.base import NoiseSource, Quantizer
+from vcam_cli.scenes.base import ChartScene
+from vcam_cli.simulation.preparation import Prepared
+from vcam_cli.simulation.simulate import prepare
+
+FURTHER = 2.5
+"""How much further than `accuracy: reference` a spectrum is followed: its error falls tenfold."""
+FINEST_CELLS = 64
+"""Largest oversampling that a camera file may ask for."""
+ORDER = 2.5
+"""Power of the oversampling with which the error of a painted edge falls."""
+MOST_BYTES = 4e9
+"""Memory beyond which a chart is not sampled more finely for the reference."""
+
+
+@dataclass(frozen=True)
+class Reference:
+    """What everything is compared with."""
+
+    full_signal: float
+    """[electrons]"""
+    exposure_time: float
+    """[s]"""
+    oversampling: float
+    """Pixel Nyquist frequencies the spectrum was followed to; 0: closed form."""
+    lost: float
+    """Estimated rms that even the reference misses, relative to full signal."""
+    settings: dict[str, Any]
+    changes: dict[str, float] = field(default_factory=dict)
+    """Knob -> rms that its last refinement changed, relative to full signal."""
+
+
+def finest_camera(camera: Camera, coarse: Prepared, most_bytes: float = 0) -> Camera:
+    """Return the camera with everything on and every knob finer than its reference.
+
+    coarse: the camera at `accuracy: reference`. Where its scene has a spectrum, it is followed
+    two and a half times as far as there, as long as so many bytes suffice; 0: `MOST_BYTES`. A
+    chart whose spectrum is known is followed as far as the key goes.
+    """
+    knobs: dict[str, Any] = dict(FINEST)
+    reached = coarse.spectrum.oversampling
+    if reached:
+        samples = (
+            min(most_bytes or MOST_BYTES, memory.available() / 2)
+            / 8
+            / max(1, coarse.spectrum.planes)
+        )
+        most = int(math.sqrt(samples / _pixels(coarse)))
+        wanted = min(math.ceil(FURTHER * reached), FINEST_CELLS)
+        if _is_rectangles(coarse):
+            wanted = most = FINEST_CELLS
+        knobs["oversampling"] = max(math.ceil(reached), min(wanted, most))
+    return with_accuracy(ablation.with_effects(camera, "all"), tolerance=CONVERGED, **knobs)
+
+
+def converged(camera: Camera, coarse: Prepared, workers: int, most_bytes: float = 0) -> Prepared:
+    """`finest`, with its light on the pixels."""
+    return prepare(finest_camera(camera, coarse, most_bytes), workers)[0]
+
+
+def describe_reference(found: Prepared, coarse: Prepared, full: float, change: float) -> Reference:
+    """Return the reference, and how good it is itself.
+
+    found: the camera converged; coarse: at `accuracy: reference`; full: full signal; change: rms
+    of the difference of their signals [electrons].
+    """
+    left = found.spectrum.lost * found.exposure_time
+    chart = isinstance(found.scene, ChartScene) and not _is_rectangles(found)
+    reached = coarse.spectrum.oversampling
+    if chart and reached and found.spectrum.oversampling > reached:
+        left = change / ((found.spectrum.oversampling / reached) ** ORDER - 1)
+    return Reference(
+        full_signal=full,
+        exposure_time=found.exposure_time,
+        oversampling=found.spectrum.oversampling,
+        lost=left / full,
+        settings=found.settings.report(),
+    )
+
+
+def changes(
+    camera: Camera, exposure_time: float, names: tuple[str, ...], workers: int
+) -> dict[str, NDArray]:
+    """Return the change of the mean raw by leaving out each effect: (rms, largest) [e].
+
+    In 64 bits, and as fine as most tolerances ask; what the settings still miss is missed with and
+    without the effect.
+    """
+    fixed = ablation.with_exposure_time(camera, exposure_time)
+    tolerance = min(max(camera.accuracy.tolerance, 0.001), 0.005)
+    fixed = with_accuracy(fixed, tolerance=tolerance, float_width=64)
+    whole = prepare(ablation.with_effects(fixed, "all"), workers)[0]
+    noise = {e.name for e in whole.plan.active if isinstance(e, NoiseSource | Quantizer)}
+    truth, out = ablation.mean_raw(whole), {}
+    for name in names:
+        if name in noise:  # drawn after the mean is known
+            out[name] = np.zeros(2)
+        else:
+            without = prepare(ablation.with_effects(fixed, "all", name), workers)[0]
+            out[name] = error(ablation.mean_raw(without) - truth)
+    return out
+
+
+def error(difference: NDArray) -> NDArray:
+    """(rms, largest) of a difference of signals [electrons]."""
+    return np.array([ablation.rms(difference), float(np.abs(difference).max())])
+
+
+def _is_rectangles(ready: Prepared) -> bool:
+    """Whether the scene is a chart of even rectangles, whose spectrum is known in closed form."""
+    return isinstance(ready.scene, ChartScene) and ready.scene.chart.edges() is not None
+
+
+def _pixels(ready: Prepared) -> float:
+    """Area of the scene with its margin, in pixels."""
+    scene, g = ready.scene, ready.geometry
+    if not isinstance(scene, ChartScene):
+        return g.rows * g.columns
+    area = scene.shape[0] * scene.pitch_y * scene.shape[1] * scene.pitch_x
+    return area / (g.pitch_x * g.pitch_y)

@@ -1,0 +1,114 @@
+"""The dark current of a pixel: as the file gives it, or from its process.
+
+References
+----------
+[1] T. Chen, "Digital Camera System Simulator and Applications", PhD thesis, Stanford University,
+    2003, section 2.2.2.
+[2] J. R. Janesick, "Scientific Charge-Coupled Devices", SPIE Press, 2001, section 7.1.1 (dark
+    current and temperature).
+"""
+
+from __future__ import annotations
+
+from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.derived.junction import depletion_width
+from vcam_cli.camera.derived.pixel_layout import detector
+from vcam_cli.camera.derived.process import Need, Process, process
+from vcam_cli.camera.photodetector import DarkCurrentDensity
+from vcam_cli.errors import bad
+from vcam_cli.physics import junction as physics
+from vcam_cli.physics import readout, silicon
+
+MOST_DOUBLINGS = 60
+"""The rule of a doubling every few kelvin holds over some tens of them, not over hundreds."""
+DOUBLING = 8.0
+"""Rise of temperature that doubles a dark current where the technology does not say [K]."""
+_PATH = "pixel.photodetector.dark_current_density"
+
+
+def dark_rate(camera: Camera) -> float:
+    """Return the dark current of a pixel at its temperature [e/s].
+
+    It is what the file gives; `junction` is eq 2.31 of [1] and what the technology adds along the
+    perimeter; where the file says nothing, the technology's terms per area and per perimeter.
+
+    Raises BadInput for numbers of the process that are missing, and temperatures too far apart.
+    """
+    own = camera.pixel.photodetector
+    if own.dark_current is not None:
+        return own.dark_current * own.dark_current_scale
+    given, made = own.dark_current_density, process(camera)
+    per_length = 0.0
+    if isinstance(given, DarkCurrentDensity):
+        per_area = given.value * _growth(camera, given.temperature, given.doubling, _PATH)
+    else:
+        junction = given == "junction"
+        density = made.dark_current.area
+        per_area = (
+            _junction_density(camera, made) if junction else _at_temperature(camera, made, density)
+        )
+        if own.kind != "pinned" and camera.pixel.architecture != "aps-4t":
+            per_length = _at_temperature(camera, made, made.dark_current.perimeter)
+    if not per_area and not per_length:
+        return 0.0
+    size = detector(camera)
+    current = per_area * size.area + per_length * size.perimeter
+    return current / readout.ELEMENTARY_CHARGE * own.dark_current_scale
+
+
+def _junction_density(camera: Camera, made: Process) -> float:
+    """Return the dark current density by eq 2.31 of [1] at the pixel's temperature [A/m2]."""
+    need = Need(_PATH, "the dark current of the junction")
+    names = "acceptors electron_diffusivity electron_lifetime substrate_depth depletion_width"
+    gated = camera.pixel.photodetector.kind == "photogate"
+    if not gated:
+        names += " donors hole_diffusivity hole_lifetime depth"
+    keys = (f"junction.{name}" for name in names.split())
+    n_a, d_n, tau_n, neutral, given, *n_side = made.require(need, *keys)
+    width = depletion_width(camera, made, given, need)
+    if gated:  # no n region: no diffusion from it, and all of the depletion region in p
+        n_d, d_p, tau_p, surface, x_n, x_p = 1.0, 0.0, 1.0, 1.0, 0.0, width
+    else:
+        n_d, d_p, tau_p, surface = n_side
+        x_n, x_p = (float(part) for part in physics.depletion_split(width, n_d, n_a))
+    n_i = _intrinsic(camera.pixel.temperature)
+    return float(
+        physics.dark_current_density(
+            n_i, d_p, d_n, n_d, n_a, surface, neutral, x_n, x_p, tau_p, tau_n
+        )
+    )
+
+
+def _intrinsic(temperature: float) -> float:
+    try:
+        return float(silicon.intrinsic_concentration(temperature))
+    except ValueError as error:
+        raise bad(
+            "pixel.temperature",
+            f"{error}, not at {temperature:g} K",
+            "change it, or give the dark current as a number",
+        ) from None
+
+
+def _at_temperature(camera: Camera, made: Process, density: float | None) -> float:
+    """Return a current density of the technology at the pixel's temperature; 0 where none is."""
+    if not density:
+        return 0.0
+    given = made.dark_current
+    doubling, path = given.doubling or DOUBLING, "pixel.technology.dark_current"
+    return density * _growth(camera, given.temperature, doubling, path)
+
+
+def _growth(camera: Camera, temperature: float | None, doubling: float, path: str) -> float:
+    """Return the factor on a dark current from a temperature [K], if any, to the pixel's, [2]."""
+    if temperature is None:
+        return 1.0
+    doublings = (camera.pixel.temperature - temperature) / doubling
+    if abs(doublings) > MOST_DOUBLINGS:
+        raise bad(
+            path,
+            f"from {temperature:g} K to {camera.pixel.temperature:g} K it doubles"
+            f" {doublings:.3g} times",
+            "give it at a temperature nearer to the pixel's, or another doubling",
+        )
+    return float(2**doublings)

@@ -1,0 +1,171 @@
+"""How electrons become volts and numbers: gain, swing, full well, ADC, solved and checked once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from vcam_cli.camera.architecture import ARCHITECTURES
+from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.derived import sense_node
+from vcam_cli.camera.pixel import AGREE
+from vcam_cli.errors import BadInput, bad
+from vcam_cli.physics import readout
+
+NOMINAL_SWING = 1.0
+"""Volts of a full well where the file gives no voltage; nothing that is counted depends on it."""
+LEAST_COUNT, MOST_COUNT = 1e-12, 1e12
+"""Electrons of a full well and of a step of the ADC: between them double precision tells codes."""
+
+
+@dataclass(frozen=True)
+class Electrical:
+    """Readout of one pixel."""
+
+    conversion_gain: float
+    """Voltage per electron on the sense node [V/e]."""
+    voltage_swing: float
+    """Voltage of the full well [V]."""
+    full_well: float
+    """Electrons that a pixel holds [e]."""
+    capacitance: float | None
+    """Capacitance of the sense node, for kTC noise [F]; None where the file gives no voltage."""
+    analog_gain: float
+    bits: int
+    """Resolution of the ADC."""
+    offset: float
+    """ADC code of no signal [DN]."""
+    full_scale: float
+    """Voltage of the highest ADC code [V]."""
+    reference: float | None = None
+    """Voltage at which a logarithmic ADC's curve bends [V]; None for a linear one."""
+
+    @property
+    def in_volts(self) -> bool:
+        """Whether volts are volts; else they are parts of a nominal swing."""
+        return self.capacitance is not None
+
+    @property
+    def highest_code(self) -> int:
+        """Highest ADC code [DN]."""
+        return 2**self.bits - 1
+
+    @property
+    def electrons_per_dn(self) -> float:
+        """Step of a linear ADC [e/DN]; a logarithmic one has as many from black to full scale."""
+        return self.full_scale / (
+            self.conversion_gain * self.analog_gain * (self.highest_code - self.offset)
+        )
+
+    @property
+    def saturation(self) -> float:
+        """Electrons at which the well or the ADC is full, whichever comes first [e]."""
+        return min(self.full_well, (self.highest_code - self.offset) * self.electrons_per_dn)
+
+
+def electrical(camera: Camera) -> Electrical:
+    """Return the solved readout of a camera: any two of gain, swing and well give the third.
+
+    The technology fills in what the file leaves open: the capacitance and with it the gain
+    (eq 2.32), then the swing (eq 2.33). A data sheet that counts in electrons and DN alone gives
+    the well and the ADC's gain; volts are then nominal.
+
+    Raises BadInput where all together leave it open, or the file contradicts itself.
+    """
+    adc = camera.adc
+    capacitance = sense_node.capacitance(camera)
+    given = camera.pixel.readout
+    nominal = capacitance is None and _counts_only(camera)
+    swing = given.voltage_swing
+    if nominal:
+        swing = NOMINAL_SWING
+    elif swing is None and given.full_well is None:
+        swing = sense_node.voltage_swing(camera)
+    gain, swing, well = _solve(given.conversion_gain, swing, given.full_well, capacitance)
+    if capacitance is None and not nominal:
+        capacitance = float(readout.sense_capacitance(gain))
+    full_scale = swing * given.gain if adc.full_scale is None else adc.full_scale
+    if adc.gain is not None:
+        codes = (adc.gain, adc.bits, adc.offset)
+        full_scale = float(readout.adc_full_scale(gain, given.gain, *codes))
+    reference = None
+    if adc.kind == "logarithmic":
+        reference = full_scale / 1000 if adc.reference is None else adc.reference
+    found = Electrical(
+        conversion_gain=gain,
+        voltage_swing=swing,
+        full_well=well,
+        capacitance=capacitance,
+        analog_gain=given.gain,
+        bits=adc.bits,
+        offset=adc.offset,
+        full_scale=full_scale,
+        reference=reference,
+    )
+    _check_counts(found)
+    return found
+
+
+def _check_counts(found: Electrical) -> None:
+    """Raise BadInput for a well, or a step of the ADC, of more or less than can be computed."""
+    for path, what, electrons in (
+        ("pixel.readout", "the full well is", found.full_well),
+        ("adc", "a step of the ADC is", found.electrons_per_dn),
+    ):
+        if not LEAST_COUNT <= electrons <= MOST_COUNT:
+            message = f"{what} {electrons:.3g} electrons"
+            raise bad(path, message, "look for a wrong unit in conversion_gain, swing or gain")
+
+
+def check(camera: Camera) -> None:
+    """Raise BadInput when the readout is open, contradicts itself or lacks volts it needs."""
+    if electrical(camera).in_volts:
+        return
+    pixel = camera.pixel
+    of_photodiode = ARCHITECTURES[pixel.architecture].reset_noise == "photodiode"
+    if pixel.readout.reset_noise == "ktc" and of_photodiode:
+        raise no_volts("pixel.readout.reset_noise", "ktc", "give it in electrons")
+    if "volts" in camera.output.raw:
+        raise no_volts("output.raw", "volts", "leave volts out")
+
+
+def no_volts(path: str, what: str, instead: str) -> BadInput:
+    """Return the error about `what` that the file asks for at `path` without giving a voltage."""
+    return bad(
+        path,
+        f"{what} needs a voltage, and the file counts in electrons and DN alone",
+        f"add pixel.readout.conversion_gain: 20 uV/e, or {instead}",
+    )
+
+
+def _counts_only(camera: Camera) -> bool:
+    """Return whether the file gives the well and the codes per electron, and no volts."""
+    given = camera.pixel.readout
+    volts = given.conversion_gain is not None or given.voltage_swing is not None
+    return not volts and given.full_well is not None and camera.adc.gain is not None
+
+
+def _solve(
+    gain: float | None, swing: float | None, well: float | None, capacitance: float | None
+) -> tuple[float, float, float]:
+    """Return conversion gain [V/e], swing [V] and full well [e] from the two that are known."""
+    if gain is None and capacitance is not None and (swing is None or well is None):
+        gain = float(readout.conversion_gain(capacitance))
+    if gain is not None and swing is not None:
+        if well is not None and abs(swing / gain - well) > AGREE * well:
+            raise bad(
+                "pixel.readout.full_well",
+                f"is {well:.6g} e, but voltage_swing / conversion_gain is {swing / gain:.6g} e",
+                "give two of conversion_gain, voltage_swing and full_well",
+            )
+        return gain, swing, swing / gain
+    if gain is not None and well is not None:
+        return gain, gain * well, well
+    if swing is not None and well is not None:
+        return swing / well, swing, well
+    raise bad(
+        "pixel.readout",
+        "the readout is not determined",
+        "give two of conversion_gain, voltage_swing and full_well"
+        " (photodetector.capacitance may stand for conversion_gain),"
+        " or full_well and adc.gain as data sheets do",
+    )

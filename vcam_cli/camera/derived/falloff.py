@@ -1,0 +1,82 @@
+"""A lens's measured relative illumination, read from its file."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.derived.geometry import Geometry, geometry
+from vcam_cli.camera.optics import FalloffFile
+from vcam_cli.errors import bad, data_file_problems
+from vcam_cli.spectra.text import read_rows
+
+HEADER = ("image_height_mm", "value")
+PATH = ("optics", "off_axis", "file")
+REMEDY = "write the columns image_height_mm,value, heights rising from 0"
+SLACK = 1e-9
+"""By how much the last height may miss the corner, relative: rounding."""
+
+
+@dataclass(frozen=True)
+class Falloff:
+    """Relative illumination over the distance from the axis, straight between its points."""
+
+    heights: tuple[float, ...]
+    """Distances from the axis, rising from 0 [m]."""
+    values: tuple[float, ...]
+    """Illumination relative to the axis: the first is 1."""
+
+
+def falloff(camera: Camera, geometry: Geometry) -> Falloff | None:
+    """Return the table that `optics.off_axis` names; None where it names none.
+
+    Raises BadInput for a file that cannot be read, is no such table, or ends before the corner of
+    the array.
+    """
+    given = camera.optics.off_axis
+    if not isinstance(given, FalloffFile):
+        return None
+    heights, values = _table(given.file)
+    corner = float(np.hypot(geometry.sensor_width, geometry.sensor_height)) / 2
+    if heights[-1] < corner * (1 - SLACK):
+        raise bad(
+            PATH,
+            f"ends at an image height of {heights[-1] * 1e3:.6g} mm, but the corner of the array"
+            f" is {corner * 1e3:.6g} mm from the axis",
+            f"add rows up to {corner * 1e3:.6g} mm, or make the array smaller",
+        )
+    return Falloff(tuple(heights), tuple(values / values[0]))
+
+
+def check(camera: Camera) -> None:
+    """Raise BadInput where the relative illumination is not to be had."""
+    if isinstance(camera.optics.off_axis, FalloffFile):
+        falloff(camera, geometry(camera))
+
+
+def _table(file: str) -> tuple[np.ndarray, np.ndarray]:
+    """Return heights [m] and values of the file. Raises BadInput."""
+    with data_file_problems(file, PATH, REMEDY):
+        header, rows = read_rows(file)
+        if tuple(header) != HEADER:
+            raise ValueError(f"{file}: the header is {','.join(header)!r}")
+        if len(rows) == 0:
+            raise ValueError(f"{file}: has no rows below its header")
+        heights, values = rows.T
+        if mistake := _mistake(heights, values):
+            raise ValueError(f"{file}: {mistake}")
+    return heights / 1e3, values
+
+
+def _mistake(heights: np.ndarray, values: np.ndarray) -> str | None:
+    """Return what is wrong: heights that do not rise from 0, values that are no light."""
+    falling = np.flatnonzero(np.diff(heights) <= 0)
+    if heights[0] != 0:
+        return f"begins at {heights[0]:g} mm, and the value on the axis is missing"
+    if falling.size:
+        before, after = heights[falling[0]], heights[falling[0] + 1]
+        return f"{after:g} mm follows {before:g} mm"
+    if (values < 0).any():
+        worst = int(np.argmax(values < 0))
+        return f"{values[worst]:g} at {heights[worst]:g} mm; light is not negative"
+    return "is 0 on the axis, and values are relative to it" if values[0] == 0 else None

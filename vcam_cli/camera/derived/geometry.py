@@ -1,0 +1,243 @@
+"""Where everything lies: lens, image, pixels, photodetectors.
+
+All the lengths that follow from a camera file, solved and checked together. Coordinates on the
+sensor: origin at the center of the array, x to the right, y down, meters, as in the upright
+picture (the lens's inversion is undone).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.derived.lattice import lattice
+from vcam_cli.camera.derived.lens import lens
+from vcam_cli.camera.derived.pixel_layout import (
+    Area,
+    check_pupil,
+    collecting_area,
+    detector_area,
+    sampling_scale,
+)
+from vcam_cli.camera.scene import Extent
+from vcam_cli.errors import Collector, bad
+from vcam_cli.physics import diffraction, radiometry
+
+
+@dataclass(frozen=True)
+class Geometry:
+    """Solved geometry of a camera. Lengths in [m], angles in [rad]."""
+
+    focal_length: float
+    f_number: float
+    aperture_diameter: float
+    object_distance: float
+    magnification: float
+    rows: int
+    columns: int
+    pixel_width: float
+    pixel_height: float
+    pitch_x: float
+    pitch_y: float
+    sensor_width: float
+    sensor_height: float
+    detector_width: float
+    detector_height: float
+    detector_x: float
+    """Center of the photodetector, right of its cell's center."""
+    detector_y: float
+    """Center of the photodetector, below its cell's center."""
+    collecting_width: float
+    """Width of the area whose light reaches the photodetector: its own without a microlens."""
+    collecting_height: float
+    """Height of that area."""
+    collecting_x: float
+    """Center of the collecting area, right of its cell's center, in a pixel on the axis."""
+    collecting_y: float
+    """Center of the collecting area, below its cell's center, in a pixel on the axis."""
+    sampling_scale: float
+    """Pitch of the collecting areas over that of the pixels."""
+    exit_pupil_distance: float
+    scene_width_on_sensor: float | None
+    """Width of the scene's image where the file states the scene's extent."""
+
+    @property
+    def image_distance(self) -> float:
+        """Distance from the lens to the sensor."""
+        return float(radiometry.image_distance(self.focal_length, self.magnification))
+
+    @property
+    def working_f_number(self) -> float:
+        """N (1 - m), the f-number that the image sees."""
+        return self.f_number * (1 - self.magnification)
+
+    @property
+    def numerical_aperture(self) -> float:
+        """Sine of the half-angle of the image-side cone, eq 2.17."""
+        return float(radiometry.numerical_aperture(self.f_number, self.magnification))
+
+    @property
+    def detector_area(self) -> float:
+        """Area of the photodetector [m2]."""
+        return self.detector_width * self.detector_height
+
+    @property
+    def fill_factor(self) -> float:
+        """Photodetector area over width x height of the pixel (gaps not counted)."""
+        return self.detector_area / (self.pixel_width * self.pixel_height)
+
+    @property
+    def effective_fill_factor(self) -> float:
+        """Collecting area over width x height of the pixel."""
+        area = self.collecting_width * self.collecting_height
+        return area / (self.pixel_width * self.pixel_height)
+
+    def report(self, oversampling: float) -> dict[str, float | int]:
+        """Return the numbers of `run.json`'s `geometry`.
+
+        Parameters
+        ----------
+        oversampling : float
+            Samples of the scene per pixel; 0 where it is not sampled.
+
+        Returns
+        -------
+        dict
+            Name -> number in SI; a unit other than SI is in the name.
+        """
+        w, h, si = self.sensor_width, self.sensor_height, self.image_distance
+        finite = math.isfinite(self.object_distance)
+        sample = self.pitch_x / (oversampling or 1)
+        return {
+            "focal_length": self.focal_length,
+            "f_number": self.f_number,
+            "working_f_number": self.working_f_number,
+            "magnification": self.magnification,
+            "object_distance": self.object_distance,
+            "image_distance": si,
+            "exit_pupil_distance": self.exit_pupil_distance,
+            "numerical_aperture": self.numerical_aperture,
+            "aperture_diameter": self.aperture_diameter,
+            "clear_aperture_area": math.pi / 4 * self.aperture_diameter**2,
+            "field_of_view_horizontal": float(radiometry.field_of_view(w, si)),
+            "field_of_view_vertical": float(radiometry.field_of_view(h, si)),
+            "field_of_view_diagonal": float(radiometry.field_of_view(math.hypot(w, h), si)),
+            "scene_width": w / -self.magnification if finite else math.inf,
+            "scene_height": h / -self.magnification if finite else math.inf,
+            "rows": self.rows,
+            "columns": self.columns,
+            "sensor_width": w,
+            "sensor_height": h,
+            "pixel_pitch_x": self.pitch_x,
+            "pixel_pitch_y": self.pitch_y,
+            "photodetector_area": self.detector_area,
+            "fill_factor": self.fill_factor,
+            "effective_fill_factor": self.effective_fill_factor,
+            "nyquist_frequency": 0.5 / self.pitch_x,
+            "diffraction_cutoff_550nm": float(
+                diffraction.cutoff_frequency(550e-9, self.f_number, self.magnification)
+            ),
+            "sample_pitch_sensor": sample,
+            "sample_pitch_scene": sample / -self.magnification if finite else math.inf,
+            "sample_pitch_angle": sample / si,
+        }
+
+
+def geometry(camera: Camera) -> Geometry:
+    """Return the solved geometry of a camera.
+
+    Raises BadInput with every contradiction found: an object at or inside the focal length, optics
+    that disagree, a photodetector that leaves its pixel, a microlens that loses light, an exit
+    pupil within the stack, a die smaller than a pixel.
+    """
+    problems = Collector()
+    optics = problems.attempt(lens, camera)
+    areas = problems.attempt(_areas, camera)
+    pixels = problems.attempt(lattice, camera)
+    problems.raise_if_any()
+    assert optics and areas and pixels
+    pixel, (detector, collecting) = camera.pixel, areas
+    pupil = camera.optics.exit_pupil_distance
+    if pupil is None:
+        pupil = float(radiometry.image_distance(optics.focal_length, optics.magnification))
+    check_pupil(camera, pupil)
+    return Geometry(
+        focal_length=optics.focal_length,
+        f_number=optics.f_number,
+        aperture_diameter=optics.focal_length / optics.f_number,
+        object_distance=camera.scene.distance,
+        magnification=optics.magnification,
+        rows=pixels.rows,
+        columns=pixels.columns,
+        pixel_width=pixel.width,
+        pixel_height=pixel.height,
+        pitch_x=pixels.pitch_x,
+        pitch_y=pixels.pitch_y,
+        sensor_width=pixels.width,
+        sensor_height=pixels.height,
+        detector_width=detector.width,
+        detector_height=detector.height,
+        detector_x=detector.x,
+        detector_y=detector.y,
+        collecting_width=collecting.width,
+        collecting_height=collecting.height,
+        collecting_x=collecting.x,
+        collecting_y=collecting.y,
+        sampling_scale=sampling_scale(camera, pupil, pixels.width, pixels.height),
+        exit_pupil_distance=pupil,
+        scene_width_on_sensor=_scene_width(camera, optics.magnification),
+    )
+
+
+def pixel_centers(geometry: Geometry, detector: bool = False) -> tuple[NDArray, NDArray]:
+    """Return the centers of the array's columns and rows on the sensor.
+
+    Parameters
+    ----------
+    geometry : Geometry
+        The camera's geometry.
+    detector : bool
+        Whether the areas whose light is collected are meant (the photodetectors where there is no
+        microlens) instead of the pixels' cells.
+
+    Returns
+    -------
+    x : ndarray, (columns,)
+        Right of the axis [m].
+    y : ndarray, (rows,)
+        Below the axis [m].
+    """
+    g = geometry
+    x = (np.arange(g.columns) + 0.5 - g.columns / 2) * g.pitch_x
+    y = (np.arange(g.rows) + 0.5 - g.rows / 2) * g.pitch_y
+    if not detector:
+        return x, y
+    return x * g.sampling_scale + g.collecting_x, y * g.sampling_scale + g.collecting_y
+
+
+def check(camera: Camera) -> None:
+    """Raise BadInput where the camera's geometry contradicts itself."""
+    geometry(camera)
+
+
+def _areas(camera: Camera) -> tuple[Area, Area]:
+    """Return the photodetector, and the area whose light it receives."""
+    found = detector_area(camera)
+    return found, collecting_area(camera, found)
+
+
+def _scene_width(camera: Camera, magnification: float) -> float | None:
+    extent = camera.scene.extent
+    if not isinstance(extent, Extent):
+        return None
+    if magnification == 0:
+        raise bad(
+            "scene.extent",
+            "a scene at infinity has no width in meters",
+            "use extent: sensor, or give scene.distance",
+        )
+    return extent.width * -magnification

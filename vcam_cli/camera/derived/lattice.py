@@ -1,0 +1,110 @@
+"""Where the pixels stand: rows and columns, staggered rows, or places of their own.
+
+Rows and columns are a pixel and its gap apart. A honeycomb is the same square grid turned by 45
+degrees: its rows lie closer, by the square root of 2, its columns wider, and every second row is
+moved by half a column; pixels stay as dense as they were (M. Tamaru et al., "High-sensitivity
+wide-dynamic-range CCD with honeycomb structure", Proc. SPIE 5301, 2004).
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcam_cli.camera.array import CLEAR, Positions
+from vcam_cli.camera.camera import Camera
+from vcam_cli.errors import bad, data_file_problems
+from vcam_cli.spectra.text import parse_numbers, read_table
+
+PATH = ("array", "pattern", "positions")
+HEADER = ("x_um", "y_um", "color")
+REMEDY = "write the columns x_um,y_um,color"
+MOST_PIXELS = 4_000_000
+"""Most pixels of a file."""
+
+
+@dataclass(frozen=True)
+class Lattice:
+    """Rows and columns of the raw frame, and the lengths [m] between and around them."""
+
+    rows: int
+    columns: int
+    pitch_x: float
+    """Distance of the columns of a row; of scattered pixels their own width and gap."""
+    pitch_y: float
+    """Distance of the rows."""
+    width: float
+    """Width of the sensitive area, which is centered on the axis."""
+    height: float
+    """Height of the sensitive area."""
+
+
+@dataclass(frozen=True, eq=False)
+class Places:
+    """Pixels at places of their own."""
+
+    x: NDArray
+    """Places right of the axis [m], (N,)."""
+    y: NDArray
+    """Places below the axis [m], (N,)."""
+    colors: tuple[str, ...]
+
+
+def lattice(camera: Camera) -> Lattice:
+    """Return the lattice of a camera's pixels; pixels at places of their own are one row.
+
+    Raises BadInput for a die smaller than a pixel and a file of positions that is none.
+    """
+    array, pixel = camera.array, camera.pixel
+    pitch_x, pitch_y = pixel.width + pixel.gap_x, pixel.height + pixel.gap_y
+    if isinstance(array.pattern, Positions):
+        found = places(camera)
+        width = 2 * float(np.abs(found.x).max()) + pitch_x
+        height = 2 * float(np.abs(found.y).max()) + pitch_y
+        return Lattice(1, len(found.x), pitch_x, pitch_y, width, height)
+    if array.pattern == "honeycomb":
+        pitch_x, pitch_y = pitch_x * math.sqrt(2), pitch_y / math.sqrt(2)
+    rows, columns = array.rows, array.columns
+    if array.die is not None:
+        rows = round(array.die.height / pitch_y)
+        columns = round(array.die.width / pitch_x)
+        if rows < 1 or columns < 1:
+            message = "the die is smaller than one pixel"
+            raise bad("array.die", message, "give a larger die, or rows and columns")
+    assert rows is not None and columns is not None
+    return Lattice(rows, columns, pitch_x, pitch_y, columns * pitch_x, rows * pitch_y)
+
+
+def places(camera: Camera) -> Places:
+    """Return the pixels of a camera whose pattern is a file of positions. Raises BadInput."""
+    assert isinstance(camera.array.pattern, Positions)
+    file = camera.array.pattern.positions
+    with data_file_problems(file, PATH, REMEDY):
+        return _read(file, os.stat(file).st_mtime_ns, tuple(camera.array.filters))
+
+
+@lru_cache(maxsize=4)
+def _read(file: str, changed: int, filters: tuple[str, ...]) -> Places:
+    """Return the pixels of the file as it is now; `changed` tells one version from another."""
+    with data_file_problems(file, PATH, REMEDY):
+        header, rows = read_table(file, MOST_PIXELS)
+        if tuple(header) != HEADER:
+            raise ValueError(f"{file}: the header is {','.join(header)!r}")
+        if not rows:
+            raise ValueError(f"{file}: has no pixels below its header")
+        x_y = np.array([parse_numbers(Path(file), n, cells[:2]) for n, cells in rows]) * 1e-6
+    colors = tuple(cells[2].strip() for _, cells in rows)
+    unknown = [c for c in dict.fromkeys(colors) if c not in filters and c not in CLEAR]
+    if unknown:
+        raise bad(
+            PATH,
+            f"{file}: has pixels of color {unknown[0]!r}, which has no filter",
+            f"add {unknown[0]}: and its spectrum to array.filters",
+        )
+    return Places(x_y[:, 0], x_y[:, 1], colors)

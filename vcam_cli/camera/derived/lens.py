@@ -1,0 +1,95 @@
+"""The lens's focal length, f-number and magnification, from whichever numbers the file gives."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.derived.lattice import lattice
+from vcam_cli.camera.pixel import AGREE
+from vcam_cli.errors import bad
+from vcam_cli.physics import radiometry
+
+_GIVE_TWO = "give two of f_number, focal_length and aperture_diameter"
+
+
+@dataclass(frozen=True)
+class Lens:
+    """A thin lens in front of a scene."""
+
+    focal_length: float
+    """Focal length [m]."""
+    f_number: float
+    """Focal length over diameter of the entrance pupil."""
+    magnification: float
+    """Magnification, negative; 0 for a scene at infinity."""
+
+
+def lens(camera: Camera) -> Lens:
+    """Return the lens of a camera.
+
+    Raises BadInput for a lens that is not determined, numbers that disagree, and a scene at or
+    inside the focal length.
+    """
+    optics, distance = camera.optics, camera.scene.distance
+    f = _focal_length(camera)
+    if distance <= f:
+        raise bad(
+            "scene.distance",
+            f"a scene {distance:.6g} m from the lens lies within its focal length of {f:.6g} m"
+            " and forms no real image",
+            "put the scene further away, or use a shorter focal length",
+        )
+    m = float(radiometry.magnification(f, distance))
+    found: dict[str, float] = {}
+    if optics.f_number is not None:
+        found["f_number"] = optics.f_number
+    if optics.numerical_aperture is not None:
+        sine = optics.numerical_aperture
+        found["numerical_aperture"] = float(radiometry.f_number_of_numerical_aperture(sine, m))
+    if optics.aperture_diameter is not None:
+        found["aperture_diameter"] = f / optics.aperture_diameter
+    if not found:
+        raise bad(
+            "optics",
+            "the lens is not determined: its f-number is missing",
+            "give f_number, aperture_diameter or numerical_aperture beside the focal length",
+        )
+    return Lens(f, _common_value(found, "", lambda number: f"f/{number:.5g}"), m)
+
+
+def _focal_length(camera: Camera) -> float:
+    """Return the focal length, from every pair that determines it."""
+    optics, distance = camera.optics, camera.scene.distance
+    found: dict[str, float] = {}
+    if optics.focal_length is not None:
+        found["focal_length"] = optics.focal_length
+    if optics.field_of_view is not None:
+        pixels = lattice(camera)
+        diagonal = math.hypot(pixels.width, pixels.height)
+        angle = optics.field_of_view
+        found["field_of_view"] = float(
+            radiometry.focal_length_of_field_of_view(angle, diagonal, distance)
+        )
+    if optics.aperture_diameter is not None:
+        if optics.f_number is not None:
+            found["aperture_diameter"] = optics.aperture_diameter * optics.f_number
+        elif optics.numerical_aperture is not None:
+            tangent = math.tan(math.asin(optics.numerical_aperture))
+            image_distance = optics.aperture_diameter / 2 / tangent
+            found["aperture_diameter"] = image_distance / (1 + image_distance / distance)
+    if not found:
+        raise bad("optics", "the lens is not determined: its focal length is missing", _GIVE_TWO)
+    return _common_value(found, "a focal length of ", lambda length: f"{length * 1e3:.6g} mm")
+
+
+def _common_value(values: Mapping[str, float], what: str, text: Callable[[float], str]) -> float:
+    """Return the first of several values for one thing. Raises BadInput where they disagree."""
+    first, value = next(iter(values.items()))
+    for name, other in values.items():
+        if abs(other - value) > AGREE * value:
+            message = f"means {what}{text(other)}, but {first} says {text(value)}"
+            raise bad(f"optics.{name}", message, _GIVE_TWO)
+    return value

@@ -1,0 +1,56 @@
+"""Which color each pixel sees."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+
+from vcam_cli.camera.array import Block
+from vcam_cli.camera.camera import Camera
+
+NONE = "."
+"""A place of a block where there is no pixel."""
+BLOCKS: dict[str, tuple[tuple[str, ...], ...]] = {
+    "monochrome": (("Y",),),
+    "bayer-rggb": (("R", "G"), ("G", "B")),
+    "bayer-grbg": (("G", "R"), ("B", "G")),
+    "bayer-gbrg": (("G", "B"), ("R", "G")),
+    "bayer-bggr": (("B", "G"), ("G", "R")),
+    "quad-bayer": (("R", "R", "G", "G"),) * 2 + (("G", "G", "B", "B"),) * 2,
+    "rgbw": tuple(tuple(row) for row in ("WBWG", "BWGW", "WGWR", "GWRW")),
+    "honeycomb": tuple(tuple(row) for row in ("R.B.", ".G.G", "B.R.", ".G.G")),
+}
+"""The block of colors that repeats over the array, from its upper-left corner. RGBW: every second
+pixel is clear, J. Compton and J. Hamilton, US patent 8139130 B2, 2012, figure 5. Honeycomb: a
+Bayer mosaic turned by 45 degrees, on a lattice with twice its columns."""
+
+
+@dataclass(frozen=True)
+class Mosaic:
+    """A block of colors that repeats over the array."""
+
+    block: tuple[tuple[str, ...], ...]
+
+    @property
+    def colors(self) -> tuple[str, ...]:
+        """Colors in the order of channels: R, G, B first, others by first appearance."""
+        return channel_order(c for row in self.block for c in row if c != NONE)
+
+    def row_colors(self, row: int) -> Iterator[tuple[int, list[slice]]]:
+        """Yield every color of an array row: its index, and its columns."""
+        line = self.block[row % len(self.block)]
+        for color in dict.fromkeys(name for name in line if name != NONE):
+            at = [offset for offset, name in enumerate(line) if name == color]
+            yield self.colors.index(color), [slice(offset, None, len(line)) for offset in at]
+
+
+def channel_order(colors: Iterable[str]) -> tuple[str, ...]:
+    """Return colors in the order of channels: R, G, B first, others by first appearance."""
+    distinct = list(dict.fromkeys(colors))
+    return tuple(sorted(distinct, key=lambda c: ("RGB".find(c) % 4, distinct.index(c))))
+
+
+def mosaic(camera: Camera) -> Mosaic:
+    """Return the camera's mosaic."""
+    pattern = camera.array.pattern
+    return Mosaic(pattern.block if isinstance(pattern, Block) else BLOCKS[str(pattern)])

@@ -1,0 +1,155 @@
+"""The node on which charge becomes a voltage: its swing, its range of bias, its capacitance.
+
+References
+----------
+[1] T. Chen, "Digital Camera System Simulator and Applications", PhD thesis, Stanford University,
+    2003, section 2.2.2.
+[2] MOSIS SCMOS design rules, revision 8, rules 6.1 and 6.2 (a contact is 2 lambda wide, and its
+    active area 1.5 lambda wider on each side; lambda is half the feature size).
+"""
+
+from __future__ import annotations
+
+from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.derived.pixel_layout import detector
+from vcam_cli.camera.derived.process import Need, Process, process
+from vcam_cli.errors import bad
+from vcam_cli.physics import junction, readout
+
+GATE_WIDTH = 2.5
+"""Width of the follower, in feature sizes: the narrowest that takes a contact, 5 lambda [2]."""
+OXIDE_THICKNESS = 1 / 44
+"""Oxide of the follower's gate, in feature sizes: 7.9, 5.7 and 4.1 nm at 0.35, 0.25 and 0.18 um,
+where MOSIS runs have 7.7 (T69H), 5.6 to 5.8 and 4.1 to 4.2 nm."""
+OXIDE_PERMITTIVITY = 3.9 * 8.8541878128e-12
+"""Permittivity of silicon dioxide [F/m]."""
+
+
+def voltage_swing(camera: Camera) -> float | None:
+    """Return the voltage swing that the file gives, or its technology [V]; None for none.
+
+    A technology gives it as a number or by its thresholds, eq 2.33 of [1]. A passive pixel has no
+    follower and swings over the whole supply. Raises BadInput for a swing that is not positive.
+    """
+    own = camera.pixel.readout.voltage_swing
+    return own if own is not None else _technology_swing(camera, process(camera))
+
+
+def _technology_swing(camera: Camera, made: Process) -> float | None:
+    if camera.pixel.technology is None:
+        return None
+    path = "pixel.readout"
+    if camera.pixel.architecture == "pps":
+        return made.require(Need(path, "the swing of a passive pixel"), "supply")[0]
+    if made.voltage_swing is not None:
+        return made.voltage_swing
+    names = ("reset", "follower_gate_source", "bias", "bias_gate")
+    if all(getattr(made.thresholds, name) is None for name in names):
+        return made.require(Need(path, "the full well"), "voltage_swing")[0]
+    keys = ("supply", *(f"thresholds.{name}" for name in names))
+    swing = float(readout.voltage_swing(*made.require(Need(path, "the swing"), *keys)))
+    if swing <= 0:
+        raise bad(
+            "pixel.technology.thresholds",
+            f"they leave a swing of {swing:.6g} V of a supply of {made.supply:.6g} V",
+            "lower them, raise the supply, or give pixel.readout.voltage_swing",
+        )
+    return swing
+
+
+def _bias_range(camera: Camera, made: Process, need: Need) -> tuple[float, float]:
+    """Return the reverse bias of the photodiode [V], full and empty.
+
+    They are the reset voltage less the swing, and the reset voltage. Raises BadInput where numbers
+    are missing, or the diode would be biased forward.
+    """
+    reset = _reset_voltage(camera, made, need)
+    own = camera.pixel.readout
+    swing = own.voltage_swing
+    if swing is None:
+        swing = _technology_swing(camera, made)
+    if swing is None and own.conversion_gain is not None and own.full_well is not None:
+        swing = own.conversion_gain * own.full_well
+    if swing is None:
+        message = f"{need.what} needs the voltage swing"
+        raise bad(need.path, message, "add pixel.readout.voltage_swing: 1.38 V")
+    if swing > reset * (1 + 1e-9):
+        raise bad(
+            "pixel.readout.voltage_swing" if own.voltage_swing else "pixel.technology",
+            f"a swing of {swing:.6g} V from a reset voltage of {reset:.6g} V would bias the"
+            " photodiode forward",
+            "give a smaller voltage_swing, or a higher pixel.technology.reset_voltage",
+        )
+    return max(reset - swing, 0.0), reset
+
+
+def _reset_voltage(camera: Camera, made: Process, need: Need) -> float:
+    """Return the reset voltage [V]: supply less a threshold; a passive pixel loses none."""
+    if camera.pixel.architecture == "pps":
+        return made.require(need, "supply")[0]
+    if made.reset_voltage is not None or made.thresholds.reset is None:
+        (reset,) = made.require(need, "reset_voltage")
+        if made.supply is not None and reset > made.supply:
+            raise bad(
+                "pixel.technology",
+                f"a reset voltage of {reset:.6g} V lies above its supply of {made.supply:.6g} V",
+                "lower pixel.technology.reset_voltage, or raise pixel.technology.supply",
+            )
+        return reset
+    supply, threshold = made.require(need, "supply", "thresholds.reset")
+    if threshold >= supply:
+        raise bad(
+            "pixel.technology.thresholds.reset",
+            f"a threshold of {threshold:.6g} V passes nothing of a supply of {supply:.6g} V",
+            "lower it, or raise the supply",
+        )
+    return supply - threshold
+
+
+def capacitance(camera: Camera) -> float | None:
+    """Return the capacitance of the photodiode's node [F]; None where the gain says it.
+
+    It is the file's number; else, where the file says `junction` or leaves the conversion gain to
+    its technology, the junction's area and sidewall averaged over the swing, and the follower's
+    gate. Raises BadInput where numbers are missing, or nothing is left of it.
+    """
+    own, given = camera.pixel.readout, camera.pixel.photodetector.capacitance
+    if isinstance(given, float):
+        return given
+    known = own.conversion_gain is not None or None not in (own.voltage_swing, own.full_well)
+    if given is None and (known or camera.pixel.technology is None):
+        return None
+    size, made = detector(camera), process(camera)
+    need = Need("pixel.photodetector.capacitance", "the capacitance of the junction")
+    names = "sidewall sidewall_built_in sidewall_grading area built_in grading"
+    keys = (f"capacitance.{name}" for name in names.split())
+    zero, built_in, grading, *_ = made.require(need, *keys)
+    per_area = area_capacitance(camera, made, need)
+    biases = _bias_range(camera, made, need)
+    per_length = float(junction.mean_capacitance(zero, *biases, built_in, grading))
+    whole = size.area * per_area + size.perimeter * per_length
+    if camera.pixel.architecture != "pps":
+        whole += _follower_gate(made, need)
+    if whole <= 0:
+        raise bad(need.path, f"{need.what} is zero", "give the technology's capacitance.area")
+    return whole
+
+
+def area_capacitance(camera: Camera, made: Process, need: Need) -> float:
+    """Return the capacitance of the junction per area, averaged over the swing [F/m2].
+
+    Raises BadInput where numbers are missing.
+    """
+    keys = ("capacitance.area", "capacitance.built_in", "capacitance.grading")
+    zero, built_in, grading = made.require(need, *keys)
+    biases = _bias_range(camera, made, need)
+    return float(junction.mean_capacitance(zero, *biases, built_in, grading))
+
+
+def _follower_gate(made: Process, need: Need) -> float:
+    """Return the capacitance of the follower's gate [F]: W L C_ox, or the technology's."""
+    given = made.capacitance.follower_gate
+    if isinstance(given, float):
+        return given
+    (size,) = made.require(Need(need.path, "the follower's gate"), "feature_size")
+    return float(GATE_WIDTH * size**2 * OXIDE_PERMITTIVITY / (OXIDE_THICKNESS * size))

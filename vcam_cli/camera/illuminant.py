@@ -1,0 +1,109 @@
+"""Lamps as a camera file writes them."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+from vcam_cli import spectra
+from vcam_cli.camera.spectrum import SpectrumFile
+from vcam_cli.config.model import Model, key
+from vcam_cli.config.quantities import Quantity
+from vcam_cli.config.validation_messages import describe
+from vcam_cli.config.values import Temperature
+from vcam_cli.config.yaml_type import DEFINED, YamlType, to_yaml
+from vcam_cli.errors import Path, bad
+
+_FORMS = (
+    "a CIE name such as D65, equal-energy, {blackbody: 5500 K}, {monochromatic: 550 nm} "
+    "or {file: lamp.csv}"
+)
+
+
+class Blackbody(Model):
+    """A black body."""
+
+    blackbody: Temperature = key("its temperature", example="5500 K")
+
+
+class Monochromatic(Model):
+    """A single line."""
+
+    monochromatic: Annotated[float, Quantity("length", above=0)] = key(
+        "its wavelength", example="550 nm"
+    )
+
+
+class LampFile(SpectrumFile):
+    """The relative spectral power of a lamp, from a CSV file."""
+
+
+_FORM_MODELS: dict[str, type[Blackbody | Monochromatic | LampFile]] = {
+    "blackbody": Blackbody,
+    "monochromatic": Monochromatic,
+    "file": LampFile,
+}
+
+
+@dataclass(frozen=True)
+class IlluminantSpec:
+    """A lamp: a name, or one of the forms above."""
+
+    lamp: str | Blackbody | Monochromatic | LampFile
+
+    def resolve(self, path: Path = ()) -> spectra.Spectrum:
+        """Return its relative spectral power. Raises BadInput, at `path`."""
+        try:
+            if isinstance(self.lamp, str):
+                return spectra.illuminant(self.lamp)
+            if isinstance(self.lamp, Blackbody):
+                return spectra.Spectrum.blackbody(self.lamp.blackbody)
+        except ValueError as error:
+            message, _, remedy = str(error).partition("; ")
+            raise bad(path, message, remedy or f"write {_FORMS}") from None
+        if isinstance(self.lamp, Monochromatic):
+            return spectra.Spectrum.line(self.lamp.monochromatic)
+        return self.lamp.resolve(path)
+
+    @property
+    def line(self) -> float | None:
+        """Wavelength of a monochromatic lamp [m]."""
+        return self.lamp.monochromatic if isinstance(self.lamp, Monochromatic) else None
+
+    def to_yaml(self) -> Any:
+        """Return the YAML form."""
+        return to_yaml(self.lamp)
+
+
+class Illuminant(YamlType):
+    """The type of a key that holds a lamp."""
+
+    forms = Blackbody | Monochromatic | LampFile
+
+    def read(self, given: Any) -> IlluminantSpec:
+        """Return the lamp of what is written in YAML; raise ValueError with a sentence."""
+        if isinstance(given, IlluminantSpec):
+            return given
+        if isinstance(given, str):
+            spectra.illuminant(given)  # ValueError for a name that nobody knows
+            return IlluminantSpec(given)
+        if isinstance(given, Mapping):
+            models = [model for name, model in _FORM_MODELS.items() if name in given]
+            if len(models) == 1:
+                return IlluminantSpec(models[0].model_validate(given))
+        raise ValueError(f"{describe(given)} is not a lamp; write {_FORMS}")
+
+    def write(self, value: IlluminantSpec | None) -> Any:
+        """Return the YAML form; None for a scene that has no lamp."""
+        return None if value is None else value.to_yaml()
+
+    def json_schema(self, forms: dict[str, Any]) -> dict[str, Any]:
+        """Return the definition of a lamp."""
+        named = {"type": "string", "examples": list(spectra.illuminant_names())}
+        return {
+            DEFINED: {
+                "name": "illuminant",
+                "description": f"A lamp: {_FORMS}.",
+                "examples": ["D65", {"blackbody": "5500 K"}],
+            },
+            "anyOf": [named, *forms["anyOf"]],
+        }

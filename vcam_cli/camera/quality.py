@@ -1,0 +1,46 @@
+"""How a picture is judged: its metrics, and the display on which pictures are compared."""
+
+from typing import Annotated, Literal, Self
+
+from pydantic import model_validator
+
+from vcam_cli.config.lists import words_of
+from vcam_cli.config.model import Model, at_most_one, key
+from vcam_cli.config.quantities import Quantity
+from vcam_cli.config.values import Length, MaybeLength, MaybePositive, Positive
+
+METRICS = ("mse", "psnr", "cielab", "s-cielab")
+
+
+METRIC_LIST = words_of(METRICS, 0, "[mse, psnr]", "a list of metrics")
+"""The type of `quality`."""
+
+
+class Display(Model):
+    """A display and its viewer; metrics that model the eye use it."""
+
+    dpi: MaybePositive = key("dots per inch; default 72", example=72.0, default=None)
+    width: MaybeLength = key(
+        "in place of dpi: the picture is always shown that wide", example="7.11 in", default=None
+    )
+    viewing_distance: Length = key("from eye to display", example="18 in", default=0.4572)
+    primaries: Literal["crt-brainard", "srgb"] = key(
+        "spectra of its primaries", default="crt-brainard"
+    )
+    gamma: Positive = key("exponent of its tone curve", default=2.2)
+    white: Annotated[float, Quantity("luminance", above=0)] = key(
+        "luminance of its white", example="100 cd/m2", default=100.0
+    )
+    filters: Literal["zhang-wandell-1996", "isetcam", "continuous"] = key(
+        "how S-CIELAB reads the eye's filters; continuous is smooth in the size of pixels",
+        example="continuous",
+        default="zhang-wandell-1996",
+    )
+
+    rules = (at_most_one("dpi", "width"),)
+
+    @model_validator(mode="after")
+    def _default(self) -> Self:
+        if self.dpi is None and self.width is None:
+            self._fill(dpi=72.0)
+        return self

@@ -1,0 +1,191 @@
+"""How a camera is simulated: effects, accuracy, seeds, and what is written."""
+
+from collections.abc import Mapping
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import Strict, create_model, model_validator
+
+from vcam_cli.config.lists import distinct_words
+from vcam_cli.config.model import Model, at_most_one, key
+from vcam_cli.config.quantities import Number, Quantity, Whole
+from vcam_cli.config.validation_messages import describe, one_of, refusal
+from vcam_cli.config.values import Choice, Either
+
+EFFECTS = {
+    "off_axis": "falloff of light away from the axis",
+    "diffraction": "blur by the lens's aperture",
+    "aberration": "blur by an imperfect lens",
+    "stray_light": "light spread evenly over the sensor",
+    "pixel_aperture": "blur by the photodetector's area",
+    "charge_diffusion": "blur by charge that diffuses in the silicon",
+    "pixel_vignetting": "shading by the layers above the photodetector",
+    "microlens": "a lens on every pixel",
+    "dark_current": "electrons that heat makes",
+    "shot_noise": "light and dark current arrive one by one",
+    "reset_noise": "charge that the reset leaves uncertain",
+    "read_noise": "noise of the readout, its columns and rows",
+    "fpn": "differences between pixels and between columns",
+    "saturation": "a pixel holds so many electrons",
+    "quantization": "the ADC's whole numbers",
+    "charge_transfer": "charge left behind in a ccd",
+}
+"""Name -> what it is."""
+PRESETS = {"draft": 0.02, "standard": 0.005, "reference": 0.0002}
+"""Preset -> its tolerance."""
+
+State = Literal["auto", "on", "off"]
+_STATES: dict[str, Any] = {
+    name: (State, key(f"{meaning}: auto, on or off", example="off", default="auto"))
+    for name, meaning in EFFECTS.items()
+}
+EffectStates = create_model(
+    "EffectStates",
+    __base__=Model,
+    __doc__="Which effects are simulated; those not named stay auto.",
+    **_STATES,
+)
+
+
+def _effects(given: Any) -> Any:
+    if isinstance(given, str) and given in ("auto", "all"):
+        return given
+    if isinstance(given, Mapping):
+        return EffectStates.model_validate(given).model_dump(exclude_unset=True)
+    also = "a mapping such as {shot_noise: off}"
+    raise refusal((), *one_of(given, ("auto", "all"), also), given)
+
+
+Effects = Annotated[
+    Literal["auto", "all"] | dict[str, State],
+    Either(_effects, Literal["auto", "all"] | EffectStates),
+]
+
+_TOLERANCE = Number(above=0, most=0.5, example="0.1 %")
+
+
+class Accuracy(Model):
+    """How exact the simulation is to be: a preset or a tolerance, and knobs that it sets."""
+
+    preset: Annotated[str | None, Choice(*PRESETS)] = key(
+        "draft (2 %), standard (0.5 %) or reference (0.02 %)", example="standard", default=None
+    )
+    tolerance: Annotated[float, _TOLERANCE] = key(
+        "in place of a preset: error allowed, relative to full signal",
+        example="0.1 %",
+        default=None,
+    )
+    wavelength_step: Annotated[float | None, Quantity("length", least=1e-10)] = key(
+        "spacing of wavelengths", example="5 nm", default=None
+    )
+    oversampling: Annotated[int | None, Whole(least=1, most=64, example="4")] = key(
+        "samples of a chart per pixel", example=4, default=None
+    )
+    table_size: Annotated[int | None, Whole(least=16, most=2**20, example="4096")] = key(
+        "entries of a table of transfer over spatial frequency", example=4096, default=None
+    )
+    spectral_rank: Annotated[int | None, Whole(least=1, most=256, example="8")] = key(
+        "most mixtures that stand for the spectra of a scene", example=8, default=None
+    )
+    vignetting_points: Annotated[int | None, Whole(least=3, most=129, example="17")] = key(
+        "places along each half of the array at which a pixel's tunnel is integrated",
+        example=17,
+        default=None,
+    )
+    field_zones: Annotated[int | None, Whole(least=2, most=65, example="9")] = key(
+        "places from center to corner at which a blur that changes over the field is known",
+        example=9,
+        default=None,
+    )
+    float_width: Annotated[int | None, Choice(32, 64)] = key(
+        "bits of the numbers computed with", example=32, default=None
+    )
+    shot_noise: Annotated[str | None, Choice("exact", "gaussian")] = key(
+        "exact: Poisson; gaussian: a normal distribution of the same variance",
+        example="exact",
+        default=None,
+    )
+
+    rules = (at_most_one("preset", "tolerance"),)
+
+    @property
+    def knobs(self) -> dict[str, Any]:
+        """Knobs that the file sets by hand."""
+        others = {name: getattr(self, name) for name in KNOBS}
+        return {name: value for name, value in others.items() if value is not None}
+
+    @model_validator(mode="after")
+    def _fill_tolerance(self) -> Self:
+        if "tolerance" not in self.model_fields_set:
+            preset = self.preset or "standard"
+            self._fill(preset=preset, tolerance=PRESETS[preset])
+        return self
+
+    def to_yaml(self) -> Any:
+        """Return the YAML form: the shortest that says it all."""
+        form = self.model_dump(mode="json")
+        form.pop("preset" if self.preset is None else "tolerance", None)
+        return next(iter(form.values())) if len(form) == 1 else form
+
+
+KNOBS = tuple(name for name in Accuracy.model_fields if name not in ("preset", "tolerance"))
+
+
+def _accuracy(given: Any) -> Accuracy:
+    if isinstance(given, (Mapping, Accuracy)):
+        return Accuracy.model_validate(given)
+    if isinstance(given, str) and given in PRESETS:
+        return Accuracy(preset=given)
+    if isinstance(given, str) and not given.lstrip("+-. ")[:1].isdigit():
+        also = "a fraction such as 0.1 %"
+        raise refusal((), *one_of(given, PRESETS, also), given)
+    return Accuracy(tolerance=_TOLERANCE.read(given))
+
+
+ACCURACY = Either(
+    _accuracy,
+    Literal["draft", "standard", "reference"] | Annotated[float, _TOLERANCE] | Accuracy,
+    yaml_form=Accuracy.to_yaml,
+)
+"""The type of `accuracy`."""
+
+_SEED = Whole(least=0, most=2**63 - 1, example="1")
+
+
+class Seed(Model):
+    """What the random numbers depend on."""
+
+    sensor: Annotated[int, _SEED] = key("which sensor: fixed-pattern noise and defects", default=1)
+    frame: Annotated[int, _SEED] = key("which frame: temporal noise", default=1)
+
+
+_CHANNELS = ("dn", "electrons", "volts")
+
+
+def _raw(given: Any) -> tuple[str, ...]:
+    if not isinstance(given, (list, tuple)) or not given:
+        raise ValueError(f"{describe(given)} is not a list of channels; write for example [dn]")
+    return distinct_words(given, _CHANNELS)
+
+
+def _render(given: Any) -> int | None:
+    if given == "none":
+        return None
+    if given in (8, 16) and isinstance(given, int):
+        return given
+    raise refusal((), *one_of(given, (8, 16, "none")), given)
+
+
+class Output(Model):
+    """What a run writes beside run.json and metrics.csv."""
+
+    raw: Annotated[tuple[str, ...], Either(_raw, list[Literal["dn", "electrons", "volts"]])] = key(
+        "channels of raw.exr: dn, electrons, volts",
+        example=["dn", "electrons"],
+        default=("dn", "electrons"),
+    )
+    render: Annotated[
+        Literal[8, 16] | None, Either(_render, Literal[8, 16, "none"], words={"none": None})
+    ] = key("bits of render.png: 8, 16 or none", default=8)
+    irradiance: Annotated[bool, Strict()] = key(
+        "also write irradiance.exr: W/(m2 nm) on the sensor, a channel a wavelength", default=False
+    )

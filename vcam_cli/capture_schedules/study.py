@@ -1,0 +1,325 @@
+"""A schedule study from its file to its tables: what `vcam schedule` does."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from numpy.typing import NDArray
+
+from vcam_cli.capture_schedules import frames, online_loss, photocurrents, schedule_file, tables
+from vcam_cli.capture_schedules.fewest_captures import FewestCaptures, fewest_captures
+from vcam_cli.capture_schedules.frames import Frames
+from vcam_cli.capture_schedules.methods import (
+    MethodResult,
+    Task,
+    find_schedules,
+    study_constraints,
+    study_sensor,
+)
+from vcam_cli.capture_schedules.model import MOST_CAPTURES
+from vcam_cli.capture_schedules.online_loss import OnlineLoss
+from vcam_cli.capture_schedules.pdf_source import BINS
+from vcam_cli.capture_schedules.photocurrents import Approximation
+from vcam_cli.capture_schedules.schedule_file import ScheduleFile
+from vcam_cli.errors import BadInput
+from vcam_cli.files.folder import OutputFolder
+from vcam_cli.files.points_store import RECORD
+from vcam_cli.files.report import hash_file
+from vcam_cli.progress import Observer, Silent
+from vcam_cli.scheduling.pdf import Pdf
+from vcam_cli.simulation import provenance
+
+LEAST_SNR = 1e-200
+"""Least mean SNR of a single capture: below it, products of what schedules are worth underflow."""
+
+
+@dataclass(frozen=True)
+class ApproximationStep:
+    """A pdf approximated by so many segments, and the schedules found on it."""
+
+    segments: int
+    plan: Pdf
+    found: tuple[MethodResult, ...]
+
+
+@dataclass(frozen=True)
+class ScheduleResult:
+    """The schedules of a study, and what they are worth.
+
+    Parameters
+    ----------
+    study : ScheduleFile
+        The study as it was read.
+    out : Path
+        The output folder.
+    task : Task
+        The pdf, the sensor and their bounds.
+    approximation : Approximation or None
+        The pdf in fewer segments, where the study asks for it.
+    found : tuple of MethodResult
+        Schedules of all methods and numbers of captures, in the study's order.
+    steps : tuple of ApproximationStep
+        Schedules found on approximations, where the study asks for several.
+    targets : tuple of FewestCaptures
+        The fewest captures that reach each gain that the study names.
+    online : tuple of OnlineLoss
+        What choosing times while capturing loses, where the study asks for it.
+    frames : Frames or None
+        Pictures taken with several schedules, where the study asks for them.
+    notes : tuple of str
+        What a user should know beside the numbers.
+    seconds : float
+        Time the study took.
+    """
+
+    study: ScheduleFile
+    out: Path
+    task: Task
+    approximation: Approximation | None
+    found: tuple[MethodResult, ...]
+    steps: tuple[ApproximationStep, ...] = ()
+    targets: tuple[FewestCaptures, ...] = ()
+    online: tuple[OnlineLoss, ...] = ()
+    frames: Frames | None = None
+    notes: tuple[str, ...] = ()
+    seconds: float = 0.0
+
+    @property
+    def summary_rows(self) -> list[dict[str, Any]]:
+        """The rows of summary.csv, with the names of its columns; None where a cell is empty."""
+        return tables.summary_dicts(self.task, self.found)
+
+    @property
+    def schedule_rows(self) -> list[dict[str, Any]]:
+        """The rows of schedule.csv, with the names of its columns."""
+        columns = tables.schedule_columns(self.study.model)
+        rows = tables.schedule_rows(self.study.model, self.found)
+        return [dict(zip(columns, row, strict=True)) for row in rows]
+
+    def times(self, method: str, count: int) -> NDArray:
+        """Return capture times (N,) [s]; without a sensor in 1 / the pdf's unit.
+
+        Raises
+        ------
+        KeyError
+            If the study has no such method and number of captures.
+        """
+        for one in self.found:
+            if (one.method, one.count) == (method, count):
+                return one.schedule.times
+        raise KeyError((method, count))
+
+    def summary(self) -> dict[str, Any]:
+        """Return what `--json` prints."""
+        return {
+            "name": self.study.model.name,
+            "out": str(self.out),
+            "summary": self.summary_rows,
+            "schedule": self.schedule_rows,
+            "targets": [vars(target) for target in self.targets],
+            **({"frames": list(self.frames.dicts())} if self.frames else {}),
+            "notes": list(self.notes),
+            "seconds": self.seconds,
+        }
+
+
+def schedule(
+    study: str | Path,
+    out: str | Path | None = None,
+    sets: Sequence[str] = (),
+    seed: int = 0,
+    accuracy: str | None = None,
+    workers: int | None = None,
+    watch: Observer | None = None,
+    tell: Callable[[str], None] | None = None,
+) -> ScheduleResult:
+    """Run a study of capture schedules, and write its tables and plots.
+
+    Parameters
+    ----------
+    study : str or Path
+        A file, or the name of a shipped study.
+    out : str or Path, optional
+        Output folder; by default out/NAME.
+    sets : sequence of str
+        Overrides "PATH=VALUE" of the study.
+    seed : int
+        Seed of random starts and simulated noise.
+    accuracy, workers : optional
+        Accuracy and threads of the camera whose photocurrents are wanted.
+    watch : Observer, optional
+        Told of the progress.
+    tell : callable, optional
+        Gets messages.
+
+    Raises
+    ------
+    BadInput
+        If the study or a camera has mistakes.
+    CannotDo
+        If something cannot be computed or written.
+    """
+    start = time.perf_counter()
+    watch, tell = watch or Silent(), tell or (lambda _: None)
+    read = schedule_file.read(study, sets, accuracy)
+    _check_frames_camera(read)
+    place = Path(out) if out is not None else Path("out") / read.model.name
+    with OutputFolder(place, RECORD, read.inputs) as folder:
+        result = _StudyRun(read, seed, workers, watch).result(place)
+        for note in result.notes:
+            tell(note)
+        watch.begin("tables and plots")
+        for name, write in tables.writers(result).items():
+            write(folder.new(name))
+        result = replace(result, frames=_take_frames(read, folder, workers, watch))
+        result = replace(result, seconds=time.perf_counter() - start)
+        folder.finish(_record(result))
+    return result
+
+
+def _check_frames_camera(study: ScheduleFile) -> None:
+    """Raise BadInput for what the pictures lack before any light is simulated."""
+    if study.frames_camera is None:
+        return
+    try:
+        frames.check_camera(study.frames_camera)
+    except BadInput as error:
+        raise error.located(study.locate) from None
+
+
+def _take_frames(
+    study: ScheduleFile, folder: OutputFolder, workers: int | None, watch: Observer
+) -> Frames | None:
+    """Take and write the pictures that the study asks for."""
+    asked, camera = study.model.frames, study.frames_camera
+    if asked is None or camera is None:
+        return None
+    try:
+        pictures = frames.take_frames(asked, camera, workers, watch)
+    except BadInput as error:
+        raise error.located(study.locate) from None
+    frames.write_frames(pictures, asked, folder, study.model.name)
+    return pictures
+
+
+class _StudyRun:
+    """The computation of a study."""
+
+    def __init__(
+        self, study: ScheduleFile, seed: int, workers: int | None, watch: Observer
+    ) -> None:
+        self.study, self.seed, self.workers, self.watch = study, seed, workers, watch
+        self.model = study.model
+        self.light: NDArray | None = None
+        """(n,) photocurrents of the camera's pixels [e/s], where the pdf is of a camera."""
+        self.pdf = study.known if study.known is not None else self._simulated_pdf()
+        self.approximation = self._approximation()
+        self.task = self._task(self._plan(self.model.segments[-1] if self.model.segments else 0))
+
+    def result(self, place: Path) -> ScheduleResult:
+        """Find the schedules and everything else that the study asks for."""
+        self.watch.begin("schedules")
+        found = self._method_results(self.task, self.model.methods)
+        return ScheduleResult(
+            study=self.study,
+            out=place,
+            task=self.task,
+            approximation=self.approximation,
+            found=found,
+            steps=tuple(self._steps()),
+            targets=self._targets(),
+            online=self._online_losses(),
+            notes=tuple(tables.notes(self.model, self.task, found)),
+        )
+
+    def _method_results(self, task: Task, methods: Sequence[str]) -> tuple[MethodResult, ...]:
+        counts = self.model.counts
+        return tuple(one for method in methods for one in find_schedules(task, method, counts))
+
+    def _simulated_pdf(self) -> Pdf:
+        assert self.study.camera is not None
+        self.light = photocurrents.camera_photocurrents(self.study.camera, self.workers, self.watch)
+        try:
+            return photocurrents.photocurrent_histogram(self.light, self.model.pdf.bins or BINS)
+        except ValueError as error:
+            raise self._error(("pdf", "camera"), error) from None
+
+    def _approximation(self) -> Approximation | None:
+        pixels = self.study.pixels if self.light is None else float(self.light.size)
+        least = min(self.model.segments, default=0)
+        return Approximation(self.pdf, least, pixels) if least else None
+
+    def _plan(self, segments: int) -> Pdf | None:
+        """Return the pdf approximated, None where it is not to be."""
+        return self.approximation.pdf(segments) if self.approximation else None
+
+    def _task(self, plan: Pdf | None) -> Task:
+        sensor, constraints = study_sensor(self.model), study_constraints(self.model)
+        try:
+            task = Task(self.pdf, sensor, constraints, plan, self.seed)
+        except ValueError as error:
+            raise self._error(("constraints", "frame_time"), error) from None
+        if not task.single > LEAST_SNR:
+            message = f"E[SNR] of a single capture is {task.single:.3g}: nothing to compare with"
+            path = ("pdf",) if self.model.sensor is None else ("sensor",)
+            raise self.study.error(path, message, "give it more light, or less noise")
+        return task
+
+    def _error(self, path: tuple[str, ...], error: ValueError) -> BadInput:
+        message, _, remedy = str(error).partition("; ")
+        return self.study.error(path, message, remedy)
+
+    def _steps(self) -> list[ApproximationStep]:
+        """Find schedules on coarser approximations."""
+        if len(self.model.segments) < 2:
+            return []
+        self.watch.begin("numbers of segments")
+        planned = ("optimal", "heuristic", "sqp", "weighted")
+        methods = [method for method in self.model.methods if method in planned]
+        steps = []
+        for n in self.model.segments:
+            plan = self._plan(n)
+            assert plan is not None
+            steps.append(
+                ApproximationStep(n, plan, self._method_results(self._task(plan), methods))
+            )
+        return steps
+
+    def _targets(self) -> tuple[FewestCaptures, ...]:
+        if not self.model.targets:
+            return ()
+        self.watch.begin("fewest captures")
+        largest = self.task.largest_gain
+        return fewest_captures(self._optimal_gain, self.model.targets, MOST_CAPTURES, largest)
+
+    def _optimal_gain(self, count: int) -> float:
+        (found,) = find_schedules(self.task, "optimal", [count])
+        return self.task.gain(found.schedule)
+
+    def _online_losses(self) -> tuple[OnlineLoss, ...]:
+        if not self.model.online:
+            return ()
+        self.watch.begin("online schedules")
+        scene = self.pdf if self.light is None else self.light
+        sensor, constraints = self.task.sensor, self.task.constraints
+        try:
+            losses = online_loss.online_losses(
+                scene, sensor, self.model.counts, 1 + self.seed, constraints
+            )
+        except ValueError as error:
+            raise self._error(("online",), error) from None
+        return tuple(losses)
+
+
+def _record(result: ScheduleResult) -> dict[str, Any]:
+    """Return what study.json says, but for the names of the files."""
+    return {
+        **result.summary(),
+        "study": result.study.model.model_dump(mode="json"),
+        "hashes": {str(path): hash_file(path) for path in result.study.inputs},
+        "versions": provenance.versions(),
+    }

@@ -1,0 +1,164 @@
+"""What a schedule study writes: schedule.csv, summary.csv, tables it asks for, plots, and notes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from vcam_cli.capture_schedules import online_loss
+from vcam_cli.capture_schedules import schedule_plots as plots
+from vcam_cli.capture_schedules.methods import MethodResult, Task
+from vcam_cli.capture_schedules.model import ScheduleStudy
+from vcam_cli.files.tables import Cell, write_table
+from vcam_cli.scheduling.objective import expected_snr_noisy_saturation
+
+if TYPE_CHECKING:
+    from vcam_cli.capture_schedules.study import ScheduleResult
+
+SCHEDULE = ("count", "method", "capture", "time_ratio", "photocurrent")
+TIME = "time [s]"
+"""The further column where there is a sensor."""
+SUMMARY = (
+    *("count", "method", "expected_snr", "single_capture_snr", "gain"),
+    *("upper_bound", "gap", "used", "seconds"),
+)
+SEGMENTS = ("segments", *SUMMARY[:5])
+TARGETS = ("target", "captures", "gain", "upper_bound")
+NOTED_LOSS = 0.05
+"""Relative loss from which on a note is given."""
+
+Row = tuple[Cell, ...]
+Writers = dict[str, Callable[[Path], None]]
+
+
+def schedule_columns(study: ScheduleStudy) -> tuple[str, ...]:
+    """Return the columns of schedule.csv."""
+    return SCHEDULE if study.sensor is None else (*SCHEDULE, TIME)
+
+
+def schedule_rows(study: ScheduleStudy, found: Sequence[MethodResult]) -> Iterator[Row]:
+    """Yield the rows of schedule.csv, one a capture."""
+    for one in found:
+        times, photocurrents = one.schedule.times, one.schedule.photocurrents
+        for k, (when, i) in enumerate(zip(times, photocurrents, strict=True), 1):
+            row = (one.count, one.method, k, float(when / times[0]), float(i))
+            yield row if study.sensor is None else (*row, float(when))
+
+
+def summary_rows(task: Task, found: Sequence[MethodResult]) -> Iterator[Row]:
+    """Yield the rows of summary.csv; the gap is empty where none is certified."""
+    for one in found:
+        gap = one.schedule.gap
+        yield (
+            one.count,
+            one.method,
+            one.schedule.expected_snr,
+            task.single,
+            task.gain(one.schedule),
+            one.bound / task.single,
+            "" if gap is None else float(gap),
+            one.used,
+            round(one.seconds, 6),
+        )
+
+
+def summary_dicts(task: Task, found: Sequence[MethodResult]) -> list[dict[str, Any]]:
+    """Return the rows of summary.csv as mappings, None in place of an empty cell."""
+    rows = (dict(zip(SUMMARY, row, strict=True)) for row in summary_rows(task, found))
+    return [{k: None if v == "" else v for k, v in row.items()} for row in rows]
+
+
+def segments_rows(result: ScheduleResult) -> Iterator[Row]:
+    """Yield what schedules are worth that are found on coarser approximations of the pdf."""
+    task = result.task
+    for step in result.steps:
+        for one in step.found:
+            value, gain = one.schedule.expected_snr, task.gain(one.schedule)
+            yield (step.segments, one.count, one.method, value, task.single, gain)
+
+
+def targets_rows(result: ScheduleResult) -> Iterator[Row]:
+    """Yield the fewest captures for each gain; empty where none that was tried reaches it."""
+    for target in result.targets:
+        cells = ("" if value is None else value for value in (target.count, target.gain))
+        yield (target.target, *cells, result.task.largest_gain)
+
+
+def writers(result: ScheduleResult) -> Writers:
+    """Return what writes each file of a study, by its name."""
+    model, found = result.study.model, result.found
+    rows, columns = schedule_rows(model, found), schedule_columns(model)
+    out: Writers = {
+        "schedule.csv": partial(write_table, columns=columns, rows=rows),
+        "summary.csv": partial(write_table, columns=SUMMARY, rows=summary_rows(result.task, found)),
+    }
+    if result.steps:
+        out["segments.csv"] = partial(write_table, columns=SEGMENTS, rows=segments_rows(result))
+        out["segments.png"] = partial(plots.plot_gain_over_segments, result)
+    if result.targets:
+        out["targets.csv"] = partial(write_table, columns=TARGETS, rows=targets_rows(result))
+    if result.online:
+        cells = [loss.cells() for loss in result.online]
+        out["online.csv"] = partial(write_table, columns=online_loss.COLUMNS, rows=cells)
+        title = f"{model.name}: captures planned online"
+        out["online.png"] = partial(online_loss.plot_losses, title=title, losses=result.online)
+    out["captures.png"] = partial(plots.plot_captures, result)
+    out["pdf.png"] = partial(plots.plot_pdf, result)
+    if len(model.counts) > 1:
+        out["gain.png"] = partial(plots.plot_gain, result)
+    if plots.binning_steps(result):
+        out["binning.png"] = partial(plots.plot_binning, result)
+    return out
+
+
+def notes(study: ScheduleStudy, task: Task, found: Sequence[MethodResult]) -> Iterator[str]:
+    """Yield a sentence for each thing that the numbers of a study leave unsaid."""
+    yield from _probability_notes(study)
+    yield from _level_notes(study, task)
+    yield from _approximation_notes(task, found)
+    if study.sensor is not None:
+        yield from _saturation_notes(task, found)
+
+
+def _probability_notes(study: ScheduleStudy) -> Iterator[str]:
+    total = sum(segment.probability for segment in study.pdf.segments or ())
+    if study.pdf.segments is not None and abs(total - 1) > 1e-6:
+        yield f"probabilities add up to {total:.6g}; they are taken relative to that"
+
+
+def _level_notes(study: ScheduleStudy, task: Task) -> Iterator[str]:
+    """Yield why more captures are not used."""
+    pdf = task.pdf
+    lit = int((pdf.probability > 0).sum() - (pdf.discrete and pdf.low[0] == 0))
+    if pdf.discrete and lit < max(study.counts) and not task.approximated:
+        are = "there is 1 level" if lit == 1 else f"there are {lit} levels"
+        used = "1 is" if lit == 1 else f"{lit} are"
+        yield f"{are} of light: of more captures than that, {used} used, the rest repeat"
+
+
+def _approximation_notes(task: Task, found: Sequence[MethodResult]) -> Iterator[str]:
+    """Yield how much the approximation may cost, where that is more than rounding."""
+    gaps = [one.schedule.gap or 0.0 for one in found if one.method == "optimal"]
+    if not task.approximated or max(gaps, default=0.0) < NOTED_LOSS:
+        return
+    few = plots.segments_text(task.plan)
+    cost = f"found on {few}, `optimal` may be {max(gaps):.2g} of its E[SNR] below the best"
+    yield f"{cost} for the pdf itself; give more segments, or none"
+
+
+def _saturation_notes(task: Task, found: Sequence[MethodResult]) -> Iterator[str]:
+    """Yield what real pixels lose, of which noise fills one in two at the limit of a capture."""
+    optimal = [one.schedule for one in found if one.method == "optimal"]
+    if not task.pdf.discrete or not optimal:
+        return
+    loss = max(
+        1 - expected_snr_noisy_saturation(task.pdf, one.times, task.sensor) / one.expected_snr
+        for one in optimal
+    )
+    if loss > NOTED_LOSS:
+        yield (
+            "captures stand exactly on levels, where noise fills one pixel in two: saturation "
+            f"by noisy values takes up to {100 * loss:.2g} % off the E[SNR] of `optimal`"
+        )

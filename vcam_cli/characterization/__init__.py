@@ -1,0 +1,1 @@
+"""Characterization of a camera on a simulated bench: what `vcam characterize` measures."""

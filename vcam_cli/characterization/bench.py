@@ -1,0 +1,356 @@
+"""The measuring bench: a camera's pixels in even light, in the dark, and before a slanted edge.
+
+As EMVA 1288 [1]_ has it, the sensor is lit evenly: every pixel gets what a pixel on the axis gets,
+and relative illumination is left out. Each color is lit so that it fills at the same step, as if by
+a lamp of its own; the lamp's spectrum is that of the camera file. The exposure time stays the same
+and the light changes (section 6 of the standard, second method).
+
+Why not the camera's own array: pixels are alike, and how many there are decides nothing but the
+statistics. A field of a fixed size measures a camera of one pixel as well as one of many millions.
+
+Why a pedestal: numbers end at 0, and an ADC without offset cuts off half of the noise in the dark.
+The standard asks for an offset that leaves at most 0.5 % of the pixels at 0; where the file's is
+lower, the codes are moved up as a whole, 0 and the highest code with them.
+
+References
+----------
+.. [1] EMVA Standard 1288, Release 4.0 Linear, European Machine Vision Association, 2021.
+.. [2] ISO 12233, "Photography - Electronic still picture imaging - Resolution and spatial frequency
+   responses".
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcam_cli.accuracy.ablation import with_effects, with_exposure_time
+from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.derived.geometry import geometry, pixel_centers
+from vcam_cli.camera.derived.mosaic import BLOCKS, NONE, mosaic
+from vcam_cli.camera.illuminant import IlluminantSpec
+from vcam_cli.camera.optics import Wavefront
+from vcam_cli.camera.scene import SlantedEdge, Uniform
+from vcam_cli.effects.base import NoiseSource, Quantizer
+from vcam_cli.effects.fpn import FixedPattern
+from vcam_cli.effects.quantization import Quantization
+from vcam_cli.errors import bad
+from vcam_cli.physics import radiometry
+from vcam_cli.progress import Stages
+from vcam_cli.quality.mtf import Lattice
+from vcam_cli.readout import exposure
+from vcam_cli.simulation.preparation import Prepared
+from vcam_cli.simulation.simulate import prepare
+from vcam_cli.spectra import integral, photons
+
+FIELD = 512
+"""Rows and columns of the field that is measured, cut down to whole blocks of colors."""
+EDGE_ANGLE, EDGE_CONTRAST = 5, 0.6
+"""Angle [degree] and contrast of the slanted edge of ISO 12233: bright over dark 4 to 1."""
+EDGE_LEVEL = 0.7
+"""Signal on the bright side of the edge, over saturation."""
+EDGE_TOLERANCE = 0.001
+"""Accuracy of the edge, over its mean signal; the file's own where it is finer."""
+PEDESTAL = 6.0
+"""Standard deviations of the dark signal that lie above code 0."""
+LEAST_NOISE = 0.5
+"""Least shot noise at 70 % of saturation, in steps of the ADC; below it, all is rounding."""
+
+
+@dataclass(frozen=True)
+class Bench:
+    """A camera ready to be measured.
+
+    Parameters
+    ----------
+    camera : Camera
+        The camera as its file has it.
+    ready : Prepared
+        The camera before its chart, with every effect that the file has and does not switch off.
+    pedestal : int
+        Steps by which the codes are moved up [DN].
+    workers : int
+        Threads.
+    """
+
+    camera: Camera
+    ready: Prepared
+    pedestal: int
+    workers: int
+
+    @property
+    def time(self) -> float:
+        """Exposure time [s]."""
+        return self.ready.exposure_time
+
+    @property
+    def dark(self) -> float:
+        """Mean dark signal of the exposure [e]."""
+        return self.ready.dark_rate * self.time
+
+    @property
+    def saturation(self) -> float:
+        """Photo-electrons that fill well or ADC, whichever is full first [e]."""
+        return self.ready.electrical.saturation - self.dark
+
+    @property
+    def noise_floor(self) -> float:
+        """Temporal variance without any charge, of reset and readout [e^2]."""
+        return sum(e.variance(0.0) for e in self._noise_sources("frame"))
+
+    def pattern_variance(self, mean: float) -> float:
+        """Return the variance from pixel to pixel at a mean signal, dark included [e^2]."""
+        return sum(e.variance(mean, self.dark) for e in self._noise_sources("sensor"))
+
+    @property
+    def column_pattern(self) -> tuple[float, float]:
+        """Standard deviations of the columns' offsets [e] and gains."""
+        sources = self._noise_sources("sensor")
+        fixed = next((e for e in sources if isinstance(e, FixedPattern)), None)
+        return (fixed.offset_column, fixed.gain_column) if fixed else (0.0, 0.0)
+
+    def _noise_sources(self, scope: str) -> list[NoiseSource]:
+        return [
+            e for e in self.ready.plan.active if isinstance(e, NoiseSource) and e.scope == scope
+        ]
+
+    @property
+    def colors(self) -> tuple[str, ...]:
+        """The colors that are sensitive to any of the light."""
+        rates = zip(self.ready.mosaic.colors, self.ready.white_rate, strict=True)
+        return tuple(color for color, rate in rates if rate > 0)
+
+    @property
+    def photon_rate(self) -> float:
+        """Photons of perfect white a second on a pixel's whole area [1/s], eq 2.18."""
+        g, scene = self.ready.geometry, self.camera.scene
+        white = self.ready.scene.white.multiply(self.camera.optics.transmittance.resolve())
+        band = scene.wavelengths
+        per_area = integral(photons(white), band.start, band.stop)
+        per_area *= float(radiometry.irradiance_per_radiance(g.f_number, g.magnification))
+        return per_area * g.pitch_x * g.pitch_y
+
+    def efficiency(self, color: str) -> float:
+        """Return the electrons per photon on the pixel of one color, by the model."""
+        index = self.ready.mosaic.colors.index(color)
+        return float(self.ready.white_rate[index]) / self.photon_rate
+
+    def flat_frame(self, electrons: float, number: int, time: float | None = None) -> NDArray:
+        """Take a raw frame in even light, or a dark one.
+
+        Parameters
+        ----------
+        electrons : float
+            Mean photo-electrons of a pixel; 0 for a dark frame [e].
+        number : int
+            Number of the frame, which decides its temporal noise.
+        time : float, optional
+            Another exposure time than the camera's [s].
+
+        Returns
+        -------
+        (rows, columns) array
+            Codes [DN].
+        """
+        time = self.time if time is None else time
+        g = self.ready.geometry
+        dtype = self.ready.settings.dtype
+        rate: NDArray = np.full((g.rows, g.columns), electrons / (time or 1.0), dtype)
+        return self.take_frame(rate, number, time)
+
+    def take_frame(self, rate: NDArray, number: int, time: float) -> NDArray:
+        """Take a raw frame, its codes moved up by the pedestal.
+
+        Parameters
+        ----------
+        rate : (rows, columns) array
+            Photo-electrons a second [e/s].
+        number : int
+            Number of the frame, which decides its temporal noise.
+        time : float
+            Exposure time [s].
+
+        Returns
+        -------
+        (rows, columns) array
+            Codes [DN].
+        """
+        code = Quantization.from_camera(self.camera, self.ready.geometry)
+        effects = tuple(e for e in self.ready.plan.active if not isinstance(e, Quantizer))
+        seed = self.camera.seed
+        # No frame of another frame seed has the same noise.
+        seeds = {"sensor": seed.sensor, "frame": seed.frame + (number << 64)}
+        electrons, _ = exposure.capture(rate, time, effects, code, seeds, self.workers)
+        dn = np.rint(code.line(electrons)) + self.pedestal
+        return np.clip(dn, 0, 2**code.bits - 1 + self.pedestal)
+
+    def color_pixels(self, frame: NDArray, color: str) -> NDArray:
+        """Return the pixels of one color as lattices of equal size, (lattices, rows, columns)."""
+        return np.stack([frame[rows, columns] for rows, columns in self.color_slices(color)])
+
+    def lattices(self, frame: NDArray, color: str) -> list[Lattice]:
+        """Return the pixels of one color with their places on the detector."""
+        x, y = pixel_centers(self.ready.geometry, detector=True)
+        return [
+            Lattice(frame[rows, columns], x[columns], y[rows])
+            for rows, columns in self.color_slices(color)
+        ]
+
+    def color_slices(self, color: str) -> Iterator[tuple[slice, slice]]:
+        """Yield the rows and columns of each lattice of one color."""
+        block = self.ready.mosaic.block
+        for row, line in enumerate(block):
+            for column, name in enumerate(line):
+                if name == color:
+                    yield slice(row, None, len(block)), slice(column, None, len(line))
+
+
+def prepare_bench(camera: Camera, workers: int, stages: Stages) -> Bench:
+    """Put a camera on the bench, in even light.
+
+    Parameters
+    ----------
+    camera : Camera
+        The camera.
+    workers : int
+        Threads.
+    stages : Stages
+        Told of the progress.
+
+    Raises
+    ------
+    BadInput
+        If the camera cannot be measured there.
+    """
+    if camera.adc.kind != "linear":
+        raise bad(
+            "adc.kind",
+            "EMVA 1288 measures linear cameras, and this ADC is logarithmic",
+            "write kind: linear to measure the pixel in front of it",
+        )
+    if camera.array.binning is not None and camera.array.binning.count > 1:
+        raise bad(
+            "array.binning",
+            "the bench measures pixels that are read one by one",
+            "write binning: none to measure the pixel",
+        )
+    pattern = camera.array.pattern
+    block = BLOCKS.get(str(pattern)) or getattr(pattern, "block", None) or ((NONE,),)
+    if any(NONE in line for line in block):
+        raise bad(
+            "array.pattern",
+            "only pixels in blocks on rows and columns are measured",
+            "write for example pattern: monochrome to measure the pixel",
+        )
+    blurs = ("diffraction", "aberration")  # they do not change even light
+    even = _before_chart(camera, Uniform(kind="chart", chart="uniform"), "off_axis", *blurs)
+    ready, _ = prepare(even, workers, stages.watch)
+    bench = Bench(camera, ready, 0, workers)
+    _check_measurable(bench)
+    e = ready.electrical
+    spread = math.sqrt(bench.noise_floor + bench.dark + bench.pattern_variance(bench.dark))
+    short = PEDESTAL * spread / e.electrons_per_dn - e.offset
+    return replace(bench, pedestal=max(0, math.ceil(short)))
+
+
+def prepare_edge_bench(bench: Bench, stages: Stages) -> Bench:
+    """Put the same camera before a slanted edge; its rate is that of the edge.
+
+    Its fixed pattern is left out: on a bench it is removed by a flat field. So is what charge
+    loses on its way out, which depends on how far from the output it is.
+
+    Raises
+    ------
+    BadInput, CannotDo
+        As a simulation does.
+    """
+    named = {"kind": "chart", "chart": "slanted-edge", "angle": f"{EDGE_ANGLE} deg"}
+    chart = SlantedEdge.model_validate({**named, "contrast": EDGE_CONTRAST})
+    camera = _before_chart(bench.camera, chart, "off_axis", "fpn", "charge_transfer")
+    if camera.accuracy.tolerance > EDGE_TOLERANCE:
+        finer = camera.accuracy.model_copy(update={"preset": None, "tolerance": EDGE_TOLERANCE})
+        camera = camera.model_copy(update={"accuracy": finer})
+    ready, _ = prepare(with_exposure_time(camera, bench.time), bench.workers, stages.watch)
+    return replace(bench, ready=ready)
+
+
+def edge_rate(edge: Bench) -> NDArray:
+    """Return the edge's photo-electrons a second, every color as bright as the others [e/s]."""
+    ready = edge.ready
+    rate = ready.rate.copy()
+    bright = (1 + EDGE_CONTRAST) / 2
+    for color in edge.colors:
+        white = float(ready.white_rate[ready.mosaic.colors.index(color)])
+        wanted = EDGE_LEVEL * edge.saturation / edge.time
+        for rows, columns in edge.color_slices(color):
+            rate[rows, columns] *= rate.dtype.type(wanted / (bright * white))
+    return rate
+
+
+def _before_chart(camera: Camera, chart: Uniform | SlantedEdge, *left_out: str) -> Camera:
+    """Return the camera before a chart, its array a field around the axis, its lens as solved."""
+    solved = geometry(camera)
+    scene = camera.scene
+    light = {} if isinstance(scene.luminance, float | None) else {"luminance": 100.0}
+    changes: dict[str, Any] = {"source": chart, "extent": "sensor", **light}
+    if scene.illuminant is None:
+        changes["illuminant"] = IlluminantSpec("D65")
+    lens: dict[str, Any] = dict.fromkeys(
+        ("aperture_diameter", "numerical_aperture", "field_of_view")
+    )
+    lens |= {"focal_length": solved.focal_length, "f_number": solved.f_number}
+    lens["zernike"] = _axial_wavefront(camera.optics.zernike)
+    block = mosaic(camera).block
+    rows, columns = (FIELD - FIELD % count for count in (len(block), len(block[0])))
+    array = {"rows": rows, "columns": columns, "die": None}
+    camera = camera.model_copy(
+        update={
+            "scene": scene.model_copy(update=changes),
+            "optics": camera.optics.model_copy(update=lens),
+            "array": camera.array.model_copy(update=array),
+            "quality": (),
+        }
+    )
+    return with_effects(camera, "on", *left_out)
+
+
+def _axial_wavefront(wavefront: Wavefront) -> Wavefront:
+    """Return the wavefront on the axis for everywhere: of those given, the nearest to it."""
+    fields = sorted(wavefront.terms, key=lambda item: item[0] or 0.0)
+    return Wavefront(((None, fields[0][1]),)) if fields else wavefront
+
+
+def _check_measurable(bench: Bench) -> None:
+    """Raise BadInput where the photon transfer has nothing to measure."""
+    ready = bench.ready
+    if not bench.colors:
+        raise bad(
+            ("scene", "illuminant"),
+            "the pixels see nothing of this light",
+            "choose another illuminant, or look at transmittance, filters and quantum efficiency",
+        )
+    if not any(e.name == "shot_noise" for e in ready.plan.active):
+        raise bad(
+            ("effects", "shot_noise"),
+            "the photon transfer measures the gain by the noise of light, which is switched off",
+            "remove this line",
+        )
+    if bench.saturation <= 0.1 * ready.electrical.saturation:
+        raise bad(
+            ("exposure",),
+            f"dark current alone makes {bench.dark:.6g} of the {ready.electrical.saturation:.6g}"
+            " electrons that a pixel or the ADC holds",
+            "expose for a shorter time, or cool the sensor",
+        )
+    steps = math.sqrt(0.7 * bench.saturation) / ready.electrical.electrons_per_dn
+    if steps < LEAST_NOISE:
+        raise bad(
+            ("adc", "bits"),
+            f"the noise of light is at most {steps:.3g} steps of the ADC, and lost in rounding",
+            "give more bits, or a lower full scale",
+        )

@@ -1,0 +1,119 @@
+"""`vcam characterize`: what a laboratory would measure of a camera, beside what its file says.
+
+Flat frames at many levels of light, dark frames of many times, stacks of both and a slanted edge
+are simulated (`bench.py`, `exposures.py`) and evaluated by the standards (`quality/`), which know
+nothing of the file. Its closed forms stand beside each number (`datasheet.py`).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from vcam_cli.camera.camera import Camera
+from vcam_cli.characterization.bench import Bench, prepare_bench
+from vcam_cli.characterization.datasheet import COLUMNS, Quantity, notes, quantities
+from vcam_cli.characterization.exposures import Channel, measure_channels
+from vcam_cli.errors import BadInput
+from vcam_cli.parallel import available_workers
+from vcam_cli.progress import Observer, Silent, Stages
+
+
+@dataclass(frozen=True)
+class Characterization:
+    """The measurement of a camera.
+
+    Parameters
+    ----------
+    bench : Bench
+        The camera in even light.
+    channels : tuple of Channel
+        What was measured of each color.
+    quantities : tuple of Quantity
+        Every number of every color.
+    notes : tuple of str
+        What a reader of the numbers has to know.
+    stages : Stages
+        Seconds that each stage took.
+    """
+
+    bench: Bench
+    channels: tuple[Channel, ...]
+    quantities: tuple[Quantity, ...]
+    notes: tuple[str, ...]
+    stages: Stages
+
+    @property
+    def nyquist(self) -> float:
+        """Nyquist frequency of the array's columns [cycles/m]."""
+        return 0.5 / self.bench.ready.geometry.pitch_x
+
+    def get(self, name: str, channel: str | None = None) -> Quantity:
+        """Return a number by its name, of one color or of the first.
+
+        Raises
+        ------
+        KeyError
+            If there is no such number.
+        """
+        for q in self.quantities:
+            if q.name == name and channel in (None, q.channel):
+                return q
+        raise KeyError(name)
+
+    def report(self) -> dict[str, Any]:
+        """Return what `characterize.json` and `--json` say."""
+        return {
+            "name": self.bench.camera.name,
+            "exposure_time": self.bench.time,
+            "pedestal": self.bench.pedestal,
+            "quantities": [dict(zip(COLUMNS, q.row, strict=True)) for q in self.quantities],
+            "channels": {c.color: _measured_points(c) for c in self.channels},
+            "notes": list(self.notes),
+            "stages": self.stages.seconds,
+        }
+
+
+def characterize(
+    camera: Camera, workers: int | None = None, watch: Observer | None = None
+) -> Characterization:
+    """Measure a camera.
+
+    Parameters
+    ----------
+    camera : Camera
+        The camera.
+    workers : int, optional
+        Threads; by default as many as there are processors. Results do not depend on it.
+    watch : Observer, optional
+        Told of stages.
+
+    Raises
+    ------
+    BadInput
+        With positions in the camera's file, if it cannot be measured.
+    """
+    try:
+        stages = Stages(watch=watch or Silent())
+        bench = prepare_bench(camera, workers or available_workers(), stages)
+        channels = measure_channels(bench, stages)
+    except BadInput as error:
+        raise error.located(camera.locate) from None
+    numbers = tuple(q for channel in channels for q in quantities(bench, channel))
+    return Characterization(bench, channels, numbers, tuple(notes(bench, channels)), stages)
+
+
+def _measured_points(channel: Channel) -> dict[str, Any]:
+    """Return the measured points behind the numbers."""
+    series, edge = channel.transfer.series, channel.edge
+    kept = edge.measured.frequency * edge.measured.pitch <= 1
+    return {
+        "photons": series.photons,
+        "mean": series.mean,
+        "variance": series.variance,
+        "dark_mean": series.dark_mean,
+        "dark_variance": series.dark_variance,
+        "frequency": edge.measured.frequency[kept],
+        "mtf": edge.measured.mtf[kept],
+        "mtf_expected": edge.expected[kept],
+    }

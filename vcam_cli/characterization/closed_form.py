@@ -1,0 +1,164 @@
+"""What the measurement should find: the closed forms of the camera's model.
+
+References
+----------
+.. [1] EMVA Standard 1288, Release 4.0 Linear, European Machine Vision Association, 2021.
+.. [2] N. Johnson, S. Kotz, N. Balakrishnan, "Continuous Univariate Distributions", vol. 1, Wiley,
+   1994, section 13.10.1 (moments of a censored normal variable).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from vcam_cli.effects.base import Effect, SeparableTransfer
+from vcam_cli.image_formation.transfer_functions import Transfer
+from vcam_cli.simulation import plan
+from vcam_cli.simulation.preparation import Prepared
+
+NODES = 33
+"""Gauss points of the integral over the pixels' differences."""
+BATCH = 16
+"""Frequencies at which a transfer of two dimensions is computed at once."""
+
+
+def clipped_variance(mean: ArrayLike, sigma: ArrayLike, limit: float) -> NDArray:
+    """Return the variance of min(X, limit) for a normal X, section 13.10.1 of [1]_.
+
+    Parameters
+    ----------
+    mean, sigma : array_like
+        Mean and standard deviation of X, above 0; their shapes broadcast.
+    limit : float
+        Where X is clipped, in the same unit.
+
+    Returns
+    -------
+    array
+        Variances, in the square of that unit.
+
+    References
+    ----------
+    .. [1] N. Johnson, S. Kotz, N. Balakrishnan, "Continuous Univariate Distributions", vol. 1,
+       Wiley, 1994.
+    """
+    from scipy.special import ndtr
+
+    m, s = np.asarray(mean, np.float64), np.asarray(sigma, np.float64)
+    a = (limit - m) / s
+    density = np.exp(-(a**2) / 2) / np.sqrt(2 * np.pi)
+    above = ndtr(-a)
+    first = a * above - density
+    second = ndtr(a) - a * density + a**2 * above
+    return s**2 * (second - first**2)
+
+
+def saturation_capacity(
+    limit: float, dark: float, floor: float, pattern: Callable[[float], float]
+) -> float:
+    """Return the photo-electrons at which the temporal variance is largest.
+
+    That is the saturation point of [1]_. Noise that is cut off at the limit is less: the point lies
+    some two standard deviations below it.
+
+    Parameters
+    ----------
+    limit : float
+        Electrons that well or ADC hold [e].
+    dark : float
+        Mean dark signal [e].
+    floor : float
+        Variance of reset and readout [e^2].
+    pattern : callable
+        Variance from pixel to pixel [e^2] at a mean signal [e].
+
+    Returns
+    -------
+    float
+        Photo-electrons [e].
+
+    References
+    ----------
+    .. [1] EMVA Standard 1288, Release 4.0 Linear, European Machine Vision Association, 2021.
+    """
+    photo = (limit - dark) * np.linspace(0.2, 1.2, 5001)
+    z, weight = np.polynomial.hermite_e.hermegauss(NODES)
+    weight = weight / weight.sum()
+    spread = np.sqrt([pattern(float(m + dark)) for m in photo])
+    means = photo[:, None] + dark + spread[:, None] * z
+    sigma = np.sqrt(np.maximum(means, 0) + floor) + 1e-9
+    variance = clipped_variance(means, sigma, limit) @ weight
+    return float(photo[np.argmax(variance)])
+
+
+def system_mtf(
+    ready: Prepared, color: int, frequency: NDArray, direction: tuple[float, float]
+) -> NDArray:
+    """Return the MTF of optics, diffusion and aperture at the center, |H(f)| / H(0).
+
+    Parameters
+    ----------
+    ready : Prepared
+        The camera.
+    color : int
+        Index of the color.
+    frequency : (n,) array
+        Spatial frequencies along `direction` [cycles/m].
+    direction : tuple of float
+        Unit vector (x, y).
+
+    Returns
+    -------
+    (n,) array
+        Transfer, 1 at frequency 0.
+    """
+    effects = plan.optical(ready.camera, ready.geometry)
+    return directional_mtf(ready.transfer, effects, color, frequency, direction)
+
+
+def directional_mtf(
+    transfer: Transfer,
+    effects: Sequence[Effect],
+    color: int,
+    frequency: NDArray,
+    direction: tuple[float, float],
+) -> NDArray:
+    """Return |H(f)| / H(0) of a transfer's first component with the apertures among the effects.
+
+    Parameters
+    ----------
+    transfer : Transfer
+        Transfer of the lens and the silicon.
+    effects : sequence of Effect
+        Effects, of which separable transfers count.
+    color : int
+        Index of the color.
+    frequency : (n,) array
+        Spatial frequencies along `direction` [cycles/m].
+    direction : tuple of float
+        Unit vector (x, y).
+
+    Returns
+    -------
+    (n,) array
+        Transfer, 1 at frequency 0.
+    """
+    fx, fy = frequency * direction[0], frequency * direction[1]
+    out = np.ones(len(frequency), np.complex128)
+    for effect in effects:
+        if isinstance(effect, SeparableTransfer):
+            out *= effect.along_x(fx) * effect.along_y(fy)
+    return np.abs(out * _blur(transfer, color, fx, fy)) / float(transfer.level[0, color])
+
+
+def _blur(transfer: Transfer, color: int, fx: NDArray, fy: NDArray) -> NDArray:
+    """Return H of the lens and the silicon at pairs of fx and fy: (n,) [e/s]."""
+    if not transfer.plane:
+        return transfer.at(np.hypot(fx, fy))[0, color]
+    # The plane over a few of each is quicker than one pair after another.
+    parts = (slice(i, i + BATCH) for i in range(0, len(fx), BATCH))
+    planes = (transfer.at_plane(fx[part], fy[part])[0, color] for part in parts)
+    return np.concatenate([np.diagonal(plane) for plane in planes])

@@ -1,0 +1,207 @@
+"""The numbers of a data sheet, each as measured and as the camera's model has it.
+
+References
+----------
+.. [1] EMVA Standard 1288, Release 4.0 Linear, European Machine Vision Association, 2021.
+.. [2] ISO 12233, "Photography - Electronic still picture imaging - Resolution and spatial frequency
+   responses".
+.. [3] T. Chen, "Digital Camera System Simulator and Applications", PhD thesis, Stanford
+   University, 2003, eqs 3.1 and 3.2.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from vcam_cli.characterization.bench import Bench
+from vcam_cli.characterization.closed_form import saturation_capacity
+from vcam_cli.characterization.exposures import Channel
+from vcam_cli.physics import readout
+from vcam_cli.quality.mtf import crossing_frequency
+from vcam_cli.quality.nonuniformity import Nonuniformity
+from vcam_cli.quality.photon_transfer import (
+    MIN_DARK_VARIANCE,
+    ROUNDING,
+    electrons_of_variance,
+    sensitivity_threshold,
+)
+
+COLUMNS = ("quantity", "channel", "measured", "expected", "unit", "definition")
+SNR_LEVEL = 0.2
+"""Signal at which the SNR of eq 3.2 is reported, over saturation."""
+R4 = "EMVA 1288 R4"
+
+Row = tuple[str, float, float, str, str]
+"""Name, measured, expected, unit and definition of a number."""
+Pattern = tuple[float, float, float, float]
+"""Standard deviations of all pixels, of rows, of columns, and of pixels alone."""
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """One number of the data sheet.
+
+    Parameters
+    ----------
+    name, channel : str
+        Name of the number and of the color.
+    measured, expected : float
+        The number as measured, and as the model has it.
+    unit, definition : str
+        Its unit, and how the standards define it.
+    """
+
+    name: str
+    channel: str
+    measured: float
+    expected: float
+    unit: str
+    definition: str
+
+    @property
+    def row(self) -> tuple[str, str, float, float, str, str]:
+        """The values in the order of `COLUMNS`."""
+        return self.name, self.channel, self.measured, self.expected, self.unit, self.definition
+
+
+def quantities(bench: Bench, channel: Channel) -> tuple[Quantity, ...]:
+    """Return every number of one color.
+
+    Parameters
+    ----------
+    bench : Bench
+        The camera in even light.
+    channel : Channel
+        What was measured of the color.
+    """
+    rows = (
+        *_response_rows(bench, channel),
+        *_range_rows(bench, channel),
+        *_pattern_rows(bench, channel),
+        *_sharpness_rows(bench, channel),
+    )
+    return tuple(
+        Quantity(name, channel.color, float(measured), float(expected), unit, definition)
+        for name, measured, expected, unit, definition in rows
+    )
+
+
+def notes(bench: Bench, channels: tuple[Channel, ...]) -> Iterator[str]:
+    """Yield what a reader of the numbers has to know."""
+    blind = [color for color in bench.ready.mosaic.colors if color not in bench.colors]
+    if blind:
+        yield f"{', '.join(blind)}: not measured, sees nothing of this light"
+    if bench.pedestal:
+        yield (
+            f"the ADC's offset of {bench.ready.electrical.offset:g} DN cuts off noise in the dark;"
+            f" measured with codes moved up by {bench.pedestal} DN, as EMVA 1288 asks"
+        )
+    if any(c.transfer.series.dark_variance < MIN_DARK_VARIANCE for c in channels):
+        yield (
+            "the noise in the dark is masked by the ADC's rounding: temporal_dark_noise and"
+            " read_noise are the most that they can be (EMVA 1288 R4 eq 54), dsnu holds rounding"
+            " as well"
+        )
+
+
+def _response_rows(bench: Bench, channel: Channel) -> Iterator[Row]:
+    """Yield gain, efficiency and noise."""
+    transfer, straight = channel.transfer, channel.linearity
+    gain = 1 / bench.ready.electrical.electrons_per_dn
+    efficiency = bench.efficiency(channel.color)
+    dark_noise = math.sqrt(bench.noise_floor + bench.dark)
+    read_noise = electrons_of_variance(channel.dark.variance, transfer.gain)
+    yield "system_gain", transfer.gain, gain, "DN/e", f"K, {R4} eq 50"
+    definition = f"electrons per photon on the pixel, in this light; {R4} eq 52"
+    yield "quantum_efficiency", 100 * transfer.quantum_efficiency, 100 * efficiency, "%", definition
+    yield "responsivity", transfer.responsivity, gain * efficiency, "DN/photon", f"R, {R4} eq 49"
+    definition = f"sigma_d, {R4} eqs 53 and 54"
+    yield "temporal_dark_noise", transfer.dark_noise, dark_noise, "e", definition
+    definition = "noise of reset and readout: temporal dark noise at no exposure time"
+    yield "read_noise", read_noise, math.sqrt(bench.noise_floor), "e", definition
+    definition = f"mu_I.mean, {R4} section 7"
+    yield "dark_current", channel.dark_current, bench.ready.dark_rate, "e/s", definition
+    yield "linearity_error", 100 * straight.error, 0.0, "%", f"LE, {R4} eq 63"
+    definition = f"of the deviations, {R4} eq 62"
+    yield "linearity_error_min", 100 * straight.min_deviation, 0.0, "%", definition
+    yield "linearity_error_max", 100 * straight.max_deviation, 0.0, "%", definition
+
+
+def _range_rows(bench: Bench, channel: Channel) -> Iterator[Row]:
+    """Yield the range, from the least light that can be distinguished from none to the most."""
+    transfer, e = channel.transfer, bench.ready.electrical
+    efficiency = bench.efficiency(channel.color)
+    floor, dark = bench.noise_floor, bench.dark
+    capacity = saturation_capacity(e.saturation, dark, floor, bench.pattern_variance)
+    least = sensitivity_threshold(floor + dark + ROUNDING * e.electrons_per_dn**2)
+    definition = "electrons that the well or the ADC holds, whichever is full first"
+    yield "full_well", channel.full_well, e.saturation, "e", definition
+    definition = f"mu_e.sat, {R4} eq 24"
+    yield "saturation_capacity", transfer.saturation_capacity, capacity, "e", definition
+    photons, definition = capacity / efficiency, f"mu_p.sat, {R4} section 6"
+    yield "saturation_photons", transfer.saturation_photons, photons, "photons", definition
+    definition = f"mu_e.min, {R4} eq 27"
+    yield "threshold_electrons", transfer.threshold_electrons, least, "e", definition
+    photons, definition = least / efficiency, f"mu_p.min, {R4} eq 26"
+    yield "threshold_photons", transfer.threshold_photons, photons, "photons", definition
+    yield "snr_max_db", _db(transfer.snr_max), _db(math.sqrt(capacity)), "dB", f"{R4} eq 55"
+    expected, definition = _db(capacity / least), f"{R4} eq 28"
+    yield "emva_dynamic_range_db", _db(transfer.dynamic_range), expected, "dB", definition
+    measured = _db((channel.full_well - channel.dark_current * bench.time) / transfer.dark_noise)
+    expected = float(readout.dynamic_range_db(e.saturation, dark, floor))
+    yield "dynamic_range_db", measured, expected, "dB", "Chen 2003 eq 3.1"
+    signal = SNR_LEVEL * bench.saturation
+    expected = float(readout.snr_db(signal, dark, floor))
+    definition = f"Chen 2003 eq 3.2, at {SNR_LEVEL:.0%} of saturation"
+    yield "snr_db", _db(transfer.measured_snr(signal)), expected, "dB", definition
+
+
+def _pattern_rows(bench: Bench, channel: Channel) -> Iterator[Row]:
+    """Yield what differs from pixel to pixel."""
+    dark, bright = _expected_patterns(bench)
+    kinds: tuple[tuple[str, Nonuniformity, Pattern, int, str, str, int], ...] = (
+        ("dsnu", channel.dsnu, dark, 1, "e", "DSNU1288", 66),
+        ("prnu", channel.prnu, bright, 100, "%", "PRNU1288", 67),
+    )
+    for name, pattern, model, scale, unit, symbol, equation in kinds:
+        parts = (pattern.total, pattern.row, pattern.column, pattern.pixel)
+        names = ("", "_row", "_column", "_pixel")
+        for part, measured, expected in zip(names, parts, model, strict=True):
+            definition = f"{symbol}{part.replace('_', '.')}, {R4} eq {equation}"
+            yield name + part, scale * measured, scale * expected, unit, definition
+
+
+def _expected_patterns(bench: Bench) -> tuple[Pattern, Pattern]:
+    """Return the model's pattern in the dark [e] and at half of saturation, relative."""
+    offset, gain = bench.column_pattern
+    dark, half = bench.pattern_variance(bench.dark), 0.5 * bench.saturation
+    bright = bench.pattern_variance(half + bench.dark) - dark
+    column = offset**2 + (gain * bench.dark) ** 2
+    pixel = math.sqrt(max(bright / half**2 - gain**2, 0))
+    return (
+        (math.sqrt(dark), 0.0, math.sqrt(column), math.sqrt(max(dark - column, 0.0))),
+        (math.sqrt(max(bright, 0.0)) / half, 0.0, gain, pixel),
+    )
+
+
+def _sharpness_rows(bench: Bench, channel: Channel) -> Iterator[Row]:
+    """Yield the system's transfer across the slanted edge."""
+    edge, expected = channel.edge.measured, channel.edge.expected
+    pitch = bench.ready.geometry.pitch_x
+    half = crossing_frequency(edge.frequency, expected, 0.5)
+    definition = "where the transfer is one half; e-SFR of ISO 12233, at the center"
+    yield "mtf50", edge.mtf50 / 1e3, half / 1e3, "lp/mm", definition
+    yield "mtf50_per_pixel", edge.mtf50 * pitch, half * pitch, "cycles/pixel", definition
+    measured, model = (
+        float(np.interp(0.5 / pitch, edge.frequency, mtf)) for mtf in (edge.mtf, expected)
+    )
+    definition = "transfer at half a cycle per pixel; e-SFR of ISO 12233"
+    yield "mtf_nyquist", measured, model, "", definition
+
+
+def _db(ratio: float) -> float:
+    return 20 * math.log10(ratio) if ratio > 0 else -math.inf

@@ -1,0 +1,41 @@
+"""The files that a user writes, and their JSON Schemas.
+
+A schema says less than `vcam validate`: which keys exclude each other, and whatever needs
+arithmetic, is checked there.
+"""
+
+from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.technology import Technology
+from vcam_cli.capture_schedules.model import ScheduleStudy
+from vcam_cli.config.schema import Schema, file_schema, model_schema, reference, with_parts
+from vcam_cli.sweeps.model import KINDS, Sweep
+
+SECTIONS = {"scene": "Scene", "optics": "Optics", "pixel": "Pixel", "array": "Array"}
+"""Sections of a camera that may be a part file -> their definitions."""
+
+
+def schemas() -> dict[str, Schema]:
+    """Return file name -> JSON Schema (draft 2020-12) of all files a user writes."""
+    camera = with_parts(model_schema(Camera), "Camera", SECTIONS, "a camera file")
+    return {
+        "camera.schema.json": camera,
+        "study.schema.json": _study_schema(),
+        "technology.schema.json": file_schema(model_schema(Technology), "a technology file"),
+    }
+
+
+def _study_schema() -> Schema:
+    """Return the schema of a study file: of capture schedules where it says so, else a sweep."""
+    definitions: Schema = {}
+    for model in (Sweep, ScheduleStudy):
+        schema = model_schema(model)
+        definitions |= schema.pop("$defs") | {model.__name__: schema}
+    either: Schema = {
+        "$defs": definitions,
+        "type": "object",
+        "properties": {"kind": {"enum": list(KINDS)}},
+        "if": {"properties": {"kind": {"const": "schedule"}}, "required": ["kind"]},
+        "then": {"$ref": reference(ScheduleStudy.__name__)},
+        "else": {"$ref": reference(Sweep.__name__)},
+    }
+    return file_schema(either, "a study file")

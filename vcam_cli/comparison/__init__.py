@@ -1,0 +1,1 @@
+"""Comparison of two image files: what `vcam compare` measures and writes."""

@@ -1,0 +1,36 @@
+"""What a package says of its files, as far as reading them depends on it."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Generic, TypeVar
+
+from vcam_cli import errors
+from vcam_cli.config.merge import NO_RULES, MergeRules
+from vcam_cli.config.model import FileModel
+from vcam_cli.config.yaml_tree import Key, Node
+
+M = TypeVar("M", bound=FileModel)
+Check = tuple[Callable[[M], None], str]
+"""What raises BadInput for a model that is wrong, and the sections that it needs to say so."""
+
+
+@dataclass(frozen=True)
+class FileFormat(Generic[M]):
+    """The files that describe one model."""
+
+    model: type[M]
+    kind: str
+    """Kind of the shipped files, a key of `shipped.KINDS`."""
+    parts: Mapping[errors.Path, str] = field(default_factory=dict)
+    """Where a part file may stand -> its kind."""
+    shorthands: Mapping[errors.Path, Key] = field(default_factory=dict)
+    """Where a text stands for a mapping of this one key -> the key."""
+    file_keys: frozenset[Key] = frozenset()
+    """Keys that hold names of data files."""
+    merge_rules: MergeRules = NO_RULES
+    refuse: Callable[[Node], None] = lambda root: None
+    """What raises BadInput for a file of another format."""
+    checks: Sequence[Check[M]] = ()
+    """Further checks of a valid model."""
+    stand_in: Callable[[], M] | None = None
+    """What returns a valid model, whose sections stand in for those that a file has wrong."""

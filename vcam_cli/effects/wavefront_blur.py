@@ -1,0 +1,229 @@
+"""Blur by a wavefront error that is the same everywhere in the field.
+
+With diffraction it is a factor on the transfer function of a perfect lens; with diffraction
+switched off it is the blur of geometrical rays.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.derived.geometry import Geometry
+from vcam_cli.effects.base import Effect, PlaneTransfer, RadialTransfer, switched_off
+from vcam_cli.physics import aberration, diffraction, ray_blur, zernike
+from vcam_cli.physics.cache import ByteCache
+from vcam_cli.physics.zernike import Terms
+
+GREEN = 550e-9
+"""Wavelength that descriptions refer to [m]."""
+MANY_WAVES = 0.18
+"""Rms wavefront error from which the Strehl ratio says less than the blur's width [waves]."""
+
+
+class AberrationBlur(Effect):
+    """What all kinds of the effect `aberration` have in common."""
+
+    name = "aberration"
+    reference = "Hopkins 1955, doi:10.1098/rspa.1955.0158; Noll 1976, doi:10.1364/JOSA.66.000207"
+    absent = "the file gives no defocus, no zernike and no psf"
+    in_lens = True
+
+
+@dataclass(frozen=True)
+class Lens:
+    """The cone in which light comes to the sensor, and whether it comes as waves."""
+
+    working_f_number: float
+    """Image distance over the diameter of the exit pupil, N (1 - m)."""
+    diffracts: bool
+
+    @classmethod
+    def from_camera(cls, camera: Camera, geometry: Geometry) -> Lens:
+        """Return the lens of a camera, which diffracts unless its file switches that off."""
+        diffracts = camera.optics.diffraction and not switched_off(camera, "diffraction")
+        return cls(geometry.working_f_number, diffracts)
+
+    def cutoff(self, wavelength: float) -> float:
+        """Return the frequency from which the transfer of an aberration is zero [cycles/m]."""
+        if not self.diffracts:
+            return math.inf
+        return float(diffraction.cutoff_frequency(wavelength, self.working_f_number))
+
+    def reach(self, terms: Terms) -> float:
+        """Return how far from the ideal image point almost all light of a wavefront lies [m]."""
+        _, tilt = zernike.split_tilt(terms)
+        moved = 2 * self.working_f_number * math.hypot(*tilt)
+        airy = 2 * GREEN * self.working_f_number if self.diffracts else 0.0
+        return moved + ray_blur.blur_radius(terms, self.working_f_number) + airy
+
+    def describe(self, terms: Terms) -> str:
+        """Return a clause that says with numbers what a wavefront does."""
+        rest, tilt = zernike.split_tilt(terms)
+        waves = zernike.rms(rest) / GREEN
+        if not zernike.combine(terms):
+            return "no wavefront error, Strehl ratio 1"
+        if not rest:
+            moved = [2e6 * self.working_f_number * slope for slope in tilt]
+            return f"moves the image by {moved[0]:.4g} um to the right and {moved[1]:.4g} um down"
+        error = f"wavefront error of {waves:.3g} waves rms at 550 nm"
+        if self.diffracts and waves < MANY_WAVES:
+            return f"{error}: Strehl ratio {zernike.strehl(rest, GREEN):.2f}"
+        width = 2e6 * ray_blur.blur_radius(rest, self.working_f_number)
+        return f"{error}: points of light become up to {width:.4g} um wide"
+
+
+def wavefronts(camera: Camera, geometry: Geometry) -> tuple[tuple[float | None, Terms], ...]:
+    """Return the wavefronts that a camera's file gives, defocus included.
+
+    They are ((place, terms), ...) by rising place, which is None for the whole field.
+    """
+    shift = zernike.defocus(camera.optics.defocus, geometry.working_f_number)
+    places = camera.optics.zernike.terms or ((None, ()),)
+    return tuple(
+        (place, zernike.combine(terms, shift))
+        for place, terms in sorted(places, key=lambda item: item[0] or 0.0)
+    )
+
+
+def uniform_wavefront(camera: Camera, geometry: Geometry) -> Terms | None:
+    """Return the wavefront that is the same everywhere, or None where it changes or turns."""
+    (place, terms), *others = wavefronts(camera, geometry)
+    same = all(other == terms for _, other in others)
+    return terms if same and (place is None or zernike.is_symmetric(terms)) else None
+
+
+@dataclass(frozen=True)
+class SymmetricBlur(AberrationBlur, RadialTransfer):
+    """A wavefront that is symmetric about the axis, the same everywhere."""
+
+    lens: Lens
+    terms: Terms
+
+    @classmethod
+    def from_camera(cls, camera: Camera, geometry: Geometry) -> SymmetricBlur | None:
+        """Return the blur of a wavefront that is symmetric everywhere, else None."""
+        terms = uniform_wavefront(camera, geometry)
+        if not terms or not zernike.is_symmetric(terms):
+            return None
+        return cls(Lens.from_camera(camera, geometry), terms)
+
+    def describe(self) -> str:
+        """Return a short clause with this camera's numbers and units."""
+        return self.lens.describe(self.terms)
+
+    @property
+    def reach(self) -> float:
+        """How far from its place the blur throws almost all of the light, diffraction aside [m]."""
+        return self.lens.reach(self.terms)
+
+    def otf(self, frequency, wavelength):
+        """Return the transfer at `frequency` [cycles/m] and `wavelength` [m]."""
+        if not self.lens.diffracts:
+            return ray_blur.otf_symmetric(frequency, self.lens.working_f_number, self.terms)
+        return aberration.otf_ratio_symmetric(
+            frequency, wavelength, self.lens.working_f_number, self.terms
+        )
+
+    def cutoff(self, wavelength):
+        """Return the frequency from which the transfer is zero, or inf [cycles/m]."""
+        return self.lens.cutoff(wavelength)
+
+    def mean_error(self, outlook) -> float:
+        """Return a bound of the rms change of the mean signal by leaving it out [electrons]."""
+        otf = self.otf(np.linspace(0, _highest(self.lens, self.terms), 257), GREEN)
+        return float(np.abs(1 - otf).max()) * outlook.full_signal
+
+
+@dataclass(frozen=True)
+class DirectedBlur(AberrationBlur, PlaneTransfer):
+    """Any wavefront, the same everywhere, turned about the axis by an angle [rad]."""
+
+    lens: Lens
+    terms: Terms
+    angle: float = 0.0
+
+    @classmethod
+    def from_camera(cls, camera: Camera, geometry: Geometry) -> DirectedBlur | None:
+        """Return the blur of a uniform wavefront that has a direction, else None."""
+        terms = uniform_wavefront(camera, geometry)
+        if not terms or zernike.is_symmetric(terms):
+            return None
+        return cls(Lens.from_camera(camera, geometry), terms)
+
+    def describe(self) -> str:
+        """Return a short clause with this camera's numbers and units."""
+        return self.lens.describe(self.terms)
+
+    @property
+    def reach(self) -> float:
+        """How far from its place the blur throws almost all of the light, diffraction aside [m]."""
+        return self.lens.reach(self.terms)
+
+    def otf_plane(self, fx, fy, wavelength):
+        """Return the transfer at all pairs of fx (n,) and fy (m,) [cycles/m]: complex (m, n)."""
+        if not self.lens.diffracts:
+            return self._rays(fx, fy)
+        # Turned frequencies rather than a turned wavefront: one grid serves all angles.
+        cos, sin = math.cos(self.angle), math.sin(self.angle)
+        x, y = fx[None, :], fy[:, None]
+        return aberration.otf_ratio(
+            cos * x + sin * y, cos * y - sin * x, wavelength, self.lens.working_f_number, self.terms
+        )
+
+    def _rays(self, fx, fy):
+        def compute():
+            turned = zernike.rotate(self.terms, self.angle)
+            return ray_blur.otf(fx, fy, self.lens.working_f_number, turned)
+
+        return self._transfer_cache.get((fx.tobytes(), fy.tobytes()), compute)
+
+    @cached_property
+    def _transfer_cache(self) -> ByteCache:
+        """The last transfer by rays, which is the same at all wavelengths."""
+        return ByteCache(0)
+
+    def cutoff(self, wavelength):
+        """Return the frequency from which the transfer is zero, or inf [cycles/m]."""
+        return self.lens.cutoff(wavelength)
+
+    @property
+    def model(self) -> tuple[DirectedBlur, int, bool]:
+        """The blur that this one is made of, its quarter turns, and whether y is mirrored before.
+
+        An angle is brought into the first quarter of a turn, of wavefronts even in y into the first
+        eighth.
+        """
+        # Rounded, so that one angle computed in two ways is the same number.
+        quarters = math.floor(self.angle / (math.pi / 2) + 1e-9)
+        rest = round(self.angle - quarters * (math.pi / 2), 12)
+        even = all(zernike.noll_orders(index)[1] >= 0 for index, _ in self.terms)
+        if even and rest > math.pi / 4 + 1e-9:
+            rest = round(math.pi / 2 - rest, 12)
+            return replace(self, angle=rest), (quarters + 1) % 4, True
+        return replace(self, angle=rest), quarters % 4, False
+
+    def mean_error(self, outlook) -> float:
+        """Return a bound of the rms change of the mean signal by leaving it out [electrons]."""
+        return largest_loss(self, _highest(self.lens, self.terms)) * outlook.full_signal
+
+
+def _highest(lens: Lens, terms: Terms) -> float:
+    """Return the frequency up to which the largest loss of contrast is sought [cycles/m]."""
+    if lens.diffracts:
+        return 0.999 * lens.cutoff(GREEN)
+    return 2 / max(ray_blur.blur_radius(terms, lens.working_f_number), 1e-9)
+
+
+def largest_loss(blur: PlaneTransfer, highest: float) -> float:
+    """Return the largest |1 - H| at frequencies up to `highest`, every 32nd part of it.
+
+    The light is green. Shorter waves lose up to twice as much, but a signal's rms about its mean
+    is at most half of full signal.
+    """
+    f = np.linspace(-highest, highest, 65)
+    return float(np.abs(1 - blur.otf_plane(f, f[32:], GREEN)).max())

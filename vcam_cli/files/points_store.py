@@ -1,0 +1,190 @@
+"""The finished points of a sweep: a small file each, in the folder `points` of its output.
+
+A file is written whole, under the hash of all that the point depends on, with a check of its own
+and the hashes of the files beside it: what is there and agrees is finished, whoever wrote it. So a
+sweep may be killed at any moment, and several processes may work in one folder. They share the work
+through locks on single bytes of a file, one for each point, which the kernel drops when their
+holder dies; without such locks some points are computed twice, and nothing else happens.
+"""
+
+import fcntl
+import hashlib
+import json
+import os
+import re
+import time
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from pathlib import Path
+from typing import Any, Self
+
+from vcam_cli.errors import CannotDo, bad
+from vcam_cli.files import atomic
+from vcam_cli.files.folder import PROGRAM, is_foreign, previous_files
+from vcam_cli.files.report import hash_file, hash_text, to_json
+
+POINTS = "points"
+RECORD = "study.json"
+_CLAIMS = ".claims"
+_POINT_FILE = re.compile(r"[0-9a-f]{32}\.(json|raw\.exr|render\.png)|\.claims|\..*\.part")
+"""The names in the folder of points."""
+_LARGEST = 1 << 20
+"""The most bytes that a point's own file can have."""
+_ABANDONED = 3600.0
+"""Seconds after which nobody writes a temporary file any more."""
+
+
+class SweepFolder:
+    """The output folder of a sweep; several processes may have it at once.
+
+        with SweepFolder(path) as folder:
+            folder.begin({"name": "pixel-size"})
+            folder.write("3fe0...", {"metrics": {"snr_db": 30.1}})
+            folder.finish({"points.csv": write_points}, {"name": "pixel-size"})
+
+    Raises on entry BadInput for a folder that is not vcam's, CannotDo where it cannot be made.
+    """
+
+    def __init__(self, path: Path | str) -> None:
+        self.path = Path(path)
+        self.corrupted: dict[str, None] = {}
+        """Names of files of points that are not as they were written, in the order of reading."""
+
+    def __enter__(self) -> Self:
+        try:
+            if is_foreign(self.path) and not self._holds_only_points():
+                message = f"{self.path} is not empty and holds no {RECORD} of vcam"
+                raise bad("--out", message, "choose a new or empty folder")
+            (self.path / POINTS).mkdir(parents=True, exist_ok=True)
+            flags = os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW
+            self._claims = os.open(self.path / POINTS / _CLAIMS, flags, 0o666)
+        except (FileExistsError, NotADirectoryError) as error:
+            message = f"{error.filename or self.path} is not a folder"
+            raise bad("--out", message, "choose another one") from error
+        except ValueError as error:
+            raise bad("--out", f"{self.path} is no folder name", "choose another one") from error
+        except OSError as error:
+            raise atomic.cannot_write(self.path, error) from error
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        os.close(self._claims)
+
+    def _holds_only_points(self) -> bool:
+        """Tell whether the folder is of a sweep without a record yet, or of other machines."""
+        names = set(os.listdir(self.path))
+        if RECORD in names:  # another process has written it since it was looked for
+            return not is_foreign(self.path)
+        if not (self.path / POINTS).is_dir():
+            return False
+        names |= set(os.listdir(self.path / POINTS))
+        return all(map(_POINT_FILE.fullmatch, names - {POINTS}))
+
+    def begin(self, record: Mapping[str, Any]) -> None:
+        """Write the record that says whose folder this is, where there is none."""
+        if not (self.path / RECORD).exists():
+            self._write_record(record, [])
+
+    def read(self, key: str, files: Sequence[str] = ()) -> dict[str, Any] | None:
+        """Return what was written under a key; None where it is missing or corrupted.
+
+        files: names of files that must have been written with it.
+        """
+        path = self._file(key, "json")
+        try:
+            with open(path, "rb") as file:
+                entry = json.loads(file.read(_LARGEST))
+            if entry["id"] != key or entry["check"] != record_check(entry):
+                raise ValueError(key)
+            if not entry["hashes"].keys() >= set(files):
+                return None
+            for name, digest in entry["hashes"].items():
+                path = self._file(key, name)
+                with open(path, "rb") as file:
+                    if hashlib.file_digest(file, "sha256").hexdigest() != digest:
+                        raise ValueError(name)
+        except FileNotFoundError:
+            return None
+        except OSError as error:
+            message = f"cannot read {path}: {error.strerror}"
+            raise CannotDo(message, "check its permissions, or choose another folder") from error
+        except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
+            self.corrupted[path.name] = None
+            return None
+        return entry["point"]
+
+    def write(
+        self, key: str, content: Mapping[str, Any], files: Mapping[str, bytes] | None = None
+    ) -> None:
+        """Keep a finished point and files beside it. Raise CannotDo."""
+        hashes = {}
+        for name, data in (files or {}).items():
+            hashes[name] = hashlib.sha256(data).hexdigest()
+            atomic.write_bytes(self._file(key, name), data)
+        entry = {"program": PROGRAM, "id": key, "point": content, "hashes": hashes}
+        entry = json.loads(to_json(entry))  # numbers as they are read back
+        text = to_json(entry | {"check": record_check(entry)})
+        atomic.write_text(self._file(key, "json"), text)
+
+    def _file(self, key: str, name: str) -> Path:
+        return self.path / POINTS / f"{key}.{name}"
+
+    def claim(self, point: str) -> bool:
+        """Claim a point for this process; False where another process has it."""
+        try:
+            fcntl.lockf(self._claims, fcntl.LOCK_EX | fcntl.LOCK_NB, 1, _byte(point))
+        except OSError as error:  # a file system without locks claims nothing
+            return not isinstance(error, BlockingIOError | PermissionError)
+        return True
+
+    def release(self, point: str) -> None:
+        """Give a claim back."""
+        with suppress(OSError):
+            fcntl.lockf(self._claims, fcntl.LOCK_UN, 1, _byte(point))
+
+    def finish(
+        self,
+        writers: Mapping[str, Callable[[Path], None]],
+        record: Mapping[str, Any],
+        inputs: Sequence[Path] = (),
+    ) -> None:
+        """Write tables and plots, each whole, then the record; remove those of former studies.
+
+        writers: name of a file -> function that writes it. Raise BadInput where one of them would
+        replace an input, CannotDo where one cannot be written.
+        """
+        former = previous_files(self.path / RECORD)
+        protected = {os.path.realpath(path) for path in inputs}
+        for path in (self.path / name for name in (*writers, RECORD)):
+            if os.path.realpath(path) in protected:
+                message = f"{path} is an input of this study and would be replaced"
+                raise bad("--out", message, "choose another folder")
+        for name, write in writers.items():
+            write(self.path / name)
+        for name in former:
+            if name not in writers and "/" not in name:
+                with suppress(OSError):
+                    (self.path / name).unlink(missing_ok=True)
+        self._write_record(record, sorted(writers))
+        self._remove_abandoned()
+
+    def _remove_abandoned(self) -> None:
+        """Remove temporary files of processes that were killed."""
+        for path in (self.path / POINTS).glob(".*.part"):
+            with suppress(OSError):
+                if time.time() - path.lstat().st_mtime > _ABANDONED:
+                    path.unlink()
+
+    def _write_record(self, record: Mapping[str, Any], names: list[str]) -> None:
+        written = {name: hash_file(self.path / name) for name in names}
+        whole = {**record, "program": PROGRAM, "files": names, "written": written}
+        atomic.write_text(self.path / RECORD, to_json({**whole, "check": record_check(whole)}))
+
+
+def record_check(record: Mapping[str, Any]) -> str:
+    """Return the hash of all that a record says, but for this hash itself."""
+    return hash_text(to_json({name: value for name, value in record.items() if name != "check"}))
+
+
+def _byte(point: str) -> int:
+    return int(point[:15], 16)

@@ -1,0 +1,61 @@
+"""Header of a spectral file, and the function that reads its samples.
+
+A reader (one module a format) opens a file, checks every claim of its header against the length of
+the file, and returns a `SpectralData`; the checks and units of all formats are in `hyperspectral`.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from vcam_cli.files.images import UnusableFile
+from vcam_cli.scenes.hyperspectral import Quantity
+
+PER_NM = 1e9
+"""Radiance per nanometer as radiance per meter."""
+MOST_WAVELENGTHS = 10**6
+"""A file may hold so many wavelengths at most."""
+
+
+@dataclass(frozen=True)
+class SpectralData:
+    """The header of a spectral file.
+
+    Values in the file x `gain` + `offset` are radiances [W/(sr m2 m)] or reflectances (white = 1).
+    """
+
+    shape: tuple[int, int]
+    """Rows and columns."""
+    wavelengths: np.ndarray
+    """The wavelengths (bands,) [m], in the order of the file."""
+    quantity: Quantity
+    read: Callable[[], Any]
+    """Returns the values (h, w, bands) as stored, perhaps as a map of the file."""
+    gain: float | np.ndarray = 1.0
+    """The gain of all bands, or one for each."""
+    offset: float | np.ndarray = 0.0
+    """The offset of all bands, or one for each."""
+    no_data: float | None = None
+    """The value that stands for missing data."""
+    white: np.ndarray | None = None
+    """The radiance (bands,) of a perfect white [W/(sr m2 m)], where the file holds it."""
+    notes: tuple[str, ...] = ()
+
+
+def finite_numbers(values: Any, what: str) -> np.ndarray:
+    """Return a list of finite numbers (n,), float64. Raise UnusableFile with the list's name."""
+    try:
+        found = np.asarray(values, dtype=np.float64)
+    except (ValueError, TypeError):
+        raise UnusableFile(f"{what} is not a list of numbers") from None
+    if found.size != max(found.shape, default=1) or not np.isfinite(found).all():
+        raise UnusableFile(f"{what} is not a list of finite numbers")
+    return found.ravel()
+
+
+def check_length(bands: int, wavelengths: np.ndarray, what: str = "wavelengths") -> None:
+    """Raise UnusableFile where there are not as many wavelengths (or others) as bands."""
+    if len(wavelengths) != bands:
+        raise UnusableFile(f"holds {bands} bands but {len(wavelengths)} {what}")

@@ -1,0 +1,205 @@
+"""How finely a scene is sampled: margin, cells of a chart, highest frequency.
+
+Pixels fold every frequency that the lens passes into the picture, so what is left out is an error.
+Each of three approximations has its share of the tolerance:
+
+- the margin beyond the array, behind which a chart is mirrored: from the tail of the line spread
+  function;
+- the cells on which a chart is painted: `chart_cells.py`;
+- the highest frequency that is filtered: from the power spectrum itself.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcam_cli.camera.derived.geometry import Geometry
+from vcam_cli.effects.base import Blur, FieldTransfer, RadialTransfer
+from vcam_cli.image_formation.cosine_series import Axis
+from vcam_cli.image_formation.optical_path import OpticalPath
+from vcam_cli.image_formation.settings import Settings
+from vcam_cli.image_formation.transfer_tables import TableSize
+from vcam_cli.scenes.base import ChartScene, SampledScene, Scene
+
+MARGIN_SHARE = 0.2
+FREQUENCY_SHARE = 0.5
+"""Parts of the tolerance that margin and highest frequency may use."""
+FIELD_SHARE = 0.2
+"""The same for modes of a field that are left out before the picture is known: as if it had full
+contrast and detail of all sizes."""
+MOST_LOST = 8e-4
+"""Part of full signal that leaving out high frequencies may cost at most, unless a tenth of the
+tolerance is more."""
+CONTRAST = 0.25
+"""Rms difference of a chart beyond its margin from its mirror image, relative to white."""
+SMALLEST_MARGIN = 4
+"""Pixels that a chart goes on beyond the array, at least; never more than the array."""
+MOST_MARGIN_CELLS = 4096
+"""Cells along an axis, as fine as the lens's cut-off asks for, that a margin may lead to."""
+NOTHING = 1e-6
+"""Transfer that ends a blur without a cut-off."""
+RESOLVED = 256
+"""Periods of the highest frequency within which the tail of a line is integrated."""
+LOWEST = 0.02
+"""Lowest frequency at which a spectrum may end [pixel Nyquist]."""
+HIGHEST = 64.0
+"""Highest frequency that is considered where no lens ends the spectrum [pixel Nyquist]."""
+LEAST_PASSED = 0.01
+"""Part of the tolerance below which what the lens passes of full contrast counts as nothing."""
+
+
+def margin(
+    geometry: Geometry,
+    blurs: Sequence[Blur | FieldTransfer],
+    band: tuple[float, float],
+    knobs: Settings,
+) -> int:
+    """Pixels that a chart goes on beyond the array.
+
+    Beyond them it is mirrored: light from there is that of another place. The rms over the array
+    of what that changes is kept below its share of the tolerance. band: wavelengths [m].
+    """
+    budget = MARGIN_SHARE * knobs.tolerance / CONTRAST
+    distance = np.geomspace(0.25 * min(geometry.pitch_x, geometry.pitch_y), 1.0, 80)
+    radial = [b for b in blurs if isinstance(b, RadialTransfer)]
+    tail = line_spread_tail(radial, band[1], distance)
+    cutoff = min((b.cutoff(band[1]) for b in radial), default=math.inf)
+    widest = max((blur.reach for blur in blurs), default=0.0)
+    inside = (np.arange(32) + 0.5) / 32
+    pitches = (geometry.pitch_y, geometry.rows), (geometry.pitch_x, geometry.columns)
+    finest = min(cutoff, 0.5 / min(geometry.pitch_x, geometry.pitch_y))
+    most = min((MOST_MARGIN_CELLS / (2 * pitch * finest) - n) / 2 for pitch, n in pitches)
+    pixels = max(
+        min(SMALLEST_MARGIN, geometry.rows, geometry.columns),
+        math.ceil(widest / min(geometry.pitch_x, geometry.pitch_y)),
+    )
+    while pixels < most:
+        squares = []
+        for pitch, count in pitches:
+            beyond = max(pixels * pitch - widest, 0.0) + inside * (count * pitch)
+            one_side = np.interp(beyond, distance, tail)
+            squares.append(float(np.mean(np.square(one_side + one_side[::-1]))))
+        if math.sqrt(sum(squares)) <= budget:
+            break
+        pixels = math.ceil(1.25 * pixels)
+    return _fast(geometry, round(pixels * knobs.margin_scale))
+
+
+def line_spread_tail(
+    blurs: Sequence[RadialTransfer], wavelength: float, distance: NDArray
+) -> NDArray:
+    """Part of the light of a line that falls further to one side than each distance (n,) [m].
+
+    1/2 - (1/pi) integral of H(f) sin(2 pi f x) / f over f > 0; from where that cancels to rounding
+    on, the tail of a cusp at 0, H = 1 - a |f|: a / (2 pi^2 x).
+    """
+    if not blurs:
+        return np.zeros(len(distance))
+    cutoff = min(blur.cutoff(wavelength) for blur in blurs)
+
+    def otf(f: NDArray) -> NDArray:
+        return np.prod([blur.otf(f, wavelength) for blur in blurs], axis=0)
+
+    top = cutoff
+    if math.isinf(cutoff):
+        tried = np.geomspace(1 / distance[-1], 16 / distance[0], 400)
+        top = float(tried[np.flatnonzero(np.abs(otf(tried)) > NOTHING)[-1]])
+
+    small = np.array([1e-4 * top])
+    cusp = float((1 - otf(small))[0] / small[0])
+    f = (np.arange(16 * RESOLVED) + 0.5) * (top / (16 * RESOLVED))
+    values = otf(f) / f
+    near = distance < RESOLVED / top
+    phase = 2 * np.pi * np.outer(distance[near], f)
+    tail = cusp / (2 * np.pi**2 * distance)
+    tail[near] = 0.5 - np.sin(phase) @ values * (top / (16 * RESOLVED)) / np.pi
+    return np.maximum.accumulate(np.clip(tail, 0, 0.5)[::-1])[::-1]
+
+
+def _fast(geometry: Geometry, least: int) -> int:
+    """The smallest margin from `least` on at which transforms of both lengths are fast."""
+
+    def cost(margin: int) -> int:
+        return sum((n + 2 * margin) * _work(n + 2 * margin) for n in sizes)
+
+    sizes = geometry.rows, geometry.columns
+    return min(range(least, least + 33), key=lambda margin: (cost(margin), margin))
+
+
+def _work(size: int) -> int:
+    """Sum of the prime factors of a transform's size: what it costs per sample."""
+    total, factor = 0, 2
+    while factor * factor <= size:
+        while size % factor == 0:
+            total += factor
+            size //= factor
+        factor += 1
+    return total + (size if size > 1 else 0)
+
+
+def highest_passed(path: OpticalPath, scene: Scene) -> float:
+    """The frequency beyond which lens and pixels pass nothing that counts [pixel Nyquist].
+
+    No further than a chart has detail.
+    """
+    g = path.geometry
+    pitch = max(g.pitch_x, g.pitch_y)
+    limit = min(2 * pitch * path.transfer.cutoff, HIGHEST)
+    f = np.linspace(0, limit, 257)
+    values = np.abs(path.transfer.at(f / (2 * pitch))).sum(axis=0).max(axis=0)
+    width = min(g.collecting_width, g.collecting_height) if path.separable else 0.0
+    envelope = values / (values[0] or 1.0) / np.maximum(1, np.pi * f / (2 * pitch) * width)
+    counts = np.flatnonzero(envelope > LEAST_PASSED * path.settings.tolerance)
+    limit = float(f[min(counts[-1] + 1, len(f) - 1)]) if len(counts) else 1.0
+    if isinstance(scene, ChartScene):
+        half_width = scene.pitch_x * scene.shape[1] / 2
+        limit = min(limit, 2 * pitch * scene.chart.highest_frequency(half_width))
+    return max(limit, LOWEST)
+
+
+def highest_frequency_share(tolerance: float) -> float:
+    """Part of full signal that may be lost with the highest frequencies."""
+    return max(0.1 * tolerance, min(FREQUENCY_SHARE * tolerance, MOST_LOST))
+
+
+def axes(path: OpticalPath, scene: SampledScene, highest: float) -> tuple[Axis, Axis]:
+    """Samples, pixels and terms along x and y, up to a frequency [pixel Nyquist]."""
+    g, cutoff = path.geometry, path.transfer.cutoff
+    ny, nx = scene.shape
+    squares = scene.samples == "squares"
+
+    def axis(samples: int, pitch: float, pixels: int, pixel: float, shift: float) -> Axis:
+        first = samples * pitch / 2 + (0.5 - pixels / 2) * pixel + shift
+        bandwidth = min(highest * 0.5 / pixel, cutoff)
+        return Axis(samples, pitch, pixels, pixel, first, squares, bandwidth)
+
+    return (
+        axis(nx, scene.pitch_x, g.columns, g.pitch_x * g.sampling_scale, g.collecting_x),
+        axis(ny, scene.pitch_y, g.rows, g.pitch_y * g.sampling_scale, g.collecting_y),
+    )
+
+
+def table_size(path: OpticalPath, highest: float, entries: int | None = None) -> TableSize:
+    """Tables up to a frequency along both axes [pixel Nyquist]; entries: default the settings'."""
+    knobs, g = path.settings, path.geometry
+    corner = math.hypot(0.5 / g.pitch_x, 0.5 / g.pitch_y)
+    tolerance = knobs.mixing_tolerance
+    if path.zones:
+        tolerance = max(tolerance, FIELD_SHARE * knobs.tolerance)
+    return TableSize(
+        top=min(path.transfer.cutoff, highest * corner),
+        entries=entries or knobs.table_size,
+        tolerance=tolerance,
+        steps_per_period=knobs.plane_steps,
+        rank=knobs.spectral_rank,
+    )
+
+
+def reach(path: OpticalPath) -> float:
+    """How far the blurs of a lens throw light, its diffraction aside [m]."""
+    blurs = [*path.transfer.effects, *(zone.blur for zone in path.zones)]
+    return max((blur.reach for blur in blurs), default=0.0)

@@ -1,0 +1,193 @@
+"""The cells on which a chart is painted: their error is measured, not guessed.
+
+Cells far finer than what the lens passes fold nothing that counts. Where the whole chart on such
+cells is cheap they are taken. Elsewhere its center, its busiest parts and some others are seen
+through the lens on finer and finer cells, against a reference whose cells share no factor with any
+of them, and the coarsest that keep their share of the tolerance are taken for the whole.
+
+A small array before a wide margin needs fine cells in its near field alone. What lies further away
+comes on coarse cells, as the difference of two images: of the whole chart, and of the near field.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import scipy.fft
+from numpy.typing import NDArray
+
+from vcam_cli.camera.derived.geometry import Geometry
+from vcam_cli.image_formation.bandwidth import axes
+from vcam_cli.image_formation.cosine_series import Axis
+from vcam_cli.image_formation.optical_path import OpticalPath
+from vcam_cli.scenes.base import ChartScene
+
+CELLS_SHARE = 0.3
+"""Part of the tolerance that cells may use."""
+BEYOND_CUTOFF = 1.1
+"""Cells per pixel pitch over the highest frequency passed [pixel Nyquist], at least."""
+FOLDED = 0.04
+"""Means over cells fold what edges have beyond the cells' Nyquist frequency: what is left of it is
+this part of full signal over the squared ratio of that frequency to the cut-off, about."""
+NEAR = 12.0
+"""Reach of the near field in inverse cut-off frequencies: what is folded further away is blurred
+away before it reaches the array."""
+CHEAP = 1 << 20
+"""Cells that are painted without asking whether fewer would do."""
+MOST = 1 << 26
+"""Cells at most."""
+LADDER = (1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 16.0, 24.0, 32.0, 48.0)
+"""Cells per pixel pitch that are tried on crops."""
+COPRIME = 1.37
+"""Cells of a crop's reference over those that reach the cut-off."""
+CROP = 24
+"""Pixels along a side of a crop."""
+CROP_CELLS = 320
+"""Cells along a side of a crop's reference, at most."""
+BLOCKS, POINTS = 16, 12
+"""Parts of a chart along each axis that are compared by contrast, and points along each."""
+FEW = 3
+"""Crops of the busiest parts, and crops of parts taken evenly."""
+EVEN = (0.7548776662466927, 0.5698402909980532)
+"""Steps of a sequence that fills a square evenly: powers of the inverse plastic number."""
+FREQUENCIES = 1025
+"""Entries of the crops' table over |f|."""
+
+
+def cell_grid(scene: ChartScene, geometry: Geometry, per_pixel: float) -> tuple[int, int]:
+    """Cells (ny, nx) of a chart, at least so many per pixel pitch, whose transforms are fast."""
+    ny = scene.shape[0] * scene.pitch_y / geometry.pitch_y * per_pixel
+    nx = scene.shape[1] * scene.pitch_x / geometry.pitch_x * per_pixel
+    fast = [scipy.fft.next_fast_len(max(1, math.ceil(n - 1e-9)), real=True) for n in (ny, nx)]
+    return fast[0], fast[1]
+
+
+def near_field(path: OpticalPath, scene: ChartScene, widest: float) -> ChartScene:
+    """The part of a chart from which light comes that is not spread evenly over the array.
+
+    widest: reach of the blurs, diffraction aside [m]. The whole chart where that is not much more.
+    """
+    g = path.geometry
+    reach = NEAR / path.transfer.cutoff + widest
+    margin = max(math.ceil(reach / min(g.pitch_x, g.pitch_y)), 4)
+    width, height = (g.columns + 2 * margin) * g.pitch_x, (g.rows + 2 * margin) * g.pitch_y
+    whole = scene.pitch_x * scene.shape[1], scene.pitch_y * scene.shape[0]
+    if math.isinf(path.transfer.cutoff) or 2 * width * height > whole[0] * whole[1]:
+        return scene
+    return scene.cropped((0.0, 0.0), width, height)
+
+
+def coarse(scene: ChartScene, pitch: float) -> ChartScene:
+    """A chart on cells of a pitch [m] that have an edge at the center, like all others of it."""
+    counts = [
+        2 * scipy.fft.next_fast_len(math.ceil(n * size / pitch / 2), real=True)
+        for n, size in zip(scene.shape, (scene.pitch_y, scene.pitch_x), strict=True)
+    ]
+    whole = scene.cropped(scene.center, counts[1] * pitch, counts[0] * pitch)
+    return whole.on_cells((counts[0], counts[1]))
+
+
+def cells_per_pixel(path: OpticalPath, scene: ChartScene, highest: float) -> tuple[float, float]:
+    """Cells per pixel pitch of a chart, and the rms error that they leave [electrons / s].
+
+    highest: frequency beyond which lens and pixels pass nothing [pixel Nyquist].
+    """
+    if path.settings.oversampling is not None:
+        return path.settings.oversampling, 0.0
+    finest = highest * max(BEYOND_CUTOFF, math.sqrt(FOLDED / path.settings.tolerance))
+    if math.prod(cell_grid(scene, path.geometry, finest)) <= CHEAP:
+        return finest, 0.0
+    reference = COPRIME * finest
+    level = path.transfer.level[:, int(path.transfer.level.sum(axis=0).argmax())]
+    otf = _mean_otf(path, finest)
+    crops = _crops(path.geometry, scene, reference, level)
+
+    def seen(crop: ChartScene, cells: float) -> NDArray:
+        return np.minimum(_signal(path, crop, cells, level, otf), path.ceiling)
+
+    converged = [seen(crop, reference) for crop in crops]
+    full = max(float(signal.max()) for signal in converged)
+    budget = CELLS_SHARE * path.settings.tolerance * full
+    whole = math.prod(cell_grid(scene, path.geometry, 1.0))
+    most = min(finest, max(1.0, math.sqrt(MOST / whole)))
+    error = 0.0
+    for cells in [c for c in LADDER if c < most] + [most]:
+        squares = [
+            float(np.square(seen(crop, cells) - signal).mean())
+            for crop, signal in zip(crops, converged, strict=True)
+        ]
+        error = math.sqrt(float(np.mean(squares)))
+        if error <= budget:
+            return cells, error
+    return most, error
+
+
+Table = tuple[NDArray, NDArray]
+"""Frequencies (n,) [cycles/m], and an OTF there (n,), without unit."""
+
+
+def _mean_otf(path: OpticalPath, highest: float) -> Table:
+    """The OTF of the color with most light, its aberrations aside: they only weaken detail."""
+    g = path.geometry
+    corner = highest * COPRIME * math.hypot(0.5 / g.pitch_x, 0.5 / g.pitch_y)
+    f = np.linspace(0, min(path.transfer.cutoff, corner), FREQUENCIES)
+    weights = path.transfer.weights[:, int(path.transfer.level.sum(axis=0).argmax())].sum(axis=0)
+    otf = (weights / (weights.sum() or 1.0)) @ path.transfer.otf_radial(f)
+    return f, otf
+
+
+def _crops(g: Geometry, scene: ChartScene, cells: float, level: NDArray) -> list[ChartScene]:
+    """Places of a chart on which cells are tried; cells: per pixel pitch, of the reference."""
+    side = int(max(4, min(CROP, CROP_CELLS / cells, g.rows, g.columns)))
+    size = side * g.pitch_x, side * g.pitch_y
+    half = (g.sensor_width - size[0]) / 2, (g.sensor_height - size[1]) / 2
+    even = 2 * (np.arange(1, FEW + 1)[:, None] * EVEN % 1) - 1
+    busy = _busiest(g, scene, level)
+    places = np.clip(np.concatenate([[(0, 0)], even * half, busy]), -np.array(half), half)
+    return [scene.cropped((float(x), float(y)), *size) for x, y in places]
+
+
+def _busiest(g: Geometry, scene: ChartScene, level: NDArray) -> NDArray:
+    """Centers (FEW, 2) of the parts of most contrast [m].
+
+    From values at points with uneven steps, which share no factor with what repeats in a chart.
+    """
+    k = np.arange(BLOCKS * POINTS)
+    x, y = (
+        ((k + k * step % 1) / len(k) - 0.5) * length
+        for length, step in zip((g.sensor_width, g.sensor_height), EVEN, strict=True)
+    )
+    light = scene.at(x, y, level[None])[0].reshape(BLOCKS, POINTS, BLOCKS, POINTS)
+    order = np.argsort(light.var(axis=(1, 3)).ravel())[::-1][:FEW]
+    centers = (np.stack([order % BLOCKS, order // BLOCKS], axis=1) + 0.5) / BLOCKS - 0.5
+    return np.asarray(centers * (g.sensor_width, g.sensor_height))
+
+
+def _signal(
+    path: OpticalPath, crop: ChartScene, cells: float, level: NDArray, otf: Table
+) -> NDArray:
+    """Signal of a crop that is mirrored at its borders: (rows, columns) [electrons / s].
+
+    level: (K,) signal of the scene's components.
+    """
+    g = path.geometry
+    rows, columns = round(crop.pitch_y / g.pitch_y), round(crop.pitch_x / g.pitch_x)
+    small = replace(path, geometry=replace(g, rows=rows, columns=columns))
+    scene = crop.on_cells(cell_grid(crop, g, cells))
+    coefficients = scipy.fft.dctn(scene.planes(level[None])[0].astype(np.float64), type=2)
+    x, y = axes(small, scene, cells)
+    radius = np.hypot(x.frequencies, y.frequencies[:, None])
+    light = coefficients[: y.terms, : x.terms] * np.interp(radius, *otf, right=0.0)
+    waves = [_waves(axis) for axis in (x, y)]
+    for effect in path.separable:
+        light *= np.outer(effect.along_y(y.frequencies), effect.along_x(x.frequencies))
+    return waves[1] @ light @ waves[0].T
+
+
+def _waves(axis: Axis) -> NDArray:
+    """Every term of an axis at every photodetector: (pixels, terms)."""
+    k = np.arange(axis.terms)
+    place = (axis.first + np.arange(axis.pixels) * axis.pixel_pitch) / axis.length
+    return np.cos(np.pi * np.outer(place, k)) * (axis.weights * np.where(k > 0, 2, 1))

@@ -1,0 +1,270 @@
+"""One axis of the image: scene samples on one side, pixel positions on the other, cosines between.
+
+A scene of N samples of pitch D, mirrored at its borders, is a cosine series over S = N D,
+    g(x) = a_0 + sum_k a_k cos(pi k x / S),   frequency of term k = k / (2 S),
+whose coefficients come from one DCT-II of the samples, whatever the pixel pitch is. A filter with
+an even kernel multiplies a_k, and the series is then evaluated at the pixels' centers:
+exactly for any ratio of the pitches.
+
+What lies between the samples:
+- 'squares' (a picture): every sample is a uniform square of light. The series goes on beyond
+  k = N: the coefficients repeat with alternating sign, times sinc(k / 2N).
+- 'averages' (a chart): samples are means over cells of a continuous scene. The series ends at
+  k = N, and dividing by sinc(k / 2N) undoes the mean.
+
+A filter whose kernel is not even turns cosines into sines of the same frequencies; they have their
+own folding and transform (`odd=True`).
+
+Evaluation: where S is a whole number of pixel pitches, terms that the pixels cannot tell apart
+are folded onto each other and one DCT-III does it. Photodetectors off their pixels' centers see the
+cosines turned: each is some of the pixels' own cosine and some of the sine, folded by themselves
+(`pixel_waves`). Where S is no whole number of pixels it is a chirp-z transform, four times slower,
+which takes as much memory as there are terms.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import scipy.fft
+from numpy.typing import NDArray
+
+NEAR = 1e-7
+"""Distances below this are rounding errors [pixel pitches]."""
+
+
+@dataclass(frozen=True)
+class Axis:
+    """Samples, pixels and cosine terms along x or y."""
+
+    samples: int
+    sample_pitch: float
+    """[m]"""
+    pixels: int
+    pixel_pitch: float
+    """[m]"""
+    first: float
+    """Position of the first photodetector's center, from the scene's edge [m]."""
+    squares: bool
+    bandwidth: float
+    """Highest spatial frequency kept [cycles/m]."""
+
+    @property
+    def length(self) -> float:
+        return self.samples * self.sample_pitch
+
+    @cached_property
+    def terms(self) -> int:
+        """Number of cosine terms kept, the constant included."""
+        most = int(self.bandwidth * 2 * self.length * (1 + 1e-12)) + 1
+        return max(1, most if self.squares else min(most, self.samples))
+
+    @cached_property
+    def frequencies(self) -> NDArray:
+        """Frequency of every term, (terms,) [cycles/m]."""
+        return np.arange(self.terms) / (2 * self.length)
+
+    @cached_property
+    def weights(self) -> NDArray:
+        """What turns a DCT-II coefficient into a DCT-III one for every term, (terms,)."""
+        box = np.sinc(np.arange(self.terms) / (2 * self.samples))
+        return (box if self.squares else 1 / box) / (2 * self.samples)
+
+    @cached_property
+    def virtual_pixels(self) -> int | None:
+        """Whole number of pixels in the scene's length, where folding is exact; else None."""
+        count, first = round(self.length / self.pixel_pitch), round(self._start)
+        whole = abs(self.length / self.pixel_pitch - count) <= NEAR
+        return count if whole and 0 <= first <= count - self.pixels else None
+
+    @property
+    def _start(self) -> float:
+        """Pixels before the first one, as its photodetector's center has it."""
+        return self.first / self.pixel_pitch - 0.5
+
+    @cached_property
+    def shift(self) -> float:
+        """How far photodetectors are off the virtual pixels' centers [pixel pitches].
+
+        0 where there are no virtual pixels: what is evaluated is the photodetectors' place then.
+        """
+        shift = self._start - round(self._start)
+        return 0.0 if self.virtual_pixels is None or abs(shift) <= NEAR else shift
+
+    def pixel_waves(self, odd: bool = False) -> list[tuple[bool, NDArray | None]]:
+        """Of which of the pixels' own waves the scene's cosines (odd: sines) are made.
+
+        [(whether they are sines, how much of them in every term (terms,); None for all), ...].
+        cos(a + b) = cos a cos b - sin a sin b, sin(a + b) = sin a cos b + cos a sin b.
+        """
+        if not self.shift:
+            return [(odd, None)]
+        angle = 2 * np.pi * self.frequencies * (self.shift * self.pixel_pitch)
+        sine = np.sin(angle)
+        return [(odd, np.cos(angle)), (not odd, sine if odd else -sine)]
+
+    @property
+    def folded(self) -> int:
+        """Number of values along this axis after folding: what `evaluate` takes."""
+        return self.virtual_pixels or self.terms
+
+    def coefficient_of(self, terms: NDArray) -> tuple[NDArray, NDArray]:
+        """DCT-II coefficient behind every cosine term: its index, and its sign (0 for none)."""
+        period = 2 * self.samples
+        rest = terms % period
+        sign = np.where(terms // period % 2 == 0, 1, -1)
+        sign = np.where(rest > self.samples, -sign, sign) * (rest != self.samples)
+        index = np.where(rest > self.samples, period - rest, rest)
+        return np.minimum(index, self.samples - 1), sign
+
+    def extend(self, coefficients: NDArray, terms: int) -> NDArray:
+        """DCT-II coefficients (..., samples) continued to `terms` cosine terms."""
+        if terms <= coefficients.shape[-1]:
+            return coefficients[..., :terms]
+        out = np.empty((*coefficients.shape[:-1], terms), coefficients.dtype)
+        for source, target, sign in segments(self.samples, terms):
+            np.multiply(coefficients[..., source], sign, out=out[..., target])
+        out[..., self.samples :: 2 * self.samples] = 0
+        return out
+
+    def folding(self, folded: slice, odd: bool = False) -> list[tuple[slice, NDArray, NDArray]]:
+        """Where a piece of the folded axis comes from: (its part, terms, weights)."""
+        if self.virtual_pixels is None:
+            terms = np.arange(folded.start, folded.stop)
+            return [(folded, terms, np.ones(len(terms)))]
+        out = []
+        period = self.virtual_pixels
+        # The period's own terms: cosines 0 .. period - 1, sines 1 .. period.
+        own = np.arange(folded.start, folded.stop) + odd
+        alone = period if odd else 0
+        for m in range(-(-self.terms // period)):
+            terms = m * period + own if m % 2 == 0 else (m + 1) * period - own
+            inside = (terms < self.terms) & ((own != alone) | ((m % 2 == 0) != odd))
+            if inside.any():
+                terms = terms[inside]
+                # The transforms count one term once and every other twice.
+                twice = (own[inside] == alone) & (terms > 0)
+                weights = _sign(m, odd) * np.where(twice, 2.0, 1.0)
+                at = np.flatnonzero(inside) + folded.start
+                out.append((slice(int(at[0]), int(at[-1]) + 1), terms, weights))
+        return out
+
+    def fold(self, terms: NDArray, odd: bool = False, overwrite: bool = False) -> NDArray:
+        """Terms (..., n) folded onto the pixels' own cosines, or sines: (..., folded).
+
+        overwrite: whether it may be done where the terms are.
+        """
+        n = terms.shape[-1]
+        if self.virtual_pixels is None:
+            out = np.zeros((*terms.shape[:-1], self.terms), terms.dtype)
+            out[..., :n] = terms
+            return out
+        parts, constant = segments(self.virtual_pixels, n, odd), terms[..., 0].copy()
+        if overwrite and not odd and n >= self.virtual_pixels:
+            out = terms[..., : self.virtual_pixels]  # the first part is where it belongs
+            parts = parts[1:]
+        else:
+            out = np.zeros((*terms.shape[:-1], self.virtual_pixels), terms.dtype)
+        for target, source, sign in parts:
+            if sign > 0:
+                out[..., target] += terms[..., source]
+            else:
+                out[..., target] -= terms[..., source]
+        # A DCT-III counts its constant once and every other term twice, a DST-III its last term.
+        if odd:
+            out[..., -1] *= 2
+        else:
+            out[..., 0] += out[..., 0] - constant
+        return out
+
+    @property
+    def window(self) -> slice | None:
+        """Which of the virtual pixels are pixels; None where there are none."""
+        if self.virtual_pixels is None:
+            return None
+        start = round(self._start)
+        return slice(start, start + self.pixels)
+
+    @property
+    def transform(self) -> int:
+        """Length of the transform that `evaluate` does."""
+        if self.virtual_pixels is not None:
+            return self.virtual_pixels
+        return int(scipy.fft.next_fast_len(self.terms + self.pixels - 1))
+
+    def evaluate(
+        self, values: NDArray, axis: int, odd: bool = False, overwrite: bool = False
+    ) -> NDArray:
+        """Folded values -> values at the photodetectors along `axis` (0 or 1 of two).
+
+        Of each of their `pixel_waves` by itself; the sum is the signal. overwrite: whether the
+        result may be a view of what is given.
+        """
+        if self.window is None:
+            return self._chirp(values, axis, odd)
+        transform = scipy.fft.dst if odd else scipy.fft.dct
+        full = transform(values, type=3, axis=axis, overwrite_x=overwrite)
+        return full[self.window] if axis == 0 else full[:, self.window]
+
+    @cached_property
+    def _chirp_parts(self) -> tuple[int, NDArray, NDArray, NDArray]:
+        """Transform length, chirp on the terms, kernel spectrum, chirp on the pixels."""
+        k, i = np.arange(self.terms), np.arange(self.pixels)
+        size = self.transform
+        half = np.pi * self.pixel_pitch / self.length / 2
+        before = np.exp(1j * (np.pi * k * (self.first / self.length) + half * k.astype(float) ** 2))
+        before[0] *= 0.5
+        lag = np.arange(size)
+        lag = np.where(lag < self.pixels, lag, lag - size).astype(float)
+        kernel = np.where(lag > -self.terms, np.exp(-1j * half * lag**2), 0)
+        after = 2 * np.exp(1j * half * i.astype(float) ** 2)
+        return size, before, scipy.fft.fft(kernel), after
+
+    def _chirp(self, values: NDArray, axis: int, odd: bool) -> NDArray:
+        """Bluestein's algorithm, for the real or imaginary part of a sum of exponentials."""
+        size, before, kernel, after = self._chirp_parts
+        kind = np.complex64 if values.dtype == np.float32 else np.complex128
+        shape = (-1, 1) if axis == 0 else (1, -1)
+        count, padded = values.shape[axis], list(values.shape)
+        padded[axis] = size
+        work: NDArray = np.zeros(padded, kind)
+        inside = work[:count] if axis == 0 else work[:, :count]
+        np.multiply(values, np.asarray(before, kind).reshape(shape), out=inside)
+        work = scipy.fft.fft(work, axis=axis, overwrite_x=True)
+        work *= kernel.astype(kind).reshape(shape)
+        work = scipy.fft.ifft(work, axis=axis, overwrite_x=True)
+        work = work[: self.pixels] if axis == 0 else work[:, : self.pixels]
+        work *= after.astype(kind).reshape(shape)
+        return work.imag if odd else work.real
+
+
+def _sign(segment: int, odd: bool = False) -> int:
+    """Sign of segment m, terms m L to (m + 1) L: cosines + - - + + - -, sines + + - - + + ..."""
+    return 1 if (segment + (not odd)) // 2 % 2 == 0 else -1
+
+
+def segments(period: int, terms: int, odd: bool = False) -> list[tuple[slice, slice, int]]:
+    """How cosine terms 0..terms-1 (odd: sine terms) fold onto a basis of `period` samples.
+
+    cos(pi k (i + 1/2) / L) repeats with k: k = 2L - j gives minus the cosine of j, k = 2L + j
+    likewise minus it, k = L vanishes. Of sines, whose basis is 1..L, k = 2L - j gives the sine of
+    j, k = 2L + j minus it, and k = 0 and 2L vanish. Returns (slice of the basis, slice of the
+    terms, sign); basis slices run backwards in odd segments, terms always forward.
+    """
+    out = []
+    for m in range(-(-terms // period)):
+        # The segment's first term vanishes: of cosines in odd segments, of sines in even ones.
+        skipped = int((m % 2 == 1) != odd)
+        n = min(period - skipped, terms - m * period - skipped)
+        if n <= 0:
+            continue
+        first = m * period + skipped
+        if m % 2 == 0:
+            basis = slice(0, n)
+        else:
+            stop = period - 1 - n
+            basis = slice(period - 1, stop if stop >= 0 else None, -1)
+        out.append((basis, slice(first, first + n), _sign(m, odd)))
+    return out

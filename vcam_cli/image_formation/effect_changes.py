@@ -1,0 +1,75 @@
+"""What each transfer function does to a picture, by Parseval's theorem."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from vcam_cli.effects.base import FieldTransfer, PlaneTransfer, RadialTransfer, SeparableTransfer
+from vcam_cli.image_formation.field_dependence import Mode
+from vcam_cli.image_formation.optical_path import OpticalPath
+from vcam_cli.image_formation.scene_sampling import SampledImage
+from vcam_cli.image_formation.transfer_tables import Tables, TableSize, radial_table
+
+MODES_SHARE = 0.1
+"""Part of the tolerance for modes of the field that this picture does not need."""
+
+
+def changes_by_omission(
+    path: OpticalPath, image: SampledImage, tables: Tables, field_change: float
+) -> dict[str, float]:
+    """Rms change of the signal by leaving out each transfer function [electrons / s].
+
+    tables: of the whole lens; field_change: rms of all that changes over the field.
+    """
+    changes = {}
+    for effect in path.effects:
+        if isinstance(effect, SeparableTransfer):
+            squares = image.power.lost_without(image.tables, effect)
+        elif isinstance(effect, RadialTransfer):
+            rest = _without(path, image, [e for e in path.transfer.radial if e is not effect])
+            squares = image.power.through(rest)
+        elif isinstance(effect, PlaneTransfer | FieldTransfer):
+            squares = image.power.through(_directed(path, tables))
+        else:
+            continue
+        also = field_change if isinstance(effect, FieldTransfer) else 0.0
+        changes[effect.name] = math.hypot(image.rms(squares), also)
+    return changes
+
+
+def _without(path: OpticalPath, image: SampledImage, radial: list[RadialTransfer]) -> Tables:
+    """The radial part with fewer transfer functions, less the whole of it."""
+    whole = image.tables.radial
+    assert whole is not None
+    others = path.transfer.through(radial).mixed(image.tables.mix)
+    size = TableSize(image.tables.top, whole.shape[-1], 0.0, 0.0)
+    return replace(image.tables, radial=radial_table(others, size) - whole)
+
+
+def _directed(path: OpticalPath, tables: Tables) -> Tables:
+    """What a blur with a direction, or the mean of one that changes over the field, adds."""
+    if any(plane is not None for plane in tables.planes) or tables.radial is None:
+        return replace(tables, radial=None)
+    alone = path.transfer.mixed(tables.mix)
+    size = TableSize(tables.top, tables.radial.shape[-1], 0.0, 0.0)
+    return replace(tables, radial=tables.radial - radial_table(alone, size))
+
+
+def needed_modes(
+    path: OpticalPath, image: SampledImage, modes: tuple[Mode, ...]
+) -> tuple[tuple[Mode, ...], float]:
+    """The modes of the field that this picture needs, and the rms that all of them add [e/s]."""
+    squares = np.array(
+        [
+            mode.map.mean_square * image.rms(image.power.through(mode.tables())) ** 2
+            for mode in modes
+        ]
+    )
+    allowed = MODES_SHARE * path.settings.tolerance * image.full_signal
+    weakest = np.argsort(squares)
+    dropped = set(weakest[np.cumsum(squares[weakest]) <= allowed**2].tolist())
+    kept = tuple(mode for i, mode in enumerate(modes) if i not in dropped)
+    return kept, math.sqrt(float(squares.sum()))

@@ -1,0 +1,228 @@
+"""Blur that changes over the field: few tables, and how much of each there is in every place.
+
+A lens's blur is known at some places, its zones, and is a weighted mean of theirs in between.
+Filtering the picture once for each of dozens of zones would cost dozens of times one filter; but
+zones are much alike. The mean of all of them and a few singular vectors of what is left stand for
+them within a known error (as eigen-images of point spread functions do: Lauer, Proc. SPIE 4847,
+2002), and each is one filter whose result is weighted by a smooth map.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcam_cli.camera.derived.geometry import Geometry
+from vcam_cli.effects.base import PlaneTransfer, RadialTransfer, Zone
+from vcam_cli.image_formation.transfer_functions import Transfer
+from vcam_cli.image_formation.transfer_tables import (
+    LARGEST_OF_FIELD,
+    PARITIES,
+    Mixing,
+    Tables,
+    TableSize,
+    mixtures,
+    plane_grid,
+    radial_table,
+    turned,
+)
+
+PLACES = 97
+"""Points of a map along each side of the sensor; between them it is straight."""
+SMALL = 0.1
+"""Part of the tolerance below which a parity of the mean transfer is left out: of zones all around
+the axis only rounding is there."""
+
+
+@dataclass(frozen=True)
+class Map:
+    """A smooth function on the sensor."""
+
+    values: NDArray
+    """(PLACES, PLACES) from edge to edge"""
+    half_width: float
+    half_height: float
+
+    def __call__(self, x: NDArray, y: NDArray) -> NDArray:
+        """At the positions x (columns,), y (rows,) [m]: (rows, columns), in the type of x."""
+        last = PLACES - 1
+        along_y = np.clip((y / self.half_height + 1) * (last / 2), 0, last)
+        along_x = np.clip((x / self.half_width + 1) * (last / 2), 0, last)
+        rows = _linear(self.values, along_y).astype(x.dtype)
+        return _linear(rows.T, along_x).T
+
+    @property
+    def mean_square(self) -> float:
+        """Over the sensor."""
+        return float(np.mean(self.values**2))
+
+
+def _linear(values: NDArray, position: NDArray) -> NDArray:
+    """Rows of a table at positions between them (n,), by linear interpolation."""
+    index = np.minimum(position.astype(int), len(values) - 2)
+    part = (position - index).astype(values.dtype)[:, None]
+    return np.asarray(values[index] * (1 - part) + values[index + 1] * part)
+
+
+@dataclass(frozen=True)
+class Mode:
+    """A table that is added, as much of it as its map says."""
+
+    tables: Callable[[], Tables]
+    """Makes the table when it is needed: all of them together take much memory."""
+    map: Map
+
+
+def field_mixtures(alone: Transfer, zones: Sequence[Zone], size: TableSize) -> Mixing:
+    """The fewest mixtures of the components that serve all zones."""
+    return mixtures(_through(alone, zones)[:: max(1, len(zones) // 6)], size)
+
+
+def _through(alone: Transfer, zones: Sequence[Zone]) -> list[Transfer]:
+    return [replace(alone, effects=(*alone.effects, zone.blur)) for zone in zones]
+
+
+def tabulate_field(
+    alone: Transfer, zones: Sequence[Zone], geometry: Geometry, size: TableSize, mixing: Mixing
+) -> tuple[Tables, tuple[Mode, ...]]:
+    """The mean transfer function of all zones, and what differs from it from place to place.
+
+    alone: the transfer function without the blur that has zones.
+    """
+    mix, error = mixing
+    alone = alone.mixed(mix)
+    base = radial_table(alone, size)
+    blurs = [zone.blur for zone in zones]
+    directed = any(isinstance(blur, PlaneTransfer) for blur in blurs)
+    if directed:
+        stack = _planes_of(alone, blurs, size)
+    else:
+        each = [radial_table(t, size)[None] for t in _through(alone, zones)]
+        stack = Stack(each, [(i, 0, False) for i in range(len(each))])
+    level = np.abs(alone.level).max() or 1.0
+    importance = _importance(stack.known[0].shape, directed) / alone.weights.shape[1]
+    shares, left = _shares(stack, importance, size.tolerance * level)
+    maps = _maps(zones, geometry)
+    weights = np.array([m.values for m in maps])
+    error += left / level
+
+    def tables(share: NDArray, parity: int) -> Tables:
+        mixed = stack.mixed(parity, share - share.mean())
+        if not directed:
+            return Tables(mix, mixed, size.top, error)
+        planes = tuple(mixed if parity == p else None for p in range(len(PARITIES)))
+        return Tables(mix, None, size.top, error, planes)
+
+    modes = tuple(
+        Mode(partial(tables, share, p), replace(maps[0], values=np.tensordot(share, weights, 1)))
+        for p, share in shares
+    )
+    even = np.full(len(zones), 1 / len(zones))
+    means = [stack.mixed(p, even) for p in range(stack.parities)]
+    if not directed:
+        return Tables(mix, means[0], size.top, error), modes
+    small = SMALL * size.tolerance * level
+    planes = (mean if _rms(mean, importance) > small else None for mean in means)
+    return Tables(mix, base, size.top, error, tuple(planes)), modes
+
+
+@dataclass(frozen=True, eq=False)
+class Stack:
+    """Tables of all zones, made of those of fewer blurs when they are asked for."""
+
+    known: list[NDArray]
+    """(parities, R, C, ...) each"""
+    zones: list[tuple[int, int, bool]]
+    """Of each zone: index into them, quarter turns, whether y is mirrored before."""
+
+    @property
+    def parities(self) -> int:
+        return len(self.known[0])
+
+    def rows(self, parity: int, at: tuple[int, ...]) -> NDArray:
+        """Of a component and color, all zones': (zones, ...) float64."""
+        found = [self._of(zone, parity, (slice(None), *at)) for zone in self.zones]
+        return np.array(found, dtype=np.float64)
+
+    def mixed(self, parity: int, shares: NDArray) -> NDArray:
+        """The sum of all zones' tables, each with its share: (R, C, ...)."""
+        total = np.zeros(self.known[0].shape[1:])
+        for zone, share in zip(self.zones, shares, strict=True):
+            total += share * self._of(zone, parity, slice(None))
+        return total
+
+    def _of(self, zone: tuple[int, int, bool], parity: int, at: Any) -> NDArray:
+        model, quarters, mirrored = zone
+        return turned(self.known[model][at], parity, quarters, mirrored)
+
+
+def _planes_of(
+    alone: Transfer, blurs: Sequence[RadialTransfer | PlaneTransfer], size: TableSize
+) -> Stack:
+    """What the zones' blurs add to the transfer. Those that are others turned are computed once."""
+    directed = [blur for blur in blurs if isinstance(blur, PlaneTransfer)]
+    grid = plane_grid(alone, size.top, size.plane_entries(directed, LARGEST_OF_FIELD))
+    models = [blur.model if isinstance(blur, PlaneTransfer) else (blur, 0, False) for blur in blurs]
+    known = list(dict.fromkeys(blur for blur, _, _ in models))
+    return Stack(
+        [grid.change([blur]).astype(np.float32) for blur in known],
+        [(known.index(blur), quarters, mirrored) for blur, quarters, mirrored in models],
+    )
+
+
+def _shares(
+    stack: Stack, importance: NDArray, allowed: float
+) -> tuple[list[tuple[int, NDArray]], float]:
+    """(parity, share of a mode in each zone), ... strongest first; error of what is left.
+
+    The error of a zone is the rms of its tables', each entry as important as its frequency, in the
+    mean over colors. Singular vectors come from the zones' products with each other, of which there
+    are few; by parity, so that a mode has only one.
+    """
+    found, left = [], np.zeros(len(stack.zones))
+    for parity in range(stack.parities):
+        products = np.zeros((len(left), len(left)))
+        for at in np.ndindex(stack.known[0].shape[1:3]):
+            rows = stack.rows(parity, at)
+            rows = ((rows - rows.mean(axis=0)) * np.sqrt(importance)).reshape(len(left), -1)
+            products += rows @ rows.T
+        left += np.diag(products)
+        strengths, vectors = np.linalg.eigh(products)
+        found += [(s, parity, v) for s, v in zip(strengths, vectors.T, strict=True)]
+    found.sort(key=lambda mode: -mode[0])
+    for count, (strength, _, share) in enumerate(found):
+        error = float(np.sqrt(max(left.max(), 0.0)))
+        if error <= allowed:
+            return [mode[1:] for mode in found[:count]], error
+        left -= max(strength, 0.0) * share**2
+    return [mode[1:] for mode in found], 0.0
+
+
+def _rms(table: NDArray, importance: NDArray) -> float:
+    """What a table adds to a picture, relative to the light that it is for."""
+    return float(np.sqrt((table**2 * importance).sum()))
+
+
+def _importance(shape: tuple[int, ...], directed: bool) -> NDArray:
+    """How much of a picture's variance lies at each entry of a table over |f|, or fx and fy.
+
+    As much in each octave: its power falls with the square of the frequency (D. L. Ruderman,
+    Network 5, 1994). Sums to 1.
+    """
+    count = shape[-1]
+    at = np.arange(count)
+    length = np.hypot(at[None, :], at[:, None]) if directed else at
+    power = np.maximum(length, 1.0) ** (-2.0 if directed else -1.0)
+    return np.asarray(power / power.sum())
+
+
+def _maps(zones: Sequence[Zone], geometry: Geometry) -> list[Map]:
+    """The zones' weights."""
+    half = geometry.sensor_width / 2, geometry.sensor_height / 2
+    at = np.linspace(-1, 1, PLACES)
+    return [Map(zone.weight(at * half[0], at * half[1]), *half) for zone in zones]

@@ -1,0 +1,230 @@
+"""From a scene's spectrum to the pixels: multiply by the transfer function, fold, transform back.
+
+The heart of image formation. A transfer function is computed at four frequencies of up to 128
+neighboring rows of the spectrum; the cubic through them is a product of small matrices, several
+times faster than looking up every term (docs/engine_ablation.md). Work is cut into fixed pieces
+of rows or columns that threads share.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcam_cli.image_formation.cosine_series import Axis
+from vcam_cli.image_formation.scene_spectrum import SceneSpectrum
+from vcam_cli.image_formation.transfer_tables import PARITIES, TableReader, Tables, reader
+from vcam_cli.parallel import at_once, each, pieces, product, within
+
+LONGEST = 128
+"""Rows of a spectrum that are filtered together."""
+NODES = 4
+"""Frequencies at which a stretch of rows has its transfer function computed."""
+GROWTH = 1.5
+"""Highest over lowest frequency of a stretch: an OTF has a cusp at 0. The cubic through Chebyshev
+nodes then errs by 1e-4 of what the OTF has lost up to there."""
+SHORTEST = 8
+"""Rows below which every row has its own transfer function."""
+
+Waves = tuple[bool, bool]
+"""Whether waves along x, and along y, are sines."""
+Share = tuple[bool, NDArray | None]
+"""Waves of the pixels, and what part of every term they are; None for all of it."""
+
+
+@dataclass(frozen=True)
+class Series:
+    """A signal that is known at the rows of photodetectors, and as a series along x."""
+
+    x: Axis
+    parts: dict[bool, NDArray]
+    """Cosines (False) and sines (True): (C, rows, folded x) [electrons / s]."""
+
+    def signal(self, color: int, rows: slice) -> NDArray:
+        """The signal of a color at the photodetectors of some rows: (rows, columns)."""
+        found = [self.x.evaluate(p[color, rows], axis=1, odd=odd) for odd, p in self.parts.items()]
+        return found[0] if len(found) == 1 else found[0] + found[1]
+
+
+@dataclass(frozen=True)
+class Filter:
+    """A transfer function acting on the cosine series of a scene."""
+
+    x: Axis
+    y: Axis
+    tables: Tables
+    along_x: NDArray
+    """Separable transfer along x at every term of the axis, without unit."""
+    along_y: NDArray
+    smooth: float
+    """Frequency range over which the tables are a cubic [cycles/m]."""
+
+    def apply(self, spectrum: SceneSpectrum, workers: int) -> Series:
+        """Signal of every color at the rows of photodetectors, still a series along x.
+
+        spectrum: of the R mixtures that the tables are for.
+        """
+        folded: dict[Waves, NDArray] = {}
+        for parity in self.tables.parities:
+            self._multiply(spectrum, parity, folded, workers)
+        parts: dict[bool, NDArray] = {}
+        for waves in sorted(folded):
+            found = self._evaluated(folded.pop(waves), waves[1], workers)
+            if waves[0] in parts:
+                parts[waves[0]] += found
+            else:
+                parts[waves[0]] = found
+        return Series(self.x, parts)
+
+    @property
+    def terms(self) -> int:
+        """Terms of a plane's spectrum that are filtered."""
+        return int(self._counts(self.y.frequencies).sum())
+
+    def _multiply(
+        self, spectrum: SceneSpectrum, parity: int, folded: dict[Waves, NDArray], workers: int
+    ) -> None:
+        """Adds what the planes give through one parity of the tables to the pixels' waves."""
+        odd_x, odd_y = PARITIES[parity]
+        dtype = spectrum.dtype
+        table = reader(self.tables, parity, self.x.frequencies)
+        shape = self.tables.colors, self.y.folded, self.x.folded
+        for wave_y, share_y in self.y.pixel_waves(odd_y):
+            targets = []
+            for wave_x, share_x in self.x.pixel_waves(odd_x):
+                sums = folded.setdefault((wave_x, wave_y), np.zeros(shape, dtype))
+                targets.append((sums, wave_x, None if share_x is None else share_x.astype(dtype)))
+
+            def multiply(
+                rows: slice,
+                wave_y: bool = wave_y,
+                share_y: NDArray | None = share_y,
+                targets: list[tuple[NDArray, bool, NDArray | None]] = targets,
+            ) -> None:
+                for target, terms, weights in self.y.folding(rows, wave_y):
+                    if share_y is not None:
+                        weights = weights * share_y[terms]
+                    for part, color, light in self._filtered(spectrum, table, terms, weights):
+                        here = slice(target.start + part.start, target.start + part.stop)
+                        for sums, wave_x, share_x in targets:
+                            some = light if share_x is None else light * share_x[: light.shape[1]]
+                            last = sums is targets[-1][0]
+                            sums[color, here] += self.x.fold(some, wave_x, overwrite=last)
+
+            each(multiply, pieces(self.y.folded, LONGEST), workers)
+
+    def _filtered(
+        self, spectrum: SceneSpectrum, table: TableReader, terms: NDArray, weights: NDArray
+    ) -> Iterator[tuple[slice, int, NDArray]]:
+        """Rows of the filtered spectrum: (which of `terms`, color, (n, count)).
+
+        terms: (n,) consecutive rows, rising or falling; weights: factors on them.
+        """
+        dtype = spectrum.dtype
+        factor = self._along_x
+        below = weights * self.y.coefficient_of(terms)[1] * self.y.weights[terms]
+        below = (below * self.along_y[terms]).astype(dtype)[:, None]
+        for stretch in self._stretches(terms):
+            fy = self.y.frequencies[terms[stretch]]
+            count = self._count(fy)
+            if not count:
+                continue
+            nodes, shares = chebyshev(fy) if len(fy) >= SHORTEST else (fy, None)
+            values = (table.values(nodes, count) * factor[:count]).astype(dtype)
+            for rows in within(stretch, at_once(count)):
+                planes = self._rows(spectrum, terms[rows], count)
+                at = slice(rows.start - stretch.start, rows.stop - stretch.start)
+                for color in range(self.tables.colors):
+                    total: NDArray | None = None
+                    for plane, of_plane in zip(planes, values[:, color], strict=True):
+                        if shares is None:
+                            light = of_plane[at] * plane
+                        else:
+                            light = product(shares[at].astype(dtype), of_plane)
+                            light *= plane
+                        total = light if total is None else np.add(total, light, out=total)
+                    assert total is not None
+                    total *= below[rows]
+                    yield rows, color, total
+
+    @cached_property
+    def _along_x(self) -> NDArray:
+        return self.x.weights * self.along_x
+
+    def _stretches(self, terms: NDArray) -> Iterator[slice]:
+        """Consecutive rows over which the tables are a cubic in fy."""
+        widest = min(LONGEST, int(self.smooth * 2 * self.y.length))
+        start, count = 0, len(terms)
+        rising = count < 2 or terms[1] > terms[0]
+        while start < count:
+            first = int(terms[start])
+            size = first * (GROWTH - 1) if rising else first * (1 - 1 / GROWTH)
+            size = min(int(size), widest)
+            if size < SHORTEST:
+                size = SHORTEST - 1
+            yield slice(start, min(start + size, count))
+            start += size
+
+    def _rows(self, spectrum: SceneSpectrum, terms: NDArray, count: int) -> list[NDArray]:
+        """Rows of every plane's spectrum without factors: R of (n, count)."""
+        index = _consecutive(self.y.coefficient_of(terms)[0])
+        planes = range(len(spectrum))
+        return [self.x.extend(spectrum.rows(plane, index, count), count) for plane in planes]
+
+    def _count(self, fy: NDArray) -> int:
+        """Terms along x that the tables reach at some of these frequencies (n,) along y."""
+        return int(self._counts(fy.min()))
+
+    def _counts(self, fy: NDArray) -> NDArray:
+        """Terms along x that the tables reach at each of these frequencies along y."""
+        left = self.tables.top**2 - fy**2
+        count = (np.sqrt(np.maximum(left, 0)) * 2 * self.x.length).astype(int) + 1
+        return np.where(left < 0, 0, np.minimum(count, self.x.terms))
+
+    def _evaluated(self, folded: NDArray, odd: bool, workers: int) -> NDArray:
+        """Signal at the rows of photodetectors of waves (C, rows, folded x) along y.
+
+        Takes the place of its argument where the virtual pixels' rows do.
+        """
+        window = self.y.window
+        out = folded
+        if window is None:
+            shape = (len(folded), self.y.pixels, self.x.folded)
+            out = np.empty(shape, folded.dtype)
+        columns = pieces(self.x.folded, at_once(self.y.transform))
+
+        def evaluate(task: tuple[int, slice]) -> None:
+            color, s = task
+            found = self.y.evaluate(folded[color, :, s], axis=0, odd=odd)
+            (out[color] if window is None else out[color, window])[:, s] = found
+
+        each(evaluate, [(c, s) for c in range(len(folded)) for s in columns], workers)
+        return out if window is None else out[:, window]
+
+
+def chebyshev(at: NDArray) -> tuple[NDArray, NDArray]:
+    """Chebyshev's nodes between the ends of `at` (n,), and the cubic's weights: (NODES,), (n, ...).
+
+    The cubic through the values at the nodes is `weights @ values` at the places `at`.
+    """
+    low, high = float(at.min()), float(at.max())
+    nodes = (low + high) / 2 + (high - low) / 2 * np.cos(np.pi * (np.arange(NODES) + 0.5) / NODES)
+    weights = np.ones((len(at), NODES))
+    for i in range(NODES):
+        for j in range(NODES):
+            if i != j:
+                weights[:, i] *= (at - nodes[j]) / (nodes[i] - nodes[j])
+    return nodes, weights
+
+
+def _consecutive(index: NDArray) -> NDArray | slice:
+    """Consecutive indices, rising or falling, as a slice, of which NumPy makes a view."""
+    steps = np.diff(index)
+    if not len(steps) or abs(steps[0]) != 1 or (steps != steps[0]).any():
+        return index
+    step, stop = int(steps[0]), int(index[-1] + steps[0])
+    return slice(int(index[0]), stop if stop >= 0 else None, step)

@@ -1,0 +1,83 @@
+"""How much memory an image takes, estimated conservatively before it is formed.
+
+One sum of what is held at once at the worst moment; a test compares it with measured peaks.
+"""
+
+from __future__ import annotations
+
+import math
+
+from vcam_cli.camera.derived.geometry import Geometry
+from vcam_cli.effects.base import PlaneTransfer
+from vcam_cli.image_formation.optical_path import OpticalPath
+from vcam_cli.image_formation.settings import Settings
+from vcam_cli.image_formation.transfer_tables import (
+    LARGEST_OF_FIELD,
+    LARGEST_PLANE,
+    PARITIES,
+    TableSize,
+)
+from vcam_cli.scenes.base import ChartScene, SampledScene
+
+BASE = 170_000_000
+"""Interpreter and libraries [bytes]."""
+SLACK = 1.1
+"""Memory of the process over what is in use: freed memory is not given back at once."""
+PUPIL_GRIDS = 300_000_000
+"""Grids of the pupil that are kept for lenses with aberrations, at most [bytes]."""
+WORK = 24_000_000
+"""Temporary arrays of one thread [bytes]."""
+
+
+def of_image(path: OpticalPath, scene: SampledScene, planes: int, size: TableSize) -> int:
+    """Memory of an image through the cosine spectrum [bytes]; planes: mixtures of components."""
+    g, width = path.geometry, path.settings.float_width // 8
+    colors, pixels = len(path.mosaic.colors), g.rows * g.columns
+    rectangles = isinstance(scene, ChartScene) and scene.chart.edges() is not None
+    samples = 4 * pixels if rectangles else math.prod(scene.shape) * planes
+    # A scene is wider than the array by its margin, which is folded and evaluated too.
+    area = scene.shape[0] * scene.pitch_y * scene.shape[1] * scene.pitch_x
+    wide = max(pixels, round(area / (g.pitch_x * g.pitch_y)))
+    waves = (2 if g.collecting_x else 1) * (2 if g.collecting_y else 1)
+    tables, modes = 0, 0
+    directed = [b for b in path.transfer.plane] + [
+        z.blur for z in path.zones if isinstance(z.blur, PlaneTransfer)
+    ]
+    if directed:
+        waves = 4
+        zones = len({blur.model[0] for blur in directed})
+        entries = size.plane_entries(directed, LARGEST_OF_FIELD if path.zones else LARGEST_PLANE)
+        per_table = entries**2 * planes * colors * len(PARITIES)
+        count = len(path.transfer.thinned().wavelengths)
+        tables = 8 * per_table * (3 + zones) + count * 2 * entries**2 * 24 + PUPIL_GRIDS
+    if path.zones:
+        modes = 2 * wide * colors * width
+    folded = waves * wide * colors * width + modes
+    held = samples * width + folded + pixels * width + tables
+    return BASE + round(SLACK * held) + WORK * path.workers
+
+
+def of_box_averages(samples: int, planes: int, geometry: Geometry, knobs: Settings) -> int:
+    """Memory of means over boxes [bytes]; samples: of one plane of a picture, 0 of a chart."""
+    pixels = geometry.rows * geometry.columns
+    width = knobs.float_width // 8
+    held = planes * (samples * width + 2 * pixels * (width + 8)) + 5 * 8 * max(samples, pixels)
+    return BASE + round(SLACK * held)
+
+
+def of_frame(
+    geometry: Geometry, knobs: Settings, colors: int, judged: bool, samples: int = 0
+) -> int:
+    """Memory of a frame without its scene [bytes]: signal, raw, render.
+
+    judged: whether an ideal image is made and compared; samples: of one integration, of each color
+    that a pixel has; 0 for a single exposure.
+    """
+    pixels = geometry.rows * geometry.columns
+    width = knobs.float_width // 8
+    frame = pixels * (2 * width + 2 + colors)
+    if samples:  # their electrons and codes, the photocurrent and what is made into a picture
+        frame += pixels * (samples * (width + 4) + 8)
+    return (
+        BASE + max(pixels * width * (colors + 1), frame) + (16 * pixels * colors if judged else 0)
+    )

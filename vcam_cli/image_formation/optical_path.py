@@ -1,0 +1,88 @@
+"""What the light passes between scene and electrons, and what it is on the sensor."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcam_cli.camera.derived.geometry import Geometry
+from vcam_cli.camera.derived.mosaic import Mosaic
+from vcam_cli.effects.base import Effect, FieldTransfer, SeparableTransfer, Zone
+from vcam_cli.image_formation.settings import Settings
+from vcam_cli.image_formation.transfer_functions import Transfer
+
+
+@dataclass(frozen=True)
+class OpticalPath:
+    """Lens, pixels and settings through which a scene is seen."""
+
+    transfer: Transfer
+    """Of the scene's components."""
+    geometry: Geometry
+    settings: Settings
+    mosaic: Mosaic
+    effects: tuple[Effect, ...]
+    workers: int
+    ceiling: float = np.inf
+    """Rate at which a pixel fills up, as far as it is known; brighter ones all look alike [e/s]."""
+
+    @property
+    def separable(self) -> tuple[SeparableTransfer, ...]:
+        """Transfer functions that are products of one along x and one along y."""
+        return tuple(e for e in self.effects if isinstance(e, SeparableTransfer))
+
+    @property
+    def field(self) -> FieldTransfer | None:
+        """The blur that changes over the field, where there is one."""
+        return next((e for e in self.effects if isinstance(e, FieldTransfer)), None)
+
+    @cached_property
+    def zones(self) -> tuple[Zone, ...]:
+        """The zones of that blur; none where there is none."""
+        return () if self.field is None else self.field.zones(self.settings.field_zones)
+
+
+@dataclass(frozen=True)
+class Layer:
+    """A share of the light on the sensor; all layers together are the signal."""
+
+    values: Callable[[int, slice], NDArray]
+    """From a color and array rows to its signal there, (rows, columns) [electrons / s]."""
+    weight: Callable[[NDArray, NDArray], NDArray] | None = None
+    """A factor at the positions x (columns,), y (rows,) [m]: (rows, columns)."""
+
+
+Layers = Iterator[Layer]
+"""One is made when the one before is done with: each may take much memory."""
+
+
+@dataclass(frozen=True)
+class SpectrumReport:
+    """How a scene was sampled and filtered, and what each transfer function does to it."""
+
+    oversampling: float = 0.0
+    """Highest frequency [pixel Nyquist]; 0 where the scene is known in closed form."""
+    lost: float = 0.0
+    """Estimated rms of the signal that sampling and filtering leave out [electrons / s]."""
+    cells: int = 0
+    """Samples of one plane of the scene that were transformed; 0 where its spectrum is known."""
+    painted: bool = False
+    """Whether they had to be painted, as those of a chart."""
+    terms: int = 0
+    """Terms of one plane's spectrum that were filtered; 0 where there was no need to."""
+    planes: int = 0
+    """Mixtures of the scene's components that were transformed."""
+    changes: dict[str, float] = field(default_factory=dict)
+    """Transfer function -> rms change of the signal by leaving it out [electrons / s]."""
+    filters: int = 0
+    """Times that the spectrum was filtered: for each parity, and for each mode of the field."""
+    table_values: int = 0
+    """Values of transfer functions of fx and fy that were computed."""
+    peak: float = 0.0
+    """Bound on the signal before blur: a ceiling above it changes nothing [electrons / s]."""
+    memory: int = 0
+    """Estimated memory [bytes]."""

@@ -1,0 +1,189 @@
+"""From the scene to the rate of photo-electrons in every pixel: the linear part.
+
+All on-axis physics is one filter per scene component and color (`transfer_functions.py`), applied
+in the plainest way that suits the scene (`strategies.py`); slowly varying factors multiply the
+result.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.derived.geometry import Geometry, pixel_centers
+from vcam_cli.camera.derived.mosaic import Mosaic
+from vcam_cli.camera.derived.photodiode import quantum_efficiency
+from vcam_cli.effects.base import Blur, Effect, Gain, VeilingGlare
+from vcam_cli.image_formation.optical_path import Layer, OpticalPath, SpectrumReport
+from vcam_cli.image_formation.settings import Settings
+from vcam_cli.image_formation.strategies import image_layers
+from vcam_cli.image_formation.transfer_functions import Band, Transfer, transfer
+from vcam_cli.parallel import each
+from vcam_cli.physics import radiometry
+from vcam_cli.rng import blocks
+from vcam_cli.scenes.base import Scene, View
+from vcam_cli.spectra import Spectrum
+
+
+def view(geometry: Geometry, settings: Settings, margin: int) -> View:
+    """The rectangle that a scene has to fill, with a margin in pixels."""
+    return View(
+        rows=geometry.rows,
+        columns=geometry.columns,
+        pitch_x=geometry.pitch_x,
+        pitch_y=geometry.pitch_y,
+        margin=margin,
+        scene_width=geometry.scene_width_on_sensor,
+        dtype=settings.dtype,
+    )
+
+
+def responses(camera: Camera, mosaic: Mosaic) -> list[Spectrum]:
+    """Electrons per photon for each color: transmittance x filter x QE."""
+    common = (camera.optics.transmittance.resolve(), quantum_efficiency(camera))
+    out = []
+    for color in mosaic.colors:
+        spec = camera.array.filters.get(color)
+        filters = () if spec is None else (spec.resolve(),)
+        out.append(common[0].multiply(common[1], *filters))
+    return out
+
+
+def scene_transfer(
+    camera: Camera,
+    geometry: Geometry,
+    settings: Settings,
+    spectra: Sequence[Spectrum],
+    mosaic: Mosaic,
+    effects: Sequence[Effect],
+) -> Transfer:
+    """H_kc of scene spectra [W / (sr m2 m)] on the axis, eq 2.18 and 2.23. [electrons / s]
+
+    Of the effects: the blurs that are the same everywhere, and the gains as they are on the axis.
+    """
+    area = geometry.detector_area
+    if camera.pixel.photodetector.quantum_efficiency.per_pixel:
+        area = geometry.pixel_width * geometry.pixel_height
+    area *= math.prod(e.on_axis for e in effects if isinstance(e, Gain))
+    irradiance = float(
+        radiometry.irradiance_per_radiance(geometry.f_number, geometry.magnification)
+    )
+    wavelengths = camera.scene.wavelengths
+    return transfer(
+        spectra,
+        responses(camera, mosaic),
+        irradiance * area,
+        Band(wavelengths.start, wavelengths.stop, settings.wavelength_step),
+        [e for e in effects if isinstance(e, Blur)],
+    )
+
+
+@dataclass(frozen=True)
+class Rate:
+    """What the linear part gives."""
+
+    values: NDArray
+    """(rows, columns) of the lattice, or (C, rows, columns) with every color [electrons / s]"""
+    spectrum: SpectrumReport
+    """How the scene was sampled and filtered, and what each transfer function does to it."""
+
+
+def photo_rate(path: OpticalPath, scene: Scene, planes: bool = False) -> Rate:
+    """Photo-electrons per second in every place of the lattice, noise-free.
+
+    planes: every color in every place, and not each place's own.
+    Raises CannotDo where memory does not suffice.
+    """
+    layers, report = image_layers(path, scene)
+    g, mosaic = path.geometry, path.mosaic
+    count = len(mosaic.colors) if planes else 1
+    out: NDArray = np.zeros((count, g.rows, g.columns), path.settings.dtype)
+    x, y = (axis.astype(out.dtype) for axis in pixel_centers(g))
+    before, glare, after = _in_order(path.effects)
+    # The light has the gain of the axis in it: see `scene_transfer`.
+    on_axis = {e: out.dtype.type(1 / (e.on_axis or 1.0)) for e in (*before, *after)}
+
+    def gain(effects: Sequence[Gain], block: slice) -> None:
+        for effect in effects:
+            factor = effect.gain(x, y[block])
+            out[:, block] *= factor if on_axis[effect] == 1 else factor * on_axis[effect]
+
+    def add(layer: Layer, first: bool, block: slice) -> None:
+        if first and layer.weight is None:
+            _fill(out[:, block], layer, mosaic, block)
+            return
+        tile = np.zeros_like(out[:, block])
+        _fill(tile, layer, mosaic, block)
+        if layer.weight is not None:
+            tile *= layer.weight(x, y[block])
+        out[:, block] += tile
+
+    def finish(block: slice) -> None:
+        np.maximum(out[:, block], 0, out=out[:, block])
+        gain(before, block)
+        if glare is None:
+            gain(after, block)
+
+    for number, layer in enumerate(layers):
+        each(partial(add, layer, number == 0), blocks(g.rows), path.workers)
+        del layer  # its memory, before the next one is made
+    each(finish, blocks(g.rows), path.workers)
+    if glare is not None:
+        _spread(out, mosaic, glare)
+        each(lambda block: gain(after, block), blocks(g.rows), path.workers)
+    return Rate(out if planes else out[0], report)
+
+
+def _in_order(effects: Sequence[Effect]) -> tuple[list[Gain], VeilingGlare | None, list[Gain]]:
+    """The gains before the veil, the veil, and the gains after it."""
+    veil = next((e for e in effects if isinstance(e, VeilingGlare)), None)
+    gains = [e for e in effects if isinstance(e, Gain)]
+    if veil is None:
+        return gains, None, []
+    early = [e for e in gains if effects.index(e) < effects.index(veil)]
+    return early, veil, [e for e in gains if e not in early]
+
+
+def _fill(tile: NDArray, layer: Layer, mosaic: Mosaic, block: slice) -> None:
+    """Puts a layer's light where it belongs: every color in its plane, or each in its places."""
+    if len(tile) > 1:
+        for color, plane in enumerate(tile):
+            plane[:] = layer.values(color, block)
+        return
+    period = len(mosaic.block)
+    for phase in range(min(period, tile.shape[1])):
+        row = block.start + phase
+        for color, places in mosaic.row_colors(row):
+            found = layer.values(color, slice(row, block.stop, period))
+            for columns in places:
+                tile[0, phase::period, columns] = found[:, columns]
+
+
+def _spread(rate: NDArray, mosaic: Mosaic, veil: VeilingGlare) -> None:
+    """Takes the veil's share of the light and lays it evenly over the pixels of its color."""
+    if len(rate) > 1:
+        for plane in rate:
+            plane += veil.fraction * (plane.mean(dtype=np.float64) - plane)
+        return
+    light = rate[0]
+    period = len(mosaic.block)
+    sums, counts = np.zeros(len(mosaic.colors)), np.zeros(len(mosaic.colors))
+    sites = [
+        (row, color, columns)
+        for row in range(period)
+        for color, places in mosaic.row_colors(row)
+        for columns in places
+    ]
+    for row, color, columns in sites:
+        here = light[row::period, columns]
+        sums[color] += here.sum(dtype=np.float64)
+        counts[color] += here.size
+    light *= light.dtype.type(1 - veil.fraction)
+    for row, color, columns in sites:
+        light[row::period, columns] += veil.fraction * sums[color] / max(counts[color], 1)

@@ -1,0 +1,111 @@
+"""The light on the sensor, computed once for cameras that differ only in what comes after it.
+
+A sweep over seeds, noise, ADC or processing brings the same light to the same pixels again and
+again, and that is most of a frame's cost. What the light depends on is told from the camera file:
+all of it but the keys listed here, of which none is read before electrons are counted. A key that
+is not listed counts as one that changes the light, so a new one can cost time but no truth.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from vcam_cli.camera.camera import Camera
+from vcam_cli.effects.base import Charge, NoiseSource
+from vcam_cli.effects.order import ORDER
+from vcam_cli.image_formation.photon_rate import Rate
+from vcam_cli.image_formation.transfer_functions import Transfer
+from vcam_cli.physics.cache import ByteCache
+
+AFTER: tuple[tuple[str, ...], ...] = tuple(
+    tuple(path.split("."))
+    for path in (
+        *("name", "seed", "adc", "exposure", "processing", "quality", "output"),
+        *("accuracy.shot_noise", "display.dpi", "display.width", "display.viewing_distance"),
+        *("pixel.fpn", "pixel.defects"),
+        *(f"pixel.readout.{k}" for k in ("gain", "read_noise", "column_noise", "row_noise")),
+        *(f"pixel.readout.{k}" for k in ("reset_noise", "charge_transfer")),
+        *(f"pixel.photodetector.{k}" for k in ("dark_current", "dark_current_density")),
+        *("pixel.photodetector.dark_current_scale", "array.binning"),
+    )
+)
+"""Keys on which the light does not depend. Exposure, ADC and analog gain set the level at which a
+pixel is full, beyond which the light is not followed as exactly: see `Lights.rate`."""
+_RANDOM = {kind.name for kind in ORDER if issubclass(kind, NoiseSource | Charge)}
+_LIMIT = 1 << 28
+"""Bytes of light that are kept."""
+_MOST = 64
+"""Cameras whose brightest light is remembered."""
+
+
+def depends_on(camera: Camera) -> str:
+    """All that the light on the sensor depends on, as a text, but for the level of saturation."""
+    form = camera.model_dump(mode="json")
+    for path in AFTER:
+        _drop(form, path)
+    accuracy = form["accuracy"]  # a preset by itself is written as its name
+    if isinstance(accuracy, dict) and set(accuracy) == {"preset"}:
+        form["accuracy"] = accuracy["preset"]
+    if isinstance(form.get("effects"), dict):
+        own = {name: state for name, state in form["effects"].items() if name not in _RANDOM}
+        form["effects"] = own or "auto"
+    return json.dumps(form, sort_keys=True)
+
+
+def _drop(form: Any, path: tuple[str, ...]) -> None:
+    *parents, last = path
+    for name in parents:
+        form = form.get(name) if isinstance(form, dict) else None
+    if isinstance(form, dict):
+        form.pop(last, None)
+
+
+@dataclass(frozen=True)
+class _Kept:
+    rate: Rate
+
+    @property
+    def nbytes(self) -> int:
+        return self.rate.values.nbytes
+
+
+class Lights:
+    """The light of the last cameras."""
+
+    def __init__(self, limit: int = _LIMIT) -> None:
+        self._kept: ByteCache[_Kept] = ByteCache(limit)
+        self._transfer: tuple[str, Transfer] | None = None
+        self._peaks: dict[str, float] = {}
+        self._told: tuple[Camera, str] | None = None
+
+    def _key(self, camera: Camera) -> str:
+        """What its light depends on, told once for the camera that is asked about again."""
+        if self._told is None or self._told[0] is not camera:
+            self._told = camera, depends_on(camera)
+        return self._told[1]
+
+    def transfer(self, camera: Camera, make: Callable[[], Transfer]) -> Transfer:
+        """What `make` gives, or gave for the camera before where its light is the same."""
+        key, kept = self._key(camera), self._transfer
+        if kept is None or kept[0] != key:
+            kept = self._transfer = (key, make())
+        return kept[1]
+
+    def rate(self, camera: Camera, ceiling: float, make: Callable[[], Rate]) -> Rate:
+        """What `make` gives, or gave for a camera of the same light that fills pixels as fast.
+
+        ceiling: rate at which a pixel is full [e/s], see `exposure.ceiling`. All those are alike
+        that the light does not reach.
+        """
+        key = self._key(camera)
+        if key in self._peaks:
+            level = min(ceiling, self._peaks[key])
+            return self._kept.get((key, level), lambda: _Kept(make())).rate
+        if len(self._peaks) >= _MOST:
+            self._peaks.clear()
+        rate = make()
+        self._peaks[key] = rate.spectrum.peak
+        return self._kept.get((key, min(ceiling, rate.spectrum.peak)), lambda: _Kept(rate)).rate

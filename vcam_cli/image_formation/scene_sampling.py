@@ -1,0 +1,117 @@
+"""A scene's spectrum, and how far up the tolerance asks for it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcam_cli.image_formation.bandwidth import LOWEST, axes, highest_frequency_share, table_size
+from vcam_cli.image_formation.chart_cells import BEYOND_CUTOFF, cell_grid
+from vcam_cli.image_formation.optical_path import OpticalPath
+from vcam_cli.image_formation.power_spectrum import (
+    PowerSpectrum,
+    brightest_mean,
+    power_spectrum,
+)
+from vcam_cli.image_formation.scene_spectrum import SceneSpectrum, of_rectangles, transformed
+from vcam_cli.image_formation.transfer_tables import Mixing, Tables, bound, tabulate
+from vcam_cli.scenes.base import ChartScene, SampledScene
+
+SINGLE = 5e-7
+"""Error of transforms of 32-bit numbers, relative to the brightest sample."""
+SINGLE_SHARE = 0.1
+"""Part of the tolerance that it may use: else numbers have 64 bits."""
+WIDE = 1.5
+"""Area of a scene over that of the array from which on its whole spectrum is taken."""
+ENTRIES = 513
+"""Entries of tables with which power is judged."""
+
+
+@dataclass(frozen=True, eq=False)
+class SampledImage:
+    """A scene's spectrum, and how far up it is filtered."""
+
+    scene: SampledScene
+    spectrum: SceneSpectrum
+    power: PowerSpectrum
+    tables: Tables
+    """The radial part of the lens, up to where power is judged."""
+    highest: float
+    """Frequency up to which it is filtered [pixel Nyquist]."""
+    lost: float
+    """Rms of the signal beyond [electrons / s]."""
+    full_signal: float
+    """Largest signal on the array, at least; at most the ceiling [electrons / s]."""
+    peak: float
+    """Bound on the signal before blur [electrons / s]."""
+    density: float
+    """Area of the scene over that of the array: as if all of its light fell on the array."""
+
+    def rms(self, squares: NDArray) -> float:
+        """Rms of a signal in the color of most, from its mean squares over the scene (C, ...)."""
+        total = squares.reshape(len(squares), -1).sum(axis=1).max()
+        return float(np.sqrt(self.density * total))
+
+
+def sampled_image(
+    path: OpticalPath, scene: SampledScene, highest: float, mixing: Mixing
+) -> SampledImage:
+    """Transforms a scene, and finds how far up its spectrum is needed.
+
+    highest: frequency beyond which nothing counts [pixel Nyquist]. Aberrations only weaken a
+    picture, so that how far to go is found for the radial part of the lens.
+    """
+    g, knobs, exact = path.geometry, path.settings, path.transfer
+    size = table_size(path, highest, ENTRIES)
+    tables = tabulate(exact.through(exact.radial), size, mixing)
+    scene, spectrum, peak = _transformed(path, scene, highest, mixing[0])
+    x, y = axes(path, scene, highest)
+    full = min(brightest_mean(spectrum, x, y, tables, path.separable), path.ceiling)
+    if spectrum.dtype == np.float32 and peak * SINGLE > SINGLE_SHARE * knobs.tolerance * full:
+        doubled = replace(path, settings=replace(knobs, float_width=64))
+        scene, spectrum, _ = _transformed(doubled, scene, highest, mixing[0])
+    power = power_spectrum(spectrum, x, y, path.separable, path.workers)
+    directed = exact.plane or path.zones
+    squares = power.at_most(bound(exact, size, mixing)) if directed else power.through(tables)
+    area = scene.shape[0] * scene.pitch_y * scene.shape[1] * scene.pitch_x
+    density = area / (g.sensor_width * g.sensor_height)
+    pitch = g.pitch_y, g.pitch_x
+    if knobs.oversampling is None:
+        # Beside a wide margin nothing is known of the array's own brightest place.
+        known = full if density < WIDE else 0.0
+        budget = highest_frequency_share(knobs.tolerance) * known / np.sqrt(density)
+        needed = power.highest_needed(squares, budget, pitch) * (1 + 1e-9)
+        highest = min(max(needed, LOWEST), highest)
+    else:
+        highest = min(highest, knobs.oversampling)
+    return SampledImage(
+        scene=scene,
+        spectrum=spectrum,
+        power=power,
+        tables=tables,
+        highest=highest,
+        lost=float(np.sqrt(density)) * power.rms_beyond(squares, highest, pitch),
+        full_signal=full,
+        peak=peak,
+        density=density,
+    )
+
+
+def _transformed(
+    path: OpticalPath, scene: SampledScene, highest: float, mix: NDArray
+) -> tuple[SampledScene, SceneSpectrum, float]:
+    """The spectrum of a scene's planes; a bound on the signal before blur [electrons / s]."""
+    dtype = path.settings.dtype
+    level = np.abs(path.transfer.mixed(mix).level)
+    rectangles = scene.rectangles(mix)
+    if isinstance(scene, ChartScene) and rectangles is not None:
+        scene = scene.on_cells(cell_grid(scene, path.geometry, BEYOND_CUTOFF * highest))
+        x, y = axes(path, scene, highest)
+        brightest = np.abs(rectangles.values).max(axis=(1, 2))
+        known = of_rectangles(rectangles, scene.shape, (y, x), dtype)
+        return scene, known, float((level.T @ brightest).max())
+    planes: NDArray = scene.planes(mix, path.workers).astype(dtype, copy=False)
+    brightest = np.array([max(float(p.max()), -float(p.min())) for p in planes])
+    return scene, transformed(planes, path.workers), float((level.T @ brightest).max())

@@ -1,0 +1,75 @@
+"""The settings of image formation, and what the tolerance sets them to.
+
+The tolerance T bounds rms(mean raw - converged mean raw) / full signal (camera file key
+`accuracy`). The settings below were chosen by measuring each alone on charts and pictures;
+`reference` also computes in 64 bits.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, replace
+
+import numpy as np
+
+from vcam_cli.camera.camera import Camera
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How finely an image is formed; most fields are keys of the camera file's `accuracy`."""
+
+    wavelength_step: float
+    """Spacing of the wavelengths at which the OTF is computed [m]; levels are exact anyway."""
+    table_size: int
+    """Entries of the tables over |f|."""
+    mixing_tolerance: float
+    """Largest relative error of a transfer function by replacing many spectra by few."""
+    field_zones: int
+    """Places from center to corner at which a blur that changes over the field is computed."""
+    plane_steps: float
+    """Steps of tables over fx and fy in one period of the phase of the widest blur."""
+    float_width: int
+    """32 or 64 bits."""
+    oversampling: float | None = None
+    """Cells per pixel pitch of a chart, and highest frequency of any spectrum in pixel Nyquist
+    frequencies; None: what the tolerance asks for."""
+    shot_noise: str = "exact"
+    """exact (Poisson) or gaussian (as the thesis has it)."""
+    spectral_rank: int | None = None
+    """Largest number of mixtures that stand for the scene's spectra; None: as many as needed."""
+    vignetting_points: int | None = None
+    """Places along each half of the array at which pixel vignetting is integrated; None: as many
+    as needed."""
+    tolerance: float = 0.005
+    """Error that these settings have to keep, relative to full signal."""
+    margin_scale: float = 1.0
+    """Factor on the margin of charts; a converged reference takes 2."""
+
+    @property
+    def dtype(self) -> type:
+        """Floating-point type of planes and signals."""
+        return np.float64 if self.float_width == 64 else np.float32
+
+    def report(self) -> dict[str, float | int | str | None]:
+        """The settings as `run.json` lists them."""
+        return asdict(self)
+
+
+DRAFT = Settings(20e-9, 2049, 2e-3, 3, 4, 32)
+STANDARD = Settings(10e-9, 2049, 5e-4, 4, 8, 32)
+FINE = Settings(10e-9, 4097, 2e-4, 5, 10, 32)
+REFERENCE = Settings(2.5e-9, 32769, 1e-5, 6, 16, 64)
+
+LADDER = ((0.02, DRAFT), (0.005, STANDARD), (0.001, FINE), (0.0, REFERENCE))
+"""Settings for tolerances from the first number of each pair upward."""
+
+
+def settings(camera: Camera) -> Settings:
+    """The settings for the camera's tolerance, with those that its file states itself."""
+    accuracy = camera.accuracy
+    chosen = next(s for least, s in LADDER if accuracy.tolerance >= least)
+    mixing = min(chosen.mixing_tolerance, accuracy.tolerance / 10)
+    chosen = replace(chosen, tolerance=accuracy.tolerance, mixing_tolerance=mixing)
+    if camera.scene.wavelengths.step is not None:
+        chosen = replace(chosen, wavelength_step=camera.scene.wavelengths.step)
+    return replace(chosen, **accuracy.knobs)

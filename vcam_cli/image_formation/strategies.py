@@ -1,0 +1,173 @@
+"""From a scene to the signal of its pixels: each scene by the plainest computation that suits it.
+
+- Waves and patterns that repeat: each harmonic has its transfer. Exact (`harmonic_scenes.py`).
+- No blur before the photodetectors: means over their areas. Exact (`box_average.py`).
+- Everything else: the cosine spectrum, multiplied by the transfer function and folded onto the
+  pixels, as finely as the tolerance asks (`bandwidth.py`, `chart_cells.py`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from functools import partial
+from itertools import chain
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcam_cli import memory
+from vcam_cli.image_formation import memory_model
+from vcam_cli.image_formation.bandwidth import axes, highest_passed, reach, table_size
+from vcam_cli.image_formation.box_average import box_averages, point_values
+from vcam_cli.image_formation.chart_cells import (
+    BEYOND_CUTOFF,
+    cell_grid,
+    cells_per_pixel,
+    coarse,
+    near_field,
+)
+from vcam_cli.image_formation.effect_changes import changes_by_omission, needed_modes
+from vcam_cli.image_formation.field_dependence import Mode, field_mixtures, tabulate_field
+from vcam_cli.image_formation.filtering import Filter
+from vcam_cli.image_formation.harmonic_scenes import (
+    harmonic_layers,
+    harmonics_count,
+    wave_layers,
+)
+from vcam_cli.image_formation.optical_path import Layer, Layers, OpticalPath, SpectrumReport
+from vcam_cli.image_formation.scene_sampling import sampled_image
+from vcam_cli.image_formation.scene_spectrum import SceneSpectrum
+from vcam_cli.image_formation.transfer_tables import Tables, mixtures, tabulate
+from vcam_cli.scenes.base import ChartScene, HarmonicScene, SampledScene, Scene, WaveScene
+
+SMOOTH = 64
+"""Parts of a table over each of which it is a cubic."""
+PERIODS = 8
+"""Parts of a period of a blur's phase over which it is a cubic."""
+
+
+def image_layers(path: OpticalPath, scene: Scene) -> tuple[Layers, SpectrumReport]:
+    """The light at the photodetectors, and how it was computed.
+
+    Raises CannotDo where memory does not suffice.
+    """
+    if isinstance(scene, WaveScene):
+        return wave_layers(path, scene)
+    if isinstance(scene, HarmonicScene):
+        count = harmonics_count(path, scene)
+        if count is not None:
+            return harmonic_layers(path, scene, count)
+        scene = scene.chart
+    if not path.transfer.effects and not path.field:
+        return _mean_layers(path, scene)
+    return _filtered_layers(path, scene)
+
+
+def _mean_layers(path: OpticalPath, scene: SampledScene) -> tuple[Layers, SpectrumReport]:
+    """Means over the photodetectors' areas; points where the aperture is switched off."""
+    g, level = path.geometry, path.transfer.level.T
+    samples = 0 if isinstance(scene, ChartScene) else math.prod(scene.shape)
+    needed = memory_model.of_box_averages(samples, len(level), g, path.settings)
+    memory.require(needed, g.rows, g.columns)
+    signal = points = point_values(scene, level, g)
+    changes = {}
+    if path.separable:
+        signal = box_averages(scene, level, g, axes(path, scene, 1.0), path.workers)
+        both = zip(signal, points, strict=True)
+        change = max(float(np.square(a - b, dtype=np.float64).mean()) for a, b in both)
+        changes = {effect.name: math.sqrt(change) for effect in path.separable}
+    report = SpectrumReport(changes=changes, memory=needed)
+    return iter([Layer(lambda color, rows: signal[color, rows])]), report
+
+
+def _filtered_layers(path: OpticalPath, scene: SampledScene) -> tuple[Layers, SpectrumReport]:
+    """Through the cosine spectrum, on cells of their own for the near and far field of a chart."""
+    if not isinstance(scene, ChartScene) or scene.chart.edges() is not None:
+        return _spectral_layers(path, scene, highest_passed(path, scene), 0.0)
+    near = near_field(path, scene, reach(path))
+    highest = highest_passed(path, near)
+    cells, error = cells_per_pixel(path, near, highest)
+    fine = near.on_cells(cell_grid(near, path.geometry, cells))
+    layers, report = _spectral_layers(path, fine, min(highest, cells), error)
+    if near is scene:
+        return layers, report
+    return chain(layers, _far_layers(path, scene, near)), report
+
+
+def _far_layers(path: OpticalPath, whole: ChartScene, near: ChartScene) -> Iterator[Layer]:
+    """What the whole of a chart brings more than its near field, on coarse cells."""
+    g, highest = path.geometry, highest_passed(path, whole)
+    pitch = min(g.pitch_x, g.pitch_y) / (BEYOND_CUTOFF * highest)
+    for sign, part in ((1, whole), (-1, near)):
+        layers, _ = _spectral_layers(path, coarse(part, pitch), highest, 0.0)
+        for layer in layers:
+            yield replace(layer, values=partial(_signed, layer.values, sign))
+
+
+def _signed(values: Callable[[int, slice], NDArray], sign: int, color: int, rows: slice) -> NDArray:
+    return sign * values(color, rows)
+
+
+def _spectral_layers(
+    path: OpticalPath, scene: SampledScene, highest: float, error: float
+) -> tuple[Layers, SpectrumReport]:
+    """A scene whose cells are chosen, through its cosine spectrum.
+
+    highest: frequency beyond which nothing counts [pixel Nyquist]; error: rms that the cells leave
+    [electrons / s].
+    """
+    exact, g, zones = path.transfer, path.geometry, path.zones
+    painted = isinstance(scene, ChartScene) and scene.chart.edges() is None
+    size = table_size(path, highest)
+    mixing = field_mixtures(exact, zones, size) if zones else mixtures([exact], size)
+    needed = memory_model.of_image(path, scene, len(mixing[0]), size)
+    memory.require(needed, g.rows, g.columns)
+    image = sampled_image(path, scene, highest, mixing)
+    size = table_size(path, image.highest)
+    modes: tuple[Mode, ...] = ()
+    if zones:
+        tables, modes = tabulate_field(exact, zones, g, size, mixing)
+    else:
+        tables = tabulate(exact, size, mixing)
+    modes, field_change = needed_modes(path, image, modes)
+    image_filter = _filter(path, image.scene, tables, image.highest)
+    planes = [plane for plane in tables.planes if plane is not None]
+    report = SpectrumReport(
+        oversampling=image.highest,
+        lost=math.hypot(image.lost, error),
+        cells=0 if scene.rectangles(mixing[0]) is not None else math.prod(scene.shape),
+        painted=painted,
+        terms=image_filter.terms,
+        planes=len(tables.mix),
+        changes=changes_by_omission(path, image, tables, field_change),
+        filters=len(tables.parities) + len(modes),
+        table_values=sum(plane.size for plane in planes) * max(1, len(zones)),
+        peak=image.peak,
+        memory=needed,
+    )
+    return _layers(image_filter, modes, image.spectrum, path.workers), report
+
+
+def _filter(path: OpticalPath, scene: SampledScene, tables: Tables, highest: float) -> Filter:
+    """Tables, and all that is separable, up to a frequency [pixel Nyquist]."""
+    x, y = axes(path, scene, highest)
+    along_x, along_y = np.ones(x.terms), np.ones(y.terms)
+    for effect in path.separable:
+        along_x *= effect.along_x(x.frequencies)
+        along_y *= effect.along_y(y.frequencies)
+    smooth, widest = tables.top / SMOOTH, reach(path)
+    if widest > 0:
+        smooth = min(smooth, 1 / (PERIODS * widest))
+    return Filter(x, y, tables, along_x, along_y, smooth)
+
+
+def _layers(
+    image_filter: Filter, modes: Sequence[Mode], spectrum: SceneSpectrum, workers: int
+) -> Iterator[Layer]:
+    """The light through the filter, and through one more for each mode of the field."""
+    for mode in (None, *modes):
+        chosen = image_filter if mode is None else replace(image_filter, tables=mode.tables())
+        series = chosen.apply(spectrum, workers)
+        yield Layer(series.signal, None if mode is None else mode.map)

@@ -1,0 +1,161 @@
+"""One transfer function per scene component and color: 31 wavelengths cost what 3 do.
+
+Scene radiance is sum_k B_k(x) S_k(wavelength). From lens to photodetector all is linear, so the
+mean signal of color c is sum_k B_k convolved with h_kc, whose spectrum is
+
+    H_kc(f) = rate integral of S_k(l) tau(l) s_c(l) OTF(f, l) dl      [electrons / s]
+
+The spectral weights are integrated exactly between all knots of all spectra, and only the OTF,
+which is smooth in wavelength, is interpolated between nodes; lines are summed as lines. Factors
+that are separable in x and y (the pixel aperture) are kept apart: they multiply along the axes
+(`filtering.py`). `transfer_tables.py` tabulates what is defined here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcam_cli.effects.base import Blur, PlaneTransfer, RadialTransfer
+from vcam_cli.spectra import Spectrum, pair_weights, photons
+
+
+@dataclass(frozen=True)
+class Band:
+    """Wavelengths of a camera: range and spacing of the nodes for the OTF. [m]"""
+
+    start: float
+    stop: float
+    step: float
+
+    def nodes(self) -> NDArray:
+        """Evenly spaced nodes that include both ends, at most `step` apart."""
+        count = max(2, int(np.ceil((self.stop - self.start) / self.step - 1e-9)) + 1)
+        return np.linspace(self.start, self.stop, count)
+
+
+@dataclass(frozen=True)
+class Transfer:
+    """H_kc as spectral weights on a few wavelengths. [electrons / s at frequency 0]"""
+
+    wavelengths: NDArray
+    """(J,) [m]"""
+    weights: NDArray
+    """(K, C, J) [electrons / s]"""
+    effects: tuple[Blur, ...]
+
+    @property
+    def radial(self) -> tuple[RadialTransfer, ...]:
+        """Those that depend on |f| only."""
+        return tuple(e for e in self.effects if isinstance(e, RadialTransfer))
+
+    @property
+    def plane(self) -> tuple[PlaneTransfer, ...]:
+        """Those that depend on the direction too."""
+        return tuple(e for e in self.effects if isinstance(e, PlaneTransfer))
+
+    def at(self, frequency: NDArray) -> NDArray:
+        """H_kc through the radial effects alone at frequencies of any shape [cycles/m].
+
+        (K, C, *shape) [electrons / s]
+        """
+        if not self.radial:
+            level = self.level.reshape(*self.level.shape, *(1,) * frequency.ndim)
+            return np.broadcast_to(level, (*self.level.shape, *frequency.shape)).copy()
+        return self.summed(self.otf_radial(frequency))
+
+    def at_plane(self, fx: NDArray, fy: NDArray) -> NDArray:
+        """H_kc through everything at all pairs of fx (n,) and fy (m,) [cycles/m].
+
+        (K, C, m, n), complex [electrons / s]
+        """
+        otf = self.otf_radial(np.hypot(fx[None, :], fy[:, None])).astype(np.complex128)
+        for plane, wavelength in zip(otf, self.wavelengths, strict=True):
+            for effect in self.plane:
+                plane *= effect.otf_plane(fx, fy, float(wavelength))
+        return self.summed(otf)
+
+    def otf_radial(self, frequency: NDArray) -> NDArray:
+        """Transfer of the radial effects at every wavelength: (J, *shape)."""
+        otf = np.ones((len(self.wavelengths), *frequency.shape))
+        for row, wavelength in zip(otf, self.wavelengths, strict=True):
+            for effect in self.radial:
+                row *= effect.otf(frequency, float(wavelength))
+        return otf
+
+    def summed(self, otf: NDArray) -> NDArray:
+        """The spectral sum of transfers (J, *shape): (K, C, *shape)."""
+        components, colors, count = self.weights.shape
+        total = self.weights.reshape(-1, count) @ otf.reshape(count, -1)
+        return total.reshape(components, colors, *otf.shape[1:])
+
+    def thinned(self) -> Transfer:
+        """The same light on every second wavelength; neighbors share the weight of those dropped.
+
+        The transfer is taken as linear between neighbors, which it is to second order.
+        """
+        count = len(self.wavelengths)
+        if count < 3:
+            return self
+        weights = self.weights.copy()
+        for j in range(1, count - 1, 2):
+            low, here, high = self.wavelengths[j - 1 : j + 2]
+            share = (here - low) / (high - low)
+            weights[..., j - 1] += (1 - share) * self.weights[..., j]
+            weights[..., j + 1] += share * self.weights[..., j]
+        keep = np.array([j % 2 == 0 or j == count - 1 for j in range(count)])
+        return replace(self, wavelengths=self.wavelengths[keep], weights=weights[..., keep])
+
+    def through(self, effects: Sequence[object]) -> Transfer:
+        """The same light through other effects, of which only blurs count."""
+        return replace(self, effects=tuple(e for e in effects if isinstance(e, Blur)))
+
+    def mixed(self, mix: NDArray) -> Transfer:
+        """The transfer of mixtures of the components, mix: (R, K)."""
+        return replace(self, weights=np.tensordot(mix, self.weights, axes=1))
+
+    @property
+    def level(self) -> NDArray:
+        """H_kc at frequency 0, the signal of a uniform scene: (K, C) [electrons / s]."""
+        return self.weights.sum(axis=-1)
+
+    @cached_property
+    def cutoff(self) -> float:
+        """Frequency from which on every H_kc is zero [cycles/m]; inf where there is none."""
+        used = self.wavelengths[np.abs(self.weights).sum(axis=(0, 1)) > 0]
+        if not len(used):
+            return 0.0
+        return min(
+            (max(effect.cutoff(float(w)) for w in used) for effect in self.effects),
+            default=np.inf,
+        )
+
+
+def transfer(
+    spectra: Sequence[Spectrum],
+    responses: Sequence[Spectrum],
+    scale: float,
+    band: Band,
+    effects: Sequence[Blur],
+) -> Transfer:
+    """Effective transfer functions of scene spectra seen through color responses.
+
+    spectra: K spectral radiances [W / (sr m2 m)], lines [W / (sr m2)]; responses: C products of
+    everything between lens and electron (transmittance x filter x QE), 0..1; scale: photons per
+    second of a photodetector per photon radiance [m2 sr], i.e. irradiance factor x area.
+    Raises ValueError where a spectrum does not cover the band.
+    """
+    nodes = band.nodes()
+    lines = sorted({w for s in spectra for w, _ in s.lines or () if band.start <= w <= band.stop})
+    lines = [w for w in lines if not np.any(nodes == w)]
+    wavelengths = np.sort(np.concatenate([nodes, lines])) if lines else nodes
+    # With every line among the nodes, the hat functions are 1 and 0 there: lines stay lines.
+    weights = pair_weights([photons(s) for s in spectra], responses, wavelengths)
+    keep = np.abs(weights).sum(axis=(0, 1)) > 0
+    if not keep.any():
+        keep[0] = True
+    return Transfer(wavelengths[keep], scale * weights[:, :, keep], tuple(effects))

@@ -1,0 +1,284 @@
+"""Transfer functions as tables: over |f|, and over fx and fy for blurs that have a direction.
+
+The radial part of a transfer function is a table over |f| with linear interpolation. What a blur
+with a direction (coma, a measured point spread function) changes is tabulated over fx and fy by
+parity, with cubic splines between the entries; it begins with the square of the frequency, so a
+coarse table will do.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcam_cli.effects.base import Blur, PlaneTransfer, RadialTransfer
+from vcam_cli.image_formation.transfer_functions import Transfer
+
+PARITIES = ((False, False), (True, True), (True, False), (False, True))
+"""Whether a transfer function turns the cosines along x, and along y, into sines."""
+SMALLEST_PLANE, LARGEST_PLANE = 41, 513
+"""Entries along an axis of a table over fx and fy."""
+LARGEST_OF_FIELD = 193
+"""The same where every zone of a field has such a table."""
+JUDGED = 256
+"""Frequencies at which mixtures of spectra are judged: transfer functions are smooth."""
+
+
+@dataclass(frozen=True)
+class TableSize:
+    """How fine tables are, and how far they go."""
+
+    top: float
+    """Highest frequency [cycles/m]."""
+    entries: int
+    """Entries over |f|."""
+    tolerance: float
+    """Largest relative error by replacing components by mixtures."""
+    steps_per_period: float
+    """Entries over fx and fy in one period of the phase of the widest blur."""
+    rank: int | None = None
+    """Largest number of mixtures; None: as many as the tolerance asks for."""
+
+    def plane_entries(self, blurs: Sequence[PlaneTransfer], largest: int = LARGEST_PLANE) -> int:
+        """Entries along an axis of a table over fx and fy for these blurs."""
+        periods = self.top * max(blur.reach for blur in blurs)
+        return int(min(max(self.steps_per_period * periods + 1, SMALLEST_PLANE), largest))
+
+
+Mixing = tuple[NDArray, float]
+"""Mixtures (R, K) of a scene's components, and the largest relative error that they leave."""
+
+
+@dataclass(frozen=True)
+class Tables:
+    """Transfer functions H_rc of R mixtures of the scene's components, in C colors.
+
+    sum_k B_k H_kc = sum_r (mix B)_r H_rc up to `error`.
+    """
+
+    mix: NDArray
+    """(R, K) without unit."""
+    radial: NDArray | None
+    """(R, C, n) over |f| from 0 to `top` [electrons / s]; None where there is no such part."""
+    top: float
+    """Frequency of the last entry [cycles/m]."""
+    error: float
+    """Bound on the error by mixtures, relative to the largest level."""
+    planes: tuple[NDArray | None, ...] = (None,) * 4
+    """By `PARITIES`, (R, C, m, m) over fy and fx from 0 to `top`: what is added to the radial part.
+    A wave cos(2 pi fx x) cos(2 pi fy y) becomes the sum of its cosines and sines times these."""
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """Numbers of mixtures R and colors C."""
+        parts = (self.radial, *self.planes)
+        found = next(part for part in parts if part is not None)
+        return found.shape[0], found.shape[1]
+
+    @property
+    def colors(self) -> int:
+        """Number of colors."""
+        return self.shape[1]
+
+    @property
+    def parities(self) -> list[int]:
+        """Indices of the `PARITIES` that occur."""
+        directed = {p for p, plane in enumerate(self.planes) if plane is not None}
+        return sorted(directed | ({0} if self.radial is not None else set()))
+
+
+@dataclass(frozen=True, eq=False)
+class TableReader:
+    """Tables of one parity, interpolated at given frequencies along x."""
+
+    tables: Tables
+    fx: NDArray
+    """(n,) rising [cycles/m]."""
+    radial: tuple[NDArray, NDArray] | None
+    """Entries over |f| and the steps to the next, (entries, R C) each, so that all tables of an
+    entry are read at once; None where this parity has no radial part."""
+    plane: NDArray | None
+    """(R, C, m, m) over fy and fx, where there is such a part."""
+    spline_x: NDArray | None
+    """(n, m) what its entries count along x."""
+
+    def values(self, fy: NDArray, count: int | None = None) -> NDArray:
+        """H_rc at the frequencies fy (m,) and the first `count` of fx: (R, C, m, count)."""
+        fx, top = self.fx[:count], self.tables.top
+        total: NDArray | None = None
+        if self.radial is not None:
+            total = self._linear(np.hypot(fx, fy[:, None]))
+        if self.plane is not None and self.spline_x is not None:
+            along_y = spline_weights(self.plane.shape[-1], fy / top)
+            on_top = (along_y @ self.plane) @ self.spline_x[: len(fx)].T
+            total = on_top if total is None else total + on_top
+        assert total is not None
+        return total
+
+    def _linear(self, radius: NDArray) -> NDArray:
+        """The radial part at frequencies (m, n); its last entry holds beyond its end."""
+        assert self.radial is not None
+        entries, steps = self.radial
+        last = len(steps)
+        position = np.minimum(radius.ravel() * (last / self.tables.top), last)
+        index = np.minimum(position.astype(np.intp), last - 1)
+        values = steps.take(index, axis=0)
+        values *= (position - index)[:, None]
+        values += entries.take(index, axis=0)
+        return values.T.reshape(*self.tables.shape, *radius.shape)
+
+
+def reader(tables: Tables, parity: int, fx: NDArray) -> TableReader:
+    """A reader of the tables of one of their parities at the frequencies fx (n,) [cycles/m]."""
+    plane, radial = tables.planes[parity], None
+    if parity == 0 and tables.radial is not None:
+        entries = np.ascontiguousarray(tables.radial.reshape(-1, tables.radial.shape[-1]).T)
+        radial = entries, np.diff(entries, axis=0)
+    spline = None if plane is None else spline_weights(plane.shape[-1], fx / tables.top)
+    return TableReader(tables, fx, radial, plane, spline)
+
+
+def spline_weights(entries: int, position: NDArray) -> NDArray:
+    """What each entry of a table counts at positions 0 to 1 (n,) in a cubic spline: (n, entries).
+
+    0 beyond 1.
+    """
+    from scipy.interpolate import make_interp_spline
+
+    spline = make_interp_spline(np.linspace(0, 1, entries), np.eye(entries), k=3)
+    weights = spline(np.minimum(position, 1.0))
+    return np.asarray(np.where(position[:, None] <= 1 + 1e-12, weights, 0.0))
+
+
+def tabulate(exact: Transfer, size: TableSize, mixing: Mixing) -> Tables:
+    """Tables of a transfer function for the given mixtures of its components."""
+    mix, error = mixing
+    mixed = exact.mixed(mix)
+    tables = Tables(mix, radial_table(mixed, size), size.top, error)
+    if exact.plane:
+        grid = plane_grid(mixed, size.top, size.plane_entries(mixed.plane))
+        parts = grid.change(mixed.plane)
+        planes = tuple(part if np.any(part) else None for part in parts)
+        tables = replace(tables, planes=planes)
+    return tables
+
+
+def radial_table(transfer: Transfer, size: TableSize) -> NDArray:
+    """The radial part of a transfer function: (K, C, entries) [electrons / s]."""
+    return transfer.at(np.linspace(0, size.top, size.entries))
+
+
+def bound(exact: Transfer, size: TableSize, mixing: Mixing) -> Tables:
+    """Tables that no lens exceeds whose radial part is this one, as if no light canceled."""
+    mixed = exact.mixed(mixing[0])
+    alone = replace(mixed.through(mixed.radial), weights=np.abs(mixed.weights))
+    return Tables(mixing[0], radial_table(alone, size), size.top, mixing[1])
+
+
+@dataclass(frozen=True, eq=False)
+class PlaneGrid:
+    """Frequencies at which blurs with a direction are computed, and the radial part there."""
+
+    alone: Transfer
+    """The radial part at every second wavelength: what is added to it is small."""
+    frequency: NDArray
+    """(m,) from 0 [cycles/m]."""
+    radial: NDArray
+    """(J, 2 m, m) transfer at fy = frequency, then -frequency, and at fx = frequency."""
+
+    def change(self, blurs: Sequence[Blur]) -> NDArray:
+        """What these blurs add to the light, by parity: (4, K, C, m, m) [electrons / s]."""
+        m = len(self.frequency)
+        fy = np.concatenate([self.frequency, -self.frequency])
+        change = np.empty(self.radial.shape, np.complex128)
+        wavelengths = self.alone.wavelengths
+        for part, radial, wavelength in zip(change, self.radial, wavelengths, strict=True):
+            otf = np.ones(part.shape, np.complex128)
+            for blur in blurs:
+                otf *= _in_plane(blur, self.frequency, fy, float(wavelength))
+            np.multiply(otf - 1, radial, out=part)
+        both = self.alone.summed(change)
+        return by_parity(both[..., :m, :], both[..., m:, :])
+
+
+def by_parity(plus: NDArray, minus: NDArray) -> NDArray:
+    """A transfer function by `PARITIES` from its values at (fx, fy) and at (fx, -fy).
+
+    H(-f) = conj(H(f)), so a half-plane tells all. plus, minus: any shape, complex. Returns
+    (4, *shape), real.
+    """
+    return np.array(
+        [
+            (plus.real + minus.real) / 2,
+            (minus.real - plus.real) / 2,
+            -(plus.imag + minus.imag) / 2,
+            (minus.imag - plus.imag) / 2,
+        ]
+    )
+
+
+def plane_grid(transfer: Transfer, top: float, entries: int) -> PlaneGrid:
+    """A grid of so many frequencies from 0 to `top` [cycles/m] along each axis."""
+    alone = transfer.through(transfer.radial).thinned()
+    f = np.linspace(0, top, entries)
+    length = np.hypot(f[None, :], np.concatenate([f, f])[:, None])
+    return PlaneGrid(alone, f, alone.otf_radial(length))
+
+
+def _in_plane(blur: Blur, fx: NDArray, fy: NDArray, wavelength: float) -> NDArray:
+    if isinstance(blur, PlaneTransfer):
+        return blur.otf_plane(fx, fy, wavelength)
+    assert isinstance(blur, RadialTransfer)
+    return blur.otf(np.hypot(fx[None, :], fy[:, None]), wavelength)
+
+
+def turned(parts: NDArray, parity: int, quarters: int, mirrored: bool) -> NDArray:
+    """One of the tables by parity (4, ..., m, m) of a blur with y mirrored, then turned.
+
+    quarters: quarter turns from x to y, each T'(fx, fy) = T(fy, -fx).
+    """
+    source, sign = [0, 1, 2, 3], [1, -1, 1, -1] if mirrored else [1, 1, 1, 1]
+    for _ in range(quarters):
+        source = [source[p] for p in (0, 1, 3, 2)]
+        sign = [sign[0], -sign[1], -sign[3], sign[2]]
+    part = parts[source[parity]]
+    if quarters % 2:
+        part = np.swapaxes(part, -1, -2)
+    return part if sign[parity] > 0 else -part
+
+
+def mixtures(through: Sequence[Transfer], size: TableSize) -> Mixing:
+    """The fewest mixtures of a scene's components that keep its transfer functions.
+
+    Where a scene has more components than colors can tell apart, singular vectors of H_kc over all
+    colors and frequencies replace them, as many as keep every H_kc within `size.tolerance` of the
+    largest level. through: the transfer functions of the same light that they have to serve.
+    """
+    exact = through[0]
+    components, colors = exact.weights.shape[:2]
+    every = np.eye(components)
+    most = components if size.rank is None else size.rank
+    if components <= min(max(colors, 3), most):
+        return every, 0.0
+    table = np.concatenate([part for t in through for part in _samples(t, size.top)], axis=1)
+    directions = np.linalg.svd(table, full_matrices=False)[0].T
+    peak = np.abs(exact.level).max() or 1.0
+    for rank in range(1, components):
+        mix = directions[:rank]
+        error = float(np.abs(mix.T @ (mix @ table) - table).max() / peak)
+        if error <= size.tolerance or rank == most:
+            return mix, error
+    return every, 0.0
+
+
+def _samples(transfer: Transfer, top: float) -> list[NDArray]:
+    """H_kc at some frequencies: (K, any number)."""
+    components = len(transfer.weights)
+    samples = [transfer.at(np.linspace(0, top, JUDGED)).reshape(components, -1)]
+    if transfer.plane:
+        more = plane_grid(transfer, top, 9).change(transfer.plane)
+        samples.append(np.moveaxis(more, 1, 0).reshape(components, -1))
+    return samples

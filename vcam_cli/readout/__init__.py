@@ -1,0 +1,1 @@
+"""Readout: from the rate of electrons to charge, noise, volts and digital numbers."""

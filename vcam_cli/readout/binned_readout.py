@@ -1,0 +1,148 @@
+"""Readout of pixels that are read as one: where each effect acts, and what noise is left.
+
+`binning.py` says which pixels these are and what of theirs is joined.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from numpy.typing import NDArray
+
+from vcam_cli.camera.array import Binning
+from vcam_cli.effects.base import Effect, Limit, NoiseSource
+from vcam_cli.readout.binning import BinningGroups
+from vcam_cli.readout.exposure import codes_type
+
+SURE = 3
+"""Standard deviations of the readout by which a pixel of full wells may read less than they hold,
+where noise comes behind the wells."""
+Take = Callable[[NDArray, float, tuple[Effect, ...]], tuple[NDArray, NDArray]]
+"""A frame of a rate [e/s] in a time [s] with effects: (electrons, dn)."""
+
+
+def variance(draw: NoiseSource, mean: float, dark: float, binning: Binning | None) -> float:
+    """Return the variance that a noise source adds to the mean of a group's pixels.
+
+    Parameters
+    ----------
+    draw : NoiseSource
+        Source of the noise.
+    mean, dark : float
+        Mean signal and mean dark signal of one pixel [electrons].
+    binning : Binning or None
+        How pixels are read as one. Charges that are joined are one pixel.
+
+    Returns
+    -------
+    float
+        Variance [electrons squared].
+    """
+    if binning is None or binning.kind == "charge":
+        return draw.variance(mean, dark)
+    parts = (0.0 if p is None else p.variance(mean, dark) for p in draw.split())
+    own, column, row = parts
+    if binning.kind == "digital":
+        return own / binning.count + column / binning.columns + row / binning.rows
+    return (own if draw.of_readout else own / binning.count) + column + row
+
+
+def conversions(binning: Binning | None) -> int:
+    """Return how many conversions of the ADC make one pixel of the raw frame."""
+    return binning.count if binning is not None and binning.kind == "digital" else 1
+
+
+def read(
+    binning_groups: BinningGroups,
+    rate: NDArray,
+    time: float,
+    effects: Sequence[Effect],
+    take: Take,
+    bits: int,
+) -> tuple[NDArray, NDArray]:
+    """Return one frame of binned pixels.
+
+    Voltages are held by the pixels, joined, and read: two frames, one after the other.
+
+    Parameters
+    ----------
+    binning_groups : BinningGroups
+        Groups of pixels that are read as one.
+    rate : NDArray
+        Rate of every pixel, or of every node where charges are joined [e/s].
+    time : float
+        Exposure time [s].
+    effects : sequence of Effect
+        Effects in the order of action.
+    take : Take
+        What makes a frame of a rate, a time and effects.
+    bits : int
+        Resolution of the ADC.
+
+    Returns
+    -------
+    electrons : NDArray
+        Signal of the raw frame [electrons].
+    dn : NDArray
+        Codes of the raw frame [DN].
+
+    References
+    ----------
+    Z. Zhou, B. Pain, E. Fossum, "Frame-transfer CMOS active pixel sensor with pixel binning", IEEE
+    Trans. Electron Devices 44(10), 1997.
+    """
+    kind, effects = binning_groups.binning.kind, tuple(effects)
+    if kind == "charge":
+        return take(rate, time, effects)
+    if kind == "digital":
+        electrons, dn = take(rate, time, effects)
+        return binning_groups.join(electrons), binning_groups.sums(
+            dn, codes_type(bits, binning_groups.count)
+        )
+    held, _ = take(rate, time, effects_in_pixels(effects))
+    return take(binning_groups.join(held), 1.0, effects_in_readout(effects))
+
+
+def effects_in_pixels(effects: Sequence[Effect]) -> tuple[Effect, ...]:
+    """Return the effects that act in the pixels, before their voltages are joined.
+
+    Parameters
+    ----------
+    effects : sequence of Effect
+        Effects in the order of action.
+
+    Returns
+    -------
+    tuple of Effect
+        Effects in the same order; of noise the part that every pixel has to itself.
+    """
+    parts = (
+        e.split()[0] if isinstance(e, NoiseSource) else e for e in effects if not _of_readout(e)
+    )
+    return tuple(e for e in parts if e is not None)
+
+
+def effects_in_readout(effects: Sequence[Effect]) -> tuple[Effect, ...]:
+    """Return the effects that act on joined voltages.
+
+    Parameters
+    ----------
+    effects : sequence of Effect
+        Effects in the order of action.
+
+    Returns
+    -------
+    tuple of Effect
+        The readout's noise, the noise of columns and rows, and clamps, in the same order.
+    """
+    out: list[Effect] = []
+    for effect in effects:
+        if _of_readout(effect) or isinstance(effect, Limit):
+            out.append(effect)
+        elif isinstance(effect, NoiseSource):
+            out += [part for part in effect.split()[1:] if part is not None]
+    return tuple(out)
+
+
+def _of_readout(effect: Effect) -> bool:
+    return isinstance(effect, NoiseSource) and effect.of_readout

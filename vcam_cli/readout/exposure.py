@@ -1,0 +1,208 @@
+"""From the rate of electrons to a raw frame: charge, noise, saturation, codes.
+
+Blocks of 64 rows flow through all of it, a few rows at a time, while they are in the cache. Every
+draw has its own stream per block, so the frame does not depend on the number of workers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcam_cli.effects.base import Charge, Effect, Limit, NoiseSource, Quantizer, Site
+from vcam_cli.parallel import each, within
+from vcam_cli.rng import BLOCK_ROWS, blocks, stream
+
+AT_ONCE = 1 << 16
+"""Pixels that flow together, about: a draw is made for them in the same order as for more."""
+LAYER = 32
+"""Bits of a block's number: those above are the layer's of stacked pixels."""
+
+
+def mean_electrons(rate: NDArray, time: float, effects: tuple[Effect, ...]) -> NDArray:
+    """Return the noise-free signal before saturation, photo-electrons and dark current.
+
+    Parameters
+    ----------
+    rate : NDArray
+        Photo-electrons per second, of any shape [e/s].
+    time : float
+        Exposure time [s].
+    effects : tuple of Effect
+        Effects of the camera, of which the charges count.
+
+    Returns
+    -------
+    NDArray
+        Mean signal in the shape and float type of `rate` [electrons].
+    """
+    return rate * rate.dtype.type(time) + rate.dtype.type(mean_dark(time, effects))
+
+
+def mean_dark(time: float, effects: tuple[Effect, ...]) -> float:
+    """Return the mean dark signal of a pixel.
+
+    Parameters
+    ----------
+    time : float
+        Exposure time [s].
+    effects : tuple of Effect
+        Effects of the camera, of which the charges count.
+
+    Returns
+    -------
+    float
+        Mean dark signal [electrons].
+    """
+    return time * sum(e.rate() for e in effects if isinstance(e, Charge))
+
+
+def sites(
+    tile: NDArray, dark: float, seeds: dict[str, int], layer: int, block: slice, sample: int = 0
+) -> dict[str, Site]:
+    """Return the sites at which the noise of a block of rows is drawn, by scope.
+
+    Streams of random numbers that were opened go on.
+
+    Parameters
+    ----------
+    tile : NDArray
+        Array of the block's shape (rows, columns) and float type.
+    dark : float
+        Mean dark signal [electrons].
+    seeds : dict
+        Seeds of 'sensor' and 'frame'.
+    layer : int
+        Index of the layer of stacked pixels.
+    block : slice
+        Rows of the block.
+    sample : int, optional
+        Index of the sample within one integration.
+
+    Returns
+    -------
+    dict
+        Site of each scope.
+    """
+    index = (layer << LAYER) + block.start // BLOCK_ROWS
+    return {
+        scope: Site(
+            rows=len(tile),
+            columns=tile.shape[1],
+            stream=_Opened(partial(stream, seed, capture=sample, block=index)),
+            line_stream=partial(stream, seed, capture=sample, block=layer << LAYER),
+            dtype=tile.dtype.type,
+            dark=dark,
+        )
+        for scope, seed in seeds.items()
+    }
+
+
+@dataclass(frozen=True)
+class _Opened:
+    """The streams of a block: each is opened once and then goes on."""
+
+    make: Callable[[str], np.random.Generator]
+    known: dict[str, np.random.Generator] = field(default_factory=dict)
+
+    def __call__(self, name: str) -> np.random.Generator:
+        if name not in self.known:
+            self.known[name] = self.make(name)
+        return self.known[name]
+
+
+def codes_type(bits: int, count: int = 1) -> type[np.unsignedinteger]:
+    """Return the smallest type of whole numbers that holds all codes of an ADC.
+
+    Parameters
+    ----------
+    bits : int
+        Resolution of the ADC.
+    count : int, optional
+        How many codes are added.
+
+    Returns
+    -------
+    type
+        `numpy.uint16` or `numpy.uint32`.
+    """
+    return np.uint16 if count * (2**bits - 1) < 1 << 16 else np.uint32
+
+
+def capture(
+    rate: NDArray,
+    time: float,
+    effects: tuple[Effect, ...],
+    code: Quantizer,
+    seeds: dict[str, int],
+    workers: int,
+    done: Callable[[slice], None] | None = None,
+    layer: int = 0,
+) -> tuple[NDArray, NDArray]:
+    """Return one frame of an array whose rate of electrons is known.
+
+    Parameters
+    ----------
+    rate : NDArray
+        Rate (rows, columns), or (C, rows, columns) of stacked pixels, which are drawn one layer
+        after the other [e/s].
+    time : float
+        Exposure time [s].
+    effects : tuple of Effect
+        Effects that run, in the order of action.
+    code : Quantizer
+        The ADC.
+    seeds : dict
+        Seeds of 'sensor' and 'frame'.
+    workers : int
+        Number of threads; results do not depend on it.
+    done : callable, optional
+        Function that is called with every block of rows that is finished.
+    layer : int, optional
+        Index of the layer of stacked pixels.
+
+    Returns
+    -------
+    electrons : NDArray
+        Noisy signal, clipped above at the full well, in the float type of `rate` [electrons].
+    dn : NDArray
+        Codes as whole numbers, uint16, or uint32 from 17 bits on [DN].
+
+    References
+    ----------
+    T. Chen, PhD thesis, Stanford University, 2003, eq 2.26.
+    """
+    if rate.ndim == 3:
+        layers = [
+            capture(plane, time, effects, code, seeds, workers, layer=number)
+            for number, plane in enumerate(rate)
+        ]
+        return np.array([e for e, _ in layers]), np.array([dn for _, dn in layers])
+    draws = [e for e in effects if isinstance(e, NoiseSource)]
+    dark = mean_dark(time, effects)
+    electrons = np.empty_like(rate)
+    dn = np.empty(rate.shape, codes_type(code.bits))
+
+    def shoot(block: slice) -> None:
+        opened = sites(rate[block], dark, seeds, layer, block)
+        for rows in within(block, max(1, AT_ONCE // rate.shape[1])):
+            tile = mean_electrons(rate[rows], time, effects)
+            here = {scope: replace(site, rows=len(tile)) for scope, site in opened.items()}
+            for draw in draws:
+                tile = draw.before_shot(tile, here[draw.scope])
+            for effect in effects:
+                if isinstance(effect, NoiseSource):
+                    tile = effect.apply(tile, here[effect.scope])
+                elif isinstance(effect, Limit):
+                    tile = effect.apply(tile)
+            electrons[rows] = tile
+            dn[rows] = code.apply(tile)
+        if done is not None:
+            done(block)
+
+    each(shoot, blocks(len(rate)), workers)
+    return electrons, dn

@@ -1,0 +1,318 @@
+"""From a rectangular lattice, on which light is computed, to the pixels of the raw frame.
+
+Most arrays are rectangular themselves. A honeycomb is every second place of a lattice with twice
+its columns. Pixels at places of their own read the light from a lattice several times finer than
+they are, between whose points it is a polynomial; every color is computed on all of it. So it is
+for stacked pixels, which have all their colors.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcam_cli.camera.array import Positions
+from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.derived.geometry import Geometry, pixel_centers
+from vcam_cli.camera.derived.lattice import Places, places
+from vcam_cli.camera.derived.mosaic import Mosaic, channel_order, mosaic
+from vcam_cli.errors import CannotDo
+from vcam_cli.image_formation.settings import Settings
+from vcam_cli.readout.binning import ALONE, BinningGroups, binning_groups
+
+FINER, FINEST = 8, 16
+"""Lattice points per pixel along each axis, for pixels at places of their own. A pixel averages
+over its own area, so that little of its signal turns faster than once in half a pixel; of that a
+polynomial through 8 points a side errs by 4 %, of what turns once in a pixel by 2e-4. Twice as
+many, where the tolerance is below `FINE`, leave a thousandth of the second and a hundredth of the
+first."""
+FINE = 1e-3
+REACH = 8
+"""Points a side of that polynomial."""
+MOST_POINTS = 1 << 27
+"""Of the lattice."""
+
+
+@dataclass(frozen=True, eq=False)
+class Layout:
+    """Where the pixels of the raw frame are, and the lattice on which their light is computed."""
+
+    geometry: Geometry
+    """Of the raw frame."""
+    mosaic: Mosaic
+    """The colors of the lattice's places."""
+    lattice: Geometry
+    planes: bool = False
+    """Whether every color is computed everywhere on the lattice."""
+    places: Places | None = None
+    binning_groups: BinningGroups = ALONE
+    """Which places of the lattice are read as one."""
+
+    @property
+    def scattered(self) -> bool:
+        """Whether the pixels form no rectangular lattice of their own."""
+        alone = self.binning_groups.count == 1
+        return self.places is not None or (alone and self.lattice is not self.geometry)
+
+    @property
+    def full_color(self) -> bool:
+        """Whether every pixel has all its colors."""
+        return self.planes and self.places is None
+
+    @property
+    def raw_mosaic(self) -> Mosaic:
+        """Mosaic of the raw frame's pixels."""
+        if self.planes:
+            return self.mosaic
+        return Mosaic(self.binning_groups.block(self.mosaic.block))
+
+    @property
+    def charge_pixels(self) -> tuple[Geometry, Mosaic]:
+        """Pixels that collect charge: the lattice's, or those whose charges are joined."""
+        if self.binning_groups.summed_charges > 1:
+            return self.geometry, self.raw_mosaic
+        return self.lattice, self.mosaic
+
+    def report(self, oversampling: float) -> dict[str, float | int]:
+        """Return the raw frame's geometry, for `run.json`.
+
+        Parameters
+        ----------
+        oversampling : float
+            Samples per point of the lattice along each axis.
+
+        Returns
+        -------
+        dict
+            Names and numbers of the geometry.
+        """
+        finer = self.geometry.pitch_x / self.lattice.pitch_x
+        return self.geometry.report(oversampling * finer)
+
+    def settings(self, knobs: Settings) -> Settings:
+        """Return the settings for the lattice; a fine one is sampled finely enough.
+
+        Parameters
+        ----------
+        knobs : Settings
+            Settings for an array of pixels.
+
+        Returns
+        -------
+        Settings
+            Settings for the lattice.
+        """
+        if self.places is None:
+            return knobs
+        return replace(knobs, oversampling=1.0)
+
+    def select_pixels(self, light: NDArray) -> NDArray:
+        """Return the raw frame's pixels from the lattice's light.
+
+        Parameters
+        ----------
+        light : NDArray
+            Light (rows, columns) of the lattice, or (C, rows, columns) where all colors are
+            computed.
+
+        Returns
+        -------
+        NDArray
+            Light (rows, columns) of the pixels, of stacked pixels (C, rows, columns), in the same
+            unit.
+        """
+        if self.places is not None:
+            return self._at_places(light)
+        if not self.scattered:
+            return light
+        out = np.empty((self.geometry.rows, self.geometry.columns), light.dtype)
+        for row in (0, 1):
+            out[row::2] = light[row::2, row::2]
+        return out
+
+    @cached_property
+    def x(self) -> NDArray:
+        """Centers of all pixels, right of the axis, in the frame's shape [m]."""
+        return self._of_pixels(0)
+
+    @cached_property
+    def y(self) -> NDArray:
+        """Centers of all pixels, below the axis, in the frame's shape [m]."""
+        return self._of_pixels(1)
+
+    @cached_property
+    def centers(self) -> tuple[NDArray, NDArray]:
+        """Centers of the raw frame's columns and rows, where it has any [m].
+
+        Of joined pixels the center of gravity: those of a mosaic are not evenly spaced.
+        """
+        if self.binning_groups.count > 1:
+            return self.binning_groups.centers(*pixel_centers(self.lattice))
+        return self._picture
+
+    @cached_property
+    def color(self) -> NDArray:
+        """Index of each pixel's color, in the frame's shape."""
+        if self.places is not None:
+            index = [self.mosaic.colors.index(c) for c in self.places.colors]
+            return np.array(index, np.int32)[None]
+        joined = self.binning_groups.count > 1
+        grid, mosaic = (self.geometry if joined else self.lattice), self.raw_mosaic
+        out = np.zeros((grid.rows, grid.columns), np.int32)
+        period = len(mosaic.block)
+        for row in range(period):
+            for color, columns in mosaic.row_colors(row):
+                for part in columns:
+                    out[row::period, part] = color
+        return self.select_pixels(out)
+
+    @cached_property
+    def picture_x(self) -> NDArray:
+        """Centers of the picture's columns, a square grid of the pixels' own width and gap [m]."""
+        return self._picture[0]
+
+    @cached_property
+    def picture_y(self) -> NDArray:
+        """Centers of the picture's rows [m]."""
+        return self._picture[1]
+
+    @property
+    def _picture(self) -> tuple[NDArray, NDArray]:
+        g = self.geometry
+        if not self.scattered:
+            return pixel_centers(g)
+        stretch = 1.0 if self.places is not None else np.sqrt(2)
+        pitch_x, pitch_y = g.pitch_x / stretch, g.pitch_y * stretch
+        columns = max(1, round(g.sensor_width / pitch_x))
+        rows = max(1, round(g.sensor_height / pitch_y))
+        x = (np.arange(columns) + 0.5 - columns / 2) * pitch_x
+        return x, (np.arange(rows) + 0.5 - rows / 2) * pitch_y
+
+    @property
+    def grid(self) -> Geometry:
+        """A rectangular array of the picture's rows and columns on the same sensor."""
+        if not self.scattered:
+            return self.geometry
+        x, y = self.picture_x, self.picture_y
+        return replace(
+            self.geometry,
+            rows=len(y),
+            columns=len(x),
+            pitch_x=self.geometry.sensor_width / len(x),
+            pitch_y=self.geometry.sensor_height / len(y),
+        )
+
+    def _of_pixels(self, axis: int) -> NDArray:
+        if self.places is not None:
+            return (self.places.x, self.places.y)[axis][None]
+        x, y = pixel_centers(self.lattice)
+        return self.select_pixels(np.broadcast_arrays(x[None, :], y[:, None])[axis])
+
+    def _at_places(self, light: NDArray) -> NDArray:
+        assert self.places is not None
+        g = self.lattice
+        out = np.empty((1, len(self.places.x)), light.dtype)
+        for color, plane in enumerate(light):
+            mine = np.flatnonzero(self.color[0] == color)
+            column = self.places.x[mine] / g.pitch_x + (g.columns - 1) / 2
+            row = self.places.y[mine] / g.pitch_y + (g.rows - 1) / 2
+            out[0, mine] = interpolate(plane, row, column)
+        return np.maximum(out, 0, out=out)
+
+
+def layout(camera: Camera, geometry: Geometry) -> Layout:
+    """Return the layout of a camera's pixels.
+
+    Parameters
+    ----------
+    camera : Camera
+        Camera whose array is laid out.
+    geometry : Geometry
+        Geometry of the array.
+
+    Returns
+    -------
+    Layout
+        Places of the raw frame's pixels and the lattice of their light.
+
+    Raises
+    ------
+    BadInput
+        For pixels that cannot be read as one in the groups that the file asks for.
+    CannotDo
+        Where the positions of pixels need too fine a lattice.
+    """
+    pattern = camera.array.pattern
+    if pattern == "stacked":
+        colors = channel_order(camera.array.colors)
+        joins = binning_groups(camera, (("all",),), geometry)
+        raw = joins.geometry(geometry)
+        return Layout(raw, Mosaic((colors,)), geometry, planes=True, binning_groups=joins)
+    if pattern == "honeycomb":
+        twice = replace(geometry, columns=2 * geometry.columns, pitch_x=geometry.pitch_x / 2)
+        return Layout(geometry, mosaic(camera), twice)
+    if isinstance(pattern, Positions):
+        found = places(camera)
+        colors = channel_order(dict.fromkeys(found.colors))
+        fine = _fine(geometry, FINEST if camera.accuracy.tolerance < FINE else FINER)
+        return Layout(geometry, Mosaic((colors,)), fine, planes=True, places=found)
+    colors_of_lattice = mosaic(camera)
+    joins = binning_groups(camera, colors_of_lattice.block, geometry)
+    return Layout(joins.geometry(geometry), colors_of_lattice, geometry, binning_groups=joins)
+
+
+def _fine(g: Geometry, finer: int) -> Geometry:
+    """Return the lattice so much finer over a sensor; raise CannotDo for one that is vast."""
+    columns = max(REACH, round(g.sensor_width / g.pitch_x * finer))
+    rows = max(REACH, round(g.sensor_height / g.pitch_y * finer))
+    if rows * columns > MOST_POINTS:
+        raise CannotDo(
+            f"the positions span {g.sensor_width * 1e3:.4g} x {g.sensor_height * 1e3:.4g} mm,"
+            f" {rows * columns:.3g} points of a lattice {finer} times as fine as a pixel",
+            "give fewer pixels, closer together",
+        )
+    pitch_x, pitch_y = g.sensor_width / columns, g.sensor_height / rows
+    return replace(g, rows=rows, columns=columns, pitch_x=pitch_x, pitch_y=pitch_y)
+
+
+def interpolate(plane: NDArray, row: NDArray, column: NDArray) -> NDArray:
+    """Return a plane between its points, by Lagrange's polynomial through 8 x 8 of them.
+
+    Parameters
+    ----------
+    plane : NDArray
+        Values of the points (rows, columns), in any unit.
+    row, column : NDArray
+        Positions (n,), counted in points from that of index 0.
+
+    Returns
+    -------
+    NDArray
+        Values (n,) in the unit and float type of the plane.
+    """
+    top, down = _weights(row, plane.shape[0])
+    left, along = _weights(column, plane.shape[1])
+    flat, width = plane.ravel(), plane.shape[1]
+    out = np.zeros(len(row))
+    for i in range(REACH):
+        line = (top + i) * width + left
+        part = np.zeros(len(row))
+        for j in range(REACH):
+            part += along[j] * flat[line + j]
+        out += down[i] * part
+    return out.astype(plane.dtype)
+
+
+def _weights(position: NDArray, count: int) -> tuple[NDArray, NDArray]:
+    """Return the first point around each position (n,), and the points' weights (REACH, n)."""
+    first = np.clip(np.floor(position).astype(int) - REACH // 2 + 1, 0, count - REACH)
+    t = position - first
+    weights = np.ones((REACH, len(position)))
+    for i in range(REACH):
+        for j in range(REACH):
+            if j != i:
+                weights[i] *= (t - j) / (i - j)
+    return first, weights

@@ -1,0 +1,220 @@
+"""Several samples of one integration, and the photocurrent that they tell.
+
+Charge goes on accumulating while it is looked at. Its mean, with dark current and defects, grows
+by what each step between two samples adds; its shot noise is that of independent steps. Reset
+noise and fixed pattern are the same in all samples of a pixel, readout noise is new in each. So
+samples of a pixel with the rates i and i_dc [e/s] have the covariance [electrons squared]
+
+    cov(Q_j, Q_l) = (i + i_dc) min(t_j, t_l) + read_variance delta_jl + reset_variance
+
+A pixel that is full stays full: no later sample of it is below the full well.
+
+Streams of random numbers are keyed by the index of the sample, so a sample does not depend on how
+many follow; the first one is, byte by byte, the frame of a single exposure of its time.
+
+References
+----------
+T. Chen, PhD thesis, Stanford University, 2003, chapter 4; X. Liu and A. El Gamal, IEEE Trans.
+Circuits Syst. I 50(4), 2003, doi:10.1109/TCSI.2003.809815.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcam_cli.camera.derived.electrical import Electrical
+from vcam_cli.effects.base import Effect, Limit, NoiseSource, Quantizer, Site
+from vcam_cli.effects.saturation import Saturation
+from vcam_cli.parallel import each
+from vcam_cli.readout.exposure import codes_type, mean_dark, mean_electrons, sites
+from vcam_cli.rng import blocks
+from vcam_cli.scheduling import estimators
+
+
+def samples(
+    rate: NDArray,
+    times: Sequence[float],
+    effects: tuple[Effect, ...],
+    code: Quantizer,
+    seeds: dict[str, int],
+    workers: int,
+    layer: int = 0,
+) -> tuple[NDArray, NDArray]:
+    """Return all samples of one integration.
+
+    Parameters
+    ----------
+    rate : NDArray
+        Rate (rows, columns), or (C, rows, columns) of stacked pixels [e/s].
+    times : sequence of float
+        Times of the N samples, rising [s].
+    effects : tuple of Effect
+        Effects that run, in the order of action.
+    code : Quantizer
+        The ADC.
+    seeds : dict
+        Seeds of 'sensor' and 'frame'.
+    workers : int
+        Number of threads; results do not depend on it.
+    layer : int, optional
+        Index of the layer of stacked pixels.
+
+    Returns
+    -------
+    electrons : NDArray
+        Samples (N, ...) in the shape of `rate`, clipped above at the full well [electrons].
+    dn : NDArray
+        Codes of the samples, uint16, or uint32 from 17 bits on [DN].
+
+    References
+    ----------
+    T. Chen, PhD thesis, Stanford University, 2003, chapter 4.
+    """
+    if rate.ndim == 3:
+        layers = [
+            samples(plane, times, effects, code, seeds, workers, number)
+            for number, plane in enumerate(rate)
+        ]
+        return np.stack([e for e, _ in layers], 1), np.stack([dn for _, dn in layers], 1)
+    electrons = np.empty((len(times), *rate.shape), rate.dtype)
+    dn = np.empty(electrons.shape, codes_type(code.bits))
+    well = next((e.full_well for e in effects if isinstance(e, Saturation)), np.inf)
+
+    def shoot(block: slice) -> None:
+        charge = np.zeros_like(rate[block])
+        full = np.zeros(charge.shape, bool)
+        before = 0.0
+        for number, time in enumerate(times):
+            step = time - before
+            dark = mean_dark(step, effects)
+            new = sites(charge, dark, seeds, layer, block, number)
+            same = sites(charge, dark, seeds, layer, block)
+            charge += _collected(mean_electrons(rate[block], step, effects), effects, new, same)
+            read = _read(charge.copy(), effects, new, same)
+            read[full] = well
+            full = read >= well
+            electrons[number, block] = read
+            dn[number, block] = code.apply(read)
+            before = time
+
+    each(shoot, blocks(len(rate)), workers)
+    return electrons, dn
+
+
+Sites = dict[str, Site]
+
+
+def _collected(mean: NDArray, effects: Sequence[Effect], new: Sites, same: Sites) -> NDArray:
+    """Return the charge that one step adds, with its shot noise [electrons]."""
+    draws = [e for e in effects if isinstance(e, NoiseSource)]
+    for draw in draws:
+        mean = draw.before_shot(mean, _site(draw, new, same))
+    for draw in draws:
+        if draw.in_samples == "accumulates":
+            mean = draw.apply(mean, _site(draw, new, same))
+    return mean
+
+
+def _read(charge: NDArray, effects: Sequence[Effect], new: Sites, same: Sites) -> NDArray:
+    """Return one readout of the charge so far, which may reuse its array [electrons]."""
+    for effect in effects:
+        if isinstance(effect, NoiseSource) and effect.in_samples != "accumulates":
+            charge = effect.apply(charge, _site(effect, new, same))
+        elif isinstance(effect, Limit):
+            charge = effect.apply(charge)
+    return charge
+
+
+def _site(draw: NoiseSource, new: Sites, same: Sites) -> Site:
+    return (same if draw.in_samples == "same" else new)[draw.scope]
+
+
+def photocurrent(
+    dn: NDArray,
+    times: Sequence[float],
+    estimator: str,
+    effects: tuple[Effect, ...],
+    code: Quantizer,
+    electrical: Electrical,
+    saturated_dn: float,
+    workers: int,
+) -> NDArray:
+    """Return the photocurrent of every pixel, estimated from the codes of its samples.
+
+    Variances count the rounding of the ADC, q^2 / 12, of a logarithmic one its step in the dark.
+    Offsets of the fixed pattern are in the estimate: no dark frame is subtracted.
+
+    Parameters
+    ----------
+    dn : NDArray
+        Codes of the samples (N, ..., rows, columns) [DN].
+    times : sequence of float
+        Times of the N samples, rising [s].
+    estimator : str
+        'lsbs' (last sample before saturation) or 'weighted' (the best linear estimate from all
+        samples before saturation).
+    effects : tuple of Effect
+        Effects that run, of which the mean dark current and the variances are known.
+    code : Quantizer
+        The ADC.
+    electrical : Electrical
+        Conversion between electrons, volts and codes.
+    saturated_dn : float
+        Lowest code of a saturated pixel [DN].
+    workers : int
+        Number of threads; results do not depend on it.
+
+    Returns
+    -------
+    NDArray
+        Photocurrents (..., rows, columns), float32 [e/s]; of a pixel that is full in the first
+        sample a lower bound.
+
+    References
+    ----------
+    X. Liu and A. El Gamal, IEEE Trans. Circuits Syst. I 50(4), 2003, doi:10.1109/TCSI.2003.809815.
+    """
+    dark = mean_dark(1.0, effects)
+    read, reset = variances(effects, code)
+    out = np.empty(dn.shape[1:], np.float32)
+
+    def estimate(block: slice) -> None:
+        here = dn[..., block, :]
+        full = here >= saturated_dn
+        linear = code.linear(here.astype(np.float64))
+        charge = (linear - electrical.offset) * electrical.electrons_per_dn
+        if estimator == "weighted":
+            found = estimators.weighted_estimate(charge, times, full, dark, read, reset)
+        else:
+            found = estimators.last_sample_before_saturation(charge, times, full, dark)
+        out[..., block, :] = found
+
+    each(estimate, blocks(dn.shape[-2]), workers)
+    return out
+
+
+def variances(effects: tuple[Effect, ...], code: Quantizer) -> tuple[float, float]:
+    """Return the variances of one readout and of what all samples have in common.
+
+    Parameters
+    ----------
+    effects : tuple of Effect
+        Effects that run, of which the temporal noise counts.
+    code : Quantizer
+        The ADC.
+
+    Returns
+    -------
+    read : float
+        Variance of one readout, rounding included [electrons squared].
+    reset : float
+        Variance that is common to all samples [electrons squared].
+    """
+    draws = [e for e in effects if isinstance(e, NoiseSource) and e.scope == "frame"]
+    new = sum(e.variance(0.0) for e in draws if e.in_samples == "new")
+    common = sum(e.variance(0.0) for e in draws if e.in_samples == "same")
+    below, above = code.line(np.array([0.0, 1.0]))
+    return float(new + (1 / (above - below)) ** 2 / 12), float(common)

@@ -1,0 +1,119 @@
+"""The times at which a camera samples one integration, where it chooses them for its scene.
+
+`captures: {schedule: optimal, count: 8, max: 100 ms}` asks for the times whose mean SNR over the
+pixels is largest, of all of at most that length. The camera plans with what it has: the noise-free
+photocurrents of its pixels, its full well or the end of its ADC, whichever comes first, and its
+dark current, readout and reset noise, as the file describes them; so a schedule does not depend on
+which effects a plan leaves out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.derived.electrical import Electrical
+from vcam_cli.effects.base import Charge, Effect, Quantizer
+from vcam_cli.readout.nondestructive_samples import variances
+from vcam_cli.scheduling.full_noise import optimal_schedules
+from vcam_cli.scheduling.pdf import photocurrent_levels
+from vcam_cli.scheduling.sensor import Sensor
+
+
+def sensor(
+    electrical: Electrical, effects: Sequence[Effect], code: Quantizer, longest: float
+) -> Sensor:
+    """Return the pixel as its schedule models it.
+
+    Rounding of the ADC counts as readout noise, as it does in the reconstruction.
+
+    Parameters
+    ----------
+    electrical : Electrical
+        Full well and end of the ADC.
+    effects : sequence of Effect
+        Effects that the camera's file describes.
+    code : Quantizer
+        The ADC.
+    longest : float
+        Longest exposure time [s].
+
+    Returns
+    -------
+    Sensor
+        Model of the pixel.
+    """
+    read, reset = variances(tuple(effects), code)
+    return Sensor(
+        well=electrical.saturation,
+        dark=sum(e.rate() for e in effects if isinstance(e, Charge)),
+        read=float(np.sqrt(read)),
+        reset=float(np.sqrt(reset)),
+        max_time=longest,
+    )
+
+
+def choose_sample_times(
+    camera: Camera,
+    rate: NDArray,
+    electrical: Electrical,
+    effects: Sequence[Effect],
+    code: Quantizer,
+) -> tuple[float, ...]:
+    """Return the times of the samples of one integration.
+
+    Parameters
+    ----------
+    camera : Camera
+        Camera whose file gives the times or asks for a schedule.
+    rate : NDArray
+        Photo-electrons per second of every pixel, of any shape [e/s].
+    electrical : Electrical
+        Full well and end of the ADC.
+    effects : sequence of Effect
+        Effects that the camera has.
+    code : Quantizer
+        The ADC.
+
+    Returns
+    -------
+    tuple of float
+        Times, rising [s]; empty where there is a single exposure. Scheduled samples are as many as
+        asked for, fewer where more would coincide.
+    """
+    asked = camera.exposure.schedule
+    if asked is None:
+        return camera.exposure.samples
+    return optimal_times(rate, asked.count, sensor(electrical, effects, code, asked.max))
+
+
+def optimal_times(rate: NDArray, count: int, pixel: Sensor) -> tuple[float, ...]:
+    """Return the times of at most `count` samples whose mean SNR is largest.
+
+    Parameters
+    ----------
+    rate : NDArray
+        Photo-electrons per second of every pixel, of any shape [e/s].
+    count : int
+        Number of samples.
+    pixel : Sensor
+        Model of the pixel.
+
+    Returns
+    -------
+    tuple of float
+        Times, rising [s]; in the dark one sample of the longest time that the dark current allows.
+
+    References
+    ----------
+    T. Chen, PhD thesis, Stanford University, 2003, chapter 4.
+    """
+    pdf = photocurrent_levels(rate)
+    if pdf is None:
+        filled = pixel.well / pixel.dark if pixel.dark > 0 else np.inf
+        return (float(min(filled, pixel.max_time)),)
+    found = optimal_schedules(pdf, [count], pixel)[count].times
+    return tuple(float(time) for time in np.unique(found))

@@ -1,0 +1,117 @@
+"""What a run would refuse only later, found when its camera file is read.
+
+The file's own contradictions are `camera.load`'s business; here is what takes the engine, the
+processing or the picture to know.
+"""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from numpy.typing import NDArray
+
+from vcam_cli.camera import load as files
+from vcam_cli.camera.array import Positions
+from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.derived.geometry import geometry
+from vcam_cli.camera.derived.lattice import places
+from vcam_cli.camera.processing import SHOWN
+from vcam_cli.effects import aberration, point_spread
+from vcam_cli.errors import bad, split
+from vcam_cli.processing import check as check_steps
+from vcam_cli.readout.layout import layout
+from vcam_cli.scenes.build import SOURCE, check_channels
+from vcam_cli.scenes.hyperspectral import check_bands
+from vcam_cli.simulation import plan
+
+
+def load(camera: str | Path, sets: Sequence[str] = ()) -> Camera:
+    """`camera.load.load`, with all that is wrong told at once. Raises the same."""
+    return files.load(camera, sets, checks=CHECKS)
+
+
+def check_effects(camera: Camera) -> None:
+    """Refuse `effects` that ask for what the file does not describe.
+
+    It does not matter how lens and readout are solved: a good camera's numbers stand in for theirs,
+    so that an error in them hides nothing here. Raises BadInput.
+    """
+    if not isinstance(camera.effects, dict) or "on" not in camera.effects.values():
+        return
+    good = files.example()
+    names = ("conversion_gain", "voltage_swing", "full_well")
+    solved = {name: getattr(good.pixel.readout, name) for name in names}
+    readout = camera.pixel.readout.model_copy(update=solved)
+    pixel = camera.pixel.model_copy(update={"readout": readout})
+    plan.described(camera.model_copy(update={"pixel": pixel, "adc": good.adc}), geometry(good))
+
+
+def check_size(camera: Camera) -> None:
+    """Refuse an array too small for the demosaicing of its processing (BadInput)."""
+    if camera.array.scattered:
+        return
+    solved = layout(camera, geometry(camera)).geometry
+    if any(step.name == "demosaic" for step in camera.processing):
+        for name, count in (("rows", solved.rows), ("columns", solved.columns)):
+            if count < 2:
+                path = ("array", "die" if camera.array.die is not None else name)
+                message = f"{solved.rows} x {solved.columns} pixels cannot be demosaiced"
+                raise bad(path, message, "use an array of at least 2 x 2 pixels")
+
+
+def check_binning(camera: Camera) -> None:
+    """Refuse an array that is no whole number of binning groups (BadInput)."""
+    if not camera.array.scattered:
+        layout(camera, geometry(camera))
+
+
+def check_positions(camera: Camera) -> None:
+    """Refuse positions of colors that cannot be processed into a picture (BadInput)."""
+    if not isinstance(camera.array.pattern, Positions):
+        return
+    colors = tuple(dict.fromkeys(places(camera).colors))
+    check_steps(camera.processing, (), colors, camera.quality, scattered=True)
+    done = {step.name for step in camera.processing if step.value != "none"}
+    wanted = bool(camera.quality or camera.output.render) and "demosaic" in done
+    if wanted and len(colors) not in SHOWN and "color_correction" not in done:
+        message = f"{', '.join(colors)} are not the colors of a display"
+        raise bad(("processing",), message, "add color_correction: fit, behind the demosaic")
+
+
+def check_picture(camera: Camera) -> None:
+    """Refuse a picture that is unreadable or contradicts its description (BadInput)."""
+    source, path = camera.scene.source, (*SOURCE, "file")
+    if source.kind == "image":
+        from vcam_cli.files.images import color_channels
+
+        check_channels(source.model, color_channels(source.file, path))
+    if source.kind == "hyperspectral":
+        from vcam_cli.files.hyperspectral import read_bands
+
+        check_bands(camera.scene, read_bands(source.file, path))
+
+
+def check_lens(camera: Camera) -> None:
+    """Refuse a wavefront too steep, or an unreadable point spread function (BadInput)."""
+    read_lens(camera)
+
+
+def read_lens(camera: Camera) -> dict[str, NDArray]:
+    """Return what the files of the camera's optics hold, for `Camera.with_samples`."""
+    aberration.check(camera, geometry(camera))
+    psf = camera.optics.psf
+    if psf is None:
+        return {}
+    from vcam_cli.files.psf import read_psf
+
+    channels = max(len(psf.wavelengths), 1)
+    return {point_spread.PSF: read_psf(psf.file, channels, (*split(point_spread.PSF), "file"))}
+
+
+CHECKS: tuple[files.CameraCheck, ...] = (
+    (check_effects, "optics pixel effects"),
+    (check_binning, "pixel array exposure adc"),
+    (check_size, "pixel array processing"),
+    (check_positions, "pixel array processing"),
+    (check_picture, "scene"),
+    (check_lens, "optics scene pixel array effects"),
+)

@@ -1,0 +1,129 @@
+"""What a frame will cost in time, before it is taken.
+
+Seconds on one core of the machine the constants were measured on, times how fast this machine is
+at the most common of these works, drawing normals; shared by the threads that run.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from functools import cache
+
+import numpy as np
+
+from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.derived.geometry import Geometry
+from vcam_cli.camera.derived.mosaic import Mosaic
+from vcam_cli.effects.base import Effect, Limit, NoiseSource, Quantizer
+from vcam_cli.image_formation.optical_path import SpectrumReport
+from vcam_cli.image_formation.settings import Settings
+from vcam_cli.image_formation.transfer_functions import Band
+from vcam_cli.scheduling.estimators import PASSES
+
+NORMAL = 8.2e-9
+"""Drawing one normal number, the unit of speed [s]."""
+SAMPLE = 6e-9
+"""Transforming one sample of one plane of the scene [s]."""
+PAINT = 22e-9
+"""Painting one sample of one plane of a chart [s]."""
+FIXED = 0.008
+"""What does not depend on the size: tables of transfer, colors of patches, the plan [s]."""
+TERM = 1.3e-9
+"""Filtering one term of the spectrum for one plane and color [s]."""
+TABLE = 1e-6
+"""One value of a transfer function of fx and fy, its part of the pupil's transforms too [s]."""
+EVALUATE = 5e-9
+"""One pixel of one color from its spectrum [s]."""
+WAVE = 12e-9
+"""One pixel of one wave, or of one box [s]."""
+PROCESS = 14e-9
+"""One pixel through demosaic to the render's codes [s]."""
+JUDGE = 60e-9
+"""One pixel of ideal image and metrics, per color [s]."""
+EXR = 28e-9
+"""One noisy value into an EXR file [s]."""
+ESTIMATE = 25e-9
+"""One sample of a pixel into its photocurrent, once [s]."""
+BANDS_AT_ONCE = 4
+"""Bands of the spectral irradiance that are computed together, as the colors of a frame are."""
+PNG = 14e-9
+"""One noisy value into a PNG file [s]."""
+
+
+@cache
+def slowness() -> float:
+    """Time this machine takes for the unit of work, relative to the constants' machine."""
+    generator = np.random.Generator(np.random.Philox(0))
+    count = 1 << 17
+    seconds = []
+    for _ in range(3):
+        start = time.perf_counter()
+        generator.standard_normal(count, dtype=np.float32)
+        seconds.append(time.perf_counter() - start)
+    return min(seconds) / count / NORMAL
+
+
+def threads(workers: int) -> float:
+    """How much faster so many threads are than one: memory is shared between them."""
+    return workers**0.75
+
+
+def linear(geometry: Geometry, mosaic: Mosaic, report: SpectrumReport) -> float:
+    """Core seconds of image formation."""
+    pixels, colors = geometry.rows * geometry.columns, len(mosaic.colors)
+    if not report.terms:
+        return FIXED + WAVE * pixels * colors
+    return (
+        FIXED
+        + (SAMPLE + PAINT * report.painted) * report.cells * report.planes
+        + TERM * report.terms * report.planes * colors * report.filters
+        + EVALUATE * pixels * colors * report.filters
+        + TABLE * report.table_values
+    )
+
+
+def after(camera: Camera, geometry: Geometry, mosaic: Mosaic) -> float:
+    """Core seconds of processing, metrics and files."""
+    pixels, colors = geometry.rows * geometry.columns, len(mosaic.colors)
+    seconds = EXR * pixels * len(camera.output.raw)
+    if camera.output.render:
+        seconds += (PROCESS + PNG * colors) * pixels
+    if camera.quality:
+        seconds += (JUDGE + EXR) * pixels * colors
+    return seconds
+
+
+def samples(camera: Camera, geometry: Geometry, effects: Sequence[Effect]) -> float:
+    """Core seconds that several samples of one integration take more than a single exposure."""
+    count = camera.exposure.count
+    if not count:
+        return 0.0
+    again = sum(
+        e.seconds_per_pixel for e in effects if isinstance(e, NoiseSource | Limit | Quantizer)
+    )
+    passes = PASSES if camera.exposure.estimator == "weighted" else 1
+    files = EXR * (count * len(camera.output.raw) + 1)
+    pixels = geometry.rows * geometry.columns
+    return pixels * ((count - 1) * again + count * passes * ESTIMATE + files)
+
+
+def irradiance(
+    camera: Camera, geometry: Geometry, knobs: Settings, report: SpectrumReport
+) -> float:
+    """Core seconds of the spectral irradiance, where it is asked for: its bands are as colors."""
+    if not camera.output.irradiance:
+        return 0.0
+    band = camera.scene.wavelengths
+    count = len(Band(band.start, band.stop, knobs.wavelength_step).nodes())
+    bands = Mosaic((tuple(str(i) for i in range(BANDS_AT_ONCE)),))
+    together = linear(geometry, bands, report) / BANDS_AT_ONCE
+    return count * (together + EXR * geometry.rows * geometry.columns)
+
+
+def at_first_sight(camera: Camera, geometry: Geometry, mosaic: Mosaic, workers: int) -> float:
+    """Seconds of a whole run, before anything is known of its scene."""
+    samples = 2 * geometry.rows * geometry.columns
+    guess = SpectrumReport(cells=samples, terms=samples, planes=3, filters=1)
+    core = linear(geometry, mosaic, guess) + after(camera, geometry, mosaic)
+    return core * slowness() / threads(workers)

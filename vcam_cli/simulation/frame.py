@@ -1,0 +1,283 @@
+"""One simulated frame: from a camera and its picture file's samples to raw numbers.
+
+`preparation.py` brings the light to the pixels and plans the rest; here the frame is taken.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
+from functools import cached_property, partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcam_cli.camera.camera import Camera
+from vcam_cli.effects.base import Gain, NoiseSource, Quantizer
+from vcam_cli.effects.quantization import Quantization
+from vcam_cli.image_formation import photon_rate
+from vcam_cli.image_formation.rate_cache import Lights
+from vcam_cli.parallel import available_workers
+from vcam_cli.physics import readout
+from vcam_cli.progress import Stages
+from vcam_cli.readout import binned_readout, exposure, nondestructive_samples
+from vcam_cli.scheduling import estimators
+from vcam_cli.simulation.pixel_figures import pixel_figures
+from vcam_cli.simulation.preparation import Prepared, prepare
+from vcam_cli.spectra import colorchecker
+
+
+@dataclass(frozen=True)
+class Frame(Prepared):
+    """A raw frame and all that is known of how it came about.
+
+    Where the camera takes several samples of one integration, it is the last of them.
+    """
+
+    electrons: NDArray
+    """(rows, columns) noisy signal, clipped at the full well [electrons]"""
+    dn: NDArray
+    """(rows, columns) [DN]"""
+    samples_electrons: NDArray | None = None
+    """(N, rows, columns) as `electrons`; None of a single exposure."""
+    samples_dn: NDArray | None = None
+    """(N, rows, columns) as `dn`; None of a single exposure."""
+    photocurrent: NDArray | None = None
+    """(rows, columns) what the samples tell of the light [e/s]; None of a single exposure."""
+
+    def sample(self, number: int) -> Frame:
+        """Return one of the samples, from 0, as a frame of its own."""
+        assert self.samples_electrons is not None and self.samples_dn is not None
+        return replace(
+            self,
+            exposure_time=self.times[number],
+            electrons=self.samples_electrons[number],
+            dn=self.samples_dn[number],
+            times=(),
+            samples_electrons=None,
+            samples_dn=None,
+            photocurrent=None,
+        )
+
+    @cached_property
+    def picture_dn(self) -> NDArray:
+        """What is made into a picture, in the shape of `dn` [DN].
+
+        Of several samples: the codes of the photocurrent in the last one's time, as if neither
+        well nor ADC had an end, and without rounding. So the scale is that of the last sample.
+        """
+        if self.photocurrent is None:
+            return self.dn
+        return self._without_end(self.photocurrent)
+
+    @property
+    def picture_saturated_dn(self) -> float:
+        """From which on a pixel of `picture_dn` is saturated: in all its samples [DN]."""
+        if not self.times:
+            return self.saturated_dn
+        linear = float(self.code.linear(np.array([self.saturated_dn]))[0])
+        charge = (linear - self.electrical.offset) * self.electrical.electrons_per_dn
+        # Not all of it: the photocurrent is rounded to 32 bits, and so is its code.
+        least = charge / self.times[0] * (1 - 1e-6) - self.dark_rate
+        return float(self._without_end(np.array([least]))[0])
+
+    def _without_end(self, photocurrent: NDArray) -> NDArray:
+        """Return codes of a photocurrent [e/s], neither rounded nor clipped [DN]."""
+        return self.to_dn((photocurrent + self.dark_rate) * self.exposure_time)
+
+    @property
+    def mean_electrons(self) -> NDArray:
+        """Noise-free signal before saturation, photo and dark, (rows, columns) [electrons]."""
+        mean = exposure.mean_electrons(self.rate, self.exposure_time, self.plan.active)
+        return self.layout.binning_groups.join(mean)
+
+    @property
+    def code(self) -> Quantizer:
+        """The ADC."""
+        return Quantization.from_camera(self.camera, self.geometry)
+
+    @property
+    def black_dn(self) -> float:
+        """Code of the mean dark signal, offset included [DN]."""
+        dark = self.dark_rate * self.exposure_time * self._summed
+        return float(self.to_dn(np.array([dark]))[0])
+
+    @property
+    def _summed(self) -> int:
+        """Pixels whose codes are added."""
+        return self.layout.binning_groups.summed_codes
+
+    def to_dn(self, electrons: NDArray) -> NDArray:
+        """Return the ADC's curve before rounding and clipping; added codes are equal [DN]."""
+        n = self._summed
+        return self.code.line(electrons) if n == 1 else n * self.code.line(electrons / n)
+
+    def linear(self, dn: NDArray) -> NDArray:
+        """Return what a linear ADC has for these codes, added where `to_dn` adds them [DN]."""
+        n = self._summed
+        return self.code.linear(dn) if n == 1 else n * self.code.linear(dn / n)
+
+    @property
+    def white_dn(self) -> NDArray:
+        """Codes (C,) of perfect white on the axis, noise-free, with dark, not clipped [DN]."""
+        electrons = (self.white_rate + self.dark_rate) * self.exposure_time
+        return np.asarray(self.to_dn(electrons * self._summed))
+
+    @property
+    def saturated_dn(self) -> float:
+        """The lowest code of a saturated pixel: of a full well, or the ADC's highest [DN].
+
+        Of pixels that are read as one, where all of them are.
+        """
+        well, highest = self.electrical.full_well, float(self.electrical.highest_code)
+        if self.layout.binning_groups.binning.kind == "voltage":
+            well -= binned_readout.SURE * self._noise_of_full
+        # In both float types: where the well lies half way between two codes they round apart.
+        codes = [self.code.apply(np.full(1, well, kind))[0] for kind in (np.float32, np.float64)]
+        return self._summed * float(min(*codes, highest))
+
+    @property
+    def _noise_of_full(self) -> float:
+        """Noise behind the full wells of joined voltages, not clipped with them [e rms]."""
+        well = self.electrical.full_well
+        draws = [
+            e
+            for e in binned_readout.effects_in_readout(self.plan.active)
+            if isinstance(e, NoiseSource)
+        ]
+        return float(np.sqrt(sum(e.variance(well) for e in draws)))
+
+    def patches_dn(self) -> NDArray:
+        """Return the codes (C, 24) of a ColorChecker in the scene's light, as `white_dn` [DN]."""
+        lit = [self.scene.white.multiply(reflectance) for _, reflectance in colorchecker()]
+        gains = [e for e in self.plan.active if isinstance(e, Gain)]
+        # Levels are exact with any wavelengths: the first and the last are enough.
+        coarse = replace(self.settings, wavelength_step=math.inf)
+        seen = photon_rate.scene_transfer(
+            self.camera, self.geometry, coarse, lit, self.mosaic, gains
+        )
+        rate = (
+            seen.level.T * self.layout.binning_groups.signal_ratio + self.dark_rate * self._summed
+        )
+        return self.to_dn(rate * self.exposure_time)
+
+    def ideal_dn(self) -> NDArray:
+        """Return the scene point-sampled at the pixels' centers, all colors everywhere [DN].
+
+        It is (C, rows, columns) of the picture, without blur, falloff and noise; black is included.
+        """
+        place = self.layout
+        level = self.transfer.level.T * self.exposure_time * place.binning_groups.signal_ratio
+        photo = self.scene.at(place.picture_x, place.picture_y, level)
+        return self.to_dn(photo + self.dark_rate * self.exposure_time * self._summed)
+
+
+def expose(
+    camera: Camera,
+    picture: NDArray | None,
+    workers: int | None,
+    stages: Stages,
+    lights: Lights | None = None,
+) -> Frame:
+    """Simulate one frame of `camera`, from its scene on.
+
+    Parameters
+    ----------
+    camera : Camera
+        The camera.
+    picture : NDArray or None
+        Samples of the scene's image file (h, w, channels) in linear light; None for charts.
+    workers : int or None
+        Number of threads; all processors by default.
+    stages : Stages
+        Observer of the stages.
+    lights : Lights, optional
+        Cache of the light for further cameras.
+
+    Raises
+    ------
+    BadInput
+        Where the camera contradicts itself.
+    CannotDo
+        Where memory does not suffice.
+    """
+    workers = workers or available_workers()
+    return take_frame(prepare(camera, picture, workers, stages, lights), workers, stages)
+
+
+def take_frame(ready: Prepared, workers: int, stages: Stages | None = None) -> Frame:
+    """Return one frame of a camera that is ready for it."""
+    stages, camera = stages or Stages(), ready.camera
+    with stages("capture"):
+        active = tuple(x for x in ready.plan.active if not isinstance(x, Quantizer))
+        code = Quantization.from_camera(camera, ready.geometry)
+        seeds = {"sensor": camera.seed.sensor, "frame": camera.seed.frame}
+        known = {field.name: getattr(ready, field.name) for field in fields(ready)}
+        times = ready.times
+        if not times:
+            take = partial(exposure.capture, code=code, seeds=seeds, workers=workers)
+            joins, time = ready.layout.binning_groups, ready.exposure_time
+            electrons, dn = binned_readout.read(joins, ready.rate, time, active, take, code.bits)
+            return Frame(**known, electrons=electrons, dn=dn)
+        electrons, dn = nondestructive_samples.samples(
+            ready.rate, times, active, code, seeds, workers
+        )
+    last = Frame(**known, electrons=electrons[-1], dn=dn[-1])
+    with stages("reconstruction"):
+        light = nondestructive_samples.photocurrent(
+            dn,
+            times,
+            camera.exposure.estimator,
+            active,
+            code,
+            ready.electrical,
+            last.saturated_dn,
+            workers,
+        )
+    return replace(last, samples_electrons=electrons, samples_dn=dn, photocurrent=light)
+
+
+def figures(frame: Frame) -> list[tuple[str, float, str]]:
+    """Return the metrics that every run has: (metric, value, unit).
+
+    `pixel_figures` computes dynamic range (eq 3.1), SNR (eq 3.2) and well capacity. Of several
+    samples of one integration, all but the last two are of the last sample.
+    """
+    e, joins = frame.electrical, frame.layout.binning_groups
+    known = pixel_figures(frame.camera, frame.geometry, e, joins, frame.exposure_time)
+    saturated = frame.dn >= frame.saturated_dn
+    if joins.count == joins.summed_charges:
+        saturated = (frame.electrons >= e.full_well) | (frame.dn >= e.highest_code)
+    listed = [
+        ("exposure_time", frame.exposure_time, "s"),
+        ("mean_electrons", float(frame.electrons.mean(dtype=np.float64)), "e"),
+        ("saturated_fraction", float(saturated.mean()), ""),
+        ("snr_db", known.snr_db, "dB"),
+        ("dynamic_range_db", known.dynamic_range_db, "dB"),
+        ("well_capacity", known.well_capacity, "e"),
+    ]
+    return listed + _of_samples(frame, known.dark, known.draws) if frame.times else listed
+
+
+def _of_samples(
+    frame: Frame, dark: float, draws: Sequence[NoiseSource]
+) -> list[tuple[str, float, str]]:
+    """Return what several samples add: dynamic range of the photocurrent, and where it is unknown.
+
+    Eq 3.1 for the photocurrent: the largest that does not fill the first sample, over the noise of
+    the estimate in the dark. `dark` is of the last sample [electrons]; `draws` are new in every
+    frame.
+    """
+    first, last = frame.times[0], frame.times[-1]
+    floor = sum(x.variance(0.0) for x in draws)
+    if frame.camera.exposure.estimator == "weighted":
+        read = sum(x.variance(0.0) for x in draws if x.in_samples == "new")
+        noise = estimators.weighted_variance(0.0, frame.times, dark / last, read, floor - read)
+        floor = float(noise) * last**2 - dark
+    well = frame.electrical.full_well * last / first
+    nowhere = frame.picture_dn >= frame.picture_saturated_dn
+    return [
+        ("hdr_saturated_fraction", float(nowhere.mean()), ""),
+        ("hdr_dynamic_range_db", float(readout.dynamic_range_db(well, dark, floor)), "dB"),
+    ]

@@ -1,0 +1,62 @@
+"""What is known of a pixel's signal and noise without a frame: eqs 3.1 and 3.2.
+
+Reference: T. Chen, "Digital Camera System Simulator and Applications", PhD thesis, Stanford
+University, 2003, section 3.2.1.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.derived.electrical import Electrical
+from vcam_cli.camera.derived.geometry import Geometry
+from vcam_cli.effects.base import Charge, NoiseSource
+from vcam_cli.physics import readout
+from vcam_cli.readout import binned_readout
+from vcam_cli.readout.binning import BinningGroups
+from vcam_cli.simulation import plan
+
+SHARE = 0.2
+"""Of the well: the signal that the SNR is told of."""
+
+
+@dataclass(frozen=True)
+class PixelFigures:
+    """Of one pixel of the camera that the file describes, whatever a plan leaves out of frames.
+
+    Of pixels that are read as one they are of one such pixel in even light, SNR where each well is
+    a fifth full, and well capacity is in the unit of the raw frame's electrons: one node's well
+    where charges are joined, the mean of the wells of voltages, the sum of those whose codes are
+    added.
+    """
+
+    snr_db: float
+    """At a fifth of the well."""
+    dynamic_range_db: float
+    well_capacity: float
+    """[electrons]"""
+    dark: float
+    """Mean dark signal of a node [electrons]."""
+    draws: tuple[NoiseSource, ...]
+    """What is new in every frame."""
+
+
+def pixel_figures(
+    camera: Camera, geometry: Geometry, electrical: Electrical, joins: BinningGroups, time: float
+) -> PixelFigures:
+    """Signal over noise of a pixel that is exposed for a time [s]."""
+    wanted = plan.wanted(camera, geometry)
+    draws = tuple(x for x in wanted if isinstance(x, NoiseSource) and x.scope == "frame")
+    # In electrons of all wells together, in which shot noise is Poisson's.
+    wells = joins.count // joins.summed_charges
+    floor = sum(binned_readout.variance(x, 0.0, 0.0, joins.binning) for x in draws) * wells**2
+    dark = sum(x.rate() for x in wanted if isinstance(x, Charge)) * time
+    well, all_dark = electrical.full_well * wells, dark * wells
+    return PixelFigures(
+        snr_db=float(readout.snr_db(SHARE * well, all_dark, floor)),
+        dynamic_range_db=float(readout.dynamic_range_db(well, all_dark, floor)),
+        well_capacity=electrical.full_well * joins.summed_codes,
+        dark=dark,
+        draws=draws,
+    )

@@ -1,0 +1,292 @@
+"""The plan: which effects run, which do not, and why.
+
+The section keys of a camera file say what exists; `effects` says what the user wants simulated;
+what is left to the plan is decided by two promises, with tolerance T:
+
+- mean: leaving effects out changes the mean raw by at most T of full signal (rms over the array);
+- variance: at 1, 10 and 100 % of full signal, temporal and fixed-pattern variance each stay
+  within 2 T of everything on.
+
+Why two: a read noise of 5 electrons is 0.06 % of full signal and most of the variance in the
+shadows. One number cannot serve both. Three quarters of the mean's tolerance are kept for the
+settings.
+
+What costs next to nothing stays on: transfer functions beside the transform they multiply into,
+charges, which are an addition. Leaving them out would gain no time, and only lose truth.
+
+What each contributes is estimated from the scene itself, and never below the truth by more than a
+tenth: `vcam accuracy` shows the estimates beside the measurement.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+
+import numpy as np
+
+from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.derived.geometry import Geometry
+from vcam_cli.camera.derived.geometry import geometry as solve
+from vcam_cli.effects.base import (
+    Charge,
+    Effect,
+    FieldTransfer,
+    Gain,
+    NoiseSource,
+    PlaneTransfer,
+    Quantizer,
+    SignalLevels,
+    Transport,
+    VeilingGlare,
+)
+from vcam_cli.effects.order import ORDER
+from vcam_cli.errors import BadInput, Collector
+from vcam_cli.image_formation.settings import Settings
+from vcam_cli.readout.binned_readout import conversions, variance
+
+MEAN_SHARE = 0.25
+"""Part of the mean's tolerance for the gains that are left out."""
+COSTLY = (Gain, PlaneTransfer, FieldTransfer)
+"""Kinds that act on the mean signal and take time; charges are an addition, and other transfers
+multiply into one that is there anyway. Veils and transports cost less than a draw, and no bound is
+known before the light is: a lamp in the picture, far beyond its full well, lights all of it."""
+LEVELS = (0.01, 0.1, 1.0)
+"""Shares of full signal at which the variance promise holds."""
+
+
+@dataclass(frozen=True)
+class Decision:
+    """What becomes of one effect."""
+
+    name: str
+    state: str
+    """on | off"""
+    by: str
+    """user | plan | camera"""
+    reason: str
+    contribution: float | None
+    """How much leaving it out would change, at most, in `unit`."""
+    unit: str
+    seconds: float
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Decisions in the order of action, the effects that run, and what that will cost."""
+
+    decisions: tuple[Decision, ...]
+    active: tuple[Effect, ...]
+    settings: Settings
+    seconds: float
+    memory_bytes: int
+
+    def report(self) -> dict:
+        """The plan as `run.json` and `--json` show it."""
+        return {
+            "effects": [asdict(d) for d in self.decisions],
+            "settings": self.settings.report(),
+            "seconds": self.seconds,
+            "memory_bytes": self.memory_bytes,
+        }
+
+
+def described(camera: Camera, geometry: Geometry) -> dict[str, Effect | None]:
+    """Every effect with this camera's numbers, or None where it does not have it.
+
+    Raises BadInput for `on` for something the file does not describe.
+    """
+    found = {kind.name: kind.from_camera(camera, geometry) for kind in ORDER}
+    if isinstance(camera.effects, dict):
+        problems = Collector()
+        absent = {kind.name: kind.absent for kind in ORDER}
+        for name, wish in camera.effects.items():
+            if wish == "on" and found.get(name) is None:
+                why = absent.get(name, "the file describes nothing of the kind")
+                problems.add(
+                    ("effects", name),
+                    f"on, but there is nothing to simulate: {why}",
+                    "describe it in its section, or remove this line",
+                )
+        problems.raise_if_any()
+    return found
+
+
+def check(camera: Camera) -> None:
+    """Raises BadInput, with its place, where `effects` asks for what the file does not describe."""
+    try:
+        described(camera, solve(camera))
+    except BadInput as error:
+        raise error.located(camera.locate) from None
+
+
+def wanted(camera: Camera, geometry: Geometry) -> tuple[Effect, ...]:
+    """Effects that the camera has and the user has not switched off."""
+    found = described(camera, geometry).values()
+    return tuple(e for e in found if e is not None and _wish(camera, e) != "off")
+
+
+def optical(camera: Camera, geometry: Geometry) -> tuple[Effect, ...]:
+    """Effects of the linear part that run, as far as no signal level is needed to decide it."""
+    present = wanted(camera, geometry)
+    dropped = _negligible_light(camera, present)
+    return tuple(e for e in present if not isinstance(e, Charge | NoiseSource) and e not in dropped)
+
+
+def _negligible_light(camera: Camera, present: Sequence[Effect]) -> set[Effect]:
+    """Effects on the mean signal that cost time, and together change it by less than their share.
+
+    The smallest first, as many as fit into the share.
+    """
+    costly = [
+        e for e in present if isinstance(e, COSTLY) and e.removable and _wish(camera, e) == "auto"
+    ]
+    one = SignalLevels(full_signal=1.0, time=1.0)
+    errors = {e: e.mean_error(one) for e in costly}
+    left = MEAN_SHARE * camera.accuracy.tolerance
+    out: set[Effect] = set()
+    for effect in sorted(costly, key=errors.__getitem__):
+        left -= errors[effect]
+        if left < 0:
+            break
+        out.add(effect)
+    return out
+
+
+def make(
+    camera: Camera,
+    geometry: Geometry,
+    settings: Settings,
+    outlook: SignalLevels,
+    memory_bytes: int,
+    changes: Mapping[str, float],
+) -> Plan:
+    """Decides every effect of `camera` for the signal that is expected.
+
+    changes: rms change of the signal by leaving out each effect, where known [electrons / s].
+    """
+    found = described(camera, geometry)
+    present = list(wanted(camera, geometry))
+    tolerance = camera.accuracy.tolerance
+    dropped = _negligible_light(camera, present)
+    candidates = [e for e in present if e.removable and _wish(camera, e) == "auto"]
+    dropped |= _negligible_variance(candidates, present, outlook, tolerance)
+    pixels = geometry.rows * geometry.columns
+    decisions, active = [], []
+    for kind in ORDER:
+        effect = found[kind.name]
+        change = changes.get(kind.name)
+        change = None if change is None else change * outlook.time
+        decision = _decide(
+            kind, effect, camera, effect in dropped, present, outlook, pixels, change
+        )
+        decisions.append(decision)
+        if effect is not None and decision.state == "on":
+            active.append(effect)
+    seconds = sum(d.seconds for d in decisions)
+    return Plan(tuple(decisions), tuple(active), settings, seconds, memory_bytes)
+
+
+def _wish(camera: Camera, effect: Effect) -> str:
+    """What the file wants of an effect it describes: on, off or auto."""
+    if camera.effects == "all":
+        return "on"
+    if camera.effects == "auto":
+        return "auto"
+    return camera.effects.get(effect.name, "auto")
+
+
+def _negligible_variance(
+    candidates: list[Effect], present: list[Effect], outlook: SignalLevels, tolerance: float
+) -> set[Effect]:
+    """Draws whose absence changes the variance of their scope by less than 2 T at every level."""
+    out: set[Effect] = set()
+    for scope in ("frame", "sensor"):
+        everything = _variances([e for e in present if _in(e, scope)], outlook)
+        missing = np.zeros(len(LEVELS))
+        draws = [e for e in candidates if _in(e, scope)]
+        for effect in sorted(draws, key=lambda e: float(_variances([e], outlook).max())):
+            missing = missing + _variances([effect], outlook)
+            # Half of it: the other is kept for what the levels in between may ask.
+            if np.any(missing > tolerance * everything):
+                break
+            out.add(effect)
+    return out
+
+
+def _in(effect: Effect, scope: str) -> bool:
+    return isinstance(effect, NoiseSource) and effect.scope == scope
+
+
+def _variances(draws: list[Effect], outlook: SignalLevels) -> np.ndarray:
+    """Summed variance of draws at every level [electrons squared].
+
+    Of pixels that are read as one, of their mean.
+    """
+    return np.array(
+        [
+            sum(
+                variance(e, level * outlook.full_signal, outlook.dark, outlook.binning)
+                for e in draws
+                if isinstance(e, NoiseSource)
+            )
+            for level in LEVELS
+        ],
+        dtype=float,
+    )
+
+
+def _decide(
+    kind: type[Effect],
+    effect: Effect | None,
+    camera: Camera,
+    dropped: bool,
+    present: list[Effect],
+    outlook: SignalLevels,
+    pixels: int,
+    change: float | None,
+) -> Decision:
+    """One line of the plan."""
+    if effect is None:
+        return Decision(kind.name, "off", "camera", kind.absent, None, "", 0.0)
+    contribution, unit = _contribution(effect, present, outlook, change)
+    seconds = kind.seconds_per_pixel * pixels
+    wish = _wish(camera, effect)
+    if wish == "off":
+        return Decision(kind.name, "off", "user", "switched off in effects", contribution, unit, 0)
+    what = effect.describe()
+    if dropped:
+        reason = f"{what}: leaving it out changes less than {camera.accuracy.tolerance:.3g} allows"
+        return Decision(kind.name, "off", "plan", reason, contribution, unit, 0.0)
+    by = "user" if wish == "on" else "plan"
+    return Decision(kind.name, "on", by, what, contribution, unit, seconds)
+
+
+def _contribution(
+    effect: Effect, present: list[Effect], outlook: SignalLevels, change: float | None
+) -> tuple[float | None, str]:
+    """The effect's largest share, of the mean signal or of the variance of its scope.
+
+    change: rms change of the mean signal by leaving it out [electrons], where it is known.
+    """
+    if isinstance(effect, NoiseSource):
+        others = [e for e in present if _in(e, effect.scope) and e.name != effect.name]
+        everything = _variances([*others, effect], outlook)  # it may be switched off
+        kind = "temporal" if effect.scope == "frame" else "fixed-pattern"
+        share = _variances([effect], outlook) / np.maximum(everything, 1e-300)
+        return float(share.max()), f"of the {kind} variance"
+    if isinstance(effect, Quantizer):
+        everything = _variances([e for e in present if _in(e, "frame")], outlook)
+        n = conversions(outlook.binning)
+        rounding = [
+            effect.rounding(level * outlook.full_signal, n * noise) / n
+            for level, noise in zip(LEVELS, everything, strict=True)
+        ]
+        share = np.array(rounding) / np.maximum(everything + rounding, 1e-300)
+        return float(share.max()), "of the temporal variance"
+    if change is not None:
+        # A pixel that is full shows no change beyond the well.
+        return min(change / outlook.full_signal, 1.0), "of full signal"
+    if isinstance(effect, Gain | Charge | VeilingGlare | Transport | FieldTransfer | PlaneTransfer):
+        return effect.mean_error(outlook) / outlook.full_signal, "of full signal"
+    return None, ""

@@ -1,0 +1,65 @@
+"""What the bytes of a frame come from: the files that are read, the versions of what computes."""
+
+from __future__ import annotations
+
+import platform
+import sys
+from collections.abc import Iterator
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import vcam_cli
+from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.derived.named_spectra import spectra
+from vcam_cli.camera.load import FILE_KEYS
+from vcam_cli.config import shipped
+from vcam_cli.files.hyperspectral import companions
+
+
+def inputs(camera: Camera) -> tuple[Path, ...]:
+    """Every file that a run reads: YAML files, and what they name."""
+    return tuple(sorted({*camera.files, *data_files(camera)}, key=str))
+
+
+def data_files(camera: Camera, form: dict[str, Any] | None = None) -> tuple[Path, ...]:
+    """Return the files that a camera names: pictures, tables, spectra, those that ship among them.
+
+    form: its YAML form, where it is at hand.
+    """
+    form = camera.model_dump(mode="json") if form is None else form
+
+    def named(value: Any) -> Iterator[str]:
+        if isinstance(value, dict):
+            for key, item in value.items():
+                if key in FILE_KEYS and isinstance(item, str):
+                    yield item
+                else:
+                    yield from named(item)
+        elif isinstance(value, list):
+            for item in value:
+                yield from named(item)
+
+    shipped_spectra = (
+        str(shipped.find("spectra", factor))
+        for _, spec in spectra(camera)
+        for factor in getattr(spec, "factors", ())
+        if isinstance(factor, str)
+    )
+    found = {*named(form), *shipped_spectra}
+    if camera.scene.source.kind == "hyperspectral":
+        found |= {str(path) for path in companions(camera.scene.source.file)}
+    return tuple(Path(name) for name in sorted(found))
+
+
+def versions() -> dict[str, str]:
+    """Versions that decide the bytes of a frame."""
+    libraries = ("numpy", "scipy", "pydantic", "OpenImageIO")
+    found = {name: _version(name) for name in libraries}
+    return {"vcam": vcam_cli.__version__, "python": platform.python_version(), **found}
+
+
+def _version(name: str) -> str:
+    """Of a library; from its files, which takes longer, where it is not loaded."""
+    known = None if name == "OpenImageIO" else getattr(sys.modules.get(name), "__version__", None)
+    return known or version(name)  # OpenImageIO numbers itself in its own way

@@ -1,0 +1,154 @@
+"""raw.exr: the raw frame as it was read, with what is needed to make sense of it; hdr.exr.
+
+Rows and columns are an image, its channels as `output.raw` asks. Stacked pixels have a channel for
+each color, dn.R, dn.G and so on. Scattered pixels are one row of N, beside them their centers x
+and y [um], right of and below the axis, and `color`, the index into the attribute `vcam:colors`;
+a honeycomb's N are its `vcam:rows` rows of `vcam:columns` pixels, one after the other.
+
+Of several samples of one integration, each is such a file, raw.exr is the last of them, and hdr.exr
+holds the photocurrent that they tell, in the same layout.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+import vcam_cli
+from vcam_cli.camera.array import Positions
+from vcam_cli.camera.derived.electrical import Electrical
+from vcam_cli.files.exr import ExrWriter
+from vcam_cli.files.rows import Attribute
+from vcam_cli.rng import BLOCK_ROWS
+from vcam_cli.simulation.frame import Frame
+
+ROWS_AT_ONCE = 4 * BLOCK_ROWS
+
+Channel = Callable[[slice], NDArray]
+"""Some rows of a channel."""
+
+
+def write_raw(path: Path, frame: Frame, config_hash: str) -> None:
+    """Write raw.exr, block by block."""
+    e = frame.electrical
+    scale = np.float32(e.conversion_gain * e.analog_gain)
+    values = {
+        "dn": (frame.dn, None),
+        "electrons": (frame.electrons, None),
+        "volts": (frame.electrons, scale),
+    }
+    asked = {name: values[name] for name in frame.camera.output.raw}
+    _write(path, frame, asked, attributes(frame, config_hash))
+
+
+def write_hdr(path: Path, frame: Frame, config_hash: str) -> None:
+    """Write hdr.exr, the photocurrent that several samples tell [e/s]."""
+    assert frame.photocurrent is not None
+    said: dict[str, Attribute] = {
+        **_whose(frame, config_hash),
+        "vcam:captureTimes": ",".join(map(repr, frame.times)),
+        "vcam:estimator": frame.camera.exposure.estimator,
+        "vcam:saturatedFrom": frame.electrical.saturation / frame.times[0] - frame.dark_rate,
+        "vcam:unit": "e/s",
+    }
+    _write(path, frame, {"photocurrent": (frame.photocurrent, None)}, said)
+
+
+Values = dict[str, tuple[NDArray, np.floating | None]]
+"""What a file holds: by name an array in the shape of the raw frame, and a factor on it."""
+
+
+def _write(path: Path, frame: Frame, values: Values, said: dict[str, Attribute]) -> None:
+    """Write values of all pixels, block by block."""
+    channels = dict(_channels(frame, values))
+    rows, columns = shape = (1, frame.dn.size) if frame.layout.scattered else frame.dn.shape[-2:]
+    with ExrWriter(path, (rows, columns), list(channels), said) as exr:
+        for row in range(0, shape[0], ROWS_AT_ONCE):
+            block = slice(row, row + ROWS_AT_ONCE)
+            exr.write_rows(row, {name: part(block) for name, part in channels.items()})
+
+
+def _channels(frame: Frame, values: Values) -> Iterator[tuple[str, Channel]]:
+    """Names and rows of the channels, in the order of the file."""
+    place = frame.layout
+    for name, (array, factor) in values.items():
+        if place.full_color:
+            for color, plane in zip(frame.mosaic.colors, array, strict=True):
+                yield f"{name}.{color}", _rows_of(plane, factor)
+        else:
+            one_row = array.reshape(1, -1) if place.scattered else array
+            yield name, _rows_of(one_row, factor)
+    if place.scattered:
+        yield "x", _rows_of(place.x.reshape(1, -1), 1e6)
+        yield "y", _rows_of(place.y.reshape(1, -1), 1e6)
+        yield "color", _rows_of(place.color.reshape(1, -1), None)
+
+
+def _rows_of(array: NDArray, factor: float | np.floating | None) -> Channel:
+    return lambda rows: array[rows] if factor is None else array[rows] * factor
+
+
+def attributes(frame: Frame, config_hash: str) -> dict[str, Attribute]:
+    """Return what the file says of the frame."""
+    e = frame.electrical
+    return {
+        **_whose(frame, config_hash),
+        "vcam:exposureTime": frame.exposure_time,
+        "vcam:blackLevel": frame.black_dn,
+        "vcam:whiteLevel": float(e.highest_code * frame.layout.binning_groups.summed_codes),
+        **({"vcam:conversionGain": e.conversion_gain} if e.in_volts else {}),
+        **_curve(e),
+    }
+
+
+def _whose(frame: Frame, config_hash: str) -> dict[str, Attribute]:
+    """Which camera, with which seeds, and what colors its pixels have."""
+    return {
+        "name": frame.camera.name,
+        "vcam:version": vcam_cli.__version__,
+        "vcam:seedSensor": str(frame.camera.seed.sensor),
+        "vcam:seedFrame": str(frame.camera.seed.frame),
+        **_pattern(frame),
+        **_binning(frame),
+        "vcam:configHash": config_hash,
+    }
+
+
+def _pattern(frame: Frame) -> dict[str, Attribute]:
+    """Which color each pixel has."""
+    pattern, colors = frame.camera.array.pattern, frame.mosaic.colors
+    listed: dict[str, Attribute] = {"vcam:colors": ",".join(colors)}
+    if frame.layout.full_color:
+        return {"vcam:cfa": "stacked", **listed}
+    if not frame.layout.scattered:
+        block = "/".join("".join(row) for row in frame.mosaic.block)
+        return {"vcam:cfa": "monochrome" if len(colors) == 1 else block}
+    if isinstance(pattern, Positions):
+        return {"vcam:cfa": "positions", **listed, "vcam:positionUnit": "um"}
+    rows, columns = frame.dn.shape
+    size: dict[str, Attribute] = {"vcam:rows": rows, "vcam:columns": columns}
+    return {"vcam:cfa": str(pattern), **listed, "vcam:positionUnit": "um", **size}
+
+
+def _binning(frame: Frame) -> dict[str, Attribute]:
+    """Which pixels are read as one: offset and highest code of `digital` are sums as well."""
+    joins = frame.layout.binning_groups
+    if joins.count == 1:
+        return {}
+    given = joins.binning
+    return {"vcam:binning": f"{given.rows}x{given.columns} {given.kind}"}
+
+
+def _curve(e: Electrical) -> dict[str, Attribute]:
+    """Return what turns raw numbers back into electrons or volts."""
+    if e.reference is None:
+        return {"vcam:adc": "linear", "vcam:electronsPerDN": e.electrons_per_dn}
+    return {
+        "vcam:adc": "logarithmic",
+        "vcam:adcOffset": e.offset,
+        "vcam:adcFullScale": e.full_scale,
+        "vcam:adcReference": e.reference,
+    }

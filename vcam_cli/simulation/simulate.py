@@ -1,0 +1,327 @@
+"""One camera from its model to all its results, in memory: what `vcam run` writes to files."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcam_cli.camera.array import Positions
+from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.derived import photodiode
+from vcam_cli.camera.derived.electrical import no_volts
+from vcam_cli.camera.derived.geometry import geometry
+from vcam_cli.errors import BadInput
+from vcam_cli.parallel import suited
+from vcam_cli.processing import Context, Patches, ProcessedPicture, process
+from vcam_cli.progress import Observer, Silent, Stages
+from vcam_cli.quality import display
+from vcam_cli.quality.mse import mse, psnr_db
+from vcam_cli.quality.scielab import cielab_map, s_cielab_map
+from vcam_cli.scenes.hyperspectral import CubeScene
+from vcam_cli.simulation.checks import read_lens
+from vcam_cli.simulation.frame import Frame, expose, figures
+from vcam_cli.simulation.preparation import Prepared
+from vcam_cli.simulation.preparation import prepare as bring_light
+from vcam_cli.simulation.shared import Shared
+from vcam_cli.spectra import luminance
+
+
+@dataclass(frozen=True)
+class Result:
+    """A simulated photograph.
+
+    Arrays of the raw frame are (rows, columns); of stacked pixels (rows, columns, C), colors in the
+    order of `colors`; of a honeycomb (rows, columns) with every second row half a column to the
+    right; of pixels at places of their own (N,). Those of the picture are on a grid of squares,
+    which is the raw frame's own but for the last two.
+
+    Where pixels are read as one, a pixel is what is read. Its electrons are those of the charges or
+    codes that are added, and the mean of voltages.
+
+    Of several samples of one integration, the raw frame is the last of them; the picture shows the
+    photocurrent that all of them tell, scaled as ever so that the perfect white is 1.
+    """
+
+    frame: Frame
+    processed: ProcessedPicture
+    stages: Stages
+    notes: tuple[str, ...] = ()
+
+    @property
+    def dn(self) -> NDArray:
+        """Raw digital numbers, whole [DN]."""
+        return self._of_raw(self.frame.dn)
+
+    @property
+    def electrons(self) -> NDArray:
+        """Raw signal before the ADC, noisy, clipped above at the full well [electrons]."""
+        return self._of_raw(self.frame.electrons)
+
+    @property
+    def volts(self) -> NDArray:
+        """Raw signal at the ADC's input [V].
+
+        It raises BadInput where the file gives no volts.
+        """
+        e = self.frame.electrical
+        if not e.in_volts:
+            raise no_volts("pixel.readout", "volts", "take electrons")
+        return self.electrons * self.electrons.dtype.type(e.conversion_gain * e.analog_gain)
+
+    @property
+    def mean_electrons(self) -> NDArray:
+        """Noise-free signal, photo and dark, before saturation [electrons]."""
+        return self._of_raw(self.frame.mean_electrons)
+
+    @property
+    def exposure_time(self) -> float:
+        """Exposure time [s]."""
+        return self.frame.exposure_time
+
+    @property
+    def times(self) -> tuple[float, ...]:
+        """Times of the samples of one integration (N,) [s]; () of a single exposure."""
+        return self.frame.times
+
+    @property
+    def samples_dn(self) -> NDArray | None:
+        """Codes of every sample (N, ...), as `dn` [DN]; None of a single exposure."""
+        return self._of_samples(self.frame.samples_dn)
+
+    @property
+    def samples_electrons(self) -> NDArray | None:
+        """Signal of every sample (N, ...), as `electrons`; None of a single exposure."""
+        return self._of_samples(self.frame.samples_electrons)
+
+    @property
+    def photocurrent(self) -> NDArray | None:
+        """Photocurrent that the samples tell, as `dn` [e/s]; None of a single exposure."""
+        found = self.frame.photocurrent
+        return None if found is None else self._of_raw(found)
+
+    def _of_samples(self, values: NDArray | None) -> NDArray | None:
+        return None if values is None else np.stack([self._of_raw(sample) for sample in values])
+
+    @property
+    def colors(self) -> tuple[str, ...]:
+        """Names of the colors, in the order of planes."""
+        return self.frame.mosaic.colors
+
+    @property
+    def color(self) -> NDArray:
+        """Index of each raw pixel's color, in the shape of `dn`."""
+        place = self.frame.layout
+        if place.full_color:
+            return np.broadcast_to(np.arange(len(self.colors)), self.dn.shape)
+        return self._of_raw(place.color)
+
+    @property
+    def x(self) -> NDArray:
+        """Centers of the raw frame's columns, right of the array's center, (columns,) [m].
+
+        Of a honeycomb and of pixels at places of their own: of every pixel, in the shape of `dn`.
+        """
+        place = self.frame.layout
+        return self._of_raw(place.x) if place.scattered else place.centers[0]
+
+    @property
+    def y(self) -> NDArray:
+        """Centers of the raw frame's rows, below the array's center, (rows,) [m]; as `x`."""
+        place = self.frame.layout
+        return self._of_raw(place.y) if place.scattered else place.centers[1]
+
+    def _of_raw(self, values: NDArray) -> NDArray:
+        """Values of the raw frame in the shape that a user sees."""
+        if values.ndim == 3:
+            return np.moveaxis(values, 0, -1)
+        places = isinstance(self.frame.camera.array.pattern, Positions)
+        return values[0] if places else values
+
+    @cached_property
+    def render(self) -> NDArray:
+        """Codes of the render after `processing`: (rows, columns) or (rows, columns, 3).
+
+        Raises BadInput for scattered pixels without demosaic, and so do `linear` and `ideal`.
+        """
+        with self.stages("processing"):
+            return self.processed.encode(self.frame.camera.output.render or 8)
+
+    @cached_property
+    def linear(self) -> NDArray:
+        """The render in linear light, perfect white = 1: (rows, columns, channels)."""
+        with self.stages("processing"):
+            return self.processed.linear
+
+    @cached_property
+    def ideal(self) -> NDArray:
+        """The scene point-sampled in the same colors and scale: (rows, columns, channels)."""
+        with self.stages("ideal"):
+            return self.processed.ideal(self.frame.ideal_dn())
+
+    @cached_property
+    def s_cielab(self) -> NDArray:
+        """S-CIELAB Delta E of the render from the ideal image on the camera's `display`."""
+        image, ideal, screen = self.linear, self.ideal, self._screen
+        with self.stages("quality"):
+            filters = self.frame.camera.display.filters
+            return s_cielab_map(image, ideal, screen, filters, workers=self.processed.workers)
+
+    @property
+    def _screen(self) -> display.Screen:
+        return display.display_screen(self.frame.camera.display, len(self.frame.layout.picture_x))
+
+    @cached_property
+    def metrics(self) -> list[tuple[str, float, str]]:
+        """(metric, value, unit): those every run has, then those that `quality` asks for."""
+        out = figures(self.frame)
+        if {"mse", "psnr"} & set(self.frame.camera.quality):
+            image, ideal = self.linear, self.ideal
+            with self.stages("quality"):
+                error = mse(image, ideal)
+                out += [("mse", error, ""), ("psnr_db", psnr_db(image, ideal), "dB")]
+        if "cielab" in self.frame.camera.quality:
+            image, ideal = self.linear, self.ideal
+            with self.stages("quality"):
+                each = cielab_map(image, ideal, self._screen, workers=self.processed.workers)
+                out.append(("mean_delta_e", float(each.mean(dtype=float)), ""))
+        if "s-cielab" in self.frame.camera.quality:
+            out.append(("mean_s_cielab", float(self.s_cielab.mean(dtype=float)), ""))
+        return out
+
+
+def threads(camera: Camera) -> int:
+    """Return the number of threads for a camera's frame: all processors, but for small frames.
+
+    It raises BadInput where the camera's size contradicts itself.
+    """
+    g = geometry(camera)
+    return suited(g.rows * g.columns)
+
+
+def simulate(
+    camera: Camera,
+    workers: int | None = None,
+    watch: Observer | None = None,
+    shared: Shared | None = None,
+) -> Result:
+    """Simulate `camera` looking at its scene.
+
+    Parameters
+    ----------
+    camera : Camera
+        The camera and its scene.
+    workers : int, optional
+        Number of threads, by default `threads`; results do not depend on it.
+    watch : Observer, optional
+        Observer of stages, here and while the result's properties are computed.
+    shared : Shared, optional
+        What cameras before this one had in common with it; results do not depend on it.
+
+    Raises
+    ------
+    BadInput
+        For a camera that contradicts itself, with positions in its file.
+    CannotDo
+        Where memory does not suffice.
+    """
+    try:
+        stages = Stages(watch=watch or Silent())
+        return _simulate(camera, workers or threads(camera), stages, shared or Shared())
+    except BadInput as error:
+        raise error.located(camera.locate) from None
+
+
+def prepare(
+    camera: Camera, workers: int | None = None, watch: Observer | None = None
+) -> tuple[Prepared, tuple[str, ...]]:
+    """Return the camera ready to take its frame, and notes: what `vcam plan` shows."""
+    try:
+        stages = Stages(watch=watch or Silent())
+        camera = _with_lens(camera, stages)
+        picture, notes = _picture(camera, stages)
+        ready = bring_light(camera, picture, workers or threads(camera), stages)
+        return ready, notes + _remarks(ready)
+    except BadInput as error:
+        raise error.located(camera.locate) from None
+
+
+def _with_lens(camera: Camera, stages: Stages) -> Camera:
+    """Return the camera with the samples of its point spread function, its wavefront checked."""
+    with stages("read"):
+        samples = read_lens(camera)
+    return camera.with_samples(samples) if samples else camera
+
+
+def _picture(camera: Camera, stages: Stages) -> tuple[Any, tuple[str, ...]]:
+    """Return what the scene's file holds (samples, or a `Cube`), or None, and notes."""
+    source, path = camera.scene.source, ("scene", "source", "file")
+    if source.kind == "image":
+        from vcam_cli.files.images import read_picture
+
+        with stages("read"):
+            read = read_picture(source.file, source.encoding, source.white, path)
+        return read.data, read.notes
+    if source.kind == "hyperspectral":
+        from vcam_cli.files.hyperspectral import read_cube
+
+        with stages("read"):
+            return read_cube(source.file, path)
+    return None, ()
+
+
+def _remarks(ready: Prepared) -> tuple[str, ...]:
+    """Return notes on the silicon, on times that the camera chose, and on a scene of spectra."""
+    scene, band = ready.scene, ready.camera.scene.wavelengths
+    before = photodiode.remarks(ready.camera) + _chosen(ready)
+    if not isinstance(scene, CubeScene):
+        return before
+    level = luminance(scene.white, band.start, band.stop)
+    notes = [f"white is taken to be {level:.4g} cd/m2"]
+    if 0 < ready.spectrum.planes < len(scene.spectra):
+        notes.append(
+            f"{len(scene.spectra)} bands are simulated as {ready.spectrum.planes} mixtures of them;"
+            f" no transfer function is off by more than {ready.settings.mixing_tolerance:g}"
+            " of the largest"
+        )
+    return before + tuple(notes)
+
+
+def _chosen(ready: Prepared) -> tuple[str, ...]:
+    """Return the times of samples that the camera scheduled itself."""
+    asked = ready.camera.exposure.schedule
+    if asked is None:
+        return ()
+    listed = ", ".join(f"{1000 * time:.4g}" for time in ready.times)
+    fewer = asked.count - len(ready.times)
+    more = f"; {fewer} more of the {asked.count} would gain nothing" if fewer else ""
+    return (f"best times for this scene: {listed} ms{more}",)
+
+
+def _simulate(camera: Camera, workers: int, stages: Stages, shared: Shared) -> Result:
+    camera = _with_lens(camera, stages)
+    picture, notes = shared.picture(camera, lambda: _picture(camera, stages))
+    frame = expose(camera, picture, workers, stages, shared.lights)
+    context = Context(
+        pattern=frame.mosaic.block,
+        colors=frame.mosaic.colors,
+        white_dn=frame.white_dn,
+        black_dn=frame.black_dn,
+        linearize=None if frame.electrical.reference is None else frame.linear,
+        saturated_dn=frame.picture_saturated_dn,
+        patches=lambda: _patches(frame),
+        planes=frame.layout.full_color,
+        layout=frame.layout if frame.layout.scattered else None,
+    )
+    with stages("balance"):
+        processed = process(frame.picture_dn, context, camera.processing, workers=workers)
+    return Result(frame, processed, stages, notes + _remarks(frame) + processed.notes)
+
+
+def _patches(frame: Frame) -> Patches:
+    """Return the ColorChecker that color correction is fitted to."""
+    band = frame.camera.scene.wavelengths
+    return Patches(frame.patches_dn(), frame.scene.white, band.start, band.stop)

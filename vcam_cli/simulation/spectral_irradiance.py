@@ -1,0 +1,138 @@
+"""Spectral irradiance on the sensor: the light before pixels, filters and silicon.
+
+The same linear part as the frame's, with one exchange: a pixel is its whole cell (pitch by pitch),
+sees one narrow band and counts watts. So every value is the mean spectral irradiance over one
+pixel's cell, after the lens's transmittance, falloff and blur (eqs 2.18 and 2.22). Where pixels
+form no rectangular array the cells are those of the picture.
+
+A band is a hat function on one wavelength of the camera's nodes, as wide as its neighbors are
+apart, and the value is the band's irradiance over the hat's area. So the sum of all values times
+these areas (the trapezoid rule) is the irradiance of the whole range exactly, whatever lines the
+lamp has; between the nodes it means the spectrum that is straight from node to node.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcam_cli.camera.derived.geometry import Geometry, pixel_centers
+from vcam_cli.camera.derived.mosaic import Mosaic
+from vcam_cli.effects.base import Blur, Gain, VeilingGlare
+from vcam_cli.effects.pixel_aperture import PixelAperture
+from vcam_cli.image_formation import photon_rate
+from vcam_cli.image_formation.optical_path import Layer, OpticalPath
+from vcam_cli.image_formation.strategies import image_layers
+from vcam_cli.image_formation.transfer_functions import Band, Transfer
+from vcam_cli.parallel import each
+from vcam_cli.physics import radiometry
+from vcam_cli.rng import blocks
+from vcam_cli.scenes.base import SampledScene, Scene, WaveScene
+from vcam_cli.scenes.build import build
+from vcam_cli.simulation.cost_model import BANDS_AT_ONCE
+from vcam_cli.simulation.preparation import Prepared
+from vcam_cli.spectra import Spectrum, hat_weights
+
+MARGIN = 32
+"""Pixels that a chart goes on beyond a picture's grid that is not the raw frame's."""
+DARK = 1e-12
+"""Share of the brightest band below which a band is rounding, of a line beside it, and no light."""
+
+
+def nodes(ready: Prepared) -> NDArray:
+    """Return the wavelengths at which it is given, (J,) rising [m]."""
+    band = ready.camera.scene.wavelengths
+    return Band(band.start, band.stop, ready.settings.wavelength_step).nodes()
+
+
+def planes(ready: Prepared, workers: int) -> Iterator[NDArray]:
+    """Spectral irradiance at each of the `nodes`, one by one: (rows, columns) [W/(m2 m)].
+
+    Raises CannotDo where memory does not suffice.
+    """
+    wavelengths = nodes(ready)
+    level = levels(ready, wavelengths)
+    largest = np.abs(level).max(axis=0)
+    lit = np.flatnonzero(largest > DARK * largest.max())
+    relative = level[:, lit] / largest[lit]
+    parts = (slice(i, i + BANDS_AT_ONCE) for i in range(0, len(lit), BANDS_AT_ONCE))
+    found = (p for s in parts for p in _bands(ready, wavelengths[lit[s]], relative[:, s], workers))
+    for band, peak in enumerate(largest):
+        if band in lit:
+            yield next(found) * ready.settings.dtype(peak)
+        else:
+            g = ready.layout.grid
+            yield np.zeros((g.rows, g.columns), ready.settings.dtype)
+
+
+def _bands(
+    ready: Prepared, wavelengths: NDArray, level: NDArray, workers: int
+) -> Iterator[NDArray]:
+    """Return the light of a few bands, as if each were a color of its own.
+
+    level: (K, n) of the scene's components in every band. Yields (rows, columns) in its unit.
+    """
+    g = _whole_cells(ready.layout.grid)
+    in_lens = [e for e in ready.plan.active if e.in_lens]
+    blurs = tuple(e for e in in_lens if isinstance(e, Blur))
+    transfer = Transfer(wavelengths, level[:, :, None] * np.eye(len(wavelengths)), blurs)
+    bands = Mosaic((tuple(f"{w * 1e9:.6f}" for w in wavelengths),))
+    effects = (*in_lens, PixelAperture(g.pitch_x, g.pitch_y))
+    light = OpticalPath(transfer, g, ready.settings, bands, effects, workers)
+    dtype = ready.settings.dtype
+    x, y = pixel_centers(g)
+    gains = [e.gain(x.astype(dtype), y.astype(dtype)) for e in in_lens if isinstance(e, Gain)]
+    astray = sum(e.fraction for e in in_lens if isinstance(e, VeilingGlare))
+    out: NDArray = np.zeros((len(wavelengths), g.rows, g.columns), dtype)
+    layers, _ = image_layers(light, _scene(ready))
+    for layer in layers:
+
+        def add(s: slice, layer: Layer = layer) -> None:
+            weight = 1 if layer.weight is None else layer.weight(x.astype(dtype), y[s])
+            for band in range(len(out)):
+                out[band, s] += weight * layer.values(band, s)
+
+        each(add, blocks(g.rows), workers)
+    for plane in out:
+        np.maximum(plane, 0, out=plane)
+        for gain in gains:
+            plane *= gain
+        if astray:
+            plane += astray * (plane.mean(dtype=np.float64) - plane)
+        yield plane
+
+
+def _scene(ready: Prepared) -> Scene:
+    """Return the frame's scene, on the picture's grid where the raw frame has another."""
+    grid = ready.layout.grid
+    if grid is ready.layout.lattice or isinstance(ready.scene, WaveScene):
+        return ready.scene
+    if isinstance(ready.scene, SampledScene) and ready.scene.samples == "squares":
+        return ready.scene
+    view = photon_rate.view(grid, ready.settings, MARGIN)
+    return build(ready.camera.scene, view, None)
+
+
+def levels(ready: Prepared, wavelengths: NDArray) -> NDArray:
+    """Of each of the scene's components on the axis, without blur: (K, J) [W/(m2 m)]."""
+    g = ready.geometry
+    per_radiance = float(radiometry.irradiance_per_radiance(g.f_number, g.magnification))
+    transmittance = ready.camera.optics.transmittance.resolve()
+    spectra = [s.multiply(transmittance) for s in ready.scene.spectra]
+    bands = np.array([hat_weights(s, wavelengths) for s in spectra])
+    return per_radiance * bands / hat_weights(Spectrum.flat(1.0), wavelengths)
+
+
+def _whole_cells(geometry: Geometry) -> Geometry:
+    """Return the same sensor collecting the light of whole cells, gaps included."""
+    return replace(
+        geometry,
+        collecting_width=geometry.pitch_x,
+        collecting_height=geometry.pitch_y,
+        collecting_x=0.0,
+        collecting_y=0.0,
+        sampling_scale=1.0,
+    )

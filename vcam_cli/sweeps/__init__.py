@@ -1,0 +1,1 @@
+"""Sweep studies: a camera measured while its parameters change."""

@@ -1,0 +1,201 @@
+"""A sweep that has something left to do: its points computed, everything written."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import closing
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+
+from vcam_cli.camera.camera import Camera
+from vcam_cli.files.points_store import POINTS, SweepFolder
+from vcam_cli.files.report import hash_file
+from vcam_cli.image_formation.rate_cache import depends_on
+from vcam_cli.progress import Observer
+from vcam_cli.simulation import provenance
+from vcam_cli.sweeps import expectations, figures, sweep_points, sweep_tables, workers
+from vcam_cli.sweeps.point_work import Job
+from vcam_cli.sweeps.study_cameras import StudyCameras
+from vcam_cli.sweeps.sweep import Execution, Share
+from vcam_cli.sweeps.sweep_file import StudyFile
+from vcam_cli.sweeps.sweep_points import LIBRARIES, Grid
+from vcam_cli.sweeps.sweep_result import FRAMES, Outcome, SweepResult, read_outcome
+from vcam_cli.sweeps.sweep_tables import Findings
+from vcam_cli.sweeps.workers import Verdict
+
+
+def computed_sweep(
+    study: StudyFile,
+    sets: Sequence[str],
+    out: Path,
+    execution: Execution,
+    request: str,
+    watch: Observer,
+    tell: Callable[[str], None],
+) -> SweepResult:
+    """Compute what is left of a sweep and write everything; request: see `request_hash`."""
+    grid = sweep_points.grid(study, sets)
+    cameras = StudyCameras(grid, sets)
+    planned, expected = figures.plan(cameras), expectations.plan(cameras)
+    hashes = {str(path): hash_file(path) for path in grid.inputs}
+    for refused in grid.refused:
+        tell(str(refused))
+    with SweepFolder(out) as folder:
+        folder.begin({"name": study.model.name})
+        points = _Points(grid, folder, execution.fresh)
+        points.read_finished()
+        if folder.corrupted:
+            names, shown = list(folder.corrupted), ", ".join(list(folder.corrupted)[:3])
+            tell(f"computed again, since corrupted: {POINTS}/{shown}" + _more(names, 3))
+        computed = _compute(points, execution, watch, tell)
+        findings = Findings(grid, points.outcomes)
+        compared = tuple(each.result(findings) for each in expected)
+        result = sweep_tables.result(findings, out, compared, computed)
+        files = sweep_tables.writers(findings) | figures.metric_plots(findings)
+        if compared:
+            files["expected.csv"] = partial(expectations.write, compared)
+        if not result.missing:
+            made, unmade = figures.writers(planned, findings, watch, tell)
+            files, result = files | made, replace(result, unmade=unmade)
+        watch.begin("tables")
+        asked = request if points.are_final and not result.unmade else ""
+        plain = study.model.model_dump(mode="json")
+        record = result.record() | {"study": plain, "hashes": hashes, "asked": asked}
+        folder.finish(files, record, grid.inputs)
+    return result
+
+
+class _Points:
+    """The points of a sweep, and what is known of them."""
+
+    def __init__(self, grid: Grid, folder: SweepFolder, fresh: bool) -> None:
+        self.outcomes: dict[str, Outcome] = {}
+        self._folder, self._fresh = folder, fresh
+        model = grid.study.model
+        self._frames = tuple(FRAMES[what] for what in model.keep)
+        self._points = {p.id: p for p in grid.points if p.camera is not None}
+        self._metrics, self._keep = model.metrics, model.keep
+
+    def read_finished(self) -> None:
+        """Read the outcomes of points that are finished."""
+        if not self._fresh:
+            for point in self._points:
+                self._read(point)
+
+    def _read(self, point: str) -> bool:
+        """Return whether a point is finished, or ended with an error that would come again."""
+        content = self._folder.read(point, () if self._fresh else self._frames)
+        if content is None:
+            return False
+        try:
+            found = read_outcome(point, content)
+        except ValueError:
+            return False
+        self.outcomes[point] = found
+        return found.final
+
+    @property
+    def are_final(self) -> bool:
+        """Whether all outcomes are known, and none would be another one at another time."""
+        return all(p in self.outcomes and self.outcomes[p].final for p in self._points)
+
+    def groups(self) -> list[list[Job]]:
+        """Return all points in the study's order, those of the same light together."""
+        versions = {name: v for name, v in provenance.versions().items() if name in LIBRARIES}
+        lights: dict[str, str] = {}
+        groups: dict[str, list[Job]] = {}
+        for point in self._points.values():
+            camera = point.camera
+            assert camera is not None
+            if point.content not in lights:
+                lights[point.content] = depends_on(camera)
+            job = Job(point.id, _bare(camera), self._metrics, self._keep, versions)
+            groups.setdefault(lights[point.content], []).append(job)
+        return list(groups.values())
+
+    def unfinished(self, groups: list[list[Job]]) -> list[list[Job]]:
+        """Return the points of these groups that are not finished."""
+        final = {point for point, outcome in self.outcomes.items() if outcome.final}
+        return [[job for job in group if job.id not in final] for group in groups]
+
+    def ask(self, job: Job) -> Verdict:
+        """Return whether a point is still to be computed, and claim it then."""
+        if not self._folder.claim(job.id):
+            return "claimed"
+        if not self._fresh and self._read(job.id):
+            self._folder.release(job.id)
+            return "finished"
+        return "compute"
+
+    def keep(self, outcome: Outcome) -> None:
+        """Keep the outcome of a point."""
+        self._folder.write(outcome.id, outcome.content(), outcome.frames)
+        self._folder.release(outcome.id)
+        self.outcomes[outcome.id] = replace(outcome, frames={})
+
+
+def _bare(camera: Camera) -> Camera:
+    """Return a camera without what is only needed for messages, quick to send."""
+    bare = camera.model_copy()
+    bare._origin = None
+    return bare
+
+
+def _groups_of_share(groups: list[list[Job]], share: Share | None) -> list[list[Job]]:
+    """Return the groups of a share: whole groups where there are enough, parts of them otherwise.
+
+    They depend on the study alone: a point that is finished keeps its place.
+    """
+    if share is None:
+        return groups
+    last, count = share.number, share.count
+    if len(groups) >= count:
+        return groups[last - 1 :: count]
+    ends = [(len(g) * (last - 1) // count, len(g) * last // count) for g in groups]
+    return [group[start:end] for group, (start, end) in zip(groups, ends, strict=True)]
+
+
+def _compute(
+    points: _Points, execution: Execution, watch: Observer, tell: Callable[[str], None]
+) -> int:
+    """Compute what is left, and return the number of points computed."""
+    if points.are_final:
+        return 0
+    groups = points.unfinished(_groups_of_share(points.groups(), execution.share))
+    total = sum(len(group) for group in groups)
+    if not total:
+        return 0
+    watch.begin("sweep")
+    watch.step(0, total)
+    computed, has_told = 0, False
+    outcomes = _outcomes(groups, total, points, execution, tell)
+    with closing(outcomes):  # type: ignore[type-var]
+        for outcome in outcomes:
+            points.keep(outcome)
+            computed += 1
+            watch.step(computed, total)
+            if outcome.trace and not has_told:
+                tell(outcome.trace)
+                has_told = True
+    return computed
+
+
+def _outcomes(
+    groups: list[list[Job]],
+    total: int,
+    points: _Points,
+    execution: Execution,
+    tell: Callable[[str], None],
+) -> Iterator[Outcome]:
+    """Yield the outcomes of points as they are computed, on a cluster or on this machine."""
+    if execution.scheduler is not None:
+        return workers.compute_on_dask(groups, points.ask, execution.scheduler, tell)
+    processes, threads = workers.processes_and_threads(execution.workers, total)
+    if processes == 1:
+        return workers.compute_here(groups, points.ask, threads)
+    return workers.compute_in_processes(groups, points.ask, processes, threads)
+
+
+def _more(names: Sequence[str], shown: int) -> str:
+    return f" and {len(names) - shown} more" if len(names) > shown else ""

@@ -1,0 +1,256 @@
+"""What a study file may say: a camera, what is varied, what is measured, what is sought.
+
+Overrides are keys of a camera by their dotted path, as in `--set`. Their values are checked as
+part of each camera that they make (see `sweep_points`).
+"""
+
+from collections.abc import Collection, Iterator, Mapping
+from typing import Annotated, Any, ClassVar, Literal, Self
+
+from pydantic import model_validator
+from pydantic_core import InitErrorDetails
+
+from vcam_cli.config.lists import list_of_any, words_of
+from vcam_cli.config.model import Model, Rule, all_or_none, at_most_one, exactly_one, key
+from vcam_cli.config.quantities import Whole
+from vcam_cli.config.validation_messages import describe, failure, fault, one_of
+from vcam_cli.config.values import Either, Text, Word, mapping
+from vcam_cli.sweeps import figure_model
+from vcam_cli.sweeps.figure_model import Figure
+from vcam_cli.sweeps.quantities import METRICS, PROPERTIES, is_measured
+
+KEPT = ("raw", "render")
+KINDS = ("sweep", "schedule")
+"""What `kind` of a study may be."""
+VARY = "vary"
+"""The key of a case that is no path."""
+OPTIMUM = "optimum"
+"""The quantity that is the best value of the parameter; and as a value of `at`, its place."""
+
+
+class Variation(Model):
+    """The values that a parameter takes: a range of equal steps, or a list."""
+
+    start: Annotated[str | float | None, Either(lambda given: given, str | float)] = key(
+        "the first value, with its unit", unit="", example="5.3 um", default=None
+    )
+    stop: Annotated[str | float | None, Either(lambda given: given, str | float)] = key(
+        "the last value", unit="", example="15 um", default=None
+    )
+    count: Annotated[int | None, Whole(least=1, most=100_000, example="20")] = key(
+        "number of values", example=20, default=None
+    )
+    values: Annotated[tuple[Any, ...] | None, list_of_any("[4 um, 6 um]")] = key(
+        "the values themselves, in place of a range", example=["4 um", "6 um"], default=None
+    )
+
+    rules = (
+        exactly_one("start", "values", of="what it varies over", remedy="write {values: [...]}"),
+        all_or_none("start", "stop", "count"),
+    )
+
+
+class Optimize(Model):
+    """What is sought."""
+
+    metric: Literal[tuple(METRICS)] = key("one of the metrics", example="mean_s_cielab")  # type: ignore[valid-type]
+    goal: Literal["min", "max"] = key("the least or the most of it", example="min")
+
+
+def _cameras(given: Any) -> tuple[str, ...]:
+    found = given if isinstance(given, (list, tuple)) else [given]
+    if not found:
+        raise ValueError("is an empty list; name at least one camera")
+    for item in found:
+        if not isinstance(item, str) or not item:
+            what = f"{describe(item)} is not the name or path of a camera file"
+            raise ValueError(f"{what}; write for example starter")
+    return tuple(found)
+
+
+def _two_values(given: Any) -> tuple[Any, Any]:
+    if not isinstance(given, (list, tuple)) or len(given) != 2:
+        raise ValueError(
+            f"{describe(given)} is not two values; write for example [6.35 um, 6.65 um]"
+        )
+    return given[0], given[1]
+
+
+def _place(given: Any) -> Any:
+    if isinstance(given, (Mapping, list, tuple)):
+        raise ValueError(f"{describe(given)} is no value; write for example 15 um, or {OPTIMUM}")
+    return given
+
+
+_Place = Annotated[Any, Either(_place, str | float)]
+
+
+class Expectation(Model):
+    """A quantity of the study and what is expected of it, which changes nothing of the sweep.
+
+    It is the study's own list of what was published or derived elsewhere; its output says what of
+    it came out, and what was set so that it comes out, which proves nothing.
+    """
+
+    quantity: Text = key(
+        "optimum (the best value itself), one of the study's metrics, or a property of the camera",
+        example="optimum",
+    )
+    between: Annotated[tuple[Any, Any], Either(_two_values, list[str | float])] = key(
+        "the least and the most that is expected", example=["6.35 um", "6.65 um"]
+    )
+    case: Text = key("name of a case; default the first", example="nominal", default="")
+    at: _Place = key(
+        "value of the parameter that is varied, or optimum",
+        unit="",
+        example="15 um",
+        default=None,
+    )
+    over: _Place = key(
+        "the ratio to what it is there: a value of the parameter, or optimum",
+        example="optimum",
+        default=None,
+    )
+    minus: _Place = key(
+        "the difference from what it is there; of optima from that of another case",
+        unit="",
+        example="5.3 um",
+        default=None,
+    )
+    set: dict[str, Any] = key(
+        "of properties: path -> value, laid over the camera",
+        example={"exposure.time": "30 ms"},
+        default=dict,
+    )
+    calibrated: Text = key(
+        "what was set so that this comes out; default nothing",
+        example="the dark current at the edge",
+        default="",
+    )
+    source: Text = key("who says so", example="Chen 2003, figure 3.8", default="")
+    why: Text = key("why it does not come out, where that is known", example="kTC", default="")
+
+    rules: ClassVar[tuple[Rule, ...]] = (at_most_one("over", "minus"),)
+
+
+class Case(Model):
+    """Overrides of a case: any paths of the camera, and `vary`."""
+
+    model_config = Model.model_config | {"extra": "allow"}
+    vary: dict[str, Variation] = key(
+        "in place of what the study varies, path by path",
+        example={"pixel.width": {"start": "3 um", "stop": "8 um", "count": 20}},
+        default=dict,
+    )
+
+    @property
+    def overrides(self) -> dict[str, Any]:
+        """Path -> value."""
+        return dict(self.__pydantic_extra__ or {})
+
+
+class Sweep(Model):
+    """A study that measures a camera while its parameters change."""
+
+    kind: Literal["sweep"] = key("the kind of study", example="sweep")
+    name: Word = key(
+        "name of the study and of its output folder; default the file's",
+        example="pixel-size",
+        default="sweep",
+    )
+    camera: Annotated[tuple[str, ...], Either(_cameras, str | list[str])] = key(
+        "name or path of a camera file, or a list of them", example="starter"
+    )
+    vary: dict[str, Variation] = key(
+        "path in the camera -> its values; several make a grid",
+        example={"pixel.width": {"start": "3 um", "stop": "8 um", "count": 20}},
+    )
+    cases: dict[Word, Case] = key(
+        "name -> overrides by path: the sweep is repeated for each",
+        example={"nominal": {}, "dim": {"scene.luminance": "10 cd/m2"}},
+        default=dict,
+    )
+    repeat: dict[str, Annotated[tuple[Any, ...], list_of_any("[0 deg, 90 deg]")]] = key(
+        "path -> values over which metrics are averaged",
+        example={"scene.source.phase": ["0 deg", "90 deg"]},
+        default=dict,
+    )
+    seeds: Annotated[int, Whole(least=1, most=100_000, example="4")] = key(
+        "number of frame seeds, from the camera's up, likewise averaged", example=4, default=1
+    )
+    metrics: Annotated[tuple[str, ...], words_of(tuple(METRICS), 1)] = key(
+        "what is measured", example=["snr_db"]
+    )
+    optimize: Annotated[Optimize | None, mapping(Optimize)] = key(
+        "find the best value of each parameter",
+        example={"metric": "mean_s_cielab", "goal": "min"},
+        default=None,
+    )
+    keep: Annotated[tuple[str, ...], words_of(KEPT, 0)] = key(
+        "frames kept of every point: raw, render", example=[], default=()
+    )
+    figures: dict[Word, Figure] = key(
+        "name of a PNG and a CSV -> what they show",
+        example={"best": {"show": "curves", "quantities": ["snr_db"]}},
+        default=dict,
+    )
+    expect: dict[Word, Expectation] = key(
+        "name -> a quantity, and between which values it is expected: expected.csv",
+        example={"best": {"quantity": "optimum", "between": ["6 um", "7 um"]}},
+        default=dict,
+    )
+
+    @model_validator(mode="after")
+    def _agrees(self) -> Self:
+        mistakes = list(self._wrong_paths())
+        if not self.vary:
+            message = "varies nothing: the grid is empty"
+            mistakes.append(fault((VARY,), message, "name a path and its values"))
+        if self.optimize is not None and self.optimize.metric not in self.metrics:
+            message = f"{self.optimize.metric} is not among the metrics"
+            mistakes.append(fault(("optimize", "metric"), message, "add it to metrics"))
+        sought = self.optimize is not None
+        mistakes += figure_model.mistakes(self.figures, self.metrics, sought)
+        for name, item in self.expect.items():
+            mistakes += _wrong_expectation(("expect", name), item, self.metrics, sought)
+        if mistakes:
+            raise failure(mistakes)
+        return self
+
+    def _wrong_paths(self) -> Iterator[InitErrorDetails]:
+        for name in self.repeat:
+            if name in self.vary:
+                yield fault(("repeat", name), "is varied too", "keep one of the two")
+        places: list[tuple[tuple[str, ...], Mapping[str, Any]]] = [
+            ((VARY,), self.vary),
+            (("repeat",), self.repeat),
+        ]
+        for name, case in self.cases.items():
+            places += [(("cases", name), case.overrides), (("cases", name, VARY), case.vary)]
+        for place, paths in places:
+            for name in paths:
+                if not name or "" in name.split("."):
+                    message = f"{describe(name)} is not a path of a camera"
+                    yield fault((*place, name), message, "write for example pixel.width")
+
+
+def _wrong_expectation(
+    place: tuple[str, ...], item: Expectation, metrics: Collection[str], sought: bool
+) -> Iterator[InitErrorDetails]:
+    """Mistakes of an expectation that take the rest of the study to tell; see `Figure`."""
+    known = (OPTIMUM, *metrics, *PROPERTIES)
+    if item.quantity not in known:
+        yield fault((*place, "quantity"), *one_of(item.quantity, known), given=item.quantity)
+        return
+    is_place = item.quantity == OPTIMUM
+    if OPTIMUM in (item.quantity, item.at, item.over, item.minus) and not sought:
+        remedy = "add optimize: {metric: ..., goal: min}"
+        yield fault((*place, "quantity"), "the study seeks no optimum", remedy)
+    if is_place and (item.at is not None or item.over is not None):
+        wrong = "at" if item.at is not None else "over"
+        yield fault((*place, wrong), "an optimum has no place of its own", f"remove {wrong}")
+    if not is_place and item.at is None:
+        yield fault((*place, "at"), "is missing", "write a value of the parameter, or optimum")
+    if item.set and (is_place or is_measured(item.quantity, metrics, item.set)):
+        message = f"{item.quantity} is taken from the sweep, which has no such overrides"
+        yield fault((*place, "set"), message, "remove set, or name a property")

@@ -1,0 +1,251 @@
+"""The best value of a parameter, and how well it is known.
+
+Every repeat and seed gives a curve of the metric over the parameter; they are averaged before the
+optimum is sought. Near the best point of the mean a cubic in ln(parameter) is fitted (in the
+parameter itself where it is not positive), to as many points as it can follow, and the optimum is
+the cubic's. The interval is that of the optima of curves drawn again with replacement (the
+bootstrap): repeats and seeds cannot tell these apart. Whole curves are drawn, so that what a repeat
+does to all values at once stays together.
+
+Where the mean departs from its cubic by more than its spread explains (a metric with a kink), or
+there is a single curve and the spread is not known, the cubic is not believed: what it leaves is
+drawn as well, and the interval reaches to the neighbors of the best point at least, between which
+the optimum of any curve with a single one lies.
+
+Reference: B. Efron, R. J. Tibshirani, An Introduction to the Bootstrap, Chapman & Hall, 1993,
+sections 6.2 and 13.3.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+DRAWS = 1000
+"""Number of means of curves that are drawn."""
+SEED = 1
+CONFIDENCE = 0.95
+"""Share of the drawn optima within low..high."""
+MIN_BOOTSTRAP_CURVES = 4
+"""Number of curves from which on means are drawn from them."""
+DEGREE = 3
+MIN_FIT_POINTS = 5
+"""Number of points that are fitted at least: a cubic passes through fewer, whatever they say."""
+REACH_SHARE, MIN_REACH = 0.2, 3
+"""Points on either side of the best that are fitted at first: a share of all, a number at least."""
+MAX_MISFIT = 4.0
+"""Mean square by which the mean may depart from its fit, over its own variance."""
+
+
+@dataclass(frozen=True)
+class Optimum:
+    """The best value of one parameter."""
+
+    place: float
+    low: float
+    """The lower end of the interval of the place; nan where a single curve leaves it open."""
+    high: float
+    """The upper end of the interval, nan likewise."""
+    value: float
+    """The metric at the optimum."""
+    edge: str = ""
+    """low | high: the range ends there, and the metric may get better beyond it."""
+
+
+def find_optimum(parameter: NDArray, curves: NDArray, goal: str) -> Optimum:
+    """Return the optimum of curves (n, points) over a parameter (points,), for the goal min or max.
+
+    Raises ValueError for curves without points, or with what is not finite.
+    """
+    order = np.argsort(parameter)
+    x = np.asarray(parameter, float)[order]
+    y = np.asarray(curves, float)[:, order] * (1 if goal == "min" else -1)
+    if not y.size or not np.isfinite(y).all():
+        raise ValueError("an optimum needs finite numbers")
+    if len(x) < MIN_FIT_POINTS:
+        return _best_point(x, y.mean(axis=0), goal)
+    scale = np.log(x) if x[0] > 0 else x
+    window, rest, follows = _fit_window(scale, y)
+    best, value = (float(part[0]) for part in _minima(scale, y.mean(axis=0)[None], window))
+    found = _minima(scale, _resampled(y, rest), window)[0]
+    low, high = math.nan, math.nan
+    if found.size:
+        tail = (1 - CONFIDENCE) / 2
+        low, high = np.quantile(found, [tail, 1 - tail], method="inverted_cdf")
+        low, high = min(low, best), max(high, best)
+    if not follows and len(x) > 2:
+        i = int(y.mean(axis=0).argmin())
+        low = np.fmin(low, min(best, scale[max(0, i - 1)]))
+        high = np.fmax(high, max(best, scale[min(len(x) - 1, i + 1)]))
+    edge = ""
+    if len(x) > 1 and best in (scale[0], scale[-1]):
+        edge = "low" if best == scale[0] else "high"
+    back = np.exp if x[0] > 0 else np.asarray
+    place, low, high = (_snapped(float(back(v)), x) for v in (best, low, high))
+    return Optimum(place, low, high, value if goal == "min" else -value, edge)
+
+
+def _best_point(x: NDArray, mean: NDArray, goal: str) -> Optimum:
+    """Return the best point itself, and its neighbors as the interval: too few for a curve."""
+    i = int(mean.argmin())
+    low, high = x[max(0, i - 1)], x[min(len(x) - 1, i + 1)]
+    ends = {0: "low", len(x) - 1: "high"} if len(x) > 1 else {}
+    value = float(mean[i]) if goal == "min" else -float(mean[i])
+    return Optimum(float(x[i]), float(low), float(high), value, ends.get(i, ""))
+
+
+def _snapped(value: float, x: NDArray) -> float:
+    """Return the value, with what the logarithm did to values of the range undone."""
+    nearest = float(x[np.abs(x - value).argmin()]) if math.isfinite(value) else value
+    return nearest if math.isclose(value, nearest, rel_tol=1e-12) else value
+
+
+@dataclass(frozen=True)
+class _Window:
+    """The points that are fitted: those from `start`, `size` of them."""
+
+    start: int
+    size: int
+
+    @property
+    def points(self) -> slice:
+        """The points as a slice."""
+        return slice(self.start, self.start + self.size)
+
+    def around(self, best: int, points: int) -> _Window:
+        """Return itself where it has the best point of a curve, moved there otherwise."""
+        if self.start <= best < self.start + self.size:
+            return self
+        return replace(self, start=min(max(0, best - self.size // 2), points - self.size))
+
+    def shorter(self, best: int) -> tuple[_Window, ...]:
+        """Return it without one of its ends, where a point is left on that side of the best one."""
+        last = self.start + self.size - 1
+        left = (_Window(self.start + 1, self.size - 1),) if self.start + 1 < best else ()
+        right = (_Window(self.start, self.size - 1),) if last - 1 > best else ()
+        return left + right
+
+
+def _fit_window(x: NDArray, curves: NDArray) -> tuple[_Window, float, bool]:
+    """Return the points around the best one of the mean that a cubic follows.
+
+    Ends that it cannot follow are left out one by one: near a pole, only on its side. Also the rms
+    by which the mean departs from the fit, less what its own spread explains, where that is known
+    (nan where nothing is); and whether the spread explains it.
+    """
+    points = len(x)
+    mean, noise = curves.mean(axis=0), _variance_of_mean(curves)
+    best, reach = int(mean.argmin()), max(MIN_REACH, round(REACH_SHARE * points))
+    size = min(points, 2 * reach + 1)
+    window = _Window(min(max(0, best - reach), points - size), size)
+    square = _misfit(x, mean, window)
+    while square > MAX_MISFIT * noise and window.size > MIN_FIT_POINTS:
+        shorter = window.shorter(best)
+        if not shorter:
+            break
+        window = min(shorter, key=lambda w: _misfit(x, mean, w))
+        square = _misfit(x, mean, window)
+    if math.isnan(square):
+        return window, math.nan if math.isnan(noise) else 0.0, False
+    rest = math.sqrt(max(0.0, square - (0.0 if math.isnan(noise) else noise)))
+    return window, rest, square <= MAX_MISFIT * noise
+
+
+def _misfit(x: NDArray, mean: NDArray, window: _Window) -> float:
+    """Return the mean square from a curve to its cubic by degree of freedom; nan without."""
+    powers, y = _powers(x[window.points]), mean[window.points]
+    free = window.size - powers.shape[1]
+    fit = powers @ np.linalg.lstsq(powers, y, rcond=None)[0]
+    return float(np.square(y - fit).sum()) / free if free else math.nan
+
+
+def _variance_of_mean(curves: NDArray) -> float:
+    """Return the variance of the mean of curves, but for shifts of the whole; nan of a single one.
+
+    The same at all points, which makes it well known from few curves.
+    """
+    count, points = curves.shape
+    if count < 2 or points < 2:
+        return math.nan
+    rest = curves - curves.mean(axis=0)
+    rest = rest - rest.mean(axis=1, keepdims=True)
+    return float(np.square(rest).sum()) / ((count - 1) * (points - 1) * count)
+
+
+def _resampled(curves: NDArray, rest: float) -> NDArray:
+    """Return means of curves drawn with replacement: (DRAWS, points).
+
+    The spread of n curves around their own mean is too small by (n - 1) / n, which is undone. Few
+    curves make too few means: normal errors of the same variance stand for them. rest: rms of what
+    the fit leaves beside the spread, all there is of a single curve. None where nothing is known.
+    """
+    rng = np.random.default_rng(SEED)
+    count, points = curves.shape
+    mean, variance = curves.mean(axis=0), _variance_of_mean(curves)
+    if math.isnan(variance) and math.isnan(rest):
+        return np.empty((0, points))
+    if count >= MIN_BOOTSTRAP_CURVES:
+        chosen = rng.integers(count, size=(DRAWS, count))
+        weights = np.stack([(chosen == i).sum(axis=1) for i in range(count)], axis=1) / count
+        out = mean + math.sqrt(count / (count - 1)) * (weights @ (curves - mean))
+    else:
+        spread = 0.0 if math.isnan(variance) else math.sqrt(variance)
+        out = mean + spread * rng.standard_normal((DRAWS, points))
+    return np.asarray(out + rest * rng.standard_normal((DRAWS, points)))
+
+
+def _powers(x: NDArray) -> NDArray:
+    """Return powers (points, degree + 1) of the parameter, from -1 to 1 over these points.
+
+    One point is left to smooth, where there are enough.
+    """
+    degree = min(DEGREE, len(x) - 1 if len(x) <= DEGREE else len(x) - 2)
+    middle, half = (x[0] + x[-1]) / 2, (x[-1] - x[0]) / 2 or 1.0
+    return np.vander((x - middle) / half, degree + 1, increasing=True)
+
+
+def _minima(x: NDArray, curves: NDArray, window: _Window) -> tuple[NDArray, NDArray]:
+    """Return where every curve is least, and how much it is there.
+
+    The minimum of the cubic, or an end of the range that is better; the best point itself where
+    the cubic has none.
+    """
+    best = curves.argmin(axis=1)
+    rows = np.arange(len(curves))
+    places, values = x[best], curves[rows, best]
+    if window.size < 3:
+        return places, values
+    windows = [window.around(int(i), len(x)) for i in best]
+    for own in dict.fromkeys(windows):
+        these = rows[[w == own for w in windows]]
+        some = x[own.points]
+        powers = _powers(some)
+        c = np.zeros((DEGREE + 1, these.size))
+        c[: powers.shape[1]] = np.linalg.lstsq(powers, curves[these, own.points].T, rcond=None)[0]
+        t, found = _cubic_minima(c)
+        here = np.polynomial.polynomial.polyval(t, c, tensor=False)
+        # A curve whose fit is best at an end of the range is best there.
+        for end, side in ((0, -1.0), (len(x) - 1, 1.0)):
+            if own.start <= end < own.start + own.size:
+                found &= here <= np.polynomial.polynomial.polyval(side, c)
+        place = (some[0] + some[-1]) / 2 + t * (some[-1] - some[0]) / 2
+        places[these] = np.where(found, place, places[these])
+        values[these] = np.where(found, here, values[these])
+    return places, values
+
+
+def _cubic_minima(c: NDArray) -> tuple[NDArray, NDArray]:
+    """Return where cubics c0 + c1 t + c2 t^2 + c3 t^3 are least, and whether in -1..1.
+
+    The root of the derivative at which the curve bends upward, in the form that loses no digits.
+    """
+    square = c[2] ** 2 - 3 * c[1] * c[3]
+    root = np.sqrt(np.maximum(square, 0))
+    safe = c[2] + root > abs(c[2]) * 1e-3
+    with np.errstate(divide="ignore", invalid="ignore"):
+        t = np.where(safe, -c[1] / (c[2] + root), (root - c[2]) / (3 * c[3]))
+    found = (square > 0) & np.isfinite(t) & (abs(t) <= 1)
+    return np.where(found, t, 0.0), found

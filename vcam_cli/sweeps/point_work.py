@@ -1,0 +1,88 @@
+"""Computing a point of a sweep: wherever it runs, the same numbers come back."""
+
+from __future__ import annotations
+
+import time
+import traceback
+from dataclasses import dataclass
+
+from vcam_cli.camera.camera import Camera
+from vcam_cli.errors import BadInput, CannotDo, one_line
+from vcam_cli.files.atomic import written_bytes
+from vcam_cli.files.png import write_png
+from vcam_cli.interrupts import restore_interrupt
+from vcam_cli.parallel import available_workers
+from vcam_cli.simulation import outputs
+from vcam_cli.simulation.provenance import versions
+from vcam_cli.simulation.shared import Shared
+from vcam_cli.simulation.simulate import Result, simulate
+from vcam_cli.sweeps.sweep_result import FRAMES, Outcome, error_cell
+
+
+@dataclass(frozen=True)
+class Job:
+    """A point to compute."""
+
+    id: str
+    camera: Camera
+    """The camera without its origin, which only messages need."""
+    metrics: tuple[str, ...]
+    """The names of the metrics that are wanted."""
+    keep: tuple[str, ...]
+    """The frames that are kept, see `FRAMES`."""
+    versions: dict[str, str]
+    """The versions of the libraries of the process that asks."""
+
+
+def compute_point(job: Job, threads: int, shared: Shared) -> Outcome:
+    """Return the outcome of a point; an error is one, an interrupt is not."""
+    start = time.perf_counter()
+    trace, final = "", True
+    try:
+        with restore_interrupt():
+            metrics, frames = _simulated(job, threads, shared)
+        return Outcome(job.id, metrics, seconds=time.perf_counter() - start, frames=frames)
+    except BadInput as error:
+        message = error_cell(error.problems)
+    except CannotDo as error:
+        message, final = str(error), False
+    except MemoryError:
+        message, final = "not enough memory; use a smaller array, or fewer workers", False
+    except Exception as error:
+        message, final = one_line(f"{type(error).__name__}: {error}"), False
+        trace = traceback.format_exc()
+    seconds = time.perf_counter() - start
+    return Outcome(job.id, error=message, final=final, seconds=seconds, trace=trace)
+
+
+def _simulated(job: Job, threads: int, shared: Shared) -> tuple[dict[str, float], dict[str, bytes]]:
+    """Return the metrics of a point, and the files that are kept of it."""
+    _check_versions(job)
+    result = simulate(job.camera, threads, shared=shared)
+    found = {name: value for name, value, _ in result.metrics}
+    metrics = {name: found[name] for name in job.metrics}
+    return metrics, {FRAMES[what]: _frame(what, result) for what in job.keep}
+
+
+_SHARED = Shared()
+
+
+def compute_on_cluster(job: Job, tasks: int) -> Outcome:
+    """Compute a point in a process of a cluster that runs so many tasks at once."""
+    return compute_point(job, max(1, available_workers() // max(1, tasks)), _SHARED)
+
+
+def _check_versions(job: Job) -> None:
+    """Raise CannotDo where this process has other versions than the one that asks."""
+    own = versions()
+    for name, wanted in job.versions.items():
+        if own.get(name) != wanted:
+            message = f"the worker has {name} {own.get(name)}, the sweep {wanted}"
+            raise CannotDo(message, "install the same version on both")
+
+
+def _frame(what: str, result: Result) -> bytes:
+    """Return the file of a frame."""
+    if what == "raw":
+        return written_bytes(FRAMES[what], lambda path: outputs.write_raw(result, path))
+    return written_bytes(FRAMES[what], lambda path: write_png(path, result.render))

@@ -1,0 +1,218 @@
+"""What follows from a camera's description in closed form, without a frame: numbers and curves.
+
+References
+----------
+[1] T. Chen, "Digital Camera System Simulator and Applications", PhD thesis, Stanford University,
+    2003, sections 3.2 and 3.4.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.derived import photodiode
+from vcam_cli.camera.derived.dark_current import dark_rate
+from vcam_cli.camera.derived.electrical import electrical
+from vcam_cli.camera.derived.geometry import Geometry, geometry
+from vcam_cli.camera.derived.pixel_layout import detector
+from vcam_cli.camera.derived.process import process
+from vcam_cli.characterization.closed_form import directional_mtf
+from vcam_cli.effects.base import Effect, Gain
+from vcam_cli.effects.off_axis import OffAxis
+from vcam_cli.effects.pixel_vignetting import PixelVignetting
+from vcam_cli.errors import bad
+from vcam_cli.image_formation import photon_rate
+from vcam_cli.image_formation.settings import settings
+from vcam_cli.physics import readout, vignetting
+from vcam_cli.readout.layout import layout
+from vcam_cli.scenes import light
+from vcam_cli.simulation import plan
+from vcam_cli.simulation.pixel_figures import pixel_figures
+from vcam_cli.sweeps.quantities import FREQUENCY, POSITION, PROPERTIES, WAVELENGTH
+
+FREQUENCIES = 161
+POSITIONS = 201
+"""Points of a curve over spatial frequency, and along the diagonal of a sensor."""
+WAVELENGTH_STEP = 2.0
+"""Step of a curve over wavelength [nm]."""
+
+
+def value(camera: Camera, name: str) -> float:
+    """Return a property of a camera in the unit of `PROPERTIES`; nan where it does not have it.
+
+    Raises BadInput where it depends on an exposure time that the camera chooses by its picture.
+    """
+    return float(_VALUES[name](camera, geometry(camera)))
+
+
+def _scaled(value: float | None, factor: float) -> float:
+    return math.nan if value is None else value * factor
+
+
+def _in_volts(camera: Camera, name: str, factor: float) -> float:
+    """Return a figure of the circuit, nan where the camera only counts electrons."""
+    circuit = electrical(camera)
+    return _scaled(getattr(circuit, name) if circuit.in_volts else None, factor)
+
+
+def _feature_size(camera: Camera) -> float | None:
+    technology = process(camera)
+    return None if technology is None else technology.feature_size
+
+
+def _corner_vignetting(camera: Camera, g: Geometry) -> float:
+    """Return the share of the light that the tunnel takes in the corner of the sensor."""
+    tunnel = PixelVignetting.from_camera(camera, g)
+    if tunnel is None:
+        return math.nan
+    corner = np.array([g.sensor_width / 2]), np.array([g.sensor_height / 2])
+    return 1 - float(_tunnel_transmission(tunnel, *corner)[0])
+
+
+def _pixel_figure(name: str) -> Callable[[Camera, Geometry], float]:
+    """Return what computes a figure of signal and noise, eqs 3.1 and 3.2 of [1]."""
+
+    def value(camera: Camera, g: Geometry) -> float:
+        time = camera.exposure.longest
+        if time is None:
+            message = f"{name} depends on the exposure time, which this camera chooses itself"
+            raise bad("exposure", message, "add set: {exposure.time: 30 ms}")
+        groups = layout(camera, g).binning_groups
+        return float(getattr(pixel_figures(camera, g, electrical(camera), groups, time), name))
+
+    return value
+
+
+_VALUES: dict[str, Callable[[Camera, Geometry], float]] = {
+    "fill_factor": lambda _, g: g.fill_factor,
+    "effective_fill_factor": lambda _, g: g.effective_fill_factor,
+    "photodetector_area": lambda _, g: g.detector_area * 1e12,
+    "photodetector_perimeter": lambda camera, _: detector(camera).perimeter * 1e6,
+    "capacitance": lambda camera, _: _scaled(electrical(camera).capacitance, 1e15),
+    "conversion_gain": lambda camera, _: _in_volts(camera, "conversion_gain", 1e6),
+    "voltage_swing": lambda camera, _: _in_volts(camera, "voltage_swing", 1.0),
+    "full_well": lambda camera, _: electrical(camera).full_well,
+    "well_capacity": lambda camera, g: (
+        electrical(camera).full_well * layout(camera, g).binning_groups.summed_codes
+    ),
+    "dark_current": lambda camera, _: dark_rate(camera),
+    "dark_current_density": lambda camera, g: (
+        dark_rate(camera) * readout.ELEMENTARY_CHARGE / g.detector_area * 1e5
+    ),
+    "nyquist_frequency": lambda _, g: 0.5e-3 / g.pitch_x,
+    "feature_size": lambda camera, _: _scaled(_feature_size(camera), 1e6),
+    "corner_vignetting": _corner_vignetting,
+    "dynamic_range_db": _pixel_figure("dynamic_range_db"),
+    "snr_db": _pixel_figure("snr_db"),
+}
+assert _VALUES.keys() == PROPERTIES.keys()
+
+
+@dataclass(frozen=True)
+class Curves:
+    """Curves of a camera over one quantity, of one color of its pixels."""
+
+    color: str
+    """"" where the color does not matter."""
+    x: dict[str, NDArray]
+    """Abscissa by column, and what else it may be counted in."""
+    y: dict[str, NDArray]
+    """Values by the name of the quantity."""
+
+
+def curves(camera: Camera, abscissa: str, nyquist: float) -> tuple[Curves, ...]:
+    """Return all curves of a camera over a spatial frequency, a wavelength or a position.
+
+    nyquist: the largest spatial frequency [lp/mm]. Raises BadInput where the camera has none.
+    """
+    if abscissa == FREQUENCY:
+        return tuple(_mtf(camera, nyquist))
+    if abscissa == WAVELENGTH:
+        return tuple(_quantum_efficiency(camera))
+    return (_along_diagonal(camera),)
+
+
+def _mtf(camera: Camera, nyquist: float) -> list[Curves]:
+    """Return the transfer along the rows on the axis, in the light of the scene's white.
+
+    There is that of the system, eq 2.28 of [1], and that of silicon and aperture, section 3.2.2.
+    """
+    if camera.scene.illuminant is None:
+        message = "the light of this scene is known only by its file"
+        raise bad("scene.source", message, "set a chart and an illuminant for this figure")
+    g, frequency = geometry(camera), np.linspace(0, nyquist * 1e3, FREQUENCIES)
+    mosaic, white = layout(camera, g).mosaic, (light.white_radiance(camera.scene),)
+
+    def transfer(effects: tuple[Effect, ...]) -> list[NDArray]:
+        found = photon_rate.scene_transfer(camera, g, settings(camera), white, mosaic, effects)
+        colors = range(len(mosaic.colors))
+        return [directional_mtf(found, effects, color, frequency, (1.0, 0.0)) for color in colors]
+
+    effects = plan.optical(camera, g)
+    both = transfer(effects), transfer(tuple(e for e in effects if not e.in_lens))
+    x = {FREQUENCY: frequency / 1e3, "of_nyquist": frequency / (nyquist * 1e3)}
+    return [
+        Curves(color, x, {"system_mtf": system, "sensor_mtf": sensor})
+        for color, system, sensor in zip(mosaic.colors, *both, strict=True)
+    ]
+
+
+def _quantum_efficiency(camera: Camera) -> list[Curves]:
+    """Return electrons per photon on the photodetector, behind the array's filters.
+
+    A quantum efficiency that is given per pixel is that of photons on the pixel.
+    """
+    band = camera.scene.wavelengths
+    count = round((band.stop - band.start) * 1e9 / WAVELENGTH_STEP) + 1
+    wavelength = np.linspace(band.start, band.stop, max(count, 2))
+    silicon = photodiode.quantum_efficiency(camera)
+    found = []
+    for color in layout(camera, geometry(camera)).mosaic.colors:
+        spec = camera.array.filters.get(color)
+        response = silicon if spec is None else silicon.multiply(spec.resolve())
+        values = {"quantum_efficiency": np.asarray(response.evaluate(wavelength))}
+        found.append(Curves(color, {WAVELENGTH: np.round(wavelength * 1e9, 6)}, values))
+    return found
+
+
+def _along_diagonal(camera: Camera) -> Curves:
+    """Return what pixels along the diagonal collect, positions positive to the lower right.
+
+    Raises BadInput where all pixels collect alike.
+    """
+    g = geometry(camera)
+    gains = [e for e in plan.wanted(camera, g) if isinstance(e, Gain)]
+    tunnel = next((e for e in gains if isinstance(e, PixelVignetting)), None)
+    falloff = next((e for e in gains if e.name == OffAxis.name), None)
+    if tunnel is None and falloff is None:
+        message = "neither a stack above the pixels nor a falloff is there: all collect alike"
+        raise bad("pixel.stack", message, "name a case that has one, or set pixel.stack")
+    part, ones = np.linspace(-1, 1, POSITIONS), np.ones(POSITIONS)
+    x, y = part * g.sensor_width / 2, part * g.sensor_height / 2
+    efficiency = ones if tunnel is None else _tunnel_transmission(tunnel, x, y)
+    illumination = ones if falloff is None else np.diagonal(falloff.gain(x, y)) / falloff.on_axis
+    relative = efficiency / efficiency[POSITIONS // 2]
+    position = part * math.hypot(g.sensor_width, g.sensor_height) / 2
+    return Curves(
+        "",
+        {POSITION: position * 1e3},
+        {
+            "relative_qe": relative,
+            "qe_over_no_vignetting": efficiency,
+            "lens_falloff": illumination,
+            "relative_signal": relative * illumination,
+        },
+    )
+
+
+def _tunnel_transmission(tunnel: PixelVignetting, x: NDArray, y: NDArray) -> NDArray:
+    """Return the share of the light behind the layers that meets the photodetector."""
+    share = np.asarray(tunnel.at(x, y), float)
+    straight = float(vignetting.stack_transmission(1.0, tunnel.layers))
+    return share / straight if tunnel.internal else share

@@ -1,0 +1,84 @@
+"""A sweep from its study to its tables: what `vcam sweep` does.
+
+What is finished is kept at once, a file a point; tables and plots are made of what is kept and
+what is known, in the study's order. So they are the same bytes however often the sweep was
+stopped, and whoever computed its points.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from vcam_cli.errors import bad
+from vcam_cli.progress import Observer, Silent
+from vcam_cli.sweeps import sweep_file
+from vcam_cli.sweeps.sweep_result import SweepResult, finished_result, request_hash
+
+
+@dataclass(frozen=True)
+class Share:
+    """One of several shares of the points."""
+
+    number: int
+    count: int
+
+    def __post_init__(self) -> None:
+        if not 1 <= self.number <= self.count:
+            message = f"there is no share {self.number} of {self.count}"
+            raise bad(
+                "--shard", message, f"write 1/{max(1, self.count)} to {self.count}/{self.count}"
+            )
+
+
+@dataclass(frozen=True)
+class Execution:
+    """Which points of a sweep are computed, and by whom."""
+
+    share: Share | None = None
+    workers: int | None = None
+    """Processes; None for one a core."""
+    scheduler: str | None = None
+    """The address of a Dask scheduler that computes in their place."""
+    fresh: bool = False
+    """Whether finished points are computed again."""
+
+
+def sweep(
+    study: str | Path,
+    out: str | Path | None = None,
+    sets: Sequence[str] = (),
+    workers: int | None = None,
+    scheduler: str | None = None,
+    shard: tuple[int, int] | None = None,
+    fresh: bool = False,
+    watch: Observer | None = None,
+    tell: Callable[[str], None] | None = None,
+) -> SweepResult:
+    """Run a sweep study, or what is left of it, and write its tables and plots.
+
+    study: a file, or the name of a shipped study; out: folder, default out/NAME; sets: overrides
+    "PATH=VALUE" laid over every camera; workers: processes, default all processors; scheduler:
+    address of a Dask scheduler in their place; shard: (i, n), the i-th of n shares of the points;
+    fresh: computes all of them again. watch is told of the progress, tell gets messages. Raises
+    BadInput (wrong study, or no camera of it is valid) and CannotDo (disk, scheduler).
+    """
+    start = time.perf_counter()
+    execution = Execution(Share(*shard) if shard else None, workers, scheduler, fresh)
+    watch, tell = watch or Silent(), tell or (lambda _: None)
+    watch.begin("points")
+    file = sweep_file.read(study)
+    place = Path(out) if out is not None else Path("out") / file.model.name
+    request = request_hash(file, sets)
+    result = None if fresh else finished_result(place, file, request)
+    if result is None:
+        # With the whole engine behind it: a sweep that is finished starts without.
+        from vcam_cli.sweeps.computation import computed_sweep
+
+        result = computed_sweep(file, sets, place, execution, request, watch, tell)
+    else:
+        for problem in result.refused:
+            tell(problem)
+    return replace(result, seconds=time.perf_counter() - start)

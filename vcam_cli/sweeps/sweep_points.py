@@ -1,0 +1,258 @@
+"""From a study to its points: every camera resolved and checked before anything runs.
+
+The order is that of points.csv: cases, then the grid (the last parameter fastest), then what is
+repeated, then seeds.
+
+A point is known by the hash of all that its numbers depend on: the resolved camera with what its
+files hold, what is measured, and the versions of what computes. How the study calls a point, and
+where files lie, is not in it: two machines agree, and a study that is extended keeps what it has.
+"""
+
+from __future__ import annotations
+
+import itertools
+import json
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from vcam_cli.camera import load as cameras
+from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.load import FILE_KEYS, merge
+from vcam_cli.camera.simulation import Seed
+from vcam_cli.config.document import Document
+from vcam_cli.config.file_names import current_folder
+from vcam_cli.config.validation_messages import NO_SUCH_KEY
+from vcam_cli.config.yaml_tree import Node, Source, tree_at
+from vcam_cli.errors import BadInput, Problem, split
+from vcam_cli.files.report import hash_file, hash_text
+from vcam_cli.simulation import provenance
+from vcam_cli.simulation.checks import CHECKS
+from vcam_cli.sweeps.model import Sweep
+from vcam_cli.sweeps.sweep_file import Cell, Parameter, StudyCase, StudyFile
+
+MOST_POINTS = 1_000_000
+LIBRARIES = ("vcam", "numpy", "scipy", "OpenImageIO")
+"""Libraries whose versions decide a point's numbers."""
+
+
+@dataclass(frozen=True)
+class Point:
+    """One frame of the study."""
+
+    case: str
+    varied: dict[str, Cell]
+    """Path of a parameter -> its value here."""
+    repeated: dict[str, Cell]
+    """Path of what is averaged over -> its value here."""
+    seed: int | None
+    """The seed of the frame; None where the camera is refused."""
+    camera: Camera | None
+    """The camera; None where it is refused."""
+    id: str
+    """The hash of the point; "" where the camera is refused."""
+    content: str = ""
+    """The hash of all but the seed, the same for all seeds of a camera."""
+    problems: tuple[Problem, ...] = ()
+    """Why the camera is refused."""
+    inputs: tuple[Path, ...] = ()
+    """The files of a camera that is refused."""
+
+
+@dataclass(frozen=True)
+class Grid:
+    """All points of a study."""
+
+    study: StudyFile
+    varied: tuple[Parameter, ...]
+    """The parameters of all cases together, each as the first case has it."""
+    repeated: tuple[Parameter, ...]
+    """What is averaged over."""
+    cases: dict[str, StudyCase]
+    """Name -> case."""
+    points: tuple[Point, ...]
+    inputs: tuple[Path, ...]
+    """Every file that was read, or will be."""
+
+    @property
+    def refused(self) -> tuple[Problem, ...]:
+        """What is wrong with cameras of the study, each mistake once."""
+        return tuple(dict.fromkeys(p for point in self.points for p in point.problems))
+
+
+def grid(study: StudyFile, sets: Sequence[str] = (), folder: Path | None = None) -> Grid:
+    """Return the points of a study, with `--set` overrides laid over every camera.
+
+    Raises BadInput where a path names nothing, and where no point at all has a valid camera.
+    Cameras that are refused are points with `problems`.
+    """
+    over = cameras.overlay(sets, folder or current_folder())
+    repeated = study.repeated()
+    cases = {case.name: case for case in study.cases()}
+    _refuse_sets(sets, {*repeated, *(path for case in cases.values() for path in case.parameters)})
+    _refuse_too_many(study.model, repeated, [case.parameters for case in cases.values()])
+    points: list[Point] = []
+    for case in cases.values():
+        points += _points(study.model, case, over, repeated)
+    found = Grid(
+        study=study,
+        varied=tuple(_by_path(case.parameters for case in cases.values()).values()),
+        repeated=tuple(repeated.values()),
+        cases=cases,
+        points=tuple(points),
+        inputs=_inputs(study, points),
+    )
+    nameless = [p for p in found.refused if p.message.startswith(NO_SUCH_KEY)]
+    if nameless:
+        raise BadInput(nameless)
+    if all(point.camera is None for point in points):
+        raise BadInput(found.refused)
+    return found
+
+
+def _by_path(parameters: Iterable[dict[str, Parameter]]) -> dict[str, Parameter]:
+    """Return the parameters of all cases together, each as the first case has it."""
+    out: dict[str, Parameter] = {}
+    for own in parameters:
+        out |= {path: parameter for path, parameter in own.items() if path not in out}
+    return out
+
+
+def _refuse_sets(sets: Sequence[str], grid_paths: Iterable[str]) -> None:
+    """Refuse overrides that would make a column of the table untrue. Raises BadInput."""
+    problems = []
+    varied = [split(path) for path in grid_paths]
+    for item in sets:
+        path = split(item.partition("=")[0].strip())
+        for other in varied:
+            n = min(len(path), len(other))
+            if path[:n] == other[:n]:
+                message = f"the study varies {'.'.join(map(str, other))}"
+                problems.append(Problem(path, message, "set another key", "--set"))
+    if problems:
+        raise BadInput(problems)
+
+
+def _refuse_too_many(model: Sweep, repeated: dict, cases: list[dict[str, Parameter]]) -> None:
+    each = model.seeds
+    for parameter in repeated.values():
+        each *= len(parameter.nodes)
+    total = 0
+    for varied in cases:
+        count = each
+        for parameter in varied.values():
+            count *= len(parameter.nodes)
+        total += count
+    if total > MOST_POINTS:
+        message = f"the study has {total} points, more than {MOST_POINTS}"
+        raise BadInput([Problem((), message, "vary less, or split it into several")])
+
+
+def _points(
+    model: Sweep, case: StudyCase, over: Node, repeated: dict[str, Parameter]
+) -> Iterator[Point]:
+    """Yield the points of a case, in their order."""
+    parameters = [*case.parameters.values(), *repeated.values()]
+    for chosen in itertools.product(*(range(len(p.nodes)) for p in parameters)):
+        nodes = {p.path: p.nodes[i] for p, i in zip(parameters, chosen, strict=True)}
+        cells = {p.path: p.cells[i] for p, i in zip(parameters, chosen, strict=True)}
+        here = Point(
+            case.name,
+            {path: cells[path] for path in case.parameters},
+            {path: cells[path] for path in repeated},
+            None,
+            None,
+            "",
+        )
+        file = case.base
+        try:
+            file = case_file(case, nodes, over)
+            camera = file.validate(CHECKS)
+        except BadInput as error:
+            refused = replace(here, problems=error.problems, inputs=file.inputs)
+            yield from itertools.repeat(refused, model.seeds)
+            continue
+        camera = camera.model_copy(update={"name": case.name.replace("/", "-")})
+        content = _content(camera, model)
+        for i in range(model.seeds):
+            own = seeded(camera, i)
+            point = hash_text(f"{content} {own.seed.frame}")[:32]
+            yield replace(here, seed=own.seed.frame, camera=own, id=point, content=content)
+
+
+def case_file(case: StudyCase, nodes: Mapping[str, Node], over: Node) -> Document:
+    """Return the camera file of a case with values by path, overrides laid over all of it."""
+    tree = Node({}, Source("", case.base.file.parent))
+    for path, node in nodes.items():
+        tree = merge(tree, tree_at(split(path), node))
+    return case.base.overlay(tree).overlay(over)
+
+
+def seeded(camera: Camera, number: int) -> Camera:
+    """Return a camera with the frame seed so many after its own."""
+    seed = Seed(sensor=camera.seed.sensor, frame=camera.seed.frame + number)
+    return camera.model_copy(update={"seed": seed})
+
+
+def _content(camera: Camera, model: Sweep) -> str:
+    """Return the hash of all that a point's numbers depend on, but for the seed of its frame."""
+    form = camera.model_dump(mode="json")
+    for name in ("name", "quality") if model.keep else ("name", "quality", "output"):
+        form.pop(name, None)
+    form["seed"] = form["seed"]["sensor"]
+    return hash_of(camera, form, {"metrics": sorted(model.metrics), "keep": sorted(model.keep)})
+
+
+def hash_of(camera: Camera, form: dict[str, Any], asked: dict[str, Any]) -> str:
+    """Return the hash of what is computed of a camera, wherever its files lie.
+
+    form: what counts of its YAML form; asked: what is computed, by keys of its own.
+    """
+    whole = asked | {
+        "camera": _with_contents(form),
+        "files": sorted(_digest(path) for path in provenance.data_files(camera, form)),
+        "versions": {name: _versions()[name] for name in LIBRARIES},
+    }
+    return hash_text(json.dumps(whole, sort_keys=True))
+
+
+def _with_contents(form: Any) -> Any:
+    """Return a camera's YAML form with what files hold in place of where they lie."""
+    if isinstance(form, dict):
+        return {
+            key: [_digest(Path(item)), Path(item).suffix.lower()]
+            if key in FILE_KEYS and isinstance(item, str)
+            else _with_contents(item)
+            for key, item in form.items()
+        }
+    return [_with_contents(item) for item in form] if isinstance(form, list) else form
+
+
+def _digest(path: Path) -> str:
+    """Return the hash of a file, computed once as long as it does not change."""
+    status = path.stat()
+    return _digest_of(str(path), status.st_mtime_ns, status.st_size, status.st_ino)
+
+
+@cache
+def _digest_of(path: str, changed: int, size: int, node: int) -> str:
+    return hash_file(path)
+
+
+@cache
+def _versions() -> dict[str, str]:
+    return provenance.versions()
+
+
+def _inputs(study: StudyFile, points: Sequence[Point]) -> tuple[Path, ...]:
+    files = {study.file}
+    seen: set[tuple[Path, ...]] = set()
+    for point in points:
+        if point.camera is None:
+            files.update(point.inputs)
+        elif point.camera.files not in seen:
+            seen.add(point.camera.files)
+            files |= {*point.camera.files, *provenance.data_files(point.camera)}
+    return tuple(sorted(files))

@@ -1,0 +1,297 @@
+"""Workers that compute points: this process, processes of this machine, or a Dask cluster.
+
+All of them compute a point alike. Points come in groups that share their light
+(`image_formation.rate_cache`): a worker keeps to its group, and shares another worker's when no
+group is left.
+
+Why the processes are no `ProcessPoolExecutor`: that one neither replaces a worker that died nor
+kills those at work when a sweep is interrupted, its workers outlive a parent that was killed, and
+they run the caller's script again.
+"""
+
+from __future__ import annotations
+
+import logging
+import os
+import subprocess
+import sys
+import time
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, wait
+from contextlib import suppress
+from importlib import import_module
+from multiprocessing import Pipe
+from multiprocessing.connection import Connection
+from threading import Lock
+from typing import Any, Literal
+
+from vcam_cli.errors import CannotDo, bad
+from vcam_cli.parallel import ThreadPool, available_workers
+from vcam_cli.simulation.shared import Shared
+from vcam_cli.sweeps.point_work import Job, compute_on_cluster, compute_point
+from vcam_cli.sweeps.sweep_result import Outcome
+
+Verdict = Literal["compute", "finished", "claimed"]
+Ask = Callable[[Job], Verdict]
+"""Tells whether a point is to be computed, is finished, or is claimed by another process."""
+Groups = Sequence[Sequence[Job]]
+Submit = Callable[[int, Job], "Future[Outcome]"]
+"""Starts to compute a point on the worker of a number."""
+
+SERVE = "import sys; sys.path[:] = {}; from vcam_cli.sweeps.workers import serve; serve({}, {})"
+"""The program of a worker process: its path, the number of its connection, and of its threads."""
+THREAD_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+TRIES = 3
+"""Number of worker processes that may die of the same point."""
+DEATH_TIMEOUT = 5.0
+"""Seconds within which a process that has closed its connection must have ended."""
+POLL_INTERVAL = 0.2
+"""Seconds between looks at points that other processes have claimed."""
+CONNECT_TIMEOUT = 5.0
+"""Seconds within which a scheduler must answer."""
+WORKER_TIMEOUT = 60.0
+"""Seconds within which a scheduler must have a worker."""
+
+
+class JobQueue:
+    """The points that are left, handed out group by group."""
+
+    def __init__(self, groups: Groups, ask: Ask) -> None:
+        self._groups = deque(deque(group) for group in groups if group)
+        self._ask = ask
+        self._own: dict[int, deque[Job]] = {}
+        self._claimed: deque[Job] = deque()
+
+    @property
+    def waiting(self) -> bool:
+        """Whether points of this sweep are claimed by other processes."""
+        return bool(self._claimed)
+
+    def next(self, worker: int) -> Job | None:
+        """Return the next point of a worker; None while there is none."""
+        for job in self._candidates(worker):
+            verdict = self._ask(job)
+            if verdict == "compute":
+                return job
+            if verdict == "claimed":
+                self._claimed.append(job)
+        return None
+
+    def _candidates(self, worker: int) -> Iterator[Job]:
+        claimed = len(self._claimed)
+        while group := self._group(worker):
+            yield group.popleft()
+        for _ in range(claimed):
+            yield self._claimed.popleft()
+
+    def _group(self, worker: int) -> deque[Job]:
+        """Return the group of a worker; where none is left, the longest of the others to share."""
+        if not self._own.get(worker):
+            longest = max(self._own.values(), key=len, default=deque())
+            self._own[worker] = self._groups.popleft() if self._groups else longest
+        return self._own[worker]
+
+
+def compute_here(groups: Groups, ask: Ask, threads: int) -> Iterator[Outcome]:
+    """Compute one point after the other in this process."""
+    shared = Shared()
+
+    def submit(_: int, job: Job) -> Future[Outcome]:
+        future: Future[Outcome] = Future()
+        future.set_result(compute_point(job, threads, shared))
+        return future
+
+    for _, future in _completed(JobQueue(groups, ask), [0], submit):
+        yield future.result()
+
+
+def compute_in_processes(groups: Groups, ask: Ask, count: int, threads: int) -> Iterator[Outcome]:
+    """Compute points in processes of this machine, each with so many threads."""
+    processes = [WorkerProcess(threads) for _ in range(count)]
+    with ThreadPool(count) as pool:
+
+        def submit(worker: int, job: Job) -> Future[Outcome]:
+            return pool.submit(processes[worker].compute, job)
+
+        try:
+            for _, future in _completed(JobQueue(groups, ask), range(count), submit):
+                yield future.result()
+        finally:
+            for process in processes:
+                process.end()
+
+
+def compute_on_dask(
+    groups: Groups, ask: Ask, address: str, report: Callable[[str], None]
+) -> Iterator[Outcome]:
+    """Compute points on the workers of a running Dask scheduler. Raise CannotDo without one."""
+    client = _client(address)
+    lost = f"the Dask scheduler at {address} is lost; finished points are kept"
+    try:
+        slots = _slots(client, address, report)
+        # A group stays with its worker, while that one is there: its light is computed once.
+        executors = [
+            client.get_executor(pure=False, retries=TRIES, workers=[name], allow_other_workers=True)
+            for name, _ in slots
+        ]
+
+        def submit(slot: int, job: Job) -> Future[Outcome]:
+            return executors[slot].submit(compute_on_cluster, job, slots[slot][1])
+
+        # Every slot has two points, so that it does not wait for the next one to be sent.
+        numbers = [*range(len(slots)), *range(len(slots))]
+        for job, future in _completed(JobQueue(groups, ask), numbers, submit):
+            yield _outcome(job, future, lost)
+    except (OSError, RuntimeError) as error:
+        raise CannotDo(lost, "run the same command again") from error
+    finally:
+        with suppress(Exception):
+            client.close(timeout=1)
+
+
+def _completed(
+    queue: JobQueue, workers: Sequence[int], submit: Submit
+) -> Iterator[tuple[Job, Future[Outcome]]]:
+    """Keep workers busy until no point is left; each number is there as often as it has points."""
+    idle = deque(workers)
+    running: dict[Future[Outcome], tuple[int, Job]] = {}
+    while True:
+        for worker in [idle.popleft() for _ in range(len(idle))]:
+            job = queue.next(worker)
+            if job is None:
+                idle.append(worker)
+            else:
+                running[submit(worker, job)] = worker, job
+        if running:
+            timeout = POLL_INTERVAL if queue.waiting else None
+            for future in wait(running, timeout, FIRST_COMPLETED).done:
+                worker, job = running.pop(future)
+                idle.append(worker)
+                yield job, future
+        elif queue.waiting:
+            time.sleep(POLL_INTERVAL)
+        else:
+            return
+
+
+class WorkerProcess:
+    """A process that computes one point at a time, replaced when it dies."""
+
+    def __init__(self, threads: int) -> None:
+        self._threads = threads
+        self._lock = Lock()
+        self._ended = False
+        self._process: subprocess.Popen | None = None
+        self._connection: Connection
+
+    def compute(self, job: Job) -> Outcome:
+        """Compute a point; called by one thread at a time."""
+        how = ""
+        for _ in range(TRIES):
+            self._start()
+            try:
+                self._connection.send(job)
+                return self._connection.recv()
+            except (EOFError, OSError):
+                how = self._death()
+        message = f"its process died {TRIES} times ({how}); too little memory?"
+        return Outcome(job.id, error=message, final=False)
+
+    def end(self) -> None:
+        """End the process, whatever it does: each point that is finished has been sent."""
+        with self._lock:
+            self._ended = True
+            if self._process is not None:
+                self._process.kill()
+                self._process.wait()
+
+    def _start(self) -> None:
+        """Start the process where there is none."""
+        with self._lock:
+            if self._ended:
+                raise CancelledError
+            if self._process is not None:
+                return
+            self._connection, theirs = Pipe()
+            with theirs:
+                self._process = subprocess.Popen(
+                    [sys.executable, "-c", SERVE.format(sys.path, theirs.fileno(), self._threads)],
+                    pass_fds=[theirs.fileno()],
+                    stdin=subprocess.DEVNULL,
+                    stdout=subprocess.DEVNULL,
+                    env=os.environ | dict.fromkeys(THREAD_VARIABLES, str(self._threads)),
+                    process_group=0,  # an interrupt is for this process alone
+                )
+
+    def _death(self) -> str:
+        """Return how the process ended, which has closed its connection."""
+        with self._lock:
+            process, self._process = self._process, None
+        assert process is not None
+        with suppress(subprocess.TimeoutExpired):
+            process.wait(DEATH_TIMEOUT)
+        process.kill()
+        code = process.wait()
+        return f"signal {-code}" if code < 0 else f"exit code {code}"
+
+
+def serve(descriptor: int, threads: int) -> None:
+    """Compute what comes, as the main function of a process, until the connection closes."""
+    connection, shared = Connection(descriptor), Shared()
+    with suppress(EOFError, OSError):
+        while True:
+            connection.send(compute_point(connection.recv(), threads, shared))
+
+
+def _outcome(job: Job, future: Any, lost: str) -> Outcome:
+    """Return the outcome of a point that a cluster has, or has not, computed."""
+    if future.cancelled():
+        raise CannotDo(lost, "run the same command again")
+    error = future.exception()
+    if isinstance(error, ImportError):
+        message = f"the Dask workers cannot import vcam: {error}"
+        raise CannotDo(message, "install vcam there, in the same version")
+    if error is not None:
+        return Outcome(job.id, error=f"lost on the cluster: {type(error).__name__}", final=False)
+    return future.result()
+
+
+def _client(address: str) -> Any:
+    """Return a client of the scheduler. Raise CannotDo, and BadInput for no address."""
+    try:
+        distributed: Any = import_module("distributed")
+    except ImportError as error:
+        message = "--scheduler needs Dask, which is not installed"
+        raise CannotDo(message, "pip install 'vcam-cli[dask]'") from error
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)
+    try:
+        return distributed.Client(address, timeout=CONNECT_TIMEOUT, set_as_default=False)
+    except ValueError as error:
+        raise bad("--scheduler", f"{address!r}: {error}", "write tcp://HOST:8786") from error
+    except (OSError, TimeoutError) as error:
+        message = f"no Dask scheduler answers at {address} within {CONNECT_TIMEOUT:g} s"
+        raise CannotDo(message, "start one with: dask scheduler") from error
+
+
+def _slots(client: Any, address: str, report: Callable[[str], None]) -> list[tuple[str, int]]:
+    """Return (worker, its threads) once for each thread of each worker."""
+    if not client.nthreads():
+        report(f"waiting for a worker at {address}")
+        with suppress(TimeoutError):
+            client.wait_for_workers(1, timeout=WORKER_TIMEOUT)
+    slots = [(name, count) for name, count in client.nthreads().items() for _ in range(count)]
+    if not slots:
+        message = f"the Dask scheduler at {address} has no workers"
+        raise CannotDo(message, f"start some with: dask worker {address}")
+    return slots
+
+
+def processes_and_threads(workers: int | None, points: int) -> tuple[int, int]:
+    """Return the number of processes for so many points, and of the threads in each.
+
+    Together they have no more threads than there are processors, unless more workers are wanted.
+    """
+    processors = available_workers()
+    count = max(1, min(workers or processors, points))
+    return count, max(1, processors // count)
