@@ -153,7 +153,6 @@ RESAMPLED = Case(
 
 PICTURE = np.random.default_rng(5).random(SAMPLES).astype(np.float32)
 FINE = Axis(SAMPLES, 1.0, PIXELS, ROOT, 0.5, True, 0.5)
-DOWN = Axis(1, 1.0, 1, 1.0, 0.5, True, 0.5)
 DETECTOR = 1 / 16
 
 
@@ -180,7 +179,7 @@ BOXES = Case(
     "a box of 1/16 sample is the difference of sums over 10007",
     "overlaps one by one",
     lambda: in_digits(_boxes_exact, ASKED),
-    lambda: box_average.of_samples(PICTURE[None], FINE, DOWN, DETECTOR, 1.0)[0, ASKED],
+    lambda: box_average.square_averages(PICTURE[None].astype(float), FINE, DETECTOR, 1)[0, ASKED],
     _boxes_by_float32_sums,
     "running sums in the picture's float32",
     1e-8,

@@ -24,10 +24,10 @@ def box_averages(
     """
     size = geometry.collecting_width, geometry.collecting_height
     if isinstance(scene, ChartScene):
-        return _of_chart(scene, mix, geometry, size)
+        return _chart_averages(scene, mix, geometry, size)
     x, y = axes
     planes = scene.planes(mix, workers)
-    return np.array([_of_squares(_of_squares(p, y, size[1], 0), x, size[0], 1) for p in planes])
+    return np.array([square_averages(square_averages(p, y, size[1], 0), x, size[0], 1) for p in planes])
 
 
 def point_values(scene: SampledScene, mix: NDArray, geometry: Geometry) -> NDArray:
@@ -35,7 +35,7 @@ def point_values(scene: SampledScene, mix: NDArray, geometry: Geometry) -> NDArr
     return scene.at(*pixel_centers(geometry, detector=True), mix)
 
 
-def _of_chart(
+def _chart_averages(
     scene: ChartScene, mix: NDArray, geometry: Geometry, size: tuple[float, float]
 ) -> NDArray:
     """The chart painted on cells that are the collecting areas, and the gaps between them."""
@@ -48,7 +48,7 @@ def _of_chart(
         rows = slice(top, min(top + band, geometry.rows))
         cells = y[0][rows.start * y[2] : (rows.stop - 1) * y[2] + y[1] + 1]
         painted = scene.chart.within(x[0], cells).averages(x[0], cells, mix)
-        out[:, rows] = _joined(_joined(painted, y, 1), x, 2)
+        out[:, rows] = _box_means(_box_means(painted, y, 1), x, 2)
     return out
 
 
@@ -68,7 +68,7 @@ def _edges(center: NDArray, size: float, coarsest: float) -> Boxes:
     return np.append(inside[:, :-1].ravel(), inside[-1, -1]), parts, parts
 
 
-def _joined(cells: NDArray, boxes: Boxes, axis: int) -> NDArray:
+def _box_means(cells: NDArray, boxes: Boxes, axis: int) -> NDArray:
     """Means over the boxes' cells along an axis."""
     _, parts, step = boxes
     every = np.moveaxis(cells, axis, -1)
@@ -78,16 +78,16 @@ def _joined(cells: NDArray, boxes: Boxes, axis: int) -> NDArray:
     return np.moveaxis(mean, -1, axis)
 
 
-def _of_squares(plane: NDArray, axis: Axis, size: float, along: int) -> NDArray:
+def square_averages(plane: NDArray, axis: Axis, size: float, along: int) -> NDArray:
     """Means of uniform squares of light over boxes, by running sums read at both edges."""
     center = (axis.first + np.arange(axis.pixels) * axis.pixel_pitch) / axis.sample_pitch
     half = size / axis.sample_pitch / 2
     sums = np.cumsum(plane, axis=along, dtype=np.float64)
-    low, high = (_up_to(sums, plane, center + edge, along) for edge in (-half, half))
+    low, high = (_mirrored_integral(sums, plane, center + edge, along) for edge in (-half, half))
     return ((high - low) / (2 * half)).astype(plane.dtype)
 
 
-def _up_to(sums: NDArray, plane: NDArray, position: NDArray, along: int) -> NDArray:
+def _mirrored_integral(sums: NDArray, plane: NDArray, position: NDArray, along: int) -> NDArray:
     """Integral of the samples, mirrored at both ends, from the edge to `position` (in samples)."""
     count = plane.shape[along]
     inside = count - np.abs(count - np.abs(position))

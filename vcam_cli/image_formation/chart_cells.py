@@ -31,6 +31,9 @@ BEYOND_CUTOFF = 1.1
 FOLDED = 0.04
 """Means over cells fold what edges have beyond the cells' Nyquist frequency: what is left of it is
 this part of full signal over the squared ratio of that frequency to the cut-off, about."""
+SAFE = 3.0
+"""Factor on the cells that this asks for where none are measured: a chart of patches smaller than
+the lens resolves leaves twice as much, relative to its own weak signal."""
 NEAR = 12.0
 """Reach of the near field in inverse cut-off frequencies: what is folded further away is blurred
 away before it reaches the array."""
@@ -96,10 +99,10 @@ def cells_per_pixel(path: OpticalPath, scene: ChartScene, highest: float) -> tup
     """
     if path.settings.oversampling is not None:
         return path.settings.oversampling, 0.0
-    finest = highest * max(BEYOND_CUTOFF, math.sqrt(FOLDED / path.settings.tolerance))
+    asked = highest * max(BEYOND_CUTOFF, math.sqrt(FOLDED / path.settings.tolerance))
+    finest, reference = SAFE * asked, COPRIME * asked
     if math.prod(cell_grid(scene, path.geometry, finest)) <= CHEAP:
         return finest, 0.0
-    reference = COPRIME * finest
     level = path.transfer.level[:, int(path.transfer.level.sum(axis=0).argmax())]
     otf = _mean_otf(path, finest)
     crops = _crops(path.geometry, scene, reference, level)
@@ -131,7 +134,7 @@ Table = tuple[NDArray, NDArray]
 def _mean_otf(path: OpticalPath, highest: float) -> Table:
     """The OTF of the color with most light, its aberrations aside: they only weaken detail."""
     g = path.geometry
-    corner = highest * COPRIME * math.hypot(0.5 / g.pitch_x, 0.5 / g.pitch_y)
+    corner = highest * math.hypot(0.5 / g.pitch_x, 0.5 / g.pitch_y)
     f = np.linspace(0, min(path.transfer.cutoff, corner), FREQUENCIES)
     weights = path.transfer.weights[:, int(path.transfer.level.sum(axis=0).argmax())].sum(axis=0)
     otf = (weights / (weights.sum() or 1.0)) @ path.transfer.otf_radial(f)
