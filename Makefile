@@ -24,7 +24,7 @@ lint: $(VENV)/.dev  ## format, lint, spelling, types
 
 check: lint test-all  ## format, lint, spelling, types, all tests
 
-bench: $(VENV)/.dev  ## speed, as ratios: to bare transforms and draws, to plain NumPy, by stage and effect, growth
+bench: $(VENV)/.dev  ## speed, as ratios: to bare transforms and draws, to plain NumPy, by camera, stage and effect
 	$(BIN)/python -m tests.bench
 
 promise: $(VENV)/.dev  ## the plan's promises, measured on twenty-two cameras and forty random ones

@@ -1,15 +1,25 @@
 """Speed, as ratios that mean the same on every machine.
 
-    python -m tests.bench [--json FILE] [--quick]
+    python -m tests.bench [PART ...] [--json FILE] [--quick]
 
 The yardstick is R_compute: what no camera simulator can do without. For a 12-megapixel Bayer
 frame: one real FFT of each component of the scene, one back for each of three colors, and one
-standard normal per pixel for each of five noise sources. Beside it: a plain NumPy pipeline,
-wavelength by wavelength; the shares of the stages; what every effect costs; how time grows with
-pixels and wavelengths; sweeps over single frames; schedules.
+standard normal per pixel for each of five noise sources. The parts, by default all of them:
+
+    frames       a camera before four scenes, over R_compute; the shares of its stages
+    shipped      every shipped camera, over R_compute of its own size
+    painted      a painted chart beside a photograph of its size; its peak memory
+    plain        a plain NumPy pipeline, wavelength by wavelength, over the frame
+    wavelengths  301 wavelengths over 31
+    effects      a frame over the same without one effect
+    sweeps       sweeps over single frames
+    growth       how time grows with pixels
+    schedules    best sampling schedules, over R_compute
+    command      `vcam run` beside the bare imports
 
 Figures are medians of repeated runs in one process, once by the wall clock and once by the time of
-all processors. --quick: small frames, one run each, fewer effects: to see that it works.
+all processors. --quick: small frames, one run each, fewer effects and cameras: to see that it
+works.
 """
 
 from __future__ import annotations
@@ -17,20 +27,23 @@ from __future__ import annotations
 import argparse
 import json
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 
 from .report import lines
-from .whole import QUICK, WHOLE, measure
+from .whole import PARTS, QUICK, WHOLE, measure
 
 
-def main() -> int:
+def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="python -m tests.bench")
+    parser.add_argument("parts", nargs="*", metavar="PART", help=f"some of {', '.join(PARTS)}")
     parser.add_argument("--json", help="also write the figures to this file")
     parser.add_argument("--quick", action="store_true", help="small frames, one run each")
-    options = parser.parse_args()
-    found = measure(
-        QUICK if options.quick else WHOLE, lambda part: print(f"{part} ...", file=sys.stderr)
-    )
+    options = parser.parse_args(arguments)
+    if unknown := set(options.parts) - set(PARTS):
+        parser.error(f"no such part: {', '.join(sorted(unknown))}; parts are {', '.join(PARTS)}")
+    size = QUICK if options.quick else WHOLE
+    found = measure(size, options.parts, lambda part: print(f"{part} ...", file=sys.stderr))
     print("\n".join(lines(found)))
     if options.json:
         Path(options.json).write_text(json.dumps(found, indent=1), encoding="utf-8")

@@ -1,8 +1,12 @@
-"""What is timed and how: medians of repeated runs in one process, wall clock and processor time."""
+"""What is measured and how: medians of repeated runs, by the wall clock and by processor time."""
 
 from __future__ import annotations
 
+import os
+import resource
 import statistics
+import subprocess
+import sys
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -15,10 +19,12 @@ from vcam_cli.camera.camera import Camera
 from vcam_cli.parallel import available_workers
 from vcam_cli.progress import Silent
 
-SOURCES = 5
-"""Of noise in the yardstick."""
+NOISE_SOURCES = 5
+"""Noise sources in the yardstick."""
 READ = "read"
-"""The stage that reads files: not counted."""
+"""The stage that reads files, which is not counted."""
+Clocks = tuple[float, float]
+"""Readings of the wall clock and of the processors' [s]."""
 
 
 @dataclass(frozen=True)
@@ -27,34 +33,96 @@ class Cost:
 
     wall: float
     cpu: float
-    """Of all threads of this process together."""
+    """Processor time of all threads together."""
 
-    def over(self, other: Cost) -> dict[str, float]:
-        """How many times as much as the other."""
+    def ratio(self, other: Cost) -> dict[str, float]:
+        """How many times as much this is as the other, by either clock."""
         return {"wall": self.wall / other.wall, "cpu": self.cpu / other.cpu}
 
-    def scaled(self, factor: float) -> Cost:
+    def scale(self, factor: float) -> Cost:
+        """This cost times a factor."""
         return Cost(self.wall * factor, self.cpu * factor)
 
 
+def process_clocks() -> Clocks:
+    """The wall clock and this process's processor time."""
+    return time.perf_counter(), time.process_time()
+
+
+def children_clocks() -> Clocks:
+    """The wall clock and the processor time of all processes that this one has waited for."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return time.perf_counter(), used.ru_utime + used.ru_stime
+
+
+def elapsed(start: Clocks, end: Clocks) -> Cost:
+    """The cost between two readings; at least a nanosecond, so that clocks that stand divide."""
+    return Cost(max(end[0] - start[0], 1e-9), max(end[1] - start[1], 1e-9))
+
+
 def median(costs: Sequence[Cost]) -> Cost:
-    """Of wall and of processor time, each by itself."""
+    """The median of wall clock and of processor time, each by itself."""
     wall = statistics.median(c.wall for c in costs)
     return Cost(wall, statistics.median(c.cpu for c in costs))
 
 
-def once(work: Callable[[], object]) -> Cost:
-    """What one run costs; at least a nanosecond, so that clocks that stand still divide."""
-    wall, cpu = time.perf_counter(), time.process_time()
+def run_cost(work: Callable[[], object], clocks: Callable[[], Clocks] = process_clocks) -> Cost:
+    """What one run costs."""
+    start = clocks()
     work()
-    return Cost(max(time.perf_counter() - wall, 1e-9), max(time.process_time() - cpu, 1e-9))
+    return elapsed(start, clocks())
 
 
-def timed(work: Callable[[], object], repeats: int, warm: bool = True) -> Cost:
+def median_cost(work: Callable[[], object], repeats: int, warm: bool = True) -> Cost:
     """Median of `repeats` runs of `work`, after one more to warm up."""
     if warm:
         work()
-    return median([once(work) for _ in range(repeats)])
+    return median([run_cost(work) for _ in range(repeats)])
+
+
+def start_cost(work: Sequence[str], folder: str) -> Cost:
+    """What a Python process of its own costs, as it is installed: compiled once, into a folder.
+
+    It raises CalledProcessError where the process fails.
+    """
+    kept = {k: v for k, v in os.environ.items() if k != "PYTHONDONTWRITEBYTECODE"}
+    kept["PYTHONPYCACHEPREFIX"] = f"{folder}/compiled"
+    command = [sys.executable, *work]
+    return run_cost(lambda: subprocess.run(command, env=kept, check=True), children_clocks)
+
+
+def take_turns(repeats: int, *works: Callable[[], Cost]) -> list[Cost]:
+    """Medians of the costs of several works, one of each at a time, after a first that is not
+    counted.
+
+    A machine is faster at one moment than at another; turns let that happen to all alike.
+    """
+    turns = [[work() for work in works] for _ in range(repeats + 1)]
+    return [median(costs) for costs in zip(*turns[1:], strict=True)]
+
+
+PEAK = """
+import sys
+from pathlib import Path
+from vcam_cli import load, simulate
+result = simulate(load(sys.argv[1]))
+result.render, result.metrics
+status = Path("/proc/self/status")
+if status.exists():  # ru_maxrss begins with that of the process that started this one
+    line = next(x for x in status.read_text().splitlines() if x.startswith("VmHWM"))
+    print(1024 * int(line.split()[1]))
+else:
+    import resource
+    print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
+"""
+"""A frame, its render and metrics in a process of its own, which prints its peak memory [bytes]."""
+
+
+def peak_memory(camera: str) -> int:
+    """Peak memory of a process that takes a frame of a camera file, with its metrics [bytes]."""
+    command = [sys.executable, "-c", PEAK, camera]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    return int(done.stdout)
 
 
 @dataclass(frozen=True)
@@ -62,13 +130,13 @@ class Yardstick:
     """R_compute, what no simulator can do without, by the number of the scene's components."""
 
     transform: Cost
-    """A real FFT of one component of the scene, on all processors."""
+    """The cost of a real FFT of one component of the scene, on all processors."""
     rest: Cost
-    """One back for each of three colors; a standard normal per pixel for each of five noise
-    sources, from one generator."""
+    """The cost of one FFT back for each of three colors, and of a standard normal per pixel for
+    each of five noise sources, from one generator."""
 
-    def of(self, components: int) -> Cost:
-        """All of it, in 32 bits."""
+    def compute(self, components: int) -> Cost:
+        """R_compute of a scene of so many components, in 32 bits."""
         return Cost(
             self.rest.wall + components * self.transform.wall,
             self.rest.cpu + components * self.transform.cpu,
@@ -76,7 +144,7 @@ class Yardstick:
 
 
 def yardstick(rows: int, columns: int, repeats: int) -> Yardstick:
-    """Measured for a frame of that size."""
+    """The yardstick of a frame of that size."""
     workers = available_workers()
     scene = np.random.default_rng(0).random((rows, columns), dtype=np.float32)
     spectrum = scipy.fft.rfft2(scene, workers=workers)
@@ -85,15 +153,15 @@ def yardstick(rows: int, columns: int, repeats: int) -> Yardstick:
     def rest() -> None:
         for _ in range(3):
             scipy.fft.irfft2(spectrum, s=scene.shape, workers=workers)
-        for _ in range(SOURCES):
+        for _ in range(NOISE_SOURCES):
             generator.standard_normal((rows, columns), dtype=np.float32)
 
-    transform = timed(lambda: scipy.fft.rfft2(scene, workers=workers), repeats)
-    return Yardstick(transform, timed(rest, repeats))
+    transform = median_cost(lambda: scipy.fft.rfft2(scene, workers=workers), repeats)
+    return Yardstick(transform, median_cost(rest, repeats))
 
 
-def middle(found: Sequence[Yardstick]) -> Yardstick:
-    """The median of several."""
+def median_yardstick(found: Sequence[Yardstick]) -> Yardstick:
+    """The median of several yardsticks."""
     return Yardstick(median([y.transform for y in found]), median([y.rest for y in found]))
 
 
@@ -103,10 +171,10 @@ class _Reading(Silent):
 
     wall: float = 0.0
     cpu: float = 0.0
-    _since: tuple[float, float] | None = None
+    _since: Clocks | None = None
 
     def begin(self, stage: str) -> None:
-        now = time.perf_counter(), time.process_time()
+        now = process_clocks()
         if self._since is not None:
             self.wall += now[0] - self._since[0]
             self.cpu += now[1] - self._since[1]
@@ -121,10 +189,10 @@ class Frames:
     costs: list[Cost] = field(default_factory=list)
     stages: list[dict[str, float]] = field(default_factory=list)
     components: int = 1
-    """Planes of the scene that were transformed."""
+    """Mixtures of the scene's components that were transformed."""
 
     def take(self, repeats: int = 1, warm: bool = False) -> Frames:
-        """Takes so many more; warm: and one before them that does not count."""
+        """Takes so many more; where `warm`, after one that does not count."""
         for number in range(repeats + warm):
             cost, stages = self._one()
             if number or not warm:
@@ -139,7 +207,7 @@ class Frames:
             results.append(simulate(self.camera, watch=reading))
             results[0].render  # noqa: B018
 
-        whole = once(work)
+        whole = run_cost(work)
         self.components = max(1, results[0].frame.spectrum.planes)
         stages = {k: v for k, v in results[0].stages.seconds.items() if k != READ}
         cost = Cost(max(whole.wall - reading.wall, 1e-9), max(whole.cpu - reading.cpu, 1e-9))
@@ -147,15 +215,16 @@ class Frames:
 
     @property
     def cost(self) -> Cost:
+        """The median of all frames."""
         return median(self.costs)
 
     @property
     def shares(self) -> dict[str, float]:
-        """Of the wall clock: stage -> median of its part of the stages' sum."""
-        parts = [{k: v / sum(s.values()) for k, v in s.items()} for s in self.stages]
-        return {name: statistics.median(p[name] for p in parts) for name in parts[-1]}
+        """Each stage's part of all stages by the wall clock, over all frames together."""
+        sums = {name: sum(s[name] for s in self.stages) for name in self.stages[-1]}
+        return {name: seconds / sum(sums.values()) for name, seconds in sums.items()}
 
 
 def frames(camera: Camera, repeats: int) -> Frames:
-    """So many of a camera's frames, after one to warm up."""
+    """Takes so many of a camera's frames, after one to warm up."""
     return Frames(camera).take(repeats, warm=True)

@@ -3,50 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import pairwise
 from typing import Any
 
-CLOCKS = ("wall", "cpu")
+FORMATS = {"wall": "9.3f", "cpu": "9.3f", "share": "9.2%", "gigabytes": "9.2f"}
+"""The columns that a row may have, and how their figures are written."""
+WIDTH = 46
+"""Characters before the first column."""
 
 
 def lines(found: dict[str, Any]) -> Iterator[str]:
-    """The table. Columns: what, ratio of wall clocks, ratio of processor times."""
+    """The table: what was measured, by the wall clock and by processor time."""
     unit, rows, columns = found["r_compute"], *found["size"]
     yield f"{rows} x {columns} pixels, {found['processors']} processors"
     yield f"R_compute = 1 ({unit['wall']:.3g} s here, {unit['cpu']:.3g} s of processors)"
-    yield f"{'':<46}{'wall':>9}{'cpu':>9}"
-    yield from _section("frame over R_compute", found["yardstick"])
-    yield from _section("plain NumPy, 31 wavelengths, over the frame", found["plain"])
-    yield f"  {'mean signals differ by, rms':<44}{found['plain_apart']:>9.2%}"
-    yield from _stages(found["stages"])
-    yield from _section("frame over the same without", found["effects"])
-    yield from _growth(found["growth"])
-    yield from _section("wavelengths", found["wavelengths"])
-    yield from _section("sweep over one frame", found["sweeps"])
-    yield from _section("schedules over R_compute at 12 megapixels", found["schedules"])
-    yield from _section("whole command over R_compute at 12 megapixels", found["command"])
+    yield f"{'':<{WIDTH}}{'wall':>9}{'cpu':>9}"
+    for title, section in found["sections"].items():
+        yield title
+        for name, row in section.items():
+            yield _row(name, row)
 
 
-def _section(title: str, rows: dict[str, dict[str, float]]) -> Iterator[str]:
-    yield title
-    for name, ratio in rows.items():
-        label = f"{name}, {ratio['points']} points" if "points" in ratio else name
-        yield f"  {label:<44}" + "".join(f"{ratio[c]:>9.3f}" for c in CLOCKS if c in ratio)
-
-
-def _stages(shares: dict[str, float]) -> Iterator[str]:
-    yield "shares of the frame of a gray picture"
-    for name, share in shares.items():
-        yield f"  {name:<44}{share:>9.1%}"
-
-
-def _growth(found: dict[str, Any]) -> Iterator[str]:
-    sizes = found["megapixels"]
-    yield "growth with pixels"
-    yield f"  {'exponent':<44}" + "".join(f"{found[c]['exponent']:>9.3f}" for c in CLOCKS)
-    for i, size in enumerate(sizes[:-1]):
-        title = f"a pixel at {size:.3g} MP over {sizes[-1]:.3g} MP"
-        yield f"  {title:<44}" + "".join(f"{found[c]['a_pixel'][i]:>9.3f}" for c in CLOCKS)
-    for i, pair in enumerate(pairwise(sizes)):
-        title = f"exponent from {pair[0]:.3g} to {pair[1]:.3g} MP"
-        yield f"  {title:<44}" + "".join(f"{found[c]['between'][i]:>9.3f}" for c in CLOCKS)
+def _row(name: str, row: dict[str, float]) -> str:
+    figures = "".join(format(row[key], style) for key, style in FORMATS.items() if key in row)
+    asked = f"  asked: at most {row['at_most']:g}" if "at_most" in row else ""
+    return f"  {name:<{WIDTH - 2}}{figures}{asked}"

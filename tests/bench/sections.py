@@ -1,14 +1,12 @@
-"""The parts of the benchmark: each a mapping of names to ratios, every ratio of one process."""
+"""The parts of the benchmark: each gives sections of rows, every row a ratio of one process."""
 
 from __future__ import annotations
 
 import math
-import os
-import subprocess
-import sys
 import tempfile
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -17,17 +15,44 @@ import numpy as np
 from vcam_cli import load, simulate, sweep
 from vcam_cli.accuracy import ablation
 from vcam_cli.accuracy.study import without
+from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.derived.geometry import geometry
+from vcam_cli.config import shipped
 from vcam_cli.scheduling.pdf import Pdf
 from vcam_cli.scheduling.shot_noise import optimal_schedules
 
 from . import plain
 from .cameras import BUSY, PLAIN, Studio, studio
-from .measure import Cost, Frames, frames, middle, timed, yardstick
+from .measure import (
+    Cost,
+    Frames,
+    frames,
+    median_cost,
+    median_yardstick,
+    peak_memory,
+    start_cost,
+    take_turns,
+    yardstick,
+)
 
-Ratio = dict[str, float]
+Row = dict[str, float]
+"""Figures by column (`report.FORMATS`), and under `at_most` what is asked of the first."""
+Section = dict[str, Row]
+"""Rows by name."""
+
 CAPTURES = range(1, 21)
-IN_TURN = 2e6
-"""Pixels that small frames of a turn have together, about."""
+PIXELS_A_TURN = 2e6
+"""Pixels that the small frames of one turn have together, about."""
+MOST_A_TURN = 8
+"""Frames of one turn, at most."""
+PAINTED_OVER_PHOTOGRAPH = 2.0
+"""What a painted chart may cost over a photograph of its size."""
+PAINTED_MEMORY = 1.3
+"""What a painted chart of 12 megapixels may take of memory [GB]."""
+START_UP = 0.3
+"""What `vcam run` may take beyond the bare imports [s]."""
+IMPORTS = ("numpy", "scipy.fft", "pydantic", "OpenImageIO", "typer")
+"""Libraries without which no frame is simulated and written."""
 VARIED = {
     "exposure time": ("exposure.time", "10 ms", "50 ms"),
     "f-number": ("optics.f_number", "2.8", "8"),
@@ -35,121 +60,172 @@ VARIED = {
 """Light is brought to the pixels once for all exposure times, and anew for every f-number."""
 
 
-def against_yardstick(
-    place: Studio, size: tuple[int, int], repeats: int, scenes: Sequence[str]
-) -> tuple[dict[str, Ratio], Frames]:
-    """Frames over R_compute of as many components; and those of the gray picture, for stages.
+def frames_a_turn(pixels: float) -> int:
+    """The number of frames of so many pixels that make one turn."""
+    return round(min(max(PIXELS_A_TURN / pixels, 1), MOST_A_TURN))
 
-    Each takes turns with the yardstick, since machines are faster at one moment than at another.
-    """
-    found, kept = {}, []
+
+def over_yardstick(camera: Camera, repeats: int) -> tuple[Row, Frames]:
+    """A camera's frames over R_compute of its own size and components, and these frames."""
+    g = geometry(camera)
+    count = frames_a_turn(g.rows * g.columns)
+    taken, units = Frames(camera).take(warm=True, repeats=0), []
+    for _ in range(repeats):
+        units.append(yardstick(g.rows, g.columns, count))
+        taken.take(count)
+    unit = median_yardstick(units).compute(taken.components)
+    return taken.cost.ratio(unit), taken
+
+
+def against_yardstick(place: Studio, repeats: int, scenes: Sequence[str]) -> dict[str, Section]:
+    """A camera before several scenes over R_compute, and the stages' shares of the gray one."""
+    rows, shares = {}, {}
     for scene in ("gray", *scenes):
-        taken, units = Frames(place.camera(scene)).take(0, warm=True), []
-        for _ in range(repeats):
-            units.append(yardstick(*size, 1))
-            taken.take()
-        unit = middle(units).of(taken.components)
+        ratio, taken = over_yardstick(place.camera(scene), repeats)
         more = f", {taken.components} components" if taken.components > 1 else " picture"
-        found[f"{scene}{more}"] = taken.cost.over(unit)
-        kept.append(taken)
-    return found, kept[0]
+        rows[f"{scene}{more}"] = ratio
+        if scene == "gray":
+            shares = {name: {"share": share} for name, share in taken.shares.items()}
+    return {"frame over R_compute": rows, "shares of the frame of a gray picture": shares}
+
+
+def shipped_cameras(names: Sequence[str], repeats: int) -> dict[str, Section]:
+    """Every shipped camera's frame over R_compute of its own size and components."""
+    rows = {}
+    for name in names:
+        camera = load(name)
+        g = geometry(camera)
+        rows[f"{name}, {g.rows * g.columns / 1e6:.2g} MP"] = over_yardstick(camera, repeats)[0]
+    return {"frame time over R_compute, shipped cameras": rows}
+
+
+def painted_chart(place: Studio, repeats: int) -> dict[str, Section]:
+    """The camera `12mp-bayer` before its painted chart and before a photograph of that size."""
+    extended = {
+        "name": "painted",
+        "extends": str(shipped.find("cameras", "12mp-bayer")),
+        "array": {"rows": place.rows, "columns": place.columns},
+        **place.always,
+    }
+    photograph = {"source": {"kind": "image", "file": "leaves.png", "model": "mallett"}}
+    chart_file = place.write(extended, "painted.yaml")
+    photograph_file = place.write({**extended, "scene": photograph}, "photograph.yaml")
+    chart, picture = (Frames(load(path)) for path in (chart_file, photograph_file))
+    for taken in (chart, picture):
+        taken.take(repeats=0, warm=True)
+    for _ in range(repeats):
+        chart.take()
+        picture.take()
+    ratio = {**chart.cost.ratio(picture.cost), "at_most": PAINTED_OVER_PHOTOGRAPH}
+    memory = {
+        "chart, peak memory [GB]": {
+            "gigabytes": peak_memory(str(chart_file)) / 1e9,
+            "at_most": PAINTED_MEMORY,
+        },
+        "photograph, peak memory [GB]": {"gigabytes": peak_memory(str(photograph_file)) / 1e9},
+    }
+    return {"a painted chart beside a photograph": {"chart over photograph": ratio, **memory}}
 
 
 def against_plain(
     place: Studio, repeats: int, scenes: Sequence[str] = ("gray", "color"), count: int = 31
-) -> tuple[dict[str, Ratio], float]:
+) -> dict[str, Section]:
     """The plain pipeline over vcam's frame, its render left out; and how far the two are apart.
 
     The last: rms of the difference of their mean rates over the largest rate. Most of it are the
     fine details that a picture sampled once a pixel does not have. No warming up for the plain one:
     it has nothing to warm.
     """
-    found = {}
+    rows: Section = {}
     apart = math.nan
     for scene in scenes:
         camera = place.camera(scene, processing=[])
         given, ours = plain.setup(camera, count)
-        theirs = timed(lambda given=given: plain.frame(given), repeats, warm=False)
-        found[scene] = theirs.over(frames(camera, repeats).cost)
+        theirs = median_cost(lambda given=given: plain.frame(given), repeats, warm=False)
+        rows[scene] = theirs.ratio(frames(camera, repeats).cost)
         apart = ablation.rms(plain.rate(given) - ours) / float(ours.max())
-    return found, apart
+    rows["mean signals differ by, rms"] = {"share": apart}
+    return {f"plain NumPy, {count} wavelengths, over the frame": rows}
 
 
 def per_effect(
     place: Studio, repeats: int, names: Sequence[str] = (), base: dict[str, Any] = BUSY
-) -> dict[str, Ratio]:
+) -> dict[str, Section]:
     """The frame with everything on over the same without one effect, at a fixed exposure time.
 
-    names: some of the effects, default all. Turns are taken, so that a machine that gets slower
-    does so for all.
+    names: some of the effects, by default all.
     """
     free = place.camera("gray", base)
     camera = ablation.with_exposure_time(free, simulate(free).exposure_time)
     chosen = names or ablation.wanted_effects(camera)
     camera = ablation.with_effects(camera, "all")
     whole = Frames(camera).take(0, warm=True)
-    others = {name: Frames(without(camera, name)) for name in chosen}
-    for name in chosen:
-        others[name].take(0, warm=True)
+    others = {name: Frames(without(camera, name)).take(0, warm=True) for name in chosen}
     for _ in range(repeats):
         whole.take()
         for other in others.values():
             other.take()
-    return {name: whole.cost.over(other.cost) for name, other in others.items()}
+    rows = {name: whole.cost.ratio(other.cost) for name, other in others.items()}
+    return {"frame over the same without": rows}
 
 
 def growth(
     sizes: Sequence[tuple[int, int]], repeats: int, always: dict[str, Any]
-) -> dict[str, Any]:
+) -> dict[str, Section]:
     """How time grows with pixels: time ~ pixels ** exponent. 1 is proportional.
 
-    The exponent of a line through all sizes, those between neighbors, and the time a pixel takes
-    at each size over that at the largest. Sizes take turns, small ones more than one at a time.
-    All pictures are the middle of the largest: the more detail, the further up spectra are
+    The exponent of a line through all sizes, the time a pixel takes at each size over that at the
+    largest, and the exponents between neighbors. Sizes take turns, small ones more than one at a
+    time. All pictures are the middle of the largest: the more detail, the further up spectra are
     followed.
     """
-    pixels = [float(rows * columns) for rows, columns in sizes]
+    pixels = np.array([float(rows * columns) for rows, columns in sizes])
     with ExitStack() as studios:
         taken = []
         for rows, columns in sizes:
             place = studios.enter_context(studio(rows, columns, always, of=sizes[-1]))
             taken.append(Frames(place.camera("gray")).take(0, warm=True))
         for _ in range(repeats):
-            for one, size in zip(taken, pixels, strict=True):
-                one.take(round(min(max(IN_TURN / size, 1), 8)))
-    costs = [one.cost for one in taken]
-    out: dict[str, Any] = {"megapixels": [p / 1e6 for p in pixels]}
-    for clock in ("wall", "cpu"):
-        seconds = [getattr(cost, clock) for cost in costs]
-        logs = np.log(pixels), np.log(seconds)
-        out[clock] = {
-            "exponent": float(np.polyfit(*logs, 1)[0]),
-            "between": (np.diff(logs[1]) / np.diff(logs[0])).tolist(),
-            "a_pixel": (np.divide(seconds, pixels) * pixels[-1] / seconds[-1]).tolist(),
-        }
-    return out
+            for one, count in zip(taken, pixels, strict=True):
+                one.take(frames_a_turn(count))
+    return {"growth with pixels": growth_rows(pixels, [one.cost for one in taken])}
 
 
-def wavelengths(place: Studio, repeats: int) -> dict[str, Ratio]:
-    """Frames of 301 wavelengths over those of 31, and the exponent that follows from it.
+def growth_rows(pixels: np.ndarray, costs: Sequence[Cost]) -> Section:
+    """The rows of `growth`, from rising numbers of pixels and what frames of so many cost."""
+    seconds = {clock: np.array([getattr(c, clock) for c in costs]) for clock in ("wall", "cpu")}
 
-    Turns are taken, since the difference is small.
-    """
+    def row(figure: Callable[[np.ndarray], float]) -> Row:
+        return {clock: float(figure(values)) for clock, values in seconds.items()}
+
+    logs, mega = np.log(pixels), pixels / 1e6
+    rows = {"exponent": row(lambda s: np.polyfit(logs, np.log(s), 1)[0])}
+    for i, size in enumerate(mega[:-1]):
+        name = f"a pixel at {size:.3g} MP over {mega[-1]:.3g} MP"
+        rows[name] = row(lambda s, i=i: s[i] / s[-1] * pixels[-1] / pixels[i])
+    for i, (low, high) in enumerate(pairwise(mega)):
+        name = f"exponent from {low:.3g} to {high:.3g} MP"
+        rows[name] = row(lambda s, i=i: np.log(s[i + 1] / s[i]) / (logs[i + 1] - logs[i]))
+    return rows
+
+
+def wavelengths(place: Studio, repeats: int) -> dict[str, Section]:
+    """Frames of 301 wavelengths over those of 31, and the exponent that follows from it."""
     few, many = (
-        Frames(place.camera("gray", accuracy={"wavelength_step": step}))
+        Frames(place.camera("gray", accuracy={"wavelength_step": step})).take(0, warm=True)
         for step in ("10 nm", "1 nm")
     )
-    for each in (few, many):
-        each.take(0, warm=True)
     for _ in range(repeats):
         few.take()
         many.take()
-    ratio = many.cost.over(few.cost)
+    ratio = many.cost.ratio(few.cost)
     exponent = {clock: math.log(r) / math.log(301 / 31) for clock, r in ratio.items()}
-    return {"301 over 31": ratio, "exponent": exponent}
+    return {"wavelengths": {"301 over 31": ratio, "exponent": exponent}}
 
 
-def sweeps(place: Studio, repeats: int, points: int = 20, varied: Sequence[str] = ()) -> dict:
+def sweeps(
+    place: Studio, repeats: int, points: int = 20, varied: Sequence[str] = ()
+) -> dict[str, Section]:
     """A sweep of so many points over one frame with its metric; 1 / points of it is one point's.
 
     Processes are started, and tables and plots written, on the sweep's account. Wall clock only:
@@ -159,8 +235,8 @@ def sweeps(place: Studio, repeats: int, points: int = 20, varied: Sequence[str] 
     tree = place.tree("gray", PLAIN, **quality)
     path = place.write(tree, "swept.yaml")
     camera = load(path)
-    single = timed(lambda: simulate(camera).metrics, repeats)
-    found = {}
+    single = median_cost(lambda: simulate(camera).metrics, repeats)
+    rows = {}
     for name in varied or VARIED:
         key, start, stop = VARIED[name]
         study = place.write(
@@ -174,8 +250,8 @@ def sweeps(place: Studio, repeats: int, points: int = 20, varied: Sequence[str] 
             "study.yaml",
         )
         seconds = _swept(study, place.folder / f"sweep {name}", points)
-        found[name] = {"wall": seconds / single.wall, "points": points}
-    return found
+        rows[f"{name}, {points} points"] = {"wall": seconds / single.wall}
+    return {"sweep over one frame": rows}
 
 
 def _swept(study: Path, out: Path, points: int) -> float:
@@ -186,49 +262,34 @@ def _swept(study: Path, out: Path, points: int) -> float:
     return done.seconds
 
 
-def schedules(unit: Cost, repeats: int, levels: int = 65_536) -> dict[str, Ratio]:
+def schedules(unit: Cost, repeats: int, levels: int = 65_536) -> dict[str, Section]:
     """Best schedules of 1 to 20 captures of a scene of so many levels, over R_compute."""
     rng = np.random.default_rng(0)
     values = np.sort(np.exp(rng.uniform(0, np.log(1e6), levels)))
     scene = Pdf.levels(values, rng.random(levels) + 1e-3)
-    cost = timed(lambda: optimal_schedules(scene, CAPTURES), repeats)
-    return {f"{levels} levels, 1 to {CAPTURES[-1]} captures": cost.over(unit)}
+    cost = median_cost(lambda: optimal_schedules(scene, CAPTURES), repeats)
+    row = {f"{levels} levels, 1 to {CAPTURES[-1]} captures": cost.ratio(unit)}
+    return {"schedules over R_compute at 12 megapixels": row}
 
 
-def command(unit: Cost, repeats: int, rows: int = 432, columns: int = 600) -> dict[str, Ratio]:
-    """`vcam run` of a small frame from start to end, and what loading takes of it.
+def command(repeats: int, rows: int = 432, columns: int = 600) -> dict[str, Section]:
+    """`vcam run` of a small frame from start to end beside the bare imports of its libraries [s].
 
-    unit: R_compute at 12 megapixels, whatever the size of this frame. As it is installed: compiled
-    once, which the first, uncounted run does.
+    Seconds, not ratios: what a user waits for. All as it is installed: compiled once, which the
+    first start does, which is not counted.
     """
     size = [f"--set=array.rows={rows}", f"--set=array.columns={columns}"]
     with tempfile.TemporaryDirectory() as folder:
         run = ["-m", "vcam_cli.commands.main", "run", "starter", "-q", "-o", f"{folder}/out", *size]
-        loading = ["-c", f"import {', '.join(LOADED)}"]
-        works = {"vcam run": run, "of it Python and loading": loading}
-        return {
-            f"{name}, {rows} x {columns}": {"wall": _started(work, folder, repeats) / unit.wall}
-            for name, work in works.items()
+        imports = ["-c", f"import {', '.join(IMPORTS)}"]
+        whole, bare = take_turns(
+            repeats, lambda: start_cost(run, folder), lambda: start_cost(imports, folder)
+        )
+    beyond = {"wall": whole.wall - bare.wall, "cpu": whole.cpu - bare.cpu, "at_most": START_UP}
+    return {
+        f"whole command, {rows} x {columns} pixels": {
+            "vcam run [s]": {"wall": whole.wall, "cpu": whole.cpu},
+            "bare imports [s]": {"wall": bare.wall, "cpu": bare.cpu},
+            "vcam run beyond the bare imports [s]": beyond,
         }
-
-
-LOADED = (
-    "vcam_cli.commands.main",
-    "vcam_cli.commands.run",
-    "vcam_cli.simulation.checks",
-    "vcam_cli.simulation.outputs",
-    "vcam_cli.simulation.simulate",
-    "vcam_cli.files.report",
-)
-"""What `vcam run` loads."""
-
-
-def _started(work: Sequence[str], folder: str, repeats: int) -> float:
-    """Seconds of a Python process: median, by the clock."""
-    kept = {k: v for k, v in os.environ.items() if k != "PYTHONDONTWRITEBYTECODE"}
-    kept["PYTHONPYCACHEPREFIX"] = f"{folder}/compiled"
-
-    def start() -> None:
-        subprocess.run([sys.executable, *work], env=kept, check=True)
-
-    return timed(start, repeats).wall
+    }

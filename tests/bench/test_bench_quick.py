@@ -7,33 +7,30 @@ import subprocess
 import numpy as np
 import pytest
 from bench import plain, sections
+from bench.__main__ import main
 from bench.cameras import BUSY, PLAIN, studio
-from bench.measure import Cost, Frames, median
+from bench.measure import Cost, Frames, Yardstick, median, peak_memory, start_cost, take_turns
 from bench.report import lines
-from bench.whole import Size, measure
+from bench.whole import PARTS, Size, measure
 
 from vcam_cli.accuracy import ablation
-
-pytestmark = pytest.mark.long
 
 TINY = Size(
     frame=(36, 48),
     part=(36, 48),
     growth=((24, 32), (36, 48)),
     repeats=1,
+    few=1,
+    plain_scenes=("color",),
     wavelengths=31,
     points=20,
     levels=64,
     effects=("shot_noise", "off_axis"),
-    plain_repeats=1,
-    plain_scenes=("color",),
     scenes=(),
+    shipped=("csf-monochrome",),
     busy=PLAIN,
     always={"processing": [{"demosaic": "bilinear"}]},  # a fit takes longest of a frame so small
 )
-
-
-_started = sections._started
 
 
 @pytest.fixture(scope="module")
@@ -41,7 +38,8 @@ def found():
     with pytest.MonkeyPatch.context() as patch:
         # Those start processes, which takes longer than all the rest.
         patch.setattr(sections, "_swept", lambda study, out, points: 1.0)
-        patch.setattr(sections, "_started", lambda work, folder, repeats: 1.0)
+        patch.setattr(sections, "start_cost", lambda work, folder: Cost(len(work), len(work)))
+        patch.setattr(sections, "peak_memory", lambda camera: 1_000_000_000)
         yield measure(TINY)
 
 
@@ -51,45 +49,101 @@ def place():
         yield made
 
 
-def figures(tree, path=()):
-    """(path, number) of all numbers of a tree."""
-    if isinstance(tree, dict):
-        for key, value in tree.items():
-            yield from figures(value, (*path, key))
-    elif isinstance(tree, list):
-        for i, value in enumerate(tree):
-            yield from figures(value, (*path, i))
-    else:
-        yield path, tree
+def figures(found):
+    """(section, row, column, figure) of all that was measured."""
+    for title, rows in found["sections"].items():
+        for name, row in rows.items():
+            for column, figure in row.items():
+                yield title, name, column, figure
 
 
+@pytest.mark.long
 def test_every_part_is_there(found):
-    assert set(found) == {
-        "processors", "size", "repeats", "r_compute", "yardstick", "stages", "plain",
-        "plain_apart", "wavelengths", "effects", "sweeps", "growth", "schedules", "command",
-    }  # fmt: skip
-    assert set(found["yardstick"]) == {"gray picture", *TINY.scenes}
-    assert set(found["effects"]) == set(TINY.effects)
-    assert set(found["sweeps"]) == set(sections.VARIED)
-    assert len(found["growth"]["wall"]["between"]) == len(TINY.growth) - 1
-    assert len(found["growth"]["cpu"]["a_pixel"]) == len(TINY.growth)
+    titles = " ".join(found["sections"])
+    for word in (
+        "frame over R_compute", "shares", "shipped", "photograph", "plain NumPy", "wavelengths",
+        "without", "sweep", "growth", "schedules", "command",
+    ):  # fmt: skip
+        assert word in titles
+    assert len(PARTS) == len(found["sections"]) - 1  # frames have their shares besides
+    assert set(found["sections"]["frame over the same without"]) == set(TINY.effects)
+    (camera,) = found["sections"]["frame time over R_compute, shipped cameras"]
+    assert camera.startswith("csf-monochrome, ")
+    assert list(found["sections"]["sweep over one frame"]) == [
+        f"{name}, 20 points" for name in sections.VARIED
+    ]
 
 
+@pytest.mark.long
 def test_figures_are_finite_and_positive(found):
-    for path, number in figures(found):
-        assert math.isfinite(number), path
-        exponent = "exponent" in path or "between" in path  # of tiny frames, it may fall
-        assert exponent or number > 0 or path[0] == "stages", path
-    assert sum(found["stages"].values()) == pytest.approx(1)  # one frame's
+    for title, name, column, figure in figures(found):
+        assert math.isfinite(figure), (title, name)
+        exponent = "exponent" in name  # of tiny frames, it may fall
+        assert exponent or figure > 0 or column == "share", (title, name)
+    shares = found["sections"]["shares of the frame of a gray picture"].values()
+    assert sum(row["share"] for row in shares) == pytest.approx(1)
 
 
+@pytest.mark.long
 def test_it_goes_to_json_and_to_a_table(found):
     assert json.loads(json.dumps(found)) == found
     table = "\n".join(lines(found))
-    for word in (*found["stages"], *TINY.effects, *sections.VARIED, "R_compute", "301 over 31"):
-        assert word in table
+    for title, name, _, _ in figures(found):
+        assert title in table
+        assert name in table
+    assert "asked: at most 1.3" in table
 
 
+@pytest.mark.long
+def test_some_parts_can_be_chosen():
+    told = []
+    found = measure(TINY, ["schedules"], told.append)
+    assert told == ["yardstick", "schedules"]
+    assert list(found["sections"]) == ["schedules over R_compute at 12 megapixels"]
+
+
+def test_an_unknown_part_is_an_error(capsys):
+    with pytest.raises(SystemExit) as end:
+        main(["frame"])
+    assert end.value.code == 2
+    assert "no such part: frame; parts are frames, " in capsys.readouterr().err
+
+
+def test_turns_are_taken_and_the_first_is_not_counted():
+    order = []
+
+    def work(name, costs):
+        def run():
+            order.append(name)
+            return Cost(*costs.pop(0))
+
+        return run
+
+    first = work("first", [(99, 99), (1, 9), (2, 8), (4, 7)])
+    second = work("second", [(99, 99), (5, 5), (6, 6), (7, 7)])
+    assert take_turns(3, first, second) == [Cost(2, 8), Cost(6, 6)]
+    assert order == ["first", "second"] * 4
+
+
+def test_small_frames_are_taken_more_often():
+    assert [sections.frames_a_turn(n) for n in (1e3, 5e5, 1e6, 12e6)] == [8, 4, 2, 1]
+
+
+def test_the_yardstick_has_a_transform_of_each_component():
+    assert Yardstick(Cost(2, 3), Cost(10, 20)).compute(4) == Cost(18, 32)
+
+
+def test_growth_is_the_exponent_of_a_power_law():
+    """Seconds that grow as pixels ** 1.5 by the clock and as pixels on the processors."""
+    pixels = np.array([1e6, 4e6, 16e6])
+    rows = sections.growth_rows(pixels, [Cost(1, 1), Cost(8, 4), Cost(64, 16)])
+    assert rows["exponent"] == pytest.approx({"wall": 1.5, "cpu": 1.0})
+    assert rows["a pixel at 1 MP over 16 MP"] == pytest.approx({"wall": 0.25, "cpu": 1.0})
+    assert rows["exponent from 4 to 16 MP"] == pytest.approx({"wall": 1.5, "cpu": 1.0})
+    assert len(rows) == 5
+
+
+@pytest.mark.long
 def test_plain_pipeline_sees_the_light_that_vcam_sees(place):
     given, ours = plain.setup(place.camera("color"))
     theirs = plain.rate(given)
@@ -105,12 +159,14 @@ def test_plain_pipeline_sees_the_light_that_vcam_sees(place):
     assert dn.mean() == pytest.approx(expected.mean(), rel=0.01)
 
 
+@pytest.mark.long
 def test_the_busy_camera_has_nearly_all_effects(place):
     names = ablation.wanted_effects(place.camera("gray", BUSY))
     assert len(names) == 15
     assert "charge_transfer" not in names
 
 
+@pytest.mark.long
 def test_reading_is_taken_off_and_medians_are_by_clock(place):
     assert median([Cost(1, 9), Cost(2, 8), Cost(3, 7)]) == Cost(2, 8)
     taken = Frames(place.camera("gray")).take(2)
@@ -118,10 +174,20 @@ def test_reading_is_taken_off_and_medians_are_by_clock(place):
     assert "read" not in taken.shares
 
 
+@pytest.mark.long
 def test_a_command_is_started_as_it_is_installed(tmp_path, monkeypatch):
     """Compiled once, not anew at every start; one that fails is no figure."""
     monkeypatch.setenv("PYTHONDONTWRITEBYTECODE", "1")
-    assert _started(["-c", "import vcam_cli.units"], str(tmp_path), 1) > 0
+    work = "import vcam_cli.units; sum(i * i for i in range(1000))"
+    assert start_cost(["-c", work], str(tmp_path)).cpu > 1e-9  # its own processor time is counted
     assert list((tmp_path / "compiled").rglob("units*.pyc"))
     with pytest.raises(subprocess.CalledProcessError):
-        _started(["-c", "raise SystemExit(2)"], str(tmp_path), 1)
+        start_cost(["-c", "raise SystemExit(2)"], str(tmp_path))
+
+
+@pytest.mark.long
+def test_a_painted_chart_takes_memory_of_its_own_process(place):
+    """Not that of the process that starts it, which holds more."""
+    held = np.ones(1 << 27)
+    path = place.write(place.tree("gray", PLAIN), "measured.yaml")
+    assert 5e7 < peak_memory(str(path)) < 1e9 <= held.nbytes
