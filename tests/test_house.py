@@ -233,8 +233,35 @@ def names_a_camera(module: Module) -> list[str]:
     return found
 
 
+def asks_for_an_effects_kind(module: Module) -> list[str]:
+    """Branches on the kind of an effect outside `effects`, which answers for itself.
+
+    `of_kind` selects effects of a kind.
+    """
+    if module.room == "effects":
+        return []
+    imported_names = {
+        alias.asname or alias.name
+        for node in ast.walk(module.tree)
+        if isinstance(node, ast.ImportFrom) and f"{node.module}.".startswith("vcam_cli.effects.")
+        for alias in node.names
+    }
+    found = []
+    for node in ast.walk(module.tree):
+        kinds: list[ast.expr] = []
+        if isinstance(node, ast.Call) and ast.unparse(node.func) == "isinstance":
+            kinds = node.args[1:]
+        elif isinstance(node, ast.MatchClass):
+            kinds = [node.cls]
+        names = {n.id for kind in kinds for n in ast.walk(kind) if isinstance(n, ast.Name)}
+        if names & imported_names:
+            found.append(f"{module.name}:{getattr(node, 'lineno', 0)}: {ast.unparse(node)}")
+    return found
+
+
 RULES = (
     climbs, image_library, heavy, writes, too_long, undocumented, unfinished, names_a_camera,
+    asks_for_an_effects_kind,
 )  # fmt: skip
 
 
@@ -275,6 +302,12 @@ BROKEN = [
     (names_a_camera, "config.x", "def camera_file():\n    pass\n"),
     (names_a_camera, "config.x", "from vcam_cli.config.x import PixelWidth\n"),
     (names_a_camera, "config.x", "f(lens=1)\n"),
+    (asks_for_an_effects_kind, "readout.x", "from vcam_cli.effects.base import Charge, Gain\n"
+     "if isinstance(a, Charge):\n    pass\nelif isinstance(a, int | Gain):\n    pass\n"),
+    (asks_for_an_effects_kind, "readout.x", "from vcam_cli.effects import base\n"
+     "[a for a in b if isinstance(a, base.Charge)]\n"),
+    (asks_for_an_effects_kind, "readout.x", "from vcam_cli.effects.fpn import FixedPattern as Fpn\n"
+     "match a:\n    case Fpn(): ...\n"),
 ]  # fmt: skip
 
 
@@ -300,6 +333,17 @@ KEPT = [
     (undocumented, "x", "'''Module.'''\ndef _private():\n    pass\n"),
     (names_a_camera, "config.x", "a = 'write pixel.width'\n"),
     (names_a_camera, "camera.x", "pixel = 1\n"),
+    (
+        asks_for_an_effects_kind,
+        "readout.x",
+        "from vcam_cli.effects.base import Charge, of_kind\n"
+        "of_kind(a, Charge)\nisinstance(a, str)\n",
+    ),
+    (
+        asks_for_an_effects_kind,
+        "effects.x",
+        "from vcam_cli.effects.base import Charge\nisinstance(a, Charge)\n",
+    ),
 ]
 
 

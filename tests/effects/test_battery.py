@@ -22,17 +22,14 @@ from vcam_cli.camera.simulation import EFFECTS
 from vcam_cli.effects.base import (
     Charge,
     Gain,
-    Limit,
-    NoiseSource,
-    Quantizer,
     RadialTransfer,
     SeparableTransfer,
     SignalLevels,
-    Site,
     Transport,
     VeilingGlare,
 )
 from vcam_cli.effects.order import ORDER
+from vcam_cli.effects.signal_chain import Limit, NoiseSource, Quantizer, Site
 from vcam_cli.rng import stream
 
 # Twenty whole periods on the 64 columns of 5 um, so that its rms is that of a whole wave.
@@ -238,7 +235,7 @@ def test_a_transfer_is_a_pure_number_that_is_one_at_rest(kind, tmp_path):
 def test_a_gain_is_a_pure_number_that_is_most_on_the_axis(kind, tmp_path):
     """One there for what the lens does: white is judged on the axis."""
     effect = effect_of(kind, tmp_path)
-    if kind.in_lens:
+    if kind.origin == "lens":
         assert effect.on_axis == 1
     for dtype in (np.float32, np.float64):
         gain = effect.gain(np.linspace(-1e-4, 1e-4, 5, dtype=dtype), np.zeros(1, dtype))
@@ -461,5 +458,6 @@ def test_finite_on_hostile_input(kind, dtype, tmp_path):
     for result in results:
         assert np.isfinite(result).all()
     error = effect.mean_error(SignalLevels(full_signal=1.0, time=1e-12))
-    assert math.isfinite(error)
-    assert error >= 0
+    if issubclass(kind, Gain | VeilingGlare | Charge | Transport):
+        assert math.isfinite(error)
+        assert error >= 0

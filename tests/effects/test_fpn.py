@@ -9,8 +9,8 @@ from making import QUIET, camera, radiance_for
 
 from vcam_cli import simulate
 from vcam_cli.camera.derived.geometry import geometry
-from vcam_cli.effects.base import Site
 from vcam_cli.effects.fpn import FixedPattern
+from vcam_cli.effects.signal_chain import Site
 from vcam_cli.rng import stream
 
 WELL = 100e3

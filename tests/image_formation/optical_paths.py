@@ -12,7 +12,7 @@ import numpy as np
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry, geometry
 from vcam_cli.camera.derived.mosaic import Mosaic, mosaic
-from vcam_cli.effects.base import Blur, Effect, FieldTransfer, PlaneTransfer, RadialTransfer
+from vcam_cli.effects.base import Blur, Effect, PlaneTransfer, RadialTransfer, of_kind
 from vcam_cli.effects.pixel_aperture import PixelAperture
 from vcam_cli.image_formation import bandwidth, photon_rate
 from vcam_cli.image_formation.optical_path import OpticalPath
@@ -60,8 +60,7 @@ def light(
     """A transfer through the blurs among the effects; 1 electron a second unless told otherwise."""
     if weights is None:
         weights = np.full((1, 1, len(wavelengths)), 1 / len(wavelengths))
-    blurs = tuple(effect for effect in effects if isinstance(effect, Blur))
-    return Transfer(np.asarray(wavelengths), np.asarray(weights, float), blurs)
+    return Transfer(np.asarray(wavelengths), np.asarray(weights, float), of_kind(effects, Blur))
 
 
 def path(
@@ -80,9 +79,8 @@ def on_chart(path: OpticalPath, chart: Chart, margin: int | None = None) -> Char
     """A chart of one component before a path, with the margin that the path needs."""
     g, knobs = path.geometry, path.settings
     if margin is None:
-        blurs = [e for e in path.effects if isinstance(e, Blur | FieldTransfer)]
         used = path.transfer.wavelengths
-        margin = bandwidth.margin(g, blurs, (used[0], used[-1]), knobs)
+        margin = bandwidth.margin(g, path.effects, (used[0], used[-1]), knobs)
     return chart_scene(chart, (WHITE,), WHITE, photon_rate.view(g, knobs, margin))
 
 
@@ -103,9 +101,8 @@ def signal(path: OpticalPath, scene: Scene) -> np.ndarray:
 def of_camera(made: Camera, picture: Any = None) -> tuple[OpticalPath, Scene]:
     """The path and the scene of a camera, as the simulation makes them."""
     g, knobs, effects = geometry(made), settings(made), plan.optical(made, geometry(made))
-    blurs = [e for e in effects if isinstance(e, Blur | FieldTransfer)]
     band, colors = made.scene.wavelengths, mosaic(made)
-    margin = bandwidth.margin(g, blurs, (band.start, band.stop), knobs)
+    margin = bandwidth.margin(g, effects, (band.start, band.stop), knobs)
     scene = build(made.scene, photon_rate.view(g, knobs, margin), picture)
     transfer = photon_rate.scene_transfer(made, g, knobs, scene.spectra, colors, effects)
     return OpticalPath(transfer, g, knobs, colors, effects, 1), scene

@@ -12,7 +12,7 @@ from vcam_cli.effects.base import Gain
 from vcam_cli.effects.dark_current import DarkCurrent
 from vcam_cli.effects.saturation import Saturation
 from vcam_cli.effects.stray_light import StrayLight
-from vcam_cli.image_formation.pixelwise import changes
+from vcam_cli.image_formation.pixelwise import changes_by_omission
 
 TIME, DARK, WELL = 0.5, 300.0, 500.0
 MOSAIC = Mosaic((("R", "G"), ("G", "B")))
@@ -77,7 +77,7 @@ def test_each_is_what_it_changes_alone(lens, veil, pixel, place):
     states = {LENS: lens, VEIL: veil, PIXEL: pixel}
     running = [e for e in PRESENT if states.get(e, True)]
     rate = signal(place, lens, veil, pixel)
-    found = changes(rate, place, MOSAIC, PRESENT, running, TIME)
+    found = changes_by_omission(rate, place, MOSAIC, PRESENT, running, TIME)
     here = (rate + DARK) * TIME
     expected = {
         "lens": rms(here, (signal(place, not lens, veil, pixel) + DARK) * TIME),
@@ -95,5 +95,5 @@ def test_a_large_array_is_looked_at_in_every_color(tmp_path):
     place = geometry(camera(tmp_path, {"array.rows": 600, "array.columns": 600}))
     rate = np.full((600, 600), 100.0)
     rate[1::2, 1::2] += np.where(np.arange(300) % 2, 40.0, -40.0)
-    found = changes(rate, place, MOSAIC, (VEIL,), (), TIME)
+    found = changes_by_omission(rate, place, MOSAIC, (VEIL,), (), TIME)
     assert found["stray_light"] == pytest.approx(0.1 * 40 / 2, rel=0.02)  # a quarter of the pixels

@@ -19,10 +19,9 @@ from vcam_cli.accuracy import ablation
 from vcam_cli.accuracy.measurements import enough
 from vcam_cli.accuracy.reference import changes, converged
 from vcam_cli.camera.camera import Camera
-from vcam_cli.effects.base import NoiseSource
 from vcam_cli.effects.order import ORDER
+from vcam_cli.effects.signal_chain import LEVELS, NoiseSource
 from vcam_cli.files.png import write_png
-from vcam_cli.simulation import plan
 from vcam_cli.simulation.preparation import Prepared
 from vcam_cli.simulation.simulate import prepare
 
@@ -356,7 +355,7 @@ def variance_lost_of(auto: Prepared, found: Prepared, full: float) -> float:
 def _variance_lost(auto: Prepared, found: Prepared, full: float, scope: str) -> float:
     worst = 0.0
     missing = (found.dark_rate - auto.dark_rate) * auto.exposure_time
-    for share in plan.LEVELS:
+    for share in LEVELS:
         level = share * full
         everything = _variance(found, scope, level)
         change = _variance(auto, scope, max(0.0, level - missing)) - everything

@@ -10,11 +10,11 @@ from making import GONE, QUIET, camera, radiance_for, tree
 
 from vcam_cli import simulate
 from vcam_cli.camera.array import Binning
-from vcam_cli.effects.base import NoiseSource
 from vcam_cli.effects.fpn import FixedPattern
 from vcam_cli.effects.quantization import Quantization
 from vcam_cli.effects.read_noise import ReadNoise
 from vcam_cli.effects.saturation import Saturation
+from vcam_cli.effects.signal_chain import NoiseSource
 from vcam_cli.errors import BadInput
 from vcam_cli.readout import binned_readout, binning, exposure
 from vcam_cli.simulation import checks, raw_file, spectral_irradiance
@@ -177,7 +177,7 @@ def test_the_plan_knows_the_variance(kind, flats):
     dark = frame.dark_rate * frame.exposure_time
     joins = frame.layout.binning_groups
     node = LIGHT * joins.summed_charges + dark
-    told = sum(binned_readout.variance(e, node, dark, joins.binning) for e in draws)
+    told = sum(e.binned_variance(node, dark, joins.binning) for e in draws)
     in_electrons = told * (N**2 if kind == "digital" else 1)
     signal = node / joins.summed_charges
     assert in_electrons == pytest.approx(of_flat(kind, signal)[1])
@@ -244,8 +244,8 @@ def test_variances_of_the_mean_by_what_is_shared(kind, reading, pattern):
     """Of 2 rows of 3 columns; the mean of what all share keeps its whole variance."""
     given = Binning(rows=ROWS, columns=COLUMNS, kind=kind)
     noise, fixed = ReadNoise(4.0, 30.0, 20.0), FixedPattern(7.0, 5.0, 0.0, 0.0)
-    assert binned_readout.variance(noise, 100.0, 0.0, given) == pytest.approx(reading)
-    assert binned_readout.variance(fixed, 100.0, 0.0, given) == pytest.approx(pattern)
+    assert noise.binned_variance(100.0, 0.0, given) == pytest.approx(reading)
+    assert fixed.binned_variance(100.0, 0.0, given) == pytest.approx(pattern)
 
 
 WELL = 1000.0

@@ -7,7 +7,6 @@ import pytest
 from making import GONE, QUIET, camera, radiance_for
 
 from vcam_cli import simulate
-from vcam_cli.effects.base import Quantizer
 from vcam_cli.effects.dark_current import DarkCurrent
 from vcam_cli.effects.fpn import FixedPattern
 from vcam_cli.effects.quantization import Quantization
@@ -15,6 +14,7 @@ from vcam_cli.effects.read_noise import ReadNoise
 from vcam_cli.effects.reset_noise import ResetNoise
 from vcam_cli.effects.saturation import Saturation
 from vcam_cli.effects.shot_noise import ShotNoise
+from vcam_cli.effects.signal_chain import Quantizer
 from vcam_cli.errors import BadInput
 from vcam_cli.image_formation import memory_model
 from vcam_cli.image_formation.settings import settings

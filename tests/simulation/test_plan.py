@@ -9,8 +9,9 @@ from making import GONE, QUIET, camera, radiance_for
 
 from vcam_cli import simulate
 from vcam_cli.camera.derived.geometry import geometry
-from vcam_cli.effects.base import Charge, NoiseSource
+from vcam_cli.effects.base import Charge
 from vcam_cli.effects.order import ORDER
+from vcam_cli.effects.signal_chain import NoiseSource
 from vcam_cli.errors import BadInput
 from vcam_cli.simulation import plan
 

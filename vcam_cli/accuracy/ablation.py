@@ -16,11 +16,9 @@ from numpy.typing import NDArray
 
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import geometry
-from vcam_cli.effects.base import Charge, NoiseSource, Quantizer
-from vcam_cli.effects.order import ORDER
-from vcam_cli.effects.quantization import Quantization
-from vcam_cli.effects.read_noise import ReadNoise
-from vcam_cli.effects.saturation import Saturation
+from vcam_cli.effects.base import Charge, of_kind
+from vcam_cli.effects.order import ORDER, quantizer
+from vcam_cli.effects.signal_chain import LEVELS, Limit, NoiseSource, Quantizer, noise_sources
 from vcam_cli.readout import binned_readout, exposure
 from vcam_cli.simulation import plan
 from vcam_cli.simulation.preparation import Prepared
@@ -85,8 +83,9 @@ def mean_raw(ready: Prepared) -> NDArray:
     """Noise-free raw signal of every pixel, clipped where the well is full, float64 [electrons]."""
     mean = exposure.mean_electrons(ready.rate, ready.exposure_time, ready.plan.active)
     mean = mean.astype(np.float64)
-    well = next((e.full_well for e in ready.plan.active if isinstance(e, Saturation)), np.inf)
-    return np.minimum(mean, well, out=mean)
+    for limit in of_kind(ready.plan.active, Limit):
+        mean = limit.apply(mean)
+    return mean
 
 
 def full_signal(ready: Prepared) -> float:
@@ -109,14 +108,14 @@ def variance_shares(ready: Prepared, full: float, workers: int) -> dict[str, flo
 
     ready: the camera with everything on; full: its full signal [electrons].
     """
-    draws = [e for e in ready.plan.active if isinstance(e, NoiseSource)]
-    shape = SQUARE if any(isinstance(e, ReadNoise) and e.row for e in draws) else FLAT
-    group = ready.layout.binning_groups.binning
+    active, group = ready.plan.active, ready.layout.binning_groups.binning
+    row_noise = [source.split()[2] for source in of_kind(active, NoiseSource)]
+    shape = SQUARE if any(row_noise) else FLAT
     shape = (shape[0] + -shape[0] % group.rows, shape[1] + -shape[1] % group.columns)
-    fields = [np.full(shape, share * full) for share in plan.LEVELS]
+    fields = [np.full(shape, share * full) for share in LEVELS]
     shares = {}
     for scope in ("frame", "sensor"):
-        here = tuple(e for e in draws if e.scope == scope)
+        here = noise_sources(active, scope)
         everything = [_taken(ready, field, here, workers) for field in fields]
         for effect in here:
             others = tuple(e for e in here if e is not effect)
@@ -124,10 +123,11 @@ def variance_shares(ready: Prepared, full: float, workers: int) -> dict[str, flo
                 np.mean((taken - _taken(ready, field, others, workers)) ** 2) / _variance(taken)
                 for taken, field in zip(everything, fields, strict=True)
             )
-        code = next((e for e in ready.plan.active if isinstance(e, Quantizer)), None)
-        if scope == "frame" and code is not None:
-            times = binned_readout.conversions(group)
-            shares[code.name] = max(_rounding_share(code, taken, times) for taken in everything)
+        if scope == "frame":
+            for code in of_kind(active, Quantizer):
+                shares[code.name] = max(
+                    _rounding_share(code, taken, group.conversions) for taken in everything
+                )
     return {name: float(share) for name, share in shares.items()}
 
 
@@ -152,8 +152,8 @@ def _taken(
     Of pixels that are read as one, their mean.
     """
     seeds = {"sensor": ready.camera.seed.sensor, "frame": ready.camera.seed.frame}
-    code = Quantization.from_camera(ready.camera, ready.geometry)
-    charges = tuple(e for e in ready.plan.active if isinstance(e, Charge))
+    code = quantizer(ready.camera, ready.geometry)
+    charges = of_kind(ready.plan.active, Charge)
     rate = field / ready.exposure_time - sum(e.rate() for e in charges)
     effects = (*charges, *draws)
     take = partial(exposure.capture, code=code, seeds=seeds, workers=workers)

@@ -9,7 +9,7 @@ from typing import Any
 
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.simulation import Accuracy
-from vcam_cli.effects.base import FieldTransfer
+from vcam_cli.effects.base import FieldTransfer, of_kind
 from vcam_cli.simulation.preparation import Prepared
 
 CONVERGED = 2e-5
@@ -56,7 +56,7 @@ def _rank(ready: Prepared) -> str:
 
 
 def _field(ready: Prepared) -> str:
-    there = any(isinstance(e, FieldTransfer) for e in ready.plan.active)
+    there = of_kind(ready.plan.active, FieldTransfer)
     return "" if there else "the lens's blur is the same all over the field"
 
 

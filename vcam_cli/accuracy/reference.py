@@ -18,7 +18,8 @@ from vcam_cli import memory
 from vcam_cli.accuracy import ablation
 from vcam_cli.accuracy.knobs import CONVERGED, FINEST, with_accuracy
 from vcam_cli.camera.camera import Camera
-from vcam_cli.effects.base import NoiseSource, Quantizer
+from vcam_cli.effects.base import of_kind
+from vcam_cli.effects.signal_chain import NoiseSource, Quantizer
 from vcam_cli.scenes.base import ChartScene
 from vcam_cli.simulation.preparation import Prepared
 from vcam_cli.simulation.simulate import prepare
@@ -110,7 +111,7 @@ def changes(
     tolerance = min(max(camera.accuracy.tolerance, 0.001), 0.005)
     fixed = with_accuracy(fixed, tolerance=tolerance, float_width=64)
     whole = prepare(ablation.with_effects(fixed, "all"), workers)[0]
-    noise = {e.name for e in whole.plan.active if isinstance(e, NoiseSource | Quantizer)}
+    noise = {e.name for e in of_kind(whole.plan.active, NoiseSource, Quantizer)}
     truth, out = ablation.mean_raw(whole), {}
     for name in names:
         if name in noise:  # drawn after the mean is known

@@ -79,6 +79,11 @@ class Binning(Model):
         """Pixels that are read as one."""
         return self.rows * self.columns
 
+    @property
+    def conversions(self) -> int:
+        """How many conversions of the ADC make one pixel of the raw frame."""
+        return self.count if self.kind == "digital" else 1
+
 
 def _pattern(given: Any) -> Any:
     if isinstance(given, (Block, Positions)) or (isinstance(given, str) and given in PATTERNS):

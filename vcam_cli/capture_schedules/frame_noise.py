@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from vcam_cli.effects.base import Effect, Quantizer
-from vcam_cli.effects.saturation import Saturation
+from vcam_cli.effects.base import Effect, of_kind
+from vcam_cli.effects.signal_chain import Limit, Quantizer
 from vcam_cli.parallel import each
 from vcam_cli.readout import nondestructive_samples
 from vcam_cli.rng import blocks
@@ -76,7 +76,7 @@ class NoiseMeasurement:
         self.workers = workers
         self.rate = ready.rate.astype(np.float64)
         self.effects: tuple[Effect, ...] = tuple(
-            e for e in ready.plan.active if not isinstance(e, Quantizer | Saturation)
+            e for e in ready.plan.active if e not in of_kind(ready.plan.active, Limit)
         )
         filled = np.multiply.outer(np.array(times), self.rate + sensor.dark)
         self.full = filled > sensor.well * (1 + SLACK)

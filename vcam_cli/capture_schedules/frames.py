@@ -25,7 +25,7 @@ from vcam_cli.capture_schedules.frame_noise import MeasuredSnr, NoiseMeasurement
 from vcam_cli.capture_schedules.frames_plots import Picture
 from vcam_cli.capture_schedules.methods import Task, find_schedules
 from vcam_cli.capture_schedules.model import ScheduleFrames
-from vcam_cli.effects.quantization import Quantization
+from vcam_cli.effects.order import quantizer
 from vcam_cli.errors import bad
 from vcam_cli.files.exr import write_exr
 from vcam_cli.files.folder import OutputFolder
@@ -155,7 +155,7 @@ def take_frames(
     ready, _ = prepare(camera, workers, watch)
     if ready.rate.ndim != 2 or ready.layout.scattered or len(ready.mosaic.colors) > 1:
         raise bad("frames.camera", "has no monochrome array", "write pattern: monochrome there")
-    code = Quantization.from_camera(camera, ready.geometry)
+    code = quantizer(camera, ready.geometry)
     effects = plan.wanted(camera, ready.geometry)
     longest = asked.max or camera.exposure.longest
     assert longest is not None

@@ -36,9 +36,8 @@ from vcam_cli.camera.derived.mosaic import BLOCKS, NONE, mosaic
 from vcam_cli.camera.illuminant import IlluminantSpec
 from vcam_cli.camera.optics import Wavefront
 from vcam_cli.camera.scene import SlantedEdge, Uniform
-from vcam_cli.effects.base import NoiseSource, Quantizer
-from vcam_cli.effects.fpn import FixedPattern
-from vcam_cli.effects.quantization import Quantization
+from vcam_cli.effects.order import quantizer
+from vcam_cli.effects.signal_chain import noise_sources
 from vcam_cli.errors import bad
 from vcam_cli.physics import radiometry
 from vcam_cli.progress import Stages
@@ -101,23 +100,18 @@ class Bench:
     @property
     def noise_floor(self) -> float:
         """Temporal variance without any charge, of reset and readout [e^2]."""
-        return sum(e.variance(0.0) for e in self._noise_sources("frame"))
+        return sum(e.variance(0.0) for e in noise_sources(self.ready.plan.active, "frame"))
 
     def pattern_variance(self, mean: float) -> float:
         """Return the variance from pixel to pixel at a mean signal, dark included [e^2]."""
-        return sum(e.variance(mean, self.dark) for e in self._noise_sources("sensor"))
+        sources = noise_sources(self.ready.plan.active, "sensor")
+        return sum(e.variance(mean, self.dark) for e in sources)
 
-    @property
-    def column_pattern(self) -> tuple[float, float]:
-        """Standard deviations of the columns' offsets [e] and gains."""
-        sources = self._noise_sources("sensor")
-        fixed = next((e for e in sources if isinstance(e, FixedPattern)), None)
-        return (fixed.offset_column, fixed.gain_column) if fixed else (0.0, 0.0)
-
-    def _noise_sources(self, scope: str) -> list[NoiseSource]:
-        return [
-            e for e in self.ready.plan.active if isinstance(e, NoiseSource) and e.scope == scope
-        ]
+    def column_variance(self, mean: float) -> float:
+        """Return the variance from column to column at a mean signal, dark included [e^2]."""
+        sources = noise_sources(self.ready.plan.active, "sensor")
+        columns = (source.split()[1] for source in sources)
+        return sum(e.variance(mean, self.dark) for e in columns if e is not None)
 
     @property
     def colors(self) -> tuple[str, ...]:
@@ -180,12 +174,12 @@ class Bench:
         (rows, columns) array
             Codes [DN].
         """
-        code = Quantization.from_camera(self.camera, self.ready.geometry)
-        effects = tuple(e for e in self.ready.plan.active if not isinstance(e, Quantizer))
+        code = quantizer(self.camera, self.ready.geometry)
         seed = self.camera.seed
         # No frame of another frame seed has the same noise.
         seeds = {"sensor": seed.sensor, "frame": seed.frame + (number << 64)}
-        electrons, _ = exposure.capture(rate, time, effects, code, seeds, self.workers)
+        active = self.ready.plan.active
+        electrons, _ = exposure.capture(rate, time, active, code, seeds, self.workers)
         dn = np.rint(code.line(electrons)) + self.pedestal
         return np.clip(dn, 0, 2**code.bits - 1 + self.pedestal)
 

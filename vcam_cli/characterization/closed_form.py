@@ -14,7 +14,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vcam_cli.effects.base import Effect, SeparableTransfer
+from vcam_cli.effects.base import Effect, SeparableTransfer, of_kind
 from vcam_cli.image_formation.transfer_functions import Transfer
 from vcam_cli.simulation import plan
 from vcam_cli.simulation.preparation import Prepared
@@ -148,9 +148,8 @@ def directional_mtf(
     """
     fx, fy = frequency * direction[0], frequency * direction[1]
     out = np.ones(len(frequency), np.complex128)
-    for effect in effects:
-        if isinstance(effect, SeparableTransfer):
-            out *= effect.along_x(fx) * effect.along_y(fy)
+    for effect in of_kind(effects, SeparableTransfer):
+        out *= effect.along_x(fx) * effect.along_y(fy)
     return np.abs(out * _blur(transfer, color, fx, fy)) / float(transfer.level[0, color])
 
 

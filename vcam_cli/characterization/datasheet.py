@@ -177,15 +177,18 @@ def _pattern_rows(bench: Bench, channel: Channel) -> Iterator[Row]:
 
 def _expected_patterns(bench: Bench) -> tuple[Pattern, Pattern]:
     """Return the model's pattern in the dark [e] and at half of saturation, relative."""
-    offset, gain = bench.column_pattern
-    dark, half = bench.pattern_variance(bench.dark), 0.5 * bench.saturation
+    half = 0.5 * bench.saturation
+    dark, dark_column = bench.pattern_variance(bench.dark), bench.column_variance(bench.dark)
     bright = bench.pattern_variance(half + bench.dark) - dark
-    column = offset**2 + (gain * bench.dark) ** 2
-    pixel = math.sqrt(max(bright / half**2 - gain**2, 0))
-    return (
-        (math.sqrt(dark), 0.0, math.sqrt(column), math.sqrt(max(dark - column, 0.0))),
-        (math.sqrt(max(bright, 0.0)) / half, 0.0, gain, pixel),
-    )
+    column = bench.column_variance(half + bench.dark) - dark_column
+    return _pattern(dark, dark_column, 1.0), _pattern(bright, column, half)
+
+
+def _pattern(total: float, column: float, signal: float) -> Pattern:
+    """Return standard deviations over a signal [e] from variances [e^2]: rows are all alike."""
+    variances = total, 0.0, column, total - column
+    whole, row, columns, pixel = (math.sqrt(max(v, 0.0)) / signal for v in variances)
+    return whole, row, columns, pixel
 
 
 def _sharpness_rows(bench: Bench, channel: Channel) -> Iterator[Row]:

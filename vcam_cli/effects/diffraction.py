@@ -18,7 +18,7 @@ class Diffraction(RadialTransfer):
     name = "diffraction"
     reference = "Chen 2003, section 2.2.1; Goodman, Introduction to Fourier Optics, section 6.3"
     absent = "the file says optics.diffraction: false, or gives a point spread function instead"
-    in_lens = True
+    origin = "lens"
 
     @classmethod
     def from_camera(cls, camera, geometry):

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from vcam_cli.camera.architecture import ARCHITECTURES
 from vcam_cli.camera.derived.electrical import electrical
-from vcam_cli.effects.base import NoiseSource
+from vcam_cli.effects.signal_chain import NoiseSource
 
 OVERFULL = 100
 """Full wells of charge in a hot pixel: more than the noise of any readout brings below one."""
@@ -48,7 +48,7 @@ class FixedPattern(NoiseSource):
     absent = "the file gives no pixel.fpn or pixel.defects that its architecture has"
     seconds_per_pixel = 20e-9
     scope = "sensor"
-    in_samples = "same"
+    sample_draws = "common"
 
     def __post_init__(self):
         # Where all pixels are defective they do not differ: the plan would see no noise in it.

@@ -31,7 +31,7 @@ class OffAxis(Gain):
     name = "off_axis"
     reference = "Chen 2003, eq 2.22 (exact) and 2.21 (cos4)"
     absent = "the file says optics.off_axis: none"
-    in_lens = True
+    origin = "lens"
     seconds_per_pixel = 8e-9
 
     @classmethod
@@ -110,7 +110,7 @@ class MeasuredFalloff(Gain):
     name = OffAxis.name
     reference = "ISO 13653:1996, relative illuminance in the image field, as measured"
     absent = OffAxis.absent
-    in_lens = True
+    origin = "lens"
     seconds_per_pixel = OffAxis.seconds_per_pixel
 
     @classmethod

@@ -1,25 +1,27 @@
 """The order in which light becomes numbers. Read this first.
 
-    in                      kind        effects                          out
-    ----------------------  ----------  -------------------------------  ----------------------
-    radiance of the scene   optics      eq 2.18, no choice               photons / (s m2 m)
-    spectrum of the image   Transfer    diffraction, aberration,         electrons / s, blurred
-                                        pixel_aperture, charge_diffusion
-    electrons / s           Gain        off_axis                         electrons / s
-    electrons / s           VeilingGlare stray_light                      electrons / s
-    electrons / s           Gain        pixel_vignetting, microlens      electrons / s
-    electrons / s           Charge      dark_current                     electrons (mean signal)
-    electrons               Transport   charge_transfer                  electrons (mean signal)
-    electrons               NoiseSource shot_noise, fpn, reset_noise,    electrons
-                                        read_noise
-    electrons               Limit       saturation                       electrons
-    electrons               Quantizer   quantization                     DN
+    in                      kind          effects                          out
+    ----------------------  ------------  -------------------------------  ----------------------
+    radiance of the scene   optics        eq 2.18, no choice               photons / (s m2 m)
+    spectrum of the image   Transfer      diffraction, aberration,         electrons / s, blurred
+                                          pixel_aperture, charge_diffusion
+    electrons / s           Gain          off_axis                         electrons / s
+    electrons / s           VeilingGlare  stray_light                      electrons / s
+    electrons / s           Gain          pixel_vignetting, microlens      electrons / s
+    electrons / s           Charge        dark_current                     electrons (mean signal)
+    electrons               Transport     charge_transfer                  electrons (mean signal)
+    electrons               NoiseSource   shot_noise, fpn, reset_noise,    electrons
+                                          read_noise
+    electrons               Limit         saturation                       electrons
+    electrons               Quantizer     quantization                     DN
 
 Within a kind the order of this tuple is the order of action. It is written nowhere else.
 """
 
 from __future__ import annotations
 
+from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.effects.aberration import Aberration
 from vcam_cli.effects.base import Effect
 from vcam_cli.effects.charge_diffusion import ChargeDiffusion
@@ -36,6 +38,7 @@ from vcam_cli.effects.read_noise import ReadNoise
 from vcam_cli.effects.reset_noise import ResetNoise
 from vcam_cli.effects.saturation import Saturation
 from vcam_cli.effects.shot_noise import ShotNoise
+from vcam_cli.effects.signal_chain import Quantizer
 from vcam_cli.effects.stray_light import StrayLight
 
 ORDER: tuple[type[Effect], ...] = (
@@ -56,3 +59,11 @@ ORDER: tuple[type[Effect], ...] = (
     Saturation,
     Quantization,
 )
+
+
+def quantizer(camera: Camera, geometry: Geometry) -> Quantizer:
+    """Return a camera's ADC, whether the effect is switched off or not."""
+    [kind] = [kind for kind in ORDER if issubclass(kind, Quantizer)]
+    found = kind.from_camera(camera, geometry)
+    assert isinstance(found, Quantizer)
+    return found

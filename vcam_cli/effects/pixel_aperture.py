@@ -29,6 +29,11 @@ class PixelAperture(SeparableTransfer):
         """Return a short clause with this camera's numbers and units."""
         return f"averages over {self.width * 1e6:.4g} x {self.height * 1e6:.4g} um"
 
+    @property
+    def box(self) -> tuple[float, float]:
+        """Width and height of the area that it averages over evenly [m]."""
+        return self.width, self.height
+
     def along_x(self, frequency):
         """Return the transfer along x at `frequency` [cycles/m]."""
         return np.sinc(frequency * self.width)

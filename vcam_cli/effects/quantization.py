@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vcam_cli.camera.derived.electrical import electrical
-from vcam_cli.effects.base import Quantizer
+from vcam_cli.effects.signal_chain import Quantizer
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from vcam_cli.camera.architecture import ARCHITECTURES
-from vcam_cli.effects.base import NoiseSource
+from vcam_cli.effects.signal_chain import NoiseSource
 
 
 @dataclass(frozen=True)
@@ -25,8 +25,7 @@ class ReadNoise(NoiseSource):
     reference = "Chen 2003, eq 2.26 (Q_r); column and row parts: EMVA 1288 release 4.0, section 8"
     absent = "the file gives no read, column or row noise that its architecture has, or 0"
     seconds_per_pixel = 9e-9
-    scope = "frame"
-    of_readout = True
+    origin = "readout"
 
     @classmethod
     def from_camera(cls, camera, geometry):

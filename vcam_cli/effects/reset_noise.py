@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from vcam_cli.camera.architecture import ARCHITECTURES
 from vcam_cli.camera.derived.electrical import electrical
-from vcam_cli.effects.base import NoiseSource
+from vcam_cli.effects.signal_chain import NoiseSource
 from vcam_cli.physics import readout
 
 
@@ -27,8 +27,7 @@ class ResetNoise(NoiseSource):
         " (aps-4t, ccd)"
     )
     seconds_per_pixel = 9e-9
-    scope = "frame"
-    in_samples = "same"
+    sample_draws = "common"
 
     @classmethod
     def from_camera(cls, camera, geometry):

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vcam_cli.camera.derived.electrical import electrical
-from vcam_cli.effects.base import Limit
+from vcam_cli.effects.signal_chain import Limit
 
 
 @dataclass(frozen=True)
@@ -30,6 +30,11 @@ class Saturation(Limit):
         """Return a short clause with this camera's numbers and units."""
         return f"full well of {self.full_well:.6g} electrons"
 
-    def apply(self, electrons):
+    @property
+    def ceiling(self) -> float:
+        """The most electrons that it lets through; a pixel that holds them is full."""
+        return self.full_well
+
+    def apply(self, electrons, site=None):
         """Return the block clipped at the full well; it reuses the array [electrons]."""
         return np.minimum(electrons, electrons.dtype.type(self.full_well), out=electrons)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from vcam_cli.effects.base import NoiseSource
+from vcam_cli.effects.signal_chain import NoiseSource
 from vcam_cli.physics import noise
 
 
@@ -18,8 +18,7 @@ class ShotNoise(NoiseSource):
     reference = "Chen 2003, eq 2.26: variance = number of electrons collected"
     absent = "every pixel has it"
     seconds_per_pixel = 20e-9
-    scope = "frame"
-    in_samples = "accumulates"
+    sample_draws = "cumulative"
 
     @classmethod
     def from_camera(cls, camera, geometry):

@@ -19,7 +19,7 @@ class StrayLight(VeilingGlare):
     name = "stray_light"
     reference = "ISO 9358:1994 (veiling glare index); Matsuda and Nitoh, Appl. Opt. 11, 1972"
     absent = "the file gives no optics.stray_light, or 0"
-    in_lens = True
+    origin = "lens"
     seconds_per_pixel = 1.5e-9
 
     @classmethod

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcam_cli.camera.derived.geometry import Geometry
-from vcam_cli.effects.base import Blur, FieldTransfer, RadialTransfer
+from vcam_cli.effects.base import Effect, RadialTransfer, of_kind
 from vcam_cli.image_formation.cosine_series import Axis
 from vcam_cli.image_formation.optical_path import OpticalPath
 from vcam_cli.image_formation.settings import Settings
@@ -54,7 +54,7 @@ LEAST_PASSED = 0.01
 
 def margin(
     geometry: Geometry,
-    blurs: Sequence[Blur | FieldTransfer],
+    effects: Sequence[Effect],
     band: tuple[float, float],
     knobs: Settings,
 ) -> int:
@@ -65,10 +65,10 @@ def margin(
     """
     budget = MARGIN_SHARE * knobs.tolerance / CONTRAST
     distance = np.geomspace(0.25 * min(geometry.pitch_x, geometry.pitch_y), 1.0, 80)
-    radial = [b for b in blurs if isinstance(b, RadialTransfer)]
+    radial = of_kind(effects, RadialTransfer)
     tail = line_spread_tail(radial, band[1], distance)
     cutoff = min((b.cutoff(band[1]) for b in radial), default=math.inf)
-    widest = max((blur.reach for blur in blurs), default=0.0)
+    widest = max((effect.reach for effect in effects), default=0.0)
     inside = (np.arange(32) + 0.5) / 32
     pitches = (geometry.pitch_y, geometry.rows), (geometry.pitch_x, geometry.columns)
     finest = min(cutoff, 0.5 / min(geometry.pitch_x, geometry.pitch_y))

@@ -27,7 +27,9 @@ def box_averages(
         return _chart_averages(scene, mix, geometry, size)
     x, y = axes
     planes = scene.planes(mix, workers)
-    return np.array([square_averages(square_averages(p, y, size[1], 0), x, size[0], 1) for p in planes])
+    return np.array(
+        [square_averages(square_averages(p, y, size[1], 0), x, size[0], 1) for p in planes]
+    )
 
 
 def point_values(scene: SampledScene, mix: NDArray, geometry: Geometry) -> NDArray:

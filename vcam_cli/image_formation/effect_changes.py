@@ -6,8 +6,9 @@ import math
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 
-from vcam_cli.effects.base import FieldTransfer, PlaneTransfer, RadialTransfer, SeparableTransfer
+from vcam_cli.effects.base import Effect, FieldTransfer, PlaneTransfer, RadialTransfer, of_kind
 from vcam_cli.image_formation.field_dependence import Mode
 from vcam_cli.image_formation.optical_path import OpticalPath
 from vcam_cli.image_formation.scene_sampling import SampledImage
@@ -24,19 +25,17 @@ def changes_by_omission(
 
     tables: of the whole lens; field_change: rms of all that changes over the field.
     """
-    changes = {}
-    for effect in path.effects:
-        if isinstance(effect, SeparableTransfer):
-            squares = image.power.lost_without(image.tables, effect)
-        elif isinstance(effect, RadialTransfer):
-            rest = _without(path, image, [e for e in path.transfer.radial if e is not effect])
-            squares = image.power.through(rest)
-        elif isinstance(effect, PlaneTransfer | FieldTransfer):
-            squares = image.power.through(_directed(path, tables))
-        else:
-            continue
-        also = field_change if isinstance(effect, FieldTransfer) else 0.0
-        changes[effect.name] = math.hypot(image.rms(squares), also)
+    squares: dict[Effect, NDArray] = {
+        effect: image.power.lost_without(image.tables, effect) for effect in path.separable
+    }
+    for effect in of_kind(path.effects, RadialTransfer):
+        rest = _without(path, image, [e for e in path.transfer.radial if e is not effect])
+        squares[effect] = image.power.through(rest)
+    if directed := of_kind(path.effects, PlaneTransfer, FieldTransfer):
+        squares |= dict.fromkeys(directed, image.power.through(_directed(path, tables)))
+    changes = {effect.name: image.rms(square) for effect, square in squares.items()}
+    if path.field is not None:
+        changes[path.field.name] = math.hypot(changes[path.field.name], field_change)
     return changes
 
 

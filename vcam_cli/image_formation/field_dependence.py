@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcam_cli.camera.derived.geometry import Geometry
-from vcam_cli.effects.base import PlaneTransfer, RadialTransfer, Zone
+from vcam_cli.effects.base import Blur, PlaneTransfer, Zone, of_kind
 from vcam_cli.image_formation.transfer_functions import Transfer
 from vcam_cli.image_formation.transfer_tables import (
     LARGEST_OF_FIELD,
@@ -98,7 +98,7 @@ def tabulate_field(
     alone = alone.mixed(mix)
     base = radial_table(alone, size)
     blurs = [zone.blur for zone in zones]
-    directed = any(isinstance(blur, PlaneTransfer) for blur in blurs)
+    directed = bool(of_kind(blurs, PlaneTransfer))
     if directed:
         stack = _planes_of(alone, blurs, size)
     else:
@@ -161,13 +161,11 @@ class Stack:
         return turned(self.known[model][at], parity, quarters, mirrored)
 
 
-def _planes_of(
-    alone: Transfer, blurs: Sequence[RadialTransfer | PlaneTransfer], size: TableSize
-) -> Stack:
+def _planes_of(alone: Transfer, blurs: Sequence[Blur], size: TableSize) -> Stack:
     """What the zones' blurs add to the transfer. Those that are others turned are computed once."""
-    directed = [blur for blur in blurs if isinstance(blur, PlaneTransfer)]
+    directed = of_kind(blurs, PlaneTransfer)
     grid = plane_grid(alone, size.top, size.plane_entries(directed, LARGEST_OF_FIELD))
-    models = [blur.model if isinstance(blur, PlaneTransfer) else (blur, 0, False) for blur in blurs]
+    models = [blur.model for blur in blurs]
     known = list(dict.fromkeys(blur for blur, _, _ in models))
     return Stack(
         [grid.change([blur]).astype(np.float32) for blur in known],

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcam_cli.camera.derived.geometry import pixel_centers
-from vcam_cli.effects.base import Blur, Effect, FieldTransfer, SeparableTransfer
+from vcam_cli.effects.base import Blur, Effect, FieldTransfer, SeparableTransfer, of_kind
 from vcam_cli.image_formation.optical_path import Layer, Layers, OpticalPath, SpectrumReport
 from vcam_cli.image_formation.transfer_functions import Transfer
 from vcam_cli.image_formation.transfer_tables import PARITIES, by_parity
@@ -61,9 +61,8 @@ def _wave_level(transfer: Transfer, effects: tuple[Effect, ...], wave: Wave) -> 
 def _separable(effects: tuple[Effect, ...], fx: NDArray, fy: NDArray) -> NDArray:
     """Product of the separable transfer functions: (fy, fx)."""
     total = np.ones((len(fy), len(fx)))
-    for effect in effects:
-        if isinstance(effect, SeparableTransfer):
-            total *= np.outer(effect.along_y(fy), effect.along_x(fx))
+    for effect in of_kind(effects, SeparableTransfer):
+        total *= np.outer(effect.along_y(fy), effect.along_x(fx))
     return total
 
 
@@ -141,9 +140,7 @@ def _changes(
     some = slice(None, None, max(1, g.rows // ROWS))
     whole = layers(path.effects)
     changes = {}
-    for effect in path.effects:
-        if not isinstance(effect, Blur | SeparableTransfer | FieldTransfer):
-            continue
+    for effect in of_kind(path.effects, Blur, SeparableTransfer, FieldTransfer):
         rest = layers(tuple(e for e in path.effects if e is not effect))
         squares = []
         for color in range(len(path.mosaic.colors)):

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 
 from vcam_cli.camera.derived.geometry import Geometry
-from vcam_cli.effects.base import PlaneTransfer
+from vcam_cli.effects.base import PlaneTransfer, of_kind
 from vcam_cli.image_formation.optical_path import OpticalPath
 from vcam_cli.image_formation.settings import Settings
 from vcam_cli.image_formation.transfer_tables import (
@@ -40,9 +40,7 @@ def of_image(path: OpticalPath, scene: SampledScene, planes: int, size: TableSiz
     wide = max(pixels, round(area / (g.pitch_x * g.pitch_y)))
     waves = (2 if g.collecting_x else 1) * (2 if g.collecting_y else 1)
     tables, modes = 0, 0
-    directed = [b for b in path.transfer.plane] + [
-        z.blur for z in path.zones if isinstance(z.blur, PlaneTransfer)
-    ]
+    directed = (*path.transfer.plane, *of_kind([z.blur for z in path.zones], PlaneTransfer))
     if directed:
         waves = 4
         zones = len({blur.model[0] for blur in directed})

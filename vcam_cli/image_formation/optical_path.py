@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.camera.derived.mosaic import Mosaic
-from vcam_cli.effects.base import Effect, FieldTransfer, SeparableTransfer, Zone
+from vcam_cli.effects.base import Effect, FieldTransfer, SeparableTransfer, Zone, of_kind
 from vcam_cli.image_formation.settings import Settings
 from vcam_cli.image_formation.transfer_functions import Transfer
 
@@ -33,12 +33,18 @@ class OpticalPath:
     @property
     def separable(self) -> tuple[SeparableTransfer, ...]:
         """Transfer functions that are products of one along x and one along y."""
-        return tuple(e for e in self.effects if isinstance(e, SeparableTransfer))
+        return of_kind(self.effects, SeparableTransfer)
+
+    @property
+    def averages_over_box(self) -> bool:
+        """Whether pixels average evenly over one rectangle, or are points."""
+        return not self.separable or [e.box is not None for e in self.separable] == [True]
 
     @property
     def field(self) -> FieldTransfer | None:
         """The blur that changes over the field, where there is one."""
-        return next((e for e in self.effects if isinstance(e, FieldTransfer)), None)
+        found = of_kind(self.effects, FieldTransfer)
+        return found[0] if found else None
 
     @cached_property
     def zones(self) -> tuple[Zone, ...]:

@@ -11,6 +11,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +20,7 @@ from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry, pixel_centers
 from vcam_cli.camera.derived.mosaic import Mosaic
 from vcam_cli.camera.derived.photodiode import quantum_efficiency
-from vcam_cli.effects.base import Blur, Effect, Gain, VeilingGlare
+from vcam_cli.effects.base import Blur, Effect, Gain, VeilingGlare, of_kind
 from vcam_cli.image_formation.optical_path import Layer, OpticalPath, SpectrumReport
 from vcam_cli.image_formation.settings import Settings
 from vcam_cli.image_formation.strategies import image_layers
@@ -70,7 +71,8 @@ def scene_transfer(
     area = geometry.detector_area
     if camera.pixel.photodetector.quantum_efficiency.per_pixel:
         area = geometry.pixel_width * geometry.pixel_height
-    area *= math.prod(e.on_axis for e in effects if isinstance(e, Gain))
+    gains = of_kind(effects, Gain)
+    area *= math.prod(gain.on_axis for gain in gains)
     irradiance = float(
         radiometry.irradiance_per_radiance(geometry.f_number, geometry.magnification)
     )
@@ -80,7 +82,7 @@ def scene_transfer(
         responses(camera, mosaic),
         irradiance * area,
         Band(wavelengths.start, wavelengths.stop, settings.wavelength_step),
-        [e for e in effects if isinstance(e, Blur)],
+        of_kind(effects, Blur),
     )
 
 
@@ -105,11 +107,11 @@ def photo_rate(path: OpticalPath, scene: Scene, planes: bool = False) -> Rate:
     count = len(mosaic.colors) if planes else 1
     out: NDArray = np.zeros((count, g.rows, g.columns), path.settings.dtype)
     x, y = (axis.astype(out.dtype) for axis in pixel_centers(g))
-    before, glare, after = _in_order(path.effects)
+    glares, gains = _glares_and_gains(path.effects)
     # The light has the gain of the axis in it: see `scene_transfer`.
-    on_axis = {e: out.dtype.type(1 / (e.on_axis or 1.0)) for e in (*before, *after)}
+    on_axis = {e: out.dtype.type(1 / (e.on_axis or 1.0)) for e in of_kind(path.effects, Gain)}
 
-    def gain(effects: Sequence[Gain], block: slice) -> None:
+    def apply_gains(effects: Sequence[Gain], block: slice) -> None:
         for effect in effects:
             factor = effect.gain(x, y[block])
             out[:, block] *= factor if on_axis[effect] == 1 else factor * on_axis[effect]
@@ -126,28 +128,25 @@ def photo_rate(path: OpticalPath, scene: Scene, planes: bool = False) -> Rate:
 
     def finish(block: slice) -> None:
         np.maximum(out[:, block], 0, out=out[:, block])
-        gain(before, block)
-        if glare is None:
-            gain(after, block)
+        apply_gains(gains[0], block)
 
     for number, layer in enumerate(layers):
         each(partial(add, layer, number == 0), blocks(g.rows), path.workers)
         del layer  # its memory, before the next one is made
     each(finish, blocks(g.rows), path.workers)
-    if glare is not None:
+    for glare, behind in zip(glares, gains[1:], strict=True):
         _spread(out, mosaic, glare)
-        each(lambda block: gain(after, block), blocks(g.rows), path.workers)
+        each(partial(apply_gains, behind), blocks(g.rows), path.workers)
     return Rate(out if planes else out[0], report)
 
 
-def _in_order(effects: Sequence[Effect]) -> tuple[list[Gain], VeilingGlare | None, list[Gain]]:
-    """The gains before the veil, the veil, and the gains after it."""
-    veil = next((e for e in effects if isinstance(e, VeilingGlare)), None)
-    gains = [e for e in effects if isinstance(e, Gain)]
-    if veil is None:
-        return gains, None, []
-    early = [e for e in gains if effects.index(e) < effects.index(veil)]
-    return early, veil, [e for e in gains if e not in early]
+def _glares_and_gains(
+    effects: Sequence[Effect],
+) -> tuple[tuple[VeilingGlare, ...], list[tuple[Gain, ...]]]:
+    """Return the veiling glares, and the gains in front of the first and behind each of them."""
+    glares = of_kind(effects, VeilingGlare)
+    ends = [0, *(effects.index(glare) for glare in glares), len(effects)]
+    return glares, [of_kind(effects[start:stop], Gain) for start, stop in pairwise(ends)]
 
 
 def _fill(tile: NDArray, layer: Layer, mosaic: Mosaic, block: slice) -> None:
@@ -165,11 +164,11 @@ def _fill(tile: NDArray, layer: Layer, mosaic: Mosaic, block: slice) -> None:
                 tile[0, phase::period, columns] = found[:, columns]
 
 
-def _spread(rate: NDArray, mosaic: Mosaic, veil: VeilingGlare) -> None:
-    """Takes the veil's share of the light and lays it evenly over the pixels of its color."""
+def _spread(rate: NDArray, mosaic: Mosaic, glare: VeilingGlare) -> None:
+    """Takes the glare's share of the light and lays it evenly over the pixels of its color."""
     if len(rate) > 1:
         for plane in rate:
-            plane += veil.fraction * (plane.mean(dtype=np.float64) - plane)
+            plane += glare.fraction * (plane.mean(dtype=np.float64) - plane)
         return
     light = rate[0]
     period = len(mosaic.block)
@@ -184,6 +183,6 @@ def _spread(rate: NDArray, mosaic: Mosaic, veil: VeilingGlare) -> None:
         here = light[row::period, columns]
         sums[color] += here.sum(dtype=np.float64)
         counts[color] += here.size
-    light *= light.dtype.type(1 - veil.fraction)
+    light *= light.dtype.type(1 - glare.fraction)
     for row, color, columns in sites:
-        light[row::period, columns] += veil.fraction * sums[color] / max(counts[color], 1)
+        light[row::period, columns] += glare.fraction * sums[color] / max(counts[color], 1)

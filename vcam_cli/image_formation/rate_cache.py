@@ -14,8 +14,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from vcam_cli.camera.camera import Camera
-from vcam_cli.effects.base import Charge, NoiseSource
+from vcam_cli.effects.base import Charge
 from vcam_cli.effects.order import ORDER
+from vcam_cli.effects.signal_chain import NoiseSource
 from vcam_cli.image_formation.photon_rate import Rate
 from vcam_cli.image_formation.transfer_functions import Transfer
 from vcam_cli.physics.cache import ByteCache

@@ -60,7 +60,7 @@ def image_layers(path: OpticalPath, scene: Scene) -> tuple[Layers, SpectrumRepor
         if count is not None:
             return harmonic_layers(path, scene, count)
         scene = scene.chart
-    if not path.transfer.effects and not path.field:
+    if not path.transfer.effects and not path.field and path.averages_over_box:
         return _mean_layers(path, scene)
     return _filtered_layers(path, scene)
 

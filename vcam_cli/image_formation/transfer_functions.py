@@ -20,7 +20,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from vcam_cli.effects.base import Blur, PlaneTransfer, RadialTransfer
+from vcam_cli.effects.base import Blur, Effect, PlaneTransfer, RadialTransfer, of_kind
 from vcam_cli.spectra import Spectrum, pair_weights, photons
 
 
@@ -51,12 +51,12 @@ class Transfer:
     @property
     def radial(self) -> tuple[RadialTransfer, ...]:
         """Those that depend on |f| only."""
-        return tuple(e for e in self.effects if isinstance(e, RadialTransfer))
+        return of_kind(self.effects, RadialTransfer)
 
     @property
     def plane(self) -> tuple[PlaneTransfer, ...]:
         """Those that depend on the direction too."""
-        return tuple(e for e in self.effects if isinstance(e, PlaneTransfer))
+        return of_kind(self.effects, PlaneTransfer)
 
     def at(self, frequency: NDArray) -> NDArray:
         """H_kc through the radial effects alone at frequencies of any shape [cycles/m].
@@ -110,9 +110,9 @@ class Transfer:
         keep = np.array([j % 2 == 0 or j == count - 1 for j in range(count)])
         return replace(self, wavelengths=self.wavelengths[keep], weights=weights[..., keep])
 
-    def through(self, effects: Sequence[object]) -> Transfer:
+    def through(self, effects: Sequence[Effect]) -> Transfer:
         """The same light through other effects, of which only blurs count."""
-        return replace(self, effects=tuple(e for e in effects if isinstance(e, Blur)))
+        return replace(self, effects=of_kind(effects, Blur))
 
     def mixed(self, mix: NDArray) -> Transfer:
         """The transfer of mixtures of the components, mix: (R, K)."""

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from vcam_cli.effects.base import Blur, PlaneTransfer, RadialTransfer
+from vcam_cli.effects.base import Blur, PlaneTransfer
 from vcam_cli.image_formation.transfer_functions import Transfer
 
 PARITIES = ((False, False), (True, True), (True, False), (False, True))
@@ -198,7 +198,7 @@ class PlaneGrid:
         for part, radial, wavelength in zip(change, self.radial, wavelengths, strict=True):
             otf = np.ones(part.shape, np.complex128)
             for blur in blurs:
-                otf *= _in_plane(blur, self.frequency, fy, float(wavelength))
+                otf *= blur.otf_plane(self.frequency, fy, float(wavelength))
             np.multiply(otf - 1, radial, out=part)
         both = self.alone.summed(change)
         return by_parity(both[..., :m, :], both[..., m:, :])
@@ -226,13 +226,6 @@ def plane_grid(transfer: Transfer, top: float, entries: int) -> PlaneGrid:
     f = np.linspace(0, top, entries)
     length = np.hypot(f[None, :], np.concatenate([f, f])[:, None])
     return PlaneGrid(alone, f, alone.otf_radial(length))
-
-
-def _in_plane(blur: Blur, fx: NDArray, fy: NDArray, wavelength: float) -> NDArray:
-    if isinstance(blur, PlaneTransfer):
-        return blur.otf_plane(fx, fy, wavelength)
-    assert isinstance(blur, RadialTransfer)
-    return blur.otf(np.hypot(fx[None, :], fy[:, None]), wavelength)
 
 
 def turned(parts: NDArray, parity: int, quarters: int, mirrored: bool) -> NDArray:

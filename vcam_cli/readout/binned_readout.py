@@ -9,8 +9,7 @@ from collections.abc import Callable, Sequence
 
 from numpy.typing import NDArray
 
-from vcam_cli.camera.array import Binning
-from vcam_cli.effects.base import Effect, Limit, NoiseSource
+from vcam_cli.effects.base import Effect
 from vcam_cli.readout.binning import BinningGroups
 from vcam_cli.readout.exposure import codes_type
 
@@ -19,37 +18,6 @@ SURE = 3
 where noise comes behind the wells."""
 Take = Callable[[NDArray, float, tuple[Effect, ...]], tuple[NDArray, NDArray]]
 """A frame of a rate [e/s] in a time [s] with effects: (electrons, dn)."""
-
-
-def variance(draw: NoiseSource, mean: float, dark: float, binning: Binning | None) -> float:
-    """Return the variance that a noise source adds to the mean of a group's pixels.
-
-    Parameters
-    ----------
-    draw : NoiseSource
-        Source of the noise.
-    mean, dark : float
-        Mean signal and mean dark signal of one pixel [electrons].
-    binning : Binning or None
-        How pixels are read as one. Charges that are joined are one pixel.
-
-    Returns
-    -------
-    float
-        Variance [electrons squared].
-    """
-    if binning is None or binning.kind == "charge":
-        return draw.variance(mean, dark)
-    parts = (0.0 if p is None else p.variance(mean, dark) for p in draw.split())
-    own, column, row = parts
-    if binning.kind == "digital":
-        return own / binning.count + column / binning.columns + row / binning.rows
-    return (own if draw.of_readout else own / binning.count) + column + row
-
-
-def conversions(binning: Binning | None) -> int:
-    """Return how many conversions of the ADC make one pixel of the raw frame."""
-    return binning.count if binning is not None and binning.kind == "digital" else 1
 
 
 def read(
@@ -116,10 +84,7 @@ def effects_in_pixels(effects: Sequence[Effect]) -> tuple[Effect, ...]:
     tuple of Effect
         Effects in the same order; of noise the part that every pixel has to itself.
     """
-    parts = (
-        e.split()[0] if isinstance(e, NoiseSource) else e for e in effects if not _of_readout(e)
-    )
-    return tuple(e for e in parts if e is not None)
+    return tuple(part for effect in effects for part in effect.parts_in_pixels())
 
 
 def effects_in_readout(effects: Sequence[Effect]) -> tuple[Effect, ...]:
@@ -135,14 +100,4 @@ def effects_in_readout(effects: Sequence[Effect]) -> tuple[Effect, ...]:
     tuple of Effect
         The readout's noise, the noise of columns and rows, and clamps, in the same order.
     """
-    out: list[Effect] = []
-    for effect in effects:
-        if _of_readout(effect) or isinstance(effect, Limit):
-            out.append(effect)
-        elif isinstance(effect, NoiseSource):
-            out += [part for part in effect.split()[1:] if part is not None]
-    return tuple(out)
-
-
-def _of_readout(effect: Effect) -> bool:
-    return isinstance(effect, NoiseSource) and effect.of_readout
+    return tuple(part for effect in effects for part in effect.parts_in_readout())

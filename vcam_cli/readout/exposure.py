@@ -13,7 +13,8 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from vcam_cli.effects.base import Charge, Effect, Limit, NoiseSource, Quantizer, Site
+from vcam_cli.effects.base import Charge, Effect, of_kind
+from vcam_cli.effects.signal_chain import ElectronEffect, NoiseSource, Quantizer, Site
 from vcam_cli.parallel import each, within
 from vcam_cli.rng import BLOCK_ROWS, blocks, stream
 
@@ -58,7 +59,8 @@ def mean_dark(time: float, effects: tuple[Effect, ...]) -> float:
     float
         Mean dark signal [electrons].
     """
-    return time * sum(e.rate() for e in effects if isinstance(e, Charge))
+    charges = of_kind(effects, Charge)
+    return time * sum(charge.rate() for charge in charges)
 
 
 def sites(
@@ -182,7 +184,6 @@ def capture(
             for number, plane in enumerate(rate)
         ]
         return np.array([e for e, _ in layers]), np.array([dn for _, dn in layers])
-    draws = [e for e in effects if isinstance(e, NoiseSource)]
     dark = mean_dark(time, effects)
     electrons = np.empty_like(rate)
     dn = np.empty(rate.shape, codes_type(code.bits))
@@ -192,13 +193,10 @@ def capture(
         for rows in within(block, max(1, AT_ONCE // rate.shape[1])):
             tile = mean_electrons(rate[rows], time, effects)
             here = {scope: replace(site, rows=len(tile)) for scope, site in opened.items()}
-            for draw in draws:
-                tile = draw.before_shot(tile, here[draw.scope])
-            for effect in effects:
-                if isinstance(effect, NoiseSource):
-                    tile = effect.apply(tile, here[effect.scope])
-                elif isinstance(effect, Limit):
-                    tile = effect.apply(tile)
+            for source in of_kind(effects, NoiseSource):
+                tile = source.before_shot(tile, here[source.scope])
+            for effect in of_kind(effects, ElectronEffect):
+                tile = effect.apply(tile, here[effect.scope])
             electrons[rows] = tile
             dn[rows] = code.apply(tile)
         if done is not None:

@@ -26,8 +26,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcam_cli.camera.derived.electrical import Electrical
-from vcam_cli.effects.base import Effect, Limit, NoiseSource, Quantizer, Site
-from vcam_cli.effects.saturation import Saturation
+from vcam_cli.effects.base import Effect, of_kind
+from vcam_cli.effects.signal_chain import (
+    ElectronEffect,
+    NoiseSource,
+    Quantizer,
+    Site,
+    full_well,
+    noise_sources,
+)
 from vcam_cli.parallel import each
 from vcam_cli.readout.exposure import codes_type, mean_dark, mean_electrons, sites
 from vcam_cli.rng import blocks
@@ -81,7 +88,7 @@ def samples(
         return np.stack([e for e, _ in layers], 1), np.stack([dn for _, dn in layers], 1)
     electrons = np.empty((len(times), *rate.shape), rate.dtype)
     dn = np.empty(electrons.shape, codes_type(code.bits))
-    well = next((e.full_well for e in effects if isinstance(e, Saturation)), np.inf)
+    well = full_well(effects)
 
     def shoot(block: slice) -> None:
         charge = np.zeros_like(rate[block])
@@ -109,27 +116,25 @@ Sites = dict[str, Site]
 
 def _collected(mean: NDArray, effects: Sequence[Effect], new: Sites, same: Sites) -> NDArray:
     """Return the charge that one step adds, with its shot noise [electrons]."""
-    draws = [e for e in effects if isinstance(e, NoiseSource)]
-    for draw in draws:
-        mean = draw.before_shot(mean, _site(draw, new, same))
-    for draw in draws:
-        if draw.in_samples == "accumulates":
-            mean = draw.apply(mean, _site(draw, new, same))
+    sources = of_kind(effects, NoiseSource)
+    for source in sources:
+        mean = source.before_shot(mean, _site(source, new, same))
+    for source in sources:
+        if source.sample_draws == "cumulative":
+            mean = source.apply(mean, _site(source, new, same))
     return mean
 
 
 def _read(charge: NDArray, effects: Sequence[Effect], new: Sites, same: Sites) -> NDArray:
     """Return one readout of the charge so far, which may reuse its array [electrons]."""
-    for effect in effects:
-        if isinstance(effect, NoiseSource) and effect.in_samples != "accumulates":
+    for effect in of_kind(effects, ElectronEffect):
+        if effect.sample_draws != "cumulative":
             charge = effect.apply(charge, _site(effect, new, same))
-        elif isinstance(effect, Limit):
-            charge = effect.apply(charge)
     return charge
 
 
-def _site(draw: NoiseSource, new: Sites, same: Sites) -> Site:
-    return (same if draw.in_samples == "same" else new)[draw.scope]
+def _site(effect: ElectronEffect, new: Sites, same: Sites) -> Site:
+    return (same if effect.sample_draws == "common" else new)[effect.scope]
 
 
 def photocurrent(
@@ -213,8 +218,8 @@ def variances(effects: tuple[Effect, ...], code: Quantizer) -> tuple[float, floa
     reset : float
         Variance that is common to all samples [electrons squared].
     """
-    draws = [e for e in effects if isinstance(e, NoiseSource) and e.scope == "frame"]
-    new = sum(e.variance(0.0) for e in draws if e.in_samples == "new")
-    common = sum(e.variance(0.0) for e in draws if e.in_samples == "same")
+    sources = noise_sources(effects, "frame")
+    new = sum(e.variance(0.0) for e in sources if e.sample_draws == "independent")
+    common = sum(e.variance(0.0) for e in sources if e.sample_draws == "common")
     below, above = code.line(np.array([0.0, 1.0]))
     return float(new + (1 / (above - below)) ** 2 / 12), float(common)

@@ -16,7 +16,9 @@ from numpy.typing import NDArray
 
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.electrical import Electrical
-from vcam_cli.effects.base import Charge, Effect, Quantizer
+from vcam_cli.effects.base import Effect
+from vcam_cli.effects.signal_chain import Quantizer
+from vcam_cli.readout.exposure import mean_dark
 from vcam_cli.readout.nondestructive_samples import variances
 from vcam_cli.scheduling.full_noise import optimal_schedules
 from vcam_cli.scheduling.pdf import photocurrent_levels
@@ -49,7 +51,7 @@ def sensor(
     read, reset = variances(tuple(effects), code)
     return Sensor(
         well=electrical.saturation,
-        dark=sum(e.rate() for e in effects if isinstance(e, Charge)),
+        dark=mean_dark(1.0, tuple(effects)),
         read=float(np.sqrt(read)),
         reset=float(np.sqrt(reset)),
         max_time=longest,

@@ -15,7 +15,8 @@ import numpy as np
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.camera.derived.mosaic import Mosaic
-from vcam_cli.effects.base import Effect, Limit, NoiseSource, Quantizer
+from vcam_cli.effects.base import Effect, of_kind
+from vcam_cli.effects.signal_chain import ElectronEffect, Quantizer
 from vcam_cli.image_formation.optical_path import SpectrumReport
 from vcam_cli.image_formation.settings import Settings
 from vcam_cli.image_formation.transfer_functions import Band
@@ -99,9 +100,8 @@ def samples(camera: Camera, geometry: Geometry, effects: Sequence[Effect]) -> fl
     count = camera.exposure.count
     if not count:
         return 0.0
-    again = sum(
-        e.seconds_per_pixel for e in effects if isinstance(e, NoiseSource | Limit | Quantizer)
-    )
+    repeated = of_kind(effects, ElectronEffect, Quantizer)
+    again = sum(e.seconds_per_pixel for e in repeated)
     passes = PASSES if camera.exposure.estimator == "weighted" else 1
     files = EXR * (count * len(camera.output.raw) + 1)
     pixels = geometry.rows * geometry.columns

@@ -14,8 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcam_cli.camera.camera import Camera
-from vcam_cli.effects.base import Gain, NoiseSource, Quantizer
-from vcam_cli.effects.quantization import Quantization
+from vcam_cli.effects.base import Gain, of_kind
+from vcam_cli.effects.order import quantizer
+from vcam_cli.effects.signal_chain import NoiseSource, Quantizer
 from vcam_cli.image_formation import photon_rate
 from vcam_cli.image_formation.rate_cache import Lights
 from vcam_cli.parallel import available_workers
@@ -95,7 +96,7 @@ class Frame(Prepared):
     @property
     def code(self) -> Quantizer:
         """The ADC."""
-        return Quantization.from_camera(self.camera, self.geometry)
+        return quantizer(self.camera, self.geometry)
 
     @property
     def black_dn(self) -> float:
@@ -141,17 +142,14 @@ class Frame(Prepared):
     def _noise_of_full(self) -> float:
         """Noise behind the full wells of joined voltages, not clipped with them [e rms]."""
         well = self.electrical.full_well
-        draws = [
-            e
-            for e in binned_readout.effects_in_readout(self.plan.active)
-            if isinstance(e, NoiseSource)
-        ]
-        return float(np.sqrt(sum(e.variance(well) for e in draws)))
+        effects = binned_readout.effects_in_readout(self.plan.active)
+        sources = of_kind(effects, NoiseSource)
+        return float(np.sqrt(sum(e.variance(well) for e in sources)))
 
     def patches_dn(self) -> NDArray:
         """Return the codes (C, 24) of a ColorChecker in the scene's light, as `white_dn` [DN]."""
         lit = [self.scene.white.multiply(reflectance) for _, reflectance in colorchecker()]
-        gains = [e for e in self.plan.active if isinstance(e, Gain)]
+        gains = of_kind(self.plan.active, Gain)
         # Levels are exact with any wavelengths: the first and the last are enough.
         coarse = replace(self.settings, wavelength_step=math.inf)
         seen = photon_rate.scene_transfer(
@@ -210,8 +208,7 @@ def take_frame(ready: Prepared, workers: int, stages: Stages | None = None) -> F
     """Return one frame of a camera that is ready for it."""
     stages, camera = stages or Stages(), ready.camera
     with stages("capture"):
-        active = tuple(x for x in ready.plan.active if not isinstance(x, Quantizer))
-        code = Quantization.from_camera(camera, ready.geometry)
+        active, code = ready.plan.active, quantizer(camera, ready.geometry)
         seeds = {"sensor": camera.seed.sensor, "frame": camera.seed.frame}
         known = {field.name: getattr(ready, field.name) for field in fields(ready)}
         times = ready.times
@@ -272,7 +269,7 @@ def _of_samples(
     first, last = frame.times[0], frame.times[-1]
     floor = sum(x.variance(0.0) for x in draws)
     if frame.camera.exposure.estimator == "weighted":
-        read = sum(x.variance(0.0) for x in draws if x.in_samples == "new")
+        read = sum(x.variance(0.0) for x in draws if x.sample_draws == "independent")
         noise = estimators.weighted_variance(0.0, frame.times, dark / last, read, floor - read)
         floor = float(noise) * last**2 - dark
     well = frame.electrical.full_well * last / first

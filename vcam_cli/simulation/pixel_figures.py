@@ -11,10 +11,10 @@ from dataclasses import dataclass
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.electrical import Electrical
 from vcam_cli.camera.derived.geometry import Geometry
-from vcam_cli.effects.base import Charge, NoiseSource
+from vcam_cli.effects.signal_chain import NoiseSource, noise_sources
 from vcam_cli.physics import readout
-from vcam_cli.readout import binned_readout
 from vcam_cli.readout.binning import BinningGroups
+from vcam_cli.readout.exposure import mean_dark
 from vcam_cli.simulation import plan
 
 SHARE = 0.2
@@ -47,11 +47,11 @@ def pixel_figures(
 ) -> PixelFigures:
     """Signal over noise of a pixel that is exposed for a time [s]."""
     wanted = plan.wanted(camera, geometry)
-    draws = tuple(x for x in wanted if isinstance(x, NoiseSource) and x.scope == "frame")
+    draws = noise_sources(wanted, "frame")
     # In electrons of all wells together, in which shot noise is Poisson's.
     wells = joins.count // joins.summed_charges
-    floor = sum(binned_readout.variance(x, 0.0, 0.0, joins.binning) for x in draws) * wells**2
-    dark = sum(x.rate() for x in wanted if isinstance(x, Charge)) * time
+    floor = sum(x.binned_variance(0.0, 0.0, joins.binning) for x in draws) * wells**2
+    dark = mean_dark(time, wanted)
     well, all_dark = electrical.full_well * wells, dark * wells
     return PixelFigures(
         snr_db=float(readout.snr_db(SHARE * well, all_dark, floor)),

@@ -28,31 +28,14 @@ import numpy as np
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.camera.derived.geometry import geometry as solve
-from vcam_cli.effects.base import (
-    Charge,
-    Effect,
-    FieldTransfer,
-    Gain,
-    NoiseSource,
-    PlaneTransfer,
-    Quantizer,
-    SignalLevels,
-    Transport,
-    VeilingGlare,
-)
+from vcam_cli.effects.base import Charge, Effect, SignalLevels, of_kind
 from vcam_cli.effects.order import ORDER
+from vcam_cli.effects.signal_chain import LEVELS, NoiseSource, noise_sources, total_variance
 from vcam_cli.errors import BadInput, Collector
 from vcam_cli.image_formation.settings import Settings
-from vcam_cli.readout.binned_readout import conversions, variance
 
 MEAN_SHARE = 0.25
 """Part of the mean's tolerance for the gains that are left out."""
-COSTLY = (Gain, PlaneTransfer, FieldTransfer)
-"""Kinds that act on the mean signal and take time; charges are an addition, and other transfers
-multiply into one that is there anyway. Veils and transports cost less than a draw, and no bound is
-known before the light is: a lamp in the picture, far beyond its full well, lights all of it."""
-LEVELS = (0.01, 0.1, 1.0)
-"""Shares of full signal at which the variance promise holds."""
 
 
 @dataclass(frozen=True)
@@ -129,23 +112,23 @@ def wanted(camera: Camera, geometry: Geometry) -> tuple[Effect, ...]:
 def optical(camera: Camera, geometry: Geometry) -> tuple[Effect, ...]:
     """Effects of the linear part that run, as far as no signal level is needed to decide it."""
     present = wanted(camera, geometry)
-    dropped = _negligible_light(camera, present)
-    return tuple(e for e in present if not isinstance(e, Charge | NoiseSource) and e not in dropped)
+    later = {*of_kind(present, Charge, NoiseSource), *_negligible_light(camera, present)}
+    return tuple(e for e in present if e not in later)
 
 
 def _negligible_light(camera: Camera, present: Sequence[Effect]) -> set[Effect]:
     """Effects on the mean signal that cost time, and together change it by less than their share.
 
-    The smallest first, as many as fit into the share.
+    The smallest first, as many as fit into the share. Charges are an addition, and most transfers
+    multiply into one that is there anyway. Glare and transport cost less than a draw, and of a lamp
+    in the picture, far beyond its full well, they light all of it: no bound is known beforehand.
     """
-    costly = [
-        e for e in present if isinstance(e, COSTLY) and e.removable and _wish(camera, e) == "auto"
-    ]
     one = SignalLevels(full_signal=1.0, time=1.0)
-    errors = {e: e.mean_error(one) for e in costly}
+    costly = [e for e in present if e.costly and e.removable and _wish(camera, e) == "auto"]
+    errors = {e: error for e in costly if (error := e.mean_error(one)) is not None}
     left = MEAN_SHARE * camera.accuracy.tolerance
     out: set[Effect] = set()
-    for effect in sorted(costly, key=errors.__getitem__):
+    for effect in sorted(errors, key=errors.__getitem__):
         left -= errors[effect]
         if left < 0:
             break
@@ -202,38 +185,16 @@ def _negligible_variance(
     """Draws whose absence changes the variance of their scope by less than 2 T at every level."""
     out: set[Effect] = set()
     for scope in ("frame", "sensor"):
-        everything = _variances([e for e in present if _in(e, scope)], outlook)
+        everything = total_variance(noise_sources(present, scope), outlook)
         missing = np.zeros(len(LEVELS))
-        draws = [e for e in candidates if _in(e, scope)]
-        for effect in sorted(draws, key=lambda e: float(_variances([e], outlook).max())):
-            missing = missing + _variances([effect], outlook)
+        variances = {e: total_variance([e], outlook) for e in noise_sources(candidates, scope)}
+        for effect in sorted(variances, key=lambda e: float(variances[e].max())):
+            missing = missing + variances[effect]
             # Half of it: the other is kept for what the levels in between may ask.
             if np.any(missing > tolerance * everything):
                 break
             out.add(effect)
     return out
-
-
-def _in(effect: Effect, scope: str) -> bool:
-    return isinstance(effect, NoiseSource) and effect.scope == scope
-
-
-def _variances(draws: list[Effect], outlook: SignalLevels) -> np.ndarray:
-    """Summed variance of draws at every level [electrons squared].
-
-    Of pixels that are read as one, of their mean.
-    """
-    return np.array(
-        [
-            sum(
-                variance(e, level * outlook.full_signal, outlook.dark, outlook.binning)
-                for e in draws
-                if isinstance(e, NoiseSource)
-            )
-            for level in LEVELS
-        ],
-        dtype=float,
-    )
 
 
 def _decide(
@@ -249,7 +210,10 @@ def _decide(
     """One line of the plan."""
     if effect is None:
         return Decision(kind.name, "off", "camera", kind.absent, None, "", 0.0)
-    contribution, unit = _contribution(effect, present, outlook, change)
+    contribution, unit = effect.contribution(outlook, present)
+    if change is not None:
+        # A pixel that is full shows no change beyond the well.
+        contribution, unit = min(change / outlook.full_signal, 1.0), "of full signal"
     seconds = kind.seconds_per_pixel * pixels
     wish = _wish(camera, effect)
     if wish == "off":
@@ -260,33 +224,3 @@ def _decide(
         return Decision(kind.name, "off", "plan", reason, contribution, unit, 0.0)
     by = "user" if wish == "on" else "plan"
     return Decision(kind.name, "on", by, what, contribution, unit, seconds)
-
-
-def _contribution(
-    effect: Effect, present: list[Effect], outlook: SignalLevels, change: float | None
-) -> tuple[float | None, str]:
-    """The effect's largest share, of the mean signal or of the variance of its scope.
-
-    change: rms change of the mean signal by leaving it out [electrons], where it is known.
-    """
-    if isinstance(effect, NoiseSource):
-        others = [e for e in present if _in(e, effect.scope) and e.name != effect.name]
-        everything = _variances([*others, effect], outlook)  # it may be switched off
-        kind = "temporal" if effect.scope == "frame" else "fixed-pattern"
-        share = _variances([effect], outlook) / np.maximum(everything, 1e-300)
-        return float(share.max()), f"of the {kind} variance"
-    if isinstance(effect, Quantizer):
-        everything = _variances([e for e in present if _in(e, "frame")], outlook)
-        n = conversions(outlook.binning)
-        rounding = [
-            effect.rounding(level * outlook.full_signal, n * noise) / n
-            for level, noise in zip(LEVELS, everything, strict=True)
-        ]
-        share = np.array(rounding) / np.maximum(everything + rounding, 1e-300)
-        return float(share.max()), "of the temporal variance"
-    if change is not None:
-        # A pixel that is full shows no change beyond the well.
-        return min(change / outlook.full_signal, 1.0), "of full signal"
-    if isinstance(effect, Gain | Charge | VeilingGlare | Transport | FieldTransfer | PlaneTransfer):
-        return effect.mean_error(outlook) / outlook.full_signal, "of full signal"
-    return None, ""

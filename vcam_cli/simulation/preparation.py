@@ -17,8 +17,8 @@ from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.electrical import Electrical, electrical
 from vcam_cli.camera.derived.geometry import Geometry, geometry
 from vcam_cli.camera.derived.mosaic import Mosaic
-from vcam_cli.effects.base import Blur, Charge, Effect, FieldTransfer, SignalLevels, Transport
-from vcam_cli.effects.quantization import Quantization
+from vcam_cli.effects.base import Effect, SignalLevels, Transport, of_kind
+from vcam_cli.effects.order import quantizer
 from vcam_cli.errors import bad
 from vcam_cli.image_formation import bandwidth, memory_model, photon_rate, pixelwise
 from vcam_cli.image_formation.optical_path import OpticalPath, SpectrumReport
@@ -26,7 +26,7 @@ from vcam_cli.image_formation.rate_cache import Lights
 from vcam_cli.image_formation.settings import Settings, settings
 from vcam_cli.image_formation.transfer_functions import Transfer
 from vcam_cli.progress import Stages
-from vcam_cli.readout import auto_exposure, sample_times
+from vcam_cli.readout import auto_exposure, exposure, sample_times
 from vcam_cli.readout.layout import Layout, layout
 from vcam_cli.scenes.base import Scene
 from vcam_cli.scenes.build import build
@@ -65,7 +65,7 @@ class Prepared:
     @property
     def dark_rate(self) -> float:
         """Dark electrons per second that are simulated [e/s]."""
-        return sum(e.rate() for e in self.plan.active if isinstance(e, Charge))
+        return exposure.mean_dark(1.0, self.plan.active)
 
 
 def prepare(
@@ -95,9 +95,8 @@ def prepare(
 
     effects = plan.optical(camera, g)
     with stages("scene"):
-        blurs = [x for x in effects if isinstance(x, Blur | FieldTransfer)]
         band = camera.scene.wavelengths
-        margin = bandwidth.margin(lattice, blurs, (band.start, band.stop), knobs)
+        margin = bandwidth.margin(lattice, effects, (band.start, band.stop), knobs)
         view = photon_rate.view(lattice, knobs, margin)
         scene = build(camera.scene, view, picture, camera.display.primaries)
     with stages("optics"):
@@ -119,12 +118,10 @@ def prepare(
     with stages("exposure"):
         white = float(white_rate.max())
         present = plan.wanted(camera, g)
-        dark = sum(x.rate() for x in present if isinstance(x, Charge))
+        dark = exposure.mean_dark(1.0, present)
         rate = joins.collect(_arriving(taken, dark / joins.summed_charges, effects))
         taken = joins.collect(taken)
-        times = sample_times.choose_sample_times(
-            camera, rate, e, present, Quantization.from_camera(camera, g)
-        )
+        times = sample_times.choose_sample_times(camera, rate, e, present, quantizer(camera, g))
         time = (
             times[-1]
             if times
@@ -136,7 +133,7 @@ def prepare(
         full = max(1.0, min(e.full_well, peak))
         outlook = SignalLevels(full, time, dark * time, camera.array.binning)
         here = _on_pixels(place, joins.collect(found.values), present, effects, time)
-        if transports := [x.name for x in present if isinstance(x, Transport)]:
+        if transports := [transport.name for transport in of_kind(present, Transport)]:
             well = min(e.full_well / time - dark, MOST_ELECTRONS)
             moved = _rms(np.minimum(rate, well) - np.minimum(taken, well))
             here |= dict.fromkeys(transports, moved)
@@ -188,7 +185,7 @@ def _on_pixels(
     parts = zip(light, mosaics, strict=True) if place.planes else [(light, mosaic)]
     found: dict[str, float] = {}
     for plane, colors in parts:
-        here = pixelwise.changes(plane, geometry, colors, present, running, time)
+        here = pixelwise.changes_by_omission(plane, geometry, colors, present, running, time)
         found = {name: max(change, found.get(name, 0.0)) for name, change in here.items()}
     return found
 
@@ -203,13 +200,12 @@ def _arriving(rate: NDArray, dark: float, effects: Sequence[Effect]) -> NDArray:
     Such that with the dark rate they are what arrives of both. Before the exposure is timed, since
     transport is linear: what is automatic sees the picture as it is read.
     """
-    for effect in effects:
-        if isinstance(effect, Transport):
-            signal = rate + rate.dtype.type(dark)
-            planes = signal.reshape(-1, *signal.shape[-2:])
-            signal = np.array([effect.transport(plane) for plane in planes]).reshape(rate.shape)
-            signal -= rate.dtype.type(dark)
-            rate = signal
+    for transport in of_kind(effects, Transport):
+        signal = rate + rate.dtype.type(dark)
+        planes = signal.reshape(-1, *signal.shape[-2:])
+        signal = np.array([transport.transport(plane) for plane in planes]).reshape(rate.shape)
+        signal -= rate.dtype.type(dark)
+        rate = signal
     return rate
 
 

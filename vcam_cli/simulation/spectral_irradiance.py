@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from vcam_cli.camera.derived.geometry import Geometry, pixel_centers
 from vcam_cli.camera.derived.mosaic import Mosaic
-from vcam_cli.effects.base import Blur, Gain, VeilingGlare
+from vcam_cli.effects.base import Blur, Gain, VeilingGlare, of_kind
 from vcam_cli.effects.pixel_aperture import PixelAperture
 from vcam_cli.image_formation import photon_rate
 from vcam_cli.image_formation.optical_path import Layer, OpticalPath
@@ -76,16 +76,15 @@ def _bands(
     level: (K, n) of the scene's components in every band. Yields (rows, columns) in its unit.
     """
     g = _whole_cells(ready.layout.grid)
-    in_lens = [e for e in ready.plan.active if e.in_lens]
-    blurs = tuple(e for e in in_lens if isinstance(e, Blur))
-    transfer = Transfer(wavelengths, level[:, :, None] * np.eye(len(wavelengths)), blurs)
+    in_lens = [e for e in ready.plan.active if e.origin == "lens"]
+    level = level[:, :, None] * np.eye(len(wavelengths))
+    transfer = Transfer(wavelengths, level, of_kind(in_lens, Blur))
     bands = Mosaic((tuple(f"{w * 1e9:.6f}" for w in wavelengths),))
     effects = (*in_lens, PixelAperture(g.pitch_x, g.pitch_y))
     light = OpticalPath(transfer, g, ready.settings, bands, effects, workers)
     dtype = ready.settings.dtype
     x, y = pixel_centers(g)
-    gains = [e.gain(x.astype(dtype), y.astype(dtype)) for e in in_lens if isinstance(e, Gain)]
-    astray = sum(e.fraction for e in in_lens if isinstance(e, VeilingGlare))
+    gains = [e.gain(x.astype(dtype), y.astype(dtype)) for e in of_kind(in_lens, Gain)]
     out: NDArray = np.zeros((len(wavelengths), g.rows, g.columns), dtype)
     layers, _ = image_layers(light, _scene(ready))
     for layer in layers:
@@ -100,8 +99,8 @@ def _bands(
         np.maximum(plane, 0, out=plane)
         for gain in gains:
             plane *= gain
-        if astray:
-            plane += astray * (plane.mean(dtype=np.float64) - plane)
+        for glare in of_kind(in_lens, VeilingGlare):
+            plane += glare.fraction * (plane.mean(dtype=np.float64) - plane)
         yield plane
 
 

@@ -23,7 +23,7 @@ from vcam_cli.camera.derived.geometry import Geometry, geometry
 from vcam_cli.camera.derived.pixel_layout import detector
 from vcam_cli.camera.derived.process import process
 from vcam_cli.characterization.closed_form import directional_mtf
-from vcam_cli.effects.base import Effect, Gain
+from vcam_cli.effects.base import Effect, Gain, of_kind
 from vcam_cli.effects.off_axis import OffAxis
 from vcam_cli.effects.pixel_vignetting import PixelVignetting
 from vcam_cli.errors import bad
@@ -155,7 +155,7 @@ def _mtf(camera: Camera, nyquist: float) -> list[Curves]:
         return [directional_mtf(found, effects, color, frequency, (1.0, 0.0)) for color in colors]
 
     effects = plan.optical(camera, g)
-    both = transfer(effects), transfer(tuple(e for e in effects if not e.in_lens))
+    both = transfer(effects), transfer(tuple(e for e in effects if e.origin != "lens"))
     x = {FREQUENCY: frequency / 1e3, "of_nyquist": frequency / (nyquist * 1e3)}
     return [
         Curves(color, x, {"system_mtf": system, "sensor_mtf": sensor})
@@ -187,8 +187,8 @@ def _along_diagonal(camera: Camera) -> Curves:
     Raises BadInput where all pixels collect alike.
     """
     g = geometry(camera)
-    gains = [e for e in plan.wanted(camera, g) if isinstance(e, Gain)]
-    tunnel = next((e for e in gains if isinstance(e, PixelVignetting)), None)
+    gains = of_kind(plan.wanted(camera, g), Gain)
+    tunnel = next(iter(of_kind(gains, PixelVignetting)), None)
     falloff = next((e for e in gains if e.name == OffAxis.name), None)
     if tunnel is None and falloff is None:
         message = "neither a stack above the pixels nor a falloff is there: all collect alike"

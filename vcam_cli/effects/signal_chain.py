@@ -1,0 +1,238 @@
+"""Kinds of effects on the electrons that a pixel has collected: noise, clamps, the ADC."""
+
+from __future__ import annotations
+
+import math
+from abc import abstractmethod
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, field
+from typing import ClassVar, Literal, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcam_cli.camera.array import Binning
+from vcam_cli.effects.base import Effect, SignalLevels, of_kind
+
+LEVELS = (0.01, 0.1, 1.0)
+"""Shares of full signal at which variances are weighed."""
+_KINDS_OF_VARIANCE = {"frame": "temporal", "sensor": "fixed-pattern"}
+
+
+@dataclass(frozen=True)
+class Site:
+    """Where a draw happens: a block of rows, and its random streams."""
+
+    rows: int
+    columns: int
+    stream: Callable[[str], np.random.Generator]
+    """Generator of a named stream for this block of rows."""
+    line_stream: Callable[[str], np.random.Generator]
+    """Generator of a named stream shared by all blocks, for draws per column."""
+    dtype: type
+    dark: float = 0.0
+    """Mean dark signal of a pixel [electrons]."""
+    columns_drawn: dict[str, NDArray] = field(default_factory=dict)
+    """Draws per column that are at hand."""
+
+    def normal(self, name: str) -> NDArray:
+        """Return one standard normal number a pixel, (rows, columns)."""
+        return self.stream(name).standard_normal((self.rows, self.columns), dtype=self.dtype)
+
+    def normal_columns(self, name: str) -> NDArray:
+        """Return one standard normal number a column, the same for every block, (columns,)."""
+        if name not in self.columns_drawn:
+            drawn = self.line_stream(name).standard_normal(self.columns, dtype=self.dtype)
+            drawn.setflags(write=False)
+            self.columns_drawn[name] = drawn
+        return self.columns_drawn[name]
+
+    def normal_rows(self, name: str) -> NDArray:
+        """Return one standard normal number a row, the same for every column, (rows, 1)."""
+        return self.stream(name).standard_normal((self.rows, 1), dtype=self.dtype)
+
+
+class ElectronEffect(Effect):
+    """An effect on the collected electrons of a frame, or of one sample of an integration."""
+
+    scope: ClassVar[str] = "frame"
+    """'frame': new in every frame; 'sensor': stays with the sensor."""
+    sample_draws: ClassVar[Literal["independent", "common", "cumulative"]] = "independent"
+    """In several samples of one integration: drawn anew in each, the same in all, or drawn anew
+    for the charge of each step, which adds up."""
+
+    @abstractmethod
+    def apply(self, electrons: NDArray, site: Site) -> NDArray:
+        """Return the block with this effect in it, which may reuse the array [electrons]."""
+
+
+class NoiseSource(ElectronEffect):
+    """A random contribution; whoever adds it also states its variance."""
+
+    def split(self) -> tuple[Self | None, Self | None, Self | None]:
+        """Return the parts of each pixel by itself, of each column, and of each row."""
+        return self, None, None
+
+    def parts_in_pixels(self) -> tuple[Effect, ...]:
+        """Return what every pixel has to itself, unless the noise is the readout's."""
+        parts = () if self.origin == "readout" else self.split()[:1]
+        return tuple(part for part in parts if part is not None)
+
+    def parts_in_readout(self) -> tuple[Effect, ...]:
+        """Return the readout's noise as it is; of other noise what columns and rows share."""
+        parts = (self,) if self.origin == "readout" else self.split()[1:]
+        return tuple(part for part in parts if part is not None)
+
+    def before_shot(self, mean: NDArray, site: Site) -> NDArray:
+        """Return the block's mean signal as this source changes it [electrons].
+
+        It may reuse the array.
+        """
+        return mean
+
+    @abstractmethod
+    def variance(self, mean: float, dark: float = 0.0) -> float:
+        """Return the variance that it adds to a pixel [electrons squared].
+
+        Parameters
+        ----------
+        mean : float
+            Mean signal of the pixel [electrons].
+        dark : float, optional
+            How much of the mean signal is dark signal [electrons].
+        """
+
+    def binned_variance(self, mean: float, dark: float, binning: Binning | None) -> float:
+        """Return the variance that it adds to the mean of pixels that are read as one.
+
+        Parameters
+        ----------
+        mean, dark : float
+            Mean signal and mean dark signal of one pixel [electrons].
+        binning : Binning or None
+            How pixels are read as one. Charges that are joined are one pixel.
+
+        Returns
+        -------
+        float
+            Variance [electrons squared].
+        """
+        if binning is None or binning.kind == "charge":
+            return self.variance(mean, dark)
+        own, column, row = (0.0 if p is None else p.variance(mean, dark) for p in self.split())
+        if binning.kind == "digital":
+            return own / binning.count + column / binning.columns + row / binning.rows
+        return (own if self.origin == "readout" else own / binning.count) + column + row
+
+    def contribution(self, outlook: SignalLevels, others: Sequence[Effect]) -> tuple[float, str]:
+        """Return its largest share of the variance of its scope, at any of the `LEVELS`."""
+        rest = [e for e in noise_sources(others, self.scope) if e.name != self.name]
+        total = total_variance([*rest, self], outlook)
+        share = total_variance([self], outlook) / np.maximum(total, 1e-300)
+        return float(share.max()), f"of the {_KINDS_OF_VARIANCE[self.scope]} variance"
+
+
+def noise_sources(effects: Iterable[Effect], scope: str) -> tuple[NoiseSource, ...]:
+    """Return the noise sources that are new in every 'frame', or that stay with the 'sensor'."""
+    return tuple(source for source in of_kind(effects, NoiseSource) if source.scope == scope)
+
+
+def total_variance(sources: Iterable[NoiseSource], outlook: SignalLevels) -> NDArray:
+    """Return the summed variance of noise sources at each of the `LEVELS` [electrons squared].
+
+    Of pixels that are read as one, of their mean.
+    """
+    listed = tuple(sources)
+    return np.array(
+        [
+            sum(
+                source.binned_variance(level * outlook.full_signal, outlook.dark, outlook.binning)
+                for source in listed
+            )
+            for level in LEVELS
+        ],
+        dtype=float,
+    )
+
+
+class Limit(ElectronEffect):
+    """A clamp."""
+
+    removable = False
+
+    @property
+    def ceiling(self) -> float:
+        """The most electrons that it lets through; a pixel that holds them is full."""
+        return math.inf
+
+    def parts_in_readout(self) -> tuple[Effect, ...]:
+        """Return the clamp itself: what joined voltages hold ends as what pixels hold does."""
+        return (self,)
+
+    @abstractmethod
+    def apply(self, electrons: NDArray, site: Site | None = None) -> NDArray:
+        """Return the clamped block, which may reuse the array [electrons]."""
+
+
+def full_well(effects: Iterable[Effect]) -> float:
+    """Return the electrons of a full pixel; inf where no effect limits them."""
+    return min((limit.ceiling for limit in of_kind(effects, Limit)), default=math.inf)
+
+
+class Quantizer(Effect):
+    """Conversion to digital numbers. A camera has one, switched off or not."""
+
+    removable = False
+    origin = "readout"
+    bits: int
+
+    @abstractmethod
+    def apply(self, electrons: NDArray) -> NDArray:
+        """Return the digital numbers of `electrons`, whole and of the same float type [DN]."""
+
+    @abstractmethod
+    def line(self, electrons: NDArray) -> NDArray:
+        """Return the same relation before rounding and clipping [DN]."""
+
+    def contribution(self, outlook: SignalLevels, others: Sequence[Effect]) -> tuple[float, str]:
+        """Return the largest share of its rounding in the temporal variance with it."""
+        total = total_variance(noise_sources(others, "frame"), outlook)
+        n = outlook.conversions
+        rounding = [
+            self.rounding(level * outlook.full_signal, n * noise) / n
+            for level, noise in zip(LEVELS, total, strict=True)
+        ]
+        share = np.array(rounding) / np.maximum(total + rounding, 1e-300)
+        return float(share.max()), "of the temporal variance"
+
+    def rounding(self, level: float, variance: float) -> float:
+        """Return the largest mean square of the rounding error at a level [electrons squared].
+
+        Of noise wider than half a step it is q^2 / 12; of less it depends on where between two
+        codes the signal lies, and is q^2 / 4 at most: q^2 / 12 + (q / pi)^2 sum_k exp(-2 (pi k
+        sigma / q)^2) / k^2, where cosines of the place are set to 1.
+
+        Parameters
+        ----------
+        level : float
+            Mean signal [electrons].
+        variance : float
+            Variance of the noise in the signal [electrons squared].
+
+        References
+        ----------
+        B. Widrow and I. Kollar, Quantization Noise, 2008, section 5.3.
+        """
+        ends = np.array([level, level + max(1.0, 1e-3 * level)])
+        below, above = self.line(ends)
+        step = (ends[1] - ends[0]) / float(above - below)
+        k = np.arange(1, 30)
+        dithered = np.exp(-2 * (np.pi * k) ** 2 * variance / step**2) / k**2
+        return float(step**2 / 12 + (step / np.pi) ** 2 * dithered.sum())
+
+    def linear(self, dn: NDArray) -> NDArray:
+        """Return what a linear ADC of the same offset and full scale has for these codes [DN].
+
+        It is a straight line of electrons whatever the curve is, in the same float type.
+        """
+        return dn
