@@ -44,6 +44,8 @@ class OpticalPath:
     def field(self) -> FieldTransfer | None:
         """The blur that changes over the field, where there is one."""
         found = of_kind(self.effects, FieldTransfer)
+        if len(found) > 1:
+            raise ValueError("one blur at most may change over the field")
         return found[0] if found else None
 
     @cached_property
