@@ -409,7 +409,7 @@ def test_nothing_that_counts_is_passed_beyond_the_highest(fill):
         seen = path(g, *blurs, aperture(g))
         found = highest_passed(seen, None)
         f = np.linspace(found, bandwidth.HIGHEST, 4000)[1:] * 0.5 / PITCH
-        passed = np.abs(seen.transfer.at(f)[0, 0] * np.sinc(f * fill * PITCH))
+        passed = np.abs(seen.transfer.radial_response(f)[0, 0] * np.sinc(f * fill * PITCH))
         assert passed.max() <= bandwidth.LEAST_PASSED * STANDARD.tolerance * (1 + 1e-9)
         assert found <= 2 * PITCH * seen.transfer.cutoff
 

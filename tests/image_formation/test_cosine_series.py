@@ -45,7 +45,7 @@ def test_coefficients_and_their_continuation_agree_with_the_definition(samples, 
     k = np.arange(count)
     direct = 2 * values @ np.cos(np.pi * np.outer(n + 0.5, k) / samples)
     np.testing.assert_allclose(axis.extend(coefficients, count), direct, atol=1e-10)
-    index, sign = axis.coefficient_of(k)
+    index, sign = axis.coefficient_index(k)
     np.testing.assert_allclose(coefficients[:, index] * sign, direct, atol=1e-10)
 
 
@@ -96,7 +96,7 @@ def test_photodetectors_off_center_need_no_chirp():
     centered, off, cropped = (
         AXES[name] for name in ("same pitch", "detector off center", "no common measure")
     )
-    assert off.virtual_pixels == off.folded == 12
+    assert off.virtual_pixels == off.folded_terms == 12
     assert off.shift == pytest.approx(-0.2)
     assert len(off.pixel_waves()) == 2
     assert len(centered.pixel_waves()) == 1
@@ -113,9 +113,9 @@ def test_folding_by_pieces_is_the_folding(name, odd):
     axis = AXES[name]
     terms = np.random.default_rng(1).standard_normal(axis.terms)
     expected = axis.fold(terms, odd)
-    got = np.zeros(axis.folded)
-    for start in range(0, axis.folded, 4):
-        piece = slice(start, min(start + 4, axis.folded))
+    got = np.zeros(axis.folded_terms)
+    for start in range(0, axis.folded_terms, 4):
+        piece = slice(start, min(start + 4, axis.folded_terms))
         for target, source, weights in axis.folding(piece, odd):
             got[target] += terms[source] * weights
     np.testing.assert_allclose(got, expected, atol=1e-12)

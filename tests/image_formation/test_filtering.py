@@ -12,7 +12,7 @@ from vcam_cli.image_formation.bandwidth import axes
 from vcam_cli.image_formation.box_average import box_averages
 from vcam_cli.image_formation.cosine_series import Axis
 from vcam_cli.image_formation.filtering import Filter, chebyshev
-from vcam_cli.image_formation.scene_spectrum import transformed
+from vcam_cli.image_formation.scene_spectrum import transform_planes
 from vcam_cli.image_formation.strategies import SMOOTH
 from vcam_cli.image_formation.transfer_tables import Tables, TableSize, tabulate
 from vcam_cli.physics.diffraction import otf_circular
@@ -88,7 +88,7 @@ def test_filter_equals_the_dense_sum(grid, dtype, tolerance):
     table = tables(2, 3, top=1.6)
     along_x, along_y = np.sinc(x.frequencies * 0.6), np.sinc(y.frequencies * 0.8)
     expected = dense(planes, x, y, table, along_x, along_y)
-    spectrum = transformed(planes.astype(dtype), workers=1)
+    spectrum = transform_planes(planes.astype(dtype), workers=1)
     series = filter_of(x, y, table, along_x, along_y).apply(spectrum, workers=1)
     got = np.array([series.signal(color, slice(None)) for color in range(3)])
     assert got.dtype == dtype
@@ -125,7 +125,7 @@ def test_stretches_of_rows_are_those_of_every_row(grid, lens, monkeypatch):
     }[lens]
     filter = filter_of(x, y, Tables(np.eye(1), values[None, None], f[-1], 0.0))
     plane = np.random.default_rng(0).standard_normal((1, y.samples, x.samples))
-    spectrum = transformed(plane.copy(), 1)
+    spectrum = transform_planes(plane.copy(), 1)
     stretched = filter.apply(spectrum, 1).signal(0, slice(None))
     every_row(monkeypatch)
     rows = filter.apply(spectrum, 1).signal(0, slice(None))
@@ -167,7 +167,7 @@ def test_same_bytes_for_any_number_of_workers():
     planes = rng.random((2, y.samples, x.samples)).astype(np.float32)
     frames = []
     for workers in (1, 2, 5):
-        spectrum = transformed(planes.copy(), workers)
+        spectrum = transform_planes(planes.copy(), workers)
         series = filter_of(x, y, tables(2, 3, 1.2)).apply(spectrum, workers)
         frames.append(series.parts[False].tobytes())
     assert frames[0] == frames[1] == frames[2]
@@ -175,7 +175,7 @@ def test_same_bytes_for_any_number_of_workers():
 
 def test_uniform_light_stays_uniform():
     x, y = GRIDS["odd ratio"]
-    spectrum = transformed(np.full((1, y.samples, x.samples), 0.7), 1)
+    spectrum = transform_planes(np.full((1, y.samples, x.samples), 0.7), 1)
     got = filter_of(x, y, tables(1, 1, 1.6)).apply(spectrum, 1).signal(0, slice(None))
     np.testing.assert_allclose(got, 0.7, atol=1e-12)
 
@@ -190,7 +190,7 @@ def test_filter_approaches_boxes_as_the_bandwidth_grows():
     for bandwidth in (4.0, 40.0):
         x, y = axes(seen, scene, bandwidth)
         flat = Tables(np.eye(1), np.ones((1, 1, 2)), 1e3, 0.0)
-        spectrum = transformed(plane[None].copy(), 1)
+        spectrum = transform_planes(plane[None].copy(), 1)
         filter = filter_of(x, y, flat, np.sinc(x.frequencies * 0.7), np.sinc(y.frequencies * 0.7))
         got = filter.apply(spectrum, 1).signal(0, slice(None))
         exact = box_averages(scene, np.ones((1, 1)), g, (x, y), 1)[0]
@@ -213,7 +213,7 @@ def test_photodetectors_off_their_pixels_centers_see_the_place_where_they_are(sh
     table = tabulate(seen.transfer, TableSize(lens.cutoff(550e-9), 1 << 14, 0.0, 8), (np.eye(1), 0))
     along = [np.sinc(x.frequencies * 0.5 * g.pitch_x), np.sinc(y.frequencies * 0.4 * g.pitch_y)]
     filter = filter_of(x, y, table, *along)
-    got = filter.apply(transformed(plane[None].copy(), 1), 1).signal(0, slice(None))
+    got = filter.apply(transform_planes(plane[None].copy(), 1), 1).signal(0, slice(None))
     np.testing.assert_allclose(got, dense([plane], x, y, table, *along)[0], atol=1e-9)
 
 
@@ -222,7 +222,7 @@ def test_a_chirp_gives_what_folding_gives():
     their places differ by 3e-7 pixels."""
     x, y = LARGE["off center"]
     plane = np.random.default_rng(7).random((1, y.samples, x.samples))
-    spectrum = transformed(plane.copy(), 1)
+    spectrum = transform_planes(plane.copy(), 1)
     folded, chirped = (
         filter_of(*(replace(a, pixel_pitch=scale) for a in (x, y)), tables(1, 2, 1.2))
         for scale in (1.0, 1 + 1e-9)
@@ -246,13 +246,13 @@ def test_several_colors_and_planes_are_summed_alike():
     x, y = GRIDS["odd ratio"]
     planes = np.random.default_rng(8).random((3, y.samples, x.samples))
     table = tables(3, 3, 1.6)
-    together = filter_of(x, y, table).apply(transformed(planes.copy(), 1), 1)
+    together = filter_of(x, y, table).apply(transform_planes(planes.copy(), 1), 1)
     for color in range(3):
         alone = 0
         for plane in range(3):
             part = replace(
                 table, mix=np.eye(1), radial=table.radial[plane : plane + 1, color : color + 1]
             )
-            spectrum = transformed(planes[plane : plane + 1].copy(), 1)
+            spectrum = transform_planes(planes[plane : plane + 1].copy(), 1)
             alone = alone + filter_of(x, y, part).apply(spectrum, 1).signal(0, slice(None))
         np.testing.assert_allclose(together.signal(color, slice(None)), alone, atol=1e-12)

@@ -107,7 +107,7 @@ def test_nothing_is_computed_that_does_not_fit(work, monkeypatch):
 
 
 def test_charts_that_do_not_fit_are_not_painted(monkeypatch):
-    monkeypatch.setattr(memory_model, "of_box_averages", lambda *args: 1 << 62)
+    monkeypatch.setattr(memory_model, "box_average_bytes", lambda *args: 1 << 62)
     with pytest.raises(CannotDo, match="GB of memory"):
         simulate(load("colorchecker-d65", [*SMALL, "optics.diffraction=false"]))
 
@@ -115,7 +115,7 @@ def test_charts_that_do_not_fit_are_not_painted(monkeypatch):
 def test_more_pixels_need_more():
     camera = load("colorchecker-d65", SMALL)
     few, many = (
-        memory_model.of_frame(replace(geometry(camera), rows=n), settings(camera), 3, False)
+        memory_model.frame_bytes(replace(geometry(camera), rows=n), settings(camera), 3, False)
         for n in (1000, 2000)
     )
     assert few < many
@@ -126,12 +126,12 @@ def test_more_pixels_need_more():
 def test_more_of_everything_needs_more(judged, samples):
     """Samples of an integration, an ideal picture to be compared with, colors, 64 bits."""
     g = sensor(1000, 1500)
-    least = memory_model.of_frame(g, STANDARD, 1, judged, samples)
-    assert memory_model.of_frame(g, STANDARD, 3, judged, samples) > least
-    assert memory_model.of_frame(g, STANDARD, 1, judged, samples + 5) > least
+    least = memory_model.frame_bytes(g, STANDARD, 1, judged, samples)
+    assert memory_model.frame_bytes(g, STANDARD, 3, judged, samples) > least
+    assert memory_model.frame_bytes(g, STANDARD, 1, judged, samples + 5) > least
     wide = replace(STANDARD, float_width=64)
-    assert memory_model.of_frame(g, wide, 1, judged, samples) > least
-    assert judged or memory_model.of_frame(g, STANDARD, 1, True, samples) > least
+    assert memory_model.frame_bytes(g, wide, 1, judged, samples) > least
+    assert judged or memory_model.frame_bytes(g, STANDARD, 1, True, samples) > least
 
 
 def test_an_image_needs_more_for_planes_cells_and_directions():
@@ -142,7 +142,7 @@ def test_an_image_needs_more_for_planes_cells_and_directions():
     scene = on_chart(seen, SiemensStar(9, 1.0), margin=20)
 
     def needed(seen=seen, scene=scene, planes=1):
-        return memory_model.of_image(seen, scene, planes, size)
+        return memory_model.image_bytes(seen, scene, planes, size)
 
     least = needed()
     shape = 2 * scene.shape[0], 2 * scene.shape[1]
@@ -161,7 +161,7 @@ def test_tables_of_strong_blurs_are_as_large_as_they_get():
     strong, absurd = (
         path(g, Diffraction(2.0, 0.0), Leaning(reach, 0, 1e-6, 1e-6)) for reach in (1e-3, 1.0)
     )
-    needed = [memory_model.of_image(p, scene, 1, size) for p in (strong, absurd)]
+    needed = [memory_model.image_bytes(p, scene, 1, size) for p in (strong, absurd)]
     assert needed[0] == needed[1] < 2e9
 
 
@@ -170,6 +170,7 @@ def test_the_estimate_of_a_picture_counts_its_samples():
     seen = path(g, Diffraction(2.0, 0.0))
     size = table_size(seen, 2.0)
     few, many = (
-        memory_model.of_image(seen, of_picture([[0.5] * n] * n, 1e-6), 1, size) for n in (400, 800)
+        memory_model.image_bytes(seen, of_picture([[0.5] * n] * n, 1e-6), 1, size)
+        for n in (400, 800)
     )
     assert many - few >= (800**2 - 400**2) * 4

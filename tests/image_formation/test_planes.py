@@ -17,7 +17,7 @@ from vcam_cli.image_formation.filtering import Filter
 from vcam_cli.image_formation.optical_path import OpticalPath
 from vcam_cli.image_formation.photon_rate import photo_rate
 from vcam_cli.image_formation.power_spectrum import power_spectrum
-from vcam_cli.image_formation.scene_spectrum import SampledSpectrum, transformed
+from vcam_cli.image_formation.scene_spectrum import SampledSpectrum, transform_planes
 from vcam_cli.image_formation.settings import STANDARD
 from vcam_cli.image_formation.transfer_functions import Transfer
 from vcam_cli.image_formation.transfer_tables import Tables, TableSize, mixtures, tabulate
@@ -127,7 +127,7 @@ def test_a_blur_of_the_plane_is_its_spread_in_space(name, axes, dtype):
         plane[0].astype(float), PITCH, x.first + np.arange(x.pixels) * x.pixel_pitch,
         y.first + np.arange(y.pixels) * y.pixel_pitch, blur,
     )  # fmt: skip
-    got = through(x, y, tables_of(light(blur), 8.5e5), transformed(plane.copy(), 1))
+    got = through(x, y, tables_of(light(blur), 8.5e5), transform_planes(plane.copy(), 1))
     assert got.dtype == dtype
     assert np.sqrt(np.mean((got - expected) ** 2)) < allowed
 
@@ -159,7 +159,7 @@ def test_what_a_sampled_spread_ends_stays_away(dtype):
     spectrum = SampledSpectrum(coefficients)
     # To rounding of the splines, beside coefficients of 1.
     assert np.abs(through(x, y, tables, spectrum)).max() < 1e-7
-    assert power_spectrum(spectrum, x, y, (), 1).through(tables).max() < 1e-14
+    assert power_spectrum(spectrum, x, y, (), 1).filtered_power(tables).max() < 1e-14
 
 
 def test_power_is_the_mean_square_of_the_picture():
@@ -167,13 +167,13 @@ def test_power_is_the_mean_square_of_the_picture():
     x, y = AXES["folded"]
     plane = np.random.default_rng(6).standard_normal((1, y.samples, x.samples))
     tables = tables_of(light(blur), 8.5e5)
-    spectrum = transformed(plane.copy(), 1)
+    spectrum = transform_planes(plane.copy(), 1)
     fine = [
         replace(a, pixels=8 * a.pixels, pixel_pitch=PITCH / 8, first=PITCH / 16) for a in (x, y)
     ]
     dense = through(*fine, tables, spectrum)
     # A transfer function is judged at the centers of blocks, a twentieth of a frequency wide.
-    power = power_spectrum(spectrum, x, y, (), 1).through(tables).sum()
+    power = power_spectrum(spectrum, x, y, (), 1).filtered_power(tables).sum()
     assert power == pytest.approx(np.mean(dense**2), rel=0.01)
 
 
@@ -197,7 +197,7 @@ def test_a_blur_that_changes_is_the_mean_of_its_zones(kind, tmp_path):
     x = Axis(g.columns, p, g.columns, p, p / 2, True, 1.7 / p)
     y = Axis(g.rows, p, g.rows, p, p / 2, True, 1.7 / p)
     plane = np.random.default_rng(8).random((1, g.rows, g.columns))
-    spectrum = transformed(plane.copy(), 1)
+    spectrum = transform_planes(plane.copy(), 1)
 
     def run(tables):
         return through(x, y, tables, spectrum)

@@ -22,8 +22,12 @@ from vcam_cli.image_formation.bandwidth import axes
 from vcam_cli.image_formation.cosine_series import Axis
 from vcam_cli.image_formation.filtering import Filter
 from vcam_cli.image_formation.power_spectrum import blocks, brightest_mean, power_spectrum
-from vcam_cli.image_formation.scene_spectrum import SampledSpectrum, of_rectangles, transformed
-from vcam_cli.image_formation.transfer_tables import Tables, TableSize, bound, tabulate
+from vcam_cli.image_formation.scene_spectrum import (
+    SampledSpectrum,
+    rectangle_spectrum,
+    transform_planes,
+)
+from vcam_cli.image_formation.transfer_tables import Tables, TableSize, bounding_tables, tabulate
 from vcam_cli.scenes.base import Rectangles
 
 PITCH = 2e-6
@@ -99,9 +103,9 @@ def test_power_is_the_sum_over_all_terms(name):
     """Of noise, without a lens: exact but for the mean over a square, judged at blocks' centers."""
     x, y = AXES[name]
     plane = planes_of(x, y)
-    power = power_spectrum(transformed(plane.copy(), 1), x, y, (), 1)
+    power = power_spectrum(transform_planes(plane.copy(), 1), x, y, (), 1)
     every = np.square(amplitudes(plane[0], x, y))
-    assert power.through(flat())[0].sum() == pytest.approx(every.sum(), rel=2e-3)
+    assert power.filtered_power(flat())[0].sum() == pytest.approx(every.sum(), rel=2e-3)
     assert power.products[0][0, 0] == pytest.approx(every[0, 0], rel=1e-12)
 
 
@@ -114,7 +118,7 @@ def test_every_block_is_the_sum_over_its_terms(name):
         shape = (-1, 1) if axis == 1 else (1, -1)
         spectrum /= (1 + np.arange(count)).reshape(shape) ** 0.7
     power = power_spectrum(SampledSpectrum(spectrum), x, y, (), 1)
-    index_x, index_y = (a.coefficient_of(np.arange(a.terms)) for a in (x, y))
+    index_x, index_y = (a.coefficient_index(np.arange(a.terms)) for a in (x, y))
     terms = spectrum[0][index_y[0]][:, index_x[0]] * np.outer(index_y[1], index_x[1])
     twice = np.outer(*(np.where(np.arange(a.terms) > 0, 2, 1) for a in (y, x)))
     every = np.square(terms * np.outer(y.weights, x.weights)) * twice
@@ -134,11 +138,11 @@ def test_mean_squares_are_those_of_the_picture():
     x, y = AXES["squares beyond their own Nyquist frequency"]
     plane = planes_of(x, y)
     tables = lens(np.exp(-2 * (np.linspace(0, 2.5, 4001)[None, None]) ** 2), 3.6 * NYQUIST)
-    spectrum = transformed(plane.copy(), 1)
+    spectrum = transform_planes(plane.copy(), 1)
     fine = [replace(a, pixels=3 * a.pixels, pixel_pitch=PITCH / 3, first=PITCH / 6) for a in (x, y)]
     filter = Filter(*fine, tables, *(np.ones(a.terms) for a in fine), smooth=tables.top / 64)
     picture = filter.apply(spectrum, 1).signal(0, slice(None))
-    power = power_spectrum(spectrum, x, y, (), 1).through(tables)
+    power = power_spectrum(spectrum, x, y, (), 1).filtered_power(tables)
     assert power.sum() == pytest.approx(np.mean(picture**2), rel=0.01)
 
 
@@ -147,12 +151,12 @@ def test_a_grating_beyond_nyquist_is_not_lost(tone):
     """All light is in one coefficient, and where it is repeated, anywhere in its blocks."""
     x, y = AXES["squares beyond their own Nyquist frequency"]
     spectrum = np.zeros((1, y.samples, x.samples))
-    index = [a.coefficient_of(np.arange(a.terms)) for a in (y, x)]
+    index = [a.coefficient_index(np.arange(a.terms)) for a in (y, x)]
     row, column = (i[0][k] for i, k in zip(index, tone, strict=True))
     spectrum[0, row, column] = 1.0
     top = 4 * NYQUIST
     tables = lens(np.linspace(1, 0, 2001)[None, None], top)
-    power = power_spectrum(SampledSpectrum(spectrum), x, y, (), 1).through(tables).sum()
+    power = power_spectrum(SampledSpectrum(spectrum), x, y, (), 1).filtered_power(tables).sum()
     along_y, along_x = (
         a.weights * (i[0] == k) * i[1] * np.where(np.arange(a.terms) > 0, np.sqrt(2), 1)
         for a, i, k in zip((y, x), index, (row, column), strict=True)
@@ -171,13 +175,13 @@ def test_a_tone_beside_the_dark_of_the_aperture_is_not_missed(off):
     )
     term = 600 + off  # at twice the pixels' Nyquist frequency, but for `off` terms
     tone = np.zeros((1, 40, 600))
-    index = x.coefficient_of(np.array([term]))[0][0]
+    index = x.coefficient_index(np.array([term]))[0][0]
     tone[0, 0, index] = 1.0
     both = np.array(sorted({k for k in (index, 1200 - index) if k < x.terms}))
     separable = (PixelAperture(PITCH, PITCH),)
     passed = np.sinc(x.frequencies[both] * PITCH)
     exact = 2 * np.square(x.weights[both] * y.weights[0] * passed).sum()
-    found = power_spectrum(SampledSpectrum(tone), x, y, separable, 1).through(flat()).sum()
+    found = power_spectrum(SampledSpectrum(tone), x, y, separable, 1).filtered_power(flat()).sum()
     assert found >= 0.99 * exact
     # and no more than it passes two blocks away
     most = 2 * module.WIDTH
@@ -193,7 +197,7 @@ def test_planes_through_several_colors():
     values = np.array([[(1 - f) ** (1 + r + 0.5 * c) * (r + 1) for c in (0, 1)] for r in range(3)])
     values[2] *= -1
     tables = Tables(np.eye(3), values, 2 * NYQUIST, 0.0)
-    power = power_spectrum(transformed(planes.copy(), 1), x, y, (), 1).through(tables)
+    power = power_spectrum(transform_planes(planes.copy(), 1), x, y, (), 1).filtered_power(tables)
     radius = np.hypot(x.frequencies, y.frequencies[:, None]) / (2 * NYQUIST)
     for color in (0, 1):
         total = sum(
@@ -212,12 +216,12 @@ def test_no_weaker_lens_passes_more_than_the_most(seed):
     planes[1] = -planes[0]
     table = np.linspace(1, 0, 60) * np.array([1.0, 1.0, 0.5])[:, None, None]
     most = Tables(np.eye(3), np.repeat(table, 2, axis=1), 2 * NYQUIST, 0.0)
-    power = power_spectrum(transformed(planes, 1), x, y, (), 1)
-    limit = power.at_most(most)
+    power = power_spectrum(transform_planes(planes, 1), x, y, (), 1)
+    limit = power.upper_bound(most)
     for _ in range(3):
         weaker = replace(most, radial=most.radial * rng.uniform(-1, 1, most.radial.shape))
-        assert (power.through(weaker) <= limit * (1 + 1e-9)).all()
-    through = power.through(most)
+        assert (power.filtered_power(weaker) <= limit * (1 + 1e-9)).all()
+    through = power.filtered_power(most)
     assert (through <= limit * (1 + 1e-9)).all()
     assert through.sum() < 0.5 * limit.sum()
 
@@ -229,9 +233,9 @@ def test_no_lens_with_coma_passes_more_than_the_most():
     blurs = Diffraction(2.8, 0.0), DirectedBlur(Lens(2.8, True), ((7, 120e-9),))
     exact = light(*blurs, weights=weights, wavelengths=(450e-9, 650e-9))
     size, mixing = TableSize(1.9 * NYQUIST, 2049, 0.0, 12), (np.eye(2), 0.0)
-    power = power_spectrum(transformed(planes_of(x, y, 2), 1), x, y, (), 1)
-    passed = power.through(tabulate(exact, size, mixing))
-    limit = power.at_most(bound(exact, size, mixing))
+    power = power_spectrum(transform_planes(planes_of(x, y, 2), 1), x, y, (), 1)
+    passed = power.filtered_power(tabulate(exact, size, mixing))
+    limit = power.upper_bound(bounding_tables(exact, size, mixing))
     assert (passed <= limit * (1 + 1e-6) + 1e-9 * limit.max()).all()
 
 
@@ -242,12 +246,12 @@ def test_what_is_lost_without_an_effect():
     own, other = PixelAperture(PITCH, 0.7 * PITCH), PixelAperture(0.3 * PITCH, 0.5 * PITCH)
     f = np.linspace(0, 1, 2001)
     tables = lens((1 - f)[None, None])
-    power = power_spectrum(transformed(plane.copy(), 1), x, y, (own, other), 1)
+    power = power_spectrum(transform_planes(plane.copy(), 1), x, y, (own, other), 1)
     radius = np.hypot(x.frequencies, y.frequencies[:, None]) / (2 * NYQUIST)
     rest = amplitudes(plane[0], x, y) * np.interp(radius, f, 1 - f)
     rest *= np.outer(other.along_y(y.frequencies), other.along_x(x.frequencies))
     lost = rest * (1 - np.outer(own.along_y(y.frequencies), own.along_x(x.frequencies)))
-    found = power.lost_without(tables, own)
+    found = power.omission_power(tables, own)
     # others are judged at the largest that they pass in a block
     assert found.shape == (1,)
     assert found[0] == pytest.approx(np.square(lost).sum(), rel=0.03)
@@ -257,43 +261,43 @@ def test_what_is_lost_without_an_effect():
 def test_rms_beyond_a_frequency(name):
     x, y = AXES[name]
     plane = planes_of(x, y)
-    power = power_spectrum(transformed(plane.copy(), 1), x, y, (), 1)
-    squares = power.through(flat())
+    power = power_spectrum(transform_planes(plane.copy(), 1), x, y, (), 1)
+    squares = power.filtered_power(flat())
     every = np.square(amplitudes(plane[0], x, y))
     shell = np.maximum(x.frequencies, y.frequencies[:, None]) / NYQUIST
     for frequency in (0.0, 0.2, 0.7, 1.0):
-        found = power.rms_beyond(squares, frequency, (PITCH, PITCH))
+        found = power.tail_rms(squares, frequency, (PITCH, PITCH))
         # a block counts as its highest frequency does: never less than what lies beyond
         wider = np.sqrt(every[shell > frequency * (1 - 2 * module.WIDTH) - 1e-9].sum())
         exact = np.sqrt(every[shell > frequency * (1 + 1e-9)].sum())
         assert exact * (1 - 2e-3) <= found <= wider * (1 + 2e-3)
-    assert power.rms_beyond(squares, 3.0, (PITCH, PITCH)) == 0
+    assert power.tail_rms(squares, 3.0, (PITCH, PITCH)) == 0
 
 
 @pytest.mark.parametrize("pitch", [(PITCH, PITCH), (2 * PITCH, PITCH), (PITCH, 3 * PITCH)])
 def test_the_highest_that_is_needed_leaves_no_more_than_the_budget(pitch):
     """And the next lower block would: pixels need not be square."""
     x, y = AXES["squares below it"]
-    power = power_spectrum(transformed(planes_of(x, y), 1), x, y, (), 1)
-    squares = power.through(lens(np.exp(-3 * np.linspace(0, 1, 500))[None, None]))
+    power = power_spectrum(transform_planes(planes_of(x, y), 1), x, y, (), 1)
+    squares = power.filtered_power(lens(np.exp(-3 * np.linspace(0, 1, 500))[None, None]))
     whole = np.sqrt(squares.sum())
     for part in (0.9, 0.5, 0.1, 0.01, 1e-9):
-        needed = power.highest_needed(squares, part * whole, pitch)
-        assert power.rms_beyond(squares, needed, pitch) <= part * whole
-        assert power.rms_beyond(squares, needed * (1 - 1e-6), pitch) > part * whole
-    assert power.highest_needed(squares, 1.01 * whole, pitch) == 0.0
+        needed = power.needed_frequency(squares, part * whole, pitch)
+        assert power.tail_rms(squares, needed, pitch) <= part * whole
+        assert power.tail_rms(squares, needed * (1 - 1e-6), pitch) > part * whole
+    assert power.needed_frequency(squares, 1.01 * whole, pitch) == 0.0
 
 
 def test_the_color_of_most_decides():
     x, y = AXES["squares below it"]
-    power = power_spectrum(transformed(planes_of(x, y), 1), x, y, (), 1)
+    power = power_spectrum(transform_planes(planes_of(x, y), 1), x, y, (), 1)
     f = np.linspace(0, 2, 500)
     soft, sharp = np.exp(-((3 * f) ** 2)), 0.5 * np.exp(-((0.5 * f) ** 2))
-    squares = power.through(Tables(np.eye(1), np.array([[soft, sharp]]), 2 * NYQUIST, 0.0))
+    squares = power.filtered_power(Tables(np.eye(1), np.array([[soft, sharp]]), 2 * NYQUIST, 0.0))
     pitch = PITCH, PITCH
     for frequency in (0.0, 1.0):
-        each = [power.rms_beyond(squares[c : c + 1], frequency, pitch) for c in (0, 1)]
-        assert power.rms_beyond(squares, frequency, pitch) == pytest.approx(max(each))
+        each = [power.tail_rms(squares[c : c + 1], frequency, pitch) for c in (0, 1)]
+        assert power.tail_rms(squares, frequency, pitch) == pytest.approx(max(each))
 
 
 def test_power_of_rectangles_is_that_of_their_cells():
@@ -303,14 +307,16 @@ def test_power_of_rectangles_is_that_of_their_cells():
     edges = [np.array([0, 37, 60, 141, a.samples]) for a in (x, y)]
     values = rng.random((2, 4, 4))
     chart = Rectangles(*(e * PITCH / 2 for e in edges), values)
-    known = of_rectangles(chart, (y.samples, x.samples), (y, x), np.float64)
+    known = rectangle_spectrum(chart, (y.samples, x.samples), (y, x), np.float64)
     power = power_spectrum(known, x, y, (), 1)
     fine = [replace(a, samples=n * a.samples, sample_pitch=a.sample_pitch / n) for a in (x, y)]
     cells = values.repeat(n * np.diff(edges[1]), axis=1).repeat(n * np.diff(edges[0]), axis=2)
-    painted = power_spectrum(transformed(cells, 1), *fine, (), 1)
+    painted = power_spectrum(transform_planes(cells, 1), *fine, (), 1)
     tables = flat(planes=2)
     # edges of cells that no border cuts: what these fold is a hundredth at their own Nyquist
-    assert power.through(tables).sum() == pytest.approx(painted.through(tables).sum(), rel=1e-4)
+    assert power.filtered_power(tables).sum() == pytest.approx(
+        painted.filtered_power(tables).sum(), rel=1e-4
+    )
     for found, expected in zip(power.products, painted.products, strict=True):
         np.testing.assert_allclose(found, expected, rtol=0.01, atol=1e-6 * abs(expected).max())
 
@@ -339,7 +345,7 @@ def brightest(seen, scene, highest: float = 3.0) -> float:
     size = TableSize(min(seen.transfer.cutoff, 2 * highest * NYQUIST), 2049, 0.0, 8)
     tables = tabulate(seen.transfer, size, (np.eye(len(seen.transfer.weights)), 0.0))
     planes = scene.planes(np.eye(len(seen.transfer.weights))).astype(float)
-    return brightest_mean(transformed(planes, 1), x, y, tables, seen.separable)
+    return brightest_mean(transform_planes(planes, 1), x, y, tables, seen.separable)
 
 
 @pytest.mark.parametrize("lens", ["none", "diffraction", "gaussian"])

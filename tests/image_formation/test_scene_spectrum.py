@@ -13,9 +13,9 @@ from vcam_cli.image_formation.cosine_series import Axis
 from vcam_cli.image_formation.scene_spectrum import (
     RectangleSpectrum,
     SampledSpectrum,
-    of_rectangles,
+    rectangle_spectrum,
     terms_of_runs,
-    transformed,
+    transform_planes,
 )
 from vcam_cli.scenes.base import Frame, Framed, Rectangles, View, chart_scene
 from vcam_cli.scenes.colorchecker import ColorChecker, largest_card, reflectances
@@ -96,7 +96,7 @@ def test_spectrum_is_that_of_cells_but_for_what_they_fold(dtype, within):
     values = rng.random((2, 3, 2))
     known = Rectangles(np.array([-5.0, 1, 5]), np.array([-6.0, -2, 3, 6]), values)
     axes = [axis_of(cells, count) for cells, count in zip(shape, terms, strict=True)]
-    spectrum = of_rectangles(known, shape, axes, dtype)
+    spectrum = rectangle_spectrum(known, shape, axes, dtype)
     found = np.array([spectrum.rows(plane, slice(None)) for plane in range(2)])
     assert found.dtype == spectrum.dtype == dtype
     assert found.shape == (2, *terms)
@@ -118,7 +118,7 @@ def test_samples_are_transformed_along_both_axes(shape, dtype):
     planes = np.random.default_rng(3).standard_normal((2, *shape))
     expected = np.array([scipy.fft.dctn(plane, type=2) for plane in planes])
     for workers in (1, 3):
-        found = transformed(planes.astype(dtype), workers)
+        found = transform_planes(planes.astype(dtype), workers)
         assert found.dtype == dtype
         assert len(found) == 2
         tolerance = 1e-12 if dtype == np.float64 else 1e-5

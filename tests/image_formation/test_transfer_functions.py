@@ -31,7 +31,9 @@ def test_a_line_is_its_own_otf():
     )
     photons = 2.0 * wavelength / (PLANCK * SPEED_OF_LIGHT)
     level = 3.0 * photons * bell(540e-9).evaluate(np.array([wavelength]))[0]
-    np.testing.assert_allclose(h.at(F)[0, 0], level * LENS.otf(F, wavelength), rtol=1e-12)
+    np.testing.assert_allclose(
+        h.radial_response(F)[0, 0], level * LENS.otf(F, wavelength), rtol=1e-12
+    )
 
 
 @pytest.mark.parametrize(("step", "tolerance"), [(20e-9, 5e-4), (10e-9, 1.3e-4), (2.5e-9, 8e-6)])
@@ -49,7 +51,7 @@ def test_many_wavelengths_by_brute_force(lamp, step, tolerance):
     mid = (edges[1:] + edges[:-1]) / 2
     density = light.evaluate(mid) * green.evaluate(mid) * mid / (PLANCK * SPEED_OF_LIGHT)
     direct = sum(d * LENS.otf(F, w) for d, w in zip(density * np.diff(edges), mid, strict=True))
-    got = h.at(F)[0, 0]
+    got = h.radial_response(F)[0, 0]
     np.testing.assert_allclose(got, direct, atol=tolerance * direct[0])
     # the level does not depend on the step at all
     np.testing.assert_allclose(got[0], direct[0], rtol=1e-6)
@@ -75,7 +77,7 @@ def test_few_mixtures_stand_for_many_spectra():
     for tolerance in (1e-2, 1e-4, 1e-7):
         table = tables_of(exact, 2001, tolerance)
         rebuilt = np.tensordot(table.mix.T, table.radial, axes=1)
-        truth = exact.at(np.linspace(0, exact.cutoff, 2001))
+        truth = exact.radial_response(np.linspace(0, exact.cutoff, 2001))
         error = np.abs(rebuilt - truth).max() / exact.level.max()
         assert error <= 1.02 * tolerance
         # it is judged at 256 frequencies, this at 2001

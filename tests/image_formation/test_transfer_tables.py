@@ -14,14 +14,14 @@ from vcam_cli.image_formation.transfer_tables import (
     SMALLEST_PLANE,
     Tables,
     TableSize,
-    bound,
-    by_parity,
+    bounding_tables,
     mixtures,
     plane_grid,
     reader,
     spline_weights,
+    split_by_parity,
     tabulate,
-    turned,
+    turn_table,
 )
 
 WAVELENGTHS = np.linspace(420e-9, 660e-9, 7)
@@ -60,7 +60,7 @@ def test_radial_tables_are_the_transfer_functions(blurs):
     assert tables.parities == [0]
     assert tables.colors == 3
     found = reader(tables, 0, F).values(G)
-    expected = exact.at(np.hypot(F, G[:, None]))
+    expected = exact.radial_response(np.hypot(F, G[:, None]))
     np.testing.assert_allclose(found, expected, atol=2e-7 * exact.level.max())
 
 
@@ -70,7 +70,7 @@ def combined(tables: Tables, fx, fy) -> np.ndarray:
     cos becomes cos and sines of the same frequencies; so H of a half-plane is put together again.
     """
     total = np.zeros((len(tables.mix), tables.colors, len(fy), len(fx)), complex)
-    # cos cos -> H0 cos cos + H1 sin sin + H2 sin cos + H3 cos sin: see `by_parity`
+    # cos cos -> H0 cos cos + H1 sin sin + H2 sin cos + H3 cos sin: see `split_by_parity`
     factors = {0: 1, 1: -1, 2: -1j, 3: -1j}
     for parity in tables.parities:
         total = total + factors[parity] * reader(tables, parity, fx).values(fy)
@@ -86,11 +86,11 @@ def test_plane_tables_are_the_transfer_functions(terms):
     exact = spectral(Diffraction(2.8, 0.0), DirectedBlur(Lens(2.8, True), terms))
     tables = tables_of(exact)
     found = combined(tables, F, G)
-    expected = exact.at_plane(F, G)
+    expected = exact.plane_response(F, G)
     level = exact.level[..., None, None]
     assert np.abs((found - expected) / level).max() < 2e-3
     # along the axes of the quadrant's mirror image, which the parities have in them too
-    mirrored = exact.at_plane(F, -G)
+    mirrored = exact.plane_response(F, -G)
     sine = {1: 1, 3: 1j}
     other = sum(
         sine.get(p, {0: 1, 2: -1j}.get(p)) * reader(tables, p, F).values(G) for p in tables.parities
@@ -104,7 +104,7 @@ def test_plane_tables_follow_the_phase_of_a_blur(steps):
     blur = Leaning(6e-6, -4e-6, 1.5e-6, 2e-6)
     exact = light(blur)
     found = combined(tables_of(exact, steps=steps), F, G)
-    worst = np.abs(found - exact.at_plane(F, G)).max()
+    worst = np.abs(found - exact.plane_response(F, G)).max()
     # a cubic spline with n steps in a period errs by about (2 pi / n)^4 / 384
     assert worst < 2 * (2 * np.pi / steps) ** 4 / 384
 
@@ -151,7 +151,7 @@ def test_parities_turn_a_cosine_into_what_a_blur_makes_of_it(fx, fy):
     blur = Leaning(2.5e-6, -1.3e-6, 1.6e-6, 2.4e-6)
     at = np.array([[fx]]), np.array([[fy]])
     plus, minus = (blur.otf_plane(at[0][0], sign * at[1][0], 550e-9) for sign in (1, -1))
-    parts = by_parity(plus, minus)[:, 0, 0]
+    parts = split_by_parity(plus, minus)[:, 0, 0]
     x, y = np.linspace(-9e-6, 9e-6, 13), np.linspace(-7e-6, 7e-6, 11)[:, None]
     size = np.exp(-2 * np.pi**2 * ((1.6e-6 * fx) ** 2 + (2.4e-6 * fy) ** 2))
     moved = np.cos(2 * np.pi * fx * (x - 2.5e-6)) * np.cos(2 * np.pi * fy * (y + 1.3e-6))
@@ -176,10 +176,11 @@ def test_tables_of_a_turned_blur_are_those_of_its_model_turned(quarters, mirrore
         right, down, along_x, along_y = -down, right, along_y, along_x
     there = Leaning(right, down, along_x, along_y)
     parts, expected = (
-        by_parity(blur.otf_plane(f, f, 0.0), blur.otf_plane(f, -f, 0.0)) for blur in (own, there)
+        split_by_parity(blur.otf_plane(f, f, 0.0), blur.otf_plane(f, -f, 0.0))
+        for blur in (own, there)
     )
     for parity in range(4):
-        found = turned(parts, parity, quarters, mirrored)
+        found = turn_table(parts, parity, quarters, mirrored)
         np.testing.assert_allclose(found, expected[parity], atol=1e-12)
 
 
@@ -189,7 +190,9 @@ def test_what_is_added_to_the_radial_part_is_zero_for_round_blurs():
     grid = plane_grid(exact, 3e5, 17)
     parts = grid.change([Gaussian(1e-6)])
     length = np.hypot(grid.frequency, grid.frequency[:, None])
-    added = exact.thinned().at(length) * (np.exp(-2 * (np.pi * 1e-6 * length) ** 2) - 1)
+    added = exact.with_half_the_wavelengths().radial_response(length) * (
+        np.exp(-2 * (np.pi * 1e-6 * length) ** 2) - 1
+    )
     np.testing.assert_allclose(parts[0], added, atol=1e-12 * exact.level.max())
     assert np.abs(parts[1:]).max() < 1e-12 * exact.level.max()
 
@@ -203,22 +206,24 @@ def test_no_lens_exceeds_the_bound(sign):
     blurs = Diffraction(2.8, 0.0), DirectedBlur(Lens(2.8, True), MIXED)
     exact = light(*blurs, weights=weights, wavelengths=WAVELENGTHS)
     size = size_of(exact)
-    limit = reader(bound(exact, size, (np.eye(2), 0.0)), 0, F).values(G)
-    assert (np.abs(exact.at_plane(F, G)) <= limit + 1e-6 * limit.max()).all()
+    limit = reader(bounding_tables(exact, size, (np.eye(2), 0.0)), 0, F).values(G)
+    assert (np.abs(exact.plane_response(F, G)) <= limit + 1e-6 * limit.max()).all()
 
 
 def test_mixtures_serve_every_place_of_a_field():
     """Two lenses of the same spectra: what is kept for both keeps each within the tolerance."""
     one = spectral(Diffraction(2.8, 0.0), components=12)
-    two = one.through((*one.effects, SymmetricBlur(Lens(2.8, True), ((4, 120e-9),))))
+    two = one.with_effects((*one.effects, SymmetricBlur(Lens(2.8, True), ((4, 120e-9),))))
     size = TableSize(3e5, 2049, 1e-3, 8)
     mix, error = mixtures([one, two], size)
     assert len(mix) < 12
     assert error <= 1e-3
     f = np.linspace(0, 3e5, 999)
     for exact in (one, two):
-        rebuilt = np.tensordot(mix.T, exact.mixed(mix).at(f), axes=1)
-        assert np.abs(rebuilt - exact.at(f)).max() <= 1.05e-3 * np.abs(exact.level).max()
+        rebuilt = np.tensordot(mix.T, exact.with_mixtures(mix).radial_response(f), axes=1)
+        assert (
+            np.abs(rebuilt - exact.radial_response(f)).max() <= 1.05e-3 * np.abs(exact.level).max()
+        )
     limited, worse = mixtures([one, two], TableSize(3e5, 2049, 1e-9, 8, rank=2))
     assert len(limited) == 2
     assert worse > error

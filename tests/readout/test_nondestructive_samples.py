@@ -377,9 +377,9 @@ def test_memory_counts_the_samples(tmp_path):
     made = camera(tmp_path, FLAT | several(*TEXTS))
     frame = simulate(made).frame
     knobs = settings(made)
-    more, less = (memory_model.of_frame(frame.geometry, knobs, 1, False, n) for n in (1000, 500))
+    more, less = (memory_model.frame_bytes(frame.geometry, knobs, 1, False, n) for n in (1000, 500))
     assert more - less == PIXELS * 500 * (knobs.float_width // 8 + 4)
-    assert memory_model.of_frame(frame.geometry, knobs, 1, False, 4) >= memory_model.of_frame(
+    assert memory_model.frame_bytes(frame.geometry, knobs, 1, False, 4) >= memory_model.frame_bytes(
         frame.geometry, knobs, 1, False
     )
 

@@ -155,9 +155,9 @@ def directional_mtf(
 
 def _blur(transfer: Transfer, color: int, fx: NDArray, fy: NDArray) -> NDArray:
     """Return H of the lens and the silicon at pairs of fx and fy: (n,) [e/s]."""
-    if not transfer.plane:
-        return transfer.at(np.hypot(fx, fy))[0, color]
+    if not transfer.plane_blurs:
+        return transfer.radial_response(np.hypot(fx, fy))[0, color]
     # The plane over a few of each is quicker than one pair after another.
     parts = (slice(i, i + BATCH) for i in range(0, len(fx), BATCH))
-    planes = (transfer.at_plane(fx[part], fy[part])[0, color] for part in parts)
+    planes = (transfer.plane_response(fx[part], fy[part])[0, color] for part in parts)
     return np.concatenate([np.diagonal(plane) for plane in planes])

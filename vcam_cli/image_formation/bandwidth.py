@@ -150,7 +150,7 @@ def highest_passed(path: OpticalPath, scene: Scene) -> float:
     pitch = max(g.pitch_x, g.pitch_y)
     limit = min(2 * pitch * path.transfer.cutoff, HIGHEST)
     f = np.linspace(0, limit, 257)
-    values = np.abs(path.transfer.at(f / (2 * pitch))).sum(axis=0).max(axis=0)
+    values = np.abs(path.transfer.radial_response(f / (2 * pitch))).sum(axis=0).max(axis=0)
     width = min(g.collecting_width, g.collecting_height) if path.separable else 0.0
     envelope = values / (values[0] or 1.0) / np.maximum(1, np.pi * f / (2 * pitch) * width)
     counts = np.flatnonzero(envelope > LEAST_PASSED * path.settings.tolerance)

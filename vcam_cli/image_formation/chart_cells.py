@@ -107,10 +107,10 @@ def cells_per_pixel(path: OpticalPath, scene: ChartScene, highest: float) -> tup
     otf = _mean_otf(path, finest)
     crops = _crops(path.geometry, scene, reference, level)
 
-    def seen(crop: ChartScene, cells: float) -> NDArray:
+    def image(crop: ChartScene, cells: float) -> NDArray:
         return np.minimum(_signal(path, crop, cells, level, otf), path.ceiling)
 
-    converged = [seen(crop, reference) for crop in crops]
+    converged = [image(crop, reference) for crop in crops]
     full = max(float(signal.max()) for signal in converged)
     budget = CELLS_SHARE * path.settings.tolerance * full
     whole = math.prod(cell_grid(scene, path.geometry, 1.0))
@@ -118,7 +118,7 @@ def cells_per_pixel(path: OpticalPath, scene: ChartScene, highest: float) -> tup
     error = 0.0
     for cells in [c for c in LADDER if c < most] + [most]:
         squares = [
-            float(np.square(seen(crop, cells) - signal).mean())
+            float(np.square(image(crop, cells) - signal).mean())
             for crop, signal in zip(crops, converged, strict=True)
         ]
         error = math.sqrt(float(np.mean(squares)))

@@ -106,11 +106,11 @@ class Axis:
         return [(odd, np.cos(angle)), (not odd, sine if odd else -sine)]
 
     @property
-    def folded(self) -> int:
+    def folded_terms(self) -> int:
         """Number of values along this axis after folding: what `evaluate` takes."""
         return self.virtual_pixels or self.terms
 
-    def coefficient_of(self, terms: NDArray) -> tuple[NDArray, NDArray]:
+    def coefficient_index(self, terms: NDArray) -> tuple[NDArray, NDArray]:
         """DCT-II coefficient behind every cosine term: its index, and its sign (0 for none)."""
         period = 2 * self.samples
         rest = terms % period

@@ -26,33 +26,39 @@ def changes_by_omission(
     tables: of the whole lens; field_change: rms of all that changes over the field.
     """
     squares: dict[Effect, NDArray] = {
-        effect: image.power.lost_without(image.tables, effect) for effect in path.separable
+        effect: image.power.omission_power(image.tables, effect) for effect in path.separable
     }
     for effect in of_kind(path.effects, RadialTransfer):
-        rest = _without(path, image, [e for e in path.transfer.radial if e is not effect])
-        squares[effect] = image.power.through(rest)
+        rest = _omission_tables(
+            path, image, [e for e in path.transfer.radial_blurs if e is not effect]
+        )
+        squares[effect] = image.power.filtered_power(rest)
     if directed := of_kind(path.effects, PlaneTransfer, FieldTransfer):
-        squares |= dict.fromkeys(directed, image.power.through(_directed(path, tables)))
+        squares |= dict.fromkeys(
+            directed, image.power.filtered_power(_directional_tables(path, tables))
+        )
     changes = {effect.name: image.rms(square) for effect, square in squares.items()}
     if path.field is not None:
         changes[path.field.name] = math.hypot(changes[path.field.name], field_change)
     return changes
 
 
-def _without(path: OpticalPath, image: SampledImage, radial: list[RadialTransfer]) -> Tables:
+def _omission_tables(
+    path: OpticalPath, image: SampledImage, radial: list[RadialTransfer]
+) -> Tables:
     """The radial part with fewer transfer functions, less the whole of it."""
     whole = image.tables.radial
     assert whole is not None
-    others = path.transfer.through(radial).mixed(image.tables.mix)
+    others = path.transfer.with_effects(radial).with_mixtures(image.tables.mix)
     size = TableSize(image.tables.top, whole.shape[-1], 0.0, 0.0)
     return replace(image.tables, radial=radial_table(others, size) - whole)
 
 
-def _directed(path: OpticalPath, tables: Tables) -> Tables:
+def _directional_tables(path: OpticalPath, tables: Tables) -> Tables:
     """What a blur with a direction, or the mean of one that changes over the field, adds."""
     if any(plane is not None for plane in tables.planes) or tables.radial is None:
         return replace(tables, radial=None)
-    alone = path.transfer.mixed(tables.mix)
+    alone = path.transfer.with_mixtures(tables.mix)
     size = TableSize(tables.top, tables.radial.shape[-1], 0.0, 0.0)
     return replace(tables, radial=tables.radial - radial_table(alone, size))
 
@@ -63,7 +69,7 @@ def needed_modes(
     """The modes of the field that this picture needs, and the rms that all of them add [e/s]."""
     squares = np.array(
         [
-            mode.map.mean_square * image.rms(image.power.through(mode.tables())) ** 2
+            mode.map.mean_square * image.rms(image.power.filtered_power(mode.tables())) ** 2
             for mode in modes
         ]
     )

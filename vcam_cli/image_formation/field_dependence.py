@@ -29,7 +29,7 @@ from vcam_cli.image_formation.transfer_tables import (
     mixtures,
     plane_grid,
     radial_table,
-    turned,
+    turn_table,
 )
 
 PLACES = 97
@@ -80,10 +80,10 @@ class Mode:
 
 def field_mixtures(alone: Transfer, zones: Sequence[Zone], size: TableSize) -> Mixing:
     """The fewest mixtures of the components that serve all zones."""
-    return mixtures(_through(alone, zones)[:: max(1, len(zones) // 6)], size)
+    return mixtures(_zone_transfers(alone, zones)[:: max(1, len(zones) // 6)], size)
 
 
-def _through(alone: Transfer, zones: Sequence[Zone]) -> list[Transfer]:
+def _zone_transfers(alone: Transfer, zones: Sequence[Zone]) -> list[Transfer]:
     return [replace(alone, effects=(*alone.effects, zone.blur)) for zone in zones]
 
 
@@ -95,14 +95,14 @@ def tabulate_field(
     alone: the transfer function without the blur that has zones.
     """
     mix, error = mixing
-    alone = alone.mixed(mix)
+    alone = alone.with_mixtures(mix)
     base = radial_table(alone, size)
     blurs = [zone.blur for zone in zones]
     directed = bool(of_kind(blurs, PlaneTransfer))
     if directed:
-        stack = _planes_of(alone, blurs, size)
+        stack = _stack_planes(alone, blurs, size)
     else:
-        each = [radial_table(t, size)[None] for t in _through(alone, zones)]
+        each = [radial_table(t, size)[None] for t in _zone_transfers(alone, zones)]
         stack = Stack(each, [(i, 0, False) for i in range(len(each))])
     level = np.abs(alone.level).max() or 1.0
     importance = _importance(stack.known[0].shape, directed) / alone.weights.shape[1]
@@ -112,7 +112,7 @@ def tabulate_field(
     error += left / level
 
     def tables(share: NDArray, parity: int) -> Tables:
-        mixed = stack.mixed(parity, share - share.mean())
+        mixed = stack.weighted_sum(parity, share - share.mean())
         if not directed:
             return Tables(mix, mixed, size.top, error)
         planes = tuple(mixed if parity == p else None for p in range(len(PARITIES)))
@@ -123,7 +123,7 @@ def tabulate_field(
         for p, share in shares
     )
     even = np.full(len(zones), 1 / len(zones))
-    means = [stack.mixed(p, even) for p in range(stack.parities)]
+    means = [stack.weighted_sum(p, even) for p in range(stack.parities)]
     if not directed:
         return Tables(mix, means[0], size.top, error), modes
     small = SMALL * size.tolerance * level
@@ -146,22 +146,22 @@ class Stack:
 
     def rows(self, parity: int, at: tuple[int, ...]) -> NDArray:
         """Of a component and color, all zones': (zones, ...) float64."""
-        found = [self._of(zone, parity, (slice(None), *at)) for zone in self.zones]
+        found = [self._zone_table(zone, parity, (slice(None), *at)) for zone in self.zones]
         return np.array(found, dtype=np.float64)
 
-    def mixed(self, parity: int, shares: NDArray) -> NDArray:
+    def weighted_sum(self, parity: int, shares: NDArray) -> NDArray:
         """The sum of all zones' tables, each with its share: (R, C, ...)."""
         total = np.zeros(self.known[0].shape[1:])
         for zone, share in zip(self.zones, shares, strict=True):
-            total += share * self._of(zone, parity, slice(None))
+            total += share * self._zone_table(zone, parity, slice(None))
         return total
 
-    def _of(self, zone: tuple[int, int, bool], parity: int, at: Any) -> NDArray:
+    def _zone_table(self, zone: tuple[int, int, bool], parity: int, at: Any) -> NDArray:
         model, quarters, mirrored = zone
-        return turned(self.known[model][at], parity, quarters, mirrored)
+        return turn_table(self.known[model][at], parity, quarters, mirrored)
 
 
-def _planes_of(alone: Transfer, blurs: Sequence[Blur], size: TableSize) -> Stack:
+def _stack_planes(alone: Transfer, blurs: Sequence[Blur], size: TableSize) -> Stack:
     """What the zones' blurs add to the transfer. Those that are others turned are computed once."""
     directed = of_kind(blurs, PlaneTransfer)
     grid = plane_grid(alone, size.top, size.plane_entries(directed, LARGEST_OF_FIELD))

@@ -73,7 +73,7 @@ class Filter:
             self._multiply(spectrum, parity, folded, workers)
         parts: dict[bool, NDArray] = {}
         for waves in sorted(folded):
-            found = self._evaluated(folded.pop(waves), waves[1], workers)
+            found = self._evaluate_columns(folded.pop(waves), waves[1], workers)
             if waves[0] in parts:
                 parts[waves[0]] += found
             else:
@@ -92,7 +92,7 @@ class Filter:
         odd_x, odd_y = PARITIES[parity]
         dtype = spectrum.dtype
         table = reader(self.tables, parity, self.x.frequencies)
-        shape = self.tables.colors, self.y.folded, self.x.folded
+        shape = self.tables.colors, self.y.folded_terms, self.x.folded_terms
         for wave_y, share_y in self.y.pixel_waves(odd_y):
             targets = []
             for wave_x, share_x in self.x.pixel_waves(odd_x):
@@ -108,16 +108,16 @@ class Filter:
                 for target, terms, weights in self.y.folding(rows, wave_y):
                     if share_y is not None:
                         weights = weights * share_y[terms]
-                    for part, color, light in self._filtered(spectrum, table, terms, weights):
+                    for part, color, light in self._filter_rows(spectrum, table, terms, weights):
                         here = slice(target.start + part.start, target.start + part.stop)
                         for sums, wave_x, share_x in targets:
                             some = light if share_x is None else light * share_x[: light.shape[1]]
                             last = sums is targets[-1][0]
                             sums[color, here] += self.x.fold(some, wave_x, overwrite=last)
 
-            each(multiply, pieces(self.y.folded, LONGEST), workers)
+            each(multiply, pieces(self.y.folded_terms, LONGEST), workers)
 
-    def _filtered(
+    def _filter_rows(
         self, spectrum: SceneSpectrum, table: TableReader, terms: NDArray, weights: NDArray
     ) -> Iterator[tuple[slice, int, NDArray]]:
         """Rows of the filtered spectrum: (which of `terms`, color, (n, count)).
@@ -125,8 +125,8 @@ class Filter:
         terms: (n,) consecutive rows, rising or falling; weights: factors on them.
         """
         dtype = spectrum.dtype
-        factor = self._along_x
-        below = weights * self.y.coefficient_of(terms)[1] * self.y.weights[terms]
+        factor = self._weights_x
+        below = weights * self.y.coefficient_index(terms)[1] * self.y.weights[terms]
         below = (below * self.along_y[terms]).astype(dtype)[:, None]
         for stretch in self._stretches(terms):
             fy = self.y.frequencies[terms[stretch]]
@@ -152,7 +152,7 @@ class Filter:
                     yield rows, color, total
 
     @cached_property
-    def _along_x(self) -> NDArray:
+    def _weights_x(self) -> NDArray:
         return self.x.weights * self.along_x
 
     def _stretches(self, terms: NDArray) -> Iterator[slice]:
@@ -171,7 +171,7 @@ class Filter:
 
     def _rows(self, spectrum: SceneSpectrum, terms: NDArray, count: int) -> list[NDArray]:
         """Rows of every plane's spectrum without factors: R of (n, count)."""
-        index = _consecutive(self.y.coefficient_of(terms)[0])
+        index = _consecutive(self.y.coefficient_index(terms)[0])
         planes = range(len(spectrum))
         return [self.x.extend(spectrum.rows(plane, index, count), count) for plane in planes]
 
@@ -185,7 +185,7 @@ class Filter:
         count = (np.sqrt(np.maximum(left, 0)) * 2 * self.x.length).astype(int) + 1
         return np.where(left < 0, 0, np.minimum(count, self.x.terms))
 
-    def _evaluated(self, folded: NDArray, odd: bool, workers: int) -> NDArray:
+    def _evaluate_columns(self, folded: NDArray, odd: bool, workers: int) -> NDArray:
         """Signal at the rows of photodetectors of waves (C, rows, folded x) along y.
 
         Takes the place of its argument where the virtual pixels' rows do.
@@ -193,9 +193,9 @@ class Filter:
         window = self.y.window
         out = folded
         if window is None:
-            shape = (len(folded), self.y.pixels, self.x.folded)
+            shape = (len(folded), self.y.pixels, self.x.folded_terms)
             out = np.empty(shape, folded.dtype)
-        columns = pieces(self.x.folded, at_once(self.y.transform))
+        columns = pieces(self.x.folded_terms, at_once(self.y.transform))
 
         def evaluate(task: tuple[int, slice]) -> None:
             color, s = task

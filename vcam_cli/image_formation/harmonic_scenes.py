@@ -12,7 +12,7 @@ from vcam_cli.camera.derived.geometry import pixel_centers
 from vcam_cli.effects.base import Blur, Effect, FieldTransfer, SeparableTransfer, of_kind
 from vcam_cli.image_formation.optical_path import Layer, Layers, OpticalPath, SpectrumReport
 from vcam_cli.image_formation.transfer_functions import Transfer
-from vcam_cli.image_formation.transfer_tables import PARITIES, by_parity
+from vcam_cli.image_formation.transfer_tables import PARITIES, split_by_parity
 from vcam_cli.scenes.base import HarmonicScene, Wave, WaveScene
 
 MOST_HARMONICS = 512
@@ -44,7 +44,7 @@ def wave_layers(path: OpticalPath, scene: WaveScene) -> tuple[Layers, SpectrumRe
     def layers(effects: tuple[Effect, ...]) -> list[tuple[NDArray, Weight]]:
         return [
             (np.array([_wave_level(transfer, effects, w) for w in scene.waves]), weight)
-            for transfer, weight in _by_zone(path, effects)
+            for transfer, weight in _zone_transfers(path, effects)
         ]
 
     changes = _changes(path, layers, layer)
@@ -54,7 +54,7 @@ def wave_layers(path: OpticalPath, scene: WaveScene) -> tuple[Layers, SpectrumRe
 def _wave_level(transfer: Transfer, effects: tuple[Effect, ...], wave: Wave) -> NDArray:
     """Complex amplitude of a wave's signal in each color, (C,) [electrons / s]."""
     fx, fy = np.array([wave.fx]), np.array([wave.fy])
-    level: NDArray = np.asarray(wave.weights) @ transfer.at_plane(fx, fy)[..., 0, 0]
+    level: NDArray = np.asarray(wave.weights) @ transfer.plane_response(fx, fy)[..., 0, 0]
     return level * _separable(effects, fx, fy)[0, 0]
 
 
@@ -66,12 +66,17 @@ def _separable(effects: tuple[Effect, ...], fx: NDArray, fy: NDArray) -> NDArray
     return total
 
 
-def _by_zone(path: OpticalPath, effects: tuple[Effect, ...]) -> list[tuple[Transfer, Weight]]:
+def _zone_transfers(
+    path: OpticalPath, effects: tuple[Effect, ...]
+) -> list[tuple[Transfer, Weight]]:
     """The transfer through some of the effects, and through each zone where the field has them."""
-    through = path.transfer.through(effects)
+    everywhere = path.transfer.with_effects(effects)
     if path.field not in effects:
-        return [(through, None)]
-    return [(through.through((*through.effects, zone.blur)), zone.weight) for zone in path.zones]
+        return [(everywhere, None)]
+    return [
+        (everywhere.with_effects((*everywhere.effects, zone.blur)), zone.weight)
+        for zone in path.zones
+    ]
 
 
 def harmonics_count(path: OpticalPath, scene: HarmonicScene) -> tuple[int, int] | None:
@@ -103,7 +108,7 @@ def harmonic_layers(
                 _harmonic_levels(transfer, fx, fy) * (amplitudes * _separable(effects, fx, fy)),
                 weight,
             )
-            for transfer, weight in _by_zone(path, effects)
+            for transfer, weight in _zone_transfers(path, effects)
         ]
 
     def layer(levels: NDArray, weight: Weight) -> Layer:
@@ -122,11 +127,11 @@ def harmonic_layers(
 
 def _harmonic_levels(transfer: Transfer, fx: NDArray, fy: NDArray) -> NDArray:
     """Signal of harmonics of amplitude 1 by parity of the transfer: (4, C, fy, fx)."""
-    if not transfer.plane:
-        radial = transfer.at(np.hypot(fx[None, :], fy[:, None]))[0]
+    if not transfer.plane_blurs:
+        radial = transfer.radial_response(np.hypot(fx[None, :], fy[:, None]))[0]
         return np.stack([radial, *[np.zeros_like(radial)] * 3])
-    plus, minus = (transfer.at_plane(fx, sign * fy)[0] for sign in (1, -1))
-    return by_parity(plus, minus)
+    plus, minus = (transfer.plane_response(fx, sign * fy)[0] for sign in (1, -1))
+    return split_by_parity(plus, minus)
 
 
 def _changes(

@@ -29,7 +29,7 @@ WORK = 24_000_000
 """Temporary arrays of one thread [bytes]."""
 
 
-def of_image(path: OpticalPath, scene: SampledScene, planes: int, size: TableSize) -> int:
+def image_bytes(path: OpticalPath, scene: SampledScene, planes: int, size: TableSize) -> int:
     """Memory of an image through the cosine spectrum [bytes]; planes: mixtures of components."""
     g, width = path.geometry, path.settings.float_width // 8
     colors, pixels = len(path.mosaic.colors), g.rows * g.columns
@@ -40,13 +40,13 @@ def of_image(path: OpticalPath, scene: SampledScene, planes: int, size: TableSiz
     wide = max(pixels, round(area / (g.pitch_x * g.pitch_y)))
     waves = (2 if g.collecting_x else 1) * (2 if g.collecting_y else 1)
     tables, modes = 0, 0
-    directed = (*path.transfer.plane, *of_kind([z.blur for z in path.zones], PlaneTransfer))
+    directed = (*path.transfer.plane_blurs, *of_kind([z.blur for z in path.zones], PlaneTransfer))
     if directed:
         waves = 4
         zones = len({blur.model[0] for blur in directed})
         entries = size.plane_entries(directed, LARGEST_OF_FIELD if path.zones else LARGEST_PLANE)
         per_table = entries**2 * planes * colors * len(PARITIES)
-        count = len(path.transfer.thinned().wavelengths)
+        count = len(path.transfer.with_half_the_wavelengths().wavelengths)
         tables = 8 * per_table * (3 + zones) + count * 2 * entries**2 * 24 + PUPIL_GRIDS
     if path.zones:
         modes = 2 * wide * colors * width
@@ -55,7 +55,7 @@ def of_image(path: OpticalPath, scene: SampledScene, planes: int, size: TableSiz
     return BASE + round(SLACK * held) + WORK * path.workers
 
 
-def of_box_averages(samples: int, planes: int, geometry: Geometry, knobs: Settings) -> int:
+def box_average_bytes(samples: int, planes: int, geometry: Geometry, knobs: Settings) -> int:
     """Memory of means over boxes [bytes]; samples: of one plane of a picture, 0 of a chart."""
     pixels = geometry.rows * geometry.columns
     width = knobs.float_width // 8
@@ -63,7 +63,7 @@ def of_box_averages(samples: int, planes: int, geometry: Geometry, knobs: Settin
     return BASE + round(SLACK * held)
 
 
-def of_frame(
+def frame_bytes(
     geometry: Geometry, knobs: Settings, colors: int, judged: bool, samples: int = 0
 ) -> int:
     """Memory of a frame without its scene [bytes]: signal, raw, render.

@@ -89,7 +89,7 @@ def changes_by_omission(
     dict
         Name of each gain, glare, charge and limit -> rms change [e/s].
     """
-    rows, columns = _thinned(rate.shape[0], rate.shape), _thinned(rate.shape[1], rate.shape)
+    rows, columns = _every_nth(rate.shape[0], rate.shape), _every_nth(rate.shape[1], rate.shape)
     x, y = pixel_centers(geometry)
     colors = _colors(mosaic, np.arange(rate.shape[0])[rows], np.arange(rate.shape[1])[columns])
     on_pixels: dict[Effect, _Factors | _Glare] = {
@@ -104,18 +104,18 @@ def changes_by_omission(
     for effect in reversed([e for e in ordered if e in running]):
         light = on_pixels[effect].undo(light)
 
-    raw = _clipped(photo + dark, limits)
+    raw = _clip(photo + dark, limits)
     others: dict[str, NDArray] = {}
     for toggled in ordered:
         signal = light
         for effect in ordered:
             if (effect in running) != (effect is toggled):
                 signal = on_pixels[effect].apply(signal)
-        others[toggled.name] = _clipped(signal + dark, limits)
+        others[toggled.name] = _clip(signal + dark, limits)
     for charge in charges:
-        others[charge.name] = _clipped(photo + (dark - charge.rate() * time), limits)
+        others[charge.name] = _clip(photo + (dark - charge.rate() * time), limits)
     for limit in limits:
-        others[limit.name] = _clipped(photo + dark, [e for e in limits if e is not limit])
+        others[limit.name] = _clip(photo + dark, [e for e in limits if e is not limit])
     has_pixel = np.any(colors, axis=0)
     pixels = slice(None) if has_pixel.all() else has_pixel
     return {
@@ -124,7 +124,7 @@ def changes_by_omission(
     }
 
 
-def _clipped(signal: NDArray, limits: Iterable[Limit]) -> NDArray:
+def _clip(signal: NDArray, limits: Iterable[Limit]) -> NDArray:
     """Return a mean signal behind clamps, which may reuse its array [electrons]."""
     for limit in limits:
         signal = limit.apply(signal)
@@ -146,7 +146,7 @@ def _colors(mosaic: Mosaic, rows: NDArray, columns: NDArray) -> list[NDArray]:
     return [names == color for color in mosaic.colors]
 
 
-def _thinned(count: int, shape: tuple[int, ...]) -> slice:
+def _every_nth(count: int, shape: tuple[int, ...]) -> slice:
     """Return every n-th of `count`, n odd, such that the array has at most `SAMPLE` of them."""
     step = int(np.ceil(np.sqrt(shape[0] * shape[1] / SAMPLE)))
     return slice(min(step // 2, count - 1), None, step + 1 - step % 2)

@@ -105,7 +105,7 @@ class PowerSpectrum:
         """The pairs of planes."""
         return list(combinations_with_replacement(range(self.planes), 2))
 
-    def through(self, tables: Tables) -> NDArray:
+    def filtered_power(self, tables: Tables) -> NDArray:
         """Mean squares of every color's signal: (C, blocks along y, blocks along x)."""
         power = np.zeros((tables.colors, len(self.y.low), len(self.x.low)))
         for parity in tables.parities:
@@ -114,7 +114,7 @@ class PowerSpectrum:
                 power += values[r] * values[s] * product
         return np.maximum(power, 0) * self._separable(self.separable)
 
-    def at_most(self, tables: Tables) -> NDArray:
+    def upper_bound(self, tables: Tables) -> NDArray:
         """The same through any lens that passes no more than these radial tables.
 
         Planes whose light cancels through one lens need not through another: as if none did.
@@ -124,11 +124,11 @@ class PowerSpectrum:
         amplitudes = values * np.sqrt(np.maximum(own, 0))[:, None]
         return np.square(amplitudes.sum(axis=0)) * self._separable(self.separable)
 
-    def lost_without(self, tables: Tables, effect: SeparableTransfer) -> NDArray:
+    def omission_power(self, tables: Tables, effect: SeparableTransfer) -> NDArray:
         """Mean squares of what leaving out a separable transfer function adds: (C,)."""
         others = tuple(e for e in self.separable if e is not effect)
         own = np.outer(effect.along_y(self.y.center), effect.along_x(self.x.center))
-        power = replace(self, separable=others).through(tables)
+        power = replace(self, separable=others).filtered_power(tables)
         return np.asarray((power * np.square(1 - own)).sum(axis=(1, 2)))
 
     def _separable(self, effects: Sequence[SeparableTransfer]) -> NDArray:
@@ -139,23 +139,23 @@ class PowerSpectrum:
             along_y *= _largest(effect.along_y, self.y)
         return np.outer(along_y, along_x)
 
-    def highest_needed(self, power: NDArray, budget: float, pitch: tuple[float, float]) -> float:
+    def needed_frequency(self, power: NDArray, budget: float, pitch: tuple[float, float]) -> float:
         """The frequency beyond which an rms of at most `budget` is left [pixel Nyquist].
 
-        power: (C, ...) from `through` or `at_most`; pitch: along y and x [m]. The frequency of a
-        term is the larger of those along the axes, each in Nyquist frequencies of its own.
+        power: (C, ...) from `filtered_power` or `upper_bound`; pitch: along y and x [m]. The
+        frequency of a term is the larger of those along both axes, each in its own Nyquist units.
         """
-        order, left = self._beyond(power, pitch)
+        order, left = self._tail_sums(power, pitch)
         needed = np.flatnonzero(left > budget**2)
         return float(order[needed[-1]]) if len(needed) else 0.0
 
-    def rms_beyond(self, power: NDArray, frequency: float, pitch: tuple[float, float]) -> float:
+    def tail_rms(self, power: NDArray, frequency: float, pitch: tuple[float, float]) -> float:
         """Rms of all that lies beyond a frequency [pixel Nyquist], in the color of most."""
-        order, left = self._beyond(power, pitch)
+        order, left = self._tail_sums(power, pitch)
         first = int(np.searchsorted(order, frequency * (1 + 1e-9), side="right"))
         return float(np.sqrt(left[first])) if first < len(left) else 0.0
 
-    def _beyond(self, power: NDArray, pitch: tuple[float, float]) -> tuple[NDArray, NDArray]:
+    def _tail_sums(self, power: NDArray, pitch: tuple[float, float]) -> tuple[NDArray, NDArray]:
         """Frequencies, rising, and the mean square from each on, in the color of most."""
         along_y, along_x = 2 * pitch[0] * self.y.high, 2 * pitch[1] * self.x.high
         shell = np.maximum(along_y[:, None], along_x).ravel()
@@ -205,7 +205,10 @@ def brightest_mean(
     array has a small part in the means near its edges.
     """
     rows, columns = _lowest(y), _lowest(x)
-    index, columns_index = y.coefficient_of(np.arange(rows)), x.coefficient_of(np.arange(columns))
+    index, columns_index = (
+        y.coefficient_index(np.arange(rows)),
+        x.coefficient_index(np.arange(columns)),
+    )
     along_x, along_y = (
         _means(x, columns, separable, "along_x"),
         _means(y, rows, separable, "along_y"),

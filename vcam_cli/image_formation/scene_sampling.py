@@ -15,8 +15,12 @@ from vcam_cli.image_formation.power_spectrum import (
     brightest_mean,
     power_spectrum,
 )
-from vcam_cli.image_formation.scene_spectrum import SceneSpectrum, of_rectangles, transformed
-from vcam_cli.image_formation.transfer_tables import Mixing, Tables, bound, tabulate
+from vcam_cli.image_formation.scene_spectrum import (
+    SceneSpectrum,
+    rectangle_spectrum,
+    transform_planes,
+)
+from vcam_cli.image_formation.transfer_tables import Mixing, Tables, bounding_tables, tabulate
 from vcam_cli.scenes.base import ChartScene, SampledScene
 
 SINGLE = 5e-7
@@ -65,16 +69,20 @@ def sampled_image(
     """
     g, knobs, exact = path.geometry, path.settings, path.transfer
     size = table_size(path, highest, ENTRIES)
-    tables = tabulate(exact.through(exact.radial), size, mixing)
-    scene, spectrum, peak = _transformed(path, scene, highest, mixing[0])
+    tables = tabulate(exact.with_effects(exact.radial_blurs), size, mixing)
+    scene, spectrum, peak = _scene_spectrum(path, scene, highest, mixing[0])
     x, y = axes(path, scene, highest)
     full = min(brightest_mean(spectrum, x, y, tables, path.separable), path.ceiling)
     if spectrum.dtype == np.float32 and peak * SINGLE > SINGLE_SHARE * knobs.tolerance * full:
         doubled = replace(path, settings=replace(knobs, float_width=64))
-        scene, spectrum, _ = _transformed(doubled, scene, highest, mixing[0])
+        scene, spectrum, _ = _scene_spectrum(doubled, scene, highest, mixing[0])
     power = power_spectrum(spectrum, x, y, path.separable, path.workers)
-    directed = exact.plane or path.zones
-    squares = power.at_most(bound(exact, size, mixing)) if directed else power.through(tables)
+    directed = exact.plane_blurs or path.zones
+    squares = (
+        power.upper_bound(bounding_tables(exact, size, mixing))
+        if directed
+        else power.filtered_power(tables)
+    )
     area = scene.shape[0] * scene.pitch_y * scene.shape[1] * scene.pitch_x
     density = area / (g.sensor_width * g.sensor_height)
     pitch = g.pitch_y, g.pitch_x
@@ -82,7 +90,7 @@ def sampled_image(
         # Beside a wide margin nothing is known of the array's own brightest place.
         known = full if density < WIDE else 0.0
         budget = highest_frequency_share(knobs.tolerance) * known / np.sqrt(density)
-        needed = power.highest_needed(squares, budget, pitch) * (1 + 1e-9)
+        needed = power.needed_frequency(squares, budget, pitch) * (1 + 1e-9)
         highest = min(max(needed, LOWEST), highest)
     else:
         highest = min(highest, knobs.oversampling)
@@ -92,26 +100,26 @@ def sampled_image(
         power=power,
         tables=tables,
         highest=highest,
-        lost=float(np.sqrt(density)) * power.rms_beyond(squares, highest, pitch),
+        lost=float(np.sqrt(density)) * power.tail_rms(squares, highest, pitch),
         full_signal=full,
         peak=peak,
         density=density,
     )
 
 
-def _transformed(
+def _scene_spectrum(
     path: OpticalPath, scene: SampledScene, highest: float, mix: NDArray
 ) -> tuple[SampledScene, SceneSpectrum, float]:
     """The spectrum of a scene's planes; a bound on the signal before blur [electrons / s]."""
     dtype = path.settings.dtype
-    level = np.abs(path.transfer.mixed(mix).level)
+    level = np.abs(path.transfer.with_mixtures(mix).level)
     rectangles = scene.rectangles(mix)
     if isinstance(scene, ChartScene) and rectangles is not None:
         scene = scene.on_cells(cell_grid(scene, path.geometry, BEYOND_CUTOFF * highest))
         x, y = axes(path, scene, highest)
         brightest = np.abs(rectangles.values).max(axis=(1, 2))
-        known = of_rectangles(rectangles, scene.shape, (y, x), dtype)
+        known = rectangle_spectrum(rectangles, scene.shape, (y, x), dtype)
         return scene, known, float((level.T @ brightest).max())
     planes: NDArray = scene.planes(mix, path.workers).astype(dtype, copy=False)
     brightest = np.array([max(float(p.max()), -float(p.min())) for p in planes])
-    return scene, transformed(planes, path.workers), float((level.T @ brightest).max())
+    return scene, transform_planes(planes, path.workers), float((level.T @ brightest).max())

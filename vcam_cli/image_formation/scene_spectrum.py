@@ -73,7 +73,7 @@ class SampledSpectrum:
         return out
 
 
-def transformed(planes: NDArray, workers: int) -> SampledSpectrum:
+def transform_planes(planes: NDArray, workers: int) -> SampledSpectrum:
     """The DCT-II of planes (R, ny, nx) along both axes; overwrites its argument.
 
     Columns are copied before they are transformed: those of a plane whose rows are 2^n numbers
@@ -125,7 +125,7 @@ def _blocks(edges: NDArray) -> list[slice]:
     return [slice(*ends) for ends in pairwise(edges)]
 
 
-def of_rectangles(
+def rectangle_spectrum(
     rectangles: Rectangles, cells: tuple[int, int], axes: Sequence[Axis], dtype: type
 ) -> RectangleSpectrum:
     """The first terms of the spectrum of a chart of even rectangles, in closed form.

@@ -69,7 +69,7 @@ def _mean_layers(path: OpticalPath, scene: SampledScene) -> tuple[Layers, Spectr
     """Means over the photodetectors' areas; points where the aperture is switched off."""
     g, level = path.geometry, path.transfer.level.T
     samples = 0 if isinstance(scene, ChartScene) else math.prod(scene.shape)
-    needed = memory_model.of_box_averages(samples, len(level), g, path.settings)
+    needed = memory_model.box_average_bytes(samples, len(level), g, path.settings)
     memory.require(needed, g.rows, g.columns)
     signal = points = point_values(scene, level, g)
     changes = {}
@@ -103,10 +103,12 @@ def _far_layers(path: OpticalPath, whole: ChartScene, near: ChartScene) -> Itera
     for sign, part in ((1, whole), (-1, near)):
         layers, _ = _spectral_layers(path, coarse(part, pitch), highest, 0.0)
         for layer in layers:
-            yield replace(layer, values=partial(_signed, layer.values, sign))
+            yield replace(layer, values=partial(_multiply_values, layer.values, sign))
 
 
-def _signed(values: Callable[[int, slice], NDArray], sign: int, color: int, rows: slice) -> NDArray:
+def _multiply_values(
+    values: Callable[[int, slice], NDArray], sign: int, color: int, rows: slice
+) -> NDArray:
     return sign * values(color, rows)
 
 
@@ -122,7 +124,7 @@ def _spectral_layers(
     painted = isinstance(scene, ChartScene) and scene.chart.edges() is None
     size = table_size(path, highest)
     mixing = field_mixtures(exact, zones, size) if zones else mixtures([exact], size)
-    needed = memory_model.of_image(path, scene, len(mixing[0]), size)
+    needed = memory_model.image_bytes(path, scene, len(mixing[0]), size)
     memory.require(needed, g.rows, g.columns)
     image = sampled_image(path, scene, highest, mixing)
     size = table_size(path, image.highest)

@@ -49,51 +49,51 @@ class Transfer:
     effects: tuple[Blur, ...]
 
     @property
-    def radial(self) -> tuple[RadialTransfer, ...]:
+    def radial_blurs(self) -> tuple[RadialTransfer, ...]:
         """Those that depend on |f| only."""
         return of_kind(self.effects, RadialTransfer)
 
     @property
-    def plane(self) -> tuple[PlaneTransfer, ...]:
+    def plane_blurs(self) -> tuple[PlaneTransfer, ...]:
         """Those that depend on the direction too."""
         return of_kind(self.effects, PlaneTransfer)
 
-    def at(self, frequency: NDArray) -> NDArray:
+    def radial_response(self, frequency: NDArray) -> NDArray:
         """H_kc through the radial effects alone at frequencies of any shape [cycles/m].
 
         (K, C, *shape) [electrons / s]
         """
-        if not self.radial:
+        if not self.radial_blurs:
             level = self.level.reshape(*self.level.shape, *(1,) * frequency.ndim)
             return np.broadcast_to(level, (*self.level.shape, *frequency.shape)).copy()
-        return self.summed(self.otf_radial(frequency))
+        return self.spectral_sum(self.otf_radial(frequency))
 
-    def at_plane(self, fx: NDArray, fy: NDArray) -> NDArray:
+    def plane_response(self, fx: NDArray, fy: NDArray) -> NDArray:
         """H_kc through everything at all pairs of fx (n,) and fy (m,) [cycles/m].
 
         (K, C, m, n), complex [electrons / s]
         """
         otf = self.otf_radial(np.hypot(fx[None, :], fy[:, None])).astype(np.complex128)
         for plane, wavelength in zip(otf, self.wavelengths, strict=True):
-            for effect in self.plane:
+            for effect in self.plane_blurs:
                 plane *= effect.otf_plane(fx, fy, float(wavelength))
-        return self.summed(otf)
+        return self.spectral_sum(otf)
 
     def otf_radial(self, frequency: NDArray) -> NDArray:
         """Transfer of the radial effects at every wavelength: (J, *shape)."""
         otf = np.ones((len(self.wavelengths), *frequency.shape))
         for row, wavelength in zip(otf, self.wavelengths, strict=True):
-            for effect in self.radial:
+            for effect in self.radial_blurs:
                 row *= effect.otf(frequency, float(wavelength))
         return otf
 
-    def summed(self, otf: NDArray) -> NDArray:
+    def spectral_sum(self, otf: NDArray) -> NDArray:
         """The spectral sum of transfers (J, *shape): (K, C, *shape)."""
         components, colors, count = self.weights.shape
         total = self.weights.reshape(-1, count) @ otf.reshape(count, -1)
         return total.reshape(components, colors, *otf.shape[1:])
 
-    def thinned(self) -> Transfer:
+    def with_half_the_wavelengths(self) -> Transfer:
         """The same light on every second wavelength; neighbors share the weight of those dropped.
 
         The transfer is taken as linear between neighbors, which it is to second order.
@@ -110,11 +110,11 @@ class Transfer:
         keep = np.array([j % 2 == 0 or j == count - 1 for j in range(count)])
         return replace(self, wavelengths=self.wavelengths[keep], weights=weights[..., keep])
 
-    def through(self, effects: Sequence[Effect]) -> Transfer:
+    def with_effects(self, effects: Sequence[Effect]) -> Transfer:
         """The same light through other effects, of which only blurs count."""
         return replace(self, effects=of_kind(effects, Blur))
 
-    def mixed(self, mix: NDArray) -> Transfer:
+    def with_mixtures(self, mix: NDArray) -> Transfer:
         """The transfer of mixtures of the components, mix: (R, K)."""
         return replace(self, weights=np.tensordot(mix, self.weights, axes=1))
 

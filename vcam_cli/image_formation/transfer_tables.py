@@ -156,11 +156,11 @@ def spline_weights(entries: int, position: NDArray) -> NDArray:
 def tabulate(exact: Transfer, size: TableSize, mixing: Mixing) -> Tables:
     """Tables of a transfer function for the given mixtures of its components."""
     mix, error = mixing
-    mixed = exact.mixed(mix)
+    mixed = exact.with_mixtures(mix)
     tables = Tables(mix, radial_table(mixed, size), size.top, error)
-    if exact.plane:
-        grid = plane_grid(mixed, size.top, size.plane_entries(mixed.plane))
-        parts = grid.change(mixed.plane)
+    if exact.plane_blurs:
+        grid = plane_grid(mixed, size.top, size.plane_entries(mixed.plane_blurs))
+        parts = grid.change(mixed.plane_blurs)
         planes = tuple(part if np.any(part) else None for part in parts)
         tables = replace(tables, planes=planes)
     return tables
@@ -168,13 +168,13 @@ def tabulate(exact: Transfer, size: TableSize, mixing: Mixing) -> Tables:
 
 def radial_table(transfer: Transfer, size: TableSize) -> NDArray:
     """The radial part of a transfer function: (K, C, entries) [electrons / s]."""
-    return transfer.at(np.linspace(0, size.top, size.entries))
+    return transfer.radial_response(np.linspace(0, size.top, size.entries))
 
 
-def bound(exact: Transfer, size: TableSize, mixing: Mixing) -> Tables:
+def bounding_tables(exact: Transfer, size: TableSize, mixing: Mixing) -> Tables:
     """Tables that no lens exceeds whose radial part is this one, as if no light canceled."""
-    mixed = exact.mixed(mixing[0])
-    alone = replace(mixed.through(mixed.radial), weights=np.abs(mixed.weights))
+    mixed = exact.with_mixtures(mixing[0])
+    alone = replace(mixed.with_effects(mixed.radial_blurs), weights=np.abs(mixed.weights))
     return Tables(mixing[0], radial_table(alone, size), size.top, mixing[1])
 
 
@@ -200,11 +200,11 @@ class PlaneGrid:
             for blur in blurs:
                 otf *= blur.otf_plane(self.frequency, fy, float(wavelength))
             np.multiply(otf - 1, radial, out=part)
-        both = self.alone.summed(change)
-        return by_parity(both[..., :m, :], both[..., m:, :])
+        both = self.alone.spectral_sum(change)
+        return split_by_parity(both[..., :m, :], both[..., m:, :])
 
 
-def by_parity(plus: NDArray, minus: NDArray) -> NDArray:
+def split_by_parity(plus: NDArray, minus: NDArray) -> NDArray:
     """A transfer function by `PARITIES` from its values at (fx, fy) and at (fx, -fy).
 
     H(-f) = conj(H(f)), so a half-plane tells all. plus, minus: any shape, complex. Returns
@@ -222,13 +222,13 @@ def by_parity(plus: NDArray, minus: NDArray) -> NDArray:
 
 def plane_grid(transfer: Transfer, top: float, entries: int) -> PlaneGrid:
     """A grid of so many frequencies from 0 to `top` [cycles/m] along each axis."""
-    alone = transfer.through(transfer.radial).thinned()
+    alone = transfer.with_effects(transfer.radial_blurs).with_half_the_wavelengths()
     f = np.linspace(0, top, entries)
     length = np.hypot(f[None, :], np.concatenate([f, f])[:, None])
     return PlaneGrid(alone, f, alone.otf_radial(length))
 
 
-def turned(parts: NDArray, parity: int, quarters: int, mirrored: bool) -> NDArray:
+def turn_table(parts: NDArray, parity: int, quarters: int, mirrored: bool) -> NDArray:
     """One of the tables by parity (4, ..., m, m) of a blur with y mirrored, then turned.
 
     quarters: quarter turns from x to y, each T'(fx, fy) = T(fy, -fx).
@@ -270,8 +270,8 @@ def mixtures(through: Sequence[Transfer], size: TableSize) -> Mixing:
 def _samples(transfer: Transfer, top: float) -> list[NDArray]:
     """H_kc at some frequencies: (K, any number)."""
     components = len(transfer.weights)
-    samples = [transfer.at(np.linspace(0, top, JUDGED)).reshape(components, -1)]
-    if transfer.plane:
-        more = plane_grid(transfer, top, 9).change(transfer.plane)
+    samples = [transfer.radial_response(np.linspace(0, top, JUDGED)).reshape(components, -1)]
+    if transfer.plane_blurs:
+        more = plane_grid(transfer, top, 9).change(transfer.plane_blurs)
         samples.append(np.moveaxis(more, 1, 0).reshape(components, -1))
     return samples

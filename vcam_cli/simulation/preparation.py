@@ -88,7 +88,9 @@ def prepare(
     colors, lattice, knobs = place.mosaic, place.lattice, place.settings(knobs)
     joins = place.binning_groups
     count = camera.exposure.count * (len(colors.colors) if place.full_color else 1)
-    needed = memory_model.of_frame(lattice, knobs, len(colors.colors), bool(camera.quality), count)
+    needed = memory_model.frame_bytes(
+        lattice, knobs, len(colors.colors), bool(camera.quality), count
+    )
     memory.require(needed, g.rows, g.columns)  # what was read of the scene is there already
     read = getattr(picture, "nbytes", 0)
     stages.watch.expect(cost_model.at_first_sight(camera, g, colors, workers))
@@ -104,7 +106,7 @@ def prepare(
         see = partial(_transfer, camera, g, knobs, spectra, colors, effects)
         both = see() if lights is None else lights.transfer(camera, see)
         # Kept light came with another camera's effects, which are equal but not the same.
-        transfer = replace(both.through(effects), weights=both.weights[:-1])
+        transfer = replace(both.with_effects(effects), weights=both.weights[:-1])
         white_rate = both.level[-1]
         _refuse_too_much(float(white_rate.max()))
         ceiling = auto_exposure.ceiling(
