@@ -26,7 +26,7 @@ def changes_by_omission(
     tables: of the whole lens; field_change: rms of all that changes over the field.
     """
     squares: dict[Effect, NDArray] = {
-        effect: image.power.omission_power(image.tables, effect) for effect in path.separable
+        effect: image.power.omission_power(image.lens_power, effect) for effect in path.separable
     }
     for effect in of_kind(path.effects, RadialTransfer):
         rest = _omission_tables(

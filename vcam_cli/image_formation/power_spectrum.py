@@ -9,7 +9,7 @@ is sampled by the pixels.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import combinations_with_replacement
 
 import numpy as np
@@ -107,12 +107,20 @@ class PowerSpectrum:
 
     def filtered_power(self, tables: Tables) -> NDArray:
         """Mean squares of every color's signal: (C, blocks along y, blocks along x)."""
+        return self.pixel_power(self.lens_power(tables))
+
+    def lens_power(self, tables: Tables) -> NDArray:
+        """The same without the separable transfer functions."""
         power = np.zeros((tables.colors, len(self.y.low), len(self.x.low)))
         for parity in tables.parities:
             values = reader(tables, parity, self.x.center).values(self.y.center)
             for (r, s), product in zip(self.pairs, self.products, strict=True):
                 power += values[r] * values[s] * product
-        return np.maximum(power, 0) * self._separable(self.separable)
+        return np.maximum(power, 0)
+
+    def pixel_power(self, power: NDArray) -> NDArray:
+        """Mean squares behind the separable transfer functions, from those before them."""
+        return power * self._separable_squares(self.separable)
 
     def upper_bound(self, tables: Tables) -> NDArray:
         """The same through any lens that passes no more than these radial tables.
@@ -122,16 +130,18 @@ class PowerSpectrum:
         values = np.abs(reader(tables, 0, self.x.center).values(self.y.center))
         own = [p for (r, s), p in zip(self.pairs, self.products, strict=True) if r == s]
         amplitudes = values * np.sqrt(np.maximum(own, 0))[:, None]
-        return np.square(amplitudes.sum(axis=0)) * self._separable(self.separable)
+        return self.pixel_power(np.square(amplitudes.sum(axis=0)))
 
-    def omission_power(self, tables: Tables, effect: SeparableTransfer) -> NDArray:
-        """Mean squares of what leaving out a separable transfer function adds: (C,)."""
-        others = tuple(e for e in self.separable if e is not effect)
+    def omission_power(self, power: NDArray, effect: SeparableTransfer) -> NDArray:
+        """Mean squares of what leaving out a separable transfer function adds: (C,).
+
+        power: from `lens_power`.
+        """
+        others = self._separable_squares([e for e in self.separable if e is not effect])
         own = np.outer(effect.along_y(self.y.center), effect.along_x(self.x.center))
-        power = replace(self, separable=others).filtered_power(tables)
-        return np.asarray((power * np.square(1 - own)).sum(axis=(1, 2)))
+        return np.asarray((power * (others * np.square(1 - own))).sum(axis=(1, 2)))
 
-    def _separable(self, effects: Sequence[SeparableTransfer]) -> NDArray:
+    def _separable_squares(self, effects: Sequence[SeparableTransfer]) -> NDArray:
         """Largest squares of separable transfer functions in the blocks."""
         along_x, along_y = np.ones(len(self.x.low)), np.ones(len(self.y.low))
         for effect in effects:
@@ -145,23 +155,21 @@ class PowerSpectrum:
         power: (C, ...) from `filtered_power` or `upper_bound`; pitch: along y and x [m]. The
         frequency of a term is the larger of those along both axes, each in its own Nyquist units.
         """
-        order, left = self._tail_sums(power, pitch)
-        needed = np.flatnonzero(left > budget**2)
-        return float(order[needed[-1]]) if len(needed) else 0.0
+        shell = self._shell(pitch).ravel()
+        order = np.argsort(shell, kind="stable")
+        sums = np.cumsum(power.reshape(len(power), -1)[:, order[::-1]], axis=1)[:, ::-1]
+        needed = np.flatnonzero(sums.max(axis=0) > budget**2)
+        return float(shell[order[needed[-1]]]) if len(needed) else 0.0
 
     def tail_rms(self, power: NDArray, frequency: float, pitch: tuple[float, float]) -> float:
         """Rms of all that lies beyond a frequency [pixel Nyquist], in the color of most."""
-        order, left = self._tail_sums(power, pitch)
-        first = int(np.searchsorted(order, frequency * (1 + 1e-9), side="right"))
-        return float(np.sqrt(left[first])) if first < len(left) else 0.0
+        beyond = self._shell(pitch) > frequency * (1 + 1e-9)
+        return float(np.sqrt(power[:, beyond].sum(axis=1).max()))
 
-    def _tail_sums(self, power: NDArray, pitch: tuple[float, float]) -> tuple[NDArray, NDArray]:
-        """Frequencies, rising, and the mean square from each on, in the color of most."""
+    def _shell(self, pitch: tuple[float, float]) -> NDArray:
+        """The frequency of every block, (blocks along y, blocks along x) [pixel Nyquist]."""
         along_y, along_x = 2 * pitch[0] * self.y.high, 2 * pitch[1] * self.x.high
-        shell = np.maximum(along_y[:, None], along_x).ravel()
-        order = np.argsort(shell, kind="stable")
-        sums = np.cumsum(power.reshape(len(power), -1)[:, order[::-1]], axis=1)[:, ::-1]
-        return shell[order], sums.max(axis=0)
+        return np.maximum(along_y[:, None], along_x)
 
 
 def _largest(transfer, blocks: Blocks) -> NDArray:

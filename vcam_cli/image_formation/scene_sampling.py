@@ -42,6 +42,8 @@ class SampledImage:
     power: PowerSpectrum
     tables: Tables
     """The radial part of the lens, up to where power is judged."""
+    lens_power: NDArray
+    """Mean squares of the signal behind them, before the separable transfer functions."""
     highest: float
     """Frequency up to which it is filtered [pixel Nyquist]."""
     lost: float
@@ -77,11 +79,12 @@ def sampled_image(
         doubled = replace(path, settings=replace(knobs, float_width=64))
         scene, spectrum, _ = _scene_spectrum(doubled, scene, highest, mixing[0])
     power = power_spectrum(spectrum, x, y, path.separable, path.workers)
+    lens_power = power.lens_power(tables)
     directed = exact.plane_blurs or path.zones
     squares = (
         power.upper_bound(bounding_tables(exact, size, mixing))
         if directed
-        else power.filtered_power(tables)
+        else power.pixel_power(lens_power)
     )
     area = scene.shape[0] * scene.pitch_y * scene.shape[1] * scene.pitch_x
     density = area / (g.sensor_width * g.sensor_height)
@@ -99,6 +102,7 @@ def sampled_image(
         spectrum=spectrum,
         power=power,
         tables=tables,
+        lens_power=lens_power,
         highest=highest,
         lost=float(np.sqrt(density)) * power.tail_rms(squares, highest, pitch),
         full_signal=full,

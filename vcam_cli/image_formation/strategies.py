@@ -42,8 +42,8 @@ from vcam_cli.image_formation.scene_spectrum import SceneSpectrum
 from vcam_cli.image_formation.transfer_tables import Tables, mixtures, tabulate
 from vcam_cli.scenes.base import ChartScene, HarmonicScene, SampledScene, Scene, WaveScene
 
-SMOOTH = 64
-"""Parts of a table over each of which it is a cubic."""
+SMOOTH = 16
+"""Parts of a table over each of which it is a cubic, to rounding."""
 PERIODS = 8
 """Parts of a period of a blur's phase over which it is a cubic."""
 

@@ -128,7 +128,7 @@ class TableReader:
         values = steps.take(index, axis=0)
         values *= (position - index)[:, None]
         values += entries.take(index, axis=0)
-        return values.T.reshape(*self.tables.shape, *radius.shape)
+        return np.ascontiguousarray(values.T).reshape(*self.tables.shape, *radius.shape)
 
 
 def reader(tables: Tables, parity: int, fx: NDArray) -> TableReader:
