@@ -9,7 +9,7 @@ from vcam_cli.errors import (
     Problem,
     VcamError,
     bad,
-    dotted,
+    dotted_path,
     nearest,
     split,
 )
@@ -45,12 +45,12 @@ def test_bad_takes_a_dotted_path():
 
 @pytest.mark.parametrize("path", [(), ("a",), ("a", 0, "b"), ("optics", "zernike", 4)])
 def test_split_inverts_dotted(path):
-    assert split(dotted(path)) == path
+    assert split(dotted_path(path)) == path
 
 
 def test_located_fills_in_only_places_that_are_not_known():
     error = BadInput([Problem(("a",), "one"), Problem(("b",), "two", "", "part.yaml:3:1")])
-    places = [p.where for p in error.located(lambda path: f"cam.yaml:{path[0]}").problems]
+    places = [p.where for p in error.with_places(lambda path: f"cam.yaml:{path[0]}").problems]
     assert places == ["cam.yaml:a", "part.yaml:3:1"]
     assert error.problems[0].where == ""  # the error handed in is not changed
 

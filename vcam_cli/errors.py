@@ -4,7 +4,7 @@ Every error a user can cause is a `VcamError` and carries the exit code of the c
 Anything else that escapes is a bug of vcam and deserves its traceback.
 
 Why problems are values: whoever finds a mistake knows its YAML path, seldom the line of the
-file. The loader fills in the places afterwards (`BadInput.located`), and gathers all
+file. The loader fills in the places afterwards (`BadInput.with_places`), and gathers all
 problems of a file before it raises (`Collector`).
 """
 
@@ -35,7 +35,7 @@ class Problem:
     """File, line and column once they are known: "camera.yaml:12:10"."""
 
     def __str__(self) -> str:
-        parts = [part for part in (self.where, dotted(self.path), self.message) if part]
+        parts = [part for part in (self.where, dotted_path(self.path), self.message) if part]
         text = ": ".join(parts)
         return one_line(f"{text}; {self.remedy}" if self.remedy else text)
 
@@ -58,7 +58,7 @@ class BadInput(VcamError):
     def __str__(self) -> str:
         return "\n".join(str(problem) for problem in self.problems)
 
-    def located(self, locate: Callable[[Path], str]) -> "BadInput":
+    def with_places(self, locate: Callable[[Path], str]) -> "BadInput":
         """Return the same error with every empty `where` filled in by `locate(path)`."""
         return BadInput(
             problem if problem.where else replace(problem, where=locate(problem.path))
@@ -134,13 +134,13 @@ def data_file_problems(file: str | PathLike[str], path: Path, remedy: str) -> It
         raise bad(path, f"{file} cannot be read: {error.strerror}", "check the file name") from None
 
 
-def dotted(path: Path) -> str:
+def dotted_path(path: Path) -> str:
     """Return a path as `--set` writes it: ("processing", 1, "gamma") is "processing.1.gamma"."""
     return ".".join(str(part) for part in path)
 
 
 def split(path: Path | str) -> Path:
-    """Return the path that `dotted` wrote; parts that are whole numbers become int."""
+    """Return the path that `dotted_path` wrote; parts that are whole numbers become int."""
     if isinstance(path, tuple):
         return path
     return tuple(int(p) if p.isascii() and p.isdigit() else p for p in path.split(".") if p)

@@ -38,7 +38,7 @@ def available_workers() -> int:
     return os.cpu_count() or 1
 
 
-def suited(pixels: int) -> int:
+def suitable_workers(pixels: int) -> int:
     """Return the number of threads that suits a frame of so many pixels.
 
     Half a megapixel takes a fifth longer with two threads than with one; a whole one gains a tenth
@@ -79,7 +79,7 @@ def each(work: Callable[[Item], object], items: Iterable[Item], workers: int) ->
             pass
 
 
-def at_once(values: int) -> int:
+def rows_at_once(values: int) -> int:
     """Return the number of rows or columns of so many values that are worked on together.
 
     Few enough for the cache; more of short ones, since every piece costs some calls.
@@ -89,10 +89,10 @@ def at_once(values: int) -> int:
 
 def pieces(count: int, size: int) -> list[slice]:
     """Return consecutive slices of at most `size` that cover `count`."""
-    return within(slice(0, count), size)
+    return slices_within(slice(0, count), size)
 
 
-def within(whole: slice, size: int) -> list[slice]:
+def slices_within(whole: slice, size: int) -> list[slice]:
     """Return consecutive slices of at most `size` that cover a slice."""
     return [slice(i, min(i + size, whole.stop)) for i in range(whole.start, whole.stop, size)]
 

@@ -71,11 +71,11 @@ def parse(text: object, dimension: str) -> float:
         raise ValueError(f"{text} is a bare number; {_needs(kind)}")
     if not isinstance(text, str):
         raise ValueError(f"{kind.title} is a number with its unit, for example {kind.example}")
-    return _parsed(text, dimension)
+    return _parse(text, dimension)
 
 
 @lru_cache(maxsize=4096)  # sweeps read the same texts for every point
-def _parsed(text: str, dimension: str) -> float:
+def _parse(text: str, dimension: str) -> float:
     kind = DIMENSIONS[dimension]
     plain = " ".join(text.translate(_SPELLINGS).split())
     if plain in kind.words:
@@ -228,7 +228,9 @@ def _decimal(number: Decimal) -> str:
     return plain if short else f"{digits:e}".replace("e+", "e")
 
 
-def _prefixed(unit: str, prefixes: str, power: int = 1, scale: int = 0) -> dict[str, Fraction]:
+def _prefixed_units(
+    unit: str, prefixes: str, power: int = 1, scale: int = 0
+) -> dict[str, Fraction]:
     """{"um": 1e-6, ...}: `unit` with every prefix ("-" stands for none), to a power."""
     names = ["" if letter == "-" else letter for letter in prefixes]
     return {p + unit: Fraction(10) ** (_PREFIXES[p] * power + scale) for p in names}
@@ -240,15 +242,15 @@ def _per(top: dict[str, Fraction], bottom: dict[str, Fraction]) -> dict[str, Fra
 
 
 def _dimensions() -> dict[str, Dimension]:
-    length = _prefixed("m", "num-pk") | {"cm": Fraction(1, 100), "in": Fraction(254, 10000)}
-    time = _prefixed("s", "-munp") | {"min": Fraction(60)}
+    length = _prefixed_units("m", "num-pk") | {"cm": Fraction(1, 100), "in": Fraction(254, 10000)}
+    time = _prefixed_units("s", "-munp") | {"min": Fraction(60)}
     area = {"cm2": Fraction(1, 10**4), "m2": Fraction(1), "mm2": Fraction(1, 10**6)}
     area["um2"] = Fraction(1, 10**12)
     cm_or_m = {"cm": Fraction(1, 100), "m": Fraction(1)}
     volume = {"cm3": Fraction(1, 10**6), "m3": Fraction(1), "um3": Fraction(1, 10**18)}
-    current = _prefixed("A", "fpnum-a")
-    farad = _prefixed("F", "fpanum-")
-    electrons = _prefixed("e", "-kM")
+    current = _prefixed_units("A", "fpnum-a")
+    farad = _prefixed_units("F", "fpanum-")
+    electrons = _prefixed_units("e", "-kM")
     pairs = {"lp/mm": 1000, "cycles/mm": 1000, "c/mm": 1000, "lp/m": 1, "cycles/m": 1, "lp/cm": 100}
     watts = {f"{p}W": s for p, s in (("", 1), ("m", Fraction(1, 1000)), ("u", Fraction(1, 10**6)))}
     forms = ("{}/(sr m2)", "{}/(m2 sr)", "{}/sr/m2", "{}/m2/sr")
@@ -263,7 +265,7 @@ def _dimensions() -> dict[str, Dimension]:
         Dimension("length", "a length", "m", length, lengths, "6.5 um"),
         Dimension("distance", "a distance", "m", length, (*lengths, "km"), "1 m", words=far),
         Dimension("time", "a time", "s", time, ("ns", "us", "ms", "s"), "30 ms"),
-        Dimension("voltage", "a voltage", "V", _prefixed("V", "-munk"), ("uV", "mV", "V"),
+        Dimension("voltage", "a voltage", "V", _prefixed_units("V", "-munk"), ("uV", "mV", "V"),
                   "1.38 V"),
         Dimension("capacitance", "a capacitance", "F", farad, ("aF", "fF", "pF", "nF"), "12 fF"),
         Dimension("temperature", "a temperature", "K", kelvin, ("K",), "300 K",
@@ -279,16 +281,16 @@ def _dimensions() -> dict[str, Dimension]:
                   ("pA/cm", "nA/cm", "uA/cm"), "0.437 pA/cm"),
         Dimension("current", "a current", "A", current, ("fA", "pA", "nA", "uA", "mA"), "5 fA"),
         Dimension("luminance", "a luminance", "cd/m2",
-                  _per(_prefixed("cd", "-mk"), {"m2": Fraction(1)}), ("mcd/m2", "cd/m2", "kcd/m2"),
-                  "100 cd/m2"),
+                  _per(_prefixed_units("cd", "-mk"), {"m2": Fraction(1)}),
+                  ("mcd/m2", "cd/m2", "kcd/m2"), "100 cd/m2"),
         Dimension("radiance", "a radiance", "W/(sr m2)", radiance,
                   ("W/(sr m2)",), "0.4 W/(sr m2)"),
-        Dimension("illuminance", "an illuminance", "lx", _prefixed("lx", "-mk"),
+        Dimension("illuminance", "an illuminance", "lx", _prefixed_units("lx", "-mk"),
                   ("mlx", "lx", "klx"), "300 lx"),
         Dimension("spatial_frequency", "a spatial frequency", "cycles/m",
                   {name: Fraction(size) for name, size in pairs.items()}, ("lp/mm",), "33 lp/mm"),
         Dimension("conversion_gain", "a conversion gain", "V/e",
-                  _per(_prefixed("V", "umn-"), {"e": Fraction(1)}),
+                  _per(_prefixed_units("V", "umn-"), {"e": Fraction(1)}),
                   ("nV/e", "uV/e", "mV/e", "V/e"), "20 uV/e"),
         Dimension("adc_gain", "an ADC gain", "DN/e",
                   {"DN/e": Fraction(1), "DN/ke": Fraction(1, 1000)}, ("DN/e",), "0.25 DN/e"),

@@ -8,8 +8,8 @@ from making import camera, radiance_for
 
 from vcam_cli.accuracy import measurements, refinement
 from vcam_cli.accuracy.knobs import KNOBS, with_accuracy, with_knobs
-from vcam_cli.accuracy.measurements import Clock, Shot, enough, settings_key
-from vcam_cli.accuracy.refinement import refine_reference, same
+from vcam_cli.accuracy.measurements import Clock, Shot, is_median_known, settings_key
+from vcam_cli.accuracy.refinement import is_same_camera, refine_reference
 from vcam_cli.accuracy.setting_errors import FLOOR, Point
 from vcam_cli.commands import accuracy as command
 from vcam_cli.progress import Silent
@@ -41,26 +41,26 @@ SMALL = {
     ],
 )
 def test_runs_end_where_the_median_is_known_or_takes_long(runs, known):
-    assert enough(runs) is known
+    assert is_median_known(runs) is known
 
 
 def test_settings_of_the_same_computation_share_their_runs(tmp_path, monkeypatch):
     """What the file says by itself, or what its accuracy resolves to, is not taken twice."""
     own = camera(tmp_path, SMALL)
     taken = []
-    whole = measurements._whole
+    whole = measurements._compute_frame
     monkeypatch.setattr(
-        measurements, "_whole", lambda c, workers: (taken.append(c), whole(c, workers))[1]
+        measurements, "_compute_frame", lambda c, workers: (taken.append(c), whole(c, workers))[1]
     )
     clock = Clock(1)
-    clock.timed(own)
+    clock.timed_shot(own)
     same_settings = [with_knobs(own, wavelength_step="10 nm"), with_knobs(own, float_width=32)]
     same_light = with_accuracy(own, tolerance=0.00501)  # other settings, the same work
     for case in (*same_settings, same_light, with_knobs(own, float_width=64)):
         clock.add(case)
     assert all(settings_key(case) == settings_key(own) for case in same_settings)
     assert settings_key(same_light) != settings_key(own)
-    clock.go(Silent())
+    clock.run_all(Silent())
     assert clock.seconds(same_light) == clock.seconds(own) == clock.seconds(same_settings[0])
     assert clock.seconds(with_knobs(own, float_width=64)) != clock.seconds(own)
     assert sum(c.accuracy.knobs == {} for c in taken) <= measurements.TURNS + 1
@@ -100,11 +100,11 @@ def test_what_is_the_base_is_not_computed_again(tmp_path):
     own = camera(tmp_path, SMALL)
     base = SimpleNamespace(spectrum=SimpleNamespace(planes=3), camera=own)
     step = knobs["wavelength_step"]
-    assert same(step, "10 nm", with_knobs(own, wavelength_step="10 nm"), base)
-    assert not same(step, "5 nm", with_knobs(own, wavelength_step="5 nm"), base)
+    assert is_same_camera(step, "10 nm", with_knobs(own, wavelength_step="10 nm"), base)
+    assert not is_same_camera(step, "5 nm", with_knobs(own, wavelength_step="5 nm"), base)
     rank = knobs["spectral_rank"]
-    assert same(rank, 3, with_knobs(own, spectral_rank=3), base)
-    assert not same(rank, 2, with_knobs(own, spectral_rank=2), base)
+    assert is_same_camera(rank, 3, with_knobs(own, spectral_rank=3), base)
+    assert not is_same_camera(rank, 2, with_knobs(own, spectral_rank=2), base)
 
 
 def point(knob: str, error: float, unsure: float) -> Point:
@@ -118,8 +118,8 @@ def told(*points: Point):
 
 def test_errors_less_than_ten_times_the_last_change_are_bounds():
     sure, unsure = point("table_size", 1e-3, 1e-4), point("field_zones", 1e-3, 2e-4)
-    assert sure.sure
-    assert not unsure.sure
+    assert sure.is_certain
+    assert not unsure.is_certain
     rows = command.settings(told(sure, unsure))
     assert [row[2] for row in rows] == ["0.1", "<0.12"]
     assert "<: at most" in (text := command.convergence(told(sure, unsure)))
@@ -128,7 +128,7 @@ def test_errors_less_than_ten_times_the_last_change_are_bounds():
 
 
 def test_smaller_than_rounding_is_sure():
-    assert point("table_size", 0.0, FLOOR).sure
+    assert point("table_size", 0.0, FLOOR).is_certain
     text = command.convergence(told(point("table_size", 0.0, FLOOR)))
     assert "refined" in text
     assert "<" not in text

@@ -9,7 +9,7 @@ from making import camera, radiance_for
 from vcam_cli import simulate
 from vcam_cli.accuracy import ablation, measurements, reference, study
 from vcam_cli.accuracy.knobs import KNOBS
-from vcam_cli.accuracy.recommendation import coarser, recommend
+from vcam_cli.accuracy.recommendation import coarser_knobs, recommend
 from vcam_cli.accuracy.setting_errors import COLUMNS, Point
 from vcam_cli.effects.order import ORDER
 from vcam_cli.simulation.simulate import prepare
@@ -208,7 +208,7 @@ def test_knobs_are_made_coarser_where_they_save_time_and_lose_little(tmp_path):
         point("wavelength_step", "20 nm", 1e-4, 0.8),
         point("shot_noise", "gaussian", 0.0, 0.1),  # not the same noise
     )
-    assert coarser(made, points) == {"wavelength_step": "20 nm", "oversampling": 2}
+    assert coarser_knobs(made, points) == {"wavelength_step": "20 nm", "oversampling": 2}
 
 
 def test_a_saving_within_the_spread_is_none(tmp_path):

@@ -83,7 +83,7 @@ def test_a_data_sheet_counts_in_electrons_and_numbers(gain, tmp_path):
     """0.399 DN/e over 12 bits above 240 DN: the ADC is full at 9662 e, whatever volts are."""
     adc = {"bits": 12, "offset": "240 DN", "gain": "0.399 DN/e"}
     e = solved(tmp_path, {"full_well": "12 ke", "gain": gain}, adc)
-    assert not e.in_volts
+    assert not e.has_volts
     assert e.capacitance is None
     assert e.full_well == pytest.approx(12_000, rel=1e-12)
     assert e.electrons_per_dn == pytest.approx(1 / 0.399, rel=1e-12)
@@ -97,7 +97,7 @@ def test_volts_that_are_given_stay_volts(swing, tmp_path):
     adc = {"bits": 12, "gain": "0.25 DN/e"}
     readout = {"full_well": "10 ke", **(swing or {"conversion_gain": "100 uV/e"})}
     e = solved(tmp_path, readout, adc)
-    assert e.in_volts
+    assert e.has_volts
     assert e.capacitance == pytest.approx(CHARGE / 100e-6, rel=1e-12)
 
 

@@ -274,7 +274,7 @@ def test_electrons_in_electrons_out(kind, tmp_path):
             assert np.array_equal(out, np.rint(out))
             # a step of the line is a step of the code
             step = np.array([0.0, effect.electrons_per_dn])
-            assert np.diff(effect.line(step))[0] == pytest.approx(1, rel=1e-12)
+            assert np.diff(effect.response(step))[0] == pytest.approx(1, rel=1e-12)
 
 
 # --- variance ------------------------------------------------------------------------------------

@@ -381,7 +381,7 @@ def test_quantization_rounds_to_the_nearest_code_and_clips():
     adc = Quantization(offset=10.0, electrons_per_dn=4.0, bits=8)
     electrons = np.array([-1e6, -40.0, 0.0, 1.9, 2.1, 400.0, 980.0, 1e6])
     assert adc.apply(electrons).tolist() == [0, 0, 10, 10, 11, 110, 255, 255]
-    assert adc.line(electrons)[1] == 0
+    assert adc.response(electrons)[1] == 0
 
 
 def test_quantization_switched_off_still_writes_codes(tmp_path):
@@ -409,7 +409,7 @@ def test_a_logarithmic_code_is_the_formula(offset, bits, dtype):
     adc = LogarithmicQuantization(offset, BEND, FULL, bits)
     electrons = np.array([-49.0, -20.0, -0.3, 0.0, 0.3, 7.0, 50.0, 1234.5, 2e4, 3e4], dtype)
     exact = np.array([by_hand(float(e), offset, bits) for e in electrons])
-    np.testing.assert_allclose(adc.line(electrons.copy()), exact, rtol=2e-6, atol=2e-3)
+    np.testing.assert_allclose(adc.response(electrons.copy()), exact, rtol=2e-6, atol=2e-3)
     codes = adc.apply(electrons.copy())
     assert codes.dtype == dtype
     assert np.abs(codes - np.clip(exact, 0, 2**bits - 1)).max() <= 0.5 + 2e-3
@@ -433,9 +433,9 @@ def test_logarithmic_codes_are_made_linear_again(dtype):
         Quantization(16.0, FULL / (4095 - 16), 12),
     )
     electrons = np.array([-40.0, 0.0, 1.0, 300.0, 2e4, 5e4], dtype)
-    back = adc.linear(adc.line(electrons))
+    back = adc.linear(adc.response(electrons))
     assert back.dtype == dtype
-    np.testing.assert_allclose(back, straight.line(electrons), rtol=5e-6, atol=1e-4)
+    np.testing.assert_allclose(back, straight.response(electrons), rtol=5e-6, atol=1e-4)
     codes = np.array([0.0, 16.0, 4095.0], dtype)
     assert np.array_equal(straight.linear(codes), codes)
 
@@ -445,7 +445,7 @@ def test_a_bend_far_above_full_scale_is_a_linear_adc():
     bent = LogarithmicQuantization(10.0, 1e12, 1020.0, 8)
     straight = Quantization(10.0, 1020 / 245, 8)
     electrons = np.linspace(-30.0, 1100, 500)
-    np.testing.assert_allclose(bent.line(electrons), straight.line(electrons), rtol=1e-6)
+    np.testing.assert_allclose(bent.response(electrons), straight.response(electrons), rtol=1e-6)
 
 
 def test_which_adc_the_camera_has(tmp_path):

@@ -44,7 +44,7 @@ def test_the_series_agrees_with_the_pupil(field, accuracy, tmp_path):
     found = effect(tmp_path, **LARGE, **FIELDS[field], accuracy=accuracy)
     place = np.random.default_rng(3).uniform(-1, 1, (2, 40))
     x, y = place[0] * found.half_width, place[1] * found.half_height
-    error = found.gain(x, y) - found.at(x[None, :], y[:, None])
+    error = found.gain(x, y) - found.exact_gain(x[None, :], y[:, None])
     assert np.abs(error).max() < found.tolerance / 2
     assert np.sqrt(np.mean(error**2)) < found.tolerance / 10
     # where the light does not end within the field a few 1e-5 are all there is
@@ -112,7 +112,7 @@ def test_the_exit_pupil_sets_the_angles(tmp_path):
     )
     assert near.cone == far.cone  # the f-number is that of the light
     x, y = np.array([[1e-4]]), np.array([[5e-5]])
-    assert near.at(x, y) == pytest.approx(far.at(2 * x, 2 * y), rel=1e-12)
+    assert near.exact_gain(x, y) == pytest.approx(far.exact_gain(2 * x, 2 * y), rel=1e-12)
     auto = effect(tmp_path, pixel__stack=STACK)
     assert auto.pupil_distance == pytest.approx(5e-3 / (1 - 5e-3), rel=1e-12)  # (1 - m) f
 
@@ -136,7 +136,7 @@ def test_a_frame_is_darker_by_the_gain(tmp_path):
     off = simulate(camera(tmp_path, changes | {"effects": QUIET | {"pixel_vignetting": "off"}}))
     found = PixelVignetting.from_camera(on.frame.camera, on.frame.geometry)
     x, y = pixel_centers(on.frame.geometry)
-    expected = off.mean_electrons * found.at(x[None, :], y[:, None])
+    expected = off.mean_electrons * found.exact_gain(x[None, :], y[:, None])
     np.testing.assert_allclose(on.mean_electrons, expected, rtol=1e-4)
     assert on.mean_electrons.min() < 0.9 * on.mean_electrons.max()
 

@@ -102,7 +102,7 @@ LOG_LINE = Case(
     "1 + x/bend forgets what x was",
     "the curve",
     lambda: in_digits(_log_code, WEAK),
-    lambda: LOG_ADC.line(WEAK.copy()),
+    lambda: LOG_ADC.response(WEAK.copy()),
     lambda: SPAN * np.log(1 + WEAK / BEND) / np.log(1 + FULL / BEND),
     "span ln(1 + x/b) / ln(1 + full/b)",
     1e-15,

@@ -100,7 +100,11 @@ def signal(path: OpticalPath, scene: Scene) -> np.ndarray:
 
 def of_camera(made: Camera, picture: Any = None) -> tuple[OpticalPath, Scene]:
     """The path and the scene of a camera, as the simulation makes them."""
-    g, knobs, effects = geometry(made), settings(made), plan.optical(made, geometry(made))
+    g, knobs, effects = (
+        geometry(made),
+        settings(made),
+        plan.mean_signal_effects(made, geometry(made)),
+    )
     band, colors = made.scene.wavelengths, mosaic(made)
     margin = bandwidth.margin(g, effects, (band.start, band.stop), knobs)
     scene = build(made.scene, photon_rate.view(g, knobs, margin), picture)

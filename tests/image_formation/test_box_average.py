@@ -225,7 +225,9 @@ def test_a_chart_without_blur_is_never_sampled(kind, aperture, tmp_path):
     g, fine = made.geometry, 100
     place = (np.arange(fine) + 0.5) / fine - 0.5
     y, x = ((np.arange(n)[:, None] - (n - 1) / 2 + place) for n in (g.rows, g.columns))
-    light = made.scene.at(x.ravel() * g.pitch_x, y.ravel() * g.pitch_y, made.transfer.level.T)
+    light = made.scene.values_at(
+        x.ravel() * g.pitch_x, y.ravel() * g.pitch_y, made.transfer.level.T
+    )
     points = light.reshape(g.rows, fine, g.columns, fine)
     share = g.collecting_width / g.pitch_x if aperture == "on" else 2 / fine
     inside = np.abs(place) < share / 2

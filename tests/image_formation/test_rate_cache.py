@@ -5,7 +5,7 @@ import pytest
 from making import camera
 
 from vcam_cli import simulate
-from vcam_cli.image_formation.rate_cache import AFTER, depends_on
+from vcam_cli.image_formation.rate_cache import AFTER, light_key
 from vcam_cli.simulation import preparation
 from vcam_cli.simulation.shared import Shared
 
@@ -69,7 +69,7 @@ def test_the_light_does_not_depend_on_it(tmp_path, path, monkeypatch):
     made = camera(tmp_path, changed(path, CHANGES[path]))
     before = {k: v for k, v in changed(path, 0).items() if k != path}
     plain = camera(tmp_path, before | ({path: BASE[path]} if path in BASE else {}))
-    assert depends_on(made) == depends_on(plain)
+    assert light_key(made) == light_key(plain)
     found = []
     true = preparation.photon_rate.photo_rate
     monkeypatch.setattr(
@@ -95,7 +95,7 @@ def test_the_light_does_not_depend_on_it(tmp_path, path, monkeypatch):
 )  # fmt: skip
 def test_what_may_change_the_light_is_told_apart(tmp_path, path, value):
     a, b = camera(tmp_path, BASE), camera(tmp_path, BASE | {path: value})
-    assert depends_on(a) != depends_on(b)
+    assert light_key(a) != light_key(b)
 
 
 @pytest.mark.parametrize(

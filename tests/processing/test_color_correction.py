@@ -149,8 +149,8 @@ def test_a_block_is_multiplied_as_colors_are():
     planes, matrix = random.random((4, 5, 7)), random.normal(size=(3, 4))
     step = ColorCorrection(tuple(map(tuple, matrix.tolist())))
     expected = np.moveaxis(np.moveaxis(planes, 0, 2) @ matrix.T, 2, 0)
-    np.testing.assert_allclose(step.on_colors(planes), expected, atol=1e-14)
-    block = step.on_block(Block(planes.astype(np.float32), 3))
+    np.testing.assert_allclose(step.process_colors(planes), expected, atol=1e-14)
+    block = step.process_block(Block(planes.astype(np.float32), 3))
     assert block.first_row == 3
     assert block.planes.dtype == np.float32
     np.testing.assert_allclose(block.planes, expected, atol=2e-6)  # sums in float32

@@ -108,7 +108,7 @@ def test_measured_values_stay_and_others_lie_between_the_extremes(mosaic, order)
 def test_a_block_knows_its_phase(first_row):
     frame = np.random.default_rng(6).random((70, 6)).astype(np.float32)
     rows = frame[mirrored_index(np.arange(first_row, first_row + 6), 70)]
-    block = Bilinear(pattern_of("GRBG"), RGB).on_block(Block(rows[np.newaxis], first_row))
+    block = Bilinear(pattern_of("GRBG"), RGB).process_block(Block(rows[np.newaxis], first_row))
     assert block.first_row == first_row + 1
     whole = bilinear(frame, pattern_of("GRBG"), RGB)
     np.testing.assert_array_equal(block.planes, whole[:, first_row + 1 : first_row + 5])

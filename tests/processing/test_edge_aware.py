@@ -125,7 +125,7 @@ def test_a_block_knows_its_phase(first_row):
     frame = np.random.default_rng(6).random((70, 6)).astype(np.float32)
     rows = frame[mirrored_index(np.arange(first_row, first_row + 10), 70)]
     method = EdgeAware(pattern_of("GRBG"), RGB, (0.5, 1.0, 0.7))
-    block = method.on_block(Block(rows[np.newaxis], first_row))
+    block = method.process_block(Block(rows[np.newaxis], first_row))
     assert block.first_row == first_row + REACH
     whole = edge_aware(frame, pattern_of("GRBG"), RGB, np.array([0.5, 1.0, 0.7]))
     np.testing.assert_array_equal(block.planes, whole[:, first_row + 3 : first_row + 7])

@@ -24,7 +24,8 @@ def demosaiced(mosaic, pattern, white=None, spans=None):
     operation = method(pattern, mosaic.shape, white)
     spans = [(0, mosaic.shape[0])] if spans is None else spans
     parts = [
-        operation.on_block(padded_block(mosaic, *span, operation.halo)).planes for span in spans
+        operation.process_block(padded_block(mosaic, *span, operation.halo)).planes
+        for span in spans
     ]
     return np.concatenate(parts, axis=1)
 
@@ -90,7 +91,7 @@ def test_an_edge_along_rows_or_columns_is_found_along_it(name, axis):
     def error(planes):
         return np.sqrt(np.mean(((planes - full) / white[:, None, None])[inside] ** 2))
 
-    smeared = error(plain.on_block(padded_block(mosaic, 0, 48, plain.halo)).planes)
+    smeared = error(plain.process_block(padded_block(mosaic, 0, 48, plain.halo)).planes)
     assert error(demosaiced(mosaic, pattern, white)) < 0.5 * smeared
 
 

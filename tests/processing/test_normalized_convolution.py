@@ -26,7 +26,8 @@ def demosaiced(mosaic, pattern, rows=None):
     operation = NormalizedConvolution(pattern, colors_of(pattern), sites)
     spans = [(0, mosaic.shape[0])] if rows is None else rows
     parts = [
-        operation.on_block(padded_block(mosaic, *span, operation.halo)).planes for span in spans
+        operation.process_block(padded_block(mosaic, *span, operation.halo)).planes
+        for span in spans
     ]
     return np.concatenate(parts, axis=1)
 

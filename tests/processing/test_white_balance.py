@@ -57,7 +57,7 @@ def test_a_mosaic_block_is_summed_and_balanced_color_by_color(first_row):
         # float64 sums of float32 values
         assert total[c] == pytest.approx(values[mask].sum(dtype=np.float64), rel=1e-14)
     block = Block(values.copy()[np.newaxis], first_row)
-    balanced = Gains((2.0, 1.0, 4.0), BAYER).on_block(block).planes[0]
+    balanced = Gains((2.0, 1.0, 4.0), BAYER).process_block(block).planes[0]
     expected = [[values[i, j] * gain[names[i][j]] for j in range(7)] for i in range(5)]
     np.testing.assert_array_equal(balanced, expected)
 
@@ -68,10 +68,10 @@ def test_full_color_is_summed_and_balanced_by_planes():
     np.testing.assert_allclose(total, planes.sum(axis=(1, 2), dtype=np.float64), rtol=1e-14)
     assert count.tolist() == [20, 20, 20]
     gains = Gains((2.0, 1.0, 0.5), BAYER)
-    expected = gains.on_colors(planes)
+    expected = gains.process_colors(planes)
     assert expected.dtype == np.float32
-    np.testing.assert_array_equal(gains.on_block(Block(planes, 0)).planes, expected)
-    np.testing.assert_array_equal(gains.on_colors(np.ones(3)), [2.0, 1.0, 0.5])
+    np.testing.assert_array_equal(gains.process_block(Block(planes, 0)).planes, expected)
+    np.testing.assert_array_equal(gains.process_colors(np.ones(3)), [2.0, 1.0, 0.5])
 
 
 def test_the_illuminant_makes_white_gray():

@@ -16,8 +16,8 @@ import numpy as np
 
 from vcam_cli import load, simulate
 from vcam_cli.accuracy import ablation
-from vcam_cli.accuracy.measurements import enough
-from vcam_cli.accuracy.reference import changes, converged
+from vcam_cli.accuracy.measurements import is_median_known
+from vcam_cli.accuracy.reference import effect_changes, prepare_converged
 from vcam_cli.camera.camera import Camera
 from vcam_cli.effects.order import ORDER
 from vcam_cli.effects.signal_chain import LEVELS, NoiseSource
@@ -328,7 +328,7 @@ class Truth:
 def truth(camera: Camera) -> Truth:
     """The camera with everything on, and finer than its reference."""
     auto = {preset: prepare(_at(camera, preset))[0] for preset in PRESETS}
-    found = converged(camera, auto["reference"], 2)
+    found = prepare_converged(camera, auto["reference"], 2)
     return Truth(found, ablation.mean_raw(found), ablation.full_signal(found), auto)
 
 
@@ -392,7 +392,7 @@ def estimates(camera: Camera, true: Truth) -> list[Estimate]:
     """The plan's contribution of every effect at standard, beside its ablation."""
     auto = true.auto["standard"]
     names = tuple(ablation.wanted_effects(camera))
-    changed = changes(camera, true.found.exposure_time, names, 2)
+    changed = effect_changes(camera, true.found.exposure_time, names, 2)
     shares = ablation.variance_shares(true.found, true.full, 2)
     out = []
     for d in auto.plan.decisions:
@@ -445,7 +445,7 @@ def seconds(camera: Camera) -> tuple[float, float]:
 
 def _timed(work: Callable[[], object]) -> float:
     runs: list[float] = []
-    while not enough(runs):
+    while not is_median_known(runs):
         start = time.perf_counter()
         work()
         runs.append(time.perf_counter() - start)

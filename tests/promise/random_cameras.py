@@ -16,7 +16,7 @@ from promises import picture_files, variance_lost_of
 from vcam_cli import load
 from vcam_cli.accuracy import ablation
 from vcam_cli.accuracy.knobs import with_accuracy
-from vcam_cli.accuracy.reference import converged
+from vcam_cli.accuracy.reference import prepare_converged
 from vcam_cli.camera.camera import Camera
 from vcam_cli.simulation.simulate import prepare
 
@@ -143,7 +143,7 @@ class Held:
 def held(camera: Camera, workers: int = 1) -> Iterator[Held]:
     """The promise of every tolerance, for one camera."""
     autos = [prepare(with_accuracy(camera, tolerance=t), workers)[0] for t in TOLERANCES]
-    found = converged(camera, autos[-1], workers, MOST_BYTES)
+    found = prepare_converged(camera, autos[-1], workers, MOST_BYTES)
     truth, full = ablation.mean_raw(found), ablation.full_signal(found)
     for tolerance, auto in zip(TOLERANCES, autos, strict=True):
         out = [d for d in auto.plan.decisions if d.state == "off" and d.by == "plan"]

@@ -207,7 +207,7 @@ def _sampled(camera, setup, points):
     scene = build(camera.scene, View(rows, columns, setup.pitch_x, setup.pitch_y), None)
     period = 3 * max(setup.size) + 6 * setup.wavelength[0] * setup.f_number
     at = ((np.arange(points) + 0.37) / points - 0.5) * period
-    light = scene.at(at, at, _reflectances(camera, setup))[0]
+    light = scene.values_at(at, at, _reflectances(camera, setup))[0]
     most = math.floor(period * cutoff(setup))
     f = np.arange(-most, most + 1) / period
     wave = np.exp(-2j * np.pi * np.outer(f, at)) / points

@@ -34,7 +34,7 @@ def scattered(folder, rows, **changes):
 def test_rows_and_columns_are_taken_as_they_are(tmp_path):
     place = made(tmp_path, "bayer-rggb")
     light = np.arange(24.0).reshape(6, 4)
-    assert not place.scattered
+    assert not place.is_scattered
     assert not place.full_color
     assert place.select_pixels(light) is light
     assert (place.color == np.tile([[0, 1], [1, 2]], (3, 2))).all()
@@ -49,7 +49,7 @@ def test_stacked_pixels_have_all_colors(tmp_path):
     light = np.arange(72.0).reshape(3, 6, 4)
     assert place.full_color
     assert place.planes
-    assert not place.scattered
+    assert not place.is_scattered
     assert place.mosaic.colors == ("R", "G", "B")
     assert place.select_pixels(light) is light
 
@@ -63,7 +63,7 @@ def test_places_of_a_honeycomb(tmp_path):
     """Columns two steps apart, rows one; the sensor 8 by 6 steps, the first pixel half a step in,
     every second row a step to the right."""
     place = made(tmp_path, "honeycomb")
-    assert place.scattered
+    assert place.is_scattered
     assert not place.full_color
     even, odd = np.array([-3.5, -1.5, 0.5, 2.5]) * STEP, np.array([-2.5, -0.5, 1.5, 3.5]) * STEP
     assert place.x == pytest.approx(np.array([even, odd] * 3), rel=1e-12)
@@ -100,7 +100,7 @@ PLACES = [(-21.0, 3.5, "G"), (4.25, -13.0, "R"), (0.0, 0.0, "W"), (17.7, 12.2, "
 
 def test_places_and_colors(tmp_path):
     place = scattered(tmp_path, PLACES)
-    assert place.scattered
+    assert place.is_scattered
     assert place.planes
     assert not place.full_color
     assert place.mosaic.colors == ("R", "G", "B", "W")

@@ -22,7 +22,7 @@ def brute(chart: ChartScene, mix: np.ndarray, points: int) -> np.ndarray:
     ny, nx = chart.shape
     x = _inside(cell_edges(nx, chart.pitch_x), points)
     y = _inside(cell_edges(ny, chart.pitch_y), points)
-    return chart.at(x, y, mix).reshape(len(mix), ny, points, nx, points).mean((2, 4))
+    return chart.values_at(x, y, mix).reshape(len(mix), ny, points, nx, points).mean((2, 4))
 
 
 def _inside(edges: np.ndarray, points: int) -> np.ndarray:

@@ -106,7 +106,7 @@ def test_planes_are_linear_in_the_mix_and_in_the_dtype_of_the_view():
     mix = mix_of(chart, 3)
     planes = chart.planes(mix)
     assert planes.dtype == np.float32
-    assert chart.at(np.zeros(1), np.zeros(1), mix).dtype == np.float32
+    assert chart.values_at(np.zeros(1), np.zeros(1), mix).dtype == np.float32
     # float32 rounding of sums of a few parts
     np.testing.assert_allclose(
         chart.planes(mix[:1] + mix[1:2])[0], planes[0] + planes[1], rtol=1e-5
@@ -139,7 +139,7 @@ def test_leaves_that_are_left_out_would_not_be_seen(source):
     chart = sampled(source, rows=120, columns=160, oversampling=7, margin=3)
     mix = mix_of(chart)
     x, y = (cell_edges(n, 3e-6 / 7) for n in chart.shape[::-1])
-    seen = chart.chart.within(x, y)
+    seen = chart.chart.crop_to_cells(x, y)
     laid = seen.leaves if source is BOTH else seen
     assert len(laid.leaves.discs) < 20_000  # of 62 000 and their copies
     planes = chart.chart.averages(x, y, mix)
@@ -152,7 +152,9 @@ def test_leaves_that_are_left_out_would_not_be_seen(source):
 def test_a_uniform_field_is_one_wave_of_frequency_zero():
     built = build(scene(FLAT), view(), None)
     assert isinstance(built, WaveScene)
-    np.testing.assert_allclose(built.at(np.arange(3.0), np.arange(2.0), np.array([[2.0]])), 0.8)
+    np.testing.assert_allclose(
+        built.values_at(np.arange(3.0), np.arange(2.0), np.array([[2.0]])), 0.8
+    )
 
 
 @pytest.mark.parametrize(
@@ -165,12 +167,12 @@ def test_a_sinusoid_runs_along_its_orientation(orientation, direction):
     x, y = np.linspace(-1e-4, 1e-4, 7), np.linspace(-2e-4, 1e-4, 5)
     along = np.add.outer(direction[1] * y, direction[0] * x)
     expected = 0.4 * (1 + 0.7 * np.cos(2 * np.pi * 50e3 * along + np.radians(20)))
-    np.testing.assert_allclose(built.at(x, y, np.ones((1, 1)))[0], expected, atol=1e-12)
+    np.testing.assert_allclose(built.values_at(x, y, np.ones((1, 1)))[0], expected, atol=1e-12)
 
 
 def test_a_sinusoid_of_phase_zero_has_a_maximum_at_the_center():
     built = build(scene(WAVE), view(), None)
-    assert built.at(np.zeros(1), np.zeros(1), np.ones((1, 1))) == pytest.approx(0.75)
+    assert built.values_at(np.zeros(1), np.zeros(1), np.ones((1, 1))) == pytest.approx(0.75)
 
 
 @pytest.mark.parametrize("source", [WAVE, FLAT])
@@ -186,7 +188,9 @@ def test_csf_grows_in_frequency_to_the_right_and_in_contrast_upward():
     chart = sampled(CSF | {"phase": "0 deg", "max_contrast": 0.9, "mean": 0.5})
     width, height = 48e-6, 36e-6
     x = np.linspace(-width / 2, width / 2, 4001)
-    top, middle, bottom = chart.at(x, np.array([-height / 2, 0, height / 2]), np.ones((1, 1)))[0]
+    top, middle, bottom = chart.values_at(
+        x, np.array([-height / 2, 0, height / 2]), np.ones((1, 1))
+    )[0]
     assert top[0] == pytest.approx(0.5 * 1.9)
     assert np.ptp(bottom) == pytest.approx(0.0, abs=1e-12)
     np.testing.assert_allclose(middle - 0.5, (top - 0.5) / 2, atol=1e-12)
@@ -313,7 +317,7 @@ def test_star_has_its_spokes_at_any_distance():
     for radius in (2e-6, 1e-4):
         angle = (np.arange(960) + 0.5) * 2 * math.pi / 960
         points = [
-            float(chart.at(np.array([x]), np.array([y]), np.ones((1, 1)))[0, 0, 0])
+            float(chart.values_at(np.array([x]), np.array([y]), np.ones((1, 1)))[0, 0, 0])
             for x, y in zip(radius * np.cos(angle), radius * np.sin(angle), strict=True)
         ]
         # 40 points a spoke and gap, half of them bright

@@ -155,7 +155,9 @@ class TestPlace:
         )  # fmt: skip
         np.testing.assert_allclose(shown.planes(mix), image.planes(mix), rtol=1e-13)
         x, y = np.linspace(-4e-5, 4e-5, 31), np.linspace(-3e-5, 3e-5, 17)
-        np.testing.assert_allclose(shown.at(x, y, mix), image.at(x, y, mix), rtol=1e-13)
+        np.testing.assert_allclose(
+            shown.values_at(x, y, mix), image.values_at(x, y, mix), rtol=1e-13
+        )
 
     def test_threads_change_nothing(self):
         data = np.random.default_rng(1).random((900, 800, 5), np.float32)

@@ -70,9 +70,9 @@ def test_the_same_seed_is_the_same_picture_whatever_the_sampling():
     one = build(scene(LEAVES), view(rows=12, columns=16), None)
     # three times the pixels in the same frame; another aspect crops centrally
     two = build(scene(LEAVES), view(rows=6, columns=16, oversampling=3, margin=5), None)
-    np.testing.assert_array_equal(one.at(x, y, mix), two.at(x, y, mix))
+    np.testing.assert_array_equal(one.values_at(x, y, mix), two.values_at(x, y, mix))
     other = build(scene(LEAVES | {"seed": 2}), view(), None)
-    assert (other.at(x, y, mix) != one.at(x, y, mix)).mean() > 0.5
+    assert (other.values_at(x, y, mix) != one.values_at(x, y, mix)).mean() > 0.5
 
 
 def test_the_first_leaves_of_a_seed_stay_what_they_are():

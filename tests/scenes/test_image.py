@@ -96,7 +96,7 @@ def test_samples_far_larger_than_the_array_stay_in_place(rows, columns):
     assert max(shown.shape) <= 2
     assert shown.pitch_x * shown.shape[1] == pytest.approx(seen.width + 4 * seen.pitch_x)
     assert shown.pitch_y * shown.shape[0] == pytest.approx(seen.height + 4 * seen.pitch_y)
-    light = shown.at(np.array([-1e-6, 1e-6]), np.array([-1e-6, 1e-6]), np.ones((1, 1)))[0]
+    light = shown.values_at(np.array([-1e-6, 1e-6]), np.array([-1e-6, 1e-6]), np.ones((1, 1)))[0]
     down = [(rows - 1) // 2, rows // 2]
     across = [(columns - 1) // 2, columns // 2]
     np.testing.assert_array_equal(light, given_picture[np.ix_(down, across)][:, :, 0])
@@ -110,14 +110,14 @@ def test_points_see_the_sample_they_fall_into():
     y = (np.arange(24) - 11.5) * shown.pitch_y
     near = 0.4 * shown.pitch_x
     for dx, dy in [(0, 0), (near, -near), (-near, near)]:
-        np.testing.assert_allclose(shown.at(x + dx, y + dy, np.ones((1, 1))), planes)
-    beyond = shown.at(x[-1:] + shown.pitch_x, y, np.ones((1, 1)))
+        np.testing.assert_allclose(shown.values_at(x + dx, y + dy, np.ones((1, 1))), planes)
+    beyond = shown.values_at(x[-1:] + shown.pitch_x, y, np.ones((1, 1)))
     np.testing.assert_allclose(beyond[:, :, 0], planes[:, :, -1])  # mirrored
 
 
 def test_points_around_a_small_image_are_black():
     shown = image_scene(picture(3, 4) + 1, (WHITE,), WHITE, view(scene_width=24e-6))
-    light = shown.at(
+    light = shown.values_at(
         np.array([-13e-6, -11e-6, 11e-6, 13e-6]), np.array([-10e-6, 0]), np.ones((1, 1))
     )
     assert (light[0] > 0).tolist() == [[False] * 4, [False, True, True, False]]
@@ -129,7 +129,11 @@ def test_an_image_is_upright():
     shown = build(scene(LASER), view(), given_picture)
     planes = shown.planes(np.eye(3))
     assert planes[:, 0, 0].tolist() == [1, 2, 3]
-    assert shown.at(np.array([-23e-6]), np.array([-17e-6]), np.eye(3)).ravel().tolist() == [1, 2, 3]
+    assert shown.values_at(np.array([-23e-6]), np.array([-17e-6]), np.eye(3)).ravel().tolist() == [
+        1,
+        2,
+        3,
+    ]
 
 
 def test_planes_are_the_linear_combination_of_channels():
@@ -141,7 +145,7 @@ def test_planes_are_the_linear_combination_of_channels():
     expected = np.einsum("rk,ijk->rij", mix, given_picture)
     np.testing.assert_allclose(planes, expected, rtol=1e-6)
     x, y = (np.arange(32) - 15.5) * 1.5e-6, (np.arange(24) - 11.5) * 1.5e-6
-    np.testing.assert_allclose(shown.at(x, y, mix), expected, rtol=1e-6)
+    np.testing.assert_allclose(shown.values_at(x, y, mix), expected, rtol=1e-6)
 
 
 def test_reflectance_of_three_channels_names_the_other_models():

@@ -219,12 +219,12 @@ def test_fewer_levels_than_captures_repeat_the_last():
     pdf = Pdf.levels([10.0, 100.0, 1000.0], [1.0, 1.0, 1.0])
     found = optimal_schedules(pdf, [8], Sensor(1000, 0, 3, 0))[8]
     np.testing.assert_allclose(found.times, [1, 10, *[100] * 6], rtol=1e-12)
-    assert (found.used, found.gap) == (3, 0)
+    assert (found.distinct_captures, found.gap) == (3, 0)
 
 
 def test_a_gap_wider_than_all_leaves_one_capture():
     found = optimal_schedules(THREE, [3], Sensor(20000, 20, 30, 0, 8.0), Constraints(100.0))[3]
-    assert found.used == 1
+    assert found.distinct_captures == 1
     assert found.times[0] == pytest.approx(20000 / 20020)
     assert found.gap < 1e-9
 

@@ -25,7 +25,7 @@ def equal(counts):
     return np.linspace(0.1, 0.9, len(counts) + 1), np.array(counts)
 
 
-def sad(counts, widths, groups):
+def absolute_deviation(counts, widths, groups):
     """Total sum of absolute differences from the mean densities of groups of bins."""
     total = Fraction(0)
     for first, end in groups:
@@ -43,7 +43,7 @@ def naive(counts, widths, segments):
             [*groups[:j], (groups[j][0], groups[j + 1][1]), *groups[j + 2 :]]
             for j in range(len(groups) - 1)
         ]
-        totals = [sad(counts, widths, one) for one in tried]
+        totals = [absolute_deviation(counts, widths, one) for one in tried]
         best = totals.index(min(totals))
         trace.append((groups[best][0], groups[best][1], groups[best + 1][1], totals[best]))
         groups = tried[best]
@@ -60,7 +60,7 @@ def check(histogram, counts, widths, segments, scale=1.0):
     assert found_merges(trace) == [merge[:3] for merge in expected]
     sads = [float(merge[3]) * scale for merge in expected]
     np.testing.assert_allclose(
-        [m.sad for m in trace], sads, rtol=1e-11, atol=1e-12 * scale * sum(counts)
+        [m.absolute_deviation for m in trace], sads, rtol=1e-11, atol=1e-12 * scale * sum(counts)
     )
     edges = np.asarray(histogram[0], float)
     np.testing.assert_array_equal(pdf.low, edges[[first for first, _ in groups]])
@@ -78,7 +78,9 @@ def test_examples(name, scale):
     pdf, trace = merge_bins((edges, counts * scale), len(example["segments"]))
     assert found_merges(trace) == [tuple(step["merged"]) for step in example["trace"]]
     sads = [step["sad"] * scale for step in example["trace"]]
-    np.testing.assert_allclose([merge.sad for merge in trace], sads, rtol=1e-13, atol=1e-15)
+    np.testing.assert_allclose(
+        [merge.absolute_deviation for merge in trace], sads, rtol=1e-13, atol=1e-15
+    )
     shape, values = merged_histogram((edges, counts * scale), trace)
     np.testing.assert_array_equal(shape, edges[[0, *(end for _, end in example["segments"])]])
     np.testing.assert_allclose(values, np.array(example["values"]) * scale, rtol=1e-8)
@@ -137,7 +139,9 @@ def test_a_bin_split_in_two_changes_nothing():
     split, trace = merge_bins((np.arange(11), fine), 3)
     np.testing.assert_array_equal(whole.low, split.low)
     np.testing.assert_allclose(whole.probability, split.probability, rtol=1e-14)
-    assert trace[-1].sad == pytest.approx(merge_bins((edges, counts), 3)[1][-1].sad)
+    assert trace[-1].absolute_deviation == pytest.approx(
+        merge_bins((edges, counts), 3)[1][-1].absolute_deviation
+    )
 
 
 @settings(max_examples=20, deadline=None)
@@ -150,7 +154,7 @@ def test_a_merge_may_bring_bins_closer():
     """Means are not medians: 5 6 and 1 7 5 differ from theirs by more than all five together."""
     counts = [5, 6, 1, 7, 5]
     check(equal(counts), counts, [1] * 5, 1)
-    totals = [merge.sad for merge in merge_bins(equal(counts), 1)[1]]
+    totals = [merge.absolute_deviation for merge in merge_bins(equal(counts), 1)[1]]
     np.testing.assert_allclose(totals, [1, 3, 23 / 3, 7.6], rtol=1e-14)
 
 

@@ -194,4 +194,4 @@ def test_a_schedule_knows_its_captures_and_how_many_differ():
     assert schedule.times.tolist() == [1, 2, 2]
     assert schedule.photocurrents.tolist() == [1, 0.5, 0.5]
     assert schedule.expected_snr == pytest.approx(0.625)
-    assert schedule.used == 2
+    assert schedule.distinct_captures == 2

@@ -238,7 +238,7 @@ def test_captures_beyond_the_levels_repeat_the_last():
     schedule = optimal_schedules(Pdf.levels([0.0, 1.0, 2.0], [5, 1, 1]), [5])[5]
     assert schedule.photocurrents.tolist() == [2, 1, 1, 1, 1]
     assert schedule.expected_snr == pytest.approx(2 / 7)  # black has no SNR
-    assert schedule.used == 2
+    assert schedule.distinct_captures == 2
 
 
 def test_of_equal_schedules_the_shorter_is_chosen():

@@ -258,7 +258,7 @@ def test_on_keeps_what_the_plan_would_leave_out(name, run, tmp_path):
 )
 def test_on_for_what_is_not_described_is_an_error(name, absent, tmp_path):
     made = camera(tmp_path, absent | {"effects": {name: "on"}})
-    for attempt in (lambda: plan.described(made, geometry(made)), lambda: simulate(made)):
+    for attempt in (lambda: plan.camera_effects(made, geometry(made)), lambda: simulate(made)):
         with pytest.raises(BadInput) as caught:
             attempt()
         [problem] = caught.value.problems
@@ -373,7 +373,7 @@ def test_a_smaller_tolerance_leaves_less_out(run):
 
 def test_optical_effects_are_those_that_need_no_signal_level(tmp_path):
     made = camera(tmp_path, EVERYTHING | {"effects": {"diffraction": "off"}})
-    found = plan.optical(made, geometry(made))
+    found = plan.mean_signal_effects(made, geometry(made))
     assert not any(isinstance(e, Charge | NoiseSource) for e in found)
     assert "diffraction" not in {e.name for e in found}
     assert {"pixel_aperture", "off_axis"} <= {e.name for e in found}

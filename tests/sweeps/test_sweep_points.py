@@ -32,12 +32,14 @@ def test_order_is_case_then_grid_then_repeat_then_seed(tmp_path):
     )
     # Written out with a product of plain lists: nothing of the package decides the order.
     expected = itertools.product("ba", (4.0, 5.0, 6.0), (2.0, 4.0), (1.0, 2.0), (1, 2))
-    seen = [(p.case, *p.varied.values(), *p.repeated.values(), p.seed) for p in found.points]
+    seen = [
+        (p.case, *p.case_values.values(), *p.averaged_values.values(), p.seed) for p in found.points
+    ]
     assert seen == list(expected)
     for p in found.points:
-        assert p.camera.pixel.width == pytest.approx(p.varied["pixel.width"] * 1e-6, rel=1e-12)
-        assert p.camera.optics.f_number == p.varied["optics.f_number"]
-        assert p.camera.pixel.readout.read_noise == p.repeated["pixel.readout.read_noise"]
+        assert p.camera.pixel.width == pytest.approx(p.case_values["pixel.width"] * 1e-6, rel=1e-12)
+        assert p.camera.optics.f_number == p.case_values["optics.f_number"]
+        assert p.camera.pixel.readout.read_noise == p.averaged_values["pixel.readout.read_noise"]
         assert p.camera.seed.frame == p.seed
         # 0.1 and 0.2 W/(sr m2) of the same lamp
         assert p.camera.scene.radiance == (0.2 if p.case == "a" else 0.1)
@@ -46,25 +48,25 @@ def test_order_is_case_then_grid_then_repeat_then_seed(tmp_path):
 def test_steps_of_a_range_are_exact_in_its_unit(tmp_path):
     found = grid(tmp_path, vary={"pixel.width": {"start": "4 um", "stop": "5000 nm", "count": 11}})
     # The double nearest to the decimal number: 4.3, not 4.300000000000001.
-    assert [p.varied["pixel.width"] for p in found.points] == [
+    assert [p.case_values["pixel.width"] for p in found.points] == [
         4.0, 4.1, 4.2, 4.3, 4.4, 4.5, 4.6, 4.7, 4.8, 4.9, 5.0,
     ]  # fmt: skip
-    assert found.varied[0].column == "pixel.width [um]"
+    assert found.case_parameters[0].column == "pixel.width [um]"
     assert found.points[3].camera.pixel.width == 4.3e-6
 
 
 def test_a_case_has_a_range_of_its_own_in_the_units_of_the_study(tmp_path):
     own = {"vary": {"pixel.width": {"values": ["7000 nm", "8 um"]}}}
     found = grid(tmp_path, cases={"nominal": {}, "wide": own})
-    widths = [p.varied["pixel.width"] for p in found.points if p.case == "wide"]
+    widths = [p.case_values["pixel.width"] for p in found.points if p.case == "wide"]
     assert widths == [7.0, 8.0]
     assert len(found.points) == 5
 
 
 def test_words_are_their_own_cells(tmp_path):
     found = grid(tmp_path, vary={"optics.off_axis": {"values": ["none", "exact", "cos4"]}})
-    assert [p.varied["optics.off_axis"] for p in found.points] == ["none", "exact", "cos4"]
-    assert found.varied[0].column == "optics.off_axis"
+    assert [p.case_values["optics.off_axis"] for p in found.points] == ["none", "exact", "cos4"]
+    assert found.case_parameters[0].column == "optics.off_axis"
 
 
 def test_several_cameras_are_cases(tmp_path):

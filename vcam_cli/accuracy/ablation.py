@@ -63,14 +63,14 @@ def with_effects(camera: Camera, every: str, *left_out: str) -> Camera:
     off = {*left_out, *(name for name, wish in own.items() if wish == "off")}
     if every == "auto":
         return camera.model_copy(update={"effects": dict.fromkeys(sorted(off), "off") or "auto"})
-    found = {n for n, effect in plan.described(camera, geometry(camera)).items() if effect}
+    found = {n for n, effect in plan.camera_effects(camera, geometry(camera)).items() if effect}
     states = {name: "off" if name in off else "on" for name in sorted(found | off)}
     return camera.model_copy(update={"effects": states})
 
 
 def wanted_effects(camera: Camera) -> list[str]:
     """Names of the effects that the file describes and does not switch off, in their order."""
-    names = {e.name for e in plan.wanted(camera, geometry(camera))}
+    names = {e.name for e in plan.enabled_effects(camera, geometry(camera))}
     return [kind.name for kind in ORDER if kind.name in names]
 
 
@@ -116,11 +116,12 @@ def variance_shares(ready: Prepared, full: float, workers: int) -> dict[str, flo
     shares = {}
     for scope in ("frame", "sensor"):
         here = noise_sources(active, scope)
-        everything = [_taken(ready, field, here, workers) for field in fields]
+        everything = [_draw_field(ready, field, here, workers) for field in fields]
         for effect in here:
             others = tuple(e for e in here if e is not effect)
             shares[effect.name] = max(
-                np.mean((taken - _taken(ready, field, others, workers)) ** 2) / _variance(taken)
+                np.mean((taken - _draw_field(ready, field, others, workers)) ** 2)
+                / _variance(taken)
                 for taken, field in zip(everything, fields, strict=True)
             )
         if scope == "frame":
@@ -133,9 +134,9 @@ def variance_shares(ready: Prepared, full: float, workers: int) -> dict[str, flo
 
 def _rounding_share(code: Quantizer, electrons: NDArray, times: int) -> float:
     """Mean square of the rounding error, a mean of so many, over the variance with it."""
-    line = code.line(electrons.copy())
+    line = code.response(electrons.copy())
     ends = electrons.mean() * np.array([1.0, 1.001]) + np.array([0.0, 1.0])
-    per_code = float(np.diff(ends)[0] / np.diff(code.line(ends.copy()))[0])
+    per_code = float(np.diff(ends)[0] / np.diff(code.response(ends.copy()))[0])
     error = float(np.mean((np.rint(line) - line) ** 2)) * per_code**2 / times
     return error / max(error + float(np.var(electrons)), 1e-300)
 
@@ -144,7 +145,7 @@ def _variance(taken: NDArray) -> float:
     return max(float(np.var(taken)), 1e-300)
 
 
-def _taken(
+def _draw_field(
     ready: Prepared, field: NDArray, draws: tuple[NoiseSource, ...], workers: int
 ) -> NDArray:
     """Return a flat field [electrons], dark signal included, with these draws in it, never clipped.

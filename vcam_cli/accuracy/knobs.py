@@ -35,75 +35,81 @@ class Knob:
     """Keys that a coarser setting needs finer than others do, for its error to be its own."""
 
 
-def _spectrum(ready: Prepared) -> str:
+def _no_spectrum(ready: Prepared) -> str:
     followed = ready.spectrum.oversampling > 0
     return "" if followed else "the scene is known in closed form, without samples"
 
 
-def _blurred(ready: Prepared) -> str:
-    blurs = ready.transfer.effects or _field(ready) == ""
+def _no_blur(ready: Prepared) -> str:
+    blurs = ready.transfer.effects or _no_field_blur(ready) == ""
     return "" if blurs else "nothing blurs the picture by its wavelength"
 
 
-def _table(ready: Prepared) -> str:
-    return _spectrum(ready) or _blurred(ready)
+def _no_table(ready: Prepared) -> str:
+    return _no_spectrum(ready) or _no_blur(ready)
 
 
-def _rank(ready: Prepared) -> str:
+def _no_rank(ready: Prepared) -> str:
     if len(ready.scene.spectra) < 2:
         return "the whole scene has one spectrum"
-    return _spectrum(ready)
+    return _no_spectrum(ready)
 
 
-def _field(ready: Prepared) -> str:
+def _no_field_blur(ready: Prepared) -> str:
     there = of_kind(ready.plan.active, FieldTransfer)
     return "" if there else "the lens's blur is the same all over the field"
 
 
-def _effect(name: str, without: str) -> Callable[[Prepared], str]:
+def _no_effect(name: str, without: str) -> Callable[[Prepared], str]:
     def absent(ready: Prepared) -> str:
         return "" if any(e.name == name for e in ready.plan.active) else without
 
     return absent
 
 
-def _of(*values: Any) -> dict[str, Any]:
+def _by_label(*values: Any) -> dict[str, Any]:
     return {str(value): value for value in values}
 
 
 KNOBS: tuple[Knob, ...] = (
     Knob(
         "wavelength_step",
-        _of("80 nm", "20 nm", "10 nm", "5 nm"),
+        _by_label("80 nm", "20 nm", "10 nm", "5 nm"),
         "1 nm",
-        _blurred,
+        _no_blur,
         ({"wavelength_step": "0.5 nm"}, {"wavelength_step": "0.25 nm"}),
     ),
-    Knob("oversampling", _of(1, 2, 3, 4, 8), None, _spectrum),
+    Knob("oversampling", _by_label(1, 2, 3, 4, 8), None, _no_spectrum),
     Knob(
         "table_size",
-        _of(64, 512, 4096),
+        _by_label(64, 512, 4096),
         1 << 14,
-        _table,
+        _no_table,
         ({"table_size": 1 << 15}, {"table_size": 1 << 17}),
     ),
     Knob(
         "vignetting_points",
-        _of(5, 9, 17, 33),
+        _by_label(5, 9, 17, 33),
         65,
-        _effect("pixel_vignetting", "no tunnel above the photodetector is described"),
+        _no_effect("pixel_vignetting", "no tunnel above the photodetector is described"),
         ({"vignetting_points": 129},),
     ),
     # As many as a tenth of the tolerance asks for.
-    Knob("spectral_rank", _of(2, 3, 4, 6), None, _rank, ({"tolerance": CONVERGED / 10},)),
-    Knob("field_zones", _of(2, 3, 4, 6), 8, _field, ({"field_zones": 16}, {"field_zones": 32})),
+    Knob("spectral_rank", _by_label(2, 3, 4, 6), None, _no_rank, ({"tolerance": CONVERGED / 10},)),
+    Knob(
+        "field_zones",
+        _by_label(2, 3, 4, 6),
+        8,
+        _no_field_blur,
+        ({"field_zones": 16}, {"field_zones": 32}),
+    ),
     Knob(
         "shot_noise",
-        _of("gaussian", "exact"),
+        _by_label("gaussian", "exact"),
         "exact",
-        _effect("shot_noise", "shot noise is not simulated"),
+        _no_effect("shot_noise", "shot noise is not simulated"),
     ),
-    Knob("float_width", _of(32, 64), 64, lambda _: ""),
+    Knob("float_width", _by_label(32, 64), 64, lambda _: ""),
 )
 """All of them, each from its coarsest setting to finer ones."""
 FINEST: dict[str, Any] = {k.name: k.finest for k in KNOBS if k.finest is not None}

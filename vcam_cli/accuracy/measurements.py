@@ -64,7 +64,7 @@ class Shot:
                 by_scope[d.unit] = by_scope.get(d.unit, 0.0) + (d.contribution or 0.0)
         return max(by_scope.values(), default=0.0)
 
-    def looks_from(self, other: Shot, workers: int, noisy: bool = False) -> float | None:
+    def color_difference(self, other: Shot, workers: int, noisy: bool = False) -> float | None:
         """Mean S-CIELAB between two renders, on the camera's display; None without renders.
 
         noisy: with their noise, which is alike only where both have as many bits.
@@ -99,7 +99,7 @@ class Clock:
         """
         return _shot(simulate(camera, self.workers, shared=shared))
 
-    def timed(self, camera: Camera) -> Shot:
+    def timed_shot(self, camera: Camera) -> Shot:
         """Return a frame of the camera, and its first run."""
         self.add(camera)
         return _shot(self._run(settings_key(camera)))
@@ -109,7 +109,7 @@ class Clock:
         self._cameras.setdefault(settings_key(camera), camera)
         self.runs.setdefault(settings_key(camera), [])
 
-    def go(self, watch: Observer, beside: Camera | None = None) -> None:
+    def run_all(self, watch: Observer, beside: Camera | None = None) -> None:
         """Run all cameras in turns.
 
         beside: one that others are compared with; it runs in every turn that another does, so that
@@ -118,10 +118,16 @@ class Clock:
         total = TURNS * len(self._cameras)
         always = "" if beside is None else settings_key(beside)
         for turn in range(TURNS):
-            due = [k for k, runs in self.runs.items() if not enough(runs) and len(runs) <= turn]
+            due = [
+                k
+                for k, runs in self.runs.items()
+                if not is_median_known(runs) and len(runs) <= turn
+            ]
             for i, key in enumerate(dict.fromkeys([always, *due]) if always and due else due):
                 watch.step(turn * len(self._cameras) + i, total)
-                if key == always or not enough(self.runs[key]):  # it may share another's by now
+                if key == always or not is_median_known(
+                    self.runs[key]
+                ):  # it may share another's by now
                     self._run(key)
 
     def seconds(self, camera: Camera) -> tuple[float, float]:
@@ -131,7 +137,7 @@ class Clock:
 
     def _run(self, key: str) -> Result:
         start = time.perf_counter()
-        result = _whole(self._cameras[key], self.workers)
+        result = _compute_frame(self._cameras[key], self.workers)
         self.runs[key].append(time.perf_counter() - start)
         first = self._found.setdefault(_computation(result), key)
         if self.runs[first] is not self.runs[key]:
@@ -156,7 +162,7 @@ def _computation(result: Result) -> tuple:
     return repr(chosen), repr(way), effects, light
 
 
-def enough(runs: list[float]) -> bool:
+def is_median_known(runs: list[float]) -> bool:
     """Whether the median of so many runs [s] is known to a tenth, or has taken long enough."""
     if len(runs) < 2:
         return False
@@ -166,7 +172,7 @@ def enough(runs: list[float]) -> bool:
     return len(runs) >= (2 if spent > TWICE else 3 if spent > THRICE else TURNS)
 
 
-def _whole(camera: Camera, workers: int) -> Result:
+def _compute_frame(camera: Camera, workers: int) -> Result:
     """Compute a frame from the scene to its render and metrics."""
     result = simulate(camera, workers)
     if camera.output.render:

@@ -29,7 +29,7 @@ class Recommendation:
     sentence: str
 
 
-def coarser(camera: Camera, points: tuple[Point, ...]) -> dict[str, Any]:
+def coarser_knobs(camera: Camera, points: tuple[Point, ...]) -> dict[str, Any]:
     """Knobs that may be coarser than the file's accuracy has them, and save time: name -> value."""
     own = next(p for p in points if p.knob == "file")
     out: dict[str, Any] = {}
@@ -61,7 +61,7 @@ def recommend(camera: Camera, points: tuple[Point, ...]) -> Recommendation:
         best = min((own, *others), key=lambda p: p.rms_error)
     elif own in keeps and not _faster(best, own):
         best = own
-    line = _line(camera, best)
+    line = _yaml_line(camera, best)
     return Recommendation(line, _sentence(line, best, own, tolerance))
 
 
@@ -91,7 +91,7 @@ def _sentence(line: str, best: Point, own: Point, tolerance: float) -> str:
     return f"{start}; {loses}."
 
 
-def _line(camera: Camera, point: Point) -> str:
+def _yaml_line(camera: Camera, point: Point) -> str:
     """Return the setting as a line of the camera file."""
     if point.knob in ("preset", "tolerance"):
         return f"accuracy: {point.setting}"

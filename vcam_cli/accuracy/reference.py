@@ -74,7 +74,9 @@ def finest_camera(camera: Camera, coarse: Prepared, most_bytes: float = 0) -> Ca
     return with_accuracy(ablation.with_effects(camera, "all"), tolerance=CONVERGED, **knobs)
 
 
-def converged(camera: Camera, coarse: Prepared, workers: int, most_bytes: float = 0) -> Prepared:
+def prepare_converged(
+    camera: Camera, coarse: Prepared, workers: int, most_bytes: float = 0
+) -> Prepared:
     """`finest`, with its light on the pixels."""
     return prepare(finest_camera(camera, coarse, most_bytes), workers)[0]
 
@@ -99,7 +101,7 @@ def describe_reference(found: Prepared, coarse: Prepared, full: float, change: f
     )
 
 
-def changes(
+def effect_changes(
     camera: Camera, exposure_time: float, names: tuple[str, ...], workers: int
 ) -> dict[str, NDArray]:
     """Return the change of the mean raw by leaving out each effect: (rms, largest) [e].
@@ -118,11 +120,11 @@ def changes(
             out[name] = np.zeros(2)
         else:
             without = prepare(ablation.with_effects(fixed, "all", name), workers)[0]
-            out[name] = error(ablation.mean_raw(without) - truth)
+            out[name] = rms_and_largest(ablation.mean_raw(without) - truth)
     return out
 
 
-def error(difference: NDArray) -> NDArray:
+def rms_and_largest(difference: NDArray) -> NDArray:
     """(rms, largest) of a difference of signals [electrons]."""
     return np.array([ablation.rms(difference), float(np.abs(difference).max())])
 

@@ -48,7 +48,7 @@ def refine_reference(
     return Refined(replace(base, mean=best), change)
 
 
-def same(knob: Knob, value: Any, case: Camera, base: Prepared) -> bool:
+def is_same_camera(knob: Knob, value: Any, case: Camera, base: Prepared) -> bool:
     """Whether a knob at this value is the camera that `base` is: nothing to be computed again."""
     if knob.name == "spectral_rank" and value >= base.spectrum.planes:
         return True  # it takes no more of them by itself

@@ -48,7 +48,7 @@ class Point:
     """Rms by which that which it is compared with may itself be wrong, relative to full signal."""
 
     @property
-    def sure(self) -> bool:
+    def is_certain(self) -> bool:
         """Whether what it is compared with is ten times as good, or as good as 64 bits can be."""
         return self.unsure <= max(self.rms_error / 10, FLOOR)
 

@@ -31,12 +31,12 @@ from vcam_cli.accuracy.measurements import Clock, Shot, settings_key
 from vcam_cli.accuracy.recommendation import Recommendation
 from vcam_cli.accuracy.reference import (
     Reference,
-    changes,
     describe_reference,
-    error,
+    effect_changes,
     finest_camera,
+    rms_and_largest,
 )
-from vcam_cli.accuracy.refinement import Refined, refine_reference, same
+from vcam_cli.accuracy.refinement import Refined, is_same_camera, refine_reference
 from vcam_cli.accuracy.setting_errors import COLUMNS, Point
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.simulation import PRESETS
@@ -114,13 +114,13 @@ class _Measurement:
     def study(self) -> Study:
         """All of it; the reference first, then what is compared with it."""
         self.watch.begin("converged reference")
-        coarse = self.clock.timed(with_accuracy(self.camera, preset="reference"))
+        coarse = self.clock.timed_shot(with_accuracy(self.camera, preset="reference"))
         truth = self.clock.shot(finest_camera(self.camera, coarse.ready))
         self.full = ablation.full_signal_of(truth.ready, truth.mean)
         change = ablation.rms(truth.mean - coarse.mean)
         reference = describe_reference(truth.ready, coarse.ready, self.full, change)
         self.watch.begin("errors of presets and tolerances")
-        own = self.clock.timed(self.camera)
+        own = self.clock.timed_shot(self.camera)
         totals = self._settings(coarse, own, truth)
         del coarse
         self.watch.begin("errors of the knobs")
@@ -132,11 +132,11 @@ class _Measurement:
         self.watch.begin("effects left out")
         effects = self._effects(own, truth, reference)
         self.watch.begin("seconds of the settings")
-        self.clock.go(self.watch, self.camera)
-        points = self._timed([*judged, *effects])
+        self.clock.run_all(self.watch, self.camera)
+        points = self._measure_times([*judged, *effects])
         shares = ablation.variance_shares(truth.ready, self.full, self.workers)
         ablations = tuple(self._ablation(own, point, shares) for point in points if point.effect)
-        points += self._combined(points, truth, reference)
+        points += self._combine_knobs(points, truth, reference)
         advice = recommendation.recommend(self.camera, points)
         return Study(self.camera, reference, points, ablations, absent, advice)
 
@@ -154,7 +154,7 @@ class _Measurement:
         out = []
         for i, (knob, setting, case) in enumerate(cases):
             self.watch.step(i, len(cases))
-            shot = known.get(settings_key(case)) or self.clock.timed(case)
+            shot = known.get(settings_key(case)) or self.clock.timed_shot(case)
             out.append((self._point(knob, setting, shot, truth), case))
         return out
 
@@ -175,7 +175,7 @@ class _Measurement:
             for setting, value in settings_to_try(knob, truth.ready).items():
                 beside = {} if value == knob.finest else knob.beside
                 case = with_accuracy(everything, **{**fixed, **beside, knob.name: value})
-                alike = same(knob, value, case, base.ready)
+                alike = is_same_camera(knob, value, case, base.ready)
                 shots[setting] = base if alike else self.clock.shot(case, shared)
             best = Refined(truth, reference.lost)
             if knob.name != "oversampling":
@@ -192,28 +192,30 @@ class _Measurement:
     def _effects(self, own: Shot, truth: Shot, reference: Reference) -> list[Judged]:
         """Return the effects, each left out."""
         names = ablation.wanted_effects(self.camera)
-        moved = changes(self.camera, reference.exposure_time, tuple(names), self.workers)
+        moved = effect_changes(self.camera, reference.exposure_time, tuple(names), self.workers)
         out = []
         for i, name in enumerate(names):
             self.watch.step(i, len(names))
-            case = without(self.camera, name)
-            point = self._point(f"effect:{name}", "off", self.clock.timed(case), own, moved[name])
+            case = without_effect(self.camera, name)
+            point = self._point(
+                f"effect:{name}", "off", self.clock.timed_shot(case), own, moved[name]
+            )
             out.append((replace(point, predicted=None, left_out=(), variance_lost=0.0), case))
         return out
 
-    def _combined(
+    def _combine_knobs(
         self, points: tuple[Point, ...], truth: Shot, reference: Reference
     ) -> tuple[Point, ...]:
         """Return the camera with all knobs coarser that need not be finer, if there are any."""
-        knobs = recommendation.coarser(self.camera, points)
+        knobs = recommendation.coarser_knobs(self.camera, points)
         if not knobs:
             return ()
         case = with_knobs(self.camera, **knobs)
         text = ", ".join(f"{name}: {value}" for name, value in knobs.items())
-        point = self._point("combined", text, self.clock.timed(case), truth)
+        point = self._point("combined", text, self.clock.timed_shot(case), truth)
         point = replace(point, unsure=reference.lost)
-        self.clock.go(self.watch, self.camera)
-        return self._timed([(point, case)])
+        self.clock.run_all(self.watch, self.camera)
+        return self._measure_times([(point, case)])
 
     # --- as it is shown --------------------------------------------------------------------------
 
@@ -225,7 +227,7 @@ class _Measurement:
         moved: (rms, largest) [electrons]; default the difference of the two.
         """
         if moved is None:
-            moved = error(shot.mean - other.mean)
+            moved = rms_and_largest(shot.mean - other.mean)
         noisy = knob.startswith("effect:") or knob == "shot_noise"
         return Point(
             knob=knob,
@@ -235,13 +237,13 @@ class _Measurement:
             rms_electrons=float(moved[0]),
             seconds=math.nan,
             seconds_spread=math.nan,
-            mean_s_cielab=shot.looks_from(other, self.workers, noisy),
+            mean_s_cielab=shot.color_difference(other, self.workers, noisy),
             predicted=shot.lost / self.full,
             left_out=shot.left_out,
             variance_lost=shot.variance_lost,
         )
 
-    def _timed(self, judged: list[Judged]) -> tuple[Point, ...]:
+    def _measure_times(self, judged: list[Judged]) -> tuple[Point, ...]:
         """Return the points with their seconds."""
         taken = ((point, self.clock.seconds(case)) for point, case in judged)
         return tuple(replace(p, seconds=median, seconds_spread=s) for p, (median, s) in taken)
@@ -261,7 +263,7 @@ class _Measurement:
         )
 
 
-def without(camera: Camera, name: str) -> Camera:
+def without_effect(camera: Camera, name: str) -> Camera:
     """Return the file's camera with one effect switched off."""
     if camera.effects == "all":
         return ablation.with_effects(camera, "all", name)

@@ -185,19 +185,19 @@ class Array(Model):
         return len(self.colors) != 1 and self.pattern != "stacked"
 
     @property
-    def scattered(self) -> bool:
+    def is_scattered(self) -> bool:
         """Whether the pixels fill no rows and columns of squares."""
         return self.pattern == "honeycomb" or isinstance(self.pattern, Positions)
 
     @property
-    def joined_charges(self) -> int:
+    def summed_charges(self) -> int:
         """Pixels whose charge is counted as one."""
         given = self.binning
         return given.count if given is not None and given.kind == "charge" else 1
 
     @model_validator(mode="after")
     def _binning_has_neighbors(self) -> Self:
-        if self.binning is not None and self.binning.count > 1 and self.scattered:
+        if self.binning is not None and self.binning.count > 1 and self.is_scattered:
             message = "joins neighbors in rows and columns, and these pixels have none"
             remedy = "write binning: none, or another pattern"
             raise refusal(("binning",), message, remedy)

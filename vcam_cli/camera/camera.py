@@ -75,7 +75,7 @@ class Camera(FileModel):
         if "processing" not in self.model_fields_set:
             self._fill(processing=default_steps(array.mosaic, monochrome=colors == 1))
         mistakes = [
-            *order_mistakes(self.processing, array.mosaic, colors, array.scattered),
+            *order_mistakes(self.processing, array.mosaic, colors, array.is_scattered),
             *picture_mistakes(
                 self.processing, array, bool(self.quality), self.output.render is not None
             ),

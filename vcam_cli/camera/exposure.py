@@ -34,7 +34,7 @@ class AutoExposure(Model):
     )
 
     @model_validator(mode="after")
-    def _in_order(self) -> Self:
+    def _check_order(self) -> Self:
         if self.min > self.max:
             raise refusal(("min",), "is longer than max", "exchange the two")
         return self

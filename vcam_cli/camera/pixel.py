@@ -81,7 +81,7 @@ class Readout(Model):
     )
 
     @model_validator(mode="after")
-    def _agree(self) -> Self:
+    def _check_agreement(self) -> Self:
         g, v, well = self.conversion_gain, self.voltage_swing, self.full_well
         if g is not None and v is not None and well is not None and abs(v / g / well - 1) > AGREE:
             message = f"voltage_swing / conversion_gain is {v / g:.6g} e, not {well:.6g} e"
@@ -124,7 +124,7 @@ class Defects(Model):
     dead: Fraction = key("fraction of pixels that collect nothing", example=1e-4, default=0.0)
 
     @model_validator(mode="after")
-    def _at_most_all(self) -> Self:
+    def _check_fractions(self) -> Self:
         if self.hot + self.dead > 1:
             message = f"hot and dead pixels are {self.hot + self.dead:g} of all"
             raise refusal((), message, "give fractions that add up to at most 1")

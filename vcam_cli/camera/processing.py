@@ -182,7 +182,7 @@ def picture_mistakes(
         if judged:
             message = "a mosaic without demosaic cannot be judged"
             yield fault(("quality",), message, f"{add} quality: []")
-        if array.scattered and shown:
+        if array.is_scattered and shown:
             message = "scattered pixels without demosaic make no picture"
             yield fault(("output", "render"), message, f"{add} render: none")
     elif len(array.colors) not in SHOWN and "color_correction" not in done and (judged or shown):

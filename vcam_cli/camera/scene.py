@@ -283,7 +283,7 @@ class Wavelengths(Model):
     )
 
     @model_validator(mode="after")
-    def _in_order(self) -> Self:
+    def _check_order(self) -> Self:
         if self.start >= self.stop:
             raise refusal(("stop",), "must be longer than start", "exchange the two")
         if self.step is not None and self.step > self.stop - self.start:

@@ -98,7 +98,7 @@ class SpectrumFile(Model):
 
     def resolve(self, path: Path) -> spectra.Spectrum:
         """Return the spectrum of the file. Raises BadInput, about `path`."""
-        return _from_file(self.file, self.outside, (*path, "file"))
+        return _read_file(self.file, self.outside, (*path, "file"))
 
 
 class SpectrumTable(Model):
@@ -190,7 +190,7 @@ def flat(value: float, most: float | None = 1.0) -> SpectrumSpec:
     return SpectrumSpec((value,), most)
 
 
-def _from_file(file: str, outside: Outside, path: Path) -> spectra.Spectrum:
+def _read_file(file: str, outside: Outside, path: Path) -> spectra.Spectrum:
     with data_file_problems(file, path, "write the columns wavelength_nm,value, rising"):
         state = os.stat(file)
         table = _read_table(file, outside, state.st_mtime_ns, state.st_size, state.st_ino)
@@ -207,7 +207,7 @@ def _resolve(factor: Factor, path: Path) -> spectra.Spectrum:
     if isinstance(factor, float):
         return spectra.Spectrum.flat(factor)
     if isinstance(factor, str):
-        return _from_file(str(shipped.find("spectra", factor, path)), "error", path)
+        return _read_file(str(shipped.find("spectra", factor, path)), "error", path)
     return factor.resolve(path)
 
 

@@ -252,15 +252,15 @@ class TechnologyChoice(Numbers):
 
     def to_yaml(self) -> Any:
         """Return the YAML form: the bare name where nothing is changed."""
-        changes = _without_empty(to_yaml(self))
+        changes = _drop_empty(to_yaml(self))
         bare = set(changes) == {"from"} and isinstance(self.from_, str)
         return self.from_ if bare else changes
 
 
-def _without_empty(form: Any) -> Any:
+def _drop_empty(form: Any) -> Any:
     if not isinstance(form, Mapping):
         return form
-    full = {name: _without_empty(item) for name, item in form.items()}
+    full = {name: _drop_empty(item) for name, item in form.items()}
     return {name: item for name, item in full.items() if item != {}}
 
 

@@ -114,7 +114,7 @@ class NoiseMeasurement:
         electrons, _ = nondestructive_samples.samples(
             self.rate, self.times, self.effects, self.code, seeds, self.workers
         )
-        dn = np.rint(self.code.line(electrons))
+        dn = np.rint(self.code.response(electrons))
         return (self.code.linear(dn) - e.offset) * e.electrons_per_dn
 
     def _estimate(self, charge: Floats, full: Flags, method: str) -> Floats:

@@ -153,10 +153,10 @@ def take_frames(
     watch, workers = watch or Silent(), workers or available_workers()
     check_camera(camera)
     ready, _ = prepare(camera, workers, watch)
-    if ready.rate.ndim != 2 or ready.layout.scattered or len(ready.mosaic.colors) > 1:
+    if ready.rate.ndim != 2 or ready.layout.is_scattered or len(ready.mosaic.colors) > 1:
         raise bad("frames.camera", "has no monochrome array", "write pattern: monochrome there")
     code = quantizer(camera, ready.geometry)
-    effects = plan.wanted(camera, ready.geometry)
+    effects = plan.enabled_effects(camera, ready.geometry)
     longest = asked.max or camera.exposure.longest
     assert longest is not None
     sensor = sample_times.sensor(ready.electrical, effects, code, longest)

@@ -68,7 +68,7 @@ class MethodResult:
         return len(self.schedule.times)
 
     @property
-    def used(self) -> int:
+    def distinct_captures(self) -> int:
         """Number of captures that differ."""
         times = self.schedule.times
         return 1 + int(np.sum(np.diff(times) > times[1:] * SLACK))
@@ -110,14 +110,14 @@ class Task:
         self._optimum: Schedules = {}
 
     @property
-    def approximated(self) -> bool:
+    def is_approximate(self) -> bool:
         """Whether schedules are found on another pdf than they are judged on."""
         return self.plan is not self.pdf
 
     @cached_property
     def exact_task(self) -> Task:
         """The task without the approximation."""
-        if not self.approximated:
+        if not self.is_approximate:
             return self
         return Task(self.pdf, self.sensor, self.constraints, seed=self.seed)
 
@@ -143,10 +143,10 @@ class Task:
     @property
     def shot_noise_only(self) -> bool:
         """Whether shot noise alone decides, and nothing restricts the times."""
-        return self.sensor.noiseless and math.isinf(self.sensor.max_time) and not self.restricted
+        return self.sensor.noiseless and math.isinf(self.sensor.max_time) and not self.is_restricted
 
     @property
-    def restricted(self) -> bool:
+    def is_restricted(self) -> bool:
         """Whether the readout demands something of capture times."""
         return bool(self.constraints.min_gap or self.constraints.frame_time)
 
@@ -155,13 +155,13 @@ class Task:
         missing = sorted(set(counts) - self._optimum.keys())
         if missing and self.shot_noise_only:
             found = shot_noise.optimal_schedules(self.plan, missing)
-            self._optimum |= {n: self._with_well(one) for n, one in found.items()}
+            self._optimum |= {n: self._scale_to_well(one) for n, one in found.items()}
         elif missing:
             found = full_noise.optimal_schedules(self.plan, missing, self.sensor, self.constraints)
             self._optimum |= found
         return {n: self._optimum[n] for n in counts}
 
-    def _with_well(self, one: Schedule) -> Schedule:
+    def _scale_to_well(self, one: Schedule) -> Schedule:
         """Convert a schedule for a well of one electron to this sensor's well."""
         well = self.sensor.well
         times, value = one.times * well, one.expected_snr * well
@@ -189,7 +189,7 @@ class Task:
         Of an approximation it says more than that of the approximated pdf: how far the schedule
         is from the best for the pdf itself.
         """
-        if not self.approximated:
+        if not self.is_approximate:
             return planned.gap
         n = len(judged.times)
         best = self.exact_task.optimum([n])[n]
@@ -200,7 +200,7 @@ class Task:
 def _optimal(task: Task, counts: Sequence[int]) -> Schedules:
     schedules = {}
     for n, planned in task.optimum(counts).items():
-        times = task.admissible_times(planned.times, n) if task.approximated else planned.times
+        times = task.admissible_times(planned.times, n) if task.is_approximate else planned.times
         gap = task.certified_gap(task.judge(times), planned)
         schedules[n] = task.judge(times, gap)
     return schedules
@@ -208,13 +208,13 @@ def _optimal(task: Task, counts: Sequence[int]) -> Schedules:
 
 def _weighted(task: Task, counts: Sequence[int]) -> Schedules:
     found = weighted_schedules.optimal_schedules(task.plan, counts, task.sensor, task.constraints)
-    if not task.approximated:
+    if not task.is_approximate:
         return found
     bounds = _upper_bounds(task, "weighted", counts)
     judged = {}
     for n, planned in found.items():
         # Where nothing restricts times, equal ones are reads of their own; else they do not fit.
-        reads = np.unique(planned.times) if task.restricted else planned.times
+        reads = np.unique(planned.times) if task.is_restricted else planned.times
         value = weighted_expected_snr(task.pdf, reads, task.sensor)
         gap = max(bounds[n] / value - 1, 0.0)
         judged[n] = Schedule(planned.times, planned.photocurrents, value, gap)

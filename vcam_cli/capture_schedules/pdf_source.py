@@ -169,7 +169,7 @@ class PdfSource(Model):
         return next(name for name in SOURCES if getattr(self, name) is not None)
 
     @model_validator(mode="after")
-    def _ascends(self) -> Self:
+    def _check_ascending(self) -> Self:
         raise_mistakes(self._segment_mistakes())
         return self
 

@@ -86,7 +86,7 @@ class ScheduleFile:
 
     def error(self, path: errors.Path | str, message: str, remedy: str) -> BadInput:
         """Return the error about a key of this study."""
-        return errors.bad(path, message, remedy).located(self.locate)
+        return errors.bad(path, message, remedy).with_places(self.locate)
 
 
 def read(
@@ -142,7 +142,7 @@ def _validate(file: Path, tree: Node) -> ScheduleStudy:
         return ScheduleStudy.model_validate(value)
     except ValidationError as error:
         unnamed = validation_messages.problems(error)
-        located = BadInput(unnamed).located(Origin(file, (file,), tree).locate).problems
+        located = BadInput(unnamed).with_places(Origin(file, (file,), tree).locate).problems
         raise BadInput(sorted(located, key=place_order)) from None
 
 

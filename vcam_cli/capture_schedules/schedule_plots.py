@@ -141,8 +141,8 @@ def plot_pdf(result: ScheduleResult, path: Path) -> None:
     """
     task, count = result.task, shown_count(result)
     whole = "photocurrents of the pixels"
-    panels = [(whole if task.approximated else f"{whole}, and {count} captures", task.pdf)]
-    if task.approximated:
+    panels = [(whole if task.is_approximate else f"{whole}, and {count} captures", task.pdf)]
+    if task.is_approximate:
         name = f"approximated by {segments_text(task.plan)}, and {count} captures"
         panels.append((name, task.plan))
     captures = [

@@ -188,7 +188,7 @@ def _check_frames_camera(study: ScheduleFile) -> None:
     try:
         frames.check_camera(study.frames_camera)
     except BadInput as error:
-        raise error.located(study.locate) from None
+        raise error.with_places(study.locate) from None
 
 
 def _take_frames(
@@ -201,7 +201,7 @@ def _take_frames(
     try:
         pictures = frames.take_frames(asked, camera, workers, watch)
     except BadInput as error:
-        raise error.located(study.locate) from None
+        raise error.with_places(study.locate) from None
     frames.write_frames(pictures, asked, folder, study.model.name)
     return pictures
 

@@ -59,7 +59,7 @@ def summary_rows(task: Task, found: Sequence[MethodResult]) -> Iterator[Row]:
             task.gain(one.schedule),
             one.bound / task.single,
             "" if gap is None else float(gap),
-            one.used,
+            one.distinct_captures,
             round(one.seconds, 6),
         )
 
@@ -132,7 +132,7 @@ def _level_notes(study: ScheduleStudy, task: Task) -> Iterator[str]:
     """Yield why more captures are not used."""
     pdf = task.pdf
     lit = int((pdf.probability > 0).sum() - (pdf.discrete and pdf.low[0] == 0))
-    if pdf.discrete and lit < max(study.counts) and not task.approximated:
+    if pdf.discrete and lit < max(study.counts) and not task.is_approximate:
         are = "there is 1 level" if lit == 1 else f"there are {lit} levels"
         used = "1 is" if lit == 1 else f"{lit} are"
         yield f"{are} of light: of more captures than that, {used} used, the rest repeat"
@@ -141,7 +141,7 @@ def _level_notes(study: ScheduleStudy, task: Task) -> Iterator[str]:
 def _approximation_notes(task: Task, found: Sequence[MethodResult]) -> Iterator[str]:
     """Yield how much the approximation may cost, where that is more than rounding."""
     gaps = [one.schedule.gap or 0.0 for one in found if one.method == "optimal"]
-    if not task.approximated or max(gaps, default=0.0) < NOTED_LOSS:
+    if not task.is_approximate or max(gaps, default=0.0) < NOTED_LOSS:
         return
     few = plots.segments_text(task.plan)
     cost = f"found on {few}, `optimal` may be {max(gaps):.2g} of its E[SNR] below the best"

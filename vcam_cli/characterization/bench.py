@@ -180,7 +180,7 @@ class Bench:
         seeds = {"sensor": seed.sensor, "frame": seed.frame + (number << 64)}
         active = self.ready.plan.active
         electrons, _ = exposure.capture(rate, time, active, code, seeds, self.workers)
-        dn = np.rint(code.line(electrons)) + self.pedestal
+        dn = np.rint(code.response(electrons)) + self.pedestal
         return np.clip(dn, 0, 2**code.bits - 1 + self.pedestal)
 
     def color_pixels(self, frame: NDArray, color: str) -> NDArray:

@@ -98,7 +98,7 @@ def characterize(
         bench = prepare_bench(camera, workers or available_workers(), stages)
         channels = measure_channels(bench, stages)
     except BadInput as error:
-        raise error.located(camera.locate) from None
+        raise error.with_places(camera.locate) from None
     numbers = tuple(q for channel in channels for q in quantities(bench, channel))
     return Characterization(bench, channels, numbers, tuple(notes(bench, channels)), stages)
 

@@ -115,7 +115,7 @@ def system_mtf(
     (n,) array
         Transfer, 1 at frequency 0.
     """
-    effects = plan.optical(ready.camera, ready.geometry)
+    effects = plan.mean_signal_effects(ready.camera, ready.geometry)
     return directional_mtf(ready.transfer, effects, color, frequency, direction)
 
 

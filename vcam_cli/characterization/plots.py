@@ -42,7 +42,7 @@ def _photon_transfer_panel(result: Characterization) -> Panel:
     curves, ends = [], []
     for channel, color, prefix in _styled_channels(result):
         transfer, series = channel.transfer, channel.transfer.series
-        ends.append(Mark(float(series.signal[series.saturated]), "saturation", color))
+        ends.append(Mark(float(series.signal[series.saturation_index]), "saturation", color))
         line = np.array([0.0, ends[-1].x])
         fit = transfer.offset + transfer.gain * line
         curves += [
@@ -63,7 +63,7 @@ def _snr_panel(result: Characterization) -> Panel:
     marks: list[Mark] = []
     for channel, color, prefix in _styled_channels(result):
         transfer, series = channel.transfer, channel.transfer.series
-        used = np.arange(len(series.photons)) <= series.saturated
+        used = np.arange(len(series.photons)) <= series.saturation_index
         photons = np.geomspace(transfer.threshold_photons / 3, transfer.saturation_photons, 200)
         model = _model_snr(result, channel, photons)
         curves += [

@@ -119,7 +119,7 @@ def convergence(found: "Study") -> str:
 
     reference = found.reference
     shown = [p for p in found.points if not p.effect]
-    unsure = sorted({p.knob for p in shown if not p.sure})
+    unsure = sorted({p.knob for p in shown if not p.is_certain})
     text = (
         f"full signal: {reference.full_signal:.6g} electrons; the reference itself is good to"
         f" {100 * reference.lost:.1g} % of it"
@@ -151,7 +151,7 @@ def settings(found: "Study") -> list[tuple[str, ...]]:
     """Return the rows of the first table."""
 
     def rms(point: "Point") -> str:
-        if point.sure:
+        if point.is_certain:
             return f"{100 * point.rms_error:.2g}"
         return f"<{100 * (point.rms_error + point.unsure):.2g}"
 

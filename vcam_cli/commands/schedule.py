@@ -138,12 +138,12 @@ def schedule_lines(result: "ScheduleResult") -> list[str]:
         lines.append(f"{method} capture times, {'t_k / t_1' if plain else 'in ms'}:")
         for one in result.found:
             if one.method == method:
-                shown = "  ".join(_shown(one.schedule.times, plain))
+                shown = "  ".join(_times_text(one.schedule.times, plain))
                 lines.append(f"  {one.count:{width}}: {shown}")
     return lines
 
 
-def _shown(times: "NDArray", plain: bool) -> list[str]:
+def _times_text(times: "NDArray", plain: bool) -> list[str]:
     """Return capture times as text, those in the middle left out where they are many."""
     shown = [f"{v:.4f}" for v in times / times[0]] if plain else [f"{v:.5g}" for v in times * 1e3]
     return shown if len(shown) <= MOST_TIMES else [*shown[: MOST_TIMES - 2], "...", shown[-1]]

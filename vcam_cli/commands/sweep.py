@@ -137,12 +137,12 @@ def report(result: "SweepResult") -> str:
     if result.missing:
         lines.append(f"{result.missing} are left to other shares")
     else:
-        lines += _expected(result.expectations)
+        lines += _expectations_text(result.expectations)
     lines.append(f"{result.name}: {result.out}/")
     return "\n".join(lines)
 
 
-def _expected(verdicts: Sequence["ExpectationResult"]) -> Iterator[str]:
+def _expectations_text(verdicts: Sequence["ExpectationResult"]) -> Iterator[str]:
     """Return how many expectations are met, and those that are not."""
     if not verdicts:
         return

@@ -44,7 +44,7 @@ def validate(
 
 def _check(file: str, sets: list[str]) -> dict[str, Any]:
     """Return the report of one file."""
-    from vcam_cli.errors import BadInput, CannotDo, dotted
+    from vcam_cli.errors import BadInput, CannotDo, dotted_path
 
     report: dict[str, Any] = {"file": file, "ok": False, "exit_code": 0, "problems": []}
     try:
@@ -53,7 +53,7 @@ def _check(file: str, sets: list[str]) -> dict[str, Any]:
         report["problems"] = [
             {
                 "where": problem.where,
-                "path": dotted(problem.path),
+                "path": dotted_path(problem.path),
                 "message": problem.message,
                 "remedy": problem.remedy,
                 "text": str(problem),

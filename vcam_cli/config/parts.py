@@ -38,7 +38,7 @@ class Findings:
 
     def add(self, problems: Iterable[Problem], locate: Callable[[errors.Path], str]) -> None:
         """Add further problems, put in place by `locate`."""
-        for problem in BadInput(problems).located(locate).problems:
+        for problem in BadInput(problems).with_places(locate).problems:
             if not any(problem.path[: len(path)] == path for path in self.failed):
                 self.problems.append(problem)
 
@@ -112,7 +112,7 @@ class PartReader:
         try:
             file = referenced_file(name, kind, chain)
         except BadInput as error:
-            raise error.located(lambda _: name.where) from None
+            raise error.with_places(lambda _: name.where) from None
         if file.resolve() in chain:
             circle = " -> ".join(link.name for link in (*chain, file))
             message = f"the files refer to each other in a circle: {circle}"

@@ -72,7 +72,7 @@ class Numeric(YamlType):
             limit, how = (low, "more than") if value <= low else (self.least, "at least")
         elif (value >= high and high < math.inf) or value > self.most:
             limit, how = (high, "less than") if value >= high else (self.most, "at most")
-        elif MOST_SIZE < abs(value) < math.inf or (0 < value < LEAST_SIZE and not self.signed):
+        elif MOST_SIZE < abs(value) < math.inf or (0 < value < LEAST_SIZE and not self.is_signed):
             size = "large" if abs(value) > MOST_SIZE else "small"
             raise ValueError(f"{describe(given)} is too {size} to compute with; write {self.hint}")
         else:
@@ -102,7 +102,7 @@ class Numeric(YamlType):
         """What to write, for messages."""
 
     @property
-    def signed(self) -> bool:
+    def is_signed(self) -> bool:
         """Whether a number may be negative."""
         return self.least < 0 and self.above < 0
 
@@ -141,7 +141,7 @@ class Quantity(Numeric):
     def number_schema(self) -> dict[str, Any]:
         """Return a definition that all keys of this dimension share."""
         kind, name, pattern = self._kind, f"signed_{self.dimension}", self._kind.pattern
-        if not self.signed:
+        if not self.is_signed:
             name, pattern = self.dimension, pattern.replace("[+-]?", "[+]?", 1)
         about = f"{kind.title.capitalize()} with its unit: {', '.join(list(kind.units)[:12])}."
         return {
@@ -158,7 +158,7 @@ class Quantity(Numeric):
     def hint(self) -> str:
         """What to write, for messages."""
         title = self._kind.title
-        if not self.signed and self.above >= 0:
+        if not self.is_signed and self.above >= 0:
             title = f"a positive {title.split(' ', 1)[1]}"
         return f"{title} such as {self._kind.example}"
 
@@ -185,7 +185,7 @@ class Number(Numeric):
     def number_schema(self) -> dict[str, Any]:
         """Return the JSON Schema of a bare number within limits, or a text in percent."""
         percent = r"^\s*[+]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d{1,3})?\s*%\s*$"
-        if self.signed:
+        if self.is_signed:
             percent = percent.replace("[+]?", "[+-]?", 1)
         bare = {"type": "number"} | self.limits
         return {"anyOf": [bare, {"type": "string", "pattern": percent}]}

@@ -105,12 +105,12 @@ def key_fields(model: type[BaseModel]) -> dict[str, Any]:
     return found
 
 
-def in_yaml(value: object) -> str:
+def yaml_text(value: object) -> str:
     """Return a value as YAML on one line."""
     if isinstance(value, Mapping):
-        return "{" + ", ".join(f"{key}: {in_yaml(item)}" for key, item in value.items()) + "}"
+        return "{" + ", ".join(f"{key}: {yaml_text(item)}" for key, item in value.items()) + "}"
     if isinstance(value, (list, tuple)):
-        return "[" + ", ".join(in_yaml(item) for item in value) + "]"
+        return "[" + ", ".join(yaml_text(item) for item in value) + "]"
     if isinstance(value, bool):
         return "true" if value else "false"
     return str(value)
@@ -136,7 +136,7 @@ def _explanation(item: Any, fields: Mapping[str, Any]) -> InitErrorDetails:
         return fault(loc, message, remedy, given)
     key = loc[0] if loc else ""
     field = fields.get(str(key))
-    example = in_yaml(field.examples[0]) if field is not None and field.examples else ""
+    example = yaml_text(field.examples[0]) if field is not None and field.examples else ""
     if kind == "missing":
         return fault(loc, "is missing", f"add it, for example {key}: {example}", given)
     if kind in ("extra_forbidden", "invalid_key"):

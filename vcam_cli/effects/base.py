@@ -96,7 +96,7 @@ class Effect(ABC):
         """How far from its place it throws almost all of the light, diffraction aside [m]."""
         return 0.0
 
-    def mean_error(self, outlook: SignalLevels) -> float | None:
+    def mean_error(self, signal: SignalLevels) -> float | None:
         """Return the largest rms change of the mean signal by leaving it out [electrons].
 
         It is None where no bound is known before the light is.
@@ -104,7 +104,7 @@ class Effect(ABC):
         return None
 
     def contribution(
-        self, outlook: SignalLevels, others: Sequence[Effect]
+        self, signal: SignalLevels, others: Sequence[Effect]
     ) -> tuple[float | None, str]:
         """Return the largest share that leaving it out changes, and what it is a share of.
 
@@ -122,8 +122,8 @@ class Effect(ABC):
         unit : str
             What it is a share of, with its preposition; empty where there is none.
         """
-        error = self.mean_error(outlook)
-        return (None, "") if error is None else (error / outlook.full_signal, "of full signal")
+        error = self.mean_error(signal)
+        return (None, "") if error is None else (error / signal.full_signal, "of full signal")
 
     def parts_in_pixels(self) -> tuple[Effect, ...]:
         """Return the parts of it that act in the pixels, before their voltages are joined."""

@@ -55,29 +55,29 @@ class ChargeTransfer(Transport):
     def describe(self) -> str:
         """Return a short clause with this camera's numbers and units."""
         most = (self.rows + self.columns) * self.phases
-        lost = float(_late(self.inefficiency, most))
+        lost = float(_deferred_share(self.inefficiency, most))
         return f"the last pixel defers {lost:.3%} of its charge in {most} transfers"
 
     def transport(self, signal: NDArray) -> NDArray:
         """Return what arrives of a mean signal (rows, columns), in its unit and float type."""
-        along_columns = _transferred(signal, self.inefficiency, self.phases)
-        return _transferred(along_columns.T, self.inefficiency, self.phases).T
+        along_columns = _transfer_rows(signal, self.inefficiency, self.phases)
+        return _transfer_rows(along_columns.T, self.inefficiency, self.phases).T
 
-    def mean_error(self, outlook) -> float:
+    def mean_error(self, signal) -> float:
         """Return a bound of the rms change of the mean signal by leaving it out [electrons]."""
         # A pixel loses at most what it defers, and gains at most as much of others as bright.
-        down = _late(self.inefficiency, self.phases * np.arange(1, self.rows + 1))
-        along = _late(self.inefficiency, self.phases * np.arange(1, self.columns + 1))
+        down = _deferred_share(self.inefficiency, self.phases * np.arange(1, self.rows + 1))
+        along = _deferred_share(self.inefficiency, self.phases * np.arange(1, self.columns + 1))
         square = np.mean(down**2) + 2 * down.mean() * along.mean() + np.mean(along**2)
-        return min(1.0, float(np.sqrt(square))) * outlook.full_signal
+        return min(1.0, float(np.sqrt(square))) * signal.full_signal
 
 
-def _late(inefficiency: float, transfers: NDArray | int) -> NDArray:
+def _deferred_share(inefficiency: float, transfers: NDArray | int) -> NDArray:
     """Return the share of a packet that does not arrive in time."""
     return -np.expm1(transfers * np.log1p(-inefficiency))
 
 
-def _transferred(signal: NDArray, inefficiency: float, phases: int) -> NDArray:
+def _transfer_rows(signal: NDArray, inefficiency: float, phases: int) -> NDArray:
     """Return what arrives of the packets in the rows of `signal`, the first at the exit.
 
     Shape and float type stay. The shares are a triangular matrix with few diagonals; it is

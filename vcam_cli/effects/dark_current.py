@@ -16,8 +16,8 @@ class DarkCurrent(Charge):
     """
 
     electrons_per_second: float
-    joined: int = 1
-    """Pixels whose charge is counted as one."""
+    pixels: int = 1
+    """Number of pixels whose charge is counted as one."""
 
     name = "dark_current"
     reference = (
@@ -29,19 +29,19 @@ class DarkCurrent(Charge):
     @classmethod
     def from_camera(cls, camera, geometry):
         """Return the dark current at the pixel's temperature, or None where it is 0."""
-        joined = camera.array.joined_charges
-        rate = dark_rate(camera) * joined
-        return cls(rate, joined) if rate > 0 else None
+        pixels = camera.array.summed_charges
+        rate = dark_rate(camera) * pixels
+        return cls(rate, pixels) if rate > 0 else None
 
     def describe(self) -> str:
         """Return a short clause with this camera's numbers and units."""
-        where = "every pixel" if self.joined == 1 else f"every {self.joined} pixels read as one"
+        where = "every pixel" if self.pixels == 1 else f"every {self.pixels} pixels read as one"
         return f"{self.electrons_per_second:.4g} electrons a second in {where}"
 
     def rate(self) -> float:
         """Return the mean electrons that a pixel collects per second [e/s]."""
         return self.electrons_per_second
 
-    def mean_error(self, outlook) -> float:
+    def mean_error(self, signal) -> float:
         """Return a bound of the rms change of the mean signal by leaving it out [electrons]."""
-        return self.electrons_per_second * outlook.time
+        return self.electrons_per_second * signal.time

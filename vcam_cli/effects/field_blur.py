@@ -128,11 +128,11 @@ class FieldBlur(AberrationBlur, FieldTransfer):
             found.append((low, *inner, high))
         return tuple(found)
 
-    def mean_error(self, outlook) -> float:
+    def mean_error(self, signal) -> float:
         """Return a bound of the rms change of the mean signal by leaving it out [electrons]."""
         # Wavefronts change evenly in between: none is worse than that of one of its ends.
         places = {0.0, 1.0, *(place for place, _ in self.places if 0 < place < 1)}
-        return max(DirectedBlur(self.lens, self.wavefront(p)).mean_error(outlook) for p in places)
+        return max(DirectedBlur(self.lens, self.wavefront(p)).mean_error(signal) for p in places)
 
 
 @dataclass(frozen=True)

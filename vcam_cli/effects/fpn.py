@@ -130,14 +130,14 @@ class FixedPattern(NoiseSource):
         gains = (self.gain_pixel**2 + self.gain_column**2) * mean**2
         working = 1 - self.hot - self.dead
         # Of a mixture: the mean variance of its parts, and the variance of their means.
-        within = offsets * (1 - self.hot) + (gains + self._of_dark(dark)) * working
+        within = offsets * (1 - self.hot) + (gains + self._dark_variance(dark)) * working
         if not self.hot:
             return within + self.dead * (1 - self.dead) * mean**2
         center = self.hot * self.full_well + working * mean
         between = self.hot * (self.full_well - center) ** 2 + working * (mean - center) ** 2
         return within + between + self.dead * center**2
 
-    def _of_dark(self, dark: float) -> float:
+    def _dark_variance(self, dark: float) -> float:
         """Variance of the dark signals [electrons squared]: of a normal number, 0 if below 0."""
         if not self.dark or not dark:
             return 0.0

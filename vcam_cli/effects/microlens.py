@@ -50,6 +50,6 @@ class Microlens(Gain):
         """Return the factor at the positions x (columns,), y (rows,) [m]: (rows, columns)."""
         return np.full((1, 1), self.ratio, x.dtype)
 
-    def mean_error(self, outlook) -> float:
+    def mean_error(self, signal) -> float:
         """Return a bound of the rms change of the mean signal by leaving it out [electrons]."""
-        return (1 - 1 / self.ratio) * outlook.full_signal
+        return (1 - 1 / self.ratio) * signal.full_signal

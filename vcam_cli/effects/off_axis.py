@@ -52,10 +52,10 @@ class OffAxis(Gain):
 
     def describe(self) -> str:
         """Return a short clause with this camera's numbers and units."""
-        loss = 1 - float(self._of_tan2((self.corner / self.image_distance) ** 2))
+        loss = 1 - float(self._relative_illumination((self.corner / self.image_distance) ** 2))
         return f"the corners receive {loss:.2%} less than the center"
 
-    def _of_tan2(self, tan2):
+    def _relative_illumination(self, tan2):
         if self.model == "cos4":
             return radiometry.relative_illumination_cos4(tan2)
         return radiometry.relative_illumination_exact(self.tan2_cone, tan2)
@@ -66,7 +66,7 @@ class OffAxis(Gain):
         y2 = ((y / self.image_distance) ** 2).astype(y.dtype)
         tan2 = x2[None, :] + y2[:, None]
         if tan2.dtype == np.float64 or self._polynomial is None:
-            return self._of_tan2(tan2).astype(tan2.dtype)
+            return self._relative_illumination(tan2).astype(tan2.dtype)
         out = np.full_like(tan2, self._polynomial[-1])
         for coefficient in self._polynomial[-2::-1]:
             out *= tan2
@@ -81,18 +81,20 @@ class OffAxis(Gain):
         """
         top = (self.corner / self.image_distance) ** 2 * 1.001
         dense = np.linspace(0, top, 257)
-        exact = self._of_tan2(dense)
+        exact = self._relative_illumination(dense)
         for degree in range(1, 13):
-            series = np.polynomial.Chebyshev.interpolate(self._of_tan2, degree, [0, top])
+            series = np.polynomial.Chebyshev.interpolate(
+                self._relative_illumination, degree, [0, top]
+            )
             if np.abs(series(dense) - exact).max() < 1e-7:
                 return tuple(series.convert(kind=np.polynomial.Polynomial).coef.astype(np.float32))
         return None
 
-    def mean_error(self, outlook) -> float:
+    def mean_error(self, signal) -> float:
         """Return a bound of the rms change of the mean signal by leaving it out [electrons]."""
         radius2 = _quadrant(self.half_width, self.half_height)
-        loss = 1 - self._of_tan2(radius2 / self.image_distance**2)
-        return 1.002 * float(np.sqrt(np.mean(loss**2))) * outlook.full_signal
+        loss = 1 - self._relative_illumination(radius2 / self.image_distance**2)
+        return 1.002 * float(np.sqrt(np.mean(loss**2))) * signal.full_signal
 
 
 @dataclass(frozen=True)
@@ -121,18 +123,18 @@ class MeasuredFalloff(Gain):
 
     def describe(self) -> str:
         """Return a short clause with this camera's numbers and units."""
-        corner = float(self._at(np.hypot(self.half_width, self.half_height)))
+        corner = float(self._relative_illumination(np.hypot(self.half_width, self.half_height)))
         kind = "less" if corner <= 1 else "more"
         return f"the corners receive {abs(1 - corner):.2%} {kind} than the center, as measured"
 
-    def _at(self, radius):
+    def _relative_illumination(self, radius):
         return np.interp(radius, self.heights, self.values)
 
     def gain(self, x, y):
         """Return the factor at the positions x (columns,), y (rows,) [m]: (rows, columns)."""
         x2, y2 = np.square(x), np.square(y)
         if x.dtype == np.float64:
-            return self._at(np.sqrt(x2[None, :] + y2[:, None]))
+            return self._relative_illumination(np.sqrt(x2[None, :] + y2[:, None]))
         scale = x.dtype.type((ENTRIES - 1) / self.heights[-1])
         out = np.empty((len(y), len(x)), x.dtype)
         for row, square in zip(out, y2, strict=True):  # a row at a time stays in the cache
@@ -149,12 +151,16 @@ class MeasuredFalloff(Gain):
         Why: `np.interp` searches its segment for every pixel, in 64 bits. A value that falls from
         1 to 0 is good to 4e-6.
         """
-        return self._at(np.linspace(0, self.heights[-1], ENTRIES)).astype(np.float32)
+        return self._relative_illumination(np.linspace(0, self.heights[-1], ENTRIES)).astype(
+            np.float32
+        )
 
-    def mean_error(self, outlook) -> float:
+    def mean_error(self, signal) -> float:
         """Return a bound of the rms change of the mean signal by leaving it out [electrons]."""
-        change = 1 - self._at(np.sqrt(_quadrant(self.half_width, self.half_height)))
-        return 1.002 * float(np.sqrt(np.mean(change**2))) * outlook.full_signal
+        change = 1 - self._relative_illumination(
+            np.sqrt(_quadrant(self.half_width, self.half_height))
+        )
+        return 1.002 * float(np.sqrt(np.mean(change**2))) * signal.full_signal
 
 
 def _quadrant(half_width: float, half_height: float) -> NDArray:

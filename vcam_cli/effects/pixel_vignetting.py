@@ -87,7 +87,7 @@ class PixelVignetting(Gain):
         loss = 1 - np.diag(self.gain(*ends))
         return f"takes {loss[0]:.2%} of the light in the center, {loss[1]:.2%} in the corners"
 
-    def at(self, x: NDArray, y: NDArray) -> NDArray:
+    def exact_gain(self, x: NDArray, y: NDArray) -> NDArray:
         """Return the gain at x, y (rows, columns) [m], integrated over the whole pupil."""
         share = vignetting.collected_fraction(
             x / self.pupil_distance,
@@ -113,7 +113,7 @@ class PixelVignetting(Gain):
         out = np.einsum("ik,kj->ij", rows, columns)
         return np.maximum(out, 0, out=out)
 
-    def mean_error(self, outlook) -> float:
+    def mean_error(self, signal) -> float:
         """Return a bound of the rms change of the mean signal by leaving it out [electrons]."""
         # A field at full signal everywhere, the brightest pixel at full signal behind its tunnel:
         # rms of the loss over a quadrant by the midpoint rule.
@@ -121,7 +121,7 @@ class PixelVignetting(Gain):
         gain = self.gain(at * self.half_width, at * self.half_height)
         brightest = max(float(gain.max()), LEAST)
         rms = float(np.sqrt(np.mean((1 - gain) ** 2)))
-        return 1.002 * rms / brightest * outlook.full_signal
+        return 1.002 * rms / brightest * signal.full_signal
 
 
 @lru_cache(maxsize=16)
@@ -135,7 +135,7 @@ def _series(effect: PixelVignetting) -> NDArray:
         points = chebyshev.chebpts1(count)
         x, y = (half * (1 + points) / 2 for half in (effect.half_width, effect.half_height))
         rows = (slice(i, i + ROWS) for i in range(0, count, ROWS))
-        values = np.concatenate([effect.at(x[None, :], y[some, None]) for some in rows])
+        values = np.concatenate([effect.exact_gain(x[None, :], y[some, None]) for some in rows])
         invert = np.linalg.inv(chebyshev.chebvander(points, count - 1))
         series = invert @ values @ invert.T
         last = max(np.abs(series[-3:]).sum(0).max(), np.abs(series[:, -3:]).sum(1).max())

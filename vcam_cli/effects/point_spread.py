@@ -58,7 +58,7 @@ class PointSpread(AberrationBlur, PlaneTransfer):
         """How far from its place the blur throws almost all of the light, diffraction aside [m]."""
         return self._radius(0.99)
 
-    def _read(self) -> NDArray:
+    def _loaded_samples(self) -> NDArray:
         if self.samples is None:
             raise RuntimeError(f"{self.file} has not been read")
         return self.samples
@@ -68,12 +68,12 @@ class PointSpread(AberrationBlur, PlaneTransfer):
         x, y = self._coordinates
         radius = np.hypot(x[None, :], y[:, None]).ravel()
         order = np.argsort(radius)
-        light = np.cumsum(self._read().mean(axis=0).ravel()[order])
+        light = np.cumsum(self._loaded_samples().mean(axis=0).ravel()[order])
         return float(radius[order][np.searchsorted(light, share * light[-1])])
 
     @property
     def _coordinates(self) -> tuple[NDArray, NDArray]:
-        _, rows, columns = self._read().shape
+        _, rows, columns = self._loaded_samples().shape
         x = (np.arange(columns) - (columns - 1) / 2) * self.pitch
         y = (np.arange(rows) - (rows - 1) / 2) * self.pitch
         return x, y
@@ -103,14 +103,14 @@ class PointSpread(AberrationBlur, PlaneTransfer):
         x, y = self._coordinates
         along = np.exp(-2j * np.pi * np.outer(x, fx)) * (np.abs(fx) < 0.5 / self.pitch)
         down = np.exp(-2j * np.pi * np.outer(fy, y)) * (np.abs(fy) < 0.5 / self.pitch)[:, None]
-        return np.array([down @ plane @ along for plane in self._read()])
+        return np.array([down @ plane @ along for plane in self._loaded_samples()])
 
     def cutoff(self, wavelength):
         """Return the frequency from which the transfer is zero, or inf [cycles/m]."""
         return math.sqrt(0.5) / self.pitch
 
-    def mean_error(self, outlook) -> float:
+    def mean_error(self, signal) -> float:
         """Return a bound of the rms change of the mean signal by leaving it out [electrons]."""
         if self.samples is None:
-            return outlook.full_signal
-        return largest_loss(self, 0.5 / self.pitch) * outlook.full_signal
+            return signal.full_signal
+        return largest_loss(self, 0.5 / self.pitch) * signal.full_signal

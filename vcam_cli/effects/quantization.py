@@ -37,7 +37,7 @@ class Quantization(Quantizer):
         """Return a short clause with this camera's numbers and units."""
         return f"{self.electrons_per_dn:.4g} electrons a step, {2**self.bits} codes"
 
-    def line(self, electrons):
+    def response(self, electrons):
         """Return the codes before rounding and clipping [DN]."""
         return electrons * (1 / self.electrons_per_dn) + self.offset
 
@@ -45,7 +45,7 @@ class Quantization(Quantizer):
         """Return the codes of `electrons`, rounded and clipped [DN]."""
         code = electrons * electrons.dtype.type(1 / self.electrons_per_dn)
         code += electrons.dtype.type(self.offset)
-        return _whole(code, self.bits)
+        return _round_and_clip(code, self.bits)
 
 
 @dataclass(frozen=True)
@@ -94,7 +94,7 @@ class LogarithmicQuantization(Quantizer):
         """Codes per natural logarithm [DN]."""
         return self._span / float(np.log1p(self.full / self.bend))
 
-    def line(self, electrons):
+    def response(self, electrons):
         """Return the codes before rounding and clipping [DN]."""
         signal = np.maximum(electrons * (1 / self.bend), -1)
         with np.errstate(divide="ignore"):  # ln(0) = -inf, which is clipped
@@ -105,7 +105,7 @@ class LogarithmicQuantization(Quantizer):
 
     def apply(self, electrons):
         """Return the codes of `electrons`, rounded and clipped [DN]."""
-        return _whole(self.line(electrons), self.bits)
+        return _round_and_clip(self.response(electrons), self.bits)
 
     def linear(self, dn):
         """Return what a linear ADC of the same offset and full scale has for these codes [DN]."""
@@ -115,7 +115,7 @@ class LogarithmicQuantization(Quantizer):
         return signal
 
 
-def _whole(level, bits):
+def _round_and_clip(level, bits):
     """Return the nearest codes, clipped; it overwrites its argument."""
     np.rint(level, out=level)
     return np.clip(level, 0, 2**bits - 1, out=level)

@@ -124,11 +124,11 @@ class NoiseSource(ElectronEffect):
             return own / binning.count + column / binning.columns + row / binning.rows
         return (own if self.origin == "readout" else own / binning.count) + column + row
 
-    def contribution(self, outlook: SignalLevels, others: Sequence[Effect]) -> tuple[float, str]:
+    def contribution(self, signal: SignalLevels, others: Sequence[Effect]) -> tuple[float, str]:
         """Return its largest share of the variance of its scope, at any of the `LEVELS`."""
         rest = [e for e in noise_sources(others, self.scope) if e.name != self.name]
-        total = total_variance([*rest, self], outlook)
-        share = total_variance([self], outlook) / np.maximum(total, 1e-300)
+        total = total_variance([*rest, self], signal)
+        share = total_variance([self], signal) / np.maximum(total, 1e-300)
         return float(share.max()), f"of the {_KINDS_OF_VARIANCE[self.scope]} variance"
 
 
@@ -137,7 +137,7 @@ def noise_sources(effects: Iterable[Effect], scope: str) -> tuple[NoiseSource, .
     return tuple(source for source in of_kind(effects, NoiseSource) if source.scope == scope)
 
 
-def total_variance(sources: Iterable[NoiseSource], outlook: SignalLevels) -> NDArray:
+def total_variance(sources: Iterable[NoiseSource], signal: SignalLevels) -> NDArray:
     """Return the summed variance of noise sources at each of the `LEVELS` [electrons squared].
 
     Of pixels that are read as one, of their mean.
@@ -146,7 +146,7 @@ def total_variance(sources: Iterable[NoiseSource], outlook: SignalLevels) -> NDA
     return np.array(
         [
             sum(
-                source.binned_variance(level * outlook.full_signal, outlook.dark, outlook.binning)
+                source.binned_variance(level * signal.full_signal, signal.dark, signal.binning)
                 for source in listed
             )
             for level in LEVELS
@@ -191,15 +191,15 @@ class Quantizer(Effect):
         """Return the digital numbers of `electrons`, whole and of the same float type [DN]."""
 
     @abstractmethod
-    def line(self, electrons: NDArray) -> NDArray:
+    def response(self, electrons: NDArray) -> NDArray:
         """Return the same relation before rounding and clipping [DN]."""
 
-    def contribution(self, outlook: SignalLevels, others: Sequence[Effect]) -> tuple[float, str]:
+    def contribution(self, signal: SignalLevels, others: Sequence[Effect]) -> tuple[float, str]:
         """Return the largest share of its rounding in the temporal variance with it."""
-        total = total_variance(noise_sources(others, "frame"), outlook)
-        n = outlook.conversions
+        total = total_variance(noise_sources(others, "frame"), signal)
+        n = signal.conversions
         rounding = [
-            self.rounding(level * outlook.full_signal, n * noise) / n
+            self.rounding(level * signal.full_signal, n * noise) / n
             for level, noise in zip(LEVELS, total, strict=True)
         ]
         share = np.array(rounding) / np.maximum(total + rounding, 1e-300)
@@ -224,7 +224,7 @@ class Quantizer(Effect):
         B. Widrow and I. Kollar, Quantization Noise, 2008, section 5.3.
         """
         ends = np.array([level, level + max(1.0, 1e-3 * level)])
-        below, above = self.line(ends)
+        below, above = self.response(ends)
         step = (ends[1] - ends[0]) / float(above - below)
         k = np.arange(1, 30)
         dithered = np.exp(-2 * (np.pi * k) ** 2 * variance / step**2) / k**2

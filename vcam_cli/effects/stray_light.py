@@ -32,7 +32,7 @@ class StrayLight(VeilingGlare):
         """Return a short clause with this camera's numbers and units."""
         return f"{self.fraction:.3%} of the light lies evenly over the sensor"
 
-    def mean_error(self, outlook) -> float:
+    def mean_error(self, signal) -> float:
         """Return a bound of the rms change of the mean signal by leaving it out [electrons]."""
         # Numbers from 0 to full signal deviate from their mean by half of it rms, at most.
-        return self.fraction * outlook.full_signal / 2
+        return self.fraction * signal.full_signal / 2

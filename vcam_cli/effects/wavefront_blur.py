@@ -133,10 +133,10 @@ class SymmetricBlur(AberrationBlur, RadialTransfer):
         """Return the frequency from which the transfer is zero, or inf [cycles/m]."""
         return self.lens.cutoff(wavelength)
 
-    def mean_error(self, outlook) -> float:
+    def mean_error(self, signal) -> float:
         """Return a bound of the rms change of the mean signal by leaving it out [electrons]."""
         otf = self.otf(np.linspace(0, _highest(self.lens, self.terms), 257), GREEN)
-        return float(np.abs(1 - otf).max()) * outlook.full_signal
+        return float(np.abs(1 - otf).max()) * signal.full_signal
 
 
 @dataclass(frozen=True)
@@ -207,9 +207,9 @@ class DirectedBlur(AberrationBlur, PlaneTransfer):
             return replace(self, angle=rest), (quarters + 1) % 4, True
         return replace(self, angle=rest), quarters % 4, False
 
-    def mean_error(self, outlook) -> float:
+    def mean_error(self, signal) -> float:
         """Return a bound of the rms change of the mean signal by leaving it out [electrons]."""
-        return largest_loss(self, _highest(self.lens, self.terms)) * outlook.full_signal
+        return largest_loss(self, _highest(self.lens, self.terms)) * signal.full_signal
 
 
 def _highest(lens: Lens, terms: Terms) -> float:

@@ -69,7 +69,7 @@ READERS: dict[str, Callable[[Path], SpectralData]] = {
 
 def read_bands(path: Path | str, yaml_path: YamlPath) -> Bands:
     """Return what a file of spectra holds, by its header. Raise as `read_cube` does."""
-    with _opened(Path(path), yaml_path) as (stored, order):
+    with _open_bands(Path(path), yaml_path) as (stored, order):
         return _bands(stored, order)
 
 
@@ -81,7 +81,7 @@ def read_cube(path: Path | str, yaml_path: YamlPath) -> tuple[Cube, tuple[str, .
     that are not finite or clearly negative; CannotDo when it may not be read or the memory does
     not suffice.
     """
-    with _opened(Path(path), yaml_path) as (stored, order):
+    with _open_bands(Path(path), yaml_path) as (stored, order):
         data, notes = _si_samples(stored, order)
         return Cube(data, _bands(stored, order)), (*stored.notes, *notes)
 
@@ -101,7 +101,7 @@ def companions(path: Path | str) -> tuple[Path, ...]:
 
 
 @contextmanager
-def _opened(path: Path, yaml_path: YamlPath) -> Iterator[tuple[SpectralData, slice]]:
+def _open_bands(path: Path, yaml_path: YamlPath) -> Iterator[tuple[SpectralData, slice]]:
     """Open a file: its header, and its bands in the order of wavelength."""
     with convert_errors(path, yaml_path, _REMEDY):
         reader = READERS.get(path.suffix.lower())

@@ -328,7 +328,7 @@ def _linear(data: np.ndarray, srgb: bool, white: float, signed: bool) -> np.ndar
     """Return linear light / white, float32: by table up to 16 bits, else block by block."""
     if data.dtype.kind == "u" and data.dtype.itemsize <= 2:
         code = np.arange(np.iinfo(data.dtype).max + 1) / np.iinfo(data.dtype).max
-        light = _over_white(code, srgb, white)[data]
+        light = _relative_to_white(code, srgb, white)[data]
         _check_light(light, data, 0)
         return light
     full = 1.0 if data.dtype.kind == "f" else float(np.iinfo(data.dtype).max)
@@ -337,12 +337,12 @@ def _linear(data: np.ndarray, srgb: bool, white: float, signed: bool) -> np.ndar
         block = data[row : row + _BLOCK]
         _check_values(block, row, signed)
         code = block.astype(np.float64) / full
-        light[row : row + _BLOCK] = _over_white(code, srgb, white)
+        light[row : row + _BLOCK] = _relative_to_white(code, srgb, white)
         _check_light(light[row : row + _BLOCK], block, row)
     return light
 
 
-def _over_white(code: np.ndarray, srgb: bool, white: float) -> np.ndarray:
+def _relative_to_white(code: np.ndarray, srgb: bool, white: float) -> np.ndarray:
     """Return the light of codes (full scale = 1) over `white`, float32; infinite beyond that."""
     with np.errstate(over="ignore"):
         return ((decode_srgb(code) if srgb else code) / white).astype(np.float32)

@@ -110,7 +110,7 @@ def _variables(bytes_: _Bytes, names: Collection[str], path: Path) -> dict[str, 
     while bytes_.position < bytes_.stop:
         kind, inside = bytes_.element(padded=False)
         if kind == PACKED:
-            unpacked = _unpacked(inside, names, path)
+            unpacked = _unpack(inside, names, path)
             if unpacked is None:
                 continue
             kind, inside = unpacked.element(padded=False)
@@ -123,7 +123,7 @@ def _variables(bytes_: _Bytes, names: Collection[str], path: Path) -> dict[str, 
     return found
 
 
-def _unpacked(packed: _Bytes, names: Collection[str], path: Path) -> _Bytes | None:
+def _unpack(packed: _Bytes, names: Collection[str], path: Path) -> _Bytes | None:
     """Return the element that is packed; None for a variable that is not wanted."""
     data = packed.data[packed.position : min(packed.position + PIECE, packed.stop)]
     begin = zlib.decompressobj().decompress(data, 4 * LONGEST_NAME + 512)

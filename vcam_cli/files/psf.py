@@ -42,11 +42,11 @@ def read_psf(
     with convert_errors(path, yaml_path, _REMEDY):
         check_file(path)
         with open_image(path) as source:
-            stored = _stored(source, channels)
-        return np.array([_normalized(stored[:, :, k]) for k in range(channels)])
+            stored = _read_channels(source, channels)
+        return np.array([_normalize(stored[:, :, k]) for k in range(channels)])
 
 
-def _stored(source: Any, channels: int) -> NDArray:
+def _read_channels(source: Any, channels: int) -> NDArray:
     """Return the channels as they are in the file, (rows, columns, channels)."""
     spec = source.spec()
     if spec.deep or spec.depth > 1:
@@ -56,7 +56,7 @@ def _stored(source: Any, channels: int) -> NDArray:
         k for k, name in enumerate(names) if name.upper() not in _ALPHA and k != spec.alpha_channel
     )
     if len(chosen) != channels:
-        raise UnusableFile(_miscounted(len(chosen), channels))
+        raise UnusableFile(_wrong_channel_count(len(chosen), channels))
     check_size(spec, channels)
     data, notes = read_samples(source, spec, chosen)
     if source.format_name() == "openexr":
@@ -64,14 +64,14 @@ def _stored(source: Any, channels: int) -> NDArray:
     return data
 
 
-def _miscounted(found: int, wanted: int) -> str:
+def _wrong_channel_count(found: int, wanted: int) -> str:
     has = f"has {found} channel{'s' * (found != 1)}"
     if wanted == 1:
         return f"{has}, where one for all wavelengths is needed"
     return f"{has}, but psf.wavelengths lists {wanted}"
 
 
-def _normalized(plane: NDArray) -> NDArray[np.float64]:
+def _normalize(plane: NDArray) -> NDArray[np.float64]:
     """Return a plane of light with the sum 1."""
     light = plane.astype(np.float64)
     if not np.isfinite(light).all():

@@ -49,9 +49,9 @@ class RowWriter:
             os.close(os.open(self._temporary, os.O_CREAT | os.O_WRONLY, 0o666))  # says why not
             output = oiio.ImageOutput.create(self._file_format)
             if output is None:
-                raise self._failed(pending_error(oiio.geterror))
+                raise self._failure(pending_error(oiio.geterror))
             if not output.open(str(self._temporary), self._spec):
-                raise self._failed(pending_error(output.geterror))
+                raise self._failure(pending_error(output.geterror))
             self._output = output
             self._stack = stack.pop_all()
         return self
@@ -83,14 +83,14 @@ class RowWriter:
         if last > self._spec.height:
             raise ValueError(f"{last} rows in an image of {self._spec.height}")
         if self._broken:
-            raise self._failed("an earlier write failed")
+            raise self._failure("an earlier write failed")
         if not block.shape[0]:
             return
         written = self._output.write_scanlines(first_row, last, 0, np.ascontiguousarray(block))
         reason = pending_error(self._output.geterror)
         if not written or reason:
             self._broken = True
-            raise self._failed(reason)
+            raise self._failure(reason)
         self._next_row = last
 
     def _check_whole(self, closed: bool) -> None:
@@ -98,9 +98,9 @@ class RowWriter:
         if self._next_row != self._spec.height:
             raise ValueError(f"{self._next_row} of {self._spec.height} rows were written")
         if not closed or reason or not self._is_whole(self._temporary):
-            raise self._failed(reason or "the file is not whole")
+            raise self._failure(reason or "the file is not whole")
 
-    def _failed(self, reason: str) -> CannotDo:
+    def _failure(self, reason: str) -> CannotDo:
         with suppress(OSError):
             if shutil.disk_usage(self._path.parent).free < _FULL:
                 return cannot_write(self._path, OSError(errno.ENOSPC, "disk full"))

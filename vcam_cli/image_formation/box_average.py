@@ -34,7 +34,7 @@ def box_averages(
 
 def point_values(scene: SampledScene, mix: NDArray, geometry: Geometry) -> NDArray:
     """A scene at the centers of the collecting areas: (C, rows, columns)."""
-    return scene.at(*pixel_centers(geometry, detector=True), mix)
+    return scene.values_at(*pixel_centers(geometry, detector=True), mix)
 
 
 def _chart_averages(
@@ -49,7 +49,7 @@ def _chart_averages(
     for top in range(0, geometry.rows, band):
         rows = slice(top, min(top + band, geometry.rows))
         cells = y[0][rows.start * y[2] : (rows.stop - 1) * y[2] + y[1] + 1]
-        painted = scene.chart.within(x[0], cells).averages(x[0], cells, mix)
+        painted = scene.chart.crop_to_cells(x[0], cells).averages(x[0], cells, mix)
         out[:, rows] = _box_means(_box_means(painted, y, 1), x, 2)
     return out
 

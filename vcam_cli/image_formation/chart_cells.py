@@ -162,7 +162,7 @@ def _busiest(g: Geometry, scene: ChartScene, level: NDArray) -> NDArray:
         ((k + k * step % 1) / len(k) - 0.5) * length
         for length, step in zip((g.sensor_width, g.sensor_height), EVEN, strict=True)
     )
-    light = scene.at(x, y, level[None])[0].reshape(BLOCKS, POINTS, BLOCKS, POINTS)
+    light = scene.values_at(x, y, level[None])[0].reshape(BLOCKS, POINTS, BLOCKS, POINTS)
     order = np.argsort(light.var(axis=(1, 3)).ravel())[::-1][:FEW]
     centers = (np.stack([order % BLOCKS, order // BLOCKS], axis=1) + 0.5) / BLOCKS - 0.5
     return np.asarray(centers * (g.sensor_width, g.sensor_height))

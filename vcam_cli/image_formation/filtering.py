@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from vcam_cli.image_formation.cosine_series import Axis
 from vcam_cli.image_formation.scene_spectrum import SceneSpectrum
 from vcam_cli.image_formation.transfer_tables import PARITIES, TableReader, Tables, reader
-from vcam_cli.parallel import at_once, each, pieces, product, within
+from vcam_cli.parallel import each, pieces, product, rows_at_once, slices_within
 
 LONGEST = 128
 """Rows of a spectrum that are filtered together."""
@@ -135,7 +135,7 @@ class Filter:
                 continue
             nodes, shares = chebyshev(fy) if len(fy) >= SHORTEST else (fy, None)
             values = (table.values(nodes, count) * factor[:count]).astype(dtype)
-            for rows in within(stretch, at_once(count)):
+            for rows in slices_within(stretch, rows_at_once(count)):
                 planes = self._rows(spectrum, terms[rows], count)
                 at = slice(rows.start - stretch.start, rows.stop - stretch.start)
                 for color in range(self.tables.colors):
@@ -195,7 +195,7 @@ class Filter:
         if window is None:
             shape = (len(folded), self.y.pixels, self.x.folded_terms)
             out = np.empty(shape, folded.dtype)
-        columns = pieces(self.x.folded_terms, at_once(self.y.transform))
+        columns = pieces(self.x.folded_terms, rows_at_once(self.y.transform))
 
         def evaluate(task: tuple[int, slice]) -> None:
             color, s = task

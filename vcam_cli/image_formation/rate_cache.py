@@ -34,7 +34,7 @@ AFTER: tuple[tuple[str, ...], ...] = tuple(
     )
 )
 """Keys on which the light does not depend. Exposure, ADC and analog gain set the level at which a
-pixel is full, beyond which the light is not followed as exactly: see `Lights.rate`."""
+pixel is full, beyond which the light is not followed as exactly: see `RateCache.rate`."""
 _RANDOM = {kind.name for kind in ORDER if issubclass(kind, NoiseSource | Charge)}
 _LIMIT = 1 << 28
 """Bytes of light that are kept."""
@@ -42,7 +42,7 @@ _MOST = 64
 """Cameras whose brightest light is remembered."""
 
 
-def depends_on(camera: Camera) -> str:
+def light_key(camera: Camera) -> str:
     """All that the light on the sensor depends on, as a text, but for the level of saturation."""
     form = camera.model_dump(mode="json")
     for path in AFTER:
@@ -73,7 +73,7 @@ class _Kept:
         return self.rate.values.nbytes
 
 
-class Lights:
+class RateCache:
     """The light of the last cameras."""
 
     def __init__(self, limit: int = _LIMIT) -> None:
@@ -85,7 +85,7 @@ class Lights:
     def _key(self, camera: Camera) -> str:
         """What its light depends on, told once for the camera that is asked about again."""
         if self._told is None or self._told[0] is not camera:
-            self._told = camera, depends_on(camera)
+            self._told = camera, light_key(camera)
         return self._told[1]
 
     def transfer(self, camera: Camera, make: Callable[[], Transfer]) -> Transfer:

@@ -16,7 +16,7 @@ import scipy.fft
 from numpy.typing import NDArray
 
 from vcam_cli.image_formation.cosine_series import Axis
-from vcam_cli.parallel import at_once, each, pieces, product, within
+from vcam_cli.parallel import each, pieces, product, rows_at_once, slices_within
 from vcam_cli.scenes.base import Rectangles
 
 Index = NDArray | slice
@@ -64,7 +64,7 @@ class SampledSpectrum:
 
         def add(block: int) -> None:
             sums = np.zeros(len(x) - 1)
-            for rows in within(slice(y[block], y[block + 1]), at_once(x[-1])):
+            for rows in slices_within(slice(y[block], y[block + 1]), rows_at_once(x[-1])):
                 both = first[rows] * second[rows]
                 sums += np.add.reduceat(both.sum(axis=0, dtype=both.dtype), x[:-1])
             out[block] = sums
@@ -89,8 +89,8 @@ def transform_planes(planes: NDArray, workers: int) -> SampledSpectrum:
             plane[:, s] = scipy.fft.dct(columns, type=2, axis=0, overwrite_x=True)
 
         rows, columns = plane.shape
-        each(along_rows, pieces(rows, at_once(columns)), workers)
-        each(along_columns, pieces(columns, at_once(rows)), workers)
+        each(along_rows, pieces(rows, rows_at_once(columns)), workers)
+        each(along_columns, pieces(columns, rows_at_once(rows)), workers)
     return SampledSpectrum(planes)
 
 

@@ -5,8 +5,8 @@ cache; an operation that looks at neighbors asks for a `halo` of rows above and 
 the same whatever the number of workers, and so are the bytes that come out.
 
 Why an operation has two faces: the ideal image has all colors at every pixel and no mosaic, but
-must go through the very same color transform as the camera's picture. `on_block` acts on the
-picture, `on_colors` on full-color values: the ideal image, and the white that sets the scale.
+must go through the very same color transform as the camera's picture. `process_block` acts on the
+picture, `process_colors` on full-color values: the ideal image, and the white that sets the scale.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -117,10 +117,10 @@ class Operation(Protocol):
     def halo(self) -> int:
         """Rows that the operation needs above and below, and takes away."""
 
-    def on_block(self, block: Block) -> Block:
+    def process_block(self, block: Block) -> Block:
         """Return the block after this step."""
 
-    def on_colors(self, values: np.ndarray) -> np.ndarray:
+    def process_colors(self, values: np.ndarray) -> np.ndarray:
         """Return full-color values (C, ...) of the last step after the same transform."""
 
 
@@ -236,5 +236,5 @@ def process_rows(dn: np.ndarray, operations: tuple[Operation, ...], start: int, 
     """
     block = padded_block(dn, start, stop, sum(operation.halo for operation in operations))
     for operation in operations:
-        block = operation.on_block(block)
+        block = operation.process_block(block)
     return block

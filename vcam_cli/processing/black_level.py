@@ -38,11 +38,11 @@ class BlackLevel:
     """Level that is taken off [DN]."""
     halo: int = 0
 
-    def on_block(self, block: Block) -> Block:
+    def process_block(self, block: Block) -> Block:
         """Return the block less the level."""
         np.subtract(block.planes, np.float32(self.level), out=block.planes)
         return block
 
-    def on_colors(self, values: np.ndarray) -> np.ndarray:
+    def process_colors(self, values: np.ndarray) -> np.ndarray:
         """Return the values less the level."""
         return values - self.level

@@ -61,7 +61,7 @@ class ColorCorrection:
     """Coefficients: rows for display R, G, B, columns for the camera's colors."""
     halo: int = 0
 
-    def on_block(self, block: Block) -> Block:
+    def process_block(self, block: Block) -> Block:
         # Sums written out: a product of matrices would start threads of its own in every block.
         """Return the block in the display's colors."""
         planes = block.planes
@@ -73,7 +73,7 @@ class ColorCorrection:
                 target += np.multiply(plane, weight, out=term)
         return Block(out, block.first_row)
 
-    def on_colors(self, values: np.ndarray) -> np.ndarray:
+    def process_colors(self, values: np.ndarray) -> np.ndarray:
         """Return the values in the display's colors."""
         matrix = np.asarray(self.matrix, dtype=values.dtype)
         return np.einsum("ij,j...->i...", matrix, values)

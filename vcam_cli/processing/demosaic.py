@@ -115,13 +115,13 @@ class Bilinear:
     colors: tuple[str, ...]
     halo: int = 1
 
-    def on_block(self, block: Block) -> Block:
+    def process_block(self, block: Block) -> Block:
         """Return the block in full color."""
         first = block.first_row + 1
         inside = self.pattern if first % 2 == 0 else self.pattern[::-1]
         return Block(bilinear_rows(block.planes[0], inside, self.colors), first)
 
-    def on_colors(self, values: np.ndarray) -> np.ndarray:
+    def process_colors(self, values: np.ndarray) -> np.ndarray:
         """Return the values as they are: they have all their colors."""
         return values
 

@@ -63,7 +63,7 @@ def edge_aware(
     """
     rows = mirrored_index(np.arange(-REACH, mosaic.shape[0] + REACH), mosaic.shape[0])
     method = EdgeAware(pattern, colors, tuple(float(w) for w in white))
-    return method.on_block(Block(mosaic[rows].astype(np.float32)[np.newaxis], -REACH)).planes
+    return method.process_block(Block(mosaic[rows].astype(np.float32)[np.newaxis], -REACH)).planes
 
 
 @dataclass(frozen=True)
@@ -76,14 +76,14 @@ class EdgeAware:
     """Signal of a perfect white in each color."""
     halo: int = REACH
 
-    def on_block(self, block: Block) -> Block:
+    def process_block(self, block: Block) -> Block:
         """Return the block in full color."""
         first = block.first_row + REACH
         inside = self.pattern if first % 2 == 0 else self.pattern[::-1]
         level = dict(zip(self.colors, self.white, strict=True))
         return Block(_demosaic_rows(block.planes[0], inside, self.colors, level), first)
 
-    def on_colors(self, values: np.ndarray) -> np.ndarray:
+    def process_colors(self, values: np.ndarray) -> np.ndarray:
         """Return the values as they are: they have all their colors."""
         return values
 
@@ -173,16 +173,18 @@ def _interpolate_green(
     """
     own, beside = halves[j], halves[1 - j]
 
-    def down(by: int) -> np.ndarray:
+    def shifted(by: int) -> np.ndarray:
         return own[rows.start + by : rows.stop + by : 2]
 
-    center = down(0)[:, 1:-1]
+    center = shifted(0)[:, 1:-1]
     twice = center + center
     left, right = (beside[rows][:, j + k : beside.shape[1] - 2 + j + k] for k in (0, 1))
-    guess_h, rough_h = _directional_estimate(left, right, twice - down(0)[:, :-2] - down(0)[:, 2:])
-    upper, lower = down(-1)[:, 1:-1], down(1)[:, 1:-1]
+    guess_h, rough_h = _directional_estimate(
+        left, right, twice - shifted(0)[:, :-2] - shifted(0)[:, 2:]
+    )
+    upper, lower = shifted(-1)[:, 1:-1], shifted(1)[:, 1:-1]
     guess_v, rough_v = _directional_estimate(
-        upper, lower, twice - down(-2)[:, 1:-1] - down(2)[:, 1:-1]
+        upper, lower, twice - shifted(-2)[:, 1:-1] - shifted(2)[:, 1:-1]
     )
 
     rough_h *= rough_h

@@ -71,7 +71,7 @@ class GuidedInterpolation:
         leader = max(self.widths[self.leader] - 1, MAX_LAG // 2 + ROUGHNESS_HALF_WIDTH - 1)
         return leader + 2 * (widest + LINE_EXTRA_WIDTH - 1) + widest - 1
 
-    def on_block(self, block: Block) -> Block:
+    def process_block(self, block: Block) -> Block:
         """Return the block in full color."""
         mosaic, halo = block.planes[0], self.halo
         rows = block.first_row + np.arange(mosaic.shape[0])
@@ -92,7 +92,7 @@ class GuidedInterpolation:
             np.copyto(plane, mosaic[inside], where=at[inside])
         return Block(out, block.first_row + halo)
 
-    def on_colors(self, values: np.ndarray) -> np.ndarray:
+    def process_colors(self, values: np.ndarray) -> np.ndarray:
         """Return the values as they are: they have all their colors."""
         return values
 

@@ -27,7 +27,7 @@ class Highlights:
     """Signal at which each color saturates, black being 0."""
     halo: int = 0
 
-    def on_block(self, block: Block) -> Block:
+    def process_block(self, block: Block) -> Block:
         """Return the block with its saturated colors raised."""
         planes = block.planes
         knees = [KNEE * ceiling if ceiling > 0 else np.inf for ceiling in self.ceilings]
@@ -41,6 +41,6 @@ class Highlights:
                 plane += np.clip(share, 0, 1, out=share) * (brightest - plane)
         return block
 
-    def on_colors(self, values: np.ndarray) -> np.ndarray:
+    def process_colors(self, values: np.ndarray) -> np.ndarray:
         """Return the values as they are: the ideal camera does not saturate."""
         return values

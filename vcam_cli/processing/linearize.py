@@ -21,10 +21,10 @@ class Linearize:
     """Whether the frame has been through it; only full-color values are still codes."""
     halo: int = 0
 
-    def on_block(self, block: Block) -> Block:
+    def process_block(self, block: Block) -> Block:
         """Return the block in linear light."""
         return block if self.frame_is_linear else Block(self.curve(block.planes), block.first_row)
 
-    def on_colors(self, values: np.ndarray) -> np.ndarray:
+    def process_colors(self, values: np.ndarray) -> np.ndarray:
         """Return the values in linear light."""
         return self.curve(values)

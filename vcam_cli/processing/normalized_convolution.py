@@ -48,12 +48,12 @@ def half_width(pattern: Pattern, color: str) -> int:
     if not here.any():
         raise ValueError(f"the pattern has no {color}")
     width = 2
-    while not _in_every_window(here, width):
+    while not _every_window_has_site(here, width):
         width += 1
     return width
 
 
-def _in_every_window(here: np.ndarray, width: int) -> bool:
+def _every_window_has_site(here: np.ndarray, width: int) -> bool:
     """Return whether every square window of so many pixels has a site."""
     shifts = [(i, j) for i in range(width) for j in range(width)]
     return bool(np.any([np.roll(here, shift, axis=(0, 1)) for shift in shifts], axis=0).all())
@@ -173,7 +173,7 @@ class NormalizedConvolution:
         """Rows that the widest tent reaches above and below."""
         return max(self.widths) - 1
 
-    def on_block(self, block: Block) -> Block:
+    def process_block(self, block: Block) -> Block:
         """Return the block in full color."""
         mosaic, halo = block.planes[0], self.halo
         rows = block.first_row + np.arange(mosaic.shape[0])
@@ -186,7 +186,7 @@ class NormalizedConvolution:
             np.copyto(plane, mosaic[inside], where=self.sites.mask(color, rows)[inside] > 0)
         return Block(planes, block.first_row + halo)
 
-    def on_colors(self, values: np.ndarray) -> np.ndarray:
+    def process_colors(self, values: np.ndarray) -> np.ndarray:
         """Return the values as they are: they have all their colors."""
         return values
 

@@ -141,5 +141,5 @@ def apply_operations(operations: Sequence[Operation], values: np.ndarray) -> np.
         Values (C, ...), or of the display's colors after color correction.
     """
     for operation in operations:
-        values = operation.on_colors(values)
+        values = operation.process_colors(values)
     return values

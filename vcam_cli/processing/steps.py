@@ -237,7 +237,7 @@ def _color_correction(draft: Draft, step: Step, path: Path) -> Draft:
         correction, note = found.operation, found.note
     else:
         correction = color_correction.ColorCorrection(step.value.matrix)
-        after = _luminance(correction.on_colors(white), color_correction.DISPLAY)
+        after = _luminance(correction.process_colors(white), color_correction.DISPLAY)
         if after <= 0 < white.max():
             raise bad(path, "this matrix leaves nothing of white", "let its rows add up to about 1")
     ceilings = draft.apply_to_colors(np.full(len(white), context.saturated_dn))

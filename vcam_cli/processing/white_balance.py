@@ -116,7 +116,7 @@ class Gains:
     context: Context
     halo: int = 0
 
-    def on_block(self, block: Block) -> Block:
+    def process_block(self, block: Block) -> Block:
         """Return the block times the gains."""
         planes, context = block.planes, self.context
         if planes.shape[0] == len(context.colors):
@@ -130,7 +130,7 @@ class Gains:
             np.multiply(rows, np.resize(one_row, planes.shape[2]), out=rows)
         return block
 
-    def on_colors(self, values: np.ndarray) -> np.ndarray:
+    def process_colors(self, values: np.ndarray) -> np.ndarray:
         """Return the values times the gains."""
         gains = np.asarray(self.gains, dtype=values.dtype)
         return values * gains.reshape(-1, *(1,) * (values.ndim - 1))

@@ -98,7 +98,7 @@ class Series:
             return self.signal / np.sqrt(self.variance)
 
     @property
-    def saturated(self) -> int:
+    def saturation_index(self) -> int:
         """Index of the saturation point: where the variance is largest, section 6 of [1]."""
         return int(np.argmax(self.variance))
 
@@ -129,7 +129,7 @@ class PhotonTransfer:
     @property
     def saturation_photons(self) -> float:
         """Photons at saturation mu_p.sat [photons]."""
-        return float(self.series.photons[self.series.saturated])
+        return float(self.series.photons[self.series.saturation_index])
 
     @property
     def saturation_capacity(self) -> float:
@@ -191,7 +191,7 @@ class PhotonTransfer:
             The series does not reach so far.
         """
         signal = self.series.signal / self.gain
-        used = (signal > 0) & (np.arange(len(signal)) <= self.series.saturated)
+        used = (signal > 0) & (np.arange(len(signal)) <= self.series.saturation_index)
         if not used.any() or not signal[used].min() <= electrons <= signal[used].max():
             raise ValueError(f"no frames around {electrons:.6g} electrons")
         x, y = np.log(signal[used]), np.log(self.series.snr[used])
@@ -219,8 +219,8 @@ def photon_transfer(series: Series) -> PhotonTransfer:
     ValueError
         Fewer than 3 levels lie in the range, or signal or variance do not rise.
     """
-    used = series.signal <= GAIN_RANGE * series.signal[series.saturated]
-    used &= np.arange(len(used)) <= series.saturated
+    used = series.signal <= GAIN_RANGE * series.signal[series.saturation_index]
+    used &= np.arange(len(used)) <= series.saturation_index
     signal, noise, photons = series.signal[used], series.noise[used], series.photons[used]
     if len(signal) < 3:
         raise ValueError(f"{len(signal)} levels up to 70 % of saturation are too few for a line")
@@ -320,9 +320,9 @@ def linearity(series: Series) -> Linearity:
     ValueError
         Fewer than 3 levels lie in the range.
     """
-    signal, full = series.signal, series.signal[series.saturated]
+    signal, full = series.signal, series.signal[series.saturation_index]
     in_range = (signal >= LINEAR_RANGE[0] * full) & (signal <= LINEAR_RANGE[1] * full)
-    in_range &= np.arange(len(signal)) <= series.saturated
+    in_range &= np.arange(len(signal)) <= series.saturation_index
     if in_range.sum() < 3:
         raise ValueError(f"{in_range.sum()} levels between 5 and 95 % of saturation are too few")
     x, y = series.photons[in_range], signal[in_range]

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from vcam_cli.effects.base import Charge, Effect, of_kind
 from vcam_cli.effects.signal_chain import ElectronEffect, NoiseSource, Quantizer, Site
-from vcam_cli.parallel import each, within
+from vcam_cli.parallel import each, slices_within
 from vcam_cli.rng import BLOCK_ROWS, blocks, stream
 
 AT_ONCE = 1 << 16
@@ -190,7 +190,7 @@ def capture(
 
     def shoot(block: slice) -> None:
         opened = sites(rate[block], dark, seeds, layer, block)
-        for rows in within(block, max(1, AT_ONCE // rate.shape[1])):
+        for rows in slices_within(block, max(1, AT_ONCE // rate.shape[1])):
             tile = mean_electrons(rate[rows], time, effects)
             here = {scope: replace(site, rows=len(tile)) for scope, site in opened.items()}
             for source in of_kind(effects, NoiseSource):

@@ -52,7 +52,7 @@ class Layout:
     """Which places of the lattice are read as one."""
 
     @property
-    def scattered(self) -> bool:
+    def is_scattered(self) -> bool:
         """Whether the pixels form no rectangular lattice of their own."""
         alone = self.binning_groups.count == 1
         return self.places is not None or (alone and self.lattice is not self.geometry)
@@ -125,8 +125,8 @@ class Layout:
             unit.
         """
         if self.places is not None:
-            return self._at_places(light)
-        if not self.scattered:
+            return self._interpolate_at_places(light)
+        if not self.is_scattered:
             return light
         out = np.empty((self.geometry.rows, self.geometry.columns), light.dtype)
         for row in (0, 1):
@@ -136,12 +136,12 @@ class Layout:
     @cached_property
     def x(self) -> NDArray:
         """Centers of all pixels, right of the axis, in the frame's shape [m]."""
-        return self._of_pixels(0)
+        return self._pixel_positions(0)
 
     @cached_property
     def y(self) -> NDArray:
         """Centers of all pixels, below the axis, in the frame's shape [m]."""
-        return self._of_pixels(1)
+        return self._pixel_positions(1)
 
     @cached_property
     def centers(self) -> tuple[NDArray, NDArray]:
@@ -182,7 +182,7 @@ class Layout:
     @property
     def _picture(self) -> tuple[NDArray, NDArray]:
         g = self.geometry
-        if not self.scattered:
+        if not self.is_scattered:
             return pixel_centers(g)
         stretch = 1.0 if self.places is not None else np.sqrt(2)
         pitch_x, pitch_y = g.pitch_x / stretch, g.pitch_y * stretch
@@ -194,7 +194,7 @@ class Layout:
     @property
     def grid(self) -> Geometry:
         """A rectangular array of the picture's rows and columns on the same sensor."""
-        if not self.scattered:
+        if not self.is_scattered:
             return self.geometry
         x, y = self.picture_x, self.picture_y
         return replace(
@@ -205,13 +205,13 @@ class Layout:
             pitch_y=self.geometry.sensor_height / len(y),
         )
 
-    def _of_pixels(self, axis: int) -> NDArray:
+    def _pixel_positions(self, axis: int) -> NDArray:
         if self.places is not None:
             return (self.places.x, self.places.y)[axis][None]
         x, y = pixel_centers(self.lattice)
         return self.select_pixels(np.broadcast_arrays(x[None, :], y[:, None])[axis])
 
-    def _at_places(self, light: NDArray) -> NDArray:
+    def _interpolate_at_places(self, light: NDArray) -> NDArray:
         assert self.places is not None
         g = self.lattice
         out = np.empty((1, len(self.places.x)), light.dtype)
@@ -257,14 +257,14 @@ def layout(camera: Camera, geometry: Geometry) -> Layout:
     if isinstance(pattern, Positions):
         found = places(camera)
         colors = channel_order(dict.fromkeys(found.colors))
-        fine = _fine(geometry, FINEST if camera.accuracy.tolerance < FINE else FINER)
+        fine = _fine_lattice(geometry, FINEST if camera.accuracy.tolerance < FINE else FINER)
         return Layout(geometry, Mosaic((colors,)), fine, planes=True, places=found)
     colors_of_lattice = mosaic(camera)
     joins = binning_groups(camera, colors_of_lattice.block, geometry)
     return Layout(joins.geometry(geometry), colors_of_lattice, geometry, binning_groups=joins)
 
 
-def _fine(g: Geometry, finer: int) -> Geometry:
+def _fine_lattice(g: Geometry, finer: int) -> Geometry:
     """Return the lattice so much finer over a sensor; raise CannotDo for one that is vast."""
     columns = max(REACH, round(g.sensor_width / g.pitch_x * finer))
     rows = max(REACH, round(g.sensor_height / g.pitch_y * finer))

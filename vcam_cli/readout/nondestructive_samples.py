@@ -99,8 +99,10 @@ def samples(
             dark = mean_dark(step, effects)
             new = sites(charge, dark, seeds, layer, block, number)
             same = sites(charge, dark, seeds, layer, block)
-            charge += _collected(mean_electrons(rate[block], step, effects), effects, new, same)
-            read = _read(charge.copy(), effects, new, same)
+            charge += _collect_charge(
+                mean_electrons(rate[block], step, effects), effects, new, same
+            )
+            read = _read_charge(charge.copy(), effects, new, same)
             read[full] = well
             full = read >= well
             electrons[number, block] = read
@@ -114,7 +116,7 @@ def samples(
 Sites = dict[str, Site]
 
 
-def _collected(mean: NDArray, effects: Sequence[Effect], new: Sites, same: Sites) -> NDArray:
+def _collect_charge(mean: NDArray, effects: Sequence[Effect], new: Sites, same: Sites) -> NDArray:
     """Return the charge that one step adds, with its shot noise [electrons]."""
     sources = of_kind(effects, NoiseSource)
     for source in sources:
@@ -125,7 +127,7 @@ def _collected(mean: NDArray, effects: Sequence[Effect], new: Sites, same: Sites
     return mean
 
 
-def _read(charge: NDArray, effects: Sequence[Effect], new: Sites, same: Sites) -> NDArray:
+def _read_charge(charge: NDArray, effects: Sequence[Effect], new: Sites, same: Sites) -> NDArray:
     """Return one readout of the charge so far, which may reuse its array [electrons]."""
     for effect in of_kind(effects, ElectronEffect):
         if effect.sample_draws != "cumulative":
@@ -221,5 +223,5 @@ def variances(effects: tuple[Effect, ...], code: Quantizer) -> tuple[float, floa
     sources = noise_sources(effects, "frame")
     new = sum(e.variance(0.0) for e in sources if e.sample_draws == "independent")
     common = sum(e.variance(0.0) for e in sources if e.sample_draws == "common")
-    below, above = code.line(np.array([0.0, 1.0]))
+    below, above = code.response(np.array([0.0, 1.0]))
     return float(new + (1 / (above - below)) ** 2 / 12), float(common)

@@ -96,7 +96,7 @@ class WaveScene:
     waves: tuple[Wave, ...]
     white: Spectrum
 
-    def at(self, x: Array, y: Array, mix: Array) -> Array:
+    def values_at(self, x: Array, y: Array, mix: Array) -> Array:
         """sum_k mix[r, k] B_k at the points (y[i], x[j]) [m]: (R, m, n), float64."""
         return wave_values(self.waves, x, y, mix)
 
@@ -124,9 +124,9 @@ class HarmonicScene:
     white: Spectrum
     chart: "ChartScene"
 
-    def at(self, x: Array, y: Array, mix: Array) -> Array:
+    def values_at(self, x: Array, y: Array, mix: Array) -> Array:
         """sum_k mix[r, k] B_k at the points (y[i], x[j]) [m]: (R, m, n)."""
-        return self.chart.at(x, y, mix)
+        return self.chart.values_at(x, y, mix)
 
 
 @dataclass(frozen=True)
@@ -154,7 +154,7 @@ class SampledScene(ABC):
         """
 
     @abstractmethod
-    def at(self, x: Array, y: Array, mix: Array) -> Array:
+    def values_at(self, x: Array, y: Array, mix: Array) -> Array:
         """sum_k mix[r, k] B_k at the points (y[i], x[j]) [m], both rising: (R, m, n)."""
 
     def rectangles(self, mix: Array) -> "Rectangles | None":
@@ -200,7 +200,7 @@ class Chart(ABC):
     def values(self, x: Array, y: Array, mix: Array) -> Array:
         """Point values: (R, len(y), len(x))."""
 
-    def within(self, x_edges: Array, y_edges: Array) -> "Chart":
+    def crop_to_cells(self, x_edges: Array, y_edges: Array) -> "Chart":
         """A chart that looks the same on these cells, if there is one that is faster there."""
         return self
 
@@ -246,7 +246,7 @@ class ChartScene(SampledScene):
         y_edges = self.center[1] + cell_edges(ny, self.pitch_y)
         out = np.empty((len(mix), ny, nx), self.dtype)
         mix = np.asarray(mix, self.dtype)
-        chart = self.chart.within(x_edges, y_edges)
+        chart = self.chart.crop_to_cells(x_edges, y_edges)
 
         def paint(rows: slice) -> None:
             chart.paint(x_edges, y_edges[rows.start : rows.stop + 1], mix, out[:, rows])
@@ -263,7 +263,7 @@ class ChartScene(SampledScene):
         middle_x, middle_y = ((e[1:] + e[:-1]) / 2 for e in (x, y))
         return Rectangles(x, y, self.chart.values(middle_x, middle_y, np.asarray(mix, float)))
 
-    def at(self, x: Array, y: Array, mix: Array) -> Array:
+    def values_at(self, x: Array, y: Array, mix: Array) -> Array:
         x, y = np.asarray(x, float), np.asarray(y, float)
         out = np.empty((len(mix), len(y), len(x)), self.dtype)
         band = max(1, CELLS_A_BAND // len(x))
@@ -376,11 +376,11 @@ class Framed(Chart):
         x, y = (_within(e, half) for e, half in zip(inner, sides, strict=True))
         return x, y
 
-    def within(self, x_edges: Array, y_edges: Array) -> "Framed":
+    def crop_to_cells(self, x_edges: Array, y_edges: Array) -> "Framed":
         _, _, inside_x = clip_cells(x_edges, self.frame.width / 2)
         _, _, inside_y = clip_cells(y_edges, self.frame.height / 2)
         if len(inside_x) and len(inside_y):
-            return replace(self, chart=self.chart.within(inside_x, inside_y))
+            return replace(self, chart=self.chart.crop_to_cells(inside_x, inside_y))
         return self
 
     def values(self, x: Array, y: Array, mix: Array) -> Array:

@@ -147,7 +147,9 @@ class DeadLeaves(Chart):
         """
         return self.unit / 1000
 
-    def within(self, x_edges: Array, y_edges: Array, hidden: Cells | None = None) -> PlacedLeaves:
+    def crop_to_cells(
+        self, x_edges: Array, y_edges: Array, hidden: Cells | None = None
+    ) -> PlacedLeaves:
         """Return the leaves that may be seen on the cells; those of `hidden` are not looked at.
 
         What is not seen is found on cells of `step` times `step`: a leaf behind one that covers

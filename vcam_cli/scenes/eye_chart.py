@@ -136,15 +136,17 @@ class EyeChart(Chart):
 
     def paint(self, x_edges: Array, y_edges: Array, mix: Array, out: Array) -> None:
         """Write the exact averages over the cells into `out`."""
-        self._mixed(polygons.cover(self.letters, x_edges, y_edges), mix, out)
+        self._mix_levels(polygons.cover(self.letters, x_edges, y_edges), mix, out)
 
     def values(self, x: Array, y: Array, mix: Array) -> Array:
         """Return the values at points."""
         out = np.empty((len(mix), len(y), len(x)), mix.dtype)
-        self._mixed(polygons.contains_points(self.letters, np.asarray(x), np.asarray(y)), mix, out)
+        self._mix_levels(
+            polygons.contains_points(self.letters, np.asarray(x), np.asarray(y)), mix, out
+        )
         return out
 
-    def _mixed(self, ink: Array, mix: Array, out: Array) -> None:
+    def _mix_levels(self, ink: Array, mix: Array, out: Array) -> None:
         light = (PAPER + (INK - PAPER) * ink).astype(mix.dtype)
         for plane, level in zip(out, mix[:, 0], strict=True):
             np.multiply(light, level, out=plane)

@@ -68,7 +68,7 @@ class HdrPatches(Chart):
             light[down, across] += (self.lamp - self.cloth) * discs.separate_cover(
                 self._disc(), *cells
             )
-        self._mixed(light, mix, out)
+        self._mix_levels(light, mix, out)
 
     def values(self, x: Array, y: Array, mix: Array) -> Array:
         """Return the values at points."""
@@ -80,7 +80,7 @@ class HdrPatches(Chart):
         light = self._patches(columns, rows)
         light[np.add.outer((y - self.lamp_y) ** 2, x**2) <= self.radius**2] = self.lamp
         out = np.empty((len(mix), len(y), len(x)), mix.dtype)
-        self._mixed(light, mix, out)
+        self._mix_levels(light, mix, out)
         return out
 
     def _patches(self, columns: Array, rows: Array) -> Array:
@@ -91,7 +91,7 @@ class HdrPatches(Chart):
     def _disc(self) -> Discs:
         return Discs(np.zeros(1), np.array([self.lamp_y]), np.array([self.radius]))
 
-    def _mixed(self, light: Array, mix: Array, out: Array) -> None:
+    def _mix_levels(self, light: Array, mix: Array, out: Array) -> None:
         for plane, level in zip(out, mix[:, 0], strict=True):
             np.multiply(light, level, out=plane, casting="same_kind")
 

@@ -93,7 +93,7 @@ class CubeScene(ImageScene):
         by_bands(paint, height, width, workers)
         return out
 
-    def at(self, x: Array, y: Array, mix: Array) -> Array:
+    def values_at(self, x: Array, y: Array, mix: Array) -> Array:
         """Return the values at points."""
         planes, (down, across) = self.planes(mix), self.black  # few planes, instead of all bands
         rows, lit_rows = self._samples_at(y, self.pitch_y, 0)

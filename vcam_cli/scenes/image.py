@@ -35,11 +35,17 @@ def placement(rows: int, columns: int, view: View) -> Placement:
         pitch = max(view.width / columns, view.height / rows)
         while pitch * columns < view.width or pitch * rows < view.height:  # a rounding error
             pitch = math.nextafter(pitch, math.inf)
-        return Placement(pitch, _cut(columns, view.width / pitch), _cut(rows, view.height / pitch))
+        return Placement(
+            pitch,
+            _surplus_samples(columns, view.width / pitch),
+            _surplus_samples(rows, view.height / pitch),
+        )
     # A stated size: what lies beyond the array, black or not, is there and is blurred into it.
     pitch = view.scene_width / columns
     width, height = _extent_with_margin(view)
-    return Placement(pitch, _cut(columns, width / pitch), _cut(rows, height / pitch))
+    return Placement(
+        pitch, _surplus_samples(columns, width / pitch), _surplus_samples(rows, height / pitch)
+    )
 
 
 def _extent_with_margin(view: View) -> tuple[float, float]:
@@ -57,7 +63,7 @@ def _visible_pitch(pitch: float, samples: int, needed: float) -> float:
     return min(pitch, needed / samples) if samples <= 2 else pitch
 
 
-def _cut(samples: int, needed: float) -> int:
+def _surplus_samples(samples: int, needed: float) -> int:
     """Return the whole samples beyond `needed` on either side; never all of them.
 
     They are rounded so that a sample is rather kept.
@@ -90,7 +96,7 @@ class ImageScene(SampledScene):
         by_bands(paint, height, width, workers)
         return out
 
-    def at(self, x: Array, y: Array, mix: Array) -> Array:
+    def values_at(self, x: Array, y: Array, mix: Array) -> Array:
         """Return the sample under each point; beyond the last sample, the picture is mirrored."""
         rows, lit_rows = self._samples_at(y, self.pitch_y, 0)
         columns, lit_columns = self._samples_at(x, self.pitch_x, 1)

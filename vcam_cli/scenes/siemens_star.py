@@ -33,7 +33,7 @@ class SiemensStar(Chart):
         """
         corner = math.hypot(abs(x_edges[[0, -1]]).max(), abs(y_edges[[0, -1]]).max())
         reach = 1.01 * corner / math.cos(math.pi / (2 * self.spokes))
-        self._mixed(polygons.cover(self._triangles(reach), x_edges, y_edges), mix, out)
+        self._mix_levels(polygons.cover(self._triangles(reach), x_edges, y_edges), mix, out)
 
     def values(self, x: Array, y: Array, mix: Array) -> Array:
         """Return the values at points."""
@@ -41,7 +41,7 @@ class SiemensStar(Chart):
         out = np.empty((len(mix), len(y), len(x)), mix.dtype)
         bright = np.heaviside(np.cos(self.spokes * angle), 0.5)
         bright[np.hypot.outer(y, x) == 0.0] = 0.5
-        self._mixed(bright, mix, out)
+        self._mix_levels(bright, mix, out)
         return out
 
     def _triangles(self, reach: float) -> polygons.Sides:
@@ -55,7 +55,7 @@ class SiemensStar(Chart):
         corners[:, 2] = reach * np.stack([np.cos(second), np.sin(second)], axis=1)
         return polygons.sides(corners)
 
-    def _mixed(self, bright: Array, mix: Array, out: Array) -> None:
+    def _mix_levels(self, bright: Array, mix: Array, out: Array) -> None:
         light = (MEAN * (1 - self.contrast + 2 * self.contrast * bright)).astype(mix.dtype)
         for plane, level in zip(out, mix[:, 0], strict=True):
             np.multiply(light, level, out=plane)

@@ -34,12 +34,12 @@ def waves(
     tuple of Wave
         A constant, and a cosine.
     """
-    fx = frequency * _without_rounding(math.cos(orientation))
-    fy = -frequency * _without_rounding(math.sin(orientation))
+    fx = frequency * _round_to_zero(math.cos(orientation))
+    fy = -frequency * _round_to_zero(math.sin(orientation))
     return (Wave((mean,)), Wave((mean * contrast,), fx, fy, phase))
 
 
-def _without_rounding(value: float) -> float:
+def _round_to_zero(value: float) -> float:
     """Return 0 for the rounding error that a multiple of 90 degrees leaves (cos 90 = 6e-17)."""
     return 0.0 if abs(value) < 1e-15 else value
 

@@ -43,8 +43,8 @@ class SlantedEdge(Chart):
         stop = np.searchsorted(along, -offset + reach, side="right")
         row, column = expand_ranges(start, stop)
         part = half_plane_cover(offset[row] + along[column], widths[0][column], widths[1][row])
-        plain = self._mixed((np.arange(len(x)) >= start[:, None]), mix)
-        for plane, edge, field in zip(out, self._mixed(part, mix), plain, strict=True):
+        plain = self._mix_levels((np.arange(len(x)) >= start[:, None]), mix)
+        for plane, edge, field in zip(out, self._mix_levels(part, mix), plain, strict=True):
             plane[:] = field
             plane[row, column] = edge
 
@@ -52,13 +52,13 @@ class SlantedEdge(Chart):
         """Return the values at points."""
         across, down = self._normal()
         distance = np.add.outer(down * np.asarray(y), across * np.asarray(x))
-        return self._mixed(np.heaviside(distance, 0.5), mix)
+        return self._mix_levels(np.heaviside(distance, 0.5), mix)
 
     def _normal(self) -> tuple[float, float]:
         """Return the unit vector (x, y down) toward the bright side."""
         return math.cos(self.angle), math.sin(self.angle)
 
-    def _mixed(self, bright: Array, mix: Array) -> Array:
+    def _mix_levels(self, bright: Array, mix: Array) -> Array:
         value = MEAN * (1.0 + self.contrast * (2.0 * bright - 1.0))
         light = value.astype(mix.dtype)
         return np.asarray(np.multiply.outer(mix[:, 0], light))

@@ -26,7 +26,7 @@ class LeavesWithColorChecker(Chart):
         """Largest cell that is painted directly [m]."""
         return self.leaves.coarsest_cell
 
-    def within(self, x_edges: Array, y_edges: Array) -> "LeavesWithColorChecker":
+    def crop_to_cells(self, x_edges: Array, y_edges: Array) -> "LeavesWithColorChecker":
         """Return the chart with only those leaves that may be seen beside the card."""
         if isinstance(self.leaves, PlacedLeaves):
             return self
@@ -35,7 +35,7 @@ class LeavesWithColorChecker(Chart):
             _CardCells(self.card.half_height, y_edges),
         )
         hidden = (down.whole, across.whole)
-        return replace(self, leaves=self.leaves.within(x_edges, y_edges, hidden))
+        return replace(self, leaves=self.leaves.crop_to_cells(x_edges, y_edges, hidden))
 
     def paint(self, x_edges: Array, y_edges: Array, mix: Array, out: Array) -> None:
         """Write the averages over the cells into `out`."""

@@ -123,10 +123,10 @@ def _continuous_candidates(
         times = np.unique(np.clip(np.append(down, down + 1), None, longest)) * frame
     times = times[(times >= start) & (times <= stop * (1 + SLACK))]
     times = _distinct_times(np.append(times, start), constraints)
-    return _with_error_bound(pdf, sensor, frame, times, tail)
+    return _add_error_bound(pdf, sensor, frame, times, tail)
 
 
-def _with_error_bound(
+def _add_error_bound(
     pdf: Pdf, sensor: Sensor, frame: float, times: Floats, tail: float
 ) -> Candidates:
     """Return the candidates with a bound of what captures inside their cells may gain.

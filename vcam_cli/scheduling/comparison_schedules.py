@@ -140,10 +140,10 @@ def captures_per_segment(probability: Floats, count: int) -> list[int]:
     """
     left_over = np.cumsum(probability[::-1])[::-1]  # of this segment and all darker ones
     shares = probability / left_over
-    counts = [max(1, int(np.ceil(_with_slack(shares[0] * count, -SLACK))))]
+    counts = [max(1, int(np.ceil(_add_slack(shares[0] * count, -SLACK))))]
     for share in shares[1:]:
         exact = (count - sum(counts)) * share
-        counts.append(int(np.floor(_with_slack(exact, SLACK) + 0.5)))
+        counts.append(int(np.floor(_add_slack(exact, SLACK) + 0.5)))
     return counts
 
 
@@ -231,7 +231,7 @@ def _first_time(t1: float, longest: float, count: int) -> float:
     return min(t1, longest)
 
 
-def _with_slack(value: float, slack: float) -> float:
+def _add_slack(value: float, slack: float) -> float:
     return value + slack * max(1.0, value)
 
 

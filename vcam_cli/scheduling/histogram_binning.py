@@ -56,7 +56,7 @@ class Merge:
     first: int
     middle: int
     end: int
-    sad: float
+    absolute_deviation: float
 
 
 def merge_bins(histogram: Pdf | Histogram, segments: int) -> tuple[Pdf, tuple[Merge, ...]]:
@@ -165,16 +165,18 @@ def _merges(widths: Floats, counts: Floats, segments: int) -> Iterator[Merge]:
     end, before = list(range(1, size + 1)), list(range(-1, size))
     sums = _Sums.from_histogram(widths, counts)
     pairs = _Pairs(size)
-    sad: list[Number] = [Fraction(0) if sums.exact else 0.0] * size  # of the segment at a bin
-    joined = sad.copy()  # of a pair
+    absolute_deviation: list[Number] = [
+        Fraction(0) if sums.exact else 0.0
+    ] * size  # of the segment at a bin
+    joined = absolute_deviation.copy()  # of a pair
 
     def increase(first: int) -> Number:
         """Return what a merge adds, below 0 where it brings both closer to their medians."""
-        return joined[first] - sad[first] - sad[end[first]]
+        return joined[first] - absolute_deviation[first] - absolute_deviation[end[first]]
 
     def enter(first: int) -> None:
         last = end[end[first]]
-        joined[first] = sums.sad(first, last)
+        joined[first] = sums.absolute_deviation(first, last)
         pairs.put(first, increase(first), sums.margin(first, last))
 
     for first in range(size - 1):
@@ -185,7 +187,7 @@ def _merges(widths: Floats, counts: Floats, segments: int) -> Iterator[Merge]:
         middle, last = end[first], end[end[first]]
         total = max(total + float(increase(first)), 0.0)
         yield Merge(first, middle, last, total)
-        sad[first] = joined[first]
+        absolute_deviation[first] = joined[first]
         end[first], before[last] = last, first
         pairs.drop(middle)
         if last < size:
@@ -223,7 +225,7 @@ class _Sums:
             return 0.0
         return CLOSE * float(self.count_below[end] - self.count_below[first])
 
-    def sad(self, first: int, end: int) -> Number:
+    def absolute_deviation(self, first: int, end: int) -> Number:
         """Return the sum of absolute differences of these bins from their mean density."""
         c, w = self.counts[first:end], self.widths[first:end]
         if self.exact:

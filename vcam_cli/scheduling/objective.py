@@ -57,7 +57,7 @@ class Schedule:
     gap: float | None = None
 
     @property
-    def used(self) -> int:
+    def distinct_captures(self) -> int:
         """Number of captures that differ."""
         return int(np.unique(self.times).size)
 

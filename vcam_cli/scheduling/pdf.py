@@ -137,15 +137,15 @@ class Pdf:
     def cdf(self, x: ArrayLike) -> Floats:
         """Return P(i <= x), the cumulative distribution function, in the shape of `x`."""
         segment, share, _ = self._position(np.asarray(x, float))
-        return self._cumulative[segment] + self._padded[segment] * share
+        return self._cumulative[segment] + self._padded_probabilities[segment] * share
 
     def first_moment(self, x: ArrayLike) -> Floats:
         """Return the integral of i f(i) up to and including `x`, in the shape of `x`."""
         segment, share, center = self._position(np.asarray(x, float))
-        return self._moments[segment] + self._padded[segment] * share * center
+        return self._moments[segment] + self._padded_probabilities[segment] * share * center
 
     @cached_property
-    def _padded(self) -> Floats:
+    def _padded_probabilities(self) -> Floats:
         """(K + 1,) probabilities, and 0 above the last."""
         return np.append(self.probability, 0.0)
 

@@ -152,13 +152,13 @@ class _CoordinateAscent:
         kept = np.unique(times)
         while len(kept) < self.count:
             beside = np.concatenate([kept + self.interval, kept - self.interval, self.kinks])
-            schedules = self._with_capture(kept, beside)
+            schedules = self._add_capture(kept, beside)
             if not len(schedules):
                 break
             kept = schedules[int(np.argmax(self._rough_snr(schedules)))]
         return kept
 
-    def _with_capture(self, others: Floats, times: Floats) -> Floats:
+    def _add_capture(self, others: Floats, times: Floats) -> Floats:
         """Return (B, n + 1) schedules: `others` with each of `times` that is admissible."""
         times = times[(times >= self.first) & (times <= self.longest)]
         if self.frame:
@@ -191,7 +191,7 @@ class _CoordinateAscent:
         """Move capture k to where the schedule is worth more, if there is such a time."""
         others, tries = np.delete(times, k), self._scan_times(times)
         for _ in range(ROUNDS):
-            schedules = self._with_capture(others, tries)
+            schedules = self._add_capture(others, tries)
             if not len(schedules):
                 break
             snr = self._rough_snr(schedules)

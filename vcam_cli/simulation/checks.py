@@ -42,12 +42,12 @@ def check_effects(camera: Camera) -> None:
     solved = {name: getattr(good.pixel.readout, name) for name in names}
     readout = camera.pixel.readout.model_copy(update=solved)
     pixel = camera.pixel.model_copy(update={"readout": readout})
-    plan.described(camera.model_copy(update={"pixel": pixel, "adc": good.adc}), geometry(good))
+    plan.camera_effects(camera.model_copy(update={"pixel": pixel, "adc": good.adc}), geometry(good))
 
 
 def check_size(camera: Camera) -> None:
     """Refuse an array too small for the demosaicing of its processing (BadInput)."""
-    if camera.array.scattered:
+    if camera.array.is_scattered:
         return
     solved = layout(camera, geometry(camera)).geometry
     if any(step.name == "demosaic" for step in camera.processing):
@@ -60,7 +60,7 @@ def check_size(camera: Camera) -> None:
 
 def check_binning(camera: Camera) -> None:
     """Refuse an array that is no whole number of binning groups (BadInput)."""
-    if not camera.array.scattered:
+    if not camera.array.is_scattered:
         layout(camera, geometry(camera))
 
 

@@ -70,7 +70,7 @@ def threads(workers: int) -> float:
     return workers**0.75
 
 
-def linear(geometry: Geometry, mosaic: Mosaic, report: SpectrumReport) -> float:
+def image_seconds(geometry: Geometry, mosaic: Mosaic, report: SpectrumReport) -> float:
     """Core seconds of image formation."""
     pixels, colors = geometry.rows * geometry.columns, len(mosaic.colors)
     if not report.terms:
@@ -84,7 +84,7 @@ def linear(geometry: Geometry, mosaic: Mosaic, report: SpectrumReport) -> float:
     )
 
 
-def after(camera: Camera, geometry: Geometry, mosaic: Mosaic) -> float:
+def output_seconds(camera: Camera, geometry: Geometry, mosaic: Mosaic) -> float:
     """Core seconds of processing, metrics and files."""
     pixels, colors = geometry.rows * geometry.columns, len(mosaic.colors)
     seconds = EXR * pixels * len(camera.output.raw)
@@ -95,7 +95,7 @@ def after(camera: Camera, geometry: Geometry, mosaic: Mosaic) -> float:
     return seconds
 
 
-def samples(camera: Camera, geometry: Geometry, effects: Sequence[Effect]) -> float:
+def sample_seconds(camera: Camera, geometry: Geometry, effects: Sequence[Effect]) -> float:
     """Core seconds that several samples of one integration take more than a single exposure."""
     count = camera.exposure.count
     if not count:
@@ -108,7 +108,7 @@ def samples(camera: Camera, geometry: Geometry, effects: Sequence[Effect]) -> fl
     return pixels * ((count - 1) * again + count * passes * ESTIMATE + files)
 
 
-def irradiance(
+def irradiance_seconds(
     camera: Camera, geometry: Geometry, knobs: Settings, report: SpectrumReport
 ) -> float:
     """Core seconds of the spectral irradiance, where it is asked for: its bands are as colors."""
@@ -117,13 +117,13 @@ def irradiance(
     band = camera.scene.wavelengths
     count = len(Band(band.start, band.stop, knobs.wavelength_step).nodes())
     bands = Mosaic((tuple(str(i) for i in range(BANDS_AT_ONCE)),))
-    together = linear(geometry, bands, report) / BANDS_AT_ONCE
+    together = image_seconds(geometry, bands, report) / BANDS_AT_ONCE
     return count * (together + EXR * geometry.rows * geometry.columns)
 
 
-def at_first_sight(camera: Camera, geometry: Geometry, mosaic: Mosaic, workers: int) -> float:
+def first_estimate(camera: Camera, geometry: Geometry, mosaic: Mosaic, workers: int) -> float:
     """Seconds of a whole run, before anything is known of its scene."""
     samples = 2 * geometry.rows * geometry.columns
     guess = SpectrumReport(cells=samples, terms=samples, planes=3, filters=1)
-    core = linear(geometry, mosaic, guess) + after(camera, geometry, mosaic)
+    core = image_seconds(geometry, mosaic, guess) + output_seconds(camera, geometry, mosaic)
     return core * slowness() / threads(workers)

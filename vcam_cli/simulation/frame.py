@@ -18,7 +18,7 @@ from vcam_cli.effects.base import Gain, of_kind
 from vcam_cli.effects.order import quantizer
 from vcam_cli.effects.signal_chain import NoiseSource, Quantizer
 from vcam_cli.image_formation import photon_rate
-from vcam_cli.image_formation.rate_cache import Lights
+from vcam_cli.image_formation.rate_cache import RateCache
 from vcam_cli.parallel import available_workers
 from vcam_cli.physics import readout
 from vcam_cli.progress import Stages
@@ -70,7 +70,7 @@ class Frame(Prepared):
         """
         if self.photocurrent is None:
             return self.dn
-        return self._without_end(self.photocurrent)
+        return self._unclipped_codes(self.photocurrent)
 
     @property
     def picture_saturated_dn(self) -> float:
@@ -81,9 +81,9 @@ class Frame(Prepared):
         charge = (linear - self.electrical.offset) * self.electrical.electrons_per_dn
         # Not all of it: the photocurrent is rounded to 32 bits, and so is its code.
         least = charge / self.times[0] * (1 - 1e-6) - self.dark_rate
-        return float(self._without_end(np.array([least]))[0])
+        return float(self._unclipped_codes(np.array([least]))[0])
 
-    def _without_end(self, photocurrent: NDArray) -> NDArray:
+    def _unclipped_codes(self, photocurrent: NDArray) -> NDArray:
         """Return codes of a photocurrent [e/s], neither rounded nor clipped [DN]."""
         return self.to_dn((photocurrent + self.dark_rate) * self.exposure_time)
 
@@ -101,29 +101,29 @@ class Frame(Prepared):
     @property
     def black_dn(self) -> float:
         """Code of the mean dark signal, offset included [DN]."""
-        dark = self.dark_rate * self.exposure_time * self._summed
+        dark = self.dark_rate * self.exposure_time * self._summed_codes
         return float(self.to_dn(np.array([dark]))[0])
 
     @property
-    def _summed(self) -> int:
+    def _summed_codes(self) -> int:
         """Pixels whose codes are added."""
         return self.layout.binning_groups.summed_codes
 
     def to_dn(self, electrons: NDArray) -> NDArray:
         """Return the ADC's curve before rounding and clipping; added codes are equal [DN]."""
-        n = self._summed
-        return self.code.line(electrons) if n == 1 else n * self.code.line(electrons / n)
+        n = self._summed_codes
+        return self.code.response(electrons) if n == 1 else n * self.code.response(electrons / n)
 
     def linear(self, dn: NDArray) -> NDArray:
         """Return what a linear ADC has for these codes, added where `to_dn` adds them [DN]."""
-        n = self._summed
+        n = self._summed_codes
         return self.code.linear(dn) if n == 1 else n * self.code.linear(dn / n)
 
     @property
     def white_dn(self) -> NDArray:
         """Codes (C,) of perfect white on the axis, noise-free, with dark, not clipped [DN]."""
         electrons = (self.white_rate + self.dark_rate) * self.exposure_time
-        return np.asarray(self.to_dn(electrons * self._summed))
+        return np.asarray(self.to_dn(electrons * self._summed_codes))
 
     @property
     def saturated_dn(self) -> float:
@@ -136,7 +136,7 @@ class Frame(Prepared):
             well -= binned_readout.SURE * self._noise_of_full
         # In both float types: where the well lies half way between two codes they round apart.
         codes = [self.code.apply(np.full(1, well, kind))[0] for kind in (np.float32, np.float64)]
-        return self._summed * float(min(*codes, highest))
+        return self._summed_codes * float(min(*codes, highest))
 
     @property
     def _noise_of_full(self) -> float:
@@ -156,7 +156,8 @@ class Frame(Prepared):
             self.camera, self.geometry, coarse, lit, self.mosaic, gains
         )
         rate = (
-            seen.level.T * self.layout.binning_groups.signal_ratio + self.dark_rate * self._summed
+            seen.level.T * self.layout.binning_groups.signal_ratio
+            + self.dark_rate * self._summed_codes
         )
         return self.to_dn(rate * self.exposure_time)
 
@@ -167,8 +168,8 @@ class Frame(Prepared):
         """
         place = self.layout
         level = self.transfer.level.T * self.exposure_time * place.binning_groups.signal_ratio
-        photo = self.scene.at(place.picture_x, place.picture_y, level)
-        return self.to_dn(photo + self.dark_rate * self.exposure_time * self._summed)
+        photo = self.scene.values_at(place.picture_x, place.picture_y, level)
+        return self.to_dn(photo + self.dark_rate * self.exposure_time * self._summed_codes)
 
 
 def expose(
@@ -176,7 +177,7 @@ def expose(
     picture: NDArray | None,
     workers: int | None,
     stages: Stages,
-    lights: Lights | None = None,
+    rate_cache: RateCache | None = None,
 ) -> Frame:
     """Simulate one frame of `camera`, from its scene on.
 
@@ -201,7 +202,7 @@ def expose(
         Where memory does not suffice.
     """
     workers = workers or available_workers()
-    return take_frame(prepare(camera, picture, workers, stages, lights), workers, stages)
+    return take_frame(prepare(camera, picture, workers, stages, rate_cache), workers, stages)
 
 
 def take_frame(ready: Prepared, workers: int, stages: Stages | None = None) -> Frame:
@@ -254,10 +255,10 @@ def figures(frame: Frame) -> list[tuple[str, float, str]]:
         ("dynamic_range_db", known.dynamic_range_db, "dB"),
         ("well_capacity", known.well_capacity, "e"),
     ]
-    return listed + _of_samples(frame, known.dark, known.draws) if frame.times else listed
+    return listed + _sample_figures(frame, known.dark, known.draws) if frame.times else listed
 
 
-def _of_samples(
+def _sample_figures(
     frame: Frame, dark: float, draws: Sequence[NoiseSource]
 ) -> list[tuple[str, float, str]]:
     """Return what several samples add: dynamic range of the photocurrent, and where it is unknown.

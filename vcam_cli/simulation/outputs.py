@@ -38,7 +38,7 @@ def write(result: Result, folder: OutputFolder) -> None:
     camera = result.frame.camera
     raw: list[Callable[[], None]] = [lambda: write_raw(result, folder.new("raw.exr"))]
     with ThreadPool(2) as pool:
-        jobs = [pool.submit(job) for job in (*raw, *_of_samples(result, folder))]
+        jobs = [pool.submit(job) for job in (*raw, *_sample_jobs(result, folder))]
         try:
             if camera.output.render:
                 render = result.render
@@ -87,7 +87,7 @@ def write_raw(result: Result, path: Path) -> None:
     raw_file.write_raw(path, result.frame, config_hash(result.frame.camera))
 
 
-def _of_samples(result: Result, folder: OutputFolder) -> Iterator[Callable[[], None]]:
+def _sample_jobs(result: Result, folder: OutputFolder) -> Iterator[Callable[[], None]]:
     """Jobs that write every sample of one integration, and what they tell together."""
     frame = result.frame
     if not frame.times:

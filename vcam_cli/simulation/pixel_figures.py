@@ -46,7 +46,7 @@ def pixel_figures(
     camera: Camera, geometry: Geometry, electrical: Electrical, joins: BinningGroups, time: float
 ) -> PixelFigures:
     """Signal over noise of a pixel that is exposed for a time [s]."""
-    wanted = plan.wanted(camera, geometry)
+    wanted = plan.enabled_effects(camera, geometry)
     draws = noise_sources(wanted, "frame")
     # In electrons of all wells together, in which shot noise is Poisson's.
     wells = joins.count // joins.summed_charges

@@ -74,7 +74,7 @@ class Plan:
         }
 
 
-def described(camera: Camera, geometry: Geometry) -> dict[str, Effect | None]:
+def camera_effects(camera: Camera, geometry: Geometry) -> dict[str, Effect | None]:
     """Every effect with this camera's numbers, or None where it does not have it.
 
     Raises BadInput for `on` for something the file does not describe.
@@ -98,20 +98,20 @@ def described(camera: Camera, geometry: Geometry) -> dict[str, Effect | None]:
 def check(camera: Camera) -> None:
     """Raises BadInput, with its place, where `effects` asks for what the file does not describe."""
     try:
-        described(camera, solve(camera))
+        camera_effects(camera, solve(camera))
     except BadInput as error:
-        raise error.located(camera.locate) from None
+        raise error.with_places(camera.locate) from None
 
 
-def wanted(camera: Camera, geometry: Geometry) -> tuple[Effect, ...]:
+def enabled_effects(camera: Camera, geometry: Geometry) -> tuple[Effect, ...]:
     """Effects that the camera has and the user has not switched off."""
-    found = described(camera, geometry).values()
+    found = camera_effects(camera, geometry).values()
     return tuple(e for e in found if e is not None and _wish(camera, e) != "off")
 
 
-def optical(camera: Camera, geometry: Geometry) -> tuple[Effect, ...]:
+def mean_signal_effects(camera: Camera, geometry: Geometry) -> tuple[Effect, ...]:
     """Effects of the linear part that run, as far as no signal level is needed to decide it."""
-    present = wanted(camera, geometry)
+    present = enabled_effects(camera, geometry)
     later = {*of_kind(present, Charge, NoiseSource), *_negligible_light(camera, present)}
     return tuple(e for e in present if e not in later)
 
@@ -140,7 +140,7 @@ def make(
     camera: Camera,
     geometry: Geometry,
     settings: Settings,
-    outlook: SignalLevels,
+    signal: SignalLevels,
     memory_bytes: int,
     changes: Mapping[str, float],
 ) -> Plan:
@@ -148,21 +148,19 @@ def make(
 
     changes: rms change of the signal by leaving out each effect, where known [electrons / s].
     """
-    found = described(camera, geometry)
-    present = list(wanted(camera, geometry))
+    found = camera_effects(camera, geometry)
+    present = list(enabled_effects(camera, geometry))
     tolerance = camera.accuracy.tolerance
     dropped = _negligible_light(camera, present)
     candidates = [e for e in present if e.removable and _wish(camera, e) == "auto"]
-    dropped |= _negligible_variance(candidates, present, outlook, tolerance)
+    dropped |= _negligible_variance(candidates, present, signal, tolerance)
     pixels = geometry.rows * geometry.columns
     decisions, active = [], []
     for kind in ORDER:
         effect = found[kind.name]
         change = changes.get(kind.name)
-        change = None if change is None else change * outlook.time
-        decision = _decide(
-            kind, effect, camera, effect in dropped, present, outlook, pixels, change
-        )
+        change = None if change is None else change * signal.time
+        decision = _decide(kind, effect, camera, effect in dropped, present, signal, pixels, change)
         decisions.append(decision)
         if effect is not None and decision.state == "on":
             active.append(effect)
@@ -180,14 +178,14 @@ def _wish(camera: Camera, effect: Effect) -> str:
 
 
 def _negligible_variance(
-    candidates: list[Effect], present: list[Effect], outlook: SignalLevels, tolerance: float
+    candidates: list[Effect], present: list[Effect], signal: SignalLevels, tolerance: float
 ) -> set[Effect]:
     """Draws whose absence changes the variance of their scope by less than 2 T at every level."""
     out: set[Effect] = set()
     for scope in ("frame", "sensor"):
-        everything = total_variance(noise_sources(present, scope), outlook)
+        everything = total_variance(noise_sources(present, scope), signal)
         missing = np.zeros(len(LEVELS))
-        variances = {e: total_variance([e], outlook) for e in noise_sources(candidates, scope)}
+        variances = {e: total_variance([e], signal) for e in noise_sources(candidates, scope)}
         for effect in sorted(variances, key=lambda e: float(variances[e].max())):
             missing = missing + variances[effect]
             # Half of it: the other is kept for what the levels in between may ask.
@@ -203,17 +201,17 @@ def _decide(
     camera: Camera,
     dropped: bool,
     present: list[Effect],
-    outlook: SignalLevels,
+    signal: SignalLevels,
     pixels: int,
     change: float | None,
 ) -> Decision:
     """One line of the plan."""
     if effect is None:
         return Decision(kind.name, "off", "camera", kind.absent, None, "", 0.0)
-    contribution, unit = effect.contribution(outlook, present)
+    contribution, unit = effect.contribution(signal, present)
     if change is not None:
         # A pixel that is full shows no change beyond the well.
-        contribution, unit = min(change / outlook.full_signal, 1.0), "of full signal"
+        contribution, unit = min(change / signal.full_signal, 1.0), "of full signal"
     seconds = kind.seconds_per_pixel * pixels
     wish = _wish(camera, effect)
     if wish == "off":

@@ -22,7 +22,7 @@ from vcam_cli.effects.order import quantizer
 from vcam_cli.errors import bad
 from vcam_cli.image_formation import bandwidth, memory_model, photon_rate, pixelwise
 from vcam_cli.image_formation.optical_path import OpticalPath, SpectrumReport
-from vcam_cli.image_formation.rate_cache import Lights
+from vcam_cli.image_formation.rate_cache import RateCache
 from vcam_cli.image_formation.settings import Settings, settings
 from vcam_cli.image_formation.transfer_functions import Transfer
 from vcam_cli.progress import Stages
@@ -73,7 +73,7 @@ def prepare(
     picture: NDArray | None,
     workers: int,
     stages: Stages,
-    lights: Lights | None = None,
+    rate_cache: RateCache | None = None,
 ) -> Prepared:
     """Brings the light of the scene to the pixels, times the exposure or its samples, decides what
     will run.
@@ -93,9 +93,9 @@ def prepare(
     )
     memory.require(needed, g.rows, g.columns)  # what was read of the scene is there already
     read = getattr(picture, "nbytes", 0)
-    stages.watch.expect(cost_model.at_first_sight(camera, g, colors, workers))
+    stages.watch.expect(cost_model.first_estimate(camera, g, colors, workers))
 
-    effects = plan.optical(camera, g)
+    effects = plan.mean_signal_effects(camera, g)
     with stages("scene"):
         band = camera.scene.wavelengths
         margin = bandwidth.margin(lattice, effects, (band.start, band.stop), knobs)
@@ -104,7 +104,7 @@ def prepare(
     with stages("optics"):
         spectra = (*scene.spectra, scene.white)
         see = partial(_transfer, camera, g, knobs, spectra, colors, effects)
-        both = see() if lights is None else lights.transfer(camera, see)
+        both = see() if rate_cache is None else rate_cache.transfer(camera, see)
         # Kept light came with another camera's effects, which are equal but not the same.
         transfer = replace(both.with_effects(effects), weights=both.weights[:-1])
         white_rate = both.level[-1]
@@ -115,11 +115,11 @@ def prepare(
         white_rate = white_rate * joins.summed_charges
         light = OpticalPath(transfer, lattice, knobs, colors, effects, workers, ceiling)
         bring = partial(photon_rate.photo_rate, light, scene, place.planes)
-        found = bring() if lights is None else lights.rate(camera, ceiling, bring)
+        found = bring() if rate_cache is None else rate_cache.rate(camera, ceiling, bring)
         taken = place.select_pixels(found.values)
     with stages("exposure"):
         white = float(white_rate.max())
-        present = plan.wanted(camera, g)
+        present = plan.enabled_effects(camera, g)
         dark = exposure.mean_dark(1.0, present)
         rate = joins.collect(_arriving(taken, dark / joins.summed_charges, effects))
         taken = joins.collect(taken)
@@ -133,16 +133,18 @@ def prepare(
         _refuse_too_much(max(peak, white * time))
         needed = max(needed, found.spectrum.memory) + read
         full = max(1.0, min(e.full_well, peak))
-        outlook = SignalLevels(full, time, dark * time, camera.array.binning)
+        signal = SignalLevels(full, time, dark * time, camera.array.binning)
         here = _on_pixels(place, joins.collect(found.values), present, effects, time)
         if transports := [transport.name for transport in of_kind(present, Transport)]:
             well = min(e.full_well / time - dark, MOST_ELECTRONS)
             moved = _rms(np.minimum(rate, well) - np.minimum(taken, well))
             here |= dict.fromkeys(transports, moved)
-        decided = plan.make(camera, g, knobs, outlook, needed, found.spectrum.changes | here)
-        core = decided.seconds + cost_model.linear(lattice, colors, found.spectrum)
-        core += cost_model.after(camera, g, colors) + cost_model.samples(camera, g, decided.active)
-        core += cost_model.irradiance(camera, g, knobs, found.spectrum)
+        decided = plan.make(camera, g, knobs, signal, needed, found.spectrum.changes | here)
+        core = decided.seconds + cost_model.image_seconds(lattice, colors, found.spectrum)
+        core += cost_model.output_seconds(camera, g, colors) + cost_model.sample_seconds(
+            camera, g, decided.active
+        )
+        core += cost_model.irradiance_seconds(camera, g, knobs, found.spectrum)
         decided = replace(
             decided, seconds=core * cost_model.slowness() / cost_model.threads(workers)
         )

@@ -48,7 +48,7 @@ def write_hdr(path: Path, frame: Frame, config_hash: str) -> None:
     """Write hdr.exr, the photocurrent that several samples tell [e/s]."""
     assert frame.photocurrent is not None
     said: dict[str, Attribute] = {
-        **_whose(frame, config_hash),
+        **_camera_metadata(frame, config_hash),
         "vcam:captureTimes": ",".join(map(repr, frame.times)),
         "vcam:estimator": frame.camera.exposure.estimator,
         "vcam:saturatedFrom": frame.electrical.saturation / frame.times[0] - frame.dark_rate,
@@ -64,7 +64,7 @@ Values = dict[str, tuple[NDArray, np.floating | None]]
 def _write(path: Path, frame: Frame, values: Values, said: dict[str, Attribute]) -> None:
     """Write values of all pixels, block by block."""
     channels = dict(_channels(frame, values))
-    rows, columns = shape = (1, frame.dn.size) if frame.layout.scattered else frame.dn.shape[-2:]
+    rows, columns = shape = (1, frame.dn.size) if frame.layout.is_scattered else frame.dn.shape[-2:]
     with ExrWriter(path, (rows, columns), list(channels), said) as exr:
         for row in range(0, shape[0], ROWS_AT_ONCE):
             block = slice(row, row + ROWS_AT_ONCE)
@@ -79,9 +79,9 @@ def _channels(frame: Frame, values: Values) -> Iterator[tuple[str, Channel]]:
             for color, plane in zip(frame.mosaic.colors, array, strict=True):
                 yield f"{name}.{color}", _rows_of(plane, factor)
         else:
-            one_row = array.reshape(1, -1) if place.scattered else array
+            one_row = array.reshape(1, -1) if place.is_scattered else array
             yield name, _rows_of(one_row, factor)
-    if place.scattered:
+    if place.is_scattered:
         yield "x", _rows_of(place.x.reshape(1, -1), 1e6)
         yield "y", _rows_of(place.y.reshape(1, -1), 1e6)
         yield "color", _rows_of(place.color.reshape(1, -1), None)
@@ -95,16 +95,16 @@ def attributes(frame: Frame, config_hash: str) -> dict[str, Attribute]:
     """Return what the file says of the frame."""
     e = frame.electrical
     return {
-        **_whose(frame, config_hash),
+        **_camera_metadata(frame, config_hash),
         "vcam:exposureTime": frame.exposure_time,
         "vcam:blackLevel": frame.black_dn,
         "vcam:whiteLevel": float(e.highest_code * frame.layout.binning_groups.summed_codes),
-        **({"vcam:conversionGain": e.conversion_gain} if e.in_volts else {}),
+        **({"vcam:conversionGain": e.conversion_gain} if e.has_volts else {}),
         **_curve(e),
     }
 
 
-def _whose(frame: Frame, config_hash: str) -> dict[str, Attribute]:
+def _camera_metadata(frame: Frame, config_hash: str) -> dict[str, Attribute]:
     """Which camera, with which seeds, and what colors its pixels have."""
     return {
         "name": frame.camera.name,
@@ -123,7 +123,7 @@ def _pattern(frame: Frame) -> dict[str, Attribute]:
     listed: dict[str, Attribute] = {"vcam:colors": ",".join(colors)}
     if frame.layout.full_color:
         return {"vcam:cfa": "stacked", **listed}
-    if not frame.layout.scattered:
+    if not frame.layout.is_scattered:
         block = "/".join("".join(row) for row in frame.mosaic.block)
         return {"vcam:cfa": "monochrome" if len(colors) == 1 else block}
     if isinstance(pattern, Positions):

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from vcam_cli.camera.camera import Camera
-from vcam_cli.image_formation.rate_cache import Lights
+from vcam_cli.image_formation.rate_cache import RateCache
 
 Picture = tuple[Any, tuple[str, ...]]
 """What a scene's file holds, and notes about it."""
@@ -20,7 +20,7 @@ class Shared:
     Files are taken to stay as they are meanwhile.
     """
 
-    lights: Lights = field(default_factory=Lights)
+    rate_cache: RateCache = field(default_factory=RateCache)
     _last: tuple[str, Picture] | None = None
 
     def picture(self, camera: Camera, read: Callable[[], Picture]) -> Picture:

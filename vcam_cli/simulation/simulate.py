@@ -15,7 +15,7 @@ from vcam_cli.camera.derived import photodiode
 from vcam_cli.camera.derived.electrical import no_volts
 from vcam_cli.camera.derived.geometry import geometry
 from vcam_cli.errors import BadInput
-from vcam_cli.parallel import suited
+from vcam_cli.parallel import suitable_workers
 from vcam_cli.processing import Context, Patches, ProcessedPicture, process
 from vcam_cli.progress import Observer, Silent, Stages
 from vcam_cli.quality import display
@@ -68,7 +68,7 @@ class Result:
         It raises BadInput where the file gives no volts.
         """
         e = self.frame.electrical
-        if not e.in_volts:
+        if not e.has_volts:
             raise no_volts("pixel.readout", "volts", "take electrons")
         return self.electrons * self.electrons.dtype.type(e.conversion_gain * e.analog_gain)
 
@@ -126,13 +126,13 @@ class Result:
         Of a honeycomb and of pixels at places of their own: of every pixel, in the shape of `dn`.
         """
         place = self.frame.layout
-        return self._of_raw(place.x) if place.scattered else place.centers[0]
+        return self._of_raw(place.x) if place.is_scattered else place.centers[0]
 
     @property
     def y(self) -> NDArray:
         """Centers of the raw frame's rows, below the array's center, (rows,) [m]; as `x`."""
         place = self.frame.layout
-        return self._of_raw(place.y) if place.scattered else place.centers[1]
+        return self._of_raw(place.y) if place.is_scattered else place.centers[1]
 
     def _of_raw(self, values: NDArray) -> NDArray:
         """Values of the raw frame in the shape that a user sees."""
@@ -199,7 +199,7 @@ def threads(camera: Camera) -> int:
     It raises BadInput where the camera's size contradicts itself.
     """
     g = geometry(camera)
-    return suited(g.rows * g.columns)
+    return suitable_workers(g.rows * g.columns)
 
 
 def simulate(
@@ -232,7 +232,7 @@ def simulate(
         stages = Stages(watch=watch or Silent())
         return _simulate(camera, workers or threads(camera), stages, shared or Shared())
     except BadInput as error:
-        raise error.located(camera.locate) from None
+        raise error.with_places(camera.locate) from None
 
 
 def prepare(
@@ -241,15 +241,15 @@ def prepare(
     """Return the camera ready to take its frame, and notes: what `vcam plan` shows."""
     try:
         stages = Stages(watch=watch or Silent())
-        camera = _with_lens(camera, stages)
+        camera = _load_lens(camera, stages)
         picture, notes = _picture(camera, stages)
         ready = bring_light(camera, picture, workers or threads(camera), stages)
         return ready, notes + _remarks(ready)
     except BadInput as error:
-        raise error.located(camera.locate) from None
+        raise error.with_places(camera.locate) from None
 
 
-def _with_lens(camera: Camera, stages: Stages) -> Camera:
+def _load_lens(camera: Camera, stages: Stages) -> Camera:
     """Return the camera with the samples of its point spread function, its wavefront checked."""
     with stages("read"):
         samples = read_lens(camera)
@@ -276,7 +276,7 @@ def _picture(camera: Camera, stages: Stages) -> tuple[Any, tuple[str, ...]]:
 def _remarks(ready: Prepared) -> tuple[str, ...]:
     """Return notes on the silicon, on times that the camera chose, and on a scene of spectra."""
     scene, band = ready.scene, ready.camera.scene.wavelengths
-    before = photodiode.remarks(ready.camera) + _chosen(ready)
+    before = photodiode.remarks(ready.camera) + _scheduled_times(ready)
     if not isinstance(scene, CubeScene):
         return before
     level = luminance(scene.white, band.start, band.stop)
@@ -290,7 +290,7 @@ def _remarks(ready: Prepared) -> tuple[str, ...]:
     return before + tuple(notes)
 
 
-def _chosen(ready: Prepared) -> tuple[str, ...]:
+def _scheduled_times(ready: Prepared) -> tuple[str, ...]:
     """Return the times of samples that the camera scheduled itself."""
     asked = ready.camera.exposure.schedule
     if asked is None:
@@ -302,9 +302,9 @@ def _chosen(ready: Prepared) -> tuple[str, ...]:
 
 
 def _simulate(camera: Camera, workers: int, stages: Stages, shared: Shared) -> Result:
-    camera = _with_lens(camera, stages)
+    camera = _load_lens(camera, stages)
     picture, notes = shared.picture(camera, lambda: _picture(camera, stages))
-    frame = expose(camera, picture, workers, stages, shared.lights)
+    frame = expose(camera, picture, workers, stages, shared.rate_cache)
     context = Context(
         pattern=frame.mosaic.block,
         colors=frame.mosaic.colors,
@@ -314,7 +314,7 @@ def _simulate(camera: Camera, workers: int, stages: Stages, shared: Shared) -> R
         saturated_dn=frame.picture_saturated_dn,
         patches=lambda: _patches(frame),
         planes=frame.layout.full_color,
-        layout=frame.layout if frame.layout.scattered else None,
+        layout=frame.layout if frame.layout.is_scattered else None,
     )
     with stages("balance"):
         processed = process(frame.picture_dn, context, camera.processing, workers=workers)

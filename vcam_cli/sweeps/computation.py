@@ -11,7 +11,7 @@ from pathlib import Path
 from vcam_cli.camera.camera import Camera
 from vcam_cli.files.points_store import POINTS, SweepFolder
 from vcam_cli.files.report import hash_file
-from vcam_cli.image_formation.rate_cache import depends_on
+from vcam_cli.image_formation.rate_cache import light_key
 from vcam_cli.progress import Observer
 from vcam_cli.simulation import provenance
 from vcam_cli.sweeps import expectations, figures, sweep_points, sweep_tables, workers
@@ -109,12 +109,12 @@ class _Points:
             camera = point.camera
             assert camera is not None
             if point.content not in lights:
-                lights[point.content] = depends_on(camera)
-            job = Job(point.id, _bare(camera), self._metrics, self._keep, versions)
+                lights[point.content] = light_key(camera)
+            job = Job(point.id, _without_texts(camera), self._metrics, self._keep, versions)
             groups.setdefault(lights[point.content], []).append(job)
         return list(groups.values())
 
-    def unfinished(self, groups: list[list[Job]]) -> list[list[Job]]:
+    def unfinished_points(self, groups: list[list[Job]]) -> list[list[Job]]:
         """Return the points of these groups that are not finished."""
         final = {point for point, outcome in self.outcomes.items() if outcome.final}
         return [[job for job in group if job.id not in final] for group in groups]
@@ -135,7 +135,7 @@ class _Points:
         self.outcomes[outcome.id] = replace(outcome, frames={})
 
 
-def _bare(camera: Camera) -> Camera:
+def _without_texts(camera: Camera) -> Camera:
     """Return a camera without what is only needed for messages, quick to send."""
     bare = camera.model_copy()
     bare._origin = None
@@ -162,7 +162,7 @@ def _compute(
     """Compute what is left, and return the number of points computed."""
     if points.are_final:
         return 0
-    groups = points.unfinished(_groups_of_share(points.groups(), execution.share))
+    groups = points.unfinished_points(_groups_of_share(points.groups(), execution.share))
     total = sum(len(group) for group in groups)
     if not total:
         return 0

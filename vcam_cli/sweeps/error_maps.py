@@ -110,10 +110,10 @@ class MapCache:
         """Return the maps of a camera; VcamError or MemoryError where they cannot be computed."""
         key = camera.camera.model_dump_json()
         if key not in self._maps:
-            self._maps[key] = self._computed(camera)
+            self._maps[key] = self._compute(camera)
         return self._maps[key]
 
-    def _computed(self, camera: FigureCamera) -> ErrorMaps:
+    def _compute(self, camera: FigureCamera) -> ErrorMaps:
         first, *others = (simulate(frame, shared=self._shared) for frame in camera.frames)
         frames = np.stack([np.asarray(r.s_cielab, np.float32) for r in (first, *others)])
         repeats = frames.reshape(-1, self._seeds, *frames.shape[1:])
@@ -184,7 +184,7 @@ def distribution(planned: PlannedFigure, cache: MapCache) -> FigureContent:
     """Return the distribution of Delta E over the pixels: density, quantiles, mean, modes."""
     rows, curves, marks = list[Row](), list[Curve](), list[tuple[float, int]]()
     every = [cache.maps(camera) for camera in planned.cameras]
-    shown = max(int(np.searchsorted(_below(maps)[1:], SHOWN)) + 2 for maps in every)
+    shown = max(int(np.searchsorted(_cumulative_shares(maps)[1:], SHOWN)) + 2 for maps in every)
     step = max(1, shown // STEPS)
     for number, (camera, maps) in enumerate(zip(planned.cameras, every, strict=True)):
         modes = density_modes(maps.counts, BIN, float(maps.delta_e.size))
@@ -193,7 +193,10 @@ def distribution(planned: PlannedFigure, cache: MapCache) -> FigureContent:
         edges, count = np.arange(len(maps.counts) + 1) * BIN, len(modes.locations)
         table: list[Row] = [
             ("mean", "", maps.mean),
-            *(("quantile", q, float(np.interp(q, _below(maps), edges))) for q in QUANTILES),
+            *(
+                ("quantile", q, float(np.interp(q, _cumulative_shares(maps), edges)))
+                for q in QUANTILES
+            ),
             ("standard deviation", "", modes.spread),
             ("modes", "", float(count)),
             *(("mode", i, place) for i, place in enumerate(modes.locations, start=1)),
@@ -212,6 +215,6 @@ def distribution(planned: PlannedFigure, cache: MapCache) -> FigureContent:
     return FigureContent((*planned.head, "what", "at", "value"), rows, (panel,))
 
 
-def _below(maps: ErrorMaps) -> NDArray:
+def _cumulative_shares(maps: ErrorMaps) -> NDArray:
     """Return the share of pixels below every edge of a bin."""
     return np.concatenate([[0.0], np.cumsum(maps.counts) / maps.counts.sum()])

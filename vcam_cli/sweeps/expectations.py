@@ -22,7 +22,7 @@ from vcam_cli.sweeps.model import OPTIMUM, Expectation
 from vcam_cli.sweeps.study_cameras import StudyCameras
 from vcam_cli.sweeps.sweep_file import Parameter
 from vcam_cli.sweeps.sweep_result import ExpectationResult
-from vcam_cli.sweeps.sweep_tables import Findings, rounded
+from vcam_cli.sweeps.sweep_tables import Findings, table_number
 
 EXPECT = "expect"
 """The key of the study file."""
@@ -51,7 +51,7 @@ class PlannedExpectation:
 
     def result(self, findings: Findings) -> ExpectationResult:
         """Compare the number that was found with those that were expected."""
-        value = rounded(self.lookup(findings))
+        value = table_number(self.lookup(findings))
         verdict = "inside" if self.least <= value <= self.most else "missed"
         if math.isnan(value):
             verdict = "unknown"

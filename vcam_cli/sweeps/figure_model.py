@@ -12,7 +12,7 @@ from pydantic_core import InitErrorDetails
 
 from vcam_cli.config.lists import list_of_any, read_list, words_of
 from vcam_cli.config.model import Model, Rule, key
-from vcam_cli.config.validation_messages import describe, fault, in_yaml
+from vcam_cli.config.validation_messages import describe, fault, yaml_text
 from vcam_cli.config.values import Choice, Either, Positive, Text
 from vcam_cli.errors import Path
 from vcam_cli.sweeps.quantities import CURVES, PROPERTIES, QUANTITIES, is_measured
@@ -49,7 +49,7 @@ def _keys_of_kind(given: Mapping[str, Any]) -> Iterator[InitErrorDetails]:
             message = f"a figure of {show} has no {name}"
             yield fault((name,), message, f"remove it: it is of {', '.join((*needing, *others))}")
         elif not given.get(name) and show in needing:
-            example = in_yaml((Figure.model_fields[name].examples or [""])[0])
+            example = yaml_text((Figure.model_fields[name].examples or [""])[0])
             yield fault((name,), "is missing", f"add it, for example {name}: {example}")
 
 

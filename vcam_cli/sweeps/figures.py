@@ -79,12 +79,12 @@ def writers(
 def metric_plots(findings: Findings) -> Writers:
     """Return what writes the plot of every metric over the parameter of most values."""
     grid, found = findings.grid, Writers()
-    parameter = max(grid.varied, key=lambda p: len(p.nodes))
+    parameter = max(grid.case_parameters, key=lambda p: len(p.nodes))
     cases = tuple(c.name for c in grid.cases.values() if parameter.path in c.parameters)
     for metric in grid.study.model.metrics:
         figure = Figure(show="curves", quantities=(metric,), title=grid.study.model.name)
         planned = PlannedFigure(metric, figure, parameter, cases, (metric,))
-        content = _over_parameter(planned, findings)
+        content = _parameter_panels(planned, findings)
         found[f"{metric}.png"] = partial(plots.draw, title=planned.title, content=content)
     return found
 
@@ -92,9 +92,9 @@ def metric_plots(findings: Findings) -> Writers:
 def _content(planned: PlannedFigure, findings: Findings, cache: MapCache) -> FigureContent:
     match planned.figure.show:
         case "curves" if planned.figure.abscissa:
-            return _over_abscissa(planned)
+            return _abscissa_panels(planned)
         case "curves":
-            return _over_parameter(planned, findings)
+            return _parameter_panels(planned, findings)
         case "optima":
             return _optima(planned, findings)
         case "pictures":
@@ -129,15 +129,15 @@ class _Series:
         return {"case": self.case, **{p.column: cell for p, cell in self.others}}
 
 
-def _over_parameter(planned: PlannedFigure, findings: Findings) -> FigureContent:
+def _parameter_panels(planned: PlannedFigure, findings: Findings) -> FigureContent:
     """Return quantities over the parameter: means and ranges of metrics, optima as crosses."""
     series = list[_Series]()
     for quantity in planned.figure.quantities:
         for case in planned.cases:
             if quantity in planned.measured:
-                series += _measured(findings, case, quantity, planned.parameter.path)
+                series += _metric_curves(findings, case, quantity, planned.parameter.path)
             else:
-                series.append(_computed(planned, case, quantity))
+                series.append(_property_curve(planned, case, quantity))
     panels = dict[str, list[_Series]]()
     for one in series:
         panels.setdefault(quantities.unit(one.quantity), []).append(one)
@@ -145,7 +145,7 @@ def _over_parameter(planned: PlannedFigure, findings: Findings) -> FigureContent
     return FigureContent(*_table(planned, series), shown)
 
 
-def _measured(findings: Findings, case: str, metric: str, path: str) -> Iterator[_Series]:
+def _metric_curves(findings: Findings, case: str, metric: str, path: str) -> Iterator[_Series]:
     """Yield a metric in a case over a parameter, for each of the values of the others."""
     surface = findings.surface(case, metric)
     axis = next(i for i, p in enumerate(surface.parameters) if p.path == path)
@@ -171,7 +171,7 @@ def _measured(findings: Findings, case: str, metric: str, path: str) -> Iterator
         )
 
 
-def _computed(planned: PlannedFigure, case: str, quantity: str) -> _Series:
+def _property_curve(planned: PlannedFigure, case: str, quantity: str) -> _Series:
     """Return a property of the cameras of a case."""
     cameras = [camera for camera in planned.cameras if camera.case == case]
     if not isinstance(cameras[0].cell, str):
@@ -220,17 +220,17 @@ def _panel(parameter: Parameter, series: Sequence[_Series]) -> Panel:
         text = ", ".join(name)
         curves.append(Curve(text, s.cells, s.values, color, dash, True, s.low, s.high, s.optimum))
     label = ", ".join(map(quantities.label, names if len(names) < 3 else ()))
-    y_label = quantities.labeled(label, quantities.unit(names[0])).lstrip()
+    y_label = quantities.axis_label(label, quantities.unit(names[0])).lstrip()
     return Panel(_axis_label(parameter), y_label, tuple(curves))
 
 
 def _axis_label(parameter: Parameter) -> str:
     """Return a parameter on an axis: "pixel width [µm]"."""
     words = " ".join(parameter.path.split(".")[-2:]).replace("_", " ")
-    return quantities.labeled(words, parameter.unit)
+    return quantities.axis_label(words, parameter.unit)
 
 
-def _over_abscissa(planned: PlannedFigure) -> FigureContent:
+def _abscissa_panels(planned: PlannedFigure) -> FigureContent:
     """Return curves of cameras over a frequency, a wavelength or a position."""
     figure, rows, drawn, marks = planned.figure, list[Row](), list[Curve](), []
     nyquists = [properties.value(c.camera, "nyquist_frequency") for c in planned.cameras]
@@ -266,7 +266,7 @@ def _optima(planned: PlannedFigure, findings: Findings) -> FigureContent:
     parameter, name = planned.parameter, planned.figure.against or ""
     rows, curves = list[Row](), list[Curve]()
     for case in planned.cases:
-        (x,) = _computed(planned, case, name).values
+        (x,) = _property_curve(planned, case, name).values
         optimum = findings.optimum(case, parameter.path)
         if optimum is not None:
             rows.append((case, x, *optimum.row[3:6]))
@@ -277,7 +277,7 @@ def _optima(planned: PlannedFigure, findings: Findings) -> FigureContent:
         ends = np.array([0.0, 1.05 * max(float(curve.x[0]) for curve in curves)])
         slope = curves[0].y[0] / float(curves[0].x[0])
         curves.append(Curve("proportional", ends, slope * ends, len(curves), 1))
-    x_label = quantities.labeled(quantities.label(name), quantities.unit(name))
+    x_label = quantities.axis_label(quantities.label(name), quantities.unit(name))
     panel = Panel(x_label, f"best {_axis_label(parameter)}", tuple(curves), y_limits=(0, None))
     columns = ("case", quantities.column(name), parameter.column, "low", "high")
     return FigureContent(columns, rows, (panel,))

@@ -70,7 +70,7 @@ def find_optimum(parameter: NDArray, curves: NDArray, goal: str) -> Optimum:
     scale = np.log(x) if x[0] > 0 else x
     window, rest, follows = _fit_window(scale, y)
     best, value = (float(part[0]) for part in _minima(scale, y.mean(axis=0)[None], window))
-    found = _minima(scale, _resampled(y, rest), window)[0]
+    found = _minima(scale, _bootstrap_means(y, rest), window)[0]
     low, high = math.nan, math.nan
     if found.size:
         tail = (1 - CONFIDENCE) / 2
@@ -84,7 +84,7 @@ def find_optimum(parameter: NDArray, curves: NDArray, goal: str) -> Optimum:
     if len(x) > 1 and best in (scale[0], scale[-1]):
         edge = "low" if best == scale[0] else "high"
     back = np.exp if x[0] > 0 else np.asarray
-    place, low, high = (_snapped(float(back(v)), x) for v in (best, low, high))
+    place, low, high = (_snap_to_range(float(back(v)), x) for v in (best, low, high))
     return Optimum(place, low, high, value if goal == "min" else -value, edge)
 
 
@@ -97,7 +97,7 @@ def _best_point(x: NDArray, mean: NDArray, goal: str) -> Optimum:
     return Optimum(float(x[i]), float(low), float(high), value, ends.get(i, ""))
 
 
-def _snapped(value: float, x: NDArray) -> float:
+def _snap_to_range(value: float, x: NDArray) -> float:
     """Return the value, with what the logarithm did to values of the range undone."""
     nearest = float(x[np.abs(x - value).argmin()]) if math.isfinite(value) else value
     return nearest if math.isclose(value, nearest, rel_tol=1e-12) else value
@@ -115,7 +115,7 @@ class _Window:
         """The points as a slice."""
         return slice(self.start, self.start + self.size)
 
-    def around(self, best: int, points: int) -> _Window:
+    def centered_on(self, best: int, points: int) -> _Window:
         """Return itself where it has the best point of a curve, moved there otherwise."""
         if self.start <= best < self.start + self.size:
             return self
@@ -175,7 +175,7 @@ def _variance_of_mean(curves: NDArray) -> float:
     return float(np.square(rest).sum()) / ((count - 1) * (points - 1) * count)
 
 
-def _resampled(curves: NDArray, rest: float) -> NDArray:
+def _bootstrap_means(curves: NDArray, rest: float) -> NDArray:
     """Return means of curves drawn with replacement: (DRAWS, points).
 
     The spread of n curves around their own mean is too small by (n - 1) / n, which is undone. Few
@@ -218,7 +218,7 @@ def _minima(x: NDArray, curves: NDArray, window: _Window) -> tuple[NDArray, NDAr
     places, values = x[best], curves[rows, best]
     if window.size < 3:
         return places, values
-    windows = [window.around(int(i), len(x)) for i in best]
+    windows = [window.centered_on(int(i), len(x)) for i in best]
     for own in dict.fromkeys(windows):
         these = rows[[w == own for w in windows]]
         some = x[own.points]

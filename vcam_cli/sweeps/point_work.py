@@ -40,7 +40,7 @@ def compute_point(job: Job, threads: int, shared: Shared) -> Outcome:
     trace, final = "", True
     try:
         with restore_interrupt():
-            metrics, frames = _simulated(job, threads, shared)
+            metrics, frames = _simulate_point(job, threads, shared)
         return Outcome(job.id, metrics, seconds=time.perf_counter() - start, frames=frames)
     except BadInput as error:
         message = error_cell(error.problems)
@@ -55,7 +55,9 @@ def compute_point(job: Job, threads: int, shared: Shared) -> Outcome:
     return Outcome(job.id, error=message, final=final, seconds=seconds, trace=trace)
 
 
-def _simulated(job: Job, threads: int, shared: Shared) -> tuple[dict[str, float], dict[str, bytes]]:
+def _simulate_point(
+    job: Job, threads: int, shared: Shared
+) -> tuple[dict[str, float], dict[str, bytes]]:
     """Return the metrics of a point, and the files that are kept of it."""
     _check_versions(job)
     result = simulate(job.camera, threads, shared=shared)

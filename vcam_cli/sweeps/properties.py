@@ -51,14 +51,14 @@ def value(camera: Camera, name: str) -> float:
     return float(_VALUES[name](camera, geometry(camera)))
 
 
-def _scaled(value: float | None, factor: float) -> float:
+def _scale(value: float | None, factor: float) -> float:
     return math.nan if value is None else value * factor
 
 
-def _in_volts(camera: Camera, name: str, factor: float) -> float:
+def _voltage(camera: Camera, name: str, factor: float) -> float:
     """Return a figure of the circuit, nan where the camera only counts electrons."""
     circuit = electrical(camera)
-    return _scaled(getattr(circuit, name) if circuit.in_volts else None, factor)
+    return _scale(getattr(circuit, name) if circuit.has_volts else None, factor)
 
 
 def _feature_size(camera: Camera) -> float | None:
@@ -94,9 +94,9 @@ _VALUES: dict[str, Callable[[Camera, Geometry], float]] = {
     "effective_fill_factor": lambda _, g: g.effective_fill_factor,
     "photodetector_area": lambda _, g: g.detector_area * 1e12,
     "photodetector_perimeter": lambda camera, _: detector(camera).perimeter * 1e6,
-    "capacitance": lambda camera, _: _scaled(electrical(camera).capacitance, 1e15),
-    "conversion_gain": lambda camera, _: _in_volts(camera, "conversion_gain", 1e6),
-    "voltage_swing": lambda camera, _: _in_volts(camera, "voltage_swing", 1.0),
+    "capacitance": lambda camera, _: _scale(electrical(camera).capacitance, 1e15),
+    "conversion_gain": lambda camera, _: _voltage(camera, "conversion_gain", 1e6),
+    "voltage_swing": lambda camera, _: _voltage(camera, "voltage_swing", 1.0),
     "full_well": lambda camera, _: electrical(camera).full_well,
     "well_capacity": lambda camera, g: (
         electrical(camera).full_well * layout(camera, g).binning_groups.summed_codes
@@ -106,7 +106,7 @@ _VALUES: dict[str, Callable[[Camera, Geometry], float]] = {
         dark_rate(camera) * readout.ELEMENTARY_CHARGE / g.detector_area * 1e5
     ),
     "nyquist_frequency": lambda _, g: 0.5e-3 / g.pitch_x,
-    "feature_size": lambda camera, _: _scaled(_feature_size(camera), 1e6),
+    "feature_size": lambda camera, _: _scale(_feature_size(camera), 1e6),
     "corner_vignetting": _corner_vignetting,
     "dynamic_range_db": _pixel_figure("dynamic_range_db"),
     "snr_db": _pixel_figure("snr_db"),
@@ -135,7 +135,7 @@ def curves(camera: Camera, abscissa: str, nyquist: float) -> tuple[Curves, ...]:
         return tuple(_mtf(camera, nyquist))
     if abscissa == WAVELENGTH:
         return tuple(_quantum_efficiency(camera))
-    return (_along_diagonal(camera),)
+    return (_diagonal_curves(camera),)
 
 
 def _mtf(camera: Camera, nyquist: float) -> list[Curves]:
@@ -154,7 +154,7 @@ def _mtf(camera: Camera, nyquist: float) -> list[Curves]:
         colors = range(len(mosaic.colors))
         return [directional_mtf(found, effects, color, frequency, (1.0, 0.0)) for color in colors]
 
-    effects = plan.optical(camera, g)
+    effects = plan.mean_signal_effects(camera, g)
     both = transfer(effects), transfer(tuple(e for e in effects if e.origin != "lens"))
     x = {FREQUENCY: frequency / 1e3, "of_nyquist": frequency / (nyquist * 1e3)}
     return [
@@ -181,13 +181,13 @@ def _quantum_efficiency(camera: Camera) -> list[Curves]:
     return found
 
 
-def _along_diagonal(camera: Camera) -> Curves:
+def _diagonal_curves(camera: Camera) -> Curves:
     """Return what pixels along the diagonal collect, positions positive to the lower right.
 
     Raises BadInput where all pixels collect alike.
     """
     g = geometry(camera)
-    gains = of_kind(plan.wanted(camera, g), Gain)
+    gains = of_kind(plan.enabled_effects(camera, g), Gain)
     tunnel = next(iter(of_kind(gains, PixelVignetting)), None)
     falloff = next((e for e in gains if e.name == OffAxis.name), None)
     if tunnel is None and falloff is None:
@@ -213,6 +213,6 @@ def _along_diagonal(camera: Camera) -> Curves:
 
 def _tunnel_transmission(tunnel: PixelVignetting, x: NDArray, y: NDArray) -> NDArray:
     """Return the share of the light behind the layers that meets the photodetector."""
-    share = np.asarray(tunnel.at(x, y), float)
+    share = np.asarray(tunnel.exact_gain(x, y), float)
     straight = float(vignetting.stack_transmission(1.0, tunnel.layers))
     return share / straight if tunnel.internal else share

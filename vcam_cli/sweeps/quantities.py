@@ -105,6 +105,6 @@ def symbol(unit: str) -> str:
     return _SYMBOLS.get(unit, unit)
 
 
-def labeled(text: str, unit: str) -> str:
+def axis_label(text: str, unit: str) -> str:
     """Return the label of an axis: "pixel width [µm]"."""
     return f"{text} [{symbol(unit)}]" if unit else text

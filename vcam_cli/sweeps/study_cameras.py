@@ -21,7 +21,7 @@ from vcam_cli.simulation.checks import CHECKS
 from vcam_cli.sweeps.figure_model import Figure
 from vcam_cli.sweeps.quantities import is_measured
 from vcam_cli.sweeps.sweep_file import Cell, Parameter
-from vcam_cli.sweeps.sweep_points import Grid, case_file, seeded
+from vcam_cli.sweeps.sweep_points import Grid, case_file, with_next_seed
 
 FIGURES = "figures"
 """The key of the study file."""
@@ -91,13 +91,13 @@ class StudyCameras:
         place: in the study file. Rendered, there is one for every repeat and seed of the study,
         whose pictures are compared; else one, of the first repeat. Raises BadInput.
         """
-        repeated, found = self.grid.repeated, list[Camera]()
+        repeated, found = self.grid.averaged_parameters, list[Camera]()
         for chosen in itertools.product(*(p.nodes for p in repeated)):
             repeat = {p.path: node for p, node in zip(repeated, chosen, strict=True)}
             camera = self._camera(place, case, nodes | repeat, is_rendered)
             if not is_rendered:
                 return (camera,)
-            found += [seeded(camera, i) for i in range(self.grid.study.model.seeds)]
+            found += [with_next_seed(camera, i) for i in range(self.grid.study.model.seeds)]
         return tuple(found)
 
     def _camera(
@@ -131,7 +131,7 @@ class StudyCameras:
         """
         metrics = self.grid.study.model.metrics
         measured = tuple(q for q in figure.quantities if is_measured(q, metrics, figure.set))
-        varied = {p.path: p for p in self.grid.varied}
+        varied = {p.path: p for p in self.grid.case_parameters}
         if figure.over and figure.over not in varied:
             raise self._wrong((name, "over"), *one_of(figure.over, varied))
         widest = max(varied.values(), key=lambda p: len(p.nodes))
@@ -163,7 +163,7 @@ class StudyCameras:
         values = self.grid.cases[case].parameters[parameter.path]
         if figure.at:
             values = self.grid.study.values(parameter, FIGURES, name, "at")
-        nodes, has_camera = self._fixed(name, figure, case, parameter.path), False
+        nodes, has_camera = self._first_values(name, figure, case, parameter.path), False
         for node, cell in zip(values.nodes, values.cells, strict=True):
             try:
                 nodes[parameter.path] = node
@@ -180,9 +180,9 @@ class StudyCameras:
             message = f"no camera of the case {case} is valid"
             raise self._wrong((name,), message, "correct the case, or leave it out of the figure")
 
-    def _fixed(self, name: str, figure: Figure, case: str, path: str) -> dict[str, Node]:
+    def _first_values(self, name: str, figure: Figure, case: str, path: str) -> dict[str, Node]:
         """Return the first values of the other parameters, which the figure has to set itself."""
-        for varied in (path, *(p.path for p in self.grid.repeated)):
+        for varied in (path, *(p.path for p in self.grid.averaged_parameters)):
             if varied in figure.set:
                 raise self._wrong(
                     (name, "set", varied), "is varied by the study", "set another key"

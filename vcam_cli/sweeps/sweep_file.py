@@ -22,7 +22,7 @@ from vcam_cli.camera.load import merge
 from vcam_cli.config import validation_messages
 from vcam_cli.config.document import Document, place_order
 from vcam_cli.config.file_names import argument_file, current_folder, referenced_file
-from vcam_cli.config.validation_messages import in_yaml
+from vcam_cli.config.validation_messages import yaml_text
 from vcam_cli.config.yaml_reader import read_file
 from vcam_cli.config.yaml_tree import Node, Origin, Source, places, tree_at
 from vcam_cli.errors import BadInput, Problem, split
@@ -103,7 +103,7 @@ class StudyFile:
         assert found is not None
         return found
 
-    def varied(self, case: str | None) -> dict[str, Parameter]:
+    def case_parameters(self, case: str | None) -> dict[str, Parameter]:
         """Return what is varied in a case, by path: the study's, or the case's in its place."""
         found = self._parameters(self.model.vary, VARY)
         if case is None or not self.model.cases[case].vary:
@@ -111,13 +111,13 @@ class StudyFile:
         own = self._parameters(self.model.cases[case].vary, "cases", case, VARY)
         for path, parameter in own.items():
             if path in found and parameter.unit != found[path].unit:
-                own[path] = _in_unit(parameter, found[path].unit)
+                own[path] = _convert_cells(parameter, found[path].unit)
         return found | own
 
-    def repeated(self) -> dict[str, Parameter]:
+    def averaged_parameters(self) -> dict[str, Parameter]:
         """Return what is averaged over, by path."""
         return {
-            path: _listed(path, self.node("repeat", path), values)
+            path: _cell_values(path, self.node("repeat", path), values)
             for path, values in self.model.repeat.items()
         }
 
@@ -136,7 +136,7 @@ class StudyFile:
                     camera = _camera_name(base)
                     name = camera if case is None else f"{camera}/{case}"
                 judged = tree_at(("quality",), quality)
-                yield StudyCase(name, base.overlay(own).overlay(judged), self.varied(case))
+                yield StudyCase(name, base.overlay(own).overlay(judged), self.case_parameters(case))
 
     def word_values(self, over: Node) -> Iterator[Document]:
         """Yield what the overrides, and each word among the values, lead to by themselves.
@@ -147,7 +147,7 @@ class StudyFile:
         nothing = Document(self.file, Node({}, Source("", self.file.parent)), cameras.FORMAT)
         yield nothing.overlay(over)
         for case in (None, *self.model.cases):
-            for parameter in (self.varied(case) | self.repeated()).values():
+            for parameter in (self.case_parameters(case) | self.averaged_parameters()).values():
                 if isinstance(parameter.cells[0], str):
                     for node in parameter.nodes:
                         yield nothing.overlay(tree_at(split(parameter.path), node))
@@ -162,15 +162,15 @@ class StudyFile:
         nodes = node if isinstance(node.value, list) else replace(node, value=[node])
         plain = nodes.plain()
         assert isinstance(plain, list)
-        found = _listed(path, nodes, tuple(plain))
-        return _in_unit(found, unit) if found.unit != unit else found
+        found = _cell_values(path, nodes, tuple(plain))
+        return _convert_cells(found, unit) if found.unit != unit else found
 
     def _parameters(self, vary: Mapping, *at: str) -> dict[str, Parameter]:
         out = {}
         for path, variation in vary.items():
             node = self.node(*at, path)
             if variation.values is not None:
-                out[path] = _listed(path, self.node(*at, path, "values"), variation.values)
+                out[path] = _cell_values(path, self.node(*at, path, "values"), variation.values)
             else:
                 try:
                     out[path] = _range(path, node, variation)
@@ -201,11 +201,11 @@ def read(study: str | Path, folder: Path | None = None) -> StudyFile:
     except ValidationError as error:
         unnamed = [_without_key_mark(p) for p in validation_messages.problems(error)]
         origin = Origin(file, (file,), tree)
-        located = BadInput(unnamed).located(origin.locate).problems
+        located = BadInput(unnamed).with_places(origin.locate).problems
         raise BadInput(sorted(located, key=place_order)) from None
     for case in (None, *found.model.cases):
-        found.varied(case)
-    found.repeated()
+        found.case_parameters(case)
+    found.averaged_parameters()
     return found
 
 
@@ -268,7 +268,7 @@ def _range(path: str, node: Node, variation) -> Parameter:
     return Parameter(path, unit, nodes, tuple(float(n) for n in numbers))
 
 
-def _listed(path: str, node: Node, values: tuple) -> Parameter:
+def _cell_values(path: str, node: Node, values: tuple) -> Parameter:
     """Return values as they were written; numbers where all are, words otherwise."""
     assert isinstance(node.value, list)
     nodes = tuple(node.value)
@@ -276,11 +276,11 @@ def _listed(path: str, node: Node, values: tuple) -> Parameter:
         first, unit = units.split(values[0])
         numbers = [first, *(units.convert(*units.split(v), unit) for v in values[1:])]
     except ValueError:
-        return Parameter(path, "", nodes, tuple(in_yaml(v) for v in values))
+        return Parameter(path, "", nodes, tuple(yaml_text(v) for v in values))
     return Parameter(path, unit, nodes, tuple(float(n) for n in numbers))
 
 
-def _in_unit(parameter: Parameter, unit: str) -> Parameter:
+def _convert_cells(parameter: Parameter, unit: str) -> Parameter:
     """Return the same values, with cells in another unit where they are numbers of that kind."""
     try:
         cells = tuple(

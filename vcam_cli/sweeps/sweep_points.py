@@ -43,9 +43,9 @@ class Point:
     """One frame of the study."""
 
     case: str
-    varied: dict[str, Cell]
+    case_values: dict[str, Cell]
     """Path of a parameter -> its value here."""
-    repeated: dict[str, Cell]
+    averaged_values: dict[str, Cell]
     """Path of what is averaged over -> its value here."""
     seed: int | None
     """The seed of the frame; None where the camera is refused."""
@@ -66,9 +66,9 @@ class Grid:
     """All points of a study."""
 
     study: StudyFile
-    varied: tuple[Parameter, ...]
+    case_parameters: tuple[Parameter, ...]
     """The parameters of all cases together, each as the first case has it."""
-    repeated: tuple[Parameter, ...]
+    averaged_parameters: tuple[Parameter, ...]
     """What is averaged over."""
     cases: dict[str, StudyCase]
     """Name -> case."""
@@ -89,7 +89,7 @@ def grid(study: StudyFile, sets: Sequence[str] = (), folder: Path | None = None)
     Cameras that are refused are points with `problems`.
     """
     over = cameras.overlay(sets, folder or current_folder())
-    repeated = study.repeated()
+    repeated = study.averaged_parameters()
     cases = {case.name: case for case in study.cases()}
     _refuse_sets(sets, {*repeated, *(path for case in cases.values() for path in case.parameters)})
     _refuse_too_many(study.model, repeated, [case.parameters for case in cases.values()])
@@ -98,8 +98,10 @@ def grid(study: StudyFile, sets: Sequence[str] = (), folder: Path | None = None)
         points += _points(study.model, case, over, repeated)
     found = Grid(
         study=study,
-        varied=tuple(_by_path(case.parameters for case in cases.values()).values()),
-        repeated=tuple(repeated.values()),
+        case_parameters=tuple(
+            _parameters_by_path(case.parameters for case in cases.values()).values()
+        ),
+        averaged_parameters=tuple(repeated.values()),
         cases=cases,
         points=tuple(points),
         inputs=_inputs(study, points),
@@ -112,7 +114,7 @@ def grid(study: StudyFile, sets: Sequence[str] = (), folder: Path | None = None)
     return found
 
 
-def _by_path(parameters: Iterable[dict[str, Parameter]]) -> dict[str, Parameter]:
+def _parameters_by_path(parameters: Iterable[dict[str, Parameter]]) -> dict[str, Parameter]:
     """Return the parameters of all cases together, each as the first case has it."""
     out: dict[str, Parameter] = {}
     for own in parameters:
@@ -177,7 +179,7 @@ def _points(
         camera = camera.model_copy(update={"name": case.name.replace("/", "-")})
         content = _content(camera, model)
         for i in range(model.seeds):
-            own = seeded(camera, i)
+            own = with_next_seed(camera, i)
             point = hash_text(f"{content} {own.seed.frame}")[:32]
             yield replace(here, seed=own.seed.frame, camera=own, id=point, content=content)
 
@@ -190,7 +192,7 @@ def case_file(case: StudyCase, nodes: Mapping[str, Node], over: Node) -> Documen
     return case.base.overlay(tree).overlay(over)
 
 
-def seeded(camera: Camera, number: int) -> Camera:
+def with_next_seed(camera: Camera, number: int) -> Camera:
     """Return a camera with the frame seed so many after its own."""
     seed = Seed(sensor=camera.seed.sensor, frame=camera.seed.frame + number)
     return camera.model_copy(update={"seed": seed})
@@ -211,23 +213,23 @@ def hash_of(camera: Camera, form: dict[str, Any], asked: dict[str, Any]) -> str:
     form: what counts of its YAML form; asked: what is computed, by keys of its own.
     """
     whole = asked | {
-        "camera": _with_contents(form),
+        "camera": _embed_files(form),
         "files": sorted(_digest(path) for path in provenance.data_files(camera, form)),
         "versions": {name: _versions()[name] for name in LIBRARIES},
     }
     return hash_text(json.dumps(whole, sort_keys=True))
 
 
-def _with_contents(form: Any) -> Any:
+def _embed_files(form: Any) -> Any:
     """Return a camera's YAML form with what files hold in place of where they lie."""
     if isinstance(form, dict):
         return {
             key: [_digest(Path(item)), Path(item).suffix.lower()]
             if key in FILE_KEYS and isinstance(item, str)
-            else _with_contents(item)
+            else _embed_files(item)
             for key, item in form.items()
         }
-    return [_with_contents(item) for item in form] if isinstance(form, list) else form
+    return [_embed_files(item) for item in form] if isinstance(form, list) else form
 
 
 def _digest(path: Path) -> str:

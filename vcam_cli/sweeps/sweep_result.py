@@ -19,7 +19,7 @@ from typing import Any
 from vcam_cli.camera import load as cameras
 from vcam_cli.config.document import Document
 from vcam_cli.config.file_names import current_folder
-from vcam_cli.errors import CannotDo, Problem, dotted, one_line
+from vcam_cli.errors import CannotDo, Problem, dotted_path, one_line
 from vcam_cli.files.folder import read_record
 from vcam_cli.files.hyperspectral import companions
 from vcam_cli.files.points_store import RECORD, SweepFolder, record_check
@@ -73,7 +73,7 @@ def error_cell(problems: Sequence[Problem]) -> str:
     """Return problems as the column `error` has them: without places, which differ by machine."""
     texts = []
     for p in problems:
-        text = ": ".join(part for part in (dotted(p.path), p.message) if part)
+        text = ": ".join(part for part in (dotted_path(p.path), p.message) if part)
         texts.append(one_line(f"{text}; {p.remedy}" if p.remedy else text))
     return " | ".join(dict.fromkeys(texts))
 
@@ -222,7 +222,7 @@ def finished_result(out: Path, study: StudyFile, request: str) -> SweepResult | 
         hashes = {**record["hashes"], **{out / n: h for n, h in record["written"].items()}}
         if not _are_same(hashes) or not _are_kept(out, record, study):
             return None
-        return _from_record(record, out, study)
+        return _read_record(record, out, study)
     except (KeyError, TypeError, ValueError, AttributeError):  # not as vcam writes it
         return None
 
@@ -240,7 +240,7 @@ def _are_kept(out: Path, record: dict[str, Any], study: StudyFile) -> bool:
     return all(folder.read(point, frames) is not None for point in record["points"] if point)
 
 
-def _from_record(record: dict[str, Any], out: Path, study: StudyFile) -> SweepResult:
+def _read_record(record: dict[str, Any], out: Path, study: StudyFile) -> SweepResult:
     """Return the result of a finished sweep, from its study.json and its points.csv."""
     return SweepResult(
         name=study.model.name,
@@ -274,8 +274,8 @@ def _rows(path: Path, types: dict[str, type]) -> Iterator[Row]:
 
 def _column_types(study: StudyFile) -> dict[str, type]:
     """Return the columns of points.csv that hold numbers -> their type."""
-    parameters = list(study.repeated().values())
+    parameters = list(study.averaged_parameters().values())
     for case in (None, *study.model.cases):
-        parameters += study.varied(case).values()
+        parameters += study.case_parameters(case).values()
     own = {p.column: float for p in parameters if isinstance(p.cells[0], float)}
     return {**own, **dict.fromkeys(study.model.metrics, float), "seed": int}

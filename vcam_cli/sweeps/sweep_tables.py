@@ -33,7 +33,7 @@ Writers = dict[str, Callable[[Path], None]]
 """Name of a file -> what writes it."""
 
 
-def rounded(value: float) -> float:
+def table_number(value: float) -> float:
     """Return a number as optimum.csv and expected.csv have it."""
     return float(f"{value:.{DIGITS}g}")
 
@@ -102,11 +102,11 @@ def _optimum(case: str, parameter: Parameter, values: NDArray, wanted: Optimize)
     if any(isinstance(cell, str) for cell in cells):
         means = values[good].mean(axis=1)
         i = int(np.argmin(means) if wanted.goal == "min" else np.argmax(means))
-        value = rounded(float(means[i]))
+        value = table_number(float(means[i]))
         return CaseOptimum(*about, str(cells[i]), math.nan, math.nan, wanted.metric, value, "")
     found = find_optimum(np.array(cells, float), values[good].T, wanted.goal)
     numbers = (found.place, found.low, found.high, found.value)
-    place, low, high, value = map(rounded, numbers)
+    place, low, high, value = map(table_number, numbers)
     return CaseOptimum(*about, place, low, high, wanted.metric, value, found.edge)
 
 
@@ -152,12 +152,12 @@ def writers(findings: Findings) -> Writers:
 
 def _key_columns(grid: Grid) -> tuple[str, ...]:
     """Return the columns that tell points from each other."""
-    return ("case", *(p.column for p in (*grid.varied, *grid.repeated)), "seed")
+    return ("case", *(p.column for p in (*grid.case_parameters, *grid.averaged_parameters)), "seed")
 
 
 def _key_cells(grid: Grid, point: Point) -> Row:
-    cells = point.varied | point.repeated
-    named = [cells.get(p.path, "") for p in (*grid.varied, *grid.repeated)]
+    cells = point.case_values | point.averaged_values
+    named = [cells.get(p.path, "") for p in (*grid.case_parameters, *grid.averaged_parameters)]
     return (point.case, *named, "" if point.seed is None else point.seed)
 
 

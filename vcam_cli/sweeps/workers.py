@@ -102,7 +102,7 @@ def compute_here(groups: Groups, ask: Ask, threads: int) -> Iterator[Outcome]:
         future.set_result(compute_point(job, threads, shared))
         return future
 
-    for _, future in _completed(JobQueue(groups, ask), [0], submit):
+    for _, future in _run_points(JobQueue(groups, ask), [0], submit):
         yield future.result()
 
 
@@ -115,7 +115,7 @@ def compute_in_processes(groups: Groups, ask: Ask, count: int, threads: int) -> 
             return pool.submit(processes[worker].compute, job)
 
         try:
-            for _, future in _completed(JobQueue(groups, ask), range(count), submit):
+            for _, future in _run_points(JobQueue(groups, ask), range(count), submit):
                 yield future.result()
         finally:
             for process in processes:
@@ -141,7 +141,7 @@ def compute_on_dask(
 
         # Every slot has two points, so that it does not wait for the next one to be sent.
         numbers = [*range(len(slots)), *range(len(slots))]
-        for job, future in _completed(JobQueue(groups, ask), numbers, submit):
+        for job, future in _run_points(JobQueue(groups, ask), numbers, submit):
             yield _outcome(job, future, lost)
     except (OSError, RuntimeError) as error:
         raise CannotDo(lost, "run the same command again") from error
@@ -150,7 +150,7 @@ def compute_on_dask(
             client.close(timeout=1)
 
 
-def _completed(
+def _run_points(
     queue: JobQueue, workers: Sequence[int], submit: Submit
 ) -> Iterator[tuple[Job, Future[Outcome]]]:
     """Keep workers busy until no point is left; each number is there as often as it has points."""
@@ -194,7 +194,7 @@ class WorkerProcess:
                 self._connection.send(job)
                 return self._connection.recv()
             except (EOFError, OSError):
-                how = self._death()
+                how = self._exit_text()
         message = f"its process died {TRIES} times ({how}); too little memory?"
         return Outcome(job.id, error=message, final=False)
 
@@ -224,7 +224,7 @@ class WorkerProcess:
                     process_group=0,  # an interrupt is for this process alone
                 )
 
-    def _death(self) -> str:
+    def _exit_text(self) -> str:
         """Return how the process ended, which has closed its connection."""
         with self._lock:
             process, self._process = self._process, None

@@ -45,10 +45,12 @@ def dark_rate(camera: Camera) -> float:
         junction = given == "junction"
         density = made.dark_current.area
         per_area = (
-            _junction_density(camera, made) if junction else _at_temperature(camera, made, density)
+            _junction_density(camera, made)
+            if junction
+            else _density_at_temperature(camera, made, density)
         )
         if own.kind != "pinned" and camera.pixel.architecture != "aps-4t":
-            per_length = _at_temperature(camera, made, made.dark_current.perimeter)
+            per_length = _density_at_temperature(camera, made, made.dark_current.perimeter)
     if not per_area and not per_length:
         return 0.0
     size = detector(camera)
@@ -90,7 +92,7 @@ def _intrinsic(temperature: float) -> float:
         ) from None
 
 
-def _at_temperature(camera: Camera, made: Process, density: float | None) -> float:
+def _density_at_temperature(camera: Camera, made: Process, density: float | None) -> float:
     """Return a current density of the technology at the pixel's temperature; 0 where none is."""
     if not density:
         return 0.0

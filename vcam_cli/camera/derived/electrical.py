@@ -40,7 +40,7 @@ class Electrical:
     """Voltage at which a logarithmic ADC's curve bends [V]; None for a linear one."""
 
     @property
-    def in_volts(self) -> bool:
+    def has_volts(self) -> bool:
         """Whether volts are volts; else they are parts of a nominal swing."""
         return self.capacitance is not None
 
@@ -118,7 +118,7 @@ def _check_counts(found: Electrical) -> None:
 
 def check(camera: Camera) -> None:
     """Raise BadInput when the readout is open, contradicts itself or lacks volts it needs."""
-    if electrical(camera).in_volts:
+    if electrical(camera).has_volts:
         return
     pixel = camera.pixel
     of_photodiode = ARCHITECTURES[pixel.architecture].reset_noise == "photodiode"
