@@ -14,7 +14,7 @@ import numpy as np
 
 from vcam_cli import load, simulate, sweep
 from vcam_cli.accuracy import ablation
-from vcam_cli.accuracy.study import without
+from vcam_cli.accuracy.study import without_effect
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import geometry
 from vcam_cli.config import shipped
@@ -160,7 +160,7 @@ def per_effect(
     chosen = names or ablation.wanted_effects(camera)
     camera = ablation.with_effects(camera, "all")
     whole = Frames(camera).take(0, warm=True)
-    others = {name: Frames(without(camera, name)).take(0, warm=True) for name in chosen}
+    others = {name: Frames(without_effect(camera, name)).take(0, warm=True) for name in chosen}
     for _ in range(repeats):
         whole.take()
         for other in others.values():
