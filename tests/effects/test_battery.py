@@ -231,6 +231,17 @@ def test_a_transfer_is_a_pure_number_that_is_one_at_rest(kind, tmp_path):
         assert np.all(np.abs(curve) <= 1)
 
 
+@every(RadialTransfer)
+def test_a_transfer_at_several_wavelengths_is_that_at_each(kind, tmp_path):
+    effect = effect_of(kind, tmp_path)
+    f = np.linspace(0, 1e6, 60).reshape(4, 15)
+    wavelengths = np.array([450e-9, 550e-9, 650e-9])
+    found = effect.spectral_otf(f, wavelengths)
+    assert found.shape == (3, 4, 15)
+    for plane, wavelength in zip(found, wavelengths, strict=True):
+        np.testing.assert_allclose(plane, effect.otf(f, wavelength), rtol=1e-12)
+
+
 @every(Gain)
 def test_a_gain_is_a_pure_number_that_is_most_on_the_axis(kind, tmp_path):
     """One there for what the lens does: white is judged on the axis."""

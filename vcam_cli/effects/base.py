@@ -169,6 +169,10 @@ class RadialTransfer(Blur):
     def otf(self, frequency: NDArray, wavelength: float) -> NDArray:
         """Return the transfer at `frequency` [cycles/m] and `wavelength` [m]; 1 at frequency 0."""
 
+    def spectral_otf(self, frequency: NDArray, wavelengths: NDArray) -> NDArray:
+        """Return the transfer at every wavelength (J,) [m]: (J, *shape of `frequency`)."""
+        return np.array([self.otf(frequency, float(w)) for w in wavelengths])
+
     def otf_plane(self, fx: NDArray, fy: NDArray, wavelength: float) -> NDArray:
         """Return the transfer at all pairs of fx (n,) and fy (m,) [cycles/m]: (m, n)."""
         return self.otf(np.hypot(fx[None, :], fy[:, None]), wavelength)

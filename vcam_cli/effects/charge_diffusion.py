@@ -60,6 +60,10 @@ class ChargeDiffusion(RadialTransfer):
             self.neutral_depth,
         )
 
+    def spectral_otf(self, frequency, wavelengths):
+        """Return the transfer at every wavelength (J,) [m]: (J, *shape of `frequency`)."""
+        return self.otf(frequency, wavelengths.reshape(-1, *(1,) * frequency.ndim))
+
     def cutoff(self, wavelength):
         """Return the frequency from which the transfer is zero, or inf [cycles/m]."""
         return np.inf

@@ -37,6 +37,10 @@ class Diffraction(RadialTransfer):
         """Return the transfer at `frequency` [cycles/m] and `wavelength` [m]."""
         return diffraction.otf_circular(frequency, wavelength, self.f_number, self.magnification)
 
+    def spectral_otf(self, frequency, wavelengths):
+        """Return the transfer at every wavelength (J,) [m]: (J, *shape of `frequency`)."""
+        return self.otf(frequency, wavelengths.reshape(-1, *(1,) * frequency.ndim))
+
     def cutoff(self, wavelength):
         """Return the frequency from which the transfer is zero, or inf [cycles/m]."""
         return diffraction.cutoff_frequency(wavelength, self.f_number, self.magnification)

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -111,12 +112,14 @@ def line_spread_tail(
 
     small = np.array([1e-4 * top])
     cusp = float((1 - otf(small))[0] / small[0])
-    f = (np.arange(16 * RESOLVED) + 0.5) * (top / (16 * RESOLVED))
-    values = otf(f) / f
-    near = distance < RESOLVED / top
-    phase = 2 * np.pi * np.outer(distance[near], f)
     tail = cusp / (2 * np.pi**2 * distance)
-    tail[near] = 0.5 - np.sin(phase) @ values * (top / (16 * RESOLVED)) / np.pi
+    for fewest, most in pairwise((0, RESOLVED // 16, RESOLVED // 4, RESOLVED)):
+        near = (fewest <= distance * top) & (distance * top < most)
+        count = min(32 * most, 16 * RESOLVED)
+        step = top / count
+        f = (np.arange(count) + 0.5) * step
+        phase = 2 * np.pi * np.outer(distance[near], f)
+        tail[near] = 0.5 - np.sin(phase) @ (otf(f) / f) * step / np.pi
     return np.maximum.accumulate(np.clip(tail, 0, 0.5)[::-1])[::-1]
 
 

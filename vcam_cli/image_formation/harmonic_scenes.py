@@ -47,8 +47,9 @@ def wave_layers(path: OpticalPath, scene: WaveScene) -> tuple[Layers, SpectrumRe
             for transfer, weight in _zone_transfers(path, effects)
         ]
 
-    changes = _changes(path, layers, layer)
-    return (layer(*parts) for parts in layers(path.effects)), SpectrumReport(changes=changes)
+    whole = layers(path.effects)
+    changes = _changes(path, whole, layers, layer)
+    return (layer(*parts) for parts in whole), SpectrumReport(changes=changes)
 
 
 def _wave_level(transfer: Transfer, effects: tuple[Effect, ...], wave: Wave) -> NDArray:
@@ -121,8 +122,9 @@ def harmonic_layers(
 
         return Layer(values, weight)
 
-    changes = _changes(path, layers, layer)
-    return (layer(*parts) for parts in layers(path.effects)), SpectrumReport(changes=changes)
+    whole = layers(path.effects)
+    changes = _changes(path, whole, layers, layer)
+    return (layer(*parts) for parts in whole), SpectrumReport(changes=changes)
 
 
 def _harmonic_levels(transfer: Transfer, fx: NDArray, fy: NDArray) -> NDArray:
@@ -136,6 +138,7 @@ def _harmonic_levels(transfer: Transfer, fx: NDArray, fy: NDArray) -> NDArray:
 
 def _changes(
     path: OpticalPath,
+    whole: list[tuple[NDArray, Weight]],
     layers: Callable[[tuple[Effect, ...]], list[tuple[NDArray, Weight]]],
     layer: Callable[[NDArray, Weight], Layer],
 ) -> dict[str, float]:
@@ -143,7 +146,6 @@ def _changes(
     g = path.geometry
     x, y = pixel_centers(g)
     some = slice(None, None, max(1, g.rows // ROWS))
-    whole = layers(path.effects)
     changes = {}
     for effect in of_kind(path.effects, Blur, SeparableTransfer, FieldTransfer):
         rest = layers(tuple(e for e in path.effects if e is not effect))

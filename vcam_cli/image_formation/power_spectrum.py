@@ -10,15 +10,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import combinations_with_replacement
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vcam_cli.effects.base import SeparableTransfer
 from vcam_cli.image_formation.cosine_series import Axis
-from vcam_cli.image_formation.scene_spectrum import SceneSpectrum
+from vcam_cli.image_formation.scene_spectrum import SceneSpectrum, pairs
 from vcam_cli.image_formation.transfer_tables import PARITIES, Tables, reader
+from vcam_cli.parallel import product
 
 ALONE = 16
 """Lowest terms along an axis that are blocks of their own."""
@@ -100,11 +100,6 @@ class PowerSpectrum:
     planes: int
     separable: tuple[SeparableTransfer, ...]
 
-    @property
-    def pairs(self) -> list[tuple[int, int]]:
-        """The pairs of planes."""
-        return list(combinations_with_replacement(range(self.planes), 2))
-
     def filtered_power(self, tables: Tables) -> NDArray:
         """Mean squares of every color's signal: (C, blocks along y, blocks along x)."""
         return self.pixel_power(self.lens_power(tables))
@@ -114,8 +109,8 @@ class PowerSpectrum:
         power = np.zeros((tables.colors, len(self.y.low), len(self.x.low)))
         for parity in tables.parities:
             values = reader(tables, parity, self.x.center).values(self.y.center)
-            for (r, s), product in zip(self.pairs, self.products, strict=True):
-                power += values[r] * values[s] * product
+            for (r, s), squares in zip(pairs(self.planes), self.products, strict=True):
+                power += values[r] * values[s] * squares
         return np.maximum(power, 0)
 
     def pixel_power(self, power: NDArray) -> NDArray:
@@ -128,7 +123,7 @@ class PowerSpectrum:
         Planes whose light cancels through one lens need not through another: as if none did.
         """
         values = np.abs(reader(tables, 0, self.x.center).values(self.y.center))
-        own = [p for (r, s), p in zip(self.pairs, self.products, strict=True) if r == s]
+        own = [p for (r, s), p in zip(pairs(self.planes), self.products, strict=True) if r == s]
         amplitudes = values * np.sqrt(np.maximum(own, 0))[:, None]
         return self.pixel_power(np.square(amplitudes.sum(axis=0)))
 
@@ -191,10 +186,11 @@ def power_spectrum(
     """
     along_x, along_y = blocks(x), blocks(y)
     products = []
-    for pair in combinations_with_replacement(range(len(spectrum)), 2):
-        sums = spectrum.products(pair, along_y.edges, along_x.edges, workers)
-        twice = 1 if pair[0] == pair[1] else 2
-        products.append(twice * (along_y.weights @ sums @ along_x.weights.T))
+    sums = spectrum.products(along_y.edges, along_x.edges, workers)
+    for (r, s), of_pair in zip(pairs(len(spectrum)), sums, strict=True):
+        twice = 1 if r == s else 2
+        squares = product(along_y.weights, product(of_pair, along_x.weights.T))
+        products.append(twice * squares)
     return PowerSpectrum(along_x, along_y, np.array(products), len(spectrum), tuple(separable))
 
 

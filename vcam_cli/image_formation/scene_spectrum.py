@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import combinations_with_replacement, pairwise
 from typing import Protocol
 
 import numpy as np
@@ -33,12 +33,17 @@ class SceneSpectrum(Protocol):
     def rows(self, plane: int, index: Index, count: int | None = None) -> NDArray:
         """Rows of a plane's first `count` coefficients along x, or all: (n, up to count)."""
 
-    def products(self, pair: tuple[int, int], y: NDArray, x: NDArray, workers: int) -> NDArray:
-        """Sums of the product of two planes' coefficients over blocks of terms.
+    def products(self, y: NDArray, x: NDArray, workers: int) -> NDArray:
+        """Sums of the product of two planes' coefficients over blocks of terms, for all `pairs`.
 
-        y, x: edges of the blocks along each axis, rising from 0. Returns (blocks along y, blocks
-        along x) in 64 bits.
+        y, x: edges of the blocks along each axis, rising from 0. Returns (pairs, blocks along y,
+        blocks along x) in 64 bits.
         """
+
+
+def pairs(planes: int) -> list[tuple[int, int]]:
+    """The pairs (r, s), r <= s, of so many planes."""
+    return list(combinations_with_replacement(range(planes), 2))
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,19 +63,37 @@ class SampledSpectrum:
     def rows(self, plane: int, index: Index, count: int | None = None) -> NDArray:
         return self.coefficients[plane, index, :count]
 
-    def products(self, pair: tuple[int, int], y: NDArray, x: NDArray, workers: int) -> NDArray:
+    def products(self, y: NDArray, x: NDArray, workers: int) -> NDArray:
+        every = pairs(len(self))
+        return np.array([self._pair_products(pair, y, x, workers) for pair in every])
+
+    def _pair_products(
+        self, pair: tuple[int, int], y: NDArray, x: NDArray, workers: int
+    ) -> NDArray:
         first, second = (self.coefficients[plane, :, : x[-1]] for plane in pair)
         out = np.empty((len(y) - 1, len(x) - 1))
 
-        def add(block: int) -> None:
-            sums = np.zeros(len(x) - 1)
-            for rows in slices_within(slice(y[block], y[block + 1]), rows_at_once(x[-1])):
-                both = first[rows] * second[rows]
-                sums += np.add.reduceat(both.sum(axis=0, dtype=both.dtype), x[:-1])
-            out[block] = sums
+        def add(blocks: slice) -> None:
+            edges = y[blocks.start : blocks.stop + 1]
+            sums = np.zeros((len(edges) - 1, len(x) - 1))
+            for rows in slices_within(slice(edges[0], edges[-1]), longest):
+                both = np.add.reduceat(first[rows] * second[rows], x[:-1], axis=1)
+                sums += np.add.reduceat(both, edges[:-1] - edges[0], axis=0)
+            out[blocks] = sums
 
-        each(add, range(len(out)), workers)
+        longest = rows_at_once(x[-1])
+        each(add, _block_groups(y, longest), workers)
         return out
+
+
+def _block_groups(edges: NDArray, longest: int) -> list[slice]:
+    """Neighboring blocks of terms, together at most `longest` terms or one block alone."""
+    out, start = [], 0
+    for stop in range(1, len(edges)):
+        if stop + 1 == len(edges) or edges[stop + 1] - edges[start] > longest:
+            out.append(slice(start, stop))
+            start = stop
+    return out
 
 
 def transform_planes(planes: NDArray, workers: int) -> SampledSpectrum:
@@ -113,12 +136,17 @@ class RectangleSpectrum:
     def rows(self, plane: int, index: Index, count: int | None = None) -> NDArray:
         return product(self.along_y[index], self.along_x[plane, :, :count])
 
-    def products(self, pair: tuple[int, int], y: NDArray, x: NDArray, workers: int) -> NDArray:
-        first, second = (self.along_x[plane].astype(np.float64) for plane in pair)
+    def products(self, y: NDArray, x: NDArray, workers: int) -> NDArray:
+        planes, runs, columns = self.along_x.shape
         below = self.along_y.astype(np.float64)
-        in_rows = np.array([below[s].T @ below[s] for s in _blocks(y)])
-        in_columns = [first[:, s] @ second[:, s].T for s in _blocks(x)]
-        return np.asarray(np.einsum("yij,xij->yx", in_rows, np.array(in_columns), optimize=True))
+        in_rows = np.array([below[s].T @ below[s] for s in _blocks(y)]).reshape(-1, runs**2)
+        out = []
+        for plane in range(planes):
+            others = self.along_x[plane:].reshape(-1, columns).astype(np.float64)
+            in_columns = np.array([others[:runs, s] @ others[:, s].T for s in _blocks(x)])
+            for other in np.split(in_columns, planes - plane, axis=2):
+                out.append(product(in_rows, other.reshape(-1, runs**2).T))
+        return np.array(out)
 
 
 def _blocks(edges: NDArray) -> list[slice]:

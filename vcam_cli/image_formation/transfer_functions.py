@@ -21,7 +21,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcam_cli.effects.base import Blur, Effect, PlaneTransfer, RadialTransfer, of_kind
+from vcam_cli.parallel import pieces, product
 from vcam_cli.spectra import Spectrum, pair_weights, photons
+
+VALUES = 1 << 17
+"""Values of a transfer that are computed together, about."""
 
 
 @dataclass(frozen=True)
@@ -82,15 +86,15 @@ class Transfer:
     def otf_radial(self, frequency: NDArray) -> NDArray:
         """Transfer of the radial effects at every wavelength: (J, *shape)."""
         otf = np.ones((len(self.wavelengths), *frequency.shape))
-        for row, wavelength in zip(otf, self.wavelengths, strict=True):
+        for some in pieces(len(otf), max(1, VALUES // max(1, frequency.size))):
             for effect in self.radial_blurs:
-                row *= effect.otf(frequency, float(wavelength))
+                otf[some] *= effect.spectral_otf(frequency, self.wavelengths[some])
         return otf
 
     def spectral_sum(self, otf: NDArray) -> NDArray:
         """The spectral sum of transfers (J, *shape): (K, C, *shape)."""
         components, colors, count = self.weights.shape
-        total = self.weights.reshape(-1, count) @ otf.reshape(count, -1)
+        total = product(self.weights.reshape(-1, count), otf.reshape(count, -1))
         return total.reshape(components, colors, *otf.shape[1:])
 
     def with_half_the_wavelengths(self) -> Transfer:
