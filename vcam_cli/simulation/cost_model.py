@@ -20,7 +20,9 @@ from vcam_cli.effects.signal_chain import ElectronEffect, Quantizer
 from vcam_cli.image_formation.optical_path import SpectrumReport
 from vcam_cli.image_formation.settings import Settings
 from vcam_cli.image_formation.transfer_functions import Band
+from vcam_cli.readout.layout import Layout
 from vcam_cli.scheduling.estimators import PASSES
+from vcam_cli.simulation.plan import Plan
 
 NORMAL = 8.2e-9
 """Drawing one normal number, the unit of speed [s]."""
@@ -54,7 +56,7 @@ PNG = 14e-9
 
 @cache
 def slowness() -> float:
-    """Time this machine takes for the unit of work, relative to the constants' machine."""
+    """Return the time this machine takes for the unit of work, over the constants' machine's."""
     generator = np.random.Generator(np.random.Philox(0))
     count = 1 << 17
     seconds = []
@@ -66,12 +68,12 @@ def slowness() -> float:
 
 
 def threads(workers: int) -> float:
-    """How much faster so many threads are than one: memory is shared between them."""
+    """Return how much faster so many threads are than one: memory is shared between them."""
     return workers**0.75
 
 
 def image_seconds(geometry: Geometry, mosaic: Mosaic, report: SpectrumReport) -> float:
-    """Core seconds of image formation."""
+    """Return the core seconds of image formation."""
     pixels, colors = geometry.rows * geometry.columns, len(mosaic.colors)
     if not report.terms:
         return FIXED + WAVE * pixels * colors
@@ -85,7 +87,7 @@ def image_seconds(geometry: Geometry, mosaic: Mosaic, report: SpectrumReport) ->
 
 
 def output_seconds(camera: Camera, geometry: Geometry, mosaic: Mosaic) -> float:
-    """Core seconds of processing, metrics and files."""
+    """Return the core seconds of processing, metrics and files."""
     pixels, colors = geometry.rows * geometry.columns, len(mosaic.colors)
     seconds = EXR * pixels * len(camera.output.raw)
     if camera.output.render:
@@ -96,7 +98,7 @@ def output_seconds(camera: Camera, geometry: Geometry, mosaic: Mosaic) -> float:
 
 
 def sample_seconds(camera: Camera, geometry: Geometry, effects: Sequence[Effect]) -> float:
-    """Core seconds that several samples of one integration take more than a single exposure."""
+    """Return the core seconds that several samples take more than a single exposure."""
     count = camera.exposure.count
     if not count:
         return 0.0
@@ -111,7 +113,10 @@ def sample_seconds(camera: Camera, geometry: Geometry, effects: Sequence[Effect]
 def irradiance_seconds(
     camera: Camera, geometry: Geometry, knobs: Settings, report: SpectrumReport
 ) -> float:
-    """Core seconds of the spectral irradiance, where it is asked for: its bands are as colors."""
+    """Return the core seconds of the spectral irradiance, 0 where no file asks for it.
+
+    Its bands cost what colors do.
+    """
     if not camera.output.irradiance:
         return 0.0
     band = camera.scene.wavelengths
@@ -122,8 +127,48 @@ def irradiance_seconds(
 
 
 def first_estimate(camera: Camera, geometry: Geometry, mosaic: Mosaic, workers: int) -> float:
-    """Seconds of a whole run, before anything is known of its scene."""
+    """Return the seconds of a whole run, before anything is known of its scene."""
     samples = 2 * geometry.rows * geometry.columns
     guess = SpectrumReport(cells=samples, terms=samples, planes=3, filters=1)
     core = image_seconds(geometry, mosaic, guess) + output_seconds(camera, geometry, mosaic)
+    return core * slowness() / threads(workers)
+
+
+def frame_seconds(
+    camera: Camera,
+    geometry: Geometry,
+    place: Layout,
+    knobs: Settings,
+    report: SpectrumReport,
+    decided: Plan,
+    workers: int,
+) -> float:
+    """Return the seconds of a whole frame.
+
+    Parameters
+    ----------
+    camera : Camera
+        The camera.
+    geometry : Geometry
+        Geometry of its array.
+    place : Layout
+        Layout of its pixels.
+    knobs : Settings
+        Settings of image formation.
+    report : SpectrumReport
+        How its scene was sampled and filtered.
+    decided : Plan
+        Its plan, with the core seconds of the effects that run.
+    workers : int
+        Number of threads.
+
+    Returns
+    -------
+    float
+        Seconds on this machine.
+    """
+    core = decided.seconds + image_seconds(place.lattice, place.mosaic, report)
+    core += output_seconds(camera, geometry, place.mosaic)
+    core += sample_seconds(camera, geometry, decided.active)
+    core += irradiance_seconds(camera, geometry, knobs, report)
     return core * slowness() / threads(workers)

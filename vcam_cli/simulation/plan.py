@@ -44,14 +44,17 @@ class Decision:
 
     name: str
     state: str
-    """on | off"""
+    """Whether it is simulated: "on" or "off"."""
     by: str
-    """user | plan | camera"""
+    """Who decided that: "user", "plan" or "camera"."""
     reason: str
+    """What it does, or why it is off."""
     contribution: float | None
-    """How much leaving it out would change, at most, in `unit`."""
+    """The largest share that leaving it out would change, in `unit`."""
     unit: str
+    """What the contribution is a share of."""
     seconds: float
+    """Time that it takes on one core [s]."""
 
 
 @dataclass(frozen=True)
@@ -65,7 +68,7 @@ class Plan:
     memory_bytes: int
 
     def report(self) -> dict:
-        """The plan as `run.json` and `--json` show it."""
+        """Return the plan as `run.json` and `--json` show it."""
         return {
             "effects": [asdict(d) for d in self.decisions],
             "settings": self.settings.report(),
@@ -75,9 +78,24 @@ class Plan:
 
 
 def camera_effects(camera: Camera, geometry: Geometry) -> dict[str, Effect | None]:
-    """Every effect with this camera's numbers, or None where it does not have it.
+    """Return every effect with a camera's numbers, by name, or None where it does not have it.
 
-    Raises BadInput for `on` for something the file does not describe.
+    Parameters
+    ----------
+    camera : Camera
+        The camera.
+    geometry : Geometry
+        Geometry of its array.
+
+    Returns
+    -------
+    dict
+        Name of an effect -> the effect, in the order of action.
+
+    Raises
+    ------
+    BadInput
+        For `on` for something that the file does not describe.
     """
     found = {kind.name: kind.from_camera(camera, geometry) for kind in ORDER}
     if isinstance(camera.effects, dict):
@@ -96,7 +114,7 @@ def camera_effects(camera: Camera, geometry: Geometry) -> dict[str, Effect | Non
 
 
 def check(camera: Camera) -> None:
-    """Raises BadInput, with its place, where `effects` asks for what the file does not describe."""
+    """Refuse `effects` that ask for what the file does not describe (BadInput, with its place)."""
     try:
         camera_effects(camera, solve(camera))
     except BadInput as error:
@@ -104,20 +122,23 @@ def check(camera: Camera) -> None:
 
 
 def enabled_effects(camera: Camera, geometry: Geometry) -> tuple[Effect, ...]:
-    """Effects that the camera has and the user has not switched off."""
+    """Return the effects that the camera has and the user has not switched off."""
     found = camera_effects(camera, geometry).values()
     return tuple(e for e in found if e is not None and _wish(camera, e) != "off")
 
 
 def mean_signal_effects(camera: Camera, geometry: Geometry) -> tuple[Effect, ...]:
-    """Effects of the linear part that run, as far as no signal level is needed to decide it."""
+    """Return the effects on the mean signal that run, as far as no signal level decides it.
+
+    Charges and noise are not among them.
+    """
     present = enabled_effects(camera, geometry)
     later = {*of_kind(present, Charge, NoiseSource), *_negligible_light(camera, present)}
     return tuple(e for e in present if e not in later)
 
 
 def _negligible_light(camera: Camera, present: Sequence[Effect]) -> set[Effect]:
-    """Effects on the mean signal that cost time, and together change it by less than their share.
+    """Return the effects on the mean signal that take time and together change little.
 
     The smallest first, as many as fit into the share. Charges are an addition, and most transfers
     multiply into one that is there anyway. Glare and transport cost less than a draw, and of a lamp
@@ -127,13 +148,13 @@ def _negligible_light(camera: Camera, present: Sequence[Effect]) -> set[Effect]:
     costly = [e for e in present if e.costly and e.removable and _wish(camera, e) == "auto"]
     errors = {e: error for e in costly if (error := e.mean_error(one)) is not None}
     left = MEAN_SHARE * camera.accuracy.tolerance
-    out: set[Effect] = set()
+    negligible: set[Effect] = set()
     for effect in sorted(errors, key=errors.__getitem__):
         left -= errors[effect]
         if left < 0:
             break
-        out.add(effect)
-    return out
+        negligible.add(effect)
+    return negligible
 
 
 def make(
@@ -144,9 +165,27 @@ def make(
     memory_bytes: int,
     changes: Mapping[str, float],
 ) -> Plan:
-    """Decides every effect of `camera` for the signal that is expected.
+    """Decide on every effect of a camera for the signal that is expected.
 
-    changes: rms change of the signal by leaving out each effect, where known [electrons / s].
+    Parameters
+    ----------
+    camera : Camera
+        The camera.
+    geometry : Geometry
+        Geometry of its array.
+    settings : Settings
+        Settings of image formation.
+    signal : SignalLevels
+        What is known of the signal.
+    memory_bytes : int
+        Memory that the frame takes [bytes].
+    changes : mapping
+        Name of an effect -> rms change of the signal by leaving it out, where it is known [e/s].
+
+    Returns
+    -------
+    Plan
+        The decisions, and the effects that run.
     """
     found = camera_effects(camera, geometry)
     present = list(enabled_effects(camera, geometry))
@@ -169,7 +208,7 @@ def make(
 
 
 def _wish(camera: Camera, effect: Effect) -> str:
-    """What the file wants of an effect it describes: on, off or auto."""
+    """Return what the file wants of an effect it describes: on, off or auto."""
     if camera.effects == "all":
         return "on"
     if camera.effects == "auto":
@@ -180,8 +219,8 @@ def _wish(camera: Camera, effect: Effect) -> str:
 def _negligible_variance(
     candidates: list[Effect], present: list[Effect], signal: SignalLevels, tolerance: float
 ) -> set[Effect]:
-    """Draws whose absence changes the variance of their scope by less than 2 T at every level."""
-    out: set[Effect] = set()
+    """Return the noise sources whose absence changes no variance by 2 T or more, at any level."""
+    negligible: set[Effect] = set()
     for scope in ("frame", "sensor"):
         everything = total_variance(noise_sources(present, scope), signal)
         missing = np.zeros(len(LEVELS))
@@ -191,8 +230,8 @@ def _negligible_variance(
             # Half of it: the other is kept for what the levels in between may ask.
             if np.any(missing > tolerance * everything):
                 break
-            out.add(effect)
-    return out
+            negligible.add(effect)
+    return negligible
 
 
 def _decide(
@@ -205,11 +244,13 @@ def _decide(
     pixels: int,
     change: float | None,
 ) -> Decision:
-    """One line of the plan."""
+    """Return the line of the plan on one effect; `change` is the rms by leaving it out [e]."""
     if effect is None:
         return Decision(kind.name, "off", "camera", kind.absent, None, "", 0.0)
-    contribution, unit = effect.contribution(signal, present)
-    if change is not None:
+    contribution: float | None
+    if change is None:
+        contribution, unit = effect.contribution(signal, present)
+    else:
         # A pixel that is full shows no change beyond the well.
         contribution, unit = min(change / signal.full_signal, 1.0), "of full signal"
     seconds = kind.seconds_per_pixel * pixels

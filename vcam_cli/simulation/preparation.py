@@ -1,6 +1,6 @@
 """All that comes before a frame is taken: the light in every pixel, the exposure time, the plan.
 
-This is the linear half of the engine in one short function; each line is a module beside this one.
+`prepare` is the linear half of the engine from top to bottom; what it calls are other modules.
 """
 
 from __future__ import annotations
@@ -32,6 +32,9 @@ from vcam_cli.scenes.base import Scene
 from vcam_cli.scenes.build import build
 from vcam_cli.simulation import cost_model, plan
 
+MOST_ELECTRONS = 1e25
+"""More than any pixel ever meets, and far from where 32-bit numbers end."""
+
 
 @dataclass(frozen=True)
 class Prepared:
@@ -45,21 +48,22 @@ class Prepared:
     layout: Layout
     scene: Scene
     transfer: Transfer
-    """Of the scene's components, to one pixel of the lattice."""
+    """Transfer of the scene's components to one pixel of the lattice."""
     white_rate: NDArray
-    """(C,) Photo-electrons per second of the perfect white on the axis, in every color [e/s]."""
+    """Photo-electrons per second (C,) of the perfect white on the axis, in every color [e/s]."""
     rate: NDArray
-    """(rows, columns) Photo-electrons per second of every pixel, as they are read out [e/s].
+    """Photo-electrons per second (rows, columns) of every pixel, as they are read out [e/s].
 
-    (C, rows, columns) of stacked pixels. Of pixels that are read as one: where charges are joined,
-    this and the other rates are those of the sum; else of every pixel, before they are joined.
+    Stacked pixels have (C, rows, columns). Of pixels that are read as one: where charges are
+    joined, this and the other rates are those of the sum; else of every pixel, before they are
+    joined.
     """
     spectrum: SpectrumReport
     """How far the scene's spectrum was followed."""
     exposure_time: float
-    """[s]"""
+    """Exposure time [s]."""
     times: tuple[float, ...]
-    """(N,) of the samples of one integration, rising [s]; () of a single exposure."""
+    """Times (N,) of the samples of one integration, rising [s]; () of a single exposure."""
     plan: plan.Plan
 
     @property
@@ -75,100 +79,174 @@ def prepare(
     stages: Stages,
     rate_cache: RateCache | None = None,
 ) -> Prepared:
-    """Brings the light of the scene to the pixels, times the exposure or its samples, decides what
-    will run.
+    """Bring the light of a scene to the pixels, time the exposure and plan what will run.
 
-    picture: samples of the scene's image file, (h, w, channels), linear light; None for charts.
-    lights: what keeps the light for further cameras, where there are any.
-    Raises BadInput where the camera contradicts itself, CannotDo where memory does not suffice.
+    Parameters
+    ----------
+    camera : Camera
+        The camera.
+    picture : NDArray or None
+        Samples of the scene's image file (h, w, channels) in linear light; None for charts.
+    workers : int
+        Number of threads.
+    stages : Stages
+        Observer of the stages.
+    rate_cache : RateCache, optional
+        Cache of the light for further cameras.
+
+    Returns
+    -------
+    Prepared
+        The camera, ready to take its frame.
+
+    Raises
+    ------
+    BadInput
+        Where the camera contradicts itself.
+    CannotDo
+        Where memory does not suffice.
     """
-    g, e = geometry(camera), electrical(camera)
-    knobs = settings(camera)
-    place = layout(camera, g)
-    colors, lattice, knobs = place.mosaic, place.lattice, place.settings(knobs)
-    joins = place.binning_groups
-    count = camera.exposure.count * (len(colors.colors) if place.full_color else 1)
-    needed = memory_model.frame_bytes(
-        lattice, knobs, len(colors.colors), bool(camera.quality), count
-    )
-    memory.require(needed, g.rows, g.columns)  # what was read of the scene is there already
-    read = getattr(picture, "nbytes", 0)
-    stages.watch.expect(cost_model.first_estimate(camera, g, colors, workers))
+    solved, circuit = geometry(camera), electrical(camera)
+    place = layout(camera, solved)
+    knobs = place.settings(settings(camera))
+    frame_bytes = _require_memory(camera, place, knobs, solved)
+    stages.watch.expect(cost_model.first_estimate(camera, solved, place.mosaic, workers))
 
-    effects = plan.mean_signal_effects(camera, g)
+    effects = plan.mean_signal_effects(camera, solved)
     with stages("scene"):
         band = camera.scene.wavelengths
-        margin = bandwidth.margin(lattice, effects, (band.start, band.stop), knobs)
-        view = photon_rate.view(lattice, knobs, margin)
+        margin = bandwidth.margin(place.lattice, effects, (band.start, band.stop), knobs)
+        view = photon_rate.view(place.lattice, knobs, margin)
         scene = build(camera.scene, view, picture, camera.display.primaries)
     with stages("optics"):
-        spectra = (*scene.spectra, scene.white)
-        see = partial(_transfer, camera, g, knobs, spectra, colors, effects)
-        both = see() if rate_cache is None else rate_cache.transfer(camera, see)
-        # Kept light came with another camera's effects, which are equal but not the same.
-        transfer = replace(both.with_effects(effects), weights=both.weights[:-1])
-        white_rate = both.level[-1]
-        _refuse_too_much(float(white_rate.max()))
+        transfer, white_rate = _transfer(camera, solved, place, scene, effects, knobs, rate_cache)
+        summed = place.binning_groups.summed_charges
         ceiling = auto_exposure.ceiling(
-            camera, float(white_rate.max()), e.saturation / joins.summed_charges
+            camera, float(white_rate.max()), circuit.saturation / summed
         )
-        white_rate = white_rate * joins.summed_charges
-        light = OpticalPath(transfer, lattice, knobs, colors, effects, workers, ceiling)
-        bring = partial(photon_rate.photo_rate, light, scene, place.planes)
-        found = bring() if rate_cache is None else rate_cache.rate(camera, ceiling, bring)
-        taken = place.select_pixels(found.values)
+        path = OpticalPath(transfer, place.lattice, knobs, place.mosaic, effects, workers, ceiling)
+        photo_rate = partial(photon_rate.photo_rate, path, scene, place.planes)
+        light = photo_rate() if rate_cache is None else rate_cache.rate(camera, ceiling, photo_rate)
+        white_rate = white_rate * summed
     with stages("exposure"):
-        white = float(white_rate.max())
-        present = plan.enabled_effects(camera, g)
-        dark = exposure.mean_dark(1.0, present)
-        rate = joins.collect(_arriving(taken, dark / joins.summed_charges, effects))
-        taken = joins.collect(taken)
-        times = sample_times.choose_sample_times(camera, rate, e, present, quantizer(camera, g))
-        time = (
-            times[-1]
-            if times
-            else auto_exposure.exposure_time(camera, rate, white, dark, e.saturation)
+        exposed = _expose(camera, solved, circuit, place, light, white_rate, effects)
+        needed = max(frame_bytes, light.spectrum.memory) + getattr(picture, "nbytes", 0)
+        changes = light.spectrum.changes | exposed.changes
+        decided = plan.make(camera, solved, knobs, exposed.signal, needed, changes)
+        seconds = cost_model.frame_seconds(
+            camera, solved, place, knobs, light.spectrum, decided, workers
         )
-        peak = (float(rate.max()) + dark) * time
-        _refuse_too_much(max(peak, white * time))
-        needed = max(needed, found.spectrum.memory) + read
-        full = max(1.0, min(e.full_well, peak))
-        signal = SignalLevels(full, time, dark * time, camera.array.binning)
-        here = _on_pixels(place, joins.collect(found.values), present, effects, time)
-        if transports := [transport.name for transport in of_kind(present, Transport)]:
-            well = min(e.full_well / time - dark, MOST_ELECTRONS)
-            moved = _rms(np.minimum(rate, well) - np.minimum(taken, well))
-            here |= dict.fromkeys(transports, moved)
-        decided = plan.make(camera, g, knobs, signal, needed, found.spectrum.changes | here)
-        core = decided.seconds + cost_model.image_seconds(lattice, colors, found.spectrum)
-        core += cost_model.output_seconds(camera, g, colors) + cost_model.sample_seconds(
-            camera, g, decided.active
-        )
-        core += cost_model.irradiance_seconds(camera, g, knobs, found.spectrum)
-        decided = replace(
-            decided, seconds=core * cost_model.slowness() / cost_model.threads(workers)
-        )
+        decided = replace(decided, seconds=seconds)
         stages.watch.expect(decided.seconds)
     return Prepared(
         camera=camera,
-        geometry=g,
-        electrical=e,
+        geometry=solved,
+        electrical=circuit,
         settings=knobs,
         mosaic=place.raw_mosaic,
         layout=place,
         scene=scene,
         transfer=transfer,
         white_rate=white_rate,
-        rate=rate,
-        spectrum=found.spectrum,
-        exposure_time=time,
-        times=times,
+        rate=exposed.rate,
+        spectrum=light.spectrum,
+        exposure_time=exposed.signal.time,
+        times=exposed.times,
         plan=decided,
     )
 
 
-MOST_ELECTRONS = 1e25
-"""More than any pixel ever meets, and far from where 32-bit numbers end."""
+def _require_memory(camera: Camera, place: Layout, knobs: Settings, solved: Geometry) -> int:
+    """Return the bytes of a frame without its scene, and refuse one that does not fit.
+
+    What was read of the scene is in memory already.
+    """
+    colors = len(place.mosaic.colors)
+    samples = camera.exposure.count * (colors if place.full_color else 1)
+    needed = memory_model.frame_bytes(place.lattice, knobs, colors, bool(camera.quality), samples)
+    memory.require(needed, solved.rows, solved.columns)
+    return needed
+
+
+def _transfer(
+    camera: Camera,
+    solved: Geometry,
+    place: Layout,
+    scene: Scene,
+    effects: tuple[Effect, ...],
+    knobs: Settings,
+    rate_cache: RateCache | None,
+) -> tuple[Transfer, NDArray]:
+    """Return the transfer of the scene's components, and the rate (C,) of perfect white [e/s].
+
+    Spectra that do not cover the wavelengths are the user's error.
+    """
+    compute = partial(
+        photon_rate.scene_transfer,
+        camera,
+        solved,
+        knobs,
+        (*scene.spectra, scene.white),
+        place.mosaic,
+        effects,
+    )
+    try:
+        whole = compute() if rate_cache is None else rate_cache.transfer(camera, compute)
+    except ValueError as error:
+        raise bad(
+            "scene.wavelengths", str(error), "narrow the wavelengths, or extend the spectrum"
+        ) from None
+    white_rate = whole.level[-1]
+    _refuse_too_much(float(white_rate.max()))
+    # A cached transfer has another camera's effects, which are equal but not the same.
+    return replace(whole.with_effects(effects), weights=whole.weights[:-1]), white_rate
+
+
+@dataclass(frozen=True)
+class _Exposed:
+    """The light of a timed exposure, as it is read out."""
+
+    rate: NDArray
+    """Photo-electrons per second of every node (..., rows, columns) [e/s]."""
+    times: tuple[float, ...]
+    """Times of the samples of one integration, rising [s]; () of a single exposure."""
+    signal: SignalLevels
+    changes: dict[str, float]
+    """Effect on pixels or charge -> rms change of the mean signal by leaving it out [e/s]."""
+
+
+def _expose(
+    camera: Camera,
+    solved: Geometry,
+    circuit: Electrical,
+    place: Layout,
+    light: photon_rate.Rate,
+    white_rate: NDArray,
+    effects: Sequence[Effect],
+) -> _Exposed:
+    """Return the light of an exposure whose time is given or chosen for the scene."""
+    groups, white = place.binning_groups, float(white_rate.max())
+    enabled = plan.enabled_effects(camera, solved)
+    dark = exposure.mean_dark(1.0, enabled)
+    collected = place.select_pixels(light.values)
+    rate = groups.collect(_transport(collected, dark / groups.summed_charges, effects))
+    adc = quantizer(camera, solved)
+    times = sample_times.choose_sample_times(camera, rate, circuit, enabled, adc)
+    time = (
+        times[-1]
+        if times
+        else auto_exposure.exposure_time(camera, rate, white, dark, circuit.saturation)
+    )
+    peak = (float(rate.max()) + dark) * time
+    _refuse_too_much(max(peak, white * time))
+    changes = _pixel_changes(place, groups.collect(light.values), enabled, effects, time)
+    if transports := [transport.name for transport in of_kind(enabled, Transport)]:
+        well = min(circuit.full_well / time - dark, MOST_ELECTRONS)
+        deferred = np.minimum(rate, well) - np.minimum(groups.collect(collected), well)
+        changes |= dict.fromkeys(transports, _rms(deferred))
+    full = max(1.0, min(circuit.full_well, peak))
+    signal = SignalLevels(full, time, dark * time, camera.array.binning)
+    return _Exposed(rate, times, signal, changes)
 
 
 def _refuse_too_much(electrons: float) -> None:
@@ -180,29 +258,32 @@ def _refuse_too_much(electrons: float) -> None:
         )
 
 
-def _on_pixels(
+def _pixel_changes(
     place: Layout, light: NDArray, present: Sequence[Effect], running: Sequence[Effect], time: float
 ) -> dict[str, float]:
-    """Rms change of the mean raw by what acts on pixels, in the color where it is most [e/s]."""
+    """Return the rms change of the mean raw by leaving out each effect on pixels [e/s].
+
+    It is that of the color where it is most.
+    """
     geometry, mosaic = place.charge_pixels
     mosaics = [Mosaic(((color,),)) for color in mosaic.colors]
     parts = zip(light, mosaics, strict=True) if place.planes else [(light, mosaic)]
-    found: dict[str, float] = {}
+    largest: dict[str, float] = {}
     for plane, colors in parts:
-        here = pixelwise.changes_by_omission(plane, geometry, colors, present, running, time)
-        found = {name: max(change, found.get(name, 0.0)) for name, change in here.items()}
-    return found
+        changes = pixelwise.changes_by_omission(plane, geometry, colors, present, running, time)
+        largest = {name: max(change, largest.get(name, 0.0)) for name, change in changes.items()}
+    return largest
 
 
 def _rms(values: NDArray) -> float:
     return float(np.sqrt(np.square(values, dtype=np.float64).mean()))
 
 
-def _arriving(rate: NDArray, dark: float, effects: Sequence[Effect]) -> NDArray:
-    """Photo-electrons per second that arrive where charge is transported [e/s].
+def _transport(rate: NDArray, dark: float, effects: Sequence[Effect]) -> NDArray:
+    """Return the photo-electrons per second that arrive where charge is transported [e/s].
 
-    Such that with the dark rate they are what arrives of both. Before the exposure is timed, since
-    transport is linear: what is automatic sees the picture as it is read.
+    With the dark rate [e/s] they are what arrives of both. Transport is linear, so it comes before
+    the exposure is timed: what is automatic sees the picture as it is read.
     """
     for transport in of_kind(effects, Transport):
         signal = rate + rate.dtype.type(dark)
@@ -211,13 +292,3 @@ def _arriving(rate: NDArray, dark: float, effects: Sequence[Effect]) -> NDArray:
         signal -= rate.dtype.type(dark)
         rate = signal
     return rate
-
-
-def _transfer(camera, g, knobs, spectra, colors, effects) -> Transfer:
-    """The scene's transfer; spectra that do not cover the wavelengths are the user's error."""
-    try:
-        return photon_rate.scene_transfer(camera, g, knobs, spectra, colors, effects)
-    except ValueError as error:
-        raise bad(
-            "scene.wavelengths", str(error), "narrow the wavelengths, or extend the spectrum"
-        ) from None
