@@ -1,7 +1,5 @@
 """Means over photodetectors against summed overlaps and means of many points."""
 
-from dataclasses import dataclass
-
 import numpy as np
 import pytest
 from making import camera
@@ -12,7 +10,7 @@ from vcam_cli.image_formation import box_average
 from vcam_cli.image_formation.bandwidth import axes
 from vcam_cli.image_formation.box_average import box_averages, point_values
 from vcam_cli.image_formation.photon_rate import photo_rate
-from vcam_cli.scenes.base import Chart, Frame
+from vcam_cli.scenes.base import Frame
 from vcam_cli.scenes.colorchecker import ColorChecker, largest_card
 from vcam_cli.scenes.dead_leaves import dead_leaves
 from vcam_cli.scenes.siemens_star import SiemensStar
@@ -130,42 +128,10 @@ def test_areas_by_many_points(name, fill):
     np.testing.assert_allclose(got, points.mean(axis=(1, 3)), atol=1 / 400)
 
 
-@dataclass(frozen=True)
-class Coarse(Chart):
-    """A star that refuses cells above a size."""
-
-    largest: float
-
-    @property
-    def coarsest_cell(self):
-        return self.largest
-
-    def paint(self, x_edges, y_edges, mix, out):
-        sizes = np.diff(x_edges).max(), np.diff(y_edges).max()
-        assert max(sizes) <= self.largest * (1 + 1e-9)
-        POINTS["star"].paint(x_edges, y_edges, mix, out)
-
-    def values(self, x, y, mix):
-        return POINTS["star"].values(x, y, mix)
-
-
-@pytest.mark.parametrize("fill", FILLS)
-@pytest.mark.parametrize("parts", [0.9, 2.5, 3.0])
-def test_no_cell_is_coarser_than_a_chart_allows(parts, fill):
-    """Photodetectors and the gaps between them are painted in parts; the light is the same."""
-    g = sensor(10, 14, FILLS[fill], SHIFT[fill], pitch=(1e-6, 1e-6))
-    seen = path(g, aperture(g))
-    coarse, whole = (
-        signal(seen, on_chart(seen, chart)) for chart in (Coarse(1e-6 / parts), POINTS["star"])
-    )
-    np.testing.assert_allclose(coarse, whole, atol=2e-6)
-
-
 def test_dead_leaves_in_parts():
-    """Leaves set how coarse their cells may be: against points, 100 along each side."""
+    """Photodetectors that hold many leaves: against points, 100 along each side."""
     g = sensor(4, 6, (0.8, 0.6), pitch=(1e-6, 1e-6))
     leaves = dead_leaves(2, Frame(24e-6, 24e-6))
-    assert leaves.coarsest_cell < g.collecting_height
     seen = path(g, aperture(g))
     scene = on_chart(seen, leaves)
     mix = np.random.default_rng(3).random((1, 12))

@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
+import scipy.ndimage
 from support import scene, view
 
 from vcam_cli.scenes import dead_leaves, discs
-from vcam_cli.scenes.base import cell_edges
+from vcam_cli.scenes.base import Frame, cell_edges
 from vcam_cli.scenes.build import build
 from vcam_cli.scenes.discs import Discs
 
@@ -108,6 +109,24 @@ def test_far_margins_are_covered():
     np.testing.assert_allclose(planes[:, :-period], planes[:, period:], atol=1e-2)
     np.testing.assert_allclose(planes[:-period], planes[period:], atol=1e-2)
     assert planes.min() > 0.05
+
+
+@pytest.mark.parametrize(("parts", "far"), [(4.3, True), (11.7, True), (32.2, False)])
+def test_averages_from_sums_over_one_period(parts, far, monkeypatch):
+    """Cells far beyond the period, and large ones within it, against their exact parts.
+
+    A lens that resolves a twentieth of what cells of 4 parts do leaves little of the difference.
+    """
+    chart = dead_leaves.dead_leaves(2, Frame(1.0, 0.7))
+    count = int((2200 if far else 1400) / parts)
+    edges = 0.0123 + cell_edges(count, parts / dead_leaves.FINEST)
+    mix = np.random.default_rng(1).random((1, 12))
+    found = chart.averages(edges, edges, mix)[0]
+    for name in ("SUMMED", "SUMMED_FAR"):
+        monkeypatch.setattr(dead_leaves, name, np.inf)
+    error = (found - chart.averages(edges, edges, mix)[0]) / mix.sum()
+    assert 1e-6 < error.std() < (1e-3 if far else 6e-5)
+    assert scipy.ndimage.gaussian_filter(error, 5.0).std() < 1e-5
 
 
 def test_the_power_spectrum_is_that_of_natural_images():

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -42,42 +40,27 @@ def _chart_averages(
 ) -> NDArray:
     """The chart painted on cells that are the collecting areas, and the gaps between them."""
     centers = pixel_centers(geometry, detector=True)
-    x, y = (_edges(c, s, scene.chart.coarsest_cell) for c, s in zip(centers, size, strict=True))
+    (x_edges, step_x), (y_edges, step_y) = (
+        _edges(c, s) for c, s in zip(centers, size, strict=True)
+    )
     mix = np.asarray(mix, scene.dtype)
     out = np.empty((len(mix), geometry.rows, geometry.columns), scene.dtype)
-    band = max(1, CELLS_A_BAND // len(x[0]) // y[1])
+    band = max(1, CELLS_A_BAND // len(x_edges))
     for top in range(0, geometry.rows, band):
         rows = slice(top, min(top + band, geometry.rows))
-        cells = y[0][rows.start * y[2] : (rows.stop - 1) * y[2] + y[1] + 1]
-        painted = scene.chart.crop_to_cells(x[0], cells).averages(x[0], cells, mix)
-        out[:, rows] = _box_means(_box_means(painted, y, 1), x, 2)
+        cells = y_edges[rows.start * step_y : (rows.stop - 1) * step_y + 2]
+        painted = scene.chart.crop_to_cells(x_edges, cells).averages(x_edges, cells, mix)
+        out[:, rows] = painted[:, ::step_y, ::step_x]
     return out
 
 
-Boxes = tuple[NDArray, int, int]
-"""Edges of cells along an axis, cells in a box, and cells from one box to the next."""
-
-
-def _edges(center: NDArray, size: float, coarsest: float) -> Boxes:
-    """Edges of boxes and of the gaps between them, the boxes in parts that can be painted [m]."""
+def _edges(center: NDArray, size: float) -> tuple[NDArray, int]:
+    """Edges of boxes and of the gaps between them [m]; cells from one box to the next."""
     pitch = center[1] - center[0] if len(center) > 1 else size
-    parts = max(1, math.ceil(size / coarsest)) if math.isfinite(coarsest) else 1
-    inside = center[:, None] + size * (np.arange(parts + 1) / parts - 0.5)
+    low, high = center - size / 2, center + size / 2
     if pitch - size > SLIVER * pitch:
-        gaps = max(1, math.ceil((pitch - size) / coarsest)) if math.isfinite(coarsest) else 1
-        gap = inside[:, -1:] + (pitch - size) * (np.arange(1, gaps) / gaps)
-        return np.concatenate([inside, gap], axis=1).ravel(), parts, parts + gaps
-    return np.append(inside[:, :-1].ravel(), inside[-1, -1]), parts, parts
-
-
-def _box_means(cells: NDArray, boxes: Boxes, axis: int) -> NDArray:
-    """Means over the boxes' cells along an axis."""
-    _, parts, step = boxes
-    every = np.moveaxis(cells, axis, -1)
-    picked = [every[..., part::step] for part in range(parts)]
-    count = min(p.shape[-1] for p in picked)
-    mean = np.mean([p[..., :count] for p in picked], axis=0, dtype=cells.dtype)
-    return np.moveaxis(mean, -1, axis)
+        return np.stack([low, high], axis=1).ravel(), 2
+    return np.append(low, high[-1]), 1
 
 
 def square_averages(plane: NDArray, axis: Axis, size: float, along: int) -> NDArray:

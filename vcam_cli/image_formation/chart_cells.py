@@ -4,9 +4,6 @@ Cells far finer than what the lens passes fold nothing that counts. Where the wh
 cells is cheap they are taken. Elsewhere its center, its busiest parts and some others are seen
 through the lens on finer and finer cells, against a reference whose cells share no factor with any
 of them, and the coarsest that keep their share of the tolerance are taken for the whole.
-
-A small array before a wide margin needs fine cells in its near field alone. What lies further away
-comes on coarse cells, as the difference of two images: of the whole chart, and of the near field.
 """
 
 from __future__ import annotations
@@ -34,9 +31,6 @@ this part of full signal over the squared ratio of that frequency to the cut-off
 SAFE = 3.0
 """Factor on the cells that this asks for where none are measured: a chart of patches smaller than
 the lens resolves leaves twice as much, relative to its own weak signal."""
-NEAR = 12.0
-"""Reach of the near field in inverse cut-off frequencies: what is folded further away is blurred
-away before it reaches the array."""
 CHEAP = 1 << 20
 """Cells that are painted without asking whether fewer would do."""
 MOST = 1 << 26
@@ -65,31 +59,6 @@ def cell_grid(scene: ChartScene, geometry: Geometry, per_pixel: float) -> tuple[
     nx = scene.shape[1] * scene.pitch_x / geometry.pitch_x * per_pixel
     fast = [scipy.fft.next_fast_len(max(1, math.ceil(n - 1e-9)), real=True) for n in (ny, nx)]
     return fast[0], fast[1]
-
-
-def near_field(path: OpticalPath, scene: ChartScene, widest: float) -> ChartScene:
-    """The part of a chart from which light comes that is not spread evenly over the array.
-
-    widest: reach of the blurs, diffraction aside [m]. The whole chart where that is not much more.
-    """
-    g = path.geometry
-    reach = NEAR / path.transfer.cutoff + widest
-    margin = max(math.ceil(reach / min(g.pitch_x, g.pitch_y)), 4)
-    width, height = (g.columns + 2 * margin) * g.pitch_x, (g.rows + 2 * margin) * g.pitch_y
-    whole = scene.pitch_x * scene.shape[1], scene.pitch_y * scene.shape[0]
-    if math.isinf(path.transfer.cutoff) or 2 * width * height > whole[0] * whole[1]:
-        return scene
-    return scene.cropped((0.0, 0.0), width, height)
-
-
-def coarse(scene: ChartScene, pitch: float) -> ChartScene:
-    """A chart on cells of a pitch [m] that have an edge at the center, like all others of it."""
-    counts = [
-        2 * scipy.fft.next_fast_len(math.ceil(n * size / pitch / 2), real=True)
-        for n, size in zip(scene.shape, (scene.pitch_y, scene.pitch_x), strict=True)
-    ]
-    whole = scene.cropped(scene.center, counts[1] * pitch, counts[0] * pitch)
-    return whole.on_cells((counts[0], counts[1]))
 
 
 def cells_per_pixel(path: OpticalPath, scene: ChartScene, highest: float) -> tuple[float, float]:

@@ -18,8 +18,8 @@ own folding and transform (`odd=True`).
 Evaluation: where S is a whole number of pixel pitches, terms that the pixels cannot tell apart
 are folded onto each other and one DCT-III does it. Photodetectors off their pixels' centers see the
 cosines turned: each is some of the pixels' own cosine and some of the sine, folded by themselves
-(`pixel_waves`). Where S is no whole number of pixels it is a chirp-z transform, four times slower,
-which takes as much memory as there are terms.
+(`pixel_waves`). Where S is no whole number of pixels, or far more than there are terms and pixels,
+it is a chirp-z transform, four times slower, which takes as much memory as there are terms.
 """
 
 from __future__ import annotations
@@ -33,6 +33,8 @@ from numpy.typing import NDArray
 
 NEAR = 1e-7
 """Distances below this are rounding errors [pixel pitches]."""
+CHIRP = 4
+"""Cost of a chirp-z transform over that of a cosine transform of its length."""
 
 
 @dataclass(frozen=True)
@@ -74,10 +76,14 @@ class Axis:
 
     @cached_property
     def virtual_pixels(self) -> int | None:
-        """Whole number of pixels in the scene's length, where folding is exact; else None."""
+        """Whole number of pixels in the scene's length, where folding is exact; else None.
+
+        None also where so few of them are pixels that a chirp-z transform costs less.
+        """
         count, first = round(self.length / self.pixel_pitch), round(self._start)
         whole = abs(self.length / self.pixel_pitch - count) <= NEAR
-        return count if whole and 0 <= first <= count - self.pixels else None
+        whole = whole and 0 <= first <= count - self.pixels
+        return count if whole and count <= CHIRP * (self.terms + self.pixels) else None
 
     @property
     def _start(self) -> float:

@@ -9,26 +9,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from functools import partial
 from itertools import chain
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vcam_cli import memory
 from vcam_cli.image_formation import memory_model
 from vcam_cli.image_formation.bandwidth import axes, highest_passed, reach, table_size
 from vcam_cli.image_formation.box_average import box_averages, point_values
-from vcam_cli.image_formation.chart_cells import (
-    BEYOND_CUTOFF,
-    cell_grid,
-    cells_per_pixel,
-    coarse,
-    near_field,
-)
+from vcam_cli.image_formation.chart_cells import cell_grid, cells_per_pixel
 from vcam_cli.image_formation.effect_changes import changes_by_omission, needed_modes
+from vcam_cli.image_formation.far_field import FarPart, far_parts, near_field
 from vcam_cli.image_formation.field_dependence import Mode, field_mixtures, tabulate_field
 from vcam_cli.image_formation.filtering import Filter
 from vcam_cli.image_formation.harmonic_scenes import (
@@ -84,38 +77,26 @@ def _mean_layers(path: OpticalPath, scene: SampledScene) -> tuple[Layers, Spectr
 
 def _filtered_layers(path: OpticalPath, scene: SampledScene) -> tuple[Layers, SpectrumReport]:
     """Through the cosine spectrum, on cells of their own for the near and far field of a chart."""
-    if not isinstance(scene, ChartScene) or scene.chart.edges() is not None:
-        return _spectral_layers(path, scene, highest_passed(path, scene), 0.0)
+    if not isinstance(scene, ChartScene):
+        return _spectral_layers(path, scene, highest_passed(path, scene))
     near = near_field(path, scene, reach(path))
-    highest = highest_passed(path, near)
-    cells, error = cells_per_pixel(path, near, highest)
-    fine = near.on_cells(cell_grid(near, path.geometry, cells))
-    layers, report = _spectral_layers(path, fine, min(highest, cells), error)
-    if near is scene:
-        return layers, report
-    return chain(layers, _far_layers(path, scene, near)), report
-
-
-def _far_layers(path: OpticalPath, whole: ChartScene, near: ChartScene) -> Iterator[Layer]:
-    """What the whole of a chart brings more than its near field, on coarse cells."""
-    g, highest = path.geometry, highest_passed(path, whole)
-    pitch = min(g.pitch_x, g.pitch_y) / (BEYOND_CUTOFF * highest)
-    for sign, part in ((1, whole), (-1, near)):
-        layers, _ = _spectral_layers(path, coarse(part, pitch), highest, 0.0)
-        for layer in layers:
-            yield replace(layer, values=partial(_multiply_values, layer.values, sign))
-
-
-def _multiply_values(
-    values: Callable[[int, slice], NDArray], sign: int, color: int, rows: slice
-) -> NDArray:
-    return sign * values(color, rows)
+    rings = far_parts(path, near, scene, reach(path))
+    highest, error = highest_passed(path, near), 0.0
+    if scene.chart.edges() is None:
+        cells, error = cells_per_pixel(path, near, highest)
+        near = near.on_cells(cell_grid(near, path.geometry, cells))
+        highest = min(highest, cells)
+    return _spectral_layers(path, near, highest, error, rings)
 
 
 def _spectral_layers(
-    path: OpticalPath, scene: SampledScene, highest: float, error: float
+    path: OpticalPath,
+    scene: SampledScene,
+    highest: float,
+    error: float = 0.0,
+    rings: Sequence[FarPart] = (),
 ) -> tuple[Layers, SpectrumReport]:
-    """A scene whose cells are chosen, through its cosine spectrum.
+    """A scene whose cells are chosen, and the rings around it, through their cosine spectra.
 
     highest: frequency beyond which nothing counts [pixel Nyquist]; error: rms that the cells leave
     [electrons / s].
@@ -149,7 +130,8 @@ def _spectral_layers(
         peak=image.peak,
         memory=needed,
     )
-    return _layers(image_filter, modes, image.spectrum, path.workers), report
+    layers = _layers(image_filter, modes, image.spectrum, path.workers)
+    return chain(layers, _far_layers(path, rings, image_filter, modes, image.highest)), report
 
 
 def _filter(path: OpticalPath, scene: SampledScene, tables: Tables, highest: float) -> Filter:
@@ -173,3 +155,19 @@ def _layers(
         chosen = image_filter if mode is None else replace(image_filter, tables=mode.tables())
         series = chosen.apply(spectrum, workers)
         yield Layer(series.signal, None if mode is None else mode.map)
+
+
+def _far_layers(
+    path: OpticalPath,
+    rings: Sequence[FarPart],
+    near: Filter,
+    modes: Sequence[Mode],
+    highest: float,
+) -> Iterator[Layer]:
+    """The light of the rings around a near field, through its filter and modes.
+
+    highest: frequency at which the filter ends [pixel Nyquist].
+    """
+    for part in rings:
+        spectrum = part.spectrum(path, highest, near.tables.mix)
+        yield from _layers(part.image_filter(near, path, highest), modes, spectrum, path.workers)

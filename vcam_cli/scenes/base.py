@@ -146,6 +146,11 @@ class SampledScene(ABC):
     samples: Literal["squares", "averages"]
     dtype: DTypeLike
 
+    @property
+    def extent(self) -> tuple[float, float]:
+        """Width and height of the grid [m]."""
+        return self.pitch_x * self.shape[1], self.pitch_y * self.shape[0]
+
     @abstractmethod
     def planes(self, mix: Array, workers: int = 1) -> Array:
         """sum_k mix[r, k] B_k on the grid: (R, ny, nx) in the view's dtype.
@@ -179,11 +184,6 @@ class Chart(ABC):
 
     `mix` is (R, K), and its dtype is that of the result.
     """
-
-    @property
-    def coarsest_cell(self) -> float:
-        """Largest cells [m] that it is painted on; larger ones are painted in parts."""
-        return math.inf
 
     def highest_frequency(self, half_width: float) -> float:
         """Frequency beyond which there is no detail within so much of the center [cycles/m].
@@ -229,7 +229,7 @@ class ChartScene(SampledScene):
     def on_cells(self, shape: tuple[int, int]) -> "ChartScene":
         """The same part of the chart on a grid of so many cells (ny, nx)."""
         ny, nx = shape
-        width, height = self.pitch_x * self.shape[1], self.pitch_y * self.shape[0]
+        width, height = self.extent
         return replace(self, shape=shape, pitch_x=width / nx, pitch_y=height / ny)
 
     def cropped(self, center: tuple[float, float], width: float, height: float) -> "ChartScene":
@@ -238,10 +238,6 @@ class ChartScene(SampledScene):
 
     def planes(self, mix: Array, workers: int = 1) -> Array:
         ny, nx = self.shape
-        parts = math.ceil(max(self.pitch_x, self.pitch_y) / self.chart.coarsest_cell)
-        if parts > 1:
-            finer = self.on_cells((ny * parts, nx * parts)).planes(mix, workers)
-            return finer.reshape(len(mix), ny, parts, nx, parts).mean(axis=(2, 4))
         x_edges = self.center[0] + cell_edges(nx, self.pitch_x)
         y_edges = self.center[1] + cell_edges(ny, self.pitch_y)
         out = np.empty((len(mix), ny, nx), self.dtype)
@@ -258,8 +254,7 @@ class ChartScene(SampledScene):
         edges = self.chart.edges()
         if edges is None:
             return None
-        extents = (self.pitch_x * self.shape[1] / 2, self.pitch_y * self.shape[0] / 2)
-        x, y = (_within(e, half) for e, half in zip(edges, extents, strict=True))
+        x, y = (_within(e, size / 2) for e, size in zip(edges, self.extent, strict=True))
         middle_x, middle_y = ((e[1:] + e[:-1]) / 2 for e in (x, y))
         return Rectangles(x, y, self.chart.values(middle_x, middle_y, np.asarray(mix, float)))
 

@@ -21,11 +21,6 @@ class LeavesWithColorChecker(Chart):
     leaves: DeadLeaves | PlacedLeaves
     card: Card
 
-    @property
-    def coarsest_cell(self) -> float:
-        """Largest cell that is painted directly [m]."""
-        return self.leaves.coarsest_cell
-
     def crop_to_cells(self, x_edges: Array, y_edges: Array) -> "LeavesWithColorChecker":
         """Return the chart with only those leaves that may be seen beside the card."""
         if isinstance(self.leaves, PlacedLeaves):

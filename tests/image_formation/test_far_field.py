@@ -1,0 +1,118 @@
+"""Rings around a near field: they tile the margin, and their light is that of one fine grid."""
+
+import math
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from optical_paths import PITCH, Leaning, aperture, on_chart, path, rms, sensor, signal
+
+from vcam_cli.effects.diffraction import Diffraction
+from vcam_cli.effects.wavefront_blur import Lens, SymmetricBlur
+from vcam_cli.image_formation import far_field, strategies
+from vcam_cli.image_formation.far_field import far_parts, near_field
+from vcam_cli.image_formation.settings import REFERENCE, STANDARD
+from vcam_cli.scenes.base import Chart, Frame
+from vcam_cli.scenes.csf import Csf
+from vcam_cli.scenes.slanted_edge import SlantedEdge
+from vcam_cli.scenes.step_wedge import step_wedge
+
+DEFOCUS = SymmetricBlur(Lens(8.0, True), ((4, 0.3e-6),))
+BLURS = {
+    "f/8": (Diffraction(8.0, 0.0),),
+    "defocus": (Diffraction(8.0, 0.0), DEFOCUS),
+    "beside its place": (Diffraction(8.0, 0.0), Leaning(5e-6, 2e-6, 1e-6, 1e-6)),
+}
+
+
+@dataclass(frozen=True)
+class Lamp(Chart):
+    """A bright square to the lower right of the array."""
+
+    near: float
+    """Its nearest sides from the array's center [m]."""
+    side: float = 60e-6
+
+    def paint(self, x_edges, y_edges, mix, out):
+        cover = [
+            np.clip(
+                np.minimum(e[1:], self.near + self.side) - np.maximum(e[:-1], self.near), 0, None
+            )
+            / np.diff(e)
+            for e in (y_edges, x_edges)
+        ]
+        out[:] = np.multiply.outer(mix[:, 0], np.outer(*cover))
+
+    def values(self, x, y, mix):
+        inside = [(at > self.near) & (at < self.near + self.side) for at in (y, x)]
+        return np.multiply.outer(mix[:, 0], np.outer(*inside).astype(float))
+
+
+CHARTS = {
+    "edge": SlantedEdge(0.3, 1.0),
+    "chirp": Csf(Frame(14 * PITCH, 10 * PITCH), 0.45 / PITCH, 0.5, 0.9, 0.0),
+    "rectangles": step_wedge(5, 2.0, Frame(14 * PITCH, 10 * PITCH)),
+    "lamp": Lamp(110e-6),
+}
+
+
+def before(*blurs, shape=(10, 14), pitch=(PITCH, PITCH), knobs=STANDARD):
+    g = sensor(*shape, (0.8, 0.7), pitch=pitch)
+    return path(g, *blurs, aperture(g), knobs=knobs)
+
+
+def split(seen, scene):
+    widest = strategies.reach(seen)
+    near = near_field(seen, scene, widest)
+    return near, far_parts(seen, near, scene, widest), widest
+
+
+@pytest.mark.parametrize("blurs", BLURS)
+@pytest.mark.parametrize("pitch", [(PITCH, PITCH), (PITCH, 3 * PITCH)])
+@pytest.mark.parametrize("shape", [(1, 1), (10, 14), (60, 7)])
+def test_rings_tile_the_margin(shape, pitch, blurs):
+    """Each begins where the one before ends, on cells as fine as its distance asks for."""
+    seen = before(*BLURS[blurs], shape=shape, pitch=pitch)
+    scene = on_chart(seen, CHARTS["edge"], margin=900)
+    near, parts, widest = split(seen, scene)
+    outer, inner = parts[::2], parts[1::2]
+    assert all(part.sign == 1 for part in outer)
+    assert all(part.sign == -1 for part in inner)
+    size = seen.geometry.sensor_width, seen.geometry.sensor_height
+    for one, two in zip(outer, inner, strict=True):
+        pitches = [(part.scene.pitch_x, part.scene.pitch_y) for part in (one, two)]
+        assert pitches[0] == pytest.approx(pitches[1], rel=1e-12)
+        sides = zip(two.scene.extent, scene.extent, size, strict=True)
+        clear = min((a - c) / 2 - widest for a, b, c in sides if b > a * (1 + 1e-9))
+        assert clear >= far_field.NEAR / seen.transfer.cutoff * (1 - 1e-9)
+        assert max(pitches[0]) <= clear / far_field.CELLS * (1 + 1e-9)
+    extents = [near.extent, *(part.scene.extent for part in outer)]
+    for one, two in pairwise(extents):
+        assert two > one
+    for one, part in zip(extents, inner, strict=False):
+        assert part.scene.extent == pytest.approx(one, rel=1e-12)
+    assert all(a >= b * (1 - 1e-9) for a, b in zip(extents[-1], scene.extent, strict=True))
+    assert sum(math.prod(part.scene.shape) for part in parts) < 3e5
+
+
+@pytest.mark.parametrize("blurs", BLURS)
+@pytest.mark.parametrize("name", CHARTS)
+def test_the_light_of_rings_is_that_of_fine_cells(name, blurs, monkeypatch):
+    """Against the whole chart on the cells of its near field.
+
+    A fortieth of the tolerance of `reference`; of a lamp beside a dark array, a thousandth of its
+    light: the rings of its diffraction pattern.
+    """
+    knobs = replace(REFERENCE, oversampling=5)
+    seen = before(*BLURS[blurs], knobs=knobs)
+    scene = on_chart(seen, CHARTS[name], margin=250)
+    near, parts, _ = split(seen, scene)
+    assert len(parts) == 4
+    found, nearby = signal(seen, scene), signal(seen, near)
+    monkeypatch.setattr(strategies, "near_field", lambda path, scene, widest: scene)
+    # the last ring ends with whole cells, where it is mirrored
+    exact = signal(seen, scene.cropped((0.0, 0.0), *parts[-2].scene.extent))
+    brought, error = rms(nearby, exact), rms(found, exact)
+    assert error < brought / 10
+    assert error < (1e-3 if name == "lamp" else 5e-6) * exact.max()

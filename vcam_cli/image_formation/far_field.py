@@ -1,0 +1,141 @@
+"""Light from far beyond a small array, on ever coarser cells.
+
+What is a distance d away is seen through the tail of the point spread function, which changes over
+lengths like d: cells of a part of d are fine enough there, however fine a detail the lens resolves.
+So the image of a chart with a wide margin is that of its near field, and of rings around it. Each
+ring is the image of a rectangle less that of the one within, both mirrored at their borders, on the
+same cells and through a low-pass that ends with what these resolve. Within the inner rectangle the
+two are the same; beyond it, the low-pass changes the tail by less than 1e-4 of itself.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.fft
+from numpy.typing import NDArray
+
+from vcam_cli.image_formation.bandwidth import axes
+from vcam_cli.image_formation.cosine_series import Axis
+from vcam_cli.image_formation.filtering import Filter
+from vcam_cli.image_formation.optical_path import OpticalPath
+from vcam_cli.image_formation.scene_spectrum import (
+    SceneSpectrum,
+    rectangle_spectrum,
+    transform_planes,
+)
+from vcam_cli.scenes.base import ChartScene
+
+NEAR = 12.0
+"""Distance from the array to the border of the near field, beyond the reach of the lens's blurs, in
+inverse cut-off frequencies: there the tail is smooth but for 0.2 % of itself."""
+LEAST_PIXELS, LEAST_PART = 4, 1 / 64
+"""That distance in pixels, and in shorter sides of the array, at least."""
+CELLS = 16
+"""Cells of a ring over the distance from the array to its inner border, at least."""
+GROWTH = 4
+"""Distance to the outer border of a ring over that to its inner one."""
+ROUNDING = 1e-9
+"""Part of a length that is no length."""
+LOW_PASS = 1.84
+"""Nyquist frequency of a ring's cells over that at which its low-pass is 1 / e. Of exp(-f^4) little
+is left at the former, 1e-5; its kernel falls fast and has no second moment, so that it leaves all
+that changes slowly as it is."""
+
+
+@dataclass(frozen=True)
+class FarPart:
+    """A rectangle of the chart on the cells of a ring."""
+
+    scene: ChartScene
+    sign: int
+    """1 of an outer rectangle, -1 of an inner."""
+
+    def spectrum(self, path: OpticalPath, highest: float, mix: NDArray) -> SceneSpectrum:
+        """Return the spectrum of its planes, mixtures (R, K) of the components, in 64 bits.
+
+        highest: frequency at which the near field's filter ends [pixel Nyquist].
+        """
+        rectangles = self.scene.rectangles(mix)
+        if rectangles is not None:
+            x, y = axes(path, self.scene, highest)
+            return rectangle_spectrum(rectangles, self.scene.shape, (y, x), np.float64)
+        planes = self.scene.planes(mix, path.workers).astype(np.float64, copy=False)
+        return transform_planes(planes, path.workers)
+
+    def image_filter(self, near: Filter, path: OpticalPath, highest: float) -> Filter:
+        """Return the filter of the near field for this part, with the ring's low-pass and the sign.
+
+        highest: frequency at which the near field's filter ends [pixel Nyquist].
+        """
+        x, y = axes(path, self.scene, highest)
+        along_x, along_y = _low_pass(x), self.sign * _low_pass(y)
+        for effect in path.separable:
+            along_x *= effect.along_x(x.frequencies)
+            along_y *= effect.along_y(y.frequencies)
+        return replace(near, x=x, y=y, along_x=along_x, along_y=along_y)
+
+
+def _low_pass(axis: Axis) -> NDArray:
+    return np.exp(-((2 * LOW_PASS * axis.sample_pitch * axis.frequencies) ** 4))
+
+
+def near_field(path: OpticalPath, scene: ChartScene, widest: float) -> ChartScene:
+    """Return the part of a chart whose light has to be followed in all detail.
+
+    That is the whole chart where its margin is not much wider. widest: reach of the blurs,
+    diffraction aside [m].
+    """
+    g, cutoff = path.geometry, path.transfer.cutoff
+    if not 0 < cutoff < math.inf:
+        return scene
+    distance = NEAR / cutoff + widest
+    distance = max(distance, LEAST_PART * min(g.sensor_width, g.sensor_height))
+    margin = max(math.ceil(distance / min(g.pitch_x, g.pitch_y)), LEAST_PIXELS)
+    width, height = (g.columns + 2 * margin) * g.pitch_x, (g.rows + 2 * margin) * g.pitch_y
+    if 2 * width * height > math.prod(scene.extent):
+        return scene
+    return scene.cropped((0.0, 0.0), width, height)
+
+
+def far_parts(
+    path: OpticalPath, near: ChartScene, whole: ChartScene, widest: float
+) -> list[FarPart]:
+    """Return the rings from the near field to the border of the whole chart, if it has any.
+
+    widest: reach of the blurs, diffraction aside [m].
+    """
+    if near is whole:
+        return []
+    sensor = path.geometry.sensor_width, path.geometry.sensor_height
+    inner, parts = near.extent, list[FarPart]()
+    clear = min(a - b for a, b in zip(inner, sensor, strict=True)) / 2 - widest
+    cells = [math.ceil(CELLS * size / clear / 2) for size in inner]
+    pitch = [size / n / 2 for size, n in zip(inner, cells, strict=True)]
+    while any(a < b * (1 - ROUNDING) for a, b in zip(inner, whole.extent, strict=True)):
+        clear *= GROWTH
+        reached = [
+            min(a + 2 * (clear + widest), b) for a, b in zip(sensor, whole.extent, strict=True)
+        ]
+        more = [_even_cells(size, p) for size, p in zip(reached, pitch, strict=True)]
+        parts += [_part(whole, more, pitch, 1), _part(whole, cells, pitch, -1)]
+        inner = more[0] * pitch[0] * 2, more[1] * pitch[1] * 2
+        cells, pitch = [n // GROWTH for n in more], [p * GROWTH for p in pitch]
+    return parts
+
+
+def _even_cells(size: float, pitch: float) -> int:
+    """Return cells on either side of the center that reach over a size [m].
+
+    They are whole cells of the next ring too, and their transforms are fast.
+    """
+    return GROWTH * scipy.fft.next_fast_len(math.ceil(size / pitch / 2 / GROWTH), real=True)
+
+
+def _part(chart: ChartScene, cells: list[int], pitch: list[float], sign: int) -> FarPart:
+    """Return a rectangle of so many cells of a pitch [m] on either side of the center, x and y."""
+    width, height = (2 * n * p for n, p in zip(cells, pitch, strict=True))
+    part = chart.cropped((0.0, 0.0), width, height).on_cells((2 * cells[1], 2 * cells[0]))
+    return FarPart(part, sign)
