@@ -215,7 +215,7 @@ def test_studies_make_their_cameras_and_one_of_each_case_runs(name):
     figures.plan(cameras)
     expectations.plan(cameras)
     assert grid.study.model.name == name
-    assert not grid.refused
+    assert not grid.problems
     for point in {p.case: p for p in grid.points}.values():
         found = {metric: value for metric, value, _ in simulate(point.camera).metrics}
         assert all(np.isfinite(found[metric]) for metric in grid.study.model.metrics)

@@ -279,7 +279,7 @@ def test_pixels_need_not_be_square(size, tmp_path):
     exact = {"preset": "reference", "oversampling": 64}
     lost = rms(some.values, rate(camera(tmp_path, changes | {"accuracy": exact}), values).values)
     assert lost < 0.2 * 5e-3 * some.values.max()
-    assert lost / 1.5 < some.spectrum.lost < lost * 1.5
+    assert lost / 1.5 < some.spectrum.lost_rms < lost * 1.5
 
 
 @pytest.mark.parametrize("rows", [201, 480])
@@ -311,7 +311,7 @@ def test_loss_of_a_picture_is_known(kind, f_number, tmp_path):
     fine = rate(camera(tmp_path, changes | {"accuracy": exact}), values)
     lost = rms(rough.values, fine.values)
     assert lost > 1e-4 * fine.values.max()
-    assert lost / 1.5 < rough.spectrum.lost < lost * 1.5
+    assert lost / 1.5 < rough.spectrum.lost_rms < lost * 1.5
 
 
 @pytest.mark.parametrize("preset", ["draft", "standard", "reference"])
@@ -362,7 +362,9 @@ def test_no_further_than_the_tolerance_asks(tmp_path):
         share = bandwidth.highest_frequency_share(tolerance)
         assert lost < 1.2 * share * whole.values.max(), preset
         # At `reference` what is left is next to nothing.
-        assert lost == pytest.approx(some.spectrum.lost, rel=2 if preset == "reference" else 0.2)
+        assert lost == pytest.approx(
+            some.spectrum.lost_rms, rel=2 if preset == "reference" else 0.2
+        )
     assert reached == sorted(reached, reverse=True)
     assert reached[0] > reached[-1] >= 1
 
@@ -406,12 +408,12 @@ def test_nothing_that_counts_is_passed_beyond_the_highest(fill):
     """The contrast of lens and aperture together, judged on its envelope."""
     g = sensor(40, 60, (fill, fill))
     for blurs in ((Diffraction(2.0, 0.0),), (Diffraction(11.0, 0.0),), (Gaussian(0.8e-6),)):
-        seen = path(g, *blurs, aperture(g))
-        found = highest_passed(seen, None)
+        optical_path = path(g, *blurs, aperture(g))
+        found = highest_passed(optical_path, None)
         f = np.linspace(found, bandwidth.HIGHEST, 4000)[1:] * 0.5 / PITCH
-        passed = np.abs(seen.transfer.radial_response(f)[0, 0] * np.sinc(f * fill * PITCH))
+        passed = np.abs(optical_path.transfer.radial_response(f)[0, 0] * np.sinc(f * fill * PITCH))
         assert passed.max() <= bandwidth.LEAST_PASSED * STANDARD.tolerance * (1 + 1e-9)
-        assert found <= 2 * PITCH * seen.transfer.cutoff
+        assert found <= 2 * PITCH * optical_path.transfer.cutoff
 
 
 def test_a_chart_without_detail_needs_no_further():
@@ -421,15 +423,15 @@ def test_a_chart_without_detail_needs_no_further():
             return 0.1 / PITCH
 
     g = sensor(40, 60)
-    seen = path(g, Diffraction(2.0, 0.0), aperture(g))
-    assert highest_passed(seen, on_chart(seen, Soft(0.0))) == pytest.approx(0.2)
-    assert highest_passed(seen, on_chart(seen, HalfPlane(0.0))) > 1
+    optical_path = path(g, Diffraction(2.0, 0.0), aperture(g))
+    assert highest_passed(optical_path, on_chart(optical_path, Soft(0.0))) == pytest.approx(0.2)
+    assert highest_passed(optical_path, on_chart(optical_path, HalfPlane(0.0))) > 1
 
 
 def test_tables_reach_the_corner_or_the_lens():
     g = sensor(40, 60, pitch=(PITCH, 2 * PITCH))
     for n in (2.0, 30.0):
-        seen = path(g, Diffraction(n, 0.0))
+        optical_path = path(g, Diffraction(n, 0.0))
         corner = math.hypot(0.5 / PITCH, 0.25 / PITCH)
-        top = bandwidth.table_size(seen, 1.5).top
-        assert top == pytest.approx(min(1.5 * corner, seen.transfer.cutoff))
+        top = bandwidth.table_size(optical_path, 1.5).top
+        assert top == pytest.approx(min(1.5 * corner, optical_path.transfer.cutoff))

@@ -91,10 +91,10 @@ SHIFT = {"gaps": (0.2, -0.1), "no gap along y": (-0.15, 0.0), "whole": (0.0, 0.0
 def test_rectangles_by_their_overlaps(name, fill):
     chart = RECTANGLES[name]
     g = sensor(18, 24, FILLS[fill], SHIFT[fill], pitch=(1e-6, 1e-6))
-    seen = path(g, aperture(g))
-    scene = on_chart(seen, chart)
+    optical_path = path(g, aperture(g))
+    scene = on_chart(optical_path, chart)
     mix = np.random.default_rng(1).random((3, 25))
-    got = box_averages(scene, mix, g, axes(seen, scene, 1.0), 1)
+    got = box_averages(scene, mix, g, axes(optical_path, scene, 1.0), 1)
 
     def ends(edges):
         return np.concatenate([[-1.0], edges[np.isfinite(edges)], [1.0]])
@@ -132,10 +132,10 @@ def test_dead_leaves_in_parts():
     """Photodetectors that hold many leaves: against points, 100 along each side."""
     g = sensor(4, 6, (0.8, 0.6), pitch=(1e-6, 1e-6))
     leaves = dead_leaves(2, Frame(24e-6, 24e-6))
-    seen = path(g, aperture(g))
-    scene = on_chart(seen, leaves)
+    optical_path = path(g, aperture(g))
+    scene = on_chart(optical_path, leaves)
     mix = np.random.default_rng(3).random((1, 12))
-    got = box_averages(scene, mix, g, axes(seen, scene, 1.0), 1)[0]
+    got = box_averages(scene, mix, g, axes(optical_path, scene, 1.0), 1)[0]
     place = (np.arange(100) + 0.5) / 100 - 0.5
     x = (np.arange(6)[:, None] - 2.5) * 1e-6 + place * g.collecting_width
     y = (np.arange(4)[:, None] - 1.5) * 1e-6 + place * g.collecting_height
@@ -145,11 +145,11 @@ def test_dead_leaves_in_parts():
 
 def test_bands_of_rows_are_those_of_all(monkeypatch):
     g = sensor(11, 14, (0.5, 0.7), pitch=(1e-6, 1e-6))
-    seen = path(g, aperture(g))
-    scene = on_chart(seen, POINTS["star"])
-    whole = box_averages(scene, ONE, g, axes(seen, scene, 1.0), 1)
+    optical_path = path(g, aperture(g))
+    scene = on_chart(optical_path, POINTS["star"])
+    whole = box_averages(scene, ONE, g, axes(optical_path, scene, 1.0), 1)
     monkeypatch.setattr(box_average, "CELLS_A_BAND", 90)  # three rows at once
-    banded = box_averages(scene, ONE, g, axes(seen, scene, 1.0), 1)
+    banded = box_averages(scene, ONE, g, axes(optical_path, scene, 1.0), 1)
     np.testing.assert_allclose(banded, whole, atol=1e-12)
 
 
@@ -168,11 +168,11 @@ def test_a_single_row_or_column(shape):
 
 def test_the_aperture_changes_what_points_and_means_differ_by():
     g = sensor(10, 14, (0.5, 0.7), pitch=(1e-6, 1e-6))
-    seen = path(g, aperture(g))
-    scene = on_chart(seen, POINTS["star"])
-    made = photo_rate(seen, scene).spectrum
+    optical_path = path(g, aperture(g))
+    scene = on_chart(optical_path, POINTS["star"])
+    made = photo_rate(optical_path, scene).spectrum
     points = point_values(scene, ONE, g)[0].astype(float)
-    expected = np.sqrt(np.mean((signal(seen, scene) - points) ** 2))
+    expected = np.sqrt(np.mean((signal(optical_path, scene) - points) ** 2))
     assert made.changes == {"pixel_aperture": pytest.approx(expected, rel=1e-6)}
     assert made.oversampling == made.cells == made.terms == 0
 
@@ -187,7 +187,7 @@ def test_a_chart_without_blur_is_never_sampled(kind, aperture, tmp_path):
     }  # fmt: skip
     made, _ = prepare(camera(tmp_path, changes), 1)
     assert made.spectrum.cells == 0
-    assert not made.spectrum.lost
+    assert not made.spectrum.lost_rms
     g, fine = made.geometry, 100
     place = (np.arange(fine) + 0.5) / fine - 0.5
     y, x = ((np.arange(n)[:, None] - (n - 1) / 2 + place) for n in (g.rows, g.columns))

@@ -36,15 +36,17 @@ def before(lens: str, tolerance: float = 0.005):
     return path(g, *LENSES[lens], aperture(g), knobs=knobs)
 
 
-def converged(seen, scene) -> np.ndarray:
+def converged(optical_path, scene) -> np.ndarray:
     """The signal on cells twice as fine as a measurement's reference, of another factor."""
-    finest = 2.31 * chart_cells.BEYOND_CUTOFF * highest_passed(seen, scene)
-    knobs = replace(seen.settings, oversampling=finest)
-    return signal(replace(seen, settings=knobs), scene)
+    finest = 2.31 * chart_cells.BEYOND_CUTOFF * highest_passed(optical_path, scene)
+    knobs = replace(optical_path.settings, oversampling=finest)
+    return signal(replace(optical_path, settings=knobs), scene)
 
 
-def on_cells(seen, scene, cells: float) -> np.ndarray:
-    return signal(replace(seen, settings=replace(seen.settings, oversampling=cells)), scene)
+def on_cells(optical_path, scene, cells: float) -> np.ndarray:
+    return signal(
+        replace(optical_path, settings=replace(optical_path.settings, oversampling=cells)), scene
+    )
 
 
 @pytest.fixture
@@ -63,12 +65,12 @@ def test_the_measured_error_is_of_the_size_of_the_true_one(name, lens, tolerance
     most of a chart is quiet. Less only of an edge that runs through the corners of a crop's cells,
     and not of the whole chart's.
     """
-    seen = before(lens, tolerance)
-    scene = on_chart(seen, CHARTS[name])
-    highest = highest_passed(seen, scene)
-    cells, error = cells_per_pixel(seen, scene, highest)
-    exact = converged(seen, scene)
-    true = rms(on_cells(seen, scene, cells), exact)
+    optical_path = before(lens, tolerance)
+    scene = on_chart(optical_path, CHARTS[name])
+    highest = highest_passed(optical_path, scene)
+    cells, error = cells_per_pixel(optical_path, scene, highest)
+    exact = converged(optical_path, scene)
+    true = rms(on_cells(optical_path, scene, cells), exact)
     assert true < tolerance * exact.max()
     assert true < (7 if name == "diagonal edge" else 1.5) * error
     budget = chart_cells.CELLS_SHARE * tolerance
@@ -79,25 +81,25 @@ def test_the_measured_error_is_of_the_size_of_the_true_one(name, lens, tolerance
 @pytest.mark.long
 @pytest.mark.parametrize("lens", LENSES)
 def test_the_error_of_dead_leaves_is_of_the_size_of_the_true_one(lens, measured):
-    seen = before(lens)
+    optical_path = before(lens)
     spectra = 12
     weights = np.full((spectra, 1, 1), 1.0)
-    seen = replace(seen, transfer=replace(seen.transfer, weights=weights))
-    scene = on_chart(seen, dead_leaves(4, FRAME))
+    optical_path = replace(optical_path, transfer=replace(optical_path.transfer, weights=weights))
+    scene = on_chart(optical_path, dead_leaves(4, FRAME))
     scene = replace(scene, spectra=scene.spectra * spectra)
-    cells, error = cells_per_pixel(seen, scene, highest_passed(seen, scene))
-    exact = converged(seen, scene)
-    true = rms(on_cells(seen, scene, cells), exact)
-    assert true < seen.settings.tolerance * exact.max()
+    cells, error = cells_per_pixel(optical_path, scene, highest_passed(optical_path, scene))
+    exact = converged(optical_path, scene)
+    true = rms(on_cells(optical_path, scene, cells), exact)
+    assert true < optical_path.settings.tolerance * exact.max()
     assert error / 4 < true < 1.5 * error
 
 
 def test_cells_are_finer_where_less_may_be_lost(measured):
     found = []
     for tolerance in (0.05, 0.01, 0.002):
-        seen = before("f/2", tolerance)
-        scene = on_chart(seen, CHARTS["star"], margin=10)
-        found.append(cells_per_pixel(seen, scene, highest_passed(seen, scene))[0])
+        optical_path = before("f/2", tolerance)
+        scene = on_chart(optical_path, CHARTS["star"], margin=10)
+        found.append(cells_per_pixel(optical_path, scene, highest_passed(optical_path, scene))[0])
     assert found == sorted(found)
     assert found[0] < found[-1]
 
@@ -110,36 +112,36 @@ def test_a_blurred_chart_needs_few(measured):
 
 
 def test_small_charts_are_painted_as_finely_as_the_lens_asks():
-    seen = before("f/2")
-    scene = on_chart(seen, CHARTS["star"], margin=10)
-    highest = highest_passed(seen, scene)
-    cells, error = cells_per_pixel(seen, scene, highest)
+    optical_path = before("f/2")
+    scene = on_chart(optical_path, CHARTS["star"], margin=10)
+    highest = highest_passed(optical_path, scene)
+    cells, error = cells_per_pixel(optical_path, scene, highest)
     assert cells >= chart_cells.BEYOND_CUTOFF * highest
     assert error == 0
-    exact = converged(seen, scene)
-    assert rms(on_cells(seen, scene, cells), exact) < 0.3 * 0.005 * exact.max()
+    exact = converged(optical_path, scene)
+    assert rms(on_cells(optical_path, scene, cells), exact) < 0.3 * 0.005 * exact.max()
 
 
 def test_a_user_may_say_how_fine():
-    seen = before("f/2")
-    seen = replace(seen, settings=replace(seen.settings, oversampling=3))
-    assert cells_per_pixel(seen, on_chart(seen, CHARTS["star"]), 5.0) == (3, 0.0)
+    optical_path = before("f/2")
+    optical_path = replace(optical_path, settings=replace(optical_path.settings, oversampling=3))
+    assert cells_per_pixel(optical_path, on_chart(optical_path, CHARTS["star"]), 5.0) == (3, 0.0)
 
 
 def test_there_are_no_more_than_memory_allows(measured, monkeypatch):
-    seen = before("f/2", 1e-4)
-    scene = on_chart(seen, CHARTS["star"], margin=10)
+    optical_path = before("f/2", 1e-4)
+    scene = on_chart(optical_path, CHARTS["star"], margin=10)
     monkeypatch.setattr(chart_cells, "MOST", 4 * (ROWS + 20) * (COLUMNS + 20))
-    cells, error = cells_per_pixel(seen, scene, highest_passed(seen, scene))
+    cells, error = cells_per_pixel(optical_path, scene, highest_passed(optical_path, scene))
     assert cells == pytest.approx(2.0, abs=0.1)
     assert error > 1e-4
 
 
 def test_detail_beyond_saturation_does_not_count(measured):
     """A signal that fills every pixel twice over is the same on any cells."""
-    seen = replace(before("f/2"), ceiling=1e-3)
-    scene = on_chart(seen, SlantedEdge(0.1, 0.5), margin=10)
-    assert cells_per_pixel(seen, scene, highest_passed(seen, scene)) == (1.0, 0.0)
+    optical_path = replace(before("f/2"), ceiling=1e-3)
+    scene = on_chart(optical_path, SlantedEdge(0.1, 0.5), margin=10)
+    assert cells_per_pixel(optical_path, scene, highest_passed(optical_path, scene)) == (1.0, 0.0)
 
 
 @pytest.mark.parametrize("per_pixel", [1.0, 1.37, 2.5, 7.3])
@@ -229,7 +231,7 @@ def test_what_repeats_is_not_mistaken_for_even(period):
 @pytest.mark.parametrize("shape", [(1, 1), (3, 50), (24, 24)])
 def test_crops_of_small_arrays(shape, measured):
     g = sensor(*shape)
-    seen = path(g, Diffraction(2.0, 0.0), aperture(g))
-    scene = on_chart(seen, CHARTS["star"], margin=4)
-    cells, _ = cells_per_pixel(seen, scene, highest_passed(seen, scene))
+    optical_path = path(g, Diffraction(2.0, 0.0), aperture(g))
+    scene = on_chart(optical_path, CHARTS["star"], margin=4)
+    cells, _ = cells_per_pixel(optical_path, scene, highest_passed(optical_path, scene))
     assert cells >= 1

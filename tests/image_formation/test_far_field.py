@@ -62,10 +62,10 @@ def before(*blurs, shape=(10, 14), pitch=(PITCH, PITCH), knobs=STANDARD):
     return path(g, *blurs, aperture(g), knobs=knobs)
 
 
-def split(seen, scene):
-    widest = strategies.reach(seen)
-    near = near_field(seen, scene, widest)
-    return near, far_parts(seen, near, scene, widest), widest
+def split(optical_path, scene):
+    widest = strategies.reach(optical_path)
+    near = near_field(optical_path, scene, widest)
+    return near, far_parts(optical_path, near, scene, widest), widest
 
 
 @pytest.mark.parametrize("blurs", BLURS)
@@ -73,19 +73,19 @@ def split(seen, scene):
 @pytest.mark.parametrize("shape", [(1, 1), (10, 14), (60, 7)])
 def test_rings_tile_the_margin(shape, pitch, blurs):
     """Each begins where the one before ends, on cells as fine as its distance asks for."""
-    seen = before(*BLURS[blurs], shape=shape, pitch=pitch)
-    scene = on_chart(seen, CHARTS["edge"], margin=900)
-    near, parts, widest = split(seen, scene)
+    optical_path = before(*BLURS[blurs], shape=shape, pitch=pitch)
+    scene = on_chart(optical_path, CHARTS["edge"], margin=900)
+    near, parts, widest = split(optical_path, scene)
     outer, inner = parts[::2], parts[1::2]
     assert all(part.sign == 1 for part in outer)
     assert all(part.sign == -1 for part in inner)
-    size = seen.geometry.sensor_width, seen.geometry.sensor_height
+    size = optical_path.geometry.sensor_width, optical_path.geometry.sensor_height
     for one, two in zip(outer, inner, strict=True):
         pitches = [(part.scene.pitch_x, part.scene.pitch_y) for part in (one, two)]
         assert pitches[0] == pytest.approx(pitches[1], rel=1e-12)
         sides = zip(two.scene.extent, scene.extent, size, strict=True)
         clear = min((a - c) / 2 - widest for a, b, c in sides if b > a * (1 + 1e-9))
-        assert clear >= far_field.NEAR / seen.transfer.cutoff * (1 - 1e-9)
+        assert clear >= far_field.NEAR / optical_path.transfer.cutoff * (1 - 1e-9)
         assert max(pitches[0]) <= clear / far_field.CELLS * (1 + 1e-9)
     extents = [near.extent, *(part.scene.extent for part in outer)]
     for one, two in pairwise(extents):
@@ -105,14 +105,14 @@ def test_the_light_of_rings_is_that_of_fine_cells(name, blurs, monkeypatch):
     light: the rings of its diffraction pattern.
     """
     knobs = replace(REFERENCE, oversampling=5)
-    seen = before(*BLURS[blurs], knobs=knobs)
-    scene = on_chart(seen, CHARTS[name], margin=250)
-    near, parts, _ = split(seen, scene)
+    optical_path = before(*BLURS[blurs], knobs=knobs)
+    scene = on_chart(optical_path, CHARTS[name], margin=250)
+    near, parts, _ = split(optical_path, scene)
     assert len(parts) == 4
-    found, nearby = signal(seen, scene), signal(seen, near)
+    found, nearby = signal(optical_path, scene), signal(optical_path, near)
     monkeypatch.setattr(strategies, "near_field", lambda path, scene, widest: scene)
     # the last ring ends with whole cells, where it is mirrored
-    exact = signal(seen, scene.cropped((0.0, 0.0), *parts[-2].scene.extent))
+    exact = signal(optical_path, scene.crop((0.0, 0.0), *parts[-2].scene.extent))
     brought, error = rms(nearby, exact), rms(found, exact)
     assert error < brought / 10
     assert error < (1e-3 if name == "lamp" else 5e-6) * exact.max()

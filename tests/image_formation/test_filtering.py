@@ -186,9 +186,9 @@ def test_filter_approaches_boxes_as_the_bandwidth_grows():
     g = sensor(18, 24, fill=(0.7, 0.7), pitch=(1.0, 1.0))
     plane = np.random.default_rng(5).random((15, 20))
     scene = of_picture(plane, 1.2)
-    seen = path(g, aperture(g))
+    optical_path = path(g, aperture(g))
     for bandwidth in (4.0, 40.0):
-        x, y = axes(seen, scene, bandwidth)
+        x, y = axes(optical_path, scene, bandwidth)
         flat = Tables(np.eye(1), np.ones((1, 1, 2)), 1e3, 0.0)
         spectrum = transform_planes(plane[None].copy(), 1)
         filter = filter_of(x, y, flat, np.sinc(x.frequencies * 0.7), np.sinc(y.frequencies * 0.7))
@@ -206,11 +206,13 @@ def test_photodetectors_off_their_pixels_centers_see_the_place_where_they_are(sh
     lens = Diffraction(4.0, 0.0)
     plane = np.random.default_rng(6).random((30, 39))
     scene = of_picture(plane, g.pitch_x * 26 / 39)
-    seen = path(g, lens, aperture(g))
-    x, y = axes(seen, scene, 2.0)
+    optical_path = path(g, lens, aperture(g))
+    x, y = axes(optical_path, scene, 2.0)
     assert x.virtual_pixels is not None
     assert bool(x.shift) == bool(shift[0])
-    table = tabulate(seen.transfer, TableSize(lens.cutoff(550e-9), 1 << 14, 0.0, 8), (np.eye(1), 0))
+    table = tabulate(
+        optical_path.transfer, TableSize(lens.cutoff(550e-9), 1 << 14, 0.0, 8), (np.eye(1), 0)
+    )
     along = [np.sinc(x.frequencies * 0.5 * g.pitch_x), np.sinc(y.frequencies * 0.4 * g.pitch_y)]
     filter = filter_of(x, y, table, *along)
     got = filter.apply(transform_planes(plane[None].copy(), 1), 1).signal(0, slice(None))

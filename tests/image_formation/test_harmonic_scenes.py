@@ -179,8 +179,8 @@ def test_colors_have_their_own_transfer():
     lens = Diffraction(5.6, 0.0)
     both = light(lens, weights=weights, wavelengths=(450e-9, 650e-9))
     colors = Mosaic((("R", "B"),))
-    seen = path(g, lens, transfer=both, knobs=EXACT, colors=colors)
-    found = photo_rate(seen, lattice(grid, g), planes=True).values
+    optical_path = path(g, lens, transfer=both, knobs=EXACT, colors=colors)
+    found = photo_rate(optical_path, lattice(grid, g), planes=True).values
     for color, (wavelength, level) in enumerate(((450e-9, 2.0), (650e-9, 3.0))):
         alone = path(g, lens, transfer=light(lens, wavelengths=(wavelength,)), knobs=EXACT)
         np.testing.assert_allclose(found[color], level * signal(alone, lattice(grid, g)), rtol=1e-9)
@@ -202,11 +202,11 @@ def test_the_series_ends_where_the_lens_does(monkeypatch):
     """One harmonic more than is counted changes nothing."""
     g = sensor(8, 8)
     grid = PointGrid(3.7 * PITCH, PITCH)
-    seen = path(g, Diffraction(4.0, 0.0), aperture(g), knobs=EXACT)
+    optical_path = path(g, Diffraction(4.0, 0.0), aperture(g), knobs=EXACT)
     scene = lattice(grid, g)
-    count = harmonics_count(seen, scene)
+    count = harmonics_count(optical_path, scene)
     layers = [
-        next(iter(harmonic_scenes.harmonic_layers(seen, scene, c)[0]))
+        next(iter(harmonic_scenes.harmonic_layers(optical_path, scene, c)[0]))
         for c in (count, (count[0] + 5, count[1] + 5))
     ]
     one, two = (layer.values(0, slice(None)) for layer in layers)
@@ -246,11 +246,13 @@ def test_waves_are_harmonics():
 
     g = sensor(11, 14, (0.6, 0.7), (0.1, 0.05))
     grating = Grating((7.3 * PITCH, 9.1 * PITCH))
-    seen = path(
+    optical_path = path(
         g, Round(0.7 * PITCH), Slanted(PITCH, -0.4 * PITCH, PITCH, 0.6 * PITCH), aperture(g),
         knobs=EXACT,
     )  # fmt: skip
-    found = signal(seen, HarmonicScene((WHITE,), grating, WHITE, None))
+    found = signal(optical_path, HarmonicScene((WHITE,), grating, WHITE, None))
     fx, fy = 1 / grating.period[0], 2 / grating.period[1]
     waves = (Wave((0.5,)), Wave((0.15,), fx, fy), Wave((0.15,), fx, -fy))
-    np.testing.assert_allclose(found, signal(seen, WaveScene((WHITE,), waves, WHITE)), atol=1e-12)
+    np.testing.assert_allclose(
+        found, signal(optical_path, WaveScene((WHITE,), waves, WHITE)), atol=1e-12
+    )

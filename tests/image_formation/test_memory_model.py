@@ -137,17 +137,17 @@ def test_more_of_everything_needs_more(judged, samples):
 def test_an_image_needs_more_for_planes_cells_and_directions():
     g = sensor(1000, 1500, (0.5, 0.5))
     lens = Diffraction(4.0, 0.0), aperture(g)
-    seen = path(g, *lens)
-    size = table_size(seen, 2.0)
-    scene = on_chart(seen, SiemensStar(9, 1.0), margin=20)
+    optical_path = path(g, *lens)
+    size = table_size(optical_path, 2.0)
+    scene = on_chart(optical_path, SiemensStar(9, 1.0), margin=20)
 
-    def needed(seen=seen, scene=scene, planes=1):
-        return memory_model.image_bytes(seen, scene, planes, size)
+    def needed(optical_path=optical_path, scene=scene, planes=1):
+        return memory_model.image_bytes(optical_path, scene, planes, size)
 
     least = needed()
     shape = 2 * scene.shape[0], 2 * scene.shape[1]
     assert needed(planes=3) > least
-    assert needed(scene=scene.on_cells(shape)) > least
+    assert needed(scene=scene.with_cells(shape)) > least
     assert needed(path(sensor(1000, 1500, (0.5, 0.5), (0.1, 0.1)), *lens)) > least
     assert needed(path(g, *lens, Leaning(1e-6, 0, 1e-6, 1e-6))) > least
     assert needed(path(g, *lens, knobs=replace(STANDARD, float_width=64))) > least
@@ -167,10 +167,10 @@ def test_tables_of_strong_blurs_are_as_large_as_they_get():
 
 def test_the_estimate_of_a_picture_counts_its_samples():
     g = sensor(100, 150)
-    seen = path(g, Diffraction(2.0, 0.0))
-    size = table_size(seen, 2.0)
+    optical_path = path(g, Diffraction(2.0, 0.0))
+    size = table_size(optical_path, 2.0)
     few, many = (
-        memory_model.image_bytes(seen, of_picture([[0.5] * n] * n, 1e-6), 1, size)
+        memory_model.image_bytes(optical_path, of_picture([[0.5] * n] * n, 1e-6), 1, size)
         for n in (400, 800)
     )
     assert many - few >= (800**2 - 400**2) * 4

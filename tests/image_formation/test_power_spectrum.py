@@ -339,13 +339,15 @@ PICTURES = {
 }
 
 
-def brightest(seen, scene, highest: float = 3.0) -> float:
+def brightest(optical_path, scene, highest: float = 3.0) -> float:
     """The bound for a path, as the engine finds it."""
-    x, y = axes(seen, scene, highest)
-    size = TableSize(min(seen.transfer.cutoff, 2 * highest * NYQUIST), 2049, 0.0, 8)
-    tables = tabulate(seen.transfer, size, (np.eye(len(seen.transfer.weights)), 0.0))
-    planes = scene.planes(np.eye(len(seen.transfer.weights))).astype(float)
-    return brightest_mean(transform_planes(planes, 1), x, y, tables, seen.separable)
+    x, y = axes(optical_path, scene, highest)
+    size = TableSize(min(optical_path.transfer.cutoff, 2 * highest * NYQUIST), 2049, 0.0, 8)
+    tables = tabulate(
+        optical_path.transfer, size, (np.eye(len(optical_path.transfer.weights)), 0.0)
+    )
+    planes = scene.planes(np.eye(len(optical_path.transfer.weights))).astype(float)
+    return brightest_mean(transform_planes(planes, 1), x, y, tables, optical_path.separable)
 
 
 @pytest.mark.parametrize("lens", ["none", "diffraction", "gaussian"])
@@ -355,9 +357,9 @@ def test_no_mean_is_brighter_than_the_brightest_place(kind, lens):
     picture = PICTURES[kind](np.random.default_rng(4))
     blurs = {"none": (), "diffraction": (Diffraction(4.0, 0.0),), "gaussian": (Gaussian(5e-6),)}
     g = sensor(66, 90, fill=(0.8, 0.6))
-    seen = path(g, *blurs[lens], aperture(g))
+    optical_path = path(g, *blurs[lens], aperture(g))
     scene = of_picture(picture, PITCH)
-    least = brightest(seen, scene)
+    least = brightest(optical_path, scene)
     fine = sensor(8 * 66, 8 * 90, pitch=(PITCH / 8, PITCH / 8))
     dense = path(fine, *blurs[lens], aperture(g))
     if lens == "none":
@@ -372,14 +374,16 @@ def test_no_mean_is_brighter_than_the_brightest_place(kind, lens):
 
 def test_an_even_picture_is_its_level():
     g = sensor(66, 90)
-    seen = path(g, Diffraction(4.0, 0.0), aperture(g))
+    optical_path = path(g, Diffraction(4.0, 0.0), aperture(g))
     scene = of_picture(np.full((66, 90), 0.7), PITCH)
-    assert brightest(seen, scene) == pytest.approx(0.7, rel=1e-9)
+    assert brightest(optical_path, scene) == pytest.approx(0.7, rel=1e-9)
 
 
 def test_one_term_is_the_mean(monkeypatch):
     monkeypatch.setattr(module, "LOWEST", 1)
     g = sensor(66, 90)
     picture = np.random.default_rng(3).random((66, 90))
-    seen = path(g, Diffraction(4.0, 0.0), aperture(g))
-    assert brightest(seen, of_picture(picture, PITCH)) == pytest.approx(picture.mean(), rel=1e-9)
+    optical_path = path(g, Diffraction(4.0, 0.0), aperture(g))
+    assert brightest(optical_path, of_picture(picture, PITCH)) == pytest.approx(
+        picture.mean(), rel=1e-9
+    )

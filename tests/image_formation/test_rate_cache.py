@@ -5,7 +5,7 @@ import pytest
 from making import camera
 
 from vcam_cli import simulate
-from vcam_cli.image_formation.rate_cache import AFTER, light_key
+from vcam_cli.image_formation.rate_cache import INDEPENDENT_KEYS, light_key
 from vcam_cli.simulation import preparation
 from vcam_cli.simulation.shared import Shared
 
@@ -61,7 +61,7 @@ def changed(path, value):
 
 
 def test_every_key_that_is_left_out_is_tried():
-    assert {".".join(path) for path in AFTER} | {"effects"} == set(CHANGES)
+    assert {".".join(path) for path in INDEPENDENT_KEYS} | {"effects"} == set(CHANGES)
 
 
 @pytest.mark.parametrize("path", CHANGES)

@@ -147,7 +147,7 @@ def held(camera: Camera, workers: int = 1) -> Iterator[Held]:
     truth, full = ablation.mean_raw(found), ablation.full_signal(found)
     for tolerance, auto in zip(TOLERANCES, autos, strict=True):
         out = [d for d in auto.plan.decisions if d.state == "off" and d.by == "plan"]
-        expected = auto.spectrum.lost * auto.exposure_time / full
+        expected = auto.spectrum.lost_rms * auto.exposure_time / full
         expected += sum(d.contribution or 0 for d in out if d.unit == "of full signal")
         mean = ablation.rms(ablation.mean_raw(auto) - truth) / full
         yield Held(tolerance, expected, mean, variance_lost_of(auto, found, full))

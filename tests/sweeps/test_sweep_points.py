@@ -200,7 +200,7 @@ def test_a_path_that_names_nothing_is_refused_even_in_one_case(tmp_path):
 def test_a_value_that_the_camera_does_not_allow_is_told_with_its_place(tmp_path):
     found = grid(tmp_path, vary={"optics.f_number": {"values": [4, -1]}}, seeds=2)
     assert [p.camera is None for p in found.points] == [False, False, True, True]
-    (problem,) = found.refused
+    (problem,) = found.problems
     assert "study.yaml:" in problem.where
     assert problem.path == ("optics", "f_number")
 

@@ -120,14 +120,14 @@ def variance_shares(ready: Prepared, full: float, workers: int) -> dict[str, flo
         for effect in here:
             others = tuple(e for e in here if e is not effect)
             shares[effect.name] = max(
-                np.mean((taken - _draw_field(ready, field, others, workers)) ** 2)
-                / _variance(taken)
-                for taken, field in zip(everything, fields, strict=True)
+                np.mean((charge - _draw_field(ready, field, others, workers)) ** 2)
+                / _variance(charge)
+                for charge, field in zip(everything, fields, strict=True)
             )
         if scope == "frame":
             for code in of_kind(active, Quantizer):
                 shares[code.name] = max(
-                    _rounding_share(code, taken, group.conversions) for taken in everything
+                    _rounding_share(code, charge, group.conversions) for charge in everything
                 )
     return {name: float(share) for name, share in shares.items()}
 
@@ -141,8 +141,8 @@ def _rounding_share(code: Quantizer, electrons: NDArray, times: int) -> float:
     return error / max(error + float(np.var(electrons)), 1e-300)
 
 
-def _variance(taken: NDArray) -> float:
-    return max(float(np.var(taken)), 1e-300)
+def _variance(charge: NDArray) -> float:
+    return max(float(np.var(charge)), 1e-300)
 
 
 def _draw_field(

@@ -29,9 +29,9 @@ class Knob:
     """What its own errors are measured against; None: what the engine takes by itself."""
     absent: Callable[[Prepared], str]
     """Why a camera has none of it; empty where it has."""
-    further: tuple[dict[str, Any], ...] = ()
+    refinements: tuple[dict[str, Any], ...] = ()
     """Keys of `accuracy`: refinements tried until their change is a tenth of its least error."""
-    beside: dict[str, Any] = field(default_factory=dict)
+    companions: dict[str, Any] = field(default_factory=dict)
     """Keys that a coarser setting needs finer than others do, for its error to be its own."""
 
 

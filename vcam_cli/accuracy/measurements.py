@@ -45,9 +45,9 @@ class Shot:
     """The same of the frame as it is, with its noise."""
 
     @property
-    def lost(self) -> float:
+    def expected_loss(self) -> float:
         """Rms of what the plan expects the settings to lose of the spectrum [electrons]."""
-        return self.ready.spectrum.lost * self.ready.exposure_time
+        return self.ready.spectrum.lost_rms * self.ready.exposure_time
 
     @property
     def left_out(self) -> tuple[str, ...]:
@@ -156,7 +156,7 @@ def _computation(result: Result) -> tuple:
     """Return what two frames have in common of which each step is the same."""
     frame = result.frame
     chosen = replace(frame.settings, tolerance=0, oversampling=0)
-    way = replace(frame.spectrum, lost=0, changes={})
+    way = replace(frame.spectrum, lost_rms=0, changes={})
     effects = tuple(e.name for e in frame.plan.active)
     light = hashlib.sha256(np.ascontiguousarray(frame.rate).data).digest()
     return repr(chosen), repr(way), effects, light

@@ -87,7 +87,7 @@ def describe_reference(found: Prepared, coarse: Prepared, full: float, change: f
     found: the camera converged; coarse: at `accuracy: reference`; full: full signal; change: rms
     of the difference of their signals [electrons].
     """
-    left = found.spectrum.lost * found.exposure_time
+    left = found.spectrum.lost_rms * found.exposure_time
     chart = isinstance(found.scene, ChartScene) and not _is_rectangles(found)
     reached = coarse.spectrum.oversampling
     if chart and reached and found.spectrum.oversampling > reached:

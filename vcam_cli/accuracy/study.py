@@ -173,13 +173,15 @@ class _Measurement:
             self.watch.step(i, len(knobs))
             shots = {}
             for setting, value in settings_to_try(knob, truth.ready).items():
-                beside = {} if value == knob.finest else knob.beside
+                beside = {} if value == knob.finest else knob.companions
                 case = with_accuracy(everything, **{**fixed, **beside, knob.name: value})
                 alike = is_same_camera(knob, value, case, base.ready)
                 shots[setting] = base if alike else self.clock.shot(case, shared)
             best = Refined(truth, reference.lost)
             if knob.name != "oversampling":
-                again = [with_accuracy(everything, **{**fixed, **more}) for more in knob.further]
+                again = [
+                    with_accuracy(everything, **{**fixed, **more}) for more in knob.refinements
+                ]
                 best = refine_reference(base, list(shots.values()), again, self.full, self.workers)
                 self.changes[knob.name] = best.change
             for setting, value in settings_to_try(knob, truth.ready).items():
@@ -238,7 +240,7 @@ class _Measurement:
             seconds=math.nan,
             seconds_spread=math.nan,
             mean_s_cielab=shot.color_difference(other, self.workers, noisy),
-            predicted=shot.lost / self.full,
+            predicted=shot.expected_loss / self.full,
             left_out=shot.left_out,
             variance_lost=shot.variance_lost,
         )

@@ -206,7 +206,7 @@ def _optimal(task: Task, counts: Sequence[int]) -> Schedules:
     return schedules
 
 
-def _weighted(task: Task, counts: Sequence[int]) -> Schedules:
+def _weighted_schedules(task: Task, counts: Sequence[int]) -> Schedules:
     found = weighted_schedules.optimal_schedules(task.plan, counts, task.sensor, task.constraints)
     if not task.is_approximate:
         return found
@@ -221,7 +221,7 @@ def _weighted(task: Task, counts: Sequence[int]) -> Schedules:
     return judged
 
 
-def _heuristic(task: Task, counts: Sequence[int]) -> Schedules:
+def _heuristic_schedules(task: Task, counts: Sequence[int]) -> Schedules:
     return _schedules_of_photocurrents(
         task, {n: heuristic_photocurrents(task.plan, n) for n in counts}
     )
@@ -256,12 +256,12 @@ def _method_of_rule(rule: Callable[[float, float, int], Floats]) -> Method:
 
 METHODS: dict[str, Method] = {
     "optimal": _optimal,
-    "heuristic": _heuristic,
+    "heuristic": _heuristic_schedules,
     "uniform": _method_of_rule(uniform_times),
     "exponential": _method_of_rule(exponential_times),
     "geometric": _method_of_rule(geometric_times),
     "sqp": _sqp,
-    "weighted": _weighted,
+    "weighted": _weighted_schedules,
 }
 
 

@@ -149,8 +149,8 @@ def _effects() -> list[Item]:
     return [Item(effect.name, f"{_first_line(effect)} ({effect.reference})") for effect in ORDER]
 
 
-def _first_line(thing: object) -> str:
-    return (thing.__doc__ or "").strip().partition("\n")[0].rstrip(".")
+def _first_line(item: object) -> str:
+    return (item.__doc__ or "").strip().partition("\n")[0].rstrip(".")
 
 
 def _metrics() -> list[Item]:

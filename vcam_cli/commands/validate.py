@@ -81,8 +81,8 @@ def _checked_name(file: str, sets: list[str]) -> str:
     if kind == "schedule":
         return schedule_file.read(file, sets).model.name
     grid = sweep_points.grid(sweep_file.read(file), sets)
-    if grid.refused:
-        raise BadInput(grid.refused)
+    if grid.problems:
+        raise BadInput(grid.problems)
     return grid.study.model.name
 
 

@@ -118,7 +118,7 @@ def _crops(g: Geometry, scene: ChartScene, cells: float, level: NDArray) -> list
     even = 2 * (np.arange(1, FEW + 1)[:, None] * EVEN % 1) - 1
     busy = _busiest(g, scene, level)
     places = np.clip(np.concatenate([[(0, 0)], even * half, busy]), -np.array(half), half)
-    return [scene.cropped((float(x), float(y)), *size) for x, y in places]
+    return [scene.crop((float(x), float(y)), *size) for x, y in places]
 
 
 def _busiest(g: Geometry, scene: ChartScene, level: NDArray) -> NDArray:
@@ -147,7 +147,7 @@ def _signal(
     g = path.geometry
     rows, columns = round(crop.pitch_y / g.pitch_y), round(crop.pitch_x / g.pitch_x)
     small = replace(path, geometry=replace(g, rows=rows, columns=columns))
-    scene = crop.on_cells(cell_grid(crop, g, cells))
+    scene = crop.with_cells(cell_grid(crop, g, cells))
     coefficients = scipy.fft.dctn(scene.planes(level[None])[0].astype(np.float64), type=2)
     x, y = axes(small, scene, cells)
     radius = np.hypot(x.frequencies, y.frequencies[:, None])

@@ -97,7 +97,7 @@ def near_field(path: OpticalPath, scene: ChartScene, widest: float) -> ChartScen
     width, height = (g.columns + 2 * margin) * g.pitch_x, (g.rows + 2 * margin) * g.pitch_y
     if 2 * width * height > math.prod(scene.extent):
         return scene
-    return scene.cropped((0.0, 0.0), width, height)
+    return scene.crop((0.0, 0.0), width, height)
 
 
 def far_parts(
@@ -137,5 +137,5 @@ def _even_cells(size: float, pitch: float) -> int:
 def _part(chart: ChartScene, cells: list[int], pitch: list[float], sign: int) -> FarPart:
     """Return a rectangle of so many cells of a pitch [m] on either side of the center, x and y."""
     width, height = (2 * n * p for n, p in zip(cells, pitch, strict=True))
-    part = chart.cropped((0.0, 0.0), width, height).on_cells((2 * cells[1], 2 * cells[0]))
+    part = chart.crop((0.0, 0.0), width, height).with_cells((2 * cells[1], 2 * cells[0]))
     return FarPart(part, sign)

@@ -105,7 +105,7 @@ def tabulate_field(
         each = [radial_table(t, size)[None] for t in _zone_transfers(alone, zones)]
         stack = Stack(each, [(i, 0, False) for i in range(len(each))])
     level = np.abs(alone.level).max() or 1.0
-    importance = _importance(stack.known[0].shape, directed) / alone.weights.shape[1]
+    importance = _importance(stack.tables[0].shape, directed) / alone.weights.shape[1]
     shares, left = _shares(stack, importance, size.tolerance * level)
     maps = _maps(zones, geometry)
     weights = np.array([m.values for m in maps])
@@ -135,14 +135,14 @@ def tabulate_field(
 class Stack:
     """Tables of all zones, made of those of fewer blurs when they are asked for."""
 
-    known: list[NDArray]
+    tables: list[NDArray]
     """(parities, R, C, ...) each"""
     zones: list[tuple[int, int, bool]]
     """Of each zone: index into them, quarter turns, whether y is mirrored before."""
 
     @property
     def parities(self) -> int:
-        return len(self.known[0])
+        return len(self.tables[0])
 
     def rows(self, parity: int, at: tuple[int, ...]) -> NDArray:
         """Of a component and color, all zones': (zones, ...) float64."""
@@ -151,14 +151,14 @@ class Stack:
 
     def weighted_sum(self, parity: int, shares: NDArray) -> NDArray:
         """The sum of all zones' tables, each with its share: (R, C, ...)."""
-        total = np.zeros(self.known[0].shape[1:])
+        total = np.zeros(self.tables[0].shape[1:])
         for zone, share in zip(self.zones, shares, strict=True):
             total += share * self._zone_table(zone, parity, slice(None))
         return total
 
     def _zone_table(self, zone: tuple[int, int, bool], parity: int, at: Any) -> NDArray:
         model, quarters, mirrored = zone
-        return turn_table(self.known[model][at], parity, quarters, mirrored)
+        return turn_table(self.tables[model][at], parity, quarters, mirrored)
 
 
 def _stack_planes(alone: Transfer, blurs: Sequence[Blur], size: TableSize) -> Stack:
@@ -185,7 +185,7 @@ def _shares(
     found, left = [], np.zeros(len(stack.zones))
     for parity in range(stack.parities):
         products = np.zeros((len(left), len(left)))
-        for at in np.ndindex(stack.known[0].shape[1:3]):
+        for at in np.ndindex(stack.tables[0].shape[1:3]):
             rows = stack.rows(parity, at)
             rows = ((rows - rows.mean(axis=0)) * np.sqrt(importance)).reshape(len(left), -1)
             products += rows @ rows.T

@@ -74,11 +74,11 @@ class SpectrumReport:
 
     oversampling: float = 0.0
     """Highest frequency [pixel Nyquist]; 0 where the scene is known in closed form."""
-    lost: float = 0.0
+    lost_rms: float = 0.0
     """Estimated rms of the signal that sampling and filtering leave out [electrons / s]."""
     cells: int = 0
     """Samples of one plane of the scene that were transformed; 0 where its spectrum is known."""
-    painted: bool = False
+    is_painted: bool = False
     """Whether they had to be painted, as those of a chart."""
     terms: int = 0
     """Terms of one plane's spectrum that were filtered; 0 where there was no need to."""

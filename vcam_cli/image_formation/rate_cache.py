@@ -21,7 +21,7 @@ from vcam_cli.image_formation.photon_rate import Rate
 from vcam_cli.image_formation.transfer_functions import Transfer
 from vcam_cli.physics.cache import ByteCache
 
-AFTER: tuple[tuple[str, ...], ...] = tuple(
+INDEPENDENT_KEYS: tuple[tuple[str, ...], ...] = tuple(
     tuple(path.split("."))
     for path in (
         *("name", "seed", "adc", "exposure", "processing", "quality", "output"),
@@ -45,7 +45,7 @@ _MOST = 64
 def light_key(camera: Camera) -> str:
     """All that the light on the sensor depends on, as a text, but for the level of saturation."""
     form = camera.model_dump(mode="json")
-    for path in AFTER:
+    for path in INDEPENDENT_KEYS:
         _drop(form, path)
     accuracy = form["accuracy"]  # a preset by itself is written as its name
     if isinstance(accuracy, dict) and set(accuracy) == {"preset"}:
@@ -65,7 +65,7 @@ def _drop(form: Any, path: tuple[str, ...]) -> None:
 
 
 @dataclass(frozen=True)
-class _Kept:
+class _CachedRate:
     rate: Rate
 
     @property
@@ -77,26 +77,26 @@ class RateCache:
     """The light of the last cameras."""
 
     def __init__(self, limit: int = _LIMIT) -> None:
-        self._kept: ByteCache[_Kept] = ByteCache(limit)
+        self._rates: ByteCache[_CachedRate] = ByteCache(limit)
         self._transfer: tuple[str, Transfer] | None = None
         self._peaks: dict[str, float] = {}
-        self._told: tuple[Camera, str] | None = None
+        self._last_key: tuple[Camera, str] | None = None
 
     def _key(self, camera: Camera) -> str:
-        """What its light depends on, told once for the camera that is asked about again."""
-        if self._told is None or self._told[0] is not camera:
-            self._told = camera, light_key(camera)
-        return self._told[1]
+        """Return what its light depends on, computed once for a camera that is asked again."""
+        if self._last_key is None or self._last_key[0] is not camera:
+            self._last_key = camera, light_key(camera)
+        return self._last_key[1]
 
     def transfer(self, camera: Camera, make: Callable[[], Transfer]) -> Transfer:
-        """What `make` gives, or gave for the camera before where its light is the same."""
+        """Return what `make` gives, or gave for the camera before where its light is the same."""
         key, kept = self._key(camera), self._transfer
         if kept is None or kept[0] != key:
             kept = self._transfer = (key, make())
         return kept[1]
 
     def rate(self, camera: Camera, ceiling: float, make: Callable[[], Rate]) -> Rate:
-        """What `make` gives, or gave for a camera of the same light that fills pixels as fast.
+        """Return what `make` gives, or gave for a camera of the same light that fills as fast.
 
         ceiling: rate at which a pixel is full [e/s], see `exposure.ceiling`. All those are alike
         that the light does not reach.
@@ -104,9 +104,11 @@ class RateCache:
         key = self._key(camera)
         if key in self._peaks:
             level = min(ceiling, self._peaks[key])
-            return self._kept.get((key, level), lambda: _Kept(make())).rate
+            return self._rates.get((key, level), lambda: _CachedRate(make())).rate
         if len(self._peaks) >= _MOST:
             self._peaks.clear()
         rate = make()
         self._peaks[key] = rate.spectrum.peak
-        return self._kept.get((key, min(ceiling, rate.spectrum.peak)), lambda: _Kept(rate)).rate
+        return self._rates.get(
+            (key, min(ceiling, rate.spectrum.peak)), lambda: _CachedRate(rate)
+        ).rate

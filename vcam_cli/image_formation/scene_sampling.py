@@ -46,7 +46,7 @@ class SampledImage:
     """Mean squares of the signal behind them, before the separable transfer functions."""
     highest: float
     """Frequency up to which it is filtered [pixel Nyquist]."""
-    lost: float
+    lost_rms: float
     """Rms of the signal beyond [electrons / s]."""
     full_signal: float
     """Largest signal on the array, at least; at most the ceiling [electrons / s]."""
@@ -104,7 +104,7 @@ def sampled_image(
         tables=tables,
         lens_power=lens_power,
         highest=highest,
-        lost=float(np.sqrt(density)) * power.tail_rms(squares, highest, pitch),
+        lost_rms=float(np.sqrt(density)) * power.tail_rms(squares, highest, pitch),
         full_signal=full,
         peak=peak,
         density=density,
@@ -119,7 +119,7 @@ def _scene_spectrum(
     level = np.abs(path.transfer.with_mixtures(mix).level)
     rectangles = scene.rectangles(mix)
     if isinstance(scene, ChartScene) and rectangles is not None:
-        scene = scene.on_cells(cell_grid(scene, path.geometry, BEYOND_CUTOFF * highest))
+        scene = scene.with_cells(cell_grid(scene, path.geometry, BEYOND_CUTOFF * highest))
         x, y = axes(path, scene, highest)
         brightest = np.abs(rectangles.values).max(axis=(1, 2))
         known = rectangle_spectrum(rectangles, scene.shape, (y, x), dtype)

@@ -84,7 +84,7 @@ def _filtered_layers(path: OpticalPath, scene: SampledScene) -> tuple[Layers, Sp
     highest, error = highest_passed(path, near), 0.0
     if scene.chart.edges() is None:
         cells, error = cells_per_pixel(path, near, highest)
-        near = near.on_cells(cell_grid(near, path.geometry, cells))
+        near = near.with_cells(cell_grid(near, path.geometry, cells))
         highest = min(highest, cells)
     return _spectral_layers(path, near, highest, error, rings)
 
@@ -102,7 +102,7 @@ def _spectral_layers(
     [electrons / s].
     """
     exact, g, zones = path.transfer, path.geometry, path.zones
-    painted = isinstance(scene, ChartScene) and scene.chart.edges() is None
+    is_painted = isinstance(scene, ChartScene) and scene.chart.edges() is None
     size = table_size(path, highest)
     mixing = field_mixtures(exact, zones, size) if zones else mixtures([exact], size)
     needed = memory_model.image_bytes(path, scene, len(mixing[0]), size)
@@ -119,9 +119,9 @@ def _spectral_layers(
     planes = [plane for plane in tables.planes if plane is not None]
     report = SpectrumReport(
         oversampling=image.highest,
-        lost=math.hypot(image.lost, error),
+        lost_rms=math.hypot(image.lost_rms, error),
         cells=0 if scene.rectangles(mixing[0]) is not None else math.prod(scene.shape),
-        painted=painted,
+        is_painted=is_painted,
         terms=image_filter.terms,
         planes=len(tables.mix),
         changes=changes_by_omission(path, image, tables, field_change),

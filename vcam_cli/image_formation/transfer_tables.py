@@ -243,20 +243,20 @@ def turn_table(parts: NDArray, parity: int, quarters: int, mirrored: bool) -> ND
     return part if sign[parity] > 0 else -part
 
 
-def mixtures(through: Sequence[Transfer], size: TableSize) -> Mixing:
+def mixtures(transfers: Sequence[Transfer], size: TableSize) -> Mixing:
     """The fewest mixtures of a scene's components that keep its transfer functions.
 
     Where a scene has more components than colors can tell apart, singular vectors of H_kc over all
     colors and frequencies replace them, as many as keep every H_kc within `size.tolerance` of the
-    largest level. through: the transfer functions of the same light that they have to serve.
+    largest level. transfers: the transfer functions of the same light that they have to serve.
     """
-    exact = through[0]
+    exact = transfers[0]
     components, colors = exact.weights.shape[:2]
     every = np.eye(components)
     most = components if size.rank is None else size.rank
     if components <= min(max(colors, 3), most):
         return every, 0.0
-    table = np.concatenate([part for t in through for part in _samples(t, size.top)], axis=1)
+    table = np.concatenate([part for t in transfers for part in _samples(t, size.top)], axis=1)
     directions = np.linalg.svd(table, full_matrices=False)[0].T
     peak = np.abs(exact.level).max() or 1.0
     for rank in range(1, components):

@@ -95,7 +95,7 @@ def sites(
         scope: Site(
             rows=len(tile),
             columns=tile.shape[1],
-            stream=_Opened(partial(stream, seed, capture=sample, block=index)),
+            stream=_StreamCache(partial(stream, seed, capture=sample, block=index)),
             line_stream=partial(stream, seed, capture=sample, block=layer << LAYER),
             dtype=tile.dtype.type,
             dark=dark,
@@ -105,16 +105,16 @@ def sites(
 
 
 @dataclass(frozen=True)
-class _Opened:
+class _StreamCache:
     """The streams of a block: each is opened once and then goes on."""
 
     make: Callable[[str], np.random.Generator]
-    known: dict[str, np.random.Generator] = field(default_factory=dict)
+    streams: dict[str, np.random.Generator] = field(default_factory=dict)
 
     def __call__(self, name: str) -> np.random.Generator:
-        if name not in self.known:
-            self.known[name] = self.make(name)
-        return self.known[name]
+        if name not in self.streams:
+            self.streams[name] = self.make(name)
+        return self.streams[name]
 
 
 def codes_type(bits: int, count: int = 1) -> type[np.unsignedinteger]:

@@ -97,12 +97,12 @@ def samples(
         for number, time in enumerate(times):
             step = time - before
             dark = mean_dark(step, effects)
-            new = sites(charge, dark, seeds, layer, block, number)
-            same = sites(charge, dark, seeds, layer, block)
+            sample_sites = sites(charge, dark, seeds, layer, block, number)
+            common_sites = sites(charge, dark, seeds, layer, block)
             charge += _collect_charge(
-                mean_electrons(rate[block], step, effects), effects, new, same
+                mean_electrons(rate[block], step, effects), effects, sample_sites, common_sites
             )
-            read = _read_charge(charge.copy(), effects, new, same)
+            read = _read_charge(charge.copy(), effects, sample_sites, common_sites)
             read[full] = well
             full = read >= well
             electrons[number, block] = read
@@ -116,27 +116,31 @@ def samples(
 Sites = dict[str, Site]
 
 
-def _collect_charge(mean: NDArray, effects: Sequence[Effect], new: Sites, same: Sites) -> NDArray:
+def _collect_charge(
+    mean: NDArray, effects: Sequence[Effect], sample_sites: Sites, common_sites: Sites
+) -> NDArray:
     """Return the charge that one step adds, with its shot noise [electrons]."""
     sources = of_kind(effects, NoiseSource)
     for source in sources:
-        mean = source.before_shot(mean, _site(source, new, same))
+        mean = source.before_shot(mean, _site(source, sample_sites, common_sites))
     for source in sources:
         if source.sample_draws == "cumulative":
-            mean = source.apply(mean, _site(source, new, same))
+            mean = source.apply(mean, _site(source, sample_sites, common_sites))
     return mean
 
 
-def _read_charge(charge: NDArray, effects: Sequence[Effect], new: Sites, same: Sites) -> NDArray:
+def _read_charge(
+    charge: NDArray, effects: Sequence[Effect], sample_sites: Sites, common_sites: Sites
+) -> NDArray:
     """Return one readout of the charge so far, which may reuse its array [electrons]."""
     for effect in of_kind(effects, ElectronEffect):
         if effect.sample_draws != "cumulative":
-            charge = effect.apply(charge, _site(effect, new, same))
+            charge = effect.apply(charge, _site(effect, sample_sites, common_sites))
     return charge
 
 
-def _site(effect: ElectronEffect, new: Sites, same: Sites) -> Site:
-    return (same if effect.sample_draws == "common" else new)[effect.scope]
+def _site(effect: ElectronEffect, sample_sites: Sites, common_sites: Sites) -> Site:
+    return (common_sites if effect.sample_draws == "common" else sample_sites)[effect.scope]
 
 
 def photocurrent(
@@ -221,7 +225,7 @@ def variances(effects: tuple[Effect, ...], code: Quantizer) -> tuple[float, floa
         Variance that is common to all samples [electrons squared].
     """
     sources = noise_sources(effects, "frame")
-    new = sum(e.variance(0.0) for e in sources if e.sample_draws == "independent")
+    sample_sites = sum(e.variance(0.0) for e in sources if e.sample_draws == "independent")
     common = sum(e.variance(0.0) for e in sources if e.sample_draws == "common")
     below, above = code.response(np.array([0.0, 1.0]))
-    return float(new + (1 / (above - below)) ** 2 / 12), float(common)
+    return float(sample_sites + (1 / (above - below)) ** 2 / 12), float(common)

@@ -226,13 +226,13 @@ class ChartScene(SampledScene):
     center: tuple[float, float] = (0.0, 0.0)
     """Of the cells, x and y from the array's center [m]."""
 
-    def on_cells(self, shape: tuple[int, int]) -> "ChartScene":
+    def with_cells(self, shape: tuple[int, int]) -> "ChartScene":
         """The same part of the chart on a grid of so many cells (ny, nx)."""
         ny, nx = shape
         width, height = self.extent
         return replace(self, shape=shape, pitch_x=width / nx, pitch_y=height / ny)
 
-    def cropped(self, center: tuple[float, float], width: float, height: float) -> "ChartScene":
+    def crop(self, center: tuple[float, float], width: float, height: float) -> "ChartScene":
         """A rectangle of the chart around a place (x, y) [m], as a single cell."""
         return replace(self, shape=(1, 1), pitch_x=width, pitch_y=height, center=center)
 
@@ -247,7 +247,7 @@ class ChartScene(SampledScene):
         def paint(rows: slice) -> None:
             chart.paint(x_edges, y_edges[rows.start : rows.stop + 1], mix, out[:, rows])
 
-        by_bands(paint, ny, nx, workers)
+        paint_by_bands(paint, ny, nx, workers)
         return out
 
     def rectangles(self, mix: Array) -> Rectangles | None:
@@ -268,7 +268,7 @@ class ChartScene(SampledScene):
         return out
 
 
-def by_bands(paint: Callable[[slice], None], rows: int, columns: int, workers: int) -> None:
+def paint_by_bands(paint: Callable[[slice], None], rows: int, columns: int, workers: int) -> None:
     """Calls `paint` on bands of rows, which do not depend on the number of workers."""
     band = max(1, CELLS_A_BAND // columns)
     bands = [slice(top, min(top + band, rows)) for top in range(0, rows, band)]

@@ -148,7 +148,7 @@ class ColorChecker(Chart):
         """Write the exact averages over the cells into `out`."""
         cover = self.card.cell_cover(x_edges, y_edges)
         alike = cover.row_runs()
-        light = self._with_surround(cover.select_rows([rows.start for rows in alike]), mix)
+        light = self._add_surround(cover.select_rows([rows.start for rows in alike]), mix)
         for number, rows in enumerate(alike):
             out[:, rows] = light[:, number, None]
 
@@ -158,9 +158,9 @@ class ColorChecker(Chart):
 
     def values(self, x: Array, y: Array, mix: Array) -> Array:
         """Return the values at points."""
-        return self._with_surround(self.card.point_cover(x, y), mix)
+        return self._add_surround(self.card.point_cover(x, y), mix)
 
-    def _with_surround(self, cover: Cover, mix: Array) -> Array:
+    def _add_surround(self, cover: Cover, mix: Array) -> Array:
         surround = SURROUND * mix[:, BLACK, None, None]
         out = self.card.light(cover, mix)
         covered = np.outer(cover.down, cover.across).astype(mix.dtype)

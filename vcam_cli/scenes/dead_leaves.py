@@ -25,7 +25,7 @@ from functools import lru_cache
 import numpy as np
 
 from vcam_cli.scenes import discs
-from vcam_cli.scenes.base import CELLS_A_BAND, Array, Chart, Frame, by_bands, cell_edges
+from vcam_cli.scenes.base import CELLS_A_BAND, Array, Chart, Frame, cell_edges, paint_by_bands
 from vcam_cli.scenes.disc_edges import Discs
 from vcam_cli.scenes.discs import Cells
 from vcam_cli.spectra import Spectrum, colorchecker
@@ -243,7 +243,7 @@ def _period_cells(seed: int, mix: tuple[tuple[float, ...], ...], dtype: np.dtype
         y = edges[rows.start : rows.stop + 1]
         leaves.paint(edges, y, np.array(mix, dtype), out[:, rows])
 
-    by_bands(paint, count, count, 1)
+    paint_by_bands(paint, count, count, 1)
     return out
 
 

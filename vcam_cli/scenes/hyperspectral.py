@@ -27,7 +27,7 @@ from vcam_cli.camera.illuminant import IlluminantSpec
 from vcam_cli.camera.scene import Scene
 from vcam_cli.errors import bad
 from vcam_cli.scenes import light
-from vcam_cli.scenes.base import Array, View, by_bands
+from vcam_cli.scenes.base import Array, View, paint_by_bands
 from vcam_cli.scenes.image import ImageScene, image_scene
 from vcam_cli.spectra import Spectrum, integral, luminance
 
@@ -90,7 +90,7 @@ class CubeScene(ImageScene):
             block = self.picture[rows].reshape(-1, bands).astype(self.dtype, copy=False)
             inside[:, rows] = (block @ weights).T.reshape(len(mix), -1, width)
 
-        by_bands(paint, height, width, workers)
+        paint_by_bands(paint, height, width, workers)
         return out
 
     def values_at(self, x: Array, y: Array, mix: Array) -> Array:

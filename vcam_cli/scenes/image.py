@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vcam_cli.scenes.base import Array, SampledScene, View, by_bands
+from vcam_cli.scenes.base import Array, SampledScene, View, paint_by_bands
 from vcam_cli.spectra import Spectrum
 
 SLIVER = 1e-6
@@ -93,7 +93,7 @@ class ImageScene(SampledScene):
                 for channel in np.flatnonzero(weights):
                     plane += weights[channel] * self.picture[rows, :, channel]
 
-        by_bands(paint, height, width, workers)
+        paint_by_bands(paint, height, width, workers)
         return out
 
     def values_at(self, x: Array, y: Array, mix: Array) -> Array:

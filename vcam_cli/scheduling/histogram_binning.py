@@ -250,8 +250,8 @@ class _Pairs:
         self.high = self.low.copy()
         self.least_low, self.least_high = self.low[0].copy(), self.low[0].copy()
         self.fractions: dict[int, Fraction] = {}
-        self.seen: dict[float, Fraction] = {}
-        self.crowded: set[float] = set()
+        self.exact_values: dict[float, Fraction] = {}
+        self.ambiguous: set[float] = set()
 
     def put(self, index: int, value: Number, margin: float) -> None:
         """Set a value, known up to a margin."""
@@ -259,8 +259,8 @@ class _Pairs:
         self._set(index, rounded - margin, rounded + margin)
         if isinstance(value, Fraction):
             self.fractions[index] = value
-            if self.seen.setdefault(rounded, value) != value:
-                self.crowded.add(rounded)
+            if self.exact_values.setdefault(rounded, value) != value:
+                self.ambiguous.add(rounded)
 
     def drop(self, index: int) -> None:
         """Remove a value."""
@@ -269,7 +269,7 @@ class _Pairs:
     def first_minimum(self) -> int:
         """Return the first index of the least value."""
         bar = float(self.least_high.min())
-        if bar in self.crowded:
+        if bar in self.ambiguous:
             same = np.flatnonzero(self.low.ravel() == bar)
             return min((int(index) for index in same), key=self.fractions.__getitem__)
         block = int(np.argmax(self.least_low <= bar))

@@ -79,7 +79,7 @@ def image_seconds(geometry: Geometry, mosaic: Mosaic, report: SpectrumReport) ->
         return FIXED + WAVE * pixels * colors
     return (
         FIXED
-        + (SAMPLE + PAINT * report.painted) * report.cells * report.planes
+        + (SAMPLE + PAINT * report.is_painted) * report.cells * report.planes
         + TERM * report.terms * report.planes * colors * report.filters
         + EVALUATE * pixels * colors * report.filters
         + TABLE * report.table_values

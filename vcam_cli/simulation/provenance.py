@@ -29,16 +29,16 @@ def data_files(camera: Camera, form: dict[str, Any] | None = None) -> tuple[Path
     """
     form = camera.model_dump(mode="json") if form is None else form
 
-    def named(value: Any) -> Iterator[str]:
+    def describe(value: Any) -> Iterator[str]:
         if isinstance(value, dict):
             for key, item in value.items():
                 if key in FILE_KEYS and isinstance(item, str):
                     yield item
                 else:
-                    yield from named(item)
+                    yield from describe(item)
         elif isinstance(value, list):
             for item in value:
-                yield from named(item)
+                yield from describe(item)
 
     shipped_spectra = (
         str(shipped.find("spectra", factor))
@@ -46,7 +46,7 @@ def data_files(camera: Camera, form: dict[str, Any] | None = None) -> tuple[Path
         for factor in getattr(spec, "factors", ())
         if isinstance(factor, str)
     )
-    found = {*named(form), *shipped_spectra}
+    found = {*describe(form), *shipped_spectra}
     if camera.scene.source.kind == "hyperspectral":
         found |= {str(path) for path in companions(camera.scene.source.file)}
     return tuple(Path(name) for name in sorted(found))

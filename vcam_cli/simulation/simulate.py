@@ -54,12 +54,12 @@ class Result:
     @property
     def dn(self) -> NDArray:
         """Raw digital numbers, whole [DN]."""
-        return self._of_raw(self.frame.dn)
+        return self._displayed(self.frame.dn)
 
     @property
     def electrons(self) -> NDArray:
         """Raw signal before the ADC, noisy, clipped above at the full well [electrons]."""
-        return self._of_raw(self.frame.electrons)
+        return self._displayed(self.frame.electrons)
 
     @property
     def volts(self) -> NDArray:
@@ -75,7 +75,7 @@ class Result:
     @property
     def mean_electrons(self) -> NDArray:
         """Noise-free signal, photo and dark, before saturation [electrons]."""
-        return self._of_raw(self.frame.mean_electrons)
+        return self._displayed(self.frame.mean_electrons)
 
     @property
     def exposure_time(self) -> float:
@@ -90,21 +90,21 @@ class Result:
     @property
     def samples_dn(self) -> NDArray | None:
         """Codes of every sample (N, ...), as `dn` [DN]; None of a single exposure."""
-        return self._of_samples(self.frame.samples_dn)
+        return self._displayed_samples(self.frame.samples_dn)
 
     @property
     def samples_electrons(self) -> NDArray | None:
         """Signal of every sample (N, ...), as `electrons`; None of a single exposure."""
-        return self._of_samples(self.frame.samples_electrons)
+        return self._displayed_samples(self.frame.samples_electrons)
 
     @property
     def photocurrent(self) -> NDArray | None:
         """Photocurrent that the samples tell, as `dn` [e/s]; None of a single exposure."""
         found = self.frame.photocurrent
-        return None if found is None else self._of_raw(found)
+        return None if found is None else self._displayed(found)
 
-    def _of_samples(self, values: NDArray | None) -> NDArray | None:
-        return None if values is None else np.stack([self._of_raw(sample) for sample in values])
+    def _displayed_samples(self, values: NDArray | None) -> NDArray | None:
+        return None if values is None else np.stack([self._displayed(sample) for sample in values])
 
     @property
     def colors(self) -> tuple[str, ...]:
@@ -117,7 +117,7 @@ class Result:
         place = self.frame.layout
         if place.full_color:
             return np.broadcast_to(np.arange(len(self.colors)), self.dn.shape)
-        return self._of_raw(place.color)
+        return self._displayed(place.color)
 
     @property
     def x(self) -> NDArray:
@@ -126,15 +126,15 @@ class Result:
         Of a honeycomb and of pixels at places of their own: of every pixel, in the shape of `dn`.
         """
         place = self.frame.layout
-        return self._of_raw(place.x) if place.is_scattered else place.centers[0]
+        return self._displayed(place.x) if place.is_scattered else place.centers[0]
 
     @property
     def y(self) -> NDArray:
         """Centers of the raw frame's rows, below the array's center, (rows,) [m]; as `x`."""
         place = self.frame.layout
-        return self._of_raw(place.y) if place.is_scattered else place.centers[1]
+        return self._displayed(place.y) if place.is_scattered else place.centers[1]
 
-    def _of_raw(self, values: NDArray) -> NDArray:
+    def _displayed(self, values: NDArray) -> NDArray:
         """Values of the raw frame in the shape that a user sees."""
         if values.ndim == 3:
             return np.moveaxis(values, 0, -1)

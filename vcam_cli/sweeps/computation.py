@@ -39,7 +39,7 @@ def computed_sweep(
     cameras = StudyCameras(grid, sets)
     planned, expected = figures.plan(cameras), expectations.plan(cameras)
     hashes = {str(path): hash_file(path) for path in grid.inputs}
-    for refused in grid.refused:
+    for refused in grid.problems:
         tell(str(refused))
     with SweepFolder(out) as folder:
         folder.begin({"name": study.model.name})
@@ -47,7 +47,7 @@ def computed_sweep(
         points.read_finished()
         if folder.corrupted:
             names, shown = list(folder.corrupted), ", ".join(list(folder.corrupted)[:3])
-            tell(f"computed again, since corrupted: {POINTS}/{shown}" + _more(names, 3))
+            tell(f"computed again, since corrupted: {POINTS}/{shown}" + _more_text(names, 3))
         computed = _compute(points, execution, watch, tell)
         findings = Findings(grid, points.outcomes)
         compared = tuple(each.result(findings) for each in expected)
@@ -197,5 +197,5 @@ def _outcomes(
     return workers.compute_in_processes(groups, points.ask, processes, threads)
 
 
-def _more(names: Sequence[str], shown: int) -> str:
+def _more_text(names: Sequence[str], shown: int) -> str:
     return f" and {len(names) - shown} more" if len(names) > shown else ""

@@ -60,13 +60,14 @@ class PlannedExpectation:
         if item.why and verdict == "missed":
             summary = f"{summary.rstrip()} ({item.why})"
         row: tuple[Cell, ...] = (
-            name, self.case, item.quantity, _known(value), self.unit, _known(self.least),
-            _known(self.most), verdict, item.calibrated, item.source, item.why,
+            name, self.case, item.quantity, _finite_cell(value), self.unit,
+            _finite_cell(self.least), _finite_cell(self.most), verdict, item.calibrated,
+            item.source, item.why,
         )  # fmt: skip
         return ExpectationResult(name, verdict, summary.rstrip(), item.calibrated, row)
 
 
-def _known(value: float) -> Cell:
+def _finite_cell(value: float) -> Cell:
     return value if math.isfinite(value) else ""
 
 
@@ -75,7 +76,7 @@ def plan(cameras: StudyCameras) -> tuple[PlannedExpectation, ...]:
     problems, planned = Collector(), []
     for name, item in cameras.grid.study.model.expect.items():
         try:
-            planned.append(_Planner(cameras, name, item).planned())
+            planned.append(_Planner(cameras, name, item).resolve())
         except BadInput as error:
             problems.extend(error)
     problems.raise_if_any()
@@ -95,7 +96,7 @@ class _Planner:
         self._case = self._known_case(item.case or next(iter(cameras.grid.cases)), "case")
         self._parameter = self._only_parameter()
 
-    def planned(self) -> PlannedExpectation:
+    def resolve(self) -> PlannedExpectation:
         """Return the expectation with the numbers that it names."""
         item = self._item
         own = self._parameter.unit if item.quantity == OPTIMUM else quantities.unit(item.quantity)

@@ -77,7 +77,7 @@ class Grid:
     """Every file that was read, or will be."""
 
     @property
-    def refused(self) -> tuple[Problem, ...]:
+    def problems(self) -> tuple[Problem, ...]:
         """What is wrong with cameras of the study, each mistake once."""
         return tuple(dict.fromkeys(p for point in self.points for p in point.problems))
 
@@ -106,11 +106,11 @@ def grid(study: StudyFile, sets: Sequence[str] = (), folder: Path | None = None)
         points=tuple(points),
         inputs=_inputs(study, points),
     )
-    nameless = [p for p in found.refused if p.message.startswith(NO_SUCH_KEY)]
+    nameless = [p for p in found.problems if p.message.startswith(NO_SUCH_KEY)]
     if nameless:
         raise BadInput(nameless)
     if all(point.camera is None for point in points):
-        raise BadInput(found.refused)
+        raise BadInput(found.problems)
     return found
 
 

@@ -123,7 +123,7 @@ def result(
         ids=tuple(point.id for point in grid.points),
         points=[dict(zip(names, row, strict=True)) for row in _point_rows(findings)],
         missing=sum(1 for p in grid.points if p.id and p.id not in outcomes),
-        refused=tuple(map(str, grid.refused)),
+        refused=tuple(map(str, grid.problems)),
         all_refused=all(refused),
         optima=findings.optima,
         expectations=expectations,
