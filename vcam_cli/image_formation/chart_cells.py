@@ -9,6 +9,7 @@ of them, and the coarsest that keep their share of the tolerance are taken for t
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -19,6 +20,7 @@ from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.image_formation.bandwidth import axes
 from vcam_cli.image_formation.cosine_series import Axis
 from vcam_cli.image_formation.optical_path import OpticalPath
+from vcam_cli.parallel import product
 from vcam_cli.scenes.base import ChartScene
 
 CELLS_SHARE = 0.3
@@ -76,21 +78,17 @@ def cells_per_pixel(path: OpticalPath, scene: ChartScene, highest: float) -> tup
     otf = _mean_otf(path, finest)
     crops = _crops(path.geometry, scene, reference, level)
 
-    def image(crop: ChartScene, cells: float) -> NDArray:
-        return np.minimum(_signal(path, crop, cells, level, otf), path.ceiling)
+    def images(cells: float) -> NDArray:
+        return np.minimum(_signals(path, crops, cells, level, otf), path.ceiling)
 
-    converged = [image(crop, reference) for crop in crops]
-    full = max(float(signal.max()) for signal in converged)
+    converged = images(reference)
+    full = float(converged.max())
     budget = CELLS_SHARE * path.settings.tolerance * full
     whole = math.prod(cell_grid(scene, path.geometry, 1.0))
     most = min(finest, max(1.0, math.sqrt(MOST / whole)))
     error = 0.0
     for cells in [c for c in LADDER if c < most] + [most]:
-        squares = [
-            float(np.square(image(crop, cells) - signal).mean())
-            for crop, signal in zip(crops, converged, strict=True)
-        ]
-        error = math.sqrt(float(np.mean(squares)))
+        error = math.sqrt(float(np.square(images(cells) - converged).mean()))
         if error <= budget:
             return cells, error
     return most, error
@@ -137,25 +135,28 @@ def _busiest(g: Geometry, scene: ChartScene, level: NDArray) -> NDArray:
     return np.asarray(centers * (g.sensor_width, g.sensor_height))
 
 
-def _signal(
-    path: OpticalPath, crop: ChartScene, cells: float, level: NDArray, otf: Table
+def _signals(
+    path: OpticalPath, crops: Sequence[ChartScene], cells: float, level: NDArray, otf: Table
 ) -> NDArray:
-    """Signal of a crop that is mirrored at its borders: (rows, columns) [electrons / s].
+    """Signals of crops of one size, mirrored at their borders [electrons / s].
 
-    level: (K,) signal of the scene's components.
+    level: (K,) signal of the scene's components. Returns (crops, rows, columns).
     """
-    g = path.geometry
-    rows, columns = round(crop.pitch_y / g.pitch_y), round(crop.pitch_x / g.pitch_x)
+    g, first = path.geometry, crops[0]
+    rows, columns = round(first.pitch_y / g.pitch_y), round(first.pitch_x / g.pitch_x)
     small = replace(path, geometry=replace(g, rows=rows, columns=columns))
-    scene = crop.with_cells(cell_grid(crop, g, cells))
-    coefficients = scipy.fft.dctn(scene.planes(level[None])[0].astype(np.float64), type=2)
-    x, y = axes(small, scene, cells)
-    radius = np.hypot(x.frequencies, y.frequencies[:, None])
-    light = coefficients[: y.terms, : x.terms] * np.interp(radius, *otf, right=0.0)
-    waves = [_waves(axis) for axis in (x, y)]
+    grid = cell_grid(first, g, cells)
+    x, y = axes(small, first.with_cells(grid), cells)
+    transfer = np.interp(np.hypot(x.frequencies, y.frequencies[:, None]), *otf, right=0.0)
     for effect in path.separable:
-        light *= np.outer(effect.along_y(y.frequencies), effect.along_x(x.frequencies))
-    return waves[1] @ light @ waves[0].T
+        transfer *= np.outer(effect.along_y(y.frequencies), effect.along_x(x.frequencies))
+    along_y, along_x = _waves(y), _waves(x).T
+    signals = []
+    for crop in crops:
+        light = crop.with_cells(grid).planes(level[None])[0].astype(np.float64)
+        light = scipy.fft.dctn(light, type=2)[: y.terms, : x.terms] * transfer
+        signals.append(product(product(along_y, light), along_x))
+    return np.array(signals)
 
 
 def _waves(axis: Axis) -> NDArray:

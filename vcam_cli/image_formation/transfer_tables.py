@@ -98,8 +98,8 @@ class TableReader:
     fx: NDArray
     """(n,) rising [cycles/m]."""
     radial: tuple[NDArray, NDArray] | None
-    """Entries over |f| and the steps to the next, (entries, R C) each, so that all tables of an
-    entry are read at once; None where this parity has no radial part."""
+    """Entries over |f| (R, C, entries) and the steps to the next; None where this parity has no
+    radial part."""
     plane: NDArray | None
     """(R, C, m, m) over fy and fx, where there is such a part."""
     spline_x: NDArray | None
@@ -122,21 +122,20 @@ class TableReader:
         """The radial part at frequencies (m, n); its last entry holds beyond its end."""
         assert self.radial is not None
         entries, steps = self.radial
-        last = len(steps)
+        last = steps.shape[-1]
         position = np.minimum(radius.ravel() * (last / self.tables.top), last)
         index = np.minimum(position.astype(np.intp), last - 1)
-        values = steps.take(index, axis=0)
-        values *= (position - index)[:, None]
-        values += entries.take(index, axis=0)
-        return np.ascontiguousarray(values.T).reshape(*self.tables.shape, *radius.shape)
+        values = steps.take(index, axis=-1)
+        values *= position - index
+        values += entries.take(index, axis=-1)
+        return values.reshape(*self.tables.shape, *radius.shape)
 
 
 def reader(tables: Tables, parity: int, fx: NDArray) -> TableReader:
     """A reader of the tables of one of their parities at the frequencies fx (n,) [cycles/m]."""
     plane, radial = tables.planes[parity], None
     if parity == 0 and tables.radial is not None:
-        entries = np.ascontiguousarray(tables.radial.reshape(-1, tables.radial.shape[-1]).T)
-        radial = entries, np.diff(entries, axis=0)
+        radial = tables.radial, np.diff(tables.radial)
     spline = None if plane is None else spline_weights(plane.shape[-1], fx / tables.top)
     return TableReader(tables, fx, radial, plane, spline)
 
