@@ -46,7 +46,7 @@ FLOORS = (
 FLOOR = {room: number for number, rooms in enumerate(FLOORS) for room in rooms}
 FLOOR[""] = len(FLOORS)  # vcam_cli/__init__.py, the face of it all
 HEAVY = ("colour", "matplotlib", "scipy.signal", "scipy.optimize", "scipy.interpolate")
-LONGEST = 450
+LONGEST = 400
 """Lines of a module."""
 UNFINISHED = ("TODO", "FIXME", "XXX", "HACK", "NotImplementedError")
 WRITERS = {

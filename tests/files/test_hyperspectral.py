@@ -12,8 +12,8 @@ from spectral_files import CUBE, NM
 
 from vcam_cli import memory
 from vcam_cli.errors import BadInput, CannotDo
-from vcam_cli.files.hyperspectral import companions, read_bands, read_cube
-from vcam_cli.files.spectral import write_spectral
+from vcam_cli.files.spectral.exr import write_spectral
+from vcam_cli.files.spectral.hyperspectral import companions, read_bands, read_cube
 
 PER_NM = 1e9
 """W/(sr m2 nm) in W/(sr m2 m)."""
@@ -317,7 +317,7 @@ class TestIsetcam:
                 raise ImportError(name)
             return real(name, *rest)
 
-        monkeypatch.setattr("vcam_cli.files.isetcam.import_module", missing)
+        monkeypatch.setattr("vcam_cli.files.spectral.isetcam.import_module", missing)
         path = tmp_path / "a.mat"
         path.write_bytes(b"MATLAB 7.3 MAT-file".ljust(512) + b"\x89HDF\r\n\x1a\n" + b"0" * 64)
         refused(path, "MATLAB 7.3", "pip install 'vcam-cli[hdf5]'")

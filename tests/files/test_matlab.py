@@ -11,9 +11,9 @@ from hypothesis.extra import numpy as hnp
 from scipy.io import loadmat, savemat
 
 from vcam_cli.errors import CannotDo
-from vcam_cli.files import matlab
-from vcam_cli.files.images import UnusableFile
-from vcam_cli.files.matlab import read_variables
+from vcam_cli.files.file_checks import UnusableFile
+from vcam_cli.files.spectral import matlab
+from vcam_cli.files.spectral.matlab import read_variables
 
 KINDS = ("f8", "f4", "i1", "u1", "i2", "u2", "i4", "u4", "i8", "u8")
 ARRAYS = st.sampled_from(KINDS).flatmap(

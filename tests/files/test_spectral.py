@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from vcam_cli.errors import CannotDo
-from vcam_cli.files import spectral
 from vcam_cli.files.exr import read_exr
-from vcam_cli.files.spectral import channel_name, write_spectral
+from vcam_cli.files.spectral import exr as spectral
+from vcam_cli.files.spectral.exr import channel_name, write_spectral
 
 WAVELENGTHS = [399.5e-9, 550e-9, 1050e-9]
 PLANES = np.random.default_rng(1).random((3, 150, 7)).astype(np.float32)

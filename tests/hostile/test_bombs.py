@@ -18,7 +18,7 @@ from cameras import camera, image_of, spectra_of, validated
 
 from vcam_cli import memory
 from vcam_cli.errors import CannotDo
-from vcam_cli.files.hyperspectral import read_bands
+from vcam_cli.files.spectral.hyperspectral import read_bands
 
 STARTER = Path(__file__).parents[2] / "configs" / "cameras" / "starter.yaml"
 MILLION = 10**6

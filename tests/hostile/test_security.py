@@ -19,7 +19,7 @@ from typer.testing import CliRunner
 
 from vcam_cli.commands import main
 from vcam_cli.errors import BadInput
-from vcam_cli.files.hyperspectral import read_cube
+from vcam_cli.files.spectral.hyperspectral import read_cube
 
 STARTER = Path(__file__).parents[2] / "configs" / "cameras" / "starter.yaml"
 

@@ -21,7 +21,7 @@ from vcam_cli.image_formation.scene_spectrum import SampledSpectrum, transform_p
 from vcam_cli.image_formation.settings import STANDARD
 from vcam_cli.image_formation.transfer_functions import Transfer
 from vcam_cli.image_formation.transfer_tables import Tables, TableSize, mixtures, tabulate
-from vcam_cli.scenes.base import Wave, WaveScene
+from vcam_cli.scenes.waves import Wave, WaveScene
 from vcam_cli.spectra import Spectrum
 
 

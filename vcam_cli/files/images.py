@@ -6,9 +6,6 @@ from alpha, map channels by name, place an EXR's data window, notice that a JPEG
 and refuse what is no picture of light (CMYK, CIELAB, NaN, negative values).
 """
 
-import os
-import stat
-import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -18,14 +15,20 @@ from typing import Any
 import numpy as np
 
 from vcam_cli import memory
-from vcam_cli.errors import BadInput, CannotDo, bad
+from vcam_cli.files.file_checks import (
+    UnusableFile,
+    brief_reason,
+    check_file,
+    convert_errors,
+    too_large,
+    truncated_file,
+)
 from vcam_cli.files.image_library import oiio
 from vcam_cli.files.rows import pending_error
 
 MOST_PIXELS = 10**9
 MOST_LIGHT = 1e30
 """The largest light over `white`: float32 ends at 3.4e38, and a camera's units need some of it."""
-_PNG_START = b"\x89PNG\r\n\x1a\n"
 _ALPHA = {"A", "ALPHA"}
 _RGB = ("R", "G", "B")
 _LIGHT = {0, 1, 2, 3, 6}  # TIFF photometrics: gray (white or black is zero), RGB, palette, YCbCr
@@ -53,14 +56,6 @@ class LinearImage:
     """What was left aside, for the user."""
 
 
-class UnusableFile(Exception):
-    """A file that cannot be used: the reason, and a remedy where it is not that of its kind."""
-
-    def __init__(self, reason: str, remedy: str = "") -> None:
-        super().__init__(reason)
-        self.reason, self.remedy = reason, remedy
-
-
 def read_picture(
     path: Path | str,
     encoding: str,
@@ -85,7 +80,7 @@ def read_picture(
     if encoding not in ("srgb", "linear") or not white > 0:
         raise ValueError(f"encoding {encoding!r}, white {white!r}")
     path = Path(path)
-    with convert_errors(path, yaml_path):
+    with convert_errors(path, yaml_path, _CONVERT):
         check_file(path)
         with open_image(path) as source:
             return _read(source, encoding == "srgb", white, channels, signed)
@@ -96,30 +91,10 @@ def color_channels(
 ) -> int:
     """Return the number of channels that `read_picture` gives, by the header; raise the same."""
     path = Path(path)
-    with convert_errors(path, yaml_path):
+    with convert_errors(path, yaml_path, _CONVERT):
         check_file(path)
         with open_image(path) as source:
             return len(_header(source.spec(), channels)[0])
-
-
-@contextmanager
-def convert_errors(
-    path: Path, yaml_path: tuple[str | int, ...] | str, remedy: str = _CONVERT
-) -> Iterator[None]:
-    """Convert what can be wrong with a file into BadInput and CannotDo.
-
-    remedy: the remedy for a file that is not of its kind.
-    """
-    try:
-        yield
-    except UnusableFile as error:
-        raise bad(yaml_path, f"{path}: {error.reason}", error.remedy or remedy) from None
-    except PermissionError:
-        raise CannotDo(f"{path} may not be read", "give yourself read permission") from None
-    except (OSError, UnicodeError, ValueError, RuntimeError) as error:
-        raise _unreadable(path, error, yaml_path, remedy) from error
-    except MemoryError:
-        raise _too_large(f"{path} does not fit the memory") from None
 
 
 def decode_srgb(code: np.ndarray) -> np.ndarray:
@@ -127,57 +102,6 @@ def decode_srgb(code: np.ndarray) -> np.ndarray:
     code = np.asarray(code)
     high = ((np.maximum(code, 0.04045) + 0.055) / 1.055) ** 2.4
     return np.where(code <= 0.04045, code / 12.92, high)
-
-
-def check_file(path: Path) -> None:
-    """Refuse what is no whole regular file, before OpenImageIO sees it."""
-    str(path).encode("utf-8")  # OpenImageIO takes no other names
-    try:
-        status = os.stat(path)
-    except FileNotFoundError:
-        raise UnusableFile("there is no such file", "check the name and the folder") from None
-    if stat.S_ISDIR(status.st_mode):
-        raise UnusableFile("is a folder, not an image file", "give an image file")
-    if not stat.S_ISREG(status.st_mode):
-        raise UnusableFile("is a device, pipe or socket", "give a regular image file")
-    if status.st_size == 0:
-        raise UnusableFile("the file is empty", "give a whole image file")
-    with open(path, "rb") as file:
-        if file.read(8) == _PNG_START and not _png_is_whole(file, status.st_size):
-            raise truncated_file()
-
-
-def _png_is_whole(file: Any, size: int) -> bool:
-    """Tell whether a PNG's chunks reach IEND unharmed (libpng would print its own complaint).
-
-    Those that it can do without may be damaged: their name begins with a small letter.
-    """
-    place = len(_PNG_START)
-    while place + 12 <= size:
-        file.seek(place)
-        head = file.read(8)
-        if head[4:] == b"IEND":
-            return True
-        if not head[4:].isalpha():
-            return False
-        length = int.from_bytes(head[:4], "big")
-        place += 12 + length
-        if place > size:
-            return False
-        if head[4:5].isupper() and not _check_sum_holds(file, head[4:], length):
-            return False
-    return False
-
-
-def _check_sum_holds(file: Any, name: bytes, length: int) -> bool:
-    """Tell whether the CRC-32 of a PNG's chunk, whose data comes next, is the one stored."""
-    found = zlib.crc32(name)
-    while length > 0:
-        part = file.read(min(length, 1 << 20))
-        found, length = zlib.crc32(part, found), length - len(part)
-        if not part:
-            return False
-    return found == int.from_bytes(file.read(4), "big")
 
 
 @contextmanager
@@ -188,7 +112,7 @@ def open_image(path: Path) -> Iterator[Any]:
     source = oiio.ImageInput.open(str(path.absolute()), config)
     if source is None:
         reason = pending_error(oiio.geterror)
-        raise UnusableFile(f"is no image that can be read ({_brief(reason, path)})")
+        raise UnusableFile(f"is no image that can be read ({brief_reason(reason, path)})")
     try:
         if source.format_name() == "null":
             raise UnusableFile("is no image")
@@ -281,7 +205,7 @@ def check_size(spec: Any, channels: int) -> None:
     free = memory.available()
     if need > free:
         size = f"{spec.width} x {spec.height} pixels"
-        raise _too_large(
+        raise too_large(
             f"an image of {size} needs {need / 1e9:.1f} GB of memory, {free / 1e9:.1f} GB are free"
         )
 
@@ -394,25 +318,3 @@ def _remarks(spec: Any) -> list[str]:
     if profile and "srgb" not in profile.lower():
         notes.append(f"its color profile ({profile[:60]}) is not used")
     return notes
-
-
-def truncated_file(reason: str = "") -> UnusableFile:
-    """Return the error for a file that ends too early."""
-    detail = f" ({reason[:100]})" if reason else ""
-    return UnusableFile(f"is truncated or damaged{detail}", "copy or download the file again")
-
-
-def _unreadable(
-    path: Path, error: Exception, yaml_path: tuple[str | int, ...] | str, remedy: str
-) -> BadInput:
-    reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
-    return bad(yaml_path, f"{path}: cannot be read ({_brief(reason, path)})", remedy)
-
-
-def _too_large(text: str) -> CannotDo:
-    return CannotDo(text, "reduce the image's size, or use a machine with more memory")
-
-
-def _brief(reason: str, path: Path) -> str:
-    reason = reason.replace(str(path.absolute()), path.name) or "unknown format"
-    return reason if len(reason) <= 120 else reason[:117] + "..."

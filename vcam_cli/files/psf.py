@@ -12,15 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vcam_cli.files.images import (
-    UnusableFile,
-    check_file,
-    check_size,
-    convert_errors,
-    extract_display_window,
-    open_image,
-    read_samples,
-)
+from vcam_cli.files.file_checks import UnusableFile, check_file, convert_errors
+from vcam_cli.files.images import check_size, extract_display_window, open_image, read_samples
 
 ROUNDING = 1e-3
 """Part of the largest value below which a negative one is the rounding of a lens program."""

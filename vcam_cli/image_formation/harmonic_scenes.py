@@ -13,7 +13,8 @@ from vcam_cli.effects.base import Blur, Effect, FieldTransfer, SeparableTransfer
 from vcam_cli.image_formation.optical_path import Layer, Layers, OpticalPath, SpectrumReport
 from vcam_cli.image_formation.transfer_functions import Transfer
 from vcam_cli.image_formation.transfer_tables import PARITIES, split_by_parity
-from vcam_cli.scenes.base import HarmonicScene, Wave, WaveScene
+from vcam_cli.scenes.base import HarmonicScene
+from vcam_cli.scenes.waves import Wave, WaveScene
 
 MOST_HARMONICS = 512
 """Harmonics along an axis up to the lens's cut-off: a pattern with more of them is sampled."""

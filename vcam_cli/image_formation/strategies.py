@@ -33,7 +33,8 @@ from vcam_cli.image_formation.optical_path import Layer, Layers, OpticalPath, Sp
 from vcam_cli.image_formation.scene_sampling import sampled_image
 from vcam_cli.image_formation.scene_spectrum import SceneSpectrum
 from vcam_cli.image_formation.transfer_tables import Tables, mixtures, tabulate
-from vcam_cli.scenes.base import ChartScene, HarmonicScene, SampledScene, Scene, WaveScene
+from vcam_cli.scenes.base import ChartScene, HarmonicScene, SampledScene, Scene
+from vcam_cli.scenes.waves import WaveScene
 
 SMOOTH = 16
 """Parts of a table over each of which it is a cubic, to rounding."""

@@ -21,8 +21,6 @@ from vcam_cli.scenes.base import (
     SampledScene,
     Scene,
     View,
-    Wave,
-    WaveScene,
     chart_scene,
     fills,
 )
@@ -33,6 +31,7 @@ from vcam_cli.scenes.point_grid import PointGrid
 from vcam_cli.scenes.sinusoid import WaveChart
 from vcam_cli.scenes.slanted_edge import SlantedEdge
 from vcam_cli.scenes.still_life import LeavesWithColorChecker
+from vcam_cli.scenes.waves import Wave, WaveScene
 from vcam_cli.spectra import Spectrum, srgb_reflectances
 
 SOURCE = ("scene", "source")

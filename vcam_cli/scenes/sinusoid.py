@@ -8,7 +8,8 @@ counterclockwise as seen, so that at 90 degrees it runs up a column.
 import math
 from dataclasses import dataclass
 
-from vcam_cli.scenes.base import Array, Chart, Wave, wave_averages, wave_values
+from vcam_cli.scenes.base import Array, Chart
+from vcam_cli.scenes.waves import Wave, wave_averages, wave_values
 
 
 def waves(

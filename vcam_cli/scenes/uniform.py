@@ -1,6 +1,6 @@
 """A uniform field: the same reflectance everywhere."""
 
-from vcam_cli.scenes.base import Wave
+from vcam_cli.scenes.waves import Wave
 
 
 def waves(reflectance: float) -> tuple[Wave, ...]:

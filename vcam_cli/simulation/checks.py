@@ -85,7 +85,7 @@ def check_picture(camera: Camera) -> None:
 
         check_channels(source.model, color_channels(source.file, path))
     if source.kind == "hyperspectral":
-        from vcam_cli.files.hyperspectral import read_bands
+        from vcam_cli.files.spectral.hyperspectral import read_bands
 
         check_bands(camera.scene, read_bands(source.file, path))
 

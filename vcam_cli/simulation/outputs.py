@@ -23,7 +23,7 @@ from vcam_cli.files.folder import OutputFolder
 from vcam_cli.files.maps import write_map
 from vcam_cli.files.png import write_png
 from vcam_cli.files.report import hash_file, hash_text, to_json
-from vcam_cli.files.spectral import write_spectral
+from vcam_cli.files.spectral.exr import write_spectral
 from vcam_cli.files.tables import write_metrics
 from vcam_cli.parallel import ThreadPool
 from vcam_cli.simulation import raw_file, spectral_irradiance

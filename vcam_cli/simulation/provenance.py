@@ -14,7 +14,7 @@ from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.named_spectra import spectra
 from vcam_cli.camera.load import FILE_KEYS
 from vcam_cli.config import shipped
-from vcam_cli.files.hyperspectral import companions
+from vcam_cli.files.spectral.hyperspectral import companions
 
 
 def inputs(camera: Camera) -> tuple[Path, ...]:

@@ -266,7 +266,7 @@ def _picture(camera: Camera, stages: Stages) -> tuple[Any, tuple[str, ...]]:
             read = read_picture(source.file, source.encoding, source.white, path)
         return read.data, read.notes
     if source.kind == "hyperspectral":
-        from vcam_cli.files.hyperspectral import read_cube
+        from vcam_cli.files.spectral.hyperspectral import read_cube
 
         with stages("read"):
             return read_cube(source.file, path)

@@ -30,8 +30,9 @@ from vcam_cli.image_formation.transfer_functions import Band, Transfer
 from vcam_cli.parallel import each
 from vcam_cli.physics import radiometry
 from vcam_cli.rng import blocks
-from vcam_cli.scenes.base import SampledScene, Scene, WaveScene
+from vcam_cli.scenes.base import SampledScene, Scene
 from vcam_cli.scenes.build import build
+from vcam_cli.scenes.waves import WaveScene
 from vcam_cli.simulation.cost_model import BANDS_AT_ONCE
 from vcam_cli.simulation.preparation import Prepared
 from vcam_cli.spectra import Spectrum, hat_weights

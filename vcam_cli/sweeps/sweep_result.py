@@ -21,9 +21,9 @@ from vcam_cli.config.document import Document
 from vcam_cli.config.file_names import current_folder
 from vcam_cli.errors import CannotDo, Problem, dotted_path, one_line
 from vcam_cli.files.folder import read_record
-from vcam_cli.files.hyperspectral import companions
 from vcam_cli.files.points_store import RECORD, SweepFolder, record_check
 from vcam_cli.files.report import hash_file, hash_text, to_json
+from vcam_cli.files.spectral.hyperspectral import companions
 from vcam_cli.files.tables import Cell
 from vcam_cli.simulation import provenance
 from vcam_cli.sweeps.sweep_file import StudyFile

@@ -19,15 +19,10 @@ import numpy as np
 
 from vcam_cli.files.atomic import cannot_write
 from vcam_cli.files.exr import ExrWriter
-from vcam_cli.files.images import (
-    UnusableFile,
-    check_size,
-    extract_display_window,
-    open_image,
-    read_samples,
-)
+from vcam_cli.files.file_checks import UnusableFile
+from vcam_cli.files.images import check_size, extract_display_window, open_image, read_samples
 from vcam_cli.files.rows import Attribute
-from vcam_cli.files.spectral_data import PER_NM, SpectralData
+from vcam_cli.files.spectral.data import PER_NM, SpectralData
 from vcam_cli.spectra import SPEED_OF_LIGHT
 
 ROWS_AT_ONCE = 64

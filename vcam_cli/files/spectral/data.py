@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from vcam_cli.files.images import UnusableFile
+from vcam_cli.files.file_checks import UnusableFile
 from vcam_cli.scenes.hyperspectral import Quantity
 
 PER_NM = 1e9

@@ -17,9 +17,10 @@ from typing import Any, Literal
 
 import numpy as np
 
-from vcam_cli.files.images import UnusableFile, check_size, open_image, read_samples
+from vcam_cli.files.file_checks import UnusableFile
+from vcam_cli.files.images import check_size, open_image, read_samples
 from vcam_cli.files.rows import pending_error
-from vcam_cli.files.spectral_data import PER_NM, SpectralData, check_length, finite_numbers
+from vcam_cli.files.spectral.data import PER_NM, SpectralData, check_length, finite_numbers
 
 LONGEST = 1 << 20  # bytes of a table
 

@@ -17,8 +17,8 @@ from typing import Any
 
 import numpy as np
 
-from vcam_cli.files.images import UnusableFile, truncated_file
-from vcam_cli.files.spectral_data import PER_NM, SpectralData, check_length, finite_numbers
+from vcam_cli.files.file_checks import UnusableFile, truncated_file
+from vcam_cli.files.spectral.data import PER_NM, SpectralData, check_length, finite_numbers
 
 TYPES = {
     1: "u1", 2: "i2", 3: "i4", 4: "f4", 5: "f8", 12: "u2", 13: "u4", 14: "i8", 15: "u8",

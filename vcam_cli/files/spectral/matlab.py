@@ -20,7 +20,7 @@ import numpy as np
 
 from vcam_cli import memory
 from vcam_cli.errors import CannotDo
-from vcam_cli.files.images import UnusableFile
+from vcam_cli.files.file_checks import UnusableFile
 
 HEADER = 128
 TYPES = {

@@ -13,8 +13,8 @@ from typing import IO, Literal
 
 import numpy as np
 
-from vcam_cli.files.images import UnusableFile, truncated_file
-from vcam_cli.files.spectral_data import (
+from vcam_cli.files.file_checks import UnusableFile, truncated_file
+from vcam_cli.files.spectral.data import (
     MOST_WAVELENGTHS,
     PER_NM,
     SpectralData,

@@ -13,8 +13,8 @@ import numpy as np
 
 from vcam_cli import memory
 from vcam_cli.errors import CannotDo
-from vcam_cli.files.images import UnusableFile, check_file, convert_errors
-from vcam_cli.files.spectral_data import SpectralData
+from vcam_cli.files.file_checks import UnusableFile, check_file, convert_errors
+from vcam_cli.files.spectral.data import SpectralData
 from vcam_cli.scenes.hyperspectral import Bands, Cube
 
 MOST_SAMPLES = 10**11
@@ -28,31 +28,31 @@ YamlPath = tuple[str | int, ...] | str
 
 
 def _exr(path: Path) -> SpectralData:
-    from vcam_cli.files.spectral import open_spectral
+    from vcam_cli.files.spectral.exr import open_spectral
 
     return open_spectral(path)
 
 
 def _envi(path: Path) -> SpectralData:
-    from vcam_cli.files.envi import open_envi
+    from vcam_cli.files.spectral.envi import open_envi
 
     return open_envi(path)
 
 
 def _isetcam(path: Path) -> SpectralData:
-    from vcam_cli.files.isetcam import open_isetcam
+    from vcam_cli.files.spectral.isetcam import open_isetcam
 
     return open_isetcam(path)
 
 
 def _npz(path: Path) -> SpectralData:
-    from vcam_cli.files.npz import open_npz
+    from vcam_cli.files.spectral.npz import open_npz
 
     return open_npz(path)
 
 
 def _tiff(path: Path) -> SpectralData:
-    from vcam_cli.files.tiff import open_tiff
+    from vcam_cli.files.spectral.tiff import open_tiff
 
     return open_tiff(path)
 
@@ -90,7 +90,7 @@ def companions(path: Path | str) -> tuple[Path, ...]:
     """Return the files beside a file of spectra that are read with it, where there are any."""
     path = Path(path)
     if path.suffix.lower() == ".hdr":
-        from vcam_cli.files.envi import data_file
+        from vcam_cli.files.spectral.envi import data_file
 
         with suppress(UnusableFile):
             return (data_file(path),)

@@ -16,15 +16,15 @@ from typing import Any
 
 import numpy as np
 
-from vcam_cli.files.images import UnusableFile
-from vcam_cli.files.matlab import ASKED, MOST_RATIO, SUSPECT, check_memory, read_variables
-from vcam_cli.files.spectral_data import (
+from vcam_cli.files.file_checks import UnusableFile
+from vcam_cli.files.spectral.data import (
     MOST_WAVELENGTHS,
     PER_NM,
     SpectralData,
     check_length,
     finite_numbers,
 )
+from vcam_cli.files.spectral.matlab import ASKED, MOST_RATIO, SUSPECT, check_memory, read_variables
 from vcam_cli.spectra import PLANCK, SPEED_OF_LIGHT
 
 Lookup = Callable[..., Any]

@@ -1,0 +1,1 @@
+"""Files of spectra: one reader a format, and what they share; `hyperspectral.py` comes first."""
