@@ -3,7 +3,8 @@
 import numpy as np
 
 from vcam_cli.camera.scene import Scene
-from vcam_cli.scenes.base import ChartScene, View, cell_edges
+from vcam_cli.scenes.base import ChartScene, View
+from vcam_cli.scenes.cells import cell_edges
 
 
 def view(rows=12, columns=16, **others) -> View:

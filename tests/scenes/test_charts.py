@@ -7,8 +7,9 @@ import pytest
 from support import brute, scene, view
 
 from vcam_cli.scenes import csf
-from vcam_cli.scenes.base import ChartScene, Frame, HarmonicScene, cell_edges
+from vcam_cli.scenes.base import ChartScene, Frame, HarmonicScene
 from vcam_cli.scenes.build import build
+from vcam_cli.scenes.cells import cell_edges
 from vcam_cli.scenes.slanted_edge import half_plane_cover
 from vcam_cli.scenes.waves import WaveScene
 from vcam_cli.spectra import illuminant, luminance

@@ -1,0 +1,1 @@
+"""Image formation: from the radiance of a scene to the mean rate of electrons in every pixel."""

@@ -16,9 +16,25 @@ SLIVER = 1e-9
 def box_averages(
     scene: SampledScene, mix: NDArray, geometry: Geometry, axes: tuple[Axis, Axis], workers: int
 ) -> NDArray:
-    """Means of a scene over the collecting areas of all pixels: (C, rows, columns).
+    """Return the means of a scene over the collecting areas of all pixels.
 
-    mix: (C, K) signal of each component in each color [electrons / s]; axes: along x and y.
+    Parameters
+    ----------
+    scene : SampledScene
+        The scene: a chart, or samples.
+    mix : NDArray
+        Signal (C, K) of each component in each color [e/s].
+    geometry : Geometry
+        Geometry of the array.
+    axes : tuple of Axis
+        Samples and pixels along x and y.
+    workers : int
+        Number of threads; the result does not depend on it.
+
+    Returns
+    -------
+    NDArray
+        Signal (C, rows, columns) [e/s].
     """
     size = geometry.collecting_width, geometry.collecting_height
     if isinstance(scene, ChartScene):
@@ -31,14 +47,29 @@ def box_averages(
 
 
 def point_values(scene: SampledScene, mix: NDArray, geometry: Geometry) -> NDArray:
-    """A scene at the centers of the collecting areas: (C, rows, columns)."""
+    """Return a scene at the centers of the collecting areas.
+
+    Parameters
+    ----------
+    scene : SampledScene
+        The scene.
+    mix : NDArray
+        Signal (C, K) of each component in each color [e/s].
+    geometry : Geometry
+        Geometry of the array.
+
+    Returns
+    -------
+    NDArray
+        Signal (C, rows, columns) [e/s].
+    """
     return scene.values_at(*pixel_centers(geometry, detector=True), mix)
 
 
 def _chart_averages(
     scene: ChartScene, mix: NDArray, geometry: Geometry, size: tuple[float, float]
 ) -> NDArray:
-    """The chart painted on cells that are the collecting areas, and the gaps between them."""
+    """Paint the chart on cells that are the collecting areas, and the gaps between them."""
     centers = pixel_centers(geometry, detector=True)
     (x_edges, step_x), (y_edges, step_y) = (
         _edges(c, s) for c, s in zip(centers, size, strict=True)
@@ -55,7 +86,7 @@ def _chart_averages(
 
 
 def _edges(center: NDArray, size: float) -> tuple[NDArray, int]:
-    """Edges of boxes and of the gaps between them [m]; cells from one box to the next."""
+    """Return edges of boxes and of the gaps between them [m]; cells from one box to the next."""
     pitch = center[1] - center[0] if len(center) > 1 else size
     low, high = center - size / 2, center + size / 2
     if pitch - size > SLIVER * pitch:
@@ -64,7 +95,24 @@ def _edges(center: NDArray, size: float) -> tuple[NDArray, int]:
 
 
 def square_averages(plane: NDArray, axis: Axis, size: float, along: int) -> NDArray:
-    """Means of uniform squares of light over boxes, by running sums read at both edges."""
+    """Return the means of uniform squares of light over boxes, by running sums.
+
+    Parameters
+    ----------
+    plane : NDArray
+        Samples of one plane, in any unit.
+    axis : Axis
+        Samples and pixels along the axis.
+    size : float
+        Width of a box [m].
+    along : int
+        The axis of `plane`, 0 or 1.
+
+    Returns
+    -------
+    NDArray
+        Means in place of the samples along that axis, in the type of `plane`.
+    """
     center = (axis.first + np.arange(axis.pixels) * axis.pixel_pitch) / axis.sample_pitch
     half = size / axis.sample_pitch / 2
     sums = np.cumsum(plane, axis=along, dtype=np.float64)
@@ -73,7 +121,10 @@ def square_averages(plane: NDArray, axis: Axis, size: float, along: int) -> NDAr
 
 
 def _mirrored_integral(sums: NDArray, plane: NDArray, position: NDArray, along: int) -> NDArray:
-    """Integral of the samples, mirrored at both ends, from the edge to `position` (in samples)."""
+    """Return the integral of samples, mirrored at both ends, from the edge to a position.
+
+    Positions are counted in samples.
+    """
     count = plane.shape[along]
     inside = count - np.abs(count - np.abs(position))
     shape = (-1, 1) if along == 0 else (1, -1)
@@ -84,7 +135,7 @@ def _mirrored_integral(sums: NDArray, plane: NDArray, position: NDArray, along: 
 
 
 def _integral(sums: NDArray, plane: NDArray, position: NDArray, along: int) -> NDArray:
-    """Integral of the samples from the edge to `position` (in samples)."""
+    """Return the integral of the samples from the edge to `position`, counted in samples."""
     index = np.minimum(position.astype(int), plane.shape[along] - 1)
     shape = (-1, 1) if along == 0 else (1, -1)
     # The running sum holds the whole sample: the part of it beyond the position is taken back.

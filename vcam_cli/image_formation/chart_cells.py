@@ -56,7 +56,22 @@ FREQUENCIES = 1025
 
 
 def cell_grid(scene: ChartScene, geometry: Geometry, per_pixel: float) -> tuple[int, int]:
-    """Cells (ny, nx) of a chart, at least so many per pixel pitch, whose transforms are fast."""
+    """Return the cells of a chart on which transforms are fast.
+
+    Parameters
+    ----------
+    scene : ChartScene
+        The chart.
+    geometry : Geometry
+        Geometry of the array.
+    per_pixel : float
+        Cells per pixel pitch, at least.
+
+    Returns
+    -------
+    ny, nx : int
+        Cells along y and x.
+    """
     ny = scene.shape[0] * scene.pitch_y / geometry.pitch_y * per_pixel
     nx = scene.shape[1] * scene.pitch_x / geometry.pitch_x * per_pixel
     fast = [scipy.fft.next_fast_len(max(1, math.ceil(n - 1e-9)), real=True) for n in (ny, nx)]
@@ -64,9 +79,23 @@ def cell_grid(scene: ChartScene, geometry: Geometry, per_pixel: float) -> tuple[
 
 
 def cells_per_pixel(path: OpticalPath, scene: ChartScene, highest: float) -> tuple[float, float]:
-    """Cells per pixel pitch of a chart, and the rms error that they leave [electrons / s].
+    """Return how finely a chart is painted, and the error that this leaves.
 
-    highest: frequency beyond which lens and pixels pass nothing [pixel Nyquist].
+    Parameters
+    ----------
+    path : OpticalPath
+        Lens, pixels and settings.
+    scene : ChartScene
+        The chart.
+    highest : float
+        Frequency beyond which lens and pixels pass nothing [pixel Nyquist].
+
+    Returns
+    -------
+    cells : float
+        Cells per pixel pitch.
+    error : float
+        Rms of the signal on crops of the chart [e/s]; 0 where none were measured.
     """
     if path.settings.oversampling is not None:
         return path.settings.oversampling, 0.0
@@ -99,7 +128,10 @@ Table = tuple[NDArray, NDArray]
 
 
 def _mean_otf(path: OpticalPath, highest: float) -> Table:
-    """The OTF of the color with most light, its aberrations aside: they only weaken detail."""
+    """Return the OTF of the color with most light, its aberrations aside.
+
+    They only weaken detail.
+    """
     g = path.geometry
     corner = highest * math.hypot(0.5 / g.pitch_x, 0.5 / g.pitch_y)
     f = np.linspace(0, min(path.transfer.cutoff, corner), FREQUENCIES)
@@ -109,7 +141,10 @@ def _mean_otf(path: OpticalPath, highest: float) -> Table:
 
 
 def _crops(g: Geometry, scene: ChartScene, cells: float, level: NDArray) -> list[ChartScene]:
-    """Places of a chart on which cells are tried; cells: per pixel pitch, of the reference."""
+    """Return places of a chart on which cells are tried.
+
+    `cells` are those of the reference, per pixel pitch.
+    """
     side = int(max(4, min(CROP, CROP_CELLS / cells, g.rows, g.columns)))
     size = side * g.pitch_x, side * g.pitch_y
     half = (g.sensor_width - size[0]) / 2, (g.sensor_height - size[1]) / 2
@@ -120,9 +155,10 @@ def _crops(g: Geometry, scene: ChartScene, cells: float, level: NDArray) -> list
 
 
 def _busiest(g: Geometry, scene: ChartScene, level: NDArray) -> NDArray:
-    """Centers (FEW, 2) of the parts of most contrast [m].
+    """Return the centers (FEW, 2) of the parts of most contrast [m].
 
-    From values at points with uneven steps, which share no factor with what repeats in a chart.
+    They come from values at points with uneven steps, which share no factor with what repeats in a
+    chart.
     """
     k = np.arange(BLOCKS * POINTS)
     x, y = (
@@ -138,9 +174,9 @@ def _busiest(g: Geometry, scene: ChartScene, level: NDArray) -> NDArray:
 def _signals(
     path: OpticalPath, crops: Sequence[ChartScene], cells: float, level: NDArray, otf: Table
 ) -> NDArray:
-    """Signals of crops of one size, mirrored at their borders [electrons / s].
+    """Return the signals (crops, rows, columns) of crops of one size [e/s].
 
-    level: (K,) signal of the scene's components. Returns (crops, rows, columns).
+    They are mirrored at their borders. `level` (K,) is the signal of the scene's components.
     """
     g, first = path.geometry, crops[0]
     rows, columns = round(first.pitch_y / g.pitch_y), round(first.pitch_x / g.pitch_x)
@@ -160,7 +196,7 @@ def _signals(
 
 
 def _waves(axis: Axis) -> NDArray:
-    """Every term of an axis at every photodetector: (pixels, terms)."""
+    """Return every term of an axis at every photodetector: (pixels, terms)."""
     k = np.arange(axis.terms)
     place = (axis.first + np.arange(axis.pixels) * axis.pixel_pitch) / axis.length
     return np.cos(np.pi * np.outer(place, k)) * (axis.weights * np.where(k > 0, 2, 1))

@@ -55,6 +55,7 @@ class Axis:
 
     @property
     def length(self) -> float:
+        """Length of the scene along the axis [m]."""
         return self.samples * self.sample_pitch
 
     @cached_property
@@ -70,7 +71,7 @@ class Axis:
 
     @cached_property
     def weights(self) -> NDArray:
-        """What turns a DCT-II coefficient into a DCT-III one for every term, (terms,)."""
+        """Factors (terms,) that turn a DCT-II coefficient into a DCT-III one."""
         box = np.sinc(np.arange(self.terms) / (2 * self.samples))
         return (box if self.squares else 1 / box) / (2 * self.samples)
 
@@ -78,7 +79,7 @@ class Axis:
     def virtual_pixels(self) -> int | None:
         """Whole number of pixels in the scene's length, where folding is exact; else None.
 
-        None also where so few of them are pixels that a chirp-z transform costs less.
+        It is None as well where so few of them are pixels that a chirp-z transform costs less.
         """
         count, first = round(self.length / self.pixel_pitch), round(self._start)
         whole = abs(self.length / self.pixel_pitch - count) <= NEAR
@@ -92,18 +93,29 @@ class Axis:
 
     @cached_property
     def shift(self) -> float:
-        """How far photodetectors are off the virtual pixels' centers [pixel pitches].
+        """Distance of photodetectors from the virtual pixels' centers [pixel pitches].
 
-        0 where there are no virtual pixels: what is evaluated is the photodetectors' place then.
+        It is 0 where there are no virtual pixels: what is evaluated is the photodetectors' place
+        then.
         """
         shift = self._start - round(self._start)
         return 0.0 if self.virtual_pixels is None or abs(shift) <= NEAR else shift
 
     def pixel_waves(self, odd: bool = False) -> list[tuple[bool, NDArray | None]]:
-        """Of which of the pixels' own waves the scene's cosines (odd: sines) are made.
+        """Return of which of the pixels' own waves the scene's waves are made.
 
-        [(whether they are sines, how much of them in every term (terms,); None for all), ...].
         cos(a + b) = cos a cos b - sin a sin b, sin(a + b) = sin a cos b + cos a sin b.
+
+        Parameters
+        ----------
+        odd : bool, optional
+            Whether the scene's waves are sines.
+
+        Returns
+        -------
+        list of tuple
+            Whether the pixels' waves are sines, and how much of them is in every term (terms,);
+            None for all.
         """
         if not self.shift:
             return [(odd, None)]
@@ -117,7 +129,20 @@ class Axis:
         return self.virtual_pixels or self.terms
 
     def coefficient_index(self, terms: NDArray) -> tuple[NDArray, NDArray]:
-        """DCT-II coefficient behind every cosine term: its index, and its sign (0 for none)."""
+        """Return the DCT-II coefficient behind every cosine term.
+
+        Parameters
+        ----------
+        terms : NDArray
+            Indices (n,) of terms.
+
+        Returns
+        -------
+        index : NDArray
+            Indices (n,) of coefficients.
+        sign : NDArray
+            Signs (n,) of the coefficients, 0 for none.
+        """
         period = 2 * self.samples
         rest = terms % period
         sign = np.where(terms // period % 2 == 0, 1, -1)
@@ -126,7 +151,20 @@ class Axis:
         return np.minimum(index, self.samples - 1), sign
 
     def extend(self, coefficients: NDArray, terms: int) -> NDArray:
-        """DCT-II coefficients (..., samples) continued to `terms` cosine terms."""
+        """Return DCT-II coefficients continued to more cosine terms.
+
+        Parameters
+        ----------
+        coefficients : NDArray
+            Coefficients (..., samples).
+        terms : int
+            Number of terms.
+
+        Returns
+        -------
+        NDArray
+            Coefficients (..., terms), which may be a view.
+        """
         if terms <= coefficients.shape[-1]:
             return coefficients[..., :terms]
         out = np.empty((*coefficients.shape[:-1], terms), coefficients.dtype)
@@ -136,7 +174,20 @@ class Axis:
         return out
 
     def folding(self, folded: slice, odd: bool = False) -> list[tuple[slice, NDArray, NDArray]]:
-        """Where a piece of the folded axis comes from: (its part, terms, weights)."""
+        """Return where a piece of the folded axis comes from.
+
+        Parameters
+        ----------
+        folded : slice
+            Piece of the folded axis.
+        odd : bool, optional
+            Whether the waves are sines.
+
+        Returns
+        -------
+        list of tuple
+            Part of the piece, the terms (n,) that are added to it, and their weights (n,).
+        """
         if self.virtual_pixels is None:
             terms = np.arange(folded.start, folded.stop)
             return [(folded, terms, np.ones(len(terms)))]
@@ -158,9 +209,21 @@ class Axis:
         return out
 
     def fold(self, terms: NDArray, odd: bool = False, overwrite: bool = False) -> NDArray:
-        """Terms (..., n) folded onto the pixels' own cosines, or sines: (..., folded).
+        """Fold terms onto the pixels' own cosines, or sines.
 
-        overwrite: whether it may be done where the terms are.
+        Parameters
+        ----------
+        terms : NDArray
+            Terms (..., n).
+        odd : bool, optional
+            Whether they are sines.
+        overwrite : bool, optional
+            Whether it may be done in the array of the terms.
+
+        Returns
+        -------
+        NDArray
+            Folded terms (..., folded_terms).
         """
         n = terms.shape[-1]
         if self.virtual_pixels is None:
@@ -187,7 +250,7 @@ class Axis:
 
     @property
     def window(self) -> slice | None:
-        """Which of the virtual pixels are pixels; None where there are none."""
+        """The virtual pixels that are pixels; None where there are none."""
         if self.virtual_pixels is None:
             return None
         start = round(self._start)
@@ -203,10 +266,25 @@ class Axis:
     def evaluate(
         self, values: NDArray, axis: int, odd: bool = False, overwrite: bool = False
     ) -> NDArray:
-        """Folded values -> values at the photodetectors along `axis` (0 or 1 of two).
+        """Evaluate folded terms at the photodetectors.
 
-        Of each of their `pixel_waves` by itself; the sum is the signal. overwrite: whether the
-        result may be a view of what is given.
+        Each of their `pixel_waves` is evaluated by itself; the sum is the signal.
+
+        Parameters
+        ----------
+        values : NDArray
+            Folded terms of two dimensions.
+        axis : int
+            The axis of `values` to be evaluated, 0 or 1.
+        odd : bool, optional
+            Whether they are sines.
+        overwrite : bool, optional
+            Whether the result may be a view of `values`.
+
+        Returns
+        -------
+        NDArray
+            Values at the photodetectors in place of the terms.
         """
         if self.window is None:
             return self._chirp(values, axis, odd)
@@ -229,7 +307,7 @@ class Axis:
         return size, before, scipy.fft.fft(kernel), after
 
     def _chirp(self, values: NDArray, axis: int, odd: bool) -> NDArray:
-        """Bluestein's algorithm, for the real or imaginary part of a sum of exponentials."""
+        """Evaluate a sum of exponentials by Bluestein's algorithm: its real or imaginary part."""
         size, before, kernel, after = self._chirp_parts
         kind = np.complex64 if values.dtype == np.float32 else np.complex128
         shape = (-1, 1) if axis == 0 else (1, -1)
@@ -247,17 +325,34 @@ class Axis:
 
 
 def _sign(segment: int, odd: bool = False) -> int:
-    """Sign of segment m, terms m L to (m + 1) L: cosines + - - + + - -, sines + + - - + + ..."""
+    """Return the sign of segment m, terms m L to (m + 1) L.
+
+    Cosines have + - - + + - -, sines + + - - + + ...
+    """
     return 1 if (segment + (not odd)) // 2 % 2 == 0 else -1
 
 
 def segments(period: int, terms: int, odd: bool = False) -> list[tuple[slice, slice, int]]:
-    """How cosine terms 0..terms-1 (odd: sine terms) fold onto a basis of `period` samples.
+    """Return how cosine terms, or sine terms, fold onto a basis of few samples.
 
     cos(pi k (i + 1/2) / L) repeats with k: k = 2L - j gives minus the cosine of j, k = 2L + j
     likewise minus it, k = L vanishes. Of sines, whose basis is 1..L, k = 2L - j gives the sine of
-    j, k = 2L + j minus it, and k = 0 and 2L vanish. Returns (slice of the basis, slice of the
-    terms, sign); basis slices run backwards in odd segments, terms always forward.
+    j, k = 2L + j minus it, and k = 0 and 2L vanish.
+
+    Parameters
+    ----------
+    period : int
+        Number of samples L of the basis.
+    terms : int
+        Number of terms, from 0 on.
+    odd : bool, optional
+        Whether they are sines.
+
+    Returns
+    -------
+    list of tuple
+        Slice of the basis, slice of the terms, and sign. Basis slices run backwards in odd
+        segments, terms always forward.
     """
     out = []
     for m in range(-(-terms // period)):

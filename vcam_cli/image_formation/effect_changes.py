@@ -21,9 +21,23 @@ MODES_SHARE = 0.1
 def changes_by_omission(
     path: OpticalPath, image: SampledImage, tables: Tables, field_change: float
 ) -> dict[str, float]:
-    """Rms change of the signal by leaving out each transfer function [electrons / s].
+    """Return the rms change of the signal by leaving out each transfer function.
 
-    tables: of the whole lens; field_change: rms of all that changes over the field.
+    Parameters
+    ----------
+    path : OpticalPath
+        Lens, pixels and settings.
+    image : SampledImage
+        The scene's spectrum.
+    tables : Tables
+        Tables of the whole lens.
+    field_change : float
+        Rms of all that changes over the field [e/s].
+
+    Returns
+    -------
+    dict
+        Name of an effect -> rms change [e/s].
     """
     squares: dict[Effect, NDArray] = {
         effect: image.power.omission_power(image.lens_power, effect) for effect in path.separable
@@ -46,7 +60,7 @@ def changes_by_omission(
 def _omission_tables(
     path: OpticalPath, image: SampledImage, radial: list[RadialTransfer]
 ) -> Tables:
-    """The radial part with fewer transfer functions, less the whole of it."""
+    """Return the radial part with fewer transfer functions, less the whole of it."""
     whole = image.tables.radial
     assert whole is not None
     others = path.transfer.with_effects(radial).with_mixtures(image.tables.mix)
@@ -55,7 +69,7 @@ def _omission_tables(
 
 
 def _directional_tables(path: OpticalPath, tables: Tables) -> Tables:
-    """What a blur with a direction, or the mean of one that changes over the field, adds."""
+    """Return what a blur with a direction, or the mean of one that changes over the field, adds."""
     if any(plane is not None for plane in tables.planes) or tables.radial is None:
         return replace(tables, radial=None)
     alone = path.transfer.with_mixtures(tables.mix)
@@ -66,7 +80,24 @@ def _directional_tables(path: OpticalPath, tables: Tables) -> Tables:
 def needed_modes(
     path: OpticalPath, image: SampledImage, modes: tuple[Mode, ...]
 ) -> tuple[tuple[Mode, ...], float]:
-    """The modes of the field that this picture needs, and the rms that all of them add [e/s]."""
+    """Return the modes of the field that a picture needs.
+
+    Parameters
+    ----------
+    path : OpticalPath
+        Lens, pixels and settings.
+    image : SampledImage
+        The scene's spectrum.
+    modes : tuple of Mode
+        All modes of the field.
+
+    Returns
+    -------
+    kept : tuple of Mode
+        The needed modes, in their order.
+    change : float
+        Rms that all modes add [e/s].
+    """
     squares = np.array(
         [
             mode.map.mean_square * image.rms(image.power.filtered_power(mode.tables())) ** 2

@@ -54,9 +54,21 @@ class FarPart:
     """1 of an outer rectangle, -1 of an inner."""
 
     def spectrum(self, path: OpticalPath, highest: float, mix: NDArray) -> SceneSpectrum:
-        """Return the spectrum of its planes, mixtures (R, K) of the components, in 64 bits.
+        """Return the spectrum of its planes, in 64 bits.
 
-        highest: frequency at which the near field's filter ends [pixel Nyquist].
+        Parameters
+        ----------
+        path : OpticalPath
+            Lens, pixels and settings.
+        highest : float
+            Frequency at which the near field's filter ends [pixel Nyquist].
+        mix : NDArray
+            Mixtures (R, K) of the scene's components.
+
+        Returns
+        -------
+        SceneSpectrum
+            Spectrum of R planes.
         """
         rectangles = self.scene.rectangles(mix)
         if rectangles is not None:
@@ -66,9 +78,21 @@ class FarPart:
         return transform_planes(planes, path.workers)
 
     def image_filter(self, near: Filter, path: OpticalPath, highest: float) -> Filter:
-        """Return the filter of the near field for this part, with the ring's low-pass and the sign.
+        """Return the filter for this part, with the ring's low-pass and the sign.
 
-        highest: frequency at which the near field's filter ends [pixel Nyquist].
+        Parameters
+        ----------
+        near : Filter
+            Filter of the near field.
+        path : OpticalPath
+            Lens, pixels and settings.
+        highest : float
+            Frequency at which that filter ends [pixel Nyquist].
+
+        Returns
+        -------
+        Filter
+            The filter.
         """
         x, y = axes(path, self.scene, highest)
         along_x, along_y = _low_pass(x), self.sign * _low_pass(y)
@@ -85,8 +109,21 @@ def _low_pass(axis: Axis) -> NDArray:
 def near_field(path: OpticalPath, scene: ChartScene, widest: float) -> ChartScene:
     """Return the part of a chart whose light has to be followed in all detail.
 
-    That is the whole chart where its margin is not much wider. widest: reach of the blurs,
-    diffraction aside [m].
+    It is the whole chart where its margin is not much wider.
+
+    Parameters
+    ----------
+    path : OpticalPath
+        Lens, pixels and settings.
+    scene : ChartScene
+        The chart.
+    widest : float
+        Reach of the blurs, diffraction aside [m].
+
+    Returns
+    -------
+    ChartScene
+        Chart on a single cell, or `scene` itself.
     """
     g, cutoff = path.geometry, path.transfer.cutoff
     if not 0 < cutoff < math.inf:
@@ -105,7 +142,21 @@ def far_parts(
 ) -> list[FarPart]:
     """Return the rings from the near field to the border of the whole chart, if it has any.
 
-    widest: reach of the blurs, diffraction aside [m].
+    Parameters
+    ----------
+    path : OpticalPath
+        Lens, pixels and settings.
+    near : ChartScene
+        Near field of the chart.
+    whole : ChartScene
+        The whole chart.
+    widest : float
+        Reach of the blurs, diffraction aside [m].
+
+    Returns
+    -------
+    list of FarPart
+        An outer and an inner rectangle for each ring, the innermost first.
     """
     if near is whole:
         return []

@@ -49,7 +49,10 @@ class Map:
     half_height: float
 
     def __call__(self, x: NDArray, y: NDArray) -> NDArray:
-        """At the positions x (columns,), y (rows,) [m]: (rows, columns), in the type of x."""
+        """Return the values (rows, columns) at the positions x (columns,), y (rows,) [m].
+
+        They have the type of x.
+        """
         last = PLACES - 1
         along_y = np.clip((y / self.half_height + 1) * (last / 2), 0, last)
         along_x = np.clip((x / self.half_width + 1) * (last / 2), 0, last)
@@ -58,12 +61,12 @@ class Map:
 
     @property
     def mean_square(self) -> float:
-        """Over the sensor."""
+        """Mean square over the sensor."""
         return float(np.mean(self.values**2))
 
 
 def _linear(values: NDArray, position: NDArray) -> NDArray:
-    """Rows of a table at positions between them (n,), by linear interpolation."""
+    """Return rows of a table at positions between them (n,), by linear interpolation."""
     index = np.minimum(position.astype(int), len(values) - 2)
     part = (position - index).astype(values.dtype)[:, None]
     return np.asarray(values[index] * (1 - part) + values[index + 1] * part)
@@ -79,7 +82,22 @@ class Mode:
 
 
 def field_mixtures(alone: Transfer, zones: Sequence[Zone], size: TableSize) -> Mixing:
-    """The fewest mixtures of the components that serve all zones."""
+    """Return the fewest mixtures of the components that serve all zones.
+
+    Parameters
+    ----------
+    alone : Transfer
+        Transfer without the blur that has zones.
+    zones : sequence of Zone
+        Zones of the blur.
+    size : TableSize
+        Size of the tables.
+
+    Returns
+    -------
+    Mixing
+        Mixtures, and the error that they leave.
+    """
     return mixtures(_zone_transfers(alone, zones)[:: max(1, len(zones) // 6)], size)
 
 
@@ -90,9 +108,31 @@ def _zone_transfers(alone: Transfer, zones: Sequence[Zone]) -> list[Transfer]:
 def tabulate_field(
     alone: Transfer, zones: Sequence[Zone], geometry: Geometry, size: TableSize, mixing: Mixing
 ) -> tuple[Tables, tuple[Mode, ...]]:
-    """The mean transfer function of all zones, and what differs from it from place to place.
+    """Return the mean transfer function of all zones, and what differs from it by place.
 
-    alone: the transfer function without the blur that has zones.
+    Parameters
+    ----------
+    alone : Transfer
+        Transfer without the blur that has zones.
+    zones : sequence of Zone
+        Zones of the blur.
+    geometry : Geometry
+        Geometry of the array.
+    size : TableSize
+        Size of the tables.
+    mixing : Mixing
+        Mixtures of the scene's components, and the error that they leave.
+
+    Returns
+    -------
+    mean : Tables
+        Tables of the mean.
+    modes : tuple of Mode
+        Modes that are added to it, the strongest first.
+
+    References
+    ----------
+    T. R. Lauer, Proc. SPIE 4847, 2002 (eigen-images of point spread functions).
     """
     mix, error = mixing
     alone = alone.with_mixtures(mix)
@@ -142,15 +182,16 @@ class Stack:
 
     @property
     def parities(self) -> int:
+        """Number of parities of the tables."""
         return len(self.tables[0])
 
     def rows(self, parity: int, at: tuple[int, ...]) -> NDArray:
-        """Of a component and color, all zones': (zones, ...) float64."""
+        """Return the tables of all zones of a component and color, (zones, ...), in 64 bits."""
         found = [self._zone_table(zone, parity, (slice(None), *at)) for zone in self.zones]
         return np.array(found, dtype=np.float64)
 
     def weighted_sum(self, parity: int, shares: NDArray) -> NDArray:
-        """The sum of all zones' tables, each with its share: (R, C, ...)."""
+        """Return the sum of all zones' tables, each with its share: (R, C, ...)."""
         total = np.zeros(self.tables[0].shape[1:])
         for zone, share in zip(self.zones, shares, strict=True):
             total += share * self._zone_table(zone, parity, slice(None))
@@ -162,7 +203,10 @@ class Stack:
 
 
 def _stack_planes(alone: Transfer, blurs: Sequence[Blur], size: TableSize) -> Stack:
-    """What the zones' blurs add to the transfer. Those that are others turned are computed once."""
+    """Return what the zones' blurs add to the transfer.
+
+    Those that are others turned are computed once.
+    """
     directed = of_kind(blurs, PlaneTransfer)
     grid = plane_grid(alone, size.top, size.plane_entries(directed, LARGEST_OF_FIELD))
     models = [blur.model for blur in blurs]
@@ -176,11 +220,12 @@ def _stack_planes(alone: Transfer, blurs: Sequence[Blur], size: TableSize) -> St
 def _shares(
     stack: Stack, importance: NDArray, allowed: float
 ) -> tuple[list[tuple[int, NDArray]], float]:
-    """(parity, share of a mode in each zone), ... strongest first; error of what is left.
+    """Return the modes, strongest first, and the error of what is left.
 
-    The error of a zone is the rms of its tables', each entry as important as its frequency, in the
-    mean over colors. Singular vectors come from the zones' products with each other, of which there
-    are few; by parity, so that a mode has only one.
+    A mode is its parity, and its share in each zone. The error of a zone is the rms of its tables',
+    each entry as important as its frequency, in the mean over colors. Singular vectors come from
+    the zones' products with each other, of which there are few; by parity, so that a mode has only
+    one.
     """
     found, left = [], np.zeros(len(stack.zones))
     for parity in range(stack.parities):
@@ -202,15 +247,15 @@ def _shares(
 
 
 def _rms(table: NDArray, importance: NDArray) -> float:
-    """What a table adds to a picture, relative to the light that it is for."""
+    """Return what a table adds to a picture, relative to the light that it is for."""
     return float(np.sqrt((table**2 * importance).sum()))
 
 
 def _importance(shape: tuple[int, ...], directed: bool) -> NDArray:
-    """How much of a picture's variance lies at each entry of a table over |f|, or fx and fy.
+    """Return how much of a picture's variance lies at each entry of a table.
 
-    As much in each octave: its power falls with the square of the frequency (D. L. Ruderman,
-    Network 5, 1994). Sums to 1.
+    It is as much in each octave: its power falls with the square of the frequency (D. L. Ruderman,
+    Network 5, 1994). The sum is 1.
     """
     count = shape[-1]
     at = np.arange(count)
@@ -220,7 +265,7 @@ def _importance(shape: tuple[int, ...], directed: bool) -> NDArray:
 
 
 def _maps(zones: Sequence[Zone], geometry: Geometry) -> list[Map]:
-    """The zones' weights."""
+    """Return the zones' weights as maps."""
     half = geometry.sensor_width / 2, geometry.sensor_height / 2
     at = np.linspace(-1, 1, PLACES)
     return [Map(zone.weight(at * half[0], at * half[1]), *half) for zone in zones]

@@ -45,7 +45,7 @@ class Series:
     """Cosines (False) and sines (True): (C, rows, folded x) [electrons / s]."""
 
     def signal(self, color: int, rows: slice) -> NDArray:
-        """The signal of a color at the photodetectors of some rows: (rows, columns)."""
+        """Return the signal (rows, columns) of a color at the photodetectors of some rows [e/s]."""
         found = [self.x.evaluate(p[color, rows], axis=1, odd=odd) for odd, p in self.parts.items()]
         return found[0] if len(found) == 1 else found[0] + found[1]
 
@@ -64,9 +64,19 @@ class Filter:
     """Frequency range over which the tables are a cubic [cycles/m]."""
 
     def apply(self, spectrum: SceneSpectrum, workers: int) -> Series:
-        """Signal of every color at the rows of photodetectors, still a series along x.
+        """Filter a spectrum and fold it onto the rows of photodetectors.
 
-        spectrum: of the R mixtures that the tables are for.
+        Parameters
+        ----------
+        spectrum : SceneSpectrum
+            Spectrum of the R mixtures that the tables are for.
+        workers : int
+            Number of threads; the result does not depend on it.
+
+        Returns
+        -------
+        Series
+            Signal of every color, still a series along x.
         """
         folded: dict[Waves, NDArray] = {}
         for parity in self.tables.parities:
@@ -82,13 +92,13 @@ class Filter:
 
     @property
     def terms(self) -> int:
-        """Terms of a plane's spectrum that are filtered."""
+        """Number of terms of a plane's spectrum that are filtered."""
         return int(self._counts(self.y.frequencies).sum())
 
     def _multiply(
         self, spectrum: SceneSpectrum, parity: int, folded: dict[Waves, NDArray], workers: int
     ) -> None:
-        """Adds what the planes give through one parity of the tables to the pixels' waves."""
+        """Add what the planes give through one parity of the tables to the pixels' waves."""
         odd_x, odd_y = PARITIES[parity]
         dtype = spectrum.dtype
         table = reader(self.tables, parity, self.x.frequencies)
@@ -120,9 +130,9 @@ class Filter:
     def _filter_rows(
         self, spectrum: SceneSpectrum, table: TableReader, terms: NDArray, weights: NDArray
     ) -> Iterator[tuple[slice, int, NDArray]]:
-        """Rows of the filtered spectrum: (which of `terms`, color, (n, count)).
+        """Yield rows of the filtered spectrum: (which of `terms`, color, (n, count)).
 
-        terms: (n,) consecutive rows, rising or falling; weights: factors on them.
+        `terms` (n,) are consecutive rows, rising or falling; `weights` are factors on them.
         """
         dtype = spectrum.dtype
         factor = self._weights_x
@@ -156,7 +166,7 @@ class Filter:
         return self.x.weights * self.along_x
 
     def _stretches(self, terms: NDArray) -> Iterator[slice]:
-        """Consecutive rows over which the tables are a cubic in fy."""
+        """Yield consecutive rows over which the tables are a cubic in fy."""
         widest = min(LONGEST, int(self.smooth * 2 * self.y.length))
         start, count = 0, len(terms)
         rising = count < 2 or terms[1] > terms[0]
@@ -170,25 +180,25 @@ class Filter:
             start += size
 
     def _rows(self, spectrum: SceneSpectrum, terms: NDArray, count: int) -> list[NDArray]:
-        """Rows of every plane's spectrum without factors: R of (n, count)."""
+        """Return rows of every plane's spectrum without factors: R of (n, count)."""
         index = _consecutive(self.y.coefficient_index(terms)[0])
         planes = range(len(spectrum))
         return [self.x.extend(spectrum.rows(plane, index, count), count) for plane in planes]
 
     def _count(self, fy: NDArray) -> int:
-        """Terms along x that the tables reach at some of these frequencies (n,) along y."""
+        """Return the terms along x that the tables reach at some of these frequencies along y."""
         return int(self._counts(fy.min()))
 
     def _counts(self, fy: NDArray) -> NDArray:
-        """Terms along x that the tables reach at each of these frequencies along y."""
+        """Return the terms along x that the tables reach at each of these frequencies along y."""
         left = self.tables.top**2 - fy**2
         count = (np.sqrt(np.maximum(left, 0)) * 2 * self.x.length).astype(int) + 1
         return np.where(left < 0, 0, np.minimum(count, self.x.terms))
 
     def _evaluate_columns(self, folded: NDArray, odd: bool, workers: int) -> NDArray:
-        """Signal at the rows of photodetectors of waves (C, rows, folded x) along y.
+        """Return the signal at the rows of photodetectors of waves (C, rows, folded x) along y.
 
-        Takes the place of its argument where the virtual pixels' rows do.
+        It takes the place of its argument where the virtual pixels' rows do.
         """
         window = self.y.window
         out = folded
@@ -207,9 +217,21 @@ class Filter:
 
 
 def chebyshev(at: NDArray) -> tuple[NDArray, NDArray]:
-    """Chebyshev's nodes between the ends of `at` (n,), and the cubic's weights: (NODES,), (n, ...).
+    """Return Chebyshev's nodes in a range, and the weights of the cubic through them.
 
-    The cubic through the values at the nodes is `weights @ values` at the places `at`.
+    The cubic through the values at the nodes is `weights @ values`.
+
+    Parameters
+    ----------
+    at : NDArray
+        Places (n,) between whose ends the nodes lie.
+
+    Returns
+    -------
+    nodes : NDArray
+        Nodes (NODES,), in the unit of the places.
+    weights : NDArray
+        Weights (n, NODES) at the places.
     """
     low, high = float(at.min()), float(at.max())
     nodes = (low + high) / 2 + (high - low) / 2 * np.cos(np.pi * (np.arange(NODES) + 0.5) / NODES)
@@ -222,7 +244,7 @@ def chebyshev(at: NDArray) -> tuple[NDArray, NDArray]:
 
 
 def _consecutive(index: NDArray) -> NDArray | slice:
-    """Consecutive indices, rising or falling, as a slice, of which NumPy makes a view."""
+    """Return consecutive indices, rising or falling, as a slice, of which NumPy makes a view."""
     steps = np.diff(index)
     if not len(steps) or abs(steps[0]) != 1 or (steps != steps[0]).any():
         return index

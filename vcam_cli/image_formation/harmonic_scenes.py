@@ -26,7 +26,22 @@ Weight = Callable[[NDArray, NDArray], NDArray] | None
 
 
 def wave_layers(path: OpticalPath, scene: WaveScene) -> tuple[Layers, SpectrumReport]:
-    """The sum of waves at the photodetectors, each with its own transfer."""
+    """Return the sum of waves at the photodetectors, each with its own transfer.
+
+    Parameters
+    ----------
+    path : OpticalPath
+        Lens, pixels and settings.
+    scene : WaveScene
+        Waves.
+
+    Returns
+    -------
+    layers : Layers
+        Signal, one layer for each zone of the field.
+    report : SpectrumReport
+        Changes by leaving out effects.
+    """
     x, y = pixel_centers(path.geometry, detector=True)
     shapes = [
         (np.exp(1j * (2 * np.pi * w.fx * x + w.phase)), np.exp(2j * np.pi * w.fy * y))
@@ -54,14 +69,14 @@ def wave_layers(path: OpticalPath, scene: WaveScene) -> tuple[Layers, SpectrumRe
 
 
 def _wave_level(transfer: Transfer, effects: tuple[Effect, ...], wave: Wave) -> NDArray:
-    """Complex amplitude of a wave's signal in each color, (C,) [electrons / s]."""
+    """Return the complex amplitude (C,) of a wave's signal in each color [e/s]."""
     fx, fy = np.array([wave.fx]), np.array([wave.fy])
     level: NDArray = np.asarray(wave.weights) @ transfer.plane_response(fx, fy)[..., 0, 0]
     return level * _separable(effects, fx, fy)[0, 0]
 
 
 def _separable(effects: tuple[Effect, ...], fx: NDArray, fy: NDArray) -> NDArray:
-    """Product of the separable transfer functions: (fy, fx)."""
+    """Return the product of the separable transfer functions: (fy, fx)."""
     total = np.ones((len(fy), len(fx)))
     for effect in of_kind(effects, SeparableTransfer):
         total *= np.outer(effect.along_y(fy), effect.along_x(fx))
@@ -71,7 +86,7 @@ def _separable(effects: tuple[Effect, ...], fx: NDArray, fy: NDArray) -> NDArray
 def _zone_transfers(
     path: OpticalPath, effects: tuple[Effect, ...]
 ) -> list[tuple[Transfer, Weight]]:
-    """The transfer through some of the effects, and through each zone where the field has them."""
+    """Return the transfer through some effects, and through each zone where the field has them."""
     everywhere = path.transfer.with_effects(effects)
     if path.field not in effects:
         return [(everywhere, None)]
@@ -82,7 +97,20 @@ def _zone_transfers(
 
 
 def harmonics_count(path: OpticalPath, scene: HarmonicScene) -> tuple[int, int] | None:
-    """Harmonics that the lens passes along x and y; None where they are too many to be summed."""
+    """Return the harmonics that the lens passes along x and y.
+
+    Parameters
+    ----------
+    path : OpticalPath
+        Lens, pixels and settings.
+    scene : HarmonicScene
+        A pattern that repeats.
+
+    Returns
+    -------
+    tuple[int, int] or None
+        Numbers along x and y; None where they are too many to be summed.
+    """
     cutoff = path.transfer.cutoff
     counts = [
         math.floor(period * cutoff) + 1 if math.isfinite(cutoff) else MOST_HARMONICS + 1
@@ -94,9 +122,25 @@ def harmonics_count(path: OpticalPath, scene: HarmonicScene) -> tuple[int, int] 
 def harmonic_layers(
     path: OpticalPath, scene: HarmonicScene, count: tuple[int, int]
 ) -> tuple[Layers, SpectrumReport]:
-    """A pattern that repeats, at the photodetectors: its series up to the lens's cut-off.
+    """Return a pattern that repeats at the photodetectors: its series up to the lens's cut-off.
 
     However its period and the pixel pitch are related, every harmonic folds where it belongs.
+
+    Parameters
+    ----------
+    path : OpticalPath
+        Lens, pixels and settings.
+    scene : HarmonicScene
+        The pattern.
+    count : tuple of int
+        Harmonics along x and y, from `harmonics_count`.
+
+    Returns
+    -------
+    layers : Layers
+        Signal, one layer for each zone of the field.
+    report : SpectrumReport
+        Changes by leaving out effects.
     """
     x, y = pixel_centers(path.geometry, detector=True)
     fx, fy = (np.arange(n) / p for n, p in zip(count, scene.harmonics.period, strict=True))
@@ -129,7 +173,7 @@ def harmonic_layers(
 
 
 def _harmonic_levels(transfer: Transfer, fx: NDArray, fy: NDArray) -> NDArray:
-    """Signal of harmonics of amplitude 1 by parity of the transfer: (4, C, fy, fx)."""
+    """Return the signal of harmonics of amplitude 1 by parity: (4, C, fy, fx) [e/s]."""
     if not transfer.plane_blurs:
         radial = transfer.radial_response(np.hypot(fx[None, :], fy[:, None]))[0]
         return np.stack([radial, *[np.zeros_like(radial)] * 3])
@@ -143,7 +187,7 @@ def _changes(
     layers: Callable[[tuple[Effect, ...]], list[tuple[NDArray, Weight]]],
     layer: Callable[[NDArray, Weight], Layer],
 ) -> dict[str, float]:
-    """Rms change of the signal by leaving out each transfer function, on some rows [e/s]."""
+    """Return the rms change of the signal by leaving out each effect, on some rows [e/s]."""
     g = path.geometry
     x, y = pixel_centers(g)
     some = slice(None, None, max(1, g.rows // ROWS))

@@ -30,7 +30,24 @@ WORK = 24_000_000
 
 
 def image_bytes(path: OpticalPath, scene: SampledScene, planes: int, size: TableSize) -> int:
-    """Memory of an image through the cosine spectrum [bytes]; planes: mixtures of components."""
+    """Return the memory of an image through the cosine spectrum.
+
+    Parameters
+    ----------
+    path : OpticalPath
+        Lens, pixels and settings.
+    scene : SampledScene
+        The scene on its grid.
+    planes : int
+        Number of mixtures of the scene's components.
+    size : TableSize
+        Size of the tables.
+
+    Returns
+    -------
+    int
+        Bytes, at least those measured.
+    """
     g, width = path.geometry, path.settings.float_width // 8
     colors, pixels = len(path.mosaic.colors), g.rows * g.columns
     rectangles = isinstance(scene, ChartScene) and scene.chart.edges() is not None
@@ -56,7 +73,24 @@ def image_bytes(path: OpticalPath, scene: SampledScene, planes: int, size: Table
 
 
 def box_average_bytes(samples: int, planes: int, geometry: Geometry, knobs: Settings) -> int:
-    """Memory of means over boxes [bytes]; samples: of one plane of a picture, 0 of a chart."""
+    """Return the memory of means over boxes.
+
+    Parameters
+    ----------
+    samples : int
+        Samples of one plane of a picture; 0 of a chart.
+    planes : int
+        Number of planes.
+    geometry : Geometry
+        Geometry of the array.
+    knobs : Settings
+        Settings of image formation.
+
+    Returns
+    -------
+    int
+        Bytes, at least those measured.
+    """
     pixels = geometry.rows * geometry.columns
     width = knobs.float_width // 8
     held = planes * (samples * width + 2 * pixels * (width + 8)) + 5 * 8 * max(samples, pixels)
@@ -66,10 +100,25 @@ def box_average_bytes(samples: int, planes: int, geometry: Geometry, knobs: Sett
 def frame_bytes(
     geometry: Geometry, knobs: Settings, colors: int, judged: bool, samples: int = 0
 ) -> int:
-    """Memory of a frame without its scene [bytes]: signal, raw, render.
+    """Return the memory of a frame without its scene: signal, raw, render.
 
-    judged: whether an ideal image is made and compared; samples: of one integration, of each color
-    that a pixel has; 0 for a single exposure.
+    Parameters
+    ----------
+    geometry : Geometry
+        Geometry of the array.
+    knobs : Settings
+        Settings of image formation.
+    colors : int
+        Number of colors.
+    judged : bool
+        Whether an ideal image is made and compared.
+    samples : int, optional
+        Samples of one integration, of each color that a pixel has; 0 for a single exposure.
+
+    Returns
+    -------
+    int
+        Bytes, at least those measured.
     """
     pixels = geometry.rows * geometry.columns
     width = knobs.float_width // 8

@@ -33,7 +33,22 @@ from vcam_cli.spectra import Spectrum
 
 
 def view(geometry: Geometry, settings: Settings, margin: int) -> View:
-    """The rectangle that a scene has to fill, with a margin in pixels."""
+    """Return the rectangle that a scene has to fill, with a margin.
+
+    Parameters
+    ----------
+    geometry : Geometry
+        Geometry of the array.
+    settings : Settings
+        Settings of image formation.
+    margin : int
+        Pixels that a chart goes on beyond the array.
+
+    Returns
+    -------
+    View
+        The rectangle.
+    """
     return View(
         rows=geometry.rows,
         columns=geometry.columns,
@@ -46,7 +61,20 @@ def view(geometry: Geometry, settings: Settings, margin: int) -> View:
 
 
 def responses(camera: Camera, mosaic: Mosaic) -> list[Spectrum]:
-    """Electrons per photon for each color: transmittance x filter x QE."""
+    """Return the electrons per photon of each color: transmittance x filter x QE.
+
+    Parameters
+    ----------
+    camera : Camera
+        The camera.
+    mosaic : Mosaic
+        Colors of the pixels.
+
+    Returns
+    -------
+    list of Spectrum
+        Spectra without unit, one for each color.
+    """
     common = (camera.optics.transmittance.resolve(), quantum_efficiency(camera))
     out = []
     for color in mosaic.colors:
@@ -64,9 +92,34 @@ def scene_transfer(
     mosaic: Mosaic,
     effects: Sequence[Effect],
 ) -> Transfer:
-    """H_kc of scene spectra [W / (sr m2 m)] on the axis, eq 2.18 and 2.23. [electrons / s]
+    """Return the transfer H_kc of scene spectra on the axis.
 
-    Of the effects: the blurs that are the same everywhere, and the gains as they are on the axis.
+    Of the effects it has the blurs that are the same everywhere, and the gains as they are on the
+    axis.
+
+    Parameters
+    ----------
+    camera : Camera
+        The camera.
+    geometry : Geometry
+        Geometry of the array.
+    settings : Settings
+        Settings of image formation.
+    spectra : sequence of Spectrum
+        Spectral radiances of the scene's components [W/(sr m2 m)].
+    mosaic : Mosaic
+        Colors of the pixels.
+    effects : sequence of Effect
+        Effects of the camera.
+
+    Returns
+    -------
+    Transfer
+        Transfer of the K components in C colors [e/s].
+
+    References
+    ----------
+    T. Chen, PhD thesis, Stanford University, 2003, eqs 2.18 and 2.23.
     """
     area = geometry.detector_area
     if camera.pixel.photodetector.quantum_efficiency.per_pixel:
@@ -97,10 +150,26 @@ class Rate:
 
 
 def photo_rate(path: OpticalPath, scene: Scene, planes: bool = False) -> Rate:
-    """Photo-electrons per second in every place of the lattice, noise-free.
+    """Return the photo-electrons per second in every place of the lattice, noise-free.
 
-    planes: every color in every place, and not each place's own.
-    Raises CannotDo where memory does not suffice.
+    Parameters
+    ----------
+    path : OpticalPath
+        Lens, pixels and settings.
+    scene : Scene
+        The scene.
+    planes : bool, optional
+        Whether every place has every color, and not its own alone.
+
+    Returns
+    -------
+    Rate
+        Rate, and how it was computed.
+
+    Raises
+    ------
+    CannotDo
+        Where memory does not suffice.
     """
     layers, report = image_layers(path, scene)
     g, mosaic = path.geometry, path.mosaic
@@ -150,7 +219,7 @@ def _glares_and_gains(
 
 
 def _fill(tile: NDArray, layer: Layer, mosaic: Mosaic, block: slice) -> None:
-    """Puts a layer's light where it belongs: every color in its plane, or each in its places."""
+    """Put a layer's light where it belongs: every color in its plane, or each in its places."""
     if len(tile) > 1:
         for color, plane in enumerate(tile):
             plane[:] = layer.values(color, block)
@@ -165,7 +234,7 @@ def _fill(tile: NDArray, layer: Layer, mosaic: Mosaic, block: slice) -> None:
 
 
 def _spread(rate: NDArray, mosaic: Mosaic, glare: VeilingGlare) -> None:
-    """Takes the glare's share of the light and lays it evenly over the pixels of its color."""
+    """Take the glare's share of the light and lay it evenly over the pixels of its color."""
     if len(rate) > 1:
         for plane in rate:
             plane += glare.fraction * (plane.mean(dtype=np.float64) - plane)

@@ -44,15 +44,25 @@ class Blocks:
 
     @property
     def center(self) -> NDArray:
-        """(n,) [cycles/m]"""
+        """Frequencies (n,) in the middle of the blocks [cycles/m]."""
         return (self.low + self.high) / 2
 
 
 def blocks(axis: Axis) -> Blocks:
-    """Blocks of the terms of an axis.
+    """Return the blocks of the terms of an axis.
 
     The spectrum of uniform squares of light goes on beyond that of the samples: coefficients repeat
     backwards and forwards, and so do their blocks.
+
+    Parameters
+    ----------
+    axis : Axis
+        Samples and terms along the axis.
+
+    Returns
+    -------
+    Blocks
+        Blocks whose width grows with the frequency.
     """
     count = min(axis.samples, axis.terms)
     starts = _starts(count)
@@ -80,7 +90,7 @@ def blocks(axis: Axis) -> Blocks:
 
 
 def _starts(terms: int) -> NDArray:
-    """First terms of blocks whose width grows with the frequency."""
+    """Return the first terms of blocks whose width grows with the frequency."""
     starts = [*range(min(ALONE, terms))]
     at = len(starts)
     while at < terms:
@@ -101,11 +111,33 @@ class PowerSpectrum:
     separable: tuple[SeparableTransfer, ...]
 
     def filtered_power(self, tables: Tables) -> NDArray:
-        """Mean squares of every color's signal: (C, blocks along y, blocks along x)."""
+        """Return the mean squares of every color's signal.
+
+        Parameters
+        ----------
+        tables : Tables
+            Transfer functions of the lens.
+
+        Returns
+        -------
+        NDArray
+            Mean squares (C, blocks along y, blocks along x) [(e/s)^2].
+        """
         return self.pixel_power(self.lens_power(tables))
 
     def lens_power(self, tables: Tables) -> NDArray:
-        """The same without the separable transfer functions."""
+        """Return the mean squares before the separable transfer functions.
+
+        Parameters
+        ----------
+        tables : Tables
+            Transfer functions of the lens.
+
+        Returns
+        -------
+        NDArray
+            Mean squares (C, blocks along y, blocks along x) [(e/s)^2].
+        """
         power = np.zeros((tables.colors, len(self.y.low), len(self.x.low)))
         for parity in tables.parities:
             values = reader(tables, parity, self.x.center).values(self.y.center)
@@ -114,13 +146,34 @@ class PowerSpectrum:
         return np.maximum(power, 0)
 
     def pixel_power(self, power: NDArray) -> NDArray:
-        """Mean squares behind the separable transfer functions, from those before them."""
+        """Return mean squares behind the separable transfer functions.
+
+        Parameters
+        ----------
+        power : NDArray
+            Mean squares before them, from `lens_power`.
+
+        Returns
+        -------
+        NDArray
+            Mean squares (C, blocks along y, blocks along x) [(e/s)^2].
+        """
         return power * self._separable_squares(self.separable)
 
     def upper_bound(self, tables: Tables) -> NDArray:
-        """The same through any lens that passes no more than these radial tables.
+        """Return mean squares that no lens exceeds whose radial part is given.
 
-        Planes whose light cancels through one lens need not through another: as if none did.
+        Planes whose light cancels through one lens need not through another: it is as if none did.
+
+        Parameters
+        ----------
+        tables : Tables
+            Tables over |f| that the lens passes at most.
+
+        Returns
+        -------
+        NDArray
+            Mean squares (C, blocks along y, blocks along x) [(e/s)^2].
         """
         values = np.abs(reader(tables, 0, self.x.center).values(self.y.center))
         own = [p for (r, s), p in zip(pairs(self.planes), self.products, strict=True) if r == s]
@@ -128,16 +181,26 @@ class PowerSpectrum:
         return self.pixel_power(np.square(amplitudes.sum(axis=0)))
 
     def omission_power(self, power: NDArray, effect: SeparableTransfer) -> NDArray:
-        """Mean squares of what leaving out a separable transfer function adds: (C,).
+        """Return mean squares of what leaving out a separable transfer function adds.
 
-        power: from `lens_power`.
+        Parameters
+        ----------
+        power : NDArray
+            Mean squares from `lens_power`.
+        effect : SeparableTransfer
+            The transfer function that is left out.
+
+        Returns
+        -------
+        NDArray
+            Mean squares (C,) [(e/s)^2].
         """
         others = self._separable_squares([e for e in self.separable if e is not effect])
         own = np.outer(effect.along_y(self.y.center), effect.along_x(self.x.center))
         return np.asarray((power * (others * np.square(1 - own))).sum(axis=(1, 2)))
 
     def _separable_squares(self, effects: Sequence[SeparableTransfer]) -> NDArray:
-        """Largest squares of separable transfer functions in the blocks."""
+        """Return the largest squares of separable transfer functions in the blocks."""
         along_x, along_y = np.ones(len(self.x.low)), np.ones(len(self.y.low))
         for effect in effects:
             along_x *= _largest(effect.along_x, self.x)
@@ -145,10 +208,23 @@ class PowerSpectrum:
         return np.outer(along_y, along_x)
 
     def needed_frequency(self, power: NDArray, budget: float, pitch: tuple[float, float]) -> float:
-        """The frequency beyond which an rms of at most `budget` is left [pixel Nyquist].
+        """Return the frequency beyond which little enough is left.
 
-        power: (C, ...) from `filtered_power` or `upper_bound`; pitch: along y and x [m]. The
-        frequency of a term is the larger of those along both axes, each in its own Nyquist units.
+        That of a term is the larger of those along both axes, each in its own Nyquist frequency.
+
+        Parameters
+        ----------
+        power : NDArray
+            Mean squares (C, ...) from `filtered_power` or `upper_bound` [(e/s)^2].
+        budget : float
+            Rms that may be left [e/s].
+        pitch : tuple of float
+            Pixel pitch along y and x [m].
+
+        Returns
+        -------
+        float
+            Frequency [pixel Nyquist].
         """
         shell = self._shell(pitch).ravel()
         order = np.argsort(shell, kind="stable")
@@ -157,18 +233,33 @@ class PowerSpectrum:
         return float(shell[order[needed[-1]]]) if len(needed) else 0.0
 
     def tail_rms(self, power: NDArray, frequency: float, pitch: tuple[float, float]) -> float:
-        """Rms of all that lies beyond a frequency [pixel Nyquist], in the color of most."""
+        """Return the rms of all that lies beyond a frequency, in the color of most.
+
+        Parameters
+        ----------
+        power : NDArray
+            Mean squares (C, ...) from `filtered_power` or `upper_bound` [(e/s)^2].
+        frequency : float
+            Frequency [pixel Nyquist].
+        pitch : tuple of float
+            Pixel pitch along y and x [m].
+
+        Returns
+        -------
+        float
+            Rms [e/s].
+        """
         beyond = self._shell(pitch) > frequency * (1 + 1e-9)
         return float(np.sqrt(power[:, beyond].sum(axis=1).max()))
 
     def _shell(self, pitch: tuple[float, float]) -> NDArray:
-        """The frequency of every block, (blocks along y, blocks along x) [pixel Nyquist]."""
+        """Return the frequency of every block, (blocks along y, blocks along x) [pixel Nyquist]."""
         along_y, along_x = 2 * pitch[0] * self.y.high, 2 * pitch[1] * self.x.high
         return np.maximum(along_y[:, None], along_x)
 
 
 def _largest(transfer, blocks: Blocks) -> NDArray:
-    """The largest square of a transfer function along one axis in every block."""
+    """Return the largest square of a transfer function along one axis in every block."""
     ends = [transfer(f) for f in (blocks.low, blocks.center, blocks.high)]
     return np.asarray(np.square(ends).max(axis=0))
 
@@ -180,9 +271,23 @@ def power_spectrum(
     separable: Sequence[SeparableTransfer],
     workers: int,
 ) -> PowerSpectrum:
-    """The power spectrum of planes up to the highest terms of the axes.
+    """Return the power spectrum of planes up to the highest terms of the axes.
 
-    separable: transfer functions along the axes.
+    Parameters
+    ----------
+    spectrum : SceneSpectrum
+        Spectrum of the planes.
+    x, y : Axis
+        Terms along x and y.
+    separable : sequence of SeparableTransfer
+        Transfer functions along the axes.
+    workers : int
+        Number of threads; the result does not depend on it.
+
+    Returns
+    -------
+    PowerSpectrum
+        Mean squares by block of terms.
     """
     along_x, along_y = blocks(x), blocks(y)
     products = []
@@ -201,12 +306,32 @@ def brightest_mean(
     tables: Tables,
     separable: Sequence[SeparableTransfer],
 ) -> float:
-    """A bound from below on the brightest place of the array, from the lowest frequencies [e/s].
+    """Return a bound from below on the brightest place of the array.
 
-    Fejer's kernel weakens the terms of a cosine series in proportion to their number: the series
-    is then a mean of the light with weights of which none is negative, so no such mean is brighter
-    than the brightest place (L. Fejer, Math. Ann. 58, 1904). Of a chart, light from beyond the
-    array has a small part in the means near its edges.
+    It is found from the lowest frequencies. Fejer's kernel weakens the terms of a cosine series in
+    proportion to their number: the series is then a mean of the light with weights of which none is
+    negative, so no such mean is brighter than the brightest place. Of a chart, light from beyond
+    the array has a small part in the means near its edges.
+
+    Parameters
+    ----------
+    spectrum : SceneSpectrum
+        Spectrum of the planes.
+    x, y : Axis
+        Terms along x and y.
+    tables : Tables
+        Transfer functions of the lens.
+    separable : sequence of SeparableTransfer
+        Transfer functions along the axes.
+
+    Returns
+    -------
+    float
+        Signal [e/s].
+
+    References
+    ----------
+    L. Fejer, Math. Ann. 58, 51-69, 1904.
     """
     rows, columns = _lowest(y), _lowest(x)
     index, columns_index = (
@@ -230,13 +355,13 @@ def brightest_mean(
 
 
 def _lowest(axis: Axis) -> int:
-    """Number of terms whose means reach over a small part of the array."""
+    """Return the number of terms whose means reach over a small part of the array."""
     over_array = LOWEST * axis.length / (axis.pixels * axis.pixel_pitch)
     return min(int(over_array), axis.terms, MOST_LOWEST)
 
 
 def _means(axis: Axis, terms: int, separable: Sequence[SeparableTransfer], direction: str):
-    """The waves of the first terms at places on the array, weakened as Fejer has it."""
+    """Return the waves of the first terms at places on the array, weakened as Fejer has it."""
     k = np.arange(terms)
     factor = axis.weights[:terms] * (1 - k / terms) * np.where(k > 0, 2, 1)
     for effect in separable:

@@ -43,7 +43,20 @@ _MOST = 64
 
 
 def light_key(camera: Camera) -> str:
-    """All that the light on the sensor depends on, as a text, but for the level of saturation."""
+    """Return all that the light on the sensor depends on, as a text.
+
+    The level of saturation is not in it.
+
+    Parameters
+    ----------
+    camera : Camera
+        The camera.
+
+    Returns
+    -------
+    str
+        JSON of the camera file without the `INDEPENDENT_KEYS`.
+    """
     form = camera.model_dump(mode="json")
     for path in INDEPENDENT_KEYS:
         _drop(form, path)
@@ -89,17 +102,43 @@ class RateCache:
         return self._last_key[1]
 
     def transfer(self, camera: Camera, make: Callable[[], Transfer]) -> Transfer:
-        """Return what `make` gives, or gave for the camera before where its light is the same."""
+        """Return a transfer, computed where the camera before had other light.
+
+        Parameters
+        ----------
+        camera : Camera
+            The camera.
+        make : callable
+            Function that computes it.
+
+        Returns
+        -------
+        Transfer
+            The transfer.
+        """
         key, kept = self._key(camera), self._transfer
         if kept is None or kept[0] != key:
             kept = self._transfer = (key, make())
         return kept[1]
 
     def rate(self, camera: Camera, ceiling: float, make: Callable[[], Rate]) -> Rate:
-        """Return what `make` gives, or gave for a camera of the same light that fills as fast.
+        """Return the light of a camera, computed where no camera of the same light filled as fast.
 
-        ceiling: rate at which a pixel is full [e/s], see `exposure.ceiling`. All those are alike
-        that the light does not reach.
+        All ceilings are alike that the light does not reach.
+
+        Parameters
+        ----------
+        camera : Camera
+            The camera.
+        ceiling : float
+            Rate at which a pixel is full, see `auto_exposure.ceiling` [e/s].
+        make : callable
+            Function that computes it.
+
+        Returns
+        -------
+        Rate
+            The light.
         """
         key = self._key(camera)
         if key in self._peaks:

@@ -56,7 +56,18 @@ class SampledImage:
     """Area of the scene over that of the array: as if all of its light fell on the array."""
 
     def rms(self, squares: NDArray) -> float:
-        """Rms of a signal in the color of most, from its mean squares over the scene (C, ...)."""
+        """Return the rms of a signal in the color of most [e/s].
+
+        Parameters
+        ----------
+        squares : NDArray
+            Mean squares over the scene (C, ...) [(e/s)^2].
+
+        Returns
+        -------
+        float
+            Rms over the array, as if all of the scene's light fell on it [e/s].
+        """
         total = squares.reshape(len(squares), -1).sum(axis=1).max()
         return float(np.sqrt(self.density * total))
 
@@ -64,10 +75,26 @@ class SampledImage:
 def sampled_image(
     path: OpticalPath, scene: SampledScene, highest: float, mixing: Mixing
 ) -> SampledImage:
-    """Transforms a scene, and finds how far up its spectrum is needed.
+    """Transform a scene, and find how far up its spectrum is needed.
 
-    highest: frequency beyond which nothing counts [pixel Nyquist]. Aberrations only weaken a
-    picture, so that how far to go is found for the radial part of the lens.
+    Aberrations only weaken a picture, so that how far to go is found for the radial part of the
+    lens.
+
+    Parameters
+    ----------
+    path : OpticalPath
+        Lens, pixels and settings.
+    scene : SampledScene
+        The scene on its grid.
+    highest : float
+        Frequency beyond which nothing counts [pixel Nyquist].
+    mixing : Mixing
+        Mixtures of the scene's components, and the error that they leave.
+
+    Returns
+    -------
+    SampledImage
+        The spectrum, and how far up it is filtered.
     """
     g, knobs, exact = path.geometry, path.settings, path.transfer
     size = table_size(path, highest, ENTRIES)
@@ -114,7 +141,7 @@ def sampled_image(
 def _scene_spectrum(
     path: OpticalPath, scene: SampledScene, highest: float, mix: NDArray
 ) -> tuple[SampledScene, SceneSpectrum, float]:
-    """The spectrum of a scene's planes; a bound on the signal before blur [electrons / s]."""
+    """Return the spectrum of a scene's planes, and a bound on the signal before blur [e/s]."""
     dtype = path.settings.dtype
     level = np.abs(path.transfer.with_mixtures(mix).level)
     rectangles = scene.rectangles(mix)

@@ -26,23 +26,48 @@ class SceneSpectrum(Protocol):
     """DCT-II coefficients of R planes along y and x, unnormalized."""
 
     @property
-    def dtype(self) -> np.dtype: ...
+    def dtype(self) -> np.dtype:
+        """Floating-point type of the coefficients."""
 
     def __len__(self) -> int: ...
 
     def rows(self, plane: int, index: Index, count: int | None = None) -> NDArray:
-        """Rows of a plane's first `count` coefficients along x, or all: (n, up to count)."""
+        """Return rows of a plane's coefficients.
+
+        Parameters
+        ----------
+        plane : int
+            Index of the plane.
+        index : Index
+            Rows (n,).
+        count : int, optional
+            Number of coefficients along x; by default all.
+
+        Returns
+        -------
+        NDArray
+            Coefficients (n, count).
+        """
 
     def products(self, y: NDArray, x: NDArray, workers: int) -> NDArray:
-        """Sums of the product of two planes' coefficients over blocks of terms, for all `pairs`.
+        """Return sums of products of two planes' coefficients over blocks of terms.
 
-        y, x: edges of the blocks along each axis, rising from 0. Returns (pairs, blocks along y,
-        blocks along x) in 64 bits.
+        Parameters
+        ----------
+        y, x : NDArray
+            Edges of the blocks along each axis, rising from 0.
+        workers : int
+            Number of threads; the result does not depend on it.
+
+        Returns
+        -------
+        NDArray
+            Sums (pairs, blocks along y, blocks along x) of all `pairs`, in 64 bits.
         """
 
 
 def pairs(planes: int) -> list[tuple[int, int]]:
-    """The pairs (r, s), r <= s, of so many planes."""
+    """Return the pairs (r, s), r <= s, of so many planes."""
     return list(combinations_with_replacement(range(planes), 2))
 
 
@@ -55,15 +80,18 @@ class SampledSpectrum:
 
     @property
     def dtype(self) -> np.dtype:
+        """Floating-point type of the coefficients."""
         return self.coefficients.dtype
 
     def __len__(self) -> int:
         return len(self.coefficients)
 
     def rows(self, plane: int, index: Index, count: int | None = None) -> NDArray:
+        """Return rows of a plane's coefficients: (n, count)."""
         return self.coefficients[plane, index, :count]
 
     def products(self, y: NDArray, x: NDArray, workers: int) -> NDArray:
+        """Return sums of products of two planes' coefficients over blocks of terms."""
         every = pairs(len(self))
         return np.array([self._pair_products(pair, y, x, workers) for pair in every])
 
@@ -87,7 +115,7 @@ class SampledSpectrum:
 
 
 def _block_groups(edges: NDArray, longest: int) -> list[slice]:
-    """Neighboring blocks of terms, together at most `longest` terms or one block alone."""
+    """Return neighboring blocks of terms, together at most `longest` or one block alone."""
     out, start = [], 0
     for stop in range(1, len(edges)):
         if stop + 1 == len(edges) or edges[stop + 1] - edges[start] > longest:
@@ -97,10 +125,22 @@ def _block_groups(edges: NDArray, longest: int) -> list[slice]:
 
 
 def transform_planes(planes: NDArray, workers: int) -> SampledSpectrum:
-    """The DCT-II of planes (R, ny, nx) along both axes; overwrites its argument.
+    """Return the DCT-II of planes along both axes; it overwrites them.
 
     Columns are copied before they are transformed: those of a plane whose rows are 2^n numbers
     apart share few lines of the cache.
+
+    Parameters
+    ----------
+    planes : NDArray
+        Samples (R, ny, nx).
+    workers : int
+        Number of threads; the result does not depend on it.
+
+    Returns
+    -------
+    SampledSpectrum
+        Coefficients, unnormalized.
     """
     for plane in planes:
 
@@ -128,15 +168,18 @@ class RectangleSpectrum:
 
     @property
     def dtype(self) -> np.dtype:
+        """Floating-point type of the coefficients."""
         return self.along_x.dtype
 
     def __len__(self) -> int:
         return len(self.along_x)
 
     def rows(self, plane: int, index: Index, count: int | None = None) -> NDArray:
+        """Return rows of a plane's coefficients: (n, count)."""
         return product(self.along_y[index], self.along_x[plane, :, :count])
 
     def products(self, y: NDArray, x: NDArray, workers: int) -> NDArray:
+        """Return sums of products of two planes' coefficients over blocks of terms."""
         planes, runs, columns = self.along_x.shape
         below = self.along_y.astype(np.float64)
         in_rows = np.array([below[s].T @ below[s] for s in _blocks(y)]).reshape(-1, runs**2)
@@ -156,10 +199,25 @@ def _blocks(edges: NDArray) -> list[slice]:
 def rectangle_spectrum(
     rectangles: Rectangles, cells: tuple[int, int], axes: Sequence[Axis], dtype: type
 ) -> RectangleSpectrum:
-    """The first terms of the spectrum of a chart of even rectangles, in closed form.
+    """Return the first terms of the spectrum of a chart of even rectangles, in closed form.
 
-    cells: of the grid (ny, nx) that scales the coefficients; axes: along y and x, whose terms are
-    computed. Frequencies that cells of a grid would fold are not in it.
+    Frequencies that cells of a grid would fold are not in it.
+
+    Parameters
+    ----------
+    rectangles : Rectangles
+        The chart.
+    cells : tuple of int
+        Cells (ny, nx) of the grid that scales the coefficients.
+    axes : sequence of Axis
+        Axes along y and x, whose terms are computed.
+    dtype : type
+        Floating-point type.
+
+    Returns
+    -------
+    RectangleSpectrum
+        Coefficients, unnormalized.
     """
     along_y = terms_of_runs(rectangles.y, cells[0], axes[0].terms)
     along_x = terms_of_runs(rectangles.x, cells[1], axes[1].terms)
@@ -169,11 +227,25 @@ def rectangle_spectrum(
 
 
 def terms_of_runs(edges: NDArray, cells: int, terms: int) -> NDArray:
-    """The first terms of the DCT-II of light that is 1 from edge to edge: (terms, runs).
+    """Return the first terms of the DCT-II of light that is 1 from edge to edge.
 
-    edges: (runs + 1,) from border to border [m]. With the edges as parts b of the way between the
-    borders, the cosine series of a run has the terms (sin(pi k b') - sin(pi k b)) / pi k; means
-    over N cells multiply them by sinc(k / 2N), and a DCT-II counts them 2N times.
+    With the edges as parts b of the way between the borders, the cosine series of a run has the
+    terms (sin(pi k b') - sin(pi k b)) / pi k; means over N cells multiply them by sinc(k / 2N), and
+    a DCT-II counts them 2N times.
+
+    Parameters
+    ----------
+    edges : NDArray
+        Edges (runs + 1,) from border to border [m].
+    cells : int
+        Number of cells N.
+    terms : int
+        Number of terms.
+
+    Returns
+    -------
+    NDArray
+        Coefficients (terms, runs).
     """
     parts = (edges - edges[0]) / (edges[-1] - edges[0])
     k = np.arange(1, terms)

@@ -51,7 +51,7 @@ class Settings:
         return np.float64 if self.float_width == 64 else np.float32
 
     def report(self) -> dict[str, float | int | str | None]:
-        """The settings as `run.json` lists them."""
+        """Return the settings as `run.json` lists them."""
         return asdict(self)
 
 
@@ -65,7 +65,7 @@ LADDER = ((0.02, DRAFT), (0.005, STANDARD), (0.001, FINE), (0.0, REFERENCE))
 
 
 def settings(camera: Camera) -> Settings:
-    """The settings for the camera's tolerance, with those that its file states itself."""
+    """Return the settings for the camera's tolerance, with those that its file states itself."""
     accuracy = camera.accuracy
     chosen = next(s for least, s in LADDER if accuracy.tolerance >= least)
     mixing = min(chosen.mixing_tolerance, accuracy.tolerance / 10)

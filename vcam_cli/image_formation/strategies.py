@@ -43,9 +43,26 @@ PERIODS = 8
 
 
 def image_layers(path: OpticalPath, scene: Scene) -> tuple[Layers, SpectrumReport]:
-    """The light at the photodetectors, and how it was computed.
+    """Return the light at the photodetectors, and how it was computed.
 
-    Raises CannotDo where memory does not suffice.
+    Parameters
+    ----------
+    path : OpticalPath
+        Lens, pixels and settings.
+    scene : Scene
+        The scene.
+
+    Returns
+    -------
+    layers : Layers
+        Shares of the signal, whose sum is all of it.
+    report : SpectrumReport
+        How the scene was sampled and filtered.
+
+    Raises
+    ------
+    CannotDo
+        Where memory does not suffice.
     """
     if isinstance(scene, WaveScene):
         return wave_layers(path, scene)
@@ -60,7 +77,7 @@ def image_layers(path: OpticalPath, scene: Scene) -> tuple[Layers, SpectrumRepor
 
 
 def _mean_layers(path: OpticalPath, scene: SampledScene) -> tuple[Layers, SpectrumReport]:
-    """Means over the photodetectors' areas; points where the aperture is switched off."""
+    """Return means over the photodetectors' areas; points where the aperture is switched off."""
     g, level = path.geometry, path.transfer.level.T
     samples = 0 if isinstance(scene, ChartScene) else math.prod(scene.shape)
     needed = memory_model.box_average_bytes(samples, len(level), g, path.settings)
@@ -77,7 +94,10 @@ def _mean_layers(path: OpticalPath, scene: SampledScene) -> tuple[Layers, Spectr
 
 
 def _filtered_layers(path: OpticalPath, scene: SampledScene) -> tuple[Layers, SpectrumReport]:
-    """Through the cosine spectrum, on cells of their own for the near and far field of a chart."""
+    """Return a scene's light through its cosine spectrum.
+
+    A chart has cells of their own for its near and its far field.
+    """
     if not isinstance(scene, ChartScene):
         return _spectral_layers(path, scene, highest_passed(path, scene))
     near = near_field(path, scene, reach(path))
@@ -97,10 +117,10 @@ def _spectral_layers(
     error: float = 0.0,
     rings: Sequence[FarPart] = (),
 ) -> tuple[Layers, SpectrumReport]:
-    """A scene whose cells are chosen, and the rings around it, through their cosine spectra.
+    """Return a scene on its cells, and the rings around it, through their cosine spectra.
 
-    highest: frequency beyond which nothing counts [pixel Nyquist]; error: rms that the cells leave
-    [electrons / s].
+    `highest` is the frequency beyond which nothing counts [pixel Nyquist], `error` the rms that the
+    cells leave [e/s].
     """
     exact, g, zones = path.transfer, path.geometry, path.zones
     is_painted = isinstance(scene, ChartScene) and scene.chart.edges() is None
@@ -136,7 +156,10 @@ def _spectral_layers(
 
 
 def _filter(path: OpticalPath, scene: SampledScene, tables: Tables, highest: float) -> Filter:
-    """Tables, and all that is separable, up to a frequency [pixel Nyquist]."""
+    """Return the filter of tables and of all that is separable up to a frequency.
+
+    `highest` is in pixel Nyquist frequencies.
+    """
     x, y = axes(path, scene, highest)
     along_x, along_y = np.ones(x.terms), np.ones(y.terms)
     for effect in path.separable:
@@ -151,7 +174,7 @@ def _filter(path: OpticalPath, scene: SampledScene, tables: Tables, highest: flo
 def _layers(
     image_filter: Filter, modes: Sequence[Mode], spectrum: SceneSpectrum, workers: int
 ) -> Iterator[Layer]:
-    """The light through the filter, and through one more for each mode of the field."""
+    """Yield the light through the filter, and through one more for each mode of the field."""
     for mode in (None, *modes):
         chosen = image_filter if mode is None else replace(image_filter, tables=mode.tables())
         series = chosen.apply(spectrum, workers)
@@ -165,9 +188,9 @@ def _far_layers(
     modes: Sequence[Mode],
     highest: float,
 ) -> Iterator[Layer]:
-    """The light of the rings around a near field, through its filter and modes.
+    """Yield the light of the rings around a near field, through its filter and modes.
 
-    highest: frequency at which the filter ends [pixel Nyquist].
+    `highest` is the frequency at which the filter ends [pixel Nyquist].
     """
     for part in rings:
         spectrum = part.spectrum(path, highest, near.tables.mix)

@@ -30,21 +30,21 @@ VALUES = 1 << 17
 
 @dataclass(frozen=True)
 class Band:
-    """Wavelengths of a camera: range and spacing of the nodes for the OTF. [m]"""
+    """Wavelengths of a camera: range, and spacing of the nodes for the OTF [m]."""
 
     start: float
     stop: float
     step: float
 
     def nodes(self) -> NDArray:
-        """Evenly spaced nodes that include both ends, at most `step` apart."""
+        """Return evenly spaced nodes that include both ends, at most `step` apart [m]."""
         count = max(2, int(np.ceil((self.stop - self.start) / self.step - 1e-9)) + 1)
         return np.linspace(self.start, self.stop, count)
 
 
 @dataclass(frozen=True)
 class Transfer:
-    """H_kc as spectral weights on a few wavelengths. [electrons / s at frequency 0]"""
+    """H_kc as spectral weights on a few wavelengths [e/s at frequency 0]."""
 
     wavelengths: NDArray
     """(J,) [m]"""
@@ -54,18 +54,26 @@ class Transfer:
 
     @property
     def radial_blurs(self) -> tuple[RadialTransfer, ...]:
-        """Those that depend on |f| only."""
+        """Blurs that depend on |f| only."""
         return of_kind(self.effects, RadialTransfer)
 
     @property
     def plane_blurs(self) -> tuple[PlaneTransfer, ...]:
-        """Those that depend on the direction too."""
+        """Blurs that depend on the direction too."""
         return of_kind(self.effects, PlaneTransfer)
 
     def radial_response(self, frequency: NDArray) -> NDArray:
-        """H_kc through the radial effects alone at frequencies of any shape [cycles/m].
+        """Return H_kc through the radial blurs alone.
 
-        (K, C, *shape) [electrons / s]
+        Parameters
+        ----------
+        frequency : NDArray
+            Frequencies of any shape [cycles/m].
+
+        Returns
+        -------
+        NDArray
+            Transfer (K, C, *shape) [e/s].
         """
         if not self.radial_blurs:
             level = self.level.reshape(*self.level.shape, *(1,) * frequency.ndim)
@@ -73,9 +81,19 @@ class Transfer:
         return self.spectral_sum(self.otf_radial(frequency))
 
     def plane_response(self, fx: NDArray, fy: NDArray) -> NDArray:
-        """H_kc through everything at all pairs of fx (n,) and fy (m,) [cycles/m].
+        """Return H_kc through all blurs at all pairs of two frequencies.
 
-        (K, C, m, n), complex [electrons / s]
+        Parameters
+        ----------
+        fx : NDArray
+            Frequencies (n,) along x [cycles/m].
+        fy : NDArray
+            Frequencies (m,) along y [cycles/m].
+
+        Returns
+        -------
+        NDArray
+            Complex transfer (K, C, m, n) [e/s].
         """
         otf = self.otf_radial(np.hypot(fx[None, :], fy[:, None])).astype(np.complex128)
         for plane, wavelength in zip(otf, self.wavelengths, strict=True):
@@ -84,7 +102,7 @@ class Transfer:
         return self.spectral_sum(otf)
 
     def otf_radial(self, frequency: NDArray) -> NDArray:
-        """Transfer of the radial effects at every wavelength: (J, *shape)."""
+        """Return the transfer (J, *shape) of the radial blurs at every wavelength."""
         otf = np.ones((len(self.wavelengths), *frequency.shape))
         for some in pieces(len(otf), max(1, VALUES // max(1, frequency.size))):
             for effect in self.radial_blurs:
@@ -92,15 +110,16 @@ class Transfer:
         return otf
 
     def spectral_sum(self, otf: NDArray) -> NDArray:
-        """The spectral sum of transfers (J, *shape): (K, C, *shape)."""
+        """Return the spectral sum (K, C, *shape) of transfers (J, *shape) [e/s]."""
         components, colors, count = self.weights.shape
         total = product(self.weights.reshape(-1, count), otf.reshape(count, -1))
         return total.reshape(components, colors, *otf.shape[1:])
 
     def with_half_the_wavelengths(self) -> Transfer:
-        """The same light on every second wavelength; neighbors share the weight of those dropped.
+        """Return the same light on every second wavelength.
 
-        The transfer is taken as linear between neighbors, which it is to second order.
+        Neighbors share the weight of those dropped: the transfer is taken as linear between them,
+        which it is to second order.
         """
         count = len(self.wavelengths)
         if count < 3:
@@ -115,16 +134,16 @@ class Transfer:
         return replace(self, wavelengths=self.wavelengths[keep], weights=weights[..., keep])
 
     def with_effects(self, effects: Sequence[Effect]) -> Transfer:
-        """The same light through other effects, of which only blurs count."""
+        """Return the same light through other effects, of which only blurs count."""
         return replace(self, effects=of_kind(effects, Blur))
 
     def with_mixtures(self, mix: NDArray) -> Transfer:
-        """The transfer of mixtures of the components, mix: (R, K)."""
+        """Return the transfer of mixtures (R, K) of the components."""
         return replace(self, weights=np.tensordot(mix, self.weights, axes=1))
 
     @property
     def level(self) -> NDArray:
-        """H_kc at frequency 0, the signal of a uniform scene: (K, C) [electrons / s]."""
+        """H_kc at frequency 0, the signal (K, C) of a uniform scene [e/s]."""
         return self.weights.sum(axis=-1)
 
     @cached_property
@@ -146,12 +165,34 @@ def transfer(
     band: Band,
     effects: Sequence[Blur],
 ) -> Transfer:
-    """Effective transfer functions of scene spectra seen through color responses.
+    """Return the effective transfer functions of scene spectra seen through color responses.
 
-    spectra: K spectral radiances [W / (sr m2 m)], lines [W / (sr m2)]; responses: C products of
-    everything between lens and electron (transmittance x filter x QE), 0..1; scale: photons per
-    second of a photodetector per photon radiance [m2 sr], i.e. irradiance factor x area.
-    Raises ValueError where a spectrum does not cover the band.
+    Parameters
+    ----------
+    spectra : sequence of Spectrum
+        Spectral radiances of K components [W/(sr m2 m)], lines [W/(sr m2)].
+    responses : sequence of Spectrum
+        Electrons per photon of C colors, from lens to electron: transmittance x filter x QE.
+    scale : float
+        Photons per second of a photodetector per photon radiance, irradiance factor x area [m2 sr].
+    band : Band
+        Wavelengths of the camera.
+    effects : sequence of Blur
+        Blurs of lens and silicon.
+
+    Returns
+    -------
+    Transfer
+        H_kc as spectral weights [e/s].
+
+    Raises
+    ------
+    ValueError
+        Where a spectrum does not cover the band.
+
+    References
+    ----------
+    T. Chen, PhD thesis, Stanford University, 2003, eqs 2.18 and 2.23.
     """
     nodes = band.nodes()
     lines = sorted({w for s in spectra for w, _ in s.lines or () if band.start <= w <= band.stop})

@@ -43,7 +43,7 @@ class TableSize:
     """Largest number of mixtures; None: as many as the tolerance asks for."""
 
     def plane_entries(self, blurs: Sequence[PlaneTransfer], largest: int = LARGEST_PLANE) -> int:
-        """Entries along an axis of a table over fx and fy for these blurs."""
+        """Return the entries along an axis of a table over fx and fy for these blurs."""
         periods = self.top * max(blur.reach for blur in blurs)
         return int(min(max(self.steps_per_period * periods + 1, SMALLEST_PLANE), largest))
 
@@ -106,7 +106,20 @@ class TableReader:
     """(n, m) what its entries count along x."""
 
     def values(self, fy: NDArray, count: int | None = None) -> NDArray:
-        """H_rc at the frequencies fy (m,) and the first `count` of fx: (R, C, m, count)."""
+        """Return H_rc at some frequencies along y.
+
+        Parameters
+        ----------
+        fy : NDArray
+            Frequencies (m,) along y [cycles/m].
+        count : int, optional
+            Number of the frequencies along x that are read; by default all.
+
+        Returns
+        -------
+        NDArray
+            Transfer (R, C, m, count) [e/s].
+        """
         fx, top = self.fx[:count], self.tables.top
         total: NDArray | None = None
         if self.radial is not None:
@@ -119,7 +132,7 @@ class TableReader:
         return total
 
     def _linear(self, radius: NDArray) -> NDArray:
-        """The radial part at frequencies (m, n); its last entry holds beyond its end."""
+        """Return the radial part at frequencies (m, n); its last entry holds beyond its end."""
         assert self.radial is not None
         entries, steps = self.radial
         last = steps.shape[-1]
@@ -132,7 +145,7 @@ class TableReader:
 
 
 def reader(tables: Tables, parity: int, fx: NDArray) -> TableReader:
-    """A reader of the tables of one of their parities at the frequencies fx (n,) [cycles/m]."""
+    """Return a reader of the tables of one parity at the frequencies fx (n,), rising [cycles/m]."""
     plane, radial = tables.planes[parity], None
     if parity == 0 and tables.radial is not None:
         radial = tables.radial, np.diff(tables.radial)
@@ -141,9 +154,9 @@ def reader(tables: Tables, parity: int, fx: NDArray) -> TableReader:
 
 
 def spline_weights(entries: int, position: NDArray) -> NDArray:
-    """What each entry of a table counts at positions 0 to 1 (n,) in a cubic spline: (n, entries).
+    """Return what each entry of a table counts in a cubic spline: (n, entries).
 
-    0 beyond 1.
+    Positions (n,) are parts of the table's length; weights are 0 beyond 1.
     """
     from scipy.interpolate import make_interp_spline
 
@@ -153,7 +166,7 @@ def spline_weights(entries: int, position: NDArray) -> NDArray:
 
 
 def tabulate(exact: Transfer, size: TableSize, mixing: Mixing) -> Tables:
-    """Tables of a transfer function for the given mixtures of its components."""
+    """Return the tables of a transfer function for the given mixtures of its components."""
     mix, error = mixing
     mixed = exact.with_mixtures(mix)
     tables = Tables(mix, radial_table(mixed, size), size.top, error)
@@ -166,12 +179,15 @@ def tabulate(exact: Transfer, size: TableSize, mixing: Mixing) -> Tables:
 
 
 def radial_table(transfer: Transfer, size: TableSize) -> NDArray:
-    """The radial part of a transfer function: (K, C, entries) [electrons / s]."""
+    """Return the radial part of a transfer function over |f|: (K, C, entries) [e/s]."""
     return transfer.radial_response(np.linspace(0, size.top, size.entries))
 
 
 def bounding_tables(exact: Transfer, size: TableSize, mixing: Mixing) -> Tables:
-    """Tables that no lens exceeds whose radial part is this one, as if no light canceled."""
+    """Return tables that no lens exceeds whose radial part is this one.
+
+    It is as if no light canceled.
+    """
     mixed = exact.with_mixtures(mixing[0])
     alone = replace(mixed.with_effects(mixed.radial_blurs), weights=np.abs(mixed.weights))
     return Tables(mixing[0], radial_table(alone, size), size.top, mixing[1])
@@ -189,7 +205,18 @@ class PlaneGrid:
     """(J, 2 m, m) transfer at fy = frequency, then -frequency, and at fx = frequency."""
 
     def change(self, blurs: Sequence[Blur]) -> NDArray:
-        """What these blurs add to the light, by parity: (4, K, C, m, m) [electrons / s]."""
+        """Return what blurs add to the light, by parity.
+
+        Parameters
+        ----------
+        blurs : sequence of Blur
+            The blurs.
+
+        Returns
+        -------
+        NDArray
+            Transfer (4, K, C, m, m) [e/s].
+        """
         m = len(self.frequency)
         fy = np.concatenate([self.frequency, -self.frequency])
         change = np.empty(self.radial.shape, np.complex128)
@@ -204,10 +231,21 @@ class PlaneGrid:
 
 
 def split_by_parity(plus: NDArray, minus: NDArray) -> NDArray:
-    """A transfer function by `PARITIES` from its values at (fx, fy) and at (fx, -fy).
+    """Return a transfer function by `PARITIES` from its values at (fx, fy) and at (fx, -fy).
 
-    H(-f) = conj(H(f)), so a half-plane tells all. plus, minus: any shape, complex. Returns
-    (4, *shape), real.
+    H(-f) = conj(H(f)), so a half-plane tells all.
+
+    Parameters
+    ----------
+    plus : NDArray
+        Complex values at (fx, fy), of any shape.
+    minus : NDArray
+        Complex values at (fx, -fy).
+
+    Returns
+    -------
+    NDArray
+        Real parts (4, *shape).
     """
     return np.array(
         [
@@ -220,7 +258,7 @@ def split_by_parity(plus: NDArray, minus: NDArray) -> NDArray:
 
 
 def plane_grid(transfer: Transfer, top: float, entries: int) -> PlaneGrid:
-    """A grid of so many frequencies from 0 to `top` [cycles/m] along each axis."""
+    """Return a grid of so many frequencies from 0 to `top` [cycles/m] along each axis."""
     alone = transfer.with_effects(transfer.radial_blurs).with_half_the_wavelengths()
     f = np.linspace(0, top, entries)
     length = np.hypot(f[None, :], np.concatenate([f, f])[:, None])
@@ -228,9 +266,25 @@ def plane_grid(transfer: Transfer, top: float, entries: int) -> PlaneGrid:
 
 
 def turn_table(parts: NDArray, parity: int, quarters: int, mirrored: bool) -> NDArray:
-    """One of the tables by parity (4, ..., m, m) of a blur with y mirrored, then turned.
+    """Return one of the tables by parity of a blur with y mirrored, then turned.
 
-    quarters: quarter turns from x to y, each T'(fx, fy) = T(fy, -fx).
+    A quarter turn from x to y is T'(fx, fy) = T(fy, -fx).
+
+    Parameters
+    ----------
+    parts : NDArray
+        Tables (4, ..., m, m) of the blur.
+    parity : int
+        Index into `PARITIES` of the table that is returned.
+    quarters : int
+        Number of quarter turns.
+    mirrored : bool
+        Whether y is mirrored before.
+
+    Returns
+    -------
+    NDArray
+        Table (..., m, m).
     """
     source, sign = [0, 1, 2, 3], [1, -1, 1, -1] if mirrored else [1, 1, 1, 1]
     for _ in range(quarters):
@@ -243,11 +297,23 @@ def turn_table(parts: NDArray, parity: int, quarters: int, mirrored: bool) -> ND
 
 
 def mixtures(transfers: Sequence[Transfer], size: TableSize) -> Mixing:
-    """The fewest mixtures of a scene's components that keep its transfer functions.
+    """Return the fewest mixtures of a scene's components that keep its transfer functions.
 
     Where a scene has more components than colors can tell apart, singular vectors of H_kc over all
     colors and frequencies replace them, as many as keep every H_kc within `size.tolerance` of the
-    largest level. transfers: the transfer functions of the same light that they have to serve.
+    largest level.
+
+    Parameters
+    ----------
+    transfers : sequence of Transfer
+        Transfers of the same light that the mixtures have to serve.
+    size : TableSize
+        Size of the tables.
+
+    Returns
+    -------
+    Mixing
+        Mixtures (R, K), and the largest relative error that they leave.
     """
     exact = transfers[0]
     components, colors = exact.weights.shape[:2]
@@ -267,7 +333,7 @@ def mixtures(transfers: Sequence[Transfer], size: TableSize) -> Mixing:
 
 
 def _samples(transfer: Transfer, top: float) -> list[NDArray]:
-    """H_kc at some frequencies: (K, any number)."""
+    """Return H_kc at some frequencies: (K, any number) [e/s]."""
     components = len(transfer.weights)
     samples = [transfer.radial_response(np.linspace(0, top, JUDGED)).reshape(components, -1)]
     if transfer.plane_blurs:

@@ -20,6 +20,7 @@ from typing import Any, Literal, Protocol
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
+from vcam_cli.scenes.cells import cell_edges, clip_cells, edges_within
 from vcam_cli.scenes.waves import WaveScene
 from vcam_cli.spectra import Spectrum
 
@@ -84,10 +85,13 @@ class Harmonics(Protocol):
 
     @property
     def period(self) -> tuple[float, float]:
-        """Along x and y [m]."""
+        """Period along x and y [m]."""
 
     def amplitudes(self, count_x: int, count_y: int) -> Array:
-        """Of cos(2 pi k x / p_x) cos(2 pi l y / p_y), from k = l = 0 on: (count_y, count_x)."""
+        """Return the amplitudes (count_y, count_x) of the cosine series.
+
+        Entry (l, k) is that of cos(2 pi k x / p_x) cos(2 pi l y / p_y).
+        """
 
 
 @dataclass(frozen=True)
@@ -103,7 +107,7 @@ class HarmonicScene:
     chart: "ChartScene"
 
     def values_at(self, x: Array, y: Array, mix: Array) -> Array:
-        """sum_k mix[r, k] B_k at the points (y[i], x[j]) [m]: (R, m, n)."""
+        """Return sum_k mix[r, k] B_k at the points (y[i], x[j]): (R, m, n)."""
         return self.chart.values_at(x, y, mix)
 
 
@@ -131,17 +135,42 @@ class SampledScene(ABC):
 
     @abstractmethod
     def planes(self, mix: Array, workers: int = 1) -> Array:
-        """sum_k mix[r, k] B_k on the grid: (R, ny, nx) in the view's dtype.
+        """Return sum_k mix[r, k] B_k on the grid.
 
-        workers: threads that share the work; the result is the same for any number.
+        Parameters
+        ----------
+        mix : Array
+            Mixtures (R, K) of the components.
+        workers : int, optional
+            Number of threads; the result does not depend on it.
+
+        Returns
+        -------
+        Array
+            Planes (R, ny, nx) in the view's type.
         """
 
     @abstractmethod
     def values_at(self, x: Array, y: Array, mix: Array) -> Array:
-        """sum_k mix[r, k] B_k at the points (y[i], x[j]) [m], both rising: (R, m, n)."""
+        """Return sum_k mix[r, k] B_k at points.
+
+        Parameters
+        ----------
+        x : Array
+            Positions (n,) right of the array's center, rising [m].
+        y : Array
+            Positions (m,) below it, rising [m].
+        mix : Array
+            Mixtures (R, K) of the components.
+
+        Returns
+        -------
+        Array
+            Values (R, m, n).
+        """
 
     def rectangles(self, mix: Array) -> "Rectangles | None":
-        """The whole grid's area as even rectangles, exact; None where it is not made of them."""
+        """Return the whole grid's area as even rectangles; None where it is not made of them."""
         return None
 
 
@@ -164,33 +193,53 @@ class Chart(ABC):
     """
 
     def highest_frequency(self, half_width: float) -> float:
-        """Frequency beyond which there is no detail within so much of the center [cycles/m].
+        """Return the frequency beyond which a chart has no detail; inf where edges are sharp.
 
-        inf where edges are sharp.
+        Parameters
+        ----------
+        half_width : float
+            Distance from the center within which detail counts [m].
+
+        Returns
+        -------
+        float
+            Frequency [cycles/m].
         """
         return math.inf
 
     @abstractmethod
     def paint(self, x_edges: Array, y_edges: Array, mix: Array, out: Array) -> None:
-        """Writes the averages over the cells between the edges into out (R, ny, nx)."""
+        """Write the averages over the cells between edges into an array.
+
+        Parameters
+        ----------
+        x_edges : Array
+            Edges (nx + 1,) of the cells along x, rising [m].
+        y_edges : Array
+            Edges (ny + 1,) of the cells along y, rising [m].
+        mix : Array
+            Mixtures (R, K) of the parts; their type is that of the result.
+        out : Array
+            Array (R, ny, nx) that is written.
+        """
 
     @abstractmethod
     def values(self, x: Array, y: Array, mix: Array) -> Array:
-        """Point values: (R, len(y), len(x))."""
+        """Return the values (R, len(y), len(x)) at points."""
 
     def crop_to_cells(self, x_edges: Array, y_edges: Array) -> "Chart":
-        """A chart that looks the same on these cells, if there is one that is faster there."""
+        """Return a chart that looks the same on these cells, if one is faster there."""
         return self
 
     def edges(self) -> tuple[Array, Array] | None:
-        """Where the light may change, x and y rising [m], of a chart of even rectangles.
+        """Return where the light of a chart of even rectangles may change, x and y rising [m].
 
-        None for all others: the light must be the same all over between neighboring edges.
+        It is None for all others: the light must be the same all over between neighboring edges.
         """
         return None
 
     def averages(self, x_edges: Array, y_edges: Array, mix: Array) -> Array:
-        """The averages over the cells: (R, len(y_edges)-1, len(x_edges)-1)."""
+        """Return the averages over the cells: (R, len(y_edges) - 1, len(x_edges) - 1)."""
         out = np.empty((len(mix), len(y_edges) - 1, len(x_edges) - 1), mix.dtype)
         self.paint(x_edges, y_edges, mix, out)
         return out
@@ -205,16 +254,17 @@ class ChartScene(SampledScene):
     """Of the cells, x and y from the array's center [m]."""
 
     def with_cells(self, shape: tuple[int, int]) -> "ChartScene":
-        """The same part of the chart on a grid of so many cells (ny, nx)."""
+        """Return the same part of the chart on a grid of so many cells (ny, nx)."""
         ny, nx = shape
         width, height = self.extent
         return replace(self, shape=shape, pitch_x=width / nx, pitch_y=height / ny)
 
     def crop(self, center: tuple[float, float], width: float, height: float) -> "ChartScene":
-        """A rectangle of the chart around a place (x, y) [m], as a single cell."""
+        """Return a rectangle of the chart around a place (x, y) [m], as a single cell."""
         return replace(self, shape=(1, 1), pitch_x=width, pitch_y=height, center=center)
 
     def planes(self, mix: Array, workers: int = 1) -> Array:
+        """Return the averages over the cells, painted in bands of rows."""
         ny, nx = self.shape
         x_edges = self.center[0] + cell_edges(nx, self.pitch_x)
         y_edges = self.center[1] + cell_edges(ny, self.pitch_y)
@@ -229,14 +279,16 @@ class ChartScene(SampledScene):
         return out
 
     def rectangles(self, mix: Array) -> Rectangles | None:
+        """Return the grid's area as even rectangles, of a chart that is made of them."""
         edges = self.chart.edges()
         if edges is None:
             return None
-        x, y = (_within(e, size / 2) for e, size in zip(edges, self.extent, strict=True))
+        x, y = (edges_within(e, size / 2) for e, size in zip(edges, self.extent, strict=True))
         middle_x, middle_y = ((e[1:] + e[:-1]) / 2 for e in (x, y))
         return Rectangles(x, y, self.chart.values(middle_x, middle_y, np.asarray(mix, float)))
 
     def values_at(self, x: Array, y: Array, mix: Array) -> Array:
+        """Return the chart's values at points: (R, m, n)."""
         x, y = np.asarray(x, float), np.asarray(y, float)
         out = np.empty((len(mix), len(y), len(x)), self.dtype)
         band = max(1, CELLS_A_BAND // len(x))
@@ -247,7 +299,7 @@ class ChartScene(SampledScene):
 
 
 def paint_by_bands(paint: Callable[[slice], None], rows: int, columns: int, workers: int) -> None:
-    """Calls `paint` on bands of rows, which do not depend on the number of workers."""
+    """Call `paint` on bands of rows, which do not depend on the number of workers."""
     band = max(1, CELLS_A_BAND // columns)
     bands = [slice(top, min(top + band, rows)) for top in range(0, rows, band)]
     if workers <= 1:
@@ -262,7 +314,10 @@ def paint_by_bands(paint: Callable[[slice], None], rows: int, columns: int, work
 def chart_scene(
     chart: Chart, spectra: tuple[Spectrum, ...], white: Spectrum, view: View
 ) -> ChartScene:
-    """The chart on the view's cells; black outside the frame where the scene has a width."""
+    """Return the chart on the view's cells, black outside the frame where it has a width.
+
+    Its parts have the spectral radiances `spectra`, and perfect white has `white` [W/(sr m2 m)].
+    """
     if view.scene_width is not None:
         chart = Framed(chart, view.frame)
     return ChartScene(
@@ -282,17 +337,12 @@ Scene = WaveScene | HarmonicScene | SampledScene
 
 
 def fills(view: View) -> bool:
-    """Whether the chart's frame covers array and margin, so that no black edge is seen."""
+    """Return whether the chart's frame covers array and margin, so that no black edge is seen."""
     if view.scene_width is None:
         return True
     width = (view.columns + 2 * view.margin) * view.pitch_x
     height = (view.rows + 2 * view.margin) * view.pitch_y
     return view.frame.width >= width and view.frame.height >= height
-
-
-def cell_edges(count: int, pitch: float) -> Array:
-    """The count + 1 edges [m] of cells centered on 0."""
-    return (np.arange(count + 1) - count / 2) * pitch
 
 
 @dataclass(frozen=True)
@@ -303,6 +353,7 @@ class Framed(Chart):
     frame: Frame
 
     def paint(self, x_edges: Array, y_edges: Array, mix: Array, out: Array) -> None:
+        """Write the averages over the cells, those on the frame's edge by area."""
         out[:] = 0
         columns, cover_x, inside_x = clip_cells(x_edges, self.frame.width / 2)
         rows, cover_y, inside_y = clip_cells(y_edges, self.frame.height / 2)
@@ -312,14 +363,16 @@ class Framed(Chart):
             out[:, rows, columns] = picture
 
     def edges(self) -> tuple[Array, Array] | None:
+        """Return where the light may change, the frame's own edges included."""
         inner = self.chart.edges()
         if inner is None:
             return None
         sides = (self.frame.width / 2, self.frame.height / 2)
-        x, y = (_within(e, half) for e, half in zip(inner, sides, strict=True))
+        x, y = (edges_within(e, half) for e, half in zip(inner, sides, strict=True))
         return x, y
 
     def crop_to_cells(self, x_edges: Array, y_edges: Array) -> "Framed":
+        """Return the same frame around a chart that may be faster on these cells."""
         _, _, inside_x = clip_cells(x_edges, self.frame.width / 2)
         _, _, inside_y = clip_cells(y_edges, self.frame.height / 2)
         if len(inside_x) and len(inside_y):
@@ -327,31 +380,6 @@ class Framed(Chart):
         return self
 
     def values(self, x: Array, y: Array, mix: Array) -> Array:
+        """Return the values at points: 0 outside the frame."""
         inside = np.outer(abs(y) <= self.frame.height / 2, abs(x) <= self.frame.width / 2)
         return self.chart.values(x, y, mix) * inside
-
-
-def clip_cells(edges: Array, half: float) -> tuple[slice, Array, Array]:
-    """The cells that reach into [-half, half].
-
-    Returns their range, the part of each that lies inside, and their edges cut to the inside.
-    """
-    sliver = 1e-9 * (edges[-1] - edges[0]) / (len(edges) - 1)  # a rounding error, not a cell
-    first = int(np.searchsorted(edges[1:], sliver - half))
-    last = int(np.searchsorted(edges[:-1], half - sliver))
-    if last <= first:
-        return slice(0, 0), np.empty(0), np.empty(0)
-    inside = np.clip(edges[first : last + 1], -half, half)
-    return slice(first, last), np.diff(inside) / np.diff(edges[first : last + 1]), inside
-
-
-def _within(edges: Array, half: float) -> Array:
-    """The edges inside [-half, half], and these two."""
-    inside = edges[(edges > -half) & (edges < half)]
-    return np.concatenate([[-half], np.unique(inside), [half]])
-
-
-def overlap(edges: Array, low: float, high: float) -> Array:
-    """The part of every cell between `edges` that lies within [low, high]: (n,) in 0..1."""
-    inside = np.minimum(edges[1:], high) - np.maximum(edges[:-1], low)
-    return np.maximum(inside, 0.0) / np.diff(edges)

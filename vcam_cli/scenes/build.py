@@ -43,14 +43,30 @@ def build(
     picture: Array | Cube | None,
     primaries: str = "crt-brainard",
 ) -> Scene:
-    """The scene as image formation needs it.
+    """Return the scene as image formation needs it.
 
-    picture: for an image source the decoded file, (h, w, channels), linear, 1 = its white; for a
-    hyperspectral source its cube.
-    primaries: of the display that shows it (`display.primaries`), for the model rgb-display.
+    Parameters
+    ----------
+    scene : models.Scene
+        What the camera file says of it.
+    view : View
+        Rectangle that the scene has to fill.
+    picture : Array or Cube or None
+        Decoded file (h, w, channels) of an image source in linear light, 1 = its white; the cube of
+        a hyperspectral source; None for charts.
+    primaries : str, optional
+        Primaries of the display that shows it, for the model rgb-display.
 
-    Raises BadInput for a picture whose channels do not suit the model, for a light level that the
-    lamp cannot give, and for sources that are not built.
+    Returns
+    -------
+    Scene
+        The scene.
+
+    Raises
+    ------
+    BadInput
+        For a picture whose channels do not suit the model, for a light level that the lamp cannot
+        give, and for sources that are not built.
     """
     source = scene.source
     if isinstance(source, models.Hyperspectral):
@@ -76,7 +92,7 @@ def build(
 
 
 def _waves(source: object) -> tuple[Wave, ...] | None:
-    """The source as waves; None where it is none."""
+    """Return the source as waves; None where it is none."""
     match source:
         case models.Uniform():
             return uniform.waves(source.reflectance)
@@ -88,7 +104,7 @@ def _waves(source: object) -> tuple[Wave, ...] | None:
 
 
 def _chart(source: object, view: View) -> tuple[Chart, tuple[Spectrum, ...]]:
-    """The chart on the view's frame, and the reflectances of its parts."""
+    """Return the chart on the view's frame, and the reflectances of its parts."""
     gray = (Spectrum.flat(1.0),)
     frame = view.frame
     match source:
@@ -134,7 +150,7 @@ def _image(
 def _model(
     scene: models.Scene, model: str, primaries: str
 ) -> tuple[tuple[Spectrum, ...], Spectrum]:
-    """Radiance of every channel where it is 1, and of white."""
+    """Return the radiance of every channel where it is 1, and of white."""
     match model:
         case "laser":
             return light.laser_white(scene)
@@ -147,7 +163,7 @@ def _model(
 
 
 def check_channels(model: str, channels: int) -> None:
-    """Raises BadInput for an image file whose color channels are not what the model needs."""
+    """Refuse an image file whose color channels are not what the model needs (BadInput)."""
     needed = 1 if model == "reflectance" else 3
     if channels != needed:
         raise _wrong_channels(model, channels, needed)

@@ -11,7 +11,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from vcam_cli.scenes.base import Array, Chart, Frame, overlap
+from vcam_cli.scenes.base import Array, Chart, Frame
+from vcam_cli.scenes.cells import overlap
 from vcam_cli.spectra import Spectrum, colorchecker
 
 ROWS, COLUMNS = 4, 6

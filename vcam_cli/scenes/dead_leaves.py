@@ -25,7 +25,8 @@ from functools import lru_cache
 import numpy as np
 
 from vcam_cli.scenes import discs
-from vcam_cli.scenes.base import CELLS_A_BAND, Array, Chart, Frame, cell_edges, paint_by_bands
+from vcam_cli.scenes.base import CELLS_A_BAND, Array, Chart, Frame, paint_by_bands
+from vcam_cli.scenes.cells import cell_edges
 from vcam_cli.scenes.disc_edges import Discs
 from vcam_cli.scenes.discs import Cells
 from vcam_cli.spectra import Spectrum, colorchecker

@@ -12,7 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from vcam_cli.scenes import discs
-from vcam_cli.scenes.base import Array, Chart, Frame, clip_cells, overlap
+from vcam_cli.scenes.base import Array, Chart, Frame
+from vcam_cli.scenes.cells import clip_cells, overlap
 from vcam_cli.scenes.disc_edges import Discs
 
 CLOTH = 0.5

@@ -21,13 +21,14 @@ class PointGrid(Chart):
     diameter: float
 
     def paint(self, x_edges: Array, y_edges: Array, mix: Array, out: Array) -> None:
-        """Exact: the area of circles within the cells."""
+        """Write the averages over the cells, exactly: the area of circles within them."""
         points = self._points(x_edges[[0, -1]], y_edges[[0, -1]])
         light = discs.separate_cover(points, x_edges, y_edges).astype(mix.dtype)
         for plane, level in zip(out, mix[:, 0], strict=True):
             np.multiply(light, level, out=plane)
 
     def values(self, x: Array, y: Array, mix: Array) -> Array:
+        """Return the values at points: 1 within a disc, else 0."""
         across, down = (
             position - self.spacing * np.rint(position / self.spacing)
             for position in (np.asarray(x), np.asarray(y))
@@ -37,6 +38,7 @@ class PointGrid(Chart):
 
     @property
     def period(self) -> tuple[float, float]:
+        """Period along x and y, the spacing of the points [m]."""
         return self.spacing, self.spacing
 
     def amplitudes(self, count_x: int, count_y: int) -> Array:
@@ -54,7 +56,7 @@ class PointGrid(Chart):
         return np.asarray(math.pi / 4 * (self.diameter / self.spacing) ** 2 * shape * twice)
 
     def _points(self, x: Array, y: Array) -> Discs:
-        """Those that may reach into a rectangle between two x and two y, row by row."""
+        """Return the points that may reach into a rectangle, row by row."""
         across, down = (self._places(*ends) for ends in (x, y))
         rows, columns = np.repeat(down, len(across)), np.tile(across, len(down))
         return Discs(columns, rows, np.full(len(rows), self.diameter / 2))

@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from vcam_cli.scenes.base import Array, Chart, clip_cells
+from vcam_cli.scenes.base import Array, Chart
+from vcam_cli.scenes.cells import clip_cells
 from vcam_cli.scenes.colorchecker import Card
 from vcam_cli.scenes.dead_leaves import PIGMENTS, DeadLeaves, PlacedLeaves
 from vcam_cli.spectra import colorchecker

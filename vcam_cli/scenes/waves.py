@@ -31,17 +31,55 @@ class WaveScene:
     white: Spectrum
 
     def values_at(self, x: Array, y: Array, mix: Array) -> Array:
-        """sum_k mix[r, k] B_k at the points (y[i], x[j]) [m]: (R, m, n), float64."""
+        """Return sum_k mix[r, k] B_k at the points (y[i], x[j]): (R, m, n)."""
         return wave_values(self.waves, x, y, mix)
 
 
 def wave_values(waves: tuple[Wave, ...], x: Array, y: Array, mix: Array) -> Array:
-    """Point values of a sum of waves, separably: cos(a + b) = Re(exp(i a) exp(i b))."""
+    """Return the values of a sum of waves at points, separably.
+
+    cos(a + b) = Re(exp(i a) exp(i b)).
+
+    Parameters
+    ----------
+    waves : tuple of Wave
+        The waves.
+    x : Array
+        Positions (n,) to the right of the array's center [m].
+    y : Array
+        Positions (m,) below the array's center [m].
+    mix : Array
+        Mixtures (R, K) of the components.
+
+    Returns
+    -------
+    Array
+        Values (R, m, n).
+    """
     return _waves(waves, (x, np.zeros_like(x, float)), (y, np.zeros_like(y, float)), mix)
 
 
 def wave_averages(waves: tuple[Wave, ...], x_edges: Array, y_edges: Array, mix: Array) -> Array:
-    """Cell averages of a sum of waves, exact: the center's value times sinc(f width) per axis."""
+    """Return the averages of a sum of waves over cells, exactly.
+
+    They are the center's value times sinc(f width) along each axis.
+
+    Parameters
+    ----------
+    waves : tuple of Wave
+        The waves.
+    x_edges : Array
+        Edges (nx + 1,) of the cells along x, rising [m].
+    y_edges : Array
+        Edges (ny + 1,) of the cells along y, rising [m].
+    mix : Array
+        Mixtures (R, K) of the components.
+
+    Returns
+    -------
+    Array
+        Averages (R, ny, nx).
+    """
     return _waves(waves, _cells(x_edges), _cells(y_edges), mix)
 
 
