@@ -59,10 +59,26 @@ def margin(
     band: tuple[float, float],
     knobs: Settings,
 ) -> int:
-    """Pixels that a chart goes on beyond the array.
+    """Return the pixels that a chart goes on beyond the array.
 
-    Beyond them it is mirrored: light from there is that of another place. The rms over the array
-    of what that changes is kept below its share of the tolerance. band: wavelengths [m].
+    Beyond them it is mirrored: light from there is that of another place. The rms over the array of
+    what that changes is kept below its share of the tolerance.
+
+    Parameters
+    ----------
+    geometry : Geometry
+        Geometry of the array.
+    effects : sequence of Effect
+        Effects of the camera, of which the blurs count.
+    band : tuple of float
+        Shortest and longest wavelength [m].
+    knobs : Settings
+        Settings of image formation.
+
+    Returns
+    -------
+    int
+        Pixels on every side, such that transforms of the whole are fast.
     """
     budget = MARGIN_SHARE * knobs.tolerance / CONTRAST
     distance = np.geomspace(0.25 * min(geometry.pitch_x, geometry.pitch_y), 1.0, 80)
@@ -93,10 +109,24 @@ def margin(
 def line_spread_tail(
     blurs: Sequence[RadialTransfer], wavelength: float, distance: NDArray
 ) -> NDArray:
-    """Part of the light of a line that falls further to one side than each distance (n,) [m].
+    """Return the part of the light of a line that falls further to one side than a distance.
 
-    1/2 - (1/pi) integral of H(f) sin(2 pi f x) / f over f > 0; from where that cancels to rounding
-    on, the tail of a cusp at 0, H = 1 - a |f|: a / (2 pi^2 x).
+    It is 1/2 - (1/pi) integral of H(f) sin(2 pi f x) / f over f > 0; from where that cancels to
+    rounding on, the tail of a cusp at 0, H = 1 - a |f|: a / (2 pi^2 x).
+
+    Parameters
+    ----------
+    blurs : sequence of RadialTransfer
+        Blurs whose transfers multiply.
+    wavelength : float
+        Wavelength [m].
+    distance : NDArray
+        Distances (n,), rising [m].
+
+    Returns
+    -------
+    NDArray
+        Parts (n,) of the light, 0 to 1/2, falling.
     """
     if not blurs:
         return np.zeros(len(distance))
@@ -124,7 +154,7 @@ def line_spread_tail(
 
 
 def _fast(geometry: Geometry, least: int) -> int:
-    """The smallest margin from `least` on at which transforms of both lengths are fast."""
+    """Return the smallest margin from `least` on at which transforms of both lengths are fast."""
 
     def cost(margin: int) -> int:
         return sum((n + 2 * margin) * _work(n + 2 * margin) for n in sizes)
@@ -134,7 +164,7 @@ def _fast(geometry: Geometry, least: int) -> int:
 
 
 def _work(size: int) -> int:
-    """Sum of the prime factors of a transform's size: what it costs per sample."""
+    """Return the sum of the prime factors of a transform's size: what it costs per sample."""
     total, factor = 0, 2
     while factor * factor <= size:
         while size % factor == 0:
@@ -145,9 +175,21 @@ def _work(size: int) -> int:
 
 
 def highest_passed(path: OpticalPath, scene: Scene) -> float:
-    """The frequency beyond which lens and pixels pass nothing that counts [pixel Nyquist].
+    """Return the frequency beyond which lens and pixels pass nothing that counts.
 
-    No further than a chart has detail.
+    It is no higher than the detail of a chart.
+
+    Parameters
+    ----------
+    path : OpticalPath
+        Lens, pixels and settings.
+    scene : Scene
+        The scene.
+
+    Returns
+    -------
+    float
+        Frequency [pixel Nyquist].
     """
     g = path.geometry
     pitch = max(g.pitch_x, g.pitch_y)
@@ -165,12 +207,38 @@ def highest_passed(path: OpticalPath, scene: Scene) -> float:
 
 
 def highest_frequency_share(tolerance: float) -> float:
-    """Part of full signal that may be lost with the highest frequencies."""
+    """Return the part of full signal that may be lost with the highest frequencies.
+
+    Parameters
+    ----------
+    tolerance : float
+        Tolerance of the camera file, relative to full signal.
+
+    Returns
+    -------
+    float
+        Rms, relative to full signal.
+    """
     return max(0.1 * tolerance, min(FREQUENCY_SHARE * tolerance, MOST_LOST))
 
 
 def axes(path: OpticalPath, scene: SampledScene, highest: float) -> tuple[Axis, Axis]:
-    """Samples, pixels and terms along x and y, up to a frequency [pixel Nyquist]."""
+    """Return samples, pixels and terms along both axes, up to a frequency.
+
+    Parameters
+    ----------
+    path : OpticalPath
+        Lens, pixels and settings.
+    scene : SampledScene
+        Scene on its grid of samples.
+    highest : float
+        Highest frequency [pixel Nyquist].
+
+    Returns
+    -------
+    x, y : Axis
+        The axes.
+    """
     g, cutoff = path.geometry, path.transfer.cutoff
     ny, nx = scene.shape
     squares = scene.samples == "squares"
@@ -187,7 +255,22 @@ def axes(path: OpticalPath, scene: SampledScene, highest: float) -> tuple[Axis, 
 
 
 def table_size(path: OpticalPath, highest: float, entries: int | None = None) -> TableSize:
-    """Tables up to a frequency along both axes [pixel Nyquist]; entries: default the settings'."""
+    """Return how fine tables are that reach to a frequency along both axes.
+
+    Parameters
+    ----------
+    path : OpticalPath
+        Lens, pixels and settings.
+    highest : float
+        Highest frequency along each axis [pixel Nyquist].
+    entries : int, optional
+        Entries over |f|; by default those of the settings.
+
+    Returns
+    -------
+    TableSize
+        Size of the tables.
+    """
     knobs, g = path.settings, path.geometry
     corner = math.hypot(0.5 / g.pitch_x, 0.5 / g.pitch_y)
     tolerance = knobs.mixing_tolerance
@@ -203,6 +286,6 @@ def table_size(path: OpticalPath, highest: float, entries: int | None = None) ->
 
 
 def reach(path: OpticalPath) -> float:
-    """How far the blurs of a lens throw light, its diffraction aside [m]."""
+    """Return how far the blurs of a lens throw light, its diffraction aside [m]."""
     blurs = [*path.transfer.effects, *(zone.blur for zone in path.zones)]
     return max((blur.reach for blur in blurs), default=0.0)
