@@ -112,13 +112,13 @@ def test_a_blurred_chart_needs_few(measured):
 
 
 def test_small_charts_are_painted_as_finely_as_the_lens_asks():
-    optical_path = before("f/2")
+    optical_path = before("f/5.6")
     scene = on_chart(optical_path, CHARTS["star"], margin=10)
     highest = highest_passed(optical_path, scene)
     cells, error = cells_per_pixel(optical_path, scene, highest)
     assert cells >= chart_cells.BEYOND_CUTOFF * highest
     assert error == 0
-    exact = converged(optical_path, scene)
+    exact = on_cells(optical_path, scene, 1.37 * cells)
     assert rms(on_cells(optical_path, scene, cells), exact) < 0.3 * 0.005 * exact.max()
 
 
@@ -183,6 +183,13 @@ def test_crops_have_the_center_and_lie_within_the_array():
         assert abs(crop.center[1]) + crop.pitch_y / 2 <= g.sensor_height / 2 * (1 + 1e-12)
 
 
+class Unpainted(Chart):
+    """A chart of which values at points are all that is asked for."""
+
+    def paint(self, x_edges, y_edges, mix, out):
+        raise AssertionError("painted")
+
+
 @pytest.mark.parametrize("place", [(-0.31, 0.22), (0.4, -0.4), (0.05, 0.47)])
 def test_crops_have_the_busiest_part(place):
     """A patch of fine checks on an otherwise even chart: a tenth of the array's width."""
@@ -191,10 +198,7 @@ def test_crops_have_the_busiest_part(place):
     half = 0.05 * g.sensor_width
 
     @dataclass(frozen=True)
-    class Patch(Chart):
-        def paint(self, x_edges, y_edges, mix, out):
-            raise NotImplementedError
-
+    class Patch(Unpainted):
         def values(self, x, y, mix):
             near = np.outer(np.abs(y - y0) < half, np.abs(x - x0) < half)
             checks = np.add.outer(y // (3.1 * PITCH), x // (3.1 * PITCH)) % 2
@@ -215,10 +219,7 @@ def test_what_repeats_is_not_mistaken_for_even(period):
     g = sensor(200, 300)
 
     @dataclass(frozen=True)
-    class Stripes(Chart):
-        def paint(self, x_edges, y_edges, mix, out):
-            raise NotImplementedError
-
+    class Stripes(Unpainted):
         def values(self, x, y, mix):
             left = x < 0  # to the right of the center nothing repeats
             bright = np.where(left, (x / (period * PITCH)) % 1 < 0.5, 0.5)

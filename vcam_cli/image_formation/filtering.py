@@ -1,9 +1,10 @@
 """From a scene's spectrum to the pixels: multiply by the transfer function, fold, transform back.
 
 The heart of image formation. A transfer function is computed at four frequencies of up to 128
-neighboring rows of the spectrum; the cubic through them is a product of small matrices, several
-times faster than looking up every term (docs/engine_ablation.md). Work is cut into fixed pieces
-of rows or columns that threads share.
+neighboring rows of the spectrum; the cubic through them is a product of small matrices. Frames of
+photographs and of charts of rectangles take 1.4 to 1.5 times as long where every term is looked up
+instead (docs/engine_ablation.md). Work is cut into fixed pieces of rows or columns that threads
+share.
 """
 
 from __future__ import annotations
