@@ -49,6 +49,9 @@ LOWEST = 0.02
 """Lowest frequency at which a spectrum may end [pixel Nyquist]."""
 HIGHEST = 64.0
 """Highest frequency that is considered where no lens ends the spectrum [pixel Nyquist]."""
+KINKS = 4.0
+"""Factor on the highest frequency of a chart's own detail: where it is mirrored it has kinks, whose
+spectrum falls with the square of the frequency."""
 LEAST_PASSED = 0.01
 """Part of the tolerance below which what the lens passes of full contrast counts as nothing."""
 
@@ -202,7 +205,7 @@ def highest_passed(path: OpticalPath, scene: Scene) -> float:
     limit = float(f[min(counts[-1] + 1, len(f) - 1)]) if len(counts) else 1.0
     if isinstance(scene, ChartScene):
         half_width = scene.pitch_x * scene.shape[1] / 2
-        limit = min(limit, 2 * pitch * scene.chart.highest_frequency(half_width))
+        limit = min(limit, KINKS * 2 * pitch * scene.chart.highest_frequency(half_width))
     return max(limit, LOWEST)
 
 
