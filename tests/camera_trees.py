@@ -1,9 +1,9 @@
 """Camera files as mappings, for the tests of the models."""
 
-import copy
 from typing import Any
 
 import pytest
+from making import with_changes
 from pydantic import ValidationError
 
 from vcam_cli.camera.camera import Camera
@@ -25,22 +25,10 @@ REQUIRED: dict[str, Any] = {
 }
 """Every key that a camera file must have."""
 
-GONE = object()
-
 
 def changed(changes: dict[str, Any]) -> dict[str, Any]:
     """The required keys with some set ("pixel.width": ...) or taken out (GONE)."""
-    tree = copy.deepcopy(REQUIRED)
-    for path, value in changes.items():
-        *parents, last = path.split(".")
-        place = tree
-        for name in parents:
-            place = place.setdefault(name, {})
-        if value is GONE:
-            place.pop(last)
-        else:
-            place[last] = copy.deepcopy(value)
-    return tree
+    return with_changes(REQUIRED, changes)
 
 
 def camera(**changes: Any) -> Camera:

@@ -45,7 +45,12 @@ QUIET = {name: "off" for name in ("shot_noise", "fpn", "reset_noise", "read_nois
 
 def tree(changes: dict[str, Any]) -> dict[str, Any]:
     """The plain camera with keys set ("pixel.width": "4 um") or taken out (GONE)."""
-    out = copy.deepcopy(PLAIN)
+    return with_changes(PLAIN, changes)
+
+
+def with_changes(base: dict[str, Any], changes: dict[str, Any]) -> dict[str, Any]:
+    """A copy of a camera with keys set by their paths, or taken out (GONE)."""
+    out = copy.deepcopy(base)
     for path, value in changes.items():
         *parents, last = path.split(".")
         place = out

@@ -117,11 +117,9 @@ def rms(a: Any, b: Any = 0.0) -> float:
     return float(np.sqrt(np.mean(np.square(np.asarray(a, float) - b))))
 
 
-@dataclass(frozen=True)
-class Gaussian(RadialTransfer):
-    """A round Gaussian of a standard deviation [m]."""
+class EndlessBlur(Blur):
+    """A blur of no camera, without a cut-off."""
 
-    size: float
     name = "aberration"
 
     @classmethod
@@ -133,6 +131,13 @@ class Gaussian(RadialTransfer):
 
     def cutoff(self, wavelength):
         return np.inf
+
+
+@dataclass(frozen=True)
+class Gaussian(EndlessBlur, RadialTransfer):
+    """A round Gaussian of a standard deviation [m]."""
+
+    size: float
 
     @property
     def reach(self):
@@ -143,24 +148,13 @@ class Gaussian(RadialTransfer):
 
 
 @dataclass(frozen=True)
-class Leaning(PlaneTransfer):
+class Leaning(EndlessBlur, PlaneTransfer):
     """A Gaussian that is wider along x than along y, and lies beside its place."""
 
     right: float
     down: float
     along_x: float
     along_y: float
-    name = "aberration"
-
-    @classmethod
-    def from_camera(cls, camera, geometry):
-        return None
-
-    def describe(self):
-        return ""
-
-    def cutoff(self, wavelength):
-        return np.inf
 
     @property
     def reach(self):

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tests.processing.test_normalized_convolution import PATTERNS, colors_of
+from tests.processing.test_normalized_convolution import PATTERNS, colors_of, in_spans
 from vcam_cli import load, simulate
 from vcam_cli.processing.base import padded_block
 from vcam_cli.processing.guided_interpolation import GuidedInterpolation
@@ -21,13 +21,7 @@ def method(pattern, shape, white=None):
 
 
 def demosaiced(mosaic, pattern, white=None, spans=None):
-    operation = method(pattern, mosaic.shape, white)
-    spans = [(0, mosaic.shape[0])] if spans is None else spans
-    parts = [
-        operation.process_block(padded_block(mosaic, *span, operation.halo)).planes
-        for span in spans
-    ]
-    return np.concatenate(parts, axis=1)
+    return in_spans(method(pattern, mosaic.shape, white), mosaic, spans)
 
 
 def mosaic_of(planes, pattern):

@@ -23,8 +23,12 @@ def colors_of(pattern):
 
 def demosaiced(mosaic, pattern, rows=None):
     sites = Sites(pattern, mosaic.shape)
-    operation = NormalizedConvolution(pattern, colors_of(pattern), sites)
-    spans = [(0, mosaic.shape[0])] if rows is None else rows
+    return in_spans(NormalizedConvolution(pattern, colors_of(pattern), sites), mosaic, rows)
+
+
+def in_spans(operation, mosaic, spans=None):
+    """Full color from spans of rows (start, stop), by default from the whole mosaic."""
+    spans = [(0, mosaic.shape[0])] if spans is None else spans
     parts = [
         operation.process_block(padded_block(mosaic, *span, operation.halo)).planes
         for span in spans

@@ -105,13 +105,9 @@ def places(tree: Node) -> dict[errors.Path, str]:
     return found
 
 
-@dataclass(frozen=True)
-class Origin:
-    """Where a model comes from: its file, all input files, and the place of every key."""
+class PlacedKeys:
+    """What comes from a tree of YAML nodes, and knows the place of every key."""
 
-    file: Path
-    files: tuple[Path, ...]
-    """YAML files read, then the data files that they name (pictures, tables)."""
     tree: Node
 
     @cached_property
@@ -124,3 +120,13 @@ class Origin:
         while path not in self.places and path:
             path = path[:-1]
         return self.places.get(path, "")
+
+
+@dataclass(frozen=True)
+class Origin(PlacedKeys):
+    """Where a model comes from: its file, all input files, and the place of every key."""
+
+    file: Path
+    files: tuple[Path, ...]
+    """YAML files read, then the data files that they name (pictures, tables)."""
+    tree: Node

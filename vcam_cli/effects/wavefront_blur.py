@@ -98,11 +98,29 @@ def uniform_wavefront(camera: Camera, geometry: Geometry) -> Terms | None:
 
 
 @dataclass(frozen=True)
-class SymmetricBlur(AberrationBlur, RadialTransfer):
-    """A wavefront that is symmetric about the axis, the same everywhere."""
+class UniformBlur(AberrationBlur):
+    """A wavefront that is the same everywhere."""
 
     lens: Lens
     terms: Terms
+
+    def describe(self) -> str:
+        """Return a short clause with this camera's numbers and units."""
+        return self.lens.describe(self.terms)
+
+    @property
+    def reach(self) -> float:
+        """How far from its place the blur throws almost all of the light, diffraction aside [m]."""
+        return self.lens.reach(self.terms)
+
+    def cutoff(self, wavelength: float) -> float:
+        """Return the frequency from which the transfer is zero, or inf [cycles/m]."""
+        return self.lens.cutoff(wavelength)
+
+
+@dataclass(frozen=True)
+class SymmetricBlur(UniformBlur, RadialTransfer):
+    """A wavefront that is symmetric about the axis, the same everywhere."""
 
     @classmethod
     def from_camera(cls, camera: Camera, geometry: Geometry) -> SymmetricBlur | None:
@@ -112,15 +130,6 @@ class SymmetricBlur(AberrationBlur, RadialTransfer):
             return None
         return cls(Lens.from_camera(camera, geometry), terms)
 
-    def describe(self) -> str:
-        """Return a short clause with this camera's numbers and units."""
-        return self.lens.describe(self.terms)
-
-    @property
-    def reach(self) -> float:
-        """How far from its place the blur throws almost all of the light, diffraction aside [m]."""
-        return self.lens.reach(self.terms)
-
     def otf(self, frequency, wavelength):
         """Return the transfer at `frequency` [cycles/m] and `wavelength` [m]."""
         if not self.lens.diffracts:
@@ -129,10 +138,6 @@ class SymmetricBlur(AberrationBlur, RadialTransfer):
             frequency, wavelength, self.lens.working_f_number, self.terms
         )
 
-    def cutoff(self, wavelength):
-        """Return the frequency from which the transfer is zero, or inf [cycles/m]."""
-        return self.lens.cutoff(wavelength)
-
     def mean_error(self, signal) -> float:
         """Return a bound of the rms change of the mean signal by leaving it out [electrons]."""
         otf = self.otf(np.linspace(0, _highest(self.lens, self.terms), 257), GREEN)
@@ -140,11 +145,9 @@ class SymmetricBlur(AberrationBlur, RadialTransfer):
 
 
 @dataclass(frozen=True)
-class DirectedBlur(AberrationBlur, PlaneTransfer):
+class DirectedBlur(UniformBlur, PlaneTransfer):
     """Any wavefront, the same everywhere, turned about the axis by an angle [rad]."""
 
-    lens: Lens
-    terms: Terms
     angle: float = 0.0
 
     @classmethod
@@ -154,15 +157,6 @@ class DirectedBlur(AberrationBlur, PlaneTransfer):
         if not terms or zernike.is_symmetric(terms):
             return None
         return cls(Lens.from_camera(camera, geometry), terms)
-
-    def describe(self) -> str:
-        """Return a short clause with this camera's numbers and units."""
-        return self.lens.describe(self.terms)
-
-    @property
-    def reach(self) -> float:
-        """How far from its place the blur throws almost all of the light, diffraction aside [m]."""
-        return self.lens.reach(self.terms)
 
     def otf_plane(self, fx, fy, wavelength):
         """Return the transfer at all pairs of fx (n,) and fy (m,) [cycles/m]: complex (m, n)."""
@@ -186,10 +180,6 @@ class DirectedBlur(AberrationBlur, PlaneTransfer):
     def _transfer_cache(self) -> ByteCache:
         """The last transfer by rays, which is the same at all wavelengths."""
         return ByteCache(0)
-
-    def cutoff(self, wavelength):
-        """Return the frequency from which the transfer is zero, or inf [cycles/m]."""
-        return self.lens.cutoff(wavelength)
 
     @property
     def model(self) -> tuple[DirectedBlur, int, bool]:

@@ -11,7 +11,6 @@ import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
-from functools import cached_property
 from pathlib import Path
 
 from pydantic import ValidationError
@@ -24,7 +23,7 @@ from vcam_cli.config.document import Document, place_order
 from vcam_cli.config.file_names import argument_file, current_folder, referenced_file
 from vcam_cli.config.validation_messages import yaml_text
 from vcam_cli.config.yaml_reader import read_file
-from vcam_cli.config.yaml_tree import Node, Origin, Source, places, tree_at
+from vcam_cli.config.yaml_tree import Node, Origin, PlacedKeys, Source, tree_at
 from vcam_cli.errors import BadInput, Problem, split
 from vcam_cli.sweeps.model import VARY, Sweep
 from vcam_cli.sweeps.quantities import QUALITY, symbol
@@ -73,23 +72,12 @@ class StudyCase:
 
 
 @dataclass(frozen=True)
-class StudyFile:
+class StudyFile(PlacedKeys):
     """A sweep study as it was written, and what it means."""
 
     file: Path
     tree: Node
     model: Sweep
-
-    @cached_property
-    def places(self) -> dict[errors.Path, str]:
-        """Keys of the study -> where they stand."""
-        return places(self.tree)
-
-    def locate(self, path: errors.Path) -> str:
-        """Return where a key of the study stands, "study.yaml:5:3"."""
-        while path not in self.places and path:
-            path = path[:-1]
-        return self.places.get(path, "")
 
     def mistake(self, path: errors.Path, message: str, remedy: str) -> BadInput:
         """Return the error of a key of the study."""
