@@ -138,13 +138,14 @@ class Filter:
         dtype = spectrum.dtype
         factor = self._weights_x
         below = weights * self.y.coefficient_index(terms)[1] * self.y.weights[terms]
-        below = (below * self.along_y[terms]).astype(dtype)[:, None]
+        below = below * self.along_y[terms]
         for stretch in self._stretches(terms):
             fy = self.y.frequencies[terms[stretch]]
             count = self._count(fy)
             if not count:
                 continue
-            nodes, shares = chebyshev(fy) if len(fy) >= SHORTEST else (fy, None)
+            nodes, shares = chebyshev(fy) if len(fy) >= SHORTEST else (fy, np.eye(len(fy)))
+            shares = (shares * below[stretch, None]).astype(dtype)
             values = (table.values(nodes, count) * factor[:count]).astype(dtype)
             for rows in slices_within(stretch, rows_at_once(count)):
                 planes = self._rows(spectrum, terms[rows], count)
@@ -152,14 +153,10 @@ class Filter:
                 for color in range(self.tables.colors):
                     total: NDArray | None = None
                     for plane, of_plane in zip(planes, values[:, color], strict=True):
-                        if shares is None:
-                            light = of_plane[at] * plane
-                        else:
-                            light = product(shares[at].astype(dtype), of_plane)
-                            light *= plane
+                        light = product(shares[at], of_plane)
+                        light *= plane
                         total = light if total is None else np.add(total, light, out=total)
                     assert total is not None
-                    total *= below[rows]
                     yield rows, color, total
 
     @cached_property
