@@ -3,14 +3,16 @@
 The camera file says what exists; an effect is what one of these things does to the light. Its
 kind says in mathematics what it does, and so where in the order it acts (`order.py`):
 
-    Transfer      multiplies the spectrum of the image, H(f, wavelength)    no unit
-    Gain          multiplies the signal, pixel by pixel                     no unit
-    VeilingGlare  spreads part of the light over the whole sensor           no unit
-    Charge        adds electrons                                            electrons
-    Transport     moves charge to later pixels on its way out               no unit
-    NoiseSource   adds randomness, of known variance                        electrons
-    Limit         clamps                                                    electrons
-    Quantizer     turns electrons into digital numbers                      electrons -> DN
+    Blur               multiplies the spectrum of the image, H(f, wavelength)   no unit
+    FieldTransfer      does so by another blur in every place of the field      no unit
+    SeparableTransfer  does so by a product, H_x(fx) H_y(fy)                    no unit
+    Gain               multiplies the signal, pixel by pixel                    no unit
+    VeilingGlare       spreads part of the light over the whole sensor          no unit
+    Charge             adds electrons                                           electrons
+    Transport          moves charge to later pixels on its way out              no unit
+    NoiseSource        adds randomness, of known variance                       electrons
+    Limit              clamps                                                   electrons
+    Quantizer          turns electrons into digital numbers                     electrons -> DN
 
 The last three are in `signal_chain.py`, all others here. Each effect lives in a file of its own and
 knows: whether a camera has it (`from_camera`), what it contributes (so that the plan can leave it
@@ -110,7 +112,7 @@ class Effect(ABC):
 
         Parameters
         ----------
-        outlook : SignalLevels
+        signal : SignalLevels
             What is known of the signal.
         others : sequence of Effect
             Effects that are wanted beside this one.

@@ -1,19 +1,24 @@
 """The order in which light becomes numbers. Read this first.
 
-    in                      kind          effects                          out
-    ----------------------  ------------  -------------------------------  ----------------------
-    radiance of the scene   optics        eq 2.18, no choice               photons / (s m2 m)
-    spectrum of the image   Transfer      diffraction, aberration,         electrons / s, blurred
-                                          pixel_aperture, charge_diffusion
-    electrons / s           Gain          off_axis                         electrons / s
-    electrons / s           VeilingGlare  stray_light                      electrons / s
-    electrons / s           Gain          pixel_vignetting, microlens      electrons / s
-    electrons / s           Charge        dark_current                     electrons (mean signal)
-    electrons               Transport     charge_transfer                  electrons (mean signal)
-    electrons               NoiseSource   shot_noise, fpn, reset_noise,    electrons
-                                          read_noise
-    electrons               Limit         saturation                       electrons
-    electrons               Quantizer     quantization                     DN
+    in                     kind               effects                        out
+    ---------------------  -----------------  -----------------------------  -----------------------
+    radiance of the scene  (always there)     camera equation, eq 2.18       photons / (s m2 m)
+    spectrum of the image  Blur               diffraction, aberration,       electrons / s, blurred
+                                              charge_diffusion
+    spectrum of the image  SeparableTransfer  pixel_aperture                 electrons / s, blurred
+    electrons / s          Gain               off_axis                       electrons / s
+    electrons / s          VeilingGlare       stray_light                    electrons / s
+    electrons / s          Gain               pixel_vignetting, microlens    electrons / s
+    electrons / s          Charge             dark_current                   electrons (mean signal)
+    electrons              Transport          charge_transfer                electrons (mean signal)
+    electrons              NoiseSource        shot_noise, fpn, reset_noise,  electrons
+                                              read_noise
+    electrons              Limit              saturation                     electrons
+    electrons              Quantizer          quantization                   DN
+
+Kinds are classes of `base.py` and `signal_chain.py`; an aberration that changes over the field is a
+FieldTransfer. Transfer functions multiply, so their order does not matter. Gains act on the blurred
+image: they are taken as constant over a pixel and a point spread function.
 
 Within a kind the order of this tuple is the order of action. It is written nowhere else.
 """
