@@ -68,11 +68,10 @@ def frames_a_turn(pixels: float) -> int:
 def over_yardstick(camera: Camera, repeats: int) -> tuple[Row, Frames]:
     """A camera's frames over R_compute of its own size and components, and these frames."""
     g = geometry(camera)
-    count = frames_a_turn(g.rows * g.columns)
     taken, units = Frames(camera).take(warm=True, repeats=0), []
     for _ in range(repeats):
-        units.append(yardstick(g.rows, g.columns, count))
-        taken.take(count)
+        units.append(yardstick(g.rows, g.columns, frames_a_turn(g.rows * g.columns)))
+        taken.take()
     unit = median_yardstick(units).compute(taken.components)
     return taken.cost.ratio(unit), taken
 
