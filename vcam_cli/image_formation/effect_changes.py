@@ -1,4 +1,7 @@
-"""What each transfer function does to a picture, by Parseval's theorem."""
+"""What each transfer function does to a picture, by Parseval's theorem.
+
+The plan shows it. What the plan leaves out it decides before, by bounds that know no picture.
+"""
 
 from __future__ import annotations
 

@@ -28,7 +28,8 @@ class OpticalPath:
     effects: tuple[Effect, ...]
     workers: int
     ceiling: float = np.inf
-    """Rate at which a pixel fills up, as far as it is known; brighter ones all look alike [e/s]."""
+    """Rate that fills a pixel by the end of the exposure, as far as it is known; brighter ones all
+    look alike [e/s]."""
 
     @property
     def separable(self) -> tuple[SeparableTransfer, ...]:
@@ -56,12 +57,16 @@ class OpticalPath:
 
 @dataclass(frozen=True)
 class Layer:
-    """A share of the light on the sensor; all layers together are the signal."""
+    """A part of the light on the sensor; all layers together are the signal.
+
+    An image has one, one more for each ring of a far field, and where a blur changes over the field
+    one for each of its zones or modes, whose weight is the layer's.
+    """
 
     values: Callable[[int, slice], NDArray]
     """From a color and array rows to its signal there, (rows, columns) [electrons / s]."""
     weight: Callable[[NDArray, NDArray], NDArray] | None = None
-    """A factor at the positions x (columns,), y (rows,) [m]: (rows, columns)."""
+    """A factor at the positions x (columns,), y (rows,) [m]: (rows, columns); None for 1."""
 
 
 Layers = Iterator[Layer]
@@ -75,7 +80,8 @@ class SpectrumReport:
     oversampling: float = 0.0
     """Highest frequency [pixel Nyquist]; 0 where the scene is known in closed form."""
     lost_rms: float = 0.0
-    """Estimated rms of the signal that sampling and filtering leave out [electrons / s]."""
+    """Estimated rms of the signal that a chart's cells and the end of the spectrum leave out; the
+    error of margin, mixtures and tables is not in it [electrons / s]."""
     cells: int = 0
     """Samples of one plane of the scene that were transformed; 0 where its spectrum is known."""
     is_painted: bool = False

@@ -144,7 +144,8 @@ class Rate:
     """What the linear part gives."""
 
     values: NDArray
-    """(rows, columns) of the lattice, or (C, rows, columns) with every color [electrons / s]"""
+    """(rows, columns), each pixel in its own color, or (C, rows, columns) with every color; a
+    honeycomb's have places without a pixel [electrons / s]"""
     spectrum: SpectrumReport
     """How the scene was sampled and filtered, and what each transfer function does to it."""
 

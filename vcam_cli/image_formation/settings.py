@@ -1,8 +1,9 @@
 """The settings of image formation, and what the tolerance sets them to.
 
 The tolerance T bounds rms(mean raw - converged mean raw) / full signal (camera file key
-`accuracy`). The settings below were chosen by measuring each alone on charts and pictures;
-`reference` also computes in 64 bits.
+`accuracy`). Full signal is the largest mean signal on the array, at most the full well: it depends
+on the scene and its exposure. The settings below were chosen by measuring each alone on charts and
+pictures; `reference` also computes in 64 bits.
 """
 
 from __future__ import annotations
@@ -23,7 +24,8 @@ class Settings:
     table_size: int
     """Entries of the tables over |f|."""
     mixing_tolerance: float
-    """Largest relative error of a transfer function by replacing many spectra by few."""
+    """Largest error of a transfer function by replacing many spectra by few mixtures of them,
+    relative to the largest level."""
     field_zones: int
     """Places from center to corner at which a blur that changes over the field is computed."""
     plane_steps: float
