@@ -7,8 +7,10 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from optical_paths import Leaning, aperture, of_picture, on_chart, path, sensor
+from reference_cameras import write_picture
 
 from vcam_cli import load, memory
 from vcam_cli.camera.derived.geometry import geometry
@@ -21,6 +23,7 @@ from vcam_cli.image_formation.transfer_tables import TableSize
 from vcam_cli.scenes.siemens_star import SiemensStar
 from vcam_cli.simulation.simulate import simulate
 
+FEW = ["array.rows=24", "array.columns=32", "quality=[]"]
 SMALL = ["array.rows=24", "array.columns=32", "quality=[]", "accuracy=draft"]
 LARGE = ["array.rows=1200", "array.columns=1600"]
 LARGER = ["array.rows=2000", "array.columns=3000"]
@@ -66,8 +69,21 @@ CAMERAS = {
     "strong coma": ("colorchecker-d65", [*SMALL, STRONG_COMA]),
     "a field": ("colorchecker-d65", [*LARGER, OVER_THE_FIELD]),
     "64 bits": ("colorchecker-d65", [*LARGE, STAR, "accuracy=reference"]),
+    "a wide margin": ("colorchecker-d65", [*FEW, STAR, "accuracy=reference"]),
+    "a margin as wide as the array": (
+        "colorchecker-d65",
+        ["array.rows=400", "array.columns=500", "quality=[]", STAR, "accuracy=reference"],
+    ),
+    "rectangles in a wide margin": ("colorchecker-d65", [*FEW, "accuracy=reference"]),
+    "leaves on few pixels": ("still-life", FEW),
 }
-QUICK = ("rectangles", "a painted chart")
+QUICK = ("rectangles", "a painted chart", "a wide margin")
+PICTURES = {
+    "as large as the array": ((1200, 1600), 0.0),
+    "of another size": ((1000, 1400), 0.0),
+    "with a lamp": ((1000, 1400), 3e6),
+}
+"""Their samples, and the brightness of a lamp in them, for which numbers have 64 bits."""
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="peaks of processes are read as on POSIX")
@@ -77,6 +93,20 @@ QUICK = ("rectangles", "a painted chart")
 def test_a_process_takes_no_more_than_estimated(name):
     """And not much less: what does not fit by the estimate would hardly have fitted."""
     estimated, peak = measured(*CAMERAS[name])
+    assert peak <= estimated <= 2.5 * peak, (estimated, peak)
+
+
+@pytest.mark.long
+@pytest.mark.skipif(sys.platform == "win32", reason="peaks of processes are read as on POSIX")
+@pytest.mark.parametrize("name", PICTURES)
+def test_pictures_take_no_more_than_estimated(name, tmp_path):
+    shape, lamp = PICTURES[name]
+    picture = np.random.default_rng(5).random((*shape, 3)).astype(np.float32)
+    if lamp:
+        picture[300:325, 400:435] = lamp
+    file = write_picture(tmp_path, picture)
+    source = f"scene.source={{kind: image, file: {file}, encoding: linear, model: mallett}}"
+    estimated, peak = measured("colorchecker-d65", [*LARGE, source, "quality=[]"])
     assert peak <= estimated <= 2.5 * peak, (estimated, peak)
 
 
@@ -112,6 +142,15 @@ def test_charts_that_do_not_fit_are_not_painted(monkeypatch):
         simulate(load("colorchecker-d65", [*SMALL, "optics.diffraction=false"]))
 
 
+def test_memory_is_asked_for_once_with_the_largest_part(monkeypatch):
+    """Near field and rings of a wide margin: nothing is asked for while they are computed."""
+    asked = []
+    monkeypatch.setattr(memory, "require", lambda needed, rows, columns: asked.append(needed))
+    found = simulate(load("colorchecker-d65", [*FEW, STAR, "accuracy=reference"]))
+    assert len(asked) == 2  # the frame without its scene, and the image
+    assert asked[1] == found.frame.spectrum.memory == found.frame.plan.memory_bytes
+
+
 def test_more_pixels_need_more():
     camera = load("colorchecker-d65", SMALL)
     few, many = (
@@ -142,7 +181,7 @@ def test_an_image_needs_more_for_planes_cells_and_directions():
     scene = on_chart(optical_path, SiemensStar(9, 1.0), margin=20)
 
     def needed(optical_path=optical_path, scene=scene, planes=1):
-        return memory_model.image_bytes(optical_path, scene, planes, size)
+        return memory_model.image_bytes(optical_path, scene, 2.0, planes, size)
 
     least = needed()
     shape = 2 * scene.shape[0], 2 * scene.shape[1]
@@ -161,7 +200,7 @@ def test_tables_of_strong_blurs_are_as_large_as_they_get():
     strong, absurd = (
         path(g, Diffraction(2.0, 0.0), Leaning(reach, 0, 1e-6, 1e-6)) for reach in (1e-3, 1.0)
     )
-    needed = [memory_model.image_bytes(p, scene, 1, size) for p in (strong, absurd)]
+    needed = [memory_model.image_bytes(p, scene, 2.0, 1, size) for p in (strong, absurd)]
     assert needed[0] == needed[1] < 2e9
 
 
@@ -170,7 +209,7 @@ def test_the_estimate_of_a_picture_counts_its_samples():
     optical_path = path(g, Diffraction(2.0, 0.0))
     size = table_size(optical_path, 2.0)
     few, many = (
-        memory_model.image_bytes(optical_path, of_picture([[0.5] * n] * n, 1e-6), 1, size)
+        memory_model.image_bytes(optical_path, of_picture([[0.5] * n] * n, 1e-6), 2.0, 1, size)
         for n in (400, 800)
     )
     assert many - few >= (800**2 - 400**2) * 4

@@ -501,3 +501,16 @@ class TestColorsOfTheContrastChart:
         # Contrast 1, phases 0 and pi: all of the first color, then all of the second.
         np.testing.assert_allclose(of_each[:, 0], [[1, 0], [0, 1]], atol=1e-9)
         np.testing.assert_allclose(chart.values(x, -y, np.eye(2)), 0.5)
+
+
+@pytest.mark.parametrize("source", [CSF, EDGE, CHECKER, LEAVES, PATCHES])
+def test_mean_and_rms_are_those_of_fine_cells(source):
+    """From points, within a tenth: what is told by them is factors apart."""
+    seen = view(rows=12, columns=16)
+    chart = sampled(source, margin=1, oversampling=20)
+    mix = mix_of(chart)
+    planes = chart.planes(mix)
+    inside = planes[:, 20:-20, 20:-20]
+    mean, rms = chart.mean_and_rms(mix, (seen.width, seen.height))
+    np.testing.assert_allclose(mean, inside.mean(axis=(1, 2)), rtol=0.1)
+    np.testing.assert_allclose(rms, np.sqrt(np.square(planes).mean(axis=(1, 2))), rtol=0.1)

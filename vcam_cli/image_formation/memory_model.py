@@ -6,9 +6,12 @@ One sum of what is held at once at the worst moment; a test compares it with mea
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.effects.base import PlaneTransfer, of_kind
+from vcam_cli.image_formation.bandwidth import axes
+from vcam_cli.image_formation.far_field import FarPart
 from vcam_cli.image_formation.optical_path import OpticalPath
 from vcam_cli.image_formation.settings import Settings
 from vcam_cli.image_formation.transfer_tables import (
@@ -29,8 +32,17 @@ WORK = 24_000_000
 """Temporary arrays of one thread [bytes]."""
 
 
-def image_bytes(path: OpticalPath, scene: SampledScene, planes: int, size: TableSize) -> int:
+def image_bytes(
+    path: OpticalPath,
+    scene: SampledScene,
+    highest: float,
+    planes: int,
+    size: TableSize,
+    rings: Sequence[FarPart] = (),
+) -> int:
     """Return the memory of an image through the cosine spectrum.
+
+    The scene and the rings around it are computed one after the other.
 
     Parameters
     ----------
@@ -38,25 +50,23 @@ def image_bytes(path: OpticalPath, scene: SampledScene, planes: int, size: Table
         Lens, pixels and settings.
     scene : SampledScene
         The scene on its grid.
+    highest : float
+        Frequency beyond which nothing counts [pixel Nyquist].
     planes : int
         Number of mixtures of the scene's components.
     size : TableSize
         Size of the tables.
+    rings : sequence of FarPart
+        Rings around a near field.
 
     Returns
     -------
     int
         Bytes, at least those measured.
     """
-    g, width = path.geometry, path.settings.float_width // 8
-    colors, pixels = len(path.mosaic.colors), g.rows * g.columns
-    rectangles = isinstance(scene, ChartScene) and scene.chart.edges() is not None
-    samples = 4 * pixels if rectangles else math.prod(scene.shape) * planes
-    # A scene is wider than the array by its margin, which is folded and evaluated too.
-    area = scene.shape[0] * scene.pitch_y * scene.shape[1] * scene.pitch_x
-    wide = max(pixels, round(area / (g.pitch_x * g.pitch_y)))
+    g, width, colors = path.geometry, path.settings.float_width // 8, len(path.mosaic.colors)
     waves = (2 if g.collecting_x else 1) * (2 if g.collecting_y else 1)
-    tables, modes = 0, 0
+    tables = 0
     directed = (*path.transfer.plane_blurs, *of_kind([z.blur for z in path.zones], PlaneTransfer))
     if directed:
         waves = 4
@@ -65,11 +75,25 @@ def image_bytes(path: OpticalPath, scene: SampledScene, planes: int, size: Table
         per_table = entries**2 * planes * colors * len(PARITIES)
         count = len(path.transfer.with_half_the_wavelengths().wavelengths)
         tables = 8 * per_table * (3 + zones) + count * 2 * entries**2 * 24 + PUPIL_GRIDS
-    if path.zones:
-        modes = 2 * wide * colors * width
-    folded = waves * wide * colors * width + modes
-    held = samples * width + folded + pixels * width + tables
+    series = colors * (waves + (2 if path.zones else 0))
+    near = width * _values(path, scene, highest, planes, series)
+    far = [8 * _values(path, part.scene, highest, planes, series) for part in rings]
+    held = max([near, *far]) + g.rows * g.columns * width + tables
     return BASE + round(SLACK * held) + WORK * path.workers
+
+
+def _values(
+    path: OpticalPath, scene: SampledScene, highest: float, planes: int, series: int
+) -> int:
+    """Numbers that a scene's spectrum takes, and so many series for the pixels.
+
+    Where folding is exact a series has as many terms as the scene has pixels, its margin included.
+    """
+    g, (x, y) = path.geometry, axes(path, scene, highest)
+    rectangles = isinstance(scene, ChartScene) and scene.chart.edges() is not None
+    samples = 4 * g.rows * g.columns if rectangles else math.prod(scene.shape) * planes
+    evaluated = g.rows * x.folded_terms if y.virtual_pixels is None else 0
+    return samples + series * (y.folded_terms * x.folded_terms + evaluated)
 
 
 def box_average_bytes(samples: int, planes: int, geometry: Geometry, knobs: Settings) -> int:

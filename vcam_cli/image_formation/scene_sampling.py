@@ -24,7 +24,7 @@ from vcam_cli.image_formation.transfer_tables import Mixing, Tables, bounding_ta
 from vcam_cli.scenes.base import ChartScene, SampledScene
 
 SINGLE = 5e-7
-"""Error of transforms of 32-bit numbers, relative to the brightest sample."""
+"""Rms error of transforms of 32-bit numbers, relative to the rms of what is transformed."""
 SINGLE_SHARE = 0.1
 """Part of the tolerance that it may use: else numbers have 64 bits."""
 WIDE = 1.5
@@ -72,6 +72,19 @@ class SampledImage:
         return float(np.sqrt(self.density * total))
 
 
+def with_sufficient_precision(path: OpticalPath, scene: SampledScene) -> OpticalPath:
+    """Return the path, in 64 bits where 32 would take more than their share of the tolerance.
+
+    Full signal is at least the mean over the array, or the ceiling.
+    """
+    g, knobs = path.geometry, path.settings
+    mean, rms = scene.mean_and_rms(path.transfer.level.T, (g.sensor_width, g.sensor_height))
+    full = min(float(mean.max()), path.ceiling)
+    if float(rms.max()) * SINGLE <= SINGLE_SHARE * knobs.tolerance * full:
+        return path
+    return replace(path, settings=replace(knobs, float_width=64))
+
+
 def sampled_image(
     path: OpticalPath, scene: SampledScene, highest: float, mixing: Mixing
 ) -> SampledImage:
@@ -102,9 +115,6 @@ def sampled_image(
     scene, spectrum, peak = _scene_spectrum(path, scene, highest, mixing[0])
     x, y = axes(path, scene, highest)
     full = min(brightest_mean(spectrum, x, y, tables, path.separable), path.ceiling)
-    if spectrum.dtype == np.float32 and peak * SINGLE > SINGLE_SHARE * knobs.tolerance * full:
-        doubled = replace(path, settings=replace(knobs, float_width=64))
-        scene, spectrum, _ = _scene_spectrum(doubled, scene, highest, mixing[0])
     power = power_spectrum(spectrum, x, y, path.separable, path.workers)
     lens_power = power.lens_power(tables)
     directed = exact.plane_blurs or path.zones

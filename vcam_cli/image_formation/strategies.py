@@ -30,7 +30,7 @@ from vcam_cli.image_formation.harmonic_scenes import (
     wave_layers,
 )
 from vcam_cli.image_formation.optical_path import Layer, Layers, OpticalPath, SpectrumReport
-from vcam_cli.image_formation.scene_sampling import sampled_image
+from vcam_cli.image_formation.scene_sampling import sampled_image, with_sufficient_precision
 from vcam_cli.image_formation.scene_spectrum import SceneSpectrum
 from vcam_cli.image_formation.transfer_tables import Tables, mixtures, tabulate
 from vcam_cli.scenes.base import ChartScene, HarmonicScene, SampledScene, Scene
@@ -122,11 +122,12 @@ def _spectral_layers(
     `highest` is the frequency beyond which nothing counts [pixel Nyquist], `error` the rms that the
     cells leave [e/s].
     """
+    path = with_sufficient_precision(path, scene)
     exact, g, zones = path.transfer, path.geometry, path.zones
     is_painted = isinstance(scene, ChartScene) and scene.chart.edges() is None
     size = table_size(path, highest)
     mixing = field_mixtures(exact, zones, size) if zones else mixtures([exact], size)
-    needed = memory_model.image_bytes(path, scene, len(mixing[0]), size)
+    needed = memory_model.image_bytes(path, scene, highest, len(mixing[0]), size, rings)
     memory.require(needed, g.rows, g.columns)
     image = sampled_image(path, scene, highest, mixing)
     size = table_size(path, image.highest)

@@ -20,7 +20,7 @@ from typing import Any, Literal, Protocol
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from vcam_cli.scenes.cells import cell_edges, clip_cells, edges_within
+from vcam_cli.scenes.cells import cell_edges, clip_cells, edges_within, uneven_points
 from vcam_cli.scenes.waves import WaveScene
 from vcam_cli.spectra import Spectrum
 
@@ -169,6 +169,13 @@ class SampledScene(ABC):
             Values (R, m, n).
         """
 
+    @abstractmethod
+    def mean_and_rms(self, mix: Array, size: tuple[float, float]) -> tuple[Array, Array]:
+        """Return the mean of sum_k mix[r, k] B_k over a centered rectangle, and an rms: (R,) each.
+
+        The rectangle's size is its width and height [m]; the rms is that over the grid, at least.
+        """
+
     def rectangles(self, mix: Array) -> "Rectangles | None":
         """Return the whole grid's area as even rectangles; None where it is not made of them."""
         return None
@@ -278,6 +285,14 @@ class ChartScene(SampledScene):
         paint_by_bands(paint, ny, nx, workers)
         return out
 
+    def mean_and_rms(self, mix: Array, size: tuple[float, float]) -> tuple[Array, Array]:
+        """Return the mean over a centered rectangle and the rms over the grid, from points."""
+        inside, everywhere = (
+            self.values_at(uneven_points(width), uneven_points(height), mix).astype(np.float64)
+            for width, height in (size, self.extent)
+        )
+        return inside.mean(axis=(1, 2)), np.sqrt(np.square(everywhere).mean(axis=(1, 2)))
+
     def rectangles(self, mix: Array) -> Rectangles | None:
         """Return the grid's area as even rectangles, of a chart that is made of them."""
         edges = self.chart.edges()
@@ -334,15 +349,6 @@ def chart_scene(
 
 Scene = WaveScene | HarmonicScene | SampledScene
 """Whatever stands before the lens."""
-
-
-def fills(view: View) -> bool:
-    """Return whether the chart's frame covers array and margin, so that no black edge is seen."""
-    if view.scene_width is None:
-        return True
-    width = (view.columns + 2 * view.margin) * view.pitch_x
-    height = (view.rows + 2 * view.margin) * view.pitch_y
-    return view.frame.width >= width and view.frame.height >= height
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,6 @@ from vcam_cli.scenes.base import (
     Scene,
     View,
     chart_scene,
-    fills,
 )
 from vcam_cli.scenes.csf import Csf
 from vcam_cli.scenes.hyperspectral import Cube, cube_scene
@@ -80,13 +79,13 @@ def build(
     white = light.white_radiance(scene)
     waves = _waves(source)
     if waves is not None:
-        if fills(view):
+        if _fills(view):
             return WaveScene((white,), waves, white)
         return chart_scene(WaveChart(waves), (white,), white, view)
     chart, reflectances = _chart(source, view)
     spectra = tuple(white.multiply(r) for r in reflectances)
     sampled = chart_scene(chart, spectra, white, view)
-    if isinstance(chart, PointGrid) and fills(view):
+    if isinstance(chart, PointGrid) and _fills(view):
         return HarmonicScene(spectra, chart, white, sampled)
     return sampled
 
@@ -187,3 +186,12 @@ def _wrong_channels(model: str, given: int, needed: int) -> BadInput:
         f"{model} needs {needed}",
         remedy,
     )
+
+
+def _fills(view: View) -> bool:
+    """Return whether the chart's frame covers array and margin, so that no black edge is seen."""
+    if view.scene_width is None:
+        return True
+    width = (view.columns + 2 * view.margin) * view.pitch_x
+    height = (view.rows + 2 * view.margin) * view.pitch_y
+    return view.frame.width >= width and view.frame.height >= height

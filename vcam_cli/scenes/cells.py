@@ -7,10 +7,21 @@ from numpy.typing import NDArray
 
 Array = NDArray[Any]
 
+POINTS = 96
+"""Points along each side of a chart that is looked at."""
+GOLDEN = 0.6180339887498949
+"""Inverse golden ratio, which no fraction of small numbers comes near."""
+
 
 def cell_edges(count: int, pitch: float) -> Array:
     """Return the count + 1 edges of cells centered on 0 [m]."""
     return (np.arange(count + 1) - count / 2) * pitch
+
+
+def uneven_points(length: float) -> Array:
+    """Return points over a centered length, rising, whose steps share no factor with it [m]."""
+    k = np.arange(POINTS)
+    return ((k + k * GOLDEN % 1) / POINTS - 0.5) * length
 
 
 def clip_cells(edges: Array, half: float) -> tuple[slice, Array, Array]:

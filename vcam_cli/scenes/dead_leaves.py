@@ -25,7 +25,7 @@ from functools import lru_cache
 import numpy as np
 
 from vcam_cli.scenes import discs
-from vcam_cli.scenes.base import CELLS_A_BAND, Array, Chart, Frame, paint_by_bands
+from vcam_cli.scenes.base import Array, Chart, Frame
 from vcam_cli.scenes.cells import cell_edges
 from vcam_cli.scenes.disc_edges import Discs
 from vcam_cli.scenes.discs import Cells
@@ -40,6 +40,8 @@ PERIOD = 1.5
 FINEST = 1000
 """Cells a side that are painted directly, at least. Where many leaves share a cell, telling which
 is seen where takes time and gigabytes: larger cells are divided."""
+AT_ONCE = 1 << 18
+"""Cells that are painted at once where many leaves are seen: bounds the memory of temporaries."""
 SUMMED, SUMMED_FAR = 32, 4
 """Parts along each side of a cell from which on its average is read from sums over one period, of
 cells within and beyond one. Their edges then fall between those of the parts: of white, an rms of
@@ -200,7 +202,17 @@ class DeadLeaves(Chart):
 
     def values(self, x: Array, y: Array, mix: Array) -> Array:
         """Return the values at points."""
-        return self._placed_leaves(x, y).values(x, y, mix)
+        (x, x_order), (y, y_order) = (self._fold_onto_period(np.asarray(at)) for at in (x, y))
+        found = self._placed_leaves(x, y).values(x, y, mix)
+        return found[:, y_order][:, :, x_order]
+
+    def _fold_onto_period(self, at: Array) -> tuple[Array, Array]:
+        """Return points on one period, rising, and the indices that bring them back to order."""
+        length = PERIOD * self.unit
+        if len(at) and at[-1] - at[0] > length:
+            at = (at + length / 2) % length - length / 2
+        order = np.argsort(at, kind="stable")
+        return at[order], np.argsort(order)
 
     def _parts(self, x_edges: Array, y_edges: Array) -> int:
         """Return into how many parts along each side cells are divided."""
@@ -212,7 +224,7 @@ class DeadLeaves(Chart):
     ) -> None:
         """Write the averages over the cells into `out`, painted in bands of their parts."""
         x, (rows, columns) = _divided(x_edges, parts), out.shape[1:]
-        band = max(1, CELLS_A_BAND // (parts**2 * columns))
+        band = max(1, AT_ONCE // (parts**2 * columns))
         for top in range(0, rows, band):
             cells = out[:, top : top + band]
             y = _divided(y_edges[top : top + band + 1], parts)
@@ -240,11 +252,10 @@ def _period_cells(seed: int, mix: tuple[tuple[float, ...], ...], dtype: np.dtype
     out = np.empty((len(mix), count, count), dtype)
     leaves = DeadLeaves(seed, 1.0).crop_to_cells(edges, edges)
 
-    def paint(rows: slice) -> None:
-        y = edges[rows.start : rows.stop + 1]
-        leaves.paint(edges, y, np.array(mix, dtype), out[:, rows])
-
-    paint_by_bands(paint, count, count, 1)
+    band = AT_ONCE // count
+    for top in range(0, count, band):
+        rows = out[:, top : top + band]
+        leaves.paint(edges, edges[top : top + band + 1], np.array(mix, dtype), rows)
     return out
 
 

@@ -82,7 +82,7 @@ class CubeScene(ImageScene):
         """
         height, width, bands = self.picture.shape
         down, across = self.black
-        weights = np.asarray(mix / self.units, self.dtype).T
+        weights = self._channel_weights(mix).astype(self.dtype).T
         out = np.zeros((len(mix), *self.shape), self.dtype)
         inside = out[:, down : down + height, across : across + width]
 
@@ -92,6 +92,10 @@ class CubeScene(ImageScene):
 
         paint_by_bands(paint, height, width, workers)
         return out
+
+    def _channel_weights(self, mix: Array) -> Array:
+        """Return what the bands count in combinations of the components (R, K)."""
+        return np.asarray(mix / self.units, float)
 
     def values_at(self, x: Array, y: Array, mix: Array) -> Array:
         """Return the values at points."""

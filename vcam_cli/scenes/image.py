@@ -13,6 +13,8 @@ import numpy as np
 from vcam_cli.scenes.base import Array, SampledScene, View, paint_by_bands
 from vcam_cli.spectra import Spectrum
 
+ROWS = 64
+"""Rows of samples that are summed at once."""
 SLIVER = 1e-6
 """Part of a sample below which it counts as a rounding error and not as a sample."""
 
@@ -71,6 +73,12 @@ def _surplus_samples(samples: int, needed: float) -> int:
     return min(math.floor((samples - needed) / 2 + SLIVER), (samples - 1) // 2)
 
 
+def _centered(count: int, needed: float) -> slice:
+    """Return the samples in the middle of so many that a length of some of them reaches."""
+    start = max(math.floor((count - needed) / 2 + SLIVER), 0)
+    return slice(min(start, (count - 1) // 2), max(count - start, count // 2 + 1))
+
+
 @dataclass(frozen=True)
 class ImageScene(SampledScene):
     """A picture on the sensor plane, linear, where 1 is the scene's white."""
@@ -104,6 +112,34 @@ class ImageScene(SampledScene):
         light = light * np.outer(lit_rows, lit_columns)[:, :, None]
         mixed = np.asarray(mix, self.dtype) @ light.reshape(-1, light.shape[2]).T
         return np.asarray(mixed.reshape(len(mix), len(rows), len(columns)))
+
+    def mean_and_rms(self, mix: Array, size: tuple[float, float]) -> tuple[Array, Array]:
+        """Return the mean over a centered rectangle and an rms over the grid, of all samples.
+
+        The rms is at least the true one: that of channels of which each is bright where all are.
+        """
+        weights = self._channel_weights(mix)
+        rows, columns = (
+            _centered(count, length / pitch)
+            for count, length, pitch in zip(
+                self.picture.shape, size[::-1], (self.pitch_y, self.pitch_x), strict=False
+            )
+        )
+        area = math.prod(size) / (self.pitch_x * self.pitch_y)
+        inside = self.picture[rows, columns]
+        total, squares = np.zeros(self.picture.shape[2]), 0.0
+        for top in range(0, len(inside), ROWS):
+            block = inside[top : top + ROWS].reshape(-1, len(total))
+            total += np.ones(len(block), block.dtype) @ block
+        for top in range(0, len(self.picture), ROWS):
+            samples = self.picture[top : top + ROWS].ravel()
+            squares += float(samples @ samples)
+        mean = weights @ total / max(area, inside.shape[0] * inside.shape[1])
+        return mean, np.linalg.norm(weights, axis=1) * math.sqrt(squares / math.prod(self.shape))
+
+    def _channel_weights(self, mix: Array) -> Array:
+        """Return what the file's channels count in combinations of the components (R, K)."""
+        return np.asarray(mix, float)
 
     def _samples_at(self, position: Array, pitch: float, axis: int) -> tuple[Array, Array]:
         """Return the index into the picture along an axis, and 1 where it has a sample, else 0."""
