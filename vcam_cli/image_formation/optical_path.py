@@ -59,8 +59,8 @@ class OpticalPath:
 class Layer:
     """A part of the light on the sensor; all layers together are the signal.
 
-    An image has one, one more for each ring of a far field, and where a blur changes over the field
-    one for each of its zones or modes, whose weight is the layer's.
+    An image has one. A blur that changes over the field makes it one for each zone, or adds one for
+    each mode; their weights are the layers'. Each ring of a far field adds twice as many.
     """
 
     values: Callable[[int, slice], NDArray]
