@@ -1,7 +1,8 @@
 """From a scene to the signal of its pixels: each scene by the plainest computation that suits it.
 
-- Waves and patterns that repeat: each harmonic has its transfer. Exact (`harmonic_scenes.py`).
-- No blur before the photodetectors: means over their areas. Exact (`box_average.py`).
+- Sinusoids, and patterns that repeat whose harmonics up to the cut-off are few enough to be summed:
+  each has its transfer. Exact (`harmonic_scenes.py`).
+- No blur in the lens or in the silicon: means over the photodetectors. Exact (`box_average.py`).
 - Everything else: the cosine spectrum, multiplied by the transfer function and folded onto the
   pixels, as finely as the tolerance asks (`bandwidth.py`, `chart_cells.py`).
 """
