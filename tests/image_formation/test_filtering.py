@@ -33,7 +33,7 @@ def tables(components, colors, top, size=4001):
 def filter_of(x, y, table, along_x=None, along_y=None):
     """A filter as the engine makes it, of blurs without a phase."""
     along = [np.ones(a.terms) if f is None else f for a, f in ((x, along_x), (y, along_y))]
-    return Filter(x, y, table, *along, smooth=table.top / SMOOTH)
+    return Filter(x, y, table, *along, cubic_range=table.top / SMOOTH)
 
 
 def dense(planes, x, y, table, along_x, along_y):

@@ -140,7 +140,7 @@ def test_mean_squares_are_those_of_the_picture():
     tables = lens(np.exp(-2 * (np.linspace(0, 2.5, 4001)[None, None]) ** 2), 3.6 * NYQUIST)
     spectrum = transform_planes(plane.copy(), 1)
     fine = [replace(a, pixels=3 * a.pixels, pixel_pitch=PITCH / 3, first=PITCH / 6) for a in (x, y)]
-    filter = Filter(*fine, tables, *(np.ones(a.terms) for a in fine), smooth=tables.top / 64)
+    filter = Filter(*fine, tables, *(np.ones(a.terms) for a in fine), cubic_range=tables.top / 64)
     picture = filter.apply(spectrum, 1).signal(0, slice(None))
     power = power_spectrum(spectrum, x, y, (), 1).filtered_power(tables)
     assert power.sum() == pytest.approx(np.mean(picture**2), rel=0.01)

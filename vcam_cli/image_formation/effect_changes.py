@@ -75,9 +75,9 @@ def _directional_tables(path: OpticalPath, tables: Tables) -> Tables:
     """Return what a blur with a direction, or the mean of one that changes over the field, adds."""
     if any(plane is not None for plane in tables.planes) or tables.radial is None:
         return replace(tables, radial=None)
-    alone = path.transfer.with_mixtures(tables.mix)
+    uniform_transfer = path.transfer.with_mixtures(tables.mix)
     size = TableSize(tables.top, tables.radial.shape[-1], 0.0, 0.0)
-    return replace(tables, radial=tables.radial - radial_table(alone, size))
+    return replace(tables, radial=tables.radial - radial_table(uniform_transfer, size))
 
 
 def needed_modes(

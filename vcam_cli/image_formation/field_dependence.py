@@ -81,12 +81,12 @@ class Mode:
     map: Map
 
 
-def field_mixtures(alone: Transfer, zones: Sequence[Zone], size: TableSize) -> Mixing:
+def field_mixtures(uniform_transfer: Transfer, zones: Sequence[Zone], size: TableSize) -> Mixing:
     """Return the fewest mixtures of the components that serve all zones.
 
     Parameters
     ----------
-    alone : Transfer
+    uniform_transfer : Transfer
         Transfer without the blur that has zones.
     zones : sequence of Zone
         Zones of the blur.
@@ -98,21 +98,27 @@ def field_mixtures(alone: Transfer, zones: Sequence[Zone], size: TableSize) -> M
     Mixing
         Mixtures, and the error that they leave.
     """
-    return mixtures(_zone_transfers(alone, zones)[:: max(1, len(zones) // 6)], size)
+    return mixtures(_zone_transfers(uniform_transfer, zones)[:: max(1, len(zones) // 6)], size)
 
 
-def _zone_transfers(alone: Transfer, zones: Sequence[Zone]) -> list[Transfer]:
-    return [replace(alone, effects=(*alone.effects, zone.blur)) for zone in zones]
+def _zone_transfers(uniform_transfer: Transfer, zones: Sequence[Zone]) -> list[Transfer]:
+    return [
+        replace(uniform_transfer, effects=(*uniform_transfer.effects, zone.blur)) for zone in zones
+    ]
 
 
 def tabulate_field(
-    alone: Transfer, zones: Sequence[Zone], geometry: Geometry, size: TableSize, mixing: Mixing
+    uniform_transfer: Transfer,
+    zones: Sequence[Zone],
+    geometry: Geometry,
+    size: TableSize,
+    mixing: Mixing,
 ) -> tuple[Tables, tuple[Mode, ...]]:
     """Return the mean transfer function of all zones, and what differs from it by place.
 
     Parameters
     ----------
-    alone : Transfer
+    uniform_transfer : Transfer
         Transfer without the blur that has zones.
     zones : sequence of Zone
         Zones of the blur.
@@ -135,18 +141,18 @@ def tabulate_field(
     T. R. Lauer, Proc. SPIE 4847, 2002 (eigen-images of point spread functions).
     """
     mix, error = mixing
-    alone = alone.with_mixtures(mix)
-    base = radial_table(alone, size)
+    uniform_transfer = uniform_transfer.with_mixtures(mix)
+    base = radial_table(uniform_transfer, size)
     blurs = [zone.blur for zone in zones]
     directed = bool(of_kind(blurs, PlaneTransfer))
     if directed:
-        stack = _stack_planes(alone, blurs, size)
+        stack = _stack_planes(uniform_transfer, blurs, size)
     else:
-        each = [radial_table(t, size)[None] for t in _zone_transfers(alone, zones)]
+        each = [radial_table(t, size)[None] for t in _zone_transfers(uniform_transfer, zones)]
         stack = Stack(each, [(i, 0, False) for i in range(len(each))])
-    level = np.abs(alone.level).max() or 1.0
-    importance = _importance(stack.tables[0].shape, directed) / alone.weights.shape[1]
-    shares, left = _shares(stack, importance, size.tolerance * level)
+    level = np.abs(uniform_transfer.level).max() or 1.0
+    power = _expected_power(stack.tables[0].shape, directed) / uniform_transfer.weights.shape[1]
+    shares, left = _shares(stack, power, size.tolerance * level)
     maps = _maps(zones, geometry)
     weights = np.array([m.values for m in maps])
     error += left / level
@@ -167,7 +173,7 @@ def tabulate_field(
     if not directed:
         return Tables(mix, means[0], size.top, error), modes
     small = SMALL * size.tolerance * level
-    planes = (mean if _rms(mean, importance) > small else None for mean in means)
+    planes = (mean if _rms(mean, power) > small else None for mean in means)
     return Tables(mix, base, size.top, error, tuple(planes)), modes
 
 
@@ -202,13 +208,13 @@ class Stack:
         return turn_table(self.tables[model][at], parity, quarters, mirrored)
 
 
-def _stack_planes(alone: Transfer, blurs: Sequence[Blur], size: TableSize) -> Stack:
+def _stack_planes(uniform_transfer: Transfer, blurs: Sequence[Blur], size: TableSize) -> Stack:
     """Return what the zones' blurs add to the transfer.
 
     Those that are others turned are computed once.
     """
     directed = of_kind(blurs, PlaneTransfer)
-    grid = plane_grid(alone, size.top, size.plane_entries(directed, LARGEST_OF_FIELD))
+    grid = plane_grid(uniform_transfer, size.top, size.plane_entries(directed, LARGEST_OF_FIELD))
     models = [blur.model for blur in blurs]
     known = list(dict.fromkeys(blur for blur, _, _ in models))
     return Stack(
@@ -218,12 +224,12 @@ def _stack_planes(alone: Transfer, blurs: Sequence[Blur], size: TableSize) -> St
 
 
 def _shares(
-    stack: Stack, importance: NDArray, allowed: float
+    stack: Stack, power: NDArray, allowed: float
 ) -> tuple[list[tuple[int, NDArray]], float]:
     """Return the modes, strongest first, and the error of what is left.
 
     A mode is its parity, and its share in each zone. The error of a zone is the rms of its tables',
-    each entry as important as its frequency, in the mean over colors. Singular vectors come from
+    each entry weighed by its expected power, in the mean over colors. Singular vectors come from
     the zones' products with each other, of which there are few; by parity, so that a mode has only
     one.
     """
@@ -232,7 +238,7 @@ def _shares(
         products = np.zeros((len(left), len(left)))
         for at in np.ndindex(stack.tables[0].shape[1:3]):
             rows = stack.rows(parity, at)
-            rows = ((rows - rows.mean(axis=0)) * np.sqrt(importance)).reshape(len(left), -1)
+            rows = ((rows - rows.mean(axis=0)) * np.sqrt(power)).reshape(len(left), -1)
             products += rows @ rows.T
         left += np.diag(products)
         strengths, vectors = np.linalg.eigh(products)
@@ -246,12 +252,12 @@ def _shares(
     return [mode[1:] for mode in found], 0.0
 
 
-def _rms(table: NDArray, importance: NDArray) -> float:
+def _rms(table: NDArray, power: NDArray) -> float:
     """Return what a table adds to a picture, relative to the light that it is for."""
-    return float(np.sqrt((table**2 * importance).sum()))
+    return float(np.sqrt((table**2 * power).sum()))
 
 
-def _importance(shape: tuple[int, ...], directed: bool) -> NDArray:
+def _expected_power(shape: tuple[int, ...], directed: bool) -> NDArray:
     """Return how much of a picture's variance lies at each entry of a table.
 
     It is as much in each octave: its power falls with the square of the frequency (D. L. Ruderman,

@@ -61,7 +61,7 @@ class Filter:
     along_x: NDArray
     """Separable transfer along x at every term of the axis, without unit."""
     along_y: NDArray
-    smooth: float
+    cubic_range: float
     """Frequency range over which the tables are a cubic [cycles/m]."""
 
     def apply(self, spectrum: SceneSpectrum, workers: int) -> Series:
@@ -165,7 +165,7 @@ class Filter:
 
     def _stretches(self, terms: NDArray) -> Iterator[slice]:
         """Yield consecutive rows over which the tables are a cubic in fy."""
-        widest = min(LONGEST, int(self.smooth * 2 * self.y.length))
+        widest = min(LONGEST, int(self.cubic_range * 2 * self.y.length))
         start, count = 0, len(terms)
         rising = count < 2 or terms[1] > terms[0]
         while start < count:

@@ -189,15 +189,15 @@ def bounding_tables(exact: Transfer, size: TableSize, mixing: Mixing) -> Tables:
     It is as if no light canceled.
     """
     mixed = exact.with_mixtures(mixing[0])
-    alone = replace(mixed.with_effects(mixed.radial_blurs), weights=np.abs(mixed.weights))
-    return Tables(mixing[0], radial_table(alone, size), size.top, mixing[1])
+    bound = replace(mixed.with_effects(mixed.radial_blurs), weights=np.abs(mixed.weights))
+    return Tables(mixing[0], radial_table(bound, size), size.top, mixing[1])
 
 
 @dataclass(frozen=True, eq=False)
 class PlaneGrid:
     """Frequencies at which blurs with a direction are computed, and the radial part there."""
 
-    alone: Transfer
+    radial_transfer: Transfer
     """The radial part at every second wavelength: what is added to it is small."""
     frequency: NDArray
     """(m,) from 0 [cycles/m]."""
@@ -220,13 +220,13 @@ class PlaneGrid:
         m = len(self.frequency)
         fy = np.concatenate([self.frequency, -self.frequency])
         change = np.empty(self.radial.shape, np.complex128)
-        wavelengths = self.alone.wavelengths
+        wavelengths = self.radial_transfer.wavelengths
         for part, radial, wavelength in zip(change, self.radial, wavelengths, strict=True):
             otf = np.ones(part.shape, np.complex128)
             for blur in blurs:
                 otf *= blur.otf_plane(self.frequency, fy, float(wavelength))
             np.multiply(otf - 1, radial, out=part)
-        both = self.alone.spectral_sum(change)
+        both = self.radial_transfer.spectral_sum(change)
         return split_by_parity(both[..., :m, :], both[..., m:, :])
 
 
@@ -259,10 +259,10 @@ def split_by_parity(plus: NDArray, minus: NDArray) -> NDArray:
 
 def plane_grid(transfer: Transfer, top: float, entries: int) -> PlaneGrid:
     """Return a grid of so many frequencies from 0 to `top` [cycles/m] along each axis."""
-    alone = transfer.with_effects(transfer.radial_blurs).with_half_the_wavelengths()
+    radial_transfer = transfer.with_effects(transfer.radial_blurs).with_half_the_wavelengths()
     f = np.linspace(0, top, entries)
     length = np.hypot(f[None, :], np.concatenate([f, f])[:, None])
-    return PlaneGrid(alone, f, alone.otf_radial(length))
+    return PlaneGrid(radial_transfer, f, radial_transfer.otf_radial(length))
 
 
 def turn_table(parts: NDArray, parity: int, quarters: int, mirrored: bool) -> NDArray:
