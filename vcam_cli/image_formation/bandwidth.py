@@ -65,7 +65,8 @@ def margin(
     """Return the pixels that a chart goes on beyond the array.
 
     Beyond them it is mirrored: light from there is that of another place. The rms over the array of
-    what that changes is kept below its share of the tolerance.
+    what that changes is kept below its share of the tolerance, relative to white. Where pixels fill
+    at a small part of white, or a lamp is brighter, it is more of full signal.
 
     Parameters
     ----------
