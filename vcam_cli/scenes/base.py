@@ -196,7 +196,8 @@ class Rectangles:
 class Chart(ABC):
     """A picture on the whole plane; positions in meters from the array's center, rising.
 
-    It goes on beyond its frame, where the array sees it through the margin. `mix` is (R, K), and its dtype is that of the result.
+    It goes on beyond its frame, where the array sees it through the margin. `mix` is (R, K),
+    and its dtype is that of the result.
     """
 
     def highest_frequency(self, half_width: float) -> float:
