@@ -12,28 +12,28 @@ from vcam_cli.image_formation.cosine_series import Axis, segments
 @given(period=st.integers(1, 20), terms=st.integers(1, 120))
 def test_segments_fold_every_cosine_right(period, terms):
     i = np.arange(period)
-    optical_path = []
+    folded_terms = []
     for basis, term, sign in segments(period, terms):
         for j, k in zip(i[basis], np.arange(terms)[term], strict=True):
             folded = sign * np.cos(np.pi * j * (i + 0.5) / period)
             # arguments reach pi k ~ 400: 1e-12 of rounding
             np.testing.assert_allclose(np.cos(np.pi * k * (i + 0.5) / period), folded, atol=1e-11)
-            optical_path.append(k)
+            folded_terms.append(k)
     vanishing = {k for k in range(terms) if k % period == 0 and k // period % 2 == 1}
-    assert sorted(optical_path) == sorted(set(range(terms)) - vanishing)
+    assert sorted(folded_terms) == sorted(set(range(terms)) - vanishing)
 
 
 @given(period=st.integers(1, 20), terms=st.integers(1, 120))
 def test_segments_fold_every_sine_right(period, terms):
     i = np.arange(period)
-    optical_path = []
+    folded_terms = []
     for basis, term, sign in segments(period, terms, odd=True):
         for j, k in zip(i[basis] + 1, np.arange(terms)[term], strict=True):
             folded = sign * np.sin(np.pi * j * (i + 0.5) / period)
             np.testing.assert_allclose(np.sin(np.pi * k * (i + 0.5) / period), folded, atol=1e-11)
-            optical_path.append(k)
+            folded_terms.append(k)
     vanishing = {k for k in range(terms) if k % (2 * period) == 0}
-    assert sorted(optical_path) == sorted(set(range(terms)) - vanishing)
+    assert sorted(folded_terms) == sorted(set(range(terms)) - vanishing)
 
 
 @given(samples=st.integers(1, 12), count=st.integers(1, 90))
