@@ -12,9 +12,11 @@ from vcam_cli.effects.diffraction import Diffraction
 from vcam_cli.effects.wavefront_blur import Lens, SymmetricBlur
 from vcam_cli.image_formation import far_field, strategies
 from vcam_cli.image_formation.far_field import far_parts, near_field
+from vcam_cli.image_formation.photon_rate import photo_rate
 from vcam_cli.image_formation.settings import REFERENCE, STANDARD
 from vcam_cli.scenes.base import Chart, Frame
 from vcam_cli.scenes.csf import Csf
+from vcam_cli.scenes.siemens_star import SiemensStar
 from vcam_cli.scenes.slanted_edge import SlantedEdge
 from vcam_cli.scenes.step_wedge import step_wedge
 
@@ -116,3 +118,16 @@ def test_the_light_of_rings_is_that_of_fine_cells(name, blurs, monkeypatch):
     brought, error = rms(nearby, exact), rms(found, exact)
     assert error < brought / 10
     assert error < (1e-3 if name == "lamp" else 5e-6) * exact.max()
+
+
+def test_filters_go_as_far_as_the_low_pass_of_rings(monkeypatch):
+    """Spokes that no lens resolves leave the spectrum empty; rings must not end in the middle."""
+    g = sensor(10, 14)
+    optical_path = path(g, Diffraction(8.0, 0.0), aperture(g))
+    scene = on_chart(optical_path, SiemensStar(400, 1.0), margin=250)
+    parts = split(optical_path, scene)[1]
+    found = photo_rate(optical_path, scene)
+    assert found.spectrum.oversampling >= parts[0].nyquist(g) * (1 - 1e-9)
+    monkeypatch.setattr(strategies, "near_field", lambda path, scene, widest: scene)
+    exact = signal(optical_path, scene.crop((0.0, 0.0), *parts[-2].scene.extent))
+    assert rms(found.values, exact) < 0.05 * STANDARD.tolerance * exact.max()

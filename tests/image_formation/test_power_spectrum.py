@@ -5,23 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from optical_paths import (
-    Gaussian,
-    aperture,
     light,
-    of_picture,
-    path,
-    sensor,
-    signal,
 )
 
 from vcam_cli.effects.diffraction import Diffraction
 from vcam_cli.effects.pixel_aperture import PixelAperture
 from vcam_cli.effects.wavefront_blur import DirectedBlur, Lens
 from vcam_cli.image_formation import power_spectrum as module
-from vcam_cli.image_formation.bandwidth import axes
 from vcam_cli.image_formation.cosine_series import Axis
 from vcam_cli.image_formation.filtering import Filter
-from vcam_cli.image_formation.power_spectrum import blocks, brightest_mean, power_spectrum
+from vcam_cli.image_formation.power_spectrum import blocks, power_spectrum
 from vcam_cli.image_formation.scene_spectrum import (
     SampledSpectrum,
     rectangle_spectrum,
@@ -319,71 +312,3 @@ def test_power_of_rectangles_is_that_of_their_cells():
     )
     for found, expected in zip(power.products, painted.products, strict=True):
         np.testing.assert_allclose(found, expected, rtol=0.01, atol=1e-6 * abs(expected).max())
-
-
-# --- the brightest mean --------------------------------------------------------------------------
-
-
-def star(rng):
-    picture = np.zeros((66, 90))
-    picture[17, 30] = 1.0
-    return picture
-
-
-PICTURES = {
-    "even": lambda rng: np.ones((66, 90)),
-    "noise": lambda rng: rng.random((66, 90)),
-    "star": star,
-    "half": lambda rng: np.repeat([[0.1, 1.0]], 45, axis=1) * np.ones((66, 1)),
-    "stripes": lambda rng: np.indices((66, 90))[1] % 2.0,
-}
-
-
-def brightest(optical_path, scene, highest: float = 3.0) -> float:
-    """The bound for a path, as the engine finds it."""
-    x, y = axes(optical_path, scene, highest)
-    size = TableSize(min(optical_path.transfer.cutoff, 2 * highest * NYQUIST), 2049, 0.0, 8)
-    tables = tabulate(
-        optical_path.transfer, size, (np.eye(len(optical_path.transfer.weights)), 0.0)
-    )
-    planes = scene.planes(np.eye(len(optical_path.transfer.weights))).astype(float)
-    return brightest_mean(transform_planes(planes, 1), x, y, tables, optical_path.separable)
-
-
-@pytest.mark.parametrize("lens", ["none", "diffraction", "gaussian"])
-@pytest.mark.parametrize("kind", PICTURES)
-def test_no_mean_is_brighter_than_the_brightest_place(kind, lens):
-    """The brightest photodetector of a camera with eight times the pixels along each axis."""
-    picture = PICTURES[kind](np.random.default_rng(4))
-    blurs = {"none": (), "diffraction": (Diffraction(4.0, 0.0),), "gaussian": (Gaussian(5e-6),)}
-    g = sensor(66, 90, fill=(0.8, 0.6))
-    optical_path = path(g, *blurs[lens], aperture(g))
-    scene = of_picture(picture, PITCH)
-    least = brightest(optical_path, scene)
-    fine = sensor(8 * 66, 8 * 90, pitch=(PITCH / 8, PITCH / 8))
-    dense = path(fine, *blurs[lens], aperture(g))
-    if lens == "none":
-        fine = sensor(8 * 66, 8 * 90, fill=(8 * 0.8, 8 * 0.6), pitch=(PITCH / 8, PITCH / 8))
-        dense = path(fine, aperture(g))
-    most = float(signal(dense, scene).max())
-    # A hundredth of a percent: the brightest place lies between those that are looked at.
-    assert 0 < least <= most * (1 + 1e-4)
-    if kind in ("even", "half"):  # larger than the means: a tenth of them is elsewhere
-        assert least > 0.9 * most
-
-
-def test_an_even_picture_is_its_level():
-    g = sensor(66, 90)
-    optical_path = path(g, Diffraction(4.0, 0.0), aperture(g))
-    scene = of_picture(np.full((66, 90), 0.7), PITCH)
-    assert brightest(optical_path, scene) == pytest.approx(0.7, rel=1e-9)
-
-
-def test_one_term_is_the_mean(monkeypatch):
-    monkeypatch.setattr(module, "LOWEST", 1)
-    g = sensor(66, 90)
-    picture = np.random.default_rng(3).random((66, 90))
-    optical_path = path(g, Diffraction(4.0, 0.0), aperture(g))
-    assert brightest(optical_path, of_picture(picture, PITCH)) == pytest.approx(
-        picture.mean(), rel=1e-9
-    )

@@ -17,6 +17,7 @@ import numpy as np
 import scipy.fft
 from numpy.typing import NDArray
 
+from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.image_formation.bandwidth import axes
 from vcam_cli.image_formation.cosine_series import Axis
 from vcam_cli.image_formation.filtering import Filter
@@ -52,6 +53,14 @@ class FarPart:
     scene: ChartScene
     sign: int
     """1 of an outer rectangle, -1 of an inner."""
+
+    def nyquist(self, geometry: Geometry) -> float:
+        """Return the Nyquist frequency of its cells, beyond which nothing is left [pixel Nyquist].
+
+        Filters have to reach it: a spectrum that ends before its low-pass does rings.
+        """
+        pixels = geometry.pitch_x / self.scene.pitch_x, geometry.pitch_y / self.scene.pitch_y
+        return max(pixels)
 
     def spectrum(self, path: OpticalPath, highest: float, mix: NDArray) -> SceneSpectrum:
         """Return the spectrum of its planes, in 64 bits.
@@ -128,6 +137,9 @@ def near_field(path: OpticalPath, scene: ChartScene, widest: float) -> ChartScen
     g, cutoff = path.geometry, path.transfer.cutoff
     if not 0 < cutoff < math.inf:
         return scene
+    asked = path.settings.oversampling
+    if asked is not None:  # the spectrum ends there
+        cutoff = min(cutoff, asked * 0.5 / max(g.pitch_x, g.pitch_y))
     distance = NEAR / cutoff + widest
     distance = max(distance, LEAST_PART * min(g.sensor_width, g.sensor_height))
     margin = max(math.ceil(distance / min(g.pitch_x, g.pitch_y)), LEAST_PIXELS)

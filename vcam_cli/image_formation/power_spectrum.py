@@ -17,16 +17,13 @@ from numpy.typing import NDArray
 from vcam_cli.effects.base import SeparableTransfer
 from vcam_cli.image_formation.cosine_series import Axis
 from vcam_cli.image_formation.scene_spectrum import SceneSpectrum, pairs
-from vcam_cli.image_formation.transfer_tables import PARITIES, Tables, reader
+from vcam_cli.image_formation.transfer_tables import Tables, reader
 from vcam_cli.parallel import product
 
 ALONE = 16
 """Lowest terms along an axis that are blocks of their own."""
 WIDTH = 1 / 20
 """Width of a block relative to its frequency."""
-LOWEST, MOST_LOWEST = 24, 512
-"""Terms along each axis from which the brightest mean is found: so many over the array's length,
-but no more than the second number."""
 
 
 @dataclass(frozen=True)
@@ -297,75 +294,3 @@ def power_spectrum(
         squares = product(along_y.weights, product(of_pair, along_x.weights.T))
         products.append(twice * squares)
     return PowerSpectrum(along_x, along_y, np.array(products), len(spectrum), tuple(separable))
-
-
-def brightest_mean(
-    spectrum: SceneSpectrum,
-    x: Axis,
-    y: Axis,
-    tables: Tables,
-    separable: Sequence[SeparableTransfer],
-) -> float:
-    """Return a bound from below on the brightest place of the array.
-
-    It is found from the lowest frequencies. Fejer's kernel weakens the terms of a cosine series in
-    proportion to their number: the series is then a mean of the light with weights of which none is
-    negative, so no such mean is brighter than the brightest place. Of a chart, light from beyond
-    the array has a small part in the means near its edges.
-
-    Parameters
-    ----------
-    spectrum : SceneSpectrum
-        Spectrum of the planes.
-    x, y : Axis
-        Terms along x and y.
-    tables : Tables
-        Transfer functions of the lens.
-    separable : sequence of SeparableTransfer
-        Transfer functions along the axes.
-
-    Returns
-    -------
-    float
-        Signal [e/s].
-
-    References
-    ----------
-    L. Fejer, Math. Ann. 58, 51-69, 1904.
-    """
-    rows, columns = _lowest(y), _lowest(x)
-    index, columns_index = (
-        y.coefficient_index(np.arange(rows)),
-        x.coefficient_index(np.arange(columns)),
-    )
-    along_x, along_y = (
-        _means(x, columns, separable, "along_x"),
-        _means(y, rows, separable, "along_y"),
-    )
-    signal = 0.0
-    for parity in tables.parities:
-        odd_x, odd_y = PARITIES[parity]
-        values = reader(tables, parity, x.frequencies[:columns]).values(y.frequencies[:rows])
-        total = np.zeros(values.shape[1:])
-        for plane in range(len(spectrum)):
-            found = spectrum.rows(plane, index[0], columns)[:, columns_index[0]].astype(np.float64)
-            total += values[plane] * found * np.outer(index[1], columns_index[1])
-        signal = signal + along_y(odd_y) @ total @ along_x(odd_x).T
-    return max(0.0, float(np.max(signal)))
-
-
-def _lowest(axis: Axis) -> int:
-    """Return the number of terms whose means reach over a small part of the array."""
-    over_array = LOWEST * axis.length / (axis.pixels * axis.pixel_pitch)
-    return min(int(over_array), axis.terms, MOST_LOWEST)
-
-
-def _means(axis: Axis, terms: int, separable: Sequence[SeparableTransfer], direction: str):
-    """Return the waves of the first terms at places on the array, weakened as Fejer has it."""
-    k = np.arange(terms)
-    factor = axis.weights[:terms] * (1 - k / terms) * np.where(k > 0, 2, 1)
-    for effect in separable:
-        factor = factor * getattr(effect, direction)(axis.frequencies[:terms])
-    places = axis.first + np.linspace(0, axis.pixels - 1, 2 * LOWEST) * axis.pixel_pitch
-    angle = np.pi * np.outer(places / axis.length, k)
-    return lambda odd: (np.sin if odd else np.cos)(angle) * factor

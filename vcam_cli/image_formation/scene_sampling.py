@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,11 +11,8 @@ from numpy.typing import NDArray
 from vcam_cli.image_formation.bandwidth import LOWEST, axes, highest_frequency_share, table_size
 from vcam_cli.image_formation.chart_cells import BEYOND_CUTOFF, cell_grid
 from vcam_cli.image_formation.optical_path import OpticalPath
-from vcam_cli.image_formation.power_spectrum import (
-    PowerSpectrum,
-    brightest_mean,
-    power_spectrum,
-)
+from vcam_cli.image_formation.peak_bound import brightest_pixel
+from vcam_cli.image_formation.power_spectrum import PowerSpectrum, power_spectrum
 from vcam_cli.image_formation.scene_spectrum import (
     SceneSpectrum,
     rectangle_spectrum,
@@ -27,8 +25,6 @@ SINGLE = 5e-7
 """Rms error of transforms of 32-bit numbers, relative to the rms of what is transformed."""
 SINGLE_SHARE = 0.1
 """Part of the tolerance that it may use: else numbers have 64 bits."""
-WIDE = 1.5
-"""Area of a scene over that of the array from which on its whole spectrum is taken."""
 ENTRIES = 513
 """Entries of tables with which power is judged."""
 
@@ -86,7 +82,11 @@ def with_sufficient_precision(path: OpticalPath, scene: SampledScene) -> Optical
 
 
 def sampled_image(
-    path: OpticalPath, scene: SampledScene, highest: float, mixing: Mixing
+    path: OpticalPath,
+    scene: SampledScene,
+    highest: float,
+    mixing: Mixing,
+    least: float = LOWEST,
 ) -> SampledImage:
     """Transform a scene, and find how far up its spectrum is needed.
 
@@ -103,6 +103,8 @@ def sampled_image(
         Frequency beyond which nothing counts [pixel Nyquist].
     mixing : Mixing
         Mixtures of the scene's components, and the error that they leave.
+    least : float, optional
+        Frequency up to which the spectrum goes at least [pixel Nyquist].
 
     Returns
     -------
@@ -114,24 +116,23 @@ def sampled_image(
     tables = tabulate(exact.with_effects(exact.radial_blurs), size, mixing)
     scene, spectrum, peak = _scene_spectrum(path, scene, highest, mixing[0])
     x, y = axes(path, scene, highest)
-    full = min(brightest_mean(spectrum, x, y, tables, path.separable), path.ceiling)
     power = power_spectrum(spectrum, x, y, path.separable, path.workers)
     lens_power = power.lens_power(tables)
-    directed = exact.plane_blurs or path.zones
+    directed = (*exact.plane_blurs, *(zone.blur for zone in path.zones))
     squares = (
         power.upper_bound(bounding_tables(exact, size, mixing))
         if directed
         else power.pixel_power(lens_power)
     )
-    area = scene.shape[0] * scene.pitch_y * scene.shape[1] * scene.pitch_x
-    density = area / (g.sensor_width * g.sensor_height)
+    rms = float(np.sqrt(squares.reshape(len(squares), -1).sum(axis=1).max()))
+    aside = max((blur.reach for blur in directed), default=0.0)
+    full = min(brightest_pixel(spectrum, (x, y), tables, path.separable, rms, aside), path.ceiling)
+    density = math.prod(scene.extent) / (g.sensor_width * g.sensor_height)
     pitch = g.pitch_y, g.pitch_x
     if knobs.oversampling is None:
-        # Beside a wide margin nothing is known of the array's own brightest place.
-        known = full if density < WIDE else 0.0
-        budget = highest_frequency_share(knobs.tolerance) * known / np.sqrt(density)
+        budget = highest_frequency_share(knobs.tolerance) * full / np.sqrt(density)
         needed = power.needed_frequency(squares, budget, pitch) * (1 + 1e-9)
-        highest = min(max(needed, LOWEST), highest)
+        highest = min(max(needed, least), highest)
     else:
         highest = min(highest, knobs.oversampling)
     return SampledImage(

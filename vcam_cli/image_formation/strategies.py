@@ -18,7 +18,7 @@ import numpy as np
 
 from vcam_cli import memory
 from vcam_cli.image_formation import memory_model
-from vcam_cli.image_formation.bandwidth import axes, highest_passed, reach, table_size
+from vcam_cli.image_formation.bandwidth import LOWEST, axes, highest_passed, reach, table_size
 from vcam_cli.image_formation.box_average import box_averages, point_values
 from vcam_cli.image_formation.chart_cells import cell_grid, cells_per_pixel
 from vcam_cli.image_formation.effect_changes import changes_by_omission, needed_modes
@@ -130,7 +130,8 @@ def _spectral_layers(
     mixing = field_mixtures(exact, zones, size) if zones else mixtures([exact], size)
     needed = memory_model.image_bytes(path, scene, highest, len(mixing[0]), size, rings)
     memory.require(needed, g.rows, g.columns)
-    image = sampled_image(path, scene, highest, mixing)
+    least = max((part.nyquist(g) for part in rings), default=LOWEST)
+    image = sampled_image(path, scene, highest, mixing, least)
     size = table_size(path, image.highest)
     modes: tuple[Mode, ...] = ()
     if zones:

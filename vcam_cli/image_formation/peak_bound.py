@@ -1,0 +1,191 @@
+"""A bound from below on the brightest pixel, from a small part of a scene's spectrum.
+
+No mean over pixels with weights that are not negative is brighter than the brightest of them. Means
+over smooth windows of pixels need few terms of the cosine series: those whose frequency the pixels
+see as nearly constant. Detail that repeats with the pixels is among them, as the constant light
+that the pixels make of it.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcam_cli.effects.base import SeparableTransfer
+from vcam_cli.image_formation.cosine_series import Axis
+from vcam_cli.image_formation.scene_spectrum import SceneSpectrum
+from vcam_cli.image_formation.transfer_tables import PARITIES, Tables, reader
+
+WINDOW = 0.35875, 0.48829, 0.14128, 0.01168
+"""Amplitudes of the cosines of the Blackman-Harris window, which is nowhere negative and passes
+less than 3e-5 of what is off its four lowest frequencies (F. J. Harris, Proc. IEEE 66, 1978,
+doi:10.1109/PROC.1978.10837)."""
+PART = 1 / 4
+"""Length of a window over that of the array."""
+PLACES = 16
+"""Windows along each axis."""
+KEPT = 3e-5
+"""Part of a term that is left in the mean over a window, from which on it is summed."""
+
+
+def brightest_pixel(
+    spectrum: SceneSpectrum,
+    axes: tuple[Axis, Axis],
+    tables: Tables,
+    separable: Sequence[SeparableTransfer],
+    rms: float,
+    reach: float = 0.0,
+) -> float:
+    """Return a signal that the brightest pixel of the array has at least [electrons / s].
+
+    It is that of the color of most, as if all pixels had it. The terms that are not summed can
+    bring no more than their part of the mean square, by Cauchy's inequality. A blur that the tables
+    leave out moves light by its reach at most: the mean over the array keeps what is further from
+    its border.
+
+    Parameters
+    ----------
+    spectrum : SceneSpectrum
+        Spectrum of the scene, mirrored at its borders.
+    axes : (Axis, Axis)
+        Terms and pixels along x and y.
+    tables : Tables
+        Transfer functions of the spectrum's planes.
+    separable : sequence of SeparableTransfer
+        Transfer functions along the axes.
+    rms : float
+        Root mean square of the signal over the scene, at least [electrons / s].
+    reach : float, optional
+        Reach of blurs that are not in the tables; by default there is none [m].
+
+    Returns
+    -------
+    float
+        The bound; 0 where nothing is known.
+    """
+    x, y = axes
+    along_x, along_y = _windows(x, reach), _windows(y, reach)
+    if along_x is None or along_y is None:
+        return 0.0
+    signal: NDArray = np.zeros(1)
+    for parity in tables.parities:
+        odd_x, odd_y = PARITIES[parity]
+        fx, fy = x.frequencies[along_x.terms], y.frequencies[along_y.terms]
+        values = reader(tables, parity, fx).values(fy)
+        light = sum(
+            values[plane] * _terms(spectrum, plane, along_x, along_y)
+            for plane in range(len(spectrum))
+        )
+        for effect in separable:
+            light = light * np.outer(effect.along_y(fy), effect.along_x(fx))
+        signal = signal + along_y.means(odd_y) @ light @ along_x.means(odd_x).T
+    every, summed = along_x.power[0] * along_y.power[0], along_x.power[1] * along_y.power[1]
+    left_out = math.sqrt(max(every - summed, 0.0) * len(tables.parities)) * rms
+    if reach == 0:
+        return max(0.0, float(signal.max()) - left_out)
+    return max(0.0, along_x.share * along_y.share * (float(signal.mean()) - left_out))
+
+
+@dataclass(frozen=True)
+class Windows:
+    """Windows of pixels along an axis, and the terms of the series that count in them."""
+
+    axis: Axis
+    terms: NDArray
+    """(m,) rising"""
+    left: NDArray
+    """(m,) Part of each of them that is left in the mean over a window."""
+    centers: NDArray
+    """(p,) Centers of the windows, from the scene's edge [m]."""
+    power: tuple[float, float]
+    """Sum of the squares of these parts over all terms, each over the mean square of its wave, and
+    over those that count."""
+    share: float
+    """Weight of a pixel in the mean over the array over that in the mean of all windows, at
+    least."""
+
+    def means(self, odd: bool) -> NDArray:
+        """Return the mean of every term, as cosine or sine, over every window: (p, m)."""
+        angle = np.outer(self.centers, 2 * np.pi * self.axis.frequencies[self.terms])
+        factor = self.left * self.axis.weights[self.terms] * _twice(self.terms)
+        return (np.sin(angle) if odd else np.cos(angle)) * factor
+
+
+def _twice(terms: NDArray) -> NDArray:
+    """Return how often a DCT counts each term; the inverse of the mean square of its wave."""
+    return np.where(terms > 0, 2, 1)
+
+
+def _windows(axis: Axis, reach: float) -> Windows | None:
+    """Return windows all over the array's side; None where blurs left out are wider than it.
+
+    What such blurs move by their reach is still on the array, if it is not nearer to its border,
+    or mirrored there.
+    """
+    aside = 0 if axis.virtual_pixels == axis.pixels else math.ceil(reach / axis.pixel_pitch)
+    inside = axis.pixels - 2 * aside
+    if inside < 1:
+        return None
+    pixels = max(math.floor(PART * inside), 1)
+    left = window_spectrum(2 * np.pi * axis.frequencies * axis.pixel_pitch, pixels)
+    terms = np.flatnonzero(np.abs(left) > KEPT)
+    starts = np.unique(np.rint(np.linspace(aside, aside + inside - pixels, PLACES))).astype(int)
+    power = np.square(left) * _twice(np.arange(axis.terms))
+    return Windows(
+        axis=axis,
+        terms=terms,
+        left=left[terms],
+        centers=axis.first + (starts + (pixels - 1) / 2) * axis.pixel_pitch,
+        power=(float(power.sum()), float(power[terms].sum())),
+        share=_share_of_mean(starts, pixels, axis.pixels),
+    )
+
+
+def _share_of_mean(starts: NDArray, pixels: int, array: int) -> float:
+    """Return the least weight of a pixel in the mean over the array, over that in all windows."""
+    weight = window(pixels)
+    total = np.zeros(array)
+    for start in starts:
+        total[start : start + pixels] += weight
+    return len(starts) / (array * float(total.max()))
+
+
+def window(pixels: int) -> NDArray:
+    """Return the weights of a window of so many pixels, whose sum is 1."""
+    place = (np.arange(pixels) + 0.5) / pixels - 0.5
+    weights = np.cos(2 * np.pi * np.outer(place, np.arange(len(WINDOW)))) @ np.array(WINDOW)
+    return weights / weights.sum()
+
+
+def window_spectrum(angle: NDArray, pixels: int) -> NDArray:
+    """Return the mean over a window of waves that have so much phase from pixel to pixel [rad].
+
+    The phase is 0 at the window's center.
+    """
+    total, level = np.zeros(len(angle)), 0.0
+    for number, amplitude in enumerate(WINDOW):
+        for sign in (1, -1):
+            shift = sign * 2 * np.pi * number / pixels
+            total += amplitude / 2 * _dirichlet(angle + shift, pixels)
+            level += amplitude / 2 * float(_dirichlet(np.array([shift]), pixels)[0])
+    return total / level
+
+
+def _dirichlet(angle: NDArray, pixels: int) -> NDArray:
+    """Return the sum of so many waves with this phase from one to the next, 0 in their middle."""
+    below = np.sin(angle / 2)
+    even = np.abs(below) < 1e-9
+    limit = pixels * np.cos(pixels * angle / 2) / np.cos(angle / 2)
+    return np.where(even, limit, np.sin(pixels * angle / 2) / np.where(even, 1.0, below))
+
+
+def _terms(spectrum: SceneSpectrum, plane: int, x: Windows, y: Windows) -> NDArray:
+    """Return coefficients of a plane's terms that count along both axes: (m_y, m_x)."""
+    index_x, sign_x = x.axis.coefficient_index(x.terms)
+    index_y, sign_y = y.axis.coefficient_index(y.terms)
+    found = spectrum.rows(plane, index_y, int(index_x.max()) + 1)[:, index_x]
+    return found.astype(np.float64) * np.outer(sign_y, sign_x)
