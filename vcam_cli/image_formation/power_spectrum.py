@@ -355,9 +355,13 @@ def brightest_mean(
 
 
 def _lowest(axis: Axis) -> int:
-    """Return the number of terms whose means reach over a small part of the array."""
+    """Return the number of terms whose means reach over a small part of the array.
+
+    They reach over some pixels, so that there are pixels as bright as the mean.
+    """
     over_array = LOWEST * axis.length / (axis.pixels * axis.pixel_pitch)
-    return min(int(over_array), axis.terms, MOST_LOWEST)
+    over_pixels = max(1.0, axis.length / (2 * axis.pixel_pitch))
+    return min(int(over_array), int(over_pixels), axis.terms, MOST_LOWEST)
 
 
 def _means(axis: Axis, terms: int, separable: Sequence[SeparableTransfer], direction: str):

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from vcam_cli.image_formation.bandwidth import LOWEST, axes, highest_frequency_share, table_size
+from vcam_cli.image_formation.bandwidth import FREQUENCY_SHARE, LOWEST, axes, table_size
 from vcam_cli.image_formation.chart_cells import BEYOND_CUTOFF, cell_grid
 from vcam_cli.image_formation.optical_path import OpticalPath
 from vcam_cli.image_formation.power_spectrum import (
@@ -129,7 +129,7 @@ def sampled_image(
     if knobs.oversampling is None:
         # Beside a wide margin nothing is known of the array's own brightest place.
         known = full if density < WIDE else 0.0
-        budget = highest_frequency_share(knobs.tolerance) * known / np.sqrt(density)
+        budget = FREQUENCY_SHARE * knobs.tolerance * known / np.sqrt(density)
         needed = power.needed_frequency(squares, budget, pitch) * (1 + 1e-9)
         highest = min(max(needed, LOWEST), highest)
     else:
