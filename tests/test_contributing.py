@@ -60,6 +60,10 @@ def test_there_is_a_recipe_for_every_kind_of_addition():
     assert [recipe.example for recipe in RECIPES] == list(MENTIONS)
 
 
+ANY_CHARTS = {"vcam_cli/simulation/scene_plans.py"}
+"""Sources that name some charts, which any others could stand for."""
+
+
 @pytest.mark.parametrize("recipe", RECIPES, ids=lambda recipe: recipe.example)
 class TestRecipe:
     def test_counts_its_files(self, recipe):
@@ -72,7 +76,7 @@ class TestRecipe:
 
     def test_no_other_source_mentions_the_example(self, recipe):
         listed = {name for name in recipe.files if name.startswith("vcam_cli/")}
-        assert mentioning(recipe.example, ROOT) == listed
+        assert mentioning(recipe.example, ROOT) - ANY_CHARTS == listed
 
 
 def test_a_source_that_is_not_listed_is_found(tmp_path):

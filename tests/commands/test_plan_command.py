@@ -21,6 +21,7 @@ def test_json_has_the_keys_of_the_contract():
     report = json.loads(plan("--json"))
     assert {"effects", "settings", "seconds", "memory_bytes", "geometry"} <= set(report)
     keys = {"name", "state", "by", "reason", "contribution", "unit", "seconds"}
+    keys |= {"allowed", "saved", "free"}
     assert all(set(effect) == keys for effect in report["effects"])
     assert [effect["name"] for effect in report["effects"]] == [kind.name for kind in ORDER]
     assert report["seconds"] > 0

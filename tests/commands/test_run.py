@@ -153,7 +153,7 @@ class TestFiles:
         assert set(raw()) == set(channels)  # EXR keeps channels in the order of the alphabet
 
     def test_attributes_of_raw(self):
-        vcam("--seed", "7")
+        vcam("--seed", "7", *sets("effects.dark_current=on"))
         _, spec = image("out/small/raw.exr")
         said = {a.name: a.value for a in spec.extra_attribs}
         run = record()
@@ -313,6 +313,7 @@ class TestRecord:
     def test_the_plan_says_what_becomes_of_every_effect(self, run):
         effects = run["plan"]["effects"]
         keys = {"name", "state", "by", "reason", "contribution", "unit", "seconds"}
+        keys |= {"allowed", "saved", "free"}
         for effect in effects:
             assert set(effect) == keys
             assert effect["state"] in ("on", "off")
@@ -323,7 +324,8 @@ class TestRecord:
             "off_axis", "diffraction", "pixel_aperture", "dark_current", "shot_noise",
             "reset_noise", "read_noise", "fpn", "saturation", "quantization",
         }  # fmt: skip
-        assert set(run["plan"]) == {"effects", "settings", "seconds", "memory_bytes"}
+        keys = {"effects", "settings", "seconds", "seconds_of_all", "memory_bytes"}
+        assert set(run["plan"]) == keys
         assert run["plan"]["memory_bytes"] > 0
         assert run["plan"]["settings"]["tolerance"] == 0.005
 
@@ -385,12 +387,15 @@ class TestRecord:
 class TestSummary:
     """What a person reads: what ran, what did not and why, the time, where the pictures are."""
 
-    def test_it_names_every_effect_and_every_picture(self):
+    def test_it_counts_effects_and_names_every_picture(self):
         said = vcam(*sets("quality=[mse]")).stdout
         plan = record()["plan"]
         on = [e["name"] for e in plan["effects"] if e["state"] == "on"]
+        described = [e for e in plan["effects"] if e["by"] != "camera"]
         text = " ".join(said.split())
-        assert f"simulated {', '.join(on)}" in text
+        assert f"simulated {len(on)} of {len(described)} effects; not called for here: " in text
+        assert "saturation (0 % of full signal)" in text
+        assert ", all of them about " in text
         for name in ("render.png", "raw.exr", "ideal.exr"):
             assert f"out/small/{name}" in said
         assert "delta_e.png" not in said
@@ -399,14 +404,15 @@ class TestSummary:
         assert f"{took:.2f} s" in said
         assert max(map(len, said.splitlines())) <= 100
 
-    def test_what_was_left_out_comes_with_its_reason(self):
+    def test_what_was_left_out_comes_with_what_it_would_change(self):
         options = ["pixel.readout.read_noise=0.5 e", "effects.fpn=off"]
         said = vcam(*sets(*options)).stdout
         [dropped] = [e for e in record()["plan"]["effects"] if e["name"] == "read_noise"]
         assert (dropped["state"], dropped["by"]) == ("off", "plan")
         text = " ".join(said.split())
-        assert f"left out read_noise: {dropped['reason']}" in text
-        assert "switched off fpn" in text
+        share = f"{100 * dropped['contribution']:.2g} % of the temporal variance"
+        assert f"read noise ({share})" in text
+        assert "switched off: fixed-pattern noise" in text
 
 
 class TestOptions:

@@ -164,9 +164,7 @@ def test_documented_with_a_reference(kind, tmp_path):
     assert re.search(r"\d", kind.reference), "a reference names an equation, a section or a year"
     assert " " in kind.absent
     assert re.search(r"\d|equal", effect_of(kind, tmp_path).describe()), "a clause with numbers"
-    # The aperture that a microlens makes stays, so its light must.
-    stays = issubclass(kind, Limit | Quantizer) or kind.name == "microlens"
-    assert kind.removable == (not stays)
+    assert kind.removable == (not issubclass(kind, Quantizer)), "codes are what a frame is made of"
 
 
 # --- zero strength -------------------------------------------------------------------------------

@@ -106,7 +106,8 @@ def test_sampled_scenes_shrink_as_well(tmp_path):
     """
     chart = {"kind": "chart", "chart": "csf", "max_frequency": "8 lp/mm"}
     scene = {"scene.source": chart, "pixel.stack": STACK, "optics.exit_pupil_distance": "0.5 mm"}
-    quiet = {"effects": QUIET | {"pixel_vignetting": "off", "off_axis": "off"}}
+    blurs = {"diffraction": "on", "pixel_aperture": "on"}
+    quiet = {"effects": QUIET | {"pixel_vignetting": "off", "off_axis": "off"} | blurs}
     centered, optimal = (
         mean_of(tmp_path, scene | quiet | {"pixel.microlens": {"gain": 1.5, "shift": shift}})
         for shift in ("centered", "optimal")
@@ -136,11 +137,11 @@ def test_it_follows_the_chief_ray(tmp_path):
     assert optimal > 0.97
 
 
-def test_a_user_may_leave_it_out_and_the_plan_may_not(tmp_path):
-    """However little it gains: the aperture would stay."""
-    weak = {"pixel.microlens": {"gain": 1.0001}, "effects": "auto", "accuracy": "draft"}
-    decisions = simulate(camera(tmp_path, weak)).frame.plan.decisions
-    assert {d.name: d.state for d in decisions}["microlens"] == "on"
+@pytest.mark.parametrize(("gain", "state"), [(1.0001, "off"), (1.1, "on")])
+def test_the_plan_leaves_out_one_that_gains_next_to_nothing(gain, state, tmp_path):
+    chosen = {"pixel.microlens": {"gain": gain}, "effects": "auto", "accuracy": "draft"}
+    decisions = simulate(camera(tmp_path, chosen)).frame.plan.decisions
+    assert {d.name: d.state for d in decisions}["microlens"] == state
 
 
 def test_what_it_says(tmp_path):

@@ -1,10 +1,11 @@
 """The promises of the plan, measured on cameras with little in common.
 
-    python -m tests.promise [--json FILE] [--random | --exact] [CAMERA...]
+    python -m tests.promise [--json FILE] [--random | --exact | --matrix | --times] [CAMERA...]
 
 Without names: all of them, forty cameras drawn at random with every effect in each, and cameras
 before lattices, charts and fine images whose mean signal is known exactly; --random, --exact: those
-alone.
+alone. --matrix: ten cameras before eighteen scenes, what is left out held against true ablations;
+--times: the time of their frames as planned and with everything on.
 
 Prints what the mean signal and the variances lose beside what may be lost, what the plan expected
 of every effect beside its ablation, whether what is not worth its cost is left out, and the time
@@ -14,6 +15,7 @@ that is saved. Exit code 1 where a figure is missed.
 from __future__ import annotations
 
 import argparse
+import itertools
 import json
 import statistics
 import sys
@@ -27,6 +29,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 import exact_errors
 import promises
 import random_cameras
+import scene_matrix
 
 from vcam_cli.accuracy import ablation
 
@@ -36,8 +39,12 @@ def main() -> int:
     parser.add_argument("cameras", nargs="*", help="some of them; default all")
     parser.add_argument("--random", action="store_true", help="only those drawn at random")
     parser.add_argument("--exact", action="store_true", help="only those with an exact truth")
+    parser.add_argument("--matrix", action="store_true", help="only ten cameras before scenes")
+    parser.add_argument("--times", action="store_true", help="only the time that the plan saves")
     parser.add_argument("--json", help="also write the figures to this file")
     options = parser.parse_args()
+    if options.matrix or options.times:
+        return _matrix(options.times, tuple(options.cameras) or scene_matrix.CAMERAS)
     out: dict[str, list] = {"kept": [], "estimates": [], "costly": [], "idle": [], "seconds": []}
     out["random"] = []
     with tempfile.TemporaryDirectory() as folder:
@@ -52,13 +59,36 @@ def main() -> int:
             print("", *exact_errors.table(exact), sep="\n")
     out["exact"] = [(each.name, each.kind, each.over_tolerance) for each in exact]
     figures = _figures(out)
-    print()
-    for text, found, good in figures:
-        print(f"{'ok    ' if good else 'MISSED'}  {text:<78} {found}")
+    _print_figures(figures)
     if options.json:
         text = json.dumps({**out, "figures": [f[:2] for f in figures]}, indent=1)
         Path(options.json).write_text(text, encoding="utf-8")
     return 0 if all(good for _, _, good in figures) else 1
+
+
+def _matrix(timed: bool, cameras: tuple[str, ...]) -> int:
+    """Measures cameras before scenes, prints their lines, and returns the exit code."""
+    with tempfile.TemporaryDirectory() as folder:
+        if timed:
+            times = []
+            for name, scene in itertools.product(cameras, scene_matrix.SCENES):
+                times.append(scene_matrix.times(name, scene, Path(folder)))
+                print(times[-1].line, flush=True)
+            figures = list(scene_matrix.time_figures(times))
+        else:
+            cells = []
+            for name, scene in itertools.product(cameras, scene_matrix.SCENES):
+                cells.append(scene_matrix.cell(name, scene, Path(folder)))
+                print(cells[-1].line, flush=True)
+            figures = list(scene_matrix.figures(cells))
+    _print_figures(figures)
+    return 0 if all(good for _, _, good in figures) else 1
+
+
+def _print_figures(figures: list[tuple[str, str, bool]]) -> None:
+    print()
+    for text, found, good in figures:
+        print(f"{'ok    ' if good else 'MISSED'}  {text:<78} {found}")
 
 
 def _one(name: str, folder: Path, out: dict[str, list]) -> None:

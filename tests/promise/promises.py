@@ -20,7 +20,7 @@ from vcam_cli.accuracy.measurements import is_median_known
 from vcam_cli.accuracy.reference import effect_changes, prepare_converged
 from vcam_cli.camera.camera import Camera
 from vcam_cli.effects.order import ORDER
-from vcam_cli.effects.signal_chain import LEVELS, NoiseSource
+from vcam_cli.effects.signal_chain import NoiseSource
 from vcam_cli.files.png import write_png
 from vcam_cli.simulation.preparation import Prepared
 from vcam_cli.simulation.simulate import prepare
@@ -311,7 +311,7 @@ class Kept:
     mean: float
     """rms of (mean raw under auto - mean raw with everything on, converged) / full signal"""
     variance: float
-    """Largest relative change of a variance at 1, 10, 100 % of full signal, of at most 2 T"""
+    """Largest relative change of a variance at a percentile of the signal, of at most 2 T"""
 
 
 @dataclass(frozen=True)
@@ -327,7 +327,7 @@ class Truth:
 
 def truth(camera: Camera) -> Truth:
     """The camera with everything on, and finer than its reference."""
-    auto = {preset: prepare(_at(camera, preset))[0] for preset in PRESETS}
+    auto = {preset: prepare(at_preset(camera, preset))[0] for preset in PRESETS}
     found = prepare_converged(camera, auto["reference"], 2)
     return Truth(found, ablation.mean_raw(found), ablation.full_signal(found), auto)
 
@@ -336,36 +336,56 @@ def kept(true: Truth) -> Iterator[Kept]:
     """Both promises, at every preset."""
     for preset, auto in true.auto.items():
         mean = ablation.rms(ablation.mean_raw(auto) - true.mean) / true.full
-        lost = variance_lost_of(auto, true.found, true.full)
+        lost = variance_lost_of(auto, true.found)
         yield Kept(preset, auto.settings.tolerance, mean, lost)
 
 
-def _at(camera: Camera, preset: str) -> Camera:
+def at_preset(camera: Camera, preset: str) -> Camera:
     return camera.model_copy(update={"accuracy": type(camera.accuracy)(preset=preset)})
 
 
-def variance_lost_of(auto: Prepared, found: Prepared, full: float) -> float:
+def variance_lost_of(auto: Prepared, found: Prepared) -> float:
     """Largest relative change of a variance, as the effects state it, with what is left out.
 
-    found: the camera with everything on; full: its full signal [electrons].
+    found: the camera with everything on.
     """
-    return max(_variance_lost(auto, found, full, scope) for scope in ("frame", "sensor"))
+    return max(_variance_lost(auto, found, scope) for scope in ("frame", "sensor"))
 
 
-def _variance_lost(auto: Prepared, found: Prepared, full: float, scope: str) -> float:
+PERCENTILES = (1, 10, 50, 90, 99)
+
+
+def scene_levels(found: Prepared) -> np.ndarray:
+    """Percentiles of a camera's noise-free signal in every color, from all pixels [electrons]."""
+    mean = ablation.mean_raw(found)
+    planes = mean if mean.ndim == 3 else mean[None]
+    block = np.array(found.mosaic.block)
+    if mean.ndim == 3 or block.shape[0] > mean.shape[0] or block.shape[1] > mean.shape[1]:
+        return np.array([np.percentile(plane, PERCENTILES) for plane in planes]).ravel()
+    names = np.tile(block, [-(-n // b) for n, b in zip(mean.shape, block.shape, strict=True)])
+    names = names[: mean.shape[0], : mean.shape[1]]
+    return np.array(
+        [np.percentile(mean[names == color], PERCENTILES) for color in np.unique(names)]
+    ).ravel()
+
+
+def _variance_lost(auto: Prepared, found: Prepared, scope: str) -> float:
+    """At the percentiles of the scene's own signal, with the dark signal that each has."""
     worst = 0.0
-    missing = (found.dark_rate - auto.dark_rate) * auto.exposure_time
-    for share in LEVELS:
-        level = share * full
-        everything = _variance(found, scope, level)
-        change = _variance(auto, scope, max(0.0, level - missing)) - everything
-        worst = max(worst, abs(change) / everything if everything else 0.0)
+    time = auto.exposure_time
+    missing = (found.dark_rate - auto.dark_rate) * time
+    for level in scene_levels(found):
+        everything = _variance(found, scope, level, found.dark_rate * time)
+        own = _variance(auto, scope, max(0.0, level - missing), auto.dark_rate * time)
+        if everything:
+            worst = max(worst, abs(own - everything) / everything)
     return worst
 
 
-def _variance(ready: Prepared, scope: str, level: float) -> float:
+def _variance(ready: Prepared, scope: str, level: float, dark: float) -> float:
+    """Of pixels that are read as one, of their mean [electrons squared]."""
     draws = [e for e in ready.plan.active if isinstance(e, NoiseSource) and e.scope == scope]
-    return sum(e.variance(level) for e in draws)
+    return sum(e.binned_variance(level, dark, ready.camera.array.binning) for e in draws)
 
 
 @dataclass(frozen=True)
@@ -439,7 +459,7 @@ def idle_work(camera: Camera) -> list[tuple[str, bool]]:
 
 def seconds(camera: Camera) -> tuple[float, float]:
     """Of a frame with its render: auto at standard, and everything on at reference, medians."""
-    everything = ablation.with_effects(_at(camera, "reference"), "all")
+    everything = ablation.with_effects(at_preset(camera, "reference"), "all")
     return _timed(lambda: simulate(camera).render), _timed(lambda: simulate(everything).render)
 
 

@@ -137,7 +137,7 @@ class Held:
     mean: float
     """Rms of (mean raw under auto - mean raw with everything on, converged)."""
     variance: float
-    """Largest relative change of a variance at 1, 10, 100 % of full signal, of at most 2 T."""
+    """Largest relative change of a variance at a percentile of the signal, of at most 2 T."""
 
 
 def held(camera: Camera, workers: int = 1) -> Iterator[Held]:
@@ -150,4 +150,4 @@ def held(camera: Camera, workers: int = 1) -> Iterator[Held]:
         expected = auto.spectrum.lost_rms * auto.exposure_time / full
         expected += sum(d.contribution or 0 for d in out if d.unit == "of full signal")
         mean = ablation.rms(ablation.mean_raw(auto) - truth) / full
-        yield Held(tolerance, expected, mean, variance_lost_of(auto, found, full))
+        yield Held(tolerance, expected, mean, variance_lost_of(auto, found))

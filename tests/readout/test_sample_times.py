@@ -135,7 +135,8 @@ def test_the_schedule_counts_what_the_plan_leaves_out(tmp_path):
 
 
 def test_readout_and_reset_noise_count(tmp_path):
-    made = camera(tmp_path, asked() | {"pixel.readout.reset_noise": "30 e"})
+    noise = {"pixel.readout.reset_noise": "30 e", "effects": "all"}
+    made = camera(tmp_path, asked() | noise)
     frame = simulate(made).frame
     effects = frame.plan.active
     pixel = sample_times.sensor(frame.electrical, effects, frame.code, 0.1)

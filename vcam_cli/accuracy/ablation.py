@@ -18,7 +18,7 @@ from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import geometry
 from vcam_cli.effects.base import Charge, of_kind
 from vcam_cli.effects.order import ORDER, quantizer
-from vcam_cli.effects.signal_chain import LEVELS, Limit, NoiseSource, Quantizer, noise_sources
+from vcam_cli.effects.signal_chain import Limit, NoiseSource, Quantizer, noise_sources
 from vcam_cli.readout import binned_readout, exposure
 from vcam_cli.simulation import plan
 from vcam_cli.simulation.preparation import Prepared
@@ -112,7 +112,8 @@ def variance_shares(ready: Prepared, full: float, workers: int) -> dict[str, flo
     row_noise = [source.split()[2] for source in of_kind(active, NoiseSource)]
     shape = SQUARE if any(row_noise) else FLAT
     shape = (shape[0] + -shape[0] % group.rows, shape[1] + -shape[1] % group.columns)
-    fields = [np.full(shape, share * full) for share in LEVELS]
+    levels = np.unique(ready.plan.levels)[[0, len(set(ready.plan.levels)) // 2, -1]]
+    fields = [np.full(shape, level) for level in levels]
     shares = {}
     for scope in ("frame", "sensor"):
         here = noise_sources(active, scope)

@@ -1,7 +1,27 @@
 """`vcam plan`: what a run would simulate, what not, why, and at what cost."""
 
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
 from vcam_cli.commands import options
 from vcam_cli.commands.progress import Progress
+
+if TYPE_CHECKING:
+    from vcam_cli.simulation.scene_plans import ScenePlan
+
+
+Scenes = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--scenes",
+        metavar="all|FILE",
+        help="Plan before other scenes: `all` for six charts in three lights, or a scene file or"
+        " shipped scene. Repeatable. Writes scenes.csv and scenes.png.",
+    ),
+]
 
 
 def plan(
@@ -11,17 +31,26 @@ def plan(
     as_json: options.Json = False,
     quiet: options.Quiet = False,
     workers: options.Workers = None,
+    scenes: Scenes = None,
+    out: options.Out = None,
 ) -> None:
     """Show which effects a run simulates, which not and why, and what it costs.
 
-    The irradiance on the pixels is computed, since the scene's spectrum decides what blur
-    contributes; no frame is exposed and nothing is written.
+    The irradiance on the pixels is computed, since the scene decides what each effect contributes;
+    no frame is exposed, and nothing is written but the table of several scenes.
 
     \b
     Example:
       vcam plan still-life
       vcam plan camera.yaml --accuracy 0.001 --json
+      vcam plan starter --scenes all
+      vcam plan starter --scenes still-life --scenes my-scene.yaml
     """
+    if scenes:
+        _plan_scenes(
+            camera, scenes, out, options.overrides(set_, accuracy=accuracy), quiet, workers
+        )
+        return
     from vcam_cli.files.report import to_json
     from vcam_cli.simulation.checks import load
     from vcam_cli.simulation.simulate import prepare
@@ -39,6 +68,49 @@ def plan(
     else:
         print(table(report))
         print(facts(report, geometry, ready.exposure_time, ready.times))
+
+
+def _plan_scenes(
+    camera: str,
+    scenes: list[str],
+    out: Path | None,
+    overrides: list[str],
+    quiet: bool,
+    workers: int | None,
+) -> None:
+    """Write and print the table of effects by scenes."""
+    from vcam_cli.files.folder import OutputFolder
+    from vcam_cli.files.tables import write_table
+    from vcam_cli.simulation import provenance, scene_plans
+    from vcam_cli.simulation.checks import load
+    from vcam_cli.simulation.scene_plans_plot import plot_scene_plans
+
+    model = load(camera, overrides)
+    path = out or Path("out") / f"{model.name}-scenes"
+    place = OutputFolder(path, record="scenes.json", inputs=provenance.inputs(model))
+    with place as folder:
+        plans = list(scene_plans.plan_scenes(camera, overrides, scenes, workers))
+        rows = list(scene_plans.rows(plans))
+        write_table(folder.new("scenes.csv"), scene_plans.COLUMNS, rows)
+        plot_scene_plans(folder.new("scenes.png"), f"{model.name}: what scenes call for", plans)
+        folder.finish({"name": model.name, "scenes": [each.scene for each in plans]})
+    if not quiet:
+        print(scene_table(plans))
+        print(f"{model.name}: {folder.path / 'scenes.csv'}, {folder.path / 'scenes.png'}")
+
+
+def scene_table(plans: "Sequence[ScenePlan]") -> str:
+    """Return effects by scenes as text: on, off, or free, one line a scene."""
+    from vcam_cli.simulation.scene_plans import effect_names
+
+    names = effect_names(plans)
+    width = max(len(each.scene) for each in plans)
+    lines = [f"{'':<{width}}  " + " ".join(names)]
+    for each in plans:
+        states = {d.name: "free" if d.free else d.state for d in each.decisions}
+        cells = (f"{states.get(name, '-'):<{len(name)}}" for name in names)
+        lines.append(f"{each.scene:<{width}}  " + " ".join(cells).rstrip())
+    return "\n".join(lines)
 
 
 def table(report: dict) -> str:

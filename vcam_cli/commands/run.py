@@ -60,14 +60,15 @@ def report(
 ) -> str:
     """Return the report of a run: metrics, effects, time and files."""
     lines = [f"{name:<20} {value:>12.6g} {unit}".rstrip() for name, value, unit in metrics]
-    lines += ["", *effect_lines(record["plan"]["effects"])]
     estimate, measured = record["plan"]["seconds"], sum(record["stages"].values())
+    lines.append("")
     lines.append(
         f"time         {measured:.2f} s, {estimate:.2f} s were estimated"
         f" ({record['seconds']:.2f} s with start-up)"
     )
     lines += [f"{about:<12} {path / name}" for name, about in FILES.items() if name in files]
     lines.append(f"{record['name']}: {path}/")
+    lines += ["", *wrap(simulated_effects(record["plan"], measured))]
     return "\n".join(lines)
 
 
@@ -83,24 +84,35 @@ FILES = {
 """Image files that a run may write -> their descriptions."""
 
 
-def effect_lines(decisions: list[dict]) -> list[str]:
-    """Return the lines on effects: simulated, left out by the plan, switched off in the file."""
+def simulated_effects(plan: dict, measured: float) -> str:
+    """Return what was simulated, what the scene does not call for, and the time of both."""
+    effects = plan["effects"]
+    on = [e for e in effects if e["state"] == "on"]
+    omitted = [e for e in effects if e["state"] == "off" and e["by"] == "plan"]
+    off = [e for e in effects if e["state"] == "off" and e["by"] == "user"]
+    parts = [f"simulated {len(on)} of {len(on) + len(omitted)} effects"]
+    if omitted:
+        parts.append("not called for here: " + ", ".join(map(_share, omitted)))
+    if off:
+        parts.append("switched off: " + ", ".join(spoken(e["name"]) for e in off))
+    time = f"{measured:.2f} s"
+    if omitted:
+        time += f", all of them about {measured * plan['seconds_of_all'] / plan['seconds']:.2f} s"
+    return "; ".join([*parts, time])
 
-    def names(state: str, *by: str) -> list[str]:
-        return [e["name"] for e in decisions if e["state"] == state and e["by"] in by]
 
-    lines = wrap("simulated", ", ".join(names("on", "plan", "user")) or "nothing but light")
-    for e in decisions:
-        if e["state"] == "off" and e["by"] == "plan":
-            lines += wrap("left out", f"{e['name']}: {e['reason']}")
-    if names("off", "user"):
-        lines += wrap("switched off", ", ".join(names("off", "user")))
-    return lines
+def _share(effect: dict) -> str:
+    """Return an effect and how much it would change."""
+    return f"{spoken(effect['name'])} ({100 * effect['contribution']:.2g} % {effect['unit']})"
 
 
-def wrap(label: str, text: str) -> list[str]:
-    """Return lines of at most 100 characters, with a label before the first."""
+def spoken(name: str) -> str:
+    """Return the name of an effect as it is said."""
+    return "fixed-pattern noise" if name == "fpn" else name.replace("_", " ")
+
+
+def wrap(text: str) -> list[str]:
+    """Return lines of at most 100 characters."""
     import textwrap
 
-    lines = textwrap.wrap(text, 100 - 12 - 1) or [""]
-    return [f"{label if not i else '':<12} {line}" for i, line in enumerate(lines)]
+    return textwrap.wrap(text, 100, break_long_words=False)

@@ -22,6 +22,7 @@ class to the tuple in `order.py`.
 
 from __future__ import annotations
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
@@ -35,6 +36,10 @@ from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry
 
 Kind = TypeVar("Kind", bound="Effect")
+ENTRIES = 257
+"""Frequencies at which a mean over wavelengths is computed."""
+PLACES = 3
+"""Places of the field at which a blur that changes over it is averaged."""
 
 
 def of_kind(effects: Iterable[Effect], *kinds: type[Kind]) -> tuple[Kind, ...]:
@@ -54,6 +59,17 @@ class SignalLevels:
     """Mean dark signal of a pixel [electrons]."""
     binning: Binning | None = None
     """How such pixels are read as one."""
+    levels: tuple[float, ...] = ()
+    """Noise-free signals of the scene at which variances are weighed, dark signal included
+    [electrons]; () where only full signal is known."""
+    extreme: float = math.inf
+    """Largest signal that noise makes of the brightest pixel, in front of all clamps
+    [electrons]."""
+
+    @property
+    def weighed(self) -> tuple[float, ...]:
+        """Signals at which variances are weighed [electrons]."""
+        return self.levels or (self.full_signal,)
 
     @property
     def conversions(self) -> int:
@@ -127,6 +143,25 @@ class Effect(ABC):
         error = self.mean_error(signal)
         return (None, "") if error is None else (error / signal.full_signal, "of full signal")
 
+    def mean_transfer(
+        self, fx: NDArray, fy: NDArray, spectrum: Sequence[tuple[float, float]]
+    ) -> NDArray | None:
+        """Return what it leaves of waves, in the mean over the light and the field.
+
+        Parameters
+        ----------
+        fx, fy : NDArray
+            Spatial frequencies along x (n,) and y (m,) [cycles/m].
+        spectrum : sequence of (float, float)
+            Wavelengths [m] and their shares of the light.
+
+        Returns
+        -------
+        NDArray or None
+            Transfer at all pairs (m, n), without unit; None where it blurs nothing.
+        """
+        return None
+
     def parts_in_pixels(self) -> tuple[Effect, ...]:
         """Return the parts of it that act in the pixels, before their voltages are joined."""
         return (self,)
@@ -154,6 +189,12 @@ class Blur(Effect):
         It is 1 at frequency 0.
         """
 
+    def mean_transfer(
+        self, fx: NDArray, fy: NDArray, spectrum: Sequence[tuple[float, float]]
+    ) -> NDArray:
+        """Return its transfer at the wavelength in the middle of the light: (m, n)."""
+        return self.otf_plane(fx, fy, spectrum[len(spectrum) // 2][0])
+
     @property
     def model(self) -> tuple[Blur, int, bool]:
         """A blur that this one is made of, so that what many have in common is computed once.
@@ -178,6 +219,15 @@ class RadialTransfer(Blur):
     def otf_plane(self, fx: NDArray, fy: NDArray, wavelength: float) -> NDArray:
         """Return the transfer at all pairs of fx (n,) and fy (m,) [cycles/m]: (m, n)."""
         return self.otf(np.hypot(fx[None, :], fy[:, None]), wavelength)
+
+    def mean_transfer(
+        self, fx: NDArray, fy: NDArray, spectrum: Sequence[tuple[float, float]]
+    ) -> NDArray:
+        """Return its transfer in the mean over the light, from a table over |f|: (m, n)."""
+        radius = np.hypot(fx[None, :], fy[:, None])
+        table = np.linspace(0, float(radius.max()), ENTRIES)
+        mean = sum(share * self.otf(table, wavelength) for wavelength, share in spectrum)
+        return np.interp(radius, table, mean)
 
 
 class PlaneTransfer(Blur):
@@ -215,6 +265,16 @@ class FieldTransfer(Effect):
         not to be enough.
         """
 
+    def mean_transfer(
+        self, fx: NDArray, fy: NDArray, spectrum: Sequence[tuple[float, float]]
+    ) -> NDArray:
+        """Return one that loses as much as the blurs of some places do, rms: (m, n)."""
+        zones = self.zones(PLACES)
+        some = [zone.blur for zone in zones[:: max(1, len(zones) // PLACES)]]
+        wavelength = spectrum[len(spectrum) // 2][0]
+        lost = [np.square(np.abs(1 - blur.otf_plane(fx, fy, wavelength))) for blur in some]
+        return np.asarray(1 - np.sqrt(np.mean(lost, axis=0)))
+
 
 class SeparableTransfer(Effect):
     """A transfer function that is a product of one along x and one along y."""
@@ -223,6 +283,12 @@ class SeparableTransfer(Effect):
     def box(self) -> tuple[float, float] | None:
         """Width and height of the area that it averages over evenly [m]; None for another shape."""
         return None
+
+    def mean_transfer(
+        self, fx: NDArray, fy: NDArray, spectrum: Sequence[tuple[float, float]]
+    ) -> NDArray:
+        """Return its transfer at all pairs of fx (n,) and fy (m,) [cycles/m]: (m, n)."""
+        return np.outer(self.along_y(fy), self.along_x(fx))
 
     @abstractmethod
     def along_x(self, frequency: NDArray) -> NDArray:

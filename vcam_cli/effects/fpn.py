@@ -124,6 +124,11 @@ class FixedPattern(NoiseSource):
             electrons += self.offset_column * site.normal_columns("fpn offset column")
         return electrons
 
+    @property
+    def fills_wells(self) -> bool:
+        """Whether there are hot pixels."""
+        return self.hot > 0
+
     def variance(self, mean, dark=0.0):
         """Return the variance that it adds to a pixel [electrons squared]."""
         offsets = self.offset_pixel**2 + self.offset_column**2

@@ -27,8 +27,6 @@ class Microlens(Gain):
         "Chen 2003, section 3.5.4; Catrysse, Liu and El Gamal 2000, doi:10.1117/12.385460 (shift)"
     )
     absent = "the file gives no microlens"
-    # The collecting area is also the sampling aperture: without the gain the two would disagree.
-    removable = False
 
     @classmethod
     def from_camera(cls, camera, geometry):

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from vcam_cli.camera.array import Binning
 from vcam_cli.effects.base import Effect, SignalLevels, of_kind
 
-LEVELS = (0.01, 0.1, 1.0)
-"""Shares of full signal at which variances are weighed."""
+SIGMAS = 6.0
+"""Standard deviations of the noise that count as its extremes."""
 _KINDS_OF_VARIANCE = {"frame": "temporal", "sensor": "fixed-pattern"}
 
 
@@ -83,6 +83,15 @@ class NoiseSource(ElectronEffect):
         parts = (self,) if self.origin == "readout" else self.split()[1:]
         return tuple(part for part in parts if part is not None)
 
+    def mean_error(self, signal: SignalLevels) -> float:
+        """Return 0: noise changes no mean."""
+        return 0.0
+
+    @property
+    def fills_wells(self) -> bool:
+        """Whether it fills some pixels, however little light there is."""
+        return False
+
     def before_shot(self, mean: NDArray, site: Site) -> NDArray:
         """Return the block's mean signal as this source changes it [electrons].
 
@@ -125,7 +134,7 @@ class NoiseSource(ElectronEffect):
         return (own if self.origin == "readout" else own / binning.count) + column + row
 
     def contribution(self, signal: SignalLevels, others: Sequence[Effect]) -> tuple[float, str]:
-        """Return its largest share of the variance of its scope, at any of the `LEVELS`."""
+        """Return its largest share of the variance of its scope, at any of the scene's levels."""
         rest = [e for e in noise_sources(others, self.scope) if e.name != self.name]
         total = total_variance([*rest, self], signal)
         share = total_variance([self], signal) / np.maximum(total, 1e-300)
@@ -138,27 +147,47 @@ def noise_sources(effects: Iterable[Effect], scope: str) -> tuple[NoiseSource, .
 
 
 def total_variance(sources: Iterable[NoiseSource], signal: SignalLevels) -> NDArray:
-    """Return the summed variance of noise sources at each of the `LEVELS` [electrons squared].
+    """Return the summed variance of noise sources at each of the levels [electrons squared].
 
     Of pixels that are read as one, of their mean.
     """
     listed = tuple(sources)
     return np.array(
         [
-            sum(
-                source.binned_variance(level * signal.full_signal, signal.dark, signal.binning)
-                for source in listed
-            )
-            for level in LEVELS
+            sum(source.binned_variance(level, signal.dark, signal.binning) for source in listed)
+            for level in signal.weighed
         ],
         dtype=float,
     )
 
 
+def extreme_signal(sources: Sequence[NoiseSource], brightest: float, dark: float) -> float:
+    """Return the largest signal that noise makes of the brightest pixel.
+
+    Parameters
+    ----------
+    sources : sequence of NoiseSource
+        Noise that is wanted.
+    brightest, dark : float
+        Largest mean signal, and the mean dark signal in it [electrons].
+
+    Returns
+    -------
+    float
+        Signal [electrons]; inf where noise fills pixels of its own.
+    """
+    if any(source.fills_wells for source in sources):
+        return math.inf
+    variance = sum(source.variance(brightest, dark) for source in sources)
+    return brightest + SIGMAS * math.sqrt(variance)
+
+
 class Limit(ElectronEffect):
     """A clamp."""
 
-    removable = False
+    def mean_error(self, signal: SignalLevels) -> float | None:
+        """Return 0 where no signal comes near the clamp; elsewhere it is not left out."""
+        return 0.0 if signal.extreme < self.ceiling else None
 
     @property
     def ceiling(self) -> float:
@@ -199,8 +228,8 @@ class Quantizer(Effect):
         total = total_variance(noise_sources(others, "frame"), signal)
         n = signal.conversions
         rounding = [
-            self.rounding(level * signal.full_signal, n * noise) / n
-            for level, noise in zip(LEVELS, total, strict=True)
+            self.rounding(level, n * noise) / n
+            for level, noise in zip(signal.weighed, total, strict=True)
         ]
         share = np.array(rounding) / np.maximum(total + rounding, 1e-300)
         return float(share.max()), "of the temporal variance"

@@ -33,7 +33,14 @@ from vcam_cli.interrupts import defer_interrupts
 LOCK = ".vcam-lock"
 PROGRAM = "vcam"
 """A record is vcam's when it says {"program": "vcam", "files": [...]}."""
-RECORDS = ("run.json", "accuracy.json", "characterize.json", "study.json", "compare.json")
+RECORDS = (
+    "run.json",
+    "accuracy.json",
+    "characterize.json",
+    "study.json",
+    "compare.json",
+    "scenes.json",
+)
 """The records of vcam's commands: each may add its files to the folder of another."""
 _LARGEST_RECORD = 1 << 26  # bytes
 _NO_LOCKS_HERE = {errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOSYS}

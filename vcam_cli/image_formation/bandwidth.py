@@ -26,15 +26,12 @@ from vcam_cli.image_formation.settings import Settings
 from vcam_cli.image_formation.transfer_tables import TableSize
 from vcam_cli.scenes.base import ChartScene, SampledScene, Scene
 
-MARGIN_SHARE = 0.2
-FREQUENCY_SHARE = 0.5
+MARGIN_SHARE = 0.15
+FREQUENCY_SHARE = 0.35
 """Parts of the tolerance that margin and highest frequency may use."""
 FIELD_SHARE = 0.2
 """The same for modes of a field that are left out before the picture is known: as if it had full
 contrast and detail of all sizes."""
-MOST_LOST = 8e-4
-"""Part of full signal that leaving out high frequencies may cost at most, unless a tenth of the
-tolerance is more."""
 CONTRAST = 0.25
 """Rms difference of a chart beyond its margin from its mirror image, relative to white."""
 SMALLEST_MARGIN = 4
@@ -61,6 +58,7 @@ def margin(
     effects: Sequence[Effect],
     band: tuple[float, float],
     knobs: Settings,
+    overexposure: float = 1.0,
 ) -> int:
     """Return the pixels that a chart goes on beyond the array.
 
@@ -78,13 +76,15 @@ def margin(
         Shortest and longest wavelength [m].
     knobs : Settings
         Settings of image formation.
+    overexposure : float, optional
+        Brightest light of the chart over the full signal of the array; below 1 it counts as 1.
 
     Returns
     -------
     int
         Pixels on every side, such that transforms of the whole are fast.
     """
-    budget = MARGIN_SHARE * knobs.tolerance / CONTRAST
+    budget = MARGIN_SHARE * knobs.tolerance / (CONTRAST * max(overexposure, 1.0))
     distance = np.geomspace(0.25 * min(geometry.pitch_x, geometry.pitch_y), 1.0, 80)
     radial = of_kind(effects, RadialTransfer)
     tail = line_spread_tail(radial, band[1], distance)
@@ -208,22 +208,6 @@ def highest_passed(path: OpticalPath, scene: Scene) -> float:
         half_width = scene.pitch_x * scene.shape[1] / 2
         limit = min(limit, KINKS * 2 * pitch * scene.chart.highest_frequency(half_width))
     return max(limit, LOWEST)
-
-
-def highest_frequency_share(tolerance: float) -> float:
-    """Return the part of full signal that may be lost with the highest frequencies.
-
-    Parameters
-    ----------
-    tolerance : float
-        Tolerance of the camera file, relative to full signal.
-
-    Returns
-    -------
-    float
-        Rms, relative to full signal.
-    """
-    return max(0.1 * tolerance, min(FREQUENCY_SHARE * tolerance, MOST_LOST))
 
 
 def axes(path: OpticalPath, scene: SampledScene, highest: float) -> tuple[Axis, Axis]:

@@ -30,6 +30,8 @@ class OpticalPath:
     ceiling: float = np.inf
     """Rate that fills a pixel by the end of the exposure, as far as it is known; brighter ones all
     look alike [e/s]."""
+    optional: tuple[Effect, ...] = ()
+    """Effects that may be left out where the scene does not call for them."""
 
     @property
     def separable(self) -> tuple[SeparableTransfer, ...]:

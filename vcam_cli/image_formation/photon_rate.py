@@ -21,6 +21,7 @@ from vcam_cli.camera.derived.geometry import Geometry, pixel_centers
 from vcam_cli.camera.derived.mosaic import Mosaic
 from vcam_cli.camera.derived.photodiode import quantum_efficiency
 from vcam_cli.effects.base import Blur, Effect, Gain, VeilingGlare, of_kind
+from vcam_cli.image_formation.light_plan import LightPlan, light_plan
 from vcam_cli.image_formation.optical_path import Layer, OpticalPath, SpectrumReport
 from vcam_cli.image_formation.settings import Settings
 from vcam_cli.image_formation.strategies import image_layers
@@ -146,6 +147,8 @@ class Rate:
     values: NDArray
     """(rows, columns), each pixel in its own color, or (C, rows, columns) with every color; a
     honeycomb's have places without a pixel [electrons / s]"""
+    plan: LightPlan
+    """What was left out because the scene does not call for it."""
     spectrum: SpectrumReport
     """How the scene was sampled and filtered, and what each transfer function does to it."""
 
@@ -172,6 +175,8 @@ def photo_rate(path: OpticalPath, scene: Scene, planes: bool = False) -> Rate:
     CannotDo
         Where memory does not suffice.
     """
+    plan = light_plan(path, scene)
+    path = plan.reduced(path)
     layers, report = image_layers(path, scene)
     g, mosaic = path.geometry, path.mosaic
     count = len(mosaic.colors) if planes else 1
@@ -207,7 +212,7 @@ def photo_rate(path: OpticalPath, scene: Scene, planes: bool = False) -> Rate:
     for glare, behind in zip(glares, gains[1:], strict=True):
         _spread(out, mosaic, glare)
         each(partial(apply_gains, behind), blocks(g.rows), path.workers)
-    return Rate(out if planes else out[0], report)
+    return Rate(out if planes else out[0], plan, report)
 
 
 def _glares_and_gains(

@@ -124,6 +124,29 @@ def changes_by_omission(
     }
 
 
+def percentiles(rate: NDArray, mosaic: Mosaic, shares: Sequence[float]) -> NDArray:
+    """Return percentiles of a signal in every color, from every n-th row and column.
+
+    Parameters
+    ----------
+    rate : NDArray
+        Signal (rows, columns), anything where the mosaic has no pixel [e/s].
+    mosaic : Mosaic
+        Colors of the pixels.
+    shares : sequence of float
+        Percentages.
+
+    Returns
+    -------
+    NDArray
+        Percentiles (colors, shares) [e/s].
+    """
+    rows, columns = (_every_nth(count, rate.shape) for count in rate.shape)
+    some = rate[rows, columns]
+    colors = _colors(mosaic, np.arange(rate.shape[0])[rows], np.arange(rate.shape[1])[columns])
+    return np.array([np.percentile(some[pixels], shares) for pixels in colors if pixels.any()])
+
+
 def _clip(signal: NDArray, limits: Iterable[Limit]) -> NDArray:
     """Return a mean signal behind clamps, which may reuse its array [electrons]."""
     for limit in limits:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from vcam_cli.image_formation.bandwidth import LOWEST, axes, highest_frequency_share, table_size
+from vcam_cli.image_formation.bandwidth import FREQUENCY_SHARE, LOWEST, axes, table_size
 from vcam_cli.image_formation.chart_cells import BEYOND_CUTOFF, cell_grid
 from vcam_cli.image_formation.optical_path import OpticalPath
 from vcam_cli.image_formation.peak_bound import brightest_pixel
@@ -130,7 +130,7 @@ def sampled_image(
     density = math.prod(scene.extent) / (g.sensor_width * g.sensor_height)
     pitch = g.pitch_y, g.pitch_x
     if knobs.oversampling is None:
-        budget = highest_frequency_share(knobs.tolerance) * full / np.sqrt(density)
+        budget = FREQUENCY_SHARE * knobs.tolerance * full / np.sqrt(density)
         needed = power.needed_frequency(squares, budget, pitch) * (1 + 1e-9)
         highest = min(max(needed, least), highest)
     else:

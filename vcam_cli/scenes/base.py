@@ -4,10 +4,8 @@ Spectral radiance on the sensor plane: L(x, y, wavelength) = sum_k B_k(x, y) S_k
 [W/(sr m2 m)], with x to the right, y down, in meters on the sensor from the array's center, and
 upright: magnification's two reversals are left out, the top of the scene is row 0.
 
-Why two kinds of scene: a sinusoid is known in closed form and stays exact through the whole
-linear part, while everything else is handed on as samples. `SampledScene.planes(mix)` paints a
-linear combination of the parts on demand, so that a chart of 25 spectra costs as many planes as
-the camera asks for, and never 25.
+Why two kinds of scene: a sinusoid is known in closed form and stays exact, all else is samples.
+`SampledScene.planes(mix)` paints as many mixtures of 25 spectra as the camera asks for.
 """
 
 import math
@@ -200,6 +198,11 @@ class Chart(ABC):
     and its dtype is that of the result.
     """
 
+    @property
+    def brightest(self) -> float:
+        """Brightest light, relative to the perfect white."""
+        return 1.0
+
     def highest_frequency(self, half_width: float) -> float:
         """Return the frequency beyond which a chart has no detail; inf where edges are sharp.
 
@@ -358,6 +361,11 @@ class Framed(Chart):
 
     chart: Chart
     frame: Frame
+
+    @property
+    def brightest(self) -> float:
+        """Brightest light of the chart, in the frame or not."""
+        return self.chart.brightest
 
     def paint(self, x_edges: Array, y_edges: Array, mix: Array, out: Array) -> None:
         """Write the averages over the cells, those on the frame's edge by area."""

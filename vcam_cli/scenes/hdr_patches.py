@@ -49,6 +49,11 @@ class HdrPatches(Chart):
     radius: float
     """Radius of the lamp [m]."""
 
+    @property
+    def brightest(self) -> float:
+        """Brightest light, relative to the perfect white: that of the lamp."""
+        return max(1.0, self.lamp)
+
     def paint(self, x_edges: Array, y_edges: Array, mix: Array, out: Array) -> None:
         """Write the averages over the cells into `out`.
 

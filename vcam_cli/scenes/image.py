@@ -133,7 +133,9 @@ class ImageScene(SampledScene):
             total += np.ones(len(block), block.dtype) @ block
         for top in range(0, len(self.picture), ROWS):
             samples = self.picture[top : top + ROWS].ravel()
-            squares += float(samples @ samples)
+            with np.errstate(over="ignore"):
+                found = float(samples @ samples)
+            squares += found if math.isfinite(found) else _squares(samples)
         mean = weights @ total / max(area, inside.shape[0] * inside.shape[1])
         return mean, np.linalg.norm(weights, axis=1) * math.sqrt(squares / math.prod(self.shape))
 
@@ -148,6 +150,12 @@ class ImageScene(SampledScene):
         index = np.minimum(index, 2 * count - 1 - index) - self.black[axis]
         lit = (index >= 0) & (index < size)
         return np.clip(index, 0, size - 1), lit.astype(self.dtype)
+
+
+def _squares(samples: Array) -> float:
+    """Return the sum of squares of samples that are too bright for 32 bits."""
+    wide = samples.astype(np.float64)
+    return float(wide @ wide)
 
 
 def image_scene(

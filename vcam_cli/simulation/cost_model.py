@@ -126,10 +126,15 @@ def irradiance_seconds(
     return count * (together + EXR * geometry.rows * geometry.columns)
 
 
+def usual_spectrum(geometry: Geometry) -> SpectrumReport:
+    """Return the spectrum that a scene in color with much detail would have."""
+    samples = 2 * geometry.rows * geometry.columns
+    return SpectrumReport(cells=samples, terms=samples, planes=3, filters=1)
+
+
 def first_estimate(camera: Camera, geometry: Geometry, mosaic: Mosaic, workers: int) -> float:
     """Return the seconds of a whole run, before anything is known of its scene."""
-    samples = 2 * geometry.rows * geometry.columns
-    guess = SpectrumReport(cells=samples, terms=samples, planes=3, filters=1)
+    guess = usual_spectrum(geometry)
     core = image_seconds(geometry, mosaic, guess) + output_seconds(camera, geometry, mosaic)
     return core * slowness() / threads(workers)
 

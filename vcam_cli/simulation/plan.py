@@ -3,39 +3,47 @@
 The section keys of a camera file say what exists; `effects` says what the user wants simulated;
 what is left to the plan is decided by two promises, with tolerance T:
 
-- mean: leaving effects out changes the mean raw by at most T of full signal (rms over the array);
-- variance: at 1, 10 and 100 % of full signal, temporal and fixed-pattern variance each stay
-  within 2 T of everything on.
+- mean: all that is left out changes the mean raw by at most T / 2 of full signal, rms over the
+  array; the other half is for the settings;
+- variance: at the 1st, 10th, 50th, 90th and 99th percentile of the scene's own signal, temporal and
+  fixed-pattern variance each stay within 2 T of everything on.
 
 Why two: a read noise of 5 electrons is 0.06 % of full signal and most of the variance in the
-shadows. One number cannot serve both. Three quarters of the mean's tolerance are kept for the
-settings.
+shadows. One number cannot serve both; and a scene without shadows does not call for it.
 
-What costs next to nothing stays on: transfer functions beside the transform they multiply into,
-charges, which are an addition. Leaving them out would gain no time, and only lose truth.
-
-What each contributes is estimated from the scene itself, and never below the truth by more than a
-tenth: `vcam accuracy` shows the estimates beside the measurement.
+Effects on the light are decided first, from a survey of the scene (`image_formation.light_plan`);
+all others here, with the light at hand.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+import math
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.camera.derived.geometry import geometry as solve
-from vcam_cli.effects.base import Charge, Effect, SignalLevels, of_kind
+from vcam_cli.effects.base import Charge, Effect, SignalLevels, Transport, of_kind
 from vcam_cli.effects.order import ORDER
-from vcam_cli.effects.signal_chain import LEVELS, NoiseSource, noise_sources, total_variance
+from vcam_cli.effects.signal_chain import (
+    ElectronEffect,
+    Limit,
+    NoiseSource,
+    noise_sources,
+    total_variance,
+)
 from vcam_cli.errors import BadInput, Collector
+from vcam_cli.image_formation.light_plan import LightPlan
 from vcam_cli.image_formation.settings import Settings
 
-MEAN_SHARE = 0.25
-"""Part of the mean's tolerance for the gains that are left out."""
+OMITTED_SHARE = 0.5
+"""Part of the mean's tolerance for all effects that are left out."""
+VARIANCE_SHARE = 0.8
+"""Part of the variance's tolerance for them; the rest is for percentiles that are estimated."""
 
 
 @dataclass(frozen=True)
@@ -51,10 +59,16 @@ class Decision:
     """What it does, or why it is off."""
     contribution: float | None
     """The largest share that leaving it out would change, in `unit`."""
+    allowed: float | None
+    """The share that all that is left out may change together, in `unit`."""
     unit: str
     """What the contribution is a share of."""
     seconds: float
     """Time that it takes on one core [s]."""
+    saved: float = 0.0
+    """Time that leaving it out saves on one core [s]."""
+    free: bool = False
+    """Whether it could be left out, but would save nothing."""
 
 
 @dataclass(frozen=True)
@@ -66,6 +80,10 @@ class Plan:
     settings: Settings
     seconds: float
     memory_bytes: int
+    seconds_of_all: float = 0.0
+    """Estimated time with everything on [s]."""
+    levels: tuple[float, ...] = ()
+    """Noise-free signals of the scene at which noise is promised [electrons]."""
 
     def report(self) -> dict:
         """Return the plan as `run.json` and `--json` show it."""
@@ -73,6 +91,7 @@ class Plan:
             "effects": [asdict(d) for d in self.decisions],
             "settings": self.settings.report(),
             "seconds": self.seconds,
+            "seconds_of_all": self.seconds_of_all,
             "memory_bytes": self.memory_bytes,
         }
 
@@ -128,83 +147,58 @@ def enabled_effects(camera: Camera, geometry: Geometry) -> tuple[Effect, ...]:
 
 
 def mean_signal_effects(camera: Camera, geometry: Geometry) -> tuple[Effect, ...]:
-    """Return the effects on the mean signal that run, as far as no signal level decides it.
-
-    Charges and noise are not among them.
-    """
+    """Effects that are wanted and act before electrons are counted, in the order of action."""
     present = enabled_effects(camera, geometry)
-    later = {*of_kind(present, Charge, NoiseSource), *_negligible_light(camera, present)}
-    return tuple(e for e in present if e not in later)
+    later = of_kind(present, Charge, NoiseSource)
+    return tuple(effect for effect in present if effect not in later)
 
 
-def _negligible_light(camera: Camera, present: Sequence[Effect]) -> set[Effect]:
-    """Return the effects on the mean signal that take time and together change little.
-
-    The smallest first, as many as fit into the share. Charges are an addition, and most transfers
-    multiply into one that is there anyway. Glare and transport cost less than a draw, and of a lamp
-    in the picture, far beyond its full well, they light all of it: no bound is known beforehand.
-    """
-    one = SignalLevels(full_signal=1.0, time=1.0)
-    costly = [e for e in present if e.costly and e.removable and _wish(camera, e) == "auto"]
-    errors = {e: error for e in costly if (error := e.mean_error(one)) is not None}
-    left = MEAN_SHARE * camera.accuracy.tolerance
-    negligible: set[Effect] = set()
-    for effect in sorted(errors, key=errors.__getitem__):
-        left -= errors[effect]
-        if left < 0:
-            break
-        negligible.add(effect)
-    return negligible
+def optional_effects(camera: Camera, effects: Iterable[Effect]) -> tuple[Effect, ...]:
+    """Those of the effects that the plan may leave out."""
+    return tuple(e for e in effects if e.removable and _wish(camera, e) == "auto")
 
 
 def make(
     camera: Camera,
     geometry: Geometry,
     settings: Settings,
+    light: LightPlan,
     signal: SignalLevels,
     memory_bytes: int,
     changes: Mapping[str, float],
 ) -> Plan:
-    """Decide on every effect of a camera for the signal that is expected.
+    """Decide every effect of a camera for the signal that is expected.
 
     Parameters
     ----------
     camera : Camera
         The camera.
     geometry : Geometry
-        Geometry of its array.
+        Its geometry.
     settings : Settings
         Settings of image formation.
+    light : LightPlan
+        What was decided of the effects on the light.
     signal : SignalLevels
-        What is known of the signal.
+        The signal.
     memory_bytes : int
-        Memory that the frame takes [bytes].
+        Estimated memory [bytes].
     changes : mapping
-        Name of an effect -> rms change of the signal by leaving it out, where it is known [e/s].
-
-    Returns
-    -------
-    Plan
-        The decisions, and the effects that run.
+        Name of an effect -> rms change of the signal by leaving it out, where known [e/s].
     """
-    found = camera_effects(camera, geometry)
-    present = list(enabled_effects(camera, geometry))
-    tolerance = camera.accuracy.tolerance
-    dropped = _negligible_light(camera, present)
-    candidates = [e for e in present if e.removable and _wish(camera, e) == "auto"]
-    dropped |= _negligible_variance(candidates, present, signal, tolerance)
-    pixels = geometry.rows * geometry.columns
-    decisions, active = [], []
-    for kind in ORDER:
-        effect = found[kind.name]
-        change = changes.get(kind.name)
-        change = None if change is None else change * signal.time
-        decision = _decide(kind, effect, camera, effect in dropped, present, signal, pixels, change)
-        decisions.append(decision)
-        if effect is not None and decision.state == "on":
-            active.append(effect)
-    seconds = sum(d.seconds for d in decisions)
-    return Plan(tuple(decisions), tuple(active), settings, seconds, memory_bytes)
+    effects = camera_effects(camera, geometry)
+    present = enabled_effects(camera, geometry)
+    shares = {name: min(c * signal.time / signal.full_signal, 1.0) for name, c in changes.items()}
+    shares |= light.shares
+    omitted = {*light.omitted, *_negligible(camera, present, light, signal, shares)}
+    weigh = _Weighing(present, signal, shares, geometry.rows * geometry.columns)
+    decisions = [_decide(kind, effects[kind.name], camera, light, omitted, weigh) for kind in ORDER]
+    on = {decision.name for decision in decisions if decision.state == "on"}
+    active = tuple(
+        effect for effect in effects.values() if effect is not None and effect.name in on
+    )
+    seconds = sum(decision.seconds for decision in decisions)
+    return Plan(tuple(decisions), active, settings, seconds, memory_bytes, levels=signal.levels)
 
 
 def _wish(camera: Camera, effect: Effect) -> str:
@@ -216,50 +210,102 @@ def _wish(camera: Camera, effect: Effect) -> str:
     return camera.effects.get(effect.name, "auto")
 
 
-def _negligible_variance(
-    candidates: list[Effect], present: list[Effect], signal: SignalLevels, tolerance: float
-) -> set[Effect]:
-    """Return the noise sources whose absence changes no variance by 2 T or more, at any level."""
-    negligible: set[Effect] = set()
-    for scope in ("frame", "sensor"):
-        everything = total_variance(noise_sources(present, scope), signal)
-        missing = np.zeros(len(LEVELS))
-        variances = {e: total_variance([e], signal) for e in noise_sources(candidates, scope)}
-        for effect in sorted(variances, key=lambda e: float(variances[e].max())):
-            missing = missing + variances[effect]
-            # Half of it: the other is kept for what the levels in between may ask.
-            if np.any(missing > tolerance * everything):
-                break
-            negligible.add(effect)
-    return negligible
+def _negligible(
+    camera: Camera,
+    present: Sequence[Effect],
+    light: LightPlan,
+    signal: SignalLevels,
+    shares: Mapping[str, float],
+) -> tuple[Effect, ...]:
+    """Effects on electrons that may all be left out together, those that change least first."""
+    tolerance = camera.accuracy.tolerance
+    budget = OMITTED_SHARE * tolerance - light.share
+    whole = _variances(present, present, signal)
+    out: tuple[Effect, ...] = ()
+    # Late charge is some of the dark signal's: with transport, the two stay together.
+    moved = any(transport not in light.omitted for transport in of_kind(present, Transport))
+    kinds = (ElectronEffect,) if moved else (Charge, ElectronEffect)
+    rest = optional_effects(camera, of_kind(present, *kinds))
+
+    def mean_share(effect: Effect) -> float:
+        if effect.name in shares and not of_kind([effect], Limit):
+            return shares[effect.name]
+        error = effect.mean_error(signal)
+        return math.inf if error is None else error / signal.full_signal
+
+    def variance_share(effects: Sequence[Effect]) -> float:
+        kept = tuple(effect for effect in present if effect not in effects)
+        lost = np.abs(_variances(present, kept, signal) - whole)
+        return float((lost / np.maximum(whole, 1e-300)).max())
+
+    def use(effect: Effect) -> float:
+        return max(
+            mean_share(effect) / OMITTED_SHARE, variance_share([effect]) / (2 * VARIANCE_SHARE)
+        )
+
+    for effect in sorted(rest, key=use):
+        together = (*out, effect)
+        if sum(map(mean_share, together)) > budget:
+            continue
+        if variance_share(together) <= 2 * VARIANCE_SHARE * tolerance:
+            out = together
+    return out
+
+
+def _variances(present: Sequence[Effect], kept: Sequence[Effect], signal: SignalLevels) -> NDArray:
+    """Temporal and fixed-pattern variances at the scene's levels: (2, levels) [electrons squared].
+
+    Without a charge, both the dark signal and the level are lower.
+    """
+    gone = [charge for charge in of_kind(present, Charge) if charge not in kept]
+    missing = sum(charge.rate() for charge in gone) * signal.time
+    levels = tuple(max(level - missing, 0.0) for level in signal.weighed)
+    here = replace(signal, dark=max(signal.dark - missing, 0.0), levels=levels)
+    return np.array(
+        [total_variance(noise_sources(kept, scope), here) for scope in ("frame", "sensor")]
+    )
+
+
+@dataclass(frozen=True)
+class _Weighing:
+    """What is known of every effect when it is decided."""
+
+    present: Sequence[Effect]
+    signal: SignalLevels
+    shares: Mapping[str, float]
+    pixels: int
+
+    def contribution(self, effect: Effect) -> tuple[float | None, str]:
+        """How much leaving it out would change, and of what."""
+        if effect.name in self.shares:
+            return self.shares[effect.name], "of full signal"
+        return effect.contribution(self.signal, self.present)
 
 
 def _decide(
     kind: type[Effect],
     effect: Effect | None,
     camera: Camera,
-    dropped: bool,
-    present: list[Effect],
-    signal: SignalLevels,
-    pixels: int,
-    change: float | None,
+    light: LightPlan,
+    omitted: Collection[Effect],
+    weigh: _Weighing,
 ) -> Decision:
-    """Return the line of the plan on one effect; `change` is the rms by leaving it out [e]."""
+    """One line of the plan."""
     if effect is None:
-        return Decision(kind.name, "off", "camera", kind.absent, None, "", 0.0)
-    contribution: float | None
-    if change is None:
-        contribution, unit = effect.contribution(signal, present)
-    else:
-        # A pixel that is full shows no change beyond the well.
-        contribution, unit = min(change / signal.full_signal, 1.0), "of full signal"
-    seconds = kind.seconds_per_pixel * pixels
-    wish = _wish(camera, effect)
+        return Decision(kind.name, "off", "camera", kind.absent, None, None, "", 0.0)
+    contribution, unit = weigh.contribution(effect)
+    part = OMITTED_SHARE if unit == "of full signal" else 2.0
+    allowed = None if contribution is None else part * camera.accuracy.tolerance
+    weighed = contribution, allowed, unit
+    wish, what = _wish(camera, effect), effect.describe()
+    seconds = kind.seconds_per_pixel * weigh.pixels
     if wish == "off":
-        return Decision(kind.name, "off", "user", "switched off in effects", contribution, unit, 0)
-    what = effect.describe()
-    if dropped:
-        reason = f"{what}: leaving it out changes less than {camera.accuracy.tolerance:.3g} allows"
-        return Decision(kind.name, "off", "plan", reason, contribution, unit, 0.0)
+        return Decision(kind.name, "off", "user", "switched off in effects", *weighed, 0.0)
+    if effect in omitted:
+        reason = f"{what}; not called for here"
+        return Decision(kind.name, "off", "plan", reason, *weighed, 0.0, saved=seconds)
+    free = effect in light.free
+    if free:
+        what += f"; free: {contribution:.2%} (could go; costs nothing)"
     by = "user" if wish == "on" else "plan"
-    return Decision(kind.name, "on", by, what, contribution, unit, seconds)
+    return Decision(kind.name, "on", by, what, *weighed, seconds, free=free)

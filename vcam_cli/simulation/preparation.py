@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -19,8 +20,10 @@ from vcam_cli.camera.derived.geometry import Geometry, geometry
 from vcam_cli.camera.derived.mosaic import Mosaic
 from vcam_cli.effects.base import Effect, SignalLevels, Transport, of_kind
 from vcam_cli.effects.order import quantizer
+from vcam_cli.effects.signal_chain import NoiseSource, extreme_signal
 from vcam_cli.errors import bad
 from vcam_cli.image_formation import bandwidth, memory_model, photon_rate, pixelwise
+from vcam_cli.image_formation.light_plan import PERCENTILES
 from vcam_cli.image_formation.optical_path import OpticalPath, SpectrumReport
 from vcam_cli.image_formation.rate_cache import RateCache
 from vcam_cli.image_formation.settings import Settings, settings
@@ -28,7 +31,7 @@ from vcam_cli.image_formation.transfer_functions import Transfer
 from vcam_cli.progress import Stages
 from vcam_cli.readout import auto_exposure, exposure, sample_times
 from vcam_cli.readout.layout import Layout, layout
-from vcam_cli.scenes.base import Scene
+from vcam_cli.scenes.base import ChartScene, Scene
 from vcam_cli.scenes.build import build
 from vcam_cli.simulation import cost_model, plan
 
@@ -115,28 +118,36 @@ def prepare(
     effects = plan.mean_signal_effects(camera, solved)
     with stages("scene"):
         band = camera.scene.wavelengths
-        margin = bandwidth.margin(place.lattice, effects, (band.start, band.stop), knobs)
-        view = photon_rate.view(place.lattice, knobs, margin)
-        scene = build(camera.scene, view, picture, camera.display.primaries)
+        margin = partial(bandwidth.margin, place.lattice, effects, (band.start, band.stop), knobs)
+
+        def scene_within(pixels: int) -> Scene:
+            view = photon_rate.view(place.lattice, knobs, pixels)
+            return build(camera.scene, view, picture, camera.display.primaries)
+
+        scene = scene_within(margin())
     with stages("optics"):
         transfer, white_rate = _transfer(camera, solved, place, scene, effects, knobs, rate_cache)
         summed = place.binning_groups.summed_charges
         ceiling = auto_exposure.ceiling(
             camera, float(white_rate.max()), circuit.saturation / summed
         )
-        path = OpticalPath(transfer, place.lattice, knobs, place.mosaic, effects, workers, ceiling)
+        overexposure = _brightest(scene) * float(white_rate.max()) / ceiling
+        if overexposure > 1:  # of what lies beside the array, too
+            scene = scene_within(margin(overexposure))
+        optional = plan.optional_effects(camera, effects)
+        path = OpticalPath(
+            transfer, place.lattice, knobs, place.mosaic, effects, workers, ceiling, optional
+        )
         photo_rate = partial(photon_rate.photo_rate, path, scene, place.planes)
         light = photo_rate() if rate_cache is None else rate_cache.rate(camera, ceiling, photo_rate)
-        white_rate = white_rate * summed
+        effects = tuple(effect for effect in effects if effect not in light.plan.omitted)
+        white_rate = white_rate * summed / (light.plan.on_axis or 1.0)
     with stages("exposure"):
         exposed = _expose(camera, solved, circuit, place, light, white_rate, effects)
         needed = max(frame_bytes, light.spectrum.memory) + getattr(picture, "nbytes", 0)
         changes = light.spectrum.changes | exposed.changes
-        decided = plan.make(camera, solved, knobs, exposed.signal, needed, changes)
-        seconds = cost_model.frame_seconds(
-            camera, solved, place, knobs, light.spectrum, decided, workers
-        )
-        decided = replace(decided, seconds=seconds)
+        decided = plan.make(camera, solved, knobs, light.plan, exposed.signal, needed, changes)
+        decided = _with_seconds(camera, solved, place, knobs, light, decided, workers)
         stages.watch.expect(decided.seconds)
     return Prepared(
         camera=camera,
@@ -154,6 +165,30 @@ def prepare(
         times=exposed.times,
         plan=decided,
     )
+
+
+def _brightest(scene: Scene) -> float:
+    """Return the brightest light that a chart has beyond the array, relative to white; else 0."""
+    return scene.chart.brightest if isinstance(scene, ChartScene) else 0.0
+
+
+def _with_seconds(
+    camera: Camera,
+    solved: Geometry,
+    place: Layout,
+    knobs: Settings,
+    light: photon_rate.Rate,
+    decided: plan.Plan,
+    workers: int,
+) -> plan.Plan:
+    """Return the plan with the seconds of the frame, and of one with everything on."""
+    spectrum = light.spectrum
+    seconds = cost_model.frame_seconds(camera, solved, place, knobs, spectrum, decided, workers)
+    if light.plan.omitted and not spectrum.terms:
+        spectrum = cost_model.usual_spectrum(place.lattice)
+    whole = replace(decided, seconds=decided.seconds + sum(d.saved for d in decided.decisions))
+    every = cost_model.frame_seconds(camera, solved, place, knobs, spectrum, whole, workers)
+    return replace(decided, seconds=seconds, seconds_of_all=every)
 
 
 def _require_memory(camera: Camera, place: Layout, knobs: Settings, solved: Geometry) -> int:
@@ -245,7 +280,15 @@ def _expose(
         deferred = np.minimum(rate, well) - np.minimum(groups.collect(collected), well)
         changes |= dict.fromkeys(transports, _rms(deferred))
     full = max(1.0, min(circuit.full_well, peak))
-    signal = SignalLevels(full, time, dark * time, camera.array.binning)
+    alone = not times and camera.array.binning is None
+    signal = SignalLevels(
+        full,
+        time,
+        dark * time,
+        camera.array.binning,
+        _levels(place, rate, dark, time, circuit.full_well),
+        extreme_signal(of_kind(enabled, NoiseSource), peak, dark * time) if alone else math.inf,
+    )
     return _Exposed(rate, times, signal, changes)
 
 
@@ -256,6 +299,20 @@ def _refuse_too_much(electrons: float) -> None:
             f"light and dark current would make {electrons:.3g} electrons in a pixel",
             "look for a wrong unit in the light level, the dark current or the exposure",
         )
+
+
+def _levels(
+    place: Layout, rate: NDArray, dark: float, time: float, well: float
+) -> tuple[float, ...]:
+    """Return the signals of the scene at which noise is promised, with the dark [electrons]."""
+    mosaic, planes = place.charge_pixels[1], rate.ndim == 3
+    mosaics = [Mosaic(((color,),)) for color in mosaic.colors] if planes else [mosaic]
+    levels = [
+        pixelwise.percentiles(plane, colors, PERCENTILES)
+        for plane, colors in zip(rate if planes else [rate], mosaics, strict=True)
+    ]
+    signal = (np.concatenate(levels).astype(float) + dark) * time
+    return tuple(np.minimum(signal, well).ravel().tolist())
 
 
 def _pixel_changes(

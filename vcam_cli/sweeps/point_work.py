@@ -6,6 +6,7 @@ import time
 import traceback
 from dataclasses import dataclass
 
+from vcam_cli.accuracy.ablation import with_effects
 from vcam_cli.camera.camera import Camera
 from vcam_cli.errors import BadInput, CannotDo, one_line
 from vcam_cli.files.atomic import written_bytes
@@ -58,9 +59,12 @@ def compute_point(job: Job, threads: int, shared: Shared) -> Outcome:
 def _simulate_point(
     job: Job, threads: int, shared: Shared
 ) -> tuple[dict[str, float], dict[str, bytes]]:
-    """Return the metrics of a point, and the files that are kept of it."""
+    """Return the metrics of a point, and the files that are kept of it.
+
+    One plan holds for all points, with everything on: a jump in a curve must not come from it.
+    """
     _check_versions(job)
-    result = simulate(job.camera, threads, shared=shared)
+    result = simulate(with_effects(job.camera, "all"), threads, shared=shared)
     found = {name: value for name, value, _ in result.metrics}
     metrics = {name: found[name] for name in job.metrics}
     return metrics, {FRAMES[what]: _frame(what, result) for what in job.keep}

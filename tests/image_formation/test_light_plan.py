@@ -1,0 +1,90 @@
+"""What the plan makes of effects on the light."""
+
+import numpy as np
+import pytest
+from making import camera, radiance_for
+
+from vcam_cli import simulate
+from vcam_cli.simulation.simulate import prepare
+
+SIZE = {"array.rows": 96, "array.columns": 128}
+SILICON = {
+    "pixel.photodetector.charge_diffusion": {
+        "diffusion_length": "20 um",
+        "depletion_width": "0.4 um",
+        "substrate_depth": "5 um",
+    }
+}
+WEDGE = {"scene.source": {"kind": "chart", "chart": "step-wedge", "steps": 3}}
+
+
+def states(tmp_path, changes: dict) -> dict[str, str]:
+    """Effect -> on, off or free."""
+    plan = prepare(camera(tmp_path, SIZE | changes), 1)[0].plan
+    return {d.name: "free" if d.free else d.state for d in plan.decisions}
+
+
+def test_an_even_scene_calls_for_no_lens_and_no_transforms(tmp_path):
+    rich = SILICON | {"optics.zernike": [{"field": 0, 4: "0 nm"}, {"field": 1, 8: "80 nm"}]}
+    wall = {"scene.source": {"kind": "chart", "chart": "uniform"}, "effects": "auto"}
+    ready = prepare(camera(tmp_path, SIZE | rich | wall), 1)[0]
+    off = {d.name for d in ready.plan.decisions if d.state == "off" and d.by == "plan"}
+    assert off >= {"diffraction", "aberration", "pixel_aperture", "charge_diffusion"}
+    assert ready.spectrum.terms == 0
+
+
+def test_without_a_blur_that_counts_there_is_no_spectrum(tmp_path):
+    """A fast lens before pixels of 20 um: three steps in gray have next to no edge."""
+    large = {"pixel.width": "20 um", "optics.f_number": 1.4, "accuracy": "draft"}
+    ready = prepare(camera(tmp_path, SIZE | large | WEDGE | {"effects": "auto"}), 1)[0]
+    assert {d.name: d.state for d in ready.plan.decisions}["diffraction"] == "off"
+    assert ready.spectrum.terms == 0
+
+
+def test_what_ends_the_spectrum_of_others_stays_and_is_free(tmp_path):
+    """Diffraction that counts for nothing beside diffusion that does: alone, it has no last
+    frequency."""
+    changes = SILICON | {
+        "pixel.width": "6 um",
+        "optics.f_number": 0.8,
+        "accuracy": 0.2,
+        "effects": {"pixel_aperture": "on", "charge_diffusion": "on"},
+        "scene.source": {"kind": "chart", "chart": "siemens-star", "spokes": 36},
+    }
+    assert states(tmp_path, changes)["diffraction"] == "free"
+
+
+@pytest.mark.parametrize(("fraction", "state"), [(1e-4, "off"), (0.03, "on")])
+def test_glare_is_left_out_where_it_shifts_nothing(fraction, state, tmp_path):
+    edge = {"scene.source": {"kind": "chart", "chart": "slanted-edge", "contrast": 0.2}}
+    changes = edge | {"optics.stray_light": fraction, "effects": "auto"}
+    assert states(tmp_path, changes)["stray_light"] == state
+
+
+def test_glare_stays_where_it_is_most_of_the_shadows(tmp_path):
+    """Of full signal it is little, but blacks of a millionth of white are nothing else."""
+    patches = {"kind": "chart", "chart": "hdr-patches", "dynamic_range": 1e6, "lamp": 1.0}
+    changes = {"scene.source": patches, "optics.stray_light": 0.002, "accuracy": "draft"}
+    assert states(tmp_path, changes | {"effects": "auto"})["stray_light"] == "on"
+
+
+def test_a_gain_that_is_left_out_leaves_its_level_out_too(tmp_path):
+    """The signal, and the white that exposures are timed by, are those without it."""
+    weak = {"pixel.microlens": {"gain": 1.001}, "scene.radiance": radiance_for(1000)}
+    weak |= {"accuracy": "draft"}
+    made = [
+        simulate(camera(tmp_path, weak | WEDGE | {"effects": effects}))
+        for effects in ("auto", {"microlens": "off"}, "all")
+    ]
+    auto, without, everything = (float(r.mean_electrons.mean()) for r in made)
+    assert auto == pytest.approx(without, rel=1e-6)
+    assert everything == pytest.approx(1.001 * without, rel=1e-6)
+    np.testing.assert_allclose(made[0].frame.white_rate, made[1].frame.white_rate, rtol=1e-9)
+
+
+def test_all_that_is_on_is_not_surveyed(tmp_path, monkeypatch):
+    """Planning takes no time where nothing may be left out."""
+    from vcam_cli.image_formation import light_plan
+
+    monkeypatch.setattr(light_plan, "scene_detail", None)
+    assert set(states(tmp_path, WEDGE | {"effects": "all"}).values()) <= {"on", "off"}

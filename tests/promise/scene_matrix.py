@@ -1,0 +1,273 @@
+"""What the plan makes of ten cameras before eighteen scenes, held against true ablations.
+
+    python -m tests.promise --matrix
+    python -m tests.promise --times
+
+Truth is the camera with everything on, converged (sampling, margin and float width differ from
+those of what is judged), and the same less one effect. Variances are those that the effects state,
+at percentiles of the true signal over all pixels of a color.
+"""
+
+from __future__ import annotations
+
+import itertools
+import statistics
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import promises
+import yaml
+
+from vcam_cli import load, simulate
+from vcam_cli.accuracy import ablation
+from vcam_cli.accuracy.reference import effect_changes, prepare_converged
+from vcam_cli.camera.camera import Camera
+from vcam_cli.effects.base import Charge, of_kind
+from vcam_cli.effects.signal_chain import NoiseSource
+from vcam_cli.simulation.preparation import Prepared
+from vcam_cli.simulation.simulate import prepare
+
+SMALL = (72, 96)
+"""Rows and columns of arrays whose truth is computed."""
+LARGE = (600, 800)
+"""Rows and columns of arrays that are timed."""
+CHARTS = (
+    "uniform", "step-wedge", "colorchecker", "dead-leaves", "slanted-edge", "hdr-patches",
+)  # fmt: skip
+LUMINANCES = (0.5, 100.0, 20000.0)
+"""Luminances of the perfect white [cd/m2]."""
+SCENES = {
+    f"{chart} {luminance:g}": {
+        "scene.source": {"kind": "chart", "chart": chart},
+        "scene.luminance": f"{luminance:g} cd/m2",
+    }
+    for chart, luminance in itertools.product(CHARTS, LUMINANCES)
+}
+RICH = """
+extends: starter
+optics:
+  stray_light: 0.5 %
+  exit_pupil_distance: 3 mm
+  zernike: [{field: 0, 11: 30 nm}, {field: 0.7, 8: 50 nm}, {field: 1, 8: 80 nm, 4: 50 nm}]
+pixel:
+  stack: {passivation: {thickness: 0.5 um, index: 2.0}, oxide: {thickness: 3 um, index: 1.46}}
+  microlens: {gain: 1.6, shift: optimal}
+  photodetector:
+    charge_diffusion: {diffusion_length: 10 um, depletion_width: 1 um, substrate_depth: 5 um}
+"""
+"""A camera with much to describe."""
+PLAIN = (
+    "starter", "still-life", "imx900", "kac-12040", "kai-02170", "low-light", "cfa-rgbw",
+    "x3-stacked", "csf-0.35um",
+)  # fmt: skip
+CAMERAS = (*PLAIN, "rich")
+
+
+def camera(name: str, scene: str, size: tuple[int, int], folder: Path) -> Camera:
+    """A camera before a scene, at standard accuracy, all effects on `auto`."""
+    source = name
+    if name == "rich":
+        path = folder / "rich.yaml"
+        path.write_text(RICH, encoding="utf-8")
+        source = str(path)
+    sets = {**SCENES[scene], "array.rows": size[0], "array.columns": size[1]}
+    sets |= {"accuracy": "standard", "effects": "auto", "quality": []}
+    listed = [
+        f"{key}={yaml.safe_dump(v, default_flow_style=True, width=999).splitlines()[0]}"
+        for key, v in sets.items()
+        if v is not None
+    ]
+    return load(source, listed)
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One camera before one scene."""
+
+    camera: str
+    scene: str
+    states: dict[str, str]
+    """Effect -> on | off | free."""
+    mean: float
+    """Rms of (mean raw under auto - truth) over full signal and tolerance."""
+    variance: float
+    """Largest relative change of a variance, over twice the tolerance."""
+    shares: dict[str, float]
+    """Effect -> its true ablation over what all that is left out may change: T / 2 of the mean,
+    2 T of a variance, whichever is more."""
+
+    @property
+    def line(self) -> str:
+        """What is printed of it."""
+        off = [name for name, state in self.states.items() if state != "on"]
+        return (
+            f"{self.camera:<12} {self.scene:<20} mean {self.mean:5.2f} T"
+            f"  variance {self.variance:5.2f} of 2 T  left out: {', '.join(off)}"
+        )
+
+
+def cell(name: str, scene: str, folder: Path) -> Cell:
+    """Judge the plan of one camera before one scene."""
+    made = camera(name, scene, SMALL, folder)
+    tolerance = made.accuracy.tolerance
+    auto = prepare(made, 1)[0]
+    fixed = ablation.with_exposure_time(made, auto.exposure_time)
+    reference = prepare(promises.at_preset(fixed, "reference"), 1)[0]
+    found = prepare_converged(fixed, reference, 1)
+    true, full = ablation.mean_raw(found), ablation.full_signal(found)
+    names = tuple(ablation.wanted_effects(made))
+    changed = effect_changes(made, auto.exposure_time, names, 1)
+    shares = {}
+    for effect in names:
+        of_mean = float(changed[effect][0]) / full / (0.5 * tolerance)
+        shares[effect] = max(of_mean, _variance_share(found, effect) / (2 * tolerance))
+    states = {
+        d.name: "free" if "; free:" in d.reason else d.state
+        for d in auto.plan.decisions
+        if d.by == "plan"
+    }
+    return Cell(
+        name,
+        scene,
+        states,
+        ablation.rms(ablation.mean_raw(auto) - true) / full / tolerance,
+        promises.variance_lost_of(auto, found) / (2 * tolerance),
+        shares,
+    )
+
+
+def _variance_share(found: Prepared, name: str) -> float:
+    """Largest relative change of a variance by leaving out one effect of those that run."""
+    time_, active = found.exposure_time, found.plan.active
+    kept = [effect for effect in active if effect.name != name]
+    missing = found.dark_rate * time_ - sum(c.rate() for c in of_kind(kept, Charge)) * time_
+    worst = 0.0
+    for level, scope in itertools.product(promises.scene_levels(found), ("frame", "sensor")):
+
+        def total(effects, level: float, dark: float, scope: str = scope) -> float:
+            sources = [e for e in of_kind(effects, NoiseSource) if e.scope == scope]
+            return sum(e.variance(level, dark) for e in sources)
+
+        whole = total(active, level, found.dark_rate * time_)
+        rest = total(kept, max(level - missing, 0.0), found.dark_rate * time_ - missing)
+        worst = max(worst, abs(whole - rest) / whole if whole else 0.0)
+    return worst
+
+
+def cells(folder: Path, cameras: tuple[str, ...] = CAMERAS) -> Iterator[Cell]:
+    """All of them."""
+    for name, scene in itertools.product(cameras, SCENES):
+        yield cell(name, scene, folder)
+
+
+@dataclass(frozen=True)
+class Times:
+    """CPU seconds of a frame with its render, the least of some, on one thread."""
+
+    camera: str
+    scene: str
+    auto: float
+    all: float
+
+    @property
+    def line(self) -> str:
+        """What is printed of it."""
+        ratio = self.auto / self.all
+        return (
+            f"{self.camera:<12} {self.scene:<20} {self.auto:.3f} s of {self.all:.3f} s: {ratio:.2f}"
+        )
+
+
+def times(name: str, scene: str, folder: Path, repeats: int = 5) -> Times:
+    """Time a frame as planned, and with everything on, in turns."""
+    auto = camera(name, scene, LARGE, folder)
+    everything = ablation.with_effects(auto, "all")
+    best = [float("inf"), float("inf")]
+    for turn in range(repeats + 1):
+        for index, made in enumerate((auto, everything)):
+            start = time.process_time()
+            _ = simulate(made, 1).render
+            if turn:
+                best[index] = min(best[index], time.process_time() - start)
+    return Times(name, scene, *best)
+
+
+PLANNED_BY_ADC = ("quantization",)
+"""Effects that the plan always keeps."""
+
+
+def figures(found: list[Cell]) -> Iterator[tuple[str, str, bool]]:
+    """(what is asked, what was found, whether it holds)"""
+    small = [
+        c.states[name] != "on"
+        for c in found
+        for name, share in c.shares.items()
+        if share < 0.1 and name in c.states and name not in PLANNED_BY_ADC
+    ]
+    part = sum(small) / len(small) if small else 1.0
+    yield (
+        "effects of an ablation under a tenth of their share that are off or free; at least 90 %",
+        f"{part:.1%} of {len(small)}",
+        part >= 0.9,
+    )
+    large = [
+        (c.camera, c.scene, name)
+        for c in found
+        for name, share in c.shares.items()
+        if share > 1 and c.states.get(name) == "off"
+    ]
+    yield "effects of an ablation over their share that are off; none", str(large), not large
+    mean, variance = max(c.mean for c in found), max(c.variance for c in found)
+    yield "error of the mean raw over the tolerance, largest; at most 1", f"{mean:.2f}", mean <= 1
+    yield (
+        "change of a variance over twice the tolerance, largest; at most 1",
+        f"{variance:.2f}",
+        variance <= 1,
+    )
+    for name in dict.fromkeys(c.camera for c in found):
+        sets = {
+            tuple(sorted(n for n, s in c.states.items() if s == "off"))
+            for c in found
+            if c.camera == name
+        }
+        text = f"different sets of effects of {name} over its scenes; at least 8 of one camera"
+        yield text, str(len(sets)), True
+    most = max(
+        len(
+            {
+                tuple(sorted(n for n, s in c.states.items() if s == "off"))
+                for c in found
+                if c.camera == name
+            }
+        )
+        for name in dict.fromkeys(c.camera for c in found)
+    )
+    yield "the same, of the camera with most; at least 8", str(most), most >= 8
+
+
+def time_figures(found: list[Times]) -> Iterator[tuple[str, str, bool]]:
+    """(what is asked, what was found, whether it holds)"""
+    ratios = {(t.camera, t.scene): t.auto / t.all for t in found}
+    worst = max(ratios, key=ratios.__getitem__)
+    yield (
+        "auto over all, largest; at most 1.02",
+        f"{ratios[worst]:.2f} ({', '.join(worst)})",
+        ratios[worst] <= 1.02,
+    )
+    for kind, asked in (("plain", 0.85), ("rich", 0.45)):
+        own = [r for (name, _), r in ratios.items() if (name == "rich") == (kind == "rich")]
+        if own:
+            middle = statistics.median(own)
+            yield (
+                f"the same, median on {kind} cameras; at most {asked}",
+                f"{middle:.2f}",
+                middle <= asked,
+            )
+    for name in dict.fromkeys(t.camera for t in found):
+        own = {t.scene: t.auto for t in found if t.camera == name}
+        part = max(
+            own[f"uniform {level:g}"] / own[f"colorchecker {level:g}"] for level in LUMINANCES
+        )
+        yield f"a gray wall over a ColorChecker, {name}; at most 0.25", f"{part:.2f}", part <= 0.25

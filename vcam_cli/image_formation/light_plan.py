@@ -1,0 +1,181 @@
+"""Which effects on the light a scene calls for, decided before any light is computed.
+
+An effect that changes the light at the pixels by next to nothing is left out, as long as all that
+are left out together stay within their share of the tolerance: transfer functions of a scene with
+little detail, gains and veiling glare whose change of the surveyed light is small. What is left out
+saves its work; without any blur, the light is a mean over the photodetectors, and no spectrum is
+computed.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcam_cli.effects.base import (
+    Blur,
+    Effect,
+    FieldTransfer,
+    Gain,
+    SeparableTransfer,
+    SignalLevels,
+    Transport,
+    VeilingGlare,
+    of_kind,
+)
+from vcam_cli.image_formation.optical_path import OpticalPath
+from vcam_cli.image_formation.scene_detail import (
+    SceneDetail,
+    change_by_omission,
+    scene_detail,
+    transfer_functions,
+)
+from vcam_cli.scenes.base import Scene
+
+LIGHT_SHARE = 0.3
+"""Part of the tolerance that all omitted effects on the light may use together."""
+LEVEL_SHARE = 0.5
+"""Part of the tolerance by which they may shift a percentile of the light, relative to it: shot
+noise has the variance of the signal."""
+PERCENTILES = (1, 10, 50, 90, 99)
+"""Percentiles of the scene's own light at which noise is promised."""
+BLURS = (Blur, SeparableTransfer, FieldTransfer)
+"""Kinds of effects that blur the light."""
+KINDS = (*BLURS, Gain, VeilingGlare, Transport)
+"""Kinds of effects on the light, and on the charge that it makes."""
+
+
+@dataclass(frozen=True)
+class LightPlan:
+    """What becomes of the effects on the light."""
+
+    omitted: tuple[Effect, ...] = ()
+    """Effects that are left out."""
+    free: tuple[Effect, ...] = ()
+    """Effects that could be left out, but would save nothing."""
+    shares: dict[str, float] = field(default_factory=dict)
+    """Estimated rms change by leaving out each of both, relative to full signal."""
+
+    @property
+    def share(self) -> float:
+        """Sum of the changes by the omitted effects, relative to full signal."""
+        return sum(self.shares[effect.name] for effect in self.omitted)
+
+    @property
+    def on_axis(self) -> float:
+        """Factor on the signal on the axis of the gains that are left out."""
+        return math.prod((gain.on_axis for gain in of_kind(self.omitted, Gain)), start=1.0)
+
+    def reduced(self, path: OpticalPath) -> OpticalPath:
+        """Return the path without the omitted effects."""
+        kept = tuple(effect for effect in path.effects if effect not in self.omitted)
+        transfer = path.transfer.with_effects(kept)
+        transfer = replace(transfer, weights=transfer.weights / (self.on_axis or 1.0))
+        return replace(path, transfer=transfer, effects=kept, optional=())
+
+
+def light_plan(path: OpticalPath, scene: Scene) -> LightPlan:
+    """Decide which of the optional effects of a path its scene does not call for.
+
+    Parameters
+    ----------
+    path : OpticalPath
+        Lens and pixels with all effects that are wanted; `optional` names those that may go.
+    scene : Scene
+        Scene before the lens.
+    """
+    candidates = of_kind(path.optional, *KINDS)
+    if not candidates:
+        return LightPlan()
+    detail = scene_detail(path, scene)
+    functions = {} if detail is None else transfer_functions(path, detail)
+    shares = {effect: _share(detail, functions, effect) for effect in candidates}
+    budget = LIGHT_SHARE * path.settings.tolerance
+    chosen: list[Effect] = []
+    for effect in sorted(shares, key=shares.__getitem__):
+        together = [*chosen, effect]
+        if _joint_share(detail, functions, together, shares) > budget:
+            break
+        if _levels_stay(path, detail, effect):
+            chosen = together
+    free = _bounding_blurs(path, chosen)
+    omitted = tuple(effect for effect in chosen if effect not in free)
+    return LightPlan(omitted, free, {effect.name: shares[effect] for effect in chosen})
+
+
+Functions = Mapping[Effect, NDArray]
+"""Transfer functions at the frequencies of a scene's detail."""
+
+
+def _share(detail: SceneDetail | None, functions: Functions, effect: Effect) -> float:
+    """Return the share that leaving out one effect changes; inf where no bound is known.
+
+    Without knowledge of the scene it is that of a scene of full contrast.
+    """
+    if detail is not None and detail.brightest and effect in functions:
+        return change_by_omission(detail, functions, [effect]) / detail.brightest
+    if detail is not None and detail.even and of_kind([effect], *BLURS):
+        return 0.0
+    bound = effect.mean_error(SignalLevels(full_signal=1.0, time=1.0))
+    bound = math.inf if bound is None else bound
+    if detail is None or not detail.brightest:
+        return bound
+    if of_kind([effect], Transport):
+        return bound * min(1.0, 2 * _rms(detail.light) / detail.brightest)
+    return min(bound, _rms(np.subtract(*_light_behind(detail, effect))) / detail.brightest)
+
+
+def _joint_share(
+    detail: SceneDetail | None,
+    functions: Functions,
+    effects: Sequence[Effect],
+    shares: Mapping[Effect, float],
+) -> float:
+    """Return the same for several effects, as if what they change added up."""
+    blurs = [effect for effect in effects if effect in functions]
+    others = sum(shares[effect] for effect in effects if effect not in blurs)
+    if not blurs or detail is None:
+        return others
+    return others + change_by_omission(detail, functions, blurs) / detail.brightest
+
+
+def _light_behind(detail: SceneDetail, effect: Effect) -> tuple[NDArray, NDArray]:
+    """Return the surveyed light behind a gain or veiling glare, and without it.
+
+    The light that was surveyed has the gain of the axis in it.
+    """
+    behind = without = detail.light
+    for gain in of_kind([effect], Gain):
+        without = detail.light / (gain.on_axis or 1.0)
+        behind = without * gain.gain(detail.x, detail.y)
+    for glare in of_kind([effect], VeilingGlare):
+        behind = without + glare.fraction * (without.mean() - without)
+    return behind, without
+
+
+def _rms(values: NDArray) -> float:
+    return math.sqrt(float(np.mean(np.square(values))))
+
+
+def _levels_stay(path: OpticalPath, detail: SceneDetail | None, effect: Effect) -> bool:
+    """Return whether the percentiles of the light stay where they are without a gain or glare."""
+    if detail is None:
+        return True
+    before, after = np.percentile(_light_behind(detail, effect), PERCENTILES, axis=(1, 2)).T
+    return bool(np.all(np.abs(after - before) <= LEVEL_SHARE * path.settings.tolerance * before))
+
+
+def _bounding_blurs(path: OpticalPath, chosen: Collection[Effect]) -> tuple[Effect, ...]:
+    """Return blurs that could go, but without which others would have no last frequency."""
+    wavelength = float(path.transfer.wavelengths[-1])
+    blurs = of_kind(path.effects, Blur)
+    kept = [blur for blur in blurs if blur not in chosen]
+    if not (kept or path.field not in (None, *chosen)):
+        return ()
+    if any(math.isfinite(blur.cutoff(wavelength)) for blur in kept):
+        return ()
+    return tuple(b for b in blurs if b in chosen and math.isfinite(b.cutoff(wavelength)))

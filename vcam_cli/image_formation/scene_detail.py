@@ -1,0 +1,300 @@
+"""How much detail a scene has at which frequencies, before it is transformed.
+
+A scene without detail needs no lens and no transform, and one with little of it shows little of
+what blurs it. A wave's power is known. Of other scenes a survey of points tells where the light
+changes; there, and by chance elsewhere, tiles of points are transformed. How probable a tile was is
+allowed for, so that the mean over the tiles is that over the array (D. G. Horvitz and D. J.
+Thompson, J. Am. Stat. Assoc. 47, 1952). Points lie at random places of their cells: detail finer
+than the cells counts as noise, which never hides (R. L. Cook, ACM Trans. Graphics 5, 1986).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.fft
+from numpy.typing import NDArray
+
+from vcam_cli.effects.base import Effect
+from vcam_cli.image_formation.optical_path import OpticalPath
+from vcam_cli.scenes.base import ChartScene, Scene, WaveScene
+
+TILE = 32
+"""Pixels along a side of a tile, at most."""
+POINTS_PER_PIXEL = 2
+"""Along each axis of a tile: up to the second Nyquist frequency."""
+TILES = 16
+"""Tiles that are transformed, at most."""
+MOST_PLACES = 24
+"""Parts of the array along each axis, at most, each of which may be a tile's place."""
+SURVEY = 4
+"""Points along each axis of such a part."""
+UNEVEN = (0.7548776662466927, 0.5698402909980532)
+"""Steps within the cells of the survey, which share no factor with what repeats in a chart."""
+ANYWHERE = 0.1
+"""Share of the tiles whose places do not depend on the survey."""
+BLOCK = 8
+"""Points along each side of the blocks in whose means the brightest light is sought."""
+UNRESOLVED = 0.75
+"""Part of the highest frequency from which on a tile's power is taken for noise of its points."""
+REACH = 12.0
+"""Reach of a lens in inverse cut-off frequencies, beyond which little light goes."""
+ENOUGH = 4.0
+"""Shorter side of an array over the reach of its lens, from which on its own light tells what the
+lens does to it."""
+CONFIDENCE = 2.0
+"""Standard errors that are added to what the tiles tell."""
+WAVELENGTHS = 8
+"""Wavelengths over which a transfer function is averaged."""
+
+
+@dataclass(frozen=True)
+class SceneDetail:
+    """A scene before the array, in the color of most light."""
+
+    fx: NDArray
+    """Spatial frequencies along x (n,) [cycles/m]."""
+    fy: NDArray
+    """Spatial frequencies along y (m,) [cycles/m]."""
+    power: NDArray
+    """Mean squares of the signal without its constant (m, n) [(electrons / s)^2]."""
+    unresolved: float
+    """Mean square of detail whose frequency is not known [(electrons / s)^2]."""
+    error: float
+    """Standard error of the whole power, relative to it; 0 where nothing is left to chance."""
+    x: NDArray
+    """Columns of the survey, from the array's center [m]."""
+    y: NDArray
+    """Rows of the survey, from the array's center [m]."""
+    light: NDArray
+    """Signal at the survey's points (rows, columns) [electrons / s]."""
+    brightest: float
+    """Bound from below on the largest signal [electrons / s]."""
+
+    @property
+    def even(self) -> bool:
+        """Whether the light is the same all over."""
+        return not self.power.any() and not self.unresolved
+
+
+def scene_detail(path: OpticalPath, scene: Scene) -> SceneDetail | None:
+    """Return the detail of a scene before the array.
+
+    Parameters
+    ----------
+    path : OpticalPath
+        Lens and pixels, whose colors tell how much each of the scene's components counts.
+    scene : Scene
+        Scene before the lens.
+
+    Returns
+    -------
+    SceneDetail or None
+        None where a lens blurs so widely that the light beside the array counts as much as its own.
+    """
+    level = path.transfer.level
+    level = level[:, int(level.sum(axis=0).argmax())]
+    if isinstance(scene, WaveScene):
+        return _wave_detail(path, scene, level)
+    if isinstance(scene, ChartScene) and _is_even(scene):
+        return _surveyed(path, scene, level, (1, 1))
+    g = path.geometry
+    widest = REACH / path.transfer.cutoff + max((e.reach for e in path.effects), default=0.0)
+    if min(g.sensor_width, g.sensor_height) < ENOUGH * widest:
+        return None
+    return _tile_detail(path, scene, level)
+
+
+def _is_even(scene: ChartScene) -> bool:
+    half_width = scene.pitch_x * scene.shape[1] / 2
+    return scene.chart.highest_frequency(half_width) == 0
+
+
+def _surveyed(
+    path: OpticalPath, scene: Scene, level: NDArray, places: Sequence[int]
+) -> SceneDetail:
+    """Return the light at a few points, as if it were even."""
+    g = path.geometry
+    y, x = (
+        ((k + k * step % 1) / len(k) - 0.5) * length
+        for k, length, step in zip(
+            (np.arange(count * SURVEY) for count in places),
+            (g.sensor_height, g.sensor_width),
+            UNEVEN,
+            strict=True,
+        )
+    )
+    light = _light_at(scene, x, y, level)
+    none, nothing = np.zeros(1), np.zeros((1, 1))
+    brightest = min(float(light.mean()), path.ceiling)
+    return SceneDetail(none, none, nothing, 0.0, 0.0, x, y, light, brightest)
+
+
+def _light_at(scene: Scene, x: NDArray, y: NDArray, level: NDArray) -> NDArray:
+    """Return the signal of a scene at points, whose products stay far from where floats end."""
+    largest = float(np.abs(level).max()) or 1.0
+    return scene.values_at(x, y, level[None] / largest)[0].astype(np.float64) * largest
+
+
+def _wave_detail(path: OpticalPath, scene: WaveScene, level: NDArray) -> SceneDetail:
+    """Return waves at their pairs of frequencies, with half of their squared amplitudes."""
+    g = path.geometry
+    shortest = min(g.columns, g.rows)
+    places = [min(max(1, round(n / TILE)), MOST_PLACES) for n in (g.rows, g.columns)]
+    even = _surveyed(path, scene, level, places if shortest > 1 else (1, 1))
+    waves = [wave for wave in scene.waves if wave.fx or wave.fy]
+    amplitudes = np.array([level @ np.asarray(wave.weights) for wave in waves])
+    return replace(
+        even,
+        fx=np.array([wave.fx for wave in waves]),
+        fy=np.array([wave.fy for wave in waves]),
+        power=np.diag(np.square(amplitudes) / 2),
+    )
+
+
+def _tile_detail(path: OpticalPath, scene: Scene, level: NDArray) -> SceneDetail:
+    """Return the power of tiles of points, each as much as it stands for."""
+    g, rng = path.geometry, np.random.default_rng(0)
+    size, pitch = np.array([g.rows, g.columns]), np.array([g.pitch_y, g.pitch_x])
+    counts = np.clip(np.round(size / TILE).astype(int), 1, MOST_PLACES)
+    side = np.minimum(TILE, size // counts)
+    points, length = POINTS_PER_PIXEL * side, side * pitch
+    even = _surveyed(path, scene, level, counts)
+    parts = even.light.reshape(counts[0], SURVEY, counts[1], SURVEY)
+    places, shares = _tile_places(_contrast(parts), rng)
+    squares, brightest = np.zeros((len(places), *points)), float(parts.mean(axis=(1, 3)).max())
+    for tile, place, share in zip(squares, places, shares, strict=True):
+        index = np.array(divmod(int(place), counts[1]))
+        # Anywhere around the place, so that what lies between two places is seen as well.
+        center = ((index + rng.random(2)) / counts - 0.5) * size * pitch
+        start = center - length / 2 if counts.prod() > 1 else -length / 2
+        y, x = (
+            first + (np.arange(n) + rng.random(n)) * (whole / n)
+            for first, whole, n in zip(start, length, points, strict=True)
+        )
+        values = _light_at(scene, x, y, level)
+        brightest = max(brightest, _brightest_block(values))
+        tile[:] = np.square(scipy.fft.dctn(values, type=2, norm="ortho")) * (share / values.size)
+        tile[0, 0] = 0
+    sums = squares.sum(axis=(1, 2))
+    whole = float(sums.sum())
+    error = float(sums.std()) * math.sqrt(len(sums)) / whole if whole else 0.0
+    power = squares.sum(axis=0)
+    top = [math.floor(UNRESOLVED * n) for n in points]
+    noise = float(power[top[0] :, top[1] :].mean())
+    fy, fx = (np.arange(n) / (2 * whole) for n, whole in zip(points, length, strict=True))
+    return replace(
+        even,
+        fx=fx,
+        fy=fy,
+        power=np.maximum(power - noise, 0),
+        unresolved=noise * power.size,
+        error=error,
+        brightest=min(brightest, path.ceiling),
+    )
+
+
+def _contrast(light: NDArray) -> NDArray:
+    """Return the contrast of every part of the array in itself and to its neighbors.
+
+    Of surveyed points (parts, points, parts, points): (parts, parts).
+    """
+    mean = light.mean(axis=(1, 3))
+    steps = [np.abs(np.diff(mean, axis=axis, append=mean.take([-1], axis))) for axis in (0, 1)]
+    return np.asarray(light.std(axis=(1, 3)) + sum(steps))
+
+
+def _tile_places(contrast: NDArray, rng: np.random.Generator) -> tuple[NDArray, NDArray]:
+    """Return the parts of the array that get a tile, and the share that each stands for.
+
+    All of them where they are few; else the more often the more contrast they have.
+    """
+    flat = contrast.ravel()
+    if flat.size <= TILES:
+        return np.arange(flat.size), np.full(flat.size, 1 / flat.size)
+    chance = np.full(flat.size, 1 / flat.size)
+    if flat.any():
+        chance = ANYWHERE * chance + (1 - ANYWHERE) * flat / flat.sum()
+    ticks = (np.arange(TILES) + rng.random()) / TILES
+    places = np.minimum(np.searchsorted(np.cumsum(chance), ticks), flat.size - 1)
+    return places, 1 / (TILES * flat.size * chance[places])
+
+
+def _brightest_block(values: NDArray) -> float:
+    """Return the largest mean over blocks of points: light that no blur takes away."""
+    n = min(BLOCK, *values.shape)
+    rows, columns = (size // n for size in values.shape)
+    blocks = values[: rows * n, : columns * n].reshape(rows, n, columns, n)
+    return float(blocks.mean(axis=(1, 3)).max())
+
+
+def transfer_functions(path: OpticalPath, detail: SceneDetail) -> dict[Effect, NDArray]:
+    """Return the transfer function of every blur at the frequencies of a scene's detail.
+
+    Parameters
+    ----------
+    path : OpticalPath
+        Lens and pixels.
+    detail : SceneDetail
+        Detail of the scene before them.
+
+    Returns
+    -------
+    dict
+        Effect -> transfer function (m, n), without unit; effects that blur nothing are missing.
+        Where it changes over the field, one that loses as much as all places in the mean.
+    """
+    if detail.even:
+        return {}
+    spectrum = _spectrum(path)
+    found = ((e, e.mean_transfer(detail.fx, detail.fy, spectrum)) for e in path.effects)
+    return {effect: function for effect, function in found if function is not None}
+
+
+def change_by_omission(
+    detail: SceneDetail, functions: Mapping[Effect, NDArray], omitted: Collection[Effect]
+) -> float:
+    """Return the rms change of the signal by leaving out transfer functions together.
+
+    Standard errors of the tiles are added.
+
+    Parameters
+    ----------
+    detail : SceneDetail
+        Detail of the scene.
+    functions : mapping
+        Transfer functions of all blurs, as of `transfer_functions`.
+    omitted : collection of Effect
+        Effects that are left out; those that blur nothing change nothing here.
+
+    Returns
+    -------
+    float
+        Rms change in the color of most light [electrons / s].
+    """
+    kept, lost = np.ones(detail.power.shape), np.ones(detail.power.shape, complex)
+    for effect, function in functions.items():
+        if effect in omitted:
+            lost *= function
+        else:
+            kept *= np.abs(function)
+    changed = np.square(kept * np.abs(1 - lost))
+    squares = float((detail.power * changed).sum()) + detail.unresolved * float(changed.max())
+    return math.sqrt(squares * (1 + CONFIDENCE * detail.error))
+
+
+def _spectrum(path: OpticalPath) -> list[tuple[float, float]]:
+    """Return some wavelengths [m], and their shares of the light."""
+    transfer = path.transfer
+    light = np.abs(transfer.weights).sum(axis=(0, 1)) + np.finfo(float).tiny
+    parts = np.array_split(np.arange(len(light)), min(WAVELENGTHS, len(light)))
+    return [
+        (
+            float(np.average(transfer.wavelengths[part], weights=light[part])),
+            float(light[part].sum() / light.sum()),
+        )
+        for part in parts
+    ]
