@@ -10,11 +10,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vcam_cli.camera.derived.mosaic import Mosaic
 from vcam_cli.effects.base import SeparableTransfer
 from vcam_cli.image_formation.cosine_series import Axis
 from vcam_cli.image_formation.scene_spectrum import SceneSpectrum
@@ -88,6 +89,42 @@ def brightest_pixel(
     if reach == 0:
         return max(0.0, float(signal.max()) - left_out)
     return max(0.0, along_x.share * along_y.share * (float(signal.mean()) - left_out))
+
+
+def brightest_of_mosaic(
+    mosaic: Mosaic,
+    spectrum: SceneSpectrum,
+    axes: tuple[Axis, Axis],
+    tables: Tables,
+    separable: Sequence[SeparableTransfer],
+    rms: float,
+    reach: float = 0.0,
+) -> float:
+    """Return the same for an array whose pixels have the colors of a mosaic [electrons / s].
+
+    Detail as fine as its block may be bright on the pixels of one color and dark on all others, so
+    each color is followed on pixels of its own: those of its first place in the block.
+    """
+    found = [0.0]
+    for index, color in enumerate(mosaic.colors):
+        row = next(i for i, line in enumerate(mosaic.block) if color in line)
+        column = mosaic.block[row].index(color)
+        x = _every_nth(axes[0], column, len(mosaic.block[row]))
+        y = _every_nth(axes[1], row, len(mosaic.block))
+        if x.pixels and y.pixels:
+            own = tables.of_color(index)
+            found.append(brightest_pixel(spectrum, (x, y), own, separable, rms, reach))
+    return max(found)
+
+
+def _every_nth(axis: Axis, first: int, step: int) -> Axis:
+    """Return an axis with every n-th of its pixels, from the first of them on."""
+    return replace(
+        axis,
+        pixels=len(range(first, axis.pixels, step)),
+        pixel_pitch=step * axis.pixel_pitch,
+        first=axis.first + first * axis.pixel_pitch,
+    )
 
 
 @dataclass(frozen=True)

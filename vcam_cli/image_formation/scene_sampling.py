@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from vcam_cli.image_formation.bandwidth import FREQUENCY_SHARE, LOWEST, axes, table_size
 from vcam_cli.image_formation.chart_cells import BEYOND_CUTOFF, cell_grid
 from vcam_cli.image_formation.optical_path import OpticalPath
-from vcam_cli.image_formation.peak_bound import brightest_pixel
+from vcam_cli.image_formation.peak_bound import brightest_of_mosaic
 from vcam_cli.image_formation.power_spectrum import PowerSpectrum, power_spectrum
 from vcam_cli.image_formation.scene_spectrum import (
     SceneSpectrum,
@@ -126,7 +126,10 @@ def sampled_image(
     )
     rms = float(np.sqrt(squares.reshape(len(squares), -1).sum(axis=1).max()))
     aside = max((blur.reach for blur in directed), default=0.0)
-    full = min(brightest_pixel(spectrum, (x, y), tables, path.separable, rms, aside), path.ceiling)
+    brightest = brightest_of_mosaic(
+        path.mosaic, spectrum, (x, y), tables, path.separable, rms, aside
+    )
+    full = min(brightest, path.ceiling)
     density = math.prod(scene.extent) / (g.sensor_width * g.sensor_height)
     pitch = g.pitch_y, g.pitch_x
     if knobs.oversampling is None:

@@ -83,6 +83,15 @@ class Tables:
         """Number of colors."""
         return self.shape[1]
 
+    def of_color(self, color: int) -> Tables:
+        """Return the tables of a single color."""
+        only = slice(color, color + 1)
+        return replace(
+            self,
+            radial=None if self.radial is None else self.radial[:, only],
+            planes=tuple(None if plane is None else plane[:, only] for plane in self.planes),
+        )
+
     @property
     def parities(self) -> list[int]:
         """Indices of the `PARITIES` that occur."""
