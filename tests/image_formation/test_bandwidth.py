@@ -235,7 +235,7 @@ def converged(tmp_path_factory):
     def result(name: str, f_number: float) -> photon_rate.Rate:
         key = name, f_number
         if key not in done:
-            accuracy = {"preset": "standard", "oversampling": 24, "float_width": 64}
+            accuracy = {"preset": "reference", "oversampling": 24}
             made = camera(folder, chart(name, f_number) | {"accuracy": accuracy})
             done[key] = rate(made)
         return done[key]
@@ -243,7 +243,7 @@ def converged(tmp_path_factory):
     return result
 
 
-@pytest.mark.parametrize("preset", ["draft", "standard"])
+@pytest.mark.parametrize("preset", ["draft", "standard", "reference"])
 @pytest.mark.parametrize("f_number", [2, 8])
 @pytest.mark.parametrize("name", CHART_PARAMS)
 def test_what_is_lost_is_within_the_tolerance(name, f_number, preset, converged, tmp_path):

@@ -29,6 +29,8 @@ PART = 1 / 4
 """Length of a window over that of the array."""
 PLACES = 16
 """Windows along each axis."""
+MOST, MOST_PART = 1 << 18, 1 / 8
+"""Terms that are summed, at most: so many, or that part of all."""
 KEPT = 3e-5
 """Part of a term that is left in the mean over a window, from which on it is summed."""
 
@@ -66,12 +68,14 @@ def brightest_pixel(
     Returns
     -------
     float
-        The bound; 0 where nothing is known.
+        The bound; 0 where none is known, or none would be found soon.
     """
     x, y = axes
     along_x, along_y = _windows(x, reach), _windows(y, reach)
     if along_x is None or along_y is None:
         return 0.0
+    if len(along_x.terms) * len(along_y.terms) > max(MOST, x.terms * y.terms * MOST_PART):
+        return 0.0  # to find it would take as long as to filter the whole spectrum
     signal: NDArray = np.zeros(1)
     for parity in tables.parities:
         odd_x, odd_y = PARITIES[parity]

@@ -127,16 +127,17 @@ class TableReader:
         Returns
         -------
         NDArray
-            Transfer (R, C, m, count) [e/s].
+            Transfer (R, C, m, count) [e/s]; with a direction, nothing beyond the end of the tables.
         """
         fx, top = self.fx[:count], self.tables.top
         total: NDArray | None = None
+        radius = np.hypot(fx, fy[:, None])
         if self.radial is not None:
-            total = self._linear(np.hypot(fx, fy[:, None]))
+            total = self._linear(radius)
         if self.plane is not None and self.spline_x is not None:
             along_y = spline_weights(self.plane.shape[-1], fy / top)
             on_top = (along_y @ self.plane) @ self.spline_x[: len(fx)].T
-            total = on_top if total is None else total + on_top
+            total = (on_top if total is None else total + on_top) * (radius <= top)
         assert total is not None
         return total
 
