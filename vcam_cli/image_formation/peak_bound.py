@@ -107,18 +107,17 @@ def brightest_of_mosaic(
     """Return the same for an array whose pixels have the colors of a mosaic [electrons / s].
 
     Detail as fine as its block may be bright on the pixels of one color and dark on all others, so
-    each color is followed on pixels of its own: those of its first place in the block.
+    the color of most light is followed on pixels of its own: those of its first place in the block.
     """
-    found = [0.0]
-    for index, color in enumerate(mosaic.colors):
-        row = next(i for i, line in enumerate(mosaic.block) if color in line)
-        column = mosaic.block[row].index(color)
-        x = _every_nth(axes[0], column, len(mosaic.block[row]))
-        y = _every_nth(axes[1], row, len(mosaic.block))
-        if x.pixels and y.pixels:
-            own = tables.of_color(index)
-            found.append(brightest_pixel(spectrum, (x, y), own, separable, rms, reach))
-    return max(found)
+    index = tables.brightest_color
+    color = mosaic.colors[index]
+    row = next(i for i, line in enumerate(mosaic.block) if color in line)
+    column = mosaic.block[row].index(color)
+    x = _every_nth(axes[0], column, len(mosaic.block[row]))
+    y = _every_nth(axes[1], row, len(mosaic.block))
+    if not (x.pixels and y.pixels):
+        return 0.0
+    return brightest_pixel(spectrum, (x, y), tables.of_color(index), separable, rms, reach)
 
 
 def _every_nth(axis: Axis, first: int, step: int) -> Axis:
