@@ -147,6 +147,15 @@ def test_rows_of_both_kinds_agree(index):
         np.testing.assert_allclose(known.rows(plane, index), sampled.rows(plane, index))
 
 
+def test_terms_of_both_kinds_agree():
+    known, sampled = both_kinds()
+    y, x = np.array([0, 3, 30, 3]), np.array([32, 0, 7])
+    for plane in range(3):
+        expected = sampled.coefficients[plane][y][:, x]
+        for spectrum in (known, sampled):
+            np.testing.assert_allclose(spectrum.terms(plane, y, x), expected, rtol=1e-12)
+
+
 def block_sums(first, second, y, x):
     """Sums over blocks of the product of two planes' coefficients."""
     both = first * second

@@ -20,6 +20,7 @@ from vcam_cli.effects.base import SeparableTransfer
 from vcam_cli.image_formation.cosine_series import Axis
 from vcam_cli.image_formation.scene_spectrum import SceneSpectrum
 from vcam_cli.image_formation.transfer_tables import PARITIES, Tables, reader
+from vcam_cli.parallel import pieces, product
 
 WINDOW = 0.35875, 0.48829, 0.14128, 0.01168
 """Amplitudes of the cosines of the Blackman-Harris window, which is nowhere negative and passes
@@ -31,6 +32,8 @@ PLACES = 16
 """Windows along each axis."""
 MOST, MOST_PART = 1 << 18, 1 / 8
 """Terms that are summed, at most: so many, or that part of all."""
+ROWS = 32
+"""Rows of terms that are summed together: few enough for the cache."""
 KEPT = 3e-5
 """Part of a term that is left in the mean over a window, from which on it is summed."""
 
@@ -45,7 +48,7 @@ def brightest_pixel(
 ) -> float:
     """Return a signal that the brightest pixel of the array has at least [electrons / s].
 
-    It is that of the color of most, as if all pixels had it. The terms that are not summed can
+    It is that of one color, as if all pixels had it. The terms that are not summed can
     bring no more than their part of the mean square, by Cauchy's inequality. A blur that the tables
     leave out moves light by its reach at most: the mean over the array keeps what is further from
     its border.
@@ -57,7 +60,7 @@ def brightest_pixel(
     axes : (Axis, Axis)
         Terms and pixels along x and y.
     tables : Tables
-        Transfer functions of the spectrum's planes.
+        Transfer functions of the spectrum's planes to that color.
     separable : sequence of SeparableTransfer
         Transfer functions along the axes.
     rms : float
@@ -76,18 +79,21 @@ def brightest_pixel(
         return 0.0
     if len(along_x.terms) * len(along_y.terms) > max(MOST, x.terms * y.terms * MOST_PART):
         return 0.0  # to find it would take as long as to filter the whole spectrum
-    signal: NDArray = np.zeros(1)
+    fx, fy = x.frequencies[along_x.terms], y.frequencies[along_y.terms]
+    (index_x, factor_x), (index_y, factor_y) = along_x.coefficients, along_y.coefficients
+    for effect in separable:
+        factor_x = factor_x * effect.along_x(fx)
+        factor_y = factor_y * effect.along_y(fy)
+    signal = np.zeros((len(along_y.centers), len(along_x.centers)))
     for parity in tables.parities:
         odd_x, odd_y = PARITIES[parity]
-        fx, fy = x.frequencies[along_x.terms], y.frequencies[along_y.terms]
-        values = reader(tables, parity, fx).values(fy)
-        light = sum(
-            values[plane] * _terms(spectrum, plane, along_x, along_y)
-            for plane in range(len(spectrum))
-        )
-        for effect in separable:
-            light = light * np.outer(effect.along_y(fy), effect.along_x(fx))
-        signal = signal + along_y.means(odd_y) @ light @ along_x.means(odd_x).T
+        table = reader(tables, parity, fx)
+        over_x, over_y = (along_x.waves(odd_x) * factor_x).T, along_y.waves(odd_y) * factor_y
+        for rows in pieces(len(fy), ROWS):
+            light: NDArray = np.zeros(1)
+            for plane, of_plane in enumerate(table.values(fy[rows])[:, 0]):
+                light = light + of_plane * spectrum.terms(plane, index_y[rows], index_x)
+            signal += over_y[:, rows] @ product(light, over_x)
     every, summed = along_x.power[0] * along_y.power[0], along_x.power[1] * along_y.power[1]
     left_out = math.sqrt(max(every - summed, 0.0) * len(tables.parities)) * rms
     if reach == 0:
@@ -148,11 +154,16 @@ class Windows:
     """Weight of a pixel in the mean over the array over that in the mean of all windows, at
     least."""
 
-    def means(self, odd: bool) -> NDArray:
-        """Return the mean of every term, as cosine or sine, over every window: (p, m)."""
+    @property
+    def coefficients(self) -> tuple[NDArray, NDArray]:
+        """The coefficients behind the terms, and what the mean over a window has of them: (m,)."""
+        index, sign = self.axis.coefficient_index(self.terms)
+        return index, sign * self.left * self.axis.weights[self.terms] * _twice(self.terms)
+
+    def waves(self, odd: bool) -> NDArray:
+        """Return every term, as cosine or sine, at the center of every window: (p, m)."""
         angle = np.outer(self.centers, 2 * np.pi * self.axis.frequencies[self.terms])
-        factor = self.left * self.axis.weights[self.terms] * _twice(self.terms)
-        return (np.sin(angle) if odd else np.cos(angle)) * factor
+        return np.sin(angle) if odd else np.cos(angle)
 
 
 def _twice(terms: NDArray) -> NDArray:
@@ -206,26 +217,19 @@ def window_spectrum(angle: NDArray, pixels: int) -> NDArray:
 
     The phase is 0 at the window's center.
     """
-    total, level = np.zeros(len(angle)), 0.0
-    for number, amplitude in enumerate(WINDOW):
-        for sign in (1, -1):
-            shift = sign * 2 * np.pi * number / pixels
+    angle = np.append(angle, 0.0)
+    total = WINDOW[0] * _dirichlet(angle, pixels)
+    for number, amplitude in enumerate(WINDOW[1:], start=1):
+        for shift in (2 * np.pi * number / pixels, -2 * np.pi * number / pixels):
             total += amplitude / 2 * _dirichlet(angle + shift, pixels)
-            level += amplitude / 2 * float(_dirichlet(np.array([shift]), pixels)[0])
-    return total / level
+    return total[:-1] / total[-1]
 
 
 def _dirichlet(angle: NDArray, pixels: int) -> NDArray:
     """Return the sum of so many waves with this phase from one to the next, 0 in their middle."""
-    below = np.sin(angle / 2)
+    half = angle / 2
+    below, total = np.sin(half), np.sin(pixels * half)
     even = np.abs(below) < 1e-9
-    limit = pixels * np.cos(pixels * angle / 2) / np.cos(angle / 2)
-    return np.where(even, limit, np.sin(pixels * angle / 2) / np.where(even, 1.0, below))
-
-
-def _terms(spectrum: SceneSpectrum, plane: int, x: Windows, y: Windows) -> NDArray:
-    """Return coefficients of a plane's terms that count along both axes: (m_y, m_x)."""
-    index_x, sign_x = x.axis.coefficient_index(x.terms)
-    index_y, sign_y = y.axis.coefficient_index(y.terms)
-    found = spectrum.rows(plane, index_y, int(index_x.max()) + 1)[:, index_x]
-    return found.astype(np.float64) * np.outer(sign_y, sign_x)
+    total[~even] /= below[~even]
+    total[even] = pixels * np.cos(pixels * half[even]) / np.cos(half[even])
+    return total

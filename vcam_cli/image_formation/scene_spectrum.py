@@ -49,6 +49,9 @@ class SceneSpectrum(Protocol):
             Coefficients (n, count).
         """
 
+    def terms(self, plane: int, y: NDArray, x: NDArray) -> NDArray:
+        """Return a plane's coefficients of these indices along both axes: (len(y), len(x))."""
+
     def products(self, y: NDArray, x: NDArray, workers: int) -> NDArray:
         """Return sums of products of two planes' coefficients over blocks of terms.
 
@@ -89,6 +92,10 @@ class SampledSpectrum:
     def rows(self, plane: int, index: Index, count: int | None = None) -> NDArray:
         """Return rows of a plane's coefficients: (n, count)."""
         return self.coefficients[plane, index, :count]
+
+    def terms(self, plane: int, y: NDArray, x: NDArray) -> NDArray:
+        """Return a plane's coefficients of these indices along both axes: (len(y), len(x))."""
+        return self.coefficients[plane][np.ix_(y, x)]
 
     def products(self, y: NDArray, x: NDArray, workers: int) -> NDArray:
         """Return sums of products of two planes' coefficients over blocks of terms."""
@@ -177,6 +184,10 @@ class RectangleSpectrum:
     def rows(self, plane: int, index: Index, count: int | None = None) -> NDArray:
         """Return rows of a plane's coefficients: (n, count)."""
         return product(self.along_y[index], self.along_x[plane, :, :count])
+
+    def terms(self, plane: int, y: NDArray, x: NDArray) -> NDArray:
+        """Return a plane's coefficients of these indices along both axes: (len(y), len(x))."""
+        return product(self.along_y[y], self.along_x[plane][:, x])
 
     def products(self, y: NDArray, x: NDArray, workers: int) -> NDArray:
         """Return sums of products of two planes' coefficients over blocks of terms."""
