@@ -30,6 +30,9 @@ PUPIL_GRIDS = 300_000_000
 """Grids of the pupil that are kept for lenses with aberrations, at most [bytes]."""
 WORK = 24_000_000
 """Temporary arrays of one thread [bytes]."""
+SCATTERED = 120
+"""Pixel at a place of its own: positions, samples by color, the tree in which its neighbors are
+found [bytes]."""
 
 
 def image_bytes(
@@ -122,7 +125,12 @@ def box_average_bytes(samples: int, planes: int, geometry: Geometry, knobs: Sett
 
 
 def frame_bytes(
-    geometry: Geometry, knobs: Settings, colors: int, judged: bool, samples: int = 0
+    geometry: Geometry,
+    knobs: Settings,
+    colors: int,
+    judged: bool,
+    samples: int = 0,
+    scattered: int = 0,
 ) -> int:
     """Return the memory of a frame without its scene: signal, raw, render.
 
@@ -138,6 +146,8 @@ def frame_bytes(
         Whether an ideal image is made and compared.
     samples : int, optional
         Samples of one integration, of each color that a pixel has; 0 for a single exposure.
+    scattered : int, optional
+        Pixels that fill no rows and columns, of which a picture on a grid is made.
 
     Returns
     -------
@@ -149,6 +159,7 @@ def frame_bytes(
     frame = pixels * (2 * width + 2 + colors)
     if samples:  # their electrons and codes, the photocurrent and what is made into a picture
         frame += pixels * (samples * (width + 4) + 8)
+    frame += SCATTERED * scattered
     return (
         BASE + max(pixels * width * (colors + 1), frame) + (16 * pixels * colors if judged else 0)
     )

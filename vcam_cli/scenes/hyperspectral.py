@@ -18,6 +18,7 @@ the components by the fewest mixtures that keep every transfer function within t
 the cube once: 0.02 s for 31 bands of a megapixel.
 """
 
+import math
 from dataclasses import dataclass, fields
 from typing import Literal
 
@@ -44,6 +45,8 @@ Bands are painted in units of white, and none in units of 0.
 """
 ROWS = 64
 """Rows that are read at once."""
+FEW_POINTS = 8
+"""Samples per point from which on the bands of the points alone are read, and not the cube."""
 
 
 @dataclass(frozen=True)
@@ -98,8 +101,10 @@ class CubeScene(ImageScene):
         return np.asarray(mix / self.units, float)
 
     def values_at(self, x: Array, y: Array, mix: Array) -> Array:
-        """Return the values at points."""
-        planes, (down, across) = self.planes(mix), self.black  # few planes, instead of all bands
+        """Return the values at points, of all bands or, at many points, of few planes."""
+        if len(x) * len(y) * FEW_POINTS <= math.prod(self.picture.shape[:2]):
+            return super().values_at(x, y, self._channel_weights(mix))
+        planes, (down, across) = self.planes(mix), self.black
         rows, lit_rows = self._samples_at(y, self.pitch_y, 0)
         columns, lit_columns = self._samples_at(x, self.pitch_x, 1)
         found = planes[:, (rows + down)[:, None], columns + across]

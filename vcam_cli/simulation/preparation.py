@@ -198,7 +198,9 @@ def _require_memory(camera: Camera, place: Layout, knobs: Settings, solved: Geom
     """
     colors = len(place.mosaic.colors)
     samples = camera.exposure.count * (colors if place.full_color else 1)
-    needed = memory_model.frame_bytes(place.lattice, knobs, colors, bool(camera.quality), samples)
+    scattered = solved.rows * solved.columns if place.is_scattered else 0
+    judged = bool(camera.quality)
+    needed = memory_model.frame_bytes(place.lattice, knobs, colors, judged, samples, scattered)
     memory.require(needed, solved.rows, solved.columns)
     return needed
 
