@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 SOURCES := vcam_cli tests scripts
 CAMERA ?= still-life
 
-.PHONY: run test test-all lint check bench promise stability fuzz schemas tables lock clean
+.PHONY: run test test-all lint check bench promise stability fuzz attacks schemas tables lock clean
 
 run: $(VENV)/.runtime  ## simulate the shipped still life: out/still-life/
 	$(BIN)/vcam run $(CAMERA)
@@ -37,7 +37,11 @@ fuzz: $(VENV)/.dev  ## twenty thousand camera and study files with something bro
 	$(BIN)/python -m tests.hostile
 	VCAM_FUZZ=20 $(BIN)/python -m pytest -q -n auto tests/hostile/test_random_cameras.py
 
+attacks: $(VENV)/.dev  ## all attacks of tests/hostile, counted in docs/attacks.md
+	$(BIN)/python tests/hostile/attacks.py
+
 schemas: $(VENV)/.dev  ## JSON Schemas of the files a user writes, from the models
+	rm -f schemas/*.schema.json
 	$(BIN)/vcam schema schemas
 
 tables: $(VENV)/.dev  ## the data tables of the package, from colour-science

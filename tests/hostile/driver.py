@@ -45,7 +45,7 @@ class Driver:
     @property
     def left(self) -> list[str]:
         """What vcam left in the folder of temporary files."""
-        return [name for name in os.listdir(self._spare.name) if name.startswith("vcam-")]
+        return [name for name in os.listdir(self._spare.name) if "vcam-" in name]
 
     def __enter__(self) -> Self:
         return self

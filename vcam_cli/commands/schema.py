@@ -18,6 +18,8 @@ def schema(
 ) -> None:
     """Write the JSON Schemas of camera, study and technology files, for editors and programs.
 
+    Other files of the same names are never overwritten.
+
     An editor that reads YAML schemas completes and checks a camera file whose first line is
     `# yaml-language-server: $schema=camera.schema.json`.
 
@@ -29,11 +31,13 @@ def schema(
     from vcam_cli.config.schema import text
     from vcam_cli.files import atomic
 
+    texts = {folder / name: text(content) for name, content in schemas().items()}
+    for path, content in texts.items():
+        atomic.refuse_other(path, content)
     atomic.make_folder(folder)
-    written = []
-    for name, content in schemas().items():
-        atomic.write_text(folder / name, text(content))
-        written.append(str(folder / name))
+    for path, content in texts.items():
+        atomic.write_text(path, content)
+    written = [str(path) for path in texts]
     if as_json:
         options.write_json({"files": written})
     else:

@@ -71,7 +71,7 @@ def written_bytes(name: str, write: Callable[[Path], None]) -> bytes:
     folder = None
     try:
         with defer_interrupts():
-            folder = tempfile.TemporaryDirectory(prefix="vcam-")
+            folder = tempfile.TemporaryDirectory(prefix=f"{STAGING}-")
         path = Path(folder.name) / name
         write(path)
         return path.read_bytes()
@@ -81,6 +81,18 @@ def written_bytes(name: str, write: Callable[[Path], None]) -> bytes:
         with defer_interrupts():
             if folder is not None:
                 folder.cleanup()
+
+
+def refuse_other(path: Path, text: str) -> None:
+    """Raise BadInput where something is at `path` that is no file of this text."""
+    if not os.path.lexists(path):
+        return
+    try:
+        is_same = not path.is_symlink() and path.is_file() and path.read_bytes() == text.encode()
+    except OSError as error:
+        raise cannot_write(path, error) from error
+    if not is_same:
+        raise bad((), f"{path} exists already, with other content", "remove it, or give a folder")
 
 
 def make_folder(folder: Path) -> None:
@@ -112,7 +124,7 @@ def cannot_write(path: Path | str, error: OSError) -> CannotDo:
 def displayed_path(path: Path | str) -> str:
     """Return `path` as the user knows it: without the folder where new files wait."""
     path = Path(path)
-    return str(Path(*(part for part in path.parts if part != STAGING)))
+    return str(Path(*(part for part in path.parts if not part.startswith(STAGING))))
 
 
 def _flush(path: Path) -> None:

@@ -2,11 +2,13 @@
 
 A run writes its files into a staging folder beside their final place. `finish` removes what the
 previous run had named in its record (run.json), moves the new files in, and writes the record
-last: a folder with a record is complete, and a run that fails leaves the former results.
+last: a folder with a record is complete, and a run that fails leaves the former results. What is
+removed or replaced must be as the record says (`records`); else the folder is refused.
 
 Why a journal: between the removal of the old record and the writing of the new one, no record names
 the files in the folder. Their names are in the lock file during that time, so that a run after a
-power cut knows which files are vcam's.
+power cut knows which files are vcam's. It also names the inode of the staging folder, whose files
+are unfinished and have no fingerprint: one that came from elsewhere has another inode.
 
 Why flock: the kernel drops it when its holder dies, however it dies.
 
@@ -27,22 +29,20 @@ from typing import Any, Self
 
 from vcam_cli.errors import BadInput, CannotDo, bad
 from vcam_cli.files.atomic import STAGING, cannot_write, flush_folder, write_text
+from vcam_cli.files.records import (
+    LOCK,
+    PROGRAM,
+    RECORDS,
+    Fingerprint,
+    Proofs,
+    file_fingerprint,
+    has_real_parents,
+    is_safe,
+    read_record,
+)
 from vcam_cli.files.report import to_json
 from vcam_cli.interrupts import defer_interrupts
 
-LOCK = ".vcam-lock"
-PROGRAM = "vcam"
-"""A record is vcam's when it says {"program": "vcam", "files": [...]}."""
-RECORDS = (
-    "run.json",
-    "accuracy.json",
-    "characterize.json",
-    "study.json",
-    "compare.json",
-    "scenes.json",
-)
-"""The records of vcam's commands: each may add its files to the folder of another."""
-_LARGEST_RECORD = 1 << 26  # bytes
 _NO_LOCKS_HERE = {errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOSYS}
 _NOT_A_FOLDER = {errno.ENOTDIR, errno.EEXIST, errno.ENAMETOOLONG, errno.ELOOP, errno.EINVAL}
 
@@ -57,9 +57,9 @@ class OutputFolder:
     Without `finish`, or when anything raises, every new file, the lock and the folders
     created on entry are removed again, and the results of an earlier run are untouched.
 
-    Raises on entry BadInput: `path` is a file, or a non-empty folder that is not vcam's, or
-    one of `inputs` would be replaced. CannotDo: another run has the folder, no permission,
-    read-only, disk full.
+    Raises on entry BadInput: `path` is a file, or a non-empty folder that is not vcam's, or a
+    file that would be removed is not as vcam wrote it, or one of `inputs` would be replaced.
+    CannotDo: another run has the folder, no permission, read-only, disk full.
     """
 
     def __init__(
@@ -70,7 +70,8 @@ class OutputFolder:
         self._inputs = tuple(os.path.realpath(name) for name in inputs)
         self._made: list[Path] = []
         self._lock: int | None = None
-        self._previous: frozenset[str] = frozenset()
+        self._staging: int | None = None
+        self._previous = Proofs(self.path)
         self._new: list[str] = []
         self._finished = False
 
@@ -117,29 +118,30 @@ class OutputFolder:
     def finish(self, report: Mapping[str, Any]) -> None:
         """Replace the previous run's files by the new ones, then write the record.
 
-        The record is `report` with `program` and `files` (names of the new files) added. The file
-        of every call of `new` must have been written. Raise CannotDo, and BadInput when the place
-        of a file was taken meanwhile; then nothing is removed.
+        The record is `report` with `program`, `files` (names of the new files) and `written`
+        (their sizes and hashes) added. The file of every call of `new` must have been written.
+        Raise CannotDo, and BadInput when the place of a file was taken, or what it holds changed,
+        meanwhile; then nothing is removed.
         """
         names = sorted(self._new)
         for name in names:
             self._check_new(name)
-        text = to_json({**report, "program": PROGRAM, "files": names})
-        try:
+        self._previous.require(self._previous.names)
+        try:  # all are there: else nothing is removed
+            written = {name: file_fingerprint(self.path / STAGING / name) for name in names}
+            text = to_json({**report, "program": PROGRAM, "files": names, "written": written})
             with defer_interrupts():
-                self._replace_previous(names, text)
+                self._replace_previous(written, text)
         except OSError as error:
             raise cannot_write(self.path, error) from error
 
-    def _replace_previous(self, names: list[str], text: str) -> None:
+    def _replace_previous(self, written: Mapping[str, Fingerprint], text: str) -> None:
         """Move the new files in; see the module for the order."""
-        record = self.path / STAGING / self._record
-        record.parent.mkdir(exist_ok=True)
-        write_text(record, text)
-        for name in names:  # all are there: else nothing is removed
-            (self.path / STAGING / name).stat()
-        self._write_journal(sorted({*names, *self._previous}))
-        self._remove([self._record, *sorted(self._previous - set(names))])
+        names = list(written)
+        write_text(self.path / STAGING / self._record, text)
+        self._write_journal(written, self._previous.plain())
+        (self.path / self._record).unlink(missing_ok=True)
+        self._remove([name for name in self._previous.names if name not in written])
         for name in [*names, self._record]:
             self._move_in(name)
         flush_folder(self.path)
@@ -161,7 +163,7 @@ class OutputFolder:
             return
         if before_lock and LOCK in present:
             return  # perhaps of a run at work: checked again under the lock
-        ours = self._own_record() or self._journal() or self._has_other_record()
+        ours = self._own_record() or self._journal()["files"] or self._has_other_record()
         if present - {LOCK, STAGING} and not ours:
             raise bad(
                 "--out",
@@ -204,15 +206,22 @@ class OutputFolder:
 
     def _recover(self) -> None:
         """Read what the previous run wrote, and remove what a killed one left unfinished."""
-        self._clear_staging()
-        record = self._own_record()
-        names = record["files"] if record else self._journal()
-        self._previous = frozenset(filter(_is_safe, names))
-        self._protect_inputs([*self._previous, self._record])
+        journal, record = self._journal(), self._own_record()
+        self._clear_staging(journal.get("staging"))
+        self._previous = Proofs(self.path, journal, record)
+        self._previous.require(self._previous.names)
+        self._protect_inputs([*self._previous.names, self._record])
         if not record:
-            self._remove(sorted(self._previous))
-            self._previous = frozenset()
-        self._write_journal([])
+            self._remove(self._previous.names)
+            self._previous = Proofs(self.path)
+        self._make_staging()
+
+    def _make_staging(self) -> None:
+        """Make the staging folder, and keep in the journal which one it is."""
+        staging = self.path / STAGING
+        staging.mkdir()
+        self._staging = staging.lstat().st_ino
+        self._write_journal({})
 
     def _protect_inputs(self, names: Iterable[str]) -> None:
         for name in names:
@@ -224,18 +233,16 @@ class OutputFolder:
                 )
 
     def _check_new(self, name: str) -> None:
-        parts = PurePosixPath(name).parts
-        if not _is_safe(name) or parts[0] in (LOCK, STAGING) or name == self._record:
+        if not is_safe(name) or name == self._record:
             raise ValueError(f"{name!r} is no name for a file of a run")
         self._protect_inputs([name])
-        target = self.path / name
-        ours = name in self._previous and (target.is_symlink() or not target.is_dir())
-        if (os.path.lexists(target) and not ours) or not _has_real_parents(self.path, name):
+        if not has_real_parents(self.path, name):
             raise bad(
                 "--out",
-                f"{target} is there already and was not written by vcam",
+                f"{self.path / name} lies behind a link or a file that vcam did not make",
                 "move it away, or choose another folder",
             )
+        self._previous.require([name])
 
     def _own_record(self) -> dict[str, Any] | None:
         """Return the record of the previous run, when it is vcam's."""
@@ -245,27 +252,35 @@ class OutputFolder:
         """Tell whether another command of vcam has finished here."""
         return any(read_record(self.path / name) for name in RECORDS if name != self._record)
 
-    def _journal(self) -> list[str]:
-        """Return the names that the lock file holds, see the module."""
-        journal = read_record(self.path / LOCK)
-        return journal["files"] if journal else []
+    def _journal(self) -> dict[str, Any]:
+        """Return what the lock file holds, see the module. Raise BadInput where it is foreign."""
+        place = self.path / LOCK
+        found = read_record(place)
+        if found is None and place.exists() and place.lstat().st_size:
+            message = f"{place} is no lock of vcam"
+            raise bad("--out", message, "remove it, or choose another folder")
+        return found or {"program": PROGRAM, "files": []}
 
-    def _write_journal(self, names: list[str]) -> None:
+    def _write_journal(
+        self, pending: Mapping[str, Any], written: Mapping[str, Any] | None = None
+    ) -> None:
+        """Write the names and fingerprints of files about to come, and of those before them."""
         assert self._lock is not None
-        text = to_json({"program": PROGRAM, "files": names}) if names else ""
-        os.ftruncate(self._lock, 0)
-        os.pwrite(self._lock, text.encode(), 0)
+        journal = {"program": PROGRAM, "files": sorted({*pending, *(written or {})})}
+        if journal["files"]:
+            journal |= {"pending": dict(pending), "written": dict(written or {})}
+        text = json.dumps(journal | {"staging": self._staging}).encode()
+        # Blanks in place of what was longer: the file is JSON after each step.
+        os.pwrite(self._lock, text.ljust(os.fstat(self._lock).st_size), 0)
+        os.ftruncate(self._lock, len(text))
         os.fsync(self._lock)
 
     def _remove(self, names: Iterable[str]) -> None:
-        """Remove these files of the folder and the subfolders left empty, nothing outside."""
+        """Remove files that are proven vcam's, and the subfolders left empty."""
         for name in names:
-            if not _is_safe(name) or not _has_real_parents(self.path, name):
+            if not self._previous.holds(name):
                 continue
-            path = self.path / name
-            if path.is_dir() and not path.is_symlink():
-                continue
-            path.unlink(missing_ok=True)
+            (self.path / name).unlink(missing_ok=True)
             for parent in PurePosixPath(name).parents[:-1]:
                 with suppress(OSError):
                     (self.path / parent).rmdir()
@@ -275,23 +290,33 @@ class OutputFolder:
         target.parent.mkdir(parents=True, exist_ok=True)
         os.replace(self.path / STAGING / name, target)
 
-    def _clear_staging(self) -> None:
+    def _clear_staging(self, inode: object) -> None:
+        """Remove the staging folder of an inode. Raise BadInput where it is another one."""
         staging = self.path / STAGING
-        if staging.is_symlink():
-            staging.unlink()
-        elif staging.exists():
+        if not os.path.lexists(staging):
+            return
+        status = staging.lstat()
+        if inode == status.st_ino and stat.S_ISDIR(status.st_mode):
             shutil.rmtree(staging)
+            return
+        try:
+            staging.rmdir()
+        except OSError:
+            message = f"{staging} is there already and was not made by a run in this folder"
+            remedy = "move it away, or choose another folder"
+            raise bad("--out", message, remedy) from None
 
     def _leave(self) -> None:
         """Remove all that is not a finished result and free the lock; never raise."""
         if self._lock is not None:
-            clean = True
-            try:
-                self._clear_staging()
-                if not self._finished and not self._own_record():
-                    self._remove(self._journal())
-            except OSError:
-                clean = False  # the journal stays for the next run
+            clean, entered = False, self._staging is not None
+            with suppress(OSError, BadInput):  # else the journal stays for the next run
+                if entered:
+                    self._clear_staging(self._staging)
+                if entered and not self._finished and not self._own_record():
+                    self._previous = Proofs(self.path, self._journal())
+                    self._remove(self._previous.names)
+                clean = entered or not os.fstat(self._lock).st_size
             with suppress(OSError):
                 if clean:
                     (self.path / LOCK).unlink(missing_ok=True)
@@ -323,12 +348,6 @@ def is_foreign(folder: Path) -> bool:
     return bool(present - {LOCK, STAGING}) and not ours
 
 
-def previous_files(record: Path) -> list[str]:
-    """Return the names of the files that a record of vcam lists, none outside its folder."""
-    found = read_record(record)
-    return [name for name in found["files"] if _is_safe(name)] if found else []
-
-
 def _flock(lock: int, folder: Path) -> None:
     try:
         fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -340,40 +359,3 @@ def _flock(lock: int, folder: Path) -> None:
     except OSError as error:
         if error.errno not in _NO_LOCKS_HERE:  # some cluster file systems have none
             raise
-
-
-def read_record(path: Path) -> dict[str, Any] | None:
-    """Return the JSON object in `path` when it is a record or journal of vcam, else None."""
-    try:
-        status = path.lstat()
-        if not stat.S_ISREG(status.st_mode) or not 0 < status.st_size <= _LARGEST_RECORD:
-            return None
-        value = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError):
-        return None
-    if not isinstance(value, dict) or value.get("program") != PROGRAM:
-        return None
-    names = value.get("files")
-    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
-        return None
-    return value
-
-
-def _is_safe(name: str) -> bool:
-    """Tell whether a file can have the name, and stays inside its folder with it."""
-    path = PurePosixPath(name)
-    try:
-        short = all(len(os.fsencode(part)) <= 255 for part in path.parts)
-    except UnicodeError:
-        return False
-    inside = bool(path.parts) and not path.is_absolute() and ".." not in path.parts
-    return short and inside and "\0" not in name
-
-
-def _has_real_parents(folder: Path, name: str) -> bool:
-    """Tell whether every folder on the way to `name` is missing or a folder itself, no link."""
-    for parent in PurePosixPath(name).parents[:-1]:
-        path = folder / parent
-        if os.path.lexists(path) and (path.is_symlink() or not path.is_dir()):
-            return False
-    return True

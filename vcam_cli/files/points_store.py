@@ -13,21 +13,26 @@ import json
 import os
 import re
 import time
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, Self
 
 from vcam_cli.errors import CannotDo, bad
 from vcam_cli.files import atomic
-from vcam_cli.files.folder import PROGRAM, is_foreign, previous_files
-from vcam_cli.files.report import hash_file, hash_text, to_json
+from vcam_cli.files.folder import is_foreign
+from vcam_cli.files.records import PROGRAM, Fingerprint, Proofs, fingerprint, read_record
+from vcam_cli.files.report import hash_text, to_json
 
 POINTS = "points"
 RECORD = "study.json"
 _CLAIMS = ".claims"
-_POINT_FILE = re.compile(r"[0-9a-f]{32}\.(json|raw\.exr|render\.png)|\.claims|\..*\.part")
+_KEPT = r"[0-9a-f]{32}\.(json|raw\.exr|render\.png)"
+_UNFINISHED = re.compile(rf"\.{_KEPT}\.\d+-[0-9a-f]{{8}}\.part")
+_POINT_FILE = re.compile(rf"{_KEPT}|\.claims|{_UNFINISHED.pattern}")
 """The names in the folder of points."""
+_FINISHING = 1 << 61
+"""The byte that a process holds while it replaces tables; bytes below 2^60 are claims of points."""
 _LARGEST = 1 << 20
 """The most bytes that a point's own file can have."""
 _ABANDONED = 3600.0
@@ -81,9 +86,19 @@ class SweepFolder:
         return all(map(_POINT_FILE.fullmatch, names - {POINTS}))
 
     def begin(self, record: Mapping[str, Any]) -> None:
-        """Write the record that says whose folder this is, where there is none."""
-        if not (self.path / RECORD).exists():
-            self._write_record(record, [])
+        """Write the record that says whose folder this is, where there is none.
+
+        Raise BadInput where a file that would be replaced is not as vcam wrote it.
+        """
+        with self._locked(_FINISHING):
+            if not os.path.lexists(self.path / RECORD):
+                self._write_record(record, [])
+            former = read_record(self.path / RECORD)
+            if former is None:
+                message = f"{self.path / RECORD} is no record of vcam"
+                raise bad("--out", message, "move it away, or choose another folder")
+            proofs = Proofs(self.path, former)
+            proofs.require(proofs.names)
 
     def read(self, key: str, files: Sequence[str] = ()) -> dict[str, Any] | None:
         """Return what was written under a key; None where it is missing or corrupted.
@@ -142,6 +157,17 @@ class SweepFolder:
         with suppress(OSError):
             fcntl.lockf(self._claims, fcntl.LOCK_UN, 1, _byte(point))
 
+    @contextmanager
+    def _locked(self, byte: int) -> Iterator[None]:
+        """Wait until no other process holds a byte, and hold it; without locks do not wait."""
+        with suppress(OSError):
+            fcntl.lockf(self._claims, fcntl.LOCK_EX, 1, byte)
+        try:
+            yield
+        finally:
+            with suppress(OSError):
+                fcntl.lockf(self._claims, fcntl.LOCK_UN, 1, byte)
+
     def finish(
         self,
         writers: Mapping[str, Callable[[Path], None]],
@@ -151,33 +177,51 @@ class SweepFolder:
         """Write tables and plots, each whole, then the record; remove those of former studies.
 
         writers: name of a file -> function that writes it. Raise BadInput where one of them would
-        replace an input, CannotDo where one cannot be written.
+        replace an input, or a file that is not as vcam wrote it, CannotDo where one cannot be
+        written.
         """
-        former = previous_files(self.path / RECORD)
         protected = {os.path.realpath(path) for path in inputs}
         for path in (self.path / name for name in (*writers, RECORD)):
             if os.path.realpath(path) in protected:
                 message = f"{path} is an input of this study and would be replaced"
                 raise bad("--out", message, "choose another folder")
-        for name, write in writers.items():
-            write(self.path / name)
-        for name in former:
-            if name not in writers and "/" not in name:
-                with suppress(OSError):
-                    (self.path / name).unlink(missing_ok=True)
-        self._write_record(record, sorted(writers))
+        contents = {name: atomic.written_bytes(name, write) for name, write in writers.items()}
+        written = {name: fingerprint(data) for name, data in contents.items()}
+        with self._locked(_FINISHING):
+            self._replace(contents, written)
+            self._write_record(record, sorted(written), written=written)
         self._remove_abandoned()
+
+    def _replace(self, contents: Mapping[str, bytes], written: Mapping[str, Fingerprint]) -> None:
+        """Put new files in the place of the former ones.
+
+        Meanwhile the record knows both, so that a sweep after a power cut knows which files are
+        vcam's. A file that is as the new one, perhaps of another process, is as good.
+        """
+        former = read_record(self.path / RECORD) or {"files": []}
+        proofs = Proofs(self.path, former, {"files": [], "written": written})
+        proofs.require(proofs.names)
+        there = [name for name in former["files"] if name in written]
+        unfinished = former | {"asked": ""}
+        self._write_record(unfinished, there, written=former.get("written"), pending=written)
+        for name, data in contents.items():
+            atomic.write_bytes(self.path / name, data)
+        for name in proofs.names:
+            if name not in written and proofs.holds(name):
+                (self.path / name).unlink(missing_ok=True)
 
     def _remove_abandoned(self) -> None:
         """Remove temporary files of processes that were killed."""
         for path in (self.path / POINTS).glob(".*.part"):
             with suppress(OSError):
-                if time.time() - path.lstat().st_mtime > _ABANDONED:
+                is_ours = _UNFINISHED.fullmatch(path.name) and not path.is_symlink()
+                if is_ours and time.time() - path.lstat().st_mtime > _ABANDONED:
                     path.unlink()
 
-    def _write_record(self, record: Mapping[str, Any], names: list[str]) -> None:
-        written = {name: hash_file(self.path / name) for name in names}
-        whole = {**record, "program": PROGRAM, "files": names, "written": written}
+    def _write_record(self, record: Mapping[str, Any], names: list[str], **more: Any) -> None:
+        whole = {**record, "program": PROGRAM, "files": names, **more}
+        if "pending" not in more:
+            whole.pop("pending", None)
         atomic.write_text(self.path / RECORD, to_json({**whole, "check": record_check(whole)}))
 
 

@@ -20,8 +20,8 @@ from vcam_cli.camera import load as cameras
 from vcam_cli.config.document import Document
 from vcam_cli.config.file_names import current_folder
 from vcam_cli.errors import CannotDo, Problem, dotted_path, one_line
-from vcam_cli.files.folder import read_record
 from vcam_cli.files.points_store import RECORD, SweepFolder, record_check
+from vcam_cli.files.records import Proofs, read_record
 from vcam_cli.files.report import hash_file, hash_text, to_json
 from vcam_cli.files.spectral.hyperspectral import companions
 from vcam_cli.files.tables import Cell
@@ -219,8 +219,10 @@ def finished_result(out: Path, study: StudyFile, request: str) -> SweepResult | 
         record = read_record(out / RECORD)
         if record is None or record["asked"] != request or record["check"] != record_check(record):
             return None
-        hashes = {**record["hashes"], **{out / n: h for n, h in record["written"].items()}}
-        if not _are_same(hashes) or not _are_kept(out, record, study):
+        written = Proofs(out, record)
+        if not _are_same(record["hashes"]) or not all(map(written.holds, record["files"])):
+            return None
+        if not _are_kept(out, record, study):
             return None
         return _read_record(record, out, study)
     except (KeyError, TypeError, ValueError, AttributeError):  # not as vcam writes it
