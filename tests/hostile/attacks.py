@@ -2,7 +2,8 @@
 
     pytestmark = pytest.mark.attack("deleting without proof")
 
-docs/attacks.md has a row for each kind. `make attacks` runs them all and writes it; `test_attacks.py` fails while it tells other numbers than there are cases.
+docs/attacks.md has a row for each kind. `make attacks` runs them all and writes it;
+`test_attacks.py` fails while it tells other numbers than there are cases.
 """
 
 import re
