@@ -266,7 +266,10 @@ class OutputFolder:
     ) -> None:
         """Write the names and fingerprints of files about to come, and of those before them."""
         assert self._lock is not None
-        journal = {"program": PROGRAM, "files": sorted({*pending, *(written or {})})}
+        journal: dict[str, Any] = {
+            "program": PROGRAM,
+            "files": sorted({*pending, *(written or {})}),
+        }
         if journal["files"]:
             journal |= {"pending": dict(pending), "written": dict(written or {})}
         text = json.dumps(journal | {"staging": self._staging}).encode()
