@@ -39,6 +39,12 @@ class Uniform(Chart):
     reflectance: Fraction = key("reflectance everywhere", default=1.0)
 
 
+class Dark(Chart):
+    """Nothing: a cap on the lens, for dark frames."""
+
+    chart: Literal["dark"] = key("which chart", example="dark")
+
+
 class Sinusoid(Chart):
     """One spatial frequency: reflectance mean x (1 + contrast cos(2 pi f u + phase))."""
 
@@ -202,6 +208,7 @@ class Hyperspectral(Model):
 
 Source = (
     Uniform
+    | Dark
     | Sinusoid
     | Csf
     | SlantedEdge
@@ -291,7 +298,7 @@ class Wavelengths(Model):
         return self
 
 
-_LUMINANCE = Quantity("luminance", above=0, words={"from-file": "from-file"})
+_LUMINANCE = Quantity("luminance", least=0, words={"from-file": "from-file"})
 
 
 class Scene(Model):
@@ -314,12 +321,12 @@ class Scene(Model):
         example="100 cd/m2",
         default=None,
     )
-    radiance: Annotated[float | None, Quantity("radiance", above=0)] = key(
+    radiance: Annotated[float | None, Quantity("radiance", least=0)] = key(
         "of a perfect white diffuser, over the wavelengths simulated",
         example="0.4 W/(sr m2)",
         default=None,
     )
-    illuminance: Annotated[float | None, Quantity("illuminance", above=0)] = key(
+    illuminance: Annotated[float | None, Quantity("illuminance", least=0)] = key(
         "on a perfect white diffuser", example="300 lx", default=None
     )
     distance: Annotated[float, Quantity("distance", above=0)] = key(

@@ -91,6 +91,8 @@ def light_plan(path: OpticalPath, scene: Scene) -> LightPlan:
     candidates = of_kind(path.optional, *KINDS)
     if not candidates:
         return LightPlan()
+    if path.transfer.is_dark:
+        return LightPlan(candidates, shares=dict.fromkeys((e.name for e in candidates), 0.0))
     detail = scene_detail(path, scene)
     functions = {} if detail is None else transfer_functions(path, detail)
     shares = {effect: _share(detail, functions, effect) for effect in candidates}

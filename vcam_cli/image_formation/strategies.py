@@ -3,6 +3,7 @@
 - Sinusoids, and patterns that repeat whose harmonics up to the cut-off are few enough to be summed:
   each has its transfer. Exact (`harmonic_scenes.py`).
 - No blur in the lens or in the silicon: means over the photodetectors. Exact (`box_average.py`).
+- No light in any color: none at the pixels.
 - Everything else: the cosine spectrum, multiplied by the transfer function and folded onto the
   pixels, as finely as the tolerance asks (`bandwidth.py`, `chart_cells.py`).
 """
@@ -17,6 +18,7 @@ from itertools import chain
 import numpy as np
 
 from vcam_cli import memory
+from vcam_cli.effects.base import Blur, FieldTransfer, SeparableTransfer, of_kind
 from vcam_cli.image_formation import memory_model
 from vcam_cli.image_formation.bandwidth import LOWEST, axes, highest_passed, reach, table_size
 from vcam_cli.image_formation.box_average import box_averages, point_values
@@ -65,6 +67,8 @@ def image_layers(path: OpticalPath, scene: Scene) -> tuple[Layers, SpectrumRepor
     CannotDo
         Where memory does not suffice.
     """
+    if path.transfer.is_dark:
+        return _dark_layers(path)
     if isinstance(scene, WaveScene):
         return wave_layers(path, scene)
     if isinstance(scene, HarmonicScene):
@@ -75,6 +79,14 @@ def image_layers(path: OpticalPath, scene: Scene) -> tuple[Layers, SpectrumRepor
     if not path.transfer.effects and not path.field and path.averages_over_box:
         return _mean_layers(path, scene)
     return _filtered_layers(path, scene)
+
+
+def _dark_layers(path: OpticalPath) -> tuple[Layers, SpectrumReport]:
+    """Return the image where no color sees light: there is none, whatever blurs it."""
+    dark = np.zeros((path.geometry.rows, path.geometry.columns), path.settings.dtype)
+    blurs = of_kind(path.effects, Blur, SeparableTransfer, FieldTransfer)
+    report = SpectrumReport(changes=dict.fromkeys((effect.name for effect in blurs), 0.0))
+    return iter([Layer(lambda color, rows: dark[rows])]), report
 
 
 def _mean_layers(path: OpticalPath, scene: SampledScene) -> tuple[Layers, SpectrumReport]:

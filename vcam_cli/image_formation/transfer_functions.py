@@ -146,6 +146,11 @@ class Transfer:
         """H_kc at frequency 0, the signal (K, C) of a uniform scene [e/s]."""
         return self.weights.sum(axis=-1)
 
+    @property
+    def is_dark(self) -> bool:
+        """Whether no color sees any light of the scene."""
+        return not self.weights.any()
+
     @cached_property
     def cutoff(self) -> float:
         """Frequency from which on every H_kc is zero [cycles/m]; inf where there is none."""

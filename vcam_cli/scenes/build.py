@@ -95,6 +95,8 @@ def _waves(source: object) -> tuple[Wave, ...] | None:
     match source:
         case models.Uniform():
             return uniform.waves(source.reflectance)
+        case models.Dark():
+            return uniform.waves(0.0)
         case models.Sinusoid():
             return sinusoid.waves(
                 source.frequency, source.contrast, source.mean, source.orientation, source.phase

@@ -276,7 +276,7 @@ def _picture(camera: Camera, stages: Stages) -> tuple[Any, tuple[str, ...]]:
 def _remarks(ready: Prepared) -> tuple[str, ...]:
     """Return notes on the silicon, on times that the camera chose, and on a scene of spectra."""
     scene, band = ready.scene, ready.camera.scene.wavelengths
-    before = photodiode.remarks(ready.camera) + _scheduled_times(ready)
+    before = photodiode.remarks(ready.camera) + _scheduled_times(ready) + _blind_colors(ready)
     if not isinstance(scene, CubeScene):
         return before
     level = luminance(scene.white, band.start, band.stop)
@@ -288,6 +288,15 @@ def _remarks(ready: Prepared) -> tuple[str, ...]:
             " of the largest"
         )
     return before + tuple(notes)
+
+
+def _blind_colors(ready: Prepared) -> tuple[str, ...]:
+    """Return which colors see nothing of a perfect white, which may be a mistake of a spectrum."""
+    white = zip(ready.mosaic.colors, ready.white_rate, strict=True)
+    blind = [color for color, rate in white if rate == 0]
+    if len(blind) == len(ready.mosaic.colors):
+        return ("no light reaches the electrons: this is a dark frame",)
+    return (f"no light reaches the electrons of {', '.join(blind)}",) if blind else ()
 
 
 def _scheduled_times(ready: Prepared) -> tuple[str, ...]:
