@@ -9,10 +9,12 @@ from making import camera, radiance_for
 from vcam_cli.accuracy import measurements, refinement
 from vcam_cli.accuracy.knobs import KNOBS, with_accuracy, with_knobs
 from vcam_cli.accuracy.measurements import Clock, Shot, is_median_known, settings_key
+from vcam_cli.accuracy.reference import MOST_BYTES, prepare_converged, sampling
 from vcam_cli.accuracy.refinement import is_same_camera, refine_reference
 from vcam_cli.accuracy.setting_errors import FLOOR, Point
 from vcam_cli.commands import accuracy as command
 from vcam_cli.progress import Silent
+from vcam_cli.simulation.simulate import prepare
 
 SMALL = {
     "scene.radiance": radiance_for(2000),
@@ -132,3 +134,22 @@ def test_smaller_than_rounding_is_sure():
     text = command.convergence(told(point("table_size", 0.0, FLOOR)))
     assert "refined" in text
     assert "<" not in text
+
+
+LEAVES = pytest.param("dead-leaves", marks=pytest.mark.long)
+
+
+@pytest.mark.parametrize("chart", ["slanted-edge", "siemens-star", "csf", LEAVES])
+@pytest.mark.parametrize("f_number", [1.2, 8])
+def test_the_reference_is_painted_more_finely_than_what_it_judges(chart, f_number, tmp_path):
+    """However fine the cells are that a tolerance asks for, and whatever the lens still passes."""
+    source = {"kind": "chart", "chart": chart}
+    if chart == "csf":
+        source["max_frequency"] = "200 lp/mm"
+    changes = SMALL | {"scene.source": source, "optics.f_number": f_number, "effects": "all"}
+    coarse = prepare(camera(tmp_path, changes | {"accuracy": "reference"}), 1)[0]
+    assert coarse.spectrum.cells_per_pixel > 0
+    found = prepare_converged(coarse.camera, coarse, 1, MOST_BYTES / 10)
+    assert sampling(found) >= min(2 * sampling(coarse), 63)
+    parts = sampling(found) / sampling(coarse)
+    assert parts != round(parts) or sampling(found) >= 63  # parts of cells fold as these do

@@ -16,6 +16,8 @@ from vcam_cli.simulation.simulate import prepare
 
 pytestmark = pytest.mark.long
 
+OWN_ERROR = {knob.name for knob in KNOBS} | {f"effect:{kind.name}" for kind in ORDER}
+"""Knobs of which no promise is made."""
 DARK = "pixel.photodetector.dark_current"
 NOISY = {
     "scene.radiance": radiance_for(2000),
@@ -48,14 +50,14 @@ def of(found, knob: str) -> dict[str, Point]:
 
 def test_every_preset_knob_and_effect_is_there(measured):
     knobs = {p.knob for p in measured.points}
-    assert {"preset", "tolerance", "effects", "file"} <= knobs
+    assert {"preset", "tolerance", "auto", "all", "file"} <= knobs
     assert {knob.name for knob in KNOBS} == (knobs | set(measured.absent)) & {
         knob.name for knob in KNOBS
     }
     assert set(measured.absent) == {"vignetting_points", "spectral_rank", "field_zones"}
     assert set(of(measured, "tolerance")) == {"1 %", "0.1 %"}
     assert set(of(measured, "preset")) == {"draft", "standard", "reference"}
-    assert set(of(measured, "effects")) == {"all"}
+    assert set(of(measured, "auto")) == set(of(measured, "all")) == set(of(measured, "preset"))
     assert {k.removeprefix("effect:") for k in knobs if k.startswith("effect:")} == {
         kind.name for kind in ORDER if kind.name in {e.name for e in measured.effects}
     }
@@ -90,6 +92,21 @@ def test_presets_keep_their_tolerance_and_rise_in_accuracy(measured):
     for name, tolerance in (("draft", 0.02), ("standard", 0.005), ("reference", 2e-4)):
         assert presets[name].rms_error <= tolerance
     assert presets["reference"].rms_error < presets["standard"].rms_error
+
+
+def test_all_and_auto_spend_the_tolerance_of_their_preset(measured):
+    """With every effect on, the settings have half of it; what the plan leaves out has the rest."""
+    for name, tolerance in (("draft", 0.02), ("standard", 0.005), ("reference", 2e-4)):
+        auto, everything = of(measured, "auto")[name], of(measured, "all")[name]
+        assert auto.tolerance == everything.tolerance == tolerance
+        assert auto.rms_error == of(measured, "preset")[name].rms_error
+        assert auto.tolerance_spent == pytest.approx(auto.rms_error / tolerance)
+        assert auto.tolerance_spent <= 1
+        assert everything.tolerance_spent <= 0.5
+        assert everything.left_out == ()
+    assert of(measured, "auto")["draft"].left_out
+    assert of(measured, "file")["as it is"].tolerance == 0.005
+    assert all((p.tolerance is None) == (p.knob in OWN_ERROR) for p in measured.points)
 
 
 def test_numbers_of_a_point_belong_together(measured):

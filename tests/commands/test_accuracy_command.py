@@ -35,11 +35,12 @@ def test_files(ran):
     ]
     lines = (out / "accuracy.csv").read_text().splitlines()
     assert lines[0] == (
-        "knob,setting,rms_error,max_error,rms_electrons,seconds,seconds_spread,mean_s_cielab"
+        "knob,setting,rms_error,max_error,rms_electrons,seconds,seconds_spread,mean_s_cielab,"
+        "tolerance_spent"
     )
     rows = list(csv.reader(lines[1:]))
     assert all(float(cell) >= 0 for row in rows for cell in row[2:] if cell != "")
-    assert {"preset", "effect:diffraction"} <= {row[0] for row in rows}
+    assert {"preset", "auto", "all", "effect:diffraction"} <= {row[0] for row in rows}
     record = json.loads((out / "accuracy.json").read_text())
     assert record["program"] == "vcam"
     assert record["camera"]
@@ -56,6 +57,7 @@ def test_a_person_reads_tables_and_a_recommendation(ran):
         "measured",
         "recommended: ",
         "does not apply",
+        "of T",
     ):
         assert word in text
 

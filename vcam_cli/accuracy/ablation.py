@@ -2,8 +2,9 @@
 
 Of an effect that changes the mean signal: rms over the array of (mean raw with everything on -
 mean raw without it), relative to full signal. Of noise, which changes no mean: its share of the
-variance, from draws at 1, 10 and 100 % of full signal with and without it. Every draw has random
-numbers of its own, so that the difference of two frames is the effect and nothing else.
+variance, from draws with and without it at the lowest, the middle and the highest of those
+percentiles of the scene's own signal at which noise is promised. Every draw has random numbers of
+its own, so that the difference of two frames is the effect and nothing else.
 """
 
 from __future__ import annotations

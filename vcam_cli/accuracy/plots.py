@@ -40,11 +40,13 @@ def pareto(
     curves: Sequence[Curve],
     tolerance: float,
     panels: Sequence[tuple[str, Sequence[Pair]]],
+    everything: Sequence[tuple[float, float, str]] = (),
 ) -> None:
     """Error over time, and beside it what each effect contributes, expected and found.
 
     presets: (seconds, error, name); tolerance: drawn as a line; panels: (label of the axis, pairs),
-    one below the other. Errors relative to full signal. Raises CannotDo where it cannot be written.
+    one below the other; everything: presets with every effect on. Errors relative to full signal.
+    Raises CannotDo where it cannot be written.
     """
     matplotlib = load()
     from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -58,7 +60,8 @@ def pareto(
         FigureCanvasAgg(figure)
         grid = figure.add_gridspec(len(rows), 2, width_ratios=(1.5, 1), height_ratios=rows)
         left = figure.add_subplot(grid[:, 0])
-        _error_over_time(left, presets, curves, tolerance)
+        _error_over_time(left, presets, everything, curves, tolerance)
+        _everything(left, presets, everything)
         left.set_title(title)
         for row, (label, pairs) in enumerate(panels):
             _pairs(figure.add_subplot(grid[row, 1]), label, pairs, legend=row == 0)
@@ -68,12 +71,14 @@ def pareto(
 def _error_over_time(
     axes: Any,
     presets: Sequence[tuple[float, float, str]],
+    everything: Sequence[tuple[float, float, str]],
     curves: Sequence[Curve],
     tolerance: float,
 ) -> None:
     from matplotlib.ticker import LogLocator, NullFormatter
 
-    every = [point for points in (presets, *(c.points for c in curves)) for point in points]
+    drawn = (presets, everything, *(c.points for c in curves))
+    every = [point for points in drawn for point in points]
     seconds = [point[0] for point in every]
     errors = [point[1] for point in every if point[1] > FLOOR] or [FLOOR]
     axes.set_xscale("log")
@@ -133,6 +138,25 @@ def _presets(axes: Any, presets: Sequence[tuple[float, float, str]]) -> None:
             arrowprops={"arrowstyle": "-", "lw": 0.6, "color": GRAY, "shrinkA": 0, "shrinkB": 4},
             zorder=6,
         )
+
+
+def _everything(
+    axes: Any,
+    presets: Sequence[tuple[float, float, str]],
+    everything: Sequence[tuple[float, float, str]],
+) -> None:
+    """Draw squares for presets with every effect on, each tied to that which is planned."""
+    planned = {name: (x, max(y, FLOOR)) for x, y, name in presets}
+    for x, error, name in everything:
+        y = max(error, FLOOR)
+        if name in planned:
+            (at, height) = planned[name]
+            axes.plot([at, x], [height, y], "-", color=GRAY, lw=0.8, zorder=3)
+        axes.plot(x, y, "s", ms=5, mfc="white", mec=GRAY, mew=1.1, zorder=4)
+    if everything:
+        x, error, _ = max(everything)
+        place = {"xytext": (0, -7), "textcoords": "offset points", "ha": "center", "va": "top"}
+        axes.annotate("all effects on", (x, max(error, FLOOR)), color=GRAY, fontsize=7, **place)
 
 
 def _plain_seconds(axis: Any) -> None:

@@ -55,11 +55,12 @@ def finest_camera(camera: Camera, coarse: Prepared, most_bytes: float = 0) -> Ca
     """Return the camera with everything on and every knob finer than its reference.
 
     coarse: the camera at `accuracy: reference`. Where its scene has a spectrum, it is followed
-    two and a half times as far as there, as long as so many bytes suffice; 0: `MOST_BYTES`. A
-    chart whose spectrum is known is followed as far as the key goes.
+    two and a half times as far as there, or painted on so many times its cells, an odd number, as
+    long as so many bytes suffice; 0: `MOST_BYTES`. A chart whose spectrum is known is followed as
+    far as the key goes.
     """
     knobs: dict[str, Any] = dict(FINEST)
-    reached = coarse.spectrum.oversampling
+    reached = sampling(coarse)
     if reached:
         samples = (
             min(most_bytes or MOST_BYTES, memory.available() / 2)
@@ -67,7 +68,7 @@ def finest_camera(camera: Camera, coarse: Prepared, most_bytes: float = 0) -> Ca
             / max(1, coarse.spectrum.planes)
         )
         most = int(math.sqrt(samples / _pixels(coarse)))
-        wanted = min(math.ceil(FURTHER * reached), FINEST_CELLS)
+        wanted = min(math.ceil(FURTHER * reached) | 1, FINEST_CELLS - 1)
         if _is_rectangles(coarse):
             wanted = most = FINEST_CELLS
         knobs["oversampling"] = max(math.ceil(reached), min(wanted, most))
@@ -89,9 +90,8 @@ def describe_reference(found: Prepared, coarse: Prepared, full: float, change: f
     """
     left = found.spectrum.lost_rms * found.exposure_time
     chart = isinstance(found.scene, ChartScene) and not _is_rectangles(found)
-    reached = coarse.spectrum.oversampling
-    if chart and reached and found.spectrum.oversampling > reached:
-        left = change / ((found.spectrum.oversampling / reached) ** ORDER - 1)
+    if chart and sampling(found) > sampling(coarse):
+        left = change / ((sampling(found) / sampling(coarse)) ** ORDER - 1)
     return Reference(
         full_signal=full,
         exposure_time=found.exposure_time,
@@ -124,6 +124,11 @@ def effect_changes(
     return out
 
 
+def sampling(ready: Prepared) -> float:
+    """Return cells per pixel pitch of a painted chart, else the last frequency [pixel Nyquist]."""
+    return ready.spectrum.cells_per_pixel or ready.spectrum.oversampling
+
+
 def rms_and_largest(difference: NDArray) -> NDArray:
     """(rms, largest) of a difference of signals [electrons]."""
     return np.array([ablation.rms(difference), float(np.abs(difference).max())])
@@ -135,9 +140,7 @@ def _is_rectangles(ready: Prepared) -> bool:
 
 
 def _pixels(ready: Prepared) -> float:
-    """Area of the scene with its margin, in pixels."""
-    scene, g = ready.scene, ready.geometry
-    if not isinstance(scene, ChartScene):
-        return g.rows * g.columns
-    area = scene.shape[0] * scene.pitch_y * scene.shape[1] * scene.pitch_x
-    return area / (g.pitch_x * g.pitch_y)
+    """Area of what is sampled of the scene, in pixels."""
+    if cells := ready.spectrum.cells_per_pixel:
+        return ready.spectrum.cells / cells**2
+    return ready.geometry.rows * ready.geometry.columns

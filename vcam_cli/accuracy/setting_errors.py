@@ -13,6 +13,7 @@ COLUMNS = (
     "seconds",
     "seconds_spread",
     "mean_s_cielab",
+    "tolerance_spent",
 )
 """Of accuracy.csv."""
 
@@ -46,6 +47,13 @@ class Point:
     """Largest share of the temporal or fixed-pattern variance that they had."""
     unsure: float = 0.0
     """Rms by which that which it is compared with may itself be wrong, relative to full signal."""
+    tolerance: float | None = None
+    """What its error may be, relative to full signal; None where no promise is made of it."""
+
+    @property
+    def tolerance_spent(self) -> float | None:
+        """Error over tolerance; None where no promise is made of it."""
+        return None if self.tolerance is None else self.rms_error / self.tolerance
 
     @property
     def is_certain(self) -> bool:

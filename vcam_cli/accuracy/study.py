@@ -10,6 +10,7 @@ without files: of the file's camera with this one thing changed.
 
 from __future__ import annotations
 
+import itertools
 import math
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
@@ -35,6 +36,7 @@ from vcam_cli.accuracy.reference import (
     effect_changes,
     finest_camera,
     rms_and_largest,
+    sampling,
 )
 from vcam_cli.accuracy.refinement import Refined, is_same_camera, refine_reference
 from vcam_cli.accuracy.setting_errors import COLUMNS, Point
@@ -71,17 +73,18 @@ class Study:
             "name": self.camera.name,
             "tolerance": self.camera.accuracy.tolerance,
             "reference": asdict(self.reference),
-            "points": [asdict(p) for p in self.points],
+            "points": [{**asdict(p), "tolerance_spent": p.tolerance_spent} for p in self.points],
             "effects": [{**asdict(e), "ratio": e.ratio} for e in self.effects],
             "absent": self.absent,
             "recommendation": asdict(self.recommendation),
             "notes": [
                 "Errors are of the mean raw signal against the reference, relative to full signal.",
                 "A knob's error is its own, with all others converged.",
+                "tolerance_spent is the error over what may be lost, for all rows that promise it.",
                 "mean_s_cielab is between renders without noise; of an effect left out and of"
                 " shot_noise, with it.",
                 "Noise and rounding change no mean: their contribution is a share of the variance"
-                " at 1, 10 and 100 % of full signal, the largest of the three.",
+                " at the 1st to 99th percentile of the scene's own signal, the largest of them.",
                 "An effect left out is measured with everything else on.",
             ],
         }
@@ -143,19 +146,25 @@ class _Measurement:
     # --- what is compared ------------------------------------------------------------------------
 
     def _settings(self, coarse: Shot, own: Shot, truth: Shot) -> list[Judged]:
-        """Presets, tolerances, every effect on, and the file as it is."""
-        cases = [("preset", name, with_accuracy(self.camera, preset=name)) for name in PRESETS]
+        """Presets, planned and with every effect on, tolerances, and the file as it is."""
+        presets = {name: with_accuracy(self.camera, preset=name) for name in PRESETS}
+        cases = [("preset", name, camera) for name, camera in presets.items()]
         for text, value in TOLERANCES.items():
             cases.append(("tolerance", text, with_accuracy(self.camera, tolerance=value)))
-        cases.append(("effects", "all", ablation.with_effects(self.camera, "all")))
+        for every, (name, camera) in itertools.product(("auto", "all"), presets.items()):
+            cases.append((every, name, ablation.with_effects(camera, every)))
         cases.append(("file", "as it is", self.camera))
-        known = {settings_key(with_accuracy(self.camera, preset="reference")): coarse}
-        known[settings_key(self.camera)] = own
+        known = {settings_key(presets["reference"]): coarse, settings_key(self.camera): own}
+        points: dict[str, Point] = {}
         out = []
         for i, (knob, setting, case) in enumerate(cases):
             self.watch.step(i, len(cases))
-            shot = known.get(settings_key(case)) or self.clock.timed_shot(case)
-            out.append((self._point(knob, setting, shot, truth), case))
+            key, allowed = settings_key(case), case.accuracy.tolerance
+            if key not in points:
+                shot = known.get(key) or self.clock.timed_shot(case)
+                points[key] = self._point(knob, setting, shot, truth)
+            point = replace(points[key], knob=knob, setting=setting, tolerance=allowed)
+            out.append((point, case))
         return out
 
     def _knobs(
@@ -163,7 +172,7 @@ class _Measurement:
     ) -> list[Judged]:
         """Return the knobs, each with its own error."""
         fixed: dict[str, Any] = {"tolerance": CONVERGED, **FINEST}
-        if reached := own.ready.spectrum.oversampling:
+        if reached := sampling(own.ready):
             fixed["oversampling"] = math.ceil(reached)
         everything = ablation.with_effects(self.camera, "all")
         shared = Shared()  # of models of noise the light is the same
@@ -215,7 +224,7 @@ class _Measurement:
         case = with_knobs(self.camera, **knobs)
         text = ", ".join(f"{name}: {value}" for name, value in knobs.items())
         point = self._point("combined", text, self.clock.timed_shot(case), truth)
-        point = replace(point, unsure=reference.lost)
+        point = replace(point, unsure=reference.lost, tolerance=case.accuracy.tolerance)
         self.clock.run_all(self.watch, self.camera)
         return self._measure_times([(point, case)])
 

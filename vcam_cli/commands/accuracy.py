@@ -18,12 +18,12 @@ SHARE_OF = {
 }
 """The plan's units, short enough for a table."""
 SETTINGS = (
-    "knob", "setting", "rms %", "largest %", "electrons", "S-CIELAB", "seconds", "spread",
+    "knob", "setting", "rms %", "of T", "largest %", "electrons", "S-CIELAB", "seconds", "spread",
 )  # fmt: skip
 EFFECTS = (
     "effect", "state", "expected %", "measured %", "ratio", "share of", "S-CIELAB", "saves ms",
 )  # fmt: skip
-TOTAL = ("preset", "tolerance", "effects", "file", "combined")
+TOTAL = ("preset", "tolerance", "auto", "all", "file", "combined")
 """The rows whose error is that of all knobs together."""
 
 
@@ -71,7 +71,7 @@ def accuracy(
 
 
 def pareto_arguments(found: "Study"):
-    """Return the arguments of `plots.pareto`: title, presets, curves, tolerance, panels."""
+    """Return the arguments of `plots.pareto`: title, presets, curves, tolerance, panels, all on."""
     from vcam_cli.accuracy.plots import Curve, Pair
 
     def points(*knobs: str):
@@ -93,7 +93,7 @@ def pareto_arguments(found: "Study"):
             panels.append((f"change by leaving it out, {label}", pairs))
     tolerance = found.camera.accuracy.tolerance
     title = f"{found.camera.name}: what accuracy costs"
-    return title, points("preset", "tolerance"), curves, tolerance, panels
+    return title, points("preset", "tolerance"), curves, tolerance, panels, points("all")
 
 
 def print_report(found: "Study", path: Path) -> None:
@@ -102,8 +102,8 @@ def print_report(found: "Study", path: Path) -> None:
 
     width = None if sys.stdout.isatty() else 120
     console = Console(width=width, soft_wrap=True, highlight=False)
-    _table(console, "error against the converged reference; a knob's is its own", SETTINGS,
-           settings(found))  # fmt: skip
+    title = "error against the converged reference, and the share of the tolerance T that it takes"
+    _table(console, f"{title}; a knob's is its own", SETTINGS, settings(found))  # fmt: skip
     _table(console, "each effect left out: expected by the plan, and measured", EFFECTS,
            effects(found))  # fmt: skip
     for knob, why in found.absent.items():
@@ -160,6 +160,7 @@ def settings(found: "Study") -> list[tuple[str, ...]]:
             p.knob,
             p.setting,
             rms(p),
+            "-" if p.tolerance_spent is None else f"{p.tolerance_spent:.2f}",
             f"{100 * p.max_error:.2g}",
             f"{p.rms_electrons:.2g}",
             _delta_e(p.mean_s_cielab),

@@ -86,6 +86,8 @@ class SpectrumReport:
     error of margin, mixtures and tables is not in it [electrons / s]."""
     cells: int = 0
     """Samples of one plane of the scene that were transformed; 0 where its spectrum is known."""
+    cells_per_pixel: float = 0.0
+    """Cells of a painted chart per pixel pitch; 0 where there are none."""
     is_painted: bool = False
     """Whether they had to be painted, as those of a chart."""
     terms: int = 0

@@ -157,6 +157,7 @@ def _spectral_layers(
         oversampling=image.highest,
         lost_rms=math.hypot(image.lost_rms, error),
         cells=0 if scene.rectangles(mixing[0]) is not None else math.prod(scene.shape),
+        cells_per_pixel=g.pitch_x / scene.pitch_x if is_painted else 0.0,
         is_painted=is_painted,
         terms=image_filter.terms,
         planes=len(tables.mix),
