@@ -15,6 +15,7 @@ from vcam_cli.image_formation.rate_cache import light_key
 from vcam_cli.progress import Observer
 from vcam_cli.simulation import provenance
 from vcam_cli.sweeps import expectations, figures, sweep_points, sweep_tables, workers
+from vcam_cli.sweeps.point_effects import effect_differences
 from vcam_cli.sweeps.point_work import Job
 from vcam_cli.sweeps.study_cameras import StudyCameras
 from vcam_cli.sweeps.sweep import Execution, Share
@@ -41,6 +42,8 @@ def computed_sweep(
     hashes = {str(path): hash_file(path) for path in grid.inputs}
     for refused in grid.problems:
         tell(str(refused))
+    if differences := effect_differences(grid.points):
+        tell(differences)
     with SweepFolder(out) as folder:
         folder.begin({"name": study.model.name})
         points = _Points(grid, folder, execution.fresh)

@@ -6,7 +6,6 @@ import time
 import traceback
 from dataclasses import dataclass
 
-from vcam_cli.accuracy.ablation import with_effects
 from vcam_cli.camera.camera import Camera
 from vcam_cli.errors import BadInput, CannotDo, one_line
 from vcam_cli.files.atomic import written_bytes
@@ -17,6 +16,7 @@ from vcam_cli.simulation import outputs
 from vcam_cli.simulation.provenance import versions
 from vcam_cli.simulation.shared import Shared
 from vcam_cli.simulation.simulate import Result, simulate
+from vcam_cli.sweeps.point_effects import with_every_effect
 from vcam_cli.sweeps.sweep_result import FRAMES, Outcome, error_cell
 
 
@@ -59,12 +59,9 @@ def compute_point(job: Job, threads: int, shared: Shared) -> Outcome:
 def _simulate_point(
     job: Job, threads: int, shared: Shared
 ) -> tuple[dict[str, float], dict[str, bytes]]:
-    """Return the metrics of a point, and the files that are kept of it.
-
-    One plan holds for all points, with everything on: a jump in a curve must not come from it.
-    """
+    """Return the metrics of a point, and the files that are kept of it."""
     _check_versions(job)
-    result = simulate(with_effects(job.camera, "all"), threads, shared=shared)
+    result = simulate(with_every_effect(job.camera), threads, shared=shared)
     found = {name: value for name, value, _ in result.metrics}
     metrics = {name: found[name] for name in job.metrics}
     return metrics, {FRAMES[what]: _frame(what, result) for what in job.keep}
