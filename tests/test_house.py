@@ -23,7 +23,7 @@ PACKAGE = Path(vcam_cli.__file__).parent
 
 FLOORS = (
     {"interrupts"},
-    {"errors", "units", "rng", "progress", "parallel"},
+    {"errors", "units", "rng", "progress", "parallel", "source_code"},
     {"memory", "spectra", "scheduling"},
     {"physics"},
     {"config"},

@@ -4,10 +4,13 @@
     result = simulate(load("camera.yaml"))
     result.dn, result.electrons, result.render
 
-Names are imported when they are first used, so that `import vcam_cli` costs nothing.
+Names are imported when they are first used, so that `import vcam_cli` costs a millisecond: that of
+listing its files, by which results know the code that made them.
 """
 
 from typing import TYPE_CHECKING, Any
+
+from vcam_cli import source_code  # noqa: F401  before any other file can change
 
 __version__ = "0.1.0"
 __all__ = ["__version__", "load", "schedule", "simulate", "sweep"]

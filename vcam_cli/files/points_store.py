@@ -85,8 +85,8 @@ class SweepFolder:
         names |= set(os.listdir(self.path / POINTS))
         return all(map(_POINT_FILE.fullmatch, names - {POINTS}))
 
-    def begin(self, record: Mapping[str, Any]) -> None:
-        """Write the record that says whose folder this is, where there is none.
+    def begin(self, record: Mapping[str, Any]) -> dict[str, Any]:
+        """Return the record of the folder; write this one first where there is none.
 
         Raise BadInput where a file that would be replaced is not as vcam wrote it.
         """
@@ -99,6 +99,7 @@ class SweepFolder:
                 raise bad("--out", message, "move it away, or choose another folder")
             proofs = Proofs(self.path, former)
             proofs.require(proofs.names)
+            return former
 
     def read(self, key: str, files: Sequence[str] = ()) -> dict[str, Any] | None:
         """Return what was written under a key; None where it is missing or corrupted.

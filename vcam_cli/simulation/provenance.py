@@ -15,6 +15,7 @@ from vcam_cli.camera.derived.named_spectra import spectra
 from vcam_cli.camera.load import FILE_KEYS
 from vcam_cli.config import shipped
 from vcam_cli.files.spectral.hyperspectral import companions
+from vcam_cli.source_code import code_hash
 
 
 def inputs(camera: Camera) -> tuple[Path, ...]:
@@ -53,10 +54,14 @@ def data_files(camera: Camera, form: dict[str, Any] | None = None) -> tuple[Path
 
 
 def versions() -> dict[str, str]:
-    """Versions that decide the bytes of a frame."""
+    """Return the versions that decide the bytes of a frame, and the hash of the code as `code`.
+
+    Raise CannotDo where the code has changed since it was loaded.
+    """
     libraries = ("numpy", "scipy", "pydantic", "OpenImageIO")
     found = {name: _version(name) for name in libraries}
-    return {"vcam": vcam_cli.__version__, "python": platform.python_version(), **found}
+    own = {"vcam": vcam_cli.__version__, "code": code_hash()}
+    return {**own, "python": platform.python_version(), **found}
 
 
 def _version(name: str) -> str:

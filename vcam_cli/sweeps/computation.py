@@ -7,6 +7,7 @@ from contextlib import closing
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 from vcam_cli.camera.camera import Camera
 from vcam_cli.files.points_store import POINTS, SweepFolder
@@ -44,9 +45,13 @@ def computed_sweep(
         tell(str(refused))
     if differences := effect_differences(grid.points):
         tell(differences)
+    whole = provenance.versions()
+    versions = {name: whole[name] for name in LIBRARIES}
     with SweepFolder(out) as folder:
-        folder.begin({"name": study.model.name})
-        points = _Points(grid, folder, execution.fresh)
+        former = folder.begin({"name": study.model.name, "versions": whole})
+        if changed := _changes(former.get("versions"), versions):
+            tell(f"points of other code are left out, and computed again ({changed})")
+        points = _Points(grid, folder, execution.fresh, versions)
         points.read_finished()
         if folder.corrupted:
             names, shown = list(folder.corrupted), ", ".join(list(folder.corrupted)[:3])
@@ -72,9 +77,11 @@ def computed_sweep(
 class _Points:
     """The points of a sweep, and what is known of them."""
 
-    def __init__(self, grid: Grid, folder: SweepFolder, fresh: bool) -> None:
+    def __init__(
+        self, grid: Grid, folder: SweepFolder, fresh: bool, versions: dict[str, str]
+    ) -> None:
         self.outcomes: dict[str, Outcome] = {}
-        self._folder, self._fresh = folder, fresh
+        self._folder, self._fresh, self._versions = folder, fresh, versions
         model = grid.study.model
         self._frames = tuple(FRAMES[what] for what in model.keep)
         self._points = {p.id: p for p in grid.points if p.camera is not None}
@@ -105,7 +112,6 @@ class _Points:
 
     def groups(self) -> list[list[Job]]:
         """Return all points in the study's order, those of the same light together."""
-        versions = {name: v for name, v in provenance.versions().items() if name in LIBRARIES}
         lights: dict[str, str] = {}
         groups: dict[str, list[Job]] = {}
         for point in self._points.values():
@@ -113,7 +119,7 @@ class _Points:
             assert camera is not None
             if point.content not in lights:
                 lights[point.content] = light_key(camera)
-            job = Job(point.id, _without_texts(camera), self._metrics, self._keep, versions)
+            job = Job(point.id, _without_texts(camera), self._metrics, self._keep, self._versions)
             groups.setdefault(lights[point.content], []).append(job)
         return list(groups.values())
 
@@ -133,9 +139,20 @@ class _Points:
 
     def keep(self, outcome: Outcome) -> None:
         """Keep the outcome of a point."""
-        self._folder.write(outcome.id, outcome.content(), outcome.frames)
+        content = outcome.content() | {"code": self._versions["code"]}
+        self._folder.write(outcome.id, content, outcome.frames)
         self._folder.release(outcome.id)
         self.outcomes[outcome.id] = replace(outcome, frames={})
+
+
+def _changes(former: Any, versions: dict[str, str]) -> str:
+    """Return by what these versions differ from those of a folder's record; "" where they agree."""
+    known = former if isinstance(former, dict) else {}
+    return ", ".join(
+        f"{name} {known.get(name, 'unknown')}, now {version}"
+        for name, version in versions.items()
+        if known.get(name) != version
+    )
 
 
 def _without_texts(camera: Camera) -> Camera:

@@ -32,7 +32,7 @@ class Job:
     keep: tuple[str, ...]
     """The frames that are kept, see `FRAMES`."""
     versions: dict[str, str]
-    """The versions of the libraries of the process that asks."""
+    """The hash of the code, and the versions of the libraries, of the process that asks."""
 
 
 def compute_point(job: Job, threads: int, shared: Shared) -> Outcome:
@@ -62,6 +62,7 @@ def _simulate_point(
     """Return the metrics of a point, and the files that are kept of it."""
     _check_versions(job)
     result = simulate(with_every_effect(job.camera), threads, shared=shared)
+    _check_versions(job)  # modules are loaded where they are first needed
     found = {name: value for name, value, _ in result.metrics}
     metrics = {name: found[name] for name in job.metrics}
     return metrics, {FRAMES[what]: _frame(what, result) for what in job.keep}
@@ -76,7 +77,7 @@ def compute_on_cluster(job: Job, tasks: int) -> Outcome:
 
 
 def _check_versions(job: Job) -> None:
-    """Raise CannotDo where this process has other versions than the one that asks."""
+    """Raise CannotDo where this process has other code or versions than the one that asks."""
     own = versions()
     for name, wanted in job.versions.items():
         if own.get(name) != wanted:

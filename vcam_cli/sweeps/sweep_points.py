@@ -4,8 +4,9 @@ The order is that of points.csv: cases, then the grid (the last parameter fastes
 repeated, then seeds.
 
 A point is known by the hash of all that its numbers depend on: the resolved camera with what its
-files hold, what is measured, and the versions of what computes. How the study calls a point, and
-where files lie, is not in it: two machines agree, and a study that is extended keeps what it has.
+files hold, what is measured, the program's own code, and the versions of its libraries. How the
+study calls a point, and where files lie, is not in it: two machines agree, and a study that is
+extended keeps what it has.
 """
 
 from __future__ import annotations
@@ -34,8 +35,8 @@ from vcam_cli.sweeps.model import Sweep
 from vcam_cli.sweeps.sweep_file import Cell, Parameter, StudyCase, StudyFile
 
 MOST_POINTS = 1_000_000
-LIBRARIES = ("vcam", "numpy", "scipy", "OpenImageIO")
-"""Libraries whose versions decide a point's numbers."""
+LIBRARIES = ("vcam", "code", "numpy", "scipy", "OpenImageIO")
+"""What decides a point's numbers, among `provenance.versions`."""
 
 
 @dataclass(frozen=True)
