@@ -23,8 +23,8 @@ PACKAGE = Path(vcam_cli.__file__).parent
 
 FLOORS = (
     {"interrupts"},
-    {"errors", "units", "rng", "progress", "parallel", "source_code"},
-    {"memory", "spectra", "scheduling"},
+    {"errors", "units", "rng", "progress", "parallel"},
+    {"memory", "spectra", "scheduling", "source_code"},
     {"physics"},
     {"config"},
     {"camera"},

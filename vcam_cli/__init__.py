@@ -10,7 +10,7 @@ listing its files, by which results know the code that made them.
 
 from typing import TYPE_CHECKING, Any
 
-from vcam_cli import source_code  # noqa: F401  before any other file can change
+from vcam_cli import source_code  # noqa: F401  first: before files change
 
 __version__ = "0.1.0"
 __all__ = ["__version__", "load", "schedule", "simulate", "sweep"]

@@ -226,7 +226,7 @@ def test_a_result_that_a_person_has_changed_is_kept(tmp_path, monkeypatch, comma
     before = contents(tmp_path)
     result = vcam(*line, *(("--workers", "1") if command == "sweep" else ()))
     assert result.exit_code == 2, result.output
-    assert f"out/{name} is there already and is not as vcam wrote it; move" in result.stderr
+    assert f"out/{name} is there already and was not written by vcam, or ch" in result.stderr
     assert contents(tmp_path) == before
     (tmp_path / "out" / name).rename(tmp_path / "mine")
     assert vcam(*line).exit_code == 0

@@ -283,7 +283,7 @@ def test_files_of_a_former_study_go(tmp_path):
 def test_temporary_files_of_the_killed_go(tmp_path):
     study, points = written(tmp_path), tmp_path / "out" / "points"
     points.mkdir(parents=True)
-    old, new = points / ".a.json.12-ab.part", points / ".b.json.13-cd.part"
+    old, new = (points / f".{key * 32}.json.12-{key * 8}.part" for key in "ab")
     for path in (old, new):
         path.touch()
     os.utime(old, (0, time.time() - 4000))

@@ -140,7 +140,7 @@ def test_a_changed_table_is_noticed_and_kept(finished, name):
     whole = (out / name).read_bytes()
     damage(out / name)
     changed = (out / name).read_bytes()
-    with pytest.raises(BadInput, match=f"{name} is there already and is not as vcam wrote it"):
+    with pytest.raises(BadInput, match=f"{name} is there already and was not"):
         sweep(study, out, workers=1)
     assert (out / name).read_bytes() == changed
     (out / name).unlink()

@@ -209,8 +209,8 @@ class OutputFolder:
         journal, record = self._journal(), self._own_record()
         self._clear_staging(journal.get("staging"))
         self._previous = Proofs(self.path, journal, record)
-        self._previous.require(self._previous.names)
         self._protect_inputs([*self._previous.names, self._record])
+        self._previous.require(self._previous.names)
         if not record:
             self._remove(self._previous.names)
             self._previous = Proofs(self.path)

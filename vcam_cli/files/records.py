@@ -121,7 +121,7 @@ class Proofs:
             more = f" and {len(found) - 1} more" if len(found) > 1 else ""
             raise bad(
                 "--out",
-                f"{found[0]}{more} is there already and is not as vcam wrote it",
+                f"{found[0]}{more} is there already and was not written by vcam, or changed since",
                 "move it away, or choose another folder",
             )
 
