@@ -83,6 +83,7 @@ class OutputFolder:
             self._leave()
             raise self._unusable(error) from error
         except ValueError as error:  # a NUL, or no text of this system
+            self._leave()
             reason = "is not UTF-8" if isinstance(error, UnicodeError) else f"({error})"
             message = f"{self.path} is no folder name: {reason}"
             raise bad("--out", message, "choose another folder") from error
@@ -209,7 +210,7 @@ class OutputFolder:
         journal, record = self._journal(), self._own_record()
         self._clear_staging(journal.get("staging"))
         self._previous = Proofs(self.path, journal, record)
-        self._protect_inputs([*self._previous.names, self._record])
+        self._protect_inputs([*filter(is_safe, self._previous.names), self._record])
         self._previous.require(self._previous.names)
         if not record:
             self._remove(self._previous.names)
