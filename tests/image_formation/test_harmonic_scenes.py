@@ -199,6 +199,37 @@ def test_too_many_harmonics_are_sampled():
     assert harmonics_count(path(g), lattice(PointGrid(4 * PITCH, PITCH), g)) is None
 
 
+def test_waves_through_zones():
+    """A wave's amplitude in every place is the weighted mean of its zones', in a few layers."""
+    g = sensor(40, 60, (0.8, 0.6))
+    ends = Slanted(0.3 * PITCH, 0.0, 0.4 * PITCH, PITCH), Slanted(0.0, 0.4 * PITCH, PITCH, PITCH)
+    changing = Changing(*ends, g.sensor_width / 2)
+    scene = WaveScene(
+        (WHITE,), (Wave((0.6,)), Wave((0.3,), 0.13 / PITCH, -0.08 / PITCH, 0.4)), WHITE
+    )
+    optical_path = path(g, Round(0.5 * PITCH), changing, aperture(g), knobs=EXACT)
+    found = signal(optical_path, scene)
+    alone = [signal(path(g, Round(0.5 * PITCH), e, aperture(g), knobs=EXACT), scene) for e in ends]
+    x = (np.arange(60) - 29.5) / 60
+    np.testing.assert_allclose(found, (0.5 - x) * alone[0] + (0.5 + x) * alone[1], atol=1e-6)
+    assert len(list(harmonic_scenes.wave_layers(optical_path, scene)[0])) == 2
+
+
+def test_even_light_stays_even_through_zones():
+    """No blur changes it: no zone's transfer is asked for."""
+
+    @dataclass(frozen=True)
+    class Unasked(Slanted):
+        def otf_plane(self, fx, fy, wavelength):
+            raise AssertionError
+
+    g = sensor(16, 20)
+    changing = Changing(*[Unasked(0.0, 0.0, PITCH, PITCH)] * 2, g.sensor_width / 2)
+    scene = WaveScene((WHITE,), (Wave((0.6,)),), WHITE)
+    found = signal(path(g, changing, aperture(g), knobs=EXACT), scene)
+    np.testing.assert_allclose(found, 0.6, rtol=1e-12)
+
+
 def test_the_series_ends_where_the_lens_does(monkeypatch):
     """One harmonic more than is counted changes nothing."""
     g = sensor(8, 8)

@@ -153,7 +153,7 @@ def tabulate_field(
     level = np.abs(uniform_transfer.level).max() or 1.0
     power = _expected_power(stack.tables[0].shape, directed) / uniform_transfer.weights.shape[1]
     shares, left = _shares(stack, power, size.tolerance * level)
-    maps = _maps(zones, geometry)
+    maps = zone_maps(zones, geometry)
     weights = np.array([m.values for m in maps])
     error += left / level
 
@@ -270,8 +270,21 @@ def _expected_power(shape: tuple[int, ...], directed: bool) -> NDArray:
     return np.asarray(power / power.sum())
 
 
-def _maps(zones: Sequence[Zone], geometry: Geometry) -> list[Map]:
-    """Return the zones' weights as maps."""
+def zone_maps(zones: Sequence[Zone], geometry: Geometry) -> list[Map]:
+    """Return the zones' weights as maps.
+
+    Parameters
+    ----------
+    zones : sequence of Zone
+        Zones of a blur, whose weights sum to 1.
+    geometry : Geometry
+        Geometry of the array.
+
+    Returns
+    -------
+    list of Map
+        A map for each zone, without unit.
+    """
     half = geometry.sensor_width / 2, geometry.sensor_height / 2
     at = np.linspace(-1, 1, PLACES)
     return [Map(zone.weight(at * half[0], at * half[1]), *half) for zone in zones]

@@ -1,15 +1,22 @@
-"""Scenes in closed form: waves, and patterns that repeat. Each wave keeps its shape; exact."""
+"""Scenes in closed form: waves, and patterns that repeat. Each wave keeps its shape; exact.
+
+Through a blur that changes over the field a wave's amplitude changes by place: the mean of all
+zones, and a few maps of what differs from it.
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
+from functools import cache, partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vcam_cli.camera.derived.geometry import pixel_centers
 from vcam_cli.effects.base import Blur, Effect, FieldTransfer, SeparableTransfer, of_kind
+from vcam_cli.image_formation.field_dependence import Map, zone_maps
 from vcam_cli.image_formation.optical_path import Layer, Layers, OpticalPath, SpectrumReport
 from vcam_cli.image_formation.transfer_functions import Transfer
 from vcam_cli.image_formation.transfer_tables import PARITIES, split_by_parity
@@ -18,6 +25,8 @@ from vcam_cli.scenes.waves import Wave, WaveScene
 
 MOST_HARMONICS = 512
 """Harmonics along an axis up to the lens's cut-off: a pattern with more of them is sampled."""
+LEFT = 0.01
+"""Part of the tolerance that the modes of the field may leave."""
 ROWS = 64
 """Rows of pixels, about, on which changes are measured."""
 
@@ -38,7 +47,7 @@ def wave_layers(path: OpticalPath, scene: WaveScene) -> tuple[Layers, SpectrumRe
     Returns
     -------
     layers : Layers
-        Signal, one layer for each zone of the field.
+        Signal, one layer and one more for each mode of the field.
     report : SpectrumReport
         Changes by leaving out effects.
     """
@@ -57,22 +66,67 @@ def wave_layers(path: OpticalPath, scene: WaveScene) -> tuple[Layers, SpectrumRe
 
         return Layer(values, weight)
 
+    zones = [_zone_otfs(path, w) for w in scene.waves]
+    maps = cache(partial(zone_maps, path.zones, path.geometry))
+
     def layers(effects: tuple[Effect, ...]) -> list[tuple[NDArray, Weight]]:
-        return [
-            (np.array([_wave_level(transfer, effects, w) for w in scene.waves]), weight)
-            for transfer, weight in _zone_transfers(path, effects)
+        of_waves = [
+            _wave_levels(path, effects, w, otfs if path.field in effects else np.ones((1, 1)))
+            for w, otfs in zip(scene.waves, zones, strict=True)
         ]
+        levels = np.stack(np.broadcast_arrays(*of_waves), axis=1)
+        return _modes(levels, maps, path.settings.tolerance)
 
     whole = layers(path.effects)
     changes = _changes(path, whole, layers, layer)
     return (layer(*parts) for parts in whole), SpectrumReport(changes=changes)
 
 
-def _wave_level(transfer: Transfer, effects: tuple[Effect, ...], wave: Wave) -> NDArray:
-    """Return the complex amplitude (C,) of a wave's signal in each color [e/s]."""
+def _zone_otfs(path: OpticalPath, wave: Wave) -> NDArray:
+    """Return the transfer (zones, J) of each zone's own blur; 1 where there is no zone."""
+    count = len(path.transfer.wavelengths)
+    if not path.zones or not (wave.fx or wave.fy):
+        return np.ones((1, count))
+    f = np.array([wave.fx]), np.array([wave.fy])
+    found = [path.transfer.with_effects([zone.blur]).otf(*f) for zone in path.zones]
+    return np.array(found).reshape(-1, count)
+
+
+def _wave_levels(
+    path: OpticalPath, effects: tuple[Effect, ...], wave: Wave, zones: NDArray
+) -> NDArray:
+    """Return the complex amplitude (zones, C) of a wave's signal in each color [e/s].
+
+    `zones` is the transfer (zones, J) of their own blurs.
+    """
     fx, fy = np.array([wave.fx]), np.array([wave.fy])
-    level: NDArray = np.asarray(wave.weights) @ transfer.plane_response(fx, fy)[..., 0, 0]
-    return level * _separable(effects, fx, fy)[0, 0]
+    everywhere = path.transfer.with_effects(effects).otf(fx, fy)[:, 0, 0]
+    weights = np.tensordot(wave.weights, path.transfer.weights, axes=1)
+    return (zones * everywhere) @ weights.T * _separable(effects, fx, fy)[0, 0]
+
+
+def _modes(
+    levels: NDArray, maps: Callable[[], list[Map]], tolerance: float
+) -> list[tuple[NDArray, Weight]]:
+    """Return the mean of the zones' amplitudes, and what differs from it: amplitudes, and weights.
+
+    `levels` are (zones, ...). As many singular vectors are kept as leave `LEFT` of the tolerance.
+    """
+    mean = levels.mean(axis=0)
+    modes: list[tuple[NDArray, Weight]] = [(mean, None)]
+    rest = np.ascontiguousarray((levels - mean).reshape(len(levels), -1)).view(np.float64)
+    allowed = LEFT * tolerance * float(np.abs(levels).max())
+    if np.linalg.norm(rest, axis=1).max() <= allowed:
+        return modes
+    vectors, strengths, amplitudes = np.linalg.svd(rest, full_matrices=False)
+    shares = vectors * strengths
+    left = np.sqrt(np.cumsum(np.square(shares[:, ::-1]), axis=1).max(axis=0))[::-1]
+    weights = np.array([m.values for m in maps()])
+    for number in np.flatnonzero(left > allowed):
+        values = np.tensordot(shares[:, number], weights, axes=1)
+        amplitude = amplitudes[number].view(levels.dtype).reshape(mean.shape)
+        modes.append((amplitude, replace(maps()[0], values=values)))
+    return modes
 
 
 def _separable(effects: tuple[Effect, ...], fx: NDArray, fy: NDArray) -> NDArray:
@@ -83,17 +137,12 @@ def _separable(effects: tuple[Effect, ...], fx: NDArray, fy: NDArray) -> NDArray
     return total
 
 
-def _zone_transfers(
-    path: OpticalPath, effects: tuple[Effect, ...]
-) -> list[tuple[Transfer, Weight]]:
+def _zone_transfers(path: OpticalPath, effects: tuple[Effect, ...]) -> list[Transfer]:
     """Return the transfer through some effects, and through each zone where the field has them."""
     everywhere = path.transfer.with_effects(effects)
     if path.field not in effects:
-        return [(everywhere, None)]
-    return [
-        (everywhere.with_effects((*everywhere.effects, zone.blur)), zone.weight)
-        for zone in path.zones
-    ]
+        return [everywhere]
+    return [everywhere.with_effects((*everywhere.effects, z.blur)) for z in path.zones]
 
 
 def harmonics_count(path: OpticalPath, scene: HarmonicScene) -> tuple[int, int] | None:
@@ -138,7 +187,7 @@ def harmonic_layers(
     Returns
     -------
     layers : Layers
-        Signal, one layer for each zone of the field.
+        Signal, one layer and one more for each mode of the field.
     report : SpectrumReport
         Changes by leaving out effects.
     """
@@ -148,14 +197,12 @@ def harmonic_layers(
     along_x = [wave(2 * np.pi * np.outer(fx, x)) for wave in (np.cos, np.sin)]
     along_y = [wave(2 * np.pi * np.outer(y, fy)) for wave in (np.cos, np.sin)]
 
+    maps = cache(partial(zone_maps, path.zones, path.geometry))
+
     def layers(effects: tuple[Effect, ...]) -> list[tuple[NDArray, Weight]]:
-        return [
-            (
-                _harmonic_levels(transfer, fx, fy) * (amplitudes * _separable(effects, fx, fy)),
-                weight,
-            )
-            for transfer, weight in _zone_transfers(path, effects)
-        ]
+        common = amplitudes * _separable(effects, fx, fy)
+        levels = [_harmonic_levels(t, fx, fy) * common for t in _zone_transfers(path, effects)]
+        return _modes(np.array(levels), maps, path.settings.tolerance)
 
     def layer(levels: NDArray, weight: Weight) -> Layer:
         def values(color: int, s: slice) -> NDArray:

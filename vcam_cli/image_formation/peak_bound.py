@@ -32,6 +32,11 @@ PLACES = 16
 """Windows along each axis."""
 MOST, MOST_PART = 1 << 18, 1 / 8
 """Terms that are summed, at most: so many, or that part of all."""
+LARGEST_REACH = 1 / 4
+"""Reach of a blur over the length of a window from which on windows are no longer moved by it."""
+STEP = 1 / 16
+"""Distance of the places to which a window is moved, over its length: between them its mean changes
+by about 3 %."""
 ROWS = 32
 """Rows of terms that are summed together: few enough for the cache."""
 KEPT = 3e-5
@@ -50,8 +55,9 @@ def brightest_pixel(
 
     It is that of one color, as if all pixels had it. The terms that are not summed can
     bring no more than their part of the mean square, by Cauchy's inequality. A blur that the tables
-    leave out moves light by its reach at most: the mean over the array keeps what is further from
-    its border.
+    leave out makes of the mean over a window one of means over that window moved, by its reach at
+    most: the darkest of them counts. Where the reach is no small part of a window, what the mean
+    over the array keeps of the light that is further from its border counts.
 
     Parameters
     ----------
@@ -84,11 +90,16 @@ def brightest_pixel(
     for effect in separable:
         factor_x = factor_x * effect.along_x(fx)
         factor_y = factor_y * effect.along_y(fy)
-    signal = np.zeros((len(along_y.centers), len(along_x.centers)))
+    length = min(along_x.length, along_y.length)
+    is_wide = reach > length * LARGEST_REACH
+    steps = 0 if is_wide else math.ceil(reach / (length * STEP))
+    moved = np.linspace(-reach, reach, 2 * steps + 1) if steps else np.zeros(1)
+    signal = np.zeros((len(along_y.centers) * len(moved), len(along_x.centers) * len(moved)))
     for parity in tables.parities:
         odd_x, odd_y = PARITIES[parity]
         table = reader(tables, parity, fx)
-        over_x, over_y = (along_x.waves(odd_x) * factor_x).T, along_y.waves(odd_y) * factor_y
+        over_x = (along_x.waves(odd_x, moved) * factor_x).T
+        over_y = along_y.waves(odd_y, moved) * factor_y
         for rows in pieces(len(fy), ROWS):
             light: NDArray = np.zeros(1)
             for plane, of_plane in enumerate(table.values(fy[rows])[:, 0]):
@@ -96,9 +107,10 @@ def brightest_pixel(
             signal += over_y[:, rows] @ product(light, over_x)
     every, summed = along_x.power[0] * along_y.power[0], along_x.power[1] * along_y.power[1]
     left_out = math.sqrt(max(every - summed, 0.0) * len(tables.parities)) * rms
-    if reach == 0:
-        return max(0.0, float(signal.max()) - left_out)
-    return max(0.0, along_x.share * along_y.share * (float(signal.mean()) - left_out))
+    if is_wide:
+        return max(0.0, along_x.share * along_y.share * (float(signal.mean()) - left_out))
+    darkest = signal.reshape(len(along_y.centers), len(moved), -1, len(moved)).min(axis=(1, 3))
+    return max(0.0, float(darkest.max()) - left_out)
 
 
 def brightest_of_mosaic(
@@ -147,6 +159,8 @@ class Windows:
     """(m,) Part of each of them that is left in the mean over a window."""
     centers: NDArray
     """(p,) Centers of the windows, from the scene's edge [m]."""
+    length: float
+    """Length of a window [m]."""
     power: tuple[float, float]
     """Sum of the squares of these parts over all terms, each over the mean square of its wave, and
     over those that count."""
@@ -160,9 +174,10 @@ class Windows:
         index, sign = self.axis.coefficient_index(self.terms)
         return index, sign * self.left * self.axis.weights[self.terms] * _twice(self.terms)
 
-    def waves(self, odd: bool) -> NDArray:
-        """Return every term, as cosine or sine, at the center of every window: (p, m)."""
-        angle = np.outer(self.centers, 2 * np.pi * self.axis.frequencies[self.terms])
+    def waves(self, odd: bool, moved: NDArray) -> NDArray:
+        """Return every term, as cosine or sine, at every center, moved by so much [m]: (p, m)."""
+        places = np.add.outer(self.centers, moved).ravel()
+        angle = np.outer(places, 2 * np.pi * self.axis.frequencies[self.terms])
         return np.sin(angle) if odd else np.cos(angle)
 
 
@@ -191,6 +206,7 @@ def _windows(axis: Axis, reach: float) -> Windows | None:
         terms=terms,
         left=left[terms],
         centers=axis.first + (starts + (pixels - 1) / 2) * axis.pixel_pitch,
+        length=pixels * axis.pixel_pitch,
         power=(float(power.sum()), float(power[terms].sum())),
         share=_share_of_mean(starts, pixels, axis.pixels),
     )

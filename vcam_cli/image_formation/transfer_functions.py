@@ -95,11 +95,15 @@ class Transfer:
         NDArray
             Complex transfer (K, C, m, n) [e/s].
         """
+        return self.spectral_sum(self.otf(fx, fy))
+
+    def otf(self, fx: NDArray, fy: NDArray) -> NDArray:
+        """Return the complex transfer (J, m, n) of all blurs at every wavelength."""
         otf = self.otf_radial(np.hypot(fx[None, :], fy[:, None])).astype(np.complex128)
         for plane, wavelength in zip(otf, self.wavelengths, strict=True):
             for effect in self.plane_blurs:
                 plane *= effect.otf_plane(fx, fy, float(wavelength))
-        return self.spectral_sum(otf)
+        return otf
 
     def otf_radial(self, frequency: NDArray) -> NDArray:
         """Return the transfer (J, *shape) of the radial blurs at every wavelength."""
