@@ -27,7 +27,7 @@ check: lint test-all  ## format, lint, spelling, types, all tests
 bench: $(VENV)/.dev  ## speed, as ratios: to bare transforms and draws, to plain NumPy, by camera, stage and effect
 	$(BIN)/python -m tests.bench
 
-promise: $(VENV)/.dev  ## the plan's promises, measured on twenty-two cameras and forty random ones
+promise: $(VENV)/.dev  ## the plan's promises: cameras named, random, exactly known, and ten before eighteen scenes
 	$(BIN)/python -m tests.promise
 
 stability: $(VENV)/.dev  ## hard cases: our error beside that of the textbook form, as a table

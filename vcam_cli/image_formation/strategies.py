@@ -16,6 +16,7 @@ from dataclasses import replace
 from itertools import chain
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vcam_cli import memory
 from vcam_cli.effects.base import Blur, FieldTransfer, SeparableTransfer, of_kind
@@ -83,7 +84,7 @@ def image_layers(path: OpticalPath, scene: Scene) -> tuple[Layers, SpectrumRepor
 
 def _dark_layers(path: OpticalPath) -> tuple[Layers, SpectrumReport]:
     """Return the image where no color sees light: there is none, whatever blurs it."""
-    dark = np.zeros((path.geometry.rows, path.geometry.columns), path.settings.dtype)
+    dark: NDArray = np.zeros((path.geometry.rows, path.geometry.columns), path.settings.dtype)
     blurs = of_kind(path.effects, Blur, SeparableTransfer, FieldTransfer)
     report = SpectrumReport(changes=dict.fromkeys((effect.name for effect in blurs), 0.0))
     return iter([Layer(lambda color, rows: dark[rows])]), report
