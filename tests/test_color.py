@@ -81,7 +81,8 @@ def photograph(*sets):
 def developed(result, processing):
     """The same frame through other steps."""
     steps = load("true-color", [processing]).processing
-    return replace(result, processed=process(result.dn, result.processed.context, steps))
+    context = result.processed.context
+    return replace(result, process=lambda: process(result.dn, context, steps))
 
 
 def through(lamp, processing):

@@ -68,7 +68,7 @@ def _irradiance(result: Result, path: Path) -> None:
     nodes = spectral_irradiance.nodes(frame)
 
     def planes() -> Iterator[np.ndarray]:
-        for done, plane in enumerate(spectral_irradiance.planes(frame, result.processed.workers)):
+        for done, plane in enumerate(spectral_irradiance.planes(frame, result.workers)):
             result.stages.watch.step(done, len(nodes))
             yield plane * 1e-9
 

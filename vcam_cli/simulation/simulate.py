@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -47,9 +48,25 @@ class Result:
     """
 
     frame: Frame
-    processed: ProcessedPicture
     stages: Stages
-    notes: tuple[str, ...] = ()
+    workers: int
+    """Threads."""
+    process: Callable[[], ProcessedPicture]
+    """Prepares the steps of `processing`: measures gains, fits the color correction."""
+    remarks: tuple[str, ...] = ()
+    """What a user should know of the frame."""
+
+    @cached_property
+    def processed(self) -> ProcessedPicture:
+        """The picture with its steps prepared; a raw frame alone does not need it."""
+        with self.stages("balance"):
+            return self.process()
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What a user should know of the frame, and of the picture where one is asked for."""
+        shown = needs_picture(self.frame.camera)
+        return self.remarks + (self.processed.notes if shown else ())
 
     @property
     def dn(self) -> NDArray:
@@ -147,20 +164,23 @@ class Result:
 
         Raises BadInput for scattered pixels without demosaic, and so do `linear` and `ideal`.
         """
+        picture = self.processed
         with self.stages("processing"):
-            return self.processed.encode(self.frame.camera.output.render or 8)
+            return picture.encode(self.frame.camera.output.render or 8)
 
     @cached_property
     def linear(self) -> NDArray:
         """The render in linear light, perfect white = 1: (rows, columns, channels)."""
+        picture = self.processed
         with self.stages("processing"):
-            return self.processed.linear
+            return picture.linear
 
     @cached_property
     def ideal(self) -> NDArray:
         """The scene point-sampled in the same colors and scale: (rows, columns, channels)."""
+        picture = self.processed
         with self.stages("ideal"):
-            return self.processed.ideal(self.frame.ideal_dn())
+            return picture.ideal(self.frame.ideal_dn())
 
     @cached_property
     def s_cielab(self) -> NDArray:
@@ -168,7 +188,7 @@ class Result:
         image, ideal, screen = self.linear, self.ideal, self._screen
         with self.stages("quality"):
             filters = self.frame.camera.display.filters
-            return s_cielab_map(image, ideal, screen, filters, workers=self.processed.workers)
+            return s_cielab_map(image, ideal, screen, filters, workers=self.workers)
 
     @property
     def _screen(self) -> display.Screen:
@@ -186,7 +206,7 @@ class Result:
         if "cielab" in self.frame.camera.quality:
             image, ideal = self.linear, self.ideal
             with self.stages("quality"):
-                each = cielab_map(image, ideal, self._screen, workers=self.processed.workers)
+                each = cielab_map(image, ideal, self._screen, workers=self.workers)
                 out.append(("mean_delta_e", float(each.mean(dtype=float)), ""))
         if "s-cielab" in self.frame.camera.quality:
             out.append(("mean_s_cielab", float(self.s_cielab.mean(dtype=float)), ""))
@@ -325,9 +345,16 @@ def _simulate(camera: Camera, workers: int, stages: Stages, shared: Shared) -> R
         planes=frame.layout.full_color,
         layout=frame.layout if frame.layout.is_scattered else None,
     )
-    with stages("balance"):
-        processed = process(frame.picture_dn, context, camera.processing, workers=workers)
-    return Result(frame, processed, stages, notes + _remarks(frame) + processed.notes)
+    steps = partial(process, frame.picture_dn, context, camera.processing, workers=workers)
+    result = Result(frame, stages, workers, steps, notes + _remarks(frame))
+    if needs_picture(camera):  # what is wrong with its steps is said before anything is written
+        _ = result.processed
+    return result
+
+
+def needs_picture(camera: Camera) -> bool:
+    """Return whether a camera file asks for more than the raw frame."""
+    return camera.output.render is not None or bool(camera.quality)
 
 
 def _patches(frame: Frame) -> Patches:

@@ -61,7 +61,11 @@ def _simulate_point(
 ) -> tuple[dict[str, float], dict[str, bytes]]:
     """Return the metrics of a point, and the files that are kept of it."""
     _check_versions(job)
-    result = simulate(with_every_effect(job.camera), threads, shared=shared)
+    camera = with_every_effect(job.camera)
+    if "render" not in job.keep:
+        output = camera.output.model_copy(update={"render": None})
+        camera = camera.model_copy(update={"output": output})
+    result = simulate(camera, threads, shared=shared)
     _check_versions(job)  # modules are loaded where they are first needed
     found = {name: value for name, value, _ in result.metrics}
     metrics = {name: found[name] for name in job.metrics}
