@@ -12,7 +12,7 @@ from vcam_cli.errors import CannotDo
 def available() -> int:
     """Return the memory that this process may still take [bytes].
 
-    That is the system's, or the control group's where it is less.
+    That is the system's, or the control group's or the process's own where it is less.
     """
     found = [1 << 62]
     with contextlib.suppress(OSError, ValueError, StopIteration):
@@ -23,7 +23,15 @@ def available() -> int:
         limit = int(Path("/sys/fs/cgroup/memory.max").read_text())
         used = int(Path("/sys/fs/cgroup/memory.current").read_text())
         found.append(limit - used)
-    if len(found) == 1:
+    system = len(found) > 1
+    with contextlib.suppress(ImportError, OSError, ValueError):
+        import resource
+
+        limit, _ = resource.getrlimit(resource.RLIMIT_AS)
+        if limit != resource.RLIM_INFINITY:
+            taken = int(Path("/proc/self/statm").read_text().split()[0])
+            found.append(limit - taken * resource.getpagesize())
+    if not system:
         with contextlib.suppress(OSError, ValueError, AttributeError):
             found.append(os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
     return min(found)

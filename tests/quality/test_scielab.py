@@ -3,12 +3,15 @@
 import itertools
 import json
 import math
+import tracemalloc
 from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.integrate import quad
 
+from vcam_cli import memory
+from vcam_cli.errors import CannotDo
 from vcam_cli.quality import scielab
 from vcam_cli.quality.display import D65, Screen, rgb_to_xyz
 from vcam_cli.quality.eye import GAUSSIANS, OPPONENT, kernels
@@ -135,9 +138,9 @@ def test_detail_too_fine_is_not_seen(filters: str) -> None:
 def test_blocks_and_workers_do_not_show(monkeypatch, workers: int) -> None:
     one, other = np.random.default_rng(4).random((2, 137, 41, 3))
     whole = s_cielab_map(one, other, screen(9))
-    assert scielab._block_and_halo(137, 5) == (137, 0)
+    assert scielab._block_and_halo(137, 41, 5) == (137, 0)
     monkeypatch.setattr(scielab, "BLOCK_ROWS", 16)
-    assert scielab._block_and_halo(137, 5) == (16, 5)  # nine blocks, the last of nine rows
+    assert scielab._block_and_halo(137, 41, 5) == (16, 5)  # nine blocks, the last of nine rows
     in_blocks = s_cielab_map(one, other, screen(9), workers=1)
     np.testing.assert_allclose(in_blocks, whole, rtol=1e-9, atol=1e-9)
     shared = s_cielab_map(one, other, screen(9), workers=workers)
@@ -209,6 +212,57 @@ def test_coarse_pixels_are_squares_of_light(shape: tuple[int, int], degree: floa
     expected = expected.reshape(shape[0], n, shape[1], n).mean(axis=(1, 3))
     found = s_cielab_map(one, other, screen(degree), "continuous")
     np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-9)
+
+
+@pytest.mark.parametrize("degree", [1 / 2, 1 / 4])
+def test_pixels_of_more_than_a_degree_are_squares_of_light(degree: float) -> None:
+    """Exactly the mean over so many finer pixels that 33 are a degree."""
+    one, other = np.random.default_rng(4).random((2, 2, 3, 3))
+    n = round(33 / degree)
+    finer = [x.repeat(n, axis=0).repeat(n, axis=1) for x in (one, other)]
+    expected = s_cielab_map(*finer, screen(degree * n), "continuous")
+    expected = expected.reshape(2, n, 3, n).mean(axis=(1, 3))
+    found = s_cielab_map(one, other, screen(degree), "continuous")
+    np.testing.assert_allclose(found, expected, rtol=1e-9)
+
+
+@pytest.mark.parametrize("filters", READINGS)
+def test_of_the_coarsest_pixels_each_is_judged_alone(filters: str) -> None:
+    """Those of a million degrees look like CIELAB, but for a millionth of their width."""
+    one, other = np.random.default_rng(5).random((2, 3, 4, 3))
+    found = s_cielab_map(one, other, screen(1e-6), filters)
+    alone = cielab_map(one, other, screen(1e-6))
+    np.testing.assert_allclose(found, alone, rtol=1e-4)
+
+
+@pytest.mark.parametrize("filters", READINGS)
+@pytest.mark.parametrize("degree", [1e-44, 1e-3, 0.3, 1.0, 7.0, 40.0, 1e4, 1e6])
+def test_memory_is_bounded_and_known(filters: str, degree: float) -> None:
+    """However few or many pixels are a degree, 16 x 18 of them take some megabytes."""
+    one, other = np.random.default_rng(6).random((2, 16, 18, 3), np.float32)
+    foretold = scielab.needed_bytes((16, 18), screen(degree), filters, 1)
+    assert foretold < 64e6
+    tracemalloc.start()
+    s_cielab_map(one, other, screen(degree), filters, workers=1)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    # Kernels are not in it: three Gaussians, their folding, at most a degree of taps.
+    assert peak < foretold + 2e6 + 200 * degree
+
+
+def test_memory_that_does_not_suffice(monkeypatch) -> None:
+    """Fewer threads where some suffice, and else an error before the work."""
+    one, other = np.random.default_rng(6).random((2, 40, 30, 3))
+    whole = s_cielab_map(one, other, screen(1), "continuous", workers=4)
+    places = scielab._Places.of((40, 30), screen(1), "continuous")
+    single = places.needed_bytes(np.dtype(float), 1)
+    monkeypatch.setattr(memory, "available", lambda: single + 1)
+    assert places.require_memory(np.dtype(float), 4) == 1
+    fewer = s_cielab_map(one, other, screen(1), "continuous", workers=4)
+    assert fewer.tobytes() == whole.tobytes()
+    monkeypatch.setattr(memory, "available", lambda: single - 1)
+    with pytest.raises(CannotDo, match="memory"):
+        s_cielab_map(one, other, screen(1), "continuous", workers=4)
 
 
 def test_continuous_kernels_are_continuous_in_the_size_of_pixels() -> None:

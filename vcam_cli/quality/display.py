@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcam_cli.camera.quality import Display
-from vcam_cli.errors import bad
+from vcam_cli.errors import BadInput, bad
 from vcam_cli.spectra import Spectrum, cmf, display_primaries, integral
 
 Primaries = Literal["crt-brainard", "srgb"]
@@ -82,7 +82,12 @@ def display_screen(display: Display, columns: int) -> Screen:
     dpi = columns * 0.0254 / display.width if display.width is not None else display.dpi
     assert dpi is not None
     per_degree = samples_per_degree(dpi, display.viewing_distance)
-    return Screen(rgb_to_xyz(display.primaries, display.white), per_degree)
+    try:
+        return Screen(rgb_to_xyz(display.primaries, display.white), per_degree)
+    except BadInput as error:
+        (problem,) = error.problems
+        name = "width" if display.width is not None else "dpi"
+        raise bad(("display", name), problem.message, problem.remedy) from None
 
 
 def samples_per_degree(dpi: float, distance: float) -> float:

@@ -169,8 +169,6 @@ def _cosines(taps: NDArray[np.float64], count: int) -> NDArray[np.float64]:
     Taps beyond a period of the mirrored picture fold onto it: no kernel is too large.
     """
     reach = taps.shape[1] // 2
-    period = np.zeros((len(taps), 2 * count))
     place = np.arange(-reach, reach + 1) % (2 * count)
-    for row, tap in zip(period, taps, strict=True):
-        np.add.at(row, place, tap)
+    period = np.array([np.bincount(place, tap, 2 * count) for tap in taps])
     return np.fft.rfft(period, axis=1).real[:, :count]

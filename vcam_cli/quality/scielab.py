@@ -14,7 +14,9 @@ workers, and so is every byte of the result.
 
 The filters `continuous` see pixels as squares of light, and what is seen changes within a square
 where pixels are coarse. Each is then looked at in several places, as if it were several pixels of
-the same light, and its Delta E is the mean.
+the same light, and its Delta E is the mean. A pixel of more than a degree is seen across its
+borders like one of a degree, since the filters end half a degree away; all the rest of it is seen
+like its center. So neither time nor memory grows beyond those of pixels of one degree.
 
 References
 ----------
@@ -29,12 +31,17 @@ import numpy as np
 import scipy.fft
 from numpy.typing import NDArray
 
+from vcam_cli import memory
 from vcam_cli.parallel import available_workers, each, pieces
 from vcam_cli.quality.cielab import Formula, delta_e, lab
 from vcam_cli.quality.display import Screen
 from vcam_cli.quality.eye import OPPONENT, Filters, kernels
 
 BLOCK_ROWS = 256
+BLOCK_PLACES = 1 << 21
+"""Places that a block has at most, as long as its rows are more than its halo's."""
+THREAD_BYTES = 7 * 3
+"""Values that a thread holds for each place of its block: seven times three planes."""
 SINGLE_PEAK = 16.0
 """Largest value, white = 1, up to which float32 serves: its transforms err by 5e-7 of it."""
 MIN_SAMPLES_PER_DEGREE = 32.0
@@ -124,26 +131,106 @@ def s_cielab_map(
     """
     image, reference = _with_three_channels(image, reference)
     dtype = _float_type(image, reference)
-    blur = _Blur.prepare(image.shape[:2], screen, filters, dtype)
+    places = _Places.of(image.shape[:2], screen, filters)
+    workers = places.require_memory(dtype, workers or available_workers())
+    blur = _Blur.prepare(places, screen, filters, dtype)
     out = np.empty(image.shape[:2], dtype)
-    n = blur.places
 
     def compare(rows: slice) -> None:
         seen, ideal = (lab(blur(x, rows)) for x in (image, reference))
-        different = delta_e(seen, ideal, formula)
-        if n > 1:
-            different = different.reshape(-1, n, out.shape[1], n).mean(axis=(1, 3))
-        out[rows] = different
+        out[rows] = places.mean(delta_e(seen, ideal, formula))
 
-    each(compare, pieces(len(out), blur.block // n), workers or available_workers())
+    each(compare, pieces(len(out), places.block // places.along), workers)
     return out
 
 
-def _samples_per_pixel(filters: Filters, screen: Screen) -> int:
-    """Return the number of places along a pixel at which it is looked at."""
-    if filters != "continuous":
-        return 1
-    return max(1, math.ceil(MIN_SAMPLES_PER_DEGREE / screen.samples_per_degree))
+def needed_bytes(shape: tuple[int, int], screen: Screen, filters: Filters, workers: int) -> int:
+    """Return the memory that S-CIELAB takes with so many threads, but for the pictures.
+
+    With little memory fewer threads run; one is needed.
+
+    Parameters
+    ----------
+    shape : tuple of int
+        Rows and columns of the pictures.
+    screen : Screen
+        Display on which they are seen.
+    filters : {"zhang-wandell-1996", "isetcam", "continuous"}
+        Filters of the eye.
+    workers : int
+        Number of threads.
+
+    Returns
+    -------
+    int
+        Bytes, with values of 32 bits.
+    """
+    return _Places.of(shape, screen, filters).needed_bytes(np.dtype(np.float32), workers)
+
+
+def places_per_pixel(screen: Screen, filters: Filters) -> int:
+    """Return the number of places at which each pixel is looked at."""
+    return _Places.of((1, 1), screen, filters).along ** 2
+
+
+@dataclass(frozen=True)
+class _Places:
+    """Where a picture is looked at: in one place a pixel, or in several, block by block."""
+
+    shape: tuple[int, int]
+    """Rows and columns of the picture."""
+    along: int
+    """Places along a pixel; rows and columns of the others are counted in them."""
+    per_degree: float
+    """Places in a degree of visual angle; of a pixel larger than that, along its borders."""
+    inside: float
+    """Part of a pixel's length, around its center, that all looks like the center."""
+    block: int
+    """Rows that come out of a whole block."""
+    halo: int
+    """Rows above and below that go in."""
+    transformed: tuple[int, int]
+    """Rows and columns of a block's transform."""
+
+    @classmethod
+    def of(cls, shape: tuple[int, int], screen: Screen, filters: Filters) -> "_Places":
+        """Return the places at which pictures of a shape are looked at."""
+        per_degree, along, inside = screen.samples_per_degree, 1, 0.0
+        if filters == "continuous":
+            inside, per_degree = max(0.0, 1 - per_degree), max(1.0, per_degree)
+            along = max(1, math.ceil(MIN_SAMPLES_PER_DEGREE / per_degree))
+            along += inside > 0 and along % 2 == 0  # one of them is the center
+        rows, columns = (count * along for count in shape)
+        reach = max(kernel.reach for kernel in kernels(filters, per_degree * along))
+        block, halo = _block_and_halo(rows, columns, reach)
+        block = -(-block // along) * along
+        transformed = _transform_length(block + 2 * halo, reach), _transform_length(columns, reach)
+        return cls(shape, along, per_degree * along, inside, block, halo, transformed)
+
+    def mean(self, different: NDArray) -> NDArray:
+        """Return the mean over every pixel of what is at its places: (rows, columns)."""
+        n = self.along
+        if n == 1:
+            return different
+        by_pixel = different.reshape(-1, n, self.shape[1], n)
+        if not self.inside:
+            return np.asarray(by_pixel.mean(axis=(1, 3)))
+        weights = np.full(n, (1 - self.inside) / n, different.dtype)
+        weights[n // 2] += different.dtype.type(self.inside)
+        return np.einsum("i,ricj,j->rc", weights, by_pixel, weights)
+
+    def needed_bytes(self, dtype: np.dtype, workers: int) -> int:
+        """Return the memory that it takes with so many threads."""
+        values = math.prod(self.transformed) * dtype.itemsize
+        threads = min(workers, -(-self.shape[0] * self.along // self.block))
+        return values * (3 + THREAD_BYTES * threads)
+
+    def require_memory(self, dtype: np.dtype, workers: int) -> int:
+        """Return how many threads memory suffices for. Raises CannotDo where it does for none."""
+        while workers > 1 and self.needed_bytes(dtype, workers) > memory.available():
+            workers //= 2
+        memory.require(self.needed_bytes(dtype, workers), *self.shape)
+        return workers
 
 
 @dataclass(frozen=True)
@@ -156,33 +243,22 @@ class _Blur:
     """Matrix (3, 3) from opponent planes to X/Xn, Y/Yn, Z/Zn."""
     response: NDArray
     """Factors (3, rows, columns) on the DCT-II of a block."""
-    block: int
-    """Rows that come out of a whole block."""
-    halo: int
-    """Rows above and below that go in."""
-    places: int
-    """Places along a pixel; rows and columns here are counted in them."""
+    places: _Places
+    """Where the picture is looked at."""
 
     @classmethod
-    def prepare(cls, shape: tuple[int, int], screen: Screen, filters: Filters, dtype: np.dtype):
-        """Return the blur of pictures of a shape."""
-        places = _samples_per_pixel(filters, screen)
-        rows, columns = (count * places for count in shape)
-        eye = kernels(filters, screen.samples_per_degree * places)
-        reach = max(kernel.reach for kernel in eye)
-        block, halo = _block_and_halo(rows, reach)
-        block = -(-block // places) * places
-        tall, wide = _transform_length(block + 2 * halo, reach), _transform_length(columns, reach)
-        response = np.array([kernel.response(tall, wide) for kernel in eye], dtype)
-        opponent = np.array(OPPONENT[filters])
-        back = np.linalg.inv(opponent) / screen.white[:, None]
-        into = _cast(opponent @ screen.to_xyz, dtype)
-        return cls(into, _cast(back, dtype), response, block, halo, places)
+    def prepare(cls, places: _Places, screen: Screen, filters: Filters, dtype: np.dtype) -> "_Blur":
+        """Return the blur of pictures that are looked at in these places."""
+        eye = kernels(filters, places.per_degree)
+        response = np.array([kernel.response(*places.transformed) for kernel in eye], dtype)
+        opponent, to_xyz = np.array(OPPONENT[filters]), screen.to_xyz / screen.white[1]
+        back = np.linalg.inv(opponent) / to_xyz.sum(axis=1)[:, None]
+        return cls(_cast(opponent @ to_xyz, dtype), _cast(back, dtype), response, places)
 
     def __call__(self, picture: NDArray, rows: slice) -> NDArray:
         """(3, rows, columns) X/Xn, Y/Yn, Z/Zn of some rows, blurred as the eye blurs."""
-        n, (_, tall, wide) = self.places, self.response.shape
-        first, columns = rows.start * n - self.halo, picture.shape[1] * n
+        n, halo, (tall, wide) = self.places.along, self.places.halo, self.places.transformed
+        first, columns = rows.start * n - halo, picture.shape[1] * n
         values = picture[_pixel_indices(first, tall, picture.shape[0], n)]
         planes = _mix(self.to_opponent, _planes(values, self.response.dtype))
         if n > 1 or wide > columns:
@@ -192,15 +268,15 @@ class _Blur:
             coefficients *= factor
             plane[...] = scipy.fft.idctn(coefficients, overwrite_x=True)
         height = (rows.stop - rows.start) * n
-        return _mix(self.to_relative, planes[:, self.halo : self.halo + height, :columns])
+        return _mix(self.to_relative, planes[:, halo : halo + height, :columns])
 
 
-def _block_and_halo(rows: int, reach: int) -> tuple[int, int]:
+def _block_and_halo(rows: int, columns: int, reach: int) -> tuple[int, int]:
     """Return the rows of a block and of its halo.
 
     All rows and no halo, where a block would be hardly less.
     """
-    block = max(BLOCK_ROWS, 2 * reach)
+    block = max(min(BLOCK_ROWS, BLOCK_PLACES // columns), 2 * reach, 1)
     if block + 2 * reach >= rows:
         return rows, 0
     count = -(-rows // block)

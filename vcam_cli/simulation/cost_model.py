@@ -20,6 +20,8 @@ from vcam_cli.effects.signal_chain import ElectronEffect, Quantizer
 from vcam_cli.image_formation.optical_path import SpectrumReport
 from vcam_cli.image_formation.settings import Settings
 from vcam_cli.image_formation.transfer_functions import Band
+from vcam_cli.quality.display import display_screen
+from vcam_cli.quality.scielab import places_per_pixel
 from vcam_cli.readout.layout import Layout
 from vcam_cli.scheduling.estimators import PASSES
 from vcam_cli.simulation.plan import Plan
@@ -93,8 +95,16 @@ def output_seconds(camera: Camera, geometry: Geometry, mosaic: Mosaic) -> float:
     if camera.output.render:
         seconds += (PROCESS + PNG * colors) * pixels
     if camera.quality:
-        seconds += (JUDGE + EXR) * pixels * colors
+        seconds += (JUDGE * _places(camera, geometry) + EXR) * pixels * colors
     return seconds
+
+
+def _places(camera: Camera, geometry: Geometry) -> int:
+    """Return at how many places of a pixel the metrics look."""
+    if "s-cielab" not in camera.quality:
+        return 1
+    screen = display_screen(camera.display, geometry.columns)
+    return places_per_pixel(screen, camera.display.filters)
 
 
 def sample_seconds(camera: Camera, geometry: Geometry, effects: Sequence[Effect]) -> float:

@@ -29,6 +29,8 @@ from vcam_cli.image_formation.rate_cache import RateCache
 from vcam_cli.image_formation.settings import Settings, settings
 from vcam_cli.image_formation.transfer_functions import Transfer
 from vcam_cli.progress import Stages
+from vcam_cli.quality import scielab
+from vcam_cli.quality.display import display_screen
 from vcam_cli.readout import auto_exposure, exposure, sample_times
 from vcam_cli.readout.layout import Layout, layout
 from vcam_cli.scenes.base import ChartScene, Scene
@@ -201,6 +203,11 @@ def _require_memory(camera: Camera, place: Layout, knobs: Settings, solved: Geom
     scattered = solved.rows * solved.columns if place.is_scattered else 0
     judged = bool(camera.quality)
     needed = memory_model.frame_bytes(place.lattice, knobs, colors, judged, samples, scattered)
+    if "s-cielab" in camera.quality:
+        shape = len(place.picture_y), len(place.picture_x)
+        screen = display_screen(camera.display, shape[1])
+        # By one thread, which is all there are where memory is little.
+        needed += scielab.needed_bytes(shape, screen, camera.display.filters, 1)
     memory.require(needed, solved.rows, solved.columns)
     return needed
 
@@ -275,7 +282,7 @@ def _expose(
         else auto_exposure.exposure_time(camera, rate, white, dark, circuit.saturation)
     )
     peak = (float(rate.max()) + dark) * time
-    _refuse_too_much(max(peak, white * time))
+    _refuse_too_much(max(peak, white * time, dark))
     changes = _pixel_changes(place, groups.collect(light.values), enabled, effects, time)
     if transports := [transport.name for transport in of_kind(enabled, Transport)]:
         well = min(circuit.full_well / time - dark, MOST_ELECTRONS)
@@ -298,7 +305,7 @@ def _refuse_too_much(electrons: float) -> None:
     if not electrons < MOST_ELECTRONS:
         raise bad(
             "scene",
-            f"light and dark current would make {electrons:.3g} electrons in a pixel",
+            f"light and dark current would make {electrons:.3g} electrons in a pixel or a second",
             "look for a wrong unit in the light level, the dark current or the exposure",
         )
 
