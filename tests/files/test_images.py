@@ -55,6 +55,32 @@ def refused(path, words, encoding="linear"):
     assert path.name in problem.message
 
 
+@pytest.mark.parametrize("kinds", [("uint",) * 3, ("uint", "half", "float"), ("half", "uint")])
+def test_whole_numbers_of_an_exr_are_numbers(tmp_path, kinds) -> None:
+    """No codes of which the largest is white, whatever the kinds of the channels beside them."""
+    numbers = np.arange(4.0 * 5 * len(kinds)).reshape(4, 5, -1)
+    names = ("R", "G", "B") if len(kinds) == 3 else ("Y", "A")
+    spec = oiio.ImageSpec(5, 4, len(kinds), kinds[0])
+    spec.channelnames = names
+    if len(set(kinds)) > 1:
+        spec.channelformats = tuple(oiio.TypeDesc(kind) for kind in kinds)
+    output = oiio.ImageOutput.create("exr")
+    assert output.open(str(tmp_path / "a.exr"), spec), output.geterror()
+    scales = np.array([2.0**32 - 1 if kind == "uint" else 1.0 for kind in kinds])
+    assert output.write_image((numbers / scales).astype(np.float64))
+    assert output.close()
+    found = read(tmp_path / "a.exr").data
+    np.testing.assert_array_equal(found, numbers[:, :, : found.shape[2]])
+
+
+@pytest.mark.parametrize("name", ["Z", "depth.Z", "z", "ZBack"])
+def test_depth_is_no_light(tmp_path, name: str) -> None:
+    refused(write(tmp_path / "a.exr", FLOAT[..., :1], [name]), "depth")
+    with_gray = read(write(tmp_path / "b.exr", FLOAT[..., :2], ["Y", name]))
+    np.testing.assert_array_equal(with_gray.data, FLOAT[..., :1])
+    assert with_gray.notes == (f"channels {name} dropped",)
+
+
 def test_srgb_follows_the_standard():
     # IEC 61966-2-1: linear below 0.04045, then a power of 2.4; 118/255 is close to 18 % gray
     found = decode_srgb(np.array([0, 0.04045, 118 / 255, 1]))

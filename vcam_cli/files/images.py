@@ -30,6 +30,8 @@ MOST_PIXELS = 10**9
 MOST_LIGHT = 1e30
 """The largest light over `white`: float32 ends at 3.4e38, and a camera's units need some of it."""
 _ALPHA = {"A", "ALPHA"}
+_DEPTH = {"Z", "ZBACK"}
+"""Names that OpenEXR gives to distances ("Technical Introduction to OpenEXR", channel names)."""
 _RGB = ("R", "G", "B")
 _LIGHT = {0, 1, 2, 3, 6}  # TIFF photometrics: gray (white or black is zero), RGB, palette, YCbCr
 _READ_AS: dict[str, type[np.integer]] = {
@@ -170,6 +172,11 @@ def _choose_channels(
     """Return the indices of the gray or the wanted channels, and notes on what is dropped."""
     upper = [name.upper() for name in names]
     color = [i for i, name in enumerate(upper) if name not in _ALPHA and i != alpha]
+    depth = [] if "X" in upper else [i for i in color if upper[i].rpartition(".")[2] in _DEPTH]
+    if depth and depth == color:
+        shown = ", ".join(names[i] for i in depth)
+        raise UnusableFile(f"holds depth (channel {shown}), not light", "use a file of light")
+    listed, color = color, [i for i in color if i not in depth]
     if all(name in upper for name in wanted):
         chosen = tuple(upper.index(name) for name in wanted)
     elif wanted != _RGB:
@@ -186,8 +193,8 @@ def _choose_channels(
         raise UnusableFile(f"has two color channels ({shown}); one or three are needed")
     else:
         raise UnusableFile(f"has no channels R, G, B but {', '.join(names) or 'none'}")
-    dropped = [names[i] for i in color if i not in chosen]
-    notes = ["alpha channel dropped"] if len(color) < len(names) else []
+    dropped = [names[i] for i in listed if i not in chosen]
+    notes = ["alpha channel dropped"] if len(listed) < len(names) else []
     if dropped:
         notes.append(f"channels {', '.join(dropped)} dropped")
     return chosen, tuple(notes)
@@ -215,19 +222,35 @@ def read_samples(
 ) -> tuple[np.ndarray, list[str]]:
     """Return the chosen channels as stored, integers as they are, else as float32; and notes.
 
+    Whole numbers of an EXR are numbers as its others are, and no codes: they come as float32.
     spec: the header of the page, by default the first of several images in the file.
     """
-    kinds = {str(spec.channelformat(index)) for index in chosen}
-    kind = _READ_AS.get(kinds.pop()) if len(kinds) == 1 else None
+    kinds = {_READ_AS.get(str(spec.channelformat(index))) for index in chosen}
+    kind = kinds.pop() if len(kinds) == 1 else None
     name = "float" if kind is None else _OIIO_NAMES.get(kind, np.dtype(kind).name)
     first, last = min(chosen), max(chosen) + 1
-    data = source.read_image(page, 0, first, last, name)
+    if source.format_name() == "openexr" and (kind or kinds):
+        data = _read_numbers(source, spec, page, first, last)
+    else:
+        data = source.read_image(page, 0, first, last, name)
     reason = pending_error(source.geterror)
     if data is None or (reason and "extraneous bytes" not in reason):
         raise truncated_file(reason)
     order = [index - first for index in chosen]
     notes = ["the file has stray bytes in it"] if reason else []
     return (data if order == list(range(last - first)) else data[:, :, order]), notes
+
+
+def _read_numbers(source: Any, spec: Any, page: int, first: int, last: int) -> np.ndarray | None:
+    """Return channels of an EXR, whole numbers not scaled to fractions; None where it ends."""
+    out = np.empty((spec.height, spec.width, last - first), np.float32)
+    for channel in range(first, last):
+        name = "uint" if str(spec.channelformat(channel)) in _READ_AS else "float"
+        data = source.read_image(page, 0, channel, channel + 1, name)
+        if data is None:
+            return None
+        out[:, :, channel - first] = data.reshape(spec.height, spec.width)
+    return out
 
 
 def extract_display_window(data: np.ndarray, spec: Any, notes: list[str]) -> np.ndarray:
