@@ -116,6 +116,34 @@ def test_no_image_from_within_the_focal_length(distance, tmp_path):
     assert "further away" in problem.remedy
 
 
+@pytest.mark.parametrize(
+    ("optics", "key"),
+    [
+        ({"f_number": 0.49, "focal_length": "5 mm"}, "f_number"),
+        ({"aperture_diameter": "10.3 mm", "focal_length": "5 mm"}, "aperture_diameter"),
+        ({"f_number": 1e5, "focal_length": "5 mm"}, "f_number"),
+        ({"aperture_diameter": "1 nm", "focal_length": "5 mm"}, "aperture_diameter"),
+    ],
+)
+def test_lenses_that_air_does_not_allow(tmp_path, optics: dict, key: str) -> None:
+    """However the f-number is told; f/0.5 itself is a lens."""
+    (problem,) = refused(tmp_path, {"optics": optics})
+    assert problem.path == ("optics", key)
+    assert problem.remedy or "0.5" in problem.message or "10000" in problem.message
+    assert solved(tmp_path, optics={"f_number": 0.5, "focal_length": "5 mm"}).f_number == 0.5
+
+
+@pytest.mark.parametrize("given", ["1 K", "1e6 K", "-270 degC"])
+@pytest.mark.parametrize(
+    "key", ["pixel.temperature", "pixel.photodetector.dark_current_density.temperature"]
+)
+def test_temperatures_that_silicon_does_not_stand(tmp_path, key: str, given: str) -> None:
+    density = {"pixel.photodetector.dark_current_density": {"value": "1 nA/cm2"}}
+    (problem,) = refused(tmp_path, density | {key: given})
+    assert problem.path == tuple(key.split("."))
+    assert "out of range" in problem.message
+
+
 def test_a_field_of_view_spans_the_diagonal_of_the_array(tmp_path):
     """90 degrees over 5 x 4 um pixels with gaps: the image distance is half the diagonal."""
     g = solved(

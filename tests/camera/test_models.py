@@ -683,8 +683,6 @@ class TestWritten:
         draw = data.draw
         positive = st.floats(1e-3, 1e3)
         units = {
-            "pixel.width": ["um", "nm", "mm"],
-            "pixel.temperature": ["K"],
             "scene.distance": ["m", "in", "km"],
             "scene.luminance": ["cd/m2", "kcd/m2"],
             "exposure.time": ["s", "ms", "us"],
@@ -702,7 +700,9 @@ class TestWritten:
             path: f"{draw(positive)!r} {draw(st.sampled_from(u))}" for path, u in units.items()
         }
         changes["pixel.technology.from"] = "x"
-        changes["optics.f_number"] = draw(positive)
+        changes["pixel.width"] = draw(st.floats(1, 1e6).map("{!r} nm".format))
+        changes["pixel.temperature"] = draw(st.floats(4, 1e3).map("{!r} K".format))
+        changes["optics.f_number"] = draw(st.floats(0.5, 1e3))
         efficiency = st.just(0.0) | st.floats(1e-9, 1)  # less is refused as too small
         changes["pixel.photodetector.quantum_efficiency"] = draw(efficiency)
         phase = f"{draw(st.floats(-360, 360))!r} deg"

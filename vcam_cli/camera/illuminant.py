@@ -2,14 +2,13 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Any
 
 from vcam_cli import spectra
 from vcam_cli.camera.spectrum import SpectrumFile
 from vcam_cli.config.model import Model, key
-from vcam_cli.config.quantities import Quantity
 from vcam_cli.config.validation_messages import describe
-from vcam_cli.config.values import Temperature
+from vcam_cli.config.values import Temperature, Wavelength
 from vcam_cli.config.yaml_type import DEFINED, YamlType, to_yaml
 from vcam_cli.errors import Path, bad
 
@@ -28,9 +27,7 @@ class Blackbody(Model):
 class Monochromatic(Model):
     """A single line."""
 
-    monochromatic: Annotated[float, Quantity("length", above=0)] = key(
-        "its wavelength", example="550 nm"
-    )
+    monochromatic: Wavelength = key("its wavelength", example="550 nm")
 
 
 class LampFile(SpectrumFile):

@@ -139,6 +139,9 @@ def _terms(given: Mapping[Any, Any]) -> Terms:
     return tuple(sorted(read_items(((name, name) for name in given), term)))
 
 
+LEAST_F_NUMBER, MOST_F_NUMBER = 0.5, 1e4
+"""A sharp image in air has no less than f/0.5, where the cone of light is a half space (Abbe's sine
+condition; M. Born and E. Wolf, Principles of Optics, 7th ed., 1999, section 4.5.1)."""
 _GROUPS = (
     ("focal_length", "field_of_view"),
     ("f_number", "numerical_aperture"),
@@ -181,9 +184,9 @@ def _neutral(name: str, given: Any) -> bool:
 class Optics(Model):
     """The lens: any two of f_number, focal_length and aperture_diameter; more must agree."""
 
-    f_number: Annotated[float | None, Number(above=0, example="2.8")] = key(
-        "focal length over diameter of the aperture", example=2.8, default=None
-    )
+    f_number: Annotated[
+        float | None, Number(above=0, least=LEAST_F_NUMBER, most=MOST_F_NUMBER, example="2.8")
+    ] = key("focal length over diameter of the aperture", example=2.8, default=None)
     focal_length: MaybeLength = key("focal length", example="3.2 mm", default=None)
     aperture_diameter: MaybeLength = key(
         "diameter of the entrance pupil", example="1.14 mm", default=None

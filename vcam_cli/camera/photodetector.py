@@ -8,7 +8,14 @@ from vcam_cli.camera.spectrum import Spectral, SpectrumSpec
 from vcam_cli.camera.technology import Junction
 from vcam_cli.config.model import Model, all_or_none, at_most_one, key, needs
 from vcam_cli.config.quantities import Number, Quantity
-from vcam_cli.config.values import Either, Length, MaybeGap, MaybeLength, MaybeTemperature, word_or
+from vcam_cli.config.values import (
+    Either,
+    Length,
+    MaybeGap,
+    MaybeLength,
+    MaybeSiliconTemperature,
+    word_or,
+)
 
 _EFFICIENCY = Spectral(most=1.0)
 
@@ -56,7 +63,7 @@ class DarkCurrentDensity(Model):
     value: Annotated[float, Quantity("current_density", least=0)] = key(
         "dark current density", example="1 nA/cm2"
     )
-    temperature: MaybeTemperature = key(
+    temperature: MaybeSiliconTemperature = key(
         "at which it holds; default the pixel's", example="300 K", default=None
     )
     doubling: Annotated[float, Quantity("temperature", above=0, difference=True)] = key(

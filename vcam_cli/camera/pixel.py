@@ -16,15 +16,19 @@ from vcam_cli.config.values import (
     MOST_ELECTRONS,
     Electrons,
     Fraction,
-    Gap,
-    Length,
     MaybeFraction,
     Positive,
-    Temperature,
+    SiliconTemperature,
     mapping,
     word_or,
 )
 
+Size = Annotated[float, Quantity("length", above=0, least=1e-9, most=1e-2)]
+"""Of a pixel, up to that of a detector of X-rays."""
+Gap = Annotated[float, Quantity("length", least=0, most=1e-3)]
+"""Between pixels."""
+Thickness = Annotated[float, Quantity("length", least=0, most=1e-2)]
+"""Of a layer on a pixel."""
 AGREE = 1e-3
 """Relative difference up to which redundant numbers of a file count as equal."""
 
@@ -134,7 +138,7 @@ class Defects(Model):
 class Layer(Model):
     """A dielectric layer."""
 
-    thickness: Gap = key("thickness", example="0.7 um")
+    thickness: Thickness = key("thickness", example="0.7 um")
     index: Annotated[float, Number(least=1, most=10, example="1.46")] = key(
         "refractive index", example=1.46
     )
@@ -205,10 +209,8 @@ class Pixel(Model):
         example="cmos-0.35um",
         default=None,
     )
-    width: Length = key("width of the pixel", example="6.5 um")
-    height: Annotated[float, Quantity("length", above=0)] = key(
-        "height of the pixel; default its width", example="6.5 um", default=None
-    )
+    width: Size = key("width of the pixel", example="6.5 um")
+    height: Size = key("height of the pixel; default its width", example="6.5 um", default=None)
     gap_x: Gap = key("between pixels of a row; pitch = width + gap", example="0 um", default=0.0)
     gap_y: Gap = key("between pixels of a column", example="0 um", default=0.0)
     photodetector: Photodetector = key(
@@ -229,7 +231,7 @@ class Pixel(Model):
     microlens: Annotated[Microlens | None, word_or(Microlens, {"none": None})] = key(
         "a lens on every pixel", example="none", default=None
     )
-    temperature: Temperature = key("of the sensor", example="300 K", default=300.0)
+    temperature: SiliconTemperature = key("of the sensor", example="300 K", default=300.0)
 
     rules = (_is_determined,)
 

@@ -19,6 +19,7 @@ from vcam_cli.config.values import (
     Frequency,
     Length,
     Positive,
+    Wavelength,
     word_or,
 )
 from vcam_cli.config.yaml_type import to_yaml
@@ -280,8 +281,8 @@ class Extent(Model):
 class Wavelengths(Model):
     """The part of the spectrum that is simulated."""
 
-    start: Length = key("shortest wavelength", example="380 nm", default=380e-9)
-    stop: Length = key("longest wavelength", example="780 nm", default=780e-9)
+    start: Wavelength = key("shortest wavelength", example="380 nm", default=380e-9)
+    stop: Wavelength = key("longest wavelength", example="780 nm", default=780e-9)
     step: Annotated[float | None, Quantity("length", least=1e-10, words={"auto": None})] = key(
         "spacing at which the lens's blur is evaluated; auto follows from the accuracy",
         unit="nm",

@@ -16,7 +16,7 @@ from vcam_cli.config.values import (
     MaybeFraction,
     MaybeGap,
     MaybeLength,
-    MaybeTemperature,
+    MaybeSiliconTemperature,
     MaybeTime,
     Text,
     Word,
@@ -121,7 +121,7 @@ class TechnologyDarkCurrent(Model):
     perimeter: Annotated[float | None, Quantity("linear_current_density", least=0)] = key(
         "per length of perimeter", example="0.437 pA/cm", default=None
     )
-    temperature: MaybeTemperature = key("at which both hold", example="300 K", default=None)
+    temperature: MaybeSiliconTemperature = key("at which both hold", example="300 K", default=None)
     doubling: Annotated[float | None, Quantity("temperature", above=0, difference=True)] = key(
         "rise of temperature that doubles them", example="8 K", default=None
     )

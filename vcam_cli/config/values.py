@@ -13,11 +13,19 @@ from vcam_cli.config.yaml_type import YamlType, to_yaml
 MOST_ELECTRONS = 1e9
 """Most electrons of a noise: beyond any well, and its square is still a number in 32 bits."""
 
-Length = Annotated[float, Quantity("length", above=0)]
-Gap = Annotated[float, Quantity("length", least=0)]
+_LENGTH = Quantity("length", above=0, least=1e-12, most=1e6)
+"""Of what can be made, from less than an atom to more than a telescope."""
+_TEMPERATURE = Quantity("temperature", above=0, least=4.0, most=1000.0)
+"""Of silicon, from liquid helium to where it conducts by itself whatever its doping (S. M. Sze and
+K. K. Ng, Physics of Semiconductor Devices, 3rd ed., 2007, section 1.4)."""
+
+Length = Annotated[float, _LENGTH]
+Gap = Annotated[float, Quantity("length", least=0, most=1e6)]
+Wavelength = Annotated[float, Quantity("length", above=0, least=1e-9, most=1e-3)]
 Shift = Annotated[float, Quantity("length")]
 Time = Annotated[float, Quantity("time", above=0)]
 Temperature = Annotated[float, Quantity("temperature", above=0)]
+SiliconTemperature = Annotated[float, _TEMPERATURE]
 Angle = Annotated[float, Quantity("angle")]
 Electrons = Annotated[float, Quantity("charge", least=0, most=MOST_ELECTRONS)]
 Frequency = Annotated[float, Quantity("spatial_frequency", least=0)]
@@ -34,10 +42,10 @@ Word = Annotated[
 Text = Annotated[str, StringConstraints(strict=True)]
 
 # The same where a key need not be given; YAML's null is not "not given" but a mistake.
-MaybeLength = Annotated[float | None, Quantity("length", above=0)]
-MaybeGap = Annotated[float | None, Quantity("length", least=0)]
+MaybeLength = Annotated[float | None, _LENGTH]
+MaybeGap = Annotated[float | None, Quantity("length", least=0, most=1e6)]
 MaybeTime = Annotated[float | None, Quantity("time", above=0)]
-MaybeTemperature = Annotated[float | None, Quantity("temperature", above=0)]
+MaybeSiliconTemperature = Annotated[float | None, _TEMPERATURE]
 MaybeFraction = Annotated[float | None, Number(least=0, most=1)]
 MaybePositive = Annotated[float | None, Number(above=0, example="1")]
 

@@ -38,6 +38,8 @@ SMALLEST_MARGIN = 4
 """Pixels that a chart goes on beyond the array, at least; never more than the array."""
 MOST_MARGIN_CELLS = 4096
 """Cells along an axis, as fine as the lens's cut-off asks for, that a margin may lead to."""
+LARGEST_TRANSFORM = 1 << 24
+"""Samples along an axis that no machine has the memory for."""
 NOTHING = 1e-6
 """Transfer that ends a blur without a cut-off."""
 RESOLVED = 256
@@ -158,7 +160,12 @@ def line_spread_tail(
 
 
 def _fast(geometry: Geometry, least: int) -> int:
-    """Return the smallest margin from `least` on at which transforms of both lengths are fast."""
+    """Return the smallest margin from `least` on at which transforms of both lengths are fast.
+
+    One whose transforms no machine has the memory for stays as it is.
+    """
+    if least > LARGEST_TRANSFORM:
+        return least
 
     def cost(margin: int) -> int:
         return sum((n + 2 * margin) * _work(n + 2 * margin) for n in sizes)

@@ -267,6 +267,8 @@ def _black_signal(draft: Draft) -> np.ndarray:
     return np.full(len(draft.context.white_dn), draft.context.black_dn)
 
 
+NO_SIGNAL = 1e-12
+"""White below which there is none [DN]: what it would be scaled by ends 32-bit numbers."""
 LUMINANCE = {"R": 0.2126, "G": 0.7152, "B": 0.0722}
 """Shares of the display's primaries in luminance, ITU-R BT.709; any other color counts fully."""
 
@@ -278,7 +280,7 @@ def _white_scale(white: np.ndarray, colors: Sequence[str]) -> float:
     darken the whole picture.
     """
     luminance = _luminance(white, colors)
-    return 1.0 / luminance if luminance > 0 else 0.0
+    return 1.0 / luminance if luminance > NO_SIGNAL else 0.0
 
 
 def _luminance(values: np.ndarray, colors: Sequence[str]) -> float:

@@ -7,6 +7,7 @@ processing or the picture to know.
 from collections.abc import Sequence
 from pathlib import Path
 
+import numpy as np
 from numpy.typing import NDArray
 
 from vcam_cli.camera import load as files
@@ -18,6 +19,7 @@ from vcam_cli.camera.processing import SHOWN
 from vcam_cli.effects import aberration, point_spread
 from vcam_cli.errors import bad, split
 from vcam_cli.processing import check as check_steps
+from vcam_cli.quality.display import display_screen
 from vcam_cli.readout.layout import layout
 from vcam_cli.scenes.build import SOURCE, check_channels
 from vcam_cli.scenes.hyperspectral import check_bands
@@ -48,6 +50,7 @@ def check_effects(camera: Camera) -> None:
 def check_size(camera: Camera) -> None:
     """Refuse an array too small for the demosaicing of its processing (BadInput)."""
     if camera.array.is_scattered:
+        _check_every_color(camera)
         return
     solved = layout(camera, geometry(camera)).geometry
     if any(step.name == "demosaic" for step in camera.processing):
@@ -56,6 +59,16 @@ def check_size(camera: Camera) -> None:
                 path = ("array", "die" if camera.array.die is not None else name)
                 message = f"{solved.rows} x {solved.columns} pixels cannot be demosaiced"
                 raise bad(path, message, "use an array of at least 2 x 2 pixels")
+
+
+def _check_every_color(camera: Camera) -> None:
+    """Refuse scattered pixels of which a color has none to be demosaiced from (BadInput)."""
+    place = layout(camera, geometry(camera))
+    there = {place.mosaic.colors[index] for index in np.unique(place.color)}
+    missing = [color for color in place.mosaic.colors if color not in there]
+    if missing and any(step.name == "demosaic" for step in camera.processing):
+        message = f"so few pixels have none of {', '.join(missing)}, and cannot be demosaiced"
+        raise bad("array", message, "use a larger array")
 
 
 def check_binning(camera: Camera) -> None:
@@ -107,6 +120,12 @@ def read_lens(camera: Camera) -> dict[str, NDArray]:
     return {point_spread.PSF: read_psf(psf.file, channels, (*split(point_spread.PSF), "file"))}
 
 
+def check_display(camera: Camera) -> None:
+    """Refuse a display too fine to be judged, where a metric looks at it (BadInput)."""
+    if {"cielab", "s-cielab"} & set(camera.quality):
+        display_screen(camera.display, len(layout(camera, geometry(camera)).picture_x))
+
+
 CHECKS: tuple[files.CameraCheck, ...] = (
     (check_effects, "optics pixel effects"),
     (check_binning, "pixel array exposure adc"),
@@ -114,4 +133,5 @@ CHECKS: tuple[files.CameraCheck, ...] = (
     (check_positions, "pixel array processing"),
     (check_picture, "scene"),
     (check_lens, "optics scene pixel array effects"),
+    (check_display, "optics scene pixel array quality display"),
 )

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.lattice import lattice
+from vcam_cli.camera.optics import LEAST_F_NUMBER, MOST_F_NUMBER
 from vcam_cli.camera.pixel import AGREE
 from vcam_cli.errors import bad
 from vcam_cli.physics import radiometry
@@ -51,6 +52,7 @@ def lens(camera: Camera) -> Lens:
         found["numerical_aperture"] = float(radiometry.f_number_of_numerical_aperture(sine, m))
     if optics.aperture_diameter is not None:
         found["aperture_diameter"] = f / optics.aperture_diameter
+        _require_f_number(found["aperture_diameter"], f, optics.aperture_diameter)
     if not found:
         raise bad(
             "optics",
@@ -58,6 +60,20 @@ def lens(camera: Camera) -> Lens:
             "give f_number, aperture_diameter or numerical_aperture beside the focal length",
         )
     return Lens(f, _common_value(found, "", lambda number: f"f/{number:.5g}"), m)
+
+
+def _require_f_number(number: float, focal_length: float, diameter: float) -> None:
+    """Raise BadInput where no lens in air has the f-number that follows from an aperture."""
+    if LEAST_F_NUMBER * (1 - AGREE) <= number <= MOST_F_NUMBER:
+        return
+    limit = "less than" if number < LEAST_F_NUMBER else "more than"
+    raise bad(
+        "optics.aperture_diameter",
+        f"{diameter * 1e3:.4g} mm at a focal length of {focal_length * 1e3:.4g} mm is"
+        f" f/{number:.4g}, {limit} a lens in air can have (f/{LEAST_F_NUMBER:g} to"
+        f" f/{MOST_F_NUMBER:g})",
+        "look for a wrong unit in the aperture or the focal length",
+    )
 
 
 def _focal_length(camera: Camera) -> float:
