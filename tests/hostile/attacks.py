@@ -56,7 +56,7 @@ def rows(text: str) -> dict[str, tuple[int, int]]:
 
 def table(found: Count) -> str:
     """Return the page with these numbers; what it says above its table stays."""
-    head, _, _ = TABLE.read_text("utf-8").partition("| kind |")
+    head, _, _ = TABLE.read_text("utf-8").partition("| kind ")
     width = max(map(len, found.tried))
     lines = [f"| {'kind':<{width}} | tried | held |", f"| {'-' * width} | ----: | ---: |"]
     for kind in sorted(found.tried):

@@ -10,17 +10,15 @@ from vcam_cli.config.lists import read_items
 from vcam_cli.config.model import Model, exactly_one, key
 from vcam_cli.config.quantities import Number, Quantity, Whole
 from vcam_cli.config.validation_messages import describe, refusal
-from vcam_cli.config.values import Either, MaybeTime, Time, mapping
+from vcam_cli.config.values import TIME, Either, MaybeTime, Time, mapping
 from vcam_cli.config.yaml_type import to_yaml
-
-_TIME = Quantity("time", above=0)
 
 
 class AutoExposure(Model):
     """The exposure time that brings a chosen level to a fraction of the full well."""
 
     max: Time = key("longest time", example="100 ms", default=0.1)
-    min: Annotated[float, Quantity("time", least=0)] = key(
+    min: Annotated[float, Quantity("time", least=0, most=1e9)] = key(
         "shortest time", unit="ms", example="0 s", default=0.0
     )
     method: Literal["white", "percentile", "mean"] = key(
@@ -66,7 +64,7 @@ def rising_times(given: Any) -> tuple[float, ...]:
 
     def read(item: Any) -> float:
         nonlocal latest
-        time = _TIME.read(item)
+        time = TIME.read(item)
         before, latest = latest, time
         if time <= before:
             raise ValueError("the times must rise; sort them")
@@ -77,7 +75,7 @@ def rising_times(given: Any) -> tuple[float, ...]:
 
 def times_to_yaml(times: tuple[float, ...]) -> list[str]:
     """Return times [s] as YAML has them."""
-    return [_TIME.text(time) for time in times]
+    return [TIME.text(time) for time in times]
 
 
 class Exposure(Model):
@@ -91,7 +89,7 @@ class Exposure(Model):
         tuple[float, ...] | CaptureSchedule | None,
         Either(
             _captures,
-            list[Annotated[float, _TIME]] | CaptureSchedule,
+            list[Annotated[float, TIME]] | CaptureSchedule,
             yaml_form=lambda v: times_to_yaml(v) if isinstance(v, tuple) else to_yaml(v),
         ),
     ] = key(

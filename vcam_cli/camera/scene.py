@@ -167,7 +167,9 @@ class HdrPatches(Chart):
     patches: Annotated[int, Whole(least=2, most=1000, example="24")] = key(
         "number of patches", default=24
     )
-    lamp: Positive = key("radiance of the lamp over that of the perfect white", default=100.0)
+    lamp: Annotated[float, Number(above=0, most=1e12, example="1")] = key(
+        "radiance of the lamp over that of the perfect white", default=100.0
+    )
 
 
 class ImageFile(Model):

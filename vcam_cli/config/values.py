@@ -15,6 +15,8 @@ MOST_ELECTRONS = 1e9
 
 _LENGTH = Quantity("length", above=0, least=1e-12, most=1e6)
 """Of what can be made, from less than an atom to more than a telescope."""
+TIME = Quantity("time", above=0, least=1e-15, most=1e9)
+"""From less than a period of light to thirty years."""
 _TEMPERATURE = Quantity("temperature", above=0, least=4.0, most=1000.0)
 """Of silicon, from liquid helium to where it conducts by itself whatever its doping (S. M. Sze and
 K. K. Ng, Physics of Semiconductor Devices, 3rd ed., 2007, section 1.4)."""
@@ -23,7 +25,7 @@ Length = Annotated[float, _LENGTH]
 Gap = Annotated[float, Quantity("length", least=0, most=1e6)]
 Wavelength = Annotated[float, Quantity("length", above=0, least=1e-9, most=1e-3)]
 Shift = Annotated[float, Quantity("length")]
-Time = Annotated[float, Quantity("time", above=0)]
+Time = Annotated[float, TIME]
 Temperature = Annotated[float, Quantity("temperature", above=0)]
 SiliconTemperature = Annotated[float, _TEMPERATURE]
 Angle = Annotated[float, Quantity("angle")]
@@ -44,7 +46,7 @@ Text = Annotated[str, StringConstraints(strict=True)]
 # The same where a key need not be given; YAML's null is not "not given" but a mistake.
 MaybeLength = Annotated[float | None, _LENGTH]
 MaybeGap = Annotated[float | None, Quantity("length", least=0, most=1e6)]
-MaybeTime = Annotated[float | None, Quantity("time", above=0)]
+MaybeTime = Annotated[float | None, TIME]
 MaybeSiliconTemperature = Annotated[float | None, _TEMPERATURE]
 MaybeFraction = Annotated[float | None, Number(least=0, most=1)]
 MaybePositive = Annotated[float | None, Number(above=0, example="1")]
