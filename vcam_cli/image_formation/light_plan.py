@@ -38,6 +38,8 @@ from vcam_cli.scenes.base import Scene
 
 LIGHT_SHARE = 0.3
 """Part of the tolerance that all omitted effects on the light may use together."""
+CLEAR = 2.0
+"""Times its budget that each blur changes where no more of the scene need be looked at."""
 LEVEL_SHARE = 0.5
 """Part of the tolerance by which they may shift a percentile of the light, relative to it: shot
 noise has the variance of the signal."""
@@ -93,10 +95,19 @@ def light_plan(path: OpticalPath, scene: Scene) -> LightPlan:
         return LightPlan()
     if path.transfer.is_dark:
         return LightPlan(candidates, shares=dict.fromkeys((e.name for e in candidates), 0.0))
-    detail = scene_detail(path, scene)
-    functions = {} if detail is None else transfer_functions(path, detail)
-    shares = {effect: _share(detail, functions, effect) for effect in candidates}
     budget = LIGHT_SHARE * path.settings.tolerance
+    functions: dict[Effect, NDArray] = {}
+
+    def every_blur_counts(found: SceneDetail) -> bool:
+        if not functions:
+            functions.update(transfer_functions(path, found))
+        blurs = of_kind(candidates, *BLURS)
+        return all(_share(found, functions, blur) > CLEAR * budget for blur in blurs)
+
+    detail = scene_detail(path, scene, every_blur_counts)
+    if detail is not None and not functions:
+        functions.update(transfer_functions(path, detail))
+    shares = {effect: _share(detail, functions, effect) for effect in candidates}
     chosen: list[Effect] = []
     for effect in sorted(shares, key=shares.__getitem__):
         together = [*chosen, effect]

@@ -11,7 +11,7 @@ than the cells counts as noise, which never hides (R. L. Cook, ACM Trans. Graphi
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -28,6 +28,8 @@ POINTS_PER_PIXEL = 2
 """Along each axis of a tile: up to the second Nyquist frequency."""
 TILES = 16
 """Tiles that are transformed, at most."""
+ASKED = (1, 2, 4, 8)
+"""Numbers of tiles after which it is asked whether they tell enough."""
 MOST_PLACES = 24
 """Parts of the array along each axis, at most, each of which may be a tile's place."""
 SURVEY = 4
@@ -80,7 +82,13 @@ class SceneDetail:
         return not self.power.any() and not self.unresolved
 
 
-def scene_detail(path: OpticalPath, scene: Scene) -> SceneDetail | None:
+Settled = Callable[[SceneDetail], bool]
+"""Whether the detail that some tiles have, as if all others had none, is enough to know."""
+
+
+def scene_detail(
+    path: OpticalPath, scene: Scene, settled: Settled = lambda _: False
+) -> SceneDetail | None:
     """Return the detail of a scene before the array.
 
     Parameters
@@ -89,6 +97,8 @@ def scene_detail(path: OpticalPath, scene: Scene) -> SceneDetail | None:
         Lens and pixels, whose colors tell how much each of the scene's components counts.
     scene : Scene
         Scene before the lens.
+    settled : callable, optional
+        Whether what some tiles tell is enough; by default all of them are asked.
 
     Returns
     -------
@@ -105,7 +115,7 @@ def scene_detail(path: OpticalPath, scene: Scene) -> SceneDetail | None:
     widest = REACH / path.transfer.cutoff + max((e.reach for e in path.effects), default=0.0)
     if min(g.sensor_width, g.sensor_height) < ENOUGH * widest:
         return None
-    return _tile_detail(path, scene, level)
+    return _tile_detail(path, scene, level, settled)
 
 
 def _is_even(scene: ChartScene) -> bool:
@@ -155,8 +165,13 @@ def _wave_detail(path: OpticalPath, scene: WaveScene, level: NDArray) -> SceneDe
     )
 
 
-def _tile_detail(path: OpticalPath, scene: Scene, level: NDArray) -> SceneDetail:
-    """Return the power of tiles of points, each as much as it stands for."""
+def _tile_detail(
+    path: OpticalPath, scene: Scene, level: NDArray, settled: Settled
+) -> SceneDetail:
+    """Return the power of tiles of points, each as much as it stands for.
+
+    Those of most contrast come first: often they tell enough.
+    """
     g, rng = path.geometry, np.random.default_rng(0)
     size, pitch = np.array([g.rows, g.columns]), np.array([g.pitch_y, g.pitch_x])
     counts = np.clip(np.round(size / TILE).astype(int), 1, MOST_PLACES)
@@ -165,8 +180,9 @@ def _tile_detail(path: OpticalPath, scene: Scene, level: NDArray) -> SceneDetail
     even = _surveyed(path, scene, level, counts)
     parts = even.light.reshape(counts[0], SURVEY, counts[1], SURVEY)
     places, shares = _tile_places(_contrast(parts), rng)
-    squares, brightest = np.zeros((len(places), *points)), float(parts.mean(axis=(1, 3)).max())
-    for tile, place, share in zip(squares, places, shares, strict=True):
+    brightest = float(parts.mean(axis=(1, 3)).max())
+    squares: list[NDArray] = []
+    for place, share in zip(places, shares, strict=True):
         index = np.array(divmod(int(place), counts[1]))
         # Anywhere around the place, so that what lies between two places is seen as well.
         center = ((index + rng.random(2)) / counts - 0.5) * size * pitch
@@ -177,15 +193,24 @@ def _tile_detail(path: OpticalPath, scene: Scene, level: NDArray) -> SceneDetail
         )
         values = _light_at(scene, x, y, level)
         brightest = max(brightest, _brightest_block(values))
-        tile[:] = np.square(scipy.fft.dctn(values, type=2, norm="ortho")) * (share / values.size)
+        tile = np.square(scipy.fft.dctn(values, type=2, norm="ortho")) * (share / values.size)
         tile[0, 0] = 0
-    sums = squares.sum(axis=(1, 2))
+        squares.append(tile)
+        found = replace(even, brightest=min(brightest, path.ceiling))
+        if len(squares) in ASKED and settled(_with_tiles(found, squares, length)):
+            break
+    return _with_tiles(found, squares, length)
+
+
+def _with_tiles(even: SceneDetail, squares: Sequence[NDArray], length: NDArray) -> SceneDetail:
+    """Return a scene's detail with the mean squares of its tiles, of so much length [m]."""
+    power, points = np.sum(squares, axis=0), squares[0].shape
+    sums = np.sum(squares, axis=(1, 2))
     whole = float(sums.sum())
     error = float(sums.std()) * math.sqrt(len(sums)) / whole if whole else 0.0
-    power = squares.sum(axis=0)
     top = [math.floor(UNRESOLVED * n) for n in points]
     noise = float(power[top[0] :, top[1] :].mean())
-    fy, fx = (np.arange(n) / (2 * whole) for n, whole in zip(points, length, strict=True))
+    fy, fx = (np.arange(n) / (2 * side) for n, side in zip(points, length, strict=True))
     return replace(
         even,
         fx=fx,
@@ -193,7 +218,6 @@ def _tile_detail(path: OpticalPath, scene: Scene, level: NDArray) -> SceneDetail
         power=np.maximum(power - noise, 0),
         unresolved=noise * power.size,
         error=error,
-        brightest=min(brightest, path.ceiling),
     )
 
 
@@ -214,12 +238,13 @@ def _tile_places(contrast: NDArray, rng: np.random.Generator) -> tuple[NDArray, 
     """
     flat = contrast.ravel()
     if flat.size <= TILES:
-        return np.arange(flat.size), np.full(flat.size, 1 / flat.size)
+        return np.argsort(-flat), np.full(flat.size, 1 / flat.size)
     chance = np.full(flat.size, 1 / flat.size)
     if flat.any():
         chance = ANYWHERE * chance + (1 - ANYWHERE) * flat / flat.sum()
     ticks = (np.arange(TILES) + rng.random()) / TILES
     places = np.minimum(np.searchsorted(np.cumsum(chance), ticks), flat.size - 1)
+    places = places[np.argsort(-chance[places])]
     return places, 1 / (TILES * flat.size * chance[places])
 
 
