@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from vcam_cli.effects.base import Blur, PlaneTransfer
 from vcam_cli.image_formation.transfer_functions import Transfer
+from vcam_cli.parallel import product
 
 PARITIES = ((False, False), (True, True), (True, False), (False, True))
 """Whether a transfer function turns the cosines along x, and along y, into sines."""
@@ -339,7 +340,7 @@ def mixtures(transfers: Sequence[Transfer], size: TableSize) -> Mixing:
     if components <= min(max(colors, 3), most):
         return every, 0.0
     table = np.concatenate([part for t in transfers for part in _samples(t, size.top)], axis=1)
-    directions = np.linalg.svd(table, full_matrices=False)[0].T
+    directions = np.linalg.eigh(product(table, table.T))[1].T[::-1]
     peak = np.abs(exact.level).max() or 1.0
     for rank in range(1, components):
         mix = directions[:rank]
