@@ -165,9 +165,7 @@ def _wave_detail(path: OpticalPath, scene: WaveScene, level: NDArray) -> SceneDe
     )
 
 
-def _tile_detail(
-    path: OpticalPath, scene: Scene, level: NDArray, settled: Settled
-) -> SceneDetail:
+def _tile_detail(path: OpticalPath, scene: Scene, level: NDArray, settled: Settled) -> SceneDetail:
     """Return the power of tiles of points, each as much as it stands for.
 
     Those of most contrast come first: often they tell enough.
