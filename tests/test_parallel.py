@@ -1,10 +1,20 @@
-"""How many threads a frame is computed in, and that they see all of it."""
+"""How many threads a frame is computed in, that they see all of it, and what if few start."""
 
+import subprocess
+import sys
+import threading
+from pathlib import Path
+
+import numpy as np
 import pytest
 from making import camera
 
-from vcam_cli import parallel
-from vcam_cli.simulation import simulate
+import vcam_cli
+from vcam_cli import memory, parallel
+from vcam_cli.commands import options
+from vcam_cli.errors import CannotDo
+from vcam_cli.files.folder import OutputFolder
+from vcam_cli.simulation import outputs, simulate
 
 
 @pytest.mark.parametrize(
@@ -24,3 +34,87 @@ def test_every_item_is_done_and_errors_come_out(workers):
     assert sorted(done) == list(range(20))
     with pytest.raises(ZeroDivisionError):
         parallel.each(lambda item: 1 // (item - 3), range(5), workers)
+
+
+@pytest.fixture
+def thread_limit(monkeypatch):
+    """Lets so many further threads start, and no more; says so as CPython does."""
+
+    def limit(most: int) -> None:
+        start, started = threading.Thread.start, []
+
+        def refuse(self) -> None:
+            if sum(thread.is_alive() for thread in started) >= most:
+                raise RuntimeError("can't start new thread")
+            started.append(self)
+            start(self)
+
+        monkeypatch.setattr(threading.Thread, "start", refuse)
+
+    return limit
+
+
+@pytest.mark.parametrize("most", [1, 2, 3])
+def test_fewer_threads_do_the_work_of_more(most, thread_limit):
+    thread_limit(most)
+    done = []
+    parallel.each(done.append, range(50), 4)
+    assert sorted(done) == list(range(50))
+
+
+def test_no_thread_at_all_is_no_bug(thread_limit):
+    thread_limit(0)
+    assert parallel.results(str, range(5), 4) == ["0", "1", "2", "3", "4"]
+    with parallel.ThreadPool(2) as pool, pytest.raises(CannotDo, match="starts no thread"):
+        pool.submit(int)
+
+
+def test_a_run_with_one_thread_to_start(tmp_path, thread_limit):
+    """The frame is the same, and its files are written."""
+    made = camera(tmp_path, {"array.rows": 300, "array.columns": 200})
+    whole = simulate.simulate(made, 4)
+    thread_limit(1)
+    few = simulate.simulate(made, 4)
+    np.testing.assert_array_equal(few.dn, whole.dn)
+    with OutputFolder(tmp_path / "out") as folder:
+        outputs.write(few, folder)
+        folder.finish({})
+    assert (tmp_path / "out" / "raw.exr").exists()
+
+
+def test_threads_are_started_in_one_module_alone():
+    """So that what holds of them there holds of all."""
+    package = Path(vcam_cli.__file__).parent
+    users = [p.name for p in package.rglob("*.py") if "ThreadPoolExecutor" in p.read_text("utf-8")]
+    assert users == ["parallel.py"]
+
+
+def limited(megabytes: int) -> subprocess.CompletedProcess:
+    """`vcam list cameras` within so much address space."""
+    line = f"ulimit -v {megabytes * 1000}; exec {sys.executable} -m vcam_cli.commands.main"
+    return subprocess.run(
+        ["bash", "-c", f"{line} list cameras"], capture_output=True, text=True, timeout=60
+    )
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="ulimit -v is Linux's")
+@pytest.mark.parametrize("megabytes", [150, 300, 390])
+def test_little_address_space_is_told_before_libraries_hang(megabytes):
+    done = limited(megabytes)
+    assert done.returncode == 3, done
+    assert "address space" in done.stderr
+    assert len(done.stderr.splitlines()) == 1
+
+
+def test_limits_of_a_process_count_as_its_memory(monkeypatch):
+    monkeypatch.setattr(memory, "_address_space", lambda: 10**9)
+    assert memory.available() < 10**9
+
+
+def test_a_hundred_thousand_workers_are_as_many_as_help(capsys):
+    most = 4 * parallel.available_workers()
+    assert options.few_workers(100_000) == most
+    assert str(most) in capsys.readouterr().err
+    assert options.few_workers(most) == most
+    assert options.few_workers(None) is None
+    assert capsys.readouterr().err == ""

@@ -8,6 +8,9 @@ from pathlib import Path
 
 from vcam_cli.errors import CannotDo
 
+LEAST_ADDRESS_SPACE = 400_000_000
+"""Of a process that simulates a few pixels: interpreter, libraries, what they reserve [bytes]."""
+
 
 def available() -> int:
     """Return the memory that this process may still take [bytes].
@@ -24,17 +27,44 @@ def available() -> int:
         used = int(Path("/sys/fs/cgroup/memory.current").read_text())
         found.append(limit - used)
     system = len(found) > 1
-    with contextlib.suppress(ImportError, OSError, ValueError):
-        import resource
-
-        limit, _ = resource.getrlimit(resource.RLIMIT_AS)
-        if limit != resource.RLIM_INFINITY:
-            taken = int(Path("/proc/self/statm").read_text().split()[0])
-            found.append(limit - taken * resource.getpagesize())
+    space = _address_space()
+    if space is not None:
+        with contextlib.suppress(OSError, ValueError, AttributeError):
+            pages = int(Path("/proc/self/statm").read_text().split()[0])
+            found.append(space - pages * os.sysconf("SC_PAGE_SIZE"))
     if not system:
         with contextlib.suppress(OSError, ValueError, AttributeError):
             found.append(os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
     return min(found)
+
+
+def require_address_space() -> None:
+    """Raise CannotDo where the process's address space does not hold the libraries it needs.
+
+    To be asked before they are loaded: OpenBLAS waits forever for what it cannot have. It reserves
+    space for each of its threads, so where space is limited it gets one: vcam has threads of its
+    own.
+    """
+    limit = _address_space()
+    if limit is None:
+        return
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    if limit < LEAST_ADDRESS_SPACE:
+        raise CannotDo(
+            f"the process may have {limit / 1e6:.0f} MB of address space;"
+            f" {LEAST_ADDRESS_SPACE / 1e6:.0f} MB are needed at least",
+            "allow more (ulimit -v)",
+        )
+
+
+def _address_space() -> int | None:
+    """Return the address space that this process may have [bytes]; None for no limit."""
+    with contextlib.suppress(ImportError, OSError, ValueError):
+        import resource
+
+        limit, _ = resource.getrlimit(resource.RLIMIT_AS)
+        return None if limit == resource.RLIM_INFINITY else limit
+    return None
 
 
 def require(needed: int, rows: int, columns: int) -> None:

@@ -9,14 +9,17 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterable
 from concurrent.futures import Future, ThreadPoolExecutor
+from contextlib import suppress
 from typing import ParamSpec, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vcam_cli.errors import CannotDo
 from vcam_cli.interrupts import defer_interrupts
 
 Item = TypeVar("Item")
+Result = TypeVar("Result")
 Arguments = ParamSpec("Arguments")
 Returned = TypeVar("Returned")
 
@@ -47,8 +50,25 @@ def suitable_workers(pixels: int) -> int:
     return max(1, min(available_workers(), pixels // A_THREAD))
 
 
+class NoThread(CannotDo):
+    """The system starts no thread."""
+
+
 class ThreadPool(ThreadPoolExecutor):
-    """Threads that have ended when the context has, also when an interrupt ends it."""
+    """Threads that have ended when the context has, also when an interrupt ends it.
+
+    Where the system starts no more of them, those that there are do the work.
+    """
+
+    def _adjust_thread_count(self) -> None:
+        try:
+            super()._adjust_thread_count()
+        except RuntimeError as error:
+            if not self._threads:
+                raise NoThread(
+                    f"the system starts no thread: {error}",
+                    "write --workers 1, or allow more threads (ulimit -u)",
+                ) from error
 
     def submit(
         self,
@@ -69,14 +89,16 @@ class ThreadPool(ThreadPoolExecutor):
 
 def each(work: Callable[[Item], object], items: Iterable[Item], workers: int) -> None:
     """Call `work` on every item; raise the first exception that any of them raises."""
+    results(work, items, workers)
+
+
+def results(work: Callable[[Item], Result], items: Iterable[Item], workers: int) -> list[Result]:
+    """Return what `work` makes of every item; raise the first exception that it raises."""
     items = list(items)
-    if workers <= 1 or len(items) <= 1:
-        for item in items:
-            work(item)
-        return
-    with ThreadPool(min(workers, len(items))) as pool:
-        for _ in pool.map(work, items):
-            pass
+    if workers > 1 and len(items) > 1:
+        with suppress(NoThread), ThreadPool(min(workers, len(items))) as pool:
+            return list(pool.map(work, items))
+    return [work(item) for item in items]
 
 
 def rows_at_once(values: int) -> int:

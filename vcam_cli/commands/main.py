@@ -30,6 +30,7 @@ try:
         import typer
         from typer.core import TyperGroup
 
+        from vcam_cli import memory
         from vcam_cli.errors import CannotDo, VcamError
 except KeyboardInterrupt:
     sys.exit(interrupts.INTERRUPTED)
@@ -163,6 +164,11 @@ def _main() -> None:
     """Run the command line; end with its exit code."""
     _replace_closed_streams()
     _escape_stdout()
+    try:
+        memory.require_address_space()
+    except CannotDo as error:
+        _print_error(error)
+        sys.exit(error.exit_code)
     try:
         try:
             app(prog_name="vcam")

@@ -95,10 +95,31 @@ Json = Annotated[
     bool, typer.Option("--json", help="Machine-readable summary on stdout, nothing else there.")
 ]
 Quiet = Annotated[bool, typer.Option("-q", "--quiet", help="No messages but errors.")]
+MOST_WORKERS_A_CORE = 4
+"""Threads or processes, from which on more only wait for each other."""
+
+
+def few_workers(asked: int | None) -> int | None:
+    """Return how many of the workers that were asked for are used, and say which."""
+    if asked is None:
+        return None
+    from vcam_cli.parallel import available_workers
+
+    most = MOST_WORKERS_A_CORE * available_workers()
+    if asked <= most:
+        return asked
+    print(f"--workers {asked}: {most} are used, as more would not be faster", file=sys.stderr)
+    return most
+
+
 Workers = Annotated[
     int | None,
     typer.Option(
-        "--workers", metavar="N", min=1, help="Threads; default all cores. Results do not change."
+        "--workers",
+        metavar="N",
+        min=1,
+        callback=few_workers,
+        help="Threads; default all cores. Results do not change.",
     ),
 ]
 

@@ -70,7 +70,10 @@ class Progress:
 
     def __enter__(self) -> Self:
         if self._thread is not None:
-            self._thread.start()
+            try:
+                self._thread.start()
+            except RuntimeError:  # the system starts no thread: the work goes on without a bar
+                self._thread = None
         return self
 
     def __exit__(self, *_: object) -> None:

@@ -40,7 +40,11 @@ Study = Annotated[
 Processes = Annotated[
     int | None,
     typer.Option(
-        "--workers", metavar="N", min=1, help="Processes; default all cores. Results do not change."
+        "--workers",
+        metavar="N",
+        min=1,
+        callback=options.few_workers,
+        help="Processes; default all cores. Results do not change.",
     ),
 ]
 Scheduler = Annotated[

@@ -10,12 +10,12 @@ picture, `process_colors` on full-color values: the ideal image, and the white t
 """
 
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Protocol, TypeVar
 
 import numpy as np
 
+from vcam_cli.parallel import results
 from vcam_cli.spectra import Spectrum
 
 ROW_STEP, MAX_BLOCK_ROWS = 16, 64
@@ -161,11 +161,7 @@ def map_blocks(
     list
         Results in the order of rows.
     """
-    spans = list(blocks(*shape[-2:]))
-    if workers <= 1 or len(spans) == 1:
-        return [work(*span) for span in spans]
-    with ThreadPoolExecutor(min(workers, len(spans))) as pool:
-        return list(pool.map(lambda span: work(*span), spans))
+    return results(lambda span: work(*span), blocks(*shape[-2:]), workers)
 
 
 def mirrored_index(index: np.ndarray, count: int) -> np.ndarray:

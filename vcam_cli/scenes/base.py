@@ -11,13 +11,13 @@ Why two kinds of scene: a sinusoid is known in closed form and stays exact, all 
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from typing import Any, Literal, Protocol
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
+from vcam_cli.parallel import each
 from vcam_cli.scenes.cells import cell_edges, clip_cells, edges_within, uneven_points
 from vcam_cli.scenes.waves import WaveScene
 from vcam_cli.spectra import Spectrum
@@ -321,13 +321,7 @@ def paint_by_bands(paint: Callable[[slice], None], rows: int, columns: int, work
     """Call `paint` on bands of rows, which do not depend on the number of workers."""
     band = max(1, CELLS_A_BAND // columns)
     bands = [slice(top, min(top + band, rows)) for top in range(0, rows, band)]
-    if workers <= 1:
-        for rows_of_band in bands:
-            paint(rows_of_band)
-        return
-    with ThreadPoolExecutor(workers) as pool:
-        for _ in pool.map(paint, bands):
-            pass  # raises what `paint` has raised
+    each(paint, bands, workers)
 
 
 def chart_scene(
