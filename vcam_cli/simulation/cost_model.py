@@ -32,8 +32,11 @@ SAMPLE = 6e-9
 """Transforming one sample of one plane of the scene [s]."""
 PAINT = 22e-9
 """Painting one sample of one plane of a chart [s]."""
-FIXED = 0.008
-"""What does not depend on the size: tables of transfer, colors of patches, the plan [s]."""
+FIXED = 0.05
+"""What does not depend on the size: tables of transfer, colors of patches, the survey of the scene,
+the plan [s]."""
+INTERPOLATE = 1.5e-6
+"""One color of a scattered pixel onto the picture's grid [s]."""
 TERM = 1.3e-9
 """Filtering one term of the spectrum for one plane and color [s]."""
 TABLE = 1e-6
@@ -45,7 +48,7 @@ WAVE = 12e-9
 PROCESS = 14e-9
 """One pixel through demosaic to the render's codes [s]."""
 JUDGE = 60e-9
-"""One pixel of ideal image and metrics, per color [s]."""
+"""One pixel of ideal image and metrics, per color; the eye's metrics count the display's [s]."""
 EXR = 28e-9
 """One noisy value into an EXR file [s]."""
 ESTIMATE = 25e-9
@@ -63,9 +66,9 @@ def slowness() -> float:
     count = 1 << 17
     seconds = []
     for _ in range(3):
-        start = time.perf_counter()
+        start = time.thread_time()  # other processes do not count
         generator.standard_normal(count, dtype=np.float32)
-        seconds.append(time.perf_counter() - start)
+        seconds.append(time.thread_time() - start)
     return min(seconds) / count / NORMAL
 
 
@@ -95,7 +98,11 @@ def output_seconds(camera: Camera, geometry: Geometry, mosaic: Mosaic) -> float:
     if camera.output.render:
         seconds += (PROCESS + PNG * colors) * pixels
     if camera.quality:
-        seconds += (JUDGE * _places(camera, geometry) + EXR) * pixels * colors
+        seen = {"cielab", "s-cielab"} & set(camera.quality)
+        shown = 3 if seen else colors  # gray is judged in the display's colors, too
+        seconds += (JUDGE * _places(camera, geometry) * shown + EXR * colors) * pixels
+    if camera.array.is_scattered and (camera.output.render or camera.quality):
+        seconds += INTERPOLATE * pixels * colors
     return seconds
 
 
