@@ -29,10 +29,12 @@ RECORD = "study.json"
 _CLAIMS = ".claims"
 _KEPT = r"[0-9a-f]{32}\.(json|raw\.exr|render\.png)"
 _UNFINISHED = re.compile(rf"\.{_KEPT}\.\d+-[0-9a-f]{{8}}\.part")
-_POINT_FILE = re.compile(rf"{_KEPT}|\.claims|{_UNFINISHED.pattern}")
+_POINT_FILE = re.compile(rf"{_KEPT}|\.claims|\..*\.part")
 """The names in the folder of points."""
-_FINISHING = 1 << 61
-"""The byte that a process holds while it replaces tables; bytes below 2^60 are claims of points."""
+_STUDIES, _STUDIES_END = 1 << 60, 1 << 61
+"""Bytes of which each process holds its study's. Those before are claims of points."""
+_STARTING, _FINISHING = (1 << 61) + 1, (1 << 61) + 2
+"""Bytes that a process holds while it looks for other studies, and while it replaces tables."""
 _LARGEST = 1 << 20
 """The most bytes that a point's own file can have."""
 _ABANDONED = 3600.0
@@ -85,11 +87,15 @@ class SweepFolder:
         names |= set(os.listdir(self.path / POINTS))
         return all(map(_POINT_FILE.fullmatch, names - {POINTS}))
 
-    def begin(self, record: Mapping[str, Any]) -> dict[str, Any]:
+    def begin(self, record: Mapping[str, Any], study: str = "0") -> dict[str, Any]:
         """Return the record of the folder; write this one first where there is none.
 
-        Raise BadInput where a file that would be replaced is not as vcam wrote it.
+        study: hexadecimal hash of what the tables will show. Raise CannotDo where another process
+        is at work on another study here, BadInput where a file that would be replaced is not as
+        vcam wrote it.
         """
+        with self._locked(_STARTING):
+            self._claim_study(_STUDIES + _byte(study))
         with self._locked(_FINISHING):
             if not os.path.lexists(self.path / RECORD):
                 self._write_record(record, [])
@@ -100,6 +106,16 @@ class SweepFolder:
             proofs = Proofs(self.path, former)
             proofs.require(proofs.names)
             return former
+
+    def _claim_study(self, own: int) -> None:
+        """Hold the byte of a study, together with others of it. Raise CannotDo, see `begin`."""
+        for start, end in ((_STUDIES, own), (own + 1, _STUDIES_END)):
+            if not self._try_lock(start, end - start):
+                message = f"folder in use: another study is being written into {self.path}"
+                raise CannotDo(message, "wait for it, or choose another folder")
+            self._unlock(start, end - start)
+        with suppress(OSError):
+            fcntl.lockf(self._claims, fcntl.LOCK_SH, 1, own)
 
     def read(self, key: str, files: Sequence[str] = ()) -> dict[str, Any] | None:
         """Return what was written under a key; None where it is missing or corrupted.
@@ -147,16 +163,26 @@ class SweepFolder:
 
     def claim(self, point: str) -> bool:
         """Claim a point for this process; False where another process has it."""
+        return self._try_lock(_byte(point), 1)
+
+    def release(self, point: str) -> None:
+        """Give a claim back."""
+        self._unlock(_byte(point), 1)
+
+    def _try_lock(self, start: int, count: int) -> bool:
+        """Lock bytes for this process; False where another one has any of them."""
+        if not count:
+            return True
         try:
-            fcntl.lockf(self._claims, fcntl.LOCK_EX | fcntl.LOCK_NB, 1, _byte(point))
+            fcntl.lockf(self._claims, fcntl.LOCK_EX | fcntl.LOCK_NB, count, start)
         except OSError as error:  # a file system without locks claims nothing
             return not isinstance(error, BlockingIOError | PermissionError)
         return True
 
-    def release(self, point: str) -> None:
-        """Give a claim back."""
+    def _unlock(self, start: int, count: int) -> None:
         with suppress(OSError):
-            fcntl.lockf(self._claims, fcntl.LOCK_UN, 1, _byte(point))
+            if count:  # 0 would be all bytes to the end
+                fcntl.lockf(self._claims, fcntl.LOCK_UN, count, start)
 
     @contextmanager
     def _locked(self, byte: int) -> Iterator[None]:
@@ -166,8 +192,7 @@ class SweepFolder:
         try:
             yield
         finally:
-            with suppress(OSError):
-                fcntl.lockf(self._claims, fcntl.LOCK_UN, 1, byte)
+            self._unlock(byte, 1)
 
     def finish(
         self,

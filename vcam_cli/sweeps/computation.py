@@ -48,7 +48,7 @@ def computed_sweep(
     whole = provenance.versions()
     versions = {name: whole[name] for name in LIBRARIES}
     with SweepFolder(out) as folder:
-        former = folder.begin({"name": study.model.name, "versions": whole})
+        former = folder.begin({"name": study.model.name, "versions": whole}, grid.hash)
         if changed := _changes(former.get("versions"), versions):
             tell(f"points of other code are left out, and computed again ({changed})")
         points = _Points(grid, folder, execution.fresh, versions)

@@ -15,6 +15,7 @@ from vcam_cli.config.model import Model, Rule, all_or_none, at_most_one, exactly
 from vcam_cli.config.quantities import Whole
 from vcam_cli.config.validation_messages import describe, failure, fault, one_of
 from vcam_cli.config.values import Either, Text, Word, mapping
+from vcam_cli.errors import split
 from vcam_cli.sweeps import figure_model
 from vcam_cli.sweeps.figure_model import Figure
 from vcam_cli.sweeps.quantities import METRICS, PROPERTIES, is_measured
@@ -218,9 +219,10 @@ class Sweep(Model):
         return self
 
     def _wrong_paths(self) -> Iterator[InitErrorDetails]:
-        for name in self.repeat:
-            if name in self.vary:
-                yield fault(("repeat", name), "is varied too", "keep one of the two")
+        found: dict[tuple[str, ...], InitErrorDetails] = {}
+        for case in ("", *self.cases):
+            found |= self._overlaps(case)
+        yield from found.values()
         places: list[tuple[tuple[str, ...], Mapping[str, Any]]] = [
             ((VARY,), self.vary),
             (("repeat",), self.repeat),
@@ -232,6 +234,30 @@ class Sweep(Model):
                 if not name or "" in name.split("."):
                     message = f"{describe(name)} is not a path of a camera"
                     yield fault((*place, name), message, "write for example pixel.width")
+
+    def _overlaps(self, case: str) -> dict[tuple[str, ...], InitErrorDetails]:
+        """Place -> mistake of keys of which one would set what another's column says."""
+        own = self.cases[case].vary if case else {}
+        varied = {path: (VARY, path) for path in self.vary}
+        varied |= {path: ("cases", case, VARY, path) for path in own}
+        places = [*varied.values(), *(("repeat", path) for path in self.repeat)]
+        found = {}
+        for number, place in enumerate(places):
+            if self.seeds > 1 and overlap(place[-1], "seed.frame"):
+                message = "seeds counts on from this key, and rows would have other values"
+                found[place] = fault(place, message, "remove this key, or seeds")
+            for other in places[:number]:
+                if overlap(place[-1], other[-1]):
+                    message = f"is varied too, by {'.'.join(other)}"
+                    found[place] = fault(place, message, "keep one of the two")
+        return found
+
+
+def overlap(path: str, other: str) -> bool:
+    """Tell whether two paths are the same key, or one a part of the other."""
+    a, b = split(path), split(other)
+    shared = min(len(a), len(b))
+    return a[:shared] == b[:shared]
 
 
 def _wrong_expectation(

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import itertools
 import json
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
@@ -28,10 +28,10 @@ from vcam_cli.config.file_names import current_folder
 from vcam_cli.config.validation_messages import NO_SUCH_KEY
 from vcam_cli.config.yaml_tree import Node, Source, tree_at
 from vcam_cli.errors import BadInput, Problem, split
-from vcam_cli.files.report import hash_file, hash_text
+from vcam_cli.files.report import hash_file, hash_text, to_json
 from vcam_cli.simulation import provenance
 from vcam_cli.simulation.checks import CHECKS
-from vcam_cli.sweeps.model import Sweep
+from vcam_cli.sweeps.model import Sweep, overlap
 from vcam_cli.sweeps.sweep_file import Cell, Parameter, StudyCase, StudyFile
 
 MOST_POINTS = 1_000_000
@@ -76,6 +76,12 @@ class Grid:
     points: tuple[Point, ...]
     inputs: tuple[Path, ...]
     """Every file that was read, or will be."""
+
+    @property
+    def hash(self) -> str:
+        """The hash of all that the study's tables and figures show, wherever its files lie."""
+        model = self.study.model.model_dump(mode="json", exclude={"camera"})
+        return hash_text(to_json([model, [point.id for point in self.points]]))
 
     @property
     def problems(self) -> tuple[Problem, ...]:
@@ -123,17 +129,15 @@ def _parameters_by_path(parameters: Iterable[dict[str, Parameter]]) -> dict[str,
     return out
 
 
-def _refuse_sets(sets: Sequence[str], grid_paths: Iterable[str]) -> None:
+def _refuse_sets(sets: Sequence[str], grid_paths: Collection[str]) -> None:
     """Refuse overrides that would make a column of the table untrue. Raises BadInput."""
     problems = []
-    varied = [split(path) for path in grid_paths]
     for item in sets:
-        path = split(item.partition("=")[0].strip())
-        for other in varied:
-            n = min(len(path), len(other))
-            if path[:n] == other[:n]:
-                message = f"the study varies {'.'.join(map(str, other))}"
-                problems.append(Problem(path, message, "set another key", "--set"))
+        path = item.partition("=")[0].strip()
+        for other in grid_paths:
+            if overlap(path, other):
+                message = f"the study varies {other}"
+                problems.append(Problem(split(path), message, "set another key", "--set"))
     if problems:
         raise BadInput(problems)
 

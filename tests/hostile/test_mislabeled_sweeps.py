@@ -1,0 +1,156 @@
+"""Sweeps whose rows would not have the values that they show, or that write over each other."""
+
+import itertools
+import json
+import subprocess
+import sys
+import textwrap
+
+import pytest
+from sweeping import ROOT, environment, written
+
+from vcam_cli.errors import BadInput, CannotDo
+from vcam_cli.files.points_store import SweepFolder
+from vcam_cli.sweeps import sweep_file
+
+pytestmark = pytest.mark.attack("mislabeled rows of a sweep")
+SETS = {
+    "exposure": [{"time": "1 ms"}, {"time": "2 ms"}],
+    "exposure.time": ["3 ms", "4 ms"],
+    "pixel": [{"width": "5 um"}],
+    "pixel.readout": [{"read_noise": "1 e"}],
+    "pixel.readout.read_noise": ["2 e"],
+    "optics.f_number": [2, 4],
+}
+PAIRS = [(a, b) for a, b in itertools.permutations(SETS, 2) if b.startswith(f"{a}.")]
+PAIRS += [(b, a) for a, b in PAIRS]
+OVERLAPS = [(place, a, b) for place in ("grid", "case") for a, b in PAIRS]
+PAIRS += [(a, a) for a in SETS]
+OVERLAPS += [(place, a, b) for place in ("repeat", "case and repeat") for a, b in PAIRS]
+
+
+def values(path: str) -> dict:
+    return {path: {"values": SETS[path]}}
+
+
+def study(place: str, first: str, second: str) -> dict:
+    """Two keys at places of a study where both would act."""
+    match place:
+        case "grid":
+            return {"vary": values(first) | values(second)}
+        case "repeat":
+            return {"vary": values(first), "repeat": {second: SETS[second]}}
+        case "case":
+            return {"vary": values(first), "cases": {"a": {}, "b": {"vary": values(second)}}}
+        case "case and repeat":
+            own = {"a": {"vary": values(first)}}
+            vary = {"adc.bits": {"values": [10]}}
+            return {"vary": vary, "cases": own, "repeat": {second: SETS[second]}}
+    return {}
+
+
+@pytest.mark.parametrize(("place", "first", "second"), OVERLAPS, ids=" ".join)
+def test_keys_that_overlap(tmp_path, place, first, second):
+    with pytest.raises(BadInput) as caught:
+        sweep_file.read(written(tmp_path, **study(place, first, second)))
+    said = [str(p) for p in caught.value.problems]
+    assert len(said) == 1
+    assert "study.yaml:" in said[0]
+    assert first in said[0]
+    assert second in said[0]
+    assert said[0].endswith("; keep one of the two")
+
+
+@pytest.mark.parametrize("place", ["vary", "repeat", "case"])
+@pytest.mark.parametrize(("path", "value"), [("seed", {"frame": 3}), ("seed.frame", 3)])
+def test_a_seed_that_is_varied_and_counted(tmp_path, place, path, value):
+    own = {"values": [value]}
+    keys = {
+        "vary": {"vary": {path: own}},
+        "repeat": {"repeat": {path: [value]}},
+        "case": {"cases": {"a": {"vary": {path: own}}}},
+    }[place]
+    sweep_file.read(written(tmp_path, **keys))
+    with pytest.raises(BadInput, match="seeds counts on from this key"):
+        sweep_file.read(written(tmp_path, **keys, seeds=2))
+
+
+@pytest.mark.parametrize("other", ["exposure.times", "exposur", "pixel.readout2", "optics"])
+def test_keys_that_only_look_alike(tmp_path, other):
+    keys = {"exposure.time": {"values": ["1 ms"]}, "pixel.readout": {"values": [{}]}}
+    keys |= {other: {"values": [1]}}
+    sweep_file.read(written(tmp_path, vary=keys))
+
+
+HOLDER = """
+    import sys
+    from vcam_cli.files.points_store import SweepFolder
+    with SweepFolder(sys.argv[1]) as folder:
+        folder.begin({"name": "s"}, sys.argv[2])
+        print("at work", flush=True)
+        sys.stdin.read()
+"""
+
+
+class Holder:
+    """A process at work on a study in a folder."""
+
+    def __init__(self, folder, study: str) -> None:
+        self.process = subprocess.Popen(
+            [sys.executable, "-c", textwrap.dedent(HOLDER), str(folder), study],
+            stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=environment(), cwd=ROOT,
+        )  # fmt: skip
+        assert self.process.stdout.readline() == "at work\n"
+
+    def __enter__(self):
+        return self
+
+    def __exit__(self, *_):
+        self.process.communicate("")
+
+
+STUDIES = ["0" * 64, "f" * 64, "7" * 64, "7" * 14 + "8" * 50, "7" * 14 + "6" * 50]
+
+
+@pytest.mark.parametrize("first", STUDIES)
+def test_two_studies_in_one_folder_at_once(tmp_path, first):
+    """The second is refused unless it is the same; when the first has ended there is room."""
+    with Holder(tmp_path, first), Holder(tmp_path, first):
+        for study in STUDIES:
+            with SweepFolder(tmp_path) as folder:
+                if study == first:
+                    folder.begin({"name": "s"}, study)
+                    continue
+                with pytest.raises(CannotDo, match="folder in use: another study"):
+                    folder.begin({"name": "s"}, study)
+    for study in STUDIES:
+        with SweepFolder(tmp_path) as folder:
+            folder.begin({"name": "s"}, study)
+
+
+@pytest.mark.parametrize(
+    ("changes", "same"),
+    [({}, True), ({"name": "other"}, False), ({"metrics": ["snr_db"]}, False),
+     ({"seeds": 2}, False), ({"vary": {"adc.bits": {"values": [8]}}}, False)],
+)  # fmt: skip
+def test_whole_sweeps_at_once(tmp_path, changes, same):
+    """A sweep of a study that another process has in hand, or of another one."""
+    first = written(tmp_path / "a")
+    second = written(tmp_path / "b", **changes)
+    find = (
+        "import sys; from vcam_cli.sweeps import sweep_file, sweep_points;"
+        "print(sweep_points.grid(sweep_file.read(sys.argv[1])).hash)"
+    )
+    line = [sys.executable, "-c", find, str(first)]
+    known = subprocess.run(line, env=environment(), capture_output=True, text=True, check=True)
+    line = [sys.executable, "-m", "vcam_cli.commands.main", "sweep", str(second), "--workers", "1"]
+    with Holder(tmp_path / "out", known.stdout.strip()):
+        done = subprocess.run(
+            [*line, "--json", "-o", str(tmp_path / "out")],
+            env=environment(), capture_output=True, text=True,
+        )  # fmt: skip
+    assert done.returncode == (0 if same else 3), done
+    if same:
+        assert json.loads(done.stdout)["computed"] == 3
+    else:
+        assert done.stderr.startswith("folder in use: another study")
