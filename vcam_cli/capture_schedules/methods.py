@@ -150,6 +150,14 @@ class Task:
         """Whether the readout demands something of capture times."""
         return bool(self.constraints.min_gap or self.constraints.frame_time)
 
+    @property
+    def most_captures(self) -> float:
+        """Number of captures, as far apart as they must be, that fit the longest exposure."""
+        room, apart = self.sensor.max_time - self.first, self.constraints.read_interval
+        if not apart or math.isinf(room):
+            return math.inf
+        return 1 + math.floor(room / apart * (1 + SLACK))
+
     def optimum(self, counts: Sequence[int]) -> Schedules:
         """Return the optimal schedules of the plan, all numbers of captures found at once."""
         missing = sorted(set(counts) - self._optimum.keys())

@@ -263,11 +263,27 @@ class _StudyRun:
             task = Task(self.pdf, sensor, constraints, plan, self.seed)
         except ValueError as error:
             raise self._error(("constraints", "frame_time"), error) from None
+        self._check_room(task)
         if not task.single > LEAST_SNR:
             message = f"E[SNR] of a single capture is {task.single:.3g}: nothing to compare with"
             path = ("pdf",) if self.model.sensor is None else ("sensor",)
             raise self.study.error(path, message, "give it more light, or less noise")
         return task
+
+    def _check_room(self, task: Task) -> None:
+        """Raise BadInput where captures, as far apart as they must be, do not all fit."""
+        count, most = max(self.model.counts), task.most_captures
+        if count > most:
+            gap, longest = task.constraints.read_interval, task.sensor.max_time
+            message = (
+                f"{count} captures, {gap:.3g} s apart, do not fit between {task.first:.3g} s, the"
+                f" longest time of the brightest photocurrent, and {longest:.3g} s, the longest"
+                " exposure"
+            )
+            limits = self.model.constraints
+            key = "min_gap" if limits.min_gap >= limits.frame_time else "frame_time"
+            remedy = f"ask for {most} at most, or make it smaller"
+            raise self.study.error(("constraints", key), message, remedy)
 
     def _error(self, path: tuple[str, ...], error: ValueError) -> BadInput:
         message, _, remedy = str(error).partition("; ")

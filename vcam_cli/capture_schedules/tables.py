@@ -117,6 +117,7 @@ def notes(study: ScheduleStudy, task: Task, found: Sequence[MethodResult]) -> It
     """Yield a sentence for each thing that the numbers of a study leave unsaid."""
     yield from _probability_notes(study)
     yield from _level_notes(study, task)
+    yield from _gap_notes(task, found)
     yield from _approximation_notes(task, found)
     if study.sensor is not None:
         yield from _saturation_notes(task, found)
@@ -136,6 +137,16 @@ def _level_notes(study: ScheduleStudy, task: Task) -> Iterator[str]:
         are = "there is 1 level" if lit == 1 else f"there are {lit} levels"
         used = "1 is" if lit == 1 else f"{lit} are"
         yield f"{are} of light: of more captures than that, {used} used, the rest repeat"
+
+
+def _gap_notes(task: Task, found: Sequence[MethodResult]) -> Iterator[str]:
+    """Yield the captures of methods that come closer than the readout allows, and repeat."""
+    if not task.is_restricted or task.pdf.discrete:
+        return
+    for one in found:
+        if one.distinct_captures < one.count:
+            kept = f"{one.distinct_captures} of its {one.count} captures"
+            yield f"{one.method} keeps {kept} far enough apart; the rest repeat"
 
 
 def _approximation_notes(task: Task, found: Sequence[MethodResult]) -> Iterator[str]:

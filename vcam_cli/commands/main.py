@@ -163,7 +163,8 @@ def main() -> None:
 def _main() -> None:
     """Run the command line; end with its exit code."""
     _replace_closed_streams()
-    _escape_stdout()
+    for name in ("stdout", "stderr"):
+        _outlive_reader(name)
     try:
         memory.require_address_space()
     except CannotDo as error:
@@ -176,9 +177,6 @@ def _main() -> None:
             sys.stdout.flush()
     except KeyboardInterrupt:
         sys.exit(interrupts.INTERRUPTED)
-    except BrokenPipeError:  # the reader (head, less) has gone: nothing more to say
-        _discard_stdout()
-        sys.exit(1)
     except OSError as error:
         if error.errno not in WRITE_ERRORS or error.filename is not None:
             raise
@@ -203,10 +201,36 @@ def _replace_closed_streams() -> None:
             setattr(sys, name, io.StringIO())
 
 
-def _escape_stdout() -> None:
-    """Let stdout escape what its encoding lacks, as stderr does: file names can hold anything."""
-    if isinstance(sys.stdout, io.TextIOWrapper):
-        sys.stdout.reconfigure(errors="backslashreplace")
+class _Unread(io.FileIO):
+    """A descriptor whose reader (head, less) may go away: what comes then is discarded.
+
+    The command does its work all the same, and its exit code says what came of it.
+    """
+
+    def write(self, data: Any, /) -> int:
+        try:
+            return super().write(data)
+        except BrokenPipeError:
+            os.dup2(os.open(os.devnull, os.O_WRONLY), self.fileno())
+            return memoryview(data).nbytes
+
+
+def _outlive_reader(name: str) -> None:
+    """Let stdout or stderr outlive its reader, and escape what its encoding lacks.
+
+    File names can hold anything.
+    """
+    stream = getattr(sys, name)
+    if isinstance(stream, io.TextIOWrapper):
+        stream.flush()
+        stream = io.TextIOWrapper(
+            io.BufferedWriter(_Unread(stream.fileno(), "w", closefd=False)),
+            encoding=stream.encoding,
+            errors="backslashreplace",
+            line_buffering=stream.line_buffering or name == "stderr",
+            write_through=stream.write_through,
+        )
+        setattr(sys, name, stream)
 
 
 def _discard_stdout() -> None:

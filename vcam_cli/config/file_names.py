@@ -5,6 +5,7 @@ in `.yaml` is a path, relative to that file. A name never means the file it stan
 `csf.yaml` may well say `scene: csf`. Shipped files look up names in what ships alone.
 """
 
+import stat
 from dataclasses import replace
 from pathlib import Path
 
@@ -90,7 +91,8 @@ def existing_file(path: Path, text: str) -> Path:
         if path.is_file():
             return path
         if path.is_symlink():
-            raise bad((), f"{text!r} is a broken link", "point it to a file, or give another one")
+            where = f"link to {_kind(path)}" if path.exists() else "broken link"
+            raise bad((), f"{text!r} is a {where}", "point it to a file, or give another one")
         if path.exists():
             raise bad((), f"{text!r} is not a regular file", "give the path of a file")
         siblings = [p.name for p in path.parent.iterdir()] if path.parent.is_dir() else []
@@ -99,6 +101,13 @@ def existing_file(path: Path, text: str) -> Path:
     near = nearest(path.name, siblings)
     remedy = f"did you mean {near!r}?" if near else f"looked in {display_path(path.parent)}"
     raise bad((), f"there is no file {text!r}", remedy)
+
+
+def _kind(path: Path) -> str:
+    """Return what is at a path, links followed, that is no regular file."""
+    mode = path.stat().st_mode
+    kinds = {stat.S_IFDIR: "a folder", stat.S_IFIFO: "a pipe", stat.S_IFSOCK: "a socket"}
+    return kinds.get(stat.S_IFMT(mode), "a device")
 
 
 def current_folder() -> Path:

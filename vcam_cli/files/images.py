@@ -17,7 +17,6 @@ import numpy as np
 from vcam_cli import memory
 from vcam_cli.files.file_checks import (
     UnusableFile,
-    brief_reason,
     check_file,
     convert_errors,
     too_large,
@@ -113,8 +112,8 @@ def open_image(path: Path) -> Iterator[Any]:
     config.attribute("oiio:UnassociatedAlpha", 1)  # else colors come multiplied by alpha
     source = oiio.ImageInput.open(str(path.absolute()), config)
     if source is None:
-        reason = pending_error(oiio.geterror)
-        raise UnusableFile(f"is no image that can be read ({brief_reason(reason, path)})")
+        pending_error(oiio.geterror)  # text of a library, which names places in its own code
+        raise UnusableFile("is no image that can be read: of no known format, or damaged")
     try:
         if source.format_name() == "null":
             raise UnusableFile("is no image")
@@ -235,7 +234,7 @@ def read_samples(
         data = source.read_image(page, 0, first, last, name)
     reason = pending_error(source.geterror)
     if data is None or (reason and "extraneous bytes" not in reason):
-        raise truncated_file(reason)
+        raise truncated_file()
     order = [index - first for index in chosen]
     notes = ["the file has stray bytes in it"] if reason else []
     return (data if order == list(range(last - first)) else data[:, :, order]), notes

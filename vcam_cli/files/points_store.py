@@ -135,7 +135,7 @@ class SweepFolder:
                 with open(path, "rb") as file:
                     if hashlib.file_digest(file, "sha256").hexdigest() != digest:
                         raise ValueError(name)
-        except FileNotFoundError:
+        except (FileNotFoundError, IsADirectoryError):
             return None
         except OSError as error:
             message = f"cannot read {path}: {error.strerror}"
@@ -148,7 +148,14 @@ class SweepFolder:
     def write(
         self, key: str, content: Mapping[str, Any], files: Mapping[str, bytes] | None = None
     ) -> None:
-        """Keep a finished point and files beside it. Raise CannotDo."""
+        """Keep a finished point and files beside it.
+
+        Raise BadInput where a folder is in the place of one of them, CannotDo.
+        """
+        for name in ("json", *(files or {})):
+            path = self._file(key, name)
+            if path.is_dir() and not path.is_symlink():
+                raise bad((), f"{POINTS}/{path.name} is a folder", "move it away")
         hashes = {}
         for name, data in (files or {}).items():
             hashes[name] = hashlib.sha256(data).hexdigest()

@@ -18,7 +18,7 @@ from typing import Self
 import numpy as np
 
 from vcam_cli.errors import CannotDo
-from vcam_cli.files.atomic import cannot_write, displayed_path, write_whole
+from vcam_cli.files.atomic import cannot_write, write_whole
 from vcam_cli.files.image_library import oiio
 
 Attribute = str | int | float
@@ -104,8 +104,9 @@ class RowWriter:
         with suppress(OSError):
             if shutil.disk_usage(self._path.parent).free < _FULL:
                 return cannot_write(self._path, OSError(errno.ENOSPC, "disk full"))
-        text = f"cannot write {displayed_path(self._path)}: {reason or 'the write failed'}"
-        return CannotDo(text, "free some disk space, or choose another folder")
+        numbers = (errno.EFBIG, errno.EDQUOT, errno.EACCES, errno.EPERM, errno.EROFS, errno.EIO)
+        number = next((n for n in numbers if os.strerror(n) in reason), 0)
+        return cannot_write(self._path, OSError(number, "it could not be written whole"))
 
 
 def image_spec(height: int, width: int, channels: int, sample: str) -> oiio.ImageSpec:

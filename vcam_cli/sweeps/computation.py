@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from vcam_cli.camera.camera import Camera
+from vcam_cli.errors import BadInput
 from vcam_cli.files.points_store import POINTS, SweepFolder
 from vcam_cli.files.report import hash_file
 from vcam_cli.image_formation.rate_cache import light_key
@@ -22,7 +23,7 @@ from vcam_cli.sweeps.study_cameras import StudyCameras
 from vcam_cli.sweeps.sweep import Execution, Share
 from vcam_cli.sweeps.sweep_file import StudyFile
 from vcam_cli.sweeps.sweep_points import LIBRARIES, Grid
-from vcam_cli.sweeps.sweep_result import FRAMES, Outcome, SweepResult, read_outcome
+from vcam_cli.sweeps.sweep_result import FRAMES, Outcome, SweepResult, error_cell, read_outcome
 from vcam_cli.sweeps.sweep_tables import Findings
 from vcam_cli.sweeps.workers import Verdict
 
@@ -138,9 +139,12 @@ class _Points:
         return "compute"
 
     def keep(self, outcome: Outcome) -> None:
-        """Keep the outcome of a point."""
+        """Keep the outcome of a point; one that cannot be kept ends with an error."""
         content = outcome.content() | {"code": self._versions["code"]}
-        self._folder.write(outcome.id, content, outcome.frames)
+        try:
+            self._folder.write(outcome.id, content, outcome.frames)
+        except BadInput as error:
+            outcome = Outcome(outcome.id, error=error_cell(error.problems), final=False)
         self._folder.release(outcome.id)
         self.outcomes[outcome.id] = replace(outcome, frames={})
 

@@ -220,8 +220,8 @@ class Sweep(Model):
 
     def _wrong_paths(self) -> Iterator[InitErrorDetails]:
         found: dict[tuple[str, ...], InitErrorDetails] = {}
-        for case in ("", *self.cases):
-            found |= self._overlaps(case)
+        for name in ("", *self.cases):
+            found |= self._overlaps(name)
         yield from found.values()
         places: list[tuple[tuple[str, ...], Mapping[str, Any]]] = [
             ((VARY,), self.vary),
@@ -238,10 +238,10 @@ class Sweep(Model):
     def _overlaps(self, case: str) -> dict[tuple[str, ...], InitErrorDetails]:
         """Place -> mistake of keys of which one would set what another's column says."""
         own = self.cases[case].vary if case else {}
-        varied = {path: (VARY, path) for path in self.vary}
+        varied: dict[str, tuple[str, ...]] = {path: (VARY, path) for path in self.vary}
         varied |= {path: ("cases", case, VARY, path) for path in own}
         places = [*varied.values(), *(("repeat", path) for path in self.repeat)]
-        found = {}
+        found: dict[tuple[str, ...], InitErrorDetails] = {}
         for number, place in enumerate(places):
             if self.seeds > 1 and overlap(place[-1], "seed.frame"):
                 message = "seeds counts on from this key, and rows would have other values"

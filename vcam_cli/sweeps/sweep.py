@@ -11,6 +11,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from urllib.parse import urlsplit
 
 from vcam_cli.errors import bad
 from vcam_cli.progress import Observer, Silent
@@ -44,6 +45,23 @@ class Execution:
     """The address of a Dask scheduler that computes in their place."""
     fresh: bool = False
     """Whether finished points are computed again."""
+
+    def __post_init__(self) -> None:
+        if self.scheduler is not None:
+            _check_address(self.scheduler)
+
+
+def _check_address(address: str) -> None:
+    """Raise BadInput for what is no address of a scheduler, before Dask sees it."""
+    try:
+        parts = urlsplit(address if "://" in address else f"tcp://{address}")
+        is_address = parts.scheme in ("tcp", "tls") and parts.hostname and parts.port
+    except ValueError:
+        is_address = False
+    rest = address.rpartition("://")[2]
+    if not is_address or not rest.isprintable() or set(rest) & set(" /?#@\\"):
+        message = f"{address!a} is no address of a Dask scheduler"
+        raise bad("--scheduler", message, "write tcp://HOST:8786")
 
 
 def sweep(

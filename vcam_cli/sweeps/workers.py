@@ -11,6 +11,7 @@ they run the caller's script again.
 
 from __future__ import annotations
 
+import asyncio
 import logging
 import os
 import subprocess
@@ -19,14 +20,14 @@ import time
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, wait
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from importlib import import_module
 from multiprocessing import Pipe
 from multiprocessing.connection import Connection
 from threading import Lock
 from typing import Any, Literal
 
-from vcam_cli.errors import CannotDo, bad
+from vcam_cli.errors import CannotDo
 from vcam_cli.parallel import ThreadPool, available_workers
 from vcam_cli.simulation.shared import Shared
 from vcam_cli.sweeps.point_work import Job, compute_on_cluster, compute_point
@@ -126,7 +127,15 @@ def compute_on_dask(
     groups: Groups, ask: Ask, address: str, report: Callable[[str], None]
 ) -> Iterator[Outcome]:
     """Compute points on the workers of a running Dask scheduler. Raise CannotDo without one."""
-    client = _client(address)
+    distributed = _distributed()
+    with _silence("distributed", "tornado", "asyncio"):  # which report what is said in a line
+        yield from _compute_on_dask(groups, ask, distributed, address, report)
+
+
+def _compute_on_dask(
+    groups: Groups, ask: Ask, distributed: Any, address: str, report: Callable[[str], None]
+) -> Iterator[Outcome]:
+    client = _client(distributed, address)
     lost = f"the Dask scheduler at {address} is lost; finished points are kept"
     try:
         slots = _slots(client, address, report)
@@ -257,19 +266,47 @@ def _outcome(job: Job, future: Any, lost: str) -> Outcome:
     return future.result()
 
 
-def _client(address: str) -> Any:
-    """Return a client of the scheduler. Raise CannotDo, and BadInput for no address."""
+@contextmanager
+def _silence(*names: str) -> Iterator[None]:
+    """Silence these loggers and those below them, each of which may have a level of its own."""
+    below = tuple(f"{name}." for name in names)
+    found = [name for name in logging.root.manager.loggerDict if name.startswith(below)]
+    loggers = [logging.getLogger(name) for name in (*names, *found)]
+    levels = [logger.level for logger in loggers]
     try:
-        distributed: Any = import_module("distributed")
+        for logger in loggers:
+            logger.setLevel(logging.CRITICAL + 1)
+        yield
+    finally:
+        for logger, level in zip(loggers, levels, strict=True):
+            logger.setLevel(level)
+
+
+def _distributed() -> Any:
+    """Return Dask's package. Raise CannotDo where it is not installed."""
+    try:
+        return import_module("distributed")
     except ImportError as error:
         message = "--scheduler needs Dask, which is not installed"
         raise CannotDo(message, "pip install 'vcam-cli[dask]'") from error
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)
+
+
+def _client(distributed: Any, address: str) -> Any:
+    """Return a client of the scheduler. Raise CannotDo where there is none."""
+    arguments = distributed.Security().get_connection_args("client")
+    if address.startswith("tls") and not arguments.get("ssl_context"):
+        message = f"Dask's configuration has no certificates for {address}"
+        raise CannotDo(message, "set distributed.comm.tls there, or use tcp://HOST:8786")
+
+    async def connect() -> None:  # a client itself waits forever for one that says nothing
+        async with asyncio.timeout(CONNECT_TIMEOUT):
+            (await distributed.comm.connect(address, CONNECT_TIMEOUT, **arguments)).abort()
+
     try:
+        with ThreadPool(1) as pool:  # whose thread has no event loop yet
+            pool.submit(lambda: asyncio.run(connect())).result()
         return distributed.Client(address, timeout=CONNECT_TIMEOUT, set_as_default=False)
-    except ValueError as error:
-        raise bad("--scheduler", f"{address!r}: {error}", "write tcp://HOST:8786") from error
-    except (OSError, TimeoutError) as error:
+    except (OSError, ValueError) as error:
         message = f"no Dask scheduler answers at {address} within {CONNECT_TIMEOUT:g} s"
         raise CannotDo(message, "start one with: dask scheduler") from error
 
