@@ -23,7 +23,7 @@ PACKAGE = Path(vcam_cli.__file__).parent
 
 FLOORS = (
     {"errors", "interrupts"},
-    {"units", "rng", "progress", "parallel"},
+    {"units", "rng", "progress", "parallel", "floats"},
     {"memory", "spectra", "scheduling", "source_code"},
     {"physics"},
     {"config"},

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from functools import cache
+from os import PathLike
 from pathlib import Path
 
 from vcam_cli.camera.camera import Camera
@@ -14,6 +15,7 @@ from vcam_cli.config.file_names import current_folder
 from vcam_cli.config.merge import Alternatives, MergeRules
 from vcam_cli.config.yaml_tree import Node
 from vcam_cli.errors import BadInput
+from vcam_cli.floats import own_float_errors
 
 EXAMPLE = "starter"
 """The shipped camera whose sections stand in for those that a file has wrong."""
@@ -86,6 +88,7 @@ FORMAT = FileFormat(
 )
 
 
+@own_float_errors
 def load(
     camera: str | Path,
     sets: Sequence[str] = (),
@@ -116,7 +119,13 @@ def load(
         With every problem of the file.
     CannotDo
         Where a file may not be read.
+    TypeError
+        For what is no name, or no list of overrides.
     """
+    if not isinstance(camera, str | PathLike):
+        raise TypeError(f"{camera!r} is no file or name of a camera")
+    if not isinstance(sets, list | tuple) or not all(isinstance(item, str) for item in sets):
+        raise TypeError(f'{sets!r} is no list of overrides; write ["pixel.width=8 um"]')
     start = folder or current_folder()
     return read(camera, start).overlay(overlay(sets, start)).validate(checks)
 

@@ -29,6 +29,7 @@ from vcam_cli.errors import BadInput
 from vcam_cli.files.folder import OutputFolder
 from vcam_cli.files.points_store import RECORD
 from vcam_cli.files.report import hash_file
+from vcam_cli.floats import own_float_errors
 from vcam_cli.progress import Observer, Silent
 from vcam_cli.scheduling.pdf import Pdf
 from vcam_cli.simulation import provenance
@@ -127,6 +128,7 @@ class ScheduleResult:
         }
 
 
+@own_float_errors
 def schedule(
     study: str | Path,
     out: str | Path | None = None,

@@ -17,6 +17,7 @@ from vcam_cli.camera.camera import Camera
 from vcam_cli.effects.base import Gain, of_kind
 from vcam_cli.effects.order import quantizer
 from vcam_cli.effects.signal_chain import NoiseSource, Quantizer
+from vcam_cli.floats import own_float_errors
 from vcam_cli.image_formation import photon_rate
 from vcam_cli.image_formation.rate_cache import RateCache
 from vcam_cli.parallel import available_workers
@@ -62,6 +63,7 @@ class Frame(Prepared):
         )
 
     @cached_property
+    @own_float_errors
     def picture_dn(self) -> NDArray:
         """What is made into a picture, in the shape of `dn` [DN].
 

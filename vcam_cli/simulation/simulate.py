@@ -16,6 +16,7 @@ from vcam_cli.camera.derived import photodiode
 from vcam_cli.camera.derived.electrical import no_volts
 from vcam_cli.camera.derived.geometry import geometry
 from vcam_cli.errors import BadInput
+from vcam_cli.floats import own_float_errors
 from vcam_cli.parallel import suitable_workers
 from vcam_cli.processing import Context, Patches, ProcessedPicture, process
 from vcam_cli.progress import Observer, Silent, Stages
@@ -57,6 +58,7 @@ class Result:
     """What a user should know of the frame."""
 
     @cached_property
+    @own_float_errors
     def processed(self) -> ProcessedPicture:
         """The picture with its steps prepared; a raw frame alone does not need it."""
         with self.stages("balance"):
@@ -159,6 +161,7 @@ class Result:
         return values[0] if places else values
 
     @cached_property
+    @own_float_errors
     def render(self) -> NDArray:
         """Codes of the render after `processing`: (rows, columns) or (rows, columns, 3).
 
@@ -169,6 +172,7 @@ class Result:
             return picture.encode(self.frame.camera.output.render or 8)
 
     @cached_property
+    @own_float_errors
     def linear(self) -> NDArray:
         """The render in linear light, perfect white = 1: (rows, columns, channels)."""
         picture = self.processed
@@ -176,6 +180,7 @@ class Result:
             return picture.linear
 
     @cached_property
+    @own_float_errors
     def ideal(self) -> NDArray:
         """The scene point-sampled in the same colors and scale: (rows, columns, channels)."""
         picture = self.processed
@@ -183,6 +188,7 @@ class Result:
             return picture.ideal(self.frame.ideal_dn())
 
     @cached_property
+    @own_float_errors
     def s_cielab(self) -> NDArray:
         """S-CIELAB Delta E of the render from the ideal image on the camera's `display`."""
         image, ideal, screen = self.linear, self.ideal, self._screen
@@ -195,6 +201,7 @@ class Result:
         return display.display_screen(self.frame.camera.display, len(self.frame.layout.picture_x))
 
     @cached_property
+    @own_float_errors
     def metrics(self) -> list[tuple[str, float, str]]:
         """(metric, value, unit): those every run has, then those that `quality` asks for."""
         out = figures(self.frame)
@@ -222,6 +229,7 @@ def threads(camera: Camera) -> int:
     return suitable_workers(g.rows * g.columns)
 
 
+@own_float_errors
 def simulate(
     camera: Camera,
     workers: int | None = None,
@@ -247,7 +255,11 @@ def simulate(
         For a camera that contradicts itself, with positions in its file.
     CannotDo
         Where memory does not suffice.
+    TypeError
+        For what is no camera, such as the name of a file.
     """
+    if not isinstance(camera, Camera):
+        raise TypeError(f'{camera!r} is no camera; write simulate(load("camera.yaml"))')
     try:
         stages = Stages(watch=watch or Silent())
         return _simulate(camera, workers or threads(camera), stages, shared or Shared())
@@ -255,6 +267,7 @@ def simulate(
         raise error.with_places(camera.locate) from None
 
 
+@own_float_errors
 def prepare(
     camera: Camera, workers: int | None = None, watch: Observer | None = None
 ) -> tuple[Prepared, tuple[str, ...]]:
@@ -341,7 +354,7 @@ def _simulate(camera: Camera, workers: int, stages: Stages, shared: Shared) -> R
         black_dn=frame.black_dn,
         linearize=None if frame.electrical.reference is None else frame.linear,
         saturated_dn=frame.picture_saturated_dn,
-        patches=lambda: _patches(frame),
+        patches=partial(_patches, frame),
         planes=frame.layout.full_color,
         layout=frame.layout if frame.layout.is_scattered else None,
     )

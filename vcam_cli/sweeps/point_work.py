@@ -10,6 +10,7 @@ from vcam_cli.camera.camera import Camera
 from vcam_cli.errors import BadInput, CannotDo, one_line
 from vcam_cli.files.atomic import written_bytes
 from vcam_cli.files.png import write_png
+from vcam_cli.floats import own_float_errors
 from vcam_cli.interrupts import restore_interrupt
 from vcam_cli.parallel import available_workers
 from vcam_cli.simulation import outputs
@@ -35,6 +36,7 @@ class Job:
     """The hash of the code, and the versions of the libraries, of the process that asks."""
 
 
+@own_float_errors
 def compute_point(job: Job, threads: int, shared: Shared) -> Outcome:
     """Return the outcome of a point; an error is one, an interrupt is not."""
     start = time.perf_counter()
