@@ -39,6 +39,9 @@ MOST = 1 << 26
 """Cells at most."""
 LADDER = (1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 16.0, 24.0, 32.0, 48.0)
 """Cells per pixel pitch that are tried on crops."""
+OVEREXPOSED = 2.0
+"""Cells of charts that fill pixels, at least: fewer end the spectrum within that of the pixels, and
+bright light rings into dark pixels that are on none of the crops."""
 COPRIME = 1.37
 """Cells of a crop's reference over those that reach the cut-off."""
 CROP = 24
@@ -105,22 +108,39 @@ def cells_per_pixel(path: OpticalPath, scene: ChartScene, highest: float) -> tup
         return finest, 0.0
     level = path.transfer.level[:, int(path.transfer.level.sum(axis=0).argmax())]
     otf = _mean_otf(path, finest)
-    crops = _crops(path.geometry, scene, reference, level)
-
-    def images(cells: float) -> NDArray:
-        return np.minimum(_signals(path, crops, cells, level, otf), path.ceiling)
-
-    converged = images(reference)
-    full = float(converged.max())
+    crops = _crops(path, scene, reference, level)
+    converged = _signals(path, crops, reference, level, otf)
+    full = min(float(converged.max()), path.ceiling)
     budget = CELLS_SHARE * path.settings.tolerance * full
     whole = math.prod(cell_grid(scene, path.geometry, 1.0))
     most = min(finest, max(1.0, math.sqrt(MOST / whole)))
+    least = OVEREXPOSED if converged.max() > path.ceiling else 0.0
     error = 0.0
-    for cells in [c for c in LADDER if c < most] + [most]:
-        error = math.sqrt(float(np.square(images(cells) - converged).mean()))
+    for cells in [c for c in LADDER if least <= c < most] + [most]:
+        found = _signals(path, crops, cells, level, otf)
+        error = _error_that_counts(found, converged, path.ceiling)
         if error <= budget:
             return cells, error
     return most, error
+
+
+def _error_that_counts(found: NDArray, converged: NDArray, ceiling: float) -> float:
+    """Return the rms of the error of crops (crops, rows, columns) that full pixels do not hide.
+
+    Where light is far brighter than what fills a pixel, hardly any error counts; but the few that
+    do, below it, are as large as full signal, and a crop has too few pixels to show them. So the
+    errors of a crop are also given to its darkest pixels first, from either end.
+    """
+    full = np.minimum(converged, ceiling)
+    squares = np.square(np.minimum(found, ceiling) - full).mean()
+    if converged.max() > ceiling:
+        crops = len(found), -1
+        light = np.sort(converged.reshape(crops), axis=1)
+        errors = np.sort((found - converged).reshape(crops), axis=1)
+        for moved in (errors, errors[:, ::-1]):
+            changed = np.clip(light + moved, 0, ceiling) - np.minimum(light, ceiling)
+            squares = max(squares, np.square(changed).mean())
+    return math.sqrt(float(squares))
 
 
 Table = tuple[NDArray, NDArray]
@@ -140,33 +160,38 @@ def _mean_otf(path: OpticalPath, highest: float) -> Table:
     return f, otf
 
 
-def _crops(g: Geometry, scene: ChartScene, cells: float, level: NDArray) -> list[ChartScene]:
+def _crops(path: OpticalPath, scene: ChartScene, cells: float, level: NDArray) -> list[ChartScene]:
     """Return places of a chart on which cells are tried.
 
     `cells` are those of the reference, per pixel pitch.
     """
+    g = path.geometry
     side = int(max(4, min(CROP, CROP_CELLS / cells, g.rows, g.columns)))
     size = side * g.pitch_x, side * g.pitch_y
     half = (g.sensor_width - size[0]) / 2, (g.sensor_height - size[1]) / 2
     even = 2 * (np.arange(1, FEW + 1)[:, None] * EVEN % 1) - 1
-    busy = _busiest(g, scene, level)
+    busy = _busiest(path, scene, level)
     places = np.clip(np.concatenate([[(0, 0)], even * half, busy]), -np.array(half), half)
     return [scene.crop((float(x), float(y)), *size) for x, y in places]
 
 
-def _busiest(g: Geometry, scene: ChartScene, level: NDArray) -> NDArray:
-    """Return the centers (FEW, 2) of the parts of most contrast [m].
+def _busiest(path: OpticalPath, scene: ChartScene, level: NDArray) -> NDArray:
+    """Return the centers (n, 2) of the parts of most contrast, with and without a ceiling [m].
 
     They come from values at points with uneven steps, which share no factor with what repeats in a
     chart.
     """
+    g = path.geometry
     k = np.arange(BLOCKS * POINTS)
     x, y = (
         ((k + k * step % 1) / len(k) - 0.5) * length
         for length, step in zip((g.sensor_width, g.sensor_height), EVEN, strict=True)
     )
     light = scene.values_at(x, y, level[None])[0].reshape(BLOCKS, POINTS, BLOCKS, POINTS)
-    order = np.argsort(light.var(axis=(1, 3)).ravel())[::-1][:FEW]
+    contrasts = [light.var(axis=(1, 3)).ravel()]
+    if light.max() > path.ceiling:
+        contrasts.append(np.minimum(light, path.ceiling).var(axis=(1, 3)).ravel())
+    order = np.concatenate([np.argsort(contrast)[::-1][:FEW] for contrast in contrasts])
     centers = (np.stack([order % BLOCKS, order // BLOCKS], axis=1) + 0.5) / BLOCKS - 0.5
     return np.asarray(centers * (g.sensor_width, g.sensor_height))
 
