@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 from sweeping import written
 
-from vcam_cli import source_code
+from vcam_cli import load, source_code
 from vcam_cli.errors import CannotDo
 from vcam_cli.simulation.shared import Shared
 from vcam_cli.sweeps import computation, point_work
@@ -161,10 +161,9 @@ def test_shares_of_one_folder_by_two_programs(tmp_path):
 def test_a_worker_with_other_code_computes_nothing(tmp_path, monkeypatch, name, when):
     """In a process of its own, or on a cluster: alike `compute_point`, wherever it runs."""
     versions = point_work.versions()
-    job = computation.Job("ab", None, (), (), {name: versions[name]})
+    job = computation.Job("ab", load("starter"), (), (), {name: versions[name]})
     later = iter([versions if when == "meanwhile" else {}, {}])
     monkeypatch.setattr(point_work, "versions", lambda: next(later))
-    monkeypatch.setattr(point_work, "with_every_effect", lambda camera: camera)
     monkeypatch.setattr(point_work, "simulate", lambda *_, **__: None)
     outcome = point_work.compute_point(job, 1, Shared())
     assert outcome.error.startswith(f"the worker has {name} None, the sweep {versions[name]}; ")
