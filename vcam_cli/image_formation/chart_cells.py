@@ -44,10 +44,10 @@ OVEREXPOSED = 2.0
 bright light rings into dark pixels that are on none of the crops."""
 COPRIME = 1.37
 """Cells of a crop's reference over those that reach the cut-off."""
-CROP = 24
-"""Pixels along a side of a crop."""
-CROP_CELLS = 320
-"""Cells along a side of a crop's reference, at most."""
+CROP, SMALLEST_CROP = 24, 12
+"""Pixels along a side of a crop, and of the smallest: fewer show too little of a chart."""
+CROP_CELLS, MOST_CROP_CELLS = 320, 480
+"""Cells along a side of a crop's reference, and of that of the smallest crops at most."""
 BLOCKS, POINTS = 16, 12
 """Parts of a chart along each axis that are compared by contrast, and points along each."""
 FEW = 3
@@ -103,7 +103,7 @@ def cells_per_pixel(path: OpticalPath, scene: ChartScene, highest: float) -> tup
     if path.settings.oversampling is not None:
         return path.settings.oversampling, 0.0
     asked = highest * max(BEYOND_CUTOFF, math.sqrt(FOLDED / path.settings.tolerance))
-    finest, reference = SAFE * asked, COPRIME * asked
+    finest, reference = SAFE * asked, min(COPRIME * asked, MOST_CROP_CELLS / SMALLEST_CROP)
     if math.prod(cell_grid(scene, path.geometry, finest)) <= CHEAP:
         return finest, 0.0
     level = path.transfer.level[:, int(path.transfer.level.sum(axis=0).argmax())]
@@ -116,7 +116,7 @@ def cells_per_pixel(path: OpticalPath, scene: ChartScene, highest: float) -> tup
     most = min(finest, max(1.0, math.sqrt(MOST / whole)))
     least = OVEREXPOSED if converged.max() > path.ceiling else 0.0
     error = 0.0
-    for cells in [c for c in LADDER if least <= c < most] + [most]:
+    for cells in [c for c in (*LADDER, most) if least <= c <= min(most, reference / COPRIME)]:
         found = _signals(path, crops, cells, level, otf)
         error = _error_that_counts(found, converged, path.ceiling)
         if error <= budget:
@@ -166,7 +166,7 @@ def _crops(path: OpticalPath, scene: ChartScene, cells: float, level: NDArray) -
     `cells` are those of the reference, per pixel pitch.
     """
     g = path.geometry
-    side = int(max(4, min(CROP, CROP_CELLS / cells, g.rows, g.columns)))
+    side = int(min(max(SMALLEST_CROP, CROP_CELLS / cells), CROP, g.rows, g.columns))
     size = side * g.pitch_x, side * g.pitch_y
     half = (g.sensor_width - size[0]) / 2, (g.sensor_height - size[1]) / 2
     even = 2 * (np.arange(1, FEW + 1)[:, None] * EVEN % 1) - 1
