@@ -110,7 +110,8 @@ def cells_per_pixel(path: OpticalPath, scene: ChartScene, highest: float) -> tup
     otf = _mean_otf(path, finest)
     crops = _crops(path, scene, reference, level)
     converged = _signals(path, crops, reference, level, otf)
-    full = min(float(converged.max()), path.ceiling)
+    g = path.geometry
+    full = min(float(_within(g, converged).max()), path.ceiling)
     budget = CELLS_SHARE * path.settings.tolerance * full
     whole = math.prod(cell_grid(scene, path.geometry, 1.0))
     most = min(finest, max(1.0, math.sqrt(MOST / whole)))
@@ -118,7 +119,11 @@ def cells_per_pixel(path: OpticalPath, scene: ChartScene, highest: float) -> tup
     error = 0.0
     for cells in [c for c in (*LADDER, most) if least <= c <= min(most, reference / COPRIME)]:
         found = _signals(path, crops, cells, level, otf)
-        error = _error_that_counts(found, converged, path.ceiling)
+        # Few pixels may have no error by chance; many around them may hide theirs.
+        error = max(
+            _error_that_counts(found, converged, path.ceiling),
+            _error_that_counts(*(_within(g, image) for image in (found, converged)), path.ceiling),
+        )
         if error <= budget:
             return cells, error
     return most, error
@@ -166,13 +171,25 @@ def _crops(path: OpticalPath, scene: ChartScene, cells: float, level: NDArray) -
     `cells` are those of the reference, per pixel pitch.
     """
     g = path.geometry
-    side = int(min(max(SMALLEST_CROP, CROP_CELLS / cells), CROP, g.rows, g.columns))
+    side = int(np.clip(CROP_CELLS / cells, SMALLEST_CROP, CROP))
     size = side * g.pitch_x, side * g.pitch_y
-    half = (g.sensor_width - size[0]) / 2, (g.sensor_height - size[1]) / 2
+    sensor = g.sensor_width, g.sensor_height
+    half = np.maximum(np.subtract(sensor, size) / 2, 0)  # a small array is amid each
     even = 2 * (np.arange(1, FEW + 1)[:, None] * EVEN % 1) - 1
     busy = _busiest(path, scene, level)
-    places = np.clip(np.concatenate([[(0, 0)], even * half, busy]), -np.array(half), half)
+    places = np.clip(np.concatenate([[(0, 0)], even * half, busy]), -half, half)
     return [scene.crop((float(x), float(y)), *size) for x, y in places]
+
+
+def _within(g: Geometry, signals: NDArray) -> NDArray:
+    """Return the pixels of crops (crops, rows, columns) that are those of the array."""
+    rows, columns = (
+        slice((side - n) // 2, (side + n + 1) // 2)
+        for side, n in zip(
+            signals.shape[1:], np.minimum(signals.shape[1:], (g.rows, g.columns)), strict=True
+        )
+    )
+    return signals[:, rows, columns]
 
 
 def _busiest(path: OpticalPath, scene: ChartScene, level: NDArray) -> NDArray:
