@@ -122,7 +122,7 @@ def cells_per_pixel(path: OpticalPath, scene: ChartScene, highest: float) -> tup
         # Few pixels may have no error by chance; many around them may hide theirs.
         error = max(
             _error_that_counts(found, converged, path.ceiling),
-            _error_that_counts(*(_within(g, image) for image in (found, converged)), path.ceiling),
+            _error_that_counts(_within(g, found), _within(g, converged), path.ceiling),
         )
         if error <= budget:
             return cells, error
