@@ -125,7 +125,7 @@ def test_finer_pixels_in_the_same_size_come_closer_to_the_ideal_image():
             "honeycomb", QUIET, array, f"pixel.width={pitch} um", "quality=[psnr]", "adc.bits=14",
             "exposure.auto.max=10 s",
         )  # fmt: skip
-        psnr.append(dict((m[0], m[1]) for m in result.metrics)["psnr_db"])
+        psnr.append(result.metrics["psnr_db"])
     assert psnr[1] > psnr[0] + 2
     assert psnr[2] > psnr[1] + 2
 

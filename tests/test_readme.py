@@ -51,7 +51,8 @@ def test_the_camera_file_runs(tmp_path, monkeypatch):
 
 
 @pytest.mark.long
-def test_the_python_lines_work():
+def test_the_python_lines_work(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
     code = next(body for kind, body in BLOCKS if kind == "python")
     exec(code.replace('"still-life"', '"still-life", ["array.rows=48", "array.columns=64"]'), {})
 

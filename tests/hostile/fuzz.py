@@ -100,7 +100,7 @@ def taken(camera: Camera) -> tuple[str, str]:
         sets.append("scene.source={kind: chart, chart: slanted-edge}")
     small = load(FILE, sets)
     result = simulate(small, 1)
-    wrong = [name for name, value, _ in result.metrics if value != value]
+    wrong = [name for name, value in result.metrics.items() if value != value]
     if wrong or not (np.isfinite(result.electrons).all() and np.isfinite(result.dn).all()):
         return "bug", f"not finite: {wrong or 'the frame'}"
     return "simulated", ""

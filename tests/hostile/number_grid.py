@@ -162,7 +162,7 @@ def of_frame(camera: Camera) -> tuple[str, str]:
     if camera.output.render:
         arrays["render"] = result.render
     wrong = [name for name, value in arrays.items() if not np.isfinite(value).all()]
-    wrong += [name for name, value, _ in result.metrics if math.isnan(value)]
+    wrong += [name for name, value in result.metrics.items() if math.isnan(value)]
     return ("bug", f"not finite: {wrong}") if wrong else ("frame", "")
 
 

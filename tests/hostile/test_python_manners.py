@@ -16,7 +16,7 @@ SETS = ["array.rows=16", "array.columns=18", "accuracy=draft", "quality=[mse]"]
 
 def arrays(result) -> list:
     found = [result.dn, result.electrons, result.linear, result.ideal, result.render]
-    return [np.asarray(each) for each in found] + [[v for _, v, _ in result.metrics]]
+    return [np.asarray(each) for each in found] + [list(result.metrics.values())]
 
 
 @pytest.fixture(scope="module", params=CAMERAS)

@@ -53,7 +53,7 @@ def held(result: Result) -> None:
     assert (result.electrons <= e.full_well * joined * (1 + 4 * SINGLE)).all()
     assert ((result.dn >= 0) & (result.dn <= e.highest_code * joined)).all()
     assert np.array_equal(result.dn, np.rint(result.dn))
-    for name, value, _ in result.metrics:
+    for name, value in result.metrics.items():
         assert not math.isnan(value), name
     assert result.render.min() >= 0
 

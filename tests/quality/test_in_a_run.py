@@ -20,7 +20,7 @@ CHART = {
 
 
 def metrics(result) -> dict[str, float]:
-    return {name: value for name, value, _ in result.metrics}
+    return dict(result.metrics)
 
 
 @pytest.mark.parametrize("pattern", ["monochrome", "bayer-rggb"])

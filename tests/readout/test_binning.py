@@ -312,7 +312,7 @@ def test_levels_are_those_of_frames(kind, adc, tmp_path):
 def test_full_pixels_are_seen_through_the_noise(kind, tmp_path):
     bright = FLAT | {"scene.radiance": radiance_for(1e6)} | joined(kind, ROWS, COLUMNS)
     result = simulate(camera(tmp_path, bright))
-    metrics = {name: value for name, value, _ in result.metrics}
+    metrics = dict(result.metrics)
     assert result.electrons.max() == pytest.approx(100e3 * (N if kind == "digital" else 1))
     # Of joined voltages all but 1.4 in a thousand: their readout's noise comes behind the wells.
     assert metrics["saturated_fraction"] >= (0.998 if kind == "voltage" else 1)

@@ -64,7 +64,7 @@ def test_the_picture_is_that_of_a_linear_adc(tmp_path):
     # half a step of the linear one is 0.012 electrons of some 500 of white, times a gain of 1.3
     np.testing.assert_allclose(bent.linear, straight.linear, atol=1e-4)
     np.testing.assert_allclose(bent.ideal, straight.ideal, atol=1e-4)
-    found, expected = dict((n, v) for n, v, _ in bent.metrics), straight.metrics
+    found, expected = dict(bent.metrics), straight.metrics
     for name, value, _ in expected:
         assert found[name] == pytest.approx(value, rel=1e-3)
     assert not np.array_equal(bent.dn, straight.dn)

@@ -61,7 +61,7 @@ def test_the_rows_are_what_a_run_of_each_camera_gives(tmp_path):
         sets = [f"pixel.width={row['pixel.width [um]']} um", f"adc.bits={row['adc.bits'][:2]}"]
         camera = load(tmp_path / "camera.yaml", [*sets, f"seed.frame={row['seed']}"])
         run = simulate(camera)
-        metrics = {name: value for name, value, _ in run.metrics}
+        metrics = dict(run.metrics)
         assert float(row["mean_electrons"]) == metrics["mean_electrons"]
         assert float(row["snr_db"]) == metrics["snr_db"]
         assert row["error"] == ""

@@ -100,6 +100,36 @@ class Camera(FileModel):
             remedy = "write kind: charge in array.binning, or give one exposure time"
             yield fault(place, message, remedy)
 
+    def with_(self, changes: Mapping[str, Any]) -> "Camera":
+        """Return the camera with some keys changed, validated as its file is.
+
+        Parameters
+        ----------
+        changes : mapping
+            Path -> value as YAML has it: {"exposure.time": "10 ms", "array.rows": 64}. Relative
+            file names start from the current folder.
+
+        Raises
+        ------
+        BadInput
+            With everything that is wrong.
+        TypeError
+            For what is no such mapping.
+        """
+        from vcam_cli.camera.load import changed
+
+        return changed(self, changes)
+
+    def __repr__(self) -> str:
+        """Return a line: name, size and colors of the array."""
+        array, die = self.array, self.array.die
+        size = f"{array.rows} x {array.columns} pixels"
+        if die is not None:
+            size = f"die of {die.width * 1e3:.4g} mm x {die.height * 1e3:.4g} mm"
+        return f"<Camera {self.name}: {size}, {' '.join(array.colors)}>"
+
+    __str__ = __repr__
+
     def with_samples(self, samples: Mapping[str, Any]) -> "Camera":
         """Return the same camera with what some of its files hold: {"optics.psf": array, ...}.
 

@@ -1,10 +1,11 @@
 """A camera file -> a `Camera`: what `config.document` reads, and what a camera has to keep to."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cache
-from os import PathLike
 from pathlib import Path
+from typing import Any
 
+from vcam_cli.arguments import require_name, require_overrides
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived import electrical, falloff, geometry, named_spectra, photodiode
 from vcam_cli.config import document, overrides, shipped
@@ -122,12 +123,17 @@ def load(
     TypeError
         For what is no name, or no list of overrides.
     """
-    if not isinstance(camera, str | PathLike):
-        raise TypeError(f"{camera!r} is no file or name of a camera")
-    if not isinstance(sets, list | tuple) or not all(isinstance(item, str) for item in sets):
-        raise TypeError(f'{sets!r} is no list of overrides; write ["pixel.width=8 um"]')
+    require_name(camera, "camera")
+    require_overrides(sets)
     start = folder or current_folder()
     return read(camera, start).overlay(overlay(sets, start)).validate(checks)
+
+
+@own_float_errors
+def changed(camera: Camera, changes: Mapping[str, Any]) -> Camera:
+    """Return a camera with other values by path, validated: what `Camera.with_` does."""
+    over = overrides.overlay_values(changes, current_folder(), MERGE_RULES)
+    return document.reopen(camera, FORMAT).overlay(over).validate()
 
 
 def read(camera: str | Path, folder: Path) -> Document[Camera]:

@@ -10,6 +10,13 @@ from typing import Any
 
 from numpy.typing import NDArray
 
+from vcam_cli.arguments import (
+    require_folder,
+    require_name,
+    require_observer,
+    require_overrides,
+    require_whole,
+)
 from vcam_cli.capture_schedules import frames, online_loss, photocurrents, schedule_file, tables
 from vcam_cli.capture_schedules.fewest_captures import FewestCaptures, fewest_captures
 from vcam_cli.capture_schedules.frames import Frames
@@ -101,6 +108,17 @@ class ScheduleResult:
         rows = tables.schedule_rows(self.study.model, self.found)
         return [dict(zip(columns, row, strict=True)) for row in rows]
 
+    @property
+    def rows(self) -> list[dict[str, Any]]:
+        """The rows of schedule.csv: what pandas and polars read, as `summary_rows`."""
+        return self.schedule_rows
+
+    def __repr__(self) -> str:
+        """Return a line: name, number of schedules, numbers of captures."""
+        model, counts = self.study.model, self.study.model.counts
+        several = f"{min(counts)} to {max(counts)}" if len(counts) > 1 else f"{counts[0]}"
+        return f"<ScheduleResult {model.name}: {len(self.found)} schedules of {several} captures>"
+
     def times(self, method: str, count: int) -> NDArray:
         """Return capture times (N,) [s]; without a sensor in 1 / the pdf's unit.
 
@@ -164,8 +182,19 @@ def schedule(
         If the study or a camera has mistakes.
     CannotDo
         If something cannot be computed or written.
+    TypeError, ValueError
+        For arguments that are none of these.
     """
     start = time.perf_counter()
+    require_name(study, "study")
+    require_overrides(sets)
+    if out is not None:
+        require_folder(out)
+    require_whole(seed, "seed", 0)
+    if workers is not None:
+        require_whole(workers, "workers", 1)
+    if watch is not None:
+        require_observer(watch)
     watch, tell = watch or Silent(), tell or (lambda _: None)
     read = schedule_file.read(study, sets, accuracy)
     _check_frames_camera(read)

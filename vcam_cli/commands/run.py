@@ -46,7 +46,7 @@ def run(
     if as_json:
         print(to_json(summary(record, folder.path)), end="")
     elif not quiet:
-        print(report(result.metrics, record, folder.path, folder.names))
+        print(report(result.metrics.rows, record, folder.path, folder.names))
 
 
 def summary(record: dict, path: Path) -> dict:
@@ -56,7 +56,7 @@ def summary(record: dict, path: Path) -> dict:
 
 
 def report(
-    metrics: list[tuple[str, float, str]], record: dict, path: Path, files: tuple[str, ...]
+    metrics: tuple[tuple[str, float, str], ...], record: dict, path: Path, files: tuple[str, ...]
 ) -> str:
     """Return the report of a run: metrics, effects, time and files."""
     lines = [f"{name:<20} {value:>12.6g} {unit}".rstrip() for name, value, unit in metrics]

@@ -20,7 +20,7 @@ from vcam_cli.config.file_format import Check, FileFormat, M
 from vcam_cli.config.file_names import absolute_file, argument_file
 from vcam_cli.config.merge import merge
 from vcam_cli.config.parts import Findings, PartReader
-from vcam_cli.config.yaml_tree import Key, Node, Origin, child_path
+from vcam_cli.config.yaml_tree import Key, Node, Origin, Source, child_path, node_of
 from vcam_cli.errors import BadInput, Problem
 
 
@@ -54,7 +54,7 @@ class Document(Generic[M]):
         """
         findings = self._findings()
         tree, data = _with_absolute_files(self._with_name(), self.format.file_keys, findings)
-        origin = Origin(self.file, tuple(dict.fromkeys((*self.files, *data))), tree)
+        origin = Origin(self.file, tuple(dict.fromkeys((*self.files, *data))), tree, self.files)
         model, wrong = _validate(tree, self.format, origin, findings)
         for check, sections in (*self.format.checks, *checks):
             if model is not None and not wrong & set(sections.split()):
@@ -94,6 +94,19 @@ def read(name: str | Path, folder: Path, format: FileFormat[M]) -> Document[M]:
     reader = PartReader(format, [], Findings())
     file = argument_file(name, folder, format.kind)
     return _document(file, reader.read(file, format.kind), reader)
+
+
+def reopen(model: M, format: FileFormat[M]) -> Document[M]:
+    """Return the document of a model: its file's, or the model's own keys where they differ.
+
+    A default that follows from other keys follows those of the next model, if it was not written.
+    """
+    origin = model.source_tree
+    if origin is not None and format.model.model_validate(origin.tree.plain()) == model:
+        return Document(origin.file, origin.tree, format, origin.yaml_files)
+    file = model.origin or Path(f"{format.model.__name__.lower()}.yaml")
+    said = node_of(model.model_dump(mode="json"), Source(str(file), file.parent, lines=False))
+    return Document(file, said, format, origin.yaml_files if origin else ())
 
 
 def place_order(problem: Problem) -> tuple[str, int, int]:

@@ -101,6 +101,11 @@ class FileModel(Model):
         return None if self._origin is None else self._origin.file
 
     @property
+    def source_tree(self) -> Origin | None:
+        """What was read, with its places; None for a model that comes from no file."""
+        return self._origin
+
+    @property
     def files(self) -> tuple[Path, ...]:
         """All files that it was read from."""
         return () if self._origin is None else self._origin.files

@@ -1,12 +1,14 @@
-"""Overrides "PATH=VALUE" of the command line as a tree."""
+"""Overrides "PATH=VALUE" of the command line, and those of Python callers, as a tree."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from vcam_cli import errors
+from vcam_cli.arguments import brief
 from vcam_cli.config.merge import MergeRules, merge
 from vcam_cli.config.yaml_reader import read_text
-from vcam_cli.config.yaml_tree import Node, Source, tree_at
+from vcam_cli.config.yaml_tree import Node, Source, node_of, tree_at
 from vcam_cli.errors import BadInput, Collector, Problem, one_line
 
 
@@ -20,6 +22,30 @@ def overlay(sets: Sequence[str], folder: Path, rules: MergeRules) -> Node:
     for item in sets:
         try:
             whole = merge(whole, _override(item, folder), rules)
+        except BadInput as error:
+            problems.extend(error)
+    problems.raise_if_any()
+    return whole
+
+
+def overlay_values(changes: Mapping[str, Any], folder: Path, rules: MergeRules) -> Node:
+    """Return the tree of Python values by their paths, later ones laid over earlier ones.
+
+    Relative file names start from `folder`. Raises BadInput, and TypeError for what is no mapping
+    of paths, or for a value that YAML cannot have.
+    """
+    if not isinstance(changes, Mapping) or not all(isinstance(path, str) for path in changes):
+        message = f"{brief(changes)} is no mapping of paths to values"
+        raise TypeError(f'{message}; write {{"exposure.time": "10 ms"}}')
+    whole = Node({}, Source("with_", folder, lines=False))
+    problems = Collector()
+    for path, value in changes.items():
+        source = Source(one_line(f"with_({{{path!r}: {brief(value)}}})"), folder, lines=False)
+        try:
+            if "" in path.split("."):
+                message = f"{path!r} is not the path of a key"
+                raise BadInput([Problem((), message, "write pixel.width", source.name)])
+            whole = merge(whole, tree_at(errors.split(path), node_of(value, source)), rules)
         except BadInput as error:
             problems.extend(error)
     problems.raise_if_any()

@@ -1,11 +1,13 @@
 """A tree of YAML values that know where they stand in a file."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from os import PathLike
 from pathlib import Path
 
 from vcam_cli import errors
+from vcam_cli.arguments import brief
 from vcam_cli.errors import Problem
 
 Scalar = str | int | float | bool | None
@@ -81,6 +83,24 @@ def tree_at(path: errors.Path, node: Node) -> Node:
     return node
 
 
+def node_of(value: object, source: Source) -> Node:
+    """Return dicts, lists and scalars as a tree, the contrary of `Node.plain`.
+
+    Raises TypeError for anything else.
+    """
+    if value is None or isinstance(value, str | bool | int | float):
+        return Node(value, source)
+    if isinstance(value, Mapping) and all(isinstance(key, str | int | float) for key in value):
+        return Node({key: node_of(item, source) for key, item in value.items()}, source)
+    if isinstance(value, list | tuple):
+        return Node([node_of(item, source) for item in value], source)
+    if hasattr(value, "tolist"):  # NumPy's numbers and arrays
+        return node_of(value.tolist(), source)
+    if isinstance(value, PathLike):
+        return Node(str(value), source)
+    raise TypeError(f"{brief(value)} is no value of a file; write it as YAML has it")
+
+
 def walk(node: Node, path: errors.Path = ()) -> Iterator[tuple[errors.Path, Node]]:
     """Yield every node below and with `node`, with its path, parents first."""
     yield path, node
@@ -130,3 +150,5 @@ class Origin(PlacedKeys):
     files: tuple[Path, ...]
     """YAML files read, then the data files that they name (pictures, tables)."""
     tree: Node
+    yaml_files: tuple[Path, ...] = ()
+    """The YAML files alone."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import resource
 import sys
+import time
 from collections.abc import Callable, Iterator
 from functools import partial
 from pathlib import Path
@@ -26,11 +27,22 @@ from vcam_cli.files.report import hash_file, hash_text, to_json
 from vcam_cli.files.spectral.exr import write_spectral
 from vcam_cli.files.tables import write_metrics
 from vcam_cli.parallel import ThreadPool
-from vcam_cli.simulation import raw_file, spectral_irradiance
+from vcam_cli.simulation import provenance, raw_file, spectral_irradiance
 from vcam_cli.simulation.frame import Frame
 from vcam_cli.simulation.provenance import versions
 from vcam_cli.simulation.raw_file import ROWS_AT_ONCE
 from vcam_cli.simulation.simulate import Result
+
+
+def save(result: Result, place: Path) -> Path:
+    """Write all files of one run, the record too, into a folder; return it."""
+    inputs = provenance.inputs(result.frame.camera)
+    start = time.perf_counter()
+    computed = sum(result.stages.seconds.values())
+    with OutputFolder(place, inputs=inputs) as folder:
+        write(result, folder)
+        folder.finish(record(result, inputs, computed + time.perf_counter() - start))
+    return place
 
 
 def write(result: Result, folder: OutputFolder) -> None:
@@ -59,7 +71,7 @@ def write(result: Result, folder: OutputFolder) -> None:
     if camera.output.irradiance:
         with result.stages("irradiance"):
             _irradiance(result, folder.new("irradiance.exr"))
-    write_metrics(folder.new("metrics.csv"), metrics)
+    write_metrics(folder.new("metrics.csv"), metrics.rows)
 
 
 def _irradiance(result: Result, path: Path) -> None:
@@ -139,7 +151,7 @@ def record(result: Result, inputs: tuple[Path, ...], seconds: float) -> dict[str
         "plan": frame.plan.report(),
         "geometry": frame.layout.report(frame.spectrum.oversampling),
         **({"captures": _samples(frame)} if frame.times else {}),
-        "metrics": {name: value for name, value, _ in result.metrics},
+        "metrics": dict(result.metrics),
         "stages": result.stages.seconds,
         "seconds": seconds,
         "peak_memory_bytes": peak_memory(),

@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vcam_cli.arguments import brief, require_folder, require_observer, require_whole
 from vcam_cli.camera.array import Positions
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived import photodiode
@@ -21,6 +23,7 @@ from vcam_cli.parallel import suitable_workers
 from vcam_cli.processing import Context, Patches, ProcessedPicture, process
 from vcam_cli.progress import Observer, Silent, Stages
 from vcam_cli.quality import display
+from vcam_cli.quality.metrics import Metrics
 from vcam_cli.quality.mse import mse, psnr_db
 from vcam_cli.quality.scielab import cielab_map, s_cielab_map
 from vcam_cli.scenes.hyperspectral import CubeScene
@@ -202,8 +205,8 @@ class Result:
 
     @cached_property
     @own_float_errors
-    def metrics(self) -> list[tuple[str, float, str]]:
-        """(metric, value, unit): those every run has, then those that `quality` asks for."""
+    def metrics(self) -> Metrics:
+        """Metric -> value: those every run has, then those that `quality` asks for."""
         out = figures(self.frame)
         if {"mse", "psnr"} & set(self.frame.camera.quality):
             image, ideal = self.linear, self.ideal
@@ -217,7 +220,19 @@ class Result:
                 out.append(("mean_delta_e", float(each.mean(dtype=float)), ""))
         if "s-cielab" in self.frame.camera.quality:
             out.append(("mean_s_cielab", float(self.s_cielab.mean(dtype=float)), ""))
-        return out
+        return Metrics(out)
+
+    def save(self, folder: str | Path) -> Path:
+        """Write what `vcam run` writes, and return the folder. Raises BadInput, CannotDo."""
+        from vcam_cli.simulation.outputs import save
+
+        return save(self, require_folder(folder))
+
+    def __repr__(self) -> str:
+        """Return a line: name, shape of the raw frame, exposure time."""
+        shape = " x ".join(map(str, self.dn.shape))
+        time = f"{1000 * self.exposure_time:.4g} ms"
+        return f"<Result {self.frame.camera.name}: {shape} pixels, {time}>"
 
 
 def threads(camera: Camera) -> int:
@@ -256,10 +271,14 @@ def simulate(
     CannotDo
         Where memory does not suffice.
     TypeError
-        For what is no camera, such as the name of a file.
+        For what is no camera, such as the name of a file, and other arguments of wrong types.
     """
     if not isinstance(camera, Camera):
-        raise TypeError(f'{camera!r} is no camera; write simulate(load("camera.yaml"))')
+        raise TypeError(f'{brief(camera)} is no camera; write simulate(load("camera.yaml"))')
+    if workers is not None:
+        require_whole(workers, "workers", 1)
+    if watch is not None:
+        require_observer(watch)
     try:
         stages = Stages(watch=watch or Silent())
         return _simulate(camera, workers or threads(camera), stages, shared or Shared())

@@ -69,8 +69,7 @@ def _simulate_point(
         camera = camera.model_copy(update={"output": output})
     result = simulate(camera, threads, shared=shared)
     _check_versions(job)  # modules are loaded where they are first needed
-    found = {name: value for name, value, _ in result.metrics}
-    metrics = {name: found[name] for name in job.metrics}
+    metrics = {name: result.metrics[name] for name in job.metrics}
     return metrics, {FRAMES[what]: _frame(what, result) for what in job.keep}
 
 

@@ -7,12 +7,21 @@ stopped, and whoever computed its points.
 
 from __future__ import annotations
 
+import sys
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from urllib.parse import urlsplit
 
+from vcam_cli.arguments import (
+    brief,
+    require_folder,
+    require_name,
+    require_observer,
+    require_overrides,
+    require_whole,
+)
 from vcam_cli.errors import bad
 from vcam_cli.progress import Observer, Silent
 from vcam_cli.sweeps import sweep_file
@@ -51,6 +60,25 @@ class Execution:
             _check_address(self.scheduler)
 
 
+def _check_arguments(
+    study: object, out: object, sets: object, workers: object, shard: object, watch: object
+) -> None:
+    """Raise TypeError or ValueError for arguments of Python callers that are of no use."""
+    require_name(study, "study")
+    require_overrides(sets)
+    if out is not None:
+        require_folder(out)
+    if workers is not None:
+        require_whole(workers, "workers", 1)
+    if shard is not None:
+        if not isinstance(shard, tuple | list) or len(shard) != 2:
+            raise TypeError(f"shard={brief(shard)} is no share; write shard=(1, 4)")
+        for part in shard:
+            require_whole(part, "share", -sys.maxsize)
+    if watch is not None:
+        require_observer(watch)
+
+
 def _check_address(address: str) -> None:
     """Raise BadInput for what is no address of a scheduler, before Dask sees it."""
     try:
@@ -81,9 +109,11 @@ def sweep(
     "PATH=VALUE" laid over every camera; workers: processes, default all processors; scheduler:
     address of a Dask scheduler in their place; shard: (i, n), the i-th of n shares of the points;
     fresh: computes all of them again. watch is told of the progress, tell gets messages. Raises
-    BadInput (wrong study, or no camera of it is valid) and CannotDo (disk, scheduler).
+    BadInput (wrong study, or no camera of it is valid), CannotDo (disk, scheduler), and TypeError
+    or ValueError for arguments that are none of these.
     """
     start = time.perf_counter()
+    _check_arguments(study, out, sets, workers, shard, watch)
     execution = Execution(Share(*shard) if shard else None, workers, scheduler, fresh)
     watch, tell = watch or Silent(), tell or (lambda _: None)
     watch.begin("points")

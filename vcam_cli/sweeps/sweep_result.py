@@ -153,6 +153,21 @@ class SweepResult:
     """Figures that could not be made, and why."""
 
     @property
+    def rows(self) -> list[Row]:
+        """The rows of points.csv, None where a cell is empty: what pandas and polars read."""
+        return [{k: None if v == "" else v for k, v in row.items()} for row in self.points]
+
+    @property
+    def optimum_rows(self) -> list[Row]:
+        """The rows of optimum.csv, None where a cell is empty."""
+        return [{k: o.plain[k] for k in OPTIMUM_COLUMNS} for o in self.optima]
+
+    def __repr__(self) -> str:
+        """Return a line: name, points, those that failed."""
+        failed = f", {self.failed} failed" if self.failed else ""
+        return f"<SweepResult {self.name}: {len(self.points)} points{failed}>"
+
+    @property
     def failed(self) -> int:
         """Number of rows with an error."""
         return sum(1 for row in self.points if row["error"])
