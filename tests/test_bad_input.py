@@ -632,7 +632,7 @@ for _name, _file, _message, _remedy in (
 case(
     "a picture in color as a reflectance",
     (CHART, IMAGE.replace("PICTURE", "good.exr").replace("laser", "reflectance")),
-    says=[("3:48", "scene.source.model", "needs one channel", "laser, rgb-display, mallett")],
+    says=[("3:48", "scene.source.model", "needs one channel", "mallett, laser, rgb-display")],
 )
 case(
     "a picture without color where colors are needed",

@@ -189,7 +189,7 @@ class TestDefaults:
         first, last = {"black_level": "subtract"}, {"gamma": "srgb"}
         color = [
             {"demosaic": "bilinear"},
-            {"white_balance": "gray-world"},
+            {"white_balance": "illuminant"},
             {"color_correction": "fit"},
         ]
         assert steps("monochrome") == [first, last]

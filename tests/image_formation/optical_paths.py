@@ -90,6 +90,7 @@ def of_picture(picture: Any, pitch: float, dtype: type = np.float64) -> ImageSce
     return ImageScene(
         spectra=(WHITE,) * samples.shape[2], white=WHITE, shape=samples.shape[:2], pitch_x=pitch,
         pitch_y=pitch, samples="squares", dtype=dtype, picture=samples, black=(0, 0),
+        seen=(1.0, 1.0),
     )  # fmt: skip
 
 

@@ -63,7 +63,7 @@ class WhiteBalance(Step):
     """A gain for each color. It may stand before demosaic or after it."""
 
     white_balance: Literal["gray-world", "bright-block", "illuminant", "none"] = key(
-        "how the gains are found", example="gray-world"
+        "how the gains are found", example="illuminant"
     )
 
 
@@ -131,7 +131,7 @@ STEP_LIST = Either(_steps, list[_ANY])
 def default_steps(mosaic: bool, monochrome: bool) -> Steps:
     """Return what is done where the file does not say."""
     color = (
-        WhiteBalance(white_balance="gray-world"),
+        WhiteBalance(white_balance="illuminant"),
         ColorCorrection.model_validate({"color_correction": "fit"}),
     )
     return (

@@ -183,11 +183,12 @@ class ImageFile(Model):
         default=None,
     )
     white: Positive = key("value in the file that has the stated luminance", default=1.0)
-    model: Literal["reflectance", "laser", "rgb-display", "mallett"] = key(
-        "what channels mean: reflectance (one channel), laser (450, 550 and 650 nm, equal planes "
-        "= equal radiance in W), rgb-display (the primaries of the camera file's display), mallett "
-        "(the smooth reflectances that have these sRGB colors under D65)",
-        default="reflectance",
+    model: Literal["auto", "reflectance", "laser", "rgb-display", "mallett"] = key(
+        "what channels mean: auto (one is reflectance, three are mallett), reflectance (one), "
+        "laser (450, 550 and 650 nm, equal planes = equal radiance in W), rgb-display (the "
+        "primaries of the camera file's display), mallett (the smooth reflectances that "
+        "have these sRGB colors under D65)",
+        default="auto",
     )
 
     @model_validator(mode="after")

@@ -143,8 +143,9 @@ def _chart(source: object, view: View) -> tuple[Chart, tuple[Spectrum, ...]]:
 def _image(
     scene: models.Scene, model: str, view: View, picture: Array, primaries: str
 ) -> SampledScene:
-    check_channels(model, picture.shape[2] if picture.ndim == 3 else 0)
-    spectra, white = _model(scene, model, primaries)
+    channels = picture.shape[2] if picture.ndim == 3 else 0
+    check_channels(model, channels)
+    spectra, white = _model(scene, picture_model(model, channels), primaries)
     return image_scene(picture, spectra, white, view)
 
 
@@ -163,8 +164,16 @@ def _model(
     return (white,), white
 
 
+def picture_model(model: str, channels: int) -> str:
+    """Return what so many channels mean where the file leaves it to them (`auto`)."""
+    if model != "auto":
+        return model
+    return "reflectance" if channels == 1 else "mallett"
+
+
 def check_channels(model: str, channels: int) -> None:
     """Refuse an image file whose color channels are not what the model needs (BadInput)."""
+    model = picture_model(model, channels)
     needed = 1 if model == "reflectance" else 3
     if channels != needed:
         raise _wrong_channels(model, channels, needed)
@@ -175,7 +184,7 @@ def _wrong_channels(model: str, given: int, needed: int) -> BadInput:
         return bad(
             (*SOURCE, "model"),
             "reflectance needs one channel, but this image has three",
-            "use one of the models for colors (laser, rgb-display, mallett), or a gray image",
+            "use one of the models for colors (mallett, laser, rgb-display), or a gray image",
         )
     remedy = f"use an image with channels R, G, B; {model} takes no other"
     if given == 1:

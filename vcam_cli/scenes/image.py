@@ -87,6 +87,8 @@ class ImageScene(SampledScene):
     """Values (h, w, K) of the samples that are kept; a view of what was read."""
     black: tuple[int, int]
     """Samples of black on every side, down and across."""
+    seen: tuple[float, float]
+    """Parts of the file's height and width that the array sees."""
 
     def planes(self, mix: Array, workers: int = 1) -> Array:
         """Return the linear combinations of the channels (R, ny, nx)."""
@@ -181,4 +183,8 @@ def image_scene(
         dtype=view.dtype,
         picture=picture[top : rows - top, left : columns - left],
         black=(max(-placed.cut_y, 0), max(-placed.cut_x, 0)),
+        seen=(
+            min(view.height / (placed.pitch * rows), 1.0),
+            min(view.width / (placed.pitch * columns), 1.0),
+        ),
     )

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from vcam_cli.arguments import brief, require_folder, require_observer, require_whole
 from vcam_cli.camera.array import Positions
 from vcam_cli.camera.camera import Camera
-from vcam_cli.camera.derived import photodiode
 from vcam_cli.camera.derived.electrical import no_volts
 from vcam_cli.camera.derived.geometry import geometry
 from vcam_cli.errors import BadInput
@@ -26,13 +25,12 @@ from vcam_cli.quality import display
 from vcam_cli.quality.metrics import Metrics
 from vcam_cli.quality.mse import mse, psnr_db
 from vcam_cli.quality.scielab import cielab_map, s_cielab_map
-from vcam_cli.scenes.hyperspectral import CubeScene
+from vcam_cli.simulation import remarks
 from vcam_cli.simulation.checks import read_lens
 from vcam_cli.simulation.frame import Frame, expose, figures
 from vcam_cli.simulation.preparation import Prepared
 from vcam_cli.simulation.preparation import prepare as bring_light
 from vcam_cli.simulation.shared import Shared
-from vcam_cli.spectra import luminance
 
 
 @dataclass(frozen=True)
@@ -296,7 +294,7 @@ def prepare(
         camera = _load_lens(camera, stages)
         picture, notes = _picture(camera, stages)
         ready = bring_light(camera, picture, workers or threads(camera), stages)
-        return ready, notes + _remarks(ready)
+        return ready, notes + remarks.remarks(ready)
     except BadInput as error:
         raise error.with_places(camera.locate) from None
 
@@ -325,43 +323,6 @@ def _picture(camera: Camera, stages: Stages) -> tuple[Any, tuple[str, ...]]:
     return None, ()
 
 
-def _remarks(ready: Prepared) -> tuple[str, ...]:
-    """Return notes on the silicon, on times that the camera chose, and on a scene of spectra."""
-    scene, band = ready.scene, ready.camera.scene.wavelengths
-    before = photodiode.remarks(ready.camera) + _scheduled_times(ready) + _blind_colors(ready)
-    if not isinstance(scene, CubeScene):
-        return before
-    level = luminance(scene.white, band.start, band.stop)
-    notes = [f"white is taken to be {level:.4g} cd/m2"]
-    if 0 < ready.spectrum.planes < len(scene.spectra):
-        notes.append(
-            f"{len(scene.spectra)} bands are simulated as {ready.spectrum.planes} mixtures of them;"
-            f" no transfer function is off by more than {ready.settings.mixing_tolerance:g}"
-            " of the largest"
-        )
-    return before + tuple(notes)
-
-
-def _blind_colors(ready: Prepared) -> tuple[str, ...]:
-    """Return which colors see nothing of a perfect white, which may be a mistake of a spectrum."""
-    white = zip(ready.mosaic.colors, ready.white_rate, strict=True)
-    blind = [color for color, rate in white if rate == 0]
-    if len(blind) == len(ready.mosaic.colors):
-        return ("no light reaches the electrons: this is a dark frame",)
-    return (f"no light reaches the electrons of {', '.join(blind)}",) if blind else ()
-
-
-def _scheduled_times(ready: Prepared) -> tuple[str, ...]:
-    """Return the times of samples that the camera scheduled itself."""
-    asked = ready.camera.exposure.schedule
-    if asked is None:
-        return ()
-    listed = ", ".join(f"{1000 * time:.4g}" for time in ready.times)
-    fewer = asked.count - len(ready.times)
-    more = f"; {fewer} more of the {asked.count} would gain nothing" if fewer else ""
-    return (f"best times for this scene: {listed} ms{more}",)
-
-
 def _simulate(camera: Camera, workers: int, stages: Stages, shared: Shared) -> Result:
     camera = _load_lens(camera, stages)
     picture, notes = shared.picture(camera, lambda: _picture(camera, stages))
@@ -378,7 +339,7 @@ def _simulate(camera: Camera, workers: int, stages: Stages, shared: Shared) -> R
         layout=frame.layout if frame.layout.is_scattered else None,
     )
     steps = partial(process, frame.picture_dn, context, camera.processing, workers=workers)
-    result = Result(frame, stages, workers, steps, notes + _remarks(frame))
+    result = Result(frame, stages, workers, steps, notes + remarks.remarks(frame))
     if needs_picture(camera):  # what is wrong with its steps is said before anything is written
         _ = result.processed
     return result

@@ -1,0 +1,82 @@
+"""Notes of a run: what it chose, left out or took for granted where the file left that open."""
+
+from vcam_cli.camera.derived import photodiode
+from vcam_cli.camera.scene import ImageFile
+from vcam_cli.scenes.build import picture_model
+from vcam_cli.scenes.hyperspectral import CubeScene
+from vcam_cli.scenes.image import ImageScene
+from vcam_cli.simulation.preparation import Prepared
+from vcam_cli.spectra import luminance
+
+VISIBLE_CROP = 5e-4
+"""Part of a picture that is worth a word when it is cut off."""
+
+
+def remarks(ready: Prepared) -> tuple[str, ...]:
+    """Return notes on the silicon, on times that the camera chose, and on a scene of spectra."""
+    scene, band = ready.scene, ready.camera.scene.wavelengths
+    before = (
+        *photodiode.remarks(ready.camera),
+        *_scheduled_times(ready),
+        *_blind_colors(ready),
+        *_colors_of_picture(ready),
+        *_cropped(ready),
+    )
+    if not isinstance(scene, CubeScene):
+        return before
+    level = luminance(scene.white, band.start, band.stop)
+    notes = [f"white is taken to be {level:.4g} cd/m2"]
+    if 0 < ready.spectrum.planes < len(scene.spectra):
+        notes.append(
+            f"{len(scene.spectra)} bands are simulated as {ready.spectrum.planes} mixtures of them;"
+            f" no transfer function is off by more than {ready.settings.mixing_tolerance:g}"
+            " of the largest"
+        )
+    return before + tuple(notes)
+
+
+def _blind_colors(ready: Prepared) -> tuple[str, ...]:
+    """Return which colors see nothing of a perfect white, which may be a mistake of a spectrum."""
+    white = zip(ready.mosaic.colors, ready.white_rate, strict=True)
+    blind = [color for color, rate in white if rate == 0]
+    if len(blind) == len(ready.mosaic.colors):
+        return ("no light reaches the electrons: this is a dark frame",)
+    return (f"no light reaches the electrons of {', '.join(blind)}",) if blind else ()
+
+
+def _scheduled_times(ready: Prepared) -> tuple[str, ...]:
+    """Return the times of samples that the camera scheduled itself."""
+    asked = ready.camera.exposure.schedule
+    if asked is None:
+        return ()
+    listed = ", ".join(f"{1000 * time:.4g}" for time in ready.times)
+    fewer = asked.count - len(ready.times)
+    more = f"; {fewer} more of the {asked.count} would gain nothing" if fewer else ""
+    return (f"best times for this scene: {listed} ms{more}",)
+
+
+def _colors_of_picture(ready: Prepared) -> tuple[str, ...]:
+    """Return what three channels are taken for, where the file does not say."""
+    source, scene = ready.camera.scene.source, ready.scene
+    if not isinstance(source, ImageFile) or source.model != "auto":
+        return ()
+    if not isinstance(scene, ImageScene):
+        return ()
+    model = picture_model(source.model, scene.picture.shape[2])
+    if model == "reflectance":
+        return ()
+    return (f"three channels are taken as reflectances with these sRGB colors (model: {model})",)
+
+
+def _cropped(ready: Prepared) -> tuple[str, ...]:
+    """Return how much of a picture lies beyond the array."""
+    if not isinstance(ready.scene, ImageScene):
+        return ()
+    parts = zip(("height", "width"), ready.scene.seen, strict=True)
+    lost = [f"{1 - part:.1%} of its {side}" for side, part in parts if part < 1 - VISIBLE_CROP]
+    if not lost:
+        return ()
+    why = "to the shape of the array"
+    if ready.geometry.scene_width_on_sensor is not None:
+        why = "by the array, which sees less than scene.extent"
+    return (f"the picture is cropped {why}: {' and '.join(lost)} cut off",)
