@@ -292,6 +292,8 @@ def _dimensions() -> dict[str, Dimension]:
         Dimension("conversion_gain", "a conversion gain", "V/e",
                   _per(_prefixed_units("V", "umn-"), {"e": Fraction(1)}),
                   ("nV/e", "uV/e", "mV/e", "V/e"), "20 uV/e"),
+        Dimension("exposure_value", "an exposure value", "EV", {"EV": Fraction(1)}, ("EV",),
+                  "1 EV"),
         Dimension("adc_gain", "an ADC gain", "DN/e",
                   {"DN/e": Fraction(1), "DN/ke": Fraction(1, 1000)}, ("DN/e",), "0.25 DN/e"),
         Dimension("dn", "a number of DN", "DN", {"DN": Fraction(1)}, ("DN",), "64 DN"),

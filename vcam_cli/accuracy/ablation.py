@@ -75,9 +75,12 @@ def wanted_effects(camera: Camera) -> list[str]:
     return [kind.name for kind in ORDER if kind.name in names]
 
 
-def with_exposure_time(camera: Camera, time: float) -> Camera:
-    """Return the camera with its exposure time fixed [s]: an effect left out must not change it."""
-    return camera.model_copy(update={"exposure": camera.exposure.single(time)})
+def with_exposure_time(camera: Camera, time: float, gain: float | None = None) -> Camera:
+    """Return the camera with its exposure time fixed [s]: an effect left out must not change it.
+
+    Its gain is the file's where none is given.
+    """
+    return camera.model_copy(update={"exposure": camera.exposure.single(time, gain)})
 
 
 def mean_raw(ready: Prepared) -> NDArray:

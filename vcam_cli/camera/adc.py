@@ -37,13 +37,13 @@ class Adc(Model):
         "the number for no signal", example="0 DN", default=0.0
     )
     full_scale: Annotated[float | None, Quantity("voltage", above=0, words={"auto": None})] = key(
-        "volts at the highest number; auto = voltage_swing x readout.gain",
+        "volts at the highest number; auto = voltage_swing x readout.gain, whatever exposure.gain",
         unit="V",
         example="auto",
         default=None,
     )
     gain: Annotated[float | None, Quantity("adc_gain", above=0)] = key(
-        "codes per electron (K of EMVA 1288), in place of full_scale",
+        "codes per electron (K of EMVA 1288) at exposure.gain 1, in place of full_scale",
         example="0.25 DN/e",
         default=None,
     )

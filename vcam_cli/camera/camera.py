@@ -68,6 +68,7 @@ class Camera(FileModel):
     output: Output = key("what is written", example={"raw": ["dn"]}, default=Output)
 
     _samples: tuple[tuple[str, Any], ...] = PrivateAttr(default=())
+    _exposure_gain: float | None = PrivateAttr(default=None)
 
     @model_validator(mode="after")
     def _agrees(self) -> Self:
@@ -129,6 +130,22 @@ class Camera(FileModel):
         return f"<Camera {self.name}: {size}, {' '.join(array.colors)}>"
 
     __str__ = __repr__
+
+    @property
+    def exposure_gain(self) -> float:
+        """Analog gain of the exposure: the file's, or what follows from its ISO speed or scene.
+
+        Before `with_exposure_gain` has told what follows, it is 1.
+        """
+        if self._exposure_gain is not None:
+            return self._exposure_gain
+        return 1.0 if self.exposure.gain is None else self.exposure.gain
+
+    def with_exposure_gain(self, gain: float) -> "Camera":
+        """Return the same camera set to a gain that follows from its ISO speed or its scene."""
+        camera = self.model_copy()
+        camera._exposure_gain = gain
+        return camera
 
     def with_samples(self, samples: Mapping[str, Any]) -> "Camera":
         """Return the same camera with what some of its files hold: {"optics.psf": array, ...}.

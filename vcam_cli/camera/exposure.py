@@ -1,4 +1,4 @@
-"""Exposure: given, chosen by the camera, or several samples of one integration."""
+"""Exposure: time and gain, given or chosen by the camera; or several samples of one integration."""
 
 import math
 from collections.abc import Mapping
@@ -7,25 +7,29 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import model_validator
 
 from vcam_cli.config.lists import read_items
-from vcam_cli.config.model import Model, exactly_one, key
+from vcam_cli.config.model import Model, at_most_one, exactly_one, key
 from vcam_cli.config.quantities import Number, Quantity, Whole
 from vcam_cli.config.validation_messages import describe, refusal
-from vcam_cli.config.values import TIME, Either, MaybeTime, Time, mapping
+from vcam_cli.config.values import TIME, Either, MaybePositive, MaybeTime, Positive, Time, mapping
 from vcam_cli.config.yaml_type import to_yaml
 
 
 class AutoExposure(Model):
-    """The exposure time that brings a chosen level to a fraction of the full well."""
+    """Time, then gain, that bring a chosen level to a fraction of saturation."""
 
     max: Time = key("longest time", example="100 ms", default=0.1)
     min: Annotated[float, Quantity("time", least=0, most=1e9)] = key(
         "shortest time", unit="ms", example="0 s", default=0.0
     )
+    max_gain: Positive = key(
+        "largest gain, where the longest time is not enough; the gain itself by default",
+        default=1.0,
+    )
     method: Literal["white", "percentile", "mean"] = key(
         "the level: the perfect white's, a percentile of the picture, or its mean", default="white"
     )
     target: Annotated[float, Number(above=0, most=1, example="0.9")] = key(
-        "fraction of the full well", default=0.9
+        "fraction of the full well, or of the ADC where that is full first", default=0.9
     )
     percentile: Annotated[float, Number(least=0, most=100, example="99.9")] = key(
         "which percentile, for that method", default=99.9
@@ -79,11 +83,24 @@ def times_to_yaml(times: tuple[float, ...]) -> list[str]:
 
 
 class Exposure(Model):
-    """Exactly one of time, auto and captures."""
+    """Exactly one of time, auto and captures; and the gain, or the ISO speed."""
 
     time: MaybeTime = key("exposure time", example="30 ms", default=None)
     auto: Annotated[AutoExposure | None, mapping(AutoExposure)] = key(
         "automatic exposure", example={"max": "100 ms", "method": "white"}, default=None
+    )
+    gain: MaybePositive = key(
+        "analog gain before the ADC, which is then full at 1 / gain of the electrons; default 1",
+        example=1,
+        default=None,
+    )
+    iso: MaybePositive = key(
+        "ISO speed (ISO 12232, saturation-based) in place of gain, which is iso / base_iso",
+        example=800,
+        default=None,
+    )
+    compensation: Annotated[float, Quantity("exposure_value", least=-20, most=20)] = key(
+        "of auto: the level is brought to target x 2^compensation", example="0 EV", default=0.0
     )
     captures: Annotated[
         tuple[float, ...] | CaptureSchedule | None,
@@ -108,7 +125,21 @@ class Exposure(Model):
         exactly_one(
             "time", "auto", "captures", of="the exposure", remedy="write for example time: 30 ms"
         ),
+        at_most_one("gain", "iso"),
     )
+
+    @model_validator(mode="after")
+    def _check_automatic(self) -> Self:
+        if self.auto is None and self.compensation:
+            message = "only an automatic exposure is compensated"
+            raise refusal(("compensation",), message, "change the time, or write auto in its place")
+        limit = (
+            self.auto.max_gain if self.auto and "max_gain" in self.auto.model_fields_set else None
+        )
+        if limit is not None and self.gain is not None and limit < self.gain:
+            message = f"is less than the gain of {self.gain:g} that it starts from"
+            raise refusal(("auto", "max_gain"), message, "raise it, or lower gain")
+        return self
 
     @property
     def samples(self) -> tuple[float, ...]:
@@ -132,6 +163,12 @@ class Exposure(Model):
             return self.schedule.max
         return self.samples[-1] if self.samples else self.time
 
-    def single(self, time: float) -> "Exposure":
-        """Return one exposure of that time [s] in place of whatever the file says."""
-        return self.model_copy(update={"auto": None, "captures": None, "time": time})
+    def single(self, time: float, gain: float | None = None) -> "Exposure":
+        """Return one exposure of that time [s] in place of whatever the file says.
+
+        Its gain is the file's where none is given.
+        """
+        fixed = {"auto": None, "captures": None, "compensation": 0.0, "time": time}
+        return self.model_copy(
+            update=fixed if gain is None else {**fixed, "gain": gain, "iso": None}
+        )

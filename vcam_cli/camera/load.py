@@ -37,6 +37,7 @@ _EXCLUSIVE = (
     "gain_pixel | prnu",
     "dpi | width",
     "gain | efficiency",
+    "gain | iso",
     "voltage_swing | thresholds",
     "blackbody | monochromatic | file | table | pixel",
     "block | positions",

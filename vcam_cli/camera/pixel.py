@@ -59,7 +59,9 @@ class Readout(Model):
         example="69 ke",
         default=None,
     )
-    gain: Positive = key("analog gain (ISO)", default=1.0)
+    gain: Positive = key(
+        "analog gain of the fixed readout chain; the photographer's is exposure.gain", default=1.0
+    )
     read_noise: Electrons = key("temporal noise of a readout", example="5 e", default=0.0)
     column_noise: Electrons = key(
         "temporal, one draw a column and frame; none in dps and ccd", example="0 e", default=0.0

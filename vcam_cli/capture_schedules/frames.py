@@ -155,7 +155,7 @@ def take_frames(
     ready, _ = prepare(camera, workers, watch)
     if ready.rate.ndim != 2 or ready.layout.is_scattered or len(ready.mosaic.colors) > 1:
         raise bad("frames.camera", "has no monochrome array", "write pattern: monochrome there")
-    code = quantizer(camera, ready.geometry)
+    code = quantizer(ready.camera, ready.geometry)
     effects = plan.enabled_effects(camera, ready.geometry)
     longest = asked.max or camera.exposure.longest
     assert longest is not None

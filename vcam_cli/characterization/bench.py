@@ -174,7 +174,7 @@ class Bench:
         (rows, columns) array
             Codes [DN].
         """
-        code = quantizer(self.camera, self.ready.geometry)
+        code = quantizer(self.ready.camera, self.ready.geometry)
         seed = self.camera.seed
         # No frame of another frame seed has the same noise.
         seeds = {"sensor": seed.sensor, "frame": seed.frame + (number << 64)}
@@ -269,7 +269,8 @@ def prepare_edge_bench(bench: Bench, stages: Stages) -> Bench:
     if camera.accuracy.tolerance > EDGE_TOLERANCE:
         finer = camera.accuracy.model_copy(update={"preset": None, "tolerance": EDGE_TOLERANCE})
         camera = camera.model_copy(update={"accuracy": finer})
-    ready, _ = prepare(with_exposure_time(camera, bench.time), bench.workers, stages.watch)
+    fixed = with_exposure_time(camera, bench.time, bench.ready.camera.exposure_gain)
+    ready, _ = prepare(fixed, bench.workers, stages.watch)
     return replace(bench, ready=ready)
 
 

@@ -161,6 +161,7 @@ def _metrics() -> list[Item]:
         "snr_db": "SNR at 20 % of the well [dB] (eq 3.2)",
         "dynamic_range_db": "dynamic range [dB] (eq 3.1)",
         "well_capacity": "full well [e]",
+        "base_iso": "ISO speed at gain 1 (ISO 12232, saturation-based)",
     }
     asked = {
         "mse": "mean squared error against the ideal image; ask for it in `quality`",

@@ -8,6 +8,8 @@ References
    University, 2003, sections 2.2.2 and 3.2.1.
 .. [2] B. Fowler, M. Godfrey, J. Balicki, J. Canfield, "Low-noise readout using active reset for
    CMOS APS", Proc. SPIE 3965, 2000 (reset noise of a capacitance).
+.. [3] ISO 12232:2019, Digital still cameras: determination of exposure index, ISO speed ratings,
+   standard output sensitivity, and recommended exposure index (saturation-based speed).
 """
 
 import numpy as np
@@ -18,6 +20,10 @@ from vcam_cli.spectra import BOLTZMANN
 Floats = NDArray[np.float64]
 
 ELEMENTARY_CHARGE = 1.602176634e-19  # [C], exact in the SI of 2019
+
+
+SATURATION_CONSTANT = 78.0
+"""Of saturation-based ISO speed [lx s]."""
 
 
 def _float(value: ArrayLike) -> Floats:
@@ -228,6 +234,25 @@ def quantization_variance(codes_per_electron: ArrayLike) -> Floats:
         Variance of quantization [e^2].
     """
     return (1 / (12 * _float(codes_per_electron) ** 2))[()]
+
+
+def saturation_speed(saturation_exposure: ArrayLike) -> Floats:
+    """Return the saturation-based ISO speed, 78 / H_sat [3].
+
+    At this speed, exposed as a light meter asks, a white of 100 % reflectance lies half a stop
+    below saturation.
+
+    Parameters
+    ----------
+    saturation_exposure : array_like
+        Least exposure of the focal plane that saturates, H_sat [lx s].
+
+    Returns
+    -------
+    ndarray
+        ISO speed [dimensionless]; 0 where no exposure saturates.
+    """
+    return (SATURATION_CONSTANT / _float(saturation_exposure))[()]
 
 
 def dynamic_range_db(

@@ -1,21 +1,38 @@
-"""How long the shutter is open: given, or chosen for the scene."""
+"""How long the shutter is open, and at what gain: given, or chosen for the scene."""
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.derived.electrical import Electrical
 from vcam_cli.camera.exposure import AutoExposure
 
 
-def exposure_time(
-    camera: Camera, rate: NDArray, white_rate: float, dark_rate: float, saturation: float
-) -> float:
-    """Return the exposure time of a camera, given or chosen for the scene.
+@dataclass(frozen=True)
+class ExposureSettings:
+    """Time and gain of an exposure."""
+
+    time: float
+    """Exposure time [s]; of several samples of one integration the last that the file gives."""
+    gain: float
+    """Analog gain before the ADC."""
+    limit: str = ""
+    """Which limit an automatic exposure ran into: "longest time", "shortest time", "largest gain";
+    "" where it reached its target, or where the file gives the time."""
+
+
+def expose(
+    camera: Camera, rate: NDArray, white_rate: float, dark_rate: float, circuit: Electrical
+) -> ExposureSettings:
+    """Return time and gain of a camera's exposure, given or chosen for the scene.
 
     The level that an automatic exposure brings to its target is the white's, a percentile of the
-    pixels', or their mean, each with the dark signal on it.
+    pixels', or their mean, each with the dark signal on it. It takes the time first: the gain rises
+    only where the longest time is not enough.
 
     Parameters
     ----------
@@ -27,19 +44,38 @@ def exposure_time(
         Rate of the scene's perfect white on the axis in its brightest color [e/s].
     dark_rate : float
         Rate of the dark current [e/s].
-    saturation : float
-        Signal at which well or ADC is full [electrons].
+    circuit : Electrical
+        Full well and ADC, at the gain that the file gives.
 
     Returns
     -------
-    float
-        Exposure time [s]; of several samples of one integration the last that the file gives.
+    ExposureSettings
+        Time, gain, and the limit that stopped an automatic exposure.
     """
-    auto = camera.exposure.auto
+    auto, gain = camera.exposure.auto, circuit.exposure_gain
     if auto is None:
         assert camera.exposure.longest is not None
-        return camera.exposure.longest
-    return _reach(auto, _level(auto, rate, white_rate) + dark_rate, saturation)
+        return ExposureSettings(camera.exposure.longest, gain)
+    level = _level(auto, rate, white_rate) + dark_rate
+    target = _target(camera)
+    wanted = target * circuit.saturation / level if level > 0 else np.inf
+    time = float(min(max(wanted, auto.min), auto.max))
+    if wanted < auto.min:
+        return ExposureSettings(time, gain, "shortest time")
+    if wanted <= auto.max:
+        return ExposureSettings(time, gain)
+    if auto.max_gain <= gain:
+        return ExposureSettings(time, gain, "longest time")
+    full_scale = circuit.adc_full_scale * gain
+    wanted = target * full_scale / (level * time) if level > 0 else np.inf
+    limit = "largest gain" if wanted > auto.max_gain else ""
+    return ExposureSettings(time, float(min(max(wanted, gain), auto.max_gain)), limit)
+
+
+def _target(camera: Camera) -> float:
+    """Return the share of saturation that an automatic exposure aims at, compensation included."""
+    assert camera.exposure.auto is not None
+    return camera.exposure.auto.target * 2**camera.exposure.compensation
 
 
 def _level(auto: AutoExposure, rate: NDArray, white_rate: float) -> float:
@@ -75,13 +111,7 @@ def ceiling(camera: Camera, white_rate: float, saturation: float) -> float:
     if auto is None:
         assert camera.exposure.longest is not None
         return saturation / camera.exposure.longest
-    return max(white_rate / auto.target, saturation / auto.max)
-
-
-def _reach(auto: AutoExposure, rate: float, saturation: float) -> float:
-    """Return the time at which `rate` fills the target's share of the well, within limits [s]."""
-    wanted = auto.target * saturation / rate if rate > 0 else np.inf
-    return float(min(max(wanted, auto.min), auto.max))
+    return max(white_rate / _target(camera), saturation / auto.max)
 
 
 def percentile(values: NDArray, percent: float) -> float:

@@ -256,6 +256,7 @@ def figures(frame: Frame) -> list[tuple[str, float, str]]:
         ("snr_db", known.snr_db, "dB"),
         ("dynamic_range_db", known.dynamic_range_db, "dB"),
         ("well_capacity", known.well_capacity, "e"),
+        ("base_iso", frame.base_iso, ""),
     ]
     return listed + _sample_figures(frame, known.dark, known.draws) if frame.times else listed
 

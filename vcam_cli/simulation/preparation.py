@@ -31,7 +31,7 @@ from vcam_cli.image_formation.transfer_functions import Transfer
 from vcam_cli.progress import Stages
 from vcam_cli.quality import scielab
 from vcam_cli.quality.display import display_screen
-from vcam_cli.readout import auto_exposure, exposure, sample_times
+from vcam_cli.readout import auto_exposure, exposure, iso_speed, sample_times
 from vcam_cli.readout.layout import Layout, layout
 from vcam_cli.scenes.base import ChartScene, Scene
 from vcam_cli.scenes.build import build
@@ -67,6 +67,10 @@ class Prepared:
     """How far the scene's spectrum was followed."""
     exposure_time: float
     """Exposure time [s]."""
+    exposure_limit: str
+    """Limit that stopped an automatic exposure, as in `ExposureSettings`."""
+    base_iso: float
+    """ISO speed at gain 1; 0 of a camera that sees nothing of daylight."""
     times: tuple[float, ...]
     """Times (N,) of the samples of one integration, rising [s]; () of a single exposure."""
     plan: plan.Plan
@@ -111,8 +115,11 @@ def prepare(
     CannotDo
         Where memory does not suffice.
     """
-    solved, circuit = geometry(camera), electrical(camera)
+    solved = geometry(camera)
     place = layout(camera, solved)
+    base_iso = iso_speed.base_iso(camera, solved, place)
+    camera = iso_speed.set_gain(camera, base_iso)
+    circuit = electrical(camera)
     knobs = place.settings(settings(camera))
     frame_bytes = _require_memory(camera, place, knobs, solved)
     stages.watch.expect(cost_model.first_estimate(camera, solved, place.mosaic, workers))
@@ -146,6 +153,7 @@ def prepare(
         white_rate = white_rate * summed / (light.plan.on_axis or 1.0)
     with stages("exposure"):
         exposed = _expose(camera, solved, circuit, place, light, white_rate, effects)
+        camera = camera.with_exposure_gain(exposed.settings.gain)
         needed = max(frame_bytes, light.spectrum.memory) + getattr(picture, "nbytes", 0)
         changes = light.spectrum.changes | exposed.changes
         decided = plan.make(camera, solved, knobs, light.plan, exposed.signal, needed, changes)
@@ -154,7 +162,7 @@ def prepare(
     return Prepared(
         camera=camera,
         geometry=solved,
-        electrical=circuit,
+        electrical=electrical(camera),
         settings=knobs,
         mosaic=place.raw_mosaic,
         layout=place,
@@ -164,6 +172,8 @@ def prepare(
         rate=exposed.rate,
         spectrum=light.spectrum,
         exposure_time=exposed.signal.time,
+        exposure_limit=exposed.settings.limit,
+        base_iso=base_iso,
         times=exposed.times,
         plan=decided,
     )
@@ -255,6 +265,7 @@ class _Exposed:
     times: tuple[float, ...]
     """Times of the samples of one integration, rising [s]; () of a single exposure."""
     signal: SignalLevels
+    settings: auto_exposure.ExposureSettings
     changes: dict[str, float]
     """Effect on pixels or charge -> rms change of the mean signal by leaving it out [e/s]."""
 
@@ -276,11 +287,10 @@ def _expose(
     rate = groups.collect(_transport(collected, dark / groups.summed_charges, effects))
     adc = quantizer(camera, solved)
     times = sample_times.choose_sample_times(camera, rate, circuit, enabled, adc)
-    time = (
-        times[-1]
-        if times
-        else auto_exposure.exposure_time(camera, rate, white, dark, circuit.saturation)
-    )
+    chosen = auto_exposure.expose(camera, rate, white, dark, circuit)
+    if times:
+        chosen = replace(chosen, time=times[-1])
+    time = chosen.time
     peak = (float(rate.max()) + dark) * time
     _refuse_too_much(max(peak, white * time, dark))
     changes = _pixel_changes(place, groups.collect(light.values), enabled, effects, time)
@@ -298,7 +308,7 @@ def _expose(
         _levels(place, rate, dark, time, circuit.full_well),
         extreme_signal(of_kind(enabled, NoiseSource), peak, dark * time) if alone else math.inf,
     )
-    return _Exposed(rate, times, signal, changes)
+    return _Exposed(rate, times, signal, chosen, changes)
 
 
 def _refuse_too_much(electrons: float) -> None:

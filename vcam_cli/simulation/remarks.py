@@ -5,6 +5,7 @@ from vcam_cli.camera.scene import ImageFile
 from vcam_cli.scenes.build import picture_model
 from vcam_cli.scenes.hyperspectral import CubeScene
 from vcam_cli.scenes.image import ImageScene
+from vcam_cli.simulation import idle_keys
 from vcam_cli.simulation.preparation import Prepared
 from vcam_cli.spectra import luminance
 
@@ -16,6 +17,7 @@ def remarks(ready: Prepared) -> tuple[str, ...]:
     """Return notes on the silicon, on times that the camera chose, and on a scene of spectra."""
     scene, band = ready.scene, ready.camera.scene.wavelengths
     before = (
+        *idle_keys.notes(ready.camera),
         *photodiode.remarks(ready.camera),
         *_scheduled_times(ready),
         *_blind_colors(ready),

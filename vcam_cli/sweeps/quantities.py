@@ -14,6 +14,7 @@ METRICS = {
     "snr_db": "dB",
     "dynamic_range_db": "dB",
     "well_capacity": "e",
+    "base_iso": "",
     "mse": "",
     "psnr_db": "dB",
     "mean_delta_e": "",
@@ -63,6 +64,7 @@ QUANTITIES = tuple(METRICS | PROPERTIES | CURVES)
 _LABELS = {
     "snr_db": "SNR at 20 % of the well",
     "dynamic_range_db": "dynamic range",
+    "base_iso": "base ISO speed",
     "mse": "mean squared error",
     "psnr_db": "PSNR",
     "mean_delta_e": "mean CIELAB Delta E",

@@ -29,7 +29,10 @@ class Electrical:
     """Electrons that a pixel holds [e]."""
     capacitance: float | None
     """Capacitance of the sense node, for kTC noise [F]; None where the file gives no voltage."""
-    analog_gain: float
+    readout_gain: float
+    """Gain of the fixed readout chain."""
+    exposure_gain: float
+    """Gain in front of the ADC, of which its full scale knows nothing."""
     bits: int
     """Resolution of the ADC."""
     offset: float
@@ -43,6 +46,11 @@ class Electrical:
     def has_volts(self) -> bool:
         """Whether volts are volts; else they are parts of a nominal swing."""
         return self.capacitance is not None
+
+    @property
+    def analog_gain(self) -> float:
+        """Voltage at the ADC per voltage on the sense node."""
+        return self.readout_gain * self.exposure_gain
 
     @property
     def highest_code(self) -> int:
@@ -59,7 +67,12 @@ class Electrical:
     @property
     def saturation(self) -> float:
         """Electrons at which the well or the ADC is full, whichever comes first [e]."""
-        return min(self.full_well, (self.highest_code - self.offset) * self.electrons_per_dn)
+        return min(self.full_well, self.adc_full_scale)
+
+    @property
+    def adc_full_scale(self) -> float:
+        """Electrons from black to the highest code [e]."""
+        return (self.highest_code - self.offset) * self.electrons_per_dn
 
 
 def electrical(camera: Camera) -> Electrical:
@@ -95,7 +108,8 @@ def electrical(camera: Camera) -> Electrical:
         voltage_swing=swing,
         full_well=well,
         capacitance=capacitance,
-        analog_gain=given.gain,
+        readout_gain=given.gain,
+        exposure_gain=camera.exposure_gain,
         bits=adc.bits,
         offset=adc.offset,
         full_scale=full_scale,

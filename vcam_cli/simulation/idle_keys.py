@@ -1,0 +1,227 @@
+"""Keys of a camera file that can change no number of its results, and why.
+
+A key that is written and does nothing is a misunderstanding: the user is told. Only keys that
+differ from their default count. What the picture decides, such as a longest exposure time that is
+not reached, is no matter of the file and not told here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from vcam_cli.camera.architecture import ARCHITECTURES
+from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.derived import photodiode
+from vcam_cli.camera.derived.dark_current import dark_rate
+from vcam_cli.camera.derived.electrical import electrical
+from vcam_cli.camera.derived.pixel_layout import detector
+from vcam_cli.camera.photodetector import DarkCurrentDensity
+from vcam_cli.config.model import Model
+from vcam_cli.errors import BadInput
+from vcam_cli.spectra import Spectrum
+
+PROBES = (2.0, 0.5, 1.1, 0.9)
+"""Factors by which a number is changed to see whether anything follows from it."""
+QE_WAVELENGTHS = np.array([4e-7, 5.5e-7, 7e-7])
+"""Where the quantum efficiency is looked at [m]."""
+
+
+@dataclass(frozen=True)
+class Rule:
+    """When some keys are idle."""
+
+    paths: tuple[str, ...]
+    is_idle: Callable[[Camera], bool]
+    why: str
+    """Reason and remedy, behind a colon; ARCHITECTURE stands for the pixel's."""
+
+
+def _gain_cancels(camera: Camera) -> bool:
+    adc = camera.adc
+    follows = adc.gain is not None or (adc.full_scale is None and adc.reference is None)
+    return follows and "volts" not in camera.output.raw
+
+
+def _needs_no_temperature(camera: Camera) -> bool:
+    return _is_probed_idle(camera, "pixel.temperature")
+
+
+def _doubling_is_idle(camera: Camera) -> bool:
+    given = camera.pixel.photodetector.dark_current_density
+    return isinstance(given, DarkCurrentDensity) and given.temperature in (
+        None,
+        camera.pixel.temperature,
+    )
+
+
+def _has_no_columns(camera: Camera) -> bool:
+    return not ARCHITECTURES[camera.pixel.architecture].column_terms
+
+
+def _cancels_reset_noise(camera: Camera) -> bool:
+    return ARCHITECTURES[camera.pixel.architecture].reset_noise == "none"
+
+
+def _has_no_bit_line(camera: Camera) -> bool:
+    of_bit_line = ARCHITECTURES[camera.pixel.architecture].reset_noise == "bit line"
+    return not of_bit_line or camera.pixel.readout.reset_noise != "ktc"
+
+
+def _needs_no_viewer(camera: Camera) -> bool:
+    return "s-cielab" not in camera.quality
+
+
+_DETECTOR = "pixel.photodetector"
+RULES = (
+    Rule(
+        ("pixel.readout.gain",),
+        _gain_cancels,
+        "the ADC's full scale follows it, so that it cancels; the photographer's gain is"
+        " exposure.gain",
+    ),
+    Rule(
+        ("exposure.auto.percentile",),
+        lambda camera: camera.exposure.auto is None or camera.exposure.auto.method != "percentile",
+        "the automatic exposure goes by another level; write method: percentile",
+    ),
+    Rule(
+        ("exposure.estimator",),
+        lambda camera: not camera.exposure.captures,
+        "a single exposure needs none; give captures",
+    ),
+    Rule(
+        ("pixel.fpn.dark", f"{_DETECTOR}.dark_current_scale"),
+        lambda camera: dark_rate(camera) == 0,
+        f"there is no dark current; give {_DETECTOR}.dark_current",
+    ),
+    Rule(
+        (f"{_DETECTOR}.dark_current_density.doubling",),
+        _doubling_is_idle,
+        "the dark current is given at the pixel's own temperature",
+    ),
+    Rule(
+        ("pixel.temperature",),
+        _needs_no_temperature,
+        "neither dark current nor noise follows from it; give the dark current's temperature,"
+        f" as {_DETECTOR}.dark_current_density: {{value: 1 nA/cm2, temperature: 300 K}}",
+    ),
+    Rule(
+        ("pixel.fpn.offset_column", "pixel.fpn.gain_column", "pixel.readout.column_noise"),
+        _has_no_columns,
+        "columns of ARCHITECTURE pixels share no amplifier",
+    ),
+    Rule(
+        ("pixel.readout.reset_noise",),
+        _cancels_reset_noise,
+        "correlated double sampling removes it in ARCHITECTURE pixels",
+    ),
+    Rule(
+        ("pixel.readout.bit_line_capacitance",),
+        _has_no_bit_line,
+        "only the kTC noise of a passive pixel (pps) follows from it",
+    ),
+    Rule(
+        ("display.dpi", "display.width", "display.viewing_distance", "display.filters"),
+        _needs_no_viewer,
+        "no metric asks how large the picture is seen; add s-cielab to quality",
+    ),
+    Rule(
+        ("display.gamma", "display.white"),
+        lambda camera: True,
+        "pictures are compared in linear light relative to white, where it cancels",
+    ),
+)
+
+
+def idle_keys(camera: Camera) -> Iterator[tuple[str, str]]:
+    """Yield the keys that can change no number, by their dotted paths, each with the reason."""
+    for rule in RULES:
+        for path in rule.paths:
+            if _is_given(camera, path) and rule.is_idle(camera):
+                yield path, rule.why.replace("ARCHITECTURE", camera.pixel.architecture)
+    for path in _process_overrides(camera):
+        if _is_probed_idle(camera, path):
+            yield path, "no number of this pixel follows from it; what it gives is given otherwise"
+
+
+def notes(camera: Camera) -> tuple[str, ...]:
+    """Return a note for every idle key."""
+    return tuple(f"{path} changes nothing here: {why}" for path, why in idle_keys(camera))
+
+
+def _is_given(camera: Camera, path: str) -> bool:
+    """Return whether a key is written, and with another value than its default."""
+    *parents, name = path.split(".")
+    model: Any = camera
+    for parent in parents:
+        model = getattr(model, parent, None)
+    if not isinstance(model, Model) or name not in model.model_fields_set:
+        return False
+    default = type(model).model_fields[name].get_default(call_default_factory=True)
+    return bool(getattr(model, name) != default)
+
+
+def _process_overrides(camera: Camera) -> Iterator[str]:
+    """Yield the paths of a process's numbers that the camera's own file gives."""
+    for path in ("pixel.technology", f"{_DETECTOR}.junction"):
+        section = camera
+        for name in path.split("."):
+            section = getattr(section, name)
+        yield from _numbers(section, path)
+
+
+def _numbers(section: Any, path: str) -> Iterator[str]:
+    if not isinstance(section, Model):
+        return
+    for name in type(section).model_fields:
+        value = getattr(section, name)
+        if name in ("from_", "scaling"):
+            continue  # a file's numbers serve pixels of all kinds
+        if isinstance(value, Model):
+            yield from _numbers(value, f"{path}.{name}")
+        elif isinstance(value, float):
+            yield f"{path}.{name}"
+
+
+def _is_probed_idle(camera: Camera, path: str) -> bool:
+    """Return whether nothing that a frame depends on follows from a number."""
+    before = _figures(camera)
+    for factor in PROBES:
+        try:
+            return _figures(_scaled(camera, path.split("."), factor)) == before
+        except BadInput:
+            continue
+    return False
+
+
+def _scaled(model: Any, names: list[str], factor: float) -> Any:
+    """Return the model with the number at a path multiplied."""
+    name, *rest = names
+    value = getattr(model, name)
+    changed = _scaled(value, rest, factor) if rest else value * factor
+    return model.model_copy(update={name: changed})
+
+
+def _figures(camera: Camera) -> tuple[Any, ...]:
+    """Return what frames depend on of all that follows from a pixel's process."""
+    circuit, efficiency = electrical(camera), photodiode.quantum_efficiency(camera)
+    reset = camera.pixel.readout.reset_noise == "ktc" and not _cancels_reset_noise(camera)
+    return (
+        circuit.full_well,
+        circuit.electrons_per_dn,
+        circuit.conversion_gain if "volts" in camera.output.raw else None,
+        (circuit.capacitance, camera.pixel.temperature) if reset else None,
+        dark_rate(camera),
+        tuple(np.ravel(_sampled(efficiency)).tolist()),
+        photodiode.diffusion(camera),
+        detector(camera),
+    )
+
+
+def _sampled(efficiency: Spectrum) -> Any:
+    covered = [w for w in QE_WAVELENGTHS if efficiency.covers(w, w)]
+    return efficiency.evaluate(np.array(covered)) if covered else np.zeros(0)
