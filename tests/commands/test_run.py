@@ -255,7 +255,7 @@ class TestFiles:
         found = {name: (float(value), unit) for name, value, unit in rows[1:]}
         assert list(found) == [
             "exposure_time", "mean_electrons", "saturated_fraction",
-            "snr_db", "dynamic_range_db", "well_capacity",
+            "snr_db", "dynamic_range_db", "well_capacity", "base_iso",
         ]  # fmt: skip
         assert found["exposure_time"] == (0.02, "s")
         mean = raw()["electrons"].mean(dtype=float)
