@@ -115,7 +115,7 @@ def digest(result: Result) -> str:
     if result.samples_dn is not None and result.photocurrent is not None:
         arrays += [result.samples_dn, result.photocurrent]
     content = b"".join(np.ascontiguousarray(array).tobytes() for array in arrays)
-    return hashlib.sha256(content + repr(result.metrics).encode()).hexdigest()
+    return hashlib.sha256(content + repr(dict(result.metrics)).encode()).hexdigest()
 
 
 def changes(kind: Numeric | None, given: Any) -> Iterator[Any]:

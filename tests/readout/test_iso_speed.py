@@ -28,7 +28,7 @@ def electrons_per_lux_second() -> float:
 
 
 def metric(result, name: str) -> float:
-    return {key: value for key, value, _ in result.metrics}[name]
+    return result.metrics[name]
 
 
 def test_base_iso_is_78_over_the_exposure_that_saturates(tmp_path) -> None:
