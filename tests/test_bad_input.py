@@ -166,7 +166,7 @@ case(
     ("{time: 30 ms}", "{captures: {schedule: best, count: 8, max: 1}}"),
     says=[
         ("20:33", "exposure.captures.schedule", "best", "optimal"),
-        ("20:54", "exposure.captures.max", "bare number", "30 ms"),
+        ("20:54", "exposure.captures.max", "bare number", "100 ms"),
     ],
 )
 

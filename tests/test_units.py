@@ -98,7 +98,7 @@ REFUSED = [
     (None, "time", "a time is a number with its unit, for example 30 ms"),
     ([1], "time", "a time is a number"),
     ({"a": 1}, "time", "a time is a number"),
-    ("300 C", "temperature", "unknown unit 'C'"),
+    ("300 C", "temperature", "no unit 'C'; did you mean degC"),
 ]
 
 

@@ -186,6 +186,9 @@ def _unit_size(kind: Dimension, text: str, unit: str) -> Fraction:
     for allowed in kind.units:
         if allowed.lower() == key.lower():
             raise ValueError(f"{text!r}: there is no unit {unit!r}; did you mean {allowed}?")
+    spelled = _SPELLED.get(key, "")
+    if spelled in kind.units:
+        raise ValueError(f"{text!r}: there is no unit {unit!r}; did you mean {spelled}?")
     others = [other.title for other in DIMENSIONS.values() if key in other.units]
     units = ", ".join(list(kind.units)[:10])
     said = f"is {others[0]}, not {kind.title}" if others else f": unknown unit {unit!r}"
@@ -193,6 +196,16 @@ def _unit_size(kind: Dimension, text: str, unit: str) -> Fraction:
         f"{text!r}{' ' if others else ''}{said}; {kind.title} is given in {units}, "
         f"for example {kind.example}"
     )
+
+
+_SPELLED = {
+    "lux": "lx", "nit": "cd/m2", "nits": "cd/m2", "micron": "um", "microns": "um", "mu": "um",
+    "sec": "s", "second": "s", "seconds": "s", "msec": "ms", "usec": "us", "C": "degC", "°C": "degC",
+    "Kelvin": "K", "kelvin": "K", "inch": "in", "inches": "in", "electrons": "e", "electron": "e",
+    "e-": "e", "ke-": "ke", "e-/s": "e/s", "electrons/s": "e/s", "uV/e-": "uV/e", "DN/e-": "DN/e",
+    "degree": "deg", "degrees": "deg", "cycles/millimeter": "cycles/mm", "LSB": "DN", "ADU": "DN",
+}  # fmt: skip
+"""Units as they are also written -> their names here."""
 
 
 def _value(

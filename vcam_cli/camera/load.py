@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from vcam_cli.arguments import require_name, require_overrides
+from vcam_cli.camera import hints
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived import electrical, falloff, geometry, named_spectra, photodiode
 from vcam_cli.config import document, overrides, shipped
@@ -79,6 +80,7 @@ FORMAT = FileFormat(
     file_keys=FILE_KEYS,
     merge_rules=MERGE_RULES,
     refuse=_refuse_study,
+    advise=hints.advise,
     checks=(
         (named_spectra.check_spectra, "scene"),
         (geometry.check, "scene optics pixel array"),

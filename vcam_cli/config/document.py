@@ -145,6 +145,19 @@ def _with_absolute_files(
     return visit(tree, ()), files
 
 
+def _given(tree: Node, path: errors.Path) -> object:
+    """Return what stands at a path, as YAML has it; None where nothing does."""
+    value = tree.plain()
+    for part in path:
+        if isinstance(value, dict):
+            value = value.get(part)
+        elif isinstance(value, list) and isinstance(part, int) and part < len(value):
+            value = value[part]
+        else:
+            return None
+    return value
+
+
 def _validate(
     tree: Node, format: FileFormat[M], origin: Origin, findings: Findings
 ) -> tuple[M | None, set]:
@@ -157,7 +170,10 @@ def _validate(
     try:
         return format.model.model_validate(value), set()
     except ValidationError as error:
-        problems = validation_messages.problems(error)
+        problems = [
+            format.advise(problem, _given(tree, problem.path))
+            for problem in validation_messages.problems(error)
+        ]
         findings.add(problems, origin.locate)
     wrong = {problem.path[0] for problem in problems if problem.path}
     findings.failed |= {(name,) for name in wrong}

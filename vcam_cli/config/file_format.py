@@ -8,6 +8,7 @@ from vcam_cli import errors
 from vcam_cli.config.merge import NO_RULES, MergeRules
 from vcam_cli.config.model import FileModel
 from vcam_cli.config.yaml_tree import Key, Node
+from vcam_cli.errors import Problem
 
 M = TypeVar("M", bound=FileModel)
 Check = tuple[Callable[[M], None], str]
@@ -30,6 +31,8 @@ class FileFormat(Generic[M]):
     merge_rules: MergeRules = NO_RULES
     refuse: Callable[[Node], None] = lambda root: None
     """What raises BadInput for a file of another format."""
+    advise: Callable[[Problem, object], Problem] = lambda problem, given: problem
+    """Says what is meant by a key or value that is wrong, knowing what stands there."""
     checks: Sequence[Check[M]] = ()
     """Further checks of a valid model."""
     stand_in: Callable[[], M] | None = None

@@ -1,0 +1,114 @@
+"""What a newcomer writes first is answered with the key and the value that are meant."""
+
+import re
+
+import pytest
+
+from vcam_cli.camera import hints
+from vcam_cli.camera.load import load
+from vcam_cli.errors import BadInput
+
+BASE = "colorchecker-d65"
+"""A shipped camera whose processing follows its pattern."""
+GUESSES = {
+    "array.pattern=bayer": "array.pattern: bayer-rggb",
+    "array.pattern=RGGB": "array.pattern: bayer-rggb",
+    "array.pattern=gray": "array.pattern: monochrome",
+    "optics.f_number=f/2.8": "optics.f_number: 2.8",
+    "optics.f_number=F8": "optics.f_number: 8",
+    "pixel.full_well=20 ke": "pixel.readout.full_well: 20 ke",
+    "full_well=20 ke": "pixel.readout.full_well: 20 ke",
+    "scene.luminance=300 lux": "scene.illuminance: 300 lx",
+    "scene.luminance=300 lx": "scene.illuminance: 300 lx",
+    "scene.illuminance=50 cd/m2": "scene.luminance: 50 cd/m2",
+    "scene.illuminance=300 lux": "scene.illuminance: 300 lx",
+    "scene.illuminant=5500K": "scene.illuminant: {blackbody: 5500 K}",
+    "scene.illuminant=tungsten": "scene.illuminant: A",
+    "exposure.shutter_speed=1/60 s": "exposure.time: 1/60 s",
+    "exposure.time=1/60": "exposure.time: 1/60 s",
+    "pixel.size=2 um": "pixel.width: 2 um",
+    "bits=12": "adc.bits: 12",
+    "pixel.qe=0.6": "pixel.photodetector.quantum_efficiency: 0.6",
+    "pixel.read_noise=3 e": "pixel.readout.read_noise: 3 e",
+    "pixel.dark_current=3 e/s": "pixel.photodetector.dark_current: 3 e/s",
+    "array.cfa=bayer": "array.pattern: bayer-rggb",
+    "pixel.temperature=20 C": "pixel.temperature: 20 degC",
+    "optics.focal_length=50": "optics.focal_length: 3.2 mm",
+}
+"""A first guess -> what it is to be led to."""
+
+
+def remedy_of(guess):
+    """The remedy's own words, and the path that they begin at where they name no other."""
+    with pytest.raises(BadInput) as caught:
+        load(BASE, [guess])
+    problem = caught.value.problems[0]
+    return problem.remedy, guess.partition("=")[0]
+
+
+@pytest.mark.parametrize(("guess", "meant"), GUESSES.items())
+def test_a_guess_is_led_to_what_is_meant(guess, meant):
+    remedy, _ = remedy_of(guess)
+    path, _, value = meant.partition(": ")
+    if path != guess.partition("=")[0]:
+        assert path.removeprefix("scene.") in remedy, remedy
+    asked = value.removeprefix("300 ").removeprefix("20 ") if "did you mean" in remedy else value
+    assert asked in remedy, remedy
+
+
+@pytest.mark.parametrize("meant", sorted(set(GUESSES.values())))
+def test_what_is_meant_is_right(meant):
+    assert accepted(meant)
+
+
+def accepted(entry):
+    """Whether a camera of that shipped camera takes entries "path: value and path: value"."""
+    for one in re.split(" and (?=[a-z]+[.:])", entry):
+        path, _, value = one.partition(": ")
+        if path.startswith("optics.") and path.split(".")[1] in (
+            "field_of_view",
+            "numerical_aperture",
+        ):
+            whole = {"field_of_view": "f_number: 2", "numerical_aperture": "focal_length: 9 mm"}
+            value = f"{{{path.split('.')[1]}: {value}, {whole[path.split('.')[1]]}}}"
+            path = "optics"
+        ccd = ["pixel.architecture=ccd"] if "charge_transfer" in path else []
+        load(BASE, [*ccd, f"{path}={value}"])
+    return True
+
+
+@pytest.mark.parametrize(
+    "entry",
+    sorted(
+        {*hints.KEYS.values(), *(e for words in hints.ELSEWHERE.values() for e in words.values())}
+    ),
+)
+def test_every_key_that_is_named_exists_and_takes_its_value(entry, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "photo.png").touch()
+    assert accepted(entry)
+
+
+@pytest.mark.parametrize(
+    ("path", "value"),
+    sorted({(path, value) for path, words in hints.VALUES.items() for value in words.values()}),
+)
+def test_every_value_that_is_named_is_taken(path, value):
+    load(BASE, [f"{path}={value}"])
+
+
+def test_no_word_of_the_table_is_a_key_of_that_place():
+    """A word that is a key somewhere is led elsewhere only where it is none."""
+    for above, words in hints.ELSEWHERE.items():
+        here = {key.name for key in hints.index() if key.path[:-1] == above}
+        assert not here & set(words), above
+
+
+def test_an_unknown_word_is_not_led_astray():
+    remedy, _ = remedy_of("fps=30")
+    assert "write one of the allowed keys" in remedy
+
+
+def test_a_step_of_processing_is_named_as_one():
+    remedy, _ = remedy_of("white_balance=auto")
+    assert "a step of processing: - white_balance: illuminant" in remedy

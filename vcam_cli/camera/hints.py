@@ -1,0 +1,226 @@
+"""Words of photographers, data sheets and other simulators, led to the keys that they mean.
+
+A camera file is written by someone who knows cameras and not yet this file. What they write first
+is mostly a right word in the wrong place, another word of the trade, or a value as one says it. Each
+table below has, for such a word, keys as a file may have them; a test reads every one of them.
+"""
+
+import re
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import cache
+from pathlib import PurePath
+
+from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.scene import CHARTS
+from vcam_cli.config.key_index import Key, keys
+from vcam_cli.config.validation_messages import NO_SUCH_KEY, yaml_text
+from vcam_cli.errors import Path, Problem, dotted_path, nearest
+
+KEYS: Mapping[str, str] = {
+    "shutter": "exposure.time: 1/60 s",
+    "shutter_speed": "exposure.time: 1/60 s",
+    "shutter_time": "exposure.time: 1/60 s",
+    "exposure_time": "exposure.time: 30 ms",
+    "integration_time": "exposure.time: 30 ms",
+    "auto_exposure": "exposure.auto: {max: 100 ms}",
+    "aperture": "optics.f_number: 2.8",
+    "f": "optics.f_number: 2.8",
+    "f_stop": "optics.f_number: 2.8",
+    "fstop": "optics.f_number: 2.8",
+    "fnumber": "optics.f_number: 2.8",
+    "n": "optics.f_number: 2.8",
+    "fov": "optics.field_of_view: 60 deg",
+    "na": "optics.numerical_aperture: 0.2",
+    "transmission": "optics.transmittance: 0.95",
+    "vignetting": "optics.off_axis: exact",
+    "relative_illumination": "optics.off_axis: exact",
+    "glare": "optics.stray_light: 0.01",
+    "flare": "optics.stray_light: 0.01",
+    "aberrations": "optics.zernike: {4: 0.05 um}",
+    "size": "pixel.width: 3 um",
+    "pixel_size": "pixel.width: 3 um",
+    "pixel_pitch": "pixel.width: 3 um",
+    "pitch": "pixel.width: 3 um",
+    "qe": "pixel.photodetector.quantum_efficiency: 0.5",
+    "noise": "pixel.readout.read_noise: 5 e",
+    "readout_noise": "pixel.readout.read_noise: 5 e",
+    "fwc": "pixel.readout.full_well: 20 ke",
+    "well": "pixel.readout.full_well: 20 ke",
+    "well_capacity": "pixel.readout.full_well: 20 ke",
+    "full_well_capacity": "pixel.readout.full_well: 20 ke",
+    "saturation_capacity": "pixel.readout.full_well: 20 ke",
+    "cte": "pixel.readout.charge_transfer: {inefficiency: 3e-5, phases: 3}",
+    "cti": "pixel.readout.charge_transfer: {inefficiency: 3e-5, phases: 3}",
+    "hot_pixels": "pixel.defects.hot: 0.0001",
+    "dead_pixels": "pixel.defects.dead: 0.0001",
+    "bit_depth": "adc.bits: 12",
+    "bitdepth": "adc.bits: 12",
+    "resolution": "array.rows: 480 and array.columns: 640",
+    "cfa": "array.pattern: bayer-rggb",
+    "bayer": "array.pattern: bayer-rggb",
+    "color": "array.pattern: bayer-rggb",
+    "lux": "scene.illuminance: 300 lx",
+    "light": "scene.illuminant: D65",
+    "lamp": "scene.illuminant: D65",
+    "brightness": "scene.luminance: 100 cd/m2",
+    "image": "scene.source: {kind: image, file: photo.png}",
+    "photo": "scene.source: {kind: image, file: photo.png}",
+    "picture": "scene.source: {kind: image, file: photo.png}",
+    "chart": "scene.source: {kind: chart, chart: colorchecker}",
+    "metrics": "quality: [mse, s-cielab]",
+}
+"""A word where there is no such key -> what is meant, as a path and a value."""
+ELSEWHERE: Mapping[Path, Mapping[str, str]] = {
+    ("array",): {
+        "width": "array.columns: 640",
+        "height": "array.rows: 480",
+        "size": "array.rows: 480 and array.columns: 640",
+        "pixels": "array.rows: 480 and array.columns: 640",
+    },
+    ("adc",): {"black_level": "adc.offset: 64 DN"},
+    ("effects",): {"noise": "effects: {shot_noise: off, read_noise: off, fpn: off}"},
+    (): {
+        "lens": "optics: {f_number: 2.8, focal_length: 4.5 mm}",
+        "sensor": "pixel: {width: 4 um} and array: {rows: 480, columns: 640}",
+        "noise": "effects: {shot_noise: off, read_noise: off, fpn: off}",
+    },
+}
+"""The same where a section gives the word another meaning."""
+VALUES: Mapping[str, Mapping[str, str]] = {
+    "array.pattern": {
+        **dict.fromkeys(("bayer", "rggb", "color", "rgb"), "bayer-rggb"),
+        **{order: f"bayer-{order}" for order in ("grbg", "gbrg", "bggr")},
+        **dict.fromkeys(("mono", "gray", "grey", "none", "bw"), "monochrome"),
+        **dict.fromkeys(("foveon", "x3"), "stacked"),
+        **dict.fromkeys(("quad", "tetracell", "quadra"), "quad-bayer"),
+    },
+    "scene.illuminant": {
+        **dict.fromkeys(("daylight", "white", "day"), "D65"),
+        **dict.fromkeys(("sun", "sunlight"), "D55"),
+        **dict.fromkeys(("tungsten", "incandescent", "halogen", "bulb"), "A"),
+        **dict.fromkeys(("fluorescent", "office"), "FL2"),
+    },
+    "exposure": {"auto": "{auto: {max: 100 ms}}"},
+    "exposure.auto": dict.fromkeys(("true", "on", "yes", "auto"), "{max: 100 ms}"),
+    "effects": {"none": "{shot_noise: off, read_noise: off, fpn: off}"},
+    "pixel.readout.reset_noise": {"cds": "none"},
+}
+"""A key -> what stands there and is not allowed -> what to write."""
+_NUMBER = r"(\d+(?:\.\d+)?)"
+FORMS: Mapping[str, tuple[tuple[str, str], ...]] = {
+    "optics.f_number": ((rf"[fF] ?/? ?{_NUMBER}", r"write \1"),),
+    "exposure.time": (
+        (r"1/\d+(\.\d+)?", r"write \g<0> s"),
+        ("auto", "write exposure: {auto: {max: 100 ms}}"),
+    ),
+    "scene.luminance": ((rf"{_NUMBER} ?(lx|lux)", r"write illuminance: \1 lx, in its place"),),
+    "scene.illuminance": (
+        (rf"{_NUMBER} ?(cd/m2|nits?)", r"write luminance: \1 cd/m2, in its place"),
+    ),
+    "scene.illuminant": (
+        (rf"{_NUMBER} ?[kK]", r"write {blackbody: \1 K}"),
+        (rf"{_NUMBER} ?nm", r"write {monochromatic: \1 nm}"),
+    ),
+    "array.pattern": (("(?i)x-?trans", "write {block: [[R, G], [G, B]]} with its own block"),),
+}
+"""A key -> expressions that a value there may fulfil, and what is then to be done."""
+_PICTURES = {".png", ".jpg", ".jpeg", ".tif", ".tiff", ".exr", ".hdr", ".bmp", ".webp", ".pfm"}
+_SEPARATE = {"name", "kind", "file", "value", "rows", "columns"}
+"""Keys that many mappings have: elsewhere they mean something else."""
+
+
+@cache
+def index() -> tuple[Key, ...]:
+    """Return all keys of a camera file, each path once; those of a technology file aside."""
+    found = {key.path: key for key in reversed(list(keys(Camera))) if "from" not in key.path[:-1]}
+    return tuple(reversed(found.values()))
+
+
+def advise(problem: Problem, given: object) -> Problem:
+    """Return a problem with the remedy of someone who knows cameras, where there is one.
+
+    Parameters
+    ----------
+    problem : Problem
+        What the model says.
+    given : object
+        What stands at its path, as YAML has it.
+    """
+    if problem.message.startswith(NO_SUCH_KEY):
+        meant = _meant_key(problem.path, given)
+    else:
+        meant = _meant_value(problem, given)
+    return replace(problem, remedy=meant) if meant else problem
+
+
+def _meant_key(path: Path, given: object) -> str:
+    """Return which key is meant by one that is not there; "" for none that is known."""
+    word, above = _plain(path[-1]), tuple(path[:-1])
+    here = [key.name for key in index() if key.path[:-1] == above]
+    if said := ELSEWHERE.get(above, {}).get(word):
+        return f"write {said}"
+    if path[0] in ("processing", "accuracy") or word in {_plain(name) for name in here}:
+        return ""
+    if word in KEYS:
+        return f"write {_entry(word, given)}"
+    places = [key for key in index() if key.path[0] != "effects" and "technology" not in key.path]
+    same = [key for key in places if key.name == word]
+    if same and word not in _SEPARATE:
+        return "write " + " or ".join(_place(key, given) for key in same[:3])
+    if len(word) < 4 or nearest(word, here):
+        return ""
+    close = nearest(word, [*(key.name for key in places), *KEYS])
+    if close in KEYS:
+        return f"write {_entry(close, given)}"
+    same = [key for key in places if key.name == close]
+    return f"did you mean {_place(same[0], given)}?" if same else ""
+
+
+def _entry(word: str, given: object) -> str:
+    """Return what is meant by a word of `KEYS`, with the value that was given if it will do."""
+    path, _, example = KEYS[word].partition(": ")
+    key = next((key for key in index() if key.dotted == path), None)
+    return f"{path}: {_value(given, key, example)}" if key else KEYS[word]
+
+
+def _place(key: Key, given: object) -> str:
+    """Return a key as a file has it, with the value that was given if it will do."""
+    value = _value(given, key, key.example)
+    if key.path[0] == "processing":
+        return f"a step of processing: - {key.name}: {value}"
+    return f"{key.dotted}: {value}"
+
+
+def _value(given: object, key: Key, example: str) -> str:
+    """Return the value that was given, where it looks like one of the key, or else an example."""
+    shaped = isinstance(given, str) and key.unit and given.endswith(key.unit.split("/")[-1])
+    bare = isinstance(given, (int, float)) and not isinstance(given, bool) and not key.unit
+    return yaml_text(given) if shaped or bare else example
+
+
+def _meant_value(problem: Problem, given: object) -> str:
+    """Return what is meant by a value that is not allowed at its key; "" where that is unknown."""
+    path = dotted_path(problem.path)
+    word = yaml_text(given) if isinstance(given, (str, int, float)) else ""
+    if not word:
+        return ""
+    if meant := VALUES.get(path, {}).get(_plain(word)):
+        return f"write {meant}"
+    for form, remedy in FORMS.get(path, ()):
+        if match := re.fullmatch(form, word.strip()):
+            return match.expand(remedy)
+    if path == "scene.source":
+        if PurePath(word).suffix.lower() in _PICTURES:
+            return f"write {{kind: image, file: {word}}}"
+        chart = nearest(word, CHARTS)
+        return f"write {{kind: chart, chart: {chart}}}" if chart else ""
+    key = next((key for key in index() if key.path == problem.path), None)
+    if key is not None and key.unit and "bare number" in problem.message:
+        before, has_example, _ = problem.remedy.partition("for example ")
+        return f"{before}for example {key.example}" if has_example else ""
+    return ""
+
+
+def _plain(word: object) -> str:
+    return str(word).lower().replace("-", "_").replace(" ", "_")
