@@ -200,8 +200,9 @@ def _unit_size(kind: Dimension, text: str, unit: str) -> Fraction:
 
 _SPELLED = {
     "lux": "lx", "nit": "cd/m2", "nits": "cd/m2", "micron": "um", "microns": "um", "mu": "um",
-    "sec": "s", "second": "s", "seconds": "s", "msec": "ms", "usec": "us", "C": "degC", "°C": "degC",
-    "Kelvin": "K", "kelvin": "K", "inch": "in", "inches": "in", "electrons": "e", "electron": "e",
+    "sec": "s", "second": "s", "seconds": "s", "msec": "ms", "usec": "us", "C": "degC",
+    "°C": "degC", "Kelvin": "K", "kelvin": "K", "inch": "in", "inches": "in",
+    "electrons": "e", "electron": "e",
     "e-": "e", "ke-": "ke", "e-/s": "e/s", "electrons/s": "e/s", "uV/e-": "uV/e", "DN/e-": "DN/e",
     "degree": "deg", "degrees": "deg", "cycles/millimeter": "cycles/mm", "LSB": "DN", "ADU": "DN",
 }  # fmt: skip

@@ -1,8 +1,8 @@
 """Words of photographers, data sheets and other simulators, led to the keys that they mean.
 
 A camera file is written by someone who knows cameras and not yet this file. What they write first
-is mostly a right word in the wrong place, another word of the trade, or a value as one says it. Each
-table below has, for such a word, keys as a file may have them; a test reads every one of them.
+is mostly a right word in the wrong place, another word of the trade, or a value as one says it. The
+tables below have, for such words, keys as a file may have them; a test reads every one.
 """
 
 import re
@@ -18,6 +18,11 @@ from vcam_cli.config.validation_messages import NO_SUCH_KEY, yaml_text
 from vcam_cli.errors import Path, Problem, dotted_path, nearest
 
 KEYS: Mapping[str, str] = {
+    "iso": "exposure.iso: 800",
+    "gain": "exposure.gain: 8",
+    "analog_gain": "exposure.gain: 8",
+    "ev": "exposure: {auto: {max: 100 ms}, compensation: 1 EV}",
+    "exposure_compensation": "exposure: {auto: {max: 100 ms}, compensation: 1 EV}",
     "shutter": "exposure.time: 1/60 s",
     "shutter_speed": "exposure.time: 1/60 s",
     "shutter_time": "exposure.time: 1/60 s",
