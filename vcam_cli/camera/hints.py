@@ -129,7 +129,7 @@ FORMS: Mapping[str, tuple[tuple[str, str], ...]] = {
     ),
     "array.pattern": (("(?i)x-?trans", "write {block: [[R, G], [G, B]]} with its own block"),),
 }
-"""A key -> expressions that a value there may fulfil, and what is then to be done."""
+"""A key -> expressions that a value there may match, and what is then to be done."""
 _PICTURES = {".png", ".jpg", ".jpeg", ".tif", ".tiff", ".exr", ".hdr", ".bmp", ".webp", ".pfm"}
 _SEPARATE = {"name", "kind", "file", "value", "rows", "columns"}
 """Keys that many mappings have: elsewhere they mean something else."""
