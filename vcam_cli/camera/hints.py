@@ -176,7 +176,7 @@ def _meant_key(path: Path, given: object) -> str:
     if len(word) < 4 or nearest(word, here):
         return ""
     close = nearest(word, [*(key.name for key in places), *KEYS])
-    if close in KEYS:
+    if close is not None and close in KEYS:
         return f"write {_entry(close, given)}"
     same = [key for key in places if key.name == close]
     return f"did you mean {_place(same[0], given)}?" if same else ""
