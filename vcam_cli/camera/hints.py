@@ -40,8 +40,6 @@ KEYS: Mapping[str, str] = {
     "transmission": "optics.transmittance: 0.95",
     "vignetting": "optics.off_axis: exact",
     "relative_illumination": "optics.off_axis: exact",
-    "glare": "optics.stray_light: 0.01",
-    "flare": "optics.stray_light: 0.01",
     "aberrations": "optics.zernike: {4: 0.05 um}",
     "size": "pixel.width: 3 um",
     "pixel_size": "pixel.width: 3 um",
