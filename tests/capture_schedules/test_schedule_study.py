@@ -498,7 +498,7 @@ def test_an_outline_is_smooth_over_many_decades():
 
 def test_what_real_pixels_lose_on_levels_is_told():
     levels = {"levels": table("l.csv", "level,count\n500,1\n5000,1\n50000,1\n")}
-    (note,) = run(pdf=levels, counts=[3], sensor=SENSOR).notes
+    _, note = run(pdf=levels, counts=[3], sensor=SENSOR).notes
     # two of three levels are read at a tenth of the time in one pixel of two, the third is lost
     lost = float(note.split(" % off")[0].split()[-1])
     assert lost == pytest.approx(100 * (1 - (2 / 5.5 + 1 / 2) / 3), rel=0.05)

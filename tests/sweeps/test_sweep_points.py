@@ -63,6 +63,36 @@ def test_a_case_has_a_range_of_its_own_in_the_units_of_the_study(tmp_path):
     assert len(found.points) == 5
 
 
+def varied(folder, **range_):
+    found = grid(folder, vary={"exposure.time": range_})
+    return [p.case_values["exposure.time"] for p in found.points]
+
+
+def test_log_spacing_has_equal_ratios_and_the_ends_given(tmp_path):
+    """Decades are round numbers, and the cameras have what the table says."""
+    decades = {"start": "1 ms", "stop": "10 s", "count": 5, "spacing": "log"}
+    assert varied(tmp_path, **decades) == [1, 10, 100, 1000, 10000]
+    third = varied(tmp_path, start="0.3 ms", stop="7 us", count=4, spacing="log")
+    # twelve digits are written
+    assert third == pytest.approx([0.3 * (7 / 300) ** (i / 3) for i in range(4)], rel=1e-11)
+    assert (third[0], third[-1]) == (0.3, 0.007)
+    assert varied(tmp_path, start="2 ms", stop="2 s", count=1, spacing="log") == [2]
+    linear = {"start": "1 ms", "stop": "9 ms", "count": 3}
+    assert varied(tmp_path, **linear, spacing="linear") == varied(tmp_path, **linear)
+
+
+@pytest.mark.parametrize(
+    ("range_", "said"),
+    [
+        ({"start": "0 ms", "stop": "1 s", "count": 3, "spacing": "log"}, "needs ends above zero"),
+        ({"values": ["1 ms"], "spacing": "log"}, "listed have no spacing"),
+        ({"start": "1 ms", "stop": "1 s", "count": 3, "spacing": "lg"}, "log"),
+    ],
+)
+def test_wrong_spacing_is_said(tmp_path, range_, said):
+    assert said in problems(tmp_path, vary={"exposure.time": range_})[0]
+
+
 def test_words_are_their_own_cells(tmp_path):
     found = grid(tmp_path, vary={"optics.off_axis": {"values": ["none", "exact", "cos4"]}})
     assert [p.case_values["optics.off_axis"] for p in found.points] == ["none", "exact", "cos4"]

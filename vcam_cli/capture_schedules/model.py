@@ -256,6 +256,9 @@ class ScheduleStudy(Model):
             yield fault(("frames", "camera"), message, "add for example camera: hdr-scene")
         if self.sensor is None:
             give = "add for example sensor: {well_capacity: 20000 e}"
+            if self.pdf.brightest is not None:
+                message = "changes nothing: without a sensor only ratios of photocurrents count"
+                yield fault(("pdf", "brightest"), message, f"remove it, or {give}")
             for name, value in self.constraints:
                 if not value:
                     continue

@@ -15,14 +15,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcam_cli.files.plots import COLORS, png_figure
-from vcam_cli.scheduling.pdf import Floats, Pdf
+from vcam_cli.scheduling.pdf import Floats, Indices, Pdf
 
 WIDE = 0.05
 """Median over largest photocurrent below which their axis is logarithmic."""
 OUTLINE_POINTS = 24
 """Points of a segment's outline on a logarithmic axis, at least and for each decade."""
 DISPLAYED = 240
-"""Bins of a pdf that is drawn, where it has more of its own."""
+"""Bins of a pdf that is drawn, at most, where it has more segments or levels of its own."""
+WIDEST_GAP = 4
+"""Such bins between two segments or levels that are drawn as neighbors."""
+LEAST_SHARE = 1 / 2000
+"""Of all pixels in such a bin."""
 FEW_LEVELS = 64
 """Largest number of levels that are drawn as lines of their own."""
 DECADES = 6.0
@@ -208,13 +212,67 @@ def outline(pdf: Pdf, low: float, wide: bool) -> tuple[Floats, Floats]:
 
 
 def _binned_outline(pdf: Pdf, low: float, wide: bool) -> tuple[Floats, Floats]:
-    spaced = np.geomspace if wide else np.linspace
-    edges = spaced(low, pdf.max, DISPLAYED + 1)
-    share = np.diff(pdf.cdf(edges))
-    share[0] += pdf.cdf(edges[0]) if wide else 0.0
+    """Return the outline of bins that are whole segments, or whole neighborhoods of levels.
+
+    Bins of the display's own would hold now one level and now two, or none: a comb that is not in
+    the light. So a bin ends where a neighborhood does, is as wide as the display can show, and
+    holds a share that is not that of chance gaps between levels.
+    """
+    edges, share = _neighborhoods(pdf, low, wide)
+    bins = _display_bins(edges, share, wide)
+    total = np.add.reduceat(share, bins[:-1])
+    edges = edges[bins]
     width = np.diff(np.log10(edges)) if wide else np.diff(edges)
+    share = total
     y = np.repeat(share / width, 2)
     return np.repeat(edges, 2), np.concatenate([[0.0], y, [0.0]])
+
+
+def _neighborhoods(pdf: Pdf, low: float, wide: bool) -> tuple[Floats, Floats]:
+    """Return the (K + 1,) ends of what is nearest to each segment or level; shares (K,).
+
+    Neighbors share what lies between them, such as codes that a stretched picture does not have;
+    wide gaps are left empty. What lies below `low` counts with the first.
+    """
+    scale, back = (np.log10, lambda place: 10**place) if wide else (np.asarray, np.asarray)
+    occurs = pdf.probability > 0
+    start, end = (scale(np.maximum(ends[occurs], low)) for ends in (pdf.low, pdf.high))
+    bin_width = (scale(pdf.max) - scale(low)) / DISPLAYED
+    margin = np.minimum((start[1:] - end[:-1]) / 2, WIDEST_GAP * bin_width / 2)
+    ends = np.empty(2 * len(start))
+    ends[::2] = np.concatenate([[scale(low)], start[1:] - margin])
+    ends[1::2] = np.concatenate([end[:-1] + margin, [scale(pdf.max)]])
+    share = np.zeros(len(ends) - 1)
+    share[::2] = pdf.probability[occurs]
+    shown = np.diff(ends) > 0
+    first = int(np.argmax(shown))
+    share[first] = share[: first + 1].sum()
+    kept = np.flatnonzero(shown)
+    edges = np.concatenate([ends[kept], ends[-1:]])
+    return back(edges), share[kept]
+
+
+def _display_bins(edges: Floats, share: Floats, wide: bool) -> Indices:
+    """Return the numbers of the edges that bound bins: (n + 1,) from 0 to K.
+
+    Each is at least one of `DISPLAYED` wide and holds `LEAST_SHARE` of the pixels, but for the last
+    before a wide gap, which is a bin of its own.
+    """
+    place = np.log10(edges) if wide else edges
+    least = (place[-1] - place[0]) / DISPLAYED
+    below = np.concatenate([[0.0], np.cumsum(share)])
+    gaps = np.append(np.flatnonzero(share == 0), len(share))
+    bins = [0]
+    while bins[-1] < len(share):
+        start = bins[-1]
+        if share[start] == 0:
+            bins.append(start + 1)
+            continue
+        by_width = np.searchsorted(place, place[start] + least * (1 - 1e-9))
+        by_share = np.searchsorted(below, below[start] + LEAST_SHARE)
+        next_gap = gaps[np.searchsorted(gaps, start)]
+        bins.append(int(min(max(by_width, by_share, start + 1), next_gap)))
+    return np.array(bins)
 
 
 def _axis_start(pdf: Pdf, wide: bool) -> float:

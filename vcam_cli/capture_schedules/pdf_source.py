@@ -4,7 +4,7 @@ Photocurrents are bare numbers: a schedule for shot noise alone depends on their
 a sensor they are electrons per second, and may have a unit.
 """
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from itertools import pairwise
 from typing import Annotated, Any, Self
 
@@ -126,6 +126,12 @@ def camera_name(example: str) -> Callable[[Any], str]:
     return read
 
 
+def _no_scale_of_cameras(given: Mapping[str, Any]) -> Iterator[InitErrorDetails]:
+    if "camera" in given and "brightest" in given:
+        message = "a camera's photocurrents are in e/s already"
+        yield fault(("brightest",), message, "remove it, or change the camera's light")
+
+
 class PdfSource(Model):
     """The photocurrents of a scene: exactly one of its keys, `bins` beside `camera`."""
 
@@ -158,9 +164,21 @@ class PdfSource(Model):
         f"of the camera's histogram; default {BINS}", example=BINS, default=None
     )
 
+    brightest: Annotated[
+        float | None,
+        Either(_rate, Annotated[float, _RATE] | Annotated[float, _CURRENT], yaml_form=_RATE.text),
+    ] = key(
+        "what the brightest photocurrent of the pdf is on the sensor, others in proportion: scales"
+        " a pdf of arbitrary units, such as the histogram of a picture; default as it stands, e/s",
+        unit="e/s",
+        example="400 ke/s",
+        default=None,
+    )
+
     rules = (
         exactly_one(*SOURCES, of="the pdf", remedy="write for example uniform: {min: 0, max: 1}"),
         needs("bins", "camera", "bins are of the histogram of a camera's photocurrents"),
+        _no_scale_of_cameras,
     )
 
     @property

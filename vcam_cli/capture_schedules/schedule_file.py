@@ -18,6 +18,7 @@ from pydantic import ValidationError
 
 from vcam_cli import errors
 from vcam_cli.camera.camera import Camera
+from vcam_cli.capture_schedules import pdf_scale
 from vcam_cli.capture_schedules.model import ScheduleStudy
 from vcam_cli.capture_schedules.pdf_source import MOST_PHOTOCURRENT, PdfSource
 from vcam_cli.config import validation_messages
@@ -126,6 +127,7 @@ def read(
     model = _validate(file, tree)
     reader = _SourceReader(file, tree, model)
     files, known, camera, pixels = reader.read_pdf(accuracy)
+    known = None if known is None else reader.scale(known)
     frames_camera = reader.read_frames_camera(accuracy, camera)
     if frames_camera is not None:
         files = (*files, *frames_camera.files, *provenance.data_files(frames_camera))
@@ -179,6 +181,13 @@ class _SourceReader:
         path = self._table_path(table.file)
         columns = self._convert(read_columns, Path(display_path(path)), names)
         return (path,), self._convert(convert, *columns), None, float(columns[-1].sum())
+
+    def scale(self, pdf: Pdf) -> Pdf:
+        """Return the pdf in e/s where there is a sensor. Raises BadInput for arbitrary units."""
+        wrong = pdf_scale.mistake(pdf, self.model)
+        if wrong is not None:
+            raise self._error(*wrong)
+        return pdf_scale.scaled(pdf, self.model)
 
     @property
     def _kind(self) -> str:

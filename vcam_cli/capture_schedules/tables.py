@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from vcam_cli.capture_schedules import online_loss
+from vcam_cli.capture_schedules import online_loss, pdf_scale
 from vcam_cli.capture_schedules import schedule_plots as plots
 from vcam_cli.capture_schedules.methods import MethodResult, Task
 from vcam_cli.capture_schedules.model import ScheduleStudy
@@ -115,6 +115,7 @@ def writers(result: ScheduleResult) -> Writers:
 
 def notes(study: ScheduleStudy, task: Task, found: Sequence[MethodResult]) -> Iterator[str]:
     """Yield a sentence for each thing that the numbers of a study leave unsaid."""
+    yield from pdf_scale.notes(task.pdf, study)
     yield from _probability_notes(study)
     yield from _level_notes(study, task)
     yield from _gap_notes(task, found)

@@ -11,7 +11,7 @@ from pydantic import model_validator
 from pydantic_core import InitErrorDetails
 
 from vcam_cli.config.lists import list_of_any, words_of
-from vcam_cli.config.model import Model, Rule, all_or_none, at_most_one, exactly_one, key
+from vcam_cli.config.model import Model, Rule, all_or_none, at_most_one, exactly_one, key, needs
 from vcam_cli.config.quantities import Whole
 from vcam_cli.config.validation_messages import describe, failure, fault, one_of
 from vcam_cli.config.values import Either, Text, Word, mapping
@@ -30,7 +30,7 @@ OPTIMUM = "optimum"
 
 
 class Variation(Model):
-    """The values that a parameter takes: a range of equal steps, or a list."""
+    """The values that a parameter takes: a range of equal steps or ratios, or a list."""
 
     start: Annotated[str | float | None, Either(lambda given: given, str | float)] = key(
         "the first value, with its unit", unit="", example="5.3 um", default=None
@@ -41,6 +41,11 @@ class Variation(Model):
     count: Annotated[int | None, Whole(least=1, most=100_000, example="20")] = key(
         "number of values", example=20, default=None
     )
+    spacing: Literal["linear", "log"] | None = key(
+        "of the values of a range: equal steps (linear, the default), or equal ratios (log)",
+        example="log",
+        default=None,
+    )
     values: Annotated[tuple[Any, ...] | None, list_of_any("[4 um, 6 um]")] = key(
         "the values themselves, in place of a range", example=["4 um", "6 um"], default=None
     )
@@ -48,6 +53,7 @@ class Variation(Model):
     rules = (
         exactly_one("start", "values", of="what it varies over", remedy="write {values: [...]}"),
         all_or_none("start", "stop", "count"),
+        needs("spacing", "start", "values that are listed have no spacing"),
     )
 
 

@@ -7,12 +7,14 @@ the study's camera files with the case's overrides.
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
 
+import numpy as np
 from pydantic import ValidationError
 
 from vcam_cli import errors, units
@@ -238,9 +240,10 @@ def _without_key_mark(problem: Problem) -> Problem:
 
 
 def _range(path: str, node: Node, variation) -> Parameter:
-    """Return values of equal steps, in the unit of the first, exact until they are written.
+    """Return values of equal steps or ratios, in the unit of the first.
 
-    Of one value there is only the first.
+    Steps are exact until they are written, ratios to twelve digits, so that decades are round
+    numbers; both ends are as given. Of one value there is only the first.
     """
     start, unit = units.split(variation.start)
     stop = units.convert(*units.split(variation.stop), unit)
@@ -248,6 +251,12 @@ def _range(path: str, node: Node, variation) -> Parameter:
         raise ValueError("start and stop are the same; give one value, or two ends")
     steps = max(1, variation.count - 1)
     numbers = [start + (stop - start) * Fraction(i, steps) for i in range(variation.count)]
+    if variation.spacing == "log":
+        if start <= 0 or stop <= 0:
+            raise ValueError("log spacing needs ends above zero; write spacing: linear")
+        logs = np.linspace(math.log(start), math.log(stop), variation.count)
+        inner = [Fraction(f"{math.exp(log):.12g}") for log in logs[1:-1]]
+        numbers = [start, *inner, stop][: variation.count]
     whole = all(n.denominator == 1 for n in numbers)
     written: list[float] = [int(n) if whole else float(n) for n in numbers]
     place = node.get("start") or node
