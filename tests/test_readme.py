@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+from vcam_cli.commands.list_ import KINDS
 from vcam_cli.commands.main import COMMANDS, app
 
 ROOT = Path(__file__).parent.parent
@@ -70,3 +71,36 @@ def test_the_mistake_shown_is_what_vcam_says(tmp_path, monkeypatch):
     assert done.exit_code == 2
     shown = next(body for kind, body in BLOCKS if kind == "text")
     assert done.stderr == shown
+
+
+def told():
+    """Texts in which a user reads commands: README, docs, help, what ships, messages in sources."""
+    yield "README.md", README
+    for folder, kinds in (("docs", "*.md"), ("configs", "**/*.yaml"), ("vcam_cli", "**/*.py")):
+        for path in sorted((ROOT / folder).glob(kinds)):
+            yield str(path.relative_to(ROOT)), path.read_text(encoding="utf-8")
+    for command in (None, *COMMANDS):
+        words = [command] if command else []
+        yield f"vcam {command} --help", CliRunner().invoke(app, [*words, "--help"]).stdout
+
+
+def test_every_command_that_is_told_exists():
+    """In code, in a block or in help, `vcam WORD` is a command, and so is `vcam list KIND`."""
+    found = 0
+    for place, text in told():
+        marks = r"(?:`|\$ )" if not place.endswith("--help") else r"(?:`|^ {2,})"
+        for word, more in re.findall(marks + r"vcam ([a-z]+)(?: ([a-z]+)\b)?", text, re.MULTILINE):
+            found += 1
+            assert word in COMMANDS, (place, word)
+            if word == "list" and more:
+                assert more in KINDS, (place, more)
+    assert found > 60
+
+
+def test_every_option_that_is_told_exists():
+    """Options in the README's commands are in the help of those commands."""
+    for command in lines("console", "$ vcam "):
+        words = shlex.split(command.partition("  #")[0])
+        help_text = CliRunner().invoke(app, [words[1], "--help"]).stdout
+        for option in (word for word in words if word.startswith("-")):
+            assert re.search(rf"(^|[\s,]){re.escape(option)}\b", help_text), (command, option)

@@ -172,6 +172,16 @@ class HdrPatches(Chart):
     )
 
 
+PICTURE_MODELS = {
+    "auto": "one channel is reflectance, three are mallett",
+    "reflectance": "one channel: the same reflectance at all wavelengths",
+    "mallett": "three channels: the smooth reflectances that have these sRGB colors under D65",
+    "laser": "three channels that emit at 450, 550 and 650 nm, equal planes equal radiance in W",
+    "rgb-display": "three channels that emit as the primaries of the camera file's display",
+}
+"""What the channels of a picture may mean."""
+
+
 class ImageFile(Model):
     """A picture, read as the reflectance or the radiance of a flat scene."""
 

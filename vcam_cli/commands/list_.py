@@ -38,7 +38,8 @@ def list_(
 ) -> None:
     """List what ships; with a NAME print the file.
 
-    Kinds: cameras, parts, technologies, studies, charts, illuminants, filters, effects, metrics.
+    Kinds: cameras, parts, technologies, studies, charts, models (what a picture's channels mean),
+    illuminants, filters, effects, metrics.
 
     \b
     Example:
@@ -131,6 +132,12 @@ def _charts() -> list[Item]:
     return [Item(name, _first_line(c)) for name, c in CHARTS.items()]
 
 
+def _models() -> list[Item]:
+    from vcam_cli.camera.scene import PICTURE_MODELS
+
+    return [Item(name, about) for name, about in PICTURE_MODELS.items()]
+
+
 def _illuminants() -> list[Item]:
     from vcam_cli.spectra import illuminant_names
 
@@ -182,6 +189,7 @@ KINDS: dict[str, Callable[[], list[Item]]] = {
     "technologies": lambda: _files("technologies"),
     "studies": lambda: _files("studies"),
     "charts": _charts,
+    "models": _models,
     "illuminants": _illuminants,
     "filters": _filters,
     "effects": _effects,

@@ -45,6 +45,7 @@ COMMANDS = {
     "compare": "compare:compare",
     "validate": "validate:validate",
     "list": "list_:list_",
+    "explain": "explain:explain",
     "init": "init:init",
     "schema": "schema:schema",
 }  # command -> module in this package : function
