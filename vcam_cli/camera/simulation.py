@@ -189,3 +189,7 @@ class Output(Model):
     irradiance: Annotated[bool, Strict()] = key(
         "also write irradiance.exr: W/(m2 nm) on the sensor, a channel a wavelength", default=False
     )
+    tiff: Annotated[bool, Strict()] = key(
+        "also write raw.tif: the whole numbers of the raw frame, with the pattern of its colors",
+        default=False,
+    )

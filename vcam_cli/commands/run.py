@@ -75,6 +75,7 @@ def report(
 FILES = {
     "render.png": "render",
     "raw.exr": "raw frame",
+    "raw.tif": "raw frame",
     "ideal.exr": "ideal image",
     "delta_e.png": "error map",
     "irradiance.exr": "irradiance",

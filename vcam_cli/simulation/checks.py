@@ -5,6 +5,7 @@ processing or the picture to know.
 """
 
 from collections.abc import Sequence
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -126,6 +127,14 @@ def check_display(camera: Camera) -> None:
         display_screen(camera.display, len(layout(camera, geometry(camera)).picture_x))
 
 
+def check_formats(camera: Camera) -> None:
+    """Refuse formats of the raw frame whose libraries are not installed (BadInput)."""
+    for asked in ("tiff",):
+        if getattr(camera.output, asked) and not find_spec("tifffile"):
+            message = "needs the library tifffile, which is not installed"
+            raise bad(("output", asked), message, "pip install 'vcam-cli[dng]'")
+
+
 CHECKS: tuple[files.CameraCheck, ...] = (
     (check_effects, "optics pixel effects"),
     (check_binning, "pixel array exposure adc"),
@@ -133,5 +142,6 @@ CHECKS: tuple[files.CameraCheck, ...] = (
     (check_positions, "pixel array processing"),
     (check_picture, "scene"),
     (check_lens, "optics scene pixel array effects"),
+    (check_formats, "output"),
     (check_display, "optics scene pixel array quality display"),
 )

@@ -48,9 +48,9 @@ def save(result: Result, place: Path) -> Path:
 def write(result: Result, folder: OutputFolder) -> None:
     """Write the files of one run, all but the record `run.json`."""
     camera = result.frame.camera
-    raw: list[Callable[[], None]] = [lambda: write_raw(result, folder.new("raw.exr"))]
     with ThreadPool(2) as pool:
-        jobs = [pool.submit(job) for job in (*raw, *_sample_jobs(result, folder))]
+        raw = (*_raw_jobs(result, folder), *_sample_jobs(result, folder))
+        jobs = [pool.submit(job) for job in raw]
         try:
             if camera.output.render:
                 render = result.render
@@ -97,6 +97,15 @@ def _irradiance(result: Result, path: Path) -> None:
 def write_raw(result: Result, path: Path) -> None:
     """Write raw.exr."""
     raw_file.write_raw(path, result.frame, config_hash(result.frame.camera))
+
+
+def _raw_jobs(result: Result, folder: OutputFolder) -> Iterator[Callable[[], None]]:
+    """Jobs that write the raw frame in every format that is asked for."""
+    yield partial(write_raw, result, folder.new("raw.exr"))
+    frame = result.frame
+    if frame.camera.output.tiff:
+        said = config_hash(frame.camera)
+        yield partial(raw_file.write_raw_tiff, folder.new("raw.tif"), frame, said)
 
 
 def _sample_jobs(result: Result, folder: OutputFolder) -> Iterator[Callable[[], None]]:

@@ -1,4 +1,4 @@
-"""raw.exr: the raw frame as it was read, with what is needed to make sense of it; hdr.exr.
+"""raw.exr, raw.tif: the raw frame as it was read, with what makes sense of it; hdr.exr.
 
 Rows and columns are an image, its channels as `output.raw` asks. Stacked pixels have a channel for
 each color, dn.R, dn.G and so on. Scattered pixels are one row of N, beside them their centers x
@@ -7,10 +7,13 @@ a honeycomb's N are its `vcam:rows` rows of `vcam:columns` pixels, one after the
 
 Of several samples of one integration, each is such a file, raw.exr is the last of them, and hdr.exr
 holds the photocurrent that they tell, in the same layout.
+
+raw.tif holds the codes alone, as whole numbers. Of scattered pixels it has no positions.
 """
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -20,6 +23,7 @@ from numpy.typing import NDArray
 import vcam_cli
 from vcam_cli.camera.array import Positions
 from vcam_cli.camera.derived.electrical import Electrical
+from vcam_cli.files import tiff
 from vcam_cli.files.exr import ExrWriter
 from vcam_cli.files.rows import Attribute
 from vcam_cli.rng import BLOCK_ROWS
@@ -42,6 +46,17 @@ def write_raw(path: Path, frame: Frame, config_hash: str) -> None:
     }
     asked = {name: values[name] for name in frame.camera.output.raw}
     _write(path, frame, asked, attributes(frame, config_hash))
+
+
+def write_raw_tiff(path: Path, frame: Frame, config_hash: str) -> None:
+    """Write raw.tif; what raw.exr says of the frame is its description, as JSON."""
+    codes = tiff.whole_numbers(frame.dn, white_level(frame))
+    if frame.layout.full_color:
+        codes = np.moveaxis(codes, 0, -1)
+    has_block = frame.camera.array.mosaic and not frame.layout.is_scattered
+    tags = tiff.mosaic_tags(frame.mosaic.block) if has_block else ()
+    said = json.dumps(attributes(frame, config_hash), indent=1)
+    tiff.write_tiff(path, codes, said, tags)
 
 
 def write_hdr(path: Path, frame: Frame, config_hash: str) -> None:
@@ -91,6 +106,29 @@ def _rows_of(array: NDArray, factor: float | np.floating | None) -> Channel:
     return lambda rows: array[rows] if factor is None else array[rows] * factor
 
 
+_LINEAR = (
+    "dn are the whole numbers of the ADC, not parts of 1: light from 0 to 1 is"
+    " (dn - blackLevel) / (whiteLevel - blackLevel)"
+)
+_LOGARITHMIC = (
+    "dn are the whole numbers of the ADC, not parts of 1; with r = adcFullScale / adcReference and"
+    " s = (dn - adcOffset) / (whiteLevel - adcOffset), light from 0 to 1 is ((1 + r)^s - 1) / r"
+)
+
+
+def _meaning(frame: Frame) -> str:
+    """Return how codes become light, for tools that take 1 for white."""
+    if frame.electrical.reference is None:
+        return _LINEAR
+    added = frame.layout.binning_groups.summed_codes
+    return _LOGARITHMIC + (f", dn and whiteLevel over the {added} added" if added > 1 else "")
+
+
+def white_level(frame: Frame) -> float:
+    """Return the highest code, of as many codes as are added [DN]."""
+    return float(frame.electrical.highest_code * frame.layout.binning_groups.summed_codes)
+
+
 def attributes(frame: Frame, config_hash: str) -> dict[str, Attribute]:
     """Return what the file says of the frame."""
     e = frame.electrical
@@ -98,7 +136,8 @@ def attributes(frame: Frame, config_hash: str) -> dict[str, Attribute]:
         **_camera_metadata(frame, config_hash),
         "vcam:exposureTime": frame.exposure_time,
         "vcam:blackLevel": frame.black_dn,
-        "vcam:whiteLevel": float(e.highest_code * frame.layout.binning_groups.summed_codes),
+        "vcam:whiteLevel": white_level(frame),
+        "vcam:dnMeaning": _meaning(frame),
         **({"vcam:conversionGain": e.conversion_gain} if e.has_volts else {}),
         **_curve(e),
     }
