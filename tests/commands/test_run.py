@@ -255,7 +255,8 @@ class TestFiles:
         found = {name: (float(value), unit) for name, value, unit in rows[1:]}
         assert list(found) == [
             "exposure_time", "mean_electrons", "saturated_fraction",
-            "snr_db", "dynamic_range_db", "well_capacity", "base_iso",
+            "snr_db", "dynamic_range_db", "well_capacity", "quantized_dynamic_range_db",
+            "picture_snr_db", "base_iso", "digital_gain",
         ]  # fmt: skip
         assert found["exposure_time"] == (0.02, "s")
         mean = raw()["electrons"].mean(dtype=float)

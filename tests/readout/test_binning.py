@@ -18,7 +18,7 @@ from vcam_cli.effects.signal_chain import NoiseSource
 from vcam_cli.errors import BadInput
 from vcam_cli.readout import binned_readout, binning, exposure
 from vcam_cli.simulation import checks, raw_file, spectral_irradiance
-from vcam_cli.simulation.frame import figures
+from vcam_cli.simulation.figures import figures
 
 KINDS = ("charge", "voltage", "digital")
 BAYER = (("R", "G"), ("G", "B"))

@@ -10,7 +10,7 @@ from vcam_cli.config.lists import read_items
 from vcam_cli.config.model import Model, key
 from vcam_cli.config.quantities import Number, Quantity
 from vcam_cli.config.validation_messages import describe, fault, one_of, refusal
-from vcam_cli.config.values import Either, word_or
+from vcam_cli.config.values import Either, mapping, word_or
 from vcam_cli.config.yaml_type import to_yaml
 
 
@@ -96,10 +96,34 @@ class Gamma(Step):
     ] = key("a number, or srgb", example="srgb")
 
 
+class ToneMapping(Model):
+    """How bright the render is, and what becomes of its highlights."""
+
+    exposure: Annotated[float, Quantity("exposure_value", least=-20, most=20)] = key(
+        "brightens the render by powers of two", example="0 EV", default=0.0
+    )
+    white: Literal["scene", "sensor"] = key(
+        "what is white in the render: a perfect white in the scene, or what saturates the sensor,"
+        " as cameras do",
+        default="scene",
+    )
+    curve: Literal["none", "filmic"] = key(
+        "none clips what is brighter than white, filmic rolls it off", default="none"
+    )
+
+
+class Tone(Step):
+    """Tone mapping of the render; metrics of the picture know nothing of it."""
+
+    tone: Annotated[ToneMapping, mapping(ToneMapping)] = key(
+        "brightness and highlights of the render", example={"white": "sensor"}
+    )
+
+
 SHOWN = (0, 1, 3)
 """Numbers of colors that make a picture as they are; 0 where only the file of positions knows."""
 Steps = tuple[Step, ...]
-_ANY = BlackLevel | Demosaic | WhiteBalance | ColorCorrection | Gamma
+_ANY = BlackLevel | Demosaic | WhiteBalance | ColorCorrection | Tone | Gamma
 STEPS: dict[str, type[Step]] = {next(iter(step.model_fields)): step for step in get_args(_ANY)}
 """Name of a step -> its model."""
 
@@ -197,6 +221,8 @@ def _reasons(
         yield f"{name} comes twice", "keep one of them"
     elif "gamma" in before:
         yield f"{name} after gamma: the steps work on linear light", "put gamma last"
+    elif "tone" in before and name != "gamma":
+        yield f"{name} after tone: the steps work on the light of the scene", f"put {name} first"
     if idle:
         return
     late = [step for step in ("white_balance", "color_correction") if step in before]

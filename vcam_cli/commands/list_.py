@@ -168,6 +168,9 @@ def _metrics() -> list[Item]:
         "snr_db": "SNR at 20 % of the well [dB] (eq 3.2)",
         "dynamic_range_db": "dynamic range [dB] (eq 3.1)",
         "well_capacity": "full well [e]",
+        "quantized_dynamic_range_db": "dynamic range up to the ADC's end, with its rounding [dB]",
+        "picture_snr_db": "mean signal of this picture over its temporal noise [dB]",
+        "digital_gain": "what the render multiplies the raw by, raw saturation = white = 1",
         "base_iso": "ISO speed at gain 1 (ISO 12232, saturation-based)",
     }
     asked = {

@@ -59,7 +59,11 @@ def report(
     metrics: tuple[tuple[str, float, str], ...], record: dict, path: Path, files: tuple[str, ...]
 ) -> str:
     """Return the report of a run: metrics, effects, time and files."""
-    lines = [f"{name:<20} {value:>12.6g} {unit}".rstrip() for name, value, unit in metrics]
+    lines = [
+        f"{name:<26} {value:>12.6g} {unit:<4} {LABELS.get(name, '')}".rstrip()
+        for name, value, unit in metrics
+    ]
+    lines += ["", *exposure_lines(record["exposure"])]
     estimate, measured = record["plan"]["seconds"], sum(record["stages"].values())
     lines.append("")
     lines.append(
@@ -70,6 +74,35 @@ def report(
     lines.append(f"{record['name']}: {path}/")
     lines += ["", *wrap(simulated_effects(record["plan"], measured))]
     return "\n".join(lines)
+
+
+LABELS = {
+    "snr_db": "of a pixel at 20 % of the well, eq 3.2",
+    "dynamic_range_db": "of a pixel, eq 3.1",
+    "quantized_dynamic_range_db": "with the ADC's end and rounding",
+    "picture_snr_db": "of this picture, mean signal over its temporal noise",
+    "base_iso": "ISO speed at gain 1",
+    "digital_gain": "of the render, over raw saturation = white",
+}
+"""Metric -> what it is measured of, where its name leaves that open."""
+
+
+def exposure_lines(exposure: dict) -> list[str]:
+    """Return how the frame was exposed, in words."""
+    from vcam_cli.units import render
+
+    time = render(float(f"{exposure['time']:.4g}"), "time")
+    how = f"{time} at gain {exposure['gain']:.4g}"
+    if exposure["iso"]:
+        how += f", ISO {exposure['iso']:.3g}"
+    if exposure["automatic"]:
+        how += "; automatic"
+    if exposure["stopped_by"]:
+        how += f", stopped at its {exposure['stopped_by']}"
+    shares = exposure["clipped"].items()
+    clipped = ", ".join(f"{color} {100 * share:.3g} %" for color, share in shares)
+    peak = f"peak {100 * exposure['raw_peak']:.3g} % of full scale"
+    return [f"exposure     {how}", f"raw          {peak}; clipped {clipped}"]
 
 
 FILES = {

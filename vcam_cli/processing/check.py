@@ -13,6 +13,7 @@ CHOICES: dict[str, tuple[str, ...]] = {
     "demosaic": ("bilinear", "edge-aware"),
     "white_balance": ("gray-world", "bright-block", "illuminant", "none"),
     "color_correction": ("fit", "none"),
+    "tone": (),
     "gamma": ("srgb",),
 }
 _NUMBER_TOO = ("black_level", "gamma")
@@ -86,6 +87,9 @@ def check(
             found.add(
                 path, f"{step.name} after gamma: the steps work on linear light", "put gamma last"
             )
+        elif "tone" in before and step.name != "gamma":
+            what = f"{step.name} after tone: the steps work on the light of the scene"
+            found.add(path, what, f"put {step.name} before tone")
         late = [name for name in ("white_balance", "color_correction") if name in before]
         if step.name == "black_level" and late:
             found.add(
@@ -115,6 +119,8 @@ def _check_value(found: Collector, path: tuple[str | int, ...], step: Step, colo
     if step.name == "color_correction" and matrix is not None:
         if len(matrix) != 3 or any(len(row) != colors for row in matrix):
             found.add((*path, "matrix"), *matrix_shape(colors))
+        return
+    if step.name == "tone":
         return
     if isinstance(step.value, str):
         if step.value not in allowed:

@@ -10,6 +10,7 @@ from vcam_cli.errors import bad
 from vcam_cli.processing import tone
 from vcam_cli.processing.base import Context, Operation, map_blocks, process_rows
 from vcam_cli.processing.check import CANNOT_JUDGE, CANNOT_SHOW
+from vcam_cli.processing.tone_map import ToneMap
 
 
 @dataclass(frozen=True)
@@ -28,6 +29,8 @@ class ProcessedPicture:
     """Colors of the picture: the camera's, or the display's after correction."""
     full_color: bool
     """Whether every pixel holds all colors: demosaiced, or monochrome."""
+    tone_map: ToneMap
+    """Tone mapping of the render."""
     workers: int = 1
     """Number of threads."""
     notes: tuple[str, ...] = ()
@@ -82,7 +85,8 @@ class ProcessedPicture:
         def fill(start: int, stop: int) -> None:
             planes = process_rows(self.dn, self.operations, start, stop).planes
             for channel, plane in enumerate(planes):
-                render[start:stop, :, channel] = tone.encode(plane, self.curve, bits)
+                shown = self.tone_map.apply(plane)
+                render[start:stop, :, channel] = tone.encode(shown, self.curve, bits)
 
         map_blocks(fill, self.shape, self.workers)
         return render if self.channels > 1 else render[:, :, 0]

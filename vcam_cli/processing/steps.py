@@ -14,6 +14,7 @@ operations.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -35,6 +36,7 @@ from vcam_cli.processing.highlights import Highlights
 from vcam_cli.processing.linearize import Linearize
 from vcam_cli.processing.normalized_convolution import NormalizedConvolution, Sites, half_width
 from vcam_cli.processing.picture import ProcessedPicture, apply_operations
+from vcam_cli.processing.tone_map import ToneMap, sensor_white
 from vcam_cli.processing.white_balance import color_sums
 
 Path = tuple[str | int, ...]
@@ -58,6 +60,8 @@ class Draft:
     """Whether a step has balanced white."""
     curve: tone.Curve = 1.0
     """Tone curve of the render."""
+    tone: Any = None
+    """What the file says of tone mapping: `exposure` [EV], `white` and `curve`."""
     notes: tuple[str, ...] = ()
     """What a user should know of the steps."""
     codes: np.ndarray = field(kw_only=True)
@@ -118,6 +122,7 @@ def process(
         draft.curve,
         colors,
         draft.full_color,
+        _tone_map(draft, scale),
         workers,
         draft.notes,
     )
@@ -253,13 +258,33 @@ def _gamma(draft: Draft, step: Step, path: Path) -> Draft:
     return replace(draft, curve=step.value)
 
 
+def _tone(draft: Draft, step: Step, path: Path) -> Draft:
+    return replace(draft, tone=step.value)
+
+
 STEPS: dict[str, Callable[[Draft, Step, Path], Draft]] = {
     "black_level": _black_level,
     "demosaic": _demosaic,
     "white_balance": _white_balance,
     "color_correction": _color_correction,
+    "tone": _tone,
     "gamma": _gamma,
 }
+
+
+def _tone_map(draft: Draft, scale: float) -> ToneMap:
+    """Return the tone mapping; `scale` makes the luminance of white 1."""
+    asked, context = draft.tone, draft.context
+    if asked is None:
+        return ToneMap()
+    factor = 2.0**asked.exposure
+    if asked.white == "sensor":
+        codes = np.array([*context.white_dn, context.black_dn, context.saturated_dn])
+        *white, black, saturated = codes if context.linearize is None else context.linearize(codes)
+        shown = _luminance(draft.apply_to_colors(_black_signal(draft)), context.colors) * scale
+        brightest = sensor_white(np.array(white), black, saturated, shown)
+        factor *= 1 / brightest if brightest > 0 else 0.0
+    return ToneMap(factor, asked.curve == "filmic")
 
 
 def _black_signal(draft: Draft) -> np.ndarray:

@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property, partial
 
@@ -21,11 +20,8 @@ from vcam_cli.floats import own_float_errors
 from vcam_cli.image_formation import photon_rate
 from vcam_cli.image_formation.rate_cache import RateCache
 from vcam_cli.parallel import available_workers
-from vcam_cli.physics import readout
 from vcam_cli.progress import Stages
 from vcam_cli.readout import binned_readout, exposure, nondestructive_samples
-from vcam_cli.scheduling import estimators
-from vcam_cli.simulation.pixel_figures import pixel_figures
 from vcam_cli.simulation.preparation import Prepared, prepare
 from vcam_cli.spectra import colorchecker
 
@@ -236,49 +232,3 @@ def take_frame(ready: Prepared, workers: int, stages: Stages | None = None) -> F
             workers,
         )
     return replace(last, samples_electrons=electrons, samples_dn=dn, photocurrent=light)
-
-
-def figures(frame: Frame) -> list[tuple[str, float, str]]:
-    """Return the metrics that every run has: (metric, value, unit).
-
-    `pixel_figures` computes dynamic range (eq 3.1), SNR (eq 3.2) and well capacity. Of several
-    samples of one integration, all but the last two are of the last sample.
-    """
-    e, joins = frame.electrical, frame.layout.binning_groups
-    known = pixel_figures(frame.camera, frame.geometry, e, joins, frame.exposure_time)
-    saturated = frame.dn >= frame.saturated_dn
-    if joins.count == joins.summed_charges:
-        saturated = (frame.electrons >= e.full_well) | (frame.dn >= e.highest_code)
-    listed = [
-        ("exposure_time", frame.exposure_time, "s"),
-        ("mean_electrons", float(frame.electrons.mean(dtype=np.float64)), "e"),
-        ("saturated_fraction", float(saturated.mean()), ""),
-        ("snr_db", known.snr_db, "dB"),
-        ("dynamic_range_db", known.dynamic_range_db, "dB"),
-        ("well_capacity", known.well_capacity, "e"),
-        ("base_iso", frame.base_iso, ""),
-    ]
-    return listed + _sample_figures(frame, known.dark, known.draws) if frame.times else listed
-
-
-def _sample_figures(
-    frame: Frame, dark: float, draws: Sequence[NoiseSource]
-) -> list[tuple[str, float, str]]:
-    """Return what several samples add: dynamic range of the photocurrent, and where it is unknown.
-
-    Eq 3.1 for the photocurrent: the largest that does not fill the first sample, over the noise of
-    the estimate in the dark. `dark` is of the last sample [electrons]; `draws` are new in every
-    frame.
-    """
-    first, last = frame.times[0], frame.times[-1]
-    floor = sum(x.variance(0.0) for x in draws)
-    if frame.camera.exposure.estimator == "weighted":
-        read = sum(x.variance(0.0) for x in draws if x.sample_draws == "independent")
-        noise = estimators.weighted_variance(0.0, frame.times, dark / last, read, floor - read)
-        floor = float(noise) * last**2 - dark
-    well = frame.electrical.full_well * last / first
-    nowhere = frame.picture_dn >= frame.picture_saturated_dn
-    return [
-        ("hdr_saturated_fraction", float(nowhere.mean()), ""),
-        ("hdr_dynamic_range_db", float(readout.dynamic_range_db(well, dark, floor)), "dB"),
-    ]

@@ -28,6 +28,7 @@ from vcam_cli.files.spectral.exr import write_spectral
 from vcam_cli.files.tables import write_metrics
 from vcam_cli.parallel import ThreadPool
 from vcam_cli.simulation import provenance, raw_file, spectral_irradiance
+from vcam_cli.simulation.figures import exposure_report
 from vcam_cli.simulation.frame import Frame
 from vcam_cli.simulation.provenance import versions
 from vcam_cli.simulation.raw_file import ROWS_AT_ONCE
@@ -159,6 +160,7 @@ def record(result: Result, inputs: tuple[Path, ...], seconds: float) -> dict[str
         "camera": camera.model_dump(mode="json"),
         "plan": frame.plan.report(),
         "geometry": frame.layout.report(frame.spectrum.oversampling),
+        "exposure": exposure_report(frame).report(),
         **({"captures": _samples(frame)} if frame.times else {}),
         "metrics": dict(result.metrics),
         "stages": result.stages.seconds,

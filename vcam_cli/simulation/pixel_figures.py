@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.electrical import Electrical
 from vcam_cli.camera.derived.geometry import Geometry
+from vcam_cli.effects.order import quantizer
 from vcam_cli.effects.signal_chain import NoiseSource, noise_sources
 from vcam_cli.physics import readout
 from vcam_cli.readout.binning import BinningGroups
@@ -34,6 +35,8 @@ class PixelFigures:
     snr_db: float
     """At a fifth of the well."""
     dynamic_range_db: float
+    quantized_dynamic_range_db: float
+    """With the ADC: up to the end of its codes, and with their rounding as noise."""
     well_capacity: float
     """[electrons]"""
     dark: float
@@ -53,9 +56,16 @@ def pixel_figures(
     floor = sum(x.binned_variance(0.0, 0.0, joins.binning) for x in draws) * wells**2
     dark = mean_dark(time, wanted)
     well, all_dark = electrical.full_well * wells, dark * wells
+    most = electrical.saturation * wells
+    conversions = joins.binning.conversions
+    one = quantizer(camera, geometry).rounding(dark, conversions * floor / wells**2)
+    rounding = wells**2 * one / conversions
     return PixelFigures(
         snr_db=float(readout.snr_db(SHARE * well, all_dark, floor)),
         dynamic_range_db=float(readout.dynamic_range_db(well, all_dark, floor)),
+        quantized_dynamic_range_db=float(
+            readout.dynamic_range_db(most, all_dark, floor + rounding)
+        ),
         well_capacity=electrical.full_well * joins.summed_codes,
         dark=dark,
         draws=draws,

@@ -27,7 +27,8 @@ from vcam_cli.quality.mse import mse, psnr_db
 from vcam_cli.quality.scielab import cielab_map, s_cielab_map
 from vcam_cli.simulation import remarks
 from vcam_cli.simulation.checks import read_lens
-from vcam_cli.simulation.frame import Frame, expose, figures
+from vcam_cli.simulation.figures import figures
+from vcam_cli.simulation.frame import Frame, expose
 from vcam_cli.simulation.preparation import Prepared
 from vcam_cli.simulation.preparation import prepare as bring_light
 from vcam_cli.simulation.shared import Shared

@@ -1,0 +1,175 @@
+"""What is measured of every frame: its metrics, and how it was exposed.
+
+References
+----------
+T. Chen, "Digital Camera System Simulator and Applications", PhD thesis, Stanford University, 2003,
+section 3.2.1; EMVA Standard 1288, release 4.0; ISO 12232:2019.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcam_cli.effects.signal_chain import NoiseSource, noise_sources
+from vcam_cli.physics import readout
+from vcam_cli.processing.tone_map import sensor_white
+from vcam_cli.scheduling import estimators
+from vcam_cli.simulation.frame import Frame
+from vcam_cli.simulation.pixel_figures import pixel_figures
+
+
+def figures(frame: Frame) -> list[tuple[str, float, str]]:
+    """Return the metrics that every run has: (metric, value, unit).
+
+    `pixel_figures` computes dynamic ranges (eq 3.1), SNR (eq 3.2) and well capacity. Of several
+    samples of one integration, all but the last two are of the last sample.
+    """
+    e, joins = frame.electrical, frame.layout.binning_groups
+    known = pixel_figures(frame.camera, frame.geometry, e, joins, frame.exposure_time)
+    listed = [
+        ("exposure_time", frame.exposure_time, "s"),
+        ("mean_electrons", float(frame.electrons.mean(dtype=np.float64)), "e"),
+        ("saturated_fraction", float(saturated_pixels(frame).mean()), ""),
+        ("snr_db", known.snr_db, "dB"),
+        ("dynamic_range_db", known.dynamic_range_db, "dB"),
+        ("well_capacity", known.well_capacity, "e"),
+        ("quantized_dynamic_range_db", known.quantized_dynamic_range_db, "dB"),
+        ("picture_snr_db", picture_snr_db(frame), "dB"),
+        ("base_iso", frame.base_iso, ""),
+        ("digital_gain", digital_gain(frame), ""),
+    ]
+    return listed + _sample_figures(frame, known.dark, known.draws) if frame.times else listed
+
+
+def _sample_figures(
+    frame: Frame, dark: float, draws: Sequence[NoiseSource]
+) -> list[tuple[str, float, str]]:
+    """Return what several samples add: dynamic range of the photocurrent, and where it is unknown.
+
+    Eq 3.1 for the photocurrent: the largest that does not fill the first sample, over the noise of
+    the estimate in the dark. `dark` is of the last sample [electrons]; `draws` are new in every
+    frame.
+    """
+    first, last = frame.times[0], frame.times[-1]
+    floor = sum(x.variance(0.0) for x in draws)
+    if frame.camera.exposure.estimator == "weighted":
+        read = sum(x.variance(0.0) for x in draws if x.sample_draws == "independent")
+        noise = estimators.weighted_variance(0.0, frame.times, dark / last, read, floor - read)
+        floor = float(noise) * last**2 - dark
+    well = frame.electrical.full_well * last / first
+    nowhere = frame.picture_dn >= frame.picture_saturated_dn
+    return [
+        ("hdr_saturated_fraction", float(nowhere.mean()), ""),
+        ("hdr_dynamic_range_db", float(readout.dynamic_range_db(well, dark, floor)), "dB"),
+    ]
+
+
+def saturated_pixels(frame: Frame) -> NDArray:
+    """Return which pixels of the raw frame are saturated, in the shape of `dn`."""
+    e, joins = frame.electrical, frame.layout.binning_groups
+    if joins.count == joins.summed_charges:
+        return np.asarray((frame.electrons >= e.full_well) | (frame.dn >= e.highest_code))
+    return np.asarray(frame.dn >= frame.saturated_dn)
+
+
+def picture_snr_db(frame: Frame) -> float:
+    """Return the mean signal of a picture over its temporal noise [dB].
+
+    Both are of the pixels whose mean signal does not saturate: the mean of their light, and the
+    root of their mean temporal variance, the ADC's rounding included. Of temporal noise variances
+    are straight lines of the signal, so that the mean variance is that of the mean signal. It is
+    -inf without light, or where all pixels saturate.
+    """
+    joins, binning = frame.layout.binning_groups, frame.camera.array.binning
+    summed = joins.summed_codes
+    signal = joins.join(frame.rate) * frame.exposure_time / summed
+    dark = frame.dark_rate * frame.exposure_time
+    usable = signal + dark < frame.electrical.saturation
+    count = int(usable.sum())
+    light = float(signal.sum(where=usable, dtype=np.float64)) / max(count, 1)
+    if light <= 0:
+        return -math.inf
+    sources = noise_sources(frame.plan.active, "frame")
+    noise = sum(source.binned_variance(light + dark, dark, binning) for source in sources)
+    rounding = frame.code.rounding(light + dark, summed * noise) / summed
+    return 20 * math.log10(light / math.sqrt(noise + rounding))
+
+
+def digital_gain(frame: Frame) -> float:
+    """Return what the render multiplies the raw by; 0 where white gives no signal.
+
+    The raw is 1 where it saturates, the render at its white. A gain of 1 needs no more than that
+    saturation is shown as white, as `tone: {white: sensor}` does.
+    """
+    tone = next((s.value for s in frame.camera.processing if s.name == "tone"), None)
+    stops = 2.0**tone.exposure if tone else 1.0
+    codes = np.array([*frame.white_dn, frame.black_dn, frame.picture_saturated_dn])
+    *white, black, saturated = frame.linear(codes)
+    needed = sensor_white(np.array(white), black, saturated)
+    return stops if tone and tone.white == "sensor" and needed > 0 else needed * stops
+
+
+@dataclass(frozen=True)
+class ExposureReport:
+    """How a frame was exposed, and how well that used the sensor."""
+
+    time: float
+    """Exposure time [s]."""
+    gain: float
+    """Analog gain before the ADC."""
+    iso: float
+    """ISO speed at this gain."""
+    automatic: bool
+    """Whether the camera chose it."""
+    stopped_by: str
+    """Limit that an automatic exposure ran into, as in `ExposureSettings`."""
+    raw_peak: float
+    """Mean signal of the brightest pixel, neither noise nor defects in it, as a fraction of full
+    scale; 1 where it saturates."""
+    clipped: dict[str, float]
+    """Color -> fraction of its pixels that are saturated."""
+
+    def report(self) -> dict[str, Any]:
+        """Return it as `run.json` has it."""
+        return asdict(self)
+
+
+def exposure_report(frame: Frame) -> ExposureReport:
+    """Return how a frame was exposed; of several samples of one integration the last."""
+    gain = frame.camera.exposure_gain
+    return ExposureReport(
+        time=frame.exposure_time,
+        gain=gain,
+        iso=frame.base_iso * gain,
+        automatic=frame.camera.exposure.auto is not None,
+        stopped_by=frame.exposure_limit,
+        raw_peak=_raw_peak(frame),
+        clipped=_clipped(frame),
+    )
+
+
+def _raw_peak(frame: Frame) -> float:
+    """Return the brightest pixel's mean code above the offset, as a fraction of full scale."""
+    joins, e = frame.layout.binning_groups, frame.electrical
+    summed = joins.summed_codes
+    brightest = (float(joins.join(frame.rate).max()) / summed + frame.dark_rate) * (
+        frame.exposure_time
+    )
+    level = float(frame.code.response(np.array([min(brightest, e.full_well)]))[0])
+    return min((level - e.offset) / (e.highest_code - e.offset), 1.0)
+
+
+def _clipped(frame: Frame) -> dict[str, float]:
+    full, colors = saturated_pixels(frame), frame.mosaic.colors
+    if frame.layout.full_color:
+        return {name: float(plane.mean()) for name, plane in zip(colors, full, strict=True)}
+    counts = np.bincount(frame.layout.color.ravel(), minlength=len(colors))
+    clipped = np.bincount(frame.layout.color.ravel(), weights=full.ravel(), minlength=len(colors))
+    shares = clipped / np.maximum(counts, 1)
+    return dict(zip(colors, shares.tolist(), strict=True))
