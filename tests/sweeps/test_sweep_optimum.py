@@ -21,7 +21,8 @@ def test_a_cubic_is_found_exactly(at, goal):
     found = find_optimum(X, sign * curve(at)[None], goal)
     # Least squares of doubles lose some digits; the curve is flat there: the square root of 1e-15.
     assert found.place == pytest.approx(at, rel=1e-7)
-    assert found.value == pytest.approx(2 * sign, rel=1e-12)
+    assert found.fitted == pytest.approx(2 * sign, rel=1e-12)
+    assert found.value == pytest.approx(sign * curve(at).min(), rel=1e-12), "that of a point"
     assert found.low <= at <= found.high
     assert found.edge == ""
 

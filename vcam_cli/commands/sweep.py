@@ -130,6 +130,8 @@ def report(result: "SweepResult") -> str:
         interval = f" ({low} to {high})" if low != "" else ""
         lines.append(f"{case}: best {parameter} {best}{interval} {unit}".rstrip())
         lines[-1] += f", {metric} {value}"
+        if f.is_beyond_points:
+            lines.append(f"  of the best point; between the points the fit reaches {f.fitted:.6g}")
         if f.edge:
             end = "low" if f.edge == "low" else "high"
             lines.append(f"  at the {end} end of its range: the optimum may lie beyond")

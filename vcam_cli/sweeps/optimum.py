@@ -50,9 +50,11 @@ class Optimum:
     high: float
     """The upper end of the interval, nan likewise."""
     value: float
-    """The metric at the optimum."""
+    """The metric at the optimum, no better than at the best point."""
     edge: str = ""
     """low | high: the range ends there, and the metric may get better beyond it."""
+    fitted: float = math.nan
+    """The metric of the fit there, which may be better than at any point; nan without a fit."""
 
 
 def find_optimum(parameter: NDArray, curves: NDArray, goal: str) -> Optimum:
@@ -70,7 +72,7 @@ def find_optimum(parameter: NDArray, curves: NDArray, goal: str) -> Optimum:
     scale = np.log(x) if x[0] > 0 else x
     window, rest, follows = _fit_window(scale, y)
     best, value = (float(part[0]) for part in _minima(scale, y.mean(axis=0)[None], window))
-    found = _minima(scale, _bootstrap_means(y, rest), window)[0]
+    found = _minima(scale, bootstrap_means(y, rest), window)[0]
     low, high = math.nan, math.nan
     if found.size:
         tail = (1 - CONFIDENCE) / 2
@@ -84,8 +86,10 @@ def find_optimum(parameter: NDArray, curves: NDArray, goal: str) -> Optimum:
     if len(x) > 1 and best in (scale[0], scale[-1]):
         edge = "low" if best == scale[0] else "high"
     back = np.exp if x[0] > 0 else np.asarray
-    place, low, high = (_snap_to_range(float(back(v)), x) for v in (best, low, high))
-    return Optimum(place, low, high, value if goal == "min" else -value, edge)
+    place, low, high = (snap_to_range(float(back(v)), x) for v in (best, low, high))
+    sign = 1 if goal == "min" else -1
+    inside = max(value, float(y.mean(axis=0).min()))
+    return Optimum(place, low, high, sign * inside, edge, sign * value)
 
 
 def _best_point(x: NDArray, mean: NDArray, goal: str) -> Optimum:
@@ -97,7 +101,7 @@ def _best_point(x: NDArray, mean: NDArray, goal: str) -> Optimum:
     return Optimum(float(x[i]), float(low), float(high), value, ends.get(i, ""))
 
 
-def _snap_to_range(value: float, x: NDArray) -> float:
+def snap_to_range(value: float, x: NDArray) -> float:
     """Return the value, with what the logarithm did to values of the range undone."""
     nearest = float(x[np.abs(x - value).argmin()]) if math.isfinite(value) else value
     return nearest if math.isclose(value, nearest, rel_tol=1e-12) else value
@@ -137,7 +141,7 @@ def _fit_window(x: NDArray, curves: NDArray) -> tuple[_Window, float, bool]:
     (nan where nothing is); and whether the spread explains it.
     """
     points = len(x)
-    mean, noise = curves.mean(axis=0), _variance_of_mean(curves)
+    mean, noise = curves.mean(axis=0), variance_of_mean(curves)
     best, reach = int(mean.argmin()), max(MIN_REACH, round(REACH_SHARE * points))
     size = min(points, 2 * reach + 1)
     window = _Window(min(max(0, best - reach), points - size), size)
@@ -162,7 +166,7 @@ def _misfit(x: NDArray, mean: NDArray, window: _Window) -> float:
     return float(np.square(y - fit).sum()) / free if free else math.nan
 
 
-def _variance_of_mean(curves: NDArray) -> float:
+def variance_of_mean(curves: NDArray) -> float:
     """Return the variance of the mean of curves, but for shifts of the whole; nan of a single one.
 
     The same at all points, which makes it well known from few curves.
@@ -175,19 +179,20 @@ def _variance_of_mean(curves: NDArray) -> float:
     return float(np.square(rest).sum()) / ((count - 1) * (points - 1) * count)
 
 
-def _bootstrap_means(curves: NDArray, rest: float) -> NDArray:
+def bootstrap_means(curves: NDArray, rest: float, least: int = MIN_BOOTSTRAP_CURVES) -> NDArray:
     """Return means of curves drawn with replacement: (DRAWS, points).
 
     The spread of n curves around their own mean is too small by (n - 1) / n, which is undone. Few
     curves make too few means: normal errors of the same variance stand for them. rest: rms of what
-    the fit leaves beside the spread, all there is of a single curve. None where nothing is known.
+    the fit leaves beside the spread, all there is of a single curve; least: number of curves that
+    are not few. None where nothing is known.
     """
     rng = np.random.default_rng(SEED)
     count, points = curves.shape
-    mean, variance = curves.mean(axis=0), _variance_of_mean(curves)
+    mean, variance = curves.mean(axis=0), variance_of_mean(curves)
     if math.isnan(variance) and math.isnan(rest):
         return np.empty((0, points))
-    if count >= MIN_BOOTSTRAP_CURVES:
+    if count >= least:
         chosen = rng.integers(count, size=(DRAWS, count))
         weights = np.stack([(chosen == i).sum(axis=1) for i in range(count)], axis=1) / count
         out = mean + math.sqrt(count / (count - 1)) * (weights @ (curves - mean))

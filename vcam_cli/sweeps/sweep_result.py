@@ -91,6 +91,13 @@ class CaseOptimum:
     metric: str
     value: float
     edge: str
+    fitted: float = math.nan
+    """What the fit says there, where that is not the value."""
+
+    @property
+    def is_beyond_points(self) -> bool:
+        """Whether the fit is better there than any point is."""
+        return not _is_unknown(self.fitted) and self.fitted != self.value
 
     @property
     def row(self) -> tuple[Cell, ...]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 from pathlib import Path
@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcam_cli.files.tables import Cell, write_table
+from vcam_cli.sweeps.joint_optimum import MIN_POINTS, find_joint_optimum
 from vcam_cli.sweeps.model import Optimize
-from vcam_cli.sweeps.optimum import find_optimum
+from vcam_cli.sweeps.optimum import Optimum, find_optimum
 from vcam_cli.sweeps.sweep_file import Parameter
 from vcam_cli.sweeps.sweep_points import Grid, Point
 from vcam_cli.sweeps.sweep_result import (
@@ -83,15 +84,45 @@ class Findings:
         return next(found, None)
 
     def _case_optima(self, case: str, wanted: Optimize) -> Iterator[CaseOptimum]:
-        """Yield the optima along each parameter, through the best point of all."""
+        """Yield the joint optimum of the parameters that are numbers.
+
+        Of those that have too few values or are words, and where points are missing, those along
+        lines through the best point of all.
+        """
         surface = self.surface(case, wanted.metric)
         sign = 1 if wanted.goal == "min" else -1
         if np.isnan(surface.mean).all():
             return
-        best = np.unravel_index(int(np.nanargmin(sign * surface.mean)), surface.mean.shape)
+        shape = surface.mean.shape
+        best = [int(i) for i in np.unravel_index(np.nanargmin(sign * surface.mean), shape)]
+        joint = _joint_optima(case, surface, best, wanted)
         for axis, parameter in enumerate(surface.parameters):
+            if axis in joint:
+                yield joint[axis]
+                continue
             line = tuple(slice(None) if i == axis else b for i, b in enumerate(best))
             yield _optimum(case, parameter, surface.values[line], wanted)
+
+
+def _joint_optima(
+    case: str, surface: Surface, best: Sequence[int], wanted: Optimize
+) -> dict[int, CaseOptimum]:
+    """Return the joint optimum by axis, of two parameters or more; {} where there is none."""
+    axes = [
+        i
+        for i, parameter in enumerate(surface.parameters)
+        if len(parameter.cells) >= MIN_POINTS and isinstance(parameter.cells[0], float)
+    ]
+    plane = tuple(slice(None) if i in axes else b for i, b in enumerate(best))
+    curves = np.moveaxis(surface.values[plane], -1, 0)
+    if len(axes) < 2 or not np.isfinite(curves).all():
+        return {}
+    numbers = [np.array(surface.parameters[i].cells, float) for i in axes]
+    found = find_joint_optimum(numbers, curves, wanted.goal)
+    return {
+        i: _table_row(case, surface.parameters[i], optimum, wanted)
+        for i, optimum in zip(axes, found, strict=True)
+    }
 
 
 def _optimum(case: str, parameter: Parameter, values: NDArray, wanted: Optimize) -> CaseOptimum:
@@ -105,9 +136,15 @@ def _optimum(case: str, parameter: Parameter, values: NDArray, wanted: Optimize)
         value = table_number(float(means[i]))
         return CaseOptimum(*about, str(cells[i]), math.nan, math.nan, wanted.metric, value, "")
     found = find_optimum(np.array(cells, float), values[good].T, wanted.goal)
-    numbers = (found.place, found.low, found.high, found.value)
-    place, low, high, value = map(table_number, numbers)
-    return CaseOptimum(*about, place, low, high, wanted.metric, value, found.edge)
+    return _table_row(case, parameter, found, wanted)
+
+
+def _table_row(case: str, parameter: Parameter, found: Optimum, wanted: Optimize) -> CaseOptimum:
+    """Return an optimum with its numbers rounded."""
+    numbers = (found.place, found.low, found.high, found.value, found.fitted)
+    place, low, high, value, fitted = map(table_number, numbers)
+    about = (case, parameter.path, parameter.unit)
+    return CaseOptimum(*about, place, low, high, wanted.metric, value, found.edge, fitted)
 
 
 def result(
