@@ -157,11 +157,11 @@ def render(value: float, dimension: str) -> str:
             unit = larger
     size = kind.units[unit]
     if size.numerator == 1 or size.denominator == 1:
-        return f"{_decimal(exact * size.denominator / size.numerator)} {unit}"
+        return f"{decimal(exact * size.denominator / size.numerator)} {unit}"
     rounded = f"{float(Fraction(value) / size):.15g}"  # deg: exact where a short number is
     if abs(float(rounded)) < 1e6 and parse(f"{rounded} {unit}", dimension) == value:
-        return f"{_decimal(Decimal(rounded))} {unit}"
-    return f"{_decimal(exact)} {kind.si}"
+        return f"{decimal(Decimal(rounded))} {unit}"
+    return f"{decimal(exact)} {kind.si}"
 
 
 def _spellings(unit: str) -> str:
@@ -232,7 +232,7 @@ def _value(
     return value
 
 
-def _decimal(number: Decimal) -> str:
+def decimal(number: Decimal) -> str:
     """Return the shortest spelling of a decimal number."""
     if number == 0:
         return "0"

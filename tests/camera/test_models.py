@@ -228,7 +228,7 @@ class TestValues:
         assert c.scene.source.frequency == 50e3
 
     def test_fpn_has_two_names(self):
-        one = camera(pixel__fpn={"offset_pixel": "2 e", "gain_pixel": 0.01})
+        one = camera(pixel__fpn={"offset_pixel": "2 e", "gain_pixel": "1.0 %"})
         two = camera(pixel__fpn={"dsnu": "2 e", "prnu": "1 %"})
         assert one == two
 
@@ -371,7 +371,7 @@ class TestRefused:
             ({"exposure.auto": {}}, "exposure.auto", "time"),
             ({"array.die": {"width": "1 mm", "height": "1 mm"}}, "array.rows", "die"),
             ({"pixel.fpn": {"dsnu": "1 e", "offset_pixel": "1 e"}}, "pixel.fpn.dsnu", "both"),
-            ({"pixel.fpn": {"prnu": 0.1, "gain_pixel": 0.1}}, "pixel.fpn.prnu", "both"),
+            ({"pixel.fpn": {"prnu": "1 %", "gain_pixel": "1 %"}}, "pixel.fpn.prnu", "both"),
             (
                 {
                     "pixel.photodetector.dark_current": "1 e/s",

@@ -85,7 +85,11 @@ class TestCamera:
             ("scene.distance", ["infinity", "1 m"], ["inf", "1"]),
             ("scene.wavelengths", [{"step": "auto"}, {"step": "5 nm"}], [{"step": "x"}]),
             ("pixel.readout.reset_noise", ["ktc", "none", "12 e"], ["kt", 12]),
-            ("pixel.fpn", [{"dsnu": "1 e", "prnu": "1 %"}, {"gain_pixel": 0.01}], [{"dsn": "1 e"}]),
+            (
+                "pixel.fpn",
+                [{"dsnu": "1 e", "prnu": "1 %"}, {"gain_pixel": "1 %"}],
+                [{"dsn": "1 e"}],
+            ),
             ("pixel.stack", ["none"], ["some", None, {"oxide": {}}]),
             ("optics.transmittance", [1, "95 %", "a", [0.5, {"file": "x"}]], [1.5, [], {"x": 1}]),
             ("optics.transmittance", [{"table": {"400": 0.1, "650.5": 1}}], [{"table": {"x": 1}}]),

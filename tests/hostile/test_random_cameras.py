@@ -191,7 +191,7 @@ SETS = {
     "optics.f_number": st.sampled_from(["2", "5.6"]),
     "scene.luminance": st.sampled_from(["7 cd/m2", "3 kcd/m2"]),
     "scene.distance": st.just("2 m"),
-    "pixel.fpn.gain_pixel": st.sampled_from(["0.01", "2 %"]),
+    "pixel.fpn.gain_pixel": st.sampled_from(["0 %", "2 %"]),
     "pixel.fpn": st.just("{offset_pixel: 3 e}"),
     "pixel.photodetector.fill_factor": st.just("0.25"),
     "exposure.time": st.just("3 ms"),

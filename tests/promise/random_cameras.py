@@ -104,7 +104,7 @@ def tree(number: int) -> dict:
             "fpn": {
                 "offset_pixel": spread(0.3, 10, "e"),
                 "offset_column": spread(0.1, 5, "e"),
-                "gain_pixel": spread(0.001, 0.02),
+                "gain_pixel": spread(0.1, 2, "%"),
             },
         },
         "array": {

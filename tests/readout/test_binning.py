@@ -131,7 +131,7 @@ FLAT = {
     "scene.radiance": radiance_for(LIGHT),
     "pixel.readout.reset_noise": f"{RESET} e",
     "pixel.readout.read_noise": f"{READ} e",
-    "pixel.fpn": {"offset_pixel": f"{OFFSET} e", "gain_pixel": GAIN},
+    "pixel.fpn": {"offset_pixel": f"{OFFSET} e", "gain_pixel": f"{100 * GAIN} %"},
     "pixel.photodetector.dark_current": "10 ke/s",
 }
 """Even light, every source of noise that a pixel has, and a dark signal of about 100 electrons."""

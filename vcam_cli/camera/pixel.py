@@ -17,6 +17,7 @@ from vcam_cli.config.values import (
     Electrons,
     Fraction,
     MaybeFraction,
+    Percent,
     Positive,
     SiliconTemperature,
     mapping,
@@ -45,7 +46,7 @@ class ChargeTransfer(Model):
 class Readout(Model):
     """From electrons to volts: two of conversion_gain, voltage_swing and full_well.
 
-    Or full_well alone, with adc.gain, as data sheets count: then there are no volts.
+    Or full_well alone, as data sheets count: then there are no volts, and the ADC is full with it.
     """
 
     conversion_gain: Annotated[float | None, Quantity("conversion_gain", above=0)] = key(
@@ -55,7 +56,7 @@ class Readout(Model):
         "at the full well", example="1.38 V", default=None
     )
     full_well: Annotated[float | None, Quantity("charge", above=0)] = key(
-        "electrons a pixel can hold; enough by itself beside adc.gain",
+        "electrons a pixel can hold; enough by itself",
         example="69 ke",
         default=None,
     )
@@ -107,16 +108,16 @@ class FixedPattern(Model):
     offset_column: Electrons = key(
         "spread of the columns' offsets; none in dps and ccd", example="1 e", default=0.0
     )
-    gain_pixel: Fraction = key(
+    gain_pixel: Percent = key(
         "spread of the pixels' gains (also: prnu)",
         example="0.5 %",
         default=0.0,
         validation_alias=AliasChoices("gain_pixel", "prnu"),
     )
-    gain_column: Fraction = key(
+    gain_column: Percent = key(
         "spread of the columns' gains; none in dps and ccd", example="0 %", default=0.0
     )
-    dark: Fraction = key("spread of the pixels' dark currents", example="0 %", default=0.0)
+    dark: Percent = key("spread of the pixels' dark currents", example="0 %", default=0.0)
 
     rules = (at_most_one("offset_pixel", "dsnu"), at_most_one("gain_pixel", "prnu"))
 
@@ -188,7 +189,7 @@ def _is_determined(given: Mapping[str, Any]) -> Iterator[InitErrorDetails]:
     known = [name for name in ("voltage_swing", "full_well") if name in readout]
     if "conversion_gain" in readout or "capacitance" in detector:
         known.append("conversion_gain")
-    if len(known) >= 2 or known == ["full_well"]:  # beside a full well, adc.gain is enough
+    if len(known) >= 2 or known == ["full_well"]:  # then the ADC is full with it
         return
     message = (
         "the readout is not determined: two of conversion_gain, voltage_swing and full_well are "

@@ -9,6 +9,7 @@ import math
 from abc import abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from decimal import Decimal
 from types import MappingProxyType
 from typing import Any
 
@@ -194,6 +195,33 @@ class Number(Numeric):
     def hint(self) -> str:
         """What to write, for messages."""
         return f"a number such as {self.example}"
+
+
+@dataclass(frozen=True)
+class Percentage(Number):
+    """A number that the field gives in percent: bare, 0.5 could be 0.5 % or 50 %."""
+
+    example: str = "0.5 %"
+
+    def number(self, given: Any) -> float:
+        """Return the number, 0.05 of "5 %"; a bare one is refused, but for 0."""
+        value = super().number(given)
+        if (isinstance(given, str) and "%" in given) or value == 0:
+            return value
+        percent = f"{value:g} %"
+        raise ValueError(
+            f"{describe(given)} is a bare number: {percent} or {100 * value:g} %? write {percent},"
+            f" or {100 * value:g} %"
+        )
+
+    def text(self, value: Any) -> Any:
+        """Return the number in percent, which is read as the same."""
+        return f"{units.decimal(Decimal(repr(float(value))).scaleb(2))} %"
+
+    def number_schema(self) -> dict[str, Any]:
+        """Return the JSON Schema of 0, or a text in percent."""
+        _, percent = super().number_schema()["anyOf"]
+        return {"anyOf": [{"const": 0}, percent]}
 
 
 @dataclass(frozen=True)

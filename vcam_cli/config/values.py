@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, Strict, StringConstraints
 
-from vcam_cli.config.quantities import NO_WORDS, Number, Quantity
+from vcam_cli.config.quantities import NO_WORDS, Number, Percentage, Quantity
 from vcam_cli.config.validation_messages import describe, key_fields, one_of, refusal
 from vcam_cli.config.yaml_type import YamlType, to_yaml
 
@@ -32,6 +32,7 @@ Angle = Annotated[float, Quantity("angle")]
 Electrons = Annotated[float, Quantity("charge", least=0, most=MOST_ELECTRONS)]
 Frequency = Annotated[float, Quantity("spatial_frequency", least=0)]
 Fraction = Annotated[float, Number(least=0, most=1)]
+Percent = Annotated[float, Percentage(least=0, most=1)]
 Positive = Annotated[float, Number(above=0, example="1")]
 Switch = Annotated[bool, Strict()]
 Word = Annotated[

@@ -80,7 +80,7 @@ def electrical(camera: Camera) -> Electrical:
 
     The technology fills in what the file leaves open: the capacitance and with it the gain
     (eq 2.32), then the swing (eq 2.33). A data sheet that counts in electrons and DN alone gives
-    the well and the ADC's gain; volts are then nominal.
+    the well, and perhaps the ADC's gain, which else follows from its bits; volts are then nominal.
 
     Raises BadInput where all together leave it open, or the file contradicts itself.
     """
@@ -134,7 +134,10 @@ def check(camera: Camera) -> None:
     """Raise BadInput when the readout is open, contradicts itself or lacks volts it needs."""
     if electrical(camera).has_volts:
         return
-    pixel = camera.pixel
+    pixel, adc = camera.pixel, camera.adc
+    for name in ("full_scale", "reference"):
+        if getattr(adc, name) is not None:
+            raise no_volts(f"adc.{name}", "it", f"leave out {name}")
     of_photodiode = ARCHITECTURES[pixel.architecture].reset_noise == "photodiode"
     if pixel.readout.reset_noise == "ktc" and of_photodiode:
         raise no_volts("pixel.readout.reset_noise", "ktc", "give it in electrons")
@@ -152,10 +155,10 @@ def no_volts(path: str, what: str, instead: str) -> BadInput:
 
 
 def _counts_only(camera: Camera) -> bool:
-    """Return whether the file gives the well and the codes per electron, and no volts."""
+    """Return whether the file gives the well in electrons and no volts, as data sheets do."""
     given = camera.pixel.readout
     volts = given.conversion_gain is not None or given.voltage_swing is not None
-    return not volts and given.full_well is not None and camera.adc.gain is not None
+    return not volts and given.full_well is not None
 
 
 def _solve(
@@ -181,5 +184,5 @@ def _solve(
         "the readout is not determined",
         "give two of conversion_gain, voltage_swing and full_well"
         " (photodetector.capacitance may stand for conversion_gain),"
-        " or full_well and adc.gain as data sheets do",
+        " or full_well alone, as data sheets do",
     )
