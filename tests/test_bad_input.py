@@ -61,7 +61,7 @@ def folder(tmp_path, monkeypatch) -> Path:
     Path("empty.png").write_bytes(b"")
     Path("short.csv").write_text("wavelength_nm,value\n500,0.5\n600,0.5\n")
     Path("lens.csv").write_text("image_height_mm,value\n0,1\n0.02,0.5\n")
-    Path("falling.csv").write_text("wavelength_nm,value\n700,0.5\n400,0.5\n")
+    Path("mixed.csv").write_text("wavelength_nm,value\n500,0.5\n700,0.5\n400,0.5\n")
     Path("words.csv").write_text("wavelength_nm,value\n400,high\n700,low\n")
     Path("loop.yaml").write_text("extends: ./loop.yaml\n")
     return tmp_path
@@ -648,8 +648,8 @@ case(
 for _name, _file, _at, _path, _message, _remedy in (
     ("a missing table", "shrt.csv", "10:25", ".file", "no file 'shrt.csv'", "'short.csv'?"),
     ("a table too short", "short.csv", "10:18", "", "380-780 nm is needed", "outside: zero"),
-    ("a table that falls", "falling.csv", "10:25", ".file", "400 nm follows 700 nm", "rising"),
-    ("a table of words", "words.csv", "10:25", ".file", "words.csv:2", "wavelength_nm,value"),
+    ("a table in no order", "mixed.csv", "10:25", ".file", "400 nm follows 700 nm", "400,0.31"),
+    ("a table of words", "words.csv", "10:25", ".file", "words.csv:2", "400,0.31"),
 ):
     case(
         _name,

@@ -327,7 +327,7 @@ def write(folder: Path, text: str | bytes) -> Path:
 
 def test_reads_csv(tmp_path: Path) -> None:
     text = "\ufeff# a lamp\n#\n\nwavelength_nm, value\r\n380, 0.5\n# inside\n780.5,1e-3\n"
-    table = spectra.read_csv(write(tmp_path, text), "hold")
+    table = spectra.read_spectrum(write(tmp_path, text), "hold")
     assert table == Table(np.array([380e-9, 780.5e-9]), np.array([0.5, 1e-3]), "hold")
 
 
@@ -336,8 +336,10 @@ def test_reads_csv(tmp_path: Path) -> None:
     [
         ("", "is empty"),
         ("# only a comment\n", "is empty"),
-        ("380,0.5\n780,0.5\n", "the header is '380,0.5'"),
-        ("nm,value\n380,0.5\n", "wavelength_nm,value"),
+        ("380,0.5,0.6\n780,0.5,0.6\n", "has 2 columns of values (2, 3); write which"),
+        ("nm,R,G\n380,0.5,0.2\n", "has 2 columns of values (R, G); write which"),
+        ("x,y\n38,1\n78,1\n", "write unit: nm, or unit: um"),
+        ("a note\nnm,value\nlow,high\n", "x.csv:2: 'nm,value' is not a row of numbers"),
         ("wavelength_nm,value\n", "no rows"),
         ("wavelength_nm,value\n380,0.5,1\n", "x.csv:2: has 3 columns"),
         ("wavelength_nm,value\n380,0.5\n390,half\n", "x.csv:3: '390,half'"),
@@ -345,7 +347,7 @@ def test_reads_csv(tmp_path: Path) -> None:
         ("wavelength_nm,value\n380,inf\n", "not finite"),
         ("wavelength_nm,value\n380,-0.1\n", "-0.1 at 380 nm"),
         ("wavelength_nm,value\n0,0.1\n", "positive"),
-        ("wavelength_nm,value\n390,1\n380,1\n", "380 nm follows 390 nm"),
+        ("wavelength_nm,value\n390,1\n380,1\n385,1\n", "380 nm follows 390 nm"),
         (b"\x89PNG\r\n\x1a\n\xff\xfe\x00", "not a text file"),
     ],
 )
@@ -353,5 +355,5 @@ def test_broken_csv_is_refused_with_its_place(
     tmp_path: Path, text: str | bytes, message: str
 ) -> None:
     with pytest.raises(ValueError, match=r"x\.csv") as caught:
-        spectra.read_csv(write(tmp_path, text))
+        spectra.read_spectrum(write(tmp_path, text))
     assert message in str(caught.value)

@@ -115,7 +115,7 @@ def test_silicon_absorbs_as_its_extinction_coefficient_says() -> None:
 
 @pytest.mark.parametrize("file", GENERIC, ids=lambda file: file.stem)
 def test_generic_curves_are_efficiencies(file: Path) -> None:
-    table = spectra.read_csv(file)
+    table = spectra.read_spectrum(file)
     assert table.covers(300e-9, 1100e-9)
     assert (table.value >= 0).all()
     assert (table.value <= 1).all()
@@ -126,16 +126,18 @@ def test_generic_curves_are_efficiencies(file: Path) -> None:
 def test_the_measured_camera_is_that_of_colour_science(colour: ModuleType) -> None:
     theirs = colour.MSDS_CAMERA_SENSITIVITIES["Nikon 5100 (NPL)"]
     for name, values in zip(theirs.labels, theirs.values.T, strict=True):
-        ours = spectra.read_csv(ROOT / f"configs/filters/nikon-5100-{name}.csv")
+        ours = spectra.read_spectrum(ROOT / f"configs/filters/nikon-5100-{name}.csv")
         np.testing.assert_array_equal(ours.evaluate(theirs.wavelengths / 1e9), values, err_msg=name)
 
 
 def test_generic_filters_see_their_own_color() -> None:
     peaks = {
-        name: spectra.read_csv(ROOT / f"configs/filters/generic-{name}.csv").evaluate(nm * 1e-9)
+        name: spectra.read_spectrum(ROOT / f"configs/filters/generic-{name}.csv").evaluate(
+            nm * 1e-9
+        )
         for name, nm in (("red", 610), ("green", 535), ("blue", 455))
     }
     assert peaks == pytest.approx({"red": 0.90, "green": 0.85, "blue": 0.82}, abs=0.005)
-    cut = spectra.read_csv(ROOT / "configs/filters/ir-cut-650.csv")
+    cut = spectra.read_spectrum(ROOT / "configs/filters/ir-cut-650.csv")
     assert cut.evaluate(650e-9) == pytest.approx(0.485)
     assert cut.evaluate(750e-9) < 1e-4

@@ -24,7 +24,7 @@ from vcam_cli.errors import BadInput, CannotDo
 from vcam_cli.files.images import color_channels, read_picture
 from vcam_cli.files.psf import read_psf
 from vcam_cli.files.spectral.hyperspectral import read_bands, read_cube
-from vcam_cli.spectra.text import read_csv
+from vcam_cli.spectra.measured import read_spectrum
 
 MEMORY = 8 << 30
 """Address space [bytes]; a file claims far more."""
@@ -148,7 +148,7 @@ def tables(folder: Path) -> dict[Path, Reader]:
 
 def _as_curve(path: Path) -> None:
     try:
-        read_csv(path)
+        read_spectrum(path)
     except ValueError as error:
         raise told(error) from None
 

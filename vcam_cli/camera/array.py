@@ -15,6 +15,7 @@ from vcam_cli.config.validation_messages import describe, fault, one_of, refusal
 from vcam_cli.config.values import Either, File, Length, mapping, word_or
 from vcam_cli.config.yaml_type import to_yaml
 from vcam_cli.errors import BadInput
+from vcam_cli.spectra.measured import column_names
 
 BAYER = ("bayer-rggb", "bayer-grbg", "bayer-gbrg", "bayer-bggr")
 PATTERNS: dict[str, tuple[str, ...]] = {
@@ -97,6 +98,8 @@ def _pattern(given: Any) -> Any:
 def _filters(given: Any) -> dict[str, SpectrumSpec]:
     if isinstance(given, str):
         return filter_set(given)
+    if isinstance(given, Mapping) and isinstance(given.get("file"), str):
+        return _filters_of_file(given)
     if not isinstance(given, Mapping):
         raise ValueError(
             f"{describe(given)} is not a set of filters; write for example {{R: 0.9, ...}}"
@@ -108,6 +111,21 @@ def _filters(given: Any) -> dict[str, SpectrumSpec]:
         return _FILTER.read(given[color])
 
     return dict(zip(given, read_items(((color, color) for color in given), read), strict=True))
+
+
+def _filters_of_file(given: Mapping[Any, Any]) -> dict[str, SpectrumSpec]:
+    """Return the filters of a file with a column for each color, by the columns' names."""
+    if "column" in given:
+        message = "a set of filters takes all columns of the file"
+        raise refusal(("column",), message, "remove it, or write {R: {file: ..}, ..}", given)
+    try:
+        names = column_names(given["file"])
+    except ValueError as error:
+        raise refusal(("file",), str(error), "give wavelengths and a column a color") from None
+    except OSError as error:
+        message = f"{given['file']} cannot be read: {error.strerror}"
+        raise refusal(("file",), message, "check the file name") from None
+    return _filters({name: {**given, "column": name} for name in names})
 
 
 def filter_set(name: str) -> dict[str, SpectrumSpec]:
@@ -157,7 +175,8 @@ class Array(Model):
         ),
     ] = key(
         "transmittance of each color's filter (a spectrum), or the name of a shipped set; "
-        "default generic-rgb, and no filter on monochrome pixels (color Y) and on W",
+        "or {file: rgb.csv} with a column for each color; default generic-rgb, and no filter on "
+        "monochrome pixels (color Y) and on W",
         example={"R": {"file": "r.csv"}, "G": {"file": "g.csv"}, "B": {"file": "b.csv"}},
         default=None,
     )

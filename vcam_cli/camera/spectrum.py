@@ -21,7 +21,7 @@ from vcam_cli.config.lists import read_items
 from vcam_cli.config.model import Model, key
 from vcam_cli.config.quantities import Number
 from vcam_cli.config.validation_messages import describe, refusal
-from vcam_cli.config.values import File, Gap
+from vcam_cli.config.values import Choice, File, Gap
 from vcam_cli.config.yaml_type import DEFINED, YamlType, to_yaml
 from vcam_cli.errors import BadInput, Path, bad, data_file_problems
 from vcam_cli.physics import silicon
@@ -87,18 +87,41 @@ def _nanometers(name: object) -> float:
     return nm
 
 
+class ColumnName(YamlType):
+    """The type of a column's name, or of its number."""
+
+    forms = Annotated[str | int, "name or number"]
+
+    def read(self, given: Any) -> str:
+        """Return the name as a text."""
+        if isinstance(given, bool) or not isinstance(given, (str, int)) or not str(given).strip():
+            raise ValueError(f"{describe(given)} is not the name of a column; write for example R")
+        return str(given)
+
+
 class SpectrumFile(Model):
     """A spectrum in a CSV file."""
 
     file: File = key(
-        "CSV file with the columns wavelength_nm,value, rising; relative to this YAML file",
+        "CSV file of wavelengths and values, with any header, separator and decimal sign; relative "
+        "to this YAML file",
         example="filter.csv",
+    )
+    column: Annotated[str | None, ColumnName()] = key(
+        "which column of values, by its name or number; needed where there are several",
+        example="R",
+        default=None,
+    )
+    unit: Annotated[str | None, Choice("nm", "um")] = key(
+        "unit of the wavelengths; default what the header says, or their size tells",
+        example="nm",
+        default=None,
     )
     outside: Outside = key(_OUTSIDE, example="hold", default="error")
 
     def resolve(self, path: Path) -> spectra.Spectrum:
         """Return the spectrum of the file. Raises BadInput, about `path`."""
-        return _read_file(self.file, self.outside, (*path, "file"))
+        return _read_file(self, (*path, "file"))
 
 
 class SpectrumTable(Model):
@@ -190,24 +213,28 @@ def flat(value: float, most: float | None = 1.0) -> SpectrumSpec:
     return SpectrumSpec((value,), most)
 
 
-def _read_file(file: str, outside: Outside, path: Path) -> spectra.Spectrum:
-    with data_file_problems(file, path, "write the columns wavelength_nm,value, rising"):
+def _read_file(given: SpectrumFile, path: Path) -> spectra.Spectrum:
+    file, remedy = given.file, "write rows of wavelength and value, such as 400,0.31"
+    with data_file_problems(file, path, remedy):
         state = os.stat(file)
-        table = _read_table(file, outside, state.st_mtime_ns, state.st_size, state.st_ino)
+        changed = (state.st_mtime_ns, state.st_size, state.st_ino)
+        table = _read_table(file, given.outside, given.column, given.unit, changed)
     return spectra.Spectrum(tables=(table,))
 
 
 @lru_cache(256)
-def _read_table(file: str, outside: Outside, changed: int, size: int, node: int) -> spectra.Table:
+def _read_table(
+    file: str, outside: Outside, column: str | None, unit: str | None, changed: tuple[int, ...]
+) -> spectra.Table:
     """Return the table of a file, read once as long as it does not change: sweeps ask often."""
-    return spectra.read_csv(file, outside)
+    return spectra.read_spectrum(file, outside, column, unit)
 
 
 def _resolve(factor: Factor, path: Path) -> spectra.Spectrum:
     if isinstance(factor, float):
         return spectra.Spectrum.flat(factor)
     if isinstance(factor, str):
-        return _read_file(str(shipped.find("spectra", factor, path)), "error", path)
+        return _read_file(SpectrumFile(file=str(shipped.find("spectra", factor, path))), path)
     return factor.resolve(path)
 
 

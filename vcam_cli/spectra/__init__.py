@@ -9,6 +9,7 @@ a millisecond and removes the question.
 """
 
 from vcam_cli.spectra.integration import hat_weights, integral, pair_weights, quadrature
+from vcam_cli.spectra.measured import read_spectrum
 from vcam_cli.spectra.spectrum import (
     BOLTZMANN,
     PHOTONS,
@@ -29,7 +30,6 @@ from vcam_cli.spectra.standard import (
     silicon_absorption,
     srgb_reflectances,
 )
-from vcam_cli.spectra.text import read_csv
 
 __all__ = [
     "BOLTZMANN",
@@ -50,7 +50,7 @@ __all__ = [
     "pair_weights",
     "photons",
     "quadrature",
-    "read_csv",
+    "read_spectrum",
     "silicon_absorption",
     "srgb_reflectances",
 ]

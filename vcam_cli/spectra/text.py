@@ -1,4 +1,4 @@
-"""Tables of spectra as CSV text: `#` comments, one header line, numbers in rows."""
+"""Tables as CSV text: `#` comments, one header line, numbers in rows."""
 
 import io
 import math
@@ -9,13 +9,14 @@ from pathlib import Path
 
 import numpy as np
 
-from vcam_cli.spectra.spectrum import Floats, Outside, Table
+from vcam_cli.spectra.spectrum import Floats
 
-HEADER = ("wavelength_nm", "value")
 MAX_ROWS = 200_000
 MAX_BYTES = 1 << 26
 """Largest file that is read; a million rows have some 30 MB."""
 MAX_LINE_LENGTH = 10_000
+_TEXT_BYTES = bytes({9, 10, 12, 13, *range(32, 127), *range(160, 256)})
+"""Bytes of a text in Latin-1."""
 MAX_COLUMNS = 8
 """Columns of a table with as many rows as are read; a shorter one may have more."""
 
@@ -48,24 +49,36 @@ def read_table(
         The file cannot be read.
     """
     file = Path(path)
+    return _cells(file, read_lines(file, 2 * most), most)
+
+
+def read_lines(file: Path, most: int) -> Iterator[tuple[int, str]]:
+    """Yield the lines of a text file that say something, with their numbers.
+
+    One by one, as a list of all that a file can hold would take a hundred times its bytes.
+    Comments begin with `#`. What is not UTF-8 is taken as Latin-1, as instruments write it.
+
+    Parameters
+    ----------
+    file : Path
+        The file.
+    most : int
+        Largest number of lines.
+
+    Raises
+    ------
+    ValueError
+        Not text, too large, too long a line, or more than `most` of them.
+    OSError
+        The file cannot be read.
+    """
     if not stat.S_ISREG(file.stat().st_mode):  # a pipe would keep us waiting
         raise ValueError(f"{file}: is not a regular file")
     with file.open("rb") as source:
         data = source.read(MAX_BYTES + 1)
     if len(data) > MAX_BYTES:
         raise ValueError(f"{file}: is larger than {MAX_BYTES >> 20} MB")
-    try:
-        return _cells(file, _lines(file, data, 2 * most), most)
-    except UnicodeDecodeError:
-        raise ValueError(f"{file}: is not a text file") from None
-
-
-def _lines(file: Path, data: bytes, most: int) -> Iterator[tuple[int, str]]:
-    """Yield the lines that say something, with their numbers.
-
-    One by one, as a list of all that a file can hold would take a hundred times its bytes.
-    """
-    text = io.TextIOWrapper(io.BytesIO(data), "utf-8-sig")
+    text = io.TextIOWrapper(io.BytesIO(data), _encoding(file, data))
     for n, line in enumerate(iter(lambda: text.readline(MAX_LINE_LENGTH + 1), ""), 1):
         if len(line) > MAX_LINE_LENGTH:
             raise ValueError(f"{file}:{n}: is longer than {MAX_LINE_LENGTH} characters")
@@ -74,6 +87,17 @@ def _lines(file: Path, data: bytes, most: int) -> Iterator[tuple[int, str]]:
         line = line.strip()
         if line and not line.startswith("#"):
             yield n, line
+
+
+def _encoding(file: Path, data: bytes) -> str:
+    """Return the encoding of a text; ValueError for what is none."""
+    try:
+        data.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        if data.translate(None, _TEXT_BYTES):
+            raise ValueError(f"{file}: is not a text file") from None
+        return "latin-1"
+    return "utf-8-sig"
 
 
 def _cells(
@@ -153,44 +177,3 @@ def parse_numbers(file: Path, line: int, cells: list[str]) -> list[float]:
     if not all(math.isfinite(value) for value in values):
         raise ValueError(f"{file}:{line}: {shown!r} holds a value that is not finite")
     return values
-
-
-def read_csv(path: str | PathLike[str], outside: Outside = "error") -> Table:
-    """Return a spectrum from a CSV file with the columns wavelength_nm,value.
-
-    Parameters
-    ----------
-    path : str or path
-        The file: wavelengths in nm, rising; values not negative, dimensionless (or relative, for a
-        lamp).
-    outside : {"error", "zero", "hold"}
-        What holds beyond the first and last wavelength.
-
-    Returns
-    -------
-    Table
-        The spectrum, with wavelengths in m.
-
-    Raises
-    ------
-    ValueError
-        Anything else stands in the file; the message names file and line.
-    OSError
-        The file cannot be read.
-    """
-    header, rows = read_rows(path)
-    if tuple(header) != HEADER:
-        raise ValueError(
-            f"{path}: the header is {','.join(header)!r}; it must be 'wavelength_nm,value'"
-        )
-    if len(rows) == 0:
-        raise ValueError(f"{path}: has no rows below its header")
-    if (rows[:, 1] < 0).any():
-        wavelength, value = rows[rows[:, 1] < 0][0]
-        raise ValueError(f"{path}: {value:g} at {wavelength:g} nm; a value must not be negative")
-    if (rows[:, 0] <= 0).any():
-        raise ValueError(f"{path}: a wavelength must be positive")
-    try:
-        return Table(rows[:, 0] / 1e9, rows[:, 1], outside)
-    except ValueError as error:
-        raise ValueError(f"{path}: {error}") from None
