@@ -116,8 +116,8 @@ def cells_per_pixel(path: OpticalPath, scene: ChartScene, highest: float) -> tup
     whole = math.prod(cell_grid(scene, path.geometry, 1.0))
     most = min(finest, max(1.0, math.sqrt(MOST / whole)))
     least = OVEREXPOSED if converged.max() > path.ceiling else 0.0
-    error = 0.0
-    for cells in [c for c in (*LADDER, most) if least <= c <= min(most, reference / COPRIME)]:
+    cells, error = most, budget
+    for cells in [c for c in LADDER if least <= c <= min(most, reference / COPRIME)]:
         found = _signals(path, crops, cells, level, otf)
         # Few pixels may have no error by chance; many around them may hide theirs.
         error = max(
@@ -126,7 +126,9 @@ def cells_per_pixel(path: OpticalPath, scene: ChartScene, highest: float) -> tup
         )
         if error <= budget:
             return cells, error
-    return most, error
+    # It falls with the square of the cells, about: faster than is reckoned here.
+    enough = min(cells * error / budget, most)
+    return enough, error * cells / enough
 
 
 def _error_that_counts(found: NDArray, converged: NDArray, ceiling: float) -> float:
