@@ -85,7 +85,9 @@ def test_reflectance_times_d65_is_an_image_of_the_same_reflectance(tmp_path):
     gray = np.random.default_rng(2).integers(1, 255, SHAPE) / 255
     lamp = illuminant("D65").evaluate(every_5 * 1e-9) * 1e-4
     flat = gray[..., None] * np.ones(len(every_5))
-    level = {"scene.luminance": "100 cd/m2"}
+    # Of the light that is simulated: beyond its bands a file of radiances has no luminance.
+    level = {"scene.radiance": "0.1 W/(sr m2)"}
+    plain = {path: value for path, value in PLAIN.items() if path != "scene.luminance"} | level
     found = {}
     for name, arrays in {
         "light": {"radiance": flat * lamp, "white": lamp},
@@ -93,7 +95,7 @@ def test_reflectance_times_d65_is_an_image_of_the_same_reflectance(tmp_path):
     }.items():
         np.savez(tmp_path / "a.npz", wavelength_nm=every_5, **arrays)
         source = {"kind": "hyperspectral", "file": str(tmp_path / "a.npz")}
-        made = camera(tmp_path, PLAIN | level | {"scene.source": source})
+        made = camera(tmp_path, plain | {"scene.source": source})
         found[name] = simulate(made).mean_electrons
     out = oiio.ImageOutput.create("p.png")
     out.open(str(tmp_path / "p.png"), oiio.ImageSpec(SHAPE[1], SHAPE[0], 1, "uint8"))
@@ -101,7 +103,7 @@ def test_reflectance_times_d65_is_an_image_of_the_same_reflectance(tmp_path):
     out.close()
     source = {"kind": "image", "file": str(tmp_path / "p.png"), "encoding": "linear"}
     lit = {"scene.source": source, "scene.illuminant": "D65"}
-    image = simulate(camera(tmp_path, PLAIN | level | lit)).mean_electrons
+    image = simulate(camera(tmp_path, plain | lit)).mean_electrons
     np.testing.assert_allclose(found["light"], image, rtol=1e-6)
     np.testing.assert_allclose(found["reflectance"], image, rtol=1e-6)
 

@@ -186,3 +186,38 @@ def test_the_plan_says_what_it_changes(tmp_path):
     assert decision.contribution == pytest.approx(change / full, rel=1e-6)
     assert decision.unit == "of full signal"
     assert "transfers" in decision.reason
+
+
+@pytest.mark.parametrize("over", [3, 1e4])
+def test_no_more_than_the_well_travels(over, tmp_path):
+    """Light far beyond a well of 20 ke leaves behind what a full well leaves, and no more."""
+    bright = {"scene.radiance": radiance_for(over * 20e3), "pixel.readout.full_well": "20 ke"}
+    bright |= {"effects": QUIET | {"dark_current": "on"}}
+    still = simulate(camera(tmp_path, SPOT | bright)).mean_electrons
+    moved = simulate(camera(tmp_path, SPOT | bright | TRANSFER)).mean_electrons
+    held = np.minimum(still, 20e3)
+    expected = clocked(clocked(held, 1e-3, 2).T, 1e-3, 2).T
+    assert (still > 20e3).any()
+    # 32-bit sums of what is beyond the well: 1e-7 of the brightest
+    np.testing.assert_allclose(moved - (still - held), expected, atol=1e-6 * still.max() + 1e-4)
+
+
+def test_what_a_lamp_leaves_behind_is_a_full_wells_share(tmp_path):
+    """Beside an edge of 10^4 x the well only electrons trail: at most the well x all transfers."""
+    lamp = {"scene.radiance": radiance_for(1e4 * 20e3), "pixel.readout.full_well": "20 ke"}
+    scene = {"scene.source": {"kind": "chart", "chart": "slanted-edge", "contrast": 1.0},
+             "pixel.photodetector.dark_current": "0 e/s", "optics.diffraction": False}  # fmt: skip
+    moved = simulate(camera(tmp_path, SPOT | lamp | scene | TRANSFER)).mean_electrons
+    dark = simulate(camera(tmp_path, SPOT | lamp | scene)).mean_electrons == 0
+    assert dark.any()
+    transfers = 2 * (48 + 64)
+    assert moved[dark].max() <= 20e3 * 1e-3 * transfers
+
+
+def test_without_a_limit_all_charge_travels(tmp_path):
+    bright = {"scene.radiance": radiance_for(60e3), "pixel.readout.full_well": "20 ke"}
+    bright |= {"effects": QUIET | {"saturation": "off", "dark_current": "on"}}
+    still = simulate(camera(tmp_path, SPOT | bright)).mean_electrons
+    moved = simulate(camera(tmp_path, SPOT | bright | TRANSFER)).mean_electrons
+    expected = clocked(clocked(still, 1e-3, 2).T, 1e-3, 2).T
+    np.testing.assert_allclose(moved, expected, rtol=1e-6)

@@ -235,8 +235,9 @@ def test_display_primaries_have_their_colors():
 
 def test_a_display_beyond_the_wavelengths_is_an_error():
     dark = {"start": "800 nm", "stop": "900 nm"}
-    with pytest.raises(BadInput, match=r"scene.wavelengths: .*no visible light"):
-        build(scene(DISPLAY, wavelengths=dark), view(), picture(4, 4, 3))
+    with pytest.raises(BadInput, match=r"scene.wavelengths: .*no power"):
+        lit = scene(DISPLAY, wavelengths=dark, radiance="1 W/(sr m2)")
+        build(lit, view(), picture(4, 4, 3))
 
 
 def test_mallett_white_is_a_perfect_diffuser():

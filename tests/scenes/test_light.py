@@ -36,6 +36,27 @@ def test_only_the_simulated_wavelengths_count():
     assert integral(white, 500e-9, 600e-9) == pytest.approx(1.0, rel=1e-12)
 
 
+@pytest.mark.parametrize("band", [("500 nm", "600 nm"), ("800 nm", "830 nm"), ("380 nm", "600 nm")])
+def test_luminance_counts_the_whole_visible_light(band):
+    """A part of the spectrum is as bright as it is beside the rest, visible or not."""
+    narrow = {"start": band[0], "stop": band[1]}
+    part = white_radiance(scene(FLAT, illuminant="D65", luminance="80 cd/m2", wavelengths=narrow))
+    whole = white_radiance(scene(FLAT, illuminant="D65", luminance="80 cd/m2"))
+    assert luminance(part, *RANGE) == pytest.approx(
+        80.0, rel=1e-12 if band[1] != "830 nm" else 1e-5
+    )
+    assert part.scale == pytest.approx(whole.scale, rel=1e-5)  # of light beyond 780 nm
+
+
+def test_a_lamp_known_in_part_counts_as_far_as_it_is_known(tmp_path):
+    lamp = tmp_path / "lamp.csv"
+    lamp.write_text("wavelength_nm,value\n450,1\n650,1\n")
+    narrow = {"start": "500 nm", "stop": "600 nm"}
+    white = white_radiance(scene(FLAT, illuminant={"file": str(lamp)}, luminance="80 cd/m2",
+                                 wavelengths=narrow))  # fmt: skip
+    assert luminance(white, 450e-9, 650e-9) == pytest.approx(80.0, rel=1e-12)
+
+
 def test_a_lamp_that_nobody_sees_has_no_luminance():
     infrared = {"start": "900 nm", "stop": "1000 nm"}
     lamp = {"monochromatic": "950 nm"}

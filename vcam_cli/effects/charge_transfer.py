@@ -30,8 +30,8 @@ class ChargeTransfer(Transport):
     Why it acts on mean signals: where every electron takes its own chance, a Poisson number of
     electrons splits into independent Poisson numbers by when they arrive (displacement theorem,
     Kingman, Poisson Processes, 1993, section 5.5). So every pixel is Poisson again, independent
-    of its neighbors, and its mean is all that has changed. Transfer is linear: charge above the
-    full well travels as well, and is clipped where it is read.
+    of its neighbors, and its mean is all that has changed. Transfer is linear up to the full well,
+    which is all that a packet holds: light beyond it leaves no trail.
     """
 
     inefficiency: float

@@ -3,7 +3,8 @@
 A camera file states one level, for a perfect white diffuser under the illuminant (or the display
 white of an image that emits): luminance [cd/m2], radiance [W/(sr m2)], or illuminance [lx] on the
 diffuser, which is pi times its luminance. Luminance is 683 lm/W times the integral with V(lambda),
-radiance the plain integral, both over the scene's wavelengths: light outside them is not there.
+over all visible light, of which a camera file may simulate a part; radiance is the plain integral
+over the scene's wavelengths.
 
 References
 ----------
@@ -17,6 +18,8 @@ from vcam_cli.camera.scene import Scene
 from vcam_cli.errors import bad
 from vcam_cli.spectra import Spectrum, display_primaries, integral, luminance
 
+VISIBLE = (380e-9, 780e-9)
+"""Wavelengths of what the eye sees [m]; beyond them is less than 2e-5 of the luminance of D65."""
 LASER_LINES = (650e-9, 550e-9, 450e-9)
 """Wavelengths of red, green and blue of an image that is shown by three lasers [1] [m]."""
 
@@ -73,13 +76,26 @@ def scale_to_level(relative: Spectrum, scene: Scene) -> Spectrum:
     if scene.radiance is not None:
         level, measured, what = scene.radiance, integral(relative, start, stop), "power"
     else:
+        relative.require(start, stop)
+        start, stop = visible_range(relative, start, stop)
         level, measured, what = _luminance(scene), luminance(relative, start, stop), "visible light"
     if not measured > 0.0:
         raise ValueError(
-            f"the light has no {what} within the simulated {start * 1e9:g}-{stop * 1e9:g} nm, "
+            f"the light has no {what} within {start * 1e9:g}-{stop * 1e9:g} nm, "
             "so the stated level cannot be reached"
         )
     return relative.scale_by(level / measured)
+
+
+def visible_range(light: Spectrum, start: float, stop: float) -> tuple[float, float]:
+    """Return the wavelengths over which luminance counts [m].
+
+    They are those simulated and all that is visible, as far as the light is known there.
+    """
+    known = [table for table in light.tables if table.outside == "error"]
+    first = max([VISIBLE[0], *(table.start for table in known)])
+    last = min([VISIBLE[1], *(table.stop for table in known)])
+    return min(start, first), max(stop, last)
 
 
 def _luminance(scene: Scene) -> float:

@@ -20,7 +20,7 @@ from vcam_cli.camera.derived.geometry import Geometry, geometry
 from vcam_cli.camera.derived.mosaic import Mosaic
 from vcam_cli.effects.base import Effect, SignalLevels, Transport, of_kind
 from vcam_cli.effects.order import quantizer
-from vcam_cli.effects.signal_chain import NoiseSource, extreme_signal
+from vcam_cli.effects.signal_chain import Limit, NoiseSource, extreme_signal
 from vcam_cli.errors import bad
 from vcam_cli.image_formation import bandwidth, memory_model, photon_rate, pixelwise
 from vcam_cli.image_formation.light_plan import PERCENTILES
@@ -291,6 +291,9 @@ def _expose(
     if times:
         chosen = replace(chosen, time=times[-1])
     time = chosen.time
+    if of_kind(enabled, Limit):  # a full well holds no more, whatever falls on it
+        held = circuit.full_well / time
+        rate = groups.collect(_transport(collected, dark / groups.summed_charges, effects, held))
     peak = (float(rate.max()) + dark) * time
     _refuse_too_much(max(peak, white * time, dark))
     changes = _pixel_changes(place, groups.collect(light.values), enabled, effects, time)
@@ -355,16 +358,22 @@ def _rms(values: NDArray) -> float:
     return float(np.sqrt(np.square(values, dtype=np.float64).mean()))
 
 
-def _transport(rate: NDArray, dark: float, effects: Sequence[Effect]) -> NDArray:
+def _transport(
+    rate: NDArray, dark: float, effects: Sequence[Effect], held: float = math.inf
+) -> NDArray:
     """Return the photo-electrons per second that arrive where charge is transported [e/s].
 
-    With the dark rate [e/s] they are what arrives of both. Transport is linear, so it comes before
-    the exposure is timed: what is automatic sees the picture as it is read.
+    With the dark rate [e/s] they are what arrives of both. What a packet does not hold, beyond
+    `held` [e/s] for the time of the exposure, stays where it is and is clipped there. Below that
+    transport is linear, so that an exposure can be timed by the picture as it is read.
     """
     for transport in of_kind(effects, Transport):
         signal = rate + rate.dtype.type(dark)
+        beyond = signal - np.minimum(signal, signal.dtype.type(min(held, MOST_ELECTRONS)))
+        signal -= beyond
         planes = signal.reshape(-1, *signal.shape[-2:])
         signal = np.array([transport.transport(plane) for plane in planes]).reshape(rate.shape)
+        signal += beyond
         signal -= rate.dtype.type(dark)
         rate = signal
     return rate

@@ -5,6 +5,7 @@ from vcam_cli.camera.scene import ImageFile
 from vcam_cli.scenes.build import picture_model
 from vcam_cli.scenes.hyperspectral import CubeScene
 from vcam_cli.scenes.image import ImageScene
+from vcam_cli.scenes.light import visible_range
 from vcam_cli.simulation import idle_keys
 from vcam_cli.simulation.preparation import Prepared
 from vcam_cli.spectra import luminance
@@ -26,7 +27,7 @@ def remarks(ready: Prepared) -> tuple[str, ...]:
     )
     if not isinstance(scene, CubeScene):
         return before
-    level = luminance(scene.white, band.start, band.stop)
+    level = luminance(scene.white, *visible_range(scene.white, band.start, band.stop))
     notes = [f"white is taken to be {level:.4g} cd/m2"]
     if 0 < ready.spectrum.planes < len(scene.spectra):
         notes.append(
