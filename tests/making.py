@@ -32,7 +32,7 @@ PLAIN: dict[str, Any] = {
     },
     "array": {"rows": 48, "columns": 64, "pattern": "monochrome"},
     "exposure": {"time": "10 ms"},
-    "adc": {"bits": 12},
+    "adc": {"bits": 12, "offset": "0 DN"},
     "processing": [],
     "effects": "all",
     "accuracy": "reference",

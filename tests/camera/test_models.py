@@ -160,7 +160,7 @@ class TestDefaults:
             ("exposure.estimator", "lsbs"),
             ("adc.bits", 10),
             ("adc.kind", "linear"),
-            ("adc.offset", 0.0),
+            ("adc.offset", None),
             ("adc.full_scale", None),
             ("quality", ()),
             ("display.dpi", 72.0),

@@ -23,7 +23,7 @@ pixel:
   readout: {conversion_gain: 20 uV/e, full_well: 100 ke}
 array: {rows: 4, columns: 4, pattern: monochrome}
 exposure: {time: 10 ms}
-adc: {bits: 12}
+adc: {bits: 12, offset: 0 DN}
 processing: []
 effects: {shot_noise: off, fpn: off, reset_noise: off, read_noise: off}
 accuracy: reference

@@ -33,8 +33,12 @@ class Adc(Model):
 
     bits: Annotated[int, Whole(least=1, most=24, example="10")] = key("resolution", default=10)
     kind: Literal["linear", "logarithmic"] = key("its curve", default="linear")
-    offset: Annotated[float, Quantity("dn", least=0)] = key(
-        "the number for no signal", example="0 DN", default=0.0
+    offset: Annotated[float | None, Quantity("dn", least=0, words={"auto": None})] = key(
+        "the number for no signal; auto = the fewest codes that keep four standard deviations of"
+        " the dark noise above 0",
+        unit="DN",
+        example="auto",
+        default=None,
     )
     full_scale: Annotated[float | None, Quantity("voltage", above=0, words={"auto": None})] = key(
         "volts at the highest number; auto = voltage_swing x readout.gain, whatever exposure.gain",
@@ -57,7 +61,7 @@ class Adc(Model):
 
     @model_validator(mode="after")
     def _leaves_codes(self) -> Self:
-        if self.offset >= 2**self.bits - 1:
+        if self.offset is not None and self.offset >= 2**self.bits - 1:
             message = f"{self.offset:g} DN leaves no number for a signal in {self.bits} bits"
             raise refusal(("offset",), message, "lower it, or give more bits")
         return self

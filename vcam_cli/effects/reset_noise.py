@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from vcam_cli.camera.architecture import ARCHITECTURES
+from vcam_cli.camera.derived.dark_noise import reset_noise
 from vcam_cli.camera.derived.electrical import electrical
 from vcam_cli.effects.signal_chain import NoiseSource
-from vcam_cli.physics import readout
 
 
 @dataclass(frozen=True)
@@ -32,19 +31,8 @@ class ResetNoise(NoiseSource):
     @classmethod
     def from_camera(cls, camera, geometry):
         """Return the noise of the reset, or None where the architecture removes it."""
-        given = camera.pixel.readout.reset_noise
-        of_what = ARCHITECTURES[camera.pixel.architecture].reset_noise
-        if given == "none" or given == 0 or of_what == "none":
-            return None
-        if given != "ktc":
-            return cls(float(given))
-        if of_what == "bit line":
-            capacitance = camera.pixel.readout.bit_line_capacitance
-        else:
-            capacitance = electrical(camera).capacitance
-            assert capacitance is not None, "refused when the file was read"
-        variance = readout.reset_noise_variance(capacitance, camera.pixel.temperature)
-        return cls(float(variance) ** 0.5)
+        electrons = reset_noise(camera, electrical(camera).capacitance)
+        return cls(electrons) if electrons else None
 
     def describe(self) -> str:
         """Return a short clause with this camera's numbers and units."""

@@ -1,7 +1,11 @@
 """Notes of a run: what it chose, left out or took for granted where the file left that open."""
 
+import numpy as np
+
 from vcam_cli.camera.derived import photodiode
+from vcam_cli.camera.derived.dark_noise import SIGMAS, dark_noise
 from vcam_cli.camera.scene import ImageFile
+from vcam_cli.effects.order import quantizer
 from vcam_cli.scenes.build import picture_model
 from vcam_cli.scenes.hyperspectral import CubeScene
 from vcam_cli.scenes.image import ImageScene
@@ -10,6 +14,8 @@ from vcam_cli.simulation import idle_keys
 from vcam_cli.simulation.preparation import Prepared
 from vcam_cli.spectra import luminance
 
+VISIBLE_CLIPPING = 0.01
+"""Part of the pixels whose noise is worth a word when it is clipped."""
 VISIBLE_CROP = 5e-4
 """Part of a picture that is worth a word when it is cut off."""
 
@@ -22,6 +28,7 @@ def remarks(ready: Prepared) -> tuple[str, ...]:
         *photodiode.remarks(ready.camera),
         *_scheduled_times(ready),
         *_blind_colors(ready),
+        *_clipped_dark(ready),
         *_colors_of_picture(ready),
         *_cropped(ready),
     )
@@ -45,6 +52,27 @@ def _blind_colors(ready: Prepared) -> tuple[str, ...]:
     if len(blind) == len(ready.mosaic.colors):
         return ("no light reaches the electrons: this is a dark frame",)
     return (f"no light reaches the electrons of {', '.join(blind)}",) if blind else ()
+
+
+def _clipped_dark(ready: Prepared) -> tuple[str, ...]:
+    """Return how many pixels are so dark that the ADC's offset clips their noise."""
+    e, time = ready.electrical, min(ready.times, default=ready.exposure_time)
+    margin = SIGMAS * dark_noise(ready.camera, e.capacitance)
+    below, above = quantizer(ready.camera, ready.geometry).response(np.array([0.0, 1.0]))
+    step = 1 / float(above - below)
+    missing = margin - e.offset * step
+    if ready.camera.adc.offset is None or missing <= 0:
+        return ()
+    share = float((ready.rate * time + ready.dark_rate * time < missing).mean())
+    if share < VISIBLE_CLIPPING:
+        return ()
+    what = "their mean comes out wrong"
+    if ready.times:
+        what += ", and photocurrents of averaged samples with it"
+    return (
+        f"adc.offset of {e.offset:g} DN clips the noise of dark pixels ({100 * share:.3g} % of"
+        f" all): {what}; write offset: auto",
+    )
 
 
 def _scheduled_times(ready: Prepared) -> tuple[str, ...]:

@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
+from vcam_cli.camera.adc import Adc
 from vcam_cli.camera.architecture import ARCHITECTURES
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived import sense_node
+from vcam_cli.camera.derived.dark_noise import SIGMAS, dark_noise
 from vcam_cli.camera.pixel import AGREE
 from vcam_cli.errors import BadInput, bad
 from vcam_cli.physics import readout
 
 NOMINAL_SWING = 1.0
 """Volts of a full well where the file gives no voltage; nothing that is counted depends on it."""
+NEGLIGIBLE_CODE = 1e-9
+"""Part of a code that rounding makes of none."""
 LEAST_COUNT, MOST_COUNT = 1e-12, 1e12
 """Electrons of a full well and of a step of the ADC: between them double precision tells codes."""
 
@@ -97,8 +102,12 @@ def electrical(camera: Camera) -> Electrical:
     if capacitance is None and not nominal:
         capacitance = float(readout.sense_capacitance(gain))
     full_scale = swing * given.gain if adc.full_scale is None else adc.full_scale
+    offset = adc.offset
+    if offset is None:
+        margin = SIGMAS * dark_noise(camera, capacitance) * camera.exposure_gain
+        offset = _automatic_offset(adc, margin, gain * given.gain * margin, full_scale)
     if adc.gain is not None:
-        codes = (adc.gain, adc.bits, adc.offset)
+        codes = (adc.gain, adc.bits, offset)
         full_scale = float(readout.adc_full_scale(gain, given.gain, *codes))
     reference = None
     if adc.kind == "logarithmic":
@@ -111,12 +120,44 @@ def electrical(camera: Camera) -> Electrical:
         readout_gain=given.gain,
         exposure_gain=camera.exposure_gain,
         bits=adc.bits,
-        offset=adc.offset,
+        offset=offset,
         full_scale=full_scale,
         reference=reference,
     )
     _check_counts(found)
     return found
+
+
+def _automatic_offset(adc: Adc, electrons: float, volts: float, full_scale: float) -> float:
+    """Return the fewest codes that keep so much noise below black unclipped [DN].
+
+    electrons, volts: the noise times the exposure gain; full_scale: of the ADC [V].
+    Raises BadInput where it takes all codes.
+    """
+    highest = 2**adc.bits - 1
+    if adc.gain is not None:
+        codes = electrons * adc.gain
+    else:
+        share = volts / full_scale
+        if adc.kind == "logarithmic":
+            bend = 1 / 1000 if adc.reference is None else adc.reference / full_scale
+            share = _logarithmic_share(share, bend)
+        codes = highest * share / (1 + share)
+    offset = math.ceil(codes - NEGLIGIBLE_CODE)
+    if offset >= highest:
+        message = f"auto would take {offset} of {highest} codes for the noise in the dark"
+        raise bad("adc.offset", message, "give it in DN, or lower noise or gain")
+    return float(offset)
+
+
+def _logarithmic_share(share: float, bend: float) -> float:
+    """Return the codes below black over those above it, for a noise as a part of full scale.
+
+    bend: the reference of the curve as a part of full scale. Below black the curve is as steep as a
+    logarithm; a noise beyond its pole counts by the slope in the dark.
+    """
+    below = share / bend
+    return (-math.log1p(-below) if below < 1 else below) / math.log1p(1 / bend)
 
 
 def _check_counts(found: Electrical) -> None:
