@@ -124,6 +124,15 @@ def test_what_is_written_is_read_as_the_same_study(changes):
         ({"methods": ["weighted"]}, "methods.0: weighted needs a sensor"),
         ({"constraints": {"min_gap": "1 ms"}}, "constraints.min_gap: is a time, and without a se"),
         ({"online": True}, "online: online needs a sensor"),
+        ({"starts": 4}, "starts: changes nothing: no method of the study has random starts; add"),
+        (
+            {"max_time_of": 10, "sensor": SENSOR | {"max_time": "1 s"}},
+            "max_time_of: is a longest exposure, and so is sensor.max_time; keep one",
+        ),
+        (
+            {"pdf": {"histogram": {"file": "h.csv"}}, "methods": ["sqp-assigned"]},
+            "methods.0: sqp-assigned needs a pdf of segments, and this is a histogram; add",
+        ),
         ({"segments": 0}, "segments: 0 is out of range"),
         ({"targets": [0]}, "targets.0: 0 is zero"),
         ({"sensor": {}}, "sensor.well_capacity: is missing"),

@@ -192,8 +192,36 @@ class TestMethods:
         assert by["exponential"]["used"] == 6  # 1 2 4 8 16 and the longest, 17.15
         assert max(by.values(), key=lambda row: row["gain"])["method"] == "optimal"
 
+    def test_with_one_longest_exposure_for_all_uniform_captures_rise(self):
+        """Figure 4.3 of the thesis: uniform captures take over 20 to be worth 10 optimal ones.
+
+        The closed form is the mean of i t over what each capture is the last of, summed by hand.
+        """
+        counts = [2, 5, 10, 20, 26, 27]
+        methods = ["uniform", "exponential", "optimal"]
+        found = run(methods=methods, counts=counts, max_time_of=10)
+        free = run(methods=["uniform", "optimal"], counts=counts)
+        gain = {(r["method"], r["count"]): r["gain"] for r in found.summary_rows}
+        stretched = [r["gain"] for r in free.summary_rows if r["method"] == "uniform"]
+        uniform = [gain["uniform", n] for n in counts]
+        assert uniform == sorted(uniform)
+        assert stretched != sorted(stretched)
+        assert uniform[-2] < gain["optimal", 10] < uniform[-1]
+        assert max(gain["exponential", n] for n in counts) < gain["optimal", 5]
+        longest = found.times("optimal", 20)[-1]
+        assert longest == pytest.approx(free.times("optimal", 10)[-1], rel=1e-6)
+        for n in counts:
+            even = np.arange(1, n) * longest / (n - 1)  # earlier than t_1 it is of no use
+            limits = 1 / np.sort(np.append(1.0, np.maximum(even, 1.0)))  # just fill the well
+            darker = np.append(limits[1:], 0.0)
+            by_hand = np.sum((limits**2 - darker**2) / limits)  # over the single one's 1/2, twice
+            assert gain["uniform", n] == pytest.approx(by_hand, rel=1e-9)
+        (note,) = found.notes
+        assert note.startswith("no exposure is longer than 17.153 t_1")
+
     def test_no_method_beats_what_is_certified(self):
         methods = ["optimal", "heuristic", "uniform", "exponential", "geometric", "sqp"]
+        methods += ["sqp-assigned"]
         found = run(pdf=segments(*THREE), counts=[3, 8], methods=methods)
         for count in (3, 8):
             best = next(
@@ -247,6 +275,13 @@ class TestMethods:
         assert [t.count for t in found.targets] == [1, 10, None]
         assert found.targets[1].gain == pytest.approx(1.722196, abs=1e-6)  # Table 4.1, 2 v_10
         assert not found.targets[2].possible
+
+    def test_more_starts_are_never_worse_and_assigned_ones_find_the_optimum(self):
+        asked = dict(pdf=segments(*THREE), counts=[6], methods=["optimal", "sqp", "sqp-assigned"])
+        optimum, one, assigned = run(**asked).summary_rows
+        _, many, _ = run(**asked, starts=4).summary_rows
+        assert one["gain"] <= many["gain"] < 0.99 * optimum["gain"]
+        assert assigned["gain"] == pytest.approx(optimum["gain"], rel=1e-9)
 
     def test_the_seed_is_of_random_starts(self):
         Path("study.yaml").write_text(

@@ -33,6 +33,7 @@ def test_every_kind_of_quantity(tmp_path):
             "case": "wide",
             "minus": "small",
             "between": ["3 um", "3 um"],
+            "chosen": "the widths",
         },
         most={"quantity": "mean_electrons", "at": "optimum", "between": [0, math.inf]},
         ratio={
@@ -56,10 +57,12 @@ def test_every_kind_of_quantity(tmp_path):
     assert list(found) == ["best", "apart", "most", "ratio", "step", "pitch", "other"]
     assert found["best"] == {
         "expectation": "best", "case": "small", "quantity": "optimum", "found": "6.0",
-        "unit": "um", "least": "5.9", "most": "6.1", "verdict": "inside", "calibrated": "",
-        "source": "by hand", "why": "",
+        "unit": "um", "least": "5.9", "most": "6.1", "verdict": "inside", "basis": "predicted",
+        "setting": "", "source": "by hand", "why": "",
     }  # fmt: skip
     assert (found["apart"]["found"], found["apart"]["verdict"]) == ("3.0", "inside")
+    assert (found["apart"]["basis"], found["apart"]["setting"]) == ("chosen", "the widths")
+    assert (found["other"]["basis"], found["other"]["setting"]) == ("calibrated", "the gap")
     assert (found["pitch"]["found"], found["other"]["found"]) == ("62.5", "50.0")
     # Areas: 16 / 36, of pixels of one fill factor.
     assert float(found["ratio"]["found"]) == pytest.approx(16 / 36, rel=0.02)
@@ -69,7 +72,8 @@ def test_every_kind_of_quantity(tmp_path):
     means = {r["pixel.width [um]"]: r["mean_electrons"] for r in result.points[:5]}
     assert float(found["ratio"]["found"]) == pytest.approx(means[4.0] / means[6.0], rel=1e-5)
     said = report(result)
-    assert "expected.csv: 6 of 7 expectations are met, 1 of them by calibration" in said
+    shares = "4 of 5 predicted, 1 of 1 chosen, 1 of 1 calibrated"
+    assert f"expected.csv: 6 of 7 expectations are met: {shares}" in said
     assert "  missed: step: -" in said
     assert ", expected 1 to 2 e" in said
     assert result.summary()["missed"] == ["step"]
@@ -101,6 +105,8 @@ def test_a_point_that_failed_leaves_it_unknown(tmp_path):
         ({"quantity": "optimum", "between": ["3 um"]}, "between", "not two values"),
         ({"quantity": "optimum", "set": {"adc.bits": 8}}, "set", "no such overrides"),
         ({"quantity": "mean_electrons", "at": "4 um", "over": "5 um", "minus": "6 um"}, "minus",
+         "cannot both be given"),
+        ({"quantity": "optimum", "calibrated": "gap", "chosen": "gap"}, "chosen",
          "cannot both be given"),
     ],
 )  # fmt: skip

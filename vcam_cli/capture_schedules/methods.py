@@ -21,9 +21,9 @@ from vcam_cli.scheduling.comparison_schedules import (
     exponential_times,
     geometric_times,
     heuristic_photocurrents,
-    sqp_schedule,
     uniform_times,
 )
+from vcam_cli.scheduling.local_search import assigned_schedule, sqp_schedule
 from vcam_cli.scheduling.objective import Schedule
 from vcam_cli.scheduling.pdf import Floats, Pdf
 from vcam_cli.scheduling.sensor import (
@@ -87,8 +87,8 @@ class Task:
         What the readout demands.
     plan : Pdf, optional
         The pdf that schedules are found on; by default `pdf` itself.
-    seed : int
-        Seed of random starts.
+    seed, starts : int
+        Seed and number of random starts.
 
     Raises
     ------
@@ -103,9 +103,11 @@ class Task:
         constraints: Constraints = UNCONSTRAINED,
         plan: Pdf | None = None,
         seed: int = 0,
+        starts: int = 1,
     ) -> None:
         self.pdf, self.plan = pdf, plan or pdf
-        self.sensor, self.constraints, self.seed = sensor, constraints, seed
+        self.sensor, self.constraints = sensor, constraints
+        self.seed, self.starts = seed, starts
         self.first = first_capture_time(pdf, sensor, constraints)
         self._optimum: Schedules = {}
 
@@ -236,7 +238,17 @@ def _heuristic_schedules(task: Task, counts: Sequence[int]) -> Schedules:
 
 
 def _sqp(task: Task, counts: Sequence[int]) -> Schedules:
-    found = {n: sqp_schedule(task.plan, n, seed=task.seed) for n in counts}
+    seeds = range(task.seed, task.seed + task.starts)
+
+    def best(count: int) -> Floats:
+        found = (sqp_schedule(task.plan, count, seed=seed) for seed in seeds)
+        return max(found, key=lambda one: one.expected_snr).photocurrents
+
+    return _schedules_of_photocurrents(task, {n: best(n) for n in counts})
+
+
+def _sqp_assigned(task: Task, counts: Sequence[int]) -> Schedules:
+    found = {n: assigned_schedule(task.plan, n, task.starts, task.seed) for n in counts}
     return _schedules_of_photocurrents(task, {n: one.photocurrents for n, one in found.items()})
 
 
@@ -269,6 +281,7 @@ METHODS: dict[str, Method] = {
     "exponential": _method_of_rule(exponential_times),
     "geometric": _method_of_rule(geometric_times),
     "sqp": _sqp,
+    "sqp-assigned": _sqp_assigned,
     "weighted": _weighted_schedules,
 }
 

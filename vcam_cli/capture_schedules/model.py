@@ -25,7 +25,17 @@ from vcam_cli.config.quantities import Number, Quantity, Whole
 from vcam_cli.config.validation_messages import describe, failure, fault, faults_at
 from vcam_cli.config.values import Either, Electrons, Fraction, MaybeTime, Switch, Word, mapping
 
-METHODS = ("optimal", "heuristic", "uniform", "exponential", "geometric", "sqp", "weighted")
+RANDOM_STARTS = ("sqp", "sqp-assigned")
+"""Methods that search from random starts."""
+METHODS = (
+    "optimal",
+    "heuristic",
+    "uniform",
+    "exponential",
+    "geometric",
+    *RANDOM_STARTS,
+    "weighted",
+)
 MOST_CAPTURES = 1000
 
 FRAME_METHODS = ("uniform", "optimal", "heuristic", "exponential", "geometric")
@@ -69,8 +79,8 @@ def _segments(given: Any) -> tuple[int, ...]:
     return tuple(sorted(_STEPS(given)))
 
 
-def _or_null(model: type[Model]) -> Callable[[Any], Any]:
-    return lambda given: None if given is None else model.model_validate(given)
+def _or_null(read: Callable[[Any], Any]) -> Callable[[Any], Any]:
+    return lambda given: None if given is None else read(given)
 
 
 class ScheduleSensor(Model):
@@ -222,7 +232,8 @@ class ScheduleStudy(Model):
         default=(),
     )
     sensor: Annotated[
-        ScheduleSensor | None, Either(_or_null(ScheduleSensor), _Null | ScheduleSensor)
+        ScheduleSensor | None,
+        Either(_or_null(ScheduleSensor.model_validate), _Null | ScheduleSensor),
     ] = key(
         "well and noise of a pixel; null: shot noise alone",
         example={"well_capacity": "20000 e", "read_noise": "10 e"},
@@ -232,6 +243,20 @@ class ScheduleStudy(Model):
         "what the readout demands of capture times",
         example={"min_gap": "1 ms"},
         default=ScheduleConstraints,
+    )
+    starts: Annotated[int, Whole(least=1, most=1000, example="10")] = key(
+        "random starts of sqp, and of sqp-assigned for each assignment of captures to segments; "
+        "the best counts",
+        example=10,
+        default=1,
+    )
+    max_time_of: Annotated[
+        int | None, Either(_or_null(_COUNT.read), _Null | Annotated[int, _COUNT])
+    ] = key(
+        "longest exposure of all schedules: that of the optimal one of so many captures; default "
+        "none, and rules such as uniform end with the optimum of each number",
+        example=10,
+        default=None,
     )
     targets: Annotated[tuple[float, ...], Either(_TARGETS, list[Annotated[float, _GAIN]])] = key(
         "gains: the fewest captures that reach each", example=[1.5], default=()
@@ -271,7 +296,17 @@ class ScheduleStudy(Model):
             if self.online:
                 message = "online needs a sensor: what is believed while capturing depends on noise"
                 yield fault(("online",), message, give)
-        smooth = {"heuristic": ("histogram", "levels", "camera"), "sqp": ("levels",)}
+        if self.starts > 1 and not set(RANDOM_STARTS) & set(self.methods):
+            message = "changes nothing: no method of the study has random starts"
+            yield fault(("starts",), message, "add the method sqp or sqp-assigned")
+        if self.max_time_of is not None and self.sensor is not None and self.sensor.max_time:
+            message = "is a longest exposure, and so is sensor.max_time"
+            yield fault(("max_time_of",), message, "keep one of the two")
+        smooth = {
+            "heuristic": ("histogram", "levels", "camera"),
+            "sqp": ("levels",),
+            "sqp-assigned": ("histogram", "levels", "camera"),
+        }
         for method, sources in smooth.items():
             if method in self.methods and self.pdf.kind in sources and not self.segments:
                 at = ("methods", self.methods.index(method))

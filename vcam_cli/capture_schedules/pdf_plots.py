@@ -39,6 +39,7 @@ METHOD_STYLES = {
     "exponential": (COLORS[3], "^"),
     "geometric": (COLORS[4], "v"),
     "sqp": (COLORS[5], "P"),
+    "sqp-assigned": ("#8c510a", "*"),
     "weighted": ("#000000", "X"),
 }
 """Color and marker of each method, the same in every plot."""

@@ -27,7 +27,7 @@ from vcam_cli.capture_schedules.methods import (
     study_constraints,
     study_sensor,
 )
-from vcam_cli.capture_schedules.model import MOST_CAPTURES
+from vcam_cli.capture_schedules.model import MOST_CAPTURES, RANDOM_STARTS
 from vcam_cli.capture_schedules.online_loss import OnlineLoss
 from vcam_cli.capture_schedules.pdf_source import BINS
 from vcam_cli.capture_schedules.photocurrents import Approximation
@@ -38,9 +38,12 @@ from vcam_cli.files.points_store import RECORD
 from vcam_cli.files.report import hash_file
 from vcam_cli.floats import own_float_errors
 from vcam_cli.progress import Observer, Silent
+from vcam_cli.scheduling.local_search import assignment_count
 from vcam_cli.scheduling.pdf import Pdf
 from vcam_cli.simulation import provenance
 
+MOST_ASSIGNMENTS = 5000
+"""Assignments of captures to segments that are searched: about a minute with one start."""
 LEAST_SNR = 1e-200
 """Least mean SNR of a single capture: below it, products of what schedules are worth underflow."""
 
@@ -290,11 +293,17 @@ class _StudyRun:
 
     def _task(self, plan: Pdf | None) -> Task:
         sensor, constraints = study_sensor(self.model), study_constraints(self.model)
+        start = self.seed, self.model.starts
         try:
-            task = Task(self.pdf, sensor, constraints, plan, self.seed)
+            task = Task(self.pdf, sensor, constraints, plan, *start)
+            if (count := self.model.max_time_of) is not None:
+                longest = float(task.exact_task.optimum([count])[count].times[-1])
+                sensor = replace(sensor, max_time=longest)
+                task = Task(self.pdf, sensor, constraints, plan, *start)
         except ValueError as error:
             raise self._error(("constraints", "frame_time"), error) from None
         self._check_room(task)
+        self._check_assignments(task)
         if not task.single > LEAST_SNR:
             message = f"E[SNR] of a single capture is {task.single:.3g}: nothing to compare with"
             path = ("pdf",) if self.model.sensor is None else ("sensor",)
@@ -316,6 +325,17 @@ class _StudyRun:
             remedy = f"ask for {most} at most, or make it smaller"
             raise self.study.error(("constraints", key), message, remedy)
 
+    def _check_assignments(self, task: Task) -> None:
+        """Raise BadInput where a search of all assignments would take too long."""
+        if "sqp-assigned" not in self.model.methods:
+            return
+        most = assignment_count(task.plan, max(self.model.counts)) * self.model.starts
+        if most > MOST_ASSIGNMENTS:
+            message = f"sqp-assigned would search {most} assignments of captures to segments"
+            path = ("methods", self.model.methods.index("sqp-assigned"))
+            remedy = f"ask for fewer captures, segments or starts: at most {MOST_ASSIGNMENTS}"
+            raise self.study.error(path, message, remedy)
+
     def _error(self, path: tuple[str, ...], error: ValueError) -> BadInput:
         message, _, remedy = str(error).partition("; ")
         return self.study.error(path, message, remedy)
@@ -325,7 +345,7 @@ class _StudyRun:
         if len(self.model.segments) < 2:
             return []
         self.watch.begin("numbers of segments")
-        planned = ("optimal", "heuristic", "sqp", "weighted")
+        planned = ("optimal", "heuristic", *RANDOM_STARTS, "weighted")
         methods = [method for method in self.model.methods if method in planned]
         steps = []
         for n in self.model.segments:

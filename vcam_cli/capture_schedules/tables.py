@@ -117,6 +117,9 @@ def notes(study: ScheduleStudy, task: Task, found: Sequence[MethodResult]) -> It
     """Yield a sentence for each thing that the numbers of a study leave unsaid."""
     yield from pdf_scale.notes(task.pdf, study)
     yield from _probability_notes(study)
+    if study.max_time_of is not None:
+        of, ratio = study.max_time_of, task.sensor.max_time / task.first
+        yield f"no exposure is longer than {ratio:.5g} t_1, that of the optimum of {of} captures"
     yield from _level_notes(study, task)
     yield from _gap_notes(task, found)
     yield from _approximation_notes(task, found)

@@ -152,8 +152,8 @@ def _expectations_text(verdicts: Sequence["ExpectationResult"]) -> Iterator[str]
     """Return how many expectations are met, and those that are not."""
     if not verdicts:
         return
-    inside = [v for v in verdicts if v.verdict == "inside"]
-    calibrated = sum(bool(v.calibrated) for v in inside)
-    how = f", {calibrated} of them by calibration" if calibrated else ""
-    yield f"expected.csv: {len(inside)} of {len(verdicts)} expectations are met{how}"
+    every = [v.basis for v in verdicts]
+    met = [v.basis for v in verdicts if v.verdict == "inside"]
+    shares = (f"{met.count(b)} of {every.count(b)} {b}" for b in sorted(set(every), reverse=True))
+    yield f"expected.csv: {len(met)} of {len(every)} expectations are met: {', '.join(shares)}"
     yield from (f"  {v.verdict}: {v.summary}" for v in verdicts if v.verdict != "inside")

@@ -27,8 +27,8 @@ from vcam_cli.sweeps.sweep_tables import Findings, table_number
 EXPECT = "expect"
 """The key of the study file."""
 COLUMNS = (
-    "expectation", "case", "quantity", "found", "unit", "least", "most", "verdict", "calibrated",
-    "source", "why",
+    "expectation", "case", "quantity", "found", "unit", "least", "most", "verdict", "basis",
+    "setting", "source", "why",
 )  # fmt: skip
 ROUNDING = 1e-9
 """Relative difference up to which two values of a parameter are the same."""
@@ -61,10 +61,10 @@ class PlannedExpectation:
             summary = f"{summary.rstrip()} ({item.why})"
         row: tuple[Cell, ...] = (
             name, self.case, item.quantity, _finite_cell(value), self.unit,
-            _finite_cell(self.least), _finite_cell(self.most), verdict, item.calibrated,
-            item.source, item.why,
+            _finite_cell(self.least), _finite_cell(self.most), verdict, item.basis,
+            item.setting, item.source, item.why,
         )  # fmt: skip
-        return ExpectationResult(name, verdict, summary.rstrip(), item.calibrated, row)
+        return ExpectationResult(name, verdict, summary.rstrip(), item.basis, row)
 
 
 def _finite_cell(value: float) -> Cell:

@@ -27,6 +27,8 @@ VARY = "vary"
 """The key of a case that is no path."""
 OPTIMUM = "optimum"
 """The quantity that is the best value of the parameter; and as a value of `at`, its place."""
+Basis = Literal["predicted", "calibrated", "chosen"]
+"""How the number of an expectation came about: from physics alone, fitted, or picked."""
 
 
 class Variation(Model):
@@ -130,14 +132,32 @@ class Expectation(Model):
         default=dict,
     )
     calibrated: Text = key(
-        "what was set so that this comes out; default nothing",
+        "what was fitted so that this very number comes out; default nothing: it is predicted",
         example="the dark current at the edge",
+        default="",
+    )
+    chosen: Text = key(
+        "what its source leaves open and the study took because this comes out; default nothing",
+        example="the f-number",
         default="",
     )
     source: Text = key("who says so", example="Chen 2003, figure 3.8", default="")
     why: Text = key("why it does not come out, where that is known", example="kTC", default="")
 
-    rules: ClassVar[tuple[Rule, ...]] = (at_most_one("over", "minus"),)
+    rules: ClassVar[tuple[Rule, ...]] = (
+        at_most_one("over", "minus"),
+        at_most_one("calibrated", "chosen"),
+    )
+
+    @property
+    def basis(self) -> Basis:
+        """How the number came about."""
+        return "calibrated" if self.calibrated else "chosen" if self.chosen else "predicted"
+
+    @property
+    def setting(self) -> str:
+        """What was calibrated or chosen."""
+        return self.calibrated or self.chosen
 
 
 class Case(Model):

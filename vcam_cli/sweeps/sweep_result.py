@@ -26,6 +26,7 @@ from vcam_cli.files.report import hash_file, hash_text, to_json
 from vcam_cli.files.spectral.hyperspectral import companions
 from vcam_cli.files.tables import Cell
 from vcam_cli.simulation import provenance
+from vcam_cli.sweeps.model import Basis
 from vcam_cli.sweeps.sweep_file import StudyFile
 
 Row = dict[str, Any]
@@ -129,8 +130,8 @@ class ExpectationResult:
     """inside | missed | unknown, where points are missing."""
     summary: str
     """A sentence for a person."""
-    calibrated: str
-    """The parameter that was set so that it comes out, where one was."""
+    basis: Basis
+    """Whether the number is predicted, calibrated or chosen."""
     row: tuple[Cell, ...]
     """The row of expected.csv."""
 
