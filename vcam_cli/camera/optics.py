@@ -37,8 +37,8 @@ class Psf(Model):
     """A point spread function, measured or from a lens program."""
 
     file: File = key(
-        "image file of the point spread function, in linear light; the middle of its grid is the "
-        "ideal image point",
+        "the point spread function in linear light: an EXR or TIFF image, an NPY file, or a text "
+        "grid as lens programs write it; the middle of the grid is the ideal image point",
         example="psf.exr",
     )
     pitch: Length = key("distance of its samples on the sensor", example="0.5 um")
