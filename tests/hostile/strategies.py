@@ -118,9 +118,9 @@ def pixels(draw: st.DrawFn) -> Tree:
     width = draw(between(0.7, 30))
     tree: Tree = {"width": f"{width} um", "photodetector": draw(_detectors(width))}
     tree["readout"] = draw(_readouts())
-    shares = {"gain_pixel": between(0, 5, "%"), "gain_column": between(0, 5, "%")}
+    shares = {"gain_pixel": between(0.01, 5, "%"), "gain_column": between(0.01, 5, "%")}
     offsets = {"offset_pixel": _ELECTRONS, "offset_column": _ELECTRONS}
-    fpn = mappings({}, shares | offsets | {"dark": between(0, 30, "%")})
+    fpn = mappings({}, shares | offsets | {"dark": between(0.01, 30, "%")})
     defects = mappings({}, {"hot": fractions(0, 0.3), "dead": fractions(0, 0.3)})
     architectures = st.sampled_from(["aps-3t", "aps-4t", "dps", "ccd"])
     temperatures = st.integers(230, 350).map(lambda k: f"{k} K")
