@@ -188,3 +188,32 @@ def test_more_pixels_than_are_read(tmp_path, monkeypatch):
     places(scattered(tmp_path))  # the header is a row of them
     with pytest.raises(BadInput, match="has more than 4 rows; no more are read"):
         scattered(tmp_path, GOOD + "1,1,R\n")
+
+
+def grid(x0, y0, rows=6, columns=8, pitch=5.0):
+    """A file of pixels of which the first is at x0, y0 [um]."""
+    lines = [f"{x0 + j * pitch},{y0 + i * pitch},G" for i in range(rows) for j in range(columns)]
+    return "x_um,y_um,color\n" + "\n".join(lines) + "\n"
+
+
+@pytest.mark.parametrize(
+    ("x0", "y0"), [(0, 0), (2.5, 2.5), (1000, 700), (-35, -25), (-40, 0), (0, -300)]
+)
+def test_an_array_beside_the_picture_is_refused(x0, y0, tmp_path):
+    """With what to subtract: the middle of the array."""
+    with pytest.raises(BadInput, match="beside the middle") as caught:
+        scattered(tmp_path, grid(x0, y0))
+    remedy = caught.value.problems[0].remedy
+    assert f"subtract {x0 + 17.5:g} from x_um and {y0 + 12.5:g} from y_um" in remedy
+    made = scattered(tmp_path, grid(-17.5, -12.5))
+    assert len(places(made).x) == 48
+
+
+@pytest.mark.parametrize(("x0", "y0"), [(-17.5, -12.5), (-10, 0), (0, -8), (-6, -6)])
+def test_an_array_off_the_middle_may_be(x0, y0, tmp_path):
+    scattered(tmp_path, grid(x0, y0))
+
+
+@pytest.mark.parametrize(("rows", "columns"), [(1, 8), (6, 1), (1, 1)])
+def test_rows_and_single_pixels_may_be_anywhere(rows, columns, tmp_path):
+    scattered(tmp_path, grid(30, 40, rows, columns))

@@ -61,7 +61,11 @@ class Block(Model):
 class Positions(Model):
     """Pixels at places of their own."""
 
-    positions: File = key("CSV file with the columns x_um,y_um,color", example="pixels.csv")
+    positions: File = key(
+        "CSV file with the columns x_um,y_um,color: places right of and below the optical axis, "
+        "which is the middle of the picture",
+        example="pixels.csv",
+    )
 
 
 class Binning(Model):

@@ -25,6 +25,8 @@ from vcam_cli.spectra.text import parse_numbers, read_table
 PATH = ("array", "pattern", "positions")
 HEADER = ("x_um", "y_um", "color")
 REMEDY = "write the columns x_um,y_um,color"
+FEW_PIXELS = 16
+"""Fewer pixels than these are no array that has a middle."""
 MOST_PIXELS = 4_000_000
 """Most pixels of a file."""
 
@@ -59,12 +61,14 @@ class Places:
 def lattice(camera: Camera) -> Lattice:
     """Return the lattice of a camera's pixels; pixels at places of their own are one row.
 
-    Raises BadInput for a die smaller than a pixel and a file of positions that is none.
+    Raises BadInput for a die smaller than a pixel, a file of positions that is none, and one of an
+    array beside the picture.
     """
     array, pixel = camera.array, camera.pixel
     pitch_x, pitch_y = pixel.width + pixel.gap_x, pixel.height + pixel.gap_y
     if isinstance(array.pattern, Positions):
         found = places(camera)
+        _require_axis_inside(found, pitch_x, pitch_y)
         width = 2 * float(np.abs(found.x).max()) + pitch_x
         height = 2 * float(np.abs(found.y).max()) + pitch_y
         return Lattice(1, len(found.x), pitch_x, pitch_y, width, height)
@@ -79,6 +83,29 @@ def lattice(camera: Camera) -> Lattice:
             raise bad("array.die", message, "give a larger die, or rows and columns")
     assert rows is not None and columns is not None
     return Lattice(rows, columns, pitch_x, pitch_y, columns * pitch_x, rows * pitch_y)
+
+
+def _require_axis_inside(found: Places, pitch_x: float, pitch_y: float) -> None:
+    """Refuse pixels that lie beside the optical axis, around which the picture is (BadInput).
+
+    Mostly their origin is a corner of the array. A row or a column may begin at the axis, and a few
+    pixels may be anywhere.
+    """
+    if len(found.x) < FEW_PIXELS:
+        return
+    beside = []
+    for at, pitch in ((found.x, pitch_x), (found.y, pitch_y)):
+        low, high = float(at.min()), float(at.max())
+        if high - low < 2 * pitch:
+            return
+        beside.append(low > -pitch if low + high > 0 else high < pitch)
+    if all(beside):
+        middle = [(float(at.min()) + float(at.max())) / 2e-6 for at in (found.x, found.y)]
+        raise bad(
+            PATH,
+            "the array lies beside the middle of the picture, from which x_um and y_um count",
+            f"subtract {middle[0]:.6g} from x_um and {middle[1]:.6g} from y_um",
+        )
 
 
 def places(camera: Camera) -> Places:
