@@ -5,6 +5,7 @@ import os
 import pty
 import subprocess
 import sys
+import time
 from pathlib import Path
 from typing import ClassVar
 
@@ -160,6 +161,54 @@ def test_stages_tell_their_observer():
         stages.watch.step(1, 2)
     assert Ear.heard == ["optics", 3.0, "files", (1, 2)]
     assert list(stages.seconds) == ["optics", "files"]
+
+
+def test_a_bar_has_a_share_only_once_there_is_one():
+    """The first bar of a long run once stood at 95 %: nothing was known yet."""
+    bar = Progress(quiet=True)
+    start = bar._start
+    bar.begin("scene")
+    assert bar._state(start + 30)["total"] is None
+    assert bar._state(start + 30)["left"] == ""
+    bar.expect(40)
+    state = bar._state(start + 30)
+    assert state["completed"] / state["total"] == pytest.approx(0.75)
+    late = bar._state(start + 80)
+    assert (late["completed"] / late["total"], late["left"]) == (0.95, "a little longer")
+    steps = Progress(quiet=True)
+    steps.begin("sweep")
+    steps.step(0, 10)
+    assert steps._state(start + 5)["total"] is None
+    steps.step(1, 10)
+    now = steps._stage_start + 6
+    assert steps._state(now)["completed"] / steps._state(now)["total"] == pytest.approx(
+        0.1, abs=0.01
+    )
+
+
+def test_a_line_a_stage_without_a_terminal(capsys, monkeypatch):
+    """Of work that takes seconds; what is quick or quiet says nothing."""
+    monkeypatch.setattr(progress, "LOG_STEP", 0.01)
+    for quiet, after in ((True, 0.0), (False, 60.0)):
+        monkeypatch.setattr(progress, "LOG_AFTER", after)
+        with Progress(quiet) as log:
+            log.begin("scene")
+            time.sleep(0.05)
+        assert capsys.readouterr().err == ""
+    monkeypatch.setattr(progress, "LOG_AFTER", 0.0)
+    with Progress() as log:
+        for stage in ("scene", "optics", "optics"):
+            log.begin(stage)
+        time.sleep(0.1)
+        log.expect(41.0)
+        log.begin("files")
+        time.sleep(0.1)
+    lines = capsys.readouterr().err.splitlines()
+    assert lines == [
+        "building the scene",
+        "light through the lens",
+        "writing files, about 41 s left",
+    ]
 
 
 @pytest.mark.parametrize(

@@ -140,6 +140,8 @@ def test_ctrl_c_says_that_points_are_kept():
 def test_a_log_has_a_line_a_minute(capsys, monkeypatch):
     assert progress.LOG_INTERVAL == 60
     monkeypatch.setattr(progress, "LOG_INTERVAL", 0.01)
+    monkeypatch.setattr(progress, "LOG_STEP", 0.01)
+    monkeypatch.setattr(progress, "LOG_AFTER", 0.0)
     with progress.Progress(quiet=True, log="sweep") as log:
         log.begin("sweep")
         log.step(3, 12)
@@ -147,10 +149,10 @@ def test_a_log_has_a_line_a_minute(capsys, monkeypatch):
     assert capsys.readouterr().err == ""
     with progress.Progress(log="sweep") as log:
         log.begin("sweep")
-        time.sleep(0.03)
-        assert capsys.readouterr().err == ""  # nothing is known yet
+        time.sleep(0.1)
+        assert capsys.readouterr().err == "sweep: computing points\n"  # nothing more is known yet
         log.step(3, 12)
-        time.sleep(0.05)
+        time.sleep(0.2)
     lines = capsys.readouterr().err.splitlines()
     assert lines
     assert all(line.startswith("sweep: 3 of 12, about ") for line in lines)

@@ -1,4 +1,7 @@
-"""Progress on stderr: a bar on a terminal after two seconds, a line a minute in the log of a sweep.
+"""Progress on stderr: a bar on a terminal after two seconds; without one, a line a stage after ten.
+
+The bar stands at the share of the time that is over, and moves to and fro as long as nobody knows
+how much there will be. Lines of a sweep come once a minute, too.
 
 The bar is drawn only on a terminal that takes it: NO_COLOR (https://no-color.org), a dumb terminal
 and --quiet are respected. The work goes on in the thread that began it; the display has a thread of
@@ -7,6 +10,7 @@ its own, which loads the library that draws the bar when the two seconds are ove
 
 import contextlib
 import os
+import queue
 import sys
 import threading
 import time
@@ -18,8 +22,12 @@ AFTER = 2.0
 """Seconds before the bar appears."""
 BAR_INTERVAL = 0.1
 """Seconds between two updates of the bar."""
+LOG_AFTER = 10.0
+"""Seconds before the first lines of a log."""
 LOG_INTERVAL = 60.0
-"""Seconds between two lines of a log."""
+"""Seconds between two lines of a log about one stage."""
+LOG_STEP = 0.1
+"""Seconds between two looks at which stages have begun."""
 WORDS = {
     "read": "reading the image",
     "scene": "building the scene",
@@ -56,16 +64,17 @@ class Progress:
         with Progress(quiet) as progress:
             simulate(camera, watch=progress)
 
-    log: the name of the work in the lines that are written where no bar can be drawn; "" for none.
+    log: the name of the work in the lines that are written where no bar can be drawn.
     """
 
     def __init__(self, quiet: bool = False, log: str = "") -> None:
         self._start = self._stage_start = time.monotonic()
         self._stage, self._log = "", log
+        self._begun: queue.SimpleQueue[str] = queue.SimpleQueue()
         self._expected = 0.0
         self._steps = (0, 0)
         self._over = threading.Event()
-        show = self._draw_bar if may_draw(quiet) else self._write_log if log and not quiet else None
+        show = self._draw_bar if may_draw(quiet) else None if quiet else self._write_log
         self._thread = threading.Thread(target=show, daemon=True) if show else None
 
     def __enter__(self) -> Self:
@@ -84,6 +93,8 @@ class Progress:
 
     def begin(self, stage: str) -> None:
         """Note that a stage begins."""
+        if stage != self._stage:
+            self._begun.put(stage)
         self._stage, self._stage_start, self._steps = stage, time.monotonic(), (0, 0)
 
     def expect(self, seconds: float) -> None:
@@ -121,24 +132,53 @@ class Progress:
                     return
 
     def _state(self, now: float) -> dict[str, Any]:
-        """Return what the bar shows; work that is overdue is nearly done."""
+        """Return what the bar shows: no share of work of unknown length, 95 % of overdue work."""
         left, done = self.seconds_left(now), now - self._start
-        description = WORDS.get(self._stage, self._stage)
-        total = done / 0.95 if left is None else done + left
+        total = None if not self._is_foretold else done / 0.95 if left is None else done + left
         return {
-            "description": description,
+            "description": WORDS.get(self._stage, self._stage),
             "completed": done,
             "total": total,
-            "left": time_left_text(left),
+            "left": time_left_text(left) if self._is_foretold else "",
         }
 
+    @property
+    def _is_foretold(self) -> bool:
+        """Whether anything is known of the time that is left."""
+        return bool(self._expected or self._steps[0])
+
     def _write_log(self) -> None:
-        while not self._over.wait(LOG_INTERVAL):
+        """Write a line for every stage of work that takes long, and every minute of steps."""
+        last = time.monotonic()
+        if self._over.wait(LOG_AFTER):
+            return
+        while True:
+            lines = [f"{WORDS.get(stage, stage)}{self._left_text()}" for stage in self._stages()]
+            now = time.monotonic()
             done, total = self._steps
-            if total:
-                left = f", {time_left_text(self.seconds_left(time.monotonic()))}" if done else ""
-                with contextlib.suppress(OSError):
-                    print(f"{self._log}: {done} of {total}{left}", file=sys.stderr, flush=True)
+            if lines:
+                last = now
+            elif total and now - last >= LOG_INTERVAL:
+                lines, last = [f"{done} of {total}{self._left_text()}"], now
+            head = f"{self._log}: " if self._log else ""
+            with contextlib.suppress(OSError):
+                for line in lines:
+                    print(f"{head}{line}", file=sys.stderr, flush=True)
+            if self._over.wait(LOG_STEP):
+                return
+
+    def _stages(self) -> list[str]:
+        """Return the stages that have begun since it was last asked."""
+        found = []
+        with contextlib.suppress(queue.Empty):
+            while True:
+                found.append(self._begun.get_nowait())
+        return found
+
+    def _left_text(self) -> str:
+        """Return the time left as the end of a line; "" where nothing is known of it."""
+        left = self.seconds_left(time.monotonic())
+        return "" if left is None or not self._is_foretold else f", {time_left_text(left)}"
 
 
 def time_left_text(left: float | None) -> str:

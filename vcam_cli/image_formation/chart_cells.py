@@ -131,6 +131,16 @@ def cells_per_pixel(path: OpticalPath, scene: ChartScene, highest: float) -> tup
     return enough, error * cells / enough
 
 
+def trials(scene: ChartScene, cells: float) -> int:
+    """Return how many times crops of a chart were painted until these cells per pixel were chosen.
+
+    The reference is one of them; where the finest cells are few, nothing is tried.
+    """
+    if math.prod(scene.shape) <= CHEAP:
+        return 0
+    return 1 + sum(1 for tried in LADDER if tried <= cells)
+
+
 def _error_that_counts(found: NDArray, converged: NDArray, ceiling: float) -> float:
     """Return the rms of the error of crops (crops, rows, columns) that full pixels do not hide.
 

@@ -90,6 +90,14 @@ class SpectrumReport:
     """Cells of a painted chart per pixel pitch; 0 where there are none."""
     is_painted: bool = False
     """Whether they had to be painted, as those of a chart."""
+    edge_seconds: float = 0.0
+    """What a painted chart costs beside its cells: see `Chart`."""
+    trials: int = 0
+    """Times that crops of a chart were painted to choose its cells."""
+    far_parts: int = 0
+    """Rectangles of the far field, each with a spectrum of its own."""
+    far_cells: int = 0
+    """Samples of one plane in all of them."""
     terms: int = 0
     """Terms of one plane's spectrum that were filtered; 0 where there was no need to."""
     planes: int = 0

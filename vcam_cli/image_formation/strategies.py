@@ -23,7 +23,7 @@ from vcam_cli.effects.base import Blur, FieldTransfer, SeparableTransfer, of_kin
 from vcam_cli.image_formation import memory_model
 from vcam_cli.image_formation.bandwidth import LOWEST, axes, highest_passed, reach, table_size
 from vcam_cli.image_formation.box_average import box_averages, point_values
-from vcam_cli.image_formation.chart_cells import cell_grid, cells_per_pixel
+from vcam_cli.image_formation.chart_cells import cell_grid, cells_per_pixel, trials
 from vcam_cli.image_formation.effect_changes import changes_by_omission, needed_modes
 from vcam_cli.image_formation.far_field import FarPart, far_parts, near_field
 from vcam_cli.image_formation.field_dependence import Mode, field_mixtures, tabulate_field
@@ -138,7 +138,7 @@ def _spectral_layers(
     """
     path = with_sufficient_precision(path, scene)
     exact, g, zones = path.transfer, path.geometry, path.zones
-    is_painted = isinstance(scene, ChartScene) and scene.chart.edges() is None
+    painted = scene if isinstance(scene, ChartScene) and scene.chart.edges() is None else None
     size = table_size(path, highest)
     mixing = field_mixtures(exact, zones, size) if zones else mixtures([exact], size)
     needed = memory_model.image_bytes(path, scene, highest, len(mixing[0]), size, rings)
@@ -158,8 +158,12 @@ def _spectral_layers(
         oversampling=image.highest,
         lost_rms=math.hypot(image.lost_rms, error),
         cells=0 if scene.rectangles(mixing[0]) is not None else math.prod(scene.shape),
-        cells_per_pixel=g.pitch_x / scene.pitch_x if is_painted else 0.0,
-        is_painted=is_painted,
+        cells_per_pixel=g.pitch_x / scene.pitch_x if painted else 0.0,
+        is_painted=painted is not None,
+        edge_seconds=painted.chart.edge_seconds if painted else 0.0,
+        trials=trials(painted, g.pitch_x / scene.pitch_x) if painted else 0,
+        far_parts=len(rings),
+        far_cells=sum(math.prod(part.scene.shape) for part in rings),
         terms=image_filter.terms,
         planes=len(tables.mix),
         changes=changes_by_omission(path, image, tables, field_change),

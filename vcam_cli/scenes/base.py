@@ -12,7 +12,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any, Literal, Protocol
+from typing import Any, ClassVar, Literal, Protocol
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
@@ -198,6 +198,9 @@ class Chart(ABC):
     and its dtype is that of the result.
     """
 
+    edge_seconds: ClassVar[float] = 0.0
+    """Core seconds to find the edges that a frame sees, whatever its cells; see `cost_model`."""
+
     @property
     def brightest(self) -> float:
         """Brightest light, relative to the perfect white."""
@@ -355,6 +358,7 @@ class Framed(Chart):
 
     chart: Chart
     frame: Frame
+    edge_seconds = property(lambda self: self.chart.edge_seconds)
 
     @property
     def brightest(self) -> float:

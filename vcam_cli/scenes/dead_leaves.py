@@ -21,6 +21,7 @@ References
 import math
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import ClassVar
 
 import numpy as np
 
@@ -149,6 +150,7 @@ class DeadLeaves(Chart):
     """Whole number, 0 or more."""
     unit: float
     """Longer side of the frame [m]."""
+    edge_seconds: ClassVar[float] = 0.13
 
     def crop_to_cells(
         self, x_edges: Array, y_edges: Array, hidden: Cells | None = None

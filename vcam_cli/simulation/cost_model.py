@@ -30,9 +30,13 @@ NORMAL = 8.2e-9
 """Drawing one normal number, the unit of speed [s]."""
 SAMPLE = 6e-9
 """Transforming one sample of one plane of the scene [s]."""
-PAINT = 22e-9
-"""Painting one sample of one plane of a chart [s]."""
-FIXED = 0.05
+PAINT = 5e-9
+"""Painting one sample of one plane of a chart, its edges aside [s]."""
+TRIAL = 1.5e-3
+"""Trying cells on crops of a chart once, its edges aside [s]."""
+TRIAL_EDGES = 0.18
+"""Share of the edges of a chart that its crops see."""
+FIXED = 0.04
 """What does not depend on the size: tables of transfer, colors of patches, the survey of the scene,
 the plan [s]."""
 INTERPOLATE = 1.5e-6
@@ -43,6 +47,9 @@ TABLE = 1e-6
 """One value of a transfer function of fx and fy, its part of the pupil's transforms too [s]."""
 EVALUATE = 5e-9
 """One pixel of one color from its spectrum [s]."""
+FAR = 20e-9
+"""The same from the spectrum of a part of the far field, whose cells and pixels have no common grid
+[s]."""
 WAVE = 12e-9
 """One pixel of one wave, or of one box [s]."""
 PROCESS = 14e-9
@@ -85,8 +92,11 @@ def image_seconds(geometry: Geometry, mosaic: Mosaic, report: SpectrumReport) ->
     return (
         FIXED
         + (SAMPLE + PAINT * report.is_painted) * report.cells * report.planes
+        + report.edge_seconds * (1 + TRIAL_EDGES * report.trials)
+        + TRIAL * report.trials
         + TERM * report.terms * report.planes * colors * report.filters
-        + EVALUATE * pixels * colors * report.filters
+        + (EVALUATE + FAR * report.far_parts) * pixels * colors * report.filters
+        + (SAMPLE + PAINT + TERM * colors * report.filters) * report.far_cells * report.planes
         + TABLE * report.table_values
     )
 
