@@ -128,6 +128,8 @@ FORMS: Mapping[str, tuple[tuple[str, str], ...]] = {
     "array.pattern": (("(?i)x-?trans", "write {block: [[R, G], [G, B]]} with its own block"),),
 }
 """A key -> expressions that a value there may match, and what is then to be done."""
+AT_MOST_1 = "it must be at most 1"
+"""What is said of a fraction that is too large, mostly since it is in percent."""
 _PICTURES = {".png", ".jpg", ".jpeg", ".tif", ".tiff", ".exr", ".hdr", ".bmp", ".webp", ".pfm"}
 _SEPARATE = {"name", "kind", "file", "value", "rows", "columns"}
 """Keys that many mappings have: elsewhere they mean something else."""
@@ -213,6 +215,8 @@ def _meant_value(problem: Problem, given: object) -> str:
     for form, remedy in FORMS.get(path, ()):
         if match := re.fullmatch(form, word.strip()):
             return match.expand(remedy)
+    if problem.remedy == AT_MOST_1 and isinstance(given, (int, float)) and 1 < given <= 100:
+        return f"write {word} %, or {given / 100:g}"
     if path == "scene.source":
         if PurePath(word).suffix.lower() in _PICTURES:
             return f"write {{kind: image, file: {word}}}"
