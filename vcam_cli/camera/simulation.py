@@ -189,6 +189,10 @@ class Output(Model):
     irradiance: Annotated[bool, Strict()] = key(
         "also write irradiance.exr: W/(m2 nm) on the sensor, a channel a wavelength", default=False
     )
+    dng: Annotated[bool, Strict()] = key(
+        "also write raw.dng, for raw converters: of Bayer mosaics, gray and stacked pixels",
+        default=False,
+    )
     tiff: Annotated[bool, Strict()] = key(
         "also write raw.tif: the whole numbers of the raw frame, with the pattern of its colors",
         default=False,

@@ -108,6 +108,7 @@ def exposure_lines(exposure: dict) -> list[str]:
 FILES = {
     "render.png": "render",
     "raw.exr": "raw frame",
+    "raw.dng": "raw frame",
     "raw.tif": "raw frame",
     "ideal.exr": "ideal image",
     "delta_e.png": "error map",

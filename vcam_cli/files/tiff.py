@@ -61,7 +61,7 @@ def extra(tags: Sequence[Tag]) -> list[tuple[int, int, int, Any, bool]]:
 def mosaic_tags(block: Sequence[Sequence[str]]) -> list[Tag]:
     """Return the tags CFARepeatPatternDim and CFAPattern of TIFF/EP; () where a color has none."""
     names = [name for row in block for name in row]
-    if not set(names) <= set(COLORS):
+    if not names or not set(names) <= set(COLORS):
         return []
     size = (len(block), len(block[0]))
     numbers = bytes(COLORS[name] for name in names)

@@ -24,7 +24,7 @@ from vcam_cli.quality.display import display_screen
 from vcam_cli.readout.layout import layout
 from vcam_cli.scenes.build import SOURCE, check_channels
 from vcam_cli.scenes.hyperspectral import check_bands
-from vcam_cli.simulation import plan
+from vcam_cli.simulation import plan, raw_dng
 
 
 def load(camera: str | Path, sets: Sequence[str] = ()) -> Camera:
@@ -127,12 +127,17 @@ def check_display(camera: Camera) -> None:
         display_screen(camera.display, len(layout(camera, geometry(camera)).picture_x))
 
 
+LIBRARIES = {"dng": ("tifffile", "imagecodecs"), "tiff": ("tifffile",)}
+"""Format of the raw frame -> libraries that write it."""
+
+
 def check_formats(camera: Camera) -> None:
     """Refuse formats of the raw frame whose libraries are not installed (BadInput)."""
-    for asked in ("tiff",):
-        if getattr(camera.output, asked) and not find_spec("tifffile"):
-            message = "needs the library tifffile, which is not installed"
-            raise bad(("output", asked), message, "pip install 'vcam-cli[dng]'")
+    for asked in LIBRARIES:
+        for library in LIBRARIES[asked] if getattr(camera.output, asked) else ():
+            if not find_spec(library):
+                message = f"needs the library {library}, which is not installed"
+                raise bad(("output", asked), message, "pip install 'vcam-cli[dng]'")
 
 
 CHECKS: tuple[files.CameraCheck, ...] = (
@@ -143,5 +148,6 @@ CHECKS: tuple[files.CameraCheck, ...] = (
     (check_picture, "scene"),
     (check_lens, "optics scene pixel array effects"),
     (check_formats, "output"),
+    (raw_dng.check, "pixel array exposure adc output"),
     (check_display, "optics scene pixel array quality display"),
 )

@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property, partial
 
@@ -23,7 +24,7 @@ from vcam_cli.parallel import available_workers
 from vcam_cli.progress import Stages
 from vcam_cli.readout import binned_readout, exposure, nondestructive_samples
 from vcam_cli.simulation.preparation import Prepared, prepare
-from vcam_cli.spectra import colorchecker
+from vcam_cli.spectra import Spectrum, colorchecker
 
 
 @dataclass(frozen=True)
@@ -99,29 +100,29 @@ class Frame(Prepared):
     @property
     def black_dn(self) -> float:
         """Code of the mean dark signal, offset included [DN]."""
-        dark = self.dark_rate * self.exposure_time * self._summed_codes
+        dark = self.dark_rate * self.exposure_time * self.summed_codes
         return float(self.to_dn(np.array([dark]))[0])
 
     @property
-    def _summed_codes(self) -> int:
+    def summed_codes(self) -> int:
         """Pixels whose codes are added."""
         return self.layout.binning_groups.summed_codes
 
     def to_dn(self, electrons: NDArray) -> NDArray:
         """Return the ADC's curve before rounding and clipping; added codes are equal [DN]."""
-        n = self._summed_codes
+        n = self.summed_codes
         return self.code.response(electrons) if n == 1 else n * self.code.response(electrons / n)
 
     def linear(self, dn: NDArray) -> NDArray:
         """Return what a linear ADC has for these codes, added where `to_dn` adds them [DN]."""
-        n = self._summed_codes
+        n = self.summed_codes
         return self.code.linear(dn) if n == 1 else n * self.code.linear(dn / n)
 
     @property
     def white_dn(self) -> NDArray:
         """Codes (C,) of perfect white on the axis, noise-free, with dark, not clipped [DN]."""
         electrons = (self.white_rate + self.dark_rate) * self.exposure_time
-        return np.asarray(self.to_dn(electrons * self._summed_codes))
+        return np.asarray(self.to_dn(electrons * self.summed_codes))
 
     @property
     def saturated_dn(self) -> float:
@@ -134,7 +135,7 @@ class Frame(Prepared):
             well -= binned_readout.SURE * self._noise_of_full
         # In both float types: where the well lies half way between two codes they round apart.
         codes = [self.code.apply(np.full(1, well, kind))[0] for kind in (np.float32, np.float64)]
-        return self._summed_codes * float(min(*codes, highest))
+        return self.summed_codes * float(min(*codes, highest))
 
     @property
     def _noise_of_full(self) -> float:
@@ -147,17 +148,21 @@ class Frame(Prepared):
     def patches_dn(self) -> NDArray:
         """Return the codes (C, 24) of a ColorChecker in the scene's light, as `white_dn` [DN]."""
         lit = [self.scene.white.multiply(reflectance) for _, reflectance in colorchecker()]
+        rate = self.axis_rate(lit) + self.dark_rate * self.summed_codes
+        return self.to_dn(rate * self.exposure_time)
+
+    def axis_rate(self, spectra: Sequence[Spectrum]) -> NDArray:
+        """Return electrons per second (C, K) of K radiances on the axis, as they are read out.
+
+        Electrons of pixels whose codes are added are, too.
+        """
         gains = of_kind(self.plan.active, Gain)
         # Levels are exact with any wavelengths: the first and the last are enough.
         coarse = replace(self.settings, wavelength_step=math.inf)
         seen = photon_rate.scene_transfer(
-            self.camera, self.geometry, coarse, lit, self.mosaic, gains
+            self.camera, self.geometry, coarse, spectra, self.mosaic, gains
         )
-        rate = (
-            seen.level.T * self.layout.binning_groups.signal_ratio
-            + self.dark_rate * self._summed_codes
-        )
-        return self.to_dn(rate * self.exposure_time)
+        return np.asarray(seen.level.T * self.layout.binning_groups.signal_ratio)
 
     def ideal_dn(self) -> NDArray:
         """Return the scene point-sampled at the pixels' centers, all colors everywhere [DN].
@@ -167,7 +172,7 @@ class Frame(Prepared):
         place = self.layout
         level = self.transfer.level.T * self.exposure_time * place.binning_groups.signal_ratio
         photo = self.scene.values_at(place.picture_x, place.picture_y, level)
-        return self.to_dn(photo + self.dark_rate * self.exposure_time * self._summed_codes)
+        return self.to_dn(photo + self.dark_rate * self.exposure_time * self.summed_codes)
 
 
 def expose(

@@ -27,7 +27,7 @@ from vcam_cli.files.report import hash_file, hash_text, to_json
 from vcam_cli.files.spectral.exr import write_spectral
 from vcam_cli.files.tables import write_metrics
 from vcam_cli.parallel import ThreadPool
-from vcam_cli.simulation import provenance, raw_file, spectral_irradiance
+from vcam_cli.simulation import provenance, raw_dng, raw_file, spectral_irradiance
 from vcam_cli.simulation.figures import exposure_report
 from vcam_cli.simulation.frame import Frame
 from vcam_cli.simulation.provenance import versions
@@ -104,8 +104,11 @@ def _raw_jobs(result: Result, folder: OutputFolder) -> Iterator[Callable[[], Non
     """Jobs that write the raw frame in every format that is asked for."""
     yield partial(write_raw, result, folder.new("raw.exr"))
     frame = result.frame
+    said = config_hash(frame.camera)
+    if frame.camera.output.dng:
+        description = raw_file.description(frame, said)
+        yield partial(raw_dng.write_raw_dng, folder.new("raw.dng"), frame, description)
     if frame.camera.output.tiff:
-        said = config_hash(frame.camera)
         yield partial(raw_file.write_raw_tiff, folder.new("raw.tif"), frame, said)
 
 

@@ -55,8 +55,12 @@ def write_raw_tiff(path: Path, frame: Frame, config_hash: str) -> None:
         codes = np.moveaxis(codes, 0, -1)
     has_block = frame.camera.array.mosaic and not frame.layout.is_scattered
     tags = tiff.mosaic_tags(frame.mosaic.block) if has_block else ()
-    said = json.dumps(attributes(frame, config_hash), indent=1)
-    tiff.write_tiff(path, codes, said, tags)
+    tiff.write_tiff(path, codes, description(frame, config_hash), tags)
+
+
+def description(frame: Frame, config_hash: str) -> str:
+    """Return what the file says of the frame as JSON, for formats without attributes."""
+    return json.dumps(attributes(frame, config_hash), indent=1)
 
 
 def write_hdr(path: Path, frame: Frame, config_hash: str) -> None:

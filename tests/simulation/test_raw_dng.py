@@ -1,0 +1,352 @@
+"""raw.dng through two readers that share no code with its writer: LibRaw and Adobe's DNG SDK.
+
+LibRaw opens files that lack almost any tag, so that it is no gate alone; Adobe's reader validates,
+and prints its warnings. What a file is to say comes from the camera here, and not from the file.
+"""
+
+import struct
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from making import camera
+
+from vcam_cli import BadInput, load, simulate
+from vcam_cli.files.dng import CODES
+from vcam_cli.processing import color_correction
+from vcam_cli.simulation import checks
+
+REASON = "the readers of DNG files are not installed here"
+rawpy = pytest.importorskip("rawpy", reason=REASON)
+dngpy = pytest.importorskip("dngpy", reason=REASON)
+tifffile = pytest.importorskip("tifffile", reason=REASON)
+
+WIDTH, HEIGHT, BLACK, WHITE = 300, 70, 64, 3289
+"""The white level is that of a full well, 2 V, 0.8 of the ADC's scale; 4095 could be a guess."""
+COLOR = {
+    "scene.illuminant": "D65",
+    "scene.radiance": "10 W/(sr m2)",
+    "scene.source": {"kind": "chart", "chart": "step-wedge"},
+    "optics.f_number": 2.8,
+    "array": {"rows": HEIGHT, "columns": WIDTH, "pattern": "bayer-rggb", "filters": "generic-rgb"},
+    "adc": {"bits": 12, "offset": f"{BLACK} DN", "full_scale": "2.5 V"},
+    "output.dng": True,
+    "output.render": "none",
+}
+
+
+def taken(folder: Path, changes: dict | None = None):
+    """A result, and the path of its raw.dng."""
+    result = simulate(camera(folder, COLOR | (changes or {})))
+    return result, result.save(folder / "out") / "raw.dng"
+
+
+def complaints(path: Path, result, capfd, iso: float, block="RGGB") -> list[str]:
+    """What both readers find that is not as the camera has it: the gate."""
+    capfd.readouterr()
+    found = []
+    for read in (_libraw, _adobe):
+        try:
+            found += read(path, result, iso, block)
+        except (rawpy.LibRawError, RuntimeError) as error:
+            found.append(f"{read.__name__} fails: {error}")
+    return found + [printed for printed in capfd.readouterr() if printed]
+
+
+def neutral(result) -> np.ndarray:
+    """The camera's color of white."""
+    return result.frame.white_rate / result.frame.white_rate.max()
+
+
+def _libraw(path: Path, result, iso: float, block: str) -> list[str]:
+    with rawpy.imread(str(path)) as file:
+        codes = file.raw_image
+        seen = {
+            "bits": np.copy(codes[..., :3] if codes.ndim == 3 else codes),  # gone with the file
+            "black": file.black_level_per_channel[:1],
+            "white": [file.white_level],
+        }
+        meant = {"bits": result.dn, "black": [BLACK], "white": [WHITE]}
+        if block:
+            letters = dict(enumerate(file.color_desc.decode()))
+            seen |= {"pattern": "".join(letters.get(n, "?") for n in np.ravel(file.raw_pattern))}
+            meant |= {"pattern": block}
+        if len(result.colors) == 3:
+            seen |= {"balance": file.camera_whitebalance[:3], "matrix": file.color_matrix[:, :3]}
+            meant |= {"balance": 1 / neutral(result), "matrix": to_display(path)}
+    return [f"LibRaw: {name}" for name in meant if not _equal(seen[name], meant[name])]
+
+
+def to_display(path: Path) -> np.ndarray:
+    """The matrix from balanced camera colors to linear sRGB that follows from ColorMatrix2.
+
+    White of the display, D65, is white of the camera: rows of the inverse that sum to 1.
+    """
+    with tifffile.TiffFile(path) as file:
+        tags = {tag.code: tag.value for tag in file.pages[0].tags}
+    if CODES["ColorMatrix2"][0] not in tags:
+        return np.eye(3)
+    pairs = np.reshape(tags[CODES["ColorMatrix2"][0]], (3, 3, 2))
+    to_camera = pairs[:, :, 0] / pairs[:, :, 1] @ SRGB_TO_XYZ
+    return np.linalg.inv(to_camera / to_camera.sum(axis=1, keepdims=True))
+
+
+SRGB_TO_XYZ = np.array(
+    [[0.412453, 0.357580, 0.180423], [0.212671, 0.715160, 0.072169], [0.019334, 0.119193, 0.950227]]
+)
+"""ITU-R BT.709 with D65."""
+
+
+def _adobe(path: Path, result, iso: float, block: str) -> list[str]:
+    file = dngpy.Dng(str(path))
+    frame, exif = result.frame, file.exif
+    seen = {
+        "bits": np.squeeze(file.raw_pixels),
+        "pattern": file.get_bayer_pattern(),
+        "exposure time": exif.exposure_time,
+        "f-number": exif.f_number,
+        "focal length": exif.focal_length,
+        "iso": exif.iso,
+        "exposure": round(file.get_baseline_exposure(), 2),  # which it is already
+    }
+    light = frame.white_rate.max() * frame.exposure_time / frame.electrical.electrons_per_dn
+    meant = {
+        "bits": result.dn,
+        "pattern": block,
+        "exposure time": 0.01,
+        "f-number": 2.8,
+        "focal length": 5.0,
+        "iso": iso,
+        "exposure": round(np.log2((WHITE - BLACK) / light), 2),
+    }
+    if len(result.colors) == 3:
+        seen |= {"neutral": file.get_white_balance()}
+        meant |= {"neutral": neutral(result)}
+    return [f"Adobe: {name}" for name in meant if not _equal(seen[name], meant[name])]
+
+
+def _equal(seen, meant) -> bool:
+    if isinstance(meant, str):
+        return seen == meant
+    # LibRaw inverts matrices by normal equations in 32 bits; 1e-4 of codes is less than one.
+    close = 1e-4 * np.max(np.abs(meant))
+    return np.shape(seen) == np.shape(meant) and np.allclose(seen, meant, rtol=0, atol=close)
+
+
+PATTERNS = {
+    **{f"bayer-{name}": name.upper() for name in ("rggb", "grbg", "gbrg", "bggr")},
+    "monochrome": "",
+    "stacked": "",
+}
+
+
+@pytest.mark.parametrize("pattern", PATTERNS)
+def test_both_readers_find_what_the_camera_took(pattern, tmp_path, capfd):
+    more = {"array.filters": "silicon-layers"} if pattern == "stacked" else {}
+    result, path = taken(tmp_path, {"array.pattern": pattern} | more)
+    assert np.ptp(result.dn) > 100
+    iso = round(result.metrics["base_iso"])
+    assert complaints(path, result, capfd, iso, PATTERNS[pattern]) == []
+
+
+def test_a_quad_bayer_that_is_binned_is_a_bayer_mosaic(tmp_path, capfd):
+    binning = {"rows": 2, "columns": 2, "kind": "charge"}
+    changes = {"array.pattern": "quad-bayer", "array.binning": binning}
+    result, path = taken(tmp_path, changes | {"exposure.time": "10 ms", "array.rows": 60})
+    assert complaints(path, result, capfd, round(result.metrics["base_iso"])) == []
+
+
+REQUIRED = sorted(
+    {"CFARepeatPatternDim", "CFAPattern", *CODES}
+    - {"DNGBackwardVersion", "LinearizationTable"}  # has a default; only of curved ADCs
+    - {"Make", "Model"}  # UniqueCameraModel says them
+    - {"ActiveArea", "CalibrationIlluminant1", "NoiseProfile"}  # neither reader shows them
+)
+
+
+@pytest.mark.parametrize("name", REQUIRED)
+def test_a_missing_tag_fails_the_gate(name, tmp_path, capfd):
+    result, path = taken(tmp_path)
+    code = {"CFARepeatPatternDim": 33421, "CFAPattern": 33422}.get(name) or CODES[name][0]
+    path.write_bytes(without(path.read_bytes(), code))
+    assert complaints(path, result, capfd, round(result.metrics["base_iso"]))
+
+
+def without(data: bytes, code: int) -> bytes:
+    """A TIFF without one tag of its first directory."""
+    (start,) = struct.unpack_from("<I", data, 4)
+    (count,) = struct.unpack_from("<H", data, start)
+    entries = [data[start + 2 + 12 * n :][:12] for n in range(count)]
+    kept = [entry for entry in entries if struct.unpack_from("<H", entry)[0] != code]
+    assert len(kept) == count - 1
+    directory = struct.pack("<H", len(kept)) + b"".join(kept) + bytes(4)
+    return data[:start] + directory + data[start + len(directory) :]
+
+
+def test_matrices_of_a_camera_that_sees_as_an_observer_are_its_mixing_matrix(tmp_path, monkeypatch):
+    """Filters over which photons are mixtures of x, y and z give them exactly, in any light."""
+    import colour
+
+    monkeypatch.setattr(color_correction, "RIDGE", 1e-6)  # keeps matrices of worse filters small
+    mixing = np.array([[0.5, 0.1, 0.0], [0.1, 0.5, 0.05], [0.0, 0.05, 0.5]])
+    observer = colour.MSDS_CMFS["CIE 1931 2 Degree Standard Observer"]
+    wavelength = observer.wavelengths
+    per_photon = mixing @ observer.values.T * (360 / wavelength)
+    for name, values in zip("RGB", per_photon, strict=True):
+        rows = "\n".join(f"{w},{v}" for w, v in zip(wavelength, values, strict=True))
+        (tmp_path / f"{name}.csv").write_text(f"wavelength_nm,value\n{rows}\n")
+    filters = {name: {"file": f"{name}.csv"} for name in "RGB"}
+    path = taken(tmp_path, {"array.filters": filters})[1]
+    with tifffile.TiffFile(path) as file:
+        tags = {tag.code: tag.value for tag in file.pages[0].tags}
+    for number, light, white in ((1, 17, (1.0985, 1, 0.3558)), (2, 21, (0.9505, 1, 1.0890))):
+        pairs = np.reshape(tags[CODES[f"ColorMatrix{number}"][0]], (3, 3, 2))
+        assert tags[CODES[f"CalibrationIlluminant{number}"][0]] == light  # EXIF's A and D65
+        expected = mixing / (mixing @ white).max()  # CIE 015 has four digits of white
+        assert pairs[:, :, 0] / pairs[:, :, 1] == pytest.approx(expected, abs=2e-4)
+
+
+def test_pictures_of_libraw_are_ours(tmp_path):
+    assert median_difference(tmp_path, {"rows": 240, "columns": 320}) < 0.2
+
+
+def median_difference(folder: Path, array: dict) -> float:
+    """Median CIEDE2000 of LibRaw's picture of a ColorChecker and ours, at the best of exposures."""
+    import colour
+
+    sets = [f"array.{name}={yaml.safe_dump(value)}" for name, value in array.items()]
+    result = simulate(load("colorchecker-d65", [*sets, "output.dng=true"]))
+    path = result.save(folder / "out") / "raw.dng"
+    with rawpy.imread(str(path)) as file:
+        theirs = file.postprocess(
+            use_camera_wb=True,
+            gamma=(1, 1),
+            no_auto_bright=True,
+            output_bps=16,
+            demosaic_algorithm=rawpy.DemosaicAlgorithm.LINEAR,
+        )
+    inside = (slice(4, -4, 3), slice(4, -4, 3))  # 3 is prime to the mosaic: all phases
+    ours, theirs = np.clip(result.linear[inside], 0, 1), theirs[inside] / 65535
+
+    def lab(picture):
+        return colour.XYZ_to_Lab(colour.RGB_to_XYZ(picture, "sRGB"))
+
+    scales = (
+        np.median(ours[..., 1]) / max(np.median(theirs[..., 1]), 1e-6) * np.linspace(0.97, 1.03, 13)
+    )
+    return min(
+        np.median(colour.delta_E(lab(ours), lab(np.clip(scale * theirs, 0, 1)))) for scale in scales
+    )
+
+
+REFUSED = {
+    "quad-bayer": "R, G, B in blocks of 4 x 4 pixels",
+    "rgbw": "R, G, B, W in blocks of 4 x 4 pixels",
+    "honeycomb": "rows and columns alone",
+}
+
+
+@pytest.mark.parametrize("pattern", REFUSED)
+def test_patterns_that_readers_get_wrong_are_refused(pattern, tmp_path):
+    with pytest.raises(BadInput, match=f"output.dng.*{REFUSED[pattern]}"):
+        _checked(tmp_path, {"array.pattern": pattern})
+
+
+@pytest.mark.parametrize("block", [["RG", "BG"], ["RW", "WB"], ["GR", "BG", "GR", "BG"], ["RGB"]])
+def test_blocks_other_than_bayers_are_refused_and_bayers_are_not(block, tmp_path):
+    with pytest.raises(BadInput, match=r"output.dng.*wrong"):
+        _checked(tmp_path, {"array.pattern": {"block": [list(row) for row in block]}})
+    _checked(tmp_path, {"array.pattern": {"block": [["G", "B"], ["R", "G"]]}})
+
+
+def _checked(folder: Path, changes: dict) -> None:
+    camera(folder, {**COLOR, "array.filters": {c: 0.5 for c in "RGBW"}} | changes)
+    checks.load(folder / "made.yaml")
+
+
+def test_the_reasons_of_the_refusal_are_true(tmp_path):
+    """`simulate` checks nothing, so that such files can be made."""
+    with rawpy.imread(str(taken(tmp_path, {"array.pattern": "quad-bayer"})[1])) as file:
+        assert np.shape(file.raw_pattern) == (2, 2)
+    for block, is_right in ((["RG", "GB"], True), (["RG", "RB"], False)):
+        changes = {"pattern": {"block": [list(row) for row in block]}, "rows": 96, "columns": 128}
+        assert (median_difference(tmp_path, changes) < 0.3) == is_right
+
+
+@pytest.mark.parametrize(
+    ("changes", "why"),
+    [
+        ({"array.rows": 21}, "less than 22 rows"),
+        ({"array.columns": 21}, "less than 22 rows and columns, and this one has 70 x 21"),
+        ({"adc.bits": 17}, "have 17 bits"),
+        (
+            {"adc.bits": 16, "array.binning": {"rows": 2, "columns": 2, "kind": "digital"},
+             "array.pattern": "monochrome"},
+            "have 18 bits",
+        ),
+    ],
+)  # fmt: skip
+def test_what_no_converter_reads_is_refused(changes, why, tmp_path):
+    with pytest.raises(BadInput, match=why):
+        _checked(tmp_path, changes)
+
+
+def test_the_least_size_is_libraws(tmp_path):
+    for rows, is_read in ((22, True), (21, False)):
+        path = taken(tmp_path, {"array.rows": rows})[1]
+        try:
+            rawpy.imread(str(path)).close()
+        except rawpy.LibRawError:
+            assert not is_read
+        else:
+            assert is_read
+
+
+def test_codes_of_a_logarithmic_adc_are_made_straight_by_the_table(tmp_path):
+    adc = {"bits": 12, "kind": "logarithmic", "offset": "50 DN", "reference": "20 mV"}
+    result, path = taken(tmp_path, {"adc": adc, "array.pattern": "monochrome"})
+    with rawpy.imread(str(path)) as file:
+        levels = file.raw_image.astype(float)
+        black, white = file.black_level_per_channel[0], file.white_level
+    assert np.array_equal(np.squeeze(dngpy.Dng(str(path)).raw_pixels), result.dn)
+    light = (levels - black) / (white - black)
+    # The well of 100 ke is full scale; a code is at most ln(101) / 4045 of signal + 1 ke.
+    step = (result.electrons + 1000) * np.log(101) / 4045
+    assert (np.abs(light * 1e5 - result.electrons) < step / 2 + 1e5 / (white - black)).all()
+
+
+@pytest.mark.parametrize(
+    "more",
+    [
+        {},
+        {"array.binning": {"rows": 2, "columns": 2, "kind": "digital"}},
+        {"array.binning": {"rows": 2, "columns": 1, "kind": "charge"}},
+        {"array.binning": {"rows": 2, "columns": 1, "kind": "voltage"}},
+    ],
+    ids=lambda more: str(more.get("array.binning", {}).get("kind")),
+)
+def test_noise_profile_is_the_variance_of_flat_fields(more, tmp_path):
+    flat = {
+        "array.pattern": "monochrome",
+        "array.rows": 200,
+        "scene.source": {"kind": "chart", "chart": "uniform"},
+        "pixel.readout.read_noise": "30 e",
+        "pixel.photodetector.dark_current": "100 ke/s",
+        "scene.illuminant": {"monochromatic": "550 nm"},
+    }
+    for radiance in ("0 W/(sr m2)", "0.3 W/(sr m2)"):
+        result, path = taken(tmp_path, flat | more | {"scene.radiance": radiance})
+        with tifffile.TiffFile(path) as file:
+            tags = {tag.code: tag.value for tag in file.pages[0].tags}
+        shot, read = tags[CODES["NoiseProfile"][0]]
+        black, white = (tags[CODES[f"{name}Level"][0]] for name in ("Black", "White"))
+        level = (result.dn - black[0] / black[1]) / (white - black[0] / black[1])
+        expected = shot * level.mean() + read
+        # The variance of n normal numbers is known to sqrt(2 / n); five of these.
+        assert level.var() == pytest.approx(expected, rel=5 * np.sqrt(2 / level.size))
+
+
+def test_the_same_camera_gives_the_same_bytes(tmp_path):
+    first = taken(tmp_path)[1].read_bytes()
+    assert taken(tmp_path)[1].read_bytes() == first
