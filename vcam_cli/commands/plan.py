@@ -22,6 +22,14 @@ Scenes = Annotated[
         " shipped scene. Repeatable. Writes scenes.csv and scenes.png.",
     ),
 ]
+Geometry = Annotated[
+    bool,
+    typer.Option(
+        "--geometry",
+        help="Print scene and optics instead: distances, angles, resolution, frequencies,"
+        " wavelengths, apertures.",
+    ),
+]
 
 
 def plan(
@@ -33,6 +41,7 @@ def plan(
     workers: options.Workers = None,
     scenes: Scenes = None,
     out: options.Out = None,
+    geometry: Geometry = False,
 ) -> None:
     """Show which effects a run simulates, which not and why, and what it costs.
 
@@ -43,9 +52,12 @@ def plan(
     Example:
       vcam plan still-life
       vcam plan camera.yaml --accuracy 0.001 --json
+      vcam plan starter --geometry
       vcam plan starter --scenes all
       vcam plan starter --scenes still-life --scenes my-scene.yaml
     """
+    if scenes and geometry:
+        raise typer.BadParameter("--geometry is of one scene; leave out --scenes")
     if scenes:
         _plan_scenes(
             camera, scenes, out, options.overrides(set_, accuracy=accuracy), quiet, workers
@@ -61,13 +73,19 @@ def plan(
     for note in notes:
         options.say(note, quiet)
     report = ready.plan.report()
-    geometry = ready.layout.report(ready.spectrum.oversampling)
+    solved = ready.layout.report(ready.spectrum.oversampling)
     if as_json:
         samples = {"captures": list(ready.times)} if ready.times else {}
-        print(to_json({**report, **samples, "geometry": geometry}), end="")
+        print(to_json({**report, **samples, "geometry": solved}), end="")
+    elif geometry:
+        from vcam_cli.commands.geometry_table import geometry_table
+
+        band = model.scene.wavelengths
+        step = report["settings"]["wavelength_step"]
+        print(geometry_table(solved, step, (band.start, band.stop)))
     else:
         print(table(report))
-        print(facts(report, geometry, ready.exposure_time, ready.times))
+        print(facts(report, solved, ready.exposure_time, ready.times))
 
 
 def _plan_scenes(

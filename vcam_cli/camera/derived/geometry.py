@@ -128,6 +128,7 @@ class Geometry:
             "field_of_view_diagonal": float(radiometry.field_of_view(math.hypot(w, h), si)),
             "scene_width": w / -self.magnification if finite else math.inf,
             "scene_height": h / -self.magnification if finite else math.inf,
+            "scene_diagonal": math.hypot(w, h) / -self.magnification if finite else math.inf,
             "rows": self.rows,
             "columns": self.columns,
             "sensor_width": w,
@@ -144,6 +145,9 @@ class Geometry:
             "sample_pitch_sensor": sample,
             "sample_pitch_scene": sample / -self.magnification if finite else math.inf,
             "sample_pitch_angle": sample / si,
+            "scene_rows": round(h / sample),
+            "scene_columns": round(w / sample),
+            "highest_frequency": 0.5 / sample if oversampling else math.inf,
         }
 
 

@@ -1,0 +1,73 @@
+"""The tables of `vcam plan --geometry`: scene and optics, as Tables 2.1 and 2.2 of Chen 2003."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+
+Row = tuple[str, str]
+
+
+def geometry_table(geometry: Mapping[str, float], step: float, band: tuple[float, float]) -> str:
+    """Return the tables as text.
+
+    Parameters
+    ----------
+    geometry : mapping
+        What `Geometry.report` returns, in SI.
+    step : float
+        Step of the wavelengths at which the lens's blur is evaluated [m].
+    band : tuple of float
+        First and last wavelength that is simulated [m].
+    """
+    parts = (("scene", _scene(geometry, step, band)), ("optics", _optics(geometry)))
+    lines = []
+    for title, rows in parts:
+        lines += [title, *(f"  {name:<24}{value}" for name, value in rows)]
+    return "\n".join(lines)
+
+
+def _scene(g: Mapping[str, float], step: float, band: tuple[float, float]) -> Iterator[Row]:
+    width, height = g["scene_width"], g["scene_height"]
+    yield "distance", _length(g["object_distance"])
+    yield "magnification", f"{g['magnification']:.6g}"
+    yield "width", f"{_angle(g['field_of_view_horizontal'])}, {_length(width)}"
+    yield "height", f"{_angle(g['field_of_view_vertical'])}, {_length(height)}"
+    yield "diagonal", f"{_angle(g['field_of_view_diagonal'])}, {_length(g['scene_diagonal'])}"
+    if math.isinf(g["highest_frequency"]):
+        yield "samples", "none: the scene's spectrum is known in closed form"
+    else:
+        pitch = f"{g['sample_pitch_sensor'] * 1e6:.4g} um on the sensor"
+        yield "angular resolution", f"{g['sample_pitch_angle'] * 1e3:.4g} mrad"
+        yield "spatial resolution", f"{_length(g['sample_pitch_scene'])}, {pitch}"
+        yield "rows, columns", f"{g['scene_rows']} x {g['scene_columns']}, seen by the array"
+        yield "highest frequency", f"{g['highest_frequency'] / 1e3:.5g} lp/mm"
+        yield "support of fx", _support(g["highest_frequency"], g["sensor_width"])
+        yield "support of fy", _support(g["highest_frequency"], g["sensor_height"])
+    number = math.ceil((band[1] - band[0]) / step - 1e-9) + 1
+    ends = f"{band[0] * 1e9:g} to {band[1] * 1e9:g} nm"
+    yield "wavelengths", f"{number}, {ends} in steps of {step * 1e9:.4g} nm at most"
+
+
+def _optics(g: Mapping[str, float]) -> Iterator[Row]:
+    yield "f-number", f"{g['f_number']:.6g}, working {g['working_f_number']:.6g}"
+    yield "focal length", f"{g['focal_length'] * 1e3:.6g} mm"
+    yield "numerical aperture", f"{g['numerical_aperture']:.6g}"
+    yield "clear diameter", f"{g['aperture_diameter'] * 1e3:.6g} mm"
+    yield "clear aperture", f"{g['clear_aperture_area'] * 1e6:.6g} mm2"
+    yield "field of view", f"{_angle(g['field_of_view_diagonal'])} on the diagonal"
+    yield "image distance", f"{g['image_distance'] * 1e3:.6g} mm"
+    yield "cut-off at 550 nm", f"{g['diffraction_cutoff_550nm'] / 1e3:.5g} lp/mm"
+
+
+def _support(highest: float, side: float) -> str:
+    """Return the frequencies of a cosine series over one side of the array."""
+    return f"0 to {highest / 1e3:.5g} lp/mm in steps of {0.5e-3 / side:.4g} lp/mm"
+
+
+def _angle(radians: float) -> str:
+    return f"{math.degrees(radians):.4g} deg"
+
+
+def _length(meters: float) -> str:
+    return "infinite" if math.isinf(meters) else f"{meters:.5g} m"
