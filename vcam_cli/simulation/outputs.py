@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 import vcam_cli
 from vcam_cli.camera.camera import Camera
@@ -55,7 +56,7 @@ def write(result: Result, folder: OutputFolder) -> None:
         try:
             if camera.output.render:
                 render = result.render
-                jobs.append(pool.submit(lambda: write_png(folder.new("render.png"), render)))
+                jobs.append(pool.submit(lambda: _render(result, folder.new("render.png"), render)))
             metrics = result.metrics
             if camera.quality:
                 jobs.append(pool.submit(lambda: _ideal(result, folder.new("ideal.exr"))))
@@ -75,6 +76,12 @@ def write(result: Result, folder: OutputFolder) -> None:
     write_metrics(folder.new("metrics.csv"), metrics.rows)
 
 
+def _render(result: Result, path: Path, render: NDArray) -> None:
+    """Write the render, and how it was taken as its description."""
+    taken = raw_file.photograph(result.frame)
+    write_png(path, render, "; ".join(f"{name} {value}" for name, value in taken.items()))
+
+
 def _irradiance(result: Result, path: Path) -> None:
     """Spectral irradiance on the sensor, computed and written wavelength by wavelength."""
     frame = result.frame
@@ -88,7 +95,9 @@ def _irradiance(result: Result, path: Path) -> None:
     said = {
         "name": frame.camera.name,
         "vcam:version": vcam_cli.__version__,
-        "vcam:quantity": "spectral irradiance on the sensor, mean over each pixel's cell",
+        "vcam:quantity": "spectral irradiance on the sensor, mean over each pixel's cell and over"
+        " the channel's band, which falls straight to 0 at the neighboring wavelengths",
+        **raw_file.photograph(frame),
         "vcam:configHash": config_hash(frame.camera),
     }
     g = frame.layout.geometry

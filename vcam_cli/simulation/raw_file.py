@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 import vcam_cli
 from vcam_cli.camera.array import Positions
 from vcam_cli.camera.derived.electrical import Electrical
+from vcam_cli.camera.illuminant import IlluminantSpec
 from vcam_cli.files import tiff
 from vcam_cli.files.exr import ExrWriter
 from vcam_cli.files.rows import Attribute
@@ -30,6 +31,9 @@ from vcam_cli.rng import BLOCK_ROWS
 from vcam_cli.simulation.frame import Frame
 
 ROWS_AT_ONCE = 4 * BLOCK_ROWS
+
+UNITS = {"dn": "DN", "electrons": "e", "volts": "V"}
+"""Unit of each channel of raw.exr."""
 
 Channel = Callable[[slice], NDArray]
 """Some rows of a channel."""
@@ -45,7 +49,8 @@ def write_raw(path: Path, frame: Frame, config_hash: str) -> None:
         "volts": (frame.electrons, scale),
     }
     asked = {name: values[name] for name in frame.camera.output.raw}
-    _write(path, frame, asked, attributes(frame, config_hash))
+    units: dict[str, Attribute] = {f"vcam:unit.{name}": UNITS[name] for name in asked}
+    _write(path, frame, asked, attributes(frame, config_hash) | units)
 
 
 def write_raw_tiff(path: Path, frame: Frame, config_hash: str) -> None:
@@ -68,6 +73,7 @@ def write_hdr(path: Path, frame: Frame, config_hash: str) -> None:
     assert frame.photocurrent is not None
     said: dict[str, Attribute] = {
         **_camera_metadata(frame, config_hash),
+        **photograph(frame),
         "vcam:captureTimes": ",".join(map(repr, frame.times)),
         "vcam:estimator": frame.camera.exposure.estimator,
         "vcam:saturatedFrom": frame.electrical.saturation / frame.times[0] - frame.dark_rate,
@@ -138,6 +144,7 @@ def attributes(frame: Frame, config_hash: str) -> dict[str, Attribute]:
     e = frame.electrical
     return {
         **_camera_metadata(frame, config_hash),
+        **photograph(frame),
         "vcam:exposureTime": frame.exposure_time,
         "vcam:blackLevel": frame.black_dn,
         "vcam:whiteLevel": white_level(frame),
@@ -145,6 +152,30 @@ def attributes(frame: Frame, config_hash: str) -> dict[str, Attribute]:
         **({"vcam:conversionGain": e.conversion_gain} if e.has_volts else {}),
         **_curve(e),
     }
+
+
+def photograph(frame: Frame) -> dict[str, Attribute]:
+    """Return how the picture was taken, by the names and in the units of OpenEXR's standard."""
+    iso = frame.base_iso * frame.camera.exposure_gain
+    light = frame.camera.scene.illuminant
+    return {
+        "software": tiff.SOFTWARE,
+        "comments": "simulated, no photograph",
+        "expTime": frame.exposure_time,
+        "aperture": frame.geometry.f_number,
+        "effectiveFocalLength": frame.geometry.focal_length * 1e3,
+        **({"isoSpeed": iso} if iso > 0 else {}),
+        **({} if light is None else {"vcam:illuminant": _light_name(light)}),
+    }
+
+
+def _light_name(light: IlluminantSpec) -> str:
+    """Return a lamp as the camera file has it; of its file the name alone, wherever it lies."""
+    form = light.to_yaml()
+    if isinstance(form, str):
+        return form
+    kind, value = next(iter(form.items()))
+    return f"{kind} {Path(value).name if kind == 'file' else value}"
 
 
 def _camera_metadata(frame: Frame, config_hash: str) -> dict[str, Attribute]:
