@@ -13,6 +13,7 @@ import yaml
 from making import camera
 
 from vcam_cli import BadInput, load, simulate
+from vcam_cli.config import shipped
 from vcam_cli.files.dng import CODES
 from vcam_cli.processing import color_correction
 from vcam_cli.simulation import checks
@@ -155,6 +156,36 @@ def test_a_quad_bayer_that_is_binned_is_a_bayer_mosaic(tmp_path, capfd):
     changes = {"array.pattern": "quad-bayer", "array.binning": binning}
     result, path = taken(tmp_path, changes | {"exposure.time": "10 ms", "array.rows": 60})
     assert complaints(path, result, capfd, round(result.metrics["base_iso"])) == []
+
+
+@pytest.mark.parametrize("bits", [1, 8, 13, 16])
+def test_codes_of_all_widths_are_read_back(bits, tmp_path, capfd):
+    result, path = taken(tmp_path, {"adc": {"bits": bits}})
+    agree(path, result, capfd)
+    with rawpy.imread(str(path)) as file:
+        assert file.white_level == 2**bits - 1
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", [path.stem for path in shipped.folder().glob("cameras/*.yaml")])
+def test_shipped_cameras_are_read_back_or_refused(name, tmp_path, capfd):
+    sets = ("output.dng=true", "output.render=none", "quality=[]", "accuracy=draft")
+    try:
+        result = simulate(checks.load(name, sets))
+    except BadInput as error:
+        assert name in ("cfa-honeycomb", "cfa-rgbw"), error
+        return
+    agree(result.save(tmp_path / "out") / "raw.dng", result, capfd)
+
+
+def agree(path: Path, result, capfd) -> None:
+    """Both readers find the codes of a camera with a linear ADC, and have nothing to say."""
+    with rawpy.imread(str(path)) as file:
+        codes = np.copy(file.raw_image)
+    assert np.array_equal(codes[..., :3] if codes.ndim == 3 else codes, result.dn)
+    capfd.readouterr()
+    assert np.array_equal(np.squeeze(dngpy.Dng(str(path)).raw_pixels), result.dn)
+    assert [*capfd.readouterr()] == ["", ""]
 
 
 REQUIRED = sorted(

@@ -124,6 +124,7 @@ def write_dng(path: Path | str, image: RawImage) -> None:
             dtype=np.uint16,
             tile=_tile_size(*image.codes.shape[:2]),
             compression=_JPEG,
+            bitspersample=MOST_BITS,  # else tifffile takes those of common JPEG, 12
             photometric="cfa" if mosaic else _LINEAR_RAW if planes else "minisblack",
             planarconfig="contig" if planes or mosaic else None,
             subfiletype=0,
