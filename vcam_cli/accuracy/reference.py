@@ -71,7 +71,7 @@ def finest_camera(camera: Camera, coarse: Prepared, most_bytes: float = 0) -> Ca
         wanted = min(math.ceil(FURTHER * reached) | 1, FINEST_CELLS - 1)
         if _is_rectangles(coarse):
             wanted = most = FINEST_CELLS
-        knobs["oversampling"] = max(math.ceil(reached), min(wanted, most))
+        knobs["oversampling"] = min(max(math.ceil(reached), min(wanted, most)), FINEST_CELLS)
     return with_accuracy(ablation.with_effects(camera, "all"), tolerance=CONVERGED, **knobs)
 
 

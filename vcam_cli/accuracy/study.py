@@ -31,6 +31,7 @@ from vcam_cli.accuracy.knobs import (
 from vcam_cli.accuracy.measurements import Clock, Shot, settings_key
 from vcam_cli.accuracy.recommendation import Recommendation
 from vcam_cli.accuracy.reference import (
+    FINEST_CELLS,
     Reference,
     describe_reference,
     effect_changes,
@@ -173,7 +174,7 @@ class _Measurement:
         """Return the knobs, each with its own error."""
         fixed: dict[str, Any] = {"tolerance": CONVERGED, **FINEST}
         if reached := sampling(own.ready):
-            fixed["oversampling"] = math.ceil(reached)
+            fixed["oversampling"] = min(math.ceil(reached), FINEST_CELLS)
         everything = ablation.with_effects(self.camera, "all")
         shared = Shared()  # of models of noise the light is the same
         base = self.clock.shot(with_accuracy(everything, **fixed), shared)

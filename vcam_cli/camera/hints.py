@@ -165,7 +165,11 @@ def _meant_key(path: Path, given: object) -> str:
     here = [key.name for key in index() if key.path[:-1] == above]
     if said := ELSEWHERE.get(above, {}).get(word):
         return f"write {said}"
-    if path[0] in ("processing", "accuracy") or word in {_plain(name) for name in here}:
+    if (
+        path[0] in ("processing", "accuracy")
+        or "technology" in above
+        or word in {_plain(name) for name in here}
+    ):
         return ""
     if word in KEYS:
         return f"write {_entry(word, given)}"

@@ -43,10 +43,10 @@ class Variation(Model):
     count: Annotated[int | None, Whole(least=1, most=100_000, example="20")] = key(
         "number of values", example=20, default=None
     )
-    spacing: Literal["linear", "log"] | None = key(
-        "of the values of a range: equal steps (linear, the default), or equal ratios (log)",
+    spacing: Literal["linear", "log"] = key(
+        "of the values of a range: equal steps (linear), or equal ratios (log)",
         example="log",
-        default=None,
+        default="linear",
     )
     values: Annotated[tuple[Any, ...] | None, list_of_any("[4 um, 6 um]")] = key(
         "the values themselves, in place of a range", example=["4 um", "6 um"], default=None
