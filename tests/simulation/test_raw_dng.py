@@ -242,6 +242,31 @@ def test_pictures_of_libraw_are_ours(tmp_path):
     assert median_difference(tmp_path, {"rows": 240, "columns": 320}) < 0.2
 
 
+def test_converters_that_interpolate_matrices_have_our_colors_in_tungsten_light(tmp_path):
+    """Chapter 6 of the DNG specification maps camera colors of light A by ColorMatrix1 alone."""
+    import colour
+
+    sets = ("array.rows=96", "array.columns=128", "output.dng=true")
+    ours = simulate(load("colorchecker-a", sets))
+    steps = "processing=[black_level: subtract, demosaic: bilinear, white_balance: illuminant]"
+    balanced = simulate(load("colorchecker-a", (*sets, steps))).linear
+    with tifffile.TiffFile(ours.save(tmp_path / "out") / "raw.dng") as file:
+        tags = {tag.code: tag.value for tag in file.pages[0].tags}
+    matrix, white = (
+        np.divide(*np.reshape(tags[CODES[name][0]], (-1, 2)).T)
+        for name in ("ColorMatrix1", "AsShotNeutral")
+    )
+    light = colour.xy_to_XYZ(colour.CCS_ILLUMINANTS["CIE 1931 2 Degree Standard Observer"]["A"])
+    d65 = colour.xy_to_XYZ((0.3127, 0.3290))
+    seen = np.linalg.inv(matrix.reshape(3, 3)) @ np.diag(white)
+    xyz = colour.chromatic_adaptation(
+        balanced @ seen.T, light, d65, method="Von Kries", transform="Bradford"
+    )
+    theirs = colour.XYZ_to_RGB(xyz, "sRGB", (0.3127, 0.3290))
+    # The tabulated white of A and the four digits of sRGB's matrix.
+    assert theirs == pytest.approx(ours.linear, abs=1e-3)
+
+
 def median_difference(folder: Path, array: dict) -> float:
     """Median CIEDE2000 of LibRaw's picture of a ColorChecker and ours, at the best of exposures."""
     import colour
