@@ -87,6 +87,16 @@ def test_dynamic_range_and_snr_by_hand() -> None:
     assert ro.snr_db(100.0, 200.0, 100.0) == pytest.approx(20 * math.log10(5))
 
 
+@given(st.floats(100, 1e6), st.floats(0, 0.5), st.floats(0, 1e8))
+def test_snr_at_a_fifth_of_the_well_lies_14_db_below_the_dynamic_range(
+    well: float, dark_share: float, read: float
+) -> None:
+    """No noise gives 38 dB of the one beside 50 dB of the other, as the thesis's Fig 3.2 has it."""
+    dark = dark_share * well
+    snr = ro.snr_db(0.2 * (well - dark), dark, read + 1)
+    assert snr <= ro.dynamic_range_db(well, dark, read + 1) + 20 * math.log10(0.2)
+
+
 def test_limits_of_the_figures_of_merit() -> None:
     assert ro.dynamic_range_db(100.0, 100.0, 4.0) == -math.inf
     assert ro.dynamic_range_db(100.0, 500.0, 4.0) == -math.inf

@@ -23,7 +23,7 @@ pytestmark = pytest.mark.long
 SMALL = (
     "array.die={width: 0.6784 mm, height: 0.6784 mm}",
     "display.width=128/72 in",
-    "pixel.fpn={}",
+    "effects={fpn: off}",
 )
 SIZES = np.geomspace(5.4, 15, 10)
 SHARED = Shared()
@@ -37,8 +37,8 @@ def curve(*sets):
         for phase in (0, 90):
             own = (f"pixel.width={size} um", f"scene.source.phase={phase} deg")
             camera = load("csf-0.35um", sets=[*SMALL, *sets, *own])
-            found = simulate(camera, workers=1, shared=SHARED).metrics
-            out[i] += next(value for name, value, _ in found if name == "mean_s_cielab") / 2
+            found = simulate(camera, workers=1, shared=SHARED)
+            out[i] += found.metrics["mean_s_cielab"] / 2
     return out
 
 
@@ -70,6 +70,35 @@ def test_with_the_black_level_taken_off_dark_current_hardly_matters(nominal):
     off, off_dark, dark_alone = curve(black), curve(black, dark), curve(dark)
     assert best(dark_alone) > 1.3 * best(nominal)
     assert best(off_dark) == pytest.approx(best(off), rel=0.1)
+
+
+def test_with_the_black_level_taken_off_noise_makes_the_optimum_where_light_is_low():
+    """The thesis's own reason: the less light, the larger the best pixel; not without noise."""
+    black = "processing=[{black_level: subtract}]"
+    silence = "effects={shot_noise: off, reset_noise: off}"
+    dim, dimmer = "scene.luminance=10 cd/m2", "scene.luminance=1 cd/m2"
+    noisy = [best(curve(black, light)) for light in (dim, dimmer)]
+    silent = [best(curve(black, light, silence)) for light in (dim, dimmer)]
+    assert noisy[0] > 1.1 * silent[0]
+    assert noisy[1] > 1.2 * silent[1]
+    assert noisy[1] > 1.15 * noisy[0]
+
+
+def test_a_tunnel_makes_pictures_worse_but_for_the_dark_signal_that_its_shade_hides():
+    """The same lens, and layers that reflect alike but have no depth. Fig 3.11's two treatments."""
+    lens = "optics={f_number: 2, focal_length: 2 mm, off_axis: none}"  # angles of the whole die
+    layer = "{{thickness: {} um, index: {}}}"
+    bare, tunnel = (
+        f"pixel.stack={{passivation: {layer.format(p, 2)}, oxide: {layer.format(o, 1.46)}}}"
+        for p, o in ((0, 0), (0.7, 3.35))
+    )
+    black = "processing=[{black_level: subtract}]"
+    left, left_bare = curve(lens, tunnel), curve(lens, bare)
+    taken, taken_bare = curve(lens, tunnel, black), curve(lens, bare, black)
+    assert (taken > taken_bare).all()
+    assert left[-1] < left_bare[-1]
+    for one, other in ((left, left_bare), (taken, taken_bare)):
+        assert best(one) > best(other) + 0.3
 
 
 def test_only_dark_current_over_light_counts(nominal):
