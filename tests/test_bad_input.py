@@ -229,7 +229,14 @@ case(
 case(
     "a percentage as a fraction",
     ("efficiency: 0.5", "efficiency: 50"),
-    says=[("15:25", "pixel.photodetector.quantum_efficiency", "50 is out of range", "write 50 %, or 0.5")],
+    says=[
+        (
+            "15:25",
+            "pixel.photodetector.quantum_efficiency",
+            "50 is out of range",
+            "write 50 %, or 0.5",
+        )
+    ],
 )
 
 # --- what contradicts itself
