@@ -26,7 +26,7 @@ from vcam_cli.readout.layout import Layout
 from vcam_cli.scheduling.estimators import PASSES
 from vcam_cli.simulation.plan import Plan
 
-NORMAL = 8.2e-9
+NORMAL = 7.1e-9
 """Drawing one normal number, the unit of speed [s]."""
 SAMPLE = 6e-9
 """Transforming one sample of one plane of the scene [s]."""
