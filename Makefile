@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 SOURCES := vcam_cli tests scripts
 CAMERA ?= still-life
 
-.PHONY: run test test-all lint check bench promise stability fuzz attacks schemas tables lock clean
+.PHONY: run test test-all lint check bench interchange promise stability fuzz attacks schemas tables lock clean
 
 run: $(VENV)/.runtime  ## simulate the shipped still life: out/still-life/
 	$(BIN)/vcam run $(CAMERA)
@@ -26,6 +26,9 @@ check: lint test-all  ## format, lint, spelling, types, all tests
 
 bench: $(VENV)/.dev  ## speed, as ratios: to bare transforms and draws, to plain NumPy, by camera, stage and effect
 	$(BIN)/python -m tests.bench
+
+interchange: $(VENV)/.dev  ## raw.dng in other people's readers: bits, colors and seconds, as a table
+	$(BIN)/python -m tests.interchange
 
 promise: $(VENV)/.dev  ## the plan's promises: cameras named, random, exactly known, and ten before eighteen scenes
 	$(BIN)/python -m tests.promise

@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcam_cli.files.atomic import write_whole
+from vcam_cli.files.dng_opcodes import gain_maps
 from vcam_cli.files.tiff import SOFTWARE, Tag, extra, library, mosaic_tags
 from vcam_cli.parallel import available_workers, results
 
@@ -60,6 +61,7 @@ CODES: dict[str, tuple[int, str]] = {
     "CalibrationIlluminant1": (50778, "H"),
     "CalibrationIlluminant2": (50779, "H"),
     "ActiveArea": (50829, "I"),
+    "OpcodeList2": (51009, "x"),
     "NoiseProfile": (51041, "d"),
 }
 """Tag -> its number, and its type as `files.tiff` has them."""
@@ -97,6 +99,8 @@ class RawImage:
     """Level of every code (N,), uint16; None where codes are levels."""
     baseline_exposure: float
     """Stops that bring the scene's white to the brightest of the picture [EV]."""
+    shading: NDArray | None
+    """Factors (M, N) that make even light even, at places from edge to edge; None for 1."""
     noise: tuple[float, float]
     """Variance of a level from 0 (black) to 1 (white): so much times the level, and so much
     more."""
@@ -184,11 +188,15 @@ def _tags(image: RawImage) -> list[Tag]:
         "DefaultCropOrigin": [margin, margin],
         "DefaultCropSize": [columns - 2 * margin, rows - 2 * margin],
         "BaselineExposure": [image.baseline_exposure],
-        "NoiseProfile": [*image.noise] * (count if image.colors is None else 3),
         "ExposureTime": [image.exposure_time],
         "FNumber": [image.f_number],
         "FocalLength": [image.focal_length * 1e3],
     }
+    if image.noise[0] > 0:  # else Adobe's reader warns of it
+        said["NoiseProfile"] = [*image.noise] * (count if image.colors is None else 3)
+    if image.shading is not None:
+        block = (len(image.block), len(image.block[0])) if image.block else (1, 1)
+        said["OpcodeList2"] = gain_maps(image.codes.shape, block, image.shading)
     if image.table is not None:
         said["LinearizationTable"] = image.table
     if image.colors is not None:
@@ -202,8 +210,10 @@ def _tags(image: RawImage) -> list[Tag]:
 
 
 def _tag(name: str, value: Any) -> Tag:
-    """Return a tag; a text, or numbers in any shape."""
+    """Return a tag; a text, bytes, or numbers in any shape."""
     code, kind = CODES[name]
+    if kind == "x":
+        return code, kind, len(value), value
     if kind == "s":
         return code, kind, len(value) + 1, value
     numbers = np.ravel(value).tolist()

@@ -19,12 +19,13 @@ from vcam_cli.errors import CannotDo
 from vcam_cli.files.atomic import write_whole
 
 Tag = tuple[int, str, int, Any]
-"""Number, type as `struct` writes it, count, and value of a tag; rationals are flat pairs "2I"."""
+"""Number, type as `struct` writes it, count, and value of a tag; rationals are flat pairs "2I",
+and "x" is bytes without a meaning in TIFF."""
 
 COLORS = {"R": 0, "G": 1, "B": 2, "C": 3, "M": 4, "W": 6}
 """Color -> its number in the tag CFAPattern of TIFF/EP (ISO 12234-2). Y is 5 there, yellow; here it
 may be the luminance of a pixel without filter, which is none of the tag's colors."""
-_TYPES = {"B": 1, "s": 2, "H": 3, "I": 4, "2I": 5, "2i": 10, "d": 12}
+_TYPES = {"B": 1, "s": 2, "H": 3, "I": 4, "2I": 5, "x": 7, "2i": 10, "d": 12}
 
 
 def write_tiff(

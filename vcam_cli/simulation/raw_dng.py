@@ -5,6 +5,9 @@ D65. Each is the inverse of what color correction is here, fitted to a ColorChec
 own lens, filters and silicon see it (`processing.color_correction`): a converter that takes the
 light's matrix and adapts white as Bradford has it comes to the same colors. Converters interpolate
 between the two for other lights; LibRaw takes that of D65 for all.
+
+What lens and pixels keep from the light toward the corners is written as gain maps: converters that
+know them (Adobe's, darktable's) make even light even again, LibRaw leaves it as it is.
 """
 
 from __future__ import annotations
@@ -18,6 +21,7 @@ from numpy.typing import NDArray
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import geometry
 from vcam_cli.camera.derived.mosaic import BLOCKS
+from vcam_cli.effects.base import Gain, of_kind
 from vcam_cli.effects.signal_chain import noise_sources
 from vcam_cli.errors import bad
 from vcam_cli.files.dng import LEAST_SIZE, LIGHT_SOURCES, MOST_BITS, Colors, RawImage, write_dng
@@ -31,6 +35,10 @@ from vcam_cli.spectra import Spectrum, cmf, colorchecker, illuminant, pair_weigh
 RANGE = (360e-9, 830e-9)
 """Wavelengths at which color is known [m]."""
 BAYER = tuple(BLOCKS[f"bayer-{name}"] for name in ("rggb", "grbg", "gbrg", "bggr"))
+MAP_POINTS = 65
+"""Rows and columns of a gain map."""
+LARGEST_GAIN = 64.0
+"""Of a gain map: what is darker than that is left dark."""
 TOP = (1 << MOST_BITS) - 1
 """Level of the highest code of a curve made straight."""
 _PATH = ("output", "dng")
@@ -86,6 +94,7 @@ def write_raw_dng(path: Path, frame: Frame, description: str) -> None:
         white=round(white),
         table=table,
         baseline_exposure=float(np.log2(span / light)) if light > 0 < span else 0.0,
+        shading=_shading(frame),
         noise=_noise(frame, span),
         name=frame.camera.name,
         exposure_time=frame.exposure_time,
@@ -95,6 +104,17 @@ def write_raw_dng(path: Path, frame: Frame, description: str) -> None:
         description=description,
     )
     write_dng(path, image)
+
+
+def _shading(frame: Frame) -> NDArray | None:
+    """Return how much brighter the axis is than places from edge to edge; None where it is not."""
+    gains, g = of_kind(frame.plan.active, Gain), frame.layout.grid
+    half_width, half_height = g.columns * g.pitch_x / 2, g.rows * g.pitch_y / 2
+    x, y = (np.linspace(-half, half, MAP_POINTS) for half in (half_width, half_height))
+    share, axis = np.ones((MAP_POINTS, MAP_POINTS)), np.zeros(1)
+    for effect in gains:
+        share *= effect.gain(x, y) / effect.gain(axis, axis)
+    return None if np.ptp(share) == 0 else 1 / np.maximum(share, 1 / LARGEST_GAIN)
 
 
 def _noise(frame: Frame, span: float) -> tuple[float, float]:

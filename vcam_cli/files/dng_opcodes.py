@@ -1,0 +1,44 @@
+"""Opcode lists of DNG files: corrections that a raw converter makes to a raw frame.
+
+Opcodes are big-endian in every file (Digital Negative specification 1.7.1, chapter 7).
+"""
+
+import struct
+
+import numpy as np
+from numpy.typing import NDArray
+
+_GAIN_MAP, _SINCE, _MAY_BE_SKIPPED = 9, 0x01030000, 1
+
+
+def gain_maps(shape: tuple[int, ...], block: tuple[int, int], gains: NDArray) -> bytes:
+    """Return an OpcodeList2 that multiplies a raw frame, after its black is subtracted.
+
+    Parameters
+    ----------
+    shape : tuple of int
+        Rows and columns of the frame; with the number of colors where every pixel has all.
+    block : (int, int)
+        Rows and columns of the block of colors that repeats; (1, 1) where there is none. Every
+        place in it has a map of its own: converters look for them so, though all are alike.
+    gains : ndarray
+        Factors (M, N) at places that lie evenly from edge to edge of the frame; converters
+        interpolate between them bilinearly.
+
+    Returns
+    -------
+    bytes
+        The value of the tag.
+    """
+    rows, columns, *planes = shape
+    points = gains.shape
+    values = np.ascontiguousarray(gains, ">f4").tobytes()
+    maps = []
+    for top, left in np.ndindex(block):
+        area = struct.pack(">4L", top, left, rows, columns)
+        acts_on = struct.pack(">4L", 0, planes[0] if planes else 1, *block)
+        spacing = (1 / (count - 1) for count in points)
+        grid = struct.pack(">2L4dL", *points, *spacing, 0.0, 0.0, 1)
+        said = area + acts_on + grid + values
+        maps.append(struct.pack(">4L", _GAIN_MAP, _SINCE, _MAY_BE_SKIPPED, len(said)) + said)
+    return struct.pack(">L", len(maps)) + b"".join(maps)
