@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 import yaml
 from making import camera
-
 from raw_readers import (
     adobe_codes,
     dngpy,
