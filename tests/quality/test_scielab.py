@@ -254,7 +254,7 @@ def test_memory_that_does_not_suffice(monkeypatch) -> None:
     """Fewer threads where some suffice, and else an error before the work."""
     one, other = np.random.default_rng(6).random((2, 40, 30, 3))
     whole = s_cielab_map(one, other, screen(1), "continuous", workers=4)
-    places = scielab._Places.of((40, 30), screen(1), "continuous")
+    places = scielab._Places.prepare((40, 30), screen(1), "continuous")
     single = places.needed_bytes(np.dtype(float), 1)
     monkeypatch.setattr(memory, "available", lambda: single + 1)
     assert places.require_memory(np.dtype(float), 4) == 1

@@ -22,7 +22,7 @@ from vcam_cli.errors import CannotDo, bad
 from vcam_cli.files import atomic
 from vcam_cli.files.folder import is_foreign
 from vcam_cli.files.records import PROGRAM, Fingerprint, Proofs, fingerprint, read_record
-from vcam_cli.files.report import hash_text, to_json
+from vcam_cli.files.report import file_digest, hash_text, to_json
 
 POINTS = "points"
 RECORD = "study.json"
@@ -132,9 +132,8 @@ class SweepFolder:
                 return None
             for name, digest in entry["hashes"].items():
                 path = self._file(key, name)
-                with open(path, "rb") as file:
-                    if hashlib.file_digest(file, "sha256").hexdigest() != digest:
-                        raise ValueError(name)
+                if file_digest(path) != digest:
+                    raise ValueError(name)
         except (FileNotFoundError, IsADirectoryError):
             return None
         except OSError as error:

@@ -29,11 +29,16 @@ def hash_text(text: str) -> str:
     return hashlib.sha256(text.encode("utf-8", "surrogateescape")).hexdigest()
 
 
+def file_digest(path: Path | str) -> str:
+    """Return the SHA-256 of a file, hexadecimal. Raise OSError where it cannot be read."""
+    with open(path, "rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
+
+
 def hash_file(path: Path | str) -> str:
     """Return the SHA-256 of a file, hexadecimal. Raise CannotDo when it cannot be read."""
     try:
-        with open(path, "rb") as file:
-            return hashlib.file_digest(file, "sha256").hexdigest()
+        return file_digest(path)
     except OSError as error:
         raise CannotDo(
             f"cannot read {path}: {error.strerror}", "check that the file can be read"

@@ -11,6 +11,8 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 import scipy.fft
@@ -59,6 +61,17 @@ FREQUENCIES = 1025
 """Entries of the crops' table over |f|."""
 
 
+class ChosenCells(NamedTuple):
+    """How finely a chart is painted."""
+
+    per_pixel: float
+    """Cells per pixel pitch."""
+    error: float = 0.0
+    """Rms of the signal on crops of the chart [e/s]; 0 where none were measured."""
+    trials: int = 0
+    """Times that the crops were painted for it, that of the reference among them."""
+
+
 def cell_grid(scene: ChartScene, geometry: Geometry, per_pixel: float) -> tuple[int, int]:
     """Return the cells of a chart on which transforms are fast.
 
@@ -82,7 +95,7 @@ def cell_grid(scene: ChartScene, geometry: Geometry, per_pixel: float) -> tuple[
     return fast[0], fast[1]
 
 
-def cells_per_pixel(path: OpticalPath, scene: ChartScene, highest: float) -> tuple[float, float]:
+def cells_per_pixel(path: OpticalPath, scene: ChartScene, highest: float) -> ChosenCells:
     """Return how finely a chart is painted, and the error that this leaves.
 
     Parameters
@@ -96,52 +109,41 @@ def cells_per_pixel(path: OpticalPath, scene: ChartScene, highest: float) -> tup
 
     Returns
     -------
-    cells : float
-        Cells per pixel pitch.
-    error : float
-        Rms of the signal on crops of the chart [e/s]; 0 where none were measured.
+    ChosenCells
+        Cells per pixel pitch, their error, and the trials that it took.
     """
     if path.settings.oversampling is not None:
-        return path.settings.oversampling, 0.0
+        return ChosenCells(path.settings.oversampling)
     asked = highest * max(BEYOND_CUTOFF, math.sqrt(FOLDED / path.settings.tolerance))
     finest = SAFE * asked
     reference = min(COPRIME * max(asked, LADDER[1]), MOST_CROP_CELLS / SMALLEST_CROP)
     if math.prod(cell_grid(scene, path.geometry, finest)) <= CHEAP:
-        return finest, 0.0
+        return ChosenCells(finest)
     level = path.transfer.level[:, int(path.transfer.level.sum(axis=0).argmax())]
     otf = _mean_otf(path, finest)
     crops = _crops(path, scene, reference, level)
     converged = _signals(path, crops, reference, level, otf)
     g = path.geometry
-    full = min(float(_within(g, converged).max()), path.ceiling)
+    within = partial(_within, g)
+    full = min(float(within(converged).max()), path.ceiling)
     budget = CELLS_SHARE * path.settings.tolerance * full
     whole = math.prod(cell_grid(scene, path.geometry, 1.0))
     most = min(finest, max(1.0, math.sqrt(MOST / whole)))
     least = OVEREXPOSED if converged.max() > path.ceiling else 0.0
-    cells, error = most, budget
+    cells, error, trials = most, budget, 1
     for cells in [c for c in LADDER if least <= c <= min(most, reference / COPRIME)]:
+        trials += 1
         found = _signals(path, crops, cells, level, otf)
         # Few pixels may have no error by chance; many around them may hide theirs.
-        error = max(
-            _error_that_counts(found, converged, path.ceiling),
-            _error_that_counts(_within(g, found), _within(g, converged), path.ceiling),
-        )
+        error = _error_that_counts(found, converged, path.ceiling)
+        if within(found).size < found.size:
+            error = max(error, _error_that_counts(within(found), within(converged), path.ceiling))
         if error <= budget:
             rows = crops[0].pitch_y / g.pitch_y
-            return max(cells, cell_grid(crops[0], g, cells)[0] / rows), error
+            return ChosenCells(max(cells, cell_grid(crops[0], g, cells)[0] / rows), error, trials)
     # It falls with the square of the cells, about: faster than is reckoned here.
     enough = min(cells * error / budget, most)
-    return enough, error * cells / enough
-
-
-def trials(scene: ChartScene, cells: float) -> int:
-    """Return how many times crops of a chart were painted until these cells per pixel were chosen.
-
-    The reference is one of them; where the finest cells are few, nothing is tried.
-    """
-    if math.prod(scene.shape) <= CHEAP:
-        return 0
-    return 1 + sum(1 for tried in LADDER if tried <= cells)
+    return ChosenCells(enough, error * cells / enough, trials)
 
 
 def _error_that_counts(found: NDArray, converged: NDArray, ceiling: float) -> float:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import pairwise
 
@@ -138,6 +138,33 @@ def scene_transfer(
         Band(wavelengths.start, wavelengths.stop, settings.wavelength_step),
         of_kind(effects, Blur),
     )
+
+
+def axis_levels(
+    camera: Camera,
+    geometry: Geometry,
+    settings: Settings,
+    spectra: Sequence[Spectrum],
+    mosaic: Mosaic,
+    gains: Sequence[Gain],
+) -> NDArray:
+    """Return the electrons per second of uniform radiances on the axis.
+
+    Parameters
+    ----------
+    camera, geometry, settings, spectra, mosaic
+        As those of `scene_transfer`.
+    gains : sequence of Gain
+        Gains of the camera.
+
+    Returns
+    -------
+    ndarray
+        (K, C) rates of K radiances in C colors [e/s].
+    """
+    # Levels are exact with any wavelengths: the first and the last are enough.
+    coarse = replace(settings, wavelength_step=math.inf)
+    return scene_transfer(camera, geometry, coarse, spectra, mosaic, gains).level
 
 
 @dataclass(frozen=True)

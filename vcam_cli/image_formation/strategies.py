@@ -23,7 +23,7 @@ from vcam_cli.effects.base import Blur, FieldTransfer, SeparableTransfer, of_kin
 from vcam_cli.image_formation import memory_model
 from vcam_cli.image_formation.bandwidth import LOWEST, axes, highest_passed, reach, table_size
 from vcam_cli.image_formation.box_average import box_averages, point_values
-from vcam_cli.image_formation.chart_cells import cell_grid, cells_per_pixel, trials
+from vcam_cli.image_formation.chart_cells import ChosenCells, cell_grid, cells_per_pixel
 from vcam_cli.image_formation.effect_changes import changes_by_omission, needed_modes
 from vcam_cli.image_formation.far_field import FarPart, far_parts, near_field
 from vcam_cli.image_formation.field_dependence import Mode, field_mixtures, tabulate_field
@@ -116,29 +116,29 @@ def _filtered_layers(path: OpticalPath, scene: SampledScene) -> tuple[Layers, Sp
         return _spectral_layers(path, scene, highest_passed(path, scene))
     near = near_field(path, scene, reach(path))
     rings = far_parts(path, near, scene, reach(path))
-    highest, error = highest_passed(path, near), 0.0
+    highest, chosen = highest_passed(path, near), None
     if scene.chart.edges() is None:
-        cells, error = cells_per_pixel(path, near, highest)
-        near = near.with_cells(cell_grid(near, path.geometry, cells))
-        highest = min(highest, cells)
-    return _spectral_layers(path, near, highest, error, rings)
+        chosen = cells_per_pixel(path, near, highest)
+        near = near.with_cells(cell_grid(near, path.geometry, chosen.per_pixel))
+        highest = min(highest, chosen.per_pixel)
+    return _spectral_layers(path, near, highest, chosen, rings)
 
 
 def _spectral_layers(
     path: OpticalPath,
     scene: SampledScene,
     highest: float,
-    error: float = 0.0,
+    chosen: ChosenCells | None = None,
     rings: Sequence[FarPart] = (),
 ) -> tuple[Layers, SpectrumReport]:
     """Return a scene on its cells, and the rings around it, through their cosine spectra.
 
-    `highest` is the frequency beyond which nothing counts [pixel Nyquist], `error` the rms that the
-    cells leave [e/s].
+    `highest` is the frequency beyond which nothing counts [pixel Nyquist], `chosen` are the
+    cells of a chart that is painted.
     """
     path = with_sufficient_precision(path, scene)
     exact, g, zones = path.transfer, path.geometry, path.zones
-    painted = scene if isinstance(scene, ChartScene) and scene.chart.edges() is None else None
+    painted = scene if chosen and isinstance(scene, ChartScene) else None
     size = table_size(path, highest)
     mixing = field_mixtures(exact, zones, size) if zones else mixtures([exact], size)
     needed = memory_model.image_bytes(path, scene, highest, len(mixing[0]), size, rings)
@@ -156,12 +156,12 @@ def _spectral_layers(
     planes = [plane for plane in tables.planes if plane is not None]
     report = SpectrumReport(
         oversampling=image.highest,
-        lost_rms=math.hypot(image.lost_rms, error),
+        lost_rms=math.hypot(image.lost_rms, chosen.error if chosen else 0.0),
         cells=0 if scene.rectangles(mixing[0]) is not None else math.prod(scene.shape),
         cells_per_pixel=g.pitch_x / scene.pitch_x if painted else 0.0,
         is_painted=painted is not None,
         edge_seconds=painted.chart.edge_seconds if painted else 0.0,
-        trials=trials(painted, g.pitch_x / scene.pitch_x) if painted else 0,
+        trials=chosen.trials if chosen else 0,
         far_parts=len(rings),
         far_cells=sum(math.prod(part.scene.shape) for part in rings),
         terms=image_filter.terms,

@@ -131,7 +131,7 @@ def s_cielab_map(
     """
     image, reference = _with_three_channels(image, reference)
     dtype = _float_type(image, reference)
-    places = _Places.of(image.shape[:2], screen, filters)
+    places = _Places.prepare(image.shape[:2], screen, filters)
     workers = places.require_memory(dtype, workers or available_workers())
     blur = _Blur.prepare(places, screen, filters, dtype)
     out = np.empty(image.shape[:2], dtype)
@@ -165,12 +165,12 @@ def needed_bytes(shape: tuple[int, int], screen: Screen, filters: Filters, worke
     int
         Bytes, with values of 32 bits.
     """
-    return _Places.of(shape, screen, filters).needed_bytes(np.dtype(np.float32), workers)
+    return _Places.prepare(shape, screen, filters).needed_bytes(np.dtype(np.float32), workers)
 
 
 def places_per_pixel(screen: Screen, filters: Filters) -> int:
     """Return the number of places at which each pixel is looked at."""
-    return _Places.of((1, 1), screen, filters).along ** 2
+    return _Places.prepare((1, 1), screen, filters).along ** 2
 
 
 @dataclass(frozen=True)
@@ -193,7 +193,7 @@ class _Places:
     """Rows and columns of a block's transform."""
 
     @classmethod
-    def of(cls, shape: tuple[int, int], screen: Screen, filters: Filters) -> "_Places":
+    def prepare(cls, shape: tuple[int, int], screen: Screen, filters: Filters) -> "_Places":
         """Return the places at which pictures of a shape are looked at."""
         per_degree, along, inside = screen.samples_per_degree, 1, 0.0
         if filters == "continuous":

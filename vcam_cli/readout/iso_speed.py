@@ -8,9 +8,6 @@ against infrared; dark signal does not count, as it depends on the time.
 
 from __future__ import annotations
 
-import math
-from dataclasses import replace
-
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.electrical import electrical
 from vcam_cli.camera.derived.geometry import Geometry
@@ -21,12 +18,10 @@ from vcam_cli.image_formation import photon_rate
 from vcam_cli.image_formation.settings import settings
 from vcam_cli.physics import radiometry, readout
 from vcam_cli.readout.layout import Layout
-from vcam_cli.spectra import illuminant, luminance
+from vcam_cli.spectra import VISIBLE, illuminant, luminance
 
 DAYLIGHT = "D55"
 """Illuminant of ISO 12232 for daylight, ISO 7589."""
-VISIBLE = (380e-9, 780e-9)
-"""Wavelengths at which light is measured in lux [m]."""
 
 
 def base_iso(camera: Camera, geometry: Geometry, layout: Layout) -> float:
@@ -54,9 +49,10 @@ def base_iso(camera: Camera, geometry: Geometry, layout: Layout) -> float:
     kinds = [kind for kind in ORDER if issubclass(kind, Gain)]
     wanted = [k.from_camera(camera, geometry) for k in kinds if not switched_off(camera, k.name)]
     gains = of_kind((gain for gain in wanted if gain is not None), Gain)
-    coarse = replace(settings(camera), wavelength_step=math.inf)  # no level depends on it
-    seen = photon_rate.scene_transfer(camera, geometry, coarse, [daylight], layout.mosaic, gains)
-    rate = float(seen.level.max()) * layout.binning_groups.summed_charges
+    levels = photon_rate.axis_levels(
+        camera, geometry, settings(camera), [daylight], layout.mosaic, gains
+    )
+    rate = float(levels.max()) * layout.binning_groups.summed_charges
     if rate <= 0:
         return 0.0
     circuit = electrical(camera.with_exposure_gain(1.0))

@@ -16,10 +16,8 @@ import math
 
 from vcam_cli.camera.scene import Scene
 from vcam_cli.errors import bad
-from vcam_cli.spectra import Spectrum, display_primaries, integral, luminance
+from vcam_cli.spectra import VISIBLE, Spectrum, display_primaries, integral, luminance
 
-VISIBLE = (380e-9, 780e-9)
-"""Wavelengths of what the eye sees [m]; beyond them is less than 2e-5 of the luminance of D65."""
 LASER_LINES = (650e-9, 550e-9, 450e-9)
 """Wavelengths of red, green and blue of an image that is shown by three lasers [1] [m]."""
 

@@ -5,7 +5,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property, partial
@@ -157,12 +156,10 @@ class Frame(Prepared):
         Electrons of pixels whose codes are added are, too.
         """
         gains = of_kind(self.plan.active, Gain)
-        # Levels are exact with any wavelengths: the first and the last are enough.
-        coarse = replace(self.settings, wavelength_step=math.inf)
-        seen = photon_rate.scene_transfer(
-            self.camera, self.geometry, coarse, spectra, self.mosaic, gains
+        levels = photon_rate.axis_levels(
+            self.camera, self.geometry, self.settings, spectra, self.mosaic, gains
         )
-        return np.asarray(seen.level.T * self.layout.binning_groups.signal_ratio)
+        return np.asarray(levels.T * self.layout.binning_groups.signal_ratio)
 
     def ideal_dn(self) -> NDArray:
         """Return the scene point-sampled at the pixels' centers, all colors everywhere [DN].

@@ -21,6 +21,7 @@ from vcam_cli.spectra.spectrum import (
 )
 from vcam_cli.spectra.standard import (
     LUMINOUS_EFFICACY,
+    VISIBLE,
     cmf,
     colorchecker,
     display_primaries,
@@ -37,6 +38,7 @@ __all__ = [
     "PHOTONS",
     "PLANCK",
     "SPEED_OF_LIGHT",
+    "VISIBLE",
     "Spectrum",
     "Table",
     "cmf",

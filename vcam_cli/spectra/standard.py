@@ -30,6 +30,8 @@ from vcam_cli.spectra.spectrum import Floats, Outside, Spectrum, Table
 from vcam_cli.spectra.text import read_rows
 
 DATA = Path(__file__).parent.parent / "data"
+VISIBLE = (380e-9, 780e-9)
+"""Wavelengths of what the eye sees [m]; beyond them is less than 2e-5 of the luminance of D65."""
 LUMINOUS_EFFICACY = 683.0  # [lm/W], at 540 THz, the definition of the candela
 EQUAL_ENERGY = ("E", "equal-energy")
 
