@@ -109,3 +109,21 @@ def test_the_brightest_light_is_a_bound_from_below(tmp_path, monkeypatch):
         float(made.mean_electrons.max()) / made.exposure_time, path.ceiling
     )
     assert detail.brightest > 0.2 * path.ceiling or detail.brightest > 50 * 100
+
+
+@pytest.mark.parametrize("rows, columns", [(24, 40), (33, 48), (60, 80), (90, 90), (100, 131)])
+@pytest.mark.parametrize(
+    "scene",
+    [
+        chart("slanted-edge", angle="0 deg"),
+        chart("slanted-edge"),
+        chart("step-wedge", steps=2),
+        chart("step-wedge", steps=3),
+    ],
+    ids=["upright edge", "slanted edge", "two steps", "three steps"],
+)
+def test_a_lone_edge_is_never_missed(scene, rows, columns, tmp_path, monkeypatch):
+    """Wherever it lies among the tiles of a small array."""
+    changes = {"array.rows": rows, "array.columns": columns} | scene
+    estimated = estimate(tmp_path, monkeypatch, changes, "diffraction")
+    assert estimated > 0.5 * change(tmp_path, changes, "diffraction")

@@ -26,6 +26,9 @@ TILE = 32
 """Pixels along a side of a tile, at most."""
 POINTS_PER_PIXEL = 2
 """Along each axis of a tile: up to the second Nyquist frequency."""
+OVERLAP = 1.25
+"""Length of the tiles that cover an array over that of its parts, at least: an edge between two
+parts lies within a tile, and never at the ends of both."""
 TILES = 16
 """Tiles that are transformed, at most."""
 ASKED = (1, 2, 4, 8)
@@ -172,8 +175,13 @@ def _tile_detail(path: OpticalPath, scene: Scene, level: NDArray, settled: Settl
     """
     g, rng = path.geometry, np.random.default_rng(0)
     size, pitch = np.array([g.rows, g.columns]), np.array([g.pitch_y, g.pitch_x])
-    counts = np.clip(np.round(size / TILE).astype(int), 1, MOST_PLACES)
-    side = np.minimum(TILE, size // counts)
+    # Few tiles cover all; the others lie anywhere around their places, to see what is between.
+    counts = np.where(size > TILE, np.ceil(size * OVERLAP / TILE), 1).astype(int)
+    side = np.minimum(TILE, size)
+    covers = counts.prod() <= TILES
+    if not covers:
+        counts = np.clip(np.round(size / TILE).astype(int), 1, MOST_PLACES)
+        side = np.minimum(TILE, size // counts)
     points, length = POINTS_PER_PIXEL * side, side * pitch
     even = _surveyed(path, scene, level, counts)
     parts = even.light.reshape(counts[0], SURVEY, counts[1], SURVEY)
@@ -182,9 +190,8 @@ def _tile_detail(path: OpticalPath, scene: Scene, level: NDArray, settled: Settl
     squares: list[NDArray] = []
     for place, share in zip(places, shares, strict=True):
         index = np.array(divmod(int(place), counts[1]))
-        # Anywhere around the place, so that what lies between two places is seen as well.
-        center = ((index + rng.random(2)) / counts - 0.5) * size * pitch
-        start = center - length / 2 if counts.prod() > 1 else -length / 2
+        place_in_part = 0.5 if covers else rng.random(2)
+        start = ((index + place_in_part) / counts - 0.5) * size * pitch - length / 2
         y, x = (
             first + (np.arange(n) + rng.random(n)) * (whole / n)
             for first, whole, n in zip(start, length, points, strict=True)
