@@ -7,8 +7,8 @@ import OpenImageIO as oiio
 import pytest
 from making import camera
 
-from vcam_cli import simulate
-from vcam_cli.simulation import spectral_irradiance
+from vcam_cli import BadInput, simulate
+from vcam_cli.simulation import checks, spectral_irradiance
 
 WORKING = 4 * 1.0 / (1.0 - 5e-3)
 """Image-side f-number of the plain camera: f/4, 5 mm, 1 m."""
@@ -152,3 +152,29 @@ def test_one_plane_at_a_time(tmp_path):
     planes = spectral_irradiance.planes(frame, 1)
     assert not next(planes).any()
     assert sum(plane.any() for plane in planes) == 1
+
+
+def test_points_are_the_values_of_the_published_table(tmp_path):
+    """CIE D65 as colour-science has it, straight between its 5 nm: 0.1 W/(sr m2) of white in all.
+
+    Means over bands of 10 nm differ from it by 4.8 % at 430 nm and 13.5 % at 760 nm.
+    """
+    import colour
+
+    table = colour.SDS_ILLUMINANTS["D65"]
+    inside = (table.wavelengths >= 380) & (table.wavelengths <= 780)
+    grid, values = table.wavelengths[inside], table.values[inside]
+    changes = {"scene.illuminant": "D65", "scene.wavelengths": {"step": "10 nm"}}
+    wavelengths, planes = of(tmp_path, changes | {"output.irradiance": {"sampling": "point"}})
+    expected = 0.1 * CONE / (np.trapezoid(values, grid) * 1e-9)
+    expected *= np.interp(wavelengths * 1e9, grid, values)
+    np.testing.assert_allclose(planes[:, 10, 10], expected, rtol=1e-9)
+    _, means = of(tmp_path, changes)
+    assert means[[5, 38], 10, 10] / expected[[5, 38]] == pytest.approx([1.048, 1.135], abs=5e-4)
+
+
+def test_lines_have_no_points(tmp_path):
+    changes = {"output.irradiance": {"sampling": "point"}}
+    camera(tmp_path, changes)
+    with pytest.raises(BadInput, match=r"output.irradiance.sampling: a line of light has no value"):
+        checks.load(tmp_path / "made.yaml")

@@ -3,7 +3,7 @@
 import struct
 
 import pytest
-from making import camera
+from making import GONE, camera
 from PIL import Image
 
 from vcam_cli import simulate
@@ -52,7 +52,8 @@ def test_attributes_are_those_of_the_standard(name, folder):
         assert said[attribute] == ("float", pytest.approx(value, rel=1e-6))
     assert said["vcam:illuminant"] == ("string", "D65")
     assert said["comments"] == ("string", "simulated, no photograph")
-    assert said["software"][1].startswith("vcam ")
+    for name in ("software", "vcam:simulatedBy"):
+        assert said[name][1].startswith("vcam ")
 
 
 @pytest.mark.parametrize(
@@ -87,3 +88,18 @@ def test_the_render_says_that_it_is_simulated_and_how(folder):
     assert "simulated, no photograph" in text
     assert "expTime 0.02" in text
     assert "vcam:illuminant D65" in text
+
+
+def test_the_ideal_image_says_which_colors_it_has(tmp_path):
+    """Red, green, blue and white of ITU-R BT.709, in the order of OpenEXR's `chromaticities`."""
+    color = {"quality": ["mse"], "array.pattern": "bayer-rggb", "scene.illuminant": "D65"}
+    result = simulate(camera(tmp_path, color | {"processing": GONE}))
+    said = header((result.save(tmp_path / "color") / "ideal.exr").read_bytes())
+    kind, value = said["chromaticities"]
+    expected = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)
+    assert kind == "chromaticities"
+    assert struct.unpack("<8f", value) == pytest.approx(expected, rel=1e-6)
+    assert said["comments"][1] == "simulated, no photograph"
+    plain = {"processing": [{"demosaic": "bilinear"}]}  # colors of the camera, not of a display
+    raw = simulate(camera(tmp_path, color | plain)).save(tmp_path / "raw")
+    assert "chromaticities" not in header((raw / "ideal.exr").read_bytes())

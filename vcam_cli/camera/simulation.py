@@ -175,6 +175,24 @@ def _render(given: Any) -> int | None:
     raise refusal((), *one_of(given, (8, 16, "none")), given)
 
 
+class Irradiance(Model):
+    """How the spectral irradiance on the sensor is sampled over wavelength."""
+
+    sampling: Literal["band", "point"] = key(
+        "band: mean over the band of each channel, which falls straight to 0 at the neighboring"
+        " wavelengths; point: value at the channel's wavelength",
+        default="band",
+    )
+
+
+def _irradiance(given: Any) -> Any:
+    if isinstance(given, bool):
+        return given
+    if isinstance(given, (Mapping, Irradiance)):
+        return Irradiance.model_validate(given)
+    raise refusal((), *one_of(given, ("true", "false"), "{sampling: point}"), given)
+
+
 class Output(Model):
     """What a run writes beside run.json and metrics.csv."""
 
@@ -186,8 +204,10 @@ class Output(Model):
     render: Annotated[
         Literal[8, 16] | None, Either(_render, Literal[8, 16, "none"], words={"none": None})
     ] = key("bits of render.png: 8, 16 or none", default=8)
-    irradiance: Annotated[bool, Strict()] = key(
-        "also write irradiance.exr: W/(m2 nm) on the sensor, a channel a wavelength", default=False
+    irradiance: Annotated[bool | Irradiance, Either(_irradiance, bool | Irradiance)] = key(
+        "also write irradiance.exr: W/(m2 nm) on the sensor, a channel a wavelength; true has means"
+        " over bands, {sampling: point} the values at the wavelengths",
+        default=False,
     )
     dng: Annotated[bool, Strict()] = key(
         "also write raw.dng, for raw converters: of Bayer mosaics, gray and stacked pixels",
@@ -197,3 +217,9 @@ class Output(Model):
         "also write raw.tif: the whole numbers of the raw frame, with the pattern of its colors",
         default=False,
     )
+
+    @property
+    def irradiance_sampling(self) -> str:
+        """Whether channels of irradiance.exr are means over bands or points."""
+        given = self.irradiance
+        return given.sampling if isinstance(given, Irradiance) else "band"

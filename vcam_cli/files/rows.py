@@ -21,7 +21,7 @@ from vcam_cli.errors import CannotDo
 from vcam_cli.files.atomic import cannot_write, write_whole
 from vcam_cli.files.image_library import oiio
 
-Attribute = str | int | float
+Attribute = str | int | float | tuple[float, ...]
 _FULL = 1 << 16  # bytes: a failed write on a disk with less room is the disk's fault
 
 
@@ -126,6 +126,8 @@ def set_attributes(spec: oiio.ImageSpec, attributes: Mapping[str, Attribute]) ->
             spec.attribute(name, int(value) if small else str(int(value)))
         elif isinstance(value, float | np.floating):
             spec.attribute(name, float(value))
+        elif isinstance(value, tuple):
+            spec.attribute(name, oiio.TypeDesc(f"float[{len(value)}]"), value)
         else:
             spec.attribute(name, str(value))
 

@@ -44,6 +44,8 @@ MIN_COLOR_DIFFERENCE = 1e-3
 
 _XY = np.array([[0.64, 0.33], [0.30, 0.60], [0.15, 0.06]])  # BT.709 primaries, and white D65
 _D65 = np.array([0.3127 / 0.3290, 1.0, (1 - 0.3127 - 0.3290) / 0.3290])
+CHROMATICITIES = (*map(float, _XY.ravel()), 0.3127, 0.3290)
+"""x, y of red, green, blue and white of the colors that come out, as OpenEXR has them."""
 _PRIMARIES = np.array([_XY[:, 0] / _XY[:, 1], np.ones(3), (1 - _XY.sum(axis=1)) / _XY[:, 1]])
 RGB_TO_XYZ = _PRIMARIES * np.linalg.solve(_PRIMARIES, _D65)
 """Matrix from linear BT.709 to XYZ; white (1, 1, 1) has Y = 1."""

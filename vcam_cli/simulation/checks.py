@@ -24,7 +24,7 @@ from vcam_cli.quality.display import display_screen
 from vcam_cli.readout.layout import layout
 from vcam_cli.scenes.build import SOURCE, check_channels
 from vcam_cli.scenes.hyperspectral import check_bands
-from vcam_cli.simulation import plan, raw_dng
+from vcam_cli.simulation import plan, raw_dng, spectral_irradiance
 
 
 def load(camera: str | Path, sets: Sequence[str] = ()) -> Camera:
@@ -149,5 +149,6 @@ CHECKS: tuple[files.CameraCheck, ...] = (
     (check_lens, "optics scene pixel array effects"),
     (check_formats, "output"),
     (raw_dng.check, "pixel array exposure adc output"),
+    (spectral_irradiance.check, "scene output"),
     (check_display, "optics scene pixel array quality display"),
 )

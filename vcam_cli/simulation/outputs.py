@@ -25,9 +25,11 @@ from vcam_cli.files.folder import OutputFolder
 from vcam_cli.files.maps import write_map
 from vcam_cli.files.png import write_png
 from vcam_cli.files.report import hash_file, hash_text, to_json
+from vcam_cli.files.rows import Attribute
 from vcam_cli.files.spectral.exr import write_spectral
 from vcam_cli.files.tables import write_metrics
 from vcam_cli.parallel import ThreadPool
+from vcam_cli.processing.color_correction import CHROMATICITIES
 from vcam_cli.simulation import provenance, raw_dng, raw_file, spectral_irradiance
 from vcam_cli.simulation.figures import exposure_report
 from vcam_cli.simulation.frame import Frame
@@ -82,6 +84,14 @@ def _render(result: Result, path: Path, render: NDArray) -> None:
     write_png(path, render, "; ".join(f"{name} {value}" for name, value in taken.items()))
 
 
+_SAMPLING = {
+    "band": " and over the channel's band, which falls straight to 0 at the neighboring"
+    " wavelengths; lines of light count whole",
+    "point": ", at the channel's wavelength",
+}
+"""Sampling -> what a channel is."""
+
+
 def _irradiance(result: Result, path: Path) -> None:
     """Spectral irradiance on the sensor, computed and written wavelength by wavelength."""
     frame = result.frame
@@ -95,8 +105,9 @@ def _irradiance(result: Result, path: Path) -> None:
     said = {
         "name": frame.camera.name,
         "vcam:version": vcam_cli.__version__,
-        "vcam:quantity": "spectral irradiance on the sensor, mean over each pixel's cell and over"
-        " the channel's band, which falls straight to 0 at the neighboring wavelengths",
+        "vcam:quantity": "spectral irradiance on the sensor, mean over each pixel's cell"
+        + _SAMPLING[frame.camera.output.irradiance_sampling],
+        "vcam:unit": "W/(m2 nm)",
         **raw_file.photograph(frame),
         "vcam:configHash": config_hash(frame.camera),
     }
@@ -152,10 +163,23 @@ def _ideal(result: Result, path: Path) -> None:
     """Write the ideal image in linear display RGB (Y for monochrome)."""
     ideal = result.ideal
     names = ("Y",) if ideal.shape[2] == 1 else ("R", "G", "B")
-    with ExrWriter(path, ideal.shape[:2], names, {"name": result.frame.camera.name}) as exr:
+    with ExrWriter(path, ideal.shape[:2], names, _ideal_attributes(result.frame)) as exr:
         for row in range(0, len(ideal), ROWS_AT_ONCE):
             rows = slice(row, row + ROWS_AT_ONCE)
             exr.write_rows(row, {n: ideal[rows, :, i] for i, n in enumerate(names)})
+
+
+def _ideal_attributes(frame: Frame) -> dict[str, Attribute]:
+    """Return what ideal.exr says; chromaticities where its colors are corrected to a display's."""
+    corrected = any(
+        step.name == "color_correction" and step.value != "none" for step in frame.camera.processing
+    )
+    return {
+        "name": frame.camera.name,
+        "vcam:quantity": "the scene point-sampled at the pixels' centers, linear, white = 1",
+        **({"chromaticities": CHROMATICITIES} if corrected else {}),
+        **raw_file.photograph(frame),
+    }
 
 
 def config_hash(camera: Camera) -> str:

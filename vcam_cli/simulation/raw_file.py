@@ -161,6 +161,7 @@ def photograph(frame: Frame) -> dict[str, Attribute]:
     return {
         "software": tiff.SOFTWARE,
         "comments": "simulated, no photograph",
+        "vcam:simulatedBy": tiff.SOFTWARE,
         "expTime": frame.exposure_time,
         "aperture": frame.geometry.f_number,
         "effectiveFocalLength": frame.geometry.focal_length * 1e3,

@@ -9,6 +9,10 @@ A band is a hat function on one wavelength of the camera's nodes, as wide as its
 apart, and the value is the band's irradiance over the hat's area. So the sum of all values times
 these areas (the trapezoid rule) is the irradiance of the whole range exactly, whatever lines the
 lamp has; between the nodes it means the spectrum that is straight from node to node.
+
+`sampling: point` has the values at the nodes instead: what tables print, and other programs compute
+with. A spectrum that bends between the nodes differs from its means (D65 at steps of 10 nm by 4.8 %
+at 430 nm and 13 % at 760 nm), and a line has no such value.
 """
 
 from __future__ import annotations
@@ -19,10 +23,12 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry, pixel_centers
 from vcam_cli.camera.derived.mosaic import Mosaic
 from vcam_cli.effects.base import Blur, Gain, VeilingGlare, of_kind
 from vcam_cli.effects.pixel_aperture import PixelAperture
+from vcam_cli.errors import bad
 from vcam_cli.image_formation import photon_rate
 from vcam_cli.image_formation.optical_path import Layer, OpticalPath
 from vcam_cli.image_formation.strategies import image_layers
@@ -41,6 +47,17 @@ MARGIN = 32
 """Pixels that a chart goes on beyond a picture's grid that is not the raw frame's."""
 DARK = 1e-12
 """Share of the brightest band below which a band is rounding, of a line beside it, and no light."""
+
+
+def check(camera: Camera) -> None:
+    """Raise BadInput for point samples of light that consists of lines."""
+    if camera.output.irradiance_sampling == "band":
+        return
+    source, light = camera.scene.source, camera.scene.illuminant
+    laser = source.kind == "image" and source.model == "laser"
+    if laser or (light is not None and light.line is not None):
+        message = "a line of light has no value per nanometer at a wavelength"
+        raise bad(("output", "irradiance", "sampling"), message, "write irradiance: true")
 
 
 def nodes(ready: Prepared) -> NDArray:
@@ -122,6 +139,8 @@ def levels(ready: Prepared, wavelengths: NDArray) -> NDArray:
     per_radiance = float(radiometry.irradiance_per_radiance(g.f_number, g.magnification))
     transmittance = ready.camera.optics.transmittance.resolve()
     spectra = [s.multiply(transmittance) for s in ready.scene.spectra]
+    if ready.camera.output.irradiance_sampling == "point":
+        return per_radiance * np.array([s.evaluate(wavelengths) for s in spectra])
     bands = np.array([hat_weights(s, wavelengths) for s in spectra])
     return per_radiance * bands / hat_weights(Spectrum.flat(1.0), wavelengths)
 
