@@ -111,7 +111,7 @@ def test_the_brightest_light_is_a_bound_from_below(tmp_path, monkeypatch):
     assert detail.brightest > 0.2 * path.ceiling or detail.brightest > 50 * 100
 
 
-@pytest.mark.parametrize("rows, columns", [(24, 40), (33, 48), (60, 80), (90, 90), (100, 131)])
+@pytest.mark.parametrize(("rows", "columns"), [(24, 40), (33, 48), (60, 80), (90, 90), (100, 131)])
 @pytest.mark.parametrize(
     "scene",
     [

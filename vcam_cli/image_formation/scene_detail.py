@@ -183,7 +183,7 @@ def _tile_detail(path: OpticalPath, scene: Scene, level: NDArray, settled: Settl
         counts = np.clip(np.round(size / TILE).astype(int), 1, MOST_PLACES)
         side = np.minimum(TILE, size // counts)
     points, length = POINTS_PER_PIXEL * side, side * pitch
-    even = _surveyed(path, scene, level, counts)
+    even = _surveyed(path, scene, level, counts.tolist())
     parts = even.light.reshape(counts[0], SURVEY, counts[1], SURVEY)
     places, shares = _tile_places(_contrast(parts), rng)
     brightest = float(parts.mean(axis=(1, 3)).max())
