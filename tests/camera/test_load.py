@@ -6,7 +6,8 @@ import pytest
 
 from vcam_cli.camera.load import load
 from vcam_cli.config import shipped
-from vcam_cli.errors import BadInput, CannotDo, bad
+from vcam_cli.config.yaml_tree import walk
+from vcam_cli.errors import BadInput, CannotDo, bad, dotted_path
 
 CAMERA = """\
 scene:
@@ -370,3 +371,19 @@ def test_further_checks_are_made_with_the_others_where_their_sections_are_right(
     with pytest.raises(BadInput):
         load("camera.yaml", [chosen], checks=[(check, "exposure")])
     assert seen == ["camera", "camera"]
+
+
+@pytest.mark.parametrize("name", shipped.names("cameras"))
+def test_an_empty_mapping_empties_every_section_of_every_camera(name):
+    """Nothing that a base gave there stays; where that leaves too little, the file says so."""
+    here = load(name).source_tree
+    for path, node in walk(here.tree):
+        if not path or not node.mapping or not all(isinstance(key, str) for key in path):
+            continue
+        try:
+            emptied = load(name, [f"{dotted_path(path)}={{}}"]).source_tree.tree
+        except BadInput:
+            continue
+        for key in path:
+            emptied = emptied.get(key)
+        assert emptied.plain() == {}, path

@@ -29,6 +29,11 @@ def merged(base: str, over: str, path=()) -> object:
         ("{a: [1, 2]}", "{a: [3]}", {"a": [3]}),
         ("{a: [1, {x: 1, y: 2}]}", "{a: {1: {x: 3}}}", {"a": [1, {"x": 3, "y": 2}]}),
         ("{a: 1}", "{a: ~}", {"a": None}),
+        # an empty mapping empties, but for the whole tree
+        ("{a: {b: 1}, c: 2}", "{a: {}}", {"a": {}, "c": 2}),
+        ("{a: {b: {c: 1}}}", "{a: {b: {}}}", {"a": {"b": {}}}),
+        ("{a: [{x: 1}]}", "{a: {}}", {"a": {}}),
+        ("{a: 1}", "{}", {"a": 1}),
         # a table of a spectrum is one value
         ("{table: {400: 1, 500: 2}}", "{table: {450: 3}}", {"table": {450: 3}}),
         # other numbered keys are merged
@@ -37,6 +42,14 @@ def merged(base: str, over: str, path=()) -> object:
 )
 def test_merging(base, over, result):
     assert merged(base, over) == result
+
+
+def test_what_follows_an_empty_mapping_stands_alone():
+    """Overrides that are merged among themselves first mean the same one after the other."""
+    base, steps = tree("{a: {b: 1, c: 2}}"), (tree("{a: {}}"), tree("{a: {c: 3}}"))
+    over = merge(*steps, MERGE_RULES)
+    assert merge(base, over, MERGE_RULES).plain() == {"a": {"c": 3}}
+    assert merge(merge(base, steps[0]), steps[1]).plain() == {"a": {"c": 3}}
 
 
 @pytest.mark.parametrize(

@@ -220,3 +220,37 @@ def test_every_shipped_mosaic_tells_its_colors() -> None:
         report = exposure_report(frame)
         assert set(report.clipped) == set(frame.mosaic.colors)
         assert 0 < max(report.clipped.values()) <= 1
+
+
+def notes(folder: Path, changes: dict, word: str) -> list[str]:
+    return [n for n in simulate(camera(folder, changes)).notes if word in n]
+
+
+@pytest.mark.parametrize("key", ["exposure.gain", "exposure.iso"])
+@pytest.mark.parametrize("share", [0.19, 0.5, 0.999, 1.0, 2.0])
+def test_a_gain_that_leaves_codes_unused_is_told(key: str, share: float, tmp_path) -> None:
+    """Behind a gain below 1 the well is full at that part of full scale; from 1 on all act."""
+    base = simulate(camera(tmp_path)).metrics["base_iso"]
+    found = notes(tmp_path, {key: share if key == "exposure.gain" else share * base}, "full scale")
+    assert len(found) == (share < 1)
+    assert all(f"pixels are full at {100 * share:.3g} %" in note for note in found)
+    assert all(("below the base ISO" in note) == (key == "exposure.iso") for note in found)
+
+
+def test_a_low_gain_before_an_adc_that_is_full_first_is_not_told(tmp_path) -> None:
+    """At gain 1 its codes end at half the well: half the gain reaches all of it."""
+    steep = {"adc.gain": f"{2 * 4095 / WELL!r} DN/e", "adc.offset": "0 DN"}
+    assert not notes(tmp_path, steep | {"exposure.gain": 0.5}, "full scale")
+    assert notes(tmp_path, steep | {"exposure.gain": 0.25}, "full scale")
+
+
+@pytest.mark.parametrize("architecture", ["aps-3t", "ccd"])
+def test_where_charge_beyond_the_well_goes_is_told(architecture: str, tmp_path) -> None:
+    """In closed form: light of 3.5 wells leaves 2.5 of them; of one well nothing."""
+    kind = {"pixel.architecture": architecture}
+    bright = kind | {"scene.radiance": radiance_for(3.5 * WELL)}
+    [note] = notes(tmp_path, bright, "beyond the full well")
+    assert "2.5 times what all wells hold, is drained" in note
+    assert "blooming" in note
+    assert ("smear" in note) == (architecture == "ccd")
+    assert not notes(tmp_path, kind | {"scene.radiance": radiance_for(WELL)}, "full well")

@@ -1,7 +1,7 @@
 """Lays one YAML tree over another: what `extends`, `use` and `--set` mean.
 
-Mappings are merged key by key, anything else is replaced. `MergeRules` keep an override from
-meaning what nobody wrote.
+Mappings are merged key by key, anything else is replaced; an empty mapping under a key empties it.
+`MergeRules` keep an override from meaning what nobody wrote.
 """
 
 from collections.abc import Mapping
@@ -56,9 +56,17 @@ def merge(base: Node, over: Node, rules: MergeRules = NO_RULES, path: errors.Pat
     merged = dict(kept)
     for key, node in over.mapping.items():
         both = key in kept and key not in rules.single_values
-        merged[key] = merge(kept[key], node, rules, child_path(path, key)) if both else node
+        merged[key] = _merge_entry(kept[key], node, rules, child_path(path, key)) if both else node
     keys = {key: node for key, node in (base.keys | over.keys).items() if key in merged}
     return replace(base, value=merged, keys=keys)
+
+
+def _merge_entry(base: Node, over: Node, rules: MergeRules, path: errors.Path) -> Node:
+    """Lay over an entry: an empty mapping empties it, and what both are laid over later."""
+    if over.mapping == {}:
+        return over
+    merged = merge(base, over, rules, path)
+    return replace(merged, whole=True) if base.mapping == {} else merged
 
 
 def _remaining_entries(
@@ -86,5 +94,5 @@ def _merge_list(base: Node, over: Node, rules: MergeRules, path: errors.Path) ->
             message = f"there is no element {index} in this list of {len(elements)}"
             remedy = f"use 0 to {len(elements) - 1}" if elements else "give the whole list"
             raise BadInput([node.problem(child_path(path, index), message, remedy)])
-        elements[index] = merge(elements[index], node, rules, (*path, index))
+        elements[index] = _merge_entry(elements[index], node, rules, (*path, index))
     return replace(base, value=elements)

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from vcam_cli.camera.architecture import ARCHITECTURES
 from vcam_cli.camera.derived import photodiode
 from vcam_cli.camera.derived.dark_noise import SIGMAS, dark_noise
 from vcam_cli.camera.scene import ImageFile
@@ -16,6 +17,10 @@ from vcam_cli.spectra import luminance
 
 VISIBLE_CLIPPING = 0.01
 """Part of the pixels whose noise is worth a word when it is clipped."""
+VISIBLE_OVERFLOW = 0.01
+"""Charge beyond the wells that is worth a word, over what all wells hold."""
+PIXELS_AT_ONCE = 1 << 20
+"""Pixels that are looked at together, so that no copy of the frame is needed."""
 VISIBLE_CROP = 5e-4
 """Part of a picture that is worth a word when it is cut off."""
 
@@ -29,6 +34,8 @@ def remarks(ready: Prepared) -> tuple[str, ...]:
         *_scheduled_times(ready),
         *_blind_colors(ready),
         *_clipped_dark(ready),
+        *_unused_codes(ready),
+        *_overflow(ready),
         *_colors_of_picture(ready),
         *_cropped(ready),
     )
@@ -72,6 +79,38 @@ def _clipped_dark(ready: Prepared) -> tuple[str, ...]:
     return (
         f"adc.offset of {e.offset:g} DN clips the noise of dark pixels ({100 * share:.3g} % of"
         f" all): {what}; write offset: auto",
+    )
+
+
+def _unused_codes(ready: Prepared) -> tuple[str, ...]:
+    """Return why the ADC's highest codes are out of reach: at a low gain pixels are full before."""
+    e, gain, iso = ready.electrical, ready.camera.exposure_gain, ready.camera.exposure.iso
+    share = e.full_well / e.adc_full_scale
+    if gain >= 1 or share > 1 - 1 / e.highest_code:
+        return ()
+    what = f"at an exposure.gain of {gain:.4g}"
+    if iso is not None:
+        what = f"ISO {iso:g} is below the base ISO of {ready.base_iso:.4g}: at a gain of {gain:.4g}"
+    return (
+        f"{what} pixels are full at {100 * share:.3g} % of the ADC's full scale; highlights ask for"
+        " less time, not for less gain",
+    )
+
+
+def _overflow(ready: Prepared) -> tuple[str, ...]:
+    """Return where charge goes that wells do not hold; no blooming or smear is simulated."""
+    well, rate = ready.electrical.full_well, ready.rate.reshape(-1)
+    dark, time = ready.dark_rate * ready.exposure_time, ready.exposure_time
+    blocks = (rate[i : i + PIXELS_AT_ONCE] for i in range(0, rate.size, PIXELS_AT_ONCE))
+    beyond = sum(float(np.maximum(block * time + (dark - well), 0).sum()) for block in blocks)
+    share = beyond / (well * rate.size)
+    if share < VISIBLE_OVERFLOW:
+        return ()
+    ccd = ARCHITECTURES[ready.camera.pixel.architecture].transfers
+    smear = ", and none is collected while charge is transferred (smear)" if ccd else ""
+    return (
+        f"charge beyond the full well, {share:.3g} times what all wells hold, is drained: none"
+        f" spills to neighbors (blooming){smear}",
     )
 
 
