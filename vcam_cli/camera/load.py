@@ -8,7 +8,14 @@ from typing import Any
 from vcam_cli.arguments import require_name, require_overrides
 from vcam_cli.camera import hints
 from vcam_cli.camera.camera import Camera
-from vcam_cli.camera.derived import electrical, falloff, geometry, named_spectra, photodiode
+from vcam_cli.camera.derived import (
+    electrical,
+    falloff,
+    geometry,
+    lens_mtf,
+    named_spectra,
+    photodiode,
+)
 from vcam_cli.config import document, overrides, shipped
 from vcam_cli.config import merge as merging
 from vcam_cli.config.document import Document
@@ -86,6 +93,7 @@ FORMAT = FileFormat(
         (geometry.check, "scene optics pixel array"),
         (electrical.check, "pixel adc"),
         (falloff.check, "scene optics pixel array"),
+        (lens_mtf.check, "scene optics pixel array"),
         (photodiode.check, "pixel"),
     ),
     stand_in=example,

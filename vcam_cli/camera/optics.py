@@ -55,6 +55,16 @@ class Psf(Model):
     rules = (at_most_one("wavelength", "wavelengths"), _channels_differ)
 
 
+class MtfFile(Model):
+    """Modulation transfer of the lens, measured or from a lens program."""
+
+    file: File = key(
+        "CSV file with the columns frequency_lp_per_mm,value, and wavelength_nm or "
+        "image_height_mm where it has them; straight in between",
+        example="mtf.csv",
+    )
+
+
 Terms = tuple[tuple[int, float], ...]
 """((Noll index, coefficient [m]), ...)"""
 _COEFFICIENT = Quantity("length")
@@ -161,14 +171,14 @@ def _is_determined(given: Mapping[str, Any]) -> Iterator[InitErrorDetails]:
         )
 
 
-def _psf_alone(given: Mapping[str, Any]) -> Iterator[InitErrorDetails]:
-    """Refuse defocus and aberrations beside a point spread function, which has them in it."""
-    if given.get("psf") in (None, "none"):
-        return
-    for name in ("defocus", "zernike"):
-        if name in given and not _neutral(name, given[name]):
-            message = "cannot be given beside psf, which has all aberrations in it"
-            yield fault((name,), message, f"remove {name}, or write psf: none", given[name])
+def _measured_alone(given: Mapping[str, Any]) -> Iterator[InitErrorDetails]:
+    """Refuse defocus, aberrations or each other beside a measured blur, which has all in it."""
+    measured = [name for name in ("psf", "mtf") if given.get(name) not in (None, "none")]
+    for name in ("defocus", "zernike", *measured[1:]):
+        if measured and name in given and (name in measured or not _neutral(name, given[name])):
+            message = f"cannot be given beside {measured[0]}, which has all aberrations in it"
+            remedy = f"remove {name}, or write {measured[0]}: none"
+            yield fault((name,), message, remedy, given[name])
 
 
 def _neutral(name: str, given: Any) -> bool:
@@ -237,8 +247,19 @@ class Optics(Model):
         example="none",
         default=None,
     )
+    mtf: Annotated[MtfFile | None, word_or(MtfFile, {"none": None})] = key(
+        "a measured modulation transfer in place of aberrations and diffraction; where it ends "
+        "above 0 it goes on like diffraction",
+        example="none",
+        default=None,
+    )
     stray_light: Fraction = key(
         "fraction of the mean irradiance that is spread evenly", default=0.0
     )
 
-    rules = (_is_determined, _psf_alone)
+    rules = (_is_determined, _measured_alone)
+
+    @property
+    def measured_blur(self) -> bool:
+        """Whether the blur was measured as a whole, aberrations and diffraction in it."""
+        return self.psf is not None or self.mtf is not None

@@ -1,9 +1,10 @@
-"""Blur by the lens's aberrations: defocus, Zernike wavefronts, or a point spread function.
+"""Blur by the lens's aberrations: defocus, Zernike wavefronts, or what was measured.
 
 `Diffraction` says what diffraction leaves of contrast; an aberration is the factor that makes it
 less. Which kind of blur a camera has depends on its file:
 
     point_spread.py     a point spread function, measured or from a lens program
+    measured_mtf.py     a measured modulation transfer, the same everywhere or over the field
     field_blur.py       a wavefront that changes over the field, or turns with the azimuth
     wavefront_blur.py   a wavefront that is the same everywhere, symmetric about the axis or not
 """
@@ -13,6 +14,7 @@ from __future__ import annotations
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.effects.field_blur import FieldBlur
+from vcam_cli.effects.measured_mtf import FieldMtf, MeasuredMtf
 from vcam_cli.effects.point_spread import PointSpread
 from vcam_cli.effects.wavefront_blur import (
     AberrationBlur,
@@ -24,7 +26,7 @@ from vcam_cli.effects.wavefront_blur import (
 from vcam_cli.errors import bad
 from vcam_cli.physics import aberration
 
-KINDS = (PointSpread, SymmetricBlur, DirectedBlur, FieldBlur)
+KINDS = (PointSpread, MeasuredMtf, FieldMtf, SymmetricBlur, DirectedBlur, FieldBlur)
 """Kinds of blur; a camera has at most one of them."""
 
 
@@ -48,7 +50,7 @@ def check(camera: Camera, geometry: Geometry) -> None:
     BadInput
         For a wavefront that rises by too many wavelengths over a pupil radius.
     """
-    if camera.optics.psf is not None or not Lens.from_camera(camera, geometry).diffracts:
+    if camera.optics.measured_blur or not Lens.from_camera(camera, geometry).diffracts:
         return
     shortest = camera.scene.wavelengths.start
     slopes = [

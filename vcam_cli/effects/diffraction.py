@@ -17,13 +17,13 @@ class Diffraction(RadialTransfer):
 
     name = "diffraction"
     reference = "Chen 2003, section 2.2.1; Goodman, Introduction to Fourier Optics, section 6.3"
-    absent = "the file says optics.diffraction: false, or gives a point spread function instead"
+    absent = "the file says optics.diffraction: false, or gives psf or mtf instead"
     origin = "lens"
 
     @classmethod
     def from_camera(cls, camera, geometry):
         """Return the diffraction of the lens, or None where the file leaves it out."""
-        replaced = camera.optics.psf is not None and not switched_off(camera, "aberration")
+        replaced = camera.optics.measured_blur and not switched_off(camera, "aberration")
         if replaced or not camera.optics.diffraction:
             return None
         return cls(geometry.f_number, geometry.magnification)

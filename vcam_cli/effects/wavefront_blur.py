@@ -30,7 +30,7 @@ class AberrationBlur(Effect):
 
     name = "aberration"
     reference = "Hopkins 1955, doi:10.1098/rspa.1955.0158; Noll 1976, doi:10.1364/JOSA.66.000207"
-    absent = "the file gives no defocus, no zernike and no psf"
+    absent = "the file gives no defocus, no zernike, no psf and no mtf"
     origin = "lens"
 
 
