@@ -14,6 +14,7 @@ from vcam_cli.camera.camera import Camera
 from vcam_cli.characterization.bench import Bench, prepare_bench
 from vcam_cli.characterization.datasheet import COLUMNS, Quantity, notes, quantities
 from vcam_cli.characterization.exposures import Channel, measure_channels
+from vcam_cli.characterization.kept_frames import Keeper
 from vcam_cli.errors import BadInput
 from vcam_cli.parallel import available_workers
 from vcam_cli.progress import Observer, Silent, Stages
@@ -75,7 +76,10 @@ class Characterization:
 
 
 def characterize(
-    camera: Camera, workers: int | None = None, watch: Observer | None = None
+    camera: Camera,
+    workers: int | None = None,
+    watch: Observer | None = None,
+    keeper: Keeper | None = None,
 ) -> Characterization:
     """Measure a camera.
 
@@ -87,6 +91,8 @@ def characterize(
         Threads; by default as many as there are processors. Results do not depend on it.
     watch : Observer, optional
         Told of stages.
+    keeper : Keeper, optional
+        Shown the flat and dark frames.
 
     Raises
     ------
@@ -96,7 +102,7 @@ def characterize(
     try:
         stages = Stages(watch=watch or Silent())
         bench = prepare_bench(camera, workers or available_workers(), stages)
-        channels = measure_channels(bench, stages)
+        channels = measure_channels(bench, stages, keeper)
     except BadInput as error:
         raise error.with_places(camera.locate) from None
     numbers = tuple(q for channel in channels for q in quantities(bench, channel))

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from vcam_cli.characterization import closed_form
 from vcam_cli.characterization.bench import Bench, edge_rate, prepare_edge_bench
+from vcam_cli.characterization.kept_frames import Keeper, Kind, NoFrames
 from vcam_cli.errors import bad
 from vcam_cli.progress import Stages
 from vcam_cli.quality import mtf, nonuniformity
@@ -106,7 +107,9 @@ class Channel:
         return self.dark.signal.current / self.transfer.gain
 
 
-def measure_channels(bench: Bench, stages: Stages) -> tuple[Channel, ...]:
+def measure_channels(
+    bench: Bench, stages: Stages, keeper: Keeper | None = None
+) -> tuple[Channel, ...]:
     """Take all frames, and measure every color.
 
     Parameters
@@ -115,20 +118,27 @@ def measure_channels(bench: Bench, stages: Stages) -> tuple[Channel, ...]:
         The camera in even light.
     stages : Stages
         Told of the progress.
+    keeper : Keeper, optional
+        Shown the flat and dark frames.
 
     Raises
     ------
     BadInput
         If the photon transfer is no line.
     """
+    keeper = keeper or NoFrames()
     numbers = iter(range(1 << 30))  # of the frames: none is taken twice
     with stages("flats"):
-        series = _flat_series(bench, numbers, stages)
-        plateau = _frame_means(bench, PLATEAU * bench.saturation, numbers)
+        series = _flat_series(bench, numbers, stages, keeper)
+        bright = bench.flat_frame(PLATEAU * bench.saturation, next(numbers))
+        plateau = _frame_means(bench, bright)
     with stages("darks"):
-        dark = _dark_measurements(bench, numbers)
+        dark = _dark_measurements(bench, numbers, keeper)
     with stages("stacks"):
-        unlit, lit = (_stacks(bench, level * bench.saturation, numbers) for level in (0.0, 0.5))
+        unlit, lit = (
+            _stacks(bench, level * bench.saturation, numbers, keeper) for level in (0.0, 0.5)
+        )
+    keeper.finish()
     with stages("edge"):
         edges = measure_edges(bench, numbers, stages)
     channels = []
@@ -172,14 +182,16 @@ def flat_levels(bench: Bench) -> NDArray:
     return full * np.unique(np.concatenate(parts))
 
 
-def _flat_series(bench: Bench, numbers: Iterator[int], stages: Stages) -> dict[str, Series]:
+def _flat_series(
+    bench: Bench, numbers: Iterator[int], stages: Stages, keeper: Keeper
+) -> dict[str, Series]:
     """Take pairs of flat frames at all levels, and of dark ones."""
     electrons = flat_levels(bench)
-    dark = _pair_statistics(bench, 0.0, numbers, PAIRS)
+    dark = _pair_statistics(bench, 0.0, numbers, PAIRS, keeper)
     levels = []
     for done, level in enumerate(electrons):
         stages.watch.step(done, len(electrons))
-        levels.append(_pair_statistics(bench, float(level), numbers, 1))
+        levels.append(_pair_statistics(bench, float(level), numbers, 1, keeper))
     return {
         color: Series(
             photons=electrons / bench.efficiency(color),
@@ -193,28 +205,39 @@ def _flat_series(bench: Bench, numbers: Iterator[int], stages: Stages) -> dict[s
 
 
 def _pair_statistics(
-    bench: Bench, electrons: float, numbers: Iterator[int], count: int, time: float | None = None
+    bench: Bench,
+    electrons: float,
+    numbers: Iterator[int],
+    count: int,
+    keeper: Keeper,
+    time: float | None = None,
 ) -> dict[str, tuple[float, float]]:
-    """Return mean and temporal variance of every color, averaged over pairs of frames."""
+    """Return mean and temporal variance of every color, averaged over pairs of frames.
+
+    The first pair is kept.
+    """
+    time = bench.time if time is None else time
+    kind: Kind = "pair" if time == bench.time else "dark"
     pairs: dict[str, list[tuple[float, float]]] = {color: [] for color in bench.colors}
-    for _ in range(count):
+    for done in range(count):
         frames = [bench.flat_frame(electrons, next(numbers), time) for _ in range(2)]
+        for frame in frames if done == 0 else ():
+            keeper.add(bench, kind, electrons, time, frame)
         for color, statistics in pairs.items():
             first, second = (bench.color_pixels(frame, color) for frame in frames)
             statistics.append(pair_statistics(first, second))
     return {c: (float(np.mean(p, 0)[0]), float(np.mean(p, 0)[1])) for c, p in pairs.items()}
 
 
-def _frame_means(
-    bench: Bench, electrons: float, numbers: Iterator[int], time: float | None = None
-) -> dict[str, float]:
+def _frame_means(bench: Bench, frame: NDArray) -> dict[str, float]:
     """Return the mean of one frame, of every color."""
-    frame = bench.flat_frame(electrons, next(numbers), time)
     pixels = {color: bench.color_pixels(frame, color) for color in bench.colors}
     return {color: float(values.mean(dtype=np.float64)) for color, values in pixels.items()}
 
 
-def _dark_measurements(bench: Bench, numbers: Iterator[int]) -> dict[str, DarkMeasurement]:
+def _dark_measurements(
+    bench: Bench, numbers: Iterator[int], keeper: Keeper
+) -> dict[str, DarkMeasurement]:
     """Take dark frames from no time up to one in which the dark is a good part of saturation.
 
     Without dark current, up to the exposure time. The noise at no time is that of reset and
@@ -224,8 +247,12 @@ def _dark_measurements(bench: Bench, numbers: Iterator[int]) -> dict[str, DarkMe
     if bench.ready.dark_rate > 0:
         longest = DARK_LEVEL * bench.ready.electrical.saturation / bench.ready.dark_rate
     times = np.linspace(0, longest, DARK_TIMES)
-    means = [_frame_means(bench, 0.0, numbers, float(time)) for time in times]
-    shortest = _pair_statistics(bench, 0.0, numbers, PAIRS, 0.0)
+    means = []
+    for time in map(float, times):
+        frame = bench.flat_frame(0.0, next(numbers), time)
+        keeper.add(bench, "dark", 0.0, time, frame)
+        means.append(_frame_means(bench, frame))
+    shortest = _pair_statistics(bench, 0.0, numbers, PAIRS, keeper, 0.0)
     return {
         color: DarkMeasurement(dark_signal(times, [m[color] for m in means]), shortest[color][1])
         for color in bench.colors
@@ -233,12 +260,13 @@ def _dark_measurements(bench: Bench, numbers: Iterator[int]) -> dict[str, DarkMe
 
 
 def _stacks(
-    bench: Bench, electrons: float, numbers: Iterator[int]
+    bench: Bench, electrons: float, numbers: Iterator[int], keeper: Keeper
 ) -> dict[str, nonuniformity.Stack]:
     """Return the statistics of many frames at one level."""
     running = {color: nonuniformity.RunningStack() for color in bench.colors}
     for _ in range(STACK):
         frame = bench.flat_frame(electrons, next(numbers))
+        keeper.add(bench, "stack", electrons, bench.time, frame)
         for color, stack in running.items():
             stack.add(bench.color_pixels(frame, color))
     return {color: stack.result() for color, stack in running.items()}

@@ -2,7 +2,9 @@
 
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
+
+import typer
 
 from vcam_cli.commands import options
 from vcam_cli.commands.progress import Progress
@@ -37,6 +39,14 @@ def characterize(
     set_: options.Set = None,
     seed: options.Seed = None,
     accuracy: options.Accuracy = None,
+    keep_frames: Annotated[
+        bool,
+        typer.Option(
+            "--keep-frames",
+            help="Also write the flat and dark frames as TIFF, with a descriptor file for"
+            " emva1288, the standard's own program.",
+        ),
+    ] = False,
     as_json: options.Json = False,
     quiet: options.Quiet = False,
     workers: options.Workers = None,
@@ -51,8 +61,10 @@ def characterize(
     Example:
       vcam characterize starter
       vcam characterize camera.yaml --set scene.illuminant="{monochromatic: 525 nm}"
+      vcam characterize kac-12040 --keep-frames
     """
     from vcam_cli.characterization import characterize as study
+    from vcam_cli.characterization.kept_frames import DESCRIPTOR, FrameFiles
     from vcam_cli.characterization.plots import characterization_panels
     from vcam_cli.files import curves, report, tables
     from vcam_cli.files.folder import OutputFolder
@@ -64,7 +76,8 @@ def characterize(
     path = out or Path("out") / model.name
     place = OutputFolder(path, record="characterize.json", inputs=inputs)
     with place as folder, Progress(quiet) as progress:
-        found = study.characterize(model, workers, progress)
+        keeper = FrameFiles(folder.new) if keep_frames else None
+        found = study.characterize(model, workers, progress, keeper)
         rows = (quantity.row for quantity in found.quantities)
         tables.write_table(folder.new("characterize.csv"), study.COLUMNS, rows)
         for name, (title, panels) in characterization_panels(found).items():
@@ -77,6 +90,8 @@ def characterize(
         print(report.to_json({"out": str(path), **found.report()}), end="")
     elif not quiet:
         print_report(found, path)
+        if keep_frames:
+            print(f"{path}/frames: TIFF files of each color, and {DESCRIPTOR}, which lists them")
 
 
 def print_report(found: "Characterization", path: Path) -> None:
