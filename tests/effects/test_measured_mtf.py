@@ -1,5 +1,6 @@
 """Modulation transfer from a file: straight between its points, over wavelength and field."""
 
+import itertools
 import math
 
 import numpy as np
@@ -33,7 +34,7 @@ def blur_of(folder, table: str, **changes):
 
 def straight(f: float, rows=ROWS) -> float:
     """By hand: the line between the points around a frequency [lp/mm]."""
-    for (f0, v0), (f1, v1) in zip(rows, rows[1:], strict=False):
+    for (f0, v0), (f1, v1) in itertools.pairwise(rows):
         if f0 <= f <= f1:
             return (v0 + (v1 - v0) * (f - f0) / (f1 - f0)) / rows[0][1]
     return 0.0
