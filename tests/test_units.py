@@ -160,6 +160,7 @@ def in_pint(unit: str) -> str:
         return f"1/{unit[:-2]}**3"
     text = re.sub(r"(?<=m)([23])", r"**\1", unit)
     text = text.replace("(sr ", "(sr*").replace(" sr)", "*sr)")
+    text = re.sub(r"sqrt\(V\)|V0\.5", "V**0.5", text)
     text = text.replace("cycles/", "1/").replace("mcd", "millicandela")
     return f"1{text}" if text.startswith("/") else text
 

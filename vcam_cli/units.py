@@ -167,6 +167,7 @@ def render(value: float, dimension: str) -> str:
 def _spellings(unit: str) -> str:
     """Return a regular expression of the ways to write `unit`: um, µm; m2, m^2, m²."""
     unit = re.sub(r"([()])", r"\\\1", unit).replace("u", "[uµμ]").replace("deg", "(deg|°)")
+    unit = unit.replace("V0.5", "V\\^?0[.]5")
     return re.sub(r"(?<=m)2", "\\^?[2²]", re.sub(r"(?<=m)3", "\\^?[3³]", unit))
 
 
@@ -317,6 +318,8 @@ def _dimensions() -> dict[str, Dimension]:
                   _per(farad, {"um": Fraction(1, 10**6)} | cm_or_m), ("fF/um", "pF/um"),
                   "0.297 fF/um"),
         Dimension("concentration", "a concentration", "1/m3", per_volume, ("1/cm3",), "1e15 1/cm3"),
+        Dimension("body_effect", "a body-effect coefficient", "sqrt(V)",
+                  {"sqrt(V)": Fraction(1), "V0.5": Fraction(1)}, ("sqrt(V)",), "0.5 sqrt(V)"),
         Dimension("diffusivity", "a diffusivity", "m2/s", _per(area, {"s": Fraction(1)}),
                   ("cm2/s",), "12 cm2/s"),
     ]  # fmt: skip

@@ -9,6 +9,7 @@ from pydantic_core import InitErrorDetails
 from vcam_cli.camera.architecture import ARCHITECTURES, article
 from vcam_cli.camera.photodetector import Photodetector
 from vcam_cli.camera.technology import CHOICE, TechnologyChoice
+from vcam_cli.camera.transfer_curve import TransferCurve
 from vcam_cli.config.model import Model, at_most_one, exactly_one, key
 from vcam_cli.config.quantities import Number, Quantity, Whole
 from vcam_cli.config.validation_messages import fault, refusal
@@ -58,6 +59,11 @@ class Readout(Model):
     full_well: Annotated[float | None, Quantity("charge", above=0)] = key(
         "electrons a pixel can hold; enough by itself",
         example="69 ke",
+        default=None,
+    )
+    transfer_curve: Annotated[TransferCurve | None, word_or(TransferCurve, {"linear": None})] = key(
+        "from charge to the output of the pixel: linear, or its capacitance and source follower",
+        example="linear",
         default=None,
     )
     gain: Positive = key(
@@ -264,6 +270,10 @@ class Pixel(Model):
             where = ("readout", "charge_transfer")
             message = f"{article(name)} {name} pixel transfers no charge"
             raise refusal(where, message, "remove it, or write architecture: ccd")
+        curve = readout.transfer_curve
+        if curve is not None and curve.follower is not None and name == "pps":
+            path = ("readout", "transfer_curve", "follower")
+            raise refusal(path, "a passive pixel has no follower", "remove it")
         of_bit_line = kind.reset_noise == "bit line" and readout.reset_noise == "ktc"
         if of_bit_line and readout.bit_line_capacitance is None:
             where = ("readout", "bit_line_capacitance")

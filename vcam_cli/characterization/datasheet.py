@@ -13,13 +13,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from vcam_cli.characterization.bench import Bench
 from vcam_cli.characterization.closed_form import saturation_capacity
 from vcam_cli.characterization.exposures import Channel
+from vcam_cli.effects.order import quantizer
 from vcam_cli.physics import readout
 from vcam_cli.quality.mtf import crossing_frequency
 from vcam_cli.quality.nonuniformity import Nonuniformity
@@ -27,6 +28,7 @@ from vcam_cli.quality.photon_transfer import (
     MIN_DARK_VARIANCE,
     ROUNDING,
     electrons_of_variance,
+    linearity,
     sensitivity_threshold,
 )
 
@@ -100,6 +102,12 @@ def notes(bench: Bench, channels: tuple[Channel, ...]) -> Iterator[str]:
             f"the ADC's offset of {bench.ready.electrical.offset:g} DN cuts off noise in the dark;"
             f" measured with codes moved up by {bench.pedestal} DN, as EMVA 1288 asks"
         )
+    curve = bench.ready.electrical.curve
+    if curve is not None:
+        yield (
+            f"the transfer curve is off a line by at most {curve.nonlinearity:.2%} of its output:"
+            " gain and all counts in electrons are those that a linear camera would have"
+        )
     if any(c.transfer.series.dark_variance < MIN_DARK_VARIANCE for c in channels):
         yield (
             "the noise in the dark is masked by the ADC's rounding: temporal_dark_noise and"
@@ -125,10 +133,24 @@ def _response_rows(bench: Bench, channel: Channel) -> Iterator[Row]:
     yield "read_noise", read_noise, math.sqrt(bench.noise_floor), "e", definition
     definition = f"mu_I.mean, {R4} section 7"
     yield "dark_current", channel.dark_current, bench.ready.dark_rate, "e/s", definition
-    yield "linearity_error", 100 * straight.error, 0.0, "%", f"LE, {R4} eq 63"
+    error, low, high = _expected_linearity(bench, channel)
+    yield "linearity_error", 100 * straight.error, 100 * error, "%", f"LE, {R4} eq 63"
     definition = f"of the deviations, {R4} eq 62"
-    yield "linearity_error_min", 100 * straight.min_deviation, 0.0, "%", definition
-    yield "linearity_error_max", 100 * straight.max_deviation, 0.0, "%", definition
+    yield "linearity_error_min", 100 * straight.min_deviation, 100 * low, "%", definition
+    yield "linearity_error_max", 100 * straight.max_deviation, 100 * high, "%", definition
+
+
+def _expected_linearity(bench: Bench, channel: Channel) -> tuple[float, float, float]:
+    """Return the linearity error of the readout's curve, its least and its largest deviation."""
+    if bench.ready.electrical.curve is None:
+        return 0.0, 0.0, 0.0
+    code = quantizer(bench.ready.camera, bench.ready.geometry)
+    series = channel.transfer.series
+    electrons = series.photons * bench.efficiency(channel.color) + bench.dark
+    black = float(code.response(np.array([bench.dark]))[0])
+    without_noise = replace(series, mean=code.response(electrons), dark_mean=black)
+    straight = linearity(without_noise)
+    return straight.error, straight.min_deviation, straight.max_deviation
 
 
 def _range_rows(bench: Bench, channel: Channel) -> Iterator[Row]:

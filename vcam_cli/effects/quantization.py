@@ -1,4 +1,4 @@
-"""The ADC, linear or logarithmic."""
+"""The ADC, linear or logarithmic, and the curve of the readout in front of it."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vcam_cli.camera.derived.electrical import electrical
+from vcam_cli.camera.derived.transfer_curve import Curve
 from vcam_cli.effects.signal_chain import Quantizer
 
 
@@ -25,8 +26,10 @@ class Quantization(Quantizer):
 
     @classmethod
     def from_camera(cls, camera, geometry):
-        """Return the camera's ADC, linear or logarithmic."""
+        """Return the camera's ADC, linear or logarithmic, with the readout's curve."""
         e = electrical(camera)
+        if e.curve is not None and e.reference is None:
+            return CurvedQuantization(e.curve, e.offset, e.full_scale / e.analog_gain, e.bits)
         if e.reference is None:
             return cls(e.offset, e.electrons_per_dn, e.bits)
         volts_per_electron = e.conversion_gain * e.analog_gain
@@ -113,6 +116,64 @@ class LogarithmicQuantization(Quantizer):
         signal *= self._span * self.bend / self.full
         signal += self.offset
         return signal
+
+
+@dataclass(frozen=True)
+class CurvedQuantization(Quantizer):
+    """Linear ADC behind a readout whose volts are not proportional to the charge.
+
+    dn = clip(round(offset + span v(electrons) / full_scale), 0, 2^bits - 1).
+    """
+
+    curve: Curve
+    offset: float
+    full_scale: float
+    """Volts of the pixel at the highest code."""
+    bits: int
+
+    name = Quantization.name
+    reference = "Chen 2003, section 2.4.1 and Fig 2.18"
+    absent = Quantization.absent
+    seconds_per_pixel = 200e-9
+
+    @classmethod
+    def from_camera(cls, camera, geometry):
+        """Return the camera's ADC behind a transfer curve, None where that is a line."""
+        found = Quantization.from_camera(camera, geometry)
+        return found if isinstance(found, cls) else None
+
+    def describe(self) -> str:
+        """Return a short clause with this camera's numbers and units."""
+        dark = 1 / (self.curve.slope * self._codes_per_volt)
+        known = ", which the processing takes out" if self.curve.corrected else ""
+        return (
+            f"{dark:.4g} electrons a step in the dark, {2**self.bits} codes; the transfer curve is"
+            f" off a line by at most {self.curve.nonlinearity:.2%} of its output{known}"
+        )
+
+    @property
+    def _codes_per_volt(self) -> float:
+        return (2**self.bits - 1 - self.offset) / self.full_scale
+
+    def response(self, electrons):
+        """Return the codes before rounding and clipping [DN]."""
+        level = self.curve.volts_of(electrons)
+        level *= self._codes_per_volt
+        level += self.offset
+        return level.astype(electrons.dtype)
+
+    def apply(self, electrons):
+        """Return the codes of `electrons`, rounded and clipped [DN]."""
+        return _round_and_clip(self.response(electrons), self.bits)
+
+    def linear(self, dn):
+        """Return the codes [DN] of the curve's chord, where the processing takes the curve out."""
+        if not self.curve.corrected:
+            return dn
+        signal = self.curve.electrons_of((dn - self.offset) / self._codes_per_volt)
+        signal *= (2**self.bits - 1 - self.offset) / float(self.curve.electrons_of(self.full_scale))
+        signal += self.offset
+        return signal.astype(dn.dtype)
 
 
 def _round_and_clip(level, bits):

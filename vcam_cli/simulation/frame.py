@@ -165,10 +165,15 @@ class Frame(Prepared):
         """Return the scene point-sampled at the pixels' centers, all colors everywhere [DN].
 
         It is (C, rows, columns) of the picture, without blur, falloff and noise; black is included.
+        Where the processing leaves the readout's curve in, it is straight from black to white.
         """
         place = self.layout
         level = self.transfer.level.T * self.exposure_time * place.binning_groups.signal_ratio
         photo = self.scene.values_at(place.picture_x, place.picture_y, level)
+        if self.electrical.curve is not None and not self.electrical.curve.corrected:
+            white = self.white_rate * self.exposure_time * self.summed_codes
+            span = np.where(white > 0, self.white_dn - self.black_dn, 0.0)
+            return self.black_dn + photo * (span / np.where(white > 0, white, 1))[:, None, None]
         return self.to_dn(photo + self.dark_rate * self.exposure_time * self.summed_codes)
 
 

@@ -17,7 +17,7 @@ from vcam_cli.camera.architecture import ARCHITECTURES
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived import photodiode
 from vcam_cli.camera.derived.dark_current import dark_rate
-from vcam_cli.camera.derived.electrical import electrical
+from vcam_cli.camera.derived.electrical import Electrical, electrical
 from vcam_cli.camera.derived.pixel_layout import detector
 from vcam_cli.camera.photodetector import DarkCurrentDensity
 from vcam_cli.config.model import Model
@@ -26,6 +26,8 @@ from vcam_cli.spectra import Spectrum
 
 PROBES = (2.0, 0.5, 1.1, 0.9)
 """Factors by which a number is changed to see whether anything follows from it."""
+STRAIGHT = 1e-9
+"""Distance from a line, relative to the output, below which a transfer curve is one."""
 QE_WAVELENGTHS = np.array([4e-7, 5.5e-7, 7e-7])
 """Where the quantum efficiency is looked at [m]."""
 
@@ -44,6 +46,11 @@ def _gain_cancels(camera: Camera) -> bool:
     adc = camera.adc
     follows = adc.gain is not None or (adc.full_scale is None and adc.reference is None)
     return follows and "volts" not in camera.output.raw
+
+
+def _curve_is_straight(camera: Camera) -> bool:
+    curve = electrical(camera).curve
+    return curve is None or curve.nonlinearity < STRAIGHT
 
 
 def _needs_no_temperature(camera: Camera) -> bool:
@@ -76,12 +83,18 @@ def _needs_no_viewer(camera: Camera) -> bool:
 
 
 _DETECTOR = "pixel.photodetector"
+_CURVE = "pixel.readout.transfer_curve"
 RULES = (
     Rule(
         ("pixel.readout.gain",),
         _gain_cancels,
         "the ADC's full scale follows it, so that it cancels; the photographer's gain is"
         " exposure.gain",
+    ),
+    Rule(
+        (f"{_CURVE}.corrected",),
+        _curve_is_straight,
+        "the transfer curve is a line, and there is nothing to take out",
     ),
     Rule(
         ("exposure.auto.percentile",),
@@ -166,8 +179,8 @@ def _is_given(camera: Camera, path: str) -> bool:
 
 
 def _process_overrides(camera: Camera) -> Iterator[str]:
-    """Yield the paths of a process's numbers that the camera's own file gives."""
-    for path in ("pixel.technology", f"{_DETECTOR}.junction"):
+    """Yield the paths of numbers of a process and its readout that the camera's own file gives."""
+    for path in ("pixel.technology", f"{_DETECTOR}.junction", _CURVE):
         section = camera
         for name in path.split("."):
             section = getattr(section, name)
@@ -179,7 +192,7 @@ def _numbers(section: Any, path: str) -> Iterator[str]:
         return
     for name in type(section).model_fields:
         value = getattr(section, name)
-        if name in ("from_", "scaling"):
+        if name not in section.model_fields_set or name in ("from_", "scaling"):
             continue  # a file's numbers serve pixels of all kinds
         if isinstance(value, Model):
             yield from _numbers(value, f"{path}.{name}")
@@ -214,12 +227,21 @@ def _figures(camera: Camera) -> tuple[Any, ...]:
         circuit.full_well,
         circuit.electrons_per_dn,
         circuit.conversion_gain if "volts" in camera.output.raw else None,
+        _coded_curve(circuit, "volts" in camera.output.raw),
         (circuit.capacitance, camera.pixel.temperature) if reset else None,
         dark_rate(camera),
         tuple(np.ravel(_sampled(efficiency)).tolist()),
         photodiode.diffusion(camera),
         detector(camera),
     )
+
+
+def _coded_curve(circuit: Electrical, in_volts: bool) -> tuple[tuple[float, ...], ...]:
+    """Return the readout's transfer curve relative to the ADC's full scale, or in volts."""
+    if circuit.curve is None:
+        return ()
+    unit = 1.0 if in_volts else circuit.full_scale / circuit.analog_gain
+    return circuit.curve.electrons, tuple(volts / unit for volts in circuit.curve.volts)
 
 
 def _sampled(efficiency: Spectrum) -> Any:

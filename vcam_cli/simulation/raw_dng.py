@@ -80,7 +80,7 @@ def write_raw_dng(path: Path, frame: Frame, description: str) -> None:
     levels = np.array([frame.black_dn, frame.saturated_dn, frame.white_dn.max()])
     linear = frame.linear(levels)
     table, (black, white) = None, levels[:2]
-    if frame.electrical.reference is not None:
+    if frame.electrical.linearized:
         curve = frame.linear(np.arange(_highest_code(frame.camera, frame.summed_codes) + 1.0))
         scale = TOP / (curve[-1] - curve[0])
         table = np.rint((curve - curve[0]) * scale).astype(np.uint16)

@@ -31,6 +31,8 @@ from vcam_cli.rng import BLOCK_ROWS
 from vcam_cli.simulation.frame import Frame
 
 ROWS_AT_ONCE = 4 * BLOCK_ROWS
+CURVE_STEP = 64
+"""Of the points of a transfer curve, every so many are written."""
 
 UNITS = {"dn": "DN", "electrons": "e", "volts": "V"}
 """Unit of each channel of raw.exr."""
@@ -42,11 +44,10 @@ Channel = Callable[[slice], NDArray]
 def write_raw(path: Path, frame: Frame, config_hash: str) -> None:
     """Write raw.exr, block by block."""
     e = frame.electrical
-    scale = np.float32(e.conversion_gain * e.analog_gain)
-    values = {
+    values: Values = {
         "dn": (frame.dn, None),
         "electrons": (frame.electrons, None),
-        "volts": (frame.electrons, scale),
+        "volts": (frame.electrons, e.volts_of),
     }
     asked = {name: values[name] for name in frame.camera.output.raw}
     units: dict[str, Attribute] = {f"vcam:unit.{name}": UNITS[name] for name in asked}
@@ -82,8 +83,10 @@ def write_hdr(path: Path, frame: Frame, config_hash: str) -> None:
     _write(path, frame, {"photocurrent": (frame.photocurrent, None)}, said)
 
 
-Values = dict[str, tuple[NDArray, np.floating | None]]
-"""What a file holds: by name an array in the shape of the raw frame, and a factor on it."""
+Conversion = Callable[[NDArray], NDArray]
+"""What some rows become in the file."""
+Values = dict[str, tuple[NDArray, Conversion | None]]
+"""What a file holds: by name an array in the shape of the raw frame, and what it becomes."""
 
 
 def _write(path: Path, frame: Frame, values: Values, said: dict[str, Attribute]) -> None:
@@ -99,26 +102,35 @@ def _write(path: Path, frame: Frame, values: Values, said: dict[str, Attribute])
 def _channels(frame: Frame, values: Values) -> Iterator[tuple[str, Channel]]:
     """Names and rows of the channels, in the order of the file."""
     place = frame.layout
-    for name, (array, factor) in values.items():
+    for name, (array, conversion) in values.items():
         if place.full_color:
             for color, plane in zip(frame.mosaic.colors, array, strict=True):
-                yield f"{name}.{color}", _rows_of(plane, factor)
+                yield f"{name}.{color}", _rows_of(plane, conversion)
         else:
             one_row = array.reshape(1, -1) if place.is_scattered else array
-            yield name, _rows_of(one_row, factor)
+            yield name, _rows_of(one_row, conversion)
     if place.is_scattered:
-        yield "x", _rows_of(place.x.reshape(1, -1), 1e6)
-        yield "y", _rows_of(place.y.reshape(1, -1), 1e6)
+        yield "x", _rows_of(place.x.reshape(1, -1), _micrometers)
+        yield "y", _rows_of(place.y.reshape(1, -1), _micrometers)
         yield "color", _rows_of(place.color.reshape(1, -1), None)
 
 
-def _rows_of(array: NDArray, factor: float | np.floating | None) -> Channel:
-    return lambda rows: array[rows] if factor is None else array[rows] * factor
+def _rows_of(array: NDArray, conversion: Conversion | None) -> Channel:
+    return lambda rows: array[rows] if conversion is None else conversion(array[rows])
+
+
+def _micrometers(values: NDArray) -> NDArray:
+    return values * 1e6
 
 
 _LINEAR = (
     "dn are the whole numbers of the ADC, not parts of 1: light from 0 to 1 is"
     " (dn - blackLevel) / (whiteLevel - blackLevel)"
+)
+_CURVED = (
+    "dn are the whole numbers of the ADC, not parts of 1; (dn - adcOffset) / (whiteLevel -"
+    " adcOffset) x adcFullScale is the output of the pixel in volts, and transferCurve lists"
+    " electrons:volts of it"
 )
 _LOGARITHMIC = (
     "dn are the whole numbers of the ADC, not parts of 1; with r = adcFullScale / adcReference and"
@@ -128,6 +140,8 @@ _LOGARITHMIC = (
 
 def _meaning(frame: Frame) -> str:
     """Return how codes become light, for tools that take 1 for white."""
+    if frame.electrical.curve is not None:
+        return _CURVED
     if frame.electrical.reference is None:
         return _LINEAR
     added = frame.layout.binning_groups.summed_codes
@@ -219,6 +233,14 @@ def _binning(frame: Frame) -> dict[str, Attribute]:
 
 def _curve(e: Electrical) -> dict[str, Attribute]:
     """Return what turns raw numbers back into electrons or volts."""
+    if e.curve is not None:
+        points = zip(e.curve.electrons[::CURVE_STEP], e.curve.volts[::CURVE_STEP], strict=True)
+        return {
+            "vcam:adc": "linear",
+            "vcam:adcOffset": e.offset,
+            "vcam:adcFullScale": e.full_scale / e.analog_gain,
+            "vcam:transferCurve": ",".join(f"{charge:.6g}:{volts:.7g}" for charge, volts in points),
+        }
     if e.reference is None:
         return {"vcam:adc": "linear", "vcam:electronsPerDN": e.electrons_per_dn}
     return {

@@ -91,7 +91,7 @@ class Result:
         e = self.frame.electrical
         if not e.has_volts:
             raise no_volts("pixel.readout", "volts", "take electrons")
-        return self.electrons * self.electrons.dtype.type(e.conversion_gain * e.analog_gain)
+        return e.volts_of(self.electrons)
 
     @property
     def mean_electrons(self) -> NDArray:
@@ -333,7 +333,7 @@ def _simulate(camera: Camera, workers: int, stages: Stages, shared: Shared) -> R
         colors=frame.mosaic.colors,
         white_dn=frame.white_dn,
         black_dn=frame.black_dn,
-        linearize=None if frame.electrical.reference is None else frame.linear,
+        linearize=frame.linear if frame.electrical.linearized else None,
         saturated_dn=frame.picture_saturated_dn,
         patches=partial(_patches, frame),
         planes=frame.layout.full_color,

@@ -5,11 +5,15 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from numpy.typing import NDArray
+
 from vcam_cli.camera.adc import Adc
 from vcam_cli.camera.architecture import ARCHITECTURES
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived import sense_node
 from vcam_cli.camera.derived.dark_noise import SIGMAS, dark_noise
+from vcam_cli.camera.derived.transfer_curve import PATH as CURVE
+from vcam_cli.camera.derived.transfer_curve import Curve, transfer_curve
 from vcam_cli.camera.pixel import AGREE
 from vcam_cli.errors import BadInput, bad
 from vcam_cli.physics import readout
@@ -46,11 +50,18 @@ class Electrical:
     """Voltage of the highest ADC code [V]."""
     reference: float | None = None
     """Voltage at which a logarithmic ADC's curve bends [V]; None for a linear one."""
+    curve: Curve | None = None
+    """Volts over electrons at the end of the pixel; None where they are proportional."""
 
     @property
     def has_volts(self) -> bool:
         """Whether volts are volts; else they are parts of a nominal swing."""
         return self.capacitance is not None
+
+    @property
+    def linearized(self) -> bool:
+        """Whether codes are made linear before the processing."""
+        return self.reference is not None or (self.curve is not None and self.curve.corrected)
 
     @property
     def analog_gain(self) -> float:
@@ -64,10 +75,23 @@ class Electrical:
 
     @property
     def electrons_per_dn(self) -> float:
-        """Step of a linear ADC [e/DN]; a logarithmic one has as many from black to full scale."""
+        """Step of a linear ADC [e/DN]; a logarithmic one has as many from black to full scale.
+
+        So has one behind a transfer curve that is no line.
+        """
+        if self.curve is not None:
+            full = self.curve.electrons_of(self.full_scale / self.analog_gain)
+            return float(full) / (self.highest_code - self.offset)
         return self.full_scale / (
             self.conversion_gain * self.analog_gain * (self.highest_code - self.offset)
         )
+
+    def volts_of(self, electrons: NDArray) -> NDArray:
+        """Return the voltage at the ADC of charges [e], in their shape and float type [V]."""
+        if self.curve is None:
+            return electrons * electrons.dtype.type(self.conversion_gain * self.analog_gain)
+        volts = self.curve.volts_of(electrons) * self.analog_gain
+        return volts.astype(electrons.dtype)
 
     @property
     def saturation(self) -> float:
@@ -101,14 +125,16 @@ def electrical(camera: Camera) -> Electrical:
     gain, swing, well = _solve(given.conversion_gain, swing, given.full_well, capacitance)
     if capacitance is None and not nominal:
         capacitance = float(readout.sense_capacitance(gain))
-    full_scale = swing * given.gain if adc.full_scale is None else adc.full_scale
+    curve = transfer_curve(camera, swing, well)
+    output, slope = (swing, gain) if curve is None else (curve.volts[-1], curve.slope)
+    full_scale = output * given.gain if adc.full_scale is None else adc.full_scale
     offset = adc.offset
     if offset is None:
         margin = SIGMAS * dark_noise(camera, capacitance) * camera.exposure_gain
-        offset = _automatic_offset(adc, margin, gain * given.gain * margin, full_scale)
+        offset = _automatic_offset(adc, margin, slope * given.gain * margin, full_scale)
     if adc.gain is not None:
         codes = (adc.gain, adc.bits, offset)
-        full_scale = float(readout.adc_full_scale(gain, given.gain, *codes))
+        full_scale = float(readout.adc_full_scale(slope, given.gain, *codes))
     reference = None
     if adc.kind == "logarithmic":
         reference = full_scale / 1000 if adc.reference is None else adc.reference
@@ -123,6 +149,7 @@ def electrical(camera: Camera) -> Electrical:
         offset=offset,
         full_scale=full_scale,
         reference=reference,
+        curve=curve,
     )
     _check_counts(found)
     return found
@@ -173,9 +200,15 @@ def _check_counts(found: Electrical) -> None:
 
 def check(camera: Camera) -> None:
     """Raise BadInput when the readout is open, contradicts itself or lacks volts it needs."""
-    if electrical(camera).has_volts:
-        return
     pixel, adc = camera.pixel, camera.adc
+    found = electrical(camera)
+    if found.curve is not None and found.reference is not None:
+        message = "a logarithmic ADC has a curve of its own"
+        raise bad(CURVE, message, "write transfer_curve: linear, or adc.kind: linear")
+    if found.has_volts:
+        return
+    if found.curve is not None:
+        raise no_volts(CURVE, "it", "write transfer_curve: linear")
     for name in ("full_scale", "reference"):
         if getattr(adc, name) is not None:
             raise no_volts(f"adc.{name}", "it", f"leave out {name}")

@@ -63,7 +63,7 @@ def _bias_range(camera: Camera, made: Process, need: Need) -> tuple[float, float
     They are the reset voltage less the swing, and the reset voltage. Raises BadInput where numbers
     are missing, or the diode would be biased forward.
     """
-    reset = _reset_voltage(camera, made, need)
+    reset = reset_voltage(camera, made, need)
     own = camera.pixel.readout
     swing = own.voltage_swing
     if swing is None:
@@ -83,8 +83,11 @@ def _bias_range(camera: Camera, made: Process, need: Need) -> tuple[float, float
     return max(reset - swing, 0.0), reset
 
 
-def _reset_voltage(camera: Camera, made: Process, need: Need) -> float:
-    """Return the reset voltage [V]: supply less a threshold; a passive pixel loses none."""
+def reset_voltage(camera: Camera, made: Process, need: Need) -> float:
+    """Return the reset voltage [V]: supply less a threshold; a passive pixel loses none.
+
+    Raises BadInput where numbers are missing or contradict each other.
+    """
     if camera.pixel.architecture == "pps":
         return made.require(need, "supply")[0]
     if made.reset_voltage is not None or made.thresholds.reset is None:
@@ -119,20 +122,36 @@ def capacitance(camera: Camera) -> float | None:
     known = own.conversion_gain is not None or None not in (own.voltage_swing, own.full_well)
     if given is None and (known or camera.pixel.technology is None):
         return None
-    size, made = detector(camera), process(camera)
+    made = process(camera)
     need = Need("pixel.photodetector.capacitance", "the capacitance of the junction")
-    names = "sidewall sidewall_built_in sidewall_grading area built_in grading"
-    keys = (f"capacitance.{name}" for name in names.split())
-    zero, built_in, grading, *_ = made.require(need, *keys)
-    per_area = area_capacitance(camera, made, need)
+    parts, whole = junction_capacitances(camera, made, need)
     biases = _bias_range(camera, made, need)
-    per_length = float(junction.mean_capacitance(zero, *biases, built_in, grading))
-    whole = size.area * per_area + size.perimeter * per_length
-    if camera.pixel.architecture != "pps":
-        whole += _follower_gate(made, need)
+    for zero, built_in, grading in parts:
+        whole += float(junction.mean_capacitance(zero, *biases, built_in, grading))
     if whole <= 0:
         raise bad(need.path, f"{need.what} is zero", "give the technology's capacitance.area")
     return whole
+
+
+def junction_capacitances(
+    camera: Camera, made: Process, need: Need
+) -> tuple[tuple[tuple[float, float, float], ...], float]:
+    """Return what the capacitance of the photodiode's node is made of.
+
+    They are the capacitance without bias [F], built-in potential [V] and grading of the junction's
+    area and of its sidewall; and the capacitance of the follower's gate [F], which a passive pixel
+    has none of. Raises BadInput where numbers are missing.
+    """
+    size = detector(camera)
+    names = "sidewall sidewall_built_in sidewall_grading area built_in grading"
+    keys = (f"capacitance.{name}" for name in names.split())
+    sidewall, *of_sidewall, area, built_in, grading = made.require(need, *keys)
+    parts = (
+        (size.area * area, built_in, grading),
+        (size.perimeter * sidewall, of_sidewall[0], of_sidewall[1]),
+    )
+    gate = 0.0 if camera.pixel.architecture == "pps" else _follower_gate(made, need)
+    return parts, gate
 
 
 def area_capacitance(camera: Camera, made: Process, need: Need) -> float:
