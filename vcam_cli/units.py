@@ -267,7 +267,7 @@ def _dimensions() -> dict[str, Dimension]:
     farad = _prefixed_units("F", "fpanum-")
     electrons = _prefixed_units("e", "-kM")
     pairs = {"lp/mm": 1000, "cycles/mm": 1000, "c/mm": 1000, "lp/m": 1, "cycles/m": 1, "lp/cm": 100}
-    watts = {f"{p}W": s for p, s in (("", 1), ("m", Fraction(1, 1000)), ("u", Fraction(1, 10**6)))}
+    watts = _prefixed_units("W", "-mu")
     forms = ("{}/(sr m2)", "{}/(m2 sr)", "{}/sr/m2", "{}/m2/sr")
     radiance = {form.format(w): Fraction(size) for form in forms for w, size in watts.items()}
     per_volume = {f"{one}/{v}": 1 / s for v, s in volume.items() for one in ("1", "")}
@@ -300,6 +300,9 @@ def _dimensions() -> dict[str, Dimension]:
                   ("mcd/m2", "cd/m2", "kcd/m2"), "100 cd/m2"),
         Dimension("radiance", "a radiance", "W/(sr m2)", radiance,
                   ("W/(sr m2)",), "0.4 W/(sr m2)"),
+        Dimension("irradiance", "an irradiance", "W/m2",
+                  _per(watts, {unit: area[unit] for unit in ("cm2", "m2")}),
+                  ("W/m2",), "0.12 W/m2"),
         Dimension("illuminance", "an illuminance", "lx", _prefixed_units("lx", "-mk"),
                   ("mlx", "lx", "klx"), "300 lx"),
         Dimension("spatial_frequency", "a spatial frequency", "cycles/m",

@@ -81,8 +81,16 @@ class TestSpectralExr:
         np.testing.assert_allclose(found.data[:, :, picked[500]], CUBE[:, :, 3] * 1e9, rtol=2e-7)
 
     def test_refuses_what_is_no_radiance(self, tmp_path):
-        path = made.spectral_exr(tmp_path / "a.exr", emissiveUnits="W.m^-2.nm^-1")
-        refused(path, "'W.m^-2.nm^-1'", "W.m^-2.sr^-1")
+        path = made.spectral_exr(tmp_path / "a.exr", emissiveUnits="cd.m^-2.nm^-1")
+        refused(path, "'cd.m^-2.nm^-1'", "W.m^-2.sr^-1")
+
+    def test_an_irradiance_is_the_radiance_of_a_diffuser(self, tmp_path):
+        """E = pi L."""
+        light = read_cube(made.spectral_exr(tmp_path / "l.exr"), "scene")[0]
+        path = made.spectral_exr(tmp_path / "e.exr", emissiveUnits="W.m^-2.nm^-1")
+        falling = read_cube(path, "scene")[0]
+        assert falling.bands.quantity == "irradiance"
+        np.testing.assert_allclose(falling.data * np.pi, light.data, rtol=3e-7)
 
     def test_refuses_light_and_reflectance_at_once(self, tmp_path):
         path = made.exr(tmp_path / "a.exr", ["S0.400nm", "T.400nm"], CUBE[:, :, :2])

@@ -10,6 +10,7 @@ from vcam_cli.camera.adc import Adc
 from vcam_cli.camera.architecture import ARCHITECTURES, article
 from vcam_cli.camera.array import Array
 from vcam_cli.camera.exposure import Exposure
+from vcam_cli.camera.lens_choice import OPTICS
 from vcam_cli.camera.optics import Optics
 from vcam_cli.camera.pixel import Pixel
 from vcam_cli.camera.processing import (
@@ -39,7 +40,10 @@ class Camera(FileModel):
         "what stands in front of the lens",
         example={"source": {"kind": "chart", "chart": "colorchecker"}, "luminance": "100 cd/m2"},
     )
-    optics: Optics = key("the lens", example={"f_number": 2.8, "focal_length": "3.2 mm"})
+    optics: Annotated[Optics, OPTICS] = key(
+        "the lens; or none: the scene's light falls on the bare sensor, along its normal",
+        example={"f_number": 2.8, "focal_length": "3.2 mm"},
+    )
     pixel: Pixel = key("one pixel", example={"width": "6.5 um"})
     array: Array = key("the pixel array", example={"rows": 512, "columns": 512})
     exposure: Exposure = key("exposure", example={"time": "30 ms"})

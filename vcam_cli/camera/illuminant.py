@@ -66,6 +66,11 @@ class IlluminantSpec:
         """Wavelength of a monochromatic lamp [m]."""
         return self.lamp.monochromatic if isinstance(self.lamp, Monochromatic) else None
 
+    @property
+    def is_measured(self) -> bool:
+        """Whether it is a file, which may have units."""
+        return isinstance(self.lamp, LampFile)
+
     def to_yaml(self) -> Any:
         """Return the YAML form."""
         return to_yaml(self.lamp)

@@ -33,7 +33,7 @@ FILE_KEYS = frozenset({"file", "positions"})
 CameraCheck = Check[Camera]
 
 _EXCLUSIVE = (
-    "luminance | radiance | illuminance",
+    "luminance | radiance | illuminance | irradiance",
     "time | auto | captures",
     "rows columns | die",
     "fill_factor | width height x y",
@@ -83,6 +83,7 @@ FORMAT = FileFormat(
         ("array", "filters"): "filters",
         ("pixel", "technology", "from"): "technologies",
     },
+    words={("optics",): "none"},
     shorthands={("pixel", "technology"): "from"},
     file_keys=FILE_KEYS,
     merge_rules=MERGE_RULES,

@@ -3,16 +3,24 @@
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic_core import InitErrorDetails
 
 from vcam_cli.camera.spectrum import Spectral, SpectrumSpec, flat
 from vcam_cli.config.lists import read_items, repeats
-from vcam_cli.config.model import Model, at_most_one, key
+from vcam_cli.config.model import Model, Rule, at_most_one, key
 from vcam_cli.config.quantities import Number, Quantity
 from vcam_cli.config.validation_messages import describe, failure, fault
-from vcam_cli.config.values import File, Fraction, Length, MaybeLength, Shift, Switch, word_or
+from vcam_cli.config.values import (
+    File,
+    Fraction,
+    Length,
+    MaybeLength,
+    Shift,
+    Switch,
+    word_or,
+)
 from vcam_cli.config.yaml_type import YamlType
 
 
@@ -257,7 +265,12 @@ class Optics(Model):
         "fraction of the mean irradiance that is spread evenly", default=0.0
     )
 
-    rules = (_is_determined, _measured_alone)
+    rules: ClassVar[tuple[Rule, ...]] = (_is_determined, _measured_alone)
+
+    @property
+    def is_lens(self) -> bool:
+        """Whether there is a lens."""
+        return True
 
     @property
     def measured_blur(self) -> bool:

@@ -7,6 +7,7 @@ from typing import Annotated, Any, Literal, Self, get_args
 from pydantic import model_validator
 
 from vcam_cli.camera.illuminant import Illuminant, IlluminantSpec
+from vcam_cli.camera.wavelengths import Wavelengths
 from vcam_cli.config.model import Model, exactly_one, key
 from vcam_cli.config.quantities import Number, Quantity, Whole
 from vcam_cli.config.validation_messages import describe, failure, fault, one_of, refusal
@@ -19,7 +20,6 @@ from vcam_cli.config.values import (
     Frequency,
     Length,
     Positive,
-    Wavelength,
     word_or,
 )
 from vcam_cli.config.yaml_type import to_yaml
@@ -291,27 +291,6 @@ class Extent(Model):
     width: Length = key("width in the scene plane; the scene is centered", example="0.5 m")
 
 
-class Wavelengths(Model):
-    """The part of the spectrum that is simulated."""
-
-    start: Wavelength = key("shortest wavelength", example="380 nm", default=380e-9)
-    stop: Wavelength = key("longest wavelength", example="780 nm", default=780e-9)
-    step: Annotated[float | None, Quantity("length", least=1e-10, words={"auto": None})] = key(
-        "spacing at which the lens's blur is evaluated; auto follows from the accuracy",
-        unit="nm",
-        example="auto",
-        default=None,
-    )
-
-    @model_validator(mode="after")
-    def _check_order(self) -> Self:
-        if self.start >= self.stop:
-            raise refusal(("stop",), "must be longer than start", "exchange the two")
-        if self.step is not None and self.step > self.stop - self.start:
-            raise refusal(("step",), "is longer than start..stop", "make it smaller")
-        return self
-
-
 _LUMINANCE = Quantity("luminance", least=0, words={"from-file": "from-file"})
 
 
@@ -343,6 +322,16 @@ class Scene(Model):
     illuminance: Annotated[float | None, Quantity("illuminance", least=0)] = key(
         "on a perfect white diffuser", example="300 lx", default=None
     )
+    irradiance: Annotated[
+        float | Literal["from-file"] | None,
+        Quantity("irradiance", least=0, words={"from-file": "from-file"}),
+    ] = key(
+        "on a perfect white diffuser, over the wavelengths simulated; from-file: the illuminant's "
+        "file, or the source's, is in W/(m2 nm). With optics: none this is the light on the sensor",
+        unit="W/m2",
+        example="0.12 W/m2",
+        default=None,
+    )
     distance: Annotated[float, Quantity("distance", above=0)] = key(
         "from lens to scene, or infinity", example="1 m", default=1.0
     )
@@ -359,7 +348,7 @@ class Scene(Model):
 
     rules = (
         exactly_one(
-            *("luminance", "radiance", "illuminance"),
+            *("luminance", "radiance", "illuminance", "irradiance"),
             of="the light level",
             remedy="write for example luminance: 100 cd/m2",
         ),
@@ -370,6 +359,12 @@ class Scene(Model):
         """Whether the source shines by itself and needs no lamp."""
         source = self.source
         return isinstance(source, ImageFile) and source.model in ("laser", "rgb-display")
+
+    @property
+    def _has_irradiance(self) -> bool:
+        """Whether a file of the scene may be in units of irradiance."""
+        measured = self.illuminant is not None and self.illuminant.is_measured
+        return measured or isinstance(self.source, Hyperspectral)
 
     @model_validator(mode="after")
     def _lamp(self) -> Self:
@@ -387,6 +382,9 @@ class Scene(Model):
         if self.luminance == "from-file" and not isinstance(self.source, Hyperspectral):
             message = "this source has no absolute radiance in a file"
             raise refusal(("luminance",), message, "write for example 100 cd/m2")
+        if self.irradiance == "from-file" and not self._has_irradiance:
+            message = "neither illuminant nor source is a file of irradiances"
+            raise refusal(("irradiance",), message, "write illuminant: {file: lamp.csv}")
         line = self.illuminant.line if self.illuminant else None
         if line is not None and not self.wavelengths.start <= line <= self.wavelengths.stop:
             message = f"{line * 1e9:.6g} nm is outside the wavelengths simulated"

@@ -39,7 +39,6 @@ from vcam_cli.camera.scene import SlantedEdge, Uniform
 from vcam_cli.effects.order import quantizer
 from vcam_cli.effects.signal_chain import noise_sources
 from vcam_cli.errors import bad
-from vcam_cli.physics import radiometry
 from vcam_cli.progress import Stages
 from vcam_cli.quality.mtf import Lattice
 from vcam_cli.readout import exposure
@@ -126,7 +125,7 @@ class Bench:
         white = self.ready.scene.white.multiply(self.camera.optics.transmittance.resolve())
         band = scene.wavelengths
         per_area = integral(photons(white), band.start, band.stop)
-        per_area *= float(radiometry.irradiance_per_radiance(g.f_number, g.magnification))
+        per_area *= g.irradiance_per_radiance
         return per_area * g.pitch_x * g.pitch_y
 
     def efficiency(self, color: str) -> float:
@@ -291,7 +290,9 @@ def _before_chart(camera: Camera, chart: Uniform | SlantedEdge, *left_out: str) 
     """Return the camera before a chart, its array a field around the axis, its lens as solved."""
     solved = geometry(camera)
     scene = camera.scene
-    light = {} if isinstance(scene.luminance, float | None) else {"luminance": 100.0}
+    light: dict[str, Any] = {}
+    if scene.luminance == "from-file" or (scene.irradiance == "from-file" and not scene.illuminant):
+        light = {"luminance": 100.0, "irradiance": None}
     changes: dict[str, Any] = {"source": chart, "extent": "sensor", **light}
     if scene.illuminant is None:
         changes["illuminant"] = IlluminantSpec("D65")
@@ -300,13 +301,14 @@ def _before_chart(camera: Camera, chart: Uniform | SlantedEdge, *left_out: str) 
     )
     lens |= {"focal_length": solved.focal_length, "f_number": solved.f_number}
     lens["zernike"] = _axial_wavefront(camera.optics.zernike)
+    optics = camera.optics.model_copy(update=lens) if camera.optics.is_lens else camera.optics
     block = mosaic(camera).block
     rows, columns = (FIELD - FIELD % count for count in (len(block), len(block[0])))
     array = {"rows": rows, "columns": columns, "die": None}
     camera = camera.model_copy(
         update={
             "scene": scene.model_copy(update=changes),
-            "optics": camera.optics.model_copy(update=lens),
+            "optics": optics,
             "array": camera.array.model_copy(update=array),
             "quality": (),
         }

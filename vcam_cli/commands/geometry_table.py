@@ -20,7 +20,8 @@ def geometry_table(geometry: Mapping[str, float], step: float, band: tuple[float
     band : tuple of float
         First and last wavelength that is simulated [m].
     """
-    parts = (("scene", _scene(geometry, step, band)), ("optics", _optics(geometry)))
+    lens = _optics(geometry) if math.isfinite(geometry["f_number"]) else [("none", "a bare sensor")]
+    parts = (("scene", _scene(geometry, step, band)), ("optics", lens))
     lines = []
     for title, rows in parts:
         lines += [title, *(f"  {name:<24}{value}" for name, value in rows)]

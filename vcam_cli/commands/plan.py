@@ -153,13 +153,15 @@ def facts(
     named["wavelength_step"] = render(named["wavelength_step"], "length")
     knobs = ", ".join(f"{name} {value}" for name, value in named.items())
     several = f", {len(samples)} samples from {samples[0]:.4g} s on" if samples else ""
-    scene = f"{geometry['scene_width']:.4g} x {geometry['scene_height']:.4g} m"
+    seen = f"{geometry['scene_width']:.4g} x {geometry['scene_height']:.4g} m"
+    place = f"pixels see {seen} at magnification {geometry['magnification']:.4g}"
+    if geometry["f_number"] == float("inf"):
+        place = "pixels without a lens"
     return "\n".join(
         (
             "",
             f"settings   {knobs}",
-            f"geometry   {geometry['rows']} x {geometry['columns']} pixels see {scene}"
-            f" at magnification {geometry['magnification']:.4g}",
+            f"geometry   {geometry['rows']} x {geometry['columns']} {place}",
             f"exposure   {exposure_time:.4g} s{several}",
             f"cost       about {report['seconds']:.2g} s and {report['memory_bytes'] / 1e6:.0f} MB",
         )

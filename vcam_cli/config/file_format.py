@@ -24,6 +24,8 @@ class FileFormat(Generic[M]):
     """Kind of the shipped files, a key of `shipped.KINDS`."""
     parts: Mapping[errors.Path, str] = field(default_factory=dict)
     """Where a part file may stand -> its kind."""
+    words: Mapping[errors.Path, str] = field(default_factory=dict)
+    """Where a part file may stand -> a word that names none."""
     shorthands: Mapping[errors.Path, Key] = field(default_factory=dict)
     """Where a text stands for a mapping of this one key -> the key."""
     file_keys: frozenset[Key] = frozenset()

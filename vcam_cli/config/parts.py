@@ -95,7 +95,8 @@ class PartReader:
 
     def _section(self, node: Node, path: errors.Path, chain: tuple[Path, ...]) -> Node:
         name = node.get("use") if node.mapping is not None else node
-        if name is None or (name is node and not isinstance(node.value, str)):
+        word = node.value == self.format.words.get(path, ())
+        if name is None or word or (name is node and not isinstance(node.value, str)):
             return self.expand(node, path, chain)
         try:
             part = self._part(name, self.format.parts[path], path, chain)

@@ -30,6 +30,8 @@ ROWS = 8
 """Of points, integrated at once: few enough for the cache."""
 LEAST = 1e-6
 """Share of light below which a pixel counts as dark."""
+NARROWEST = 1e-6
+"""Tangent of a cone of light that is as good as parallel: what falls on a bare sensor."""
 
 
 @dataclass(frozen=True)
@@ -71,7 +73,7 @@ class PixelVignetting(Gain):
             layers,
             geometry.detector_width,
             geometry.detector_height,
-            1 / (2 * geometry.working_f_number),
+            max(1 / (2 * geometry.working_f_number), NARROWEST),
             geometry.exit_pupil_distance,
             geometry.sensor_width / 2,
             geometry.sensor_height / 2,

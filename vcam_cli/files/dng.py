@@ -109,6 +109,7 @@ class RawImage:
     exposure_time: float
     """[s]"""
     f_number: float
+    """Of the lens; inf where there is none."""
     focal_length: float
     """[m]"""
     iso: float
@@ -189,9 +190,9 @@ def _tags(image: RawImage) -> list[Tag]:
         "DefaultCropSize": [columns - 2 * margin, rows - 2 * margin],
         "BaselineExposure": [image.baseline_exposure],
         "ExposureTime": [image.exposure_time],
-        "FNumber": [image.f_number],
-        "FocalLength": [image.focal_length * 1e3],
     }
+    if np.isfinite(image.f_number):
+        said |= {"FNumber": [image.f_number], "FocalLength": [image.focal_length * 1e3]}
     if image.noise[0] > 0:  # else Adobe's reader warns of it
         said["NoiseProfile"] = [*image.noise] * (count if image.colors is None else 3)
     if image.shading is not None:

@@ -27,7 +27,6 @@ from vcam_cli.image_formation.settings import Settings
 from vcam_cli.image_formation.strategies import image_layers
 from vcam_cli.image_formation.transfer_functions import Band, Transfer, transfer
 from vcam_cli.parallel import each
-from vcam_cli.physics import radiometry
 from vcam_cli.rng import blocks
 from vcam_cli.scenes.base import Scene, View
 from vcam_cli.spectra import Spectrum
@@ -127,14 +126,11 @@ def scene_transfer(
         area = geometry.pixel_width * geometry.pixel_height
     gains = of_kind(effects, Gain)
     area *= math.prod(gain.on_axis for gain in gains)
-    irradiance = float(
-        radiometry.irradiance_per_radiance(geometry.f_number, geometry.magnification)
-    )
     wavelengths = camera.scene.wavelengths
     return transfer(
         spectra,
         responses(camera, mosaic),
-        irradiance * area,
+        geometry.irradiance_per_radiance * area,
         Band(wavelengths.start, wavelengths.stop, settings.wavelength_step),
         of_kind(effects, Blur),
     )

@@ -16,7 +16,7 @@ from vcam_cli.effects.order import ORDER
 from vcam_cli.errors import bad
 from vcam_cli.image_formation import photon_rate
 from vcam_cli.image_formation.settings import settings
-from vcam_cli.physics import radiometry, readout
+from vcam_cli.physics import readout
 from vcam_cli.readout.layout import Layout
 from vcam_cli.spectra import VISIBLE, illuminant, luminance
 
@@ -64,8 +64,8 @@ def _lux(camera: Camera, geometry: Geometry) -> float:
     lens = camera.optics.transmittance.resolve()
     band = camera.scene.wavelengths
     start, stop = VISIBLE if lens.covers(*VISIBLE) else (band.start, band.stop)
-    per_radiance = radiometry.irradiance_per_radiance(geometry.f_number, geometry.magnification)
-    return float(per_radiance) * luminance(illuminant(DAYLIGHT).multiply(lens), start, stop)
+    behind = luminance(illuminant(DAYLIGHT).multiply(lens), start, stop)
+    return geometry.irradiance_per_radiance * behind
 
 
 def set_gain(camera: Camera, base_iso: float) -> Camera:

@@ -32,7 +32,7 @@ from vcam_cli.scenes.base import Array, View, paint_by_bands
 from vcam_cli.scenes.image import ImageScene, image_scene
 from vcam_cli.spectra import Spectrum, integral, luminance
 
-Quantity = Literal["radiance", "reflectance"]
+Quantity = Literal["radiance", "irradiance", "reflectance"]
 FILE = ("scene", "source", "file")
 DEFAULT_ILLUMINANT = "D65"
 """Light of reflectances where the camera file names no lamp."""
@@ -56,7 +56,7 @@ class Bands:
     wavelengths: Array
     """Wavelengths of the bands (bands,), rising [m]."""
     quantity: Quantity
-    """Whether the values are radiances or reflectances."""
+    """What the values are; an irradiance as the radiance, E / pi, of a white diffuser there."""
     white: Array | None = None
     """Radiance of a perfect white (bands,) [W/(sr m2 m)], where a file of radiances has it."""
 
@@ -125,18 +125,30 @@ def check_bands(scene: Scene, bands: Bands) -> None:
             "are simulated",
             f"write wavelengths: {{start: {low}, stop: {high}}}, or less",
         ) from None
-    if bands.quantity == "radiance" and scene.illuminant is not None:
+    if bands.quantity != "reflectance" and scene.illuminant is not None:
         raise bad(
             ("scene", "illuminant"),
-            "the file holds radiances, which are light already",
+            f"the file holds {bands.quantity.replace('ance', 'ances')}, which are light already",
             "remove the illuminant",
         )
-    if bands.quantity == "reflectance" and scene.luminance == "from-file":
+    asked = [n for n in ("luminance", "irradiance") if getattr(scene, n) == "from-file"]
+    lit = scene.illuminant is not None and scene.illuminant.is_measured
+    if bands.quantity == "reflectance" and asked and not (asked == ["irradiance"] and lit):
         raise bad(
-            ("scene", "luminance"),
+            ("scene", asked[0]),
             "the file holds reflectances, which have no level of their own",
-            "write for example 100 cd/m2",
+            "write for example luminance: 100 cd/m2",
         )
+    if bands.quantity == "radiance" and asked == ["irradiance"]:
+        message = "the file holds radiances, and no irradiances"
+        raise bad(("scene", "irradiance"), message, "write luminance: from-file")
+
+
+def check_place(bands: Bands, has_lens: bool) -> None:
+    """Raise BadInput where light that lies on a sensor is to be seen through a lens."""
+    if bands.quantity == "irradiance" and has_lens:
+        message = "the file holds irradiances on a sensor, which no lens has before it"
+        raise bad(FILE, message, "write optics: none, or give a file of radiances")
 
 
 def cube_scene(scene: Scene, cube: Cube, view: View) -> CubeScene:
@@ -214,7 +226,7 @@ def _white_of_lamp(scene: Scene) -> Spectrum:
 
 def _scale_to_scene(white: Spectrum, scene: Scene) -> Spectrum:
     """Return the file's white at the scene's level; as it is where that is the file's."""
-    if scene.luminance == "from-file":
+    if "from-file" in (scene.luminance, scene.irradiance):
         return white
     try:
         return light.scale_to_level(white, scene)

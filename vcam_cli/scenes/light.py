@@ -1,10 +1,11 @@
 """The level of a scene: the spectral radiance of its perfect white.
 
 A camera file states one level, for a perfect white diffuser under the illuminant (or the display
-white of an image that emits): luminance [cd/m2], radiance [W/(sr m2)], or illuminance [lx] on the
-diffuser, which is pi times its luminance. Luminance is 683 lm/W times the integral with V(lambda),
-over all visible light, of which a camera file may simulate a part; radiance is the plain integral
-over the scene's wavelengths.
+white of an image that emits): luminance [cd/m2], radiance [W/(sr m2)], or what falls on the
+diffuser, pi times as much: illuminance [lx], irradiance [W/m2]. Luminance is 683 lm/W times
+the integral with V(lambda), over all visible light, of which a camera file may simulate a part;
+radiance is the plain integral over the scene's wavelengths. Irradiances from a file are as bright
+as they are.
 
 References
 ----------
@@ -32,7 +33,11 @@ def white_radiance(scene: Scene) -> Spectrum:
     if scene.illuminant is None:
         raise bad(path, "this scene needs an illuminant", "write for example illuminant: D65")
     try:
-        return scale_to_level(scene.illuminant.resolve(path), scene)
+        lamp = scene.illuminant.resolve(path)
+        if scene.irradiance == "from-file":
+            lamp.require(scene.wavelengths.start, scene.wavelengths.stop)
+            return lamp.scale_by(1e9 / math.pi)  # of W/(m2 nm)
+        return scale_to_level(lamp, scene)
     except ValueError as error:
         raise bad(path, str(error)) from None
 
@@ -71,8 +76,9 @@ def display_white(scene: Scene, primaries: str) -> tuple[tuple[Spectrum, ...], S
 def scale_to_level(relative: Spectrum, scene: Scene) -> Spectrum:
     """Return a spectrum at the scene's stated level; ValueError where that cannot be."""
     start, stop = scene.wavelengths.start, scene.wavelengths.stop
-    if scene.radiance is not None:
-        level, measured, what = scene.radiance, integral(relative, start, stop), "power"
+    power = _radiance(scene)
+    if power is not None:
+        level, measured, what = power, integral(relative, start, stop), "power"
     else:
         relative.require(start, stop)
         start, stop = visible_range(relative, start, stop)
@@ -94,6 +100,13 @@ def visible_range(light: Spectrum, start: float, stop: float) -> tuple[float, fl
     first = max([VISIBLE[0], *(table.start for table in known)])
     last = min([VISIBLE[1], *(table.stop for table in known)])
     return min(start, first), max(stop, last)
+
+
+def _radiance(scene: Scene) -> float | None:
+    """Return the radiance that the scene states [W/(sr m2)]; None where it states no power."""
+    if isinstance(scene.irradiance, float):
+        return scene.irradiance / math.pi
+    return scene.radiance
 
 
 def _luminance(scene: Scene) -> float:

@@ -23,7 +23,7 @@ from vcam_cli.processing import check as check_steps
 from vcam_cli.quality.display import display_screen
 from vcam_cli.readout.layout import layout
 from vcam_cli.scenes.build import SOURCE, check_channels
-from vcam_cli.scenes.hyperspectral import check_bands
+from vcam_cli.scenes.hyperspectral import check_bands, check_place
 from vcam_cli.simulation import plan, raw_dng, spectral_irradiance
 
 
@@ -101,7 +101,9 @@ def check_picture(camera: Camera) -> None:
     if source.kind == "hyperspectral":
         from vcam_cli.files.spectral.hyperspectral import read_bands
 
-        check_bands(camera.scene, read_bands(source.file, path))
+        bands = read_bands(source.file, path)
+        check_place(bands, camera.optics.is_lens)
+        check_bands(camera.scene, bands)
 
 
 def check_lens(camera: Camera) -> None:

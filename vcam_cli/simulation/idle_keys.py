@@ -102,6 +102,11 @@ RULES = (
         "the automatic exposure goes by another level; write method: percentile",
     ),
     Rule(
+        ("scene.distance",),
+        lambda camera: not camera.optics.is_lens,
+        "the light falls on the bare sensor",
+    ),
+    Rule(
         ("exposure.estimator",),
         lambda camera: not camera.exposure.captures,
         "a single exposure needs none; give captures",

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 import vcam_cli
 from vcam_cli.camera.array import Positions
 from vcam_cli.camera.derived.electrical import Electrical
+from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.camera.illuminant import IlluminantSpec
 from vcam_cli.files import tiff
 from vcam_cli.files.exr import ExrWriter
@@ -177,11 +178,16 @@ def photograph(frame: Frame) -> dict[str, Attribute]:
         "comments": "simulated, no photograph",
         "vcam:simulatedBy": tiff.SOFTWARE,
         "expTime": frame.exposure_time,
-        "aperture": frame.geometry.f_number,
-        "effectiveFocalLength": frame.geometry.focal_length * 1e3,
+        **_lens(frame.geometry),
         **({"isoSpeed": iso} if iso > 0 else {}),
         **({} if light is None else {"vcam:illuminant": _light_name(light)}),
     }
+
+
+def _lens(geometry: Geometry) -> dict[str, Attribute]:
+    if not geometry.has_lens:
+        return {}
+    return {"aperture": geometry.f_number, "effectiveFocalLength": geometry.focal_length * 1e3}
 
 
 def _light_name(light: IlluminantSpec) -> str:

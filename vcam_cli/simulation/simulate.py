@@ -318,9 +318,12 @@ def _picture(camera: Camera, stages: Stages) -> tuple[Any, tuple[str, ...]]:
         return read.data, read.notes
     if source.kind == "hyperspectral":
         from vcam_cli.files.spectral.hyperspectral import read_cube
+        from vcam_cli.scenes.hyperspectral import check_place
 
         with stages("read"):
-            return read_cube(source.file, path)
+            cube, notes = read_cube(source.file, path)
+        check_place(cube.bands, camera.optics.is_lens)
+        return cube, notes
     return None, ()
 
 

@@ -34,7 +34,6 @@ from vcam_cli.image_formation.optical_path import Layer, OpticalPath
 from vcam_cli.image_formation.strategies import image_layers
 from vcam_cli.image_formation.transfer_functions import Band, Transfer
 from vcam_cli.parallel import each
-from vcam_cli.physics import radiometry
 from vcam_cli.rng import blocks
 from vcam_cli.scenes.base import SampledScene, Scene
 from vcam_cli.scenes.build import build
@@ -135,8 +134,7 @@ def _scene(ready: Prepared) -> Scene:
 
 def levels(ready: Prepared, wavelengths: NDArray) -> NDArray:
     """Of each of the scene's components on the axis, without blur: (K, J) [W/(m2 m)]."""
-    g = ready.geometry
-    per_radiance = float(radiometry.irradiance_per_radiance(g.f_number, g.magnification))
+    per_radiance = ready.geometry.irradiance_per_radiance
     transmittance = ready.camera.optics.transmittance.resolve()
     spectra = [s.multiply(transmittance) for s in ready.scene.spectra]
     if ready.camera.output.irradiance_sampling == "point":

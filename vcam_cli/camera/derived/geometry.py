@@ -81,6 +81,21 @@ class Geometry:
         return float(radiometry.numerical_aperture(self.f_number, self.magnification))
 
     @property
+    def has_lens(self) -> bool:
+        """Whether there is a lens before the sensor."""
+        return math.isfinite(self.f_number)
+
+    @property
+    def irradiance_per_radiance(self) -> float:
+        """Irradiance on the axis over the scene's radiance, eq 2.18 [sr].
+
+        Without a lens the sensor lies in the place of the scene's diffuser: pi.
+        """
+        if not self.has_lens:
+            return math.pi
+        return float(radiometry.irradiance_per_radiance(self.f_number, self.magnification))
+
+    @property
     def detector_area(self) -> float:
         """Area of the photodetector [m2]."""
         return self.detector_width * self.detector_height
@@ -172,8 +187,8 @@ def geometry(camera: Camera) -> Geometry:
     return Geometry(
         focal_length=optics.focal_length,
         f_number=optics.f_number,
-        aperture_diameter=optics.focal_length / optics.f_number,
-        object_distance=camera.scene.distance,
+        aperture_diameter=optics.focal_length / optics.f_number if camera.optics.is_lens else 0.0,
+        object_distance=camera.scene.distance if camera.optics.is_lens else math.inf,
         magnification=optics.magnification,
         rows=pixels.rows,
         columns=pixels.columns,
@@ -238,6 +253,9 @@ def _scene_width(camera: Camera, magnification: float) -> float | None:
     extent = camera.scene.extent
     if not isinstance(extent, Extent):
         return None
+    if not camera.optics.is_lens:
+        message = "a bare sensor sees its scene on its own plane, where the scene covers it"
+        raise bad("scene.extent", message, "use extent: sensor")
     if magnification == 0:
         raise bad(
             "scene.extent",

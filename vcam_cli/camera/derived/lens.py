@@ -29,12 +29,14 @@ class Lens:
 
 
 def lens(camera: Camera) -> Lens:
-    """Return the lens of a camera.
+    """Return the lens of a camera; without one, the narrowest cone from infinitely far away.
 
     Raises BadInput for a lens that is not determined, numbers that disagree, and a scene at or
     inside the focal length.
     """
     optics, distance = camera.optics, camera.scene.distance
+    if not optics.is_lens:
+        return Lens(math.inf, math.inf, 0.0)
     f = _focal_length(camera)
     if distance <= f:
         raise bad(

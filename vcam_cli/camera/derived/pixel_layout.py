@@ -206,7 +206,7 @@ def sampling_scale(camera: Camera, distance: float, width: float, height: float)
         The factor, at most 1; 1 without a stack or microlenses that are shifted.
     """
     stack = layers(camera)
-    if not follows_chief_ray(camera) or not stack:
+    if not follows_chief_ray(camera) or not stack or math.isinf(distance):
         return 1.0
     field = (np.arange(64) + 0.5) / 64
     across, down = field * width / 2 / distance, field * height / 2 / distance

@@ -4,6 +4,7 @@ A reader (one module a format) opens a file, checks every claim of its header ag
 the file, and returns a `SpectralData`; the checks and units of all formats are in `hyperspectral`.
 """
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -15,6 +16,12 @@ from vcam_cli.scenes.hyperspectral import Quantity
 
 PER_NM = 1e9
 """Radiance per nanometer as radiance per meter."""
+GAINS: dict[Quantity, float] = {
+    "radiance": PER_NM,
+    "irradiance": PER_NM / math.pi,
+    "reflectance": 1.0,
+}
+"""Factors on what files hold per nanometer, with which scenes are made."""
 MOST_WAVELENGTHS = 10**6
 """A file may hold so many wavelengths at most."""
 

@@ -22,12 +22,15 @@ from vcam_cli.files.exr import ExrWriter
 from vcam_cli.files.file_checks import UnusableFile
 from vcam_cli.files.images import check_size, extract_display_window, open_image, read_samples
 from vcam_cli.files.rows import Attribute
-from vcam_cli.files.spectral.data import PER_NM, SpectralData
+from vcam_cli.files.spectral.data import GAINS, SpectralData
+from vcam_cli.scenes.hyperspectral import Quantity
 from vcam_cli.spectra import SPEED_OF_LIGHT
 
 ROWS_AT_ONCE = 64
 RADIANCE = ("W.m^-2.sr^-1", "W.m^-2.sr^-1.nm^-1")
 """The units of emissive channels, both per nanometer."""
+IRRADIANCE = "W.m^-2.nm^-1"
+"""The unit of what falls on a surface, as vcam writes it."""
 _CHANNEL = re.compile(r"(S[0-3]|T)\.(\d*,?\d*(?:[Ee][+-]?\d+)?)([EPTGMkhdcmunp]?)(m|Hz)")
 _PREFIX = {
     "": 0, "E": 18, "P": 15, "T": 12, "G": 9, "M": 6, "k": 3, "h": 2, "d": -1, "c": -2, "m": -3,
@@ -90,9 +93,9 @@ def open_spectral(path: Path) -> SpectralData:
             raise UnusableFile("is no flat OpenEXR file")
         found, notes = _channels(spec.channelnames)
         check_size(spec, len(found))
-        emits = spec.channelnames[found[0][1]].startswith("S")
-        if emits:
-            _check_units(spec.get_string_attribute("emissiveUnits"))
+        quantity: Quantity = "reflectance"
+        if spec.channelnames[found[0][1]].startswith("S"):
+            quantity = _quantity(spec.get_string_attribute("emissiveUnits"))
         if spec.get_float_attribute("EV", 0.0) != 0.0:
             notes.append("its exposure compensation (EV) is not used")
         if source.seek_subimage(1, 0):
@@ -100,9 +103,9 @@ def open_spectral(path: Path) -> SpectralData:
     return SpectralData(
         shape=(spec.full_height, spec.full_width),
         wavelengths=np.array([wavelength for wavelength, _ in found]),
-        quantity="radiance" if emits else "reflectance",
+        quantity=quantity,
         read=lambda: _read(path, tuple(index for _, index in found)),
-        gain=PER_NM if emits else 1.0,
+        gain=GAINS[quantity],
         notes=tuple(notes),
     )
 
@@ -134,12 +137,16 @@ def _wavelength(match: re.Match[str]) -> float:
     return value if match[4] == "m" else SPEED_OF_LIGHT / value
 
 
-def _check_units(units: str) -> None:
-    if units and "".join(units.split()) not in RADIANCE:
+def _quantity(units: str) -> Quantity:
+    unit = "".join(units.split())
+    if unit == IRRADIANCE:
+        return "irradiance"
+    if unit and unit not in RADIANCE:
         raise UnusableFile(
             f"has emissiveUnits {units!r}, which is no radiance",
             f"give radiances, and write emissiveUnits {RADIANCE[1]}",
         )
+    return "radiance"
 
 
 def _read(path: Path, chosen: tuple[int, ...]) -> np.ndarray:
