@@ -8,6 +8,7 @@ for stacked pixels, which have all their colors.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -169,6 +170,15 @@ class Layout:
                     out[row::period, part] = color
         return self.select_pixels(out)
 
+    @property
+    def picture_shape(self) -> tuple[int, int]:
+        """Rows and columns of the picture."""
+        g = self.geometry
+        if not self.is_scattered:
+            return g.rows, g.columns
+        pitch_y, pitch_x = self._square_pitches
+        return max(1, round(g.sensor_height / pitch_y)), max(1, round(g.sensor_width / pitch_x))
+
     @cached_property
     def picture_x(self) -> NDArray:
         """Centers of the picture's columns, a square grid of the pixels' own width and gap [m]."""
@@ -184,25 +194,28 @@ class Layout:
         g = self.geometry
         if not self.is_scattered:
             return pixel_centers(g)
-        stretch = 1.0 if self.places is not None else np.sqrt(2)
-        pitch_x, pitch_y = g.pitch_x / stretch, g.pitch_y * stretch
-        columns = max(1, round(g.sensor_width / pitch_x))
-        rows = max(1, round(g.sensor_height / pitch_y))
+        (rows, columns), (pitch_y, pitch_x) = self.picture_shape, self._square_pitches
         x = (np.arange(columns) + 0.5 - columns / 2) * pitch_x
         return x, (np.arange(rows) + 0.5 - rows / 2) * pitch_y
+
+    @property
+    def _square_pitches(self) -> tuple[float, float]:
+        """Pitches along y and x of the picture of pixels that are scattered [m]."""
+        stretch = 1.0 if self.places is not None else math.sqrt(2)
+        return self.geometry.pitch_y * stretch, self.geometry.pitch_x / stretch
 
     @property
     def grid(self) -> Geometry:
         """A rectangular array of the picture's rows and columns on the same sensor."""
         if not self.is_scattered:
             return self.geometry
-        x, y = self.picture_x, self.picture_y
+        rows, columns = self.picture_shape
         return replace(
             self.geometry,
-            rows=len(y),
-            columns=len(x),
-            pitch_x=self.geometry.sensor_width / len(x),
-            pitch_y=self.geometry.sensor_height / len(y),
+            rows=rows,
+            columns=columns,
+            pitch_x=self.geometry.sensor_width / columns,
+            pitch_y=self.geometry.sensor_height / rows,
         )
 
     def _pixel_positions(self, axis: int) -> NDArray:

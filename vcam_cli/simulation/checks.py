@@ -126,7 +126,7 @@ def read_lens(camera: Camera) -> dict[str, NDArray]:
 def check_display(camera: Camera) -> None:
     """Refuse a display too fine to be judged, where a metric looks at it (BadInput)."""
     if {"cielab", "s-cielab"} & set(camera.quality):
-        display_screen(camera.display, len(layout(camera, geometry(camera)).picture_x))
+        display_screen(camera.display, layout(camera, geometry(camera)).picture_shape[1])
 
 
 LIBRARIES = {"dng": ("tifffile", "imagecodecs"), "tiff": ("tifffile",)}

@@ -214,7 +214,7 @@ def _require_memory(camera: Camera, place: Layout, knobs: Settings, solved: Geom
     judged = bool(camera.quality)
     needed = memory_model.frame_bytes(place.lattice, knobs, colors, judged, samples, scattered)
     if "s-cielab" in camera.quality:
-        shape = len(place.picture_y), len(place.picture_x)
+        shape = place.picture_shape
         screen = display_screen(camera.display, shape[1])
         # By one thread, which is all there are where memory is little.
         needed += scielab.needed_bytes(shape, screen, camera.display.filters, 1)

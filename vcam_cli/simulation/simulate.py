@@ -200,7 +200,7 @@ class Result:
 
     @property
     def _screen(self) -> display.Screen:
-        return display.display_screen(self.frame.camera.display, len(self.frame.layout.picture_x))
+        return display.display_screen(self.frame.camera.display, self.frame.layout.picture_shape[1])
 
     @cached_property
     @own_float_errors
