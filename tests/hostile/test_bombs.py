@@ -76,7 +76,9 @@ def test_yaml_that_stands_for_much(tmp_path):
 
 def test_an_array_of_millions_of_rows_takes_no_memory_to_check(tmp_path):
     """Its picture is counted, not laid out, for a display so fine that it is refused."""
-    text = "extends: csf-0.35um\narray: {die: {height: 2 km}}\ndisplay: {viewing_distance: 9 km}\n"
+    text = (
+        "extends: csf-0.35um\narray: {die: {height: 2 km}}\ndisplay: {viewing_distance: 100 km}\n"
+    )
     said = validated(yaml_bombs(tmp_path, {"tall": text}), tmp_path)
     assert "pixels in a degree" in said["tall.yaml"]
 

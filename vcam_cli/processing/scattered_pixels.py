@@ -84,7 +84,7 @@ def interpolate_to_grid(
     ValueError
         There is no sample of a color.
     """
-    grid = layout.picture_shape
+    grid = (len(layout.picture_y), len(layout.picture_x))
     planes = np.empty((colors, *grid), np.float32)
     highest = np.zeros(grid, codes.dtype)
     sources = []
