@@ -314,6 +314,7 @@ def _dimensions() -> dict[str, Dimension]:
                   "1 EV"),
         Dimension("adc_gain", "an ADC gain", "DN/e",
                   {"DN/e": Fraction(1), "DN/ke": Fraction(1, 1000)}, ("DN/e",), "0.25 DN/e"),
+        Dimension("pixels", "a length in pixels", "px", {"px": Fraction(1)}, ("px",), "1 px"),
         Dimension("dn", "a number of DN", "DN", {"DN": Fraction(1)}, ("DN",), "64 DN"),
         Dimension("capacitance_per_area", "a capacitance per area", "F/m2", _per(farad, area),
                   ("fF/um2", "pF/um2"), "0.906 fF/um2"),

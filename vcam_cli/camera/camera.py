@@ -16,7 +16,9 @@ from vcam_cli.camera.pixel import Pixel
 from vcam_cli.camera.processing import (
     STEP_LIST,
     Steps,
+    code_mistakes,
     default_steps,
+    light_mistakes,
     order_mistakes,
     picture_mistakes,
 )
@@ -78,12 +80,14 @@ class Camera(FileModel):
     def _agrees(self) -> Self:
         array, colors = self.array, len(self.array.colors)
         if "processing" not in self.model_fields_set:
-            self._fill(processing=default_steps(array.mosaic, monochrome=colors == 1))
+            emits = self.scene.emits
+            self._fill(processing=default_steps(array.mosaic, colors == 1, emits))
+        render = self.output.render
         mistakes = [
             *order_mistakes(self.processing, array.mosaic, colors, array.is_scattered),
-            *picture_mistakes(
-                self.processing, array, bool(self.quality), self.output.render is not None
-            ),
+            *picture_mistakes(self.processing, array, bool(self.quality), render is not None),
+            *light_mistakes(self.processing, self.scene.emits),
+            *code_mistakes(self.processing, render),
             *self._capture_mistakes(),
         ]
         if mistakes:

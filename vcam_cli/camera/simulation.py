@@ -218,6 +218,12 @@ class Output(Model):
         default=False,
     )
 
+    steps: Annotated[bool, Strict()] = key(
+        "also write step_01_NAME.png and so on: the render as it would be, did `processing` end"
+        " after that step; linear before gamma",
+        default=False,
+    )
+
     @property
     def irradiance_sampling(self) -> str:
         """Whether channels of irradiance.exr are means over bands or points."""

@@ -39,7 +39,7 @@ def list_(
     """List what ships; with a NAME print the file.
 
     Kinds: cameras, parts, technologies, studies, charts, models (what a picture's channels mean),
-    illuminants, filters, effects, metrics.
+    illuminants, filters, effects, steps (of processing), metrics.
 
     \b
     Example:
@@ -156,6 +156,17 @@ def _effects() -> list[Item]:
     return [Item(effect.name, f"{_first_line(effect)} ({effect.reference})") for effect in ORDER]
 
 
+def _steps() -> list[Item]:
+    from vcam_cli.camera.processing import STEPS
+    from vcam_cli.camera.step_plugins import origin, registered
+
+    foreign = {name: point for name, point in registered().items() if name not in STEPS}
+    return [
+        *(Item(name, _first_line(model)) for name, model in STEPS.items()),
+        *(Item(name, f"step of {origin(point)}") for name, point in foreign.items()),
+    ]
+
+
 def _first_line(item: object) -> str:
     return (item.__doc__ or "").strip().partition("\n")[0].rstrip(".")
 
@@ -196,5 +207,6 @@ KINDS: dict[str, Callable[[], list[Item]]] = {
     "illuminants": _illuminants,
     "filters": _filters,
     "effects": _effects,
+    "steps": _steps,
     "metrics": _metrics,
 }

@@ -89,6 +89,8 @@ class Context:
     """Code from which on a pixel is saturated [DN]."""
     patches: Callable[[], Patches] | None = None
     """Gives the ColorChecker as this camera sees it; called only where a step asks for it."""
+    primaries: Callable[[], np.ndarray] | None = None
+    """Gives the signal (C, 3) of the primaries of a picture that emits, as `white_dn` [DN]."""
     planes: bool = False
     """Whether every raw pixel has all its colors: the frame is (C, rows, columns), no mosaic."""
     layout: Layout | None = None

@@ -5,6 +5,8 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from vcam_cli.camera.processing import OF_COLORS, acts_on, stage_mistakes
+from vcam_cli.camera.step_plugins import PluginStep
 from vcam_cli.errors import Collector, nearest
 from vcam_cli.processing.base import Pattern
 
@@ -12,9 +14,13 @@ CHOICES: dict[str, tuple[str, ...]] = {
     "black_level": ("subtract", "none"),
     "demosaic": ("bilinear", "edge-aware"),
     "white_balance": ("gray-world", "bright-block", "illuminant", "none"),
-    "color_correction": ("fit", "none"),
+    "color_correction": ("fit", "primaries", "none"),
+    "denoise": (),
+    "sharpen": (),
+    "gamut_mapping": ("desaturate", "none"),
     "tone": (),
     "gamma": ("srgb",),
+    "jpeg": (),
 }
 _NUMBER_TOO = ("black_level", "gamma")
 CANNOT_JUDGE = (
@@ -75,21 +81,14 @@ def check(
     names = [step.name for step in steps]
     for index, step in enumerate(steps):
         path = ("processing", index, step.name)
-        if step.name not in CHOICES:
+        if step.name not in CHOICES and not isinstance(step, PluginStep):
             likely = nearest(step.name, CHOICES)
             found.add(path, "no such step", f"write `{likely}`" if likely else _one_of(CHOICES))
             continue
         _check_value(found, path, step, len(colors))
         before = names[:index]
-        if step.name in before:
-            found.add(path, f"{step.name} comes twice", "keep one of them")
-        if "gamma" in before:
-            found.add(
-                path, f"{step.name} after gamma: the steps work on linear light", "put gamma last"
-            )
-        elif "tone" in before and step.name != "gamma":
-            what = f"{step.name} after tone: the steps work on the light of the scene"
-            found.add(path, what, f"put {step.name} before tone")
+        for message, remedy in stage_mistakes(step, steps[:index]):
+            found.add(path, message, remedy)
         late = [name for name in ("white_balance", "color_correction") if name in before]
         if step.name == "black_level" and late:
             found.add(
@@ -101,12 +100,10 @@ def check(
             found.add(path, "every pixel of this array has all its colors", "remove this step")
         elif step.value == "edge-aware" and scattered:
             found.add(path, "edge-aware needs pixels in rows and columns", "write `bilinear`")
-        if step.name == "white_balance" and step.value != "none" and single:
-            found.add(path, "white_balance needs an array of several colors", "remove this step")
-        if step.name == "color_correction" and step.value != "none":
-            if single:
+        if step.value != "none":
+            if step.name in OF_COLORS and single:
                 found.add(path, "a monochrome array has no colors to change", "remove this step")
-            elif mosaic and "demosaic" not in before:
+            elif acts_on(step) == "colors" and mosaic and "demosaic" not in before:
                 found.add(path, "a pixel of a mosaic has one color only", "put demosaic before it")
     if quality and mosaic and "demosaic" not in names:
         found.add(("quality",), *CANNOT_JUDGE)
@@ -114,13 +111,13 @@ def check(
 
 
 def _check_value(found: Collector, path: tuple[str | int, ...], step: Step, colors: int) -> None:
-    allowed = CHOICES[step.name]
+    allowed = CHOICES.get(step.name, ())
     matrix = getattr(step.value, "matrix", None)
     if step.name == "color_correction" and matrix is not None:
         if len(matrix) != 3 or any(len(row) != colors for row in matrix):
             found.add((*path, "matrix"), *matrix_shape(colors))
         return
-    if step.name == "tone":
+    if not allowed:
         return
     if isinstance(step.value, str):
         if step.value not in allowed:

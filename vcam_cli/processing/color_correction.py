@@ -127,6 +127,39 @@ def fit_matrix(signals: np.ndarray, white: np.ndarray, balanced: bool, patches: 
     return Fit(matrix if balanced else matrix * (white.max() / white), note)
 
 
+def fit_primaries(signals: np.ndarray, balanced: bool) -> Fit:
+    """Return the matrix that brings the primaries of a picture back to R, G and B of the display.
+
+    A picture that emits is a sum of three lights, and three colors of a camera that differ tell
+    each pixel's shares exactly, whatever colors the lights have. Laser light of 450, 550 and 650 nm
+    is more saturated than any display of BT.709 can show; fitted to a ColorChecker, whose colors
+    are seen as they are, half of such a picture's colors would be clipped.
+
+    Parameters
+    ----------
+    signals : ndarray
+        Signals of the three primaries (C, 3) above black, as the steps before leave them; their
+        sum is white.
+    balanced : bool
+        See `fit_matrix`.
+
+    Returns
+    -------
+    Fit
+        The matrix; of more than three colors the one that amplifies noise least, and of colors
+        that cannot tell the primaries apart the closest.
+    """
+    white = signals.sum(axis=1)
+    identity = np.eye(3, len(white))
+    if not white.max() > 0 or white.min() <= MIN_COLOR_SHARE * white.max():
+        return Fit(identity, "color correction left out: not every color sees this light")
+    relative = signals / white[:, np.newaxis]
+    rank = int(np.linalg.matrix_rank(relative, MIN_COLOR_DIFFERENCE))
+    matrix = np.linalg.pinv(relative, MIN_COLOR_DIFFERENCE)
+    note = "" if rank == 3 else "color correction is weak: " + _FILTERS_ALIKE
+    return Fit(matrix if balanced else matrix * (white.max() / white), note)
+
+
 _FILTERS_ALIKE = "under this light these filters tell too few colors apart"
 
 

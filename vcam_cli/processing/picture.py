@@ -1,6 +1,6 @@
 """The picture after processing: computed when it is asked for, block of rows by block of rows."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -10,6 +10,7 @@ from vcam_cli.errors import bad
 from vcam_cli.processing import tone
 from vcam_cli.processing.base import Context, Operation, map_blocks, process_rows
 from vcam_cli.processing.check import CANNOT_JUDGE, CANNOT_SHOW
+from vcam_cli.processing.jpeg import Compression
 from vcam_cli.processing.tone_map import ToneMap
 
 
@@ -35,11 +36,19 @@ class ProcessedPicture:
     """Number of threads."""
     notes: tuple[str, ...] = ()
     """What a user should know of the steps."""
+    on_codes: tuple[Callable[[np.ndarray], np.ndarray], ...] = ()
+    """What is applied to the codes of the render, in this order."""
 
     @property
     def channels(self) -> int:
         """Number of channels of the picture."""
         return len(self.colors) if self.full_color else 1
+
+    @property
+    def is_shown(self) -> bool:
+        """Whether a display can show it: in rows and columns, of one color or three."""
+        on_grid = self.context.layout is None or self.full_color
+        return on_grid and self.channels in (1, 3)
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -67,7 +76,7 @@ class ProcessedPicture:
         return linear
 
     def encode(self, bits: int = 8) -> np.ndarray:
-        """Return the render: codes after the tone curve.
+        """Return the render: codes after the tone curve, and what steps make of them.
 
         Parameters
         ----------
@@ -80,6 +89,23 @@ class ProcessedPicture:
             Codes (rows, columns, C), or (rows, columns) where `linear` has one channel; uint8 up to
             8 bits, else uint16.
         """
+        shown = self._coded(bits)
+        for change in self.on_codes:
+            shown = change(shown)
+        return shown
+
+    def jpeg(self) -> bytes | None:
+        """Return the JPEG file of the render; None where compression is not its last step."""
+        *before, last = self.on_codes or (None,)
+        if not isinstance(last, Compression):
+            return None
+        shown = self._coded(8)
+        for change in before:
+            shown = change(shown)
+        return last.file(shown)
+
+    def _coded(self, bits: int) -> np.ndarray:
+        """Return the codes after the tone curve."""
         render = np.empty((*self.shape, self.channels), np.uint8 if bits <= 8 else np.uint16)
 
         def fill(start: int, stop: int) -> None:

@@ -13,67 +13,36 @@ operations.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 
-from vcam_cli.errors import bad
+from vcam_cli.errors import BadInput, bad
 from vcam_cli.processing import (
     black_level,
     bright_block,
     color_correction,
+    jpeg,
+    picture_steps,
     scattered_pixels,
-    tone,
     white_balance,
 )
 from vcam_cli.processing.base import Context, Operation, map_blocks, process_rows
 from vcam_cli.processing.check import Step, check
 from vcam_cli.processing.demosaic import Bilinear, is_bayer
+from vcam_cli.processing.draft import Draft
 from vcam_cli.processing.edge_aware import EdgeAware
 from vcam_cli.processing.guided_interpolation import GuidedInterpolation
 from vcam_cli.processing.highlights import Highlights
 from vcam_cli.processing.linearize import Linearize
 from vcam_cli.processing.normalized_convolution import NormalizedConvolution, Sites, half_width
-from vcam_cli.processing.picture import ProcessedPicture, apply_operations
+from vcam_cli.processing.picture import ProcessedPicture
 from vcam_cli.processing.tone_map import ToneMap, sensor_white
 from vcam_cli.processing.white_balance import color_sums
 
 Path = tuple[str | int, ...]
-
-
-@dataclass(frozen=True)
-class Draft:
-    """A picture on its way through the steps."""
-
-    dn: np.ndarray
-    """Frame (rows, columns) or (C, rows, columns) [DN], or samples on the picture's grid."""
-    context: Context
-    """The camera as the picture is now: after color correction its colors are the display's."""
-    workers: int
-    """Number of threads."""
-    full_color: bool
-    """Whether the operations lead to all colors at every pixel."""
-    operations: tuple[Operation, ...] = ()
-    """What is applied so far."""
-    balanced: bool = False
-    """Whether a step has balanced white."""
-    curve: tone.Curve = 1.0
-    """Tone curve of the render."""
-    tone: Any = None
-    """What the file says of tone mapping: `exposure` [EV], `white` and `curve`."""
-    notes: tuple[str, ...] = ()
-    """What a user should know of the steps."""
-    codes: np.ndarray = field(kw_only=True)
-    """The picture's pixels as they were measured, (rows, columns) or (C, rows, columns) [DN]."""
-
-    def with_operations(self, *operations: Operation) -> "Draft":
-        """Return the draft with more operations."""
-        return replace(self, operations=self.operations + operations)
-
-    def apply_to_colors(self, dn: np.ndarray) -> np.ndarray:
-        """Return full-color raw values (C, ...) as the steps so far leave them."""
-        return apply_operations(self.operations, np.asarray(dn, dtype=np.float64))
 
 
 def process(
@@ -111,7 +80,8 @@ def process(
     draft = _initial_draft(dn, context, workers, any(step.name == "demosaic" for step in steps))
     for index, step in enumerate(steps):
         if step.value != "none":
-            draft = STEPS[step.name](draft, step, ("processing", index, step.name))
+            apply = STEPS.get(step.name, _plugin)
+            draft = apply(draft, step, ("processing", index, step.name))
     colors = draft.context.colors
     scale = _white_scale(draft.apply_to_colors(context.white_dn), colors)
     scaled = draft.with_operations(white_balance.Gains((scale,) * len(colors), draft.context))
@@ -125,6 +95,7 @@ def process(
         _tone_map(draft, scale),
         workers,
         draft.notes,
+        draft.on_codes,
     )
 
 
@@ -233,12 +204,8 @@ def _color_correction(draft: Draft, step: Step, path: Path) -> Draft:
         return draft
     white = draft.apply_to_colors(context.white_dn)
     note = ""
-    if step.value == "fit":
-        if context.patches is None:
-            raise ValueError("a fit needs the patches of a ColorChecker")
-        patches, black = context.patches(), draft.apply_to_colors(_black_signal(draft))
-        signals = draft.apply_to_colors(patches.dn) - black[:, np.newaxis]
-        found = color_correction.fit_matrix(signals, white - black, draft.balanced, patches)
+    if step.value in ("fit", "primaries"):
+        found = _fit(draft, step.value, white)
         correction, note = found.operation, found.note
     else:
         correction = color_correction.ColorCorrection(step.value.matrix)
@@ -254,6 +221,93 @@ def _color_correction(draft: Draft, step: Step, path: Path) -> Draft:
     )
 
 
+def _fit(draft: Draft, to: str, white: np.ndarray) -> color_correction.Fit:
+    """Return the matrix fitted to a ColorChecker ("fit"), or to the primaries of the scene."""
+    black = draft.apply_to_colors(_black_signal(draft))[:, np.newaxis]
+    context = draft.context
+    if to == "primaries":
+        if context.primaries is None:
+            raise ValueError("only a picture that emits light has primaries")
+        signals = draft.apply_to_colors(context.primaries()) - black
+        return color_correction.fit_primaries(signals, draft.balanced)
+    if context.patches is None:
+        raise ValueError("a fit needs the patches of a ColorChecker")
+    patches = context.patches()
+    signals = draft.apply_to_colors(patches.dn) - black
+    return color_correction.fit_matrix(signals, white - black[:, 0], draft.balanced, patches)
+
+
+def _denoise(draft: Draft, step: Step, path: Path) -> Draft:
+    def sums(start: int, stop: int) -> np.ndarray:
+        rows = process_rows(draft.dn, draft.operations, start, stop)
+        return picture_steps.noise_sums(rows.planes)
+
+    total = sum(map_blocks(sums, draft.dn.shape, draft.workers))
+    deviation = step.value.strength * picture_steps.noise_level(np.asarray(total))
+    work = partial(picture_steps.denoised, deviation=deviation)
+    return _with_neighbors(draft, work, picture_steps.WINDOW // 2)
+
+
+def _sharpen(draft: Draft, step: Step, path: Path) -> Draft:
+    mask = step.value
+    work = partial(picture_steps.sharpened, radius=mask.radius, amount=mask.amount)
+    return _with_neighbors(draft, work, picture_steps.blur_reach(mask.radius))
+
+
+def _gamut_mapping(draft: Draft, step: Step, path: Path) -> Draft:
+    colors = draft.context.colors
+    shares = np.array([LUMINANCE.get(color, 1.0) for color in colors])
+    work = partial(picture_steps.desaturated, shares=shares / shares.sum())
+    operation = picture_steps.PictureOperation(work, 0, draft.dn.shape[-2], work)
+    return draft.with_operations(operation)
+
+
+def _plugin(draft: Draft, step: Any, path: Path) -> Draft:
+    """Return the draft with a step of an installed package."""
+    if step.acts_on == "codes":
+        return _with_codes(draft, partial(_checked_codes, step.process, path))
+    work = partial(_checked_planes, step.process, path)
+    return _with_neighbors(draft, work, step.halo, step.process_ideal)
+
+
+def _checked_planes(process: Callable, path: Path, planes: np.ndarray) -> np.ndarray:
+    done = np.asarray(process(planes.copy()))
+    if done.shape != planes.shape:
+        raise _wrong_shape(path, planes.shape, done.shape)
+    return done
+
+
+def _checked_codes(process: Callable, path: Path, codes: np.ndarray) -> np.ndarray:
+    done = np.asarray(process(codes))
+    if done.shape != codes.shape or done.dtype != codes.dtype:
+        given, made = (f"{a.shape} of {a.dtype}" for a in (codes, done))
+        raise _wrong_shape(path, given, made)
+    return done
+
+
+def _wrong_shape(path: Path, given: object, made: object) -> BadInput:
+    return bad(path, f"this step makes {made} of {given}", "mend the package, or remove the step")
+
+
+def _jpeg(draft: Draft, step: Step, path: Path) -> Draft:
+    return _with_codes(draft, jpeg.Compression(step.value.quality))
+
+
+def _with_neighbors(
+    draft: Draft,
+    work: Callable[[np.ndarray], np.ndarray],
+    halo: int,
+    on_colors: Callable[[np.ndarray], np.ndarray] | None = None,
+) -> Draft:
+    rows = draft.dn.shape[-2]
+    known = () if on_colors is None else (on_colors,)
+    return draft.with_operations(picture_steps.PictureOperation(work, halo, rows, *known))
+
+
+def _with_codes(draft: Draft, work: Callable[[np.ndarray], np.ndarray]) -> Draft:
+    return replace(draft, on_codes=(*draft.on_codes, work))
+
+
 def _gamma(draft: Draft, step: Step, path: Path) -> Draft:
     return replace(draft, curve=step.value)
 
@@ -267,8 +321,12 @@ STEPS: dict[str, Callable[[Draft, Step, Path], Draft]] = {
     "demosaic": _demosaic,
     "white_balance": _white_balance,
     "color_correction": _color_correction,
+    "denoise": _denoise,
+    "sharpen": _sharpen,
+    "gamut_mapping": _gamut_mapping,
     "tone": _tone,
     "gamma": _gamma,
+    "jpeg": _jpeg,
 }
 
 

@@ -150,6 +150,11 @@ class Frame(Prepared):
         rate = self.axis_rate(lit) + self.dark_rate * self.summed_codes
         return self.to_dn(rate * self.exposure_time)
 
+    def primaries_dn(self) -> NDArray:
+        """Return the codes (C, 3) of each channel of a picture that emits, as `white_dn` [DN]."""
+        rate = self.axis_rate(self.scene.spectra) + self.dark_rate * self.summed_codes
+        return self.to_dn(rate * self.exposure_time)
+
     def axis_rate(self, spectra: Sequence[Spectrum]) -> NDArray:
         """Return electrons per second (C, K) of K radiances on the axis, as they are read out.
 

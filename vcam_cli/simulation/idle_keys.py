@@ -148,6 +148,11 @@ RULES = (
         "no metric asks how large the picture is seen; add s-cielab to quality",
     ),
     Rule(
+        ("output.steps",),
+        lambda camera: not camera.processing,
+        "no steps are asked for; give processing",
+    ),
+    Rule(
         ("display.gamma", "display.white"),
         lambda camera: True,
         "pictures are compared in linear light relative to white, where it cancels",

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 import vcam_cli
 from vcam_cli.camera.camera import Camera
+from vcam_cli.files import atomic
 from vcam_cli.files.exr import ExrWriter
 from vcam_cli.files.folder import OutputFolder
 from vcam_cli.files.maps import write_map
@@ -59,6 +60,9 @@ def write(result: Result, folder: OutputFolder) -> None:
             if camera.output.render:
                 render = result.render
                 jobs.append(pool.submit(lambda: _render(result, folder.new("render.png"), render)))
+                compressed = result.processed.jpeg()
+                if compressed is not None:
+                    atomic.write_bytes(folder.new("render.jpg"), compressed)
             metrics = result.metrics
             if camera.quality:
                 jobs.append(pool.submit(lambda: _ideal(result, folder.new("ideal.exr"))))
@@ -72,6 +76,10 @@ def write(result: Result, folder: OutputFolder) -> None:
         with result.stages("files"):
             for done in jobs:
                 done.result()
+    if camera.output.steps:
+        for name, shown in result.renders_of_steps():
+            with result.stages("files"):
+                _render(result, folder.new(name), shown)
     if camera.output.irradiance:
         with result.stages("irradiance"):
             _irradiance(result, folder.new("irradiance.exr"))

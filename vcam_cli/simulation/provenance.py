@@ -13,6 +13,7 @@ import vcam_cli
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.named_spectra import spectra
 from vcam_cli.camera.load import FILE_KEYS
+from vcam_cli.camera.step_plugins import origin, registered
 from vcam_cli.config import shipped
 from vcam_cli.files.spectral.hyperspectral import companions
 from vcam_cli.source_code import code_hash
@@ -60,6 +61,7 @@ def versions() -> dict[str, str]:
     """
     libraries = ("numpy", "scipy", "pydantic", "OpenImageIO")
     found = {name: _version(name) for name in libraries}
+    found |= {f"step {name}": origin(point) for name, point in registered().items()}
     own = {"vcam": vcam_cli.__version__, "code": code_hash()}
     return {**own, "python": platform.python_version(), **found}
 

@@ -5,6 +5,7 @@ import numpy as np
 from vcam_cli.camera.architecture import ARCHITECTURES
 from vcam_cli.camera.derived import photodiode
 from vcam_cli.camera.derived.dark_noise import SIGMAS, dark_noise
+from vcam_cli.camera.processing import SHOWN
 from vcam_cli.camera.scene import ImageFile
 from vcam_cli.effects.order import quantizer
 from vcam_cli.scenes.build import picture_model
@@ -38,6 +39,7 @@ def remarks(ready: Prepared) -> tuple[str, ...]:
         *_overflow(ready),
         *_colors_of_picture(ready),
         *_cropped(ready),
+        *_steps_not_shown(ready),
     )
     if not isinstance(scene, CubeScene):
         return before
@@ -136,6 +138,22 @@ def _colors_of_picture(ready: Prepared) -> tuple[str, ...]:
     if model == "reflectance":
         return ()
     return (f"three channels are taken as reflectances with these sRGB colors (model: {model})",)
+
+
+def _steps_not_shown(ready: Prepared) -> tuple[str, ...]:
+    """Return why there are no pictures after the first steps, where they are asked for."""
+    if not (ready.camera.output.steps and ready.camera.processing):
+        return ()
+    colors = ready.mosaic.colors
+    if len(colors) not in SHOWN and not ready.layout.full_color:
+        names = ", ".join(colors)
+        return (f"output.steps shows nothing between demosaic and color_correction: {names} are"
+                " not the colors of a display",)  # fmt: skip
+    if ready.layout.is_scattered and not ready.layout.full_color:
+        return (
+            "output.steps shows nothing before demosaic: the pixels are in no rows and columns",
+        )
+    return ()
 
 
 def _cropped(ready: Prepared) -> tuple[str, ...]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property, partial
 from pathlib import Path
@@ -16,6 +16,7 @@ from vcam_cli.camera.array import Positions
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.electrical import no_volts
 from vcam_cli.camera.derived.geometry import geometry
+from vcam_cli.camera.processing_steps import Step
 from vcam_cli.errors import BadInput
 from vcam_cli.floats import own_float_errors
 from vcam_cli.parallel import suitable_workers
@@ -54,8 +55,8 @@ class Result:
     stages: Stages
     workers: int
     """Threads."""
-    process: Callable[[], ProcessedPicture]
-    """Prepares the steps of `processing`: measures gains, fits the color correction."""
+    process: Callable[[Sequence[Step]], ProcessedPicture]
+    """Prepares steps of processing: measures gains, fits the color correction."""
     remarks: tuple[str, ...] = ()
     """What a user should know of the frame."""
 
@@ -64,7 +65,7 @@ class Result:
     def processed(self) -> ProcessedPicture:
         """The picture with its steps prepared; a raw frame alone does not need it."""
         with self.stages("balance"):
-            return self.process()
+            return self.process(self.frame.camera.processing)
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -172,6 +173,21 @@ class Result:
         picture = self.processed
         with self.stages("processing"):
             return picture.encode(self.frame.camera.output.render or 8)
+
+    def renders_of_steps(self) -> Iterator[tuple[str, NDArray]]:
+        """Yield step_01_NAME.png and so on, with the render as it were if steps ended there.
+
+        Steps that do nothing are left out, and those after which no display can show the picture.
+        """
+        steps = self.frame.camera.processing
+        for number, step in enumerate(steps, 1):
+            if step.value == "none":
+                continue
+            with self.stages("processing"):
+                picture = self.process(steps[:number])
+                if picture.is_shown:
+                    render = picture.encode(self.frame.camera.output.render or 8)
+                    yield f"step_{number:02d}_{step.name}.png", render
 
     @cached_property
     @own_float_errors
@@ -339,10 +355,11 @@ def _simulate(camera: Camera, workers: int, stages: Stages, shared: Shared) -> R
         linearize=frame.linear if frame.electrical.linearized else None,
         saturated_dn=frame.picture_saturated_dn,
         patches=partial(_patches, frame),
+        primaries=frame.primaries_dn if camera.scene.emits else None,
         planes=frame.layout.full_color,
         layout=frame.layout if frame.layout.is_scattered else None,
     )
-    steps = partial(process, frame.picture_dn, context, camera.processing, workers=workers)
+    steps = partial(process, frame.picture_dn, context, workers=workers)
     result = Result(frame, stages, workers, steps, notes + remarks.remarks(frame))
     if needs_picture(camera):  # what is wrong with its steps is said before anything is written
         _ = result.processed

@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from vcam_cli.camera import load as cameras
+from vcam_cli.camera import step_plugins
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.load import FILE_KEYS, merge
 from vcam_cli.camera.simulation import Seed
@@ -221,6 +222,7 @@ def hash_of(camera: Camera, form: dict[str, Any], asked: dict[str, Any]) -> str:
         "camera": _embed_files(form),
         "files": sorted(_digest(path) for path in provenance.data_files(camera, form)),
         "versions": {name: _versions()[name] for name in LIBRARIES},
+        **step_plugins.code(camera.processing),
     }
     return hash_text(json.dumps(whole, sort_keys=True))
 

@@ -1,0 +1,200 @@
+"""The steps that `processing` may have: a model for each, of one key, the step's name."""
+
+from typing import Annotated, Any, ClassVar, Literal
+
+from vcam_cli.config.model import Model, key
+from vcam_cli.config.quantities import Number, Quantity, Whole
+from vcam_cli.config.values import Either, mapping, word_or
+
+ActsOn = Literal["light", "colors", "codes"]
+"""What a step takes: the raw frame's linear light, mosaic or not; that with all colors at every
+pixel; or the codes of the render, behind its tone curve."""
+
+
+class Step(Model):
+    """One entry of `processing`: a mapping of one key, the step's name."""
+
+    acts_on: ClassVar[ActsOn] = "light"
+
+    @property
+    def name(self) -> str:
+        """Name of the step."""
+        return next(iter(type(self).model_fields))
+
+    @property
+    def value(self) -> Any:
+        """What the file says of it."""
+        return getattr(self, self.name)
+
+
+_DN = Quantity("dn", least=0, words={"subtract": "subtract", "none": "none"})
+_BARE = Number(least=0, example="64")
+
+
+def _black_level(given: Any) -> Any:
+    """Return the value of a word, or of a number of DN with or without its unit."""
+    bare = isinstance(given, (int, float)) and not isinstance(given, bool)
+    return _BARE.read(given) if bare else _DN.read(given)
+
+
+class BlackLevel(Step):
+    """What is subtracted from the raw numbers."""
+
+    black_level: Annotated[
+        float | Literal["subtract", "none"],
+        Either(_black_level, Annotated[float, _DN] | Annotated[float, _BARE], yaml_form=_DN.write),
+    ] = key(
+        "subtract (mean dark signal and offset), none, or a number of DN",
+        unit="DN",
+        example="subtract",
+    )
+
+
+class Demosaic(Step):
+    """All colors at every pixel."""
+
+    demosaic: Literal["bilinear", "edge-aware"] = key(
+        "how missing colors are found", example="bilinear"
+    )
+
+
+class WhiteBalance(Step):
+    """A gain for each color. It may stand before demosaic or after it."""
+
+    white_balance: Literal["gray-world", "bright-block", "illuminant", "none"] = key(
+        "how the gains are found", example="illuminant"
+    )
+
+
+class Matrix(Model):
+    """A color matrix."""
+
+    matrix: tuple[tuple[Annotated[float, Number()], ...], ...] = key(
+        "rows for display R, G, B; columns for the camera's colors",
+        example=[[1.6, -0.4, -0.2], [-0.3, 1.5, -0.2], [0.0, -0.5, 1.5]],
+    )
+
+    def suits(self, colors: int) -> bool:
+        """Return whether it has three rows of one number for each of the camera's colors."""
+        return len(self.matrix) == 3 and {len(row) for row in self.matrix} == {colors}
+
+
+_FITS = {"fit": "fit", "primaries": "primaries", "none": "none"}
+
+
+class ColorCorrection(Step):
+    """From the camera's colors to the display's."""
+
+    acts_on = "colors"
+
+    color_correction: Annotated[
+        Literal["fit", "primaries", "none"] | Matrix, word_or(Matrix, _FITS)
+    ] = key(
+        "fit (to the ColorChecker), primaries (of a picture that emits: its channels come back as"
+        " R, G and B of the render; the default there), none, or a matrix",
+        example="fit",
+    )
+
+
+class Gamma(Step):
+    """The tone curve of the render."""
+
+    gamma: Annotated[
+        float | Literal["srgb"], Number(above=0, example="2.2", words={"srgb": "srgb"})
+    ] = key("a number, or srgb", example="srgb")
+
+
+class ToneMapping(Model):
+    """How bright the render is, and what becomes of its highlights."""
+
+    exposure: Annotated[float, Quantity("exposure_value", least=-20, most=20)] = key(
+        "brightens the render by powers of two", example="0 EV", default=0.0
+    )
+    white: Literal["scene", "sensor"] = key(
+        "what is white in the render: a perfect white in the scene, or what saturates the sensor,"
+        " as cameras do",
+        default="scene",
+    )
+    curve: Literal["none", "filmic"] = key(
+        "none clips what is brighter than white, filmic rolls it off", default="none"
+    )
+
+
+class Tone(Step):
+    """Tone mapping of the render; metrics of the picture know nothing of it."""
+
+    tone: Annotated[ToneMapping, mapping(ToneMapping)] = key(
+        "brightness and highlights of the render", example={"white": "sensor"}
+    )
+
+
+class Noise(Model):
+    """How much of the noise is taken away."""
+
+    strength: Annotated[float, Number(least=0, most=100, example="1")] = key(
+        "factor on the standard deviation that is taken for noise; 0 changes nothing", default=1.0
+    )
+
+
+class Denoise(Step):
+    """Less noise, by the adaptive Wiener filter of Lee (1980) over 5 x 5 pixels."""
+
+    acts_on = "colors"
+
+    denoise: Annotated[Noise, mapping(Noise)] = key(
+        "smooths where the picture varies no more than its noise, which is measured in it",
+        example={"strength": 1},
+    )
+
+
+class UnsharpMask(Model):
+    """How wide and how strong an unsharp mask is."""
+
+    radius: Annotated[float, Quantity("pixels", above=0, most=20)] = key(
+        "standard deviation of the Gaussian blur", example="1 px", default=1.0
+    )
+    amount: Annotated[float, Number(least=0, most=20, example="0.5")] = key(
+        "what the difference from the blurred picture is multiplied by", default=0.5
+    )
+
+
+class Sharpen(Step):
+    """Unsharp masking in linear light."""
+
+    acts_on = "colors"
+
+    sharpen: Annotated[UnsharpMask, mapping(UnsharpMask)] = key(
+        "adds the difference from a blurred copy", example={"radius": "1 px", "amount": 0.5}
+    )
+
+
+class GamutMapping(Step):
+    """Colors that the display cannot show, brought into its gamut."""
+
+    acts_on = "colors"
+
+    gamut_mapping: Literal["desaturate", "none"] = key(
+        "desaturate: towards the gray of the same luminance, until no component is negative;"
+        " what is brighter than white is the matter of tone",
+        example="desaturate",
+    )
+
+
+class Compression(Model):
+    """How strongly a picture is compressed."""
+
+    quality: Annotated[int, Whole(least=1, most=100, example="90")] = key(
+        "of the quantization tables, 1 to 100, as libjpeg counts", default=90
+    )
+
+
+class Jpeg(Step):
+    """JPEG compression of the render, 8 bits, colors at half the resolution (4:2:0)."""
+
+    acts_on = "codes"
+
+    jpeg: Annotated[Compression, mapping(Compression)] = key(
+        "compresses the render: render.png shows what is left, render.jpg is the file itself;"
+        " metrics compare linear light and know nothing of it",
+        example={"quality": 90},
+    )
