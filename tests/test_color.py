@@ -82,7 +82,7 @@ def developed(result, processing):
     """The same frame through other steps."""
     steps = load("true-color", [processing]).processing
     context = result.processed.context
-    return replace(result, process=lambda: process(result.dn, context, steps))
+    return replace(result, process=lambda _: process(result.dn, context, steps))
 
 
 def through(lamp, processing):
