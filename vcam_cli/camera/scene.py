@@ -1,25 +1,22 @@
 """The scene: what stands in front of the lens, how it is lit, how far away and how large."""
 
 from collections.abc import Mapping
-from pathlib import PurePath
 from typing import Annotated, Any, Literal, Self, get_args
 
 from pydantic import model_validator
 
 from vcam_cli.camera.illuminant import Illuminant, IlluminantSpec
+from vcam_cli.camera.scene_files import Hyperspectral, ImageFile
 from vcam_cli.camera.wavelengths import Wavelengths
 from vcam_cli.config.model import Model, exactly_one, key
 from vcam_cli.config.quantities import Number, Quantity, Whole
 from vcam_cli.config.validation_messages import describe, failure, fault, one_of, refusal
 from vcam_cli.config.values import (
     Angle,
-    Choice,
     Either,
-    File,
     Fraction,
     Frequency,
     Length,
-    Positive,
     word_or,
 )
 from vcam_cli.config.yaml_type import to_yaml
@@ -180,44 +177,6 @@ PICTURE_MODELS = {
     "rgb-display": "three channels that emit as the primaries of the camera file's display",
 }
 """What the channels of a picture may mean."""
-
-
-class ImageFile(Model):
-    """A picture, read as the reflectance or the radiance of a flat scene."""
-
-    kind: Literal["image"] = key("what kind of source this is", example="image")
-    file: File = key("any image file that OpenImageIO reads", example="photo.png")
-    encoding: Annotated[str, Choice("srgb", "linear")] = key(
-        "how the file codes light; default srgb, for .exr, .hdr and .pfm linear",
-        example="srgb",
-        default=None,
-    )
-    white: Positive = key("value in the file that has the stated luminance", default=1.0)
-    model: Literal["auto", "reflectance", "laser", "rgb-display", "mallett"] = key(
-        "what channels mean: auto (one is reflectance, three are mallett), reflectance (one), "
-        "laser (450, 550 and 650 nm, equal planes = equal radiance in W), rgb-display (the "
-        "primaries of the camera file's display), mallett (the smooth reflectances that "
-        "have these sRGB colors under D65)",
-        default="auto",
-    )
-
-    @model_validator(mode="after")
-    def _encoding(self) -> Self:
-        if "encoding" not in self.model_fields_set:
-            linear = PurePath(self.file).suffix.lower() in (".exr", ".hdr", ".pfm")
-            self._fill(encoding="linear" if linear else "srgb")
-        return self
-
-
-class Hyperspectral(Model):
-    """A file of spectra: spectral EXR, ENVI, ISETCam scene, npz, multichannel TIFF."""
-
-    kind: Literal["hyperspectral"] = key("what kind of source this is", example="hyperspectral")
-    file: File = key(
-        "radiances or reflectances: a spectral .exr, an ENVI .hdr, an ISETCam .mat, a .npz with "
-        "wavelength_nm and radiance or reflectance, a .tif with a table of its wavelengths",
-        example="scene.exr",
-    )
 
 
 Source = (

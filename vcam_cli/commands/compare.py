@@ -121,6 +121,7 @@ def compare(
     \b
     Example:
       vcam compare out/a/render.png out/b/render.png
+      vcam compare out/a/raw.dng out/a/render.png
       vcam compare a.exr b.exr --space xyz --ppd 23 --delta-e 2000 -o out/ab
     """
     from vcam_cli.comparison import image_files as study

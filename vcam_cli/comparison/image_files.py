@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcam_cli.errors import bad
+from vcam_cli.files.camera_raw import develop, is_raw
 from vcam_cli.files.exr import write_exr
 from vcam_cli.files.folder import OutputFolder
 from vcam_cli.files.images import LinearImage, read_picture
@@ -44,7 +45,8 @@ class Settings:
         """Return the color space of one file's values."""
         if self.space is not None:
             return self.space
-        return "linear-srgb" if path.suffix.lower() in LINEAR_FILES else "srgb"
+        linear = path.suffix.lower() in LINEAR_FILES or is_raw(path)
+        return "linear-srgb" if linear else "srgb"
 
     @property
     def screen(self) -> Screen:
@@ -137,6 +139,11 @@ def compare(
 
 
 def _read(path: Path, settings: Settings, name: str) -> LinearImage:
+    if is_raw(path):
+        if settings.space not in (None, "linear-srgb"):
+            message = f"{path} is a raw file, which is developed to linear sRGB"
+            raise bad((name,), message, "compare it without --space")
+        return develop(path, (name,))
     space = settings.space_of(path)
     encoding = "srgb" if space == "srgb" else "linear"
     channels = ("X", "Y", "Z") if space == "xyz" else ("R", "G", "B")

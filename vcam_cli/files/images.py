@@ -176,7 +176,10 @@ def _choose_channels(
         shown = ", ".join(names[i] for i in depth)
         raise UnusableFile(f"holds depth (channel {shown}), not light", "use a file of light")
     listed, color = color, [i for i in color if i not in depth]
-    if all(name in upper for name in wanted):
+    layer = _layer(upper, wanted)
+    if layer:
+        chosen = tuple(upper.index(layer + name) for name in wanted)
+    elif all(name in upper for name in wanted):
         chosen = tuple(upper.index(name) for name in wanted)
     elif wanted != _RGB:
         shown = ", ".join(names) or "none"
@@ -197,6 +200,23 @@ def _choose_channels(
     if dropped:
         notes.append(f"channels {', '.join(dropped)} dropped")
     return chosen, tuple(notes)
+
+
+def _layer(names: list[str], wanted: tuple[str, ...]) -> str:
+    """Return the prefix of the layer that holds the picture; "" where there is none.
+
+    Renderers write channels such as ViewLayer.Combined.R, with other layers (Blender manual,
+    "Output Properties", OpenEXR MultiLayer).
+    """
+    prefixes = {name[: -len(wanted[0])] for name in names if name.endswith("." + wanted[0])}
+    whole = [layer for layer in prefixes if all(layer + name in names for name in wanted)]
+    combined = [layer for layer in whole if layer.endswith("COMBINED.")]
+    if all(name in names for name in wanted) or not whole:
+        return ""
+    if len(whole) > 1 and len(combined) != 1:
+        shown = ", ".join(sorted(layer.rstrip(".") for layer in whole))
+        raise UnusableFile(f"has several layers of color ({shown})", "save the one you mean alone")
+    return (combined or whole)[0]
 
 
 def check_size(spec: Any, channels: int) -> None:

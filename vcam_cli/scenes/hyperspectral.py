@@ -30,7 +30,8 @@ from vcam_cli.errors import bad
 from vcam_cli.scenes import light
 from vcam_cli.scenes.base import Array, View, paint_by_bands
 from vcam_cli.scenes.image import ImageScene, image_scene
-from vcam_cli.spectra import Spectrum, integral, luminance
+from vcam_cli.spectra import Spectrum, Table, integral, luminance
+from vcam_cli.spectra.spectrum import Outside
 
 Quantity = Literal["radiance", "irradiance", "reflectance"]
 FILE = ("scene", "source", "file")
@@ -59,6 +60,8 @@ class Bands:
     """What the values are; an irradiance as the radiance, E / pi, of a white diffuser there."""
     white: Array | None = None
     """Radiance of a perfect white (bands,) [W/(sr m2 m)], where a file of radiances has it."""
+    dark_beyond: bool = False
+    """Whether there is no light at wavelengths beyond the bands; else they are not known."""
 
 
 @dataclass(frozen=True)
@@ -112,19 +115,27 @@ class CubeScene(ImageScene):
         return found
 
 
-def check_bands(scene: Scene, bands: Bands) -> None:
-    """Raise BadInput where the scene asks for what a file with these bands does not give."""
+def covers(scene: Scene, bands: Bands) -> bool:
+    """Return whether the light of a file is known at all wavelengths simulated."""
+    table = Table(bands.wavelengths, bands.wavelengths)
+    return bands.dark_beyond or table.covers(scene.wavelengths.start, scene.wavelengths.stop)
+
+
+def check_coverage(scene: Scene, bands: Bands) -> None:
+    """Raise BadInput where wavelengths are simulated at which a file's light is not known."""
     start, stop = scene.wavelengths.start, scene.wavelengths.stop
-    try:
-        Spectrum.from_samples(bands.wavelengths, bands.wavelengths).require(start, stop)
-    except ValueError:
+    if not covers(scene, bands):
         low, high = (f"{w * 1e9:.6g} nm" for w in bands.wavelengths[[0, -1]])
         raise bad(
             ("scene", "wavelengths"),
             f"the file covers {low} to {high}, but {start * 1e9:.6g} to {stop * 1e9:.6g} nm "
             "are simulated",
             f"write wavelengths: {{start: {low}, stop: {high}}}, or less",
-        ) from None
+        )
+
+
+def check_bands(scene: Scene, bands: Bands) -> None:
+    """Raise BadInput where a file's light contradicts the scene's lamp or level."""
     if bands.quantity != "reflectance" and scene.illuminant is not None:
         raise bad(
             ("scene", "illuminant"),
@@ -154,8 +165,9 @@ def check_place(bands: Bands, has_lens: bool) -> None:
 def cube_scene(scene: Scene, cube: Cube, view: View) -> CubeScene:
     """Return the cube on the sensor plane, in the light that the scene names or its own.
 
-    Raises BadInput as `check_bands` does, and for a file without light.
+    Raises BadInput as `check_bands` and `check_coverage` do, and for a file without light.
     """
+    check_coverage(scene, cube.bands)
     check_bands(scene, cube.bands)
     hats = _hat_functions(cube.bands.wavelengths)
     if cube.bands.quantity == "reflectance":
@@ -163,7 +175,9 @@ def cube_scene(scene: Scene, cube: Cube, view: View) -> CubeScene:
         spectra = tuple(white.multiply(hat) for hat in hats)
     else:
         values = file_white(scene, cube)
-        white = _scale_to_scene(Spectrum.from_samples(cube.bands.wavelengths, values), scene)
+        beyond: Outside = "zero" if cube.bands.dark_beyond else "error"
+        known = Spectrum.from_samples(cube.bands.wavelengths, values, beyond)
+        white = _scale_to_scene(known, scene)
         units = np.maximum(values, MIN_UNIT * values.max())
         spectra = tuple(
             hat.scale_by(unit * white.scale) for hat, unit in zip(hats, units, strict=True)

@@ -23,8 +23,8 @@ from vcam_cli.processing import check as check_steps
 from vcam_cli.quality.display import display_screen
 from vcam_cli.readout.layout import layout
 from vcam_cli.scenes.build import SOURCE, check_channels
-from vcam_cli.scenes.hyperspectral import check_bands, check_place
-from vcam_cli.simulation import plan, raw_dng, spectral_irradiance
+from vcam_cli.scenes.hyperspectral import check_bands, check_coverage, check_place
+from vcam_cli.simulation import plan, raw_dng, scene_bands, spectral_irradiance
 
 
 def load(camera: str | Path, sets: Sequence[str] = ()) -> Camera:
@@ -101,9 +101,20 @@ def check_picture(camera: Camera) -> None:
     if source.kind == "hyperspectral":
         from vcam_cli.files.spectral.hyperspectral import read_bands
 
-        bands = read_bands(source.file, path)
+        bands = read_bands(source.file, path, source.channels)
         check_place(bands, camera.optics.is_lens)
         check_bands(camera.scene, bands)
+
+
+def check_spectral_file(camera: Camera) -> None:
+    """Refuse a file of spectra that ends at wavelengths that the camera sees (BadInput)."""
+    source = camera.scene.source
+    if source.kind == "hyperspectral":
+        from vcam_cli.files.spectral.hyperspectral import read_bands
+
+        bands = read_bands(source.file, (*SOURCE, "file"), source.channels)
+        if scene_bands.unseen_share(camera, bands) > camera.accuracy.tolerance:
+            check_coverage(camera.scene, bands)
 
 
 def check_lens(camera: Camera) -> None:
@@ -148,6 +159,7 @@ CHECKS: tuple[files.CameraCheck, ...] = (
     (check_size, "pixel array processing"),
     (check_positions, "pixel array processing"),
     (check_picture, "scene"),
+    (check_spectral_file, "scene optics pixel array exposure adc accuracy"),
     (check_lens, "optics scene pixel array effects"),
     (check_formats, "output"),
     (raw_dng.check, "pixel array exposure adc output"),

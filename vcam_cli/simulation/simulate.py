@@ -26,7 +26,8 @@ from vcam_cli.quality import display
 from vcam_cli.quality.metrics import Metrics
 from vcam_cli.quality.mse import mse, psnr_db
 from vcam_cli.quality.scielab import cielab_map, s_cielab_map
-from vcam_cli.simulation import remarks
+from vcam_cli.scenes.hyperspectral import Cube
+from vcam_cli.simulation import remarks, scene_bands
 from vcam_cli.simulation.checks import read_lens
 from vcam_cli.simulation.figures import figures
 from vcam_cli.simulation.frame import Frame, expose
@@ -309,7 +310,7 @@ def prepare(
     try:
         stages = Stages(watch=watch or Silent())
         camera = _load_lens(camera, stages)
-        picture, notes = _picture(camera, stages)
+        picture, notes = _completed(camera, *_picture(camera, stages))
         ready = bring_light(camera, picture, workers or threads(camera), stages)
         return ready, notes + remarks.remarks(ready)
     except BadInput as error:
@@ -337,15 +338,23 @@ def _picture(camera: Camera, stages: Stages) -> tuple[Any, tuple[str, ...]]:
         from vcam_cli.scenes.hyperspectral import check_place
 
         with stages("read"):
-            cube, notes = read_cube(source.file, path)
+            cube, notes = read_cube(source.file, path, source.channels)
         check_place(cube.bands, camera.optics.is_lens)
         return cube, notes
     return None, ()
 
 
+def _completed(camera: Camera, picture: Any, notes: tuple[str, ...]) -> tuple[Any, tuple[str, ...]]:
+    """Return what the scene's file holds, dark where it ends and the camera hardly sees."""
+    if not isinstance(picture, Cube):
+        return picture, notes
+    cube, more = scene_bands.completed(camera, picture)
+    return cube, (*notes, *more)
+
+
 def _simulate(camera: Camera, workers: int, stages: Stages, shared: Shared) -> Result:
     camera = _load_lens(camera, stages)
-    picture, notes = shared.picture(camera, lambda: _picture(camera, stages))
+    picture, notes = _completed(camera, *shared.picture(camera, lambda: _picture(camera, stages)))
     frame = expose(camera, picture, workers, stages, shared.rate_cache)
     context = Context(
         pattern=frame.mosaic.block,

@@ -11,6 +11,7 @@ RGB channels beside, and these are the integral of S0 over nanometers.
 
 import re
 from collections.abc import Iterable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryFile
 from typing import BinaryIO
@@ -85,16 +86,22 @@ def _rows(
     return found
 
 
-def open_spectral(path: Path) -> SpectralData:
-    """Return the header of a spectral EXR file. Raise UnusableFile."""
+def open_spectral(path: Path, wavelengths: Mapping[str, float] | None = None) -> SpectralData:
+    """Return the header of a spectral EXR file. Raise UnusableFile.
+
+    wavelengths: those of channels that do not follow the layout [m], as renderers name them; they
+    are radiances.
+    """
     with open_image(path) as source:
         spec = source.spec()
         if source.format_name() != "openexr" or spec.deep:
             raise UnusableFile("is no flat OpenEXR file")
-        found, notes = _channels(spec.channelnames)
+        named = wavelengths is not None
+        find = _channels if wavelengths is None else partial(_named_channels, wavelengths)
+        found, notes = find(spec.channelnames)
         check_size(spec, len(found))
-        quantity: Quantity = "reflectance"
-        if spec.channelnames[found[0][1]].startswith("S"):
+        quantity: Quantity = "radiance" if named else "reflectance"
+        if not named and spec.channelnames[found[0][1]].startswith("S"):
             quantity = _quantity(spec.get_string_attribute("emissiveUnits"))
         if spec.get_float_attribute("EV", 0.0) != 0.0:
             notes.append("its exposure compensation (EV) is not used")
@@ -124,6 +131,21 @@ def _channels(names: Sequence[str]) -> tuple[list[tuple[float, int]], list[str]]
         raise UnusableFile("has no channels named like S0.550,000000nm or T.550,000000nm")
     dark = {"S1", "S2", "S3"} & set(by_kind)
     return sorted(found), ["its polarization is not used"] if dark else []
+
+
+def _named_channels(
+    wavelengths: Mapping[str, float], names: Sequence[str]
+) -> tuple[list[tuple[float, int]], list[str]]:
+    """Return (wavelength [m], index) of the channels that are named, and notes."""
+    missing = [name for name in wavelengths if name not in names]
+    if missing:
+        shown = ", ".join(names[:20]) + (" ..." if len(names) > 20 else "")
+        raise UnusableFile(
+            f"has no channel {', '.join(missing)}; it has {shown}", "name those that it has"
+        )
+    others = [name for name in names if name not in wavelengths]
+    notes = [f"channels {', '.join(others)} of the file are not used"] if others else []
+    return sorted((wavelengths[name], names.index(name)) for name in wavelengths), notes
 
 
 def _wavelength(match: re.Match[str]) -> float:

@@ -4,7 +4,7 @@ Each format has a reader of its own; here are the checks and the change of units
 come radiances in W/(sr m2 m), or reflectances, as float32, bands by rising wavelength.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -25,12 +25,18 @@ _BLOCK = 32  # rows
 _REMEDY = "give a whole spectral .exr, ENVI .hdr, ISETCam .mat, .npz or multichannel .tif"
 
 YamlPath = tuple[str | int, ...] | str
+Channels = Mapping[str, float] | None
+"""Name of a channel of an EXR -> its wavelength [m]; None where the names say it."""
 
 
 def _exr(path: Path) -> SpectralData:
+    return _named_exr(path, None)
+
+
+def _named_exr(path: Path, channels: Channels) -> SpectralData:
     from vcam_cli.files.spectral.exr import open_spectral
 
-    return open_spectral(path)
+    return open_spectral(path, channels)
 
 
 def _envi(path: Path) -> SpectralData:
@@ -67,13 +73,15 @@ READERS: dict[str, Callable[[Path], SpectralData]] = {
 }
 
 
-def read_bands(path: Path | str, yaml_path: YamlPath) -> Bands:
+def read_bands(path: Path | str, yaml_path: YamlPath, channels: Channels = None) -> Bands:
     """Return what a file of spectra holds, by its header. Raise as `read_cube` does."""
-    with _open_bands(Path(path), yaml_path) as (stored, order):
+    with _open_bands(Path(path), yaml_path, channels) as (stored, order):
         return _bands(stored, order)
 
 
-def read_cube(path: Path | str, yaml_path: YamlPath) -> tuple[Cube, tuple[str, ...]]:
+def read_cube(
+    path: Path | str, yaml_path: YamlPath, channels: Channels = None
+) -> tuple[Cube, tuple[str, ...]]:
     """Return a file of spectra, and notes for the user.
 
     Values slightly below 0 become 0, with a note. Raise BadInput (with `yaml_path`) for a file
@@ -81,7 +89,7 @@ def read_cube(path: Path | str, yaml_path: YamlPath) -> tuple[Cube, tuple[str, .
     that are not finite or clearly negative; CannotDo when it may not be read or the memory does
     not suffice.
     """
-    with _open_bands(Path(path), yaml_path) as (stored, order):
+    with _open_bands(Path(path), yaml_path, channels) as (stored, order):
         data, notes = _si_samples(stored, order)
         return Cube(data, _bands(stored, order)), (*stored.notes, *notes)
 
@@ -101,7 +109,9 @@ def companions(path: Path | str) -> tuple[Path, ...]:
 
 
 @contextmanager
-def _open_bands(path: Path, yaml_path: YamlPath) -> Iterator[tuple[SpectralData, slice]]:
+def _open_bands(
+    path: Path, yaml_path: YamlPath, channels: Channels
+) -> Iterator[tuple[SpectralData, slice]]:
     """Open a file: its header, and its bands in the order of wavelength."""
     with convert_errors(path, yaml_path, _REMEDY):
         reader = READERS.get(path.suffix.lower())
@@ -109,7 +119,7 @@ def _open_bands(path: Path, yaml_path: YamlPath) -> Iterator[tuple[SpectralData,
             known = ", ".join(READERS)
             raise UnusableFile(f"has the ending {path.suffix or 'none'!r}; known are {known}")
         check_file(path)
-        stored = reader(path)
+        stored = reader(path) if channels is None else _named_exr(path, channels)
         order = _order(stored.wavelengths)
         _check_size(path, stored)
         yield stored, order

@@ -1,0 +1,74 @@
+"""Scenes that are files: pictures, and spectra at every place."""
+
+from collections.abc import Mapping
+from pathlib import PurePath
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import model_validator
+
+from vcam_cli.config.model import Model, key
+from vcam_cli.config.quantities import Quantity
+from vcam_cli.config.validation_messages import describe, refusal
+from vcam_cli.config.values import Choice, Either, File, Positive, Wavelength
+
+
+class ImageFile(Model):
+    """A picture, read as the reflectance or the radiance of a flat scene."""
+
+    kind: Literal["image"] = key("what kind of source this is", example="image")
+    file: File = key("any image file that OpenImageIO reads", example="photo.png")
+    encoding: Annotated[str, Choice("srgb", "linear")] = key(
+        "how the file codes light; default srgb, for .exr, .hdr and .pfm linear",
+        example="srgb",
+        default=None,
+    )
+    white: Positive = key("value in the file that has the stated luminance", default=1.0)
+    model: Literal["auto", "reflectance", "laser", "rgb-display", "mallett"] = key(
+        "what channels mean: auto (one is reflectance, three are mallett), reflectance (one), "
+        "laser (450, 550 and 650 nm, equal planes = equal radiance in W), rgb-display (the "
+        "primaries of the camera file's display), mallett (the smooth reflectances that "
+        "have these sRGB colors under D65)",
+        default="auto",
+    )
+
+    @model_validator(mode="after")
+    def _encoding(self) -> Self:
+        if "encoding" not in self.model_fields_set:
+            linear = PurePath(self.file).suffix.lower() in (".exr", ".hdr", ".pfm")
+            self._fill(encoding="linear" if linear else "srgb")
+        return self
+
+
+_CHANNEL = Quantity("length", above=0, least=1e-9, most=1e-3)
+
+
+def _channels(given: Any) -> Mapping[str, float]:
+    if not isinstance(given, Mapping) or len(given) < 2:
+        raise ValueError(
+            f"{describe(given)} names no channels; write for example {{w400: 400 nm, w450: 450 nm}}"
+        )
+    return {str(name): _CHANNEL.read(value) for name, value in given.items()}
+
+
+class Hyperspectral(Model):
+    """A file of spectra: spectral EXR, ENVI, ISETCam scene, npz, multichannel TIFF."""
+
+    kind: Literal["hyperspectral"] = key("what kind of source this is", example="hyperspectral")
+    file: File = key(
+        "radiances or reflectances: a spectral .exr, an ENVI .hdr, an ISETCam .mat, a .npz with "
+        "wavelength_nm and radiance or reflectance, a .tif with a table of its wavelengths",
+        example="scene.exr",
+    )
+    channels: Annotated[Mapping[str, float] | None, Either(_channels, dict[str, Wavelength])] = key(
+        "of an .exr that names its channels in its own way, as renderers do: the wavelength of"
+        " each, radiances in W/(sr m2 nm)",
+        example={"w400": "400 nm", "w450": "450 nm"},
+        default=None,
+    )
+
+    @model_validator(mode="after")
+    def _named(self) -> Self:
+        if self.channels is not None and PurePath(self.file).suffix.lower() != ".exr":
+            message = "only the channels of an .exr have names of their own"
+            raise refusal(("channels",), message, "remove it, or give an .exr")
+        return self
