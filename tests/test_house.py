@@ -34,6 +34,7 @@ FLOORS = (
     {"processing"},
     {"quality"},
     {"files"},
+    {"reports"},
     {"simulation"},
     {"comparison"},
     {"accuracy"},

@@ -217,10 +217,13 @@ class Output(Model):
         "also write raw.tif: the whole numbers of the raw frame, with the pattern of its colors",
         default=False,
     )
-
     steps: Annotated[bool, Strict()] = key(
         "also write step_01_NAME.png and so on: the render as it would be, did `processing` end"
         " after that step; linear before gamma",
+        default=False,
+    )
+    report: Annotated[bool, Strict()] = key(
+        "also write report.html: pictures, plan, noise, spectra, sharpness and origin on one page",
         default=False,
     )
 

@@ -17,7 +17,14 @@ from vcam_cli.arguments import (
     require_overrides,
     require_whole,
 )
-from vcam_cli.capture_schedules import frames, online_loss, photocurrents, schedule_file, tables
+from vcam_cli.capture_schedules import (
+    frames,
+    online_loss,
+    photocurrents,
+    schedule_file,
+    schedule_report,
+    tables,
+)
 from vcam_cli.capture_schedules.fewest_captures import FewestCaptures, fewest_captures
 from vcam_cli.capture_schedules.frames import Frames
 from vcam_cli.capture_schedules.methods import (
@@ -35,12 +42,10 @@ from vcam_cli.capture_schedules.schedule_file import ScheduleFile
 from vcam_cli.errors import BadInput
 from vcam_cli.files.folder import OutputFolder
 from vcam_cli.files.points_store import RECORD
-from vcam_cli.files.report import hash_file
 from vcam_cli.floats import own_float_errors
 from vcam_cli.progress import Observer, Silent
 from vcam_cli.scheduling.local_search import assignment_count
 from vcam_cli.scheduling.pdf import Pdf
-from vcam_cli.simulation import provenance
 
 MOST_ASSIGNMENTS = 5000
 """Assignments of captures to segments that are searched: about a minute with one start."""
@@ -159,6 +164,7 @@ def schedule(
     workers: int | None = None,
     watch: Observer | None = None,
     tell: Callable[[str], None] | None = None,
+    report: bool = False,
 ) -> ScheduleResult:
     """Run a study of capture schedules, and write its tables and plots.
 
@@ -178,6 +184,8 @@ def schedule(
         Told of the progress.
     tell : callable, optional
         Gets messages.
+    report : bool
+        Whether to write report.html.
 
     Raises
     ------
@@ -211,7 +219,9 @@ def schedule(
             write(folder.new(name))
         result = replace(result, frames=_take_frames(read, folder, workers, watch))
         result = replace(result, seconds=time.perf_counter() - start)
-        folder.finish(_record(result))
+        if report:
+            schedule_report.write(result, folder)
+        folder.finish(tables.record(result))
     return result
 
 
@@ -380,13 +390,3 @@ class _StudyRun:
         except ValueError as error:
             raise self._error(("online",), error) from None
         return tuple(losses)
-
-
-def _record(result: ScheduleResult) -> dict[str, Any]:
-    """Return what study.json says, but for the names of the files."""
-    return {
-        **result.summary(),
-        "study": result.study.model.model_dump(mode="json"),
-        "hashes": {str(path): hash_file(path) for path in result.study.inputs},
-        "versions": provenance.versions(),
-    }

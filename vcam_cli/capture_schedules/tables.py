@@ -11,8 +11,10 @@ from vcam_cli.capture_schedules import online_loss, pdf_scale
 from vcam_cli.capture_schedules import schedule_plots as plots
 from vcam_cli.capture_schedules.methods import MethodResult, Task
 from vcam_cli.capture_schedules.model import ScheduleStudy
+from vcam_cli.files.report import hash_file
 from vcam_cli.files.tables import Cell, write_table
 from vcam_cli.scheduling.objective import expected_snr_noisy_saturation
+from vcam_cli.simulation import provenance
 
 if TYPE_CHECKING:
     from vcam_cli.capture_schedules.study import ScheduleResult
@@ -111,6 +113,16 @@ def writers(result: ScheduleResult) -> Writers:
     if plots.binning_steps(result):
         out["binning.png"] = partial(plots.plot_binning, result)
     return out
+
+
+def record(result: ScheduleResult) -> dict[str, Any]:
+    """Return what study.json says, but for the names of the files."""
+    return {
+        **result.summary(),
+        "study": result.study.model.model_dump(mode="json"),
+        "hashes": {str(path): hash_file(path) for path in result.study.inputs},
+        "versions": provenance.versions(),
+    }
 
 
 def notes(study: ScheduleStudy, task: Task, found: Sequence[MethodResult]) -> Iterator[str]:

@@ -36,6 +36,7 @@ def accuracy(
     as_json: options.Json = False,
     quiet: options.Quiet = False,
     workers: options.Workers = None,
+    wants_report: options.Report = False,
 ) -> None:
     """Show what accuracy costs: error and seconds of every preset, knob and effect.
 
@@ -50,6 +51,7 @@ def accuracy(
     from vcam_cli.accuracy import plots, study
     from vcam_cli.files import report, tables
     from vcam_cli.files.folder import OutputFolder
+    from vcam_cli.reports import study_report
     from vcam_cli.simulation import provenance
     from vcam_cli.simulation.checks import load
 
@@ -62,6 +64,8 @@ def accuracy(
         rows = (point.row for point in found.points)
         tables.write_table(folder.new("accuracy.csv"), study.COLUMNS, rows)
         plots.pareto(folder.new("accuracy.png"), *pareto_arguments(found))
+        if wants_report:
+            study_report.write(folder, **report_arguments(found))
         record = found.report() | {"camera": model.model_dump(mode="json")}
         folder.finish(record | {"versions": provenance.versions()})
     if as_json:
@@ -94,6 +98,28 @@ def pareto_arguments(found: "Study"):
     tolerance = found.camera.accuracy.tolerance
     title = f"{found.camera.name}: what accuracy costs"
     return title, points("preset", "tolerance"), curves, tolerance, panels, points("all")
+
+
+def report_arguments(found: "Study") -> dict[str, Any]:
+    """Return title, text, facts and captions of the report."""
+    from vcam_cli.reports.page import Facts
+
+    facts = [("recommended", found.recommendation.sentence), ("reference", convergence(found))]
+    facts += [(f"{knob} does not apply", why) for knob, why in found.absent.items()]
+    captions = {
+        "accuracy.csv": "Errors are relative to full signal, of the mean raw frame against the"
+        " reference; a knob's is its own, with all others converged.",
+        "accuracy.png": "Error over seconds of every preset and along every knob; what the plan"
+        " expected of each effect over what leaving it out did",
+    }
+    about = "Error of the mean raw frame against a converged reference, and the seconds it takes."
+    title = f"{found.camera.name}: what accuracy costs"
+    return {
+        "title": title,
+        "about": about,
+        "facts": [Facts("In short", facts)],
+        "captions": captions,
+    }
 
 
 def print_report(found: "Study", path: Path) -> None:

@@ -1,8 +1,9 @@
 """`vcam characterize`: a camera measured by EMVA 1288 and ISO 12233."""
 
 import sys
+from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -50,6 +51,7 @@ def characterize(
     as_json: options.Json = False,
     quiet: options.Quiet = False,
     workers: options.Workers = None,
+    wants_report: options.Report = False,
 ) -> None:
     """Measure a camera on a simulated bench: photon transfer, noise, range, linearity, MTF.
 
@@ -68,6 +70,7 @@ def characterize(
     from vcam_cli.characterization.plots import characterization_panels
     from vcam_cli.files import curves, report, tables
     from vcam_cli.files.folder import OutputFolder
+    from vcam_cli.reports import study_report
     from vcam_cli.simulation import provenance
     from vcam_cli.simulation.checks import load
 
@@ -82,6 +85,8 @@ def characterize(
         tables.write_table(folder.new("characterize.csv"), study.COLUMNS, rows)
         for name, (title, panels) in characterization_panels(found).items():
             curves.draw(folder.new(name), title, panels)
+        if wants_report:
+            study_report.write(folder, **report_arguments(found))
         record = found.report() | {"camera": model.model_dump(mode="json")}
         folder.finish(record | {"versions": provenance.versions()})
     for note in found.notes:
@@ -92,6 +97,30 @@ def characterize(
         print_report(found, path)
         if keep_frames:
             print(f"{path}/frames: TIFF files of each color, and {DESCRIPTOR}, which lists them")
+
+
+def report_arguments(found: "Characterization") -> dict[str, Any]:
+    """Return title, text, facts and captions of the report."""
+    from vcam_cli.reports.page import Facts
+
+    def measured(color: str) -> Iterator[tuple[str, str]]:
+        for name in SHOWN:
+            q = found.get(name, color)
+            yield name, f"{q.measured:.4g} (expected {q.expected:.4g}) {q.unit}".rstrip()
+
+    cards = [Facts(channel.color, list(measured(channel.color))) for channel in found.channels]
+    if found.notes:
+        cards.append(Facts("Notes", [("", note) for note in found.notes]))
+    captions = {
+        "characterize.csv": "What the bench measured beside what the camera file says.",
+        "photon_transfer.png": "Temporal variance over the mean, whose slope is the system gain K",
+        "snr.png": "Signal over temporal noise over the photons on a pixel, with the model",
+        "linearity.png": "Mean over photons, and the deviation from a straight line",
+        "mtf.png": "Transfer of contrast of a slanted edge over spatial frequency, with the model",
+    }
+    about = "Measured on simulated raw frames as EMVA 1288 and ISO 12233 have it."
+    title = f"{found.bench.camera.name}: a camera on the bench"
+    return {"title": title, "about": about, "facts": cards, "captions": captions}
 
 
 def print_report(found: "Characterization", path: Path) -> None:

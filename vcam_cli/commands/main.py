@@ -43,6 +43,7 @@ COMMANDS = {
     "schedule": "schedule:schedule",
     "characterize": "characterize:characterize",
     "compare": "compare:compare",
+    "report": "report:report",
     "validate": "validate:validate",
     "list": "list_:list_",
     "explain": "explain:explain",

@@ -95,6 +95,12 @@ Json = Annotated[
     bool, typer.Option("--json", help="Machine-readable summary on stdout, nothing else there.")
 ]
 Quiet = Annotated[bool, typer.Option("-q", "--quiet", help="No messages but errors.")]
+Report = Annotated[
+    bool,
+    typer.Option(
+        "--report", help="Also write report.html: all of it on one page, to read or send."
+    ),
+]
 MOST_WORKERS_A_CORE = 4
 """Threads or processes, from which on more only wait for each other."""
 

@@ -4,6 +4,7 @@ from pathlib import Path
 
 from vcam_cli.commands import options
 from vcam_cli.commands.progress import Progress
+from vcam_cli.reports.run_facts import spoken
 
 
 def run(
@@ -15,6 +16,7 @@ def run(
     as_json: options.Json = False,
     quiet: options.Quiet = False,
     workers: options.Workers = None,
+    report: options.Report = False,
 ) -> None:
     """Simulate a camera and write raw.exr, render.png, metrics.csv and run.json.
 
@@ -28,7 +30,8 @@ def run(
     from vcam_cli.simulation.checks import load
 
     start = time.perf_counter()
-    model = load(camera, options.overrides(set_, seed, accuracy))
+    asked = ["output.report=true"] if report else []
+    model = load(camera, [*options.overrides(set_, seed, accuracy), *asked])
     from vcam_cli.files.folder import OutputFolder
     from vcam_cli.files.report import to_json
     from vcam_cli.simulation import outputs, provenance
@@ -39,14 +42,13 @@ def run(
     with place as folder, Progress(quiet) as progress:
         result = simulate(model, workers, progress)
         outputs.write(result, folder)
-        record = outputs.record(result, inputs, time.perf_counter() - start)
-        folder.finish(record)
+        record = outputs.finish(result, folder, inputs, lambda: time.perf_counter() - start)
     for note in result.notes:
         options.say(note, quiet)
     if as_json:
         print(to_json(summary(record, folder.path)), end="")
     elif not quiet:
-        print(report(result.metrics.rows, record, folder.path, folder.names))
+        print(summary_text(result.metrics.rows, record, folder.path, folder.names))
 
 
 def summary(record: dict, path: Path) -> dict:
@@ -55,10 +57,10 @@ def summary(record: dict, path: Path) -> dict:
     return {"out": str(path), **{name: record[name] for name in names}}
 
 
-def report(
+def summary_text(
     metrics: tuple[tuple[str, float, str], ...], record: dict, path: Path, files: tuple[str, ...]
 ) -> str:
-    """Return the report of a run: metrics, effects, time and files."""
+    """Return what a run prints: metrics, effects, time and files."""
     lines = [
         f"{name:<26} {value:>12.6g} {unit:<4} {LABELS.get(name, '')}".rstrip()
         for name, value, unit in metrics
@@ -115,8 +117,9 @@ FILES = {
     "irradiance.exr": "irradiance",
     "captures/raw_001.exr": "first sample",
     "hdr.exr": "photocurrent",
+    "report.html": "report",
 }
-"""Image files that a run may write -> their descriptions."""
+"""Files to look at that a run may write -> their descriptions."""
 
 
 def simulated_effects(plan: dict, measured: float) -> str:
@@ -139,11 +142,6 @@ def simulated_effects(plan: dict, measured: float) -> str:
 def _share(effect: dict) -> str:
     """Return an effect and how much it would change."""
     return f"{spoken(effect['name'])} ({100 * effect['contribution']:.2g} % {effect['unit']})"
-
-
-def spoken(name: str) -> str:
-    """Return the name of an effect as it is said."""
-    return "fixed-pattern noise" if name == "fpn" else name.replace("_", " ")
 
 
 def wrap(text: str) -> list[str]:

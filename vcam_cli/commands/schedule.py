@@ -52,6 +52,7 @@ def schedule(
     as_json: options.Json = False,
     quiet: options.Quiet = False,
     workers: options.Workers = None,
+    report: options.Report = False,
 ) -> None:
     """Find the best times to read a pixel several times, and the gain over reading it once.
 
@@ -70,7 +71,9 @@ def schedule(
         options.say(message, quiet)
 
     with Progress(quiet) as progress:
-        result = run(study, out, list(set_ or ()), seed or 0, accuracy, workers, progress, tell)
+        result = run(
+            study, out, list(set_ or ()), seed or 0, accuracy, workers, progress, tell, report
+        )
     if as_json:
         print(to_json(result.summary()), end="")
     elif not quiet:

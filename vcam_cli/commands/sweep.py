@@ -75,6 +75,7 @@ def sweep(
     scheduler: Scheduler = None,
     shard: Shard = None,
     fresh: Fresh = False,
+    wants_report: options.Report = False,
 ) -> None:
     """Run a sweep study and write points.csv, optimum.csv and a plot of every metric.
 
@@ -109,6 +110,7 @@ def sweep(
                     fresh,
                     progress,
                     tell,
+                    wants_report,
                 )
         except KeyboardInterrupt as error:
             options.say("interrupted; finished points are kept, the same command goes on with them")

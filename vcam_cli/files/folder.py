@@ -116,6 +116,11 @@ class OutputFolder:
         """The names of the new files, in the order of the calls of `new`."""
         return tuple(self._new)
 
+    def written(self, *suffixes: str) -> dict[str, bytes]:
+        """Return the bytes of the new files of some kinds, by name, in the order of `new`."""
+        names = [name for name in self._new if name.endswith(suffixes)]
+        return {name: (self.path / STAGING / name).read_bytes() for name in names}
+
     def finish(self, report: Mapping[str, Any]) -> None:
         """Replace the previous run's files by the new ones, then write the record.
 

@@ -1,4 +1,4 @@
-"""Style of plots: PNG files of the same bytes for the same numbers.
+"""Style of plots: PNG files and drawings of the same bytes for the same numbers.
 
 Matplotlib is imported where a plot is drawn and nowhere else: it takes longer to load than most
 commands take to run. Figures are made without pyplot, so that no state outlives them.
@@ -6,8 +6,9 @@ commands take to run. Figures are made without pyplot, so that no state outlives
 
 import importlib
 import importlib.util
+import io
 import os
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from types import ModuleType
@@ -92,3 +93,43 @@ def png_figure(path: Path | str, size: tuple[float, float], dpi: int = 150) -> I
         FigureCanvasAgg(figure)
         yield figure
         save(figure, path)
+
+
+INK, FAINT = "#123456", "#654321"
+"""Stand for the colors of text and of grids in a drawing, which follow the reader's page."""
+PAGE_COLORS = (
+    "<style>svg { color: #1c1e21 } @media (prefers-color-scheme: dark) { svg { color: #e4e6e9 } }"
+    "</style>"
+)
+
+
+def svg(draw: Callable[[Any], None], size: tuple[float, float]) -> bytes:
+    """Return a drawing as SVG: no background, ink that is light where the reader's page is dark.
+
+    Parameters
+    ----------
+    draw : callable
+        Gets a Matplotlib figure of the common style, and draws into it.
+    size : tuple of float
+        Width and height [inch].
+    """
+    matplotlib = load()
+    from matplotlib.backends.backend_svg import FigureCanvasSVG
+    from matplotlib.figure import Figure
+
+    names = ("text.color", "axes.labelcolor", "axes.titlecolor", "axes.edgecolor", "xtick.color",
+             "ytick.color")  # fmt: skip
+    style: Any = {**matplotlib.rcParamsDefault, **STYLE, **dict.fromkeys(names, INK)}
+    style |= {"grid.color": FAINT, "svg.hashsalt": "vcam"}
+    with matplotlib.rc_context(style):
+        figure = Figure(figsize=size, layout="constrained")
+        FigureCanvasSVG(figure)
+        draw(figure)
+        buffer = io.StringIO()
+        metadata = {"Date": None, "Creator": None}
+        figure.savefig(buffer, format="svg", transparent=True, metadata=metadata)
+    text = buffer.getvalue().replace(INK, "currentColor")
+    text = text.replace(f"stroke: {FAINT}", "stroke: currentColor; stroke-opacity: 0.2")
+    start = text.index("<svg")
+    head = text.index(">", start) + 1
+    return (text[start:head] + PAGE_COLORS + text[head:]).encode()

@@ -205,10 +205,12 @@ class SweepFolder:
         writers: Mapping[str, Callable[[Path], None]],
         record: Mapping[str, Any],
         inputs: Sequence[Path] = (),
+        report: Callable[[Mapping[str, bytes]], Mapping[str, bytes]] | None = None,
     ) -> None:
         """Write tables and plots, each whole, then the record; remove those of former studies.
 
-        writers: name of a file -> function that writes it. Raise BadInput where one of them would
+        writers: name of a file -> function that writes it; report: from the bytes of all of these
+        to those of further files. Raise BadInput where one of them would
         replace an input, or a file that is not as vcam wrote it, CannotDo where one cannot be
         written.
         """
@@ -218,6 +220,7 @@ class SweepFolder:
                 message = f"{path} is an input of this study and would be replaced"
                 raise bad("--out", message, "choose another folder")
         contents = {name: atomic.written_bytes(name, write) for name, write in writers.items()}
+        contents |= report(contents) if report else {}
         written = {name: fingerprint(data) for name, data in contents.items()}
         with self._locked(_FINISHING):
             self._replace(contents, written)

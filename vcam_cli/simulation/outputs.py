@@ -46,8 +46,25 @@ def save(result: Result, place: Path) -> Path:
     computed = sum(result.stages.seconds.values())
     with OutputFolder(place, inputs=inputs) as folder:
         write(result, folder)
-        folder.finish(record(result, inputs, computed + time.perf_counter() - start))
+        finish(result, folder, inputs, lambda: computed + time.perf_counter() - start)
     return place
+
+
+def finish(
+    result: Result, folder: OutputFolder, inputs: tuple[Path, ...], seconds: Callable[[], float]
+) -> dict[str, Any]:
+    """Write the report where one is asked for, and the record; return what it says.
+
+    seconds: the time that all of it took so far [s].
+    """
+    if result.frame.camera.output.report:
+        from vcam_cli.simulation import run_report
+
+        known = record(result, inputs, seconds())
+        run_report.write(folder.new("report.html"), result, known)
+    found = record(result, inputs, seconds())
+    folder.finish(found)
+    return found
 
 
 def write(result: Result, folder: OutputFolder) -> None:

@@ -16,7 +16,14 @@ from vcam_cli.files.report import hash_file
 from vcam_cli.image_formation.rate_cache import light_key
 from vcam_cli.progress import Observer
 from vcam_cli.simulation import provenance
-from vcam_cli.sweeps import expectations, figures, sweep_points, sweep_tables, workers
+from vcam_cli.sweeps import (
+    expectations,
+    figures,
+    sweep_points,
+    sweep_report,
+    sweep_tables,
+    workers,
+)
 from vcam_cli.sweeps.point_effects import effect_differences
 from vcam_cli.sweeps.point_work import Job
 from vcam_cli.sweeps.study_cameras import StudyCameras
@@ -36,6 +43,7 @@ def computed_sweep(
     request: str,
     watch: Observer,
     tell: Callable[[str], None],
+    wants_report: bool = False,
 ) -> SweepResult:
     """Compute what is left of a sweep and write everything; request: see `request_hash`."""
     grid = sweep_points.grid(study, sets)
@@ -71,7 +79,8 @@ def computed_sweep(
         asked = request if points.are_final and not result.unmade else ""
         plain = study.model.model_dump(mode="json")
         record = result.record() | {"study": plain, "hashes": hashes, "asked": asked}
-        folder.finish(files, record, grid.inputs)
+        report = partial(sweep_report.report_file, result) if wants_report else None
+        folder.finish(files, record, grid.inputs, report)
     return result
 
 

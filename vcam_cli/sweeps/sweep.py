@@ -102,13 +102,15 @@ def sweep(
     fresh: bool = False,
     watch: Observer | None = None,
     tell: Callable[[str], None] | None = None,
+    report: bool = False,
 ) -> SweepResult:
     """Run a sweep study, or what is left of it, and write its tables and plots.
 
     study: a file, or the name of a shipped study; out: folder, default out/NAME; sets: overrides
     "PATH=VALUE" laid over every camera; workers: processes, default all processors; scheduler:
     address of a Dask scheduler in their place; shard: (i, n), the i-th of n shares of the points;
-    fresh: computes all of them again. watch is told of the progress, tell gets messages. Raises
+    fresh: computes all of them again. watch is told of the progress, tell gets messages; report:
+    also writes report.html. Raises
     BadInput (wrong study, or no camera of it is valid), CannotDo (disk, scheduler), and TypeError
     or ValueError for arguments that are none of these.
     """
@@ -119,13 +121,13 @@ def sweep(
     watch.begin("points")
     file = sweep_file.read(study)
     place = Path(out) if out is not None else Path("out") / file.model.name
-    request = request_hash(file, sets)
+    request = request_hash(file, sets, report)
     result = None if fresh else finished_result(place, file, request)
     if result is None:
         # With the whole engine behind it: a sweep that is finished starts without.
         from vcam_cli.sweeps.computation import computed_sweep
 
-        result = computed_sweep(file, sets, place, execution, request, watch, tell)
+        result = computed_sweep(file, sets, place, execution, request, watch, tell, report)
     else:
         for problem in result.refused:
             tell(problem)

@@ -216,7 +216,7 @@ class SweepResult:
         }
 
 
-def request_hash(study: StudyFile, sets: Sequence[str]) -> str:
+def request_hash(study: StudyFile, sets: Sequence[str], wants_report: bool = False) -> str:
     """Return the hash of what is asked, but for the contents of the files that it names.
 
     sets: overrides "PATH=VALUE" laid over every camera. Raises BadInput for what is none.
@@ -227,7 +227,8 @@ def request_hash(study: StudyFile, sets: Sequence[str]) -> str:
     words = [_files_named(base) for base in study.word_values(over)]
     places = [str(study.file), str(folder) if sets else ""]
     versions = provenance.versions() | {"matplotlib": version("matplotlib")}
-    return hash_text(to_json([study.tree.plain(), over.plain(), bases, words, places, versions]))
+    asked = [study.tree.plain(), over.plain(), bases, words, places, versions, wants_report]
+    return hash_text(to_json(asked))
 
 
 def _files_named(base: Document) -> list[Any]:

@@ -1,0 +1,213 @@
+"""Drawings of a run's report: noise, spectra, sharpness and codes, from what the frame knows."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcam_cli.effects.signal_chain import noise_sources
+from vcam_cli.files.plots import COLORS
+from vcam_cli.image_formation import photon_rate
+from vcam_cli.simulation.frame import Frame
+from vcam_cli.spectra import Spectrum, photons
+
+CHANNEL_COLORS = {"R": "#d55e00", "G": "#009e73", "B": "#0072b2", "Y": "#777777", "W": "#777777"}
+"""Color of a color's curve; others get those that are left."""
+DASHES = {"R": "-", "G": (0, (5, 1.5)), "B": (0, (1.5, 1)), "Y": "-", "W": (0, (4, 1, 1, 1))}
+"""Dashes tell curves apart where colors cannot."""
+LEVELS = 200
+"""Signals at which the noise is shown."""
+FREQUENCIES = 161
+BINS = 256
+"""Bins of the histogram at most."""
+
+
+def channel_style(frame: Frame) -> list[dict[str, Any]]:
+    """Return color, dashes and label of each color's curves."""
+    others = iter(COLORS[3:])
+    return [
+        {
+            "color": CHANNEL_COLORS.get(name) or next(others, "#777777"),
+            "ls": DASHES.get(name, "-"),
+            "label": "all pixels" if name == "Y" else name,
+        }
+        for name in frame.mosaic.colors
+    ]
+
+
+def noise_parts(frame: Frame) -> tuple[NDArray, dict[str, NDArray]]:
+    """Return signals of a pixel (n,) [e], and the variance that each source adds to each [e^2].
+
+    Sources are those that the plan has on, and the rounding of the ADC. Of pixels that are read as
+    one, variances are of their mean.
+    """
+    binning, dark = frame.layout.binning_groups.binning, frame.dark_rate * frame.exposure_time
+    signal = np.geomspace(1, max(frame.electrical.full_well, 10), LEVELS)
+    parts: dict[str, NDArray] = {}
+    for scope in ("frame", "sensor"):
+        for source in noise_sources(frame.plan.active, scope):
+            each = [source.binned_variance(level + dark, dark, binning) for level in signal]
+            parts[source.name] = np.array(each)
+    joins = binning.conversions
+    temporal = sum(parts[s.name] for s in noise_sources(frame.plan.active, "frame"))
+    noise = np.broadcast_to(temporal, signal.shape)
+    rounding = [
+        frame.code.rounding(level + dark, joins * float(n)) / joins
+        for level, n in zip(signal, noise, strict=True)
+    ]
+    return signal, parts | {"quantization": np.array(rounding)}
+
+
+def draw_noise_budget(figure: Any, frame: Frame, names: Sequence[str]) -> None:
+    """Draw the share of each noise source in the variance over the signal, stacked.
+
+    names: what the sources are called, in the order of `noise_parts`.
+    """
+    signal, parts = noise_parts(frame)
+    axes = figure.add_subplot()
+    total = np.maximum(sum(parts.values()), 1e-300)
+    shares = [100 * part / total for part in parts.values()]
+    hatches = ("", "//", "..", "\\\\", "xx", "--", "++")
+    areas = axes.stackplot(signal, shares, labels=names, alpha=0.75)
+    for i, area in enumerate(areas):
+        area.set(facecolor=COLORS[i % len(COLORS)], hatch=hatches[i % len(hatches)])
+        area.set(edgecolor="white", linewidth=0)
+    axes.set(xscale="log", xlim=(1, signal[-1]), ylim=(0, 100))
+    axes.set(xlabel="signal of a pixel [e]", ylabel="share of the variance [%]")
+    mark_scene(axes, frame)
+    figure.legend(loc="outside upper left", ncols=3, fontsize=7.5)
+
+
+def draw_snr(figure: Any, frame: Frame) -> None:
+    """Draw the signal over temporal noise and over all noise, with the shot-noise limit."""
+    signal, parts = noise_parts(frame)
+    temporal = [s.name for s in noise_sources(frame.plan.active, "frame")]
+    of_time = sum(parts[name] for name in [*temporal, "quantization"])
+    axes = figure.add_subplot()
+    curves = (
+        ("shot-noise limit", signal, "#777777", (0, (4, 3))),
+        ("temporal noise", of_time, COLORS[0], "-"),
+        ("with fixed pattern", sum(parts.values()), COLORS[1], (0, (5, 1.5))),
+    )
+    for label, variance, color, dashes in curves:
+        snr = 20 * np.log10(signal / np.sqrt(np.maximum(variance, 1e-300)))
+        axes.plot(signal, snr, label=label, color=color, ls=dashes, lw=1.3)
+    axes.set(xscale="log", xlim=(1, signal[-1]))
+    axes.set(xlabel="signal of a pixel [e]", ylabel="signal over noise [dB]")
+    mark_scene(axes, frame)
+    axes.legend(fontsize=7.5, loc="upper left")
+
+
+def mark_scene(axes: Any, frame: Frame) -> None:
+    """Mark from where to where the scene's own signals lie."""
+    dark = frame.dark_rate * frame.exposure_time
+    levels = [level - dark for level in frame.plan.levels if level - dark > 1]
+    if levels:
+        axes.axvspan(min(levels), max(levels), ymax=0.03, color="#777777", label="this scene")
+
+
+def draw_spectra(figure: Any, frame: Frame) -> None:
+    """Draw the light of white, what lens, filters and silicon leave of it, and its electrons."""
+    band = frame.camera.scene.wavelengths
+    wavelengths = np.linspace(band.start, band.stop, 401)
+    light, responses = photons(frame.scene.white), photon_rate.responses(frame.camera, frame.mosaic)
+    above, middle, below = figure.subplots(3, sharex=True)
+    _draw_spectrum(above, light, wavelengths, {"color": "#777777"})
+    above.set(ylabel="photons of white", yticklabels=())
+    white = frame.white_rate * frame.exposure_time
+    for response, electrons, style in zip(responses, white, channel_style(frame), strict=True):
+        middle.plot(wavelengths * 1e9, 100 * response.evaluate(wavelengths), lw=1.3, **style)
+        seen = light.multiply(response)
+        whole = _integral(seen, wavelengths)
+        unit = electrons / whole / (1 if seen.lines else 1e9) if whole else 0.0
+        _draw_spectrum(below, seen.scale_by(unit), wavelengths, style)
+    middle.set_ylabel("electrons per photon [%]")
+    below.set_ylabel("signal of white [e]" if light.lines else "signal of white [e/nm]")
+    below.set_xlabel("wavelength [nm]")
+    for axes in (above, middle, below):
+        axes.set_ylim(bottom=0)
+    if len(responses) > 1:
+        middle.legend(fontsize=7.5, ncols=len(responses), loc="upper right")
+
+
+def _draw_spectrum(axes: Any, spectrum: Spectrum, wavelengths: NDArray, style: dict) -> None:
+    if spectrum.lines is not None:
+        inside = [line for line in spectrum.lines if wavelengths[0] <= line[0] <= wavelengths[-1]]
+        for wavelength, power in inside:
+            axes.vlines(wavelength * 1e9, 0, power, color=style["color"], lw=1.5)
+        return
+    axes.plot(wavelengths * 1e9, spectrum.evaluate(wavelengths), lw=1.3, **style)
+
+
+def _integral(spectrum: Spectrum, wavelengths: NDArray) -> float:
+    if spectrum.lines is not None:
+        inside = (p for w, p in spectrum.lines if wavelengths[0] <= w <= wavelengths[-1])
+        return float(sum(inside))
+    return float(np.trapezoid(spectrum.evaluate(wavelengths), wavelengths))
+
+
+def mtf_parts(frame: Frame) -> tuple[NDArray, dict[str, NDArray]]:
+    """Return frequencies along a row (n,) [cycles/m], and what each effect leaves of waves.
+
+    They are the means over the light of the scene; see `Effect.mean_transfer`.
+    """
+    frequency = np.linspace(0, 1 / frame.geometry.pitch_x, FREQUENCIES)
+    transfer = frame.transfer
+    shares = np.abs(transfer.weights).sum(axis=(0, 1))
+    shares = shares / max(float(shares.sum()), 1e-300)
+    spectrum = list(zip(transfer.wavelengths.tolist(), shares.tolist(), strict=True))
+    parts = {}
+    for effect in frame.plan.active:
+        found = effect.mean_transfer(frequency, np.zeros(1), spectrum)
+        if found is not None:
+            parts[effect.name] = np.abs(np.asarray(found)[0])
+    return frequency, parts
+
+
+def draw_mtf(figure: Any, frame: Frame, names: Sequence[str]) -> None:
+    """Draw what each effect leaves of the contrast of waves along a row, and all together.
+
+    names: what the effects are called, in the order of `mtf_parts`.
+    """
+    frequency, parts = mtf_parts(frame)
+    axes = figure.add_subplot()
+    styles = ((0, (5, 1.5)), (0, (1.5, 1)), (0, (4, 1, 1, 1)), (0, (7, 3)))
+    for i, (label, part) in enumerate(zip(names, parts.values(), strict=True)):
+        color = COLORS[i % len(COLORS)]
+        axes.plot(frequency / 1e3, part, label=label, color=color, ls=styles[i % 4], lw=1.3)
+    whole = np.prod(list(parts.values()), axis=0)
+    axes.plot(frequency / 1e3, whole, label="all together", color="#777777", lw=2)
+    axes.axvline(frequency[-1] / 2e3, color="#777777", lw=0.9, ls=(0, (1, 2)))
+    axes.text(frequency[-1] / 2e3, 1.02, " Nyquist", fontsize=7.5, va="bottom", ha="center")
+    axes.set(xlabel="spatial frequency on the sensor [lp/mm]", ylabel="transfer of contrast")
+    axes.set(xlim=(0, frequency[-1] / 1e3), ylim=(0, 1.1))
+    axes.legend(fontsize=7.5)
+
+
+def histogram(frame: Frame) -> tuple[NDArray, list[NDArray]]:
+    """Return the edges (n + 1,) of bins [DN], and the pixels of each color in them."""
+    top = int(frame.electrical.highest_code) * frame.summed_codes
+    bins = min(BINS, top + 1)
+    edges = np.linspace(-0.5, top + 0.5, bins + 1)
+    dn, colors = frame.dn, range(len(frame.mosaic.colors))
+    if frame.layout.full_color:
+        each = list(dn)
+    else:
+        each = [dn[frame.layout.color == color] for color in colors]
+    return edges, [np.histogram(values, edges)[0] for values in each]
+
+
+def draw_histogram(figure: Any, frame: Frame) -> None:
+    """Draw how many pixels of each color have which code."""
+    edges, counts = histogram(frame)
+    axes = figure.add_subplot()
+    for count, style in zip(counts, channel_style(frame), strict=True):
+        axes.stairs(count, edges, color=style["color"], ls=style["ls"], label=style["label"])
+    axes.axvline(frame.black_dn, color="#777777", lw=0.9, ls=(0, (1, 2)), label="black level")
+    axes.set(xlabel="code of the raw frame [DN]", ylabel="pixels", yscale="symlog")
+    axes.set(xlim=(edges[0], edges[-1]))
+    axes.set_ylim(bottom=0)
+    axes.legend(fontsize=7.5, ncols=2)
