@@ -42,7 +42,8 @@ class Checked(HTMLParser):
             self.open.append(tag)
 
     def handle_endtag(self, tag):
-        assert self.open and self.open.pop() == tag
+        assert self.open
+        assert self.open.pop() == tag
 
     def handle_data(self, data):
         if self.open and self.open[-1] not in ("style", "script"):
@@ -89,6 +90,7 @@ def test_a_page_of_every_part_is_valid_and_escapes_what_it_shows():
     [
         ("still-life", []),
         ("x3-stacked", []),
+        ("starter", ["optics=none"]),
         ("starter", ["adc={bits: 10, kind: logarithmic}", "output.render=none", "quality=[]"]),
         (
             "starter",
@@ -177,6 +179,9 @@ def small(*words):
 @pytest.fixture(scope="module")
 def runs(tmp_path_factory):
     place = tmp_path_factory.mktemp("runs")
+    assert (
+        run(*small("run", "starter"), "--set", "optics=none", "-o", place / "bare").exit_code == 0
+    )
     for name, time in (("a", "10 ms"), ("b", "20 ms")):
         done = run(*small("run", "starter"), "--set", f"exposure.time={time}", "-o", place / name)
         assert done.exit_code == 0, done.output
@@ -193,6 +198,7 @@ def test_runs_side_by_side(runs, tmp_path):
     assert "10 ms" in settings
     assert "20 ms" in settings
     assert "f_number" not in settings
+    assert run("report", runs / "bare", "-q", "-o", tmp_path / "bare.html").exit_code == 0
     again = run("report", runs / "a", runs / "b", "-o", tmp_path / "both.html", "-q")
     assert (again.exit_code, again.stdout) == (0, "")
 

@@ -54,15 +54,22 @@ def geometry_rows(geometry: Mapping[str, Any]) -> list[Row]:
 
 
 def _geometry(g: Mapping[str, Any]) -> Iterator[Row]:
+    if _infinite(g["focal_length"]):
+        yield "lens", "none: a bare sensor"
+    else:
+        yield from _lens(g)
+    yield "sensor", f"{g['sensor_width'] * 1e3:.4g} x {g['sensor_height'] * 1e3:.4g} mm"
+    yield "pixel pitch", f"{g['pixel_pitch_x'] * 1e6:.4g} x {g['pixel_pitch_y'] * 1e6:.4g} um"
+    yield "Nyquist frequency", f"{g['nyquist_frequency'] / 1e3:.4g} lp/mm"
+
+
+def _lens(g: Mapping[str, Any]) -> Iterator[Row]:
     distance = g["object_distance"]
     yield "distance", "infinite" if _infinite(distance) else f"{distance:.4g} m"
     angles = (g[f"field_of_view_{name}"] for name in ("horizontal", "vertical", "diagonal"))
     yield "field of view", " x ".join(f"{math.degrees(a):.3g}" for a in angles) + " deg diagonal"
     yield "focal length", f"{g['focal_length'] * 1e3:.4g} mm"
     yield "f-number", f"{g['f_number']:.4g}, working {g['working_f_number']:.4g}"
-    yield "sensor", f"{g['sensor_width'] * 1e3:.4g} x {g['sensor_height'] * 1e3:.4g} mm"
-    yield "pixel pitch", f"{g['pixel_pitch_x'] * 1e6:.4g} x {g['pixel_pitch_y'] * 1e6:.4g} um"
-    yield "Nyquist frequency", f"{g['nyquist_frequency'] / 1e3:.4g} lp/mm"
     yield "diffraction cut-off", f"{g['diffraction_cutoff_550nm'] / 1e3:.4g} lp/mm at 550 nm"
 
 

@@ -52,13 +52,13 @@ def report(result: Result, record: Mapping[str, Any]) -> Page:
 
 
 def _about(frame: Frame) -> str:
-    g, lens = frame.geometry, frame.geometry
+    g = frame.geometry
     rows, columns = frame.dn.shape[-2:]
-    return (
-        f"{columns} x {rows} pixels of {g.pitch_x * 1e6:.3g} um behind a lens of"
-        f" {lens.focal_length * 1e3:.3g} mm at f/{lens.f_number:.3g}. Colors:"
-        f" {', '.join(frame.mosaic.colors)}."
-    )
+    lens = "without a lens"
+    if math.isfinite(g.focal_length):
+        lens = f"behind a lens of {g.focal_length * 1e3:.3g} mm at f/{g.f_number:.3g}"
+    colors = ", ".join(frame.mosaic.colors)
+    return f"{columns} x {rows} pixels of {g.pitch_x * 1e6:.3g} um {lens}. Colors: {colors}."
 
 
 def _pictures(result: Result) -> Iterator[Part]:
