@@ -217,6 +217,12 @@ class Output(Model):
         "also write raw.tif: the whole numbers of the raw frame, with the pattern of its colors",
         default=False,
     )
+    isetcam: Annotated[bool, Strict()] = key(
+        "also write scene.mat, irradiance.mat and volts.mat, with which ISETCam goes on: radiance"
+        " of the scene and irradiance on the sensor in photons, the sensor in volts; wavelengths"
+        " and sampling as those of irradiance",
+        default=False,
+    )
     steps: Annotated[bool, Strict()] = key(
         "also write step_01_NAME.png and so on: the render as it would be, did `processing` end"
         " after that step; linear before gamma",

@@ -44,6 +44,7 @@ WORDS = {
     "quality": "measuring image quality",
     "files": "writing files",
     "irradiance": "spectral irradiance",
+    "isetcam": "light for ISETCam",
     "points": "checking all points",
     "sweep": "computing points",
     "figures": "computing figures",

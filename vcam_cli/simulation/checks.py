@@ -24,7 +24,7 @@ from vcam_cli.quality.display import display_screen
 from vcam_cli.readout.layout import layout
 from vcam_cli.scenes.build import SOURCE, check_channels
 from vcam_cli.scenes.hyperspectral import check_bands, check_coverage, check_place
-from vcam_cli.simulation import plan, raw_dng, scene_bands, spectral_irradiance
+from vcam_cli.simulation import isetcam_files, plan, raw_dng, scene_bands, spectral_irradiance
 
 
 def load(camera: str | Path, sets: Sequence[str] = ()) -> Camera:
@@ -164,5 +164,6 @@ CHECKS: tuple[files.CameraCheck, ...] = (
     (check_formats, "output"),
     (raw_dng.check, "pixel array exposure adc output"),
     (spectral_irradiance.check, "scene output"),
+    (isetcam_files.check, "pixel array exposure adc output"),
     (check_display, "optics scene pixel array quality display"),
 )

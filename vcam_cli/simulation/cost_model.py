@@ -144,13 +144,12 @@ def irradiance_seconds(
 
     Its bands cost what colors do.
     """
-    if not camera.output.irradiance:
-        return 0.0
+    files = bool(camera.output.irradiance) + camera.output.isetcam
     band = camera.scene.wavelengths
     count = len(Band(band.start, band.stop, knobs.wavelength_step).nodes())
     bands = Mosaic((tuple(str(i) for i in range(BANDS_AT_ONCE)),))
     together = image_seconds(geometry, bands, report) / BANDS_AT_ONCE
-    return count * (together + EXR * geometry.rows * geometry.columns)
+    return files * count * (together + EXR * geometry.rows * geometry.columns)
 
 
 def usual_spectrum(geometry: Geometry) -> SpectrumReport:

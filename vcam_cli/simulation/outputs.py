@@ -31,7 +31,7 @@ from vcam_cli.files.spectral.exr import write_spectral
 from vcam_cli.files.tables import write_metrics
 from vcam_cli.parallel import ThreadPool
 from vcam_cli.processing.color_correction import CHROMATICITIES
-from vcam_cli.simulation import provenance, raw_dng, raw_file, spectral_irradiance
+from vcam_cli.simulation import isetcam_files, provenance, raw_dng, raw_file, spectral_irradiance
 from vcam_cli.simulation.figures import exposure_report
 from vcam_cli.simulation.frame import Frame
 from vcam_cli.simulation.provenance import versions
@@ -100,6 +100,10 @@ def write(result: Result, folder: OutputFolder) -> None:
     if camera.output.irradiance:
         with result.stages("irradiance"):
             _irradiance(result, folder.new("irradiance.exr"))
+    if camera.output.isetcam:
+        with result.stages("isetcam"):
+            watch = result.stages.watch
+            isetcam_files.write_isetcam(folder.new, result.frame, result.workers, watch.step)
     write_metrics(folder.new("metrics.csv"), metrics.rows)
 
 

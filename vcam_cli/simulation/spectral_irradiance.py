@@ -17,7 +17,7 @@ at 430 nm and 13 % at 760 nm), and a line has no such value.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -137,10 +137,15 @@ def levels(ready: Prepared, wavelengths: NDArray) -> NDArray:
     per_radiance = ready.geometry.irradiance_per_radiance
     transmittance = ready.camera.optics.transmittance.resolve()
     spectra = [s.multiply(transmittance) for s in ready.scene.spectra]
-    if ready.camera.output.irradiance_sampling == "point":
-        return per_radiance * np.array([s.evaluate(wavelengths) for s in spectra])
+    return per_radiance * spectral_levels(ready.camera, spectra, wavelengths)
+
+
+def spectral_levels(camera: Camera, spectra: Sequence[Spectrum], wavelengths: NDArray) -> NDArray:
+    """Return spectra as `output.irradiance` samples them: (K, J) [their unit per m]."""
+    if camera.output.irradiance_sampling == "point":
+        return np.array([s.evaluate(wavelengths) for s in spectra])
     bands = np.array([hat_weights(s, wavelengths) for s in spectra])
-    return per_radiance * bands / hat_weights(Spectrum.flat(1.0), wavelengths)
+    return np.asarray(bands / hat_weights(Spectrum.flat(1.0), wavelengths))
 
 
 def _whole_cells(geometry: Geometry) -> Geometry:
