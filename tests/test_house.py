@@ -41,6 +41,7 @@ FLOORS = (
     {"characterization"},
     {"sweeps"},
     {"capture_schedules"},
+    {"verification"},
     {"commands"},
 )
 """From the bottom: a module imports from floors below its own, and from its own room (package)."""

@@ -81,6 +81,8 @@ class TestCameras:
 
     def test_the_picture_is_one(self, name):
         """Dark and light areas, and not mostly clipped, in every channel together."""
+        if not load(name).optics.is_lens:
+            pytest.skip("a bare sensor under even light takes no picture")
         render = small(name).render.astype(float)
         assert render.std() > 10
         assert 20 < render.mean() < 240  # an eye chart is white paper, most of it
@@ -89,9 +91,10 @@ class TestCameras:
     def test_the_lens_and_the_pixels_could_be_built(self, name):
         camera = load(name)
         g, e = geometry(camera), electrical(camera)
-        assert 0.9 <= g.f_number <= 22
-        assert 1e-3 <= g.focal_length <= 0.1
-        assert math.radians(5) < 2 * math.atan(g.sensor_width / 2 / g.image_distance) < 2.1
+        if g.has_lens:
+            assert 0.9 <= g.f_number <= 22
+            assert 1e-3 <= g.focal_length <= 0.1
+            assert math.radians(5) < 2 * math.atan(g.sensor_width / 2 / g.image_distance) < 2.1
         assert 1e-6 <= g.pitch_x <= 20e-6
         assert 1e-6 <= g.pitch_y <= 20e-6
         assert 0.1 <= g.fill_factor <= 1 + 1e-9
@@ -153,8 +156,8 @@ class TestFiles:
             assert (path.parent / match[1]).is_file()
 
     def test_some_camera_uses_it(self, path):
-        if path.parent.name == "studies":
-            pytest.skip("a study uses cameras")
+        if path.parent.name in ("studies", "measurements"):
+            pytest.skip("a study uses cameras, a measurement lies beside one")
         used = {file for name in CAMERAS for file in load(name).files}
         assert path.resolve() in used
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from vcam_cli import spectra
-from vcam_cli.camera.spectrum import SpectrumFile
+from vcam_cli.camera.spectrum import Spectral, SpectrumFile, SpectrumSpec
 from vcam_cli.config.model import Model, key
 from vcam_cli.config.validation_messages import describe
 from vcam_cli.config.values import Temperature, Wavelength
@@ -13,8 +13,8 @@ from vcam_cli.config.yaml_type import DEFINED, YamlType, to_yaml
 from vcam_cli.errors import Path, bad
 
 _FORMS = (
-    "a CIE name such as D65, equal-energy, {blackbody: 5500 K}, {monochromatic: 550 nm} "
-    "or {file: lamp.csv}"
+    "a CIE name such as D65, equal-energy, {blackbody: 5500 K}, {monochromatic: 550 nm}, "
+    "{file: lamp.csv}, or a list of one and the filters before it"
 )
 
 
@@ -41,14 +41,22 @@ _FORM_MODELS: dict[str, type[Blackbody | Monochromatic | LampFile]] = {
 }
 
 
+_GLASS = Spectral(most=1.0)
+
+
 @dataclass(frozen=True)
 class IlluminantSpec:
     """A lamp: a name, or one of the forms above."""
 
     lamp: str | Blackbody | Monochromatic | LampFile
+    filters: tuple[SpectrumSpec, ...] = ()
+    """What its light goes through; a stated level is that behind them."""
 
     def resolve(self, path: Path = ()) -> spectra.Spectrum:
         """Return its relative spectral power. Raises BadInput, at `path`."""
+        return self._resolve_lamp(path).multiply(*(glass.resolve(path) for glass in self.filters))
+
+    def _resolve_lamp(self, path: Path) -> spectra.Spectrum:
         try:
             if isinstance(self.lamp, str):
                 return spectra.illuminant(self.lamp)
@@ -73,7 +81,8 @@ class IlluminantSpec:
 
     def to_yaml(self) -> Any:
         """Return the YAML form."""
-        return to_yaml(self.lamp)
+        lamp = to_yaml(self.lamp)
+        return [lamp, *(glass.to_yaml() for glass in self.filters)] if self.filters else lamp
 
 
 class Illuminant(YamlType):
@@ -88,6 +97,9 @@ class Illuminant(YamlType):
         if isinstance(given, str):
             spectra.illuminant(given)  # ValueError for a name that nobody knows
             return IlluminantSpec(given)
+        if isinstance(given, (list, tuple)) and given:
+            alone = self.read(given[0])
+            return IlluminantSpec(alone.lamp, tuple(_GLASS.read(glass) for glass in given[1:]))
         if isinstance(given, Mapping):
             models = [model for name, model in _FORM_MODELS.items() if name in given]
             if len(models) == 1:
@@ -107,5 +119,5 @@ class Illuminant(YamlType):
                 "description": f"A lamp: {_FORMS}.",
                 "examples": ["D65", {"blackbody": "5500 K"}],
             },
-            "anyOf": [named, *forms["anyOf"]],
+            "anyOf": [named, *forms["anyOf"], {"type": "array", "minItems": 1}],
         }

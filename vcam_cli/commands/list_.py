@@ -38,8 +38,8 @@ def list_(
 ) -> None:
     """List what ships; with a NAME print the file.
 
-    Kinds: cameras, parts, technologies, studies, charts, models (what a picture's channels mean),
-    illuminants, filters, effects, steps (of processing), metrics.
+    Kinds: cameras, parts, technologies, studies, measurements, charts, models
+    (what a picture's channels mean), illuminants, filters, effects, steps (of processing), metrics.
 
     \b
     Example:
@@ -202,6 +202,7 @@ KINDS: dict[str, Callable[[], list[Item]]] = {
     "parts": lambda: _files(*PARTS),
     "technologies": lambda: _files("technologies"),
     "studies": lambda: _files("studies"),
+    "measurements": lambda: _files("measurements"),
     "charts": _charts,
     "models": _models,
     "illuminants": _illuminants,

@@ -1,7 +1,7 @@
 """The program `vcam`: its commands and its exit codes.
 
 Exit codes: 0 done, 2 bad input or usage, 3 this machine cannot do it, 4 some points of a sweep
-failed, 1 a bug (only then a traceback), 130 interrupted.
+failed or a prediction missed its tolerance, 1 a bug (only then a traceback), 130 interrupted.
 
 Why commands are looked up by name: a command's module is imported when that command is called,
 and imports its physics when it runs, so `vcam --help` and shell completion are quick.
@@ -42,6 +42,7 @@ COMMANDS = {
     "sweep": "sweep:sweep",
     "schedule": "schedule:schedule",
     "characterize": "characterize:characterize",
+    "verify": "verify:verify",
     "compare": "compare:compare",
     "report": "report:report",
     "validate": "validate:validate",

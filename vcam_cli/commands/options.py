@@ -24,6 +24,11 @@ def complete_study(incomplete: str) -> list[str]:
     return _complete("studies", incomplete)
 
 
+def complete_measurement(incomplete: str) -> list[str]:
+    """Complete shipped measurements, YAML files and folders, for the shell."""
+    return _complete("measurements", incomplete)
+
+
 def _complete(kind: str, incomplete: str) -> list[str]:
     from vcam_cli.config import shipped
 

@@ -9,6 +9,7 @@ from vcam_cli.camera.technology import Technology
 from vcam_cli.capture_schedules.model import ScheduleStudy
 from vcam_cli.config.schema import Schema, file_schema, model_schema, reference, with_parts
 from vcam_cli.sweeps.model import KINDS, Sweep
+from vcam_cli.verification.model import Measurement
 
 SECTIONS = {"scene": "Scene", "optics": "Optics", "pixel": "Pixel", "array": "Array"}
 """Sections of a camera that may be a part file -> their definitions."""
@@ -20,6 +21,7 @@ def schemas() -> dict[str, Schema]:
     return {
         "camera.schema.json": camera,
         "study.schema.json": _study_schema(),
+        "measurement.schema.json": file_schema(model_schema(Measurement), "a measurement file"),
         "technology.schema.json": file_schema(model_schema(Technology), "a technology file"),
     }
 

@@ -1,4 +1,4 @@
-"""`vcam validate`: checks camera and study files, runs nothing."""
+"""`vcam validate`: checks camera, study and measurement files, runs nothing."""
 
 from pathlib import Path
 from typing import Annotated, Any
@@ -7,6 +7,8 @@ import typer
 
 from vcam_cli.commands import options
 from vcam_cli.errors import one_line
+
+MEASUREMENT = "measurement"
 
 
 def validate(
@@ -23,7 +25,7 @@ def validate(
     as_json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
-    """Check camera and study files and report everything that is wrong with them.
+    """Check camera, study and measurement files and report everything that is wrong with them.
 
     \b
     Example:
@@ -78,6 +80,10 @@ def _checked_name(file: str, sets: list[str]) -> str:
     from vcam_cli.errors import BadInput
     from vcam_cli.sweeps import sweep_file, sweep_points
 
+    if kind == MEASUREMENT:
+        from vcam_cli.verification import measurement_file
+
+        return measurement_file.read(file).name
     if kind == "schedule":
         return schedule_file.read(file, sets).model.name
     grid = sweep_points.grid(sweep_file.read(file), sets)
@@ -87,7 +93,7 @@ def _checked_name(file: str, sets: list[str]) -> str:
 
 
 def _study_kind(file: str) -> str | None:
-    """Return the kind of study that a file, or a shipped study, says it is; None for a camera."""
+    """Return the kind that a file, or a shipped one, says it is; None for a camera."""
     from vcam_cli.config import shipped
     from vcam_cli.config.file_names import is_file
     from vcam_cli.config.yaml_reader import read_file
@@ -96,11 +102,12 @@ def _study_kind(file: str) -> str | None:
 
     path = Path(file)
     if not is_file(path):
-        if file not in shipped.names("studies") or file in shipped.names("cameras"):
+        others = [k for k in ("studies", "measurements") if file in shipped.names(k)]
+        if not others or file in shipped.names("cameras"):
             return None
-        path = shipped.find("studies", file)
+        path = shipped.find(others[0], file)
     try:
         kind = read_file(path).get("kind")
     except VcamError:  # said when it is read as a camera
         return None
-    return str(kind.value) if kind is not None and kind.value in KINDS else None
+    return str(kind.value) if kind is not None and kind.value in (*KINDS, MEASUREMENT) else None

@@ -18,6 +18,7 @@ KINDS = {
     "filters": "a filter set",
     "technologies": "a technology",
     "studies": "a study",
+    "measurements": "a measurement",
     "spectra": "a spectrum",
 }
 """Folder of `configs/` -> what one of its files is called in messages."""

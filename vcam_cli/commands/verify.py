@@ -1,0 +1,124 @@
+"""`vcam verify`: what a camera file predicts beside what was measured."""
+
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from vcam_cli.commands import options
+from vcam_cli.commands.progress import Progress
+
+if TYPE_CHECKING:
+    from vcam_cli.verification.verify import Verification
+
+MISSED = 4
+"""Exit code where a stated tolerance is missed."""
+
+
+def verify(
+    camera: options.Camera,
+    measurement: Annotated[
+        str,
+        typer.Argument(
+            metavar="MEASUREMENT",
+            help="A measurement file, or the name of a shipped one.",
+            autocompletion=options.complete_measurement,
+            show_default=False,
+        ),
+    ],
+    out: options.Out = None,
+    set_: options.Set = None,
+    accuracy: options.Accuracy = None,
+    wants_report: options.Report = False,
+    as_json: options.Json = False,
+    quiet: options.Quiet = False,
+) -> None:
+    """Predict measured signals from a camera file, and show the errors.
+
+    Mean signals under even light of known irradiance are predicted as the camera's pixels give
+    them, its lens left out. Write verify.csv, verify.json and errors.png, a histogram of the
+    errors. The exit code is 4 where an error is larger than the measurement's tolerance.
+
+    \b
+    Example:
+      vcam verify test-pixel-0.18um test-pixel-simulated
+      vcam verify camera.yaml bench.yaml --set pixel.temperature="310 K"
+    """
+    from vcam_cli.files import report, tables
+    from vcam_cli.files.folder import OutputFolder
+    from vcam_cli.reports import study_report
+    from vcam_cli.simulation import provenance
+    from vcam_cli.simulation.checks import load
+    from vcam_cli.verification import measurement_file
+    from vcam_cli.verification import verify as comparison
+    from vcam_cli.verification.plots import draw_errors
+
+    model = load(camera, options.overrides(set_, None, accuracy))
+    measured = measurement_file.read(measurement)
+    inputs = (*provenance.inputs(model), *measured.files)
+    path = out or Path("out") / measured.name
+    with OutputFolder(path, record="verify.json", inputs=inputs) as folder, Progress(quiet) as bar:
+        found = comparison.verify(model, measured, bar)
+        rows = (row.cells for row in found.rows)
+        tables.write_table(folder.new("verify.csv"), comparison.COLUMNS, rows)
+        draw_errors(folder.new("errors.png"), found)
+        if wants_report:
+            study_report.write(folder, **report_arguments(found))
+        forms = {
+            "camera": model.model_dump(mode="json"),
+            "measurement": measured.model_dump(mode="json"),
+        }
+        folder.finish(found.report() | forms | {"versions": provenance.versions()})
+    for note in found.notes:
+        options.say(note, quiet)
+    if as_json:
+        print(report.to_json({"out": str(path), **found.report()}), end="")
+    elif not quiet:
+        print_report(found, path)
+    if found.missed:
+        options.say(f"{len(found.missed)} of {len(found.rows)} predictions miss their tolerance")
+        raise typer.Exit(MISSED)
+
+
+def report_arguments(found: "Verification") -> dict[str, Any]:
+    """Return title, text, facts and captions of the report."""
+    from vcam_cli.reports.page import Facts
+
+    numbers = found.summary().items()
+    cards = [Facts("Errors", [(name.replace("_", " "), f"{value:.4g}") for name, value in numbers])]
+    if found.notes:
+        cards.append(Facts("Notes", [("", note) for note in found.notes]))
+    captions = {
+        "verify.csv": "What was measured beside what the camera file predicts.",
+        "errors.png": "How many predictions have which error",
+    }
+    about = "Mean signals under even light of known irradiance, predicted from a camera file."
+    title = f"{found.measurement.name} against {found.camera.name}"
+    return {"title": title, "about": about, "facts": cards, "captions": captions}
+
+
+def print_report(found: "Verification", path: Path) -> None:
+    """Print the table: measured, predicted, error."""
+    from rich import box
+    from rich.console import Console
+    from rich.table import Table
+
+    width = None if sys.stdout.isatty() else 120
+    console = Console(width=width, soft_wrap=True, highlight=False)
+    table = Table(box=box.SIMPLE_HEAD if console.is_terminal else None, pad_edge=False)
+    for name in ("frame", "channel", "quantity"):
+        table.add_column(name, no_wrap=True)
+    for name in ("measured", "predicted", "error"):
+        table.add_column(name, justify="right", no_wrap=True)
+    for row in found.rows:
+        late = " missed" if row.missed else ""
+        numbers = f"{row.measured:.5g}", f"{row.predicted:.5g}", f"{100 * row.error:+.2f} %{late}"
+        table.add_row(row.frame, row.channel, row.quantity, *numbers)
+    console.print(table)
+    all_ = found.summary()
+    console.print(
+        f"errors: mean {all_['mean_error_percent']:+.2f} %, rms {all_['rms_error_percent']:.2f} %,"
+        f" largest {all_['largest_error_percent']:.2f} %"
+    )
+    console.print(f"{path}/verify.csv, errors.png")

@@ -1,0 +1,1 @@
+"""Measurements of a real sensor beside what its camera file predicts."""

@@ -1,0 +1,102 @@
+"""What a camera file says that a measured condition should give: without noise, pixel by pixel.
+
+Light is that on the sensor, so the camera's lens is left out: its scene becomes even light of the
+measured spectrum and level. Everything behind that is the camera's.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.derived.electrical import electrical
+from vcam_cli.camera.derived.geometry import geometry
+from vcam_cli.camera.derived.lattice import places
+from vcam_cli.errors import bad
+from vcam_cli.simulation.frame import Frame
+from vcam_cli.simulation.simulate import simulate
+from vcam_cli.spectra import integral, photons
+from vcam_cli.verification.model import Point, Signal
+
+DARK = {"source": {"kind": "chart", "chart": "dark"}, "irradiance": "0 W/m2"}
+EVEN = {"source": {"kind": "chart", "chart": "uniform"}}
+SIZE = 48
+"""Rows and columns that are enough: even light is the same in all pixels of a color."""
+
+
+def check(camera: Camera, point: Point) -> None:
+    """Raise BadInput, about a key of the point, where the camera predicts no such signal."""
+    colors = camera.array.colors or places(camera).colors
+    if point.channel not in colors and (point.channel or len(set(colors)) > 1):
+        what = f"{point.channel!r} is no color of this camera" if point.channel else "is missing"
+        raise bad(("channel",), what, f"write channel: {' or '.join(dict.fromkeys(colors))}")
+    if point.signal.channel == "volts" and not electrical(camera).has_volts:
+        message = "is in volts, and this camera counts in electrons and DN alone"
+        remedy = "give it in DN, or add pixel.readout.conversion_gain to the camera"
+        raise bad(("signal",), message, remedy)
+
+
+def conditions(camera: Camera, point: Point) -> Camera:
+    """Return the camera as it was when a signal was measured.
+
+    Raises BadInput where the camera cannot be brought there.
+    """
+    scene: dict[str, Any] = DARK
+    if point.light is not None:
+        level = {"illuminant": point.light.to_yaml(), "irradiance": _irradiance(camera, point)}
+        scene = EVEN | level
+    changes = {
+        "scene": scene | {"extent": "sensor"},
+        "optics": "none",
+        "exposure": {"time": f"{point.exposure!r} s"},
+        "quality": [],
+        "output": {"render": "none"},
+    }
+    array, transfers = camera.array, camera.pixel.architecture == "ccd"
+    large = array.die is None and min(array.rows or 0, array.columns or 0) > SIZE
+    if large and not (transfers or array.is_scattered or array.binning):
+        changes["array"] = {"rows": SIZE, "columns": SIZE}
+    return camera.with_(changes)
+
+
+def _irradiance(camera: Camera, point: Point) -> str:
+    """Return the level of the light, as a scene states it."""
+    if point.irradiance == "from-file":
+        return "from-file"
+    if point.irradiance is not None:
+        return f"{point.irradiance!r} W/m2"
+    assert point.light is not None and point.photons is not None
+    band, lamp = camera.scene.wavelengths, point.light.resolve(("light",))
+    per_joule = integral(photons(lamp), band.start, band.stop)
+    per_joule /= integral(lamp, band.start, band.stop)
+    solved = geometry(camera)
+    area = solved.pitch_x * solved.pitch_y
+    return f"{point.photons / (per_joule * area * point.exposure)!r} W/m2"
+
+
+def predict(camera: Camera, point: Point) -> Signal:
+    """Return the mean raw signal that a camera file predicts of a measured condition.
+
+    Raises BadInput where the camera cannot be brought under the point's conditions.
+    """
+    frame = simulate(conditions(camera, point)).frame
+    electrons = np.minimum(frame.mean_electrons, frame.electrical.full_well)
+    chosen = electrons[_pixels(frame, point.channel)].astype(np.float64)
+    if point.signal.channel == "electrons":
+        value = chosen
+    elif point.signal.channel == "dn":
+        value = np.clip(frame.to_dn(chosen), 0, frame.electrical.highest_code * frame.summed_codes)
+    else:
+        value = frame.electrical.volts_of(chosen)
+    return Signal(float(value.mean()), point.signal.channel)
+
+
+def _pixels(frame: Frame, channel: str) -> Any:
+    """Return the index of the pixels of a color; of all where there is but one color."""
+    colors = frame.mosaic.colors
+    if not channel:
+        return ...
+    index = colors.index(channel)
+    return index if frame.layout.full_color else frame.layout.color == index
