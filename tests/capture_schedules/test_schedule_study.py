@@ -483,7 +483,7 @@ def test_plots_are_the_same_bytes_for_the_same_numbers(monkeypatch, folder):
     (folder / "study.yaml").write_text(yaml.safe_dump(study))
     found = schedule(folder / "study.yaml", folder / "out")
     pngs = {p.name: p.read_bytes() for p in (folder / "out").glob("*.png")}
-    names = ("captures", "pdf", "gain", "binning", "segments")
+    names = ("captures", "charge", "pdf", "gain", "binning", "segments")
     assert set(pngs) == {f"{name}.png" for name in names}
     assert all(content.startswith(b"\x89PNG") for content in pngs.values())
     again = folder / "again.png"

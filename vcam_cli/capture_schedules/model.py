@@ -19,11 +19,12 @@ from vcam_cli.capture_schedules.pdf_source import (
     camera_name,
     raise_mistakes,
 )
-from vcam_cli.config.lists import list_of, words_of
+from vcam_cli.config.lists import distinct_words, list_of, words_of
 from vcam_cli.config.model import Model, key
 from vcam_cli.config.quantities import Number, Quantity, Whole
 from vcam_cli.config.validation_messages import describe, failure, fault, faults_at
 from vcam_cli.config.values import Either, Electrons, Fraction, MaybeTime, Switch, Word, mapping
+from vcam_cli.scheduling.density_estimators import ESTIMATORS, HISTOGRAM
 
 RANDOM_STARTS = ("sqp", "sqp-assigned")
 """Methods that search from random starts."""
@@ -40,13 +41,17 @@ MOST_CAPTURES = 1000
 
 FRAME_METHODS = ("uniform", "optimal", "heuristic", "exponential", "geometric")
 """How the times of the pictures may be found."""
-ESTIMATORS = ("lsbs", "weighted")
 _TIMES_EXAMPLE = {"mine": ["5 ms", "15 ms", "30 ms", "200 ms"]}
 _NAME: TypeAdapter[str] = TypeAdapter(Word)
 
 _COUNT = Whole(least=1, most=MOST_CAPTURES, example="8")
 _SEGMENTS = Whole(least=1, most=100_000, example="3")
 _GAIN = Number(above=0, example="1.5")
+
+
+DENSITIES = (HISTOGRAM, *ESTIMATORS)
+"""Estimates of a pdf from its pixels."""
+FRAME_ESTIMATORS = ("lsbs", "weighted")
 
 
 class _Null:
@@ -77,6 +82,11 @@ def _segments(given: Any) -> tuple[int, ...]:
     if not isinstance(given, (list, tuple)):
         return (_SEGMENTS.read(given),)
     return tuple(sorted(_STEPS(given)))
+
+
+def _densities(given: Any) -> tuple[str, ...]:
+    """Return names of estimators; of one, or a list."""
+    return distinct_words([given] if isinstance(given, str) else given, DENSITIES)
 
 
 def _or_null(read: Callable[[Any], Any]) -> Callable[[Any], Any]:
@@ -176,8 +186,8 @@ class ScheduleFrames(Model):
             yaml_form=lambda value: {name: times_to_yaml(times) for name, times in value.items()},
         ),
     ] = key("name -> times of your own", unit="ms", example=_TIMES_EXAMPLE, default=dict)
-    estimators: Annotated[tuple[str, ...], words_of(ESTIMATORS, 1)] = key(
-        "how captures become one picture", example=["lsbs", "weighted"], default=ESTIMATORS
+    estimators: Annotated[tuple[str, ...], words_of(FRAME_ESTIMATORS, 1)] = key(
+        "how captures become one picture", example=["lsbs", "weighted"], default=FRAME_ESTIMATORS
     )
     segments: Annotated[int, Whole(least=1, most=100_000, example="3")] = key(
         "of the pdf that the heuristic plans with", example=3, default=3
@@ -230,6 +240,19 @@ class ScheduleStudy(Model):
         "segments.csv, the largest is what the other tables are of",
         example=3,
         default=(),
+    )
+    density: Annotated[
+        tuple[str, ...],
+        Either(
+            _densities,
+            Literal[DENSITIES] | list[Literal[DENSITIES]],
+            yaml_form=lambda value: list(value) if len(value) > 1 else value[0],
+        ),
+    ] = key(
+        "how the pdf is estimated from its pixels before segments approximate it; several: compared"
+        " in segments.csv, the first is what the other tables are of",
+        example="histogram",
+        default=(HISTOGRAM,),
     )
     sensor: Annotated[
         ScheduleSensor | None,
@@ -296,6 +319,9 @@ class ScheduleStudy(Model):
             if self.online:
                 message = "online needs a sensor: what is believed while capturing depends on noise"
                 yield fault(("online",), message, give)
+        if self.density != (HISTOGRAM,) and not self.segments:
+            message = "changes nothing: the pdf is taken as it is"
+            yield fault(("density",), message, "add for example segments: 3")
         if self.starts > 1 and not set(RANDOM_STARTS) & set(self.methods):
             message = "changes nothing: no method of the study has random starts"
             yield fault(("starts",), message, "add the method sqp or sqp-assigned")

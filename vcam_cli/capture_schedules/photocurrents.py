@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from vcam_cli.camera.camera import Camera
 from vcam_cli.progress import Observer
 from vcam_cli.scheduling import histogram_binning
+from vcam_cli.scheduling.density_estimators import ESTIMATORS, HISTOGRAM
 from vcam_cli.scheduling.pdf import Pdf
 from vcam_cli.simulation.simulate import prepare
 
@@ -94,15 +95,29 @@ class Approximation:
     pixels : float
         Number of pixels that the pdf counts, where it is of whole numbers of them: merges that are
         equally good are then recognized exactly.
+    density : str
+        How the pdf is estimated from its pixels before: "histogram" (as they are), or one of
+        `density_estimators.ESTIMATORS`.
+
+    Raises
+    ------
+    ValueError
+        If an estimator is asked for and the pdf counts no pixels.
     """
 
-    def __init__(self, pdf: Pdf, least: int, pixels: float = 0.0) -> None:
+    def __init__(self, pdf: Pdf, least: int, pixels: float = 0.0, density: str = HISTOGRAM) -> None:
         occupied = np.flatnonzero(pdf.probability > 0)
         inside = slice(occupied[0], occupied[-1] + 1)
         self._pdf = Pdf(pdf.low[inside], pdf.high[inside], pdf.probability[inside])
         edges, shares = histogram_binning.histogram_of_pdf(self._pdf)
         whole = np.round(shares * pixels)
         as_counts = pixels and np.allclose(shares * pixels, whole, rtol=0, atol=WHOLE)
+        if density != HISTOGRAM and not as_counts:
+            message = f"{density} needs a pdf that counts pixels: of a camera, or a table of counts"
+            raise ValueError(f"{message}; write density: histogram")
+        if density != HISTOGRAM:
+            shares, as_counts = ESTIMATORS[density](whole), False
+            self._pdf = Pdf.histogram(edges, shares)
         self._histogram = (edges, whole if as_counts else shares)
         self._few = not self._pdf.discrete and len(self._pdf.low) <= least
         self._merges = () if self._few else histogram_binning.merge_bins(self._histogram, least)[1]

@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from vcam_cli.capture_schedules import pdf_plots
+from vcam_cli.capture_schedules.charge_plot import plot_charge
 from vcam_cli.capture_schedules.methods import MethodResult, Task
+from vcam_cli.capture_schedules.model import DENSITIES
 from vcam_cli.capture_schedules.pdf_plots import (
     DISPLAYED,
     GRAY,
@@ -34,17 +36,28 @@ FEW = 10
 TIME_UNITS = ((1.0, "s"), (1e-3, "ms"), (1e-6, "us"), (1e-9, "ns"))
 DASHED: Any = (0, (4, 3))
 DOTTED: Any = (0, (1, 2))
+LINES: Any = ("-", DASHED, DOTTED, (0, (6, 2, 1, 2)))
+"""Of curves whose pdf is estimated as `DENSITIES` says."""
 GAIN_LABEL = "mean SNR / that of a single capture"
 
 
 @dataclass(frozen=True)
 class GainCurve:
-    """Gains of a method over a number of captures or of segments, and its own upper bound."""
+    """Gains of a method over a number of captures or of segments, and its own upper bound.
+
+    `density` names how the pdf was estimated, where that differs from curve to curve.
+    """
 
     method: str
     x: tuple[int, ...]
     gains: tuple[float, ...]
     bound: tuple[float, ...] = ()
+    density: str = ""
+
+    @property
+    def label(self) -> str:
+        """What the legend says."""
+        return f"{self.method}, {self.density}" if self.density else self.method
 
 
 def plot_gain(result: ScheduleResult, path: Path) -> None:
@@ -129,6 +142,18 @@ def plot_captures(result: ScheduleResult, path: Path) -> None:
         top.set_title(f"{result.study.model.name}: {count} captures")
         top.set_ylabel("pixels that\nsaturate per decade")
         top.tick_params(labelbottom=False)
+
+
+def plot_charge_over_time(result: ScheduleResult, path: Path) -> None:
+    """Plot the charge of two pixels over time, sampled by the study's first method.
+
+    Raises
+    ------
+    CannotDo
+        If the file cannot be written.
+    """
+    shown = _results_of_count(result, shown_count(result))[0]
+    plot_charge(result, shown, study_units(result), path)
 
 
 def plot_pdf(result: ScheduleResult, path: Path) -> None:
@@ -223,15 +248,18 @@ def _curves_over_captures(found: Sequence[MethodResult], task: Task) -> list[Gai
 
 def _curves_over_segments(result: ScheduleResult, count: int) -> list[GainCurve]:
     curves = []
-    for method in dict.fromkeys(one.method for one in result.steps[0].found):
-        points = [
-            (step.segments, result.task.gain(one.schedule))
-            for step in result.steps
-            for one in step.found
-            if (one.method, one.count) == (method, count)
-        ]
-        x, gains = zip(*points, strict=True)
-        curves.append(GainCurve(method, x, gains))
+    densities = result.study.model.density
+    for density in densities:
+        for method in dict.fromkeys(one.method for one in result.steps[0].found):
+            points = [
+                (step.segments, result.task.gain(one.schedule))
+                for step in result.steps
+                for one in step.found
+                if (step.density, one.method, one.count) == (density, method, count)
+            ]
+            x, gains = zip(*points, strict=True)
+            named = density if len(densities) > 1 else ""
+            curves.append(GainCurve(method, x, gains, density=named))
     return curves
 
 
@@ -241,8 +269,12 @@ def _draw_gain_curves(axes: Any, curves: Sequence[GainCurve], ms: float, lw: flo
 
     for curve in curves:
         color, marker = METHOD_STYLES[curve.method]
-        axes.plot(curve.x, curve.gains, marker=marker, ms=ms, lw=lw, color=color,
-                  label=curve.method)  # fmt: skip
+        line: Any = "-"
+        if curve.density:
+            number = DENSITIES.index(curve.density)
+            color, line = COLORS[number], LINES[number]
+        axes.plot(curve.x, curve.gains, marker=marker, ms=ms, lw=lw, color=color, ls=line,
+                  label=curve.label)  # fmt: skip
         if curve.bound:
             axes.plot(curve.x, curve.bound, color=color, lw=0.9, ls=DOTTED,
                       label=f"upper bound, {curve.method}")  # fmt: skip

@@ -57,6 +57,7 @@ LEAST_SNR = 1e-200
 class ApproximationStep:
     """A pdf approximated by so many segments, and the schedules found on it."""
 
+    density: str
     segments: int
     plan: Pdf
     found: tuple[MethodResult, ...]
@@ -261,8 +262,9 @@ class _StudyRun:
         self.light: NDArray | None = None
         """(n,) photocurrents of the camera's pixels [e/s], where the pdf is of a camera."""
         self.pdf = study.known if study.known is not None else self._simulated_pdf()
-        self.approximation = self._approximation()
-        self.task = self._task(self._plan(self.model.segments[-1] if self.model.segments else 0))
+        self.approximation = self._approximation(self.model.density[0])
+        most = self.model.segments[-1] if self.model.segments else 0
+        self.task = self._task(self.approximation.pdf(most) if self.approximation else None)
 
     def result(self, place: Path) -> ScheduleResult:
         """Find the schedules and everything else that the study asks for."""
@@ -292,14 +294,14 @@ class _StudyRun:
         except ValueError as error:
             raise self._error(("pdf", "camera"), error) from None
 
-    def _approximation(self) -> Approximation | None:
+    def _approximation(self, density: str) -> Approximation | None:
+        """Return the pdf on its way to few segments, None where it is not to be approximated."""
         pixels = self.study.pixels if self.light is None else float(self.light.size)
         least = min(self.model.segments, default=0)
-        return Approximation(self.pdf, least, pixels) if least else None
-
-    def _plan(self, segments: int) -> Pdf | None:
-        """Return the pdf approximated, None where it is not to be."""
-        return self.approximation.pdf(segments) if self.approximation else None
+        try:
+            return Approximation(self.pdf, least, pixels, density) if least else None
+        except ValueError as error:
+            raise self._error(("density",), error) from None
 
     def _task(self, plan: Pdf | None) -> Task:
         sensor, constraints = study_sensor(self.model), study_constraints(self.model)
@@ -352,18 +354,19 @@ class _StudyRun:
 
     def _steps(self) -> list[ApproximationStep]:
         """Find schedules on coarser approximations."""
-        if len(self.model.segments) < 2:
+        if max(len(self.model.segments), len(self.model.density)) < 2:
             return []
         self.watch.begin("numbers of segments")
         planned = ("optimal", "heuristic", *RANDOM_STARTS, "weighted")
         methods = [method for method in self.model.methods if method in planned]
         steps = []
-        for n in self.model.segments:
-            plan = self._plan(n)
-            assert plan is not None
-            steps.append(
-                ApproximationStep(n, plan, self._method_results(self._task(plan), methods))
-            )
+        for density in self.model.density:
+            approximation = self._approximation(density)
+            assert approximation is not None
+            for n in self.model.segments:
+                plan = approximation.pdf(n)
+                found = self._method_results(self._task(plan), methods)
+                steps.append(ApproximationStep(density, n, plan, found))
         return steps
 
     def _targets(self) -> tuple[FewestCaptures, ...]:

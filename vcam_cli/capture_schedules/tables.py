@@ -26,7 +26,7 @@ SUMMARY = (
     *("count", "method", "expected_snr", "single_capture_snr", "gain"),
     *("upper_bound", "gap", "used", "seconds"),
 )
-SEGMENTS = ("segments", *SUMMARY[:5])
+SEGMENTS = ("segments", *SUMMARY[:5], "density")
 TARGETS = ("target", "captures", "gain", "upper_bound")
 NOTED_LOSS = 0.05
 """Relative loss from which on a note is given."""
@@ -78,7 +78,8 @@ def segments_rows(result: ScheduleResult) -> Iterator[Row]:
     for step in result.steps:
         for one in step.found:
             value, gain = one.schedule.expected_snr, task.gain(one.schedule)
-            yield (step.segments, one.count, one.method, value, task.single, gain)
+            row = (step.segments, one.count, one.method, value, task.single, gain)
+            yield (*row, step.density)
 
 
 def targets_rows(result: ScheduleResult) -> Iterator[Row]:
@@ -107,6 +108,7 @@ def writers(result: ScheduleResult) -> Writers:
         title = f"{model.name}: captures planned online"
         out["online.png"] = partial(online_loss.plot_losses, title=title, losses=result.online)
     out["captures.png"] = partial(plots.plot_captures, result)
+    out["charge.png"] = partial(plots.plot_charge_over_time, result)
     out["pdf.png"] = partial(plots.plot_pdf, result)
     if len(model.counts) > 1:
         out["gain.png"] = partial(plots.plot_gain, result)
