@@ -19,7 +19,8 @@ from vcam_cli.commands.schemas import schemas
 from vcam_cli.errors import BadInput
 from vcam_cli.files.atomic import STAGING, write_text
 from vcam_cli.files.folder import OutputFolder
-from vcam_cli.files.points_store import POINTS, SweepFolder
+from vcam_cli.files.in_use import POINTS
+from vcam_cli.files.points_store import SweepFolder
 from vcam_cli.files.records import LOCK, RECORDS
 
 pytestmark = pytest.mark.attack("deleting without proof")

@@ -10,6 +10,7 @@ import pytest
 from sweeping import ROOT, environment, written
 
 from vcam_cli.errors import BadInput, CannotDo
+from vcam_cli.files.folder import OutputFolder
 from vcam_cli.files.points_store import SweepFolder
 from vcam_cli.sweeps import sweep_file
 
@@ -154,3 +155,39 @@ def test_whole_sweeps_at_once(tmp_path, changes, same):
         assert json.loads(done.stdout)["computed"] == 3
     else:
         assert done.stderr.startswith("folder in use: another study")
+
+
+def call(*args: str, cwd) -> subprocess.CompletedProcess:
+    line = [sys.executable, "-m", "vcam_cli.commands.main", *args, "-q"]
+    return subprocess.run(line, cwd=cwd, env=environment(), capture_output=True, text=True)
+
+
+WRITING = [
+    ("run", "starter"), ("accuracy", "starter"), ("characterize", "starter"),
+    ("plan", "starter", "--scenes", "csf"), ("schedule", "captures"),
+    ("compare", "gray.png", "gray.png"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("command", WRITING, ids=[command[0] for command in WRITING])
+def test_every_other_command_in_the_folder_of_a_sweep_at_work(command, tmp_path):
+    """It is refused before it computes, and the folder stays what it is."""
+    oiio = pytest.importorskip("OpenImageIO")
+    oiio.ImageBuf(oiio.ImageSpec(4, 4, 1, "uint8")).write(str(tmp_path / "gray.png"))
+    out = tmp_path / "out"
+    with Holder(out, STUDIES[0]):
+        before = sorted(path.name for path in out.rglob("*"))
+        done = call(*command, "-o", "out", cwd=tmp_path)
+        assert done.returncode == 3, done
+        assert done.stderr.startswith("folder in use: a sweep is writing out; wait for it")
+        assert sorted(path.name for path in out.rglob("*")) == before
+
+
+def test_a_sweep_in_the_folder_of_a_run_at_work(tmp_path):
+    study = written(tmp_path / "a")
+    with OutputFolder(tmp_path / "out"):
+        done = call("sweep", str(study), "-o", "out", cwd=tmp_path)
+    assert done.returncode == 3, done
+    assert done.stderr.startswith("folder in use: another run is writing out; wait for it")
+    done = call("sweep", str(study), "-o", "out", "--workers", "1", cwd=tmp_path)
+    assert done.returncode == 0, done

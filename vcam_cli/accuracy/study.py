@@ -43,6 +43,7 @@ from vcam_cli.accuracy.refinement import Refined, is_same_camera, refine_referen
 from vcam_cli.accuracy.setting_errors import COLUMNS, Point
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.simulation import PRESETS
+from vcam_cli.floats import own_float_errors
 from vcam_cli.parallel import available_workers
 from vcam_cli.progress import Observer, Silent
 from vcam_cli.simulation.shared import Shared
@@ -91,6 +92,7 @@ class Study:
         }
 
 
+@own_float_errors
 def accuracy(camera: Camera, workers: int | None = None, watch: Observer | None = None) -> Study:
     """Measures `camera` along every knob, with every preset, without every effect.
 

@@ -50,6 +50,11 @@ FIELD = 512
 """Rows and columns of the field that is measured, cut down to whole blocks of colors."""
 EDGE_ANGLE, EDGE_CONTRAST = 5, 0.6
 """Angle [degree] and contrast of the slanted edge of ISO 12233: bright over dark 4 to 1."""
+LEVELS = ("luminance", "radiance", "illuminance", "irradiance")
+"""Keys of a scene that give its light's level."""
+BENCH_LUMINANCE = 100.0
+"""Of the bench's white before a camera whose own scene is dark, or has its light in a file [cd/m2]:
+levels are set by the bench, and follow from no luminance."""
 EDGE_LEVEL = 0.7
 """Signal on the bright side of the edge, over saturation."""
 EDGE_TOLERANCE = 0.001
@@ -290,10 +295,13 @@ def _before_chart(camera: Camera, chart: Uniform | SlantedEdge, *left_out: str) 
     """Return the camera before a chart, its array a field around the axis, its lens as solved."""
     solved = geometry(camera)
     scene = camera.scene
-    light: dict[str, Any] = {}
-    if scene.luminance == "from-file" or (scene.irradiance == "from-file" and not scene.illuminant):
-        light = {"luminance": 100.0, "irradiance": None}
-    changes: dict[str, Any] = {"source": chart, "extent": "sensor", **light}
+    changes: dict[str, Any] = {"source": chart, "extent": "sensor"}
+    levels = {name: getattr(scene, name) for name in LEVELS}
+    in_file = scene.luminance == "from-file" or (
+        scene.irradiance == "from-file" and not scene.illuminant
+    )
+    if in_file or 0 in levels.values():
+        changes |= dict.fromkeys(LEVELS, None) | {"luminance": BENCH_LUMINANCE}
     if scene.illuminant is None:
         changes["illuminant"] = IlluminantSpec("D65")
     lens: dict[str, Any] = dict.fromkeys(

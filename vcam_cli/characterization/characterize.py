@@ -16,6 +16,7 @@ from vcam_cli.characterization.datasheet import COLUMNS, Quantity, notes, quanti
 from vcam_cli.characterization.exposures import Channel, measure_channels
 from vcam_cli.characterization.kept_frames import Keeper
 from vcam_cli.errors import BadInput
+from vcam_cli.floats import own_float_errors
 from vcam_cli.parallel import available_workers
 from vcam_cli.progress import Observer, Silent, Stages
 
@@ -75,6 +76,7 @@ class Characterization:
         }
 
 
+@own_float_errors
 def characterize(
     camera: Camera,
     workers: int | None = None,

@@ -29,6 +29,7 @@ from typing import Any, Self
 
 from vcam_cli.errors import BadInput, CannotDo, bad
 from vcam_cli.files.atomic import STAGING, cannot_write, flush_folder, write_text
+from vcam_cli.files.in_use import require_no_sweep
 from vcam_cli.files.records import (
     LOCK,
     PROGRAM,
@@ -158,6 +159,7 @@ class OutputFolder:
         str(self.path).encode("utf-8")  # the libraries that write pictures take no other names
         self._refuse_foreign(before_lock=True)
         self._make_and_lock()
+        require_no_sweep(self.path)
         self._refuse_foreign()
         self._recover()
 

@@ -21,18 +21,15 @@ from typing import Any, Self
 from vcam_cli.errors import CannotDo, bad
 from vcam_cli.files import atomic
 from vcam_cli.files.folder import is_foreign
+from vcam_cli.files.in_use import CLAIMS, POINTS, STUDIES, STUDIES_END, require_no_run
 from vcam_cli.files.records import PROGRAM, Fingerprint, Proofs, fingerprint, read_record
 from vcam_cli.files.report import file_digest, hash_text, to_json
 
-POINTS = "points"
 RECORD = "study.json"
-_CLAIMS = ".claims"
 _KEPT = r"[0-9a-f]{32}\.(json|raw\.exr|render\.png)"
 _UNFINISHED = re.compile(rf"\.{_KEPT}\.\d+-[0-9a-f]{{8}}\.part")
 _POINT_FILE = re.compile(rf"{_KEPT}|\.claims|\..*\.part")
 """The names in the folder of points."""
-_STUDIES, _STUDIES_END = 1 << 60, 1 << 61
-"""Bytes of which each process holds its study's. Those before are claims of points."""
 _STARTING, _FINISHING = (1 << 61) + 1, (1 << 61) + 2
 """Bytes that a process holds while it looks for other studies, and while it replaces tables."""
 _LARGEST = 1 << 20
@@ -64,7 +61,7 @@ class SweepFolder:
                 raise bad("--out", message, "choose a new or empty folder")
             (self.path / POINTS).mkdir(parents=True, exist_ok=True)
             flags = os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW
-            self._claims = os.open(self.path / POINTS / _CLAIMS, flags, 0o666)
+            self._claims = os.open(self.path / POINTS / CLAIMS, flags, 0o666)
         except (FileExistsError, NotADirectoryError) as error:
             message = f"{error.filename or self.path} is not a folder"
             raise bad("--out", message, "choose another one") from error
@@ -91,11 +88,12 @@ class SweepFolder:
         """Return the record of the folder; write this one first where there is none.
 
         study: hexadecimal hash of what the tables will show. Raise CannotDo where another process
-        is at work on another study here, BadInput where a file that would be replaced is not as
+        is at work on something else here, BadInput where a file that would be replaced is not as
         vcam wrote it.
         """
         with self._locked(_STARTING):
-            self._claim_study(_STUDIES + _byte(study))
+            self._claim_study(STUDIES + _byte(study))
+            require_no_run(self.path)
         with self._locked(_FINISHING):
             if not os.path.lexists(self.path / RECORD):
                 self._write_record(record, [])
@@ -109,7 +107,7 @@ class SweepFolder:
 
     def _claim_study(self, own: int) -> None:
         """Hold the byte of a study, together with others of it. Raise CannotDo, see `begin`."""
-        for start, end in ((_STUDIES, own), (own + 1, _STUDIES_END)):
+        for start, end in ((STUDIES, own), (own + 1, STUDIES_END)):
             if not self._try_lock(start, end - start):
                 message = f"folder in use: another study is being written into {self.path}"
                 raise CannotDo(message, "wait for it, or choose another folder")

@@ -11,7 +11,8 @@ from typing import Any
 
 from vcam_cli.camera.camera import Camera
 from vcam_cli.errors import BadInput
-from vcam_cli.files.points_store import POINTS, SweepFolder
+from vcam_cli.files.in_use import POINTS
+from vcam_cli.files.points_store import SweepFolder
 from vcam_cli.files.report import hash_file
 from vcam_cli.image_formation.rate_cache import light_key
 from vcam_cli.progress import Observer

@@ -23,6 +23,7 @@ from vcam_cli.arguments import (
     require_whole,
 )
 from vcam_cli.errors import bad
+from vcam_cli.floats import own_float_errors
 from vcam_cli.progress import Observer, Silent
 from vcam_cli.sweeps import sweep_file
 from vcam_cli.sweeps.sweep_result import SweepResult, finished_result, request_hash
@@ -92,6 +93,7 @@ def _check_address(address: str) -> None:
         raise bad("--scheduler", message, "write tcp://HOST:8786")
 
 
+@own_float_errors
 def sweep(
     study: str | Path,
     out: str | Path | None = None,
