@@ -119,7 +119,8 @@ def test_a_schedule_for_no_light_is_refused_with_its_place(sees, tmp_path):
 def test_benches(sees, treatment, tmp_path, monkeypatch):
     """The bench has a lamp of its own: what the scene is makes no difference.
 
-    But of rounding: light ten times as bright is another number in 32 bits (6e-8).
+    But of rounding: light ten times as bright is another number in 32 bits, by which some draws of
+    noise are other electrons. That is far below the noise of MTF50, around 1e-3.
     """
     monkeypatch.setattr(bench, "FIELD", 192)
     time = {"exposure": {"time": "20 ms"}}
@@ -133,7 +134,7 @@ def test_benches(sees, treatment, tmp_path, monkeypatch):
         assert np.geterr() == before
     assert [q.name for q in found] == [q.name for q in expected]
     for one, other in zip(found, expected, strict=True):
-        assert one.measured == pytest.approx(other.measured, rel=1e-6, nan_ok=True)
+        assert one.measured == pytest.approx(other.measured, rel=1e-4, nan_ok=True)
 
 
 @pytest.mark.parametrize("sees", ["silicon", "transmittance"])
