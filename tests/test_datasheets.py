@@ -124,3 +124,25 @@ def test_a_sheet_in_electrons_and_numbers_has_no_volts():
         load("imx900", ["output.raw=[dn, volts]"])
     known = simulate(load("kai-02170", ["array.rows=16", "array.columns=16"]))
     assert known.volts == pytest.approx(known.electrons * 33e-6, rel=1e-6)
+
+
+KNOWN = {
+    # What the sheet prints and the camera file does not say, but makes.
+    "olympus-e300": {"dynamic_range_db": 64.0},  # Kodak rounds 25.5 ke over 16 e to 64.4 dB
+    "mt9v011": {"dynamic_range_db": 60.0},
+    "pixel-4a": {"base_iso": 55.0},  # ISO of gain 1 of the phone; the efficiency is estimated
+}
+
+
+@pytest.mark.parametrize("name", KNOWN)
+def test_known_cameras_make_what_is_printed_of_them(name):
+    metrics = simulate(load(name, ["array.rows=64", "array.columns=64", "quality=[]"])).metrics
+    for quantity, printed in KNOWN[name].items():
+        # Decibels are printed to one place; a speed is good to a fifth of a stop.
+        tolerance = {"abs": 0.1} if quantity.endswith("db") else {"rel": 0.15}
+        assert metrics[quantity] == pytest.approx(printed, **tolerance)
+
+
+def test_three_exposures_of_an_automotive_sensor_have_its_dynamic_range():
+    metrics = simulate(load("ar0132at", ["array.rows=64", "array.columns=64"])).metrics
+    assert metrics["hdr_dynamic_range_db"] == pytest.approx(115, abs=0.5)

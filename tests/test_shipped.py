@@ -95,8 +95,8 @@ class TestCameras:
             assert 0.9 <= g.f_number <= 22
             assert 1e-3 <= g.focal_length <= 0.1
             assert math.radians(5) < 2 * math.atan(g.sensor_width / 2 / g.image_distance) < 2.1
-        assert 1e-6 <= g.pitch_x <= 20e-6
-        assert 1e-6 <= g.pitch_y <= 20e-6
+        assert 0.5e-6 <= g.pitch_x <= 20e-6  # the smallest that are sold have 0.5 um
+        assert 0.5e-6 <= g.pitch_y <= 20e-6
         assert 0.1 <= g.fill_factor <= 1 + 1e-9
         assert 5e-6 <= e.conversion_gain <= 300e-6
         assert 0.2 <= e.voltage_swing <= 3
