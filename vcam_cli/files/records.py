@@ -26,6 +26,7 @@ RECORDS = (
     "study.json",
     "compare.json",
     "scenes.json",
+    "verify.json",
 )
 """The records of vcam's commands: each may add its files to the folder of another."""
 _LARGEST_RECORD = 1 << 26  # bytes
