@@ -6,7 +6,7 @@ files of `configs/technologies` say in their `source`.
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import reference_silicon as silicon
@@ -28,6 +28,10 @@ class Process:
     film: float = 0.25e-6  # of polysilicon, over a photogate
     dark_area: float = 1e-4
     dark_perimeter: float = 0.3e-10
+    supply: float = 3.3
+    acceptors: float = 8e22
+    well: float = 1.5e-6
+    well_donors: float = 5e22
     scale: float = 0.75  # of the quantum efficiency: reflection and stack
     border: float = 5.017
     transistors: float = 91.1
@@ -39,11 +43,13 @@ PROCESSES = {
     ),
     "cmos-0.25um": Process(
         0.25e-6, 1.67, 2.25, (1.762e-3, 0.99, 0.46), (0.388e-9, 0.99, 0.35),
-        depth=0.143e-6, neutral=3.57e-6, length=14.3e-6, film=0.2e-6,
+        depth=0.143e-6, neutral=3.57e-6, length=14.3e-6, film=0.2e-6, acceptors=3.7e23,
+        well=1.2e-6, well_donors=7e22,
     ),
     "cmos-0.18um": Process(
         0.18e-6, 1.12, 1.65, (0.9925e-3, 0.727, 0.357), (0.2475e-9, 0.575, 0.132),
-        depth=0.103e-6, neutral=2.57e-6, length=10.3e-6, film=0.2e-6,
+        depth=0.103e-6, neutral=2.57e-6, length=10.3e-6, film=0.2e-6, acceptors=8.6e22,
+        supply=2.5, well=1e-6, well_donors=1e23,
     ),
 }  # fmt: skip
 
@@ -84,7 +90,10 @@ class Photodiode:
 
 
 def photodiode(process: Process, width: float, height: float, kind: str = "ndiff-psub"):
-    """The photodiode that the process's layout leaves of a pixel [m]."""
+    """The photodiode that the process's layout leaves of a pixel [m].
+
+    A photogate's and a pinned one's capacitance is not told here.
+    """
     p = process
     area, perimeter = silicon.layout(width, height, p.feature, p.border, p.transistors)
     part = math.sqrt(area / (width * height))
@@ -92,14 +101,66 @@ def photodiode(process: Process, width: float, height: float, kind: str = "ndiff
     per_area = silicon.mean_over_swing(p.area[0], *bias, *p.area[1:])
     per_length = silicon.mean_over_swing(p.sidewall[0], *bias, *p.sidewall[1:])
     gate = 2.5 * p.feature * p.feature * OXIDE / (p.feature / 44)
-    x1 = 0.0 if kind == "photogate" else p.depth
-    x2 = x1 + SILICON / per_area
+    x1, depleted = p.depth, SILICON / per_area
+    if kind == "photogate":
+        x1, depleted = 0.0, gate_depletion(p.supply, p.feature, p.acceptors)
+    elif kind == "pinned":
+        x1, depleted = 0.1e-6, pinned_depletion()
+    elif kind == "nwell-psub":
+        x1, depleted = p.well, well_depletion(p, p.well_donors)
+    x2 = x1 + depleted
     return Photodiode(
         p, kind, area, perimeter, (part * width, part * height),
         per_area * area + per_length * perimeter + gate, (x1, x2, x2 + p.neutral),
     )  # fmt: skip
 
 
-def with_well(process: Process) -> Process:
-    """The same process with the depth of its n-well in place of its n-diffusion."""
-    return replace(process, depth=1.5e-6)
+def thermal(concentration: float) -> float:
+    """(k T / q) ln(N / n_i) at 300 K [V], with the package's n_i: it is known to some percent."""
+    from vcam_cli.physics.silicon import intrinsic_concentration
+
+    n_i = float(intrinsic_concentration(300.0))
+    return 1.380649e-23 * 300 / CHARGE * math.log(concentration / n_i)
+
+
+def pinned_depletion(layer=0.25e-6, donors=5e22, acceptors=1.6e21, surface=1e24) -> float:
+    """All of the n layer and what is depleted below it: where both regions meet [m].
+
+    Sought by the upper region's width, at which both sides have the layer at one voltage.
+    """
+    from scipy.optimize import brentq
+
+    slope = CHARGE * donors / (2 * SILICON)
+    upper, lower = thermal(donors) + thermal(surface), thermal(donors) + thermal(acceptors)
+
+    def difference(x: float) -> float:
+        below = slope * (1 + donors / acceptors) * (layer - x) ** 2
+        return (slope * x**2 - upper) - (below - lower)
+
+    x = brentq(difference, 0, layer, xtol=1e-16)
+    return layer + (layer - x) * donors / acceptors
+
+
+def gate_depletion(supply: float, feature: float, acceptors: float) -> float:
+    """Mean width of the region below a gate, empty in deep depletion, and full at inversion [m]."""
+    from scipy.optimize import brentq
+
+    fermi, oxide = thermal(acceptors), OXIDE / (feature / 44)
+
+    def width(psi: float) -> float:
+        return math.sqrt(2 * SILICON * psi / (CHARGE * acceptors))
+
+    voltage = supply + 0.56 + fermi
+    empty = brentq(
+        lambda psi: psi + CHARGE * acceptors * width(psi) / oxide - voltage, 0, voltage, xtol=1e-15
+    )
+    return (width(empty) + width(2 * fermi)) / 2
+
+
+def well_depletion(process: Process, donors: float, acceptors: float = 1.6e21) -> float:
+    """Permittivity over the capacitance per area of an abrupt junction, averaged [m]."""
+    potential = thermal(donors) + thermal(acceptors)
+    both = donors * acceptors / (donors + acceptors)
+    zero = SILICON / math.sqrt(2 * SILICON * potential / (CHARGE * both))
+    bias = process.reset - process.swing, process.reset
+    return SILICON / silicon.mean_over_swing(zero, *bias, potential, 0.5)

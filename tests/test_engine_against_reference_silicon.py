@@ -16,7 +16,7 @@ import reference_pixel as layers
 import reference_readout as readout
 import reference_scenes as scenes
 from reference_cameras import READOUT, Case, continuous, error, leaves, lines, setup_of
-from reference_process import PROCESSES, photodiode, with_well
+from reference_process import PROCESSES, photodiode
 from reference_scenes import flat, lamp
 from reference_silicon import Diffusion, dark_density
 
@@ -148,7 +148,7 @@ array: {rows: 8, columns: 12, pattern: monochrome}
 GRAY = ref.Waves((0.18,), (0.0,), (0.0,), (0.0,))
 
 
-@pytest.mark.parametrize("kind", ["ndiff-psub", "pinned", "photogate"])
+@pytest.mark.parametrize("kind", ["ndiff-psub", "nwell-psub", "pinned", "photogate"])
 @pytest.mark.parametrize("name", PROCESSES)
 def test_photodiodes_of_processes(name, kind, tmp_path):
     # size, QE and dark current all from the technology. QE is straight between wavelengths 0.25 nm
@@ -156,15 +156,6 @@ def test_photodiodes_of_processes(name, kind, tmp_path):
     case = Case(UNIFORM.replace("TECHNOLOGY", name).replace("KIND", kind), None)
     camera = case.load(tmp_path, "process", "all", "reference")
     diode = photodiode(PROCESSES[name], 6.5e-6, 6.5e-6, kind)
-    setup = setup_of(camera, GRAY, continuous(lamp("D65")), quantum=diode.external_efficiency)
-    setup = replace(setup, aperture=(0.0, 0.0, *diode.side), dark_rate=diode.dark_rate(308.0))
-    assert error(camera, ref.mean_electrons(setup)) < 1e-6
-
-
-def test_an_n_well_lies_deeper(tmp_path):
-    case = Case(UNIFORM.replace("TECHNOLOGY", "cmos-0.35um").replace("KIND", "nwell-psub"), None)
-    camera = case.load(tmp_path, "well", "all", "reference")
-    diode = photodiode(with_well(PROCESSES["cmos-0.35um"]), 6.5e-6, 6.5e-6)
     setup = setup_of(camera, GRAY, continuous(lamp("D65")), quantum=diode.external_efficiency)
     setup = replace(setup, aperture=(0.0, 0.0, *diode.side), dark_rate=diode.dark_rate(308.0))
     assert error(camera, ref.mean_electrons(setup)) < 1e-6

@@ -10,6 +10,8 @@ from typing import ClassVar
 
 import numpy as np
 import pytest
+import reference_process
+import yaml
 from making import BOLTZMANN, CHARGE, GONE, camera
 
 from vcam_cli.camera.derived.dark_current import dark_rate
@@ -20,7 +22,9 @@ from vcam_cli.camera.derived.photodiode import diffusion, quantum_efficiency
 from vcam_cli.camera.derived.pixel_layout import detector
 from vcam_cli.camera.derived.process import Need
 from vcam_cli.camera.derived.sense_node import capacitance, voltage_swing
+from vcam_cli.config import shipped
 from vcam_cli.errors import BadInput
+from vcam_cli.physics.charge_storage import abrupt_capacitance
 
 EPSILON = 11.7 * 8.8541878128e-12
 ALPHA = {550e-9: 6.39e5, 650e-9: 2.79e5}
@@ -337,43 +341,92 @@ def test_lines_between_its_wavelengths_follow_the_curve(tmp_path):
 
 
 class TestKinds:
-    """The same numbers in two kinds differ in just what the table says."""
+    """Each kind has the depletion region, the capacitance and the full well of its structure."""
 
-    SAME: ClassVar = {
-        "junction": {"depth": "0.2 um", "donors": "5e19 1/cm3"},
-        "charge_diffusion": "junction",
-    }
+    SAME: ClassVar = {"charge_diffusion": "junction"}
 
     def of(self, folder, kind, **more):
         return photodiode(made(folder, kind=kind, **(self.SAME | more)))
 
-    def test_an_n_well_with_the_numbers_of_an_n_diffusion_is_one(self, tmp_path):
-        junction = {"dark_current_density": "junction"}
-        first = self.of(tmp_path, "ndiff-psub", **junction)
-        assert self.of(tmp_path, "nwell-psub", **junction) == first
-
     def test_an_n_well_is_deeper_and_less_doped(self, tmp_path):
-        """Blue is lost above it; the holes of its weaker doping add dark current."""
-        well = photodiode(made(tmp_path, kind="nwell-psub", dark_current_density="junction"))
-        diffusion = photodiode(made(tmp_path, dark_current_density="junction"))
+        """Blue is lost above it, and its depletion region is wider."""
+        well = photodiode(made(tmp_path, kind="nwell-psub"))
+        diffusion = photodiode(made(tmp_path))
         assert well.depths.x1 == 1.5e-6
-        assert well.quantum_efficiency.evaluate(
-            450e-9
-        ) < 0.6 * diffusion.quantum_efficiency.evaluate(450e-9)
-        assert well.depths.x2 - well.depths.x1 == pytest.approx(
-            diffusion.depths.x2 - diffusion.depths.x1
+        blue = [d.quantum_efficiency.evaluate(450e-9) for d in (well, diffusion)]
+        assert blue[0] < 0.6 * blue[1]
+        width = reference_process.well_depletion(reference_process.PROCESSES["cmos-0.35um"], 5e22)
+        assert well.depths.x2 - well.depths.x1 == pytest.approx(width, rel=1e-6)
+
+    def test_an_n_well_has_the_capacitance_of_its_doping(self, tmp_path):
+        """Area, and sides as deep as the well; MOSIS measured 129 aF/um2 (TSMC 0.18 um, T53R)."""
+        own = {"capacitance": {"follower_gate": "0 fF"}}
+        c = made(tmp_path, kind="nwell-psub", technology={"from": "cmos-0.18um"} | own)
+        size = detector(c)
+        zero = reference_process.SILICON / reference_process.well_depletion(
+            reference_process.PROCESSES["cmos-0.18um"], 1e23
         )
+        found = photodiode(c).capacitance
+        assert found == pytest.approx((size.area + size.perimeter * 1e-6) * zero, rel=1e-6)
+        measured = abrupt_capacitance(1e23, 1.6e21, 0.73)
+        assert measured == pytest.approx(129e-6, rel=0.05)
+
+    @pytest.mark.parametrize("kind", ["photogate", "pinned"])
+    def test_charge_that_is_transferred_is_read_on_a_floating_diffusion(self, kind, tmp_path):
+        """2.5 features square, whatever the pixel's size, with the n+ junction's capacitances."""
+        found = [
+            photodiode(made(tmp_path, kind=kind, pitch=pitch)).capacitance
+            for pitch in ("6.5 um", "10 um")
+        ]
+        _, area, sidewall, phi, m, phi_s, m_s, reset, swing = MEASURED["cmos-0.35um"]
+        side = 2.5 * 0.35
+        whole = side**2 * mean_capacitance(area, reset - swing, reset, phi, m)
+        whole += 4 * side * mean_capacitance(sidewall, reset - swing, reset, phi_s, m_s)
+        gate = 2.5 * 0.35**2 * 3.9 * 8.8541878128e-3 / (0.35 / 44)  # fF, lengths in um
+        assert found == pytest.approx([(whole + gate) * 1e-15] * 2, rel=1e-5)
+
+    def test_a_pinned_layer_of_little_charge_limits_the_full_well(self, tmp_path):
+        """Doping times what is neutral at 0 V, by the reference's own potentials."""
+        thermal, q = reference_process.thermal, CHARGE
+        layer = {"pinned": {"layer": "0.19 um"}}
+        c = made(tmp_path, kind="pinned", technology={"from": "cmos-0.35um"} | layer)
+        unit = 2 * reference_process.SILICON / (q * 5e22)
+        above = math.sqrt(unit * (thermal(5e22) + thermal(1e24)))
+        below = math.sqrt(unit * (thermal(5e22) + thermal(1.6e21)) / (1 + 5e22 / 1.6e21))
+        held = 5e22 * (0.19e-6 - above - below) * detector(c).area
+        e = electrical(c)
+        assert e.full_well == pytest.approx(held, rel=1e-3)
+        assert e.voltage_swing < 1.38
+        deep = electrical(made(tmp_path, kind="pinned"))
+        assert deep.voltage_swing == pytest.approx(1.38), "there its diffusion limits it"
+
+    def test_a_layer_without_charge_is_refused(self, tmp_path):
+        layer = {"pinned": {"layer": "0.1 um"}}
+        text = refused(tmp_path, kind="pinned", technology={"from": "cmos-0.35um"} | layer)
+        assert "holds no charge" in text
+
+    @pytest.mark.parametrize(
+        ("kind", "section", "key"),
+        [("nwell-psub", "well", "junction.acceptors"), ("pinned", "pinned", "pinned.layer"),
+         ("photogate", "gate", "gate.thickness")],
+    )  # fmt: skip
+    def test_a_kind_without_its_numbers_is_refused(self, kind, section, key, tmp_path):
+        own = yaml.safe_load(shipped.find("technologies", "cmos-0.35um").read_text("utf-8"))
+        del own[section]
+        assert key in refused(tmp_path, kind=kind, technology={"from": own})
 
     def test_the_surface_of_a_pinned_diode_collects_nothing(self, tmp_path):
-        """What is born above x1 is what the diffusion collected more, x / x1 of it."""
-        pinned, open_ = self.of(tmp_path, "pinned"), self.of(tmp_path, "ndiff-psub")
+        """Against layers of 1/20000 of the depth, each of which collects all or a share."""
+        pinned = self.of(tmp_path, "pinned")
+        d = pinned.depths
+        width = reference_process.pinned_depletion()
+        assert (d.x1, d.x2) == pytest.approx((0.1e-6, 0.1e-6 + width), rel=1e-9)
+        z = d.x3 * (np.arange(20000) + 0.5) / 20000
+        kept = np.where(z < d.x1, 0, np.where(z < d.x2, 1, (d.x3 - z) / (d.x3 - d.x2)))
         for wavelength, a in ALPHA.items():
-            x = 0.2e-6 * (np.arange(20000) + 0.5) / 20000
-            surface = float(np.mean(a * np.exp(-a * x) * x / 0.2e-6) * 0.2e-6)
-            more = open_.quantum_efficiency.evaluate(
-                wavelength
-            ) - pinned.quantum_efficiency.evaluate(wavelength)
-            assert more == pytest.approx(0.75 * surface, rel=3e-3)
+            expected = 0.75 * float(np.mean(a * np.exp(-a * z) * kept) * d.x3)
+            found = pinned.quantum_efficiency.evaluate(wavelength)
+            assert found == pytest.approx(expected, rel=4e-3)
 
     def test_the_surface_of_a_pinned_diode_stays_dark(self, tmp_path):
         pinned, open_ = self.of(tmp_path, "pinned"), self.of(tmp_path, "ndiff-psub")
@@ -381,25 +434,24 @@ class TestKinds:
         assert pinned.dark_rate * CHARGE == pytest.approx(size.area * 1e-4, rel=1e-12)
         more = (open_.dark_rate - pinned.dark_rate) * CHARGE
         assert more == pytest.approx(size.perimeter * 0.3e-10, rel=1e-9)
-        assert (pinned.capacitance, pinned.diffusion) == (open_.capacitance, open_.diffusion)
 
     def test_so_does_that_of_four_transistors(self, tmp_path):
         c = camera(tmp_path, LEFT | {"pixel.architecture": "aps-4t"})
         assert photodiode(c).dark_rate == pytest.approx(self.of(tmp_path, "pinned").dark_rate)
 
     def test_a_photogate_looks_through_its_gate(self, tmp_path):
-        """0.25 um of silicon first, then no n region."""
+        """0.25 um of silicon first, then no n region, and a region in deep depletion."""
         gate = self.of(tmp_path, "photogate")
-        w = depletion()
+        w = reference_process.gate_depletion(3.3, 0.35e-6, 8e22)
         assert gate.depths.x1 == 0
+        assert gate.depths.x2 == pytest.approx(w, rel=1e-9)
         assert gate.depths.x3 - gate.depths.x2 == pytest.approx(5e-6)
         for wavelength, a in ALPHA.items():
             below = (math.exp(-a * w) - math.exp(-a * (w + 5e-6))) / (a * 5e-6)
             expected = 0.75 * math.exp(-a * 0.25e-6) * (1 - below)
             assert gate.quantum_efficiency.evaluate(wavelength) == pytest.approx(expected, rel=3e-3)
         open_ = self.of(tmp_path, "ndiff-psub")
-        assert (gate.dark_rate, gate.capacitance) == (open_.dark_rate, open_.capacitance)
-        assert gate.diffusion == open_.diffusion
+        assert gate.dark_rate == open_.dark_rate
 
     def test_a_photogate_without_a_thickness(self, tmp_path):
         own = {"name": "x", "feature_size": "0.35 um", "voltage_swing": "1 V"}

@@ -24,7 +24,7 @@ TECHNOLOGY = {
         "hole_lifetime": "1 us", "electron_lifetime": "2 us",
         "hole_diffusivity": "2 cm2/s", "electron_diffusivity": "20 cm2/s",
     },
-    "well": {"depth": "1.5 um", "donors": "1e17 1/cm3"},
+    "well": {"depth": "1.5 um", "donors": "1e17 1/cm3", "acceptors": "2e15 1/cm3"},
     "gate": {"thickness": "0.25 um"},
     "capacitance": {
         "area": "1 fF/um2", "sidewall": "0.3 fF/um", "built_in": "0.8 V", "grading": 0.4,
@@ -152,10 +152,10 @@ class TestWell:
     def test_numbers(self, tmp_path):
         well = made(tmp_path, pixel__photodetector__kind="nwell-psub").junction
         diffusion = made(tmp_path).junction
-        assert (well.depth, well.donors) == pytest.approx((1.5e-6, 1e23))
+        assert (well.depth, well.donors, well.acceptors) == pytest.approx((1.5e-6, 1e23, 2e21))
         assert well.depth > diffusion.depth
         assert well.donors < diffusion.donors
-        same = {"depth": diffusion.depth, "donors": diffusion.donors}
+        same = {n: getattr(diffusion, n) for n in ("depth", "donors", "acceptors")}
         assert well.model_copy(update=same) == diffusion
 
     def test_the_photodetectors_junction_wins(self, tmp_path):
@@ -171,8 +171,9 @@ class TestWell:
         own = {k: v for k, v in TECHNOLOGY.items() if k != "well"}
         with pytest.raises(BadInput) as caught:
             made(tmp_path, {"from": own}, pixel__photodetector__kind="nwell-psub")
-        (problem,) = caught.value.problems
+        problem = next(iter(caught.value.problems))
         assert "junction.depth" in problem.message
+        assert "junction.acceptors" in problem.message, "the p-well of transistors is none, either"
         assert "pixel.photodetector.junction.depth: 0.2 um" in problem.remedy
 
     def test_scales(self, tmp_path):

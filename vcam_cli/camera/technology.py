@@ -75,6 +75,27 @@ class Well(Model):
         "depth of its junction with the substrate", example="1.5 um", default=None
     )
     donors: _Concentration = key("donor concentration", example="1e17 1/cm3", default=None)
+    acceptors: _Concentration = key(
+        "acceptor concentration of the substrate that it lies in",
+        example="1.6e15 1/cm3",
+        default=None,
+    )
+
+
+class Pinned(Model):
+    """The implants of a pinned photodiode."""
+
+    surface: MaybeLength = key("depth of the p+ surface layer", example="0.1 um", default=None)
+    surface_acceptors: _Concentration = key(
+        "acceptor concentration of the surface layer", example="1e18 1/cm3", default=None
+    )
+    layer: MaybeLength = key("thickness of the n layer below it", example="0.25 um", default=None)
+    donors: _Concentration = key(
+        "donor concentration of the n layer", example="5e16 1/cm3", default=None
+    )
+    acceptors: _Concentration = key(
+        "acceptor concentration of the substrate", example="1.6e15 1/cm3", default=None
+    )
 
 
 class Gate(Model):
@@ -188,9 +209,12 @@ class Numbers(Model):
         "the photodiode's junction", example={"depth": "0.2 um"}, default=Junction
     )
     well: Well = key(
-        "depth and donors of a photodetector nwell-psub",
-        example={"depth": "1.5 um", "donors": "1e17 1/cm3"},
+        "depth and doping of a photodetector nwell-psub",
+        example={"depth": "1.5 um", "donors": "1e17 1/cm3", "acceptors": "1.6e15 1/cm3"},
         default=Well,
+    )
+    pinned: Pinned = key(
+        "implants of a pinned photodetector", example={"layer": "0.25 um"}, default=Pinned
     )
     gate: Gate = key("of a photogate", example={"thickness": "0.25 um"}, default=Gate)
     capacitance: JunctionCapacitance = key(

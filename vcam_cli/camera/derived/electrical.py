@@ -11,6 +11,7 @@ from vcam_cli.camera.adc import Adc
 from vcam_cli.camera.architecture import ARCHITECTURES
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived import sense_node
+from vcam_cli.camera.derived.charge_storage import capacity
 from vcam_cli.camera.derived.dark_noise import SIGMAS, dark_noise
 from vcam_cli.camera.derived.transfer_curve import PATH as CURVE
 from vcam_cli.camera.derived.transfer_curve import Curve, transfer_curve
@@ -121,7 +122,7 @@ def electrical(camera: Camera) -> Electrical:
     if nominal:
         swing = NOMINAL_SWING
     elif swing is None and given.full_well is None:
-        swing = sense_node.voltage_swing(camera)
+        swing = _swing(camera, capacitance)
     gain, swing, well = _solve(given.conversion_gain, swing, given.full_well, capacitance)
     if capacitance is None and not nominal:
         capacitance = float(readout.sense_capacitance(gain))
@@ -226,6 +227,17 @@ def no_volts(path: str, what: str, instead: str) -> BadInput:
         f"{what} needs a voltage, and the file counts in electrons and DN alone",
         f"add pixel.readout.conversion_gain: 20 uV/e, or {instead}",
     )
+
+
+def _swing(camera: Camera, capacitance: float | None) -> float | None:
+    """Return the technology's swing [V], or less where the photodetector holds less."""
+    swing, gain = sense_node.voltage_swing(camera), camera.pixel.readout.conversion_gain
+    if gain is None and capacitance is not None:
+        gain = float(readout.conversion_gain(capacitance))
+    held = capacity(camera)
+    if swing is None or gain is None or held is None:
+        return swing
+    return min(swing, held * gain)
 
 
 def _counts_only(camera: Camera) -> bool:

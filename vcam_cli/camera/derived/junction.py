@@ -1,8 +1,8 @@
 """The depths of a pixel's junction, from its process.
 
-The kinds of photodetector differ only here and in what follows from it: an n-well is deeper and
-less doped (`process`); a photogate has a film above it and no n region; the surface layer of a
-pinned diode collects nothing and keeps its surface dark.
+An n-well is deeper and less doped (`process`), and so its depletion region is wider; a photogate
+has a film above it and no n region; the surface layer of a pinned diode collects nothing and keeps
+its surface dark, and all of the layer below it is depleted (`charge_storage`).
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.derived.charge_storage import gate_well, pinned_layer
 from vcam_cli.camera.derived.process import Need, Process, process
 from vcam_cli.camera.derived.sense_node import area_capacitance
 from vcam_cli.errors import bad
@@ -44,11 +45,18 @@ def depths(camera: Camera, need: Need) -> Depths:
 def depletion_width(camera: Camera, made: Process, given: float | str, need: Need) -> float:
     """Return the width of the depletion region [m].
 
-    It is the number given, or permittivity over the junction's mean capacitance per area. Raises
-    BadInput where numbers are missing.
+    It is the number given; else of a diffusion or a well permittivity over the junction's mean
+    capacitance per area, of the others what their structure depletes. Raises BadInput where numbers
+    are missing.
     """
     if isinstance(given, float):
         return given
+    kind = camera.pixel.photodetector.kind
+    if kind == "pinned":
+        (layer,) = made.require(need, "pinned.layer")
+        return float(layer) + pinned_layer(made, need).reach
+    if kind == "photogate":
+        return gate_well(made, need).depletion_width
     per_area = area_capacitance(camera, made, need)
     if per_area <= 0:
         raise bad(

@@ -22,6 +22,7 @@ from vcam_cli.camera.technology import (
     JunctionCapacitance,
     Layout,
     Numbers,
+    Pinned,
     Scaling,
     Technology,
     TechnologyChoice,
@@ -56,7 +57,11 @@ _SCALED: dict[str, dict[str, str]] = {
         ),
         **dict.fromkeys(("donors", "acceptors"), "concentrations"),
     },
-    "well": {"depth": "lengths", "donors": "concentrations"},
+    "well": {"depth": "lengths", "donors": "concentrations", "acceptors": "concentrations"},
+    "pinned": {
+        **dict.fromkeys(("surface", "layer"), "lengths"),
+        **dict.fromkeys(("surface_acceptors", "donors", "acceptors"), "concentrations"),
+    },
     "gate": {"thickness": "lengths"},
     "capacitance": {
         "area": "capacitance_area",
@@ -90,8 +95,9 @@ class Process:
     reset_voltage: float | None
     thresholds: Thresholds
     junction: Junction
-    """Junction of this pixel's kind of photodetector: that of the n-well where it is one."""
+    """Junction of this pixel's kind of photodetector: that of its n-well, or of its pinned layers."""
     gate: Gate
+    pinned: Pinned
     capacitance: JunctionCapacitance
     dark_current: TechnologyDarkCurrent
     quantum_efficiency_scale: float | None
@@ -126,8 +132,11 @@ def process(camera: Camera) -> Process:
     numbers = Numbers() if choice is None else _numbers(choice)
     junction = numbers.junction
     if detector.kind == "nwell-psub":
-        well = {"depth": numbers.well.depth, "donors": numbers.well.donors}
-        junction = junction.model_copy(update=well)
+        junction = junction.model_copy(update=dict(numbers.well))
+    if detector.kind == "pinned":
+        implants = numbers.pinned
+        own = {"depth": implants.surface, "donors": implants.donors}
+        junction = junction.model_copy(update=own | {"acceptors": implants.acceptors})
     return Process(
         technology=choice is not None,
         feature_size=numbers.feature_size if isinstance(numbers, Technology) else None,
@@ -137,6 +146,7 @@ def process(camera: Camera) -> Process:
         thresholds=numbers.thresholds or Thresholds(),
         junction=_overlay(junction, detector.junction),
         gate=numbers.gate,
+        pinned=numbers.pinned,
         capacitance=numbers.capacitance,
         dark_current=numbers.dark_current,
         quantum_efficiency_scale=numbers.quantum_efficiency_scale,

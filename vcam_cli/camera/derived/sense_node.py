@@ -11,6 +11,12 @@ References
 from __future__ import annotations
 
 from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.derived.charge_storage import (
+    OXIDE_PERMITTIVITY,
+    OXIDE_THICKNESS,
+    TRANSFERRED,
+    well_capacitance,
+)
 from vcam_cli.camera.derived.pixel_layout import detector
 from vcam_cli.camera.derived.process import Need, Process, process
 from vcam_cli.errors import bad
@@ -18,11 +24,8 @@ from vcam_cli.physics import junction, readout
 
 GATE_WIDTH = 2.5
 """Width of the follower, in feature sizes: the narrowest that takes a contact, 5 lambda [2]."""
-OXIDE_THICKNESS = 1 / 44
-"""Oxide of the follower's gate, in feature sizes: 7.9, 5.7 and 4.1 nm at 0.35, 0.25 and 0.18 um,
-where MOSIS runs have 7.7 (T69H), 5.6 to 5.8 and 4.1 to 4.2 nm."""
-OXIDE_PERMITTIVITY = 3.9 * 8.8541878128e-12
-"""Permittivity of silicon dioxide [F/m]."""
+DIFFUSION_WIDTH = 2.5
+"""Side of a floating diffusion, in feature sizes: the smallest that takes a contact, likewise."""
 
 
 def voltage_swing(camera: Camera) -> float | None:
@@ -140,18 +143,27 @@ def junction_capacitances(
 
     They are the capacitance without bias [F], built-in potential [V] and grading of the junction's
     area and of its sidewall; and the capacitance of the follower's gate [F], which a passive pixel
-    has none of. Raises BadInput where numbers are missing.
+    has none of. Charge of a photogate or a pinned photodetector is read on a floating diffusion, an
+    n+ junction as small as can be. Raises BadInput where numbers are missing.
     """
-    size = detector(camera)
+    size, kind = detector(camera), camera.pixel.photodetector.kind
+    surface, edge = size.area, size.perimeter
+    if kind in TRANSFERRED:
+        (feature,) = made.require(need, "feature_size")
+        side = DIFFUSION_WIDTH * feature
+        surface, edge = side**2, 4 * side
+    if kind == "nwell-psub":
+        well, potential, depth = well_capacitance(made, need)
+        parts = (surface * well, potential, 0.5), (edge * depth * well, potential, 0.5)
+        return parts, _gate_capacitance(camera, made, need)
     names = "sidewall sidewall_built_in sidewall_grading area built_in grading"
     keys = (f"capacitance.{name}" for name in names.split())
     sidewall, *of_sidewall, area, built_in, grading = made.require(need, *keys)
     parts = (
-        (size.area * area, built_in, grading),
-        (size.perimeter * sidewall, of_sidewall[0], of_sidewall[1]),
+        (surface * area, built_in, grading),
+        (edge * sidewall, of_sidewall[0], of_sidewall[1]),
     )
-    gate = 0.0 if camera.pixel.architecture == "pps" else _follower_gate(made, need)
-    return parts, gate
+    return parts, _gate_capacitance(camera, made, need)
 
 
 def area_capacitance(camera: Camera, made: Process, need: Need) -> float:
@@ -159,14 +171,23 @@ def area_capacitance(camera: Camera, made: Process, need: Need) -> float:
 
     Raises BadInput where numbers are missing.
     """
-    keys = ("capacitance.area", "capacitance.built_in", "capacitance.grading")
-    zero, built_in, grading = made.require(need, *keys)
+    if camera.pixel.photodetector.kind == "nwell-psub":
+        zero, built_in, _ = well_capacitance(made, need)
+        grading = 0.5
+    else:
+        keys = ("capacitance.area", "capacitance.built_in", "capacitance.grading")
+        zero, built_in, grading = made.require(need, *keys)
     biases = _bias_range(camera, made, need)
     return float(junction.mean_capacitance(zero, *biases, built_in, grading))
 
 
-def _follower_gate(made: Process, need: Need) -> float:
-    """Return the capacitance of the follower's gate [F]: W L C_ox, or the technology's."""
+def _gate_capacitance(camera: Camera, made: Process, need: Need) -> float:
+    """Return the capacitance of the follower's gate [F]: W L C_ox, or the technology's.
+
+    A passive pixel has none.
+    """
+    if camera.pixel.architecture == "pps":
+        return 0.0
     given = made.capacitance.follower_gate
     if isinstance(given, float):
         return given
