@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 SOURCES := vcam_cli tests scripts
 CAMERA ?= still-life
 
-.PHONY: run test test-all lint check bench interchange promise stability fuzz attacks schemas tables lock clean
+.PHONY: run test test-all lint check bench interchange promise stability docs fuzz attacks schemas tables lock clean
 
 run: $(VENV)/.runtime  ## simulate the shipped still life: out/still-life/
 	$(BIN)/vcam run $(CAMERA)
@@ -42,6 +42,9 @@ fuzz: $(VENV)/.dev  ## twenty thousand camera and study files with something bro
 
 attacks: $(VENV)/.dev  ## all attacks of tests/hostile, counted in docs/attacks.md
 	$(BIN)/python tests/hostile/attacks.py
+
+docs: $(VENV)/.dev  ## the documentation, with gallery and a reference of every key: build/site/index.html
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build -q
 
 schemas: $(VENV)/.dev  ## JSON Schemas of the files a user writes, from the models
 	rm -f schemas/*.schema.json

@@ -8,35 +8,27 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+from tests import documents
+from tests.documents import ROOT
 from vcam_cli.commands.list_ import KINDS
 from vcam_cli.commands.main import COMMANDS, app
 
-ROOT = Path(__file__).parent.parent
-README = (ROOT / "README.md").read_text(encoding="utf-8")
-BLOCKS = re.findall(r"```(\w+)\n(.*?)```", README, re.DOTALL)
+README = documents.read(ROOT / "README.md")
+BLOCKS = [(block.language, block.text) for block in documents.blocks(README)]
+PAGES = [documents.read(page) for page in documents.pages()]
 TARGETS = re.findall(r"^(\w+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE)
-
-
-def lines(language, start):
-    text = [line for kind, body in BLOCKS if kind == language for line in body.splitlines()]
-    return [line.removeprefix("$ ") for line in text if line.startswith(start)]
 
 
 @pytest.mark.long
 def test_vcam_commands_run_in_their_order(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    commands = lines("console", "$ vcam ")
-    assert len(commands) >= 3
-    for command in commands:
-        words = shlex.split(command.partition("  #")[0])[1:]
-        if words[0] == "accuracy" or words[:2] == ["sweep", "pixel-size"]:
-            continue  # takes minutes, and has tests of its own
-        done = CliRunner().invoke(app, words)
-        assert done.exit_code == 0, (command, done.output)
+    assert len(documents.commands(README)) >= 3
+    documents.run(README)
 
 
 def test_make_targets_exist():
-    named = {command.split()[1] for command in lines("console", "$ make ")}
+    shown = [command for page in PAGES for command in documents.commands(page, "make")]
+    named = {command.split()[1] for command in shown}
     assert named
     assert named <= set(TARGETS)
 
@@ -54,7 +46,8 @@ def test_the_camera_file_runs(tmp_path, monkeypatch):
 @pytest.mark.long
 def test_the_python_lines_work(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    code = next(body for kind, body in BLOCKS if kind == "python")
+    page = documents.read(ROOT / "docs" / "python.md")
+    code = next(block.text for block in documents.blocks(page) if block.language == "python")
     exec(code.replace('"still-life"', '"still-life", ["array.rows=48", "array.columns=64"]'), {})
 
 
@@ -76,7 +69,7 @@ def test_the_mistake_shown_is_what_vcam_says(tmp_path, monkeypatch):
 def told():
     """Texts in which a user reads commands: README, docs, help, what ships, messages in sources."""
     yield "README.md", README
-    for folder, kinds in (("docs", "*.md"), ("configs", "**/*.yaml"), ("vcam_cli", "**/*.py")):
+    for folder, kinds in (("docs", "**/*.md"), ("configs", "**/*.yaml"), ("vcam_cli", "**/*.py")):
         for path in sorted((ROOT / folder).glob(kinds)):
             yield str(path.relative_to(ROOT)), path.read_text(encoding="utf-8")
     for command in (None, *COMMANDS):
@@ -98,8 +91,8 @@ def test_every_command_that_is_told_exists():
 
 
 def test_every_option_that_is_told_exists():
-    """Options in the README's commands are in the help of those commands."""
-    for command in lines("console", "$ vcam "):
+    """Options in the commands of all pages are in the help of those commands."""
+    for command in (command for page in PAGES for command in documents.commands(page)):
         words = shlex.split(command.partition("  #")[0])
         help_text = CliRunner().invoke(app, [words[1], "--help"]).stdout
         for option in (word for word in words if word.startswith("-")):

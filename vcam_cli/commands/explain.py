@@ -98,14 +98,14 @@ def _of_key(where: str, key: Any) -> dict[str, Any]:
         "default": default,
         "example": f"{key.name}: {key.example}",
     }
-    effects = [effect for effect in _effects().values() if _concerns(effect, key)]
+    effects = [effect for effect in _effects().values() if concerns(effect, key)]
     if where == "camera file" and effects and key.path[0] != "effects":
         entry["effect"] = "; ".join(f"{effect.name} ({effect.reference})" for effect in effects)
         entry["see also"] = ", ".join(f"vcam explain {effect.name}" for effect in effects)
     return entry
 
 
-def _concerns(effect: Any, key: Any) -> bool:
+def concerns(effect: Any, key: Any) -> bool:
     """Return whether an effect is known by a key: it has its name, or says that it needs it."""
     named = any(str(part).startswith(effect.name) for part in key.path)
     return named or key.dotted in effect.absent
@@ -132,7 +132,7 @@ def _of_effect(word: str) -> Iterator[dict[str, Any]]:
         if where == "camera file"
         and key.path[0] != "effects"
         and len(key.path) > 1
-        and _concerns(effect, key)
+        and concerns(effect, key)
     ]
     yield {
         "title": f"{effect.name} (effect of the {effect.origin})",

@@ -1,0 +1,304 @@
+"""Pages of the documentation that are made from the program: MkDocs calls this while it builds.
+
+Keys come from the models and their JSON Schemas, effects from their docstrings, commands from their
+help, and the gallery from photographs that every shipped camera takes during the build.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import inspect
+import json
+import os
+import re
+import subprocess
+import sys
+from collections.abc import Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+from mkdocs.config.defaults import MkDocsConfig
+from mkdocs.structure.files import File, Files
+from mkdocs.structure.pages import Page
+
+ROOT = Path(__file__).parent.parent
+CACHE = ROOT / "build" / "gallery"
+"""Photographs of former builds, known by a hash of all that they depend on."""
+WIDEST = 480
+"""Columns of a photograph in the gallery, at most."""
+
+
+def on_files(files: Files, config: MkDocsConfig) -> Files:
+    """Add the pages that are made."""
+    made = {
+        "reference/camera.md": _keys_page(*_camera_keys()),
+        "reference/studies.md": _keys_page(*_study_keys()),
+        "reference/commands.md": "\n".join(_commands()),
+        "reference/effects.md": "\n".join(_effects()),
+        "cite.md": _cite(),
+    }
+    if "thesis.md" not in files.src_uris:
+        made["thesis.md"] = "# Thesis, line by line\n\nThis page is not written yet.\n"
+    gallery, photographs = _gallery()
+    made["gallery.md"] = gallery
+    for name, text in made.items():
+        files.append(File.generated(config, name, content=text))
+    for name, data in photographs.items():
+        files.append(File.generated(config, name, content=data))
+    return files
+
+
+def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Files) -> str:
+    """Turn links to files that are no part of the pages into their names."""
+    depth = page.file.src_uri.count("/")
+    outside = r"\[([^\]]+)\]\(" + r"\.\./" * (depth + 1) + r"[^)]+\)"
+    return re.sub(outside, lambda link: f"`{link[1].strip('`')}`", markdown)
+
+
+# Keys
+
+
+def _camera_keys() -> tuple[str, str, Iterable[Any], dict[str, Any]]:
+    from vcam_cli.camera.hints import index
+
+    about = "Every key of a camera file. `vcam explain KEY` says the same in a terminal."
+    return "Keys of a camera file", about, index(), _definitions("camera")
+
+
+def _study_keys() -> tuple[str, str, Iterable[Any], dict[str, Any]]:
+    from vcam_cli.capture_schedules.model import ScheduleStudy
+    from vcam_cli.config.key_index import keys
+    from vcam_cli.sweeps.model import Sweep
+
+    found = [
+        (kind, key)
+        for kind, model in (("sweep", Sweep), ("schedule", ScheduleStudy))
+        for key in {key.path: key for key in keys(model)}.values()
+    ]
+    about = "Every key of a sweep study (`kind: sweep`), then of a schedule (`kind: schedule`)."
+    return "Keys of studies", about, found, _definitions("study")
+
+
+def _definitions(name: str) -> dict[str, Any]:
+    schema = json.loads((ROOT / "schemas" / f"{name}.schema.json").read_text("utf-8"))
+    return dict(schema["$defs"])
+
+
+def _keys_page(title: str, about: str, keys: Iterable[Any], definitions: dict[str, Any]) -> str:
+    lines, section = [f"# {title}", "", about, ""], ""
+    for item in keys:
+        kind, key = item if isinstance(item, tuple) else ("", item)
+        first = kind or str(key.path[0])
+        if first != section:
+            lines += [f"## {first}", ""]
+            section = first
+        anchor = f"{kind}.{key.dotted}" if kind else key.dotted
+        lines += [f"### `{key.dotted}` {{ #{anchor} }}", "", *_key_lines(key, definitions), ""]
+    return "\n".join(lines)
+
+
+def _key_lines(key: Any, definitions: dict[str, Any]) -> Iterator[str]:
+    from vcam_cli.config.validation_messages import yaml_text
+
+    yield _sentence(_escaped(key.description)) + "\n"
+    if key.unit:
+        yield f"- unit: `{key.unit}`"
+    if key.required:
+        yield "- must be given"
+    elif key.default is not None:
+        yield f"- default: `{yaml_text(key.default)}`"
+    else:
+        yield "- default: not given"
+    field = definitions.get(key.model.__name__, {}).get("properties", {}).get(key.name)
+    allowed = _allowed(field, definitions) if field else ""
+    if allowed:
+        yield f"- allowed: {allowed}"
+    if key.example:
+        yield f"- example: `{key.name}: {key.example}`"
+    effects = _effects_of(key)
+    if effects:
+        yield "- effect: " + ", ".join(f"[{name}](effects.md#{name})" for name in effects)
+
+
+def _effects_of(key: Any) -> list[str]:
+    from vcam_cli.commands.explain import concerns
+    from vcam_cli.effects.order import ORDER
+
+    if key.path[0] in ("effects", "kind", "vary", "pdf", "sensor"):
+        return []
+    return [effect.name for effect in ORDER if concerns(effect, key)]
+
+
+def _allowed(field: dict[str, Any], definitions: dict[str, Any]) -> str:
+    """Return what a field's schema allows, in words."""
+    forms = [_form(form, definitions) for form in field.get("anyOf", [field])]
+    mappings = [form for form in forms if form.startswith("a mapping")]
+    if len(mappings) > 2:
+        forms = [form for form in forms if form not in mappings] + ["one of several mappings"]
+    return " or ".join(dict.fromkeys(form for form in forms if form))
+
+
+def _form(form: dict[str, Any], definitions: dict[str, Any]) -> str:
+    if "const" in form:
+        return f"`{form['const']}`"
+    if "enum" in form:
+        return ", ".join(f"`{json.dumps(word).strip(chr(34))}`" for word in form["enum"])
+    if "$ref" in form:
+        return _referred(form["$ref"].rpartition("/")[2], definitions)
+    kind = form.get("type")
+    if kind in ("number", "integer"):
+        return _range(form, kind)
+    words = {"boolean": "`true`, `false`", "array": "a list", "object": "a mapping"}
+    if kind == "array" and "items" in form:
+        inside = _allowed(form["items"], definitions)
+        return f"a list of {inside}" if inside else "a list"
+    if kind == "string" and "%" in form.get("pattern", ""):
+        return "a percentage"
+    return words.get(str(kind), "")
+
+
+def _referred(name: str, definitions: dict[str, Any]) -> str:
+    if definitions.get(name, {}).get("properties"):
+        return f"a mapping of {', '.join(f'`{k}`' for k in definitions[name]['properties'])}"
+    if name.startswith("spectrum"):
+        return "a [spectrum](../camera-file.md#spectra)" + " of at most 1" * name.endswith("_1")
+    return f"a {name.replace('_', ' ')} with its unit"
+
+
+def _range(form: dict[str, Any], kind: str) -> str:
+    low, high = form.get("minimum"), form.get("maximum")
+    above, below = form.get("exclusiveMinimum"), form.get("exclusiveMaximum")
+    name = "a whole number" if kind == "integer" else "a number"
+    limits = [
+        f"from {low:g}" if low is not None else f"above {above:g}" if above is not None else ""
+    ]
+    limits.append(f"to {high:g}" if high is not None else f"below {below:g}" if below else "")
+    return " ".join([name, *filter(None, limits)])
+
+
+def _sentence(text: str) -> str:
+    return f"{text[:1].upper()}{text[1:].rstrip('.')}."
+
+
+def _escaped(text: str) -> str:
+    """Return text that Markdown shows as it is."""
+    return re.sub(r"([*_<>\[\]{}|#])", r"\\\1", text)
+
+
+# Effects and commands
+
+
+def _effects() -> Iterator[str]:
+    from vcam_cli.effects.order import ORDER
+
+    yield "# Effects and their equations\n"
+    yield "In the order in which they act on the light. Numbers of equations without another source"
+    yield "are those of Chen's thesis. `vcam plan CAMERA` says which of them a scene calls for.\n"
+    for effect in ORDER:
+        yield f"## {effect.name.replace('_', ' ')} {{ #{effect.name} }}\n"
+        yield _prose(effect.__doc__) + "\n"
+        module = inspect.getdoc(inspect.getmodule(effect)) or ""
+        text = module.partition("\n\n")[2].split("\nReferences\n")[0]
+        if text.strip():
+            yield _blocks(text) + "\n"
+        yield f"- equation and source: {_escaped(effect.reference)}"
+        yield f"- not where {_escaped(effect.absent)}"
+        yield f"- switched off by `effects: {{{effect.name}: off}}`\n"
+
+
+def _prose(text: str | None) -> str:
+    return _escaped(" ".join(inspect.cleandoc(text or "").split()))
+
+
+def _blocks(text: str) -> str:
+    """Return paragraphs of a docstring; indented ones are equations and stay as they are."""
+    parts = []
+    for block in text.strip("\n").split("\n\n"):
+        is_code = all(line.startswith("    ") for line in block.splitlines() if line.strip())
+        parts.append(f"```text\n{inspect.cleandoc(block)}\n```" if is_code else _escaped(block))
+    return "\n\n".join(parts)
+
+
+def _commands() -> Iterator[str]:
+    from typer.testing import CliRunner
+
+    from vcam_cli.commands.main import COMMANDS, app
+
+    yield "# Commands\n"
+    yield "What `vcam COMMAND --help` prints.\n"
+    for command in COMMANDS:
+        shown = CliRunner().invoke(app, [command, "--help"], env={"COLUMNS": "96"}).stdout
+        yield f"## vcam {command} {{ #{command} }}\n\n```text\n{shown.strip()}\n```\n"
+
+
+def _cite() -> str:
+    text = (ROOT / "CITATION.cff").read_text("utf-8")
+    return (
+        "# How to cite\n\nPlease cite the software, and the thesis that its physics follows.\n\n"
+        f"```yaml\n{text}```\n"
+    )
+
+
+# Gallery
+
+
+def _gallery() -> tuple[str, dict[str, bytes]]:
+    """Return the page of all shipped cameras, and their photographs by name."""
+    from vcam_cli.config import shipped
+
+    lines = ["# Gallery", "", "Every shipped camera, as `vcam run NAME` takes its photograph.", ""]
+    names = shipped.names("cameras")
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        taken = list(pool.map(_photograph, names))
+    photographs = {f"gallery/{name}.png": data for name, data in zip(names, taken, strict=True)}
+    for name in names:
+        path = shipped.find("cameras", name)
+        about = " ".join(_comment(path.read_text("utf-8")))
+        lines += [f"## {name}", "", f"![Photograph taken by {name}](gallery/{name}.png)", ""]
+        lines += [_escaped(about), "", f"`vcam list cameras {name}` prints the file.", ""]
+    return "\n".join(lines), photographs
+
+
+def _comment(text: str) -> Iterator[str]:
+    """Yield the comment at the top of a file."""
+    for line in text.splitlines():
+        if not line.startswith("#"):
+            return
+        if "yaml-language-server" not in line:
+            yield line.lstrip("# ").strip()
+
+
+def _photograph(name: str) -> bytes:
+    """Return the photograph of a camera, from a former build where nothing has changed."""
+    from vcam_cli import load
+    from vcam_cli.files.report import hash_text, to_json
+    from vcam_cli.simulation.provenance import inputs, versions
+
+    camera = load(name)
+    digests = [hashlib.sha256(path.read_bytes()).hexdigest() for path in inputs(camera)]
+    known = hash_text(to_json([camera.model_dump(mode="json"), digests, versions()]))
+    file = CACHE / f"{name}-{known[:16]}.png"
+    if not file.exists():
+        CACHE.mkdir(parents=True, exist_ok=True)
+        code = f"from scripts.docs_pages import take; take({name!r}, {str(file)!r})"
+        env = os.environ | {"PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"}
+        subprocess.run([sys.executable, "-c", code], check=True, cwd=ROOT, env=env)
+    return file.read_bytes()
+
+
+def take(name: str, file: str) -> None:
+    """Take a shipped camera's photograph, shrunk to fit the page, and write it as a PNG."""
+    import numpy as np
+
+    from vcam_cli import load, simulate
+    from vcam_cli.files.png import write_png
+
+    image = simulate(load(name)).render
+    if image.dtype != np.uint8:
+        image = (image >> 8).astype(np.uint8)
+    step = -(-image.shape[1] // WIDEST)
+    rows, columns = image.shape[0] // step * step, image.shape[1] // step * step
+    blocks = image[:rows, :columns].reshape(rows // step, step, columns // step, step, -1)
+    small = np.round(blocks.mean(axis=(1, 3))).astype(np.uint8)
+    write_png(Path(file), small[:, :, 0] if small.shape[2] == 1 else small)

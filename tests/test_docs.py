@@ -1,0 +1,82 @@
+"""The documentation is kept true: commands run, files are valid, links lead somewhere."""
+
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from tests import documents
+from tests.documents import ROOT
+from vcam_cli.commands.main import app
+
+PAGES = [page for page in documents.pages() if page.name != "README.md"]
+NAMES = [str(page.relative_to(ROOT)) for page in PAGES]
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("page", PAGES, ids=NAMES)
+def test_the_commands_of_a_page_run_in_their_order(page, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    documents.run(documents.read(page))
+
+
+@pytest.mark.parametrize("page", PAGES, ids=NAMES)
+def test_the_camera_files_of_a_page_are_valid(page, tmp_path, monkeypatch):
+    """Files with a name of their own; a picture that an earlier command makes stands in."""
+    monkeypatch.chdir(tmp_path)
+    given = [block for block in documents.blocks(documents.read(page)) if block.title]
+    for block in given:
+        Path(block.title).write_text(block.text, encoding="utf-8")
+        for named in re.findall(r"file: (out/\S+?\.png)", block.text):
+            Path(named).parent.mkdir(parents=True, exist_ok=True)
+            shutil.copy(ROOT / "configs" / "scenes" / "hdr-scene.png", named)
+    cameras = [block.title for block in given if block.title.endswith(".yaml")]
+    if cameras:
+        done = CliRunner().invoke(app, ["validate", *cameras])
+        assert done.exit_code == 0, done.output
+
+
+@pytest.mark.parametrize("page", documents.pages(), ids=["README.md", *NAMES])
+def test_links_to_files_lead_somewhere(page):
+    """Pages that the build makes have no file; MkDocs checks those, and anchors."""
+    made = {"reference", "gallery", "gallery.md", "cite.md", "thesis.md"}
+    text = re.sub(r"^```.*?^```", "", documents.read(page), flags=re.DOTALL | re.MULTILINE)
+    for link in re.findall(r"\]\(([^)#]+)(?:#[^)]*)?\)", text):
+        if re.match(r"\w+:", link) or link.removeprefix("../").split("/")[0] in made:
+            continue
+        assert (page.parent / link).exists(), link
+
+
+def test_every_page_is_in_the_navigation():
+    written = documents.read(ROOT / "mkdocs.yml")
+    for name in NAMES:
+        assert name.removeprefix("docs/") in written
+
+
+def test_the_version_is_told_the_same_everywhere():
+    import vcam_cli
+
+    cited = re.search(r"^version: (\S+)$", documents.read(ROOT / "CITATION.cff"), re.MULTILINE)
+    assert cited is not None
+    assert cited[1] == vcam_cli.__version__
+
+
+@pytest.mark.long
+def test_the_documentation_builds_without_a_warning_and_loads_nothing(tmp_path):
+    """Strict: a link or an anchor that leads nowhere ends the build."""
+    pytest.importorskip("mkdocs")
+    build = [sys.executable, "-m", "mkdocs", "build", "-q", "-d", str(tmp_path / "site")]
+    done = subprocess.run(build, cwd=ROOT, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    pages = list((tmp_path / "site").rglob("*.html"))
+    assert len(pages) > 20
+    loads = r'<(?:script|img|link|iframe)[^>]+(?:src|href)="(https?:)?//'
+    for page in pages:
+        assert not re.search(loads, page.read_text("utf-8")), page
+    keys = (tmp_path / "site" / "reference" / "camera.html").read_text("utf-8")
+    for key in ("pixel.readout.read_noise", "optics.f_number", "output.report"):
+        assert f'id="{key}"' in keys
