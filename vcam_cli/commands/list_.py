@@ -35,6 +35,13 @@ def list_(
         str | None, typer.Argument(metavar="[NAME]", help="Print this file or description.")
     ] = None,
     as_json: options.Json = False,
+    wants_report: Annotated[
+        bool,
+        typer.Option(
+            "--report",
+            help="Of a technology: where its photodetectors' photocurrent and dark current arise.",
+        ),
+    ] = False,
 ) -> None:
     """List what ships; with a NAME print the file.
 
@@ -46,8 +53,13 @@ def list_(
       vcam list
       vcam list charts
       vcam list illuminants D65
+      vcam list technologies cmos-0.18um --report
     """
     from vcam_cli.errors import bad, nearest
+
+    if wants_report and (kind != "technologies" or name is None):
+        message = "--report is for a technology"
+        raise bad((), message, "write for example vcam list technologies cmos-0.18um --report")
 
     if kind is not None and kind not in KINDS:
         near = nearest(kind, KINDS)
@@ -55,7 +67,13 @@ def list_(
         raise bad((), f"{kind!r} is not a kind of thing that ships", remedy)
     found = {k: list(KINDS[k]()) for k in ([kind] if kind else KINDS)}
     if kind is not None and name is not None:
-        _show(kind, _choose(kind, name, found[kind]), as_json)
+        chosen = _choose(kind, name, found[kind])
+        if wants_report:
+            from vcam_cli.commands.process_table import process_table
+
+            print(process_table(chosen.name))
+        else:
+            _show(kind, chosen, as_json)
     elif as_json:
         options.write_json({k: [_plain(item) for item in items] for k, items in found.items()})
     elif kind is not None:

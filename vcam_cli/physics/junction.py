@@ -8,6 +8,9 @@ References
    sections 2.2 and 2.3, doi:10.1002/0470068329.
 .. [3] R. S. Muller, T. I. Kamins, M. Chan, "Device Electronics for Integrated Circuits",
    3rd edition, Wiley, 2003, section 4.3 (capacitance of a graded junction).
+.. [4] G. A. M. Hurkx, D. B. M. Klaassen, M. P. G. Knuvers, "A new recombination model for device
+   simulation including tunneling", IEEE Trans. Electron Devices 39(2), 331-338, 1992,
+   doi:10.1109/16.121690.
 """
 
 import numpy as np
@@ -15,8 +18,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from vcam_cli.physics.readout import ELEMENTARY_CHARGE
 from vcam_cli.physics.silicon import PERMITTIVITY
+from vcam_cli.spectra import BOLTZMANN, PLANCK
 
 Floats = NDArray[np.float64]
+
+ELECTRON_MASS = 9.1093837015e-31
+"""[kg], CODATA 2018."""
 
 
 def _float(value: ArrayLike) -> Floats:
@@ -68,6 +75,55 @@ def dark_current_density(
     ValueError
         A width, concentration or lifetime that is not positive.
     """
+    parts = dark_current_parts(
+        intrinsic,
+        hole_diffusivity,
+        electron_diffusivity,
+        donors,
+        acceptors,
+        surface_width,
+        neutral_width,
+        x_n,
+        x_p,
+        hole_lifetime,
+        electron_lifetime,
+    )
+    return (parts[0] + parts[1] + parts[2])[()]
+
+
+def dark_current_parts(
+    intrinsic: ArrayLike,
+    hole_diffusivity: ArrayLike,
+    electron_diffusivity: ArrayLike,
+    donors: ArrayLike,
+    acceptors: ArrayLike,
+    surface_width: ArrayLike,
+    neutral_width: ArrayLike,
+    x_n: ArrayLike,
+    x_p: ArrayLike,
+    hole_lifetime: ArrayLike,
+    electron_lifetime: ArrayLike,
+) -> tuple[Floats, Floats, Floats]:
+    """Return the three terms of eq 2.31 of [1], by the region where they come from.
+
+    Parameters
+    ----------
+    intrinsic, hole_diffusivity, electron_diffusivity, donors, acceptors : array_like
+        As of `dark_current_density`.
+    surface_width, neutral_width, x_n, x_p, hole_lifetime, electron_lifetime : array_like
+        Likewise.
+
+    Returns
+    -------
+    holes, generation, electrons : ndarray
+        Current densities [A/m2]: diffusion from the n region, generation in the depletion region,
+        diffusion from the p region.
+
+    Raises
+    ------
+    ValueError
+        A width, concentration or lifetime that is not positive.
+    """
     below = (donors, acceptors, surface_width, neutral_width, hole_lifetime, electron_lifetime)
     n_d, n_a, width_n, width_p, tau_p, tau_n = (_float(value) for value in below)
     if not all((value > 0).all() for value in (n_d, n_a, width_n, width_p, tau_p, tau_n)):
@@ -76,8 +132,9 @@ def dark_current_density(
     holes = _float(hole_diffusivity) / (n_d * width_n)
     electrons = _float(electron_diffusivity) / (n_a * width_p)
     generation = 0.5 * (_float(x_n) / tau_p + _float(x_p) / tau_n)
-    # n_i once outside: its square underflows in deep cold, where generation alone is left.
-    return (ELEMENTARY_CHARGE * n_i * (n_i * (holes + electrons) + generation))[()]
+    # n_i never squared by itself: that underflows in deep cold, where generation alone is left.
+    unit = ELEMENTARY_CHARGE * n_i
+    return unit * (n_i * holes), unit * generation, unit * (n_i * electrons)
 
 
 def depletion_width(capacitance_per_area: ArrayLike) -> Floats:
@@ -94,6 +151,32 @@ def depletion_width(capacitance_per_area: ArrayLike) -> Floats:
         Width [m].
     """
     return (PERMITTIVITY / _float(capacitance_per_area))[()]
+
+
+def field_enhancement(field: ArrayLike, temperature: ArrayLike) -> Floats:
+    """Return by how much tunneling by traps raises the generation in a field, 1 + Gamma of [4].
+
+    Gamma = 2 sqrt(3 pi) (F / F_G) exp((F / F_G)^2), F_G = sqrt(24 m (k T)^3) / (q hbar), with an
+    effective mass of 0.25 electron masses. It holds below some 9e7 V/m, where band-to-band
+    tunneling takes over.
+
+    Parameters
+    ----------
+    field : array_like
+        Electric field F [V/m].
+    temperature : array_like
+        Temperature T [K].
+
+    Returns
+    -------
+    ndarray
+        Factor on the generation current, at least 1.
+    """
+    thermal = BOLTZMANN * _float(temperature)
+    mass, hbar = 0.25 * ELECTRON_MASS, PLANCK / (2 * np.pi)
+    unit = np.sqrt(24 * mass * thermal) * thermal / (ELEMENTARY_CHARGE * hbar)
+    ratio = np.abs(_float(field)) / unit
+    return (1 + 2 * np.sqrt(3 * np.pi) * ratio * np.exp(ratio**2))[()]
 
 
 def depletion_split(

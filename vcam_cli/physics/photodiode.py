@@ -60,6 +60,34 @@ def quantum_efficiency(
     return (np.where(a * x1 < 1, shallow, deep) + _neutral_region_efficiency(a, x2, x3))[()]
 
 
+def collected_parts(
+    absorption: ArrayLike, x1: ArrayLike, x2: ArrayLike, x3: ArrayLike
+) -> tuple[Floats, Floats, Floats]:
+    """Return the three terms of eq 2.30 of [1], by the region where the charge is born.
+
+    Parameters
+    ----------
+    absorption : array_like
+        Absorption coefficient a [1/m], not negative.
+    x1, x2, x3 : array_like
+        Depths [m], 0 <= x1 <= x2 <= x3. All four broadcast.
+
+    Returns
+    -------
+    n_region, depletion_region, p_region : ndarray
+        Electrons per photon that enters the silicon; they add up to `quantum_efficiency`.
+
+    Raises
+    ------
+    ValueError
+        A negative absorption, or depths that do not rise.
+    """
+    a, x1, x2, x3 = _checked_depths(absorption, x1, x2, x3)
+    above = -np.expm1(-a * x1) - _psi(a * x1)
+    within = -np.exp(-a * x1) * np.expm1(-a * (x2 - x1))
+    return above[()], within[()], _neutral_region_efficiency(a, x2, x3)[()]
+
+
 def quantum_efficiency_pinned(
     absorption: ArrayLike, x1: ArrayLike, x2: ArrayLike, x3: ArrayLike
 ) -> Floats:

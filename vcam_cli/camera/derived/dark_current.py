@@ -60,6 +60,15 @@ def dark_rate(camera: Camera) -> float:
 
 def _junction_density(camera: Camera, made: Process) -> float:
     """Return the dark current density by eq 2.31 of [1] at the pixel's temperature [A/m2]."""
+    return sum(junction_parts(camera, made))
+
+
+def junction_parts(camera: Camera, made: Process) -> tuple[float, float, float]:
+    """Return the terms of eq 2.31 of [1] at the pixel's temperature [A/m2].
+
+    They are diffusion from the n region, generation in the depletion region, diffusion from the p
+    region. Raises BadInput where numbers are missing.
+    """
     need = Need(_PATH, "the dark current of the junction")
     names = "acceptors electron_diffusivity electron_lifetime substrate_depth depletion_width"
     gated = camera.pixel.photodetector.kind == "photogate"
@@ -74,11 +83,9 @@ def _junction_density(camera: Camera, made: Process) -> float:
         n_d, d_p, tau_p, surface = n_side
         x_n, x_p = (float(part) for part in physics.depletion_split(width, n_d, n_a))
     n_i = _intrinsic(camera.pixel.temperature)
-    return float(
-        physics.dark_current_density(
-            n_i, d_p, d_n, n_d, n_a, surface, neutral, x_n, x_p, tau_p, tau_n
-        )
-    )
+    numbers = (n_i, d_p, d_n, n_d, n_a, surface, neutral, x_n, x_p, tau_p, tau_n)
+    holes, generation, electrons = physics.dark_current_parts(*numbers)
+    return float(holes), float(generation), float(electrons)
 
 
 def _intrinsic(temperature: float) -> float:

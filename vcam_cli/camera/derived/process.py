@@ -95,7 +95,7 @@ class Process:
     reset_voltage: float | None
     thresholds: Thresholds
     junction: Junction
-    """Junction of this pixel's kind of photodetector: that of its n-well, or of its pinned layers."""
+    """Junction of this pixel's kind of photodetector: of its n-well, or of its pinned layers."""
     gate: Gate
     pinned: Pinned
     capacitance: JunctionCapacitance

@@ -1,0 +1,109 @@
+"""What the kinds of photodetector are like in a process: their depths, currents and capacities.
+
+References
+----------
+T. Chen, "Digital Camera System Simulator and Applications", PhD thesis, Stanford University, 2003:
+Fig 1.4 and eqs 2.30 and 2.31 (photocurrent and dark current of three regions).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from vcam_cli.camera import load as cameras
+from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.derived import charge_storage, dark_current, sense_node
+from vcam_cli.camera.derived.electrical import electrical
+from vcam_cli.camera.derived.junction import Depths, depths
+from vcam_cli.camera.derived.pixel_layout import detector
+from vcam_cli.camera.derived.process import Need, process
+from vcam_cli.errors import BadInput
+from vcam_cli.physics import junction, photodiode, silicon
+
+KINDS = ("ndiff-psub", "nwell-psub", "photogate", "pinned")
+WAVELENGTHS = (450e-9, 550e-9, 650e-9)
+"""Where the parts of the photocurrent are told [m]."""
+FEATURES = 19
+"""Width of the pixel that is taken, in feature sizes: 6.65 um at 0.35 um."""
+BASE = "csf-0.35um"
+"""The shipped camera whose pixel is put into the process."""
+NEED = Need("pixel.technology", "the report")
+
+
+@dataclass(frozen=True)
+class KindReport:
+    """A kind of photodetector in a pixel of a process, at 300 K."""
+
+    kind: str
+    depths: Depths
+    photo: tuple[tuple[float, float, float], ...]
+    """Electrons per photon in the silicon, of n, depletion and p region, at each wavelength."""
+    dark: tuple[float, float, float]
+    """Dark current density by eq 2.31, of the same regions [A/m2]."""
+    field: float | None
+    """Highest field of the junction after a reset [V/m]; None where no such junction collects."""
+    area: float
+    """Of the photodetector [m2]."""
+    capacitance: float
+    """Of the node that the voltage is read on [F]."""
+    full_well: float
+    """[e]"""
+
+    @property
+    def enhancement(self) -> float:
+        """Factor of that field on the generation in the depletion region, by traps."""
+        return 1.0 if self.field is None else float(junction.field_enhancement(self.field, 300.0))
+
+
+def process_report(technology: str) -> Iterator[tuple[str, KindReport | str]]:
+    """Yield each kind of photodetector with its report, or the reason why there is none.
+
+    Parameters
+    ----------
+    technology : str
+        Name of a shipped technology, or the path of a file.
+    """
+    base = cameras.load(BASE).with_({"pixel.technology": technology})
+    size = process(base).feature_size or 0.0
+    for kind in KINDS:
+        changes = {
+            "pixel.width": f"{FEATURES * size!r} m",
+            "pixel.photodetector": {"kind": kind},
+        }
+        try:
+            yield kind, _of_kind(base.with_(changes), kind)
+        except BadInput as error:
+            yield kind, error.problems[0].message
+
+
+def _of_kind(camera: Camera, kind: str) -> KindReport:
+    made, found, circuit = process(camera), depths(camera, NEED), electrical(camera)
+    assert circuit.capacitance is not None
+    return KindReport(
+        kind=kind,
+        depths=found,
+        photo=tuple(_collected(camera, found, w) for w in WAVELENGTHS),
+        dark=dark_current.junction_parts(camera, made),
+        field=_field(camera) if kind not in charge_storage.TRANSFERRED else None,
+        area=detector(camera).area,
+        capacitance=circuit.capacitance,
+        full_well=circuit.full_well,
+    )
+
+
+def _collected(camera: Camera, x: Depths, wavelength: float) -> tuple[float, float, float]:
+    absorption = float(silicon.absorption(wavelength))
+    parts = tuple(map(float, photodiode.collected_parts(absorption, x.x1, x.x2, x.x3)))
+    if camera.pixel.photodetector.kind == "pinned":  # its surface layer keeps what is born there
+        return 0.0, parts[1], parts[2]
+    return parts[0], parts[1], parts[2]
+
+
+def _field(camera: Camera) -> float:
+    """Return the highest field of an abrupt junction, 2 (V + phi) / W, after a reset [V/m]."""
+    made = process(camera)
+    (area, built_in, grading), _ = sense_node.junction_capacitances(camera, made, NEED)[0]
+    reset = sense_node.reset_voltage(camera, made, NEED)
+    per_area = float(junction.capacitance(area, reset, built_in, grading)) / detector(camera).area
+    return 2 * (reset + built_in) / float(junction.depletion_width(per_area))
