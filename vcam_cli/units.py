@@ -280,6 +280,8 @@ def _dimensions() -> dict[str, Dimension]:
         Dimension("length", "a length", "m", length, lengths, "6.5 um"),
         Dimension("distance", "a distance", "m", length, (*lengths, "km"), "1 m", words=far),
         Dimension("time", "a time", "s", time, ("ns", "us", "ms", "s"), "30 ms"),
+        Dimension("frequency", "a frequency", "Hz", _prefixed_units("Hz", "-kM"),
+                  ("Hz", "kHz", "MHz"), "100 Hz"),
         Dimension("voltage", "a voltage", "V", _prefixed_units("V", "-munk"), ("uV", "mV", "V"),
                   "1.38 V"),
         Dimension("capacitance", "a capacitance", "F", farad, ("aF", "fF", "pF", "nF"), "12 fF"),

@@ -25,6 +25,7 @@ from vcam_cli.effects.base import (
     RadialTransfer,
     SeparableTransfer,
     SignalLevels,
+    TemporalGain,
     Transport,
     VeilingGlare,
 )
@@ -83,6 +84,22 @@ CASES: dict[str, Case] = {
         {"pixel.stack": "none"},
     ),
     "microlens": Case({"pixel.microlens": {"gain": 1.5}}, {"pixel.microlens": "none"}),
+    "flicker": Case(
+        {
+            "scene.illuminant": {
+                "monochromatic": "550 nm",
+                "flicker": {"frequency": "100 Hz", "depth": "30 %"},
+            },
+            "exposure": {"time": "4 ms", "shutter": {"rolling": {"line_time": "100 us"}}},
+        },
+        {
+            "scene.illuminant": {
+                "monochromatic": "550 nm",
+                "flicker": {"frequency": "100 Hz", "depth": "0 %"},
+            },
+            "exposure": {"time": "4 ms", "shutter": {"rolling": {"line_time": "100 us"}}},
+        },
+    ),
     "dark_current": Case(
         {"pixel.photodetector.dark_current": "5 ke/s"},
         {"pixel.photodetector.dark_current": "0 e/s"},
@@ -450,6 +467,9 @@ def test_finite_on_hostile_input(kind, dtype, tmp_path):
         results = [effect.gain(places, places)]
     elif isinstance(effect, Charge):
         results = [np.array(effect.rate())]
+    elif isinstance(effect, TemporalGain):
+        places = np.array([-1.0, -1e-12, 0, 1e-6, 1e-3], dtype)
+        results = [effect.gain(places, places, 0, time) for time in (1e-9, 1e9)]
     elif isinstance(effect, VeilingGlare):
         results = [np.array(effect.fraction)]
         assert 0 < effect.fraction <= 1

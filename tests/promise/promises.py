@@ -164,7 +164,9 @@ array: {rows: 130, columns: 90, pattern: bayer-bggr}
 exposure: {auto: {max: 1 s}}
 """,
     "out of focus": """
-scene: {source: {kind: chart, chart: dead-leaves, seed: 5}}
+scene:
+  source: {kind: chart, chart: dead-leaves, seed: 5}
+  illuminant: {lamp: FL2, flicker: {frequency: 100 Hz, depth: 2 %}}
 optics: {f_number: 2, defocus: 15 um, stray_light: 0.04, off_axis: cos4}
 pixel: {architecture: aps-4t, readout: {column_noise: 3 e, row_noise: 2 e}}
 array: {rows: 60, columns: 80, pattern: bayer-rggb}

@@ -52,7 +52,9 @@ def tree(number: int) -> dict:
     source = dict(SCENES[number % len(SCENES)])
     scene: dict = {"source": source, "distance": "1 m", "luminance": spread(20, 5000, "cd/m2")}
     if source.get("model") != "laser":
-        scene["illuminant"] = LAMPS[int(rng.integers(len(LAMPS)))]
+        lamp = LAMPS[int(rng.integers(len(LAMPS)))]
+        flicker = {"frequency": "100 Hz", "depth": f"{0.2 * 2 ** (number % 8):g} %"}
+        scene["illuminant"] = {"lamp": lamp, "flicker": flicker}
     blur: dict = {"defocus": spread(1, 15, "um")}
     if number % 3 == 0:
         blur = {"zernike": {k: spread(5, 60, "nm") for k in (4, 7, 8, 11)}}
@@ -112,7 +114,10 @@ def tree(number: int) -> dict:
             "columns": 32,
             "pattern": ("monochrome", "bayer-rggb")[int(rng.integers(2))],
         },
-        "exposure": {"auto": {"max": "100 ms"}},
+        "exposure": {
+            "auto": {"max": "100 ms"},
+            "shutter": {"rolling": {"line_time": "370 us"}},
+        },
         "adc": {"bits": int(rng.integers(8, 15))},
     }
 

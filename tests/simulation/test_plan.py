@@ -94,6 +94,11 @@ CAMERAS = {
         "accuracy": "draft",
         "optics.diffraction": False,
         "optics.stray_light": 0.009,
+        "scene.illuminant": {
+            "monochromatic": "550 nm",
+            "flicker": {"frequency": "100 Hz", "depth": "5 %"},
+        },
+        "exposure": {"time": "4 ms", "shutter": {"rolling": {"line_time": "100 us"}}},
     },
     "highlights far beyond the well, in a ccd": {
         "scene.radiance": radiance_for(2e7),

@@ -10,7 +10,16 @@ from vcam_cli.config.lists import read_items
 from vcam_cli.config.model import Model, at_most_one, exactly_one, key
 from vcam_cli.config.quantities import Number, Quantity, Whole
 from vcam_cli.config.validation_messages import describe, refusal
-from vcam_cli.config.values import TIME, Either, MaybePositive, MaybeTime, Positive, Time, mapping
+from vcam_cli.config.values import (
+    TIME,
+    Either,
+    MaybePositive,
+    MaybeTime,
+    Positive,
+    Time,
+    mapping,
+    word_or,
+)
 from vcam_cli.config.yaml_type import to_yaml
 
 
@@ -40,6 +49,25 @@ class AutoExposure(Model):
         if self.min > self.max:
             raise refusal(("min",), "is longer than max", "exchange the two")
         return self
+
+
+class RollingShutter(Model):
+    """Lines that are exposed one after the other, each as long as all others."""
+
+    line_time: Annotated[float, Quantity("time", least=0, most=1e3)] = key(
+        "from the start of one line to that of the next", unit="us", example="15 us"
+    )
+    direction: Literal["down", "up", "right", "left"] = key(
+        "where the lines go in the picture as it is seen: down begins with the top row, right with"
+        " the leftmost column",
+        default="down",
+    )
+
+
+class Rolling(Model):
+    """A shutter that rolls."""
+
+    rolling: RollingShutter = key("lines one after the other", example={"line_time": "15 us"})
 
 
 class CaptureSchedule(Model):
@@ -102,6 +130,11 @@ class Exposure(Model):
     compensation: Annotated[float, Quantity("exposure_value", least=-20, most=20)] = key(
         "of auto: the level is brought to target x 2^compensation", example="0 EV", default=0.0
     )
+    shutter: Annotated[Literal["global"] | Rolling, word_or(Rolling, {"global": "global"})] = key(
+        "global: all pixels are exposed together; or {rolling: {line_time: 15 us, direction:"
+        " down}}: line after line",
+        default="global",
+    )
     captures: Annotated[
         tuple[float, ...] | CaptureSchedule | None,
         Either(
@@ -150,6 +183,11 @@ class Exposure(Model):
     def schedule(self) -> CaptureSchedule | None:
         """How the camera is to choose the times of its samples; None where it does not."""
         return self.captures if isinstance(self.captures, CaptureSchedule) else None
+
+    @property
+    def rolling(self) -> RollingShutter | None:
+        """The rolling shutter; None where all pixels are exposed together."""
+        return self.shutter.rolling if isinstance(self.shutter, Rolling) else None
 
     @property
     def count(self) -> int:

@@ -1,40 +1,94 @@
 """Lamps as a camera file writes them."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import Annotated, Any
 
 from vcam_cli import spectra
 from vcam_cli.camera.spectrum import Spectral, SpectrumFile, SpectrumSpec
 from vcam_cli.config.model import Model, key
+from vcam_cli.config.quantities import Percentage, Quantity
 from vcam_cli.config.validation_messages import describe
-from vcam_cli.config.values import Temperature, Wavelength
+from vcam_cli.config.values import Angle, Percent, Temperature, Wavelength, mapping
 from vcam_cli.config.yaml_type import DEFINED, YamlType, to_yaml
 from vcam_cli.errors import Path, bad
 
 _FORMS = (
     "a CIE name such as D65, equal-energy, {blackbody: 5500 K}, {monochromatic: 550 nm}, "
-    "{file: lamp.csv}, or a list of one and the filters before it"
+    "{file: lamp.csv}, or a list of one and the filters before it; with flicker: "
+    "{frequency: 100 Hz, depth: 30 %} where it flickers"
 )
 
 
-class Blackbody(Model):
+class FlickerSpec(Model):
+    """How the brightness of a lamp goes up and down, about a mean that is the scene's level."""
+
+    frequency: Annotated[float, Quantity("frequency", above=0, most=1e9)] = key(
+        "of the light: twice the mains frequency for lamps of alternating current",
+        example="100 Hz",
+    )
+    depth: Percent = key("(brightest - darkest) / (brightest + darkest)", example="30 %")
+    phase: Angle = key(
+        "of the light when the exposure begins: 0 deg = brightest, or a pulse's start",
+        example="0 deg",
+        default=0.0,
+    )
+    duty: Annotated[float | None, Percentage(above=0, most=1)] = key(
+        "of lamps that are switched: bright part of a period; by default the light is a sinusoid",
+        example="50 %",
+        default=None,
+    )
+
+
+class Lamp(Model):
+    """A lamp that may flicker."""
+
+    flicker: Annotated[FlickerSpec | None, mapping(FlickerSpec)] = key(
+        "how the light goes up and down; the same at all wavelengths",
+        example={"frequency": "100 Hz", "depth": "30 %"},
+        default=None,
+    )
+
+
+class LampName(YamlType):
+    """The type of a key that holds the name of a lamp."""
+
+    forms = str
+
+    def read(self, given: Any) -> str:
+        """Return the name of a lamp that is known; raise ValueError for others."""
+        if not isinstance(given, str):
+            raise ValueError(f"{describe(given)} is not the name of a lamp; write for example FL2")
+        spectra.illuminant(given)
+        return given
+
+
+class Named(Lamp):
+    """A lamp by its name, where more is said of it."""
+
+    lamp: Annotated[str, LampName()] = key(
+        "its CIE name, or equal-energy", example="FL2", default="D65"
+    )
+
+
+class Blackbody(Lamp):
     """A black body."""
 
     blackbody: Temperature = key("its temperature", example="5500 K")
 
 
-class Monochromatic(Model):
+class Monochromatic(Lamp):
     """A single line."""
 
     monochromatic: Wavelength = key("its wavelength", example="550 nm")
 
 
-class LampFile(SpectrumFile):
+class LampFile(SpectrumFile, Lamp):
     """The relative spectral power of a lamp, from a CSV file."""
 
 
-_FORM_MODELS: dict[str, type[Blackbody | Monochromatic | LampFile]] = {
+_FORM_MODELS: dict[str, type[Named | Blackbody | Monochromatic | LampFile]] = {
+    "lamp": Named,
     "blackbody": Blackbody,
     "monochromatic": Monochromatic,
     "file": LampFile,
@@ -48,7 +102,7 @@ _GLASS = Spectral(most=1.0)
 class IlluminantSpec:
     """A lamp: a name, or one of the forms above."""
 
-    lamp: str | Blackbody | Monochromatic | LampFile
+    lamp: str | Named | Blackbody | Monochromatic | LampFile
     filters: tuple[SpectrumSpec, ...] = ()
     """What its light goes through; a stated level is that behind them."""
 
@@ -57,17 +111,33 @@ class IlluminantSpec:
         return self._resolve_lamp(path).multiply(*(glass.resolve(path) for glass in self.filters))
 
     def _resolve_lamp(self, path: Path) -> spectra.Spectrum:
+        lamp = self.steady.lamp
         try:
-            if isinstance(self.lamp, str):
-                return spectra.illuminant(self.lamp)
-            if isinstance(self.lamp, Blackbody):
-                return spectra.Spectrum.blackbody(self.lamp.blackbody)
+            if isinstance(lamp, str):
+                return spectra.illuminant(lamp)
+            if isinstance(lamp, Blackbody):
+                return spectra.Spectrum.blackbody(lamp.blackbody)
         except ValueError as error:
             message, _, remedy = str(error).partition("; ")
             raise bad(path, message, remedy or f"write {_FORMS}") from None
-        if isinstance(self.lamp, Monochromatic):
-            return spectra.Spectrum.line(self.lamp.monochromatic)
-        return self.lamp.resolve(path)
+        if isinstance(lamp, Monochromatic):
+            return spectra.Spectrum.line(lamp.monochromatic)
+        assert isinstance(lamp, LampFile)
+        return lamp.resolve(path)
+
+    @property
+    def flicker(self) -> FlickerSpec | None:
+        """How the lamp flickers; None for steady light."""
+        return None if isinstance(self.lamp, str) else self.lamp.flicker
+
+    @property
+    def steady(self) -> "IlluminantSpec":
+        """The same lamp without its flicker."""
+        if isinstance(self.lamp, str):
+            return self
+        if isinstance(self.lamp, Named):
+            return replace(self, lamp=self.lamp.lamp)
+        return replace(self, lamp=self.lamp.model_copy(update={"flicker": None}))
 
     @property
     def line(self) -> float | None:
@@ -88,7 +158,7 @@ class IlluminantSpec:
 class Illuminant(YamlType):
     """The type of a key that holds a lamp."""
 
-    forms = Blackbody | Monochromatic | LampFile
+    forms = Named | Blackbody | Monochromatic | LampFile
 
     def read(self, given: Any) -> IlluminantSpec:
         """Return the lamp of what is written in YAML; raise ValueError with a sentence."""
@@ -102,6 +172,8 @@ class Illuminant(YamlType):
             return IlluminantSpec(alone.lamp, tuple(_GLASS.read(glass) for glass in given[1:]))
         if isinstance(given, Mapping):
             models = [model for name, model in _FORM_MODELS.items() if name in given]
+            if not models and "flicker" in given:
+                models = [Named]
             if len(models) == 1:
                 return IlluminantSpec(models[0].model_validate(given))
         raise ValueError(f"{describe(given)} is not a lamp; write {_FORMS}")

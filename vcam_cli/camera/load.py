@@ -47,7 +47,7 @@ _EXCLUSIVE = (
     "gain | efficiency",
     "gain | iso",
     "voltage_swing | thresholds",
-    "blackbody | monochromatic | file | table | pixel",
+    "lamp | blackbody | monochromatic | file | table | pixel",
     "block | positions",
 )
 MERGE_RULES = MergeRules(

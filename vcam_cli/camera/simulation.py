@@ -20,6 +20,7 @@ EFFECTS = {
     "charge_diffusion": "blur by charge that diffuses in the silicon",
     "pixel_vignetting": "shading by the layers above the photodetector",
     "microlens": "a lens on every pixel",
+    "flicker": "a lamp that is not equally bright at all times",
     "dark_current": "electrons that heat makes",
     "shot_noise": "light and dark current arrive one by one",
     "reset_noise": "charge that the reset leaves uncertain",

@@ -155,6 +155,9 @@ def take_frames(
     ready, _ = prepare(camera, workers, watch)
     if ready.rate.ndim != 2 or ready.layout.is_scattered or len(ready.mosaic.colors) > 1:
         raise bad("frames.camera", "has no monochrome array", "write pattern: monochrome there")
+    if ready.step_rates:
+        message = "has a lamp that flickers, and schedules are for steady photocurrents"
+        raise bad("frames.camera", message, "remove scene.illuminant.flicker there")
     code = quantizer(ready.camera, ready.geometry)
     effects = plan.enabled_effects(camera, ready.geometry)
     longest = asked.max or camera.exposure.longest

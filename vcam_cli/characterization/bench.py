@@ -302,8 +302,8 @@ def _before_chart(camera: Camera, chart: Uniform | SlantedEdge, *left_out: str) 
     )
     if in_file or 0 in levels.values():
         changes |= dict.fromkeys(LEVELS, None) | {"luminance": BENCH_LUMINANCE}
-    if scene.illuminant is None:
-        changes["illuminant"] = IlluminantSpec("D65")
+    lamp = scene.illuminant or IlluminantSpec("D65")
+    changes["illuminant"] = lamp.steady  # as EMVA 1288 asks
     lens: dict[str, Any] = dict.fromkeys(
         ("aperture_diameter", "numerical_aperture", "field_of_view")
     )

@@ -8,6 +8,7 @@ kind says in mathematics what it does, and so where in the order it acts (`order
     SeparableTransfer  does so by a product, H_x(fx) H_y(fy)                    no unit
     Gain               multiplies the signal, pixel by pixel                    no unit
     VeilingGlare       spreads part of the light over the whole sensor          no unit
+    TemporalGain       multiplies the signal by the light of each line's time   no unit
     Charge             adds electrons                                           electrons
     Transport          moves charge to later pixels on its way out              no unit
     NoiseSource        adds randomness, of known variance                       electrons
@@ -322,6 +323,18 @@ class VeilingGlare(Effect):
 
     fraction: float
     """Of the light of each color, averaged over the array."""
+
+
+class TemporalGain(Effect):
+    """A factor on the photo signal that depends on when a line is exposed."""
+
+    @abstractmethod
+    def gain(self, x: NDArray, y: NDArray, start: float, stop: float) -> NDArray:
+        """Return the mean factor from `start` to `stop` after a line's exposure begins [s].
+
+        Its shape at the positions x (columns,), y (rows,) [m] is (rows or 1, columns or 1): 1
+        where it is the same along that axis. Its mean over all times is 1.
+        """
 
 
 class Charge(Effect):

@@ -9,6 +9,7 @@
     electrons / s          Gain               off_axis                       electrons / s
     electrons / s          VeilingGlare       stray_light                    electrons / s
     electrons / s          Gain               pixel_vignetting, microlens    electrons / s
+    electrons / s          TemporalGain       flicker                        electrons / s
     electrons / s          Charge             dark_current                   electrons (mean signal)
     electrons              Transport          charge_transfer                electrons (mean signal)
     electrons              NoiseSource        shot_noise, fpn, reset_noise,  electrons
@@ -33,6 +34,7 @@ from vcam_cli.effects.charge_diffusion import ChargeDiffusion
 from vcam_cli.effects.charge_transfer import ChargeTransfer
 from vcam_cli.effects.dark_current import DarkCurrent
 from vcam_cli.effects.diffraction import Diffraction
+from vcam_cli.effects.flicker import Flicker
 from vcam_cli.effects.fpn import FixedPattern
 from vcam_cli.effects.microlens import Microlens
 from vcam_cli.effects.off_axis import OffAxis
@@ -55,6 +57,7 @@ ORDER: tuple[type[Effect], ...] = (
     StrayLight,
     PixelVignetting,
     Microlens,
+    Flicker,
     DarkCurrent,
     ChargeTransfer,
     ShotNoise,

@@ -49,6 +49,7 @@ def samples(
     seeds: dict[str, int],
     workers: int,
     layer: int = 0,
+    step_rates: Sequence[NDArray] = (),
 ) -> tuple[NDArray, NDArray]:
     """Return all samples of one integration.
 
@@ -68,6 +69,9 @@ def samples(
         Number of threads; results do not depend on it.
     layer : int, optional
         Index of the layer of stacked pixels.
+    step_rates : sequence of NDArray, optional
+        Mean rate between each sample and the one before, where it is not the same all the time:
+        N times the shape of `rate` [e/s].
 
     Returns
     -------
@@ -82,7 +86,10 @@ def samples(
     """
     if rate.ndim == 3:
         layers = [
-            samples(plane, times, effects, code, seeds, workers, number)
+            samples(
+                *(plane, times, effects, code, seeds, workers, number),
+                [of_step[number] for of_step in step_rates],
+            )
             for number, plane in enumerate(rate)
         ]
         return np.stack([e for e, _ in layers], 1), np.stack([dn for _, dn in layers], 1)
@@ -99,8 +106,9 @@ def samples(
             dark = mean_dark(step, effects)
             sample_sites = sites(charge, dark, seeds, layer, block, number)
             common_sites = sites(charge, dark, seeds, layer, block)
+            lit = step_rates[number] if step_rates else rate
             charge += _collect_charge(
-                mean_electrons(rate[block], step, effects), effects, sample_sites, common_sites
+                mean_electrons(lit[block], step, effects), effects, sample_sites, common_sites
             )
             read = _read_charge(charge.copy(), effects, sample_sites, common_sites)
             read[full] = well

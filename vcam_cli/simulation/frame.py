@@ -229,7 +229,7 @@ def take_frame(ready: Prepared, workers: int, stages: Stages | None = None) -> F
             electrons, dn = binned_readout.read(joins, ready.rate, time, active, take, code.bits)
             return Frame(**known, electrons=electrons, dn=dn)
         electrons, dn = nondestructive_samples.samples(
-            ready.rate, times, active, code, seeds, workers
+            ready.rate, times, active, code, seeds, workers, step_rates=ready.step_rates
         )
     last = Frame(**known, electrons=electrons[-1], dn=dn[-1])
     with stages("reconstruction"):

@@ -82,6 +82,11 @@ def _needs_no_viewer(camera: Camera) -> bool:
     return "s-cielab" not in camera.quality
 
 
+def _is_lit_by_flicker(camera: Camera) -> bool:
+    lamp = camera.scene.illuminant
+    return lamp is not None and lamp.flicker is not None and lamp.flicker.depth > 0
+
+
 _DETECTOR = "pixel.photodetector"
 _CURVE = "pixel.readout.transfer_curve"
 RULES = (
@@ -105,6 +110,11 @@ RULES = (
         ("scene.distance",),
         lambda camera: not camera.optics.is_lens,
         "the light falls on the bare sensor",
+    ),
+    Rule(
+        ("exposure.shutter",),
+        lambda camera: not _is_lit_by_flicker(camera),
+        "nothing in this scene changes while the lines are exposed; give scene.illuminant.flicker",
     ),
     Rule(
         ("exposure.estimator",),

@@ -5,12 +5,9 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
-import numpy as np
 from numpy.typing import NDArray
 
 from vcam_cli import memory
@@ -18,12 +15,9 @@ from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.electrical import Electrical, electrical
 from vcam_cli.camera.derived.geometry import Geometry, geometry
 from vcam_cli.camera.derived.mosaic import Mosaic
-from vcam_cli.effects.base import Effect, SignalLevels, Transport, of_kind
-from vcam_cli.effects.order import quantizer
-from vcam_cli.effects.signal_chain import Limit, NoiseSource, extreme_signal
+from vcam_cli.effects.base import Effect
 from vcam_cli.errors import bad
-from vcam_cli.image_formation import bandwidth, memory_model, photon_rate, pixelwise
-from vcam_cli.image_formation.light_plan import PERCENTILES
+from vcam_cli.image_formation import bandwidth, memory_model, photon_rate
 from vcam_cli.image_formation.optical_path import OpticalPath, SpectrumReport
 from vcam_cli.image_formation.rate_cache import RateCache
 from vcam_cli.image_formation.settings import Settings, settings
@@ -31,14 +25,11 @@ from vcam_cli.image_formation.transfer_functions import Transfer
 from vcam_cli.progress import Stages
 from vcam_cli.quality import scielab
 from vcam_cli.quality.display import display_screen
-from vcam_cli.readout import auto_exposure, exposure, iso_speed, sample_times
+from vcam_cli.readout import auto_exposure, exposure, iso_speed
 from vcam_cli.readout.layout import Layout, layout
 from vcam_cli.scenes.base import ChartScene, Scene
 from vcam_cli.scenes.build import build
-from vcam_cli.simulation import cost_model, plan
-
-MOST_ELECTRONS = 1e25
-"""More than any pixel ever meets, and far from where 32-bit numbers end."""
+from vcam_cli.simulation import cost_model, exposed_light, plan
 
 
 @dataclass(frozen=True)
@@ -74,6 +65,9 @@ class Prepared:
     times: tuple[float, ...]
     """Times (N,) of the samples of one integration, rising [s]; () of a single exposure."""
     plan: plan.Plan
+    step_rates: tuple[NDArray, ...]
+    """Rates (N, ...) as `rate` between each sample and the one before, where light changes with
+    time [e/s]; () elsewhere."""
 
     @property
     def dark_rate(self) -> float:
@@ -152,11 +146,15 @@ def prepare(
         effects = tuple(effect for effect in effects if effect not in light.plan.omitted)
         white_rate = white_rate * summed / (light.plan.on_axis or 1.0)
     with stages("exposure"):
-        exposed = _expose(camera, solved, circuit, place, light, white_rate, effects)
+        exposed = exposed_light.expose(
+            *(camera, solved, circuit, place, light, white_rate, effects, optional, knobs)
+        )
         camera = camera.with_exposure_gain(exposed.settings.gain)
         needed = max(frame_bytes, light.spectrum.memory) + getattr(picture, "nbytes", 0)
         changes = light.spectrum.changes | exposed.changes
-        decided = plan.make(camera, solved, knobs, light.plan, exposed.signal, needed, changes)
+        decided = plan.make(
+            camera, solved, knobs, exposed.light_plan, exposed.signal, needed, changes
+        )
         decided = _with_seconds(camera, solved, place, knobs, light, decided, workers)
         stages.watch.expect(decided.seconds)
     return Prepared(
@@ -176,6 +174,7 @@ def prepare(
         base_iso=base_iso,
         times=exposed.times,
         plan=decided,
+        step_rates=exposed.step_rates,
     )
 
 
@@ -210,6 +209,9 @@ def _require_memory(camera: Camera, place: Layout, knobs: Settings, solved: Geom
     """
     colors = len(place.mosaic.colors)
     samples = camera.exposure.count * (colors if place.full_color else 1)
+    lamp = camera.scene.illuminant
+    if lamp is not None and lamp.flicker is not None:
+        samples *= 2  # each has a rate of its own
     scattered = solved.rows * solved.columns if place.is_scattered else 0
     judged = bool(camera.quality)
     needed = memory_model.frame_bytes(place.lattice, knobs, colors, judged, samples, scattered)
@@ -251,129 +253,6 @@ def _transfer(
             "scene.wavelengths", str(error), "narrow the wavelengths, or extend the spectrum"
         ) from None
     white_rate = whole.level[-1]
-    _refuse_too_much(float(white_rate.max()))
+    exposed_light.refuse_too_much(float(white_rate.max()))
     # A cached transfer has another camera's effects, which are equal but not the same.
     return replace(whole.with_effects(effects), weights=whole.weights[:-1]), white_rate
-
-
-@dataclass(frozen=True)
-class _Exposed:
-    """The light of a timed exposure, as it is read out."""
-
-    rate: NDArray
-    """Photo-electrons per second of every node (..., rows, columns) [e/s]."""
-    times: tuple[float, ...]
-    """Times of the samples of one integration, rising [s]; () of a single exposure."""
-    signal: SignalLevels
-    settings: auto_exposure.ExposureSettings
-    changes: dict[str, float]
-    """Effect on pixels or charge -> rms change of the mean signal by leaving it out [e/s]."""
-
-
-def _expose(
-    camera: Camera,
-    solved: Geometry,
-    circuit: Electrical,
-    place: Layout,
-    light: photon_rate.Rate,
-    white_rate: NDArray,
-    effects: Sequence[Effect],
-) -> _Exposed:
-    """Return the light of an exposure whose time is given or chosen for the scene."""
-    groups, white = place.binning_groups, float(white_rate.max())
-    enabled = plan.enabled_effects(camera, solved)
-    dark = exposure.mean_dark(1.0, enabled)
-    collected = place.select_pixels(light.values)
-    rate = groups.collect(_transport(collected, dark / groups.summed_charges, effects))
-    adc = quantizer(camera, solved)
-    times = sample_times.choose_sample_times(camera, rate, circuit, enabled, adc)
-    chosen = auto_exposure.expose(camera, rate, white, dark, circuit)
-    if times:
-        chosen = replace(chosen, time=times[-1])
-    time = chosen.time
-    if of_kind(enabled, Limit):  # a full well holds no more, whatever falls on it
-        held = circuit.full_well / time
-        rate = groups.collect(_transport(collected, dark / groups.summed_charges, effects, held))
-    peak = (float(rate.max()) + dark) * time
-    _refuse_too_much(max(peak, white * time, dark))
-    changes = _pixel_changes(place, groups.collect(light.values), enabled, effects, time)
-    if transports := [transport.name for transport in of_kind(enabled, Transport)]:
-        well = min(circuit.full_well / time - dark, MOST_ELECTRONS)
-        deferred = np.minimum(rate, well) - np.minimum(groups.collect(collected), well)
-        changes |= dict.fromkeys(transports, _rms(deferred))
-    full = max(1.0, min(circuit.full_well, peak))
-    alone = not times and camera.array.binning is None
-    signal = SignalLevels(
-        full,
-        time,
-        dark * time,
-        camera.array.binning,
-        _levels(place, rate, dark, time, circuit.full_well),
-        extreme_signal(of_kind(enabled, NoiseSource), peak, dark * time) if alone else math.inf,
-    )
-    return _Exposed(rate, times, signal, chosen, changes)
-
-
-def _refuse_too_much(electrons: float) -> None:
-    if not electrons < MOST_ELECTRONS:
-        raise bad(
-            "scene",
-            f"light and dark current would make {electrons:.3g} electrons in a pixel or a second",
-            "look for a wrong unit in the light level, the dark current or the exposure",
-        )
-
-
-def _levels(
-    place: Layout, rate: NDArray, dark: float, time: float, well: float
-) -> tuple[float, ...]:
-    """Return the signals of the scene at which noise is promised, with the dark [electrons]."""
-    mosaic, planes = place.charge_pixels[1], rate.ndim == 3
-    mosaics = [Mosaic(((color,),)) for color in mosaic.colors] if planes else [mosaic]
-    levels = [
-        pixelwise.percentiles(plane, colors, PERCENTILES)
-        for plane, colors in zip(rate if planes else [rate], mosaics, strict=True)
-    ]
-    signal = (np.concatenate(levels).astype(float) + dark) * time
-    return tuple(np.minimum(signal, well).ravel().tolist())
-
-
-def _pixel_changes(
-    place: Layout, light: NDArray, present: Sequence[Effect], running: Sequence[Effect], time: float
-) -> dict[str, float]:
-    """Return the rms change of the mean raw by leaving out each effect on pixels [e/s].
-
-    It is that of the color where it is most.
-    """
-    geometry, mosaic = place.charge_pixels
-    mosaics = [Mosaic(((color,),)) for color in mosaic.colors]
-    parts = zip(light, mosaics, strict=True) if place.planes else [(light, mosaic)]
-    largest: dict[str, float] = {}
-    for plane, colors in parts:
-        changes = pixelwise.changes_by_omission(plane, geometry, colors, present, running, time)
-        largest = {name: max(change, largest.get(name, 0.0)) for name, change in changes.items()}
-    return largest
-
-
-def _rms(values: NDArray) -> float:
-    return float(np.sqrt(np.square(values, dtype=np.float64).mean()))
-
-
-def _transport(
-    rate: NDArray, dark: float, effects: Sequence[Effect], held: float = math.inf
-) -> NDArray:
-    """Return the photo-electrons per second that arrive where charge is transported [e/s].
-
-    With the dark rate [e/s] they are what arrives of both. What a packet does not hold, beyond
-    `held` [e/s] for the time of the exposure, stays where it is and is clipped there. Below that
-    transport is linear, so that an exposure can be timed by the picture as it is read.
-    """
-    for transport in of_kind(effects, Transport):
-        signal = rate + rate.dtype.type(dark)
-        beyond = signal - np.minimum(signal, signal.dtype.type(min(held, MOST_ELECTRONS)))
-        signal -= beyond
-        planes = signal.reshape(-1, *signal.shape[-2:])
-        signal = np.array([transport.transport(plane) for plane in planes]).reshape(rate.shape)
-        signal += beyond
-        signal -= rate.dtype.type(dark)
-        rate = signal
-    return rate

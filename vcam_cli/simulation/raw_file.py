@@ -192,7 +192,7 @@ def _lens(geometry: Geometry) -> dict[str, Attribute]:
 
 def _light_name(light: IlluminantSpec) -> str:
     """Return a lamp as the camera file has it; of its file the name alone, wherever it lies."""
-    form = light.to_yaml()
+    form = light.steady.to_yaml()
     if light.filters:
         return f"{_light_name(IlluminantSpec(light.lamp))} behind {len(light.filters)} filters"
     if isinstance(form, str):

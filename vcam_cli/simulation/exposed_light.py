@@ -1,0 +1,176 @@
+"""The light of a timed exposure: its time and gain, and what arrives of it where charge is read."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.derived.electrical import Electrical
+from vcam_cli.camera.derived.geometry import Geometry
+from vcam_cli.camera.derived.mosaic import Mosaic
+from vcam_cli.effects.base import Effect, SignalLevels, TemporalGain, Transport, of_kind
+from vcam_cli.effects.order import quantizer
+from vcam_cli.effects.signal_chain import Limit, NoiseSource, extreme_signal
+from vcam_cli.errors import bad
+from vcam_cli.image_formation import photon_rate, pixelwise, timed_gains
+from vcam_cli.image_formation.light_plan import PERCENTILES, LightPlan
+from vcam_cli.image_formation.settings import Settings
+from vcam_cli.readout import auto_exposure, exposure, sample_times
+from vcam_cli.readout.layout import Layout
+from vcam_cli.simulation import plan
+
+MOST_ELECTRONS = 1e25
+"""More than any pixel ever meets, and far from where 32-bit numbers end."""
+
+
+@dataclass(frozen=True)
+class ExposedLight:
+    """The light of a timed exposure, as it is read out."""
+
+    rate: NDArray
+    """Photo-electrons per second of every node (..., rows, columns) [e/s]."""
+    times: tuple[float, ...]
+    """Times of the samples of one integration, rising [s]; () of a single exposure."""
+    signal: SignalLevels
+    settings: auto_exposure.ExposureSettings
+    changes: dict[str, float]
+    """Effect on pixels or charge -> rms change of the mean signal by leaving it out [e/s]."""
+    light_plan: LightPlan
+    """That of the light, with what is left out now that the exposure time is known."""
+    step_rates: tuple[NDArray, ...]
+    """As `Prepared.step_rates`."""
+
+
+def expose(
+    camera: Camera,
+    solved: Geometry,
+    circuit: Electrical,
+    place: Layout,
+    light: photon_rate.Rate,
+    white_rate: NDArray,
+    effects: Sequence[Effect],
+    optional: Sequence[Effect],
+    knobs: Settings,
+) -> ExposedLight:
+    """Return the light of an exposure whose time is given or chosen for the scene."""
+    groups, white = place.binning_groups, float(white_rate.max())
+    enabled = plan.enabled_effects(camera, solved)
+    dark = exposure.mean_dark(1.0, enabled)
+    collected = place.select_pixels(light.values)
+    rate = groups.collect(_transport(collected, dark / groups.summed_charges, effects))
+    adc = quantizer(camera, solved)
+    times = sample_times.choose_sample_times(camera, rate, circuit, enabled, adc)
+    chosen = auto_exposure.expose(camera, rate, white, dark, circuit)
+    if times:
+        chosen = replace(chosen, time=times[-1])
+    time = chosen.time
+    # A full well holds no more, whatever falls on it.
+    held = circuit.full_well / time if of_kind(enabled, Limit) else math.inf
+    light_plan = timed_gains.light_plan(light.plan, effects, optional, time, knobs.tolerance)
+    timed = tuple(e for e in of_kind(effects, TemporalGain) if e not in light_plan.omitted)
+
+    def collect(start: float, stop: float) -> NDArray:
+        lit = collected
+        if timed:
+            found = timed_gains.apply(light.values, timed, place.lattice, start, stop)
+            lit = place.select_pixels(found)
+        return groups.collect(_transport(lit, dark / groups.summed_charges, effects, held))
+
+    rate = collect(0.0, time)
+    steps = pairwise((0.0, *times)) if timed else ()
+    step_rates = tuple(collect(start, stop) for start, stop in steps)
+    peak = (float(rate.max()) + dark) * time
+    refuse_too_much(max(peak, white * time, dark))
+    lit = timed_gains.apply(light.values, timed, place.lattice, 0.0, time)
+    changes = _pixel_changes(place, groups.collect(lit), enabled, effects, time)
+    for effect in timed:
+        others = tuple(e for e in timed if e is not effect)
+        without = timed_gains.apply(light.values, others, place.lattice, 0.0, time)
+        changes[effect.name] = _rms(np.subtract(lit, without))
+    if transports := [transport.name for transport in of_kind(enabled, Transport)]:
+        well = min(circuit.full_well / time - dark, MOST_ELECTRONS)
+        deferred = np.minimum(rate, well) - np.minimum(groups.collect(collected), well)
+        changes |= dict.fromkeys(transports, _rms(deferred))
+    full = max(1.0, min(circuit.full_well, peak))
+    alone = not times and camera.array.binning is None
+    signal = SignalLevels(
+        full,
+        time,
+        dark * time,
+        camera.array.binning,
+        _levels(place, rate, dark, time, circuit.full_well),
+        extreme_signal(of_kind(enabled, NoiseSource), peak, dark * time) if alone else math.inf,
+    )
+    return ExposedLight(rate, times, signal, chosen, changes, light_plan, step_rates)
+
+
+def refuse_too_much(electrons: float) -> None:
+    """Refuse light that no unit could have meant (BadInput)."""
+    if not electrons < MOST_ELECTRONS:
+        raise bad(
+            "scene",
+            f"light and dark current would make {electrons:.3g} electrons in a pixel or a second",
+            "look for a wrong unit in the light level, the dark current or the exposure",
+        )
+
+
+def _levels(
+    place: Layout, rate: NDArray, dark: float, time: float, well: float
+) -> tuple[float, ...]:
+    """Return the signals of the scene at which noise is promised, with the dark [electrons]."""
+    mosaic, planes = place.charge_pixels[1], rate.ndim == 3
+    mosaics = [Mosaic(((color,),)) for color in mosaic.colors] if planes else [mosaic]
+    levels = [
+        pixelwise.percentiles(plane, colors, PERCENTILES)
+        for plane, colors in zip(rate if planes else [rate], mosaics, strict=True)
+    ]
+    signal = (np.concatenate(levels).astype(float) + dark) * time
+    return tuple(np.minimum(signal, well).ravel().tolist())
+
+
+def _pixel_changes(
+    place: Layout, light: NDArray, present: Sequence[Effect], running: Sequence[Effect], time: float
+) -> dict[str, float]:
+    """Return the rms change of the mean raw by leaving out each effect on pixels [e/s].
+
+    It is that of the color where it is most.
+    """
+    geometry, mosaic = place.charge_pixels
+    mosaics = [Mosaic(((color,),)) for color in mosaic.colors]
+    parts = zip(light, mosaics, strict=True) if place.planes else [(light, mosaic)]
+    largest: dict[str, float] = {}
+    for plane, colors in parts:
+        changes = pixelwise.changes_by_omission(plane, geometry, colors, present, running, time)
+        largest = {name: max(change, largest.get(name, 0.0)) for name, change in changes.items()}
+    return largest
+
+
+def _rms(values: NDArray) -> float:
+    return float(np.sqrt(np.square(values, dtype=np.float64).mean()))
+
+
+def _transport(
+    rate: NDArray, dark: float, effects: Sequence[Effect], held: float = math.inf
+) -> NDArray:
+    """Return the photo-electrons per second that arrive where charge is transported [e/s].
+
+    With the dark rate [e/s] they are what arrives of both. What a packet does not hold, beyond
+    `held` [e/s] for the time of the exposure, stays where it is and is clipped there. Below that
+    transport is linear, so that an exposure can be timed by the picture as it is read.
+    """
+    for transport in of_kind(effects, Transport):
+        signal = rate + rate.dtype.type(dark)
+        beyond = signal - np.minimum(signal, signal.dtype.type(min(held, MOST_ELECTRONS)))
+        signal -= beyond
+        planes = signal.reshape(-1, *signal.shape[-2:])
+        signal = np.array([transport.transport(plane) for plane in planes]).reshape(rate.shape)
+        signal += beyond
+        signal -= rate.dtype.type(dark)
+        rate = signal
+    return rate
