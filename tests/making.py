@@ -39,7 +39,13 @@ PLAIN: dict[str, Any] = {
 }
 """Monochromatic light on a monochrome array: no noise but that of light, no falloff."""
 
-QUIET = {name: "off" for name in ("shot_noise", "fpn", "reset_noise", "read_noise")}
+QUIET = {
+    name: "off"
+    for name in (
+        *("shot_noise", "fpn", "fpn_shading", "reset_noise", "read_noise"),
+        *("heavy_tailed_noise", "correlated_row_noise", "telegraph_noise"),
+    )
+}
 """`effects` of a camera without any randomness."""
 
 

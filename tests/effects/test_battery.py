@@ -31,7 +31,7 @@ from vcam_cli.effects.base import (
 )
 from vcam_cli.effects.order import ORDER
 from vcam_cli.effects.signal_chain import Limit, NoiseSource, Quantizer, Site
-from vcam_cli.rng import stream
+from vcam_cli.rng import BLOCK_ROWS, stream
 
 # Twenty whole periods on the 64 columns of 5 um, so that its rms is that of a whole wave.
 WAVE = {"kind": "chart", "chart": "sinusoid", "frequency": "62.5 lp/mm", "contrast": 1, "mean": 0.5}
@@ -133,6 +133,22 @@ CASES: dict[str, Case] = {
         {"pixel.readout.read_noise": "9 e", "pixel.readout.column_noise": "4 e"},
         {"pixel.readout.read_noise": "0 e", "pixel.readout.column_noise": "0 e"},
     ),
+    "fpn_shading": Case(
+        {"pixel.fpn.shading": {"offset": "6 e", "gain": "1 %", "cycles": 3}},
+        {"pixel.fpn.shading": {"offset": "0 e"}},
+    ),
+    "heavy_tailed_noise": Case(
+        {"pixel.readout.heavy_tailed_noise": {"rms": "9 e", "shape": -0.1}},
+        {"pixel.readout.heavy_tailed_noise": {"rms": "0 e"}},
+    ),
+    "correlated_row_noise": Case(
+        {"pixel.readout.correlated_row_noise": {"rms": "9 e", "correlation": 0.5}},
+        {"pixel.readout.correlated_row_noise": {"rms": "0 e"}},
+    ),
+    "telegraph_noise": Case(
+        {"pixel.readout.telegraph_noise": {"fraction": "60 %", "amplitude": "20 e"}},
+        {"pixel.readout.telegraph_noise": {"fraction": "0 %", "amplitude": "20 e"}},
+    ),
     "saturation": Case({}, None, {"scene.radiance": radiance_for(2e5)}),
     "quantization": Case({}, None),
 }
@@ -156,7 +172,7 @@ def effect_of(kind, folder, changes=None):
 
 def site(rows: int, columns: int, seed: int = 1, block: int = 0, dtype=np.float64) -> Site:
     here, anywhere = partial(stream, seed, block=block), partial(stream, seed)
-    return Site(rows, columns, here, anywhere, dtype, DARK)
+    return Site(rows, columns, here, anywhere, dtype, DARK, first_row=block * BLOCK_ROWS)
 
 
 def drawn(effect: NoiseSource, mean: np.ndarray, where: Site) -> np.ndarray:
@@ -309,18 +325,23 @@ def test_electrons_in_electrons_out(kind, tmp_path):
 @every(NoiseSource)
 @pytest.mark.parametrize("mean", [0.0, 0.4, 6.0, 30.0, 2e4])
 def test_stated_variance_is_the_measured_one(kind, mean, tmp_path):
-    """One row of 200 000 pixels, so that draws per column are as many as those per pixel.
+    """One row of 200 000 pixels, so that draws per column are as many as those per pixel; of noise
+    of the rows as many rows, of which those that resemble their neighbors count for a third: a
+    correlation of r = 1/2 makes of the mean's error (1 + r) / (1 - r) and of the variance's
+    (1 + r^2) / (1 - r^2), squared.
 
     Standard errors: of the mean sqrt(v / n); of the variance v sqrt((k - 1) / n) with the kurtosis
     k, 3 for normal numbers and 3 + 1/m for Poisson's; of the fixed pattern what the sample has, for
-    some pixels are dead. Those take their share of the mean.
+    some pixels are dead, and of tails and traps. Those dead take their share of the mean.
     """
     n = 200_000
     effect = effect_of(kind, tmp_path)
-    out = drawn(effect, np.full((1, n), mean), site(1, n, seed=5))
+    shape = (n, 1) if kind.name == "correlated_row_noise" else (1, n)
+    out = drawn(effect, np.full(shape, mean), site(*shape, seed=5))
+    n = n / 3 if kind.name == "correlated_row_noise" else n
     stated = effect.variance(mean, DARK)
     kurtosis = 3 + (1 / mean if kind.name == "shot_noise" and mean else 0)
-    if kind.name == "fpn":
+    if kind.name in ("fpn", "heavy_tailed_noise", "telegraph_noise"):
         kurtosis = np.mean((out - out.mean()) ** 4) / out.var() ** 2
     mean *= 1 - getattr(effect, "dead", 0.0)
     assert out.mean() == pytest.approx(mean, abs=5 * math.sqrt(stated / n))
@@ -395,6 +416,10 @@ NOISY = {
     "pixel.fpn": {"offset_pixel": "7 e", "offset_column": "3 e"},
     "pixel.readout.reset_noise": "12 e",
     "pixel.readout.read_noise": "9 e",
+    "pixel.fpn.shading": {"offset": "6 e"},
+    "pixel.readout.heavy_tailed_noise": {"rms": "5 e"},
+    "pixel.readout.correlated_row_noise": {"rms": "5 e"},
+    "pixel.readout.telegraph_noise": {"fraction": "60 %", "amplitude": "20 e"},
     "scene.radiance": radiance_for(900),
     "array.rows": 150,
 }
@@ -434,16 +459,21 @@ def test_gain_noise_keeps_its_draws_when_light_is_noisy(tmp_path):
 
 @every(NoiseSource)
 def test_each_seed_moves_its_own_draws_only(kind, tmp_path):
-    """Fixed patterns stay with the sensor when the frame changes; the rest is new."""
+    """Fixed patterns stay with the sensor when the frame changes; the rest is new.
+
+    Traps stay with the sensor and are filled anew in every frame: both seeds move them, and pixels
+    without one, or in the same of two states, are as they were.
+    """
     alone = {"effects": only(kind.name)}
     first = electrons(tmp_path, **alone)
     frame = electrons(tmp_path, **alone, **{"seed.frame": 2})
     sensor = electrons(tmp_path, **alone, **{"seed.sensor": 2})
     moved, kept = (frame, sensor) if kind.scope == "frame" else (sensor, frame)
-    assert np.array_equal(first, kept)
+    of_traps = kind.name == "telegraph_noise"
+    assert np.array_equal(first, kept) != of_traps
     # hardly a pixel is the same: whole electrons of shot noise coincide by chance in 1 of 100
-    assert np.mean(first == moved) < 0.05
-    assert kind.scope == ("sensor" if kind.name == "fpn" else "frame")
+    assert np.mean(first == moved) < (0.75 if of_traps else 0.05)
+    assert kind.scope == ("sensor" if kind.name.startswith("fpn") else "frame")
 
 
 # --- hostile input -------------------------------------------------------------------------------

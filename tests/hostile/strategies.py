@@ -120,7 +120,8 @@ def pixels(draw: st.DrawFn) -> Tree:
     tree["readout"] = draw(_readouts())
     shares = {"gain_pixel": between(0.01, 5, "%"), "gain_column": between(0.01, 5, "%")}
     offsets = {"offset_pixel": _ELECTRONS, "offset_column": _ELECTRONS}
-    fpn = mappings({}, shares | offsets | {"dark": between(0.01, 30, "%")})
+    shading = mappings({"offset": _ELECTRONS}, {"gain": between(0.01, 5, "%")})
+    fpn = mappings({}, shares | offsets | {"dark": between(0.01, 30, "%"), "shading": shading})
     defects = mappings({}, {"hot": fractions(0, 0.3), "dead": fractions(0, 0.3)})
     architectures = st.sampled_from(["aps-3t", "aps-4t", "dps", "ccd"])
     temperatures = st.integers(230, 350).map(lambda k: f"{k} K")
@@ -174,7 +175,14 @@ def _readouts(draw: st.DrawFn) -> Tree:
     )
     noises = {name: _ELECTRONS for name in ("read_noise", "column_noise", "row_noise")}
     resets = {"reset_noise": st.one_of(st.sampled_from(["ktc", "none"]), _ELECTRONS)}
-    return tree | draw(mappings({}, noises | resets | {"gain": between(0.5, 16)}))
+    tails = mappings({"rms": _ELECTRONS}, {"shape": st.floats(-0.4, 0.14)})
+    bands = mappings({"rms": _ELECTRONS}, {"correlation": st.floats(0, 0.99)})
+    traps = mappings(
+        {"fraction": between(0.01, 100, "%"), "amplitude": _ELECTRONS},
+        {"occupancy": between(1, 99, "%")},
+    )
+    others = {"heavy_tailed_noise": tails, "correlated_row_noise": bands, "telegraph_noise": traps}
+    return tree | draw(mappings({}, noises | resets | others | {"gain": between(0.5, 16)}))
 
 
 @st.composite

@@ -250,8 +250,14 @@ pixel:
   architecture: aps-3t
   defects: {hot: 1e-3, dead: 1e-3}
   photodetector: {dark_current: 2000 e/s}
-  readout: {column_noise: 4 e, row_noise: 4 e, reset_noise: 10 e}
-  fpn: {dark: 20 %, offset_column: 5 e, gain_column: 0.2 %}
+  readout:
+    column_noise: 4 e
+    row_noise: 4 e
+    reset_noise: 10 e
+    heavy_tailed_noise: {rms: 4 e, shape: -0.15}
+    correlated_row_noise: {rms: 3 e, correlation: 0.8}
+    telegraph_noise: {fraction: 3 %, amplitude: 30 e}
+  fpn: {dark: 20 %, offset_column: 5 e, gain_column: 0.2 %, shading: {offset: 4 e, gain: 1 %}}
 array: {rows: 60, columns: 80}
 exposure: {auto: {max: 100 ms}}
 """,

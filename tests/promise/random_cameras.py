@@ -101,12 +101,16 @@ def tree(number: int) -> dict:
                 "conversion_gain": f"{gain} uV/e",
                 "voltage_swing": "1 V",
                 "read_noise": spread(0.3, 30, "e"),
+                "heavy_tailed_noise": {"rms": spread(0.3, 10, "e"), "shape": -0.1},
+                "correlated_row_noise": {"rms": spread(0.1, 5, "e"), "correlation": 0.8},
+                "telegraph_noise": {"fraction": "3 %", "amplitude": spread(3, 60, "e")},
                 **noise,
             },
             "fpn": {
                 "offset_pixel": spread(0.3, 10, "e"),
                 "offset_column": spread(0.1, 5, "e"),
                 "gain_pixel": spread(0.1, 2, "%"),
+                "shading": {"offset": spread(0.3, 5, "e"), "gain": spread(0.1, 2, "%")},
             },
         },
         "array": {

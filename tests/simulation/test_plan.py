@@ -50,7 +50,7 @@ CAMERAS = {
     "a wide lens": {"accuracy": "draft", "scene.radiance": radiance_for(3e4)} | WIDE | EDGE,
     "a long lens": {"accuracy": "draft", "scene.radiance": radiance_for(3e4)} | LONG | EDGE,
     "a trace of dark current": {DARK: "300 e/s", "accuracy": "draft"}
-    | {"scene.radiance": radiance_for(5e4)},
+    | {"scene.radiance": radiance_for(5e4), "pixel.fpn.shading": {"gain": "1 %"}},
     "a lot of dark current": {DARK: "40 ke/s", "accuracy": "standard"} | NOISE | CSF,
     "overexposed": {"accuracy": "standard", "scene.radiance": radiance_for(4e5)} | NOISE | LONG,
     "daylight in color": {"accuracy": "standard", DARK: "100 e/s"} | BAYER | PATCHES | NOISE | LONG,
@@ -74,7 +74,10 @@ CAMERAS = {
         "pixel.architecture": "ccd",
         "pixel.readout.charge_transfer": {"inefficiency": 2e-4},
         "pixel.readout.row_noise": "3 e",
-        "pixel.fpn": {"dark": "20 %"},
+        "pixel.readout.heavy_tailed_noise": {"rms": "40 e"},
+        "pixel.readout.correlated_row_noise": {"rms": "40 e"},
+        "pixel.readout.telegraph_noise": {"fraction": "5 %", "amplitude": "90 e"},
+        "pixel.fpn": {"dark": "20 %", "shading": {"offset": "20 e", "gain": "1 %"}},
         "pixel.defects": {"hot": 0.01, "dead": 0.02},
         "pixel.microlens": {"gain": 1.5},
         "pixel.stack": {

@@ -7,6 +7,12 @@ from pydantic import AliasChoices, model_validator
 from pydantic_core import InitErrorDetails
 
 from vcam_cli.camera.architecture import ARCHITECTURES, article
+from vcam_cli.camera.noise import (
+    CorrelatedRowNoise,
+    HeavyTailedNoise,
+    PatternShading,
+    TelegraphNoise,
+)
 from vcam_cli.camera.photodetector import Photodetector
 from vcam_cli.camera.technology import CHOICE, TechnologyChoice
 from vcam_cli.camera.transfer_curve import TransferCurve
@@ -74,6 +80,27 @@ class Readout(Model):
         "temporal, one draw a column and frame; none in dps and ccd", example="0 e", default=0.0
     )
     row_noise: Electrons = key("temporal, one draw a row and frame", example="0 e", default=0.0)
+    heavy_tailed_noise: Annotated[
+        HeavyTailedNoise | None, word_or(HeavyTailedNoise, {"none": None})
+    ] = key(
+        "temporal noise of a readout with large values more often than normal noise has",
+        example={"rms": "3 e", "shape": -0.1},
+        default=None,
+    )
+    correlated_row_noise: Annotated[
+        CorrelatedRowNoise | None, word_or(CorrelatedRowNoise, {"none": None})
+    ] = key(
+        "temporal, of rows that resemble their neighbors",
+        example={"rms": "1 e", "correlation": 0.9},
+        default=None,
+    )
+    telegraph_noise: Annotated[TelegraphNoise | None, word_or(TelegraphNoise, {"none": None})] = (
+        key(
+            "random telegraph noise of the pixels that have a trap",
+            example={"fraction": "2 %", "amplitude": "10 e"},
+            default=None,
+        )
+    )
     reset_noise: Annotated[
         float | Literal["ktc", "none"],
         Quantity("charge", least=0, most=MOST_ELECTRONS, words={"ktc": "ktc", "none": "none"}),
@@ -124,6 +151,9 @@ class FixedPattern(Model):
         "spread of the columns' gains; none in dps and ccd", example="0 %", default=0.0
     )
     dark: Percent = key("spread of the pixels' dark currents", example="0 %", default=0.0)
+    shading: Annotated[PatternShading | None, word_or(PatternShading, {"none": None})] = key(
+        "slow differences over the array", example={"offset": "2 e", "gain": "0.5 %"}, default=None
+    )
 
     rules = (at_most_one("offset_pixel", "dsnu"), at_most_one("gain_pixel", "prnu"))
 

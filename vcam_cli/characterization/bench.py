@@ -269,7 +269,7 @@ def prepare_edge_bench(bench: Bench, stages: Stages) -> Bench:
     """
     named = {"kind": "chart", "chart": "slanted-edge", "angle": f"{EDGE_ANGLE} deg"}
     chart = SlantedEdge.model_validate({**named, "contrast": EDGE_CONTRAST})
-    camera = _before_chart(bench.camera, chart, "off_axis", "fpn", "charge_transfer")
+    camera = _before_chart(bench.camera, chart, "off_axis", "fpn", "fpn_shading", "charge_transfer")
     if camera.accuracy.tolerance > EDGE_TOLERANCE:
         finer = camera.accuracy.model_copy(update={"preset": None, "tolerance": EDGE_TOLERANCE})
         camera = camera.model_copy(update={"accuracy": finer})

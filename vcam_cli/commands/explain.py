@@ -1,5 +1,6 @@
 """`vcam explain`: what a key, an effect, a metric, a chart or a word of the trade means."""
 
+import re
 from collections.abc import Iterator
 from functools import cache
 from typing import Annotated, Any
@@ -106,9 +107,14 @@ def _of_key(where: str, key: Any) -> dict[str, Any]:
 
 
 def concerns(effect: Any, key: Any) -> bool:
-    """Return whether an effect is known by a key: it has its name, or says that it needs it."""
+    """Return whether an effect is known by a key: it has its name, or says that it needs it.
+
+    Or needs the mapping that the key is in.
+    """
     named = any(str(part).startswith(effect.name) for part in key.path)
-    return named or key.dotted in effect.absent
+    parent = re.escape(key.dotted.rpartition(".")[0])
+    of_mapping = re.search(rf"{parent}(?![.\w])", effect.absent) if parent else None
+    return named or key.dotted in effect.absent or of_mapping is not None
 
 
 def _effects() -> dict[str, Any]:

@@ -137,7 +137,7 @@ def table(report: dict) -> str:
     for effect in report["effects"]:
         share = effect["contribution"]
         amount = "" if share is None else f"{100 * share:.3g} % {effect['unit']}"
-        line = f"{effect['state']:<3}  {effect['name']:<17}{effect['by']:<7} {amount}"
+        line = f"{effect['state']:<3}  {effect['name']:<21}{effect['by']:<7} {amount}"
         lines.append(line.rstrip())
         lines.append(f"     {effect['reason']}")
     return "\n".join(lines)

@@ -12,8 +12,11 @@
     electrons / s          TemporalGain       flicker                        electrons / s
     electrons / s          Charge             dark_current                   electrons (mean signal)
     electrons              Transport          charge_transfer                electrons (mean signal)
-    electrons              NoiseSource        shot_noise, fpn, reset_noise,  electrons
-                                              read_noise
+    electrons              NoiseSource        shot_noise, fpn, fpn_shading,  electrons
+                                              reset_noise, read_noise,
+                                              heavy_tailed_noise,
+                                              correlated_row_noise,
+                                              telegraph_noise
     electrons              Limit              saturation                     electrons
     electrons              Quantizer          quantization                   DN
 
@@ -32,10 +35,13 @@ from vcam_cli.effects.aberration import Aberration
 from vcam_cli.effects.base import Effect
 from vcam_cli.effects.charge_diffusion import ChargeDiffusion
 from vcam_cli.effects.charge_transfer import ChargeTransfer
+from vcam_cli.effects.correlated_row_noise import CorrelatedRowNoise
 from vcam_cli.effects.dark_current import DarkCurrent
 from vcam_cli.effects.diffraction import Diffraction
 from vcam_cli.effects.flicker import Flicker
 from vcam_cli.effects.fpn import FixedPattern
+from vcam_cli.effects.fpn_shading import PatternShading
+from vcam_cli.effects.heavy_tailed_noise import HeavyTailedNoise
 from vcam_cli.effects.microlens import Microlens
 from vcam_cli.effects.off_axis import OffAxis
 from vcam_cli.effects.pixel_aperture import PixelAperture
@@ -47,6 +53,7 @@ from vcam_cli.effects.saturation import Saturation
 from vcam_cli.effects.shot_noise import ShotNoise
 from vcam_cli.effects.signal_chain import Quantizer
 from vcam_cli.effects.stray_light import StrayLight
+from vcam_cli.effects.telegraph_noise import TelegraphNoise
 
 ORDER: tuple[type[Effect], ...] = (
     Diffraction,
@@ -62,8 +69,12 @@ ORDER: tuple[type[Effect], ...] = (
     ChargeTransfer,
     ShotNoise,
     FixedPattern,
+    PatternShading,
     ResetNoise,
     ReadNoise,
+    HeavyTailedNoise,
+    CorrelatedRowNoise,
+    TelegraphNoise,
     Saturation,
     Quantization,
 )

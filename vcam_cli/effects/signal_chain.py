@@ -32,8 +32,24 @@ class Site:
     dtype: type
     dark: float = 0.0
     """Mean dark signal of a pixel [electrons]."""
-    columns_drawn: dict[str, NDArray] = field(default_factory=dict)
-    """Draws per column that are at hand."""
+    first_row: int = 0
+    """Index of the block's first row in the array."""
+    array_rows: int | None = None
+    """Rows of the whole array; None where it ends with the block."""
+    sensor: Callable[[str], np.random.Generator] | None = None
+    """Generator of a named stream for this block of what stays with the sensor, where that is
+    another one than `stream`."""
+    lines_drawn: dict[str, NDArray] = field(default_factory=dict)
+    """Draws per column and per row of the array that are at hand."""
+
+    @property
+    def all_rows(self) -> int:
+        """Rows of the whole array."""
+        return self.first_row + self.rows if self.array_rows is None else self.array_rows
+
+    def sensor_stream(self, name: str) -> np.random.Generator:
+        """Return the generator of a named stream for this block that stays with the sensor."""
+        return (self.sensor or self.stream)(name)
 
     def normal(self, name: str) -> NDArray:
         """Return one standard normal number a pixel, (rows, columns)."""
@@ -41,15 +57,26 @@ class Site:
 
     def normal_columns(self, name: str) -> NDArray:
         """Return one standard normal number a column, the same for every block, (columns,)."""
-        if name not in self.columns_drawn:
+        if name not in self.lines_drawn:
             drawn = self.line_stream(name).standard_normal(self.columns, dtype=self.dtype)
             drawn.setflags(write=False)
-            self.columns_drawn[name] = drawn
-        return self.columns_drawn[name]
+            self.lines_drawn[name] = drawn
+        return self.lines_drawn[name]
 
     def normal_rows(self, name: str) -> NDArray:
         """Return one standard normal number a row, the same for every column, (rows, 1)."""
         return self.stream(name).standard_normal((self.rows, 1), dtype=self.dtype)
+
+    def of_all_rows(self, name: str, shape: Callable[[NDArray], NDArray]) -> NDArray:
+        """Return the block's part (rows, 1) of a sequence over all rows of the array.
+
+        `shape` makes the sequence of one standard normal number a row, in 64 bits.
+        """
+        if name not in self.lines_drawn:
+            drawn = shape(self.line_stream(name).standard_normal(self.all_rows))
+            drawn.setflags(write=False)
+            self.lines_drawn[name] = drawn
+        return self.lines_drawn[name][self.first_row : self.first_row + self.rows, None]
 
 
 class ElectronEffect(Effect):

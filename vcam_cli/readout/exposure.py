@@ -64,7 +64,7 @@ def mean_dark(time: float, effects: tuple[Effect, ...]) -> float:
 
 
 def sites(
-    tile: NDArray, dark: float, seeds: dict[str, int], layer: int, block: slice, sample: int = 0
+    rate: NDArray, dark: float, seeds: dict[str, int], layer: int, block: slice, sample: int = 0
 ) -> dict[str, Site]:
     """Return the sites at which the noise of a block of rows is drawn, by scope.
 
@@ -72,8 +72,8 @@ def sites(
 
     Parameters
     ----------
-    tile : NDArray
-        Array of the block's shape (rows, columns) and float type.
+    rate : NDArray
+        An array of the shape (rows, columns) and float type of the whole layer.
     dark : float
         Mean dark signal [electrons].
     seeds : dict
@@ -91,14 +91,18 @@ def sites(
         Site of each scope.
     """
     index = (layer << LAYER) + block.start // BLOCK_ROWS
+    sensor = _StreamCache(partial(stream, seeds["sensor"], block=index))
     return {
         scope: Site(
-            rows=len(tile),
-            columns=tile.shape[1],
+            rows=block.stop - block.start,
+            columns=rate.shape[1],
             stream=_StreamCache(partial(stream, seed, capture=sample, block=index)),
             line_stream=partial(stream, seed, capture=sample, block=layer << LAYER),
-            dtype=tile.dtype.type,
+            dtype=rate.dtype.type,
             dark=dark,
+            first_row=block.start,
+            array_rows=len(rate),
+            sensor=sensor,
         )
         for scope, seed in seeds.items()
     }
@@ -189,10 +193,11 @@ def capture(
     dn = np.empty(rate.shape, codes_type(code.bits))
 
     def shoot(block: slice) -> None:
-        opened = sites(rate[block], dark, seeds, layer, block)
+        opened = sites(rate, dark, seeds, layer, block)
         for rows in slices_within(block, max(1, AT_ONCE // rate.shape[1])):
             tile = mean_electrons(rate[rows], time, effects)
-            here = {scope: replace(site, rows=len(tile)) for scope, site in opened.items()}
+            place = {"rows": len(tile), "first_row": rows.start}
+            here = {scope: replace(site, **place) for scope, site in opened.items()}
             for source in of_kind(effects, NoiseSource):
                 tile = source.before_shot(tile, here[source.scope])
             for effect in of_kind(effects, ElectronEffect):

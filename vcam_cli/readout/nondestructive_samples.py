@@ -104,8 +104,8 @@ def samples(
         for number, time in enumerate(times):
             step = time - before
             dark = mean_dark(step, effects)
-            sample_sites = sites(charge, dark, seeds, layer, block, number)
-            common_sites = sites(charge, dark, seeds, layer, block)
+            sample_sites = sites(rate, dark, seeds, layer, block, number)
+            common_sites = sites(rate, dark, seeds, layer, block)
             lit = step_rates[number] if step_rates else rate
             charge += _collect_charge(
                 mean_electrons(lit[block], step, effects), effects, sample_sites, common_sites

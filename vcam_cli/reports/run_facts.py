@@ -17,7 +17,8 @@ UNITS = {
 
 def spoken(name: str) -> str:
     """Return the name of an effect as it is said."""
-    return "fixed-pattern noise" if name == "fpn" else name.replace("_", " ")
+    fixed = {"fpn": "fixed-pattern noise", "fpn_shading": "shading of the fixed pattern"}
+    return fixed.get(name, name.replace("_", " "))
 
 
 def metric_rows(metrics: Mapping[str, Any]) -> list[Row]:

@@ -2,6 +2,7 @@
 
 It is of the camera that the file describes, whatever effects are switched off, and of no exposure
 time: the shot noise of a dark signal comes with the signal itself, which lifts it off zero.
+Telegraph noise is left out: it is of few pixels.
 """
 
 from __future__ import annotations
@@ -63,6 +64,9 @@ def dark_noise(camera: Camera, capacitance: float | None) -> float:
     given, pattern = camera.pixel.readout, camera.pixel.fpn
     parts = [given.read_noise, given.row_noise, pattern.offset_pixel]
     parts.append(reset_noise(camera, capacitance))
+    for noise in (given.heavy_tailed_noise, given.correlated_row_noise):
+        parts.append(0.0 if noise is None else noise.rms)
+    parts.append(0.0 if pattern.shading is None else pattern.shading.offset)
     if ARCHITECTURES[camera.pixel.architecture].column_terms:
         parts += [given.column_noise, pattern.offset_column]
     return math.hypot(*parts)

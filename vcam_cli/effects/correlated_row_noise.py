@@ -1,0 +1,74 @@
+"""Noise of whole rows that neighboring rows share in part: horizontal bands."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from vcam_cli.effects.signal_chain import NoiseSource
+
+
+@dataclass(frozen=True)
+class CorrelatedRowNoise(NoiseSource):
+    """Noise of rows as a first-order autoregression from the first row to the last.
+
+    Row k has x_k = r x_(k-1) + sqrt(1 - r^2) z_k of normal numbers z, so that rows n apart have the
+    correlation r^n and the power spectrum over f [cycles/row] is rms^2 (1 - r^2) / (1 - 2 r cos(2
+    pi f) + r^2). It adds to `row_noise`, of which all rows are independent.
+    """
+
+    rms: float
+    """Standard deviation [electrons]."""
+    correlation: float
+    """Correlation r of neighboring rows."""
+
+    name = "correlated_row_noise"
+    reference = "EMVA 1288 release 4.0, section 8 (row noise); Box and Jenkins 1976, section 3.2.3"
+    absent = "the file gives no pixel.readout.correlated_row_noise, or 0"
+    seconds_per_pixel = 1e-9
+    origin = "readout"
+
+    @classmethod
+    def from_camera(cls, camera, geometry):
+        """Return the noise that the file gives, or None where it gives none."""
+        given = camera.pixel.readout.correlated_row_noise
+        return cls(given.rms, given.correlation) if given is not None and given.rms else None
+
+    def describe(self) -> str:
+        """Return a short clause with this camera's numbers and units."""
+        return f"{self.rms:.4g} electrons rms of every row, {self.correlation:g} of it the next's"
+
+    def split(self):
+        """Return nothing of pixels by themselves nor of columns: all of it is the rows'."""
+        return replace(self, rms=0.0), None, self
+
+    def apply(self, electrons, site):
+        """Return the block with the noise of its rows in it; it reuses the array [electrons]."""
+        if self.rms:
+            rows = site.of_all_rows(self.name, self._autoregression)
+            electrons += (self.rms * rows).astype(electrons.dtype)
+        return electrons
+
+    def _autoregression(self, z):
+        """Return the sequence of all rows of unit variance, of independent normal numbers."""
+        from scipy.signal import lfilter
+
+        fresh = np.sqrt(1 - self.correlation**2)
+        start = np.concatenate([z[:1], fresh * z[1:]])
+        return lfilter([1.0], [1.0, -self.correlation], start)
+
+    def variance(self, mean, dark=0.0):
+        """Return the variance that it adds to a pixel [electrons squared]."""
+        return self.rms**2
+
+    def binned_variance(self, mean, dark, binning):
+        """Return the variance of the mean of pixels read as one, whose rows are neighbors.
+
+        In mosaics, where they lie farther apart, it is an upper bound [electrons squared].
+        """
+        if binning is None or binning.kind != "digital":
+            return self.variance(mean, dark)
+        apart = np.arange(1, binning.rows)
+        pairs = float(((binning.rows - apart) * self.correlation**apart).sum())
+        return self.rms**2 * (binning.rows + 2 * pairs) / binning.rows**2

@@ -1,0 +1,95 @@
+"""The slow part of the fixed pattern: offsets and gains that drift over the array."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcam_cli.effects.signal_chain import NoiseSource
+
+
+@dataclass(frozen=True)
+class PatternShading(NoiseSource):
+    """Offsets [electrons] and gains [1] that are sums of few cosines over the array.
+
+    The cosines are those of the discrete cosine transform up to `cycles` per width and height,
+    without the even one; their strengths are drawn from the sensor seed. Offsets and gains are
+    scaled to exactly their rms over the array, and uncorrelated, so that the variance stated is
+    that of every sensor.
+    """
+
+    offset: float
+    """Rms of the offsets over the array [electrons]."""
+    gain: float
+    """Rms of the gains over the array."""
+    cycles: int
+    """Highest spatial frequency [cycles per width, and per height]."""
+
+    name = "fpn_shading"
+    reference = "EMVA 1288 release 4.0, section 8 (low frequencies of the spectrogram); own model"
+    absent = "the file gives no pixel.fpn.shading, or 0"
+    seconds_per_pixel = 6e-9
+    scope = "sensor"
+    sample_draws = "common"
+
+    @classmethod
+    def from_camera(cls, camera, geometry):
+        """Return the pattern that the file gives, or None where it gives none."""
+        given = camera.pixel.fpn.shading
+        if given is None or not (given.offset or given.gain):
+            return None
+        return cls(given.offset, given.gain, given.cycles)
+
+    def describe(self) -> str:
+        """Return a short clause with this camera's numbers and units."""
+        return (
+            f"offsets of {self.offset:.4g} e rms and gains of {self.gain:.3%}, up to"
+            f" {self.cycles} cycles over the array"
+        )
+
+    def apply(self, electrons, site):
+        """Return the block with gains and offsets in it; it reuses the array [electrons]."""
+        offsets, gains = self._strengths(site)
+        if self.gain:
+            electrons *= 1 + self.gain * _cosines(gains, site).astype(electrons.dtype)
+        if self.offset:
+            electrons += self.offset * _cosines(offsets, site).astype(electrons.dtype)
+        return electrons
+
+    def _strengths(self, site) -> tuple[NDArray, NDArray]:
+        """Return the strengths of the cosines, (along y, along x), for offsets and for gains."""
+        half_cycles = 2 * self.cycles
+        rows = np.arange(min(half_cycles + 1, site.all_rows))
+        columns = np.arange(min(half_cycles + 1, site.columns))
+        low = np.hypot(rows[:, None], columns) <= half_cycles
+        low[0, 0] = False
+        drawn = site.line_stream(self.name).standard_normal((2, *low.shape)) * low
+        offsets, gains = drawn / max(np.linalg.norm(drawn[0]), np.finfo(float).tiny)
+        if low.sum() > 1:
+            gains = gains - (gains * offsets).sum() * offsets
+        return offsets, gains / max(float(np.linalg.norm(gains)), np.finfo(float).tiny)
+
+    def variance(self, mean, dark=0.0):
+        """Return the variance over the array that it adds [electrons squared]."""
+        return self.offset**2 + (self.gain * mean) ** 2
+
+    def binned_variance(self, mean, dark, binning):
+        """Return the same of pixels that are read as one: neighbors are alike."""
+        return self.variance(mean, dark)
+
+
+def _cosines(strengths: NDArray, site) -> NDArray:
+    """Return the sum of cosines at the pixels of a block, (rows, columns)."""
+    rows = site.first_row + np.arange(site.rows)
+    along_y = _basis(rows, site.all_rows, strengths.shape[0])
+    along_x = _basis(np.arange(site.columns), site.columns, strengths.shape[1])
+    return along_y @ strengths @ along_x.T
+
+
+def _basis(places: NDArray, length: int, count: int) -> NDArray:
+    """Return cosines of unit mean square over `length` pixels, (places, count)."""
+    waves = np.cos(np.pi / length * np.outer(places + 0.5, np.arange(count)))
+    waves[:, 1:] *= np.sqrt(2)
+    return waves

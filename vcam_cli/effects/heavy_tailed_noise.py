@@ -1,0 +1,91 @@
+"""Noise of the readout whose large values are more frequent than those of normal noise."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcam_cli.effects.signal_chain import NoiseSource
+
+LEAST_CHANCE = 2.0**-54
+"""A number drawn evenly from 0 to 1 is kept this far from 0, half of the generator's step."""
+
+
+def tukey_lambda(chance: NDArray, shape: float) -> NDArray:
+    """Return the quantile of Tukey's lambda distribution, (u^s - (1 - u)^s) / s; the logit for 0.
+
+    Parameters
+    ----------
+    chance : NDArray
+        Probabilities u, above 0 and below 1.
+    shape : float
+        Shape s of the distribution.
+
+    Returns
+    -------
+    NDArray
+        Quantiles, symmetric about 0 [dimensionless].
+
+    References
+    ----------
+    J. W. Tukey, "The practical relationship between the common transformations of percentages or
+    fractions and of amounts", 1960; B. L. Joiner and J. R. Rosenblatt, J. Am. Stat. Assoc. 66,
+    1971, doi:10.1080/01621459.1971.10482275.
+    """
+    below, above = np.log(chance), np.log1p(-chance)
+    if shape == 0:
+        return below - above
+    return (np.expm1(shape * below) - np.expm1(shape * above)) / shape
+
+
+@dataclass(frozen=True)
+class HeavyTailedNoise(NoiseSource):
+    """Independent noise of every pixel and readout, by Tukey's lambda distribution.
+
+    It adds to `read_noise`: a readout that has no normal noise gives 0 there.
+    """
+
+    rms: float
+    """Standard deviation [electrons]."""
+    shape: float
+
+    name = "heavy_tailed_noise"
+    reference = (
+        "Wei et al., A physics-based noise formation model for extreme low-light raw denoising,"
+        " CVPR 2020, section 3.2 (read noise)"
+    )
+    absent = "the file gives no pixel.readout.heavy_tailed_noise, or 0"
+    seconds_per_pixel = 60e-9
+    origin = "readout"
+
+    @classmethod
+    def from_camera(cls, camera, geometry):
+        """Return the noise that the file gives, or None where it gives none."""
+        given = camera.pixel.readout.heavy_tailed_noise
+        return cls(given.rms, given.shape) if given is not None and given.rms else None
+
+    def describe(self) -> str:
+        """Return a short clause with this camera's numbers and units."""
+        return f"{self.rms:.4g} electrons rms, Tukey lambda of shape {self.shape:g}"
+
+    def apply(self, electrons, site):
+        """Return the block with the noise of one readout in it; it reuses the array [electrons]."""
+        # 64 bits whatever the rest is computed in: tails end where the generator's steps begin.
+        chance = site.stream(self.name).random((site.rows, site.columns))
+        z = tukey_lambda(np.maximum(chance, LEAST_CHANCE), self.shape)
+        z *= self.rms / self._spread
+        electrons += z.astype(electrons.dtype)
+        return electrons
+
+    @property
+    def _spread(self) -> float:
+        """Return the standard deviation of the distribution without scale."""
+        from scipy.stats import tukeylambda
+
+        return float(tukeylambda.std(self.shape))
+
+    def variance(self, mean, dark=0.0):
+        """Return the variance that it adds to a pixel [electrons squared]."""
+        return self.rms**2
