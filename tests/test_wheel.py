@@ -6,14 +6,19 @@ be fetched from the network), and used from where it was unpacked.
 
 import json
 import os
+import re
 import subprocess
 import sys
+import tarfile
 import zipfile
 from pathlib import Path
 
 import pytest
+import yaml
+from typer.testing import CliRunner
 
 import vcam_cli
+from vcam_cli.commands.main import app
 
 ROOT = Path(vcam_cli.__file__).parents[1]
 
@@ -22,15 +27,33 @@ pytestmark = pytest.mark.skipif(
 )
 
 
+def build(kind: str, source: Path, folder: Path) -> Path:
+    """Build a `wheel` or an `sdist` of a source tree into a folder."""
+    line = [sys.executable, "-m", "hatchling", "build", "-t", kind, "-d", str(folder)]
+    env = os.environ | {"PYTHONDONTWRITEBYTECODE": "1"}
+    result = subprocess.run(line, cwd=source, capture_output=True, text=True, env=env)
+    assert result.returncode == 0, result.stderr
+    (file,) = folder.glob("*.whl" if kind == "wheel" else "*.tar.gz")
+    return file
+
+
 @pytest.fixture(scope="module")
 def wheel(tmp_path_factory) -> Path:
-    folder = tmp_path_factory.mktemp("dist")
-    build = [sys.executable, "-m", "hatchling", "build", "-t", "wheel", "-d", str(folder)]
-    env = os.environ | {"PYTHONDONTWRITEBYTECODE": "1"}
-    result = subprocess.run(build, cwd=ROOT, capture_output=True, text=True, env=env)
-    assert result.returncode == 0, result.stderr
-    (file,) = folder.glob("*.whl")
-    return file
+    return build("wheel", ROOT, tmp_path_factory.mktemp("dist"))
+
+
+def test_the_sdist_builds_the_same_wheel(wheel, tmp_path):
+    with tarfile.open(build("sdist", ROOT, tmp_path)) as archive:
+        archive.extractall(tmp_path / "source", filter="data")
+    (source,) = (tmp_path / "source").iterdir()
+    for name in ("README.md", "CITATION.cff", "mkdocs.yml", "docs/index.md", "tests/conftest.py"):
+        assert (source / name).is_file()
+    again = build("wheel", source, tmp_path)
+    with zipfile.ZipFile(wheel) as one, zipfile.ZipFile(again) as other:
+        assert sorted(one.namelist()) == sorted(other.namelist())
+        assert {i.filename: i.CRC for i in one.infolist() if "RECORD" not in i.filename} == {
+            i.filename: i.CRC for i in other.infolist() if "RECORD" not in i.filename
+        }
 
 
 @pytest.fixture(scope="module")
@@ -71,7 +94,7 @@ def test_all_schemas_lie_where_the_shipped_files_look_for_them(installed):
 
 
 def test_all_sources_and_data_tables(installed):
-    kinds = (".py", ".csv", ".npz", ".json")
+    kinds = (".py", ".csv", ".npz", ".json", ".typed", ".html", ".css", ".js")
     mine = files(ROOT / "vcam_cli", kinds)
     there = {
         n
@@ -126,3 +149,22 @@ def test_a_camera_runs_from_the_unpacked_wheel(installed, tmp_path):
     assert result.returncode == 0, result.stderr
     assert (tmp_path / "out" / "raw.exr").is_file()
     assert str(installed) in (tmp_path / "out" / "run.json").read_text()
+
+
+def test_the_container_copies_what_exists():
+    text = (ROOT / "Containerfile").read_text("utf-8")
+    copied = [name for line in re.findall(r"^COPY (.+) \S+$", text, re.M) for name in line.split()]
+    assert {"vcam_cli", "configs", "schemas", "requirements.lock"} <= set(copied)
+    assert all((ROOT / name).exists() for name in copied)
+
+
+def test_the_action_uses_inputs_and_options_that_exist():
+    action = yaml.safe_load((ROOT / "action.yml").read_text("utf-8"))
+    text = json.dumps(action)
+    assert set(re.findall(r"inputs\.([\w-]+)", text)) == set(action["inputs"])
+    (sweep,) = (step for step in action["runs"]["steps"] if step.get("name") == "sweep")
+    shown = CliRunner().invoke(app, ["sweep", "--help"]).stdout
+    for option in re.findall(r"(?<![\w$])--?\w+", sweep["run"].partition("#")[0]):
+        assert f"{option} " in shown or f"{option}," in shown, option
+    variables = set(re.findall(r"\$\{?(\w+)", sweep["run"]))
+    assert variables == set(sweep["env"])

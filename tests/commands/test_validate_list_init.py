@@ -42,6 +42,11 @@ def process(*args: str, **more) -> subprocess.CompletedProcess:
 
 
 class TestMain:
+    def test_help_cuts_no_sentence(self):
+        commands = vcam("--help").stdout.partition("Commands:")[2]
+        assert "..." not in commands
+        assert "Simulate a camera and write raw.exr, render.png, metrics.csv and" in commands
+
     def test_help_names_every_command(self):
         text = vcam("--help").stdout
         for name in main.COMMANDS:
@@ -199,6 +204,13 @@ class TestMain:
         env = {"_VCAM_COMPLETE": "complete_bash", "COMP_WORDS": "vcam run start", "COMP_CWORD": "2"}
         assert process(env=env).stdout.split() == ["starter"]
 
+    def test_completion_of_settings(self):
+        words = {"_VCAM_COMPLETE": "complete_bash", "COMP_CWORD": "4"}
+        env = words | {"COMP_WORDS": "vcam run starter --set optics.f_n"}
+        assert process(env=env).stdout.split() == ["optics.f_number="]
+        env = words | {"COMP_WORDS": "vcam schedule captures --set max_"}
+        assert process(env=env).stdout.split() == ["max_time_of="]
+
     def test_completion_of_paths(self, folder):
         (folder / "cams").mkdir()
         for name in ("cams/a.yaml", "cams/b.png", "c.yml"):
@@ -280,6 +292,15 @@ class TestList:
         lines = vcam("list", kind).stdout.splitlines()
         items = json.loads(vcam("list", kind, "--json").stdout)[kind]
         assert [line.split("  ")[0] for line in lines] == [item["name"] for item in items]
+
+    def test_a_terminal_gets_columns_that_fit(self, monkeypatch):
+        monkeypatch.setattr("sys.stdout.isatty", lambda: True, raising=False)
+        monkeypatch.setenv("COLUMNS", "72")
+        head, text = "effects:      ", ", ".join(["diffraction"] * 20)
+        lines = list_._fitted(head, text).splitlines()
+        assert len(lines) > 2
+        assert all(len(line) <= 72 for line in lines)
+        assert lines[1].startswith(" " * len(head) + "diffraction")
 
     def test_all(self):
         text = vcam("list").stdout

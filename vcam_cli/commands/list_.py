@@ -80,7 +80,7 @@ def list_(
         _table(found[kind])
     else:
         for k, items in found.items():
-            print(f"{k + ':':14}{', '.join(item.name for item in items) or '(none yet)'}")
+            print(_fitted(f"{k + ':':14}", ", ".join(item.name for item in items) or "(none yet)"))
 
 
 def _choose(kind: str, name: str, items: list[Item]) -> Item:
@@ -106,7 +106,26 @@ def _show(kind: str, item: Item, as_json: bool) -> None:
 def _table(items: list[Item]) -> None:
     width = max((len(item.name) for item in items), default=0)
     for item in items:
-        print(f"{item.name:{width}}  {item.about}".rstrip())
+        print(_fitted(f"{item.name:{width}}  ", item.about))
+
+
+def _fitted(head: str, text: str) -> str:
+    """Return a head and its text, in a terminal wrapped beside the head; elsewhere a line."""
+    import shutil
+    import sys
+    import textwrap
+
+    columns = shutil.get_terminal_size().columns
+    if not sys.stdout.isatty() or columns < len(head) + 24:
+        return f"{head}{text}".rstrip()
+    return textwrap.fill(
+        text,
+        columns,
+        initial_indent=head,
+        subsequent_indent=" " * len(head),
+        break_long_words=False,
+        break_on_hyphens=False,
+    )
 
 
 def _plain(item: Item) -> dict[str, str]:

@@ -71,6 +71,12 @@ class Commands(TyperGroup):
             self.commands[cmd_name] = typer.main.get_command(one)
         return self.commands[cmd_name]
 
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        """Write the commands with whole sentences, which wrap where Click would cut them."""
+        rows = [(name, self.get_command(ctx, name).get_short_help_str(1000)) for name in COMMANDS]
+        with formatter.section("Commands"):
+            formatter.write_dl(rows)
+
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """Find the command that the arguments call."""
         if args and args[0] not in COMMANDS:

@@ -41,6 +41,22 @@ def _complete(kind: str, incomplete: str) -> list[str]:
     return found
 
 
+def complete_setting(incomplete: str) -> list[str]:
+    """Complete the keys of a camera file for `--set PATH=`, for the shell."""
+    from vcam_cli.camera.hints import index
+
+    return [f"{key.dotted}=" for key in index() if key.dotted.startswith(incomplete)]
+
+
+def complete_study_setting(incomplete: str) -> list[str]:
+    """Complete the keys of a schedule study for `--set PATH=`, for the shell."""
+    from vcam_cli.capture_schedules.model import ScheduleStudy
+    from vcam_cli.config.key_index import keys
+
+    found = dict.fromkeys(f"{key.dotted}=" for key in keys(ScheduleStudy))
+    return [key for key in found if key.startswith(incomplete)]
+
+
 def check_accuracy(value: str | None) -> str | None:
     """Check that a value is draft, standard, reference, or a fraction ("0.01", "1 %")."""
     if value is None or value in PRESETS:
@@ -78,6 +94,7 @@ Set = Annotated[
     typer.Option(
         "--set",
         metavar="PATH=VALUE",
+        autocompletion=complete_setting,
         help='Override a key of the file, as in --set pixel.width="8 um". Repeatable.',
     ),
 ]

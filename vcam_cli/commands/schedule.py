@@ -32,6 +32,7 @@ Set = Annotated[
     typer.Option(
         "--set",
         metavar="PATH=VALUE",
+        autocompletion=options.complete_study_setting,
         help='Override a key of the study, as in --set sensor.read_noise="5 e". Repeatable.',
     ),
 ]
