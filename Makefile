@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 SOURCES := vcam_cli tests scripts
 CAMERA ?= still-life
 
-.PHONY: run test test-all lint check bench interchange promise stability docs fuzz attacks schemas tables lock clean
+.PHONY: run test test-all lint check bench interchange promise stability docs fuzz attacks schemas tables thesis lock clean
 
 run: $(VENV)/.runtime  ## simulate the shipped still life: out/still-life/
 	$(BIN)/vcam run $(CAMERA)
@@ -52,6 +52,13 @@ schemas: $(VENV)/.dev  ## JSON Schemas of the files a user writes, from the mode
 
 tables: $(VENV)/.dev  ## the data tables of the package, from colour-science
 	$(BIN)/python scripts/make_tables.py
+
+thesis: $(VENV)/.dev  ## docs/thesis.md, from the runs of its studies; minutes where nothing is kept
+	$(BIN)/vcam sweep pixel-size -q -o out/pixel-size > /dev/null
+	$(BIN)/vcam schedule captures-segments -q -o out/captures-segments > /dev/null
+	$(BIN)/vcam schedule captures-hdr-scene -q -o out/captures-hdr-scene > /dev/null
+	$(BIN)/vcam schedule captures-dark-room -q -o out/captures-dark-room > /dev/null
+	$(BIN)/python scripts/make_thesis.py
 
 lock: $(VENV)/.dev  ## new versions for reproducible installs
 	$(BIN)/python -m pip install -q uv
