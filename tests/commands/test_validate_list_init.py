@@ -359,7 +359,15 @@ class TestInit:
         assert load("new/camera.yaml").array.rows * load("new/camera.yaml").array.columns < 200_000
         assert Path("new/camera.yaml").read_text().count("#") > 8
         names = sorted(path.name for path in (folder / "new").iterdir())
-        assert names == ["camera.yaml", "study.yaml"]
+        assert names == ["camera.yaml", "schemas", "study.yaml"]
+
+    def test_editors_find_the_schemas_by_the_first_lines(self):
+        vcam("init", "new")
+        for name in ("camera", "study"):
+            first = Path(f"new/{name}.yaml").read_text().splitlines()[0]
+            place = first.removeprefix("# yaml-language-server: $schema=")
+            schema = json.loads((Path("new") / place).read_text("utf-8"))
+            assert schema["title"] == f"vcam: a {name} file"
 
     def test_the_current_folder_is_the_default(self):
         vcam("init", "-q")
@@ -367,7 +375,9 @@ class TestInit:
 
     def test_json(self):
         result = vcam("init", "new", "--json")
-        assert json.loads(result.stdout) == {"files": ["new/camera.yaml", "new/study.yaml"]}
+        names = ["camera.yaml", "study.yaml"]
+        names += [f"schemas/{kind}.schema.json" for kind in ("camera", "study")]
+        assert json.loads(result.stdout) == {"files": [f"new/{name}" for name in names]}
         assert result.stderr == ""
 
     def test_nothing_is_overwritten(self):

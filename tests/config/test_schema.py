@@ -10,6 +10,7 @@ from camera_trees import REQUIRED, changed
 from vcam_cli.commands import schemas
 from vcam_cli.config import schema, shipped
 from vcam_cli.config.yaml_reader import read_file
+from vcam_cli.spectra import illuminant_names
 from vcam_cli.units import DIMENSIONS, parse
 
 CHECKED_IN = Path(__file__).parents[2] / "schemas"
@@ -60,6 +61,20 @@ def test_shipped_parts_are_valid(kind, file):
     tree = plain(file)
     loose = "extends" in tree or "use" in tree
     part(SECTIONS[kind] + (schema.OVERRIDES if loose else "")).validate(tree)
+
+
+@pytest.mark.parametrize("kind", SECTIONS)
+def test_part_files_have_a_schema_of_their_own(kind):
+    section = SECTIONS[kind].lower()
+    own = jsonschema.Draft202012Validator(SCHEMAS[f"{section}.schema.json"])
+    for file in shipped.files(kind).values():
+        own.validate(plain(file))
+        assert f"$schema=../../schemas/{section}.schema.json" in file.read_text().splitlines()[0]
+    required = "required" in SCHEMAS[f"{section}.schema.json"]["$defs"][SECTIONS[kind]]
+    assert own.is_valid({}) != required
+    assert not own.is_valid({"no_such_key": 1})
+    assert own.is_valid({"extends": "other.yaml"})
+    assert not own.is_valid({"extends": "other.yaml", "no_such_key": 1})
 
 
 def test_shipped_technologies_are_valid():
@@ -115,6 +130,33 @@ class TestCamera:
             assert accepts(tree), value
         for value in bad:
             assert not accepts(changed({path: value})), value
+
+    def test_a_source_has_the_keys_of_its_kind_alone(self):
+        """And a mistake is told of the one form that is meant, not of fifteen."""
+        scene = {"kind": "chart", "chart": "slanted-edge", "contrast": 0.5}
+        for source, right in (
+            (scene, True),
+            (scene | {"max_frequency": "3 lp/mm"}, False),  # of csf
+            ({"kind": "image", "file": "a.png", "white": 2}, True),
+            ({"kind": "image", "file": "a.png", "contrast": 0.5}, False),
+            ({"kind": "image"}, False),
+            ({"chart": "uniform"}, False),
+        ):
+            assert accepts(changed({"scene.source": source})) == right, source
+        (mistake,) = part("Scene").iter_errors(
+            {"source": {"kind": "image", "file": 3}, "luminance": "1 cd/m2"}
+        )
+        assert list(mistake.path) == ["source", "file"]
+        base = {"extends": "other.yaml"}
+        assert accepts(base | {"scene": {"source": {"contrast": 0.5}}})
+        assert not accepts(base | {"scene": {"source": {"contrst": 0.5}}})
+        assert not accepts(base | {"scene": {"source": {"kind": "image", "contrast": 0.5}}})
+
+    def test_illuminants_are_described(self):
+        forms = SCHEMAS["camera.schema.json"]["$defs"]["illuminant"]["anyOf"]
+        said = {form["const"]: form["description"] for form in forms if "const" in form}
+        assert said["FL2"] == "fluorescent, cool white, 4230 K."
+        assert set(said) == set(illuminant_names())
 
     def test_parts(self):
         assert accepts(changed({"optics": "f2.8-normal"}))

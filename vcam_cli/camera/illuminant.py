@@ -184,6 +184,7 @@ class Illuminant(YamlType):
 
     def json_schema(self, forms: dict[str, Any]) -> dict[str, Any]:
         """Return the definition of a lamp."""
+        known = [{"const": name, "description": f"{said}."} for name, said in spectra.LAMPS.items()]
         named = {"type": "string", "examples": list(spectra.illuminant_names())}
         return {
             DEFINED: {
@@ -191,5 +192,5 @@ class Illuminant(YamlType):
                 "description": f"A lamp: {_FORMS}.",
                 "examples": ["D65", {"blackbody": "5500 K"}],
             },
-            "anyOf": [named, *forms["anyOf"], {"type": "array", "minItems": 1}],
+            "anyOf": [*known, named, *forms["anyOf"], {"type": "array", "minItems": 1}],
         }

@@ -13,7 +13,7 @@ from vcam_cli.config.quantities import Number, Quantity, Whole
 from vcam_cli.config.validation_messages import describe, failure, fault, one_of, refusal
 from vcam_cli.config.values import (
     Angle,
-    Either,
+    ByWords,
     Fraction,
     Frequency,
     Length,
@@ -256,7 +256,7 @@ _LUMINANCE = Quantity("luminance", least=0, words={"from-file": "from-file"})
 class Scene(Model):
     """What the camera looks at."""
 
-    source: Annotated[Source, Either(_source, Source)] = key(
+    source: Annotated[Source, ByWords(_source, Source, telling=("kind", "chart"))] = key(
         "a chart, an image file or a hyperspectral file",
         example={"kind": "chart", "chart": "colorchecker"},
     )

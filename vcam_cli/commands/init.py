@@ -11,6 +11,9 @@ FILE = "camera.yaml"
 STARTER = "starter"  # the shipped camera that is copied
 STUDY = "study.yaml"
 STARTER_STUDY = "exposure-and-noise"  # the shipped study of that camera that is copied
+SCHEMA = "schemas/{}.schema.json"
+MODELINE = "# yaml-language-server: $schema={}\n"
+"""First line by which editors find the schema of a file."""
 
 
 def init(
@@ -23,7 +26,8 @@ def init(
 ) -> None:
     """Write a small commented camera file and a study of it, which run as they are.
 
-    Existing files are never overwritten.
+    Existing files are never overwritten. The JSON Schemas beside them, in `schemas`, are what an
+    editor completes and checks the two with.
 
     \b
     Example:
@@ -38,12 +42,21 @@ def init(
     for target in (camera, study):
         if target.exists() or target.is_symlink():
             raise bad((), f"{target} exists already", "give another folder, or remove the file")
+    names = [SCHEMA.format(kind) for kind in ("camera", "study")]
+    texts = [(shipped.schemas() / Path(name).name).read_text("utf-8") for name in names]
+    for name, text in zip(names, texts, strict=True):
+        atomic.refuse_other(folder / name, text)
     atomic.make_folder(folder)
-    atomic.write_text(camera, shipped.find("cameras", STARTER).read_text("utf-8"))
+    atomic.make_folder(folder / Path(names[0]).parent)
+    for name, text in zip(names, texts, strict=True):
+        atomic.write_text(folder / name, text)
+    first, second = map(MODELINE.format, names)
+    atomic.write_text(camera, first + shipped.find("cameras", STARTER).read_text("utf-8"))
     _, _, text = shipped.find("studies", STARTER_STUDY).read_text("utf-8").partition("\n")
-    atomic.write_text(study, text.replace(f"camera: {STARTER}", f"camera: {FILE}"))
+    atomic.write_text(study, second + text.replace(f"camera: {STARTER}", f"camera: {FILE}"))
     if as_json:
-        options.write_json({"files": [str(camera), str(study)]})
+        written = [camera, study, *(folder / name for name in names)]
+        options.write_json({"files": list(map(str, written))})
     else:
         options.say(f"wrote {camera}; next: vcam run {camera}", quiet)
         options.say(f"wrote {study}; next: vcam sweep {study}", quiet)

@@ -176,9 +176,9 @@ def _models() -> list[Item]:
 
 
 def _illuminants() -> list[Item]:
-    from vcam_cli.spectra import illuminant_names
+    from vcam_cli.spectra import LAMPS, illuminant_names
 
-    named = [Item(name, "CIE illuminant, by name") for name in illuminant_names()]
+    named = [Item(name, LAMPS[name]) for name in illuminant_names()]
     return [
         *named,
         Item("{blackbody: 5500 K}", "a blackbody of any temperature"),

@@ -7,7 +7,14 @@ arithmetic, is checked there.
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.technology import Technology
 from vcam_cli.capture_schedules.model import ScheduleStudy
-from vcam_cli.config.schema import Schema, file_schema, model_schema, reference, with_parts
+from vcam_cli.config.schema import (
+    Schema,
+    file_schema,
+    model_schema,
+    part_schema,
+    reference,
+    with_parts,
+)
 from vcam_cli.sweeps.model import KINDS, Sweep
 from vcam_cli.verification.model import Measurement
 
@@ -23,6 +30,10 @@ def schemas() -> dict[str, Schema]:
         "study.schema.json": _study_schema(),
         "measurement.schema.json": file_schema(model_schema(Measurement), "a measurement file"),
         "technology.schema.json": file_schema(model_schema(Technology), "a technology file"),
+        **{
+            f"{section}.schema.json": part_schema(camera, name, f"a part file: {section}")
+            for section, name in SECTIONS.items()
+        },
     }
 
 

@@ -106,6 +106,24 @@ def with_parts(schema: Schema, name: str, sections: dict[str, str], title: str) 
     return file_schema({"$defs": definitions, "type": "object", **either}, title)
 
 
+def part_schema(whole: Schema, section: str, title: str) -> Schema:
+    """Return the schema of a part file: a section of a file, which may extend another part.
+
+    Parameters
+    ----------
+    whole : dict
+        What `with_parts` returned.
+    section : str
+        Definition of the section.
+    title : str
+        What the file is.
+    """
+    some = {"anyOf": [{"required": ["use"]}, {"required": ["extends"]}]}
+    then, otherwise = {"$ref": reference(section + OVERRIDES)}, {"$ref": reference(section)}
+    either = {"if": some, "then": then, "else": otherwise}
+    return file_schema({"$defs": whole["$defs"], "type": "object", **either}, title)
+
+
 def reference(name: str) -> str:
     """Return the reference to a definition."""
     return f"#/$defs/{name}"
@@ -215,7 +233,9 @@ def _loosen(node: Any, rename: Callable[[str], str]) -> Any:
     for key, item in node.items():
         if key == "required" and isinstance(item, list):
             continue
-        if key == "$ref":
+        if key == "if":  # which form is meant
+            found[key] = item
+        elif key == "$ref":
             found[key] = reference(rename(item.removeprefix("#/$defs/")))
         else:
             found[key] = item if key in ("examples", "default") else _loosen(item, rename)

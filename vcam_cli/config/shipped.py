@@ -32,6 +32,11 @@ def folder() -> Path:
     return inside if inside.is_dir() else package.parent / "configs"
 
 
+def schemas() -> Path:
+    """Return the folder of this installation's JSON Schemas."""
+    return folder().parent / "schemas"
+
+
 @cache
 def files(kind: str) -> dict[str, Path]:
     """Return name -> file of all that ships of `kind`, sorted by name; spectra are CSV files."""

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_args
 
 from pydantic import BaseModel, Strict, StringConstraints
 
@@ -95,6 +95,42 @@ class Either(YamlType):
             if value is meaning:
                 return word
         return None if value is None else self.yaml_form(value)
+
+
+@dataclass(frozen=True)
+class ByWords(Either):
+    """One of several models, told apart by words that each requires of some of its keys.
+
+    So an editor completes the keys of the one that is meant, and not of all.
+    """
+
+    telling: tuple[str, ...] = ()
+    """The keys whose words tell."""
+
+    def json_schema(self, forms: dict[str, Any]) -> dict[str, Any]:
+        """Return the JSON Schema: for the words of each model, that model."""
+        chosen: list[dict[str, Any]] = []
+        keys: dict[str, None] = {}
+        words: dict[str, list[str]] = {name: [] for name in self.telling}
+        for model, form in zip(get_args(self.forms), forms["anyOf"], strict=True):
+            own = {
+                name: get_args(model.model_fields[name].annotation)[0]
+                for name in self.telling
+                if name in model.model_fields
+            }
+            said = {name: {"const": word} for name, word in own.items()}
+            chosen.append({"if": {"properties": said, "required": list(own)}, "then": form})
+            for name, word in own.items():
+                words[name].append(word)
+            keys |= dict.fromkeys(key_fields(model))
+        properties = {n: {"enum": list(dict.fromkeys(found))} for n, found in words.items()}
+        return {
+            "type": "object",
+            "required": [self.telling[0]],
+            "properties": properties,
+            "propertyNames": {"enum": list(keys)},
+            "allOf": chosen,
+        }
 
 
 def word_or(model: type[BaseModel], words: Mapping[str, Any]) -> Either:

@@ -20,6 +20,7 @@ from vcam_cli.spectra.spectrum import (
     photons,
 )
 from vcam_cli.spectra.standard import (
+    LAMPS,
     LUMINOUS_EFFICACY,
     VISIBLE,
     cmf,
@@ -34,6 +35,7 @@ from vcam_cli.spectra.standard import (
 
 __all__ = [
     "BOLTZMANN",
+    "LAMPS",
     "LUMINOUS_EFFICACY",
     "PHOTONS",
     "PLANCK",
