@@ -42,6 +42,7 @@ CHANGES = {
     "pixel.readout.telegraph_noise": {"fraction": "9 %", "amplitude": "9 e"},
     "pixel.readout.reset_noise": "9 e",
     "pixel.readout.charge_transfer": {"inefficiency": 1e-3},
+    "pixel.readout.timing": {"pixel_time": "1 us"},
     "pixel.photodetector.dark_current": "900 e/s",
     "pixel.photodetector.dark_current_density": "5 nA/cm2",
     "pixel.photodetector.dark_current_scale": 3,

@@ -11,6 +11,7 @@ from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived import (
     electrical,
     falloff,
+    frame_rate,
     geometry,
     lens_mtf,
     named_spectra,
@@ -96,6 +97,7 @@ FORMAT = FileFormat(
         (falloff.check, "scene optics pixel array"),
         (lens_mtf.check, "scene optics pixel array"),
         (photodiode.check, "pixel"),
+        (frame_rate.check, "pixel array"),
     ),
     stand_in=example,
 )

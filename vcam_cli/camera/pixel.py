@@ -24,6 +24,7 @@ from vcam_cli.config.values import (
     Electrons,
     Fraction,
     MaybeFraction,
+    MaybeTime,
     Percent,
     Positive,
     SiliconTemperature,
@@ -48,6 +49,26 @@ class ChargeTransfer(Model):
         "charge left behind at a stage", example=3e-5, default=3e-5
     )
     phases: Annotated[int, Whole(least=1, most=8, example="3")] = key("stages per pixel", default=3)
+
+
+class Timing(Model):
+    """Clocks of the readout, from which `vcam plan` has the frame rate."""
+
+    pixel_time: MaybeTime = key(
+        "of one pixel at an output; default of a ccd: as fast as its charge transfer allows, of"
+        " others none, where columns have an ADC each",
+        example="25 ns",
+        default=None,
+    )
+    row_time: MaybeTime = key(
+        "to bring a row to the foot of its columns", example="10 us", default=None
+    )
+    conversion_time: Annotated[float, Quantity("time", least=0, most=1e9)] = key(
+        "of the ADCs in all pixels of a dps", example="1 ms", unit="ms", default=0.0
+    )
+    outputs: Annotated[int, Whole(least=1, most=10_000, example="1")] = key(
+        "pixels that leave the array at a time", default=1
+    )
 
 
 class Readout(Model):
@@ -118,6 +139,10 @@ class Readout(Model):
     )
     charge_transfer: Annotated[ChargeTransfer | None, mapping(ChargeTransfer)] = key(
         "of a ccd; default the example's", example={"inefficiency": 3e-5, "phases": 3}, default=None
+    )
+
+    timing: Annotated[Timing | None, mapping(Timing)] = key(
+        "clocks, for the frame rate of vcam plan alone", example={"row_time": "10 us"}, default=None
     )
 
     @model_validator(mode="after")

@@ -63,6 +63,7 @@ def plan(
             camera, scenes, out, options.overrides(set_, accuracy=accuracy), quiet, workers
         )
         return
+    from vcam_cli.camera.derived.frame_rate import frame_rate
     from vcam_cli.files.report import to_json
     from vcam_cli.simulation.checks import load
     from vcam_cli.simulation.simulate import prepare
@@ -74,9 +75,15 @@ def plan(
         options.say(note, quiet)
     report = ready.plan.report()
     solved = ready.layout.report(ready.spectrum.oversampling)
+    readout = frame_rate(model)
+    said, rate_of_frames = {}, ""
+    if readout is not None:
+        rate = readout.rate(ready.exposure_time)
+        said = {"frame_rate": {"readout_time": readout.readout_time, "frames_per_second": rate}}
+        rate_of_frames = f"{rate:.4g} frames/s, {readout.rate():.4g} at most: {readout.reason}"
     if as_json:
         samples = {"captures": list(ready.times)} if ready.times else {}
-        print(to_json({**report, **samples, "geometry": solved}), end="")
+        print(to_json({**report, **samples, **said, "geometry": solved}), end="")
     elif geometry:
         from vcam_cli.commands.geometry_table import geometry_table
 
@@ -85,7 +92,7 @@ def plan(
         print(geometry_table(solved, step, (band.start, band.stop)))
     else:
         print(table(report))
-        print(facts(report, solved, ready.exposure_time, ready.times))
+        print(facts(report, solved, ready.exposure_time, ready.times, rate_of_frames))
 
 
 def _plan_scenes(
@@ -144,9 +151,13 @@ def table(report: dict) -> str:
 
 
 def facts(
-    report: dict, geometry: dict, exposure_time: float, samples: tuple[float, ...] = ()
+    report: dict,
+    geometry: dict,
+    exposure_time: float,
+    samples: tuple[float, ...] = (),
+    frame_rate: str = "",
 ) -> str:
-    """Return settings, geometry, exposure and cost as text, in a few lines."""
+    """Return settings, geometry, exposure, frame rate and cost as text, in a few lines."""
     from vcam_cli.units import render
 
     named = dict(report["settings"])
@@ -163,6 +174,7 @@ def facts(
             f"settings   {knobs}",
             f"geometry   {geometry['rows']} x {geometry['columns']} {place}",
             f"exposure   {exposure_time:.4g} s{several}",
+            *([f"readout    {frame_rate}"] if frame_rate else []),
             f"cost       about {report['seconds']:.2g} s and {report['memory_bytes'] / 1e6:.0f} MB",
         )
     )
