@@ -67,6 +67,12 @@ def test_pixels_that_are_joined_first_are_read_as_one(tmp_path):
     assert found.readout_time == pytest.approx(50 * (8e-6 + 50e-6))
 
 
+def test_the_lines_of_a_rolling_shutter_tell_the_time(tmp_path):
+    rolling = {"exposure": {"time": "1 ms", "shutter": {"rolling": {"line_time": "20 us"}}}}
+    found = rate_of(tmp_path, "aps-3t", **rolling)
+    assert found.rate(1e-3) == pytest.approx(1 / (100 * 20e-6)), "exposed while others are read"
+
+
 def test_without_clocks_nothing_is_said(tmp_path):
     assert rate_of(tmp_path, "aps-3t") is None
     stages = {"pixel.readout.charge_transfer": {"inefficiency": 1e-5, "phases": 1}}

@@ -6,8 +6,9 @@
     dps                conversion_time + rows x columns x pixel_time / outputs
     ccd (interline)    rows x (a shift of the vertical registers + columns x pixel_time / outputs)
 
-A frame is read while the next one is exposed, where charge is moved away first (ccd, dps): then the
-longer of both counts. The others begin anew after their readout: both times add up.
+A frame is read while the next one is exposed, where charge is moved away first (ccd, dps) or the
+shutter is rolling: then the longer of both counts. The others begin anew after their readout, and
+both times add up. Without clocks, the lines of a rolling shutter tell the time.
 
 References
 ----------
@@ -27,8 +28,6 @@ from vcam_cli.errors import bad
 from vcam_cli.physics.transfer_time import transfer_time
 
 PATH = "pixel.readout.timing"
-OVERLAPPING = ("ccd", "dps")
-"""Architectures that read a frame while the next one is exposed."""
 
 
 @dataclass(frozen=True)
@@ -62,6 +61,12 @@ def frame_rate(camera: Camera) -> FrameRate | None:
         if given is None and (transfer.phases == 1 or transfer.inefficiency == 0):
             return None
         return _of_registers(camera, given or Timing(), transfer)
+    rolling = camera.exposure.rolling
+    if given is None and rolling is not None and rolling.line_time > 0:
+        lines, along = lattice(camera), rolling.direction in ("down", "up")
+        count = lines.rows if along else lines.columns
+        reason = f"{count} lines of {_text(rolling.line_time)}, each exposed while others are read"
+        return FrameRate(count * rolling.line_time, True, reason)
     if given is None:
         return None
     needed = "pixel_time" if name == "dps" else "row_time"
@@ -79,7 +84,7 @@ def frame_rate(camera: Camera) -> FrameRate | None:
     assert given.row_time is not None
     row = given.row_time + at_output
     reason = f"{rows} rows of {_text(given.row_time)} and {_text(at_output)} for {columns} pixels"
-    return FrameRate(rows * row, False, reason)
+    return FrameRate(rows * row, rolling is not None, reason)
 
 
 def _of_registers(camera: Camera, given: Timing, transfer: ChargeTransfer) -> FrameRate:
