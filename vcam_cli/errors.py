@@ -124,12 +124,13 @@ def data_file_problems(file: str | PathLike[str], path: Path, remedy: str) -> It
     path : tuple
         The key that names it.
     remedy : str
-        What to write, for a file whose content is wrong.
+        What to write, for a file whose content is wrong and whose reader does not say it.
     """
     try:
         yield
     except ValueError as error:
-        raise bad(path, str(error), remedy) from None
+        message, _, own = str(error).partition("; write ")
+        raise bad(path, message, f"write {own}" if own else remedy) from None
     except OSError as error:
         raise bad(path, f"{file} cannot be read: {error.strerror}", "check the file name") from None
 

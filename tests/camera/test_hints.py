@@ -1,6 +1,8 @@
 """What a newcomer writes first is answered with the key and the value that are meant."""
 
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -49,6 +51,33 @@ GUESSES = {
     "array.cfa=bayer": "array.pattern: bayer-rggb",
     "pixel.temperature=20 C": "pixel.temperature: 20 degC",
     "optics.focal_length=50": "optics.focal_length: 3.2 mm",
+    # the value that was given, where it is one
+    "pixel.full_well=6000": "pixel.readout.full_well: 6000 e",
+    "pixel.full_well=6000 e-": "pixel.readout.full_well: 6000 e",
+    "pixel.readout.full_well=6 ke-": "pixel.readout.full_well: 6 ke",
+    "pixel.read_noise=1.8 e- rms": "pixel.readout.read_noise: 1.8 e",
+    "pixel.readout.read_noise=1.8 electrons": "pixel.readout.read_noise: 1.8 e",
+    "pixel.dark_current=3 e-/s": "pixel.photodetector.dark_current: 3 e/s",
+    "pixel.qe=60%": "pixel.photodetector.quantum_efficiency: 60%",
+    "pixel.prnu=1": "pixel.fpn.prnu: 1 %",
+    "pixel.size=1.4": "pixel.width: 1.4 um",
+    "array.width=4032": "array.columns: 4032",
+    "optics.aperture=f/1.8": "optics.f_number: 1.8",
+    "exposure.shutter=1/500": "exposure.time: 1/500 s",
+    # a value in place of its section
+    "exposure=1/30 s": "exposure: {time: 1/30 s}",
+    "exposure=1/30": "exposure: {time: 1/30 s}",
+    "exposure=ISO 400": "exposure: {time: 30 ms, iso: 400}",
+    "adc=10 bit": "adc: {bits: 10}",
+    "adc=12-bit": "adc: {bits: 12}",
+    "array=640x480": "array: {columns: 640, rows: 480}",
+    "optics=f/1.8": "optics: {f_number: 1.8, focal_length: 4.5 mm}",
+    # a file in place of what names it
+    "array.filters=qe.csv": "array.filters: {file: qe.csv}",
+    "scene.illuminant=lamp.csv": "scene.illuminant: {file: lamp.csv}",
+    "optics.psf=psf.csv": "optics.psf: {file: psf.csv, pitch: 0.5 um}",
+    "optics.mtf=mtf.csv": "optics.mtf: {file: mtf.csv}",
+    "optics.off_axis=falloff.csv": "optics.off_axis: {file: falloff.csv}",
 }
 """A first guess -> what it is to be led to."""
 
@@ -58,6 +87,12 @@ def folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     Path("camera.yaml").write_text(BASE, encoding="utf-8")
     Path("photo.png").touch()
+    rows = "\n".join(f"{nm},0.5,0.4,0.3" for nm in range(380, 781, 10))
+    Path("qe.csv").write_text(f"wavelength,R,G,B\n{rows}\n")
+    Path("lamp.csv").write_text("nm,W\n380,1\n780,2\n")
+    Path("psf.csv").write_text("0,1,0\n1,2,1\n0,1,0\n")
+    Path("mtf.csv").write_text("frequency_lp_per_mm,value\n0,1\n100,0\n")
+    Path("falloff.csv").write_text("image_height_mm,value\n0,1\n5,0.5\n")
 
 
 def remedy_of(guess):
@@ -125,3 +160,32 @@ def test_an_unknown_word_is_not_led_astray():
 def test_a_step_of_processing_is_named_as_one():
     remedy, _ = remedy_of("white_balance=auto")
     assert "a step of processing: - white_balance: illuminant" in remedy
+
+
+@pytest.mark.parametrize(
+    ("option", "meant"),
+    [
+        ("--iso", "exposure.iso=800"), ("--time", "exposure.time=30 ms"),
+        ("--f-number", "optics.f_number=2.8"), ("--rows", "array.rows=480"),
+        ("--bits", "adc.bits=10"), ("--qe", "pixel.photodetector.quantum_efficiency=0.5"),
+    ],
+)  # fmt: skip
+def test_an_option_that_is_a_key_is_led_to_set(option, meant):
+    """And what it is led to is taken."""
+    path, _, value = meant.partition("=")
+    line = [sys.executable, "-m", "vcam_cli.commands.main", "run", "camera.yaml", option, "1"]
+    done = subprocess.run(line, capture_output=True, text=True)
+    assert done.returncode == 2
+    assert f'--set {path}="{value}"' in done.stderr
+    load("camera.yaml", [meant])
+
+
+@pytest.mark.parametrize(
+    ("option", "meant"),
+    [("--resume", "the same command goes on"), ("--jobs", "--workers"), ("--exposure", "--set")],
+)
+def test_an_option_of_other_programs(option, meant):
+    line = [sys.executable, "-m", "vcam_cli.commands.main", "run", "camera.yaml", option, "1"]
+    done = subprocess.run(line, capture_output=True, text=True)
+    assert done.returncode == 2
+    assert meant in done.stderr

@@ -11,6 +11,7 @@ from dataclasses import replace
 from functools import cache
 from pathlib import PurePath
 
+from vcam_cli import units
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.scene import CHARTS
 from vcam_cli.config.key_index import Key, keys
@@ -84,6 +85,8 @@ ELSEWHERE: Mapping[Path, Mapping[str, str]] = {
     ("adc",): {"black_level": "adc.offset: 64 DN"},
     ("effects",): {"noise": "effects: {shot_noise: off, read_noise: off, fpn: off}"},
     (): {
+        "rows": "array.rows: 480",
+        "columns": "array.columns: 640",
         "lens": "optics: {f_number: 2.8, focal_length: 4.5 mm}",
         "sensor": "pixel: {width: 4 um} and array: {rows: 480, columns: 640}",
         "noise": "effects: {shot_noise: off, read_noise: off, fpn: off}",
@@ -110,9 +113,23 @@ VALUES: Mapping[str, Mapping[str, str]] = {
     "pixel.readout.reset_noise": {"cds": "none"},
 }
 """A key -> what stands there and is not allowed -> what to write."""
+BARE: Mapping[str, str] = {
+    unit: unit.removeprefix("k") for unit in ("e", "ke", "e/s", "um", "lx", "cd/m2", "%")
+}
+"""Unit of a key -> unit that a number without one has, where no other is usual."""
 _NUMBER = r"(\d+(?:\.\d+)?)"
 FORMS: Mapping[str, tuple[tuple[str, str], ...]] = {
     "optics.f_number": ((rf"[fF] ?/? ?{_NUMBER}", r"write \1"),),
+    "exposure": (
+        (r"(1/\d+|[\d.]+) ?(s|ms|us)", r"write {time: \g<0>}"),
+        (r"1/\d+", r"write {time: \g<0> s}"),
+        (r"(?i)iso ?(\d+)", r"write {time: 30 ms, iso: \1}"),
+    ),
+    "adc": ((r"(\d+)[ -]?(bits?)?", r"write {bits: \1}"),),
+    "array": ((r"(\d+) ?[xX*×] ?(\d+)", r"write {columns: \1, rows: \2}"),),
+    "pixel": ((rf"{_NUMBER} ?[uµμ]m", r"write width: \1 um below it"),),
+    "optics": ((rf"[fF] ?/? ?{_NUMBER}", r"write {f_number: \1, focal_length: 4.5 mm}"),),
+    "scene": ((r".*\.(png|jpe?g|tiff?|exr)", r"write {source: {kind: image, file: \g<0>}, ...}"),),
     "exposure.time": (
         (r"1/\d+(\.\d+)?", r"write \g<0> s"),
         ("auto", "write exposure: {auto: {max: 100 ms}}"),
@@ -131,6 +148,8 @@ FORMS: Mapping[str, tuple[tuple[str, str], ...]] = {
 AT_MOST_1 = "it must be at most 1"
 """What is said of a fraction that is too large, mostly since it is in percent."""
 _PICTURES = {".png", ".jpg", ".jpeg", ".tif", ".tiff", ".exr", ".hdr", ".bmp", ".webp", ".pfm"}
+_DATA = _PICTURES | {".csv", ".txt", ".dat", ".npy", ".tsv"}
+"""Ends of names of files that hold a curve, a table or a point spread function."""
 _SEPARATE = {"name", "kind", "file", "value", "rows", "columns"}
 """Keys that many mappings have: elsewhere they mean something else."""
 
@@ -140,6 +159,16 @@ def index() -> tuple[Key, ...]:
     """Return all keys of a camera file, each path once; those of a technology file aside."""
     found = {key.path: key for key in reversed(list(keys(Camera))) if "from" not in key.path[:-1]}
     return tuple(reversed(found.values()))
+
+
+def set_option(name: str) -> str:
+    """Return the `--set` that is meant by an option that no command has; "" for none known."""
+    word = _plain(name.lstrip("-"))
+    entry = re.split(" or | and ", _meant_key((word,), None))[0]
+    path, _, value = entry.partition(": ")
+    if path.startswith("write "):
+        return f'--set {path.removeprefix("write ")}="{value}"'
+    return f"--set {word}.KEY=VALUE" if word in Camera.model_fields else ""
 
 
 def advise(problem: Problem, given: object) -> Problem:
@@ -164,7 +193,7 @@ def _meant_key(path: Path, given: object) -> str:
     word, above = _plain(path[-1]), tuple(path[:-1])
     here = [key.name for key in index() if key.path[:-1] == above]
     if said := ELSEWHERE.get(above, {}).get(word):
-        return f"write {said}"
+        return f"write {_with_value(said, given)}"
     if (
         path[0] in ("processing", "accuracy")
         or "technology" in above
@@ -188,9 +217,14 @@ def _meant_key(path: Path, given: object) -> str:
 
 def _entry(word: str, given: object) -> str:
     """Return what is meant by a word of `KEYS`, with the value that was given if it will do."""
-    path, _, example = KEYS[word].partition(": ")
+    return _with_value(KEYS[word], given)
+
+
+def _with_value(entry: str, given: object) -> str:
+    """Return an entry "path: value", with the value that was given if it will do."""
+    path, _, example = entry.partition(": ")
     key = next((key for key in index() if key.dotted == path), None)
-    return f"{path}: {_value(given, key, example)}" if key else KEYS[word]
+    return f"{path}: {_value(given, key, example)}" if key else entry
 
 
 def _place(key: Key, given: object) -> str:
@@ -202,10 +236,29 @@ def _place(key: Key, given: object) -> str:
 
 
 def _value(given: object, key: Key, example: str) -> str:
-    """Return the value that was given, where it looks like one of the key, or else an example."""
-    shaped = isinstance(given, str) and key.unit and given.endswith(key.unit.split("/")[-1])
-    bare = isinstance(given, (int, float)) and not isinstance(given, bool) and not key.unit
-    return yaml_text(given) if shaped or bare else example
+    """Return the value that was given, where it may be one of the key, or else an example."""
+    if isinstance(given, bool) or not isinstance(given, (str, int, float)):
+        return example
+    text = in_electrons(yaml_text(given))
+    if key.name == "f_number":
+        text = re.sub(r"^[fF] ?/? ?", "", text)
+    try:
+        number, unit = units.split(text)
+        if not unit and key.unit:
+            meant = "s" if "/" in text and key.unit == "ms" else BARE.get(key.unit)
+            return f"{text} {meant}" if meant else example
+        if unit == "%" and not key.unit:
+            return text
+        units.convert(number, unit, key.unit)
+    except ValueError:
+        return example
+    return text
+
+
+def in_electrons(text: str) -> str:
+    """Return a quantity with electrons as a file writes it: 6 e for 6 e-, 6 e- rms, 6 electrons."""
+    text = re.sub(r" ?rms$", "", text.strip())
+    return re.sub(r"(?<![a-z])(k?)(e-|electrons?)(?=$|/)", r"\1e", text)
 
 
 def _meant_value(problem: Problem, given: object) -> str:
@@ -219,6 +272,8 @@ def _meant_value(problem: Problem, given: object) -> str:
     for form, remedy in FORMS.get(path, ()):
         if match := re.fullmatch(form, word.strip()):
             return match.expand(remedy)
+    if (plain := in_electrons(word)) != word and " unit " in problem.message:
+        return f"write {plain}"
     if problem.remedy == AT_MOST_1 and isinstance(given, (int, float)) and 1 < given <= 100:
         return f"write {word} %, or {given / 100:g}"
     if path == "scene.source":
@@ -226,6 +281,11 @@ def _meant_value(problem: Problem, given: object) -> str:
             return f"write {{kind: image, file: {word}}}"
         chart = nearest(word, CHARTS)
         return f"write {{kind: chart, chart: {chart}}}" if chart else ""
+    file = next((key for key in index() if key.path == (*problem.path, "file")), None)
+    if file is not None and PurePath(word).suffix.lower() in _DATA:
+        beside = [k for k in index() if k.path[:-1] == problem.path and k.model is file.model]
+        needed = [f"{key.name}: {key.example}" for key in beside if key.required][1:]
+        return f"write {{{', '.join((f'file: {word}', *needed))}}}"
     key = next((key for key in index() if key.path == problem.path), None)
     if key is not None and key.unit and "bare number" in problem.message:
         before, has_example, _ = problem.remedy.partition("for example ")

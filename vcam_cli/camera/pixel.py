@@ -243,7 +243,8 @@ def _is_determined(given: Mapping[str, Any]) -> Iterator[InitErrorDetails]:
     here = ("photodetector",)
     if not {"fill_factor", "width", "height"} & set(detector):
         message = "the photodetector's size is missing"
-        yield fault(here, message, "add fill_factor: 0.3, or width and height")
+        remedy = "add fill_factor: 0.3 (1 for a data sheet's QE of the whole pixel)"
+        yield fault(here, message, f"{remedy}, or width and height")
     if "quantum_efficiency" not in detector:
         example = "add it, for example quantum_efficiency: 0.5"
         yield fault((*here, "quantum_efficiency"), "is missing", example)

@@ -22,7 +22,7 @@ from vcam_cli.capture_schedules import pdf_scale
 from vcam_cli.capture_schedules.model import ScheduleStudy
 from vcam_cli.capture_schedules.pdf_source import MOST_PHOTOCURRENT, PdfSource
 from vcam_cli.config import validation_messages
-from vcam_cli.config.document import place_order
+from vcam_cli.config.document import given_at, place_order
 from vcam_cli.config.file_names import argument_file, current_folder, existing_file, referenced_file
 from vcam_cli.config.merge import Alternatives, MergeRules, merge
 from vcam_cli.config.overrides import overlay
@@ -32,6 +32,7 @@ from vcam_cli.errors import BadInput, Problem
 from vcam_cli.scheduling.pdf import Pdf
 from vcam_cli.simulation import checks, provenance
 from vcam_cli.spectra.text import parse_numbers, read_table
+from vcam_cli.sweeps import study_hints
 from vcam_cli.sweeps.sweep_file import refuse_others
 
 HISTOGRAM, LEVELS = ("low", "high", "count"), ("level", "count")
@@ -143,7 +144,8 @@ def _validate(file: Path, tree: Node) -> ScheduleStudy:
     try:
         return ScheduleStudy.model_validate(value)
     except ValidationError as error:
-        unnamed = validation_messages.problems(error)
+        bare = validation_messages.problems(error)
+        unnamed = [study_hints.advise(p, given_at(tree, p.path)) for p in bare]
         located = BadInput(unnamed).with_places(Origin(file, (file,), tree).locate).problems
         raise BadInput(sorted(located, key=place_order)) from None
 

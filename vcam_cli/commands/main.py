@@ -53,6 +53,17 @@ COMMANDS = {
 }  # command -> module in this package : function
 
 
+OPTIONS = {
+    **dict.fromkeys(("--resume", "--continue"), "none; the same command goes on where it stopped"),
+    **dict.fromkeys(("--jobs", "--threads", "--cores", "--processes"), "--workers"),
+    **dict.fromkeys(("--output", "--output-dir", "--dir"), "--out"),
+    **dict.fromkeys(("--verbose", "--debug"), "none; vcam plan says what a run does, and why"),
+}
+"""An option of other programs -> the one of this."""
+UsageError: type[Exception] = typer.BadParameter.__mro__[1]
+"""Of wrong arguments: typer exports only errors below it."""
+
+
 class Commands(TyperGroup):
     """The commands of `COMMANDS`, each imported when it is wanted."""
 
@@ -134,6 +145,9 @@ def report_failures() -> Iterator[None]:
     try:
         with interrupts.restore_interrupt():
             yield
+    except UsageError as error:
+        _suggest_key(error)
+        raise
     except VcamError as error:
         _exit(str(error), error.exit_code, error)
     except MemoryError as error:
@@ -144,6 +158,20 @@ def report_failures() -> Iterator[None]:
             interrupts.INTERRUPTED,
             error,
         )
+
+
+def _suggest_key(error: Any) -> None:
+    """Suggest the key of a camera file where an option is not there, such as --iso."""
+    option = getattr(error, "option_name", None)
+    if option is None:
+        return
+    if said := OPTIONS.get(option):
+        error.possibilities = [said]
+        return
+    from vcam_cli.camera.hints import set_option
+
+    if meant := set_option(option):
+        error.possibilities = [meant]
 
 
 def _exit(message: str, code: int, error: BaseException) -> None:

@@ -96,7 +96,7 @@ def exposure_lines(exposure: dict) -> list[str]:
     time = render(float(f"{exposure['time']:.4g}"), "time")
     how = f"{time} at gain {exposure['gain']:.4g}"
     if exposure["iso"]:
-        how += f", ISO {exposure['iso']:.3g}"
+        how += f", ISO {float(format(exposure['iso'], '.3g')):g}"
     if exposure["automatic"]:
         how += "; automatic"
     if exposure["stopped_by"]:

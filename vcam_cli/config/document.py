@@ -145,7 +145,7 @@ def _with_absolute_files(
     return visit(tree, ()), files
 
 
-def _given(tree: Node, path: errors.Path) -> object:
+def given_at(tree: Node, path: errors.Path) -> object:
     """Return what stands at a path, as YAML has it; None where nothing does."""
     value = tree.plain()
     for part in path:
@@ -171,7 +171,7 @@ def _validate(
         return format.model.model_validate(value), set()
     except ValidationError as error:
         problems = [
-            format.advise(problem, _given(tree, problem.path))
+            format.advise(problem, given_at(tree, problem.path))
             for problem in validation_messages.problems(error)
         ]
         findings.add(problems, origin.locate)

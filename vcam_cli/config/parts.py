@@ -105,7 +105,12 @@ class PartReader:
                 part = merge(part, own, self.format.merge_rules, path)
             return replace(part, whole=True)
         except BadInput as error:
-            self.findings.fail(path, error.problems)
+            here = {(), path}  # and not inside the part
+            problems = [
+                self.format.advise(replace(p, path=path), name.value) if p.path in here else p
+                for p in error.problems
+            ]
+            self.findings.fail(path, problems)
             return node
 
     def _part(self, name: Node, kind: str, path: errors.Path, chain: tuple[Path, ...]) -> Node:

@@ -142,7 +142,10 @@ def word_or(model: type[BaseModel], words: Mapping[str, Any]) -> Either:
         if isinstance(given, str) and given in words:
             return words[given]
         also = "a mapping of " + ", ".join(key_fields(model))
-        unknown = (f"{describe(given)} is not allowed here", f"write {also}")
+        unknown = (
+            "is empty" if given is None else f"{describe(given)} is not allowed here",
+            f"write {also}",
+        )
         raise refusal((), *(one_of(given, words, also) if words else unknown), given)
 
     return Either(pick, Literal[tuple(words)] | model if words else model, words)

@@ -21,12 +21,13 @@ from vcam_cli import errors, units
 from vcam_cli.camera import load as cameras
 from vcam_cli.camera.load import merge
 from vcam_cli.config import validation_messages
-from vcam_cli.config.document import Document, place_order
+from vcam_cli.config.document import Document, given_at, place_order
 from vcam_cli.config.file_names import argument_file, current_folder, referenced_file
 from vcam_cli.config.validation_messages import yaml_text
 from vcam_cli.config.yaml_reader import read_file
 from vcam_cli.config.yaml_tree import Node, Origin, PlacedKeys, Source, tree_at
 from vcam_cli.errors import BadInput, Problem, split
+from vcam_cli.sweeps import study_hints
 from vcam_cli.sweeps.model import VARY, Sweep
 from vcam_cli.sweeps.quantities import QUALITY, symbol
 
@@ -189,7 +190,8 @@ def read(study: str | Path, folder: Path | None = None) -> StudyFile:
     try:
         found = StudyFile(file, tree, Sweep.model_validate(value))
     except ValidationError as error:
-        unnamed = [_without_key_mark(p) for p in validation_messages.problems(error)]
+        bare = [_without_key_mark(p) for p in validation_messages.problems(error)]
+        unnamed = [study_hints.advise(p, given_at(tree, p.path)) for p in bare]
         origin = Origin(file, (file,), tree)
         located = BadInput(unnamed).with_places(origin.locate).problems
         raise BadInput(sorted(located, key=place_order)) from None
