@@ -8,6 +8,7 @@ import sys
 import pytest
 
 from vcam_cli.accuracy.plots import Curve, Pair, pareto
+from vcam_cli.files.plots import in_formats
 
 PRESETS = ((0.1, 1e-3, "draft"), (0.2, 2e-4, "standard"), (3.0, 0.0, "reference"))
 CURVES = (Curve("oversampling", ((0.1, 4e-3, "1"), (0.4, 1e-4, "8"))),)
@@ -24,6 +25,23 @@ def drawn(path, panels=PANELS, curves=CURVES):
 
 def test_same_numbers_same_bytes(tmp_path):
     assert drawn(tmp_path / "a.png") == drawn(tmp_path / "b.png")
+
+
+@pytest.mark.parametrize(("form", "begins"), [("svg", b"<?xml"), ("pdf", b"%PDF")])
+def test_other_formats_have_the_same_bytes_too(form, begins, tmp_path, monkeypatch):
+    """Whenever they are drawn: a date in them would differ."""
+    one = drawn(tmp_path / f"a.{form}")
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", "86400")
+    assert drawn(tmp_path / f"b.{form}") == one
+    assert one.startswith(begins)
+
+
+def test_plots_get_further_formats_and_tables_do_not(tmp_path):
+    called = []
+    writers = {"a.png": called.append, "a.csv": called.append}
+    found = in_formats(writers, ("svg", "pdf"))
+    assert list(found) == ["a.png", "a.csv", "a.svg", "a.pdf"]
+    assert in_formats(writers, ()) == writers
 
 
 def test_nothing_in_the_file_but_the_picture(tmp_path):

@@ -235,7 +235,8 @@ def test_a_sweep_has_a_report_of_its_tables_and_plots(tmp_path):
     out = tmp_path / "out"
     words = ["sweep", "exposure-and-noise", "-q", "--workers", 1, "-o", out]
     more = [part for s in SMALL for part in ("--set", s)]
-    assert run(*words, *more, "--report").exit_code == 0
+    assert run(*words, *more, "--report", "--format", "pdf").exit_code == 0
+    assert (out / "mean_s_cielab.pdf").read_bytes().startswith(b"%PDF")
     found = check((out / "report.html").read_text("utf-8"))
     alts = {image["alt"] for image in found.images}
     assert any("mean_s_cielab" in alt for alt in alts)
@@ -243,16 +244,23 @@ def test_a_sweep_has_a_report_of_its_tables_and_plots(tmp_path):
     assert all(name in shown for name in ("points.csv", "optimum.csv", "timings.csv", "quiet"))
     assert "report.html" in json.loads((out / "study.json").read_text())["files"]
     points = (out / "points.csv").read_bytes()
-    again = run(*words, *more, "--report", "--json")
+    again = run(*words, *more, "--report", "--format", "pdf", "--json")
     assert json.loads(again.stdout)["computed"] == 0
     assert (out / "points.csv").read_bytes() == points
     assert run(*words, *more).exit_code == 0
     assert not (out / "report.html").exists()  # it is of a request that has one
+    assert not (out / "mean_s_cielab.pdf").exists()
 
 
 def test_a_schedule_has_a_report(tmp_path):
-    done = run("schedule", "captures", "--set", "counts=[2, 3]", "--report", "-q", "-o", tmp_path)
+    words = ["schedule", "captures", "--set", "counts=[2, 3]", "--report", "-q", "-o", tmp_path]
+    done = run(*words, "--format", "svg", "--format", "png")
     assert done.exit_code == 0, done.output
+    plots = {path.stem for path in tmp_path.glob("*.png")}
+    assert len(plots) >= 3
+    assert {path.stem for path in tmp_path.glob("*.svg")} == plots
+    assert not list(tmp_path.glob("*.pdf"))
+    assert run(*words, "--format", "bmp").exit_code == 2
     found = check((tmp_path / "report.html").read_text("utf-8"))
     assert "best of 3 captures" in "".join(found.texts)
     assert len(found.images) >= 2

@@ -9,7 +9,7 @@ import numpy as np
 
 from vcam_cli.capture_schedules.methods import MethodResult, Task
 from vcam_cli.capture_schedules.pdf_plots import GRAY, Units
-from vcam_cli.files.plots import COLORS, png_figure
+from vcam_cli.files.plots import COLORS, plot_figure
 from vcam_cli.scheduling.pdf import Floats, Pdf
 
 if TYPE_CHECKING:
@@ -49,7 +49,7 @@ def plot_charge(result: ScheduleResult, shown: MethodResult, units: Units, path:
     wide = times[-1] > WIDE * times[0]
     start = times[0] / 3 if wide else 0.0
     line = np.geomspace(start, times[-1], POINTS) if wide else np.linspace(0, times[-1], POINTS)
-    with png_figure(path, (5.8, 3.6)) as figure:
+    with plot_figure(path, (5.8, 3.6)) as figure:
         axes = figure.add_subplot()
         axes.axhline(1.0, color=GRAY, lw=0.9, ls=(0, (4, 3)))
         axes.vlines(times / size, 0, 1.0, color=GRAY, lw=0.5, alpha=0.6)

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vcam_cli.files.plots import COLORS, png_figure
+from vcam_cli.files.plots import COLORS, plot_figure
 from vcam_cli.files.png import write_png
 
 Square = tuple[slice, slice]
@@ -167,6 +167,6 @@ def _show_picture(
 @contextmanager
 def _titled_figure(path: Path | str, title: str, size: tuple[float, float]) -> Iterator[Any]:
     """Yield a figure with a title above all its axes."""
-    with png_figure(path, size) as figure:
+    with plot_figure(path, size) as figure:
         yield figure
         figure.suptitle(title, x=0.01, ha="left", fontsize=10)

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vcam_cli.files.plots import COLORS, png_figure
+from vcam_cli.files.plots import COLORS, plot_figure
 from vcam_cli.scheduling.pdf import Floats, Indices, Pdf
 
 WIDE = 0.05
@@ -82,7 +82,7 @@ def plot_pdf_and_captures(
         If the file cannot be written.
     """
     wide = is_wide(panels[0][1])
-    with png_figure(path, (6.4, 0.9 + 2.1 * len(panels))) as figure:
+    with plot_figure(path, (6.4, 0.9 + 2.1 * len(panels))) as figure:
         above = None
         for row, (name, pdf) in enumerate(panels):
             axes = figure.add_subplot(len(panels), 1, row + 1, sharex=above)
@@ -122,7 +122,7 @@ def plot_binning(
     wide = is_wide(original)
     columns = 2 if len(steps) > 3 else 1
     rows = -(-len(steps) // columns)
-    with png_figure(path, (7.2 if columns == 2 else 5.6, 0.8 + 1.6 * rows)) as figure:
+    with plot_figure(path, (7.2 if columns == 2 else 5.6, 0.8 + 1.6 * rows)) as figure:
         above = None
         for number, (name, pdf) in enumerate(steps):
             axes = figure.add_subplot(rows, columns, number + 1, sharex=above, sharey=above)

@@ -22,7 +22,7 @@ from vcam_cli.capture_schedules.pdf_plots import (
     is_wide,
     label_axes,
 )
-from vcam_cli.files.plots import COLORS, png_figure
+from vcam_cli.files.plots import COLORS, plot_figure
 from vcam_cli.scheduling.pdf import Pdf
 from vcam_cli.scheduling.sensor import Sensor
 
@@ -69,7 +69,7 @@ def plot_gain(result: ScheduleResult, path: Path) -> None:
         If the file cannot be written.
     """
     task = result.task
-    with png_figure(path, (7.6, 4.1)) as figure:
+    with plot_figure(path, (7.6, 4.1)) as figure:
         grid = figure.add_gridspec(1, 2, width_ratios=(2.1, 1))
         axes = figure.add_subplot(grid[0, 0])
         _draw_gain_curves(axes, _curves_over_captures(result.found, task), ms=3.8, lw=1.1)
@@ -96,7 +96,7 @@ def plot_gain_over_segments(result: ScheduleResult, path: Path) -> None:
     """
     count = max(result.study.model.counts)
     best = result.task.exact_task.optimum([count])[count]
-    with png_figure(path, (5.6, 3.7)) as figure:
+    with plot_figure(path, (5.6, 3.7)) as figure:
         axes = figure.add_subplot()
         _draw_gain_curves(axes, _curves_over_segments(result, count), ms=4, lw=1.2)
         axes.axhline(result.task.gain(best), color=GRAY, lw=0.9, ls=DASHED,
@@ -119,7 +119,7 @@ def plot_captures(result: ScheduleResult, path: Path) -> None:
     if result.study.model.sensor is None:
         units = Units(units.photocurrent, units.time, task.first)
     rows = _results_of_count(result, count)
-    with png_figure(path, (6.8, 2.3 + 0.32 * len(rows))) as figure:
+    with plot_figure(path, (6.8, 2.3 + 0.32 * len(rows))) as figure:
         grid = figure.add_gridspec(2, 1, height_ratios=(1.2, 0.3 * len(rows) + 0.2))
         top = figure.add_subplot(grid[0, 0])
         axes = figure.add_subplot(grid[1, 0], sharex=top)

@@ -41,6 +41,7 @@ from vcam_cli.capture_schedules.photocurrents import Approximation
 from vcam_cli.capture_schedules.schedule_file import ScheduleFile
 from vcam_cli.errors import BadInput
 from vcam_cli.files.folder import OutputFolder
+from vcam_cli.files.plots import in_formats
 from vcam_cli.files.points_store import RECORD
 from vcam_cli.floats import own_float_errors
 from vcam_cli.progress import Observer, Silent
@@ -166,6 +167,7 @@ def schedule(
     watch: Observer | None = None,
     tell: Callable[[str], None] | None = None,
     report: bool = False,
+    formats: Sequence[str] = (),
 ) -> ScheduleResult:
     """Run a study of capture schedules, and write its tables and plots.
 
@@ -187,6 +189,8 @@ def schedule(
         Gets messages.
     report : bool
         Whether to write report.html.
+    formats : sequence of str
+        Formats of plots beside PNG: "svg", "pdf".
 
     Raises
     ------
@@ -216,7 +220,7 @@ def schedule(
         for note in result.notes:
             tell(note)
         watch.begin("tables and plots")
-        for name, write in tables.writers(result).items():
+        for name, write in in_formats(tables.writers(result), formats).items():
             write(folder.new(name))
         result = replace(result, frames=_take_frames(read, folder, workers, watch))
         result = replace(result, seconds=time.perf_counter() - start)

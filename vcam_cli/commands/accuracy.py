@@ -37,6 +37,7 @@ def accuracy(
     quiet: options.Quiet = False,
     workers: options.Workers = None,
     wants_report: options.Report = False,
+    formats: options.Formats = None,
 ) -> None:
     """Show what accuracy costs: error and seconds of every preset, knob and effect.
 
@@ -48,8 +49,9 @@ def accuracy(
       vcam accuracy starter
       vcam accuracy camera.yaml -o out/knobs --set optics.f_number=8
     """
-    from vcam_cli.accuracy import plots, study
-    from vcam_cli.files import report, tables
+    from vcam_cli.accuracy import study
+    from vcam_cli.accuracy.plots import pareto
+    from vcam_cli.files import plots, report, tables
     from vcam_cli.files.folder import OutputFolder
     from vcam_cli.reports import study_report
     from vcam_cli.simulation import provenance
@@ -63,7 +65,9 @@ def accuracy(
         found = study.accuracy(model, workers, progress)
         rows = (point.row for point in found.points)
         tables.write_table(folder.new("accuracy.csv"), study.COLUMNS, rows)
-        plots.pareto(folder.new("accuracy.png"), *pareto_arguments(found))
+        drawn = {"accuracy.png": lambda path: pareto(path, *pareto_arguments(found))}
+        for name, draw in plots.in_formats(drawn, formats or ()).items():
+            draw(folder.new(name))
         if wants_report:
             study_report.write(folder, **report_arguments(found))
         record = found.report() | {"camera": model.model_dump(mode="json")}

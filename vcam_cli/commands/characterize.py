@@ -2,6 +2,7 @@
 
 import sys
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -52,6 +53,7 @@ def characterize(
     quiet: options.Quiet = False,
     workers: options.Workers = None,
     wants_report: options.Report = False,
+    formats: options.Formats = None,
 ) -> None:
     """Measure a camera on a simulated bench: photon transfer, noise, range, linearity, MTF.
 
@@ -68,7 +70,7 @@ def characterize(
     from vcam_cli.characterization import characterize as study
     from vcam_cli.characterization.kept_frames import DESCRIPTOR, FrameFiles
     from vcam_cli.characterization.plots import characterization_panels
-    from vcam_cli.files import curves, report, tables
+    from vcam_cli.files import curves, plots, report, tables
     from vcam_cli.files.folder import OutputFolder
     from vcam_cli.reports import study_report
     from vcam_cli.simulation import provenance
@@ -83,8 +85,12 @@ def characterize(
         found = study.characterize(model, workers, progress, keeper)
         rows = (quantity.row for quantity in found.quantities)
         tables.write_table(folder.new("characterize.csv"), study.COLUMNS, rows)
-        for name, (title, panels) in characterization_panels(found).items():
-            curves.draw(folder.new(name), title, panels)
+        drawn = {
+            name: partial(curves.draw, title=title, panels=panels)
+            for name, (title, panels) in characterization_panels(found).items()
+        }
+        for name, draw in plots.in_formats(drawn, formats or ()).items():
+            draw(folder.new(name))
         if wants_report:
             study_report.write(folder, **report_arguments(found))
         record = found.report() | {"camera": model.model_dump(mode="json")}

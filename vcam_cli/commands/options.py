@@ -123,6 +123,27 @@ Report = Annotated[
         "--report", help="Also write report.html: all of it on one page, to read or send."
     ),
 ]
+
+
+def check_formats(values: list[str] | None) -> list[str]:
+    """Check that values are formats of plots; png, which is always written, adds nothing."""
+    known = ("png", "svg", "pdf")
+    for value in values or ():
+        if value not in known:
+            raise typer.BadParameter(f"{value!r} is not one of {', '.join(known)}")
+    return [value for value in dict.fromkeys(values or ()) if value != "png"]
+
+
+Formats = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--format",
+        metavar="FORMAT",
+        callback=check_formats,
+        autocompletion=lambda: ["svg", "pdf"],
+        help="Write plots as svg or pdf, too, beside PNG. Repeatable.",
+    ),
+]
 MOST_WORKERS_A_CORE = 4
 """Threads or processes, from which on more only wait for each other."""
 

@@ -54,6 +54,7 @@ def schedule(
     quiet: options.Quiet = False,
     workers: options.Workers = None,
     report: options.Report = False,
+    formats: options.Formats = None,
 ) -> None:
     """Find the best times to read a pixel several times, and the gain over reading it once.
 
@@ -73,7 +74,16 @@ def schedule(
 
     with Progress(quiet) as progress:
         result = run(
-            study, out, list(set_ or ()), seed or 0, accuracy, workers, progress, tell, report
+            study,
+            out,
+            list(set_ or ()),
+            seed or 0,
+            accuracy,
+            workers,
+            progress,
+            tell,
+            report,
+            formats or (),
         )
     if as_json:
         print(to_json(result.summary()), end="")

@@ -76,6 +76,7 @@ def sweep(
     shard: Shard = None,
     fresh: Fresh = False,
     wants_report: options.Report = False,
+    formats: options.Formats = None,
 ) -> None:
     """Run a sweep study and write points.csv, optimum.csv and a plot of every metric.
 
@@ -111,6 +112,7 @@ def sweep(
                     progress,
                     tell,
                     wants_report,
+                    formats or (),
                 )
         except KeyboardInterrupt as error:
             options.say("interrupted; finished points are kept, the same command goes on with them")

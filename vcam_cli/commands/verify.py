@@ -1,6 +1,7 @@
 """`vcam verify`: what a camera file predicts beside what was measured."""
 
 import sys
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -31,6 +32,7 @@ def verify(
     set_: options.Set = None,
     accuracy: options.Accuracy = None,
     wants_report: options.Report = False,
+    formats: options.Formats = None,
     as_json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
@@ -45,7 +47,7 @@ def verify(
       vcam verify test-pixel-0.18um test-pixel-simulated
       vcam verify camera.yaml bench.yaml --set pixel.temperature="310 K"
     """
-    from vcam_cli.files import report, tables
+    from vcam_cli.files import plots, report, tables
     from vcam_cli.files.folder import OutputFolder
     from vcam_cli.reports import study_report
     from vcam_cli.simulation import provenance
@@ -62,7 +64,9 @@ def verify(
         found = comparison.verify(model, measured, bar)
         rows = (row.cells for row in found.rows)
         tables.write_table(folder.new("verify.csv"), comparison.COLUMNS, rows)
-        draw_errors(folder.new("errors.png"), found)
+        drawn = {"errors.png": partial(draw_errors, result=found)}
+        for name, draw in plots.in_formats(drawn, formats or ()).items():
+            draw(folder.new(name))
         if wants_report:
             study_report.write(folder, **report_arguments(found))
         forms = {

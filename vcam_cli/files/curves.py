@@ -13,7 +13,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from vcam_cli.files.plots import COLORS, MARKERS, png_figure
+from vcam_cli.files.plots import COLORS, MARKERS, plot_figure
 
 Look = Literal["points", "line", "dashed"]
 
@@ -101,7 +101,7 @@ def draw(path: Path | str, title: str, panels: Sequence[Panel]) -> None:
         If the file cannot be written.
     """
     heights = [panel.height for panel in panels]
-    with png_figure(path, (6.6, 1.1 + 3.3 * sum(heights))) as figure:
+    with plot_figure(path, (6.6, 1.1 + 3.3 * sum(heights))) as figure:
         grid = figure.add_gridspec(len(panels), 1, height_ratios=heights)
         above = None
         for row, panel in enumerate(panels):

@@ -1,4 +1,4 @@
-"""Style of plots: PNG files and drawings of the same bytes for the same numbers.
+"""Style of plots: PNG, SVG and PDF files of the same bytes for the same numbers.
 
 Matplotlib is imported where a plot is drawn and nowhere else: it takes longer to load than most
 commands take to run. Figures are made without pyplot, so that no state outlives them.
@@ -8,7 +8,7 @@ import importlib
 import importlib.util
 import io
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from types import ModuleType
@@ -35,6 +35,7 @@ STYLE: dict[str, Any] = {
     "xtick.minor.size": 1.8,
     "ytick.minor.size": 1.8,
     "legend.frameon": False,
+    "svg.hashsalt": "vcam",  # else names in the file would change from run to run
 }
 
 
@@ -59,20 +60,51 @@ def load() -> ModuleType:
             os.environ["MATPLOTLIBRC"] = told
 
 
+FORMATS = ("svg", "pdf")
+"""Formats in which plots may be written beside PNG."""
+_METADATA: dict[str, dict[str, Any]] = {
+    "png": {"Software": None},
+    "svg": {"Date": None, "Creator": None},
+    "pdf": {"CreationDate": None, "Producer": None, "Creator": None},
+}
+"""Format -> what is left out of its files, since it would change from run to run."""
+
+
 def save(figure: Any, path: Path | str) -> None:
-    """Write a Matplotlib figure as a PNG file that is whole or not there."""
+    """Write a Matplotlib figure as a file that is whole or not there; its name says the format."""
+    form = Path(path).suffix.removeprefix(".")
     with write_whole(path) as temporary:
-        figure.savefig(temporary, format="png", metadata={"Software": None})
+        figure.savefig(temporary, format=form, metadata=_METADATA[form])
+
+
+def in_formats(
+    writers: Mapping[str, Callable[[Path], None]], formats: Sequence[str]
+) -> dict[str, Callable[[Path], None]]:
+    """Return writers of files by name, with those of all PNG plots in further formats beside.
+
+    Parameters
+    ----------
+    writers : mapping
+        Name of a file -> function that writes it under a path; that of a plot takes the format
+        from the path.
+    formats : sequence of str
+        Formats of `FORMATS`.
+    """
+    found = dict(writers)
+    for name, write in writers.items():
+        if name.endswith(".png"):
+            found |= {f"{name.removesuffix('png')}{form}": write for form in formats}
+    return found
 
 
 @contextmanager
-def png_figure(path: Path | str, size: tuple[float, float], dpi: int = 150) -> Iterator[Any]:
-    """Yield a Matplotlib figure of the common style, and write it as a PNG when the block ends.
+def plot_figure(path: Path | str, size: tuple[float, float], dpi: int = 150) -> Iterator[Any]:
+    """Yield a Matplotlib figure of the common style, and write it when the block ends.
 
     Parameters
     ----------
     path : Path or str
-        The file.
+        The file: PNG, SVG or PDF by its name.
     size : tuple of float
         Width and height [inch].
     dpi : int
@@ -120,7 +152,7 @@ def svg(draw: Callable[[Any], None], size: tuple[float, float]) -> bytes:
     names = ("text.color", "axes.labelcolor", "axes.titlecolor", "axes.edgecolor", "xtick.color",
              "ytick.color")  # fmt: skip
     style: Any = {**matplotlib.rcParamsDefault, **STYLE, **dict.fromkeys(names, INK)}
-    style |= {"grid.color": FAINT, "svg.hashsalt": "vcam"}
+    style["grid.color"] = FAINT
     with matplotlib.rc_context(style):
         figure = Figure(figsize=size, layout="constrained")
         FigureCanvasSVG(figure)

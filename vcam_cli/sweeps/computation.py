@@ -12,6 +12,7 @@ from typing import Any
 from vcam_cli.camera.camera import Camera
 from vcam_cli.errors import BadInput
 from vcam_cli.files.in_use import POINTS
+from vcam_cli.files.plots import in_formats
 from vcam_cli.files.points_store import SweepFolder
 from vcam_cli.files.report import hash_file
 from vcam_cli.image_formation.rate_cache import light_key
@@ -31,7 +32,14 @@ from vcam_cli.sweeps.study_cameras import StudyCameras
 from vcam_cli.sweeps.sweep import Execution, Share
 from vcam_cli.sweeps.sweep_file import StudyFile
 from vcam_cli.sweeps.sweep_points import LIBRARIES, Grid
-from vcam_cli.sweeps.sweep_result import FRAMES, Outcome, SweepResult, error_cell, read_outcome
+from vcam_cli.sweeps.sweep_result import (
+    FRAMES,
+    Extras,
+    Outcome,
+    SweepResult,
+    error_cell,
+    read_outcome,
+)
 from vcam_cli.sweeps.sweep_tables import Findings
 from vcam_cli.sweeps.workers import Verdict
 
@@ -44,7 +52,7 @@ def computed_sweep(
     request: str,
     watch: Observer,
     tell: Callable[[str], None],
-    wants_report: bool = False,
+    extras: Extras,
 ) -> SweepResult:
     """Compute what is left of a sweep and write everything; request: see `request_hash`."""
     grid = sweep_points.grid(study, sets)
@@ -80,7 +88,8 @@ def computed_sweep(
         asked = request if points.are_final and not result.unmade else ""
         plain = study.model.model_dump(mode="json")
         record = result.record() | {"study": plain, "hashes": hashes, "asked": asked}
-        report = partial(sweep_report.report_file, result) if wants_report else None
+        report = partial(sweep_report.report_file, result) if extras.report else None
+        files = in_formats(files, extras.formats)
         folder.finish(files, record, grid.inputs, report)
     return result
 

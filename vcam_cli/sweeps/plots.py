@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vcam_cli.files.plots import COLORS, MARKERS, png_figure
+from vcam_cli.files.plots import COLORS, MARKERS, plot_figure
 from vcam_cli.files.tables import Cell
 from vcam_cli.sweeps.sweep_result import CaseOptimum
 
@@ -83,7 +83,7 @@ def draw(path: Path | str, title: str, content: FigureContent) -> None:
     legends = [[curve.name for curve in panel.curves if curve.name] for panel in panels]
     is_beside = max(map(len, legends)) >= MANY
     place: Any = {"loc": "center left", "bbox_to_anchor": (1.01, 0.5)} if is_beside else {}
-    with png_figure(path, (width + (2.2 if is_beside else 0), height * rows)) as figure:
+    with plot_figure(path, (width + (2.2 if is_beside else 0), height * rows)) as figure:
         for number, (panel, names) in enumerate(zip(panels, legends, strict=True)):
             axes = figure.add_subplot(rows, columns, number + 1)
             letter = f"({chr(ord('a') + number)}) " if len(panels) > 1 else ""

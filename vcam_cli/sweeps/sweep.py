@@ -26,7 +26,7 @@ from vcam_cli.errors import bad
 from vcam_cli.floats import own_float_errors
 from vcam_cli.progress import Observer, Silent
 from vcam_cli.sweeps import sweep_file
-from vcam_cli.sweeps.sweep_result import SweepResult, finished_result, request_hash
+from vcam_cli.sweeps.sweep_result import Extras, SweepResult, finished_result, request_hash
 
 
 @dataclass(frozen=True)
@@ -105,6 +105,7 @@ def sweep(
     watch: Observer | None = None,
     tell: Callable[[str], None] | None = None,
     report: bool = False,
+    formats: Sequence[str] = (),
 ) -> SweepResult:
     """Run a sweep study, or what is left of it, and write its tables and plots.
 
@@ -112,7 +113,7 @@ def sweep(
     "PATH=VALUE" laid over every camera; workers: processes, default all processors; scheduler:
     address of a Dask scheduler in their place; shard: (i, n), the i-th of n shares of the points;
     fresh: computes all of them again. watch is told of the progress, tell gets messages; report:
-    also writes report.html. Raises
+    also writes report.html; formats: "svg", "pdf" of plots, beside PNG. Raises
     BadInput (wrong study, or no camera of it is valid), CannotDo (disk, scheduler), and TypeError
     or ValueError for arguments that are none of these.
     """
@@ -123,13 +124,14 @@ def sweep(
     watch.begin("points")
     file = sweep_file.read(study)
     place = Path(out) if out is not None else Path("out") / file.model.name
-    request = request_hash(file, sets, report)
+    extras = Extras(report, tuple(formats))
+    request = request_hash(file, sets, extras)
     result = None if fresh else finished_result(place, file, request)
     if result is None:
         # With the whole engine behind it: a sweep that is finished starts without.
         from vcam_cli.sweeps.computation import computed_sweep
 
-        result = computed_sweep(file, sets, place, execution, request, watch, tell, report)
+        result = computed_sweep(file, sets, place, execution, request, watch, tell, extras)
     else:
         for problem in result.refused:
             tell(problem)

@@ -36,6 +36,16 @@ OPTIMUM_COLUMNS = ("case", "parameter", "unit", "optimum", "low", "high", "metri
 
 
 @dataclass(frozen=True)
+class Extras:
+    """What is written beside tables and PNG plots."""
+
+    report: bool = False
+    """Whether report.html is."""
+    formats: tuple[str, ...] = ()
+    """Formats of plots beside PNG, of `plots.FORMATS`."""
+
+
+@dataclass(frozen=True)
 class Outcome:
     """What came of a point."""
 
@@ -216,7 +226,7 @@ class SweepResult:
         }
 
 
-def request_hash(study: StudyFile, sets: Sequence[str], wants_report: bool = False) -> str:
+def request_hash(study: StudyFile, sets: Sequence[str], extras: Extras) -> str:
     """Return the hash of what is asked, but for the contents of the files that it names.
 
     sets: overrides "PATH=VALUE" laid over every camera. Raises BadInput for what is none.
@@ -227,7 +237,7 @@ def request_hash(study: StudyFile, sets: Sequence[str], wants_report: bool = Fal
     words = [_files_named(base) for base in study.word_values(over)]
     places = [str(study.file), str(folder) if sets else ""]
     versions = provenance.versions() | {"matplotlib": version("matplotlib")}
-    asked = [study.tree.plain(), over.plain(), bases, words, places, versions, wants_report]
+    asked = [study.tree.plain(), over.plain(), bases, words, places, versions, asdict(extras)]
     return hash_text(to_json(asked))
 
 

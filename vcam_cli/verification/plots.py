@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from vcam_cli.files.plots import COLORS, png_figure
+from vcam_cli.files.plots import COLORS, plot_figure
 from vcam_cli.verification.verify import Verification
 
 LEAST_BINS, MOST_BINS = 10, 60
@@ -18,7 +18,7 @@ def draw_errors(path: Path, result: Verification) -> None:
     width = _round_width(2 * reach / LEAST_BINS, 2 * reach / MOST_BINS)
     ends = np.ceil(reach / width) * width
     edges = np.arange(-ends, ends + width / 2, width)
-    with png_figure(path, (5.4, 3.2)) as figure:
+    with plot_figure(path, (5.4, 3.2)) as figure:
         axes = figure.subplots()
         axes.hist(percent, edges, color=COLORS[0], edgecolor="white", linewidth=0.8)
         axes.set_xlabel("error of the prediction [%]")
