@@ -57,6 +57,11 @@ CASES: dict[str, Case] = {
         {"scene.source": WAVE},
         wavelengths=(380e-9, 550e-9, 1e-3),
     ),
+    "motion": Case(
+        {"scene.camera_motion": {"pan": "20 deg/s"}},
+        {"scene.camera_motion": {"pan": "0 deg/s"}},
+        {"scene.source": WAVE},
+    ),
     "pixel_aperture": Case({}, None, {"scene.source": WAVE}),
     "charge_diffusion": Case(
         {

@@ -178,6 +178,14 @@ optics: {f_number: 2.8, zernike: {7: 30 nm, 8: 80 nm, 11: 40 nm}}
 array: {rows: 60, columns: 80}
 exposure: {auto: {max: 100 ms}}
 """,
+    "passing by": """
+scene:
+  source: {kind: chart, chart: slanted-edge, motion: {x: 1 mm/s, y: -0.3 mm/s}}
+  distance: 0.1 m
+optics: {f_number: 2.8}
+array: {rows: 60, columns: 80}
+exposure: {time: 20 ms, shutter: {rolling: {line_time: 100 us}}}
+""",
     "changing field": """
 scene:
   source: {kind: image, file: color.png, model: laser}

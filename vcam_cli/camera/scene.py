@@ -6,6 +6,7 @@ from typing import Annotated, Any, Literal, Self, get_args
 from pydantic import model_validator
 
 from vcam_cli.camera.illuminant import Illuminant, IlluminantSpec
+from vcam_cli.camera.motion import MOTION, CameraMotion, MaybeMotion
 from vcam_cli.camera.scene_files import Hyperspectral, ImageFile
 from vcam_cli.camera.wavelengths import Wavelengths
 from vcam_cli.config.model import Model, exactly_one, key
@@ -17,6 +18,7 @@ from vcam_cli.config.values import (
     Fraction,
     Frequency,
     Length,
+    mapping,
     word_or,
 )
 from vcam_cli.config.yaml_type import to_yaml
@@ -28,6 +30,7 @@ class Chart(Model):
     """A test chart: reflectances between 0 and 1, computed and not read from a file."""
 
     kind: Literal["chart"] = key("what kind of source this is", example="chart")
+    motion: MaybeMotion = MOTION
 
 
 class Uniform(Chart):
@@ -227,6 +230,8 @@ def _source(given: Any) -> Any:
             f"{describe(given)} is not a source; write {{kind: chart, chart: uniform}}"
         )
     kind = given.get("kind")
+    if kind == "layers":
+        raise refusal(("kind",), "layers are not built yet", "use a flat source", kind)
     if not isinstance(kind, str) or kind not in KINDS:
         raise failure([_choice("kind", kind, KINDS, given)])
     model = KINDS[kind]
@@ -299,6 +304,9 @@ class Scene(Model):
         "the scene plane, black outside",
         default="sensor",
     )
+    camera_motion: Annotated[CameraMotion | None, mapping(CameraMotion)] = key(
+        "how the camera turns during the exposure", example={"pan": "10 deg/s"}, default=None
+    )
     wavelengths: Wavelengths = key(
         "range of wavelengths simulated",
         example={"start": "380 nm", "stop": "780 nm", "step": "auto"},
@@ -312,6 +320,12 @@ class Scene(Model):
             remedy="write for example luminance: 100 cd/m2",
         ),
     )
+
+    @property
+    def moves(self) -> bool:
+        """Whether scene or camera move while a frame is exposed."""
+        motion, turn = self.source.motion, self.camera_motion
+        return bool((motion and (motion.x or motion.y)) or (turn and (turn.pan or turn.tilt)))
 
     @property
     def emits(self) -> bool:

@@ -6,16 +6,29 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import model_validator
 
+from vcam_cli.camera.motion import MOTION, MaybeMotion
 from vcam_cli.config.model import Model, key
 from vcam_cli.config.quantities import Quantity
 from vcam_cli.config.validation_messages import describe, refusal
-from vcam_cli.config.values import Choice, Either, File, Positive, Wavelength
+from vcam_cli.config.values import Choice, Either, File, FileName, Positive, Wavelength
+
+DEPTH = key(
+    "distance along the axis [m] at every sample: not built yet", example="depth.exr", default=None
+)
+"""The key of scenes that are files."""
+
+
+def refuse_depth(source: Any) -> None:
+    """Refuse the depth of a scene that is a file: only flat scenes are built."""
+    if source.depth is not None:
+        raise refusal(("depth",), "scenes with depth are not built yet", "leave it out")
 
 
 class ImageFile(Model):
     """A picture, read as the reflectance or the radiance of a flat scene."""
 
     kind: Literal["image"] = key("what kind of source this is", example="image")
+    motion: MaybeMotion = MOTION
     file: File = key("any image file that OpenImageIO reads", example="photo.png")
     encoding: Annotated[str, Choice("srgb", "linear")] = key(
         "how the file codes light; default srgb, for .exr, .hdr and .pfm linear",
@@ -31,8 +44,11 @@ class ImageFile(Model):
         default="auto",
     )
 
+    depth: Annotated[str | None, FileName()] = DEPTH
+
     @model_validator(mode="after")
     def _encoding(self) -> Self:
+        refuse_depth(self)
         if "encoding" not in self.model_fields_set:
             linear = PurePath(self.file).suffix.lower() in (".exr", ".hdr", ".pfm")
             self._fill(encoding="linear" if linear else "srgb")
@@ -54,6 +70,7 @@ class Hyperspectral(Model):
     """A file of spectra: spectral EXR, ENVI, ISETCam scene, npz, multichannel TIFF."""
 
     kind: Literal["hyperspectral"] = key("what kind of source this is", example="hyperspectral")
+    motion: MaybeMotion = MOTION
     file: File = key(
         "radiances or reflectances: a spectral .exr, an ENVI .hdr, an ISETCam .mat, a .npz with "
         "wavelength_nm and radiance or reflectance, a .tif with a table of its wavelengths",
@@ -66,8 +83,11 @@ class Hyperspectral(Model):
         default=None,
     )
 
+    depth: Annotated[str | None, FileName()] = DEPTH
+
     @model_validator(mode="after")
     def _named(self) -> Self:
+        refuse_depth(self)
         if self.channels is not None and PurePath(self.file).suffix.lower() != ".exr":
             message = "only the channels of an .exr have names of their own"
             raise refusal(("channels",), message, "remove it, or give an .exr")

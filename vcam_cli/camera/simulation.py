@@ -16,6 +16,7 @@ EFFECTS = {
     "diffraction": "blur by the lens's aperture",
     "aberration": "blur by an imperfect lens",
     "stray_light": "light spread evenly over the sensor",
+    "motion": "blur and skew by motion of scene or camera",
     "pixel_aperture": "blur by the photodetector's area",
     "charge_diffusion": "blur by charge that diffuses in the silicon",
     "pixel_vignetting": "shading by the layers above the photodetector",

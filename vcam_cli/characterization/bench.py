@@ -295,7 +295,7 @@ def _before_chart(camera: Camera, chart: Uniform | SlantedEdge, *left_out: str) 
     """Return the camera before a chart, its array a field around the axis, its lens as solved."""
     solved = geometry(camera)
     scene = camera.scene
-    changes: dict[str, Any] = {"source": chart, "extent": "sensor"}
+    changes: dict[str, Any] = {"source": chart, "extent": "sensor", "camera_motion": None}
     levels = {name: getattr(scene, name) for name in LEVELS}
     in_file = scene.luminance == "from-file" or (
         scene.irradiance == "from-file" and not scene.illuminant

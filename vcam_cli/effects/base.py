@@ -6,6 +6,7 @@ kind says in mathematics what it does, and so where in the order it acts (`order
     Blur               multiplies the spectrum of the image, H(f, wavelength)   no unit
     FieldTransfer      does so by another blur in every place of the field      no unit
     SeparableTransfer  does so by a product, H_x(fx) H_y(fy)                    no unit
+    ImageMotion        is one of these, and displaces what every row sees       no unit
     Gain               multiplies the signal, pixel by pixel                    no unit
     VeilingGlare       spreads part of the light over the whole sensor          no unit
     TemporalGain       multiplies the signal by the light of each line's time   no unit
@@ -298,6 +299,22 @@ class SeparableTransfer(Effect):
     @abstractmethod
     def along_y(self, frequency: NDArray) -> NDArray:
         """Return the transfer along y at `frequency` [cycles/m]."""
+
+
+class ImageMotion(Effect):
+    """Motion of the image: a blur, and a displacement of what rows see at their own times."""
+
+    costly = True
+
+    @property
+    @abstractmethod
+    def drift(self) -> tuple[float, float]:
+        """Displacement of the image per length down the sensor, along x and y."""
+
+    @property
+    @abstractmethod
+    def travel(self) -> float:
+        """How far from its place light comes to lie [m]."""
 
 
 class Gain(Effect):

@@ -5,6 +5,7 @@
     radiance of the scene  (always there)     camera equation, eq 2.18       photons / (s m2 m)
     spectrum of the image  Blur               diffraction, aberration,       electrons / s, blurred
                                               charge_diffusion
+    spectrum of the image  ImageMotion        motion                         electrons / s, blurred
     spectrum of the image  SeparableTransfer  pixel_aperture                 electrons / s, blurred
     electrons / s          Gain               off_axis                       electrons / s
     electrons / s          VeilingGlare       stray_light                    electrons / s
@@ -43,6 +44,7 @@ from vcam_cli.effects.fpn import FixedPattern
 from vcam_cli.effects.fpn_shading import PatternShading
 from vcam_cli.effects.heavy_tailed_noise import HeavyTailedNoise
 from vcam_cli.effects.microlens import Microlens
+from vcam_cli.effects.motion import Motion
 from vcam_cli.effects.off_axis import OffAxis
 from vcam_cli.effects.pixel_aperture import PixelAperture
 from vcam_cli.effects.pixel_vignetting import PixelVignetting
@@ -58,6 +60,7 @@ from vcam_cli.effects.telegraph_noise import TelegraphNoise
 ORDER: tuple[type[Effect], ...] = (
     Diffraction,
     Aberration,
+    Motion,
     PixelAperture,
     ChargeDiffusion,
     OffAxis,

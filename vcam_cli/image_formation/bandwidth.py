@@ -13,13 +13,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vcam_cli.camera.derived.geometry import Geometry
-from vcam_cli.effects.base import Effect, RadialTransfer, of_kind
+from vcam_cli.camera.derived.geometry import Geometry, pixel_centers
+from vcam_cli.effects.base import Effect, ImageMotion, RadialTransfer, of_kind
 from vcam_cli.image_formation.cosine_series import Axis
 from vcam_cli.image_formation.optical_path import OpticalPath
 from vcam_cli.image_formation.settings import Settings
@@ -92,6 +93,7 @@ def margin(
     tail = line_spread_tail(radial, band[1], distance)
     cutoff = min((b.cutoff(band[1]) for b in radial), default=math.inf)
     widest = max((effect.reach for effect in effects), default=0.0)
+    widest += sum((motion.travel for motion in of_kind(effects, ImageMotion)), 0.0)
     inside = (np.arange(32) + 0.5) / 32
     pitches = (geometry.pitch_y, geometry.rows), (geometry.pitch_x, geometry.columns)
     finest = min(cutoff, 0.5 / min(geometry.pitch_x, geometry.pitch_y))
@@ -238,15 +240,22 @@ def axes(path: OpticalPath, scene: SampledScene, highest: float) -> tuple[Axis, 
     ny, nx = scene.shape
     squares = scene.samples == "squares"
 
-    def axis(samples: int, pitch: float, pixels: int, pixel: float, shift: float) -> Axis:
-        first = samples * pitch / 2 + (0.5 - pixels / 2) * pixel + shift
-        bandwidth = min(highest * 0.5 / pixel, cutoff)
-        return Axis(samples, pitch, pixels, pixel, first, squares, bandwidth)
+    drift_x, drift_y = path.drift
 
-    return (
-        axis(nx, scene.pitch_x, g.columns, g.pitch_x * g.sampling_scale, g.collecting_x),
-        axis(ny, scene.pitch_y, g.rows, g.pitch_y * g.sampling_scale, g.collecting_y),
-    )
+    def axis(
+        samples: int, pitch: float, pixels: int, pixel: float, shift: float, seen: float = 1.0
+    ) -> Axis:
+        first = samples * pitch / 2 + seen * ((0.5 - pixels / 2) * pixel + shift)
+        bandwidth = min(highest * 0.5 / pixel, cutoff)
+        return Axis(samples, pitch, pixels, seen * pixel, first, squares, bandwidth)
+
+    x = axis(nx, scene.pitch_x, g.columns, g.pitch_x * g.sampling_scale, g.collecting_x)
+    pitch_y = g.pitch_y * g.sampling_scale
+    y = axis(ny, scene.pitch_y, g.rows, pitch_y, g.collecting_y, 1 - drift_y)
+    if drift_x:
+        _, rows = pixel_centers(g, detector=True)
+        x = replace(x, row_shifts=-drift_x * rows)
+    return x, y
 
 
 def table_size(path: OpticalPath, highest: float, entries: int | None = None) -> TableSize:

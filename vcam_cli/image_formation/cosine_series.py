@@ -37,7 +37,7 @@ CHIRP = 4
 """Cost of a chirp-z transform over that of a cosine transform of its length."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Axis:
     """Samples, pixels and cosine terms along x or y."""
 
@@ -52,6 +52,8 @@ class Axis:
     squares: bool
     bandwidth: float
     """Highest spatial frequency kept [cycles/m]."""
+    row_shifts: NDArray | None = None
+    """Displacement of the photodetectors of every row (rows,), where it is not the same [m]."""
 
     @property
     def length(self) -> float:
@@ -81,6 +83,8 @@ class Axis:
 
         It is None as well where so few of them are pixels that a chirp-z transform costs less.
         """
+        if self.row_shifts is not None:
+            return None  # what one row cannot tell apart, another can
         count, first = round(self.length / self.pixel_pitch), round(self._start)
         whole = abs(self.length / self.pixel_pitch - count) <= NEAR
         whole = whole and 0 <= first <= count - self.pixels

@@ -52,8 +52,12 @@ def wave_layers(path: OpticalPath, scene: WaveScene) -> tuple[Layers, SpectrumRe
         Changes by leaving out effects.
     """
     x, y = pixel_centers(path.geometry, detector=True)
+    drift_x, drift_y = path.drift
     shapes = [
-        (np.exp(1j * (2 * np.pi * w.fx * x + w.phase)), np.exp(2j * np.pi * w.fy * y))
+        (
+            np.exp(1j * (2 * np.pi * w.fx * x + w.phase)),
+            np.exp(2j * np.pi * (w.fy * (1 - drift_y) - w.fx * drift_x) * y),
+        )
         for w in scene.waves
     ]
 

@@ -21,6 +21,7 @@ from vcam_cli.effects.base import (
     Effect,
     FieldTransfer,
     Gain,
+    ImageMotion,
     SeparableTransfer,
     SignalLevels,
     Transport,
@@ -60,7 +61,8 @@ class LightPlan:
     free: tuple[Effect, ...] = ()
     """Effects that could be left out, but would save nothing."""
     shares: dict[str, float] = field(default_factory=dict)
-    """Estimated rms change by leaving out each of both, relative to full signal."""
+    """Estimated rms change by leaving out each of both, and motion, which is more than its blur;
+    relative to full signal."""
 
     @property
     def share(self) -> float:
@@ -117,7 +119,8 @@ def light_plan(path: OpticalPath, scene: Scene) -> LightPlan:
             chosen = together
     free = _bounding_blurs(path, chosen)
     omitted = tuple(effect for effect in chosen if effect not in free)
-    return LightPlan(omitted, free, {effect.name: shares[effect] for effect in chosen})
+    told = (*chosen, *of_kind(candidates, ImageMotion))
+    return LightPlan(omitted, free, {effect.name: shares[effect] for effect in told})
 
 
 Functions = Mapping[Effect, NDArray]

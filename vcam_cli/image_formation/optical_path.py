@@ -11,7 +11,14 @@ from numpy.typing import NDArray
 
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.camera.derived.mosaic import Mosaic
-from vcam_cli.effects.base import Effect, FieldTransfer, SeparableTransfer, Zone, of_kind
+from vcam_cli.effects.base import (
+    Effect,
+    FieldTransfer,
+    ImageMotion,
+    SeparableTransfer,
+    Zone,
+    of_kind,
+)
 from vcam_cli.image_formation.settings import Settings
 from vcam_cli.image_formation.transfer_functions import Transfer
 
@@ -37,6 +44,17 @@ class OpticalPath:
     def separable(self) -> tuple[SeparableTransfer, ...]:
         """Transfer functions that are products of one along x and one along y."""
         return of_kind(self.effects, SeparableTransfer)
+
+    @property
+    def drift(self) -> tuple[float, float]:
+        """Displacement of the image per length down the sensor, along x and y."""
+        drifts = [motion.drift for motion in of_kind(self.effects, ImageMotion)]
+        return sum(x for x, _ in drifts), sum(y for _, y in drifts)
+
+    @property
+    def travel(self) -> float:
+        """How far motion takes light from its place [m]."""
+        return sum((motion.travel for motion in of_kind(self.effects, ImageMotion)), 0.0)
 
     @property
     def averages_over_box(self) -> bool:

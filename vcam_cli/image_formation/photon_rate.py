@@ -20,7 +20,7 @@ from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry, pixel_centers
 from vcam_cli.camera.derived.mosaic import Mosaic
 from vcam_cli.camera.derived.photodiode import quantum_efficiency
-from vcam_cli.effects.base import Blur, Effect, Gain, VeilingGlare, of_kind
+from vcam_cli.effects.base import Blur, Effect, Gain, ImageMotion, VeilingGlare, of_kind
 from vcam_cli.image_formation.light_plan import LightPlan, light_plan
 from vcam_cli.image_formation.optical_path import Layer, OpticalPath, SpectrumReport
 from vcam_cli.image_formation.settings import Settings
@@ -201,6 +201,10 @@ def photo_rate(path: OpticalPath, scene: Scene, planes: bool = False) -> Rate:
     plan = light_plan(path, scene)
     path = plan.reduced(path)
     layers, report = image_layers(path, scene)
+    if any(path.drift):  # more changes than the blur, of which the report knows
+        moved = {motion.name for motion in of_kind(path.effects, ImageMotion)}
+        known = {name: change for name, change in report.changes.items() if name not in moved}
+        report = replace(report, changes=known)
     g, mosaic = path.geometry, path.mosaic
     count = len(mosaic.colors) if planes else 1
     out: NDArray = np.zeros((count, g.rows, g.columns), path.settings.dtype)

@@ -60,8 +60,10 @@ def light_key(camera: Camera) -> str:
         JSON of the camera file without the `INDEPENDENT_KEYS`.
     """
     form = camera.model_dump(mode="json")
+    moving = ("exposure",) if camera.scene.moves else ()
     for path in INDEPENDENT_KEYS:
-        _drop(form, path)
+        if path != moving:
+            _drop(form, path)
     accuracy = form["accuracy"]  # a preset by itself is written as its name
     if isinstance(accuracy, dict) and set(accuracy) == {"preset"}:
         form["accuracy"] = accuracy["preset"]

@@ -73,7 +73,7 @@ def image_layers(path: OpticalPath, scene: Scene) -> tuple[Layers, SpectrumRepor
     if isinstance(scene, WaveScene):
         return wave_layers(path, scene)
     if isinstance(scene, HarmonicScene):
-        count = harmonics_count(path, scene)
+        count = None if any(path.drift) else harmonics_count(path, scene)
         if count is not None:
             return harmonic_layers(path, scene, count)
         scene = scene.chart
@@ -114,8 +114,9 @@ def _filtered_layers(path: OpticalPath, scene: SampledScene) -> tuple[Layers, Sp
     """
     if not isinstance(scene, ChartScene):
         return _spectral_layers(path, scene, highest_passed(path, scene))
-    near = near_field(path, scene, reach(path))
-    rings = far_parts(path, near, scene, reach(path))
+    widest = reach(path) + path.travel
+    near = near_field(path, scene, widest)
+    rings = far_parts(path, near, scene, widest)
     highest, chosen = highest_passed(path, near), None
     if scene.chart.edges() is None:
         chosen = cells_per_pixel(path, near, highest)

@@ -15,6 +15,7 @@ from vcam_cli.camera import load as files
 from vcam_cli.camera.array import Positions
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import geometry
+from vcam_cli.camera.derived.image_motion import check_motion
 from vcam_cli.camera.derived.lattice import places
 from vcam_cli.camera.derived.line_times import check_shutter
 from vcam_cli.camera.processing import SHOWN
@@ -157,6 +158,7 @@ def check_formats(camera: Camera) -> None:
 CHECKS: tuple[files.CameraCheck, ...] = (
     (check_effects, "optics pixel effects"),
     (check_shutter, "array exposure"),
+    (check_motion, "scene optics exposure"),
     (check_binning, "pixel array exposure adc"),
     (check_size, "pixel array processing"),
     (check_positions, "pixel array processing"),

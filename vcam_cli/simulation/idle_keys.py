@@ -113,8 +113,9 @@ RULES = (
     ),
     Rule(
         ("exposure.shutter",),
-        lambda camera: not _is_lit_by_flicker(camera),
-        "nothing in this scene changes while the lines are exposed; give scene.illuminant.flicker",
+        lambda camera: not (_is_lit_by_flicker(camera) or camera.scene.moves),
+        "nothing in this scene changes while the lines are exposed; give scene.illuminant.flicker"
+        " or scene.source.motion",
     ),
     Rule(
         ("exposure.estimator",),
