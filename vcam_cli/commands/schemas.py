@@ -7,6 +7,7 @@ arithmetic, is checked there.
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.technology import Technology
 from vcam_cli.capture_schedules.model import ScheduleStudy
+from vcam_cli.config.key_index import Key, keys
 from vcam_cli.config.schema import (
     Schema,
     file_schema,
@@ -15,7 +16,7 @@ from vcam_cli.config.schema import (
     reference,
     with_parts,
 )
-from vcam_cli.sweeps.model import KINDS, Sweep
+from vcam_cli.sweeps.model import KINDS, Case, Sweep
 from vcam_cli.verification.model import Measurement
 
 SECTIONS = {"scene": "Scene", "optics": "Optics", "pixel": "Pixel", "array": "Array"}
@@ -37,12 +38,34 @@ def schemas() -> dict[str, Schema]:
     }
 
 
+def _complete_paths(definitions: Schema) -> None:
+    """Add the paths of a camera's keys where a sweep has them, to be completed and explained."""
+    paths = {key.dotted: _about(key) for key in keys(Camera)}
+    sweep, case = (definitions[model.__name__]["properties"] for model in (Sweep, Case))
+    for name, mappings in (("vary", (sweep, case)), ("repeat", (sweep,))):
+        value = sweep[name]["additionalProperties"]
+        known = {path: about | value for path, about in paths.items()}
+        definitions[f"{name} paths"] = {"properties": known, "additionalProperties": value}
+        for properties in mappings:
+            del properties[name]["additionalProperties"]
+            properties[name] |= {"$ref": reference(f"{name} paths")}
+    case |= {path: about for path, about in paths.items() if path not in case}
+
+
+def _about(key: Key) -> Schema:
+    """Return what an editor shows of a key."""
+    title = f"{key.dotted} [{key.unit}]" if key.unit else key.dotted
+    said = f"{key.description[:1].upper()}{key.description[1:]}."
+    return {"title": title, "description": said, "examples": [key.example]}
+
+
 def _study_schema() -> Schema:
     """Return the schema of a study file: of capture schedules where it says so, else a sweep."""
     definitions: Schema = {}
     for model in (Sweep, ScheduleStudy):
         schema = model_schema(model)
         definitions |= schema.pop("$defs") | {model.__name__: schema}
+    _complete_paths(definitions)
     either: Schema = {
         "$defs": definitions,
         "type": "object",
