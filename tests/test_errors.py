@@ -79,3 +79,9 @@ def test_a_collector_raises_all_at_once_or_nothing():
 )
 def test_nearest(word, right):
     assert nearest(word, ["width", "height", "f_number", 7]) == right
+
+
+def test_a_name_that_begins_with_the_word_is_nearest():
+    assert nearest("snr", ["psnr", "snr_db", "snr_max_db"]) == "snr_db"
+    assert nearest("psnr", ["psnr", "psnr_db"]) == "psnr"
+    assert nearest("widht", ["width", "height"]) == "width"

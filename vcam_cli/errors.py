@@ -148,10 +148,16 @@ def split(path: Path | str) -> Path:
 
 
 def nearest(word: object, allowed: Iterable[object]) -> str | None:
-    """Return the allowed name closest to `word`, case, `-` and `_` aside, or None."""
+    """Return the allowed name closest to `word`, case, `-` and `_` aside, or None.
+
+    One that begins with the whole word, such as snr_db with snr, is closer than any other.
+    """
     if not isinstance(word, str):
         return None
     names = {_plain(name): name for name in allowed if isinstance(name, str)}
+    begun = [name for name in names if name.startswith(f"{_plain(word)}_")]
+    if begun and _plain(word) not in names:
+        return names[min(begun, key=len)]
     found = difflib.get_close_matches(_plain(word[:100]), names, n=1, cutoff=0.6)
     return names[found[0]] if found else None
 

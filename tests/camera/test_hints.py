@@ -64,6 +64,16 @@ GUESSES = {
     "array.width=4032": "array.columns: 4032",
     "optics.aperture=f/1.8": "optics.f_number: 1.8",
     "exposure.shutter=1/500": "exposure.time: 1/500 s",
+    # words of other programs
+    "output.dng=yes": "output.dng: true",
+    "optics.diffraction=no": "optics.diffraction: false",
+    "effects.shot_noise=false": "effects.shot_noise: off",
+    "effects.fpn=0": "effects.fpn: off",
+    "quality=psnr": "quality: [psnr]",
+    "output.raw=electrons": "output.raw: [electrons]",
+    "output.raw=tiff": "output: {tiff: true}",
+    "seed=5": "seed: {frame: 5}",
+    "optics.transmittance=1.2": "optics.transmittance: 1.2 %",
     # a value in place of its section
     "exposure=1/30 s": "exposure: {time: 1/30 s}",
     "exposure=1/30": "exposure: {time: 1/30 s}",
@@ -143,6 +153,25 @@ def test_every_key_that_is_named_exists_and_takes_its_value(entry):
 )
 def test_every_value_that_is_named_is_taken(path, value):
     load("camera.yaml", [f"{path}={value}"])
+
+
+def test_a_mosaic_by_its_letters():
+    remedy, _ = remedy_of("array.pattern=RCCB")
+    assert remedy.startswith("write {block: [[R, C], [C, B]]}")
+
+
+@pytest.mark.parametrize("kind", ["photo", "JPEG", "picture"])
+def test_a_photograph_is_an_image(kind):
+    remedy, _ = remedy_of(f"scene.source={{kind: {kind}, file: photo.png}}")
+    assert remedy == "write image"
+
+
+@pytest.mark.parametrize("word", hints.NOT_SIMULATED)
+def test_what_is_not_simulated_is_said(word):
+    """And is no key anywhere: what comes to be simulated leaves this table."""
+    assert word not in {key.name for key in hints.index()}
+    remedy, _ = remedy_of(f"pixel.{word}=1")
+    assert "is not simulated" in remedy
 
 
 def test_no_word_of_the_table_is_a_key_of_that_place():

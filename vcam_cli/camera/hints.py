@@ -130,6 +130,7 @@ FORMS: Mapping[str, tuple[tuple[str, str], ...]] = {
     "pixel": ((rf"{_NUMBER} ?[uµμ]m", r"write width: \1 um below it"),),
     "optics": ((rf"[fF] ?/? ?{_NUMBER}", r"write {f_number: \1, focal_length: 4.5 mm}"),),
     "scene": ((r".*\.(png|jpe?g|tiff?|exr)", r"write {source: {kind: image, file: \g<0>}, ...}"),),
+    "exposure.shutter": ((r"(1/\d+(\.\d+)?) ?s?", r"write exposure.time: \1 s, in its place"),),
     "exposure.time": (
         (r"1/\d+(\.\d+)?", r"write \g<0> s"),
         ("auto", "write exposure: {auto: {max: 100 ms}}"),
@@ -142,9 +143,41 @@ FORMS: Mapping[str, tuple[tuple[str, str], ...]] = {
         (rf"{_NUMBER} ?[kK]", r"write {blackbody: \1 K}"),
         (rf"{_NUMBER} ?nm", r"write {monochromatic: \1 nm}"),
     ),
-    "array.pattern": (("(?i)x-?trans", "write {block: [[R, G], [G, B]]} with its own block"),),
+    "array.pattern": (
+        ("(?i)x-?trans", "write {block: [[R, G], [G, B]]} with its own block"),
+        (
+            "([RGBWCY])" * 4,
+            r"write {block: [[\1, \2], [\3, \4]]}, with a spectrum for each in filters",
+        ),
+    ),
+    "seed": ((r"\d+", r"write {frame: \g<0>}"),),
+    "quality": ((r"mse|psnr|cielab|s-cielab", r"write [\g<0>]"),),
+    "output.raw": (
+        (r"dn|electrons|volts", r"write [\g<0>]"),
+        (r"dng|tiff", r"write output: {\g<0>: true}"),
+    ),
+    "scene.source.kind": (
+        (r"(?i)photo|picture|file|jpe?g|png|exr", "write image"),
+        (r"(?i)(multi)?spectral|cube", "write hyperspectral"),
+    ),
 }
 """A key -> expressions that a value there may match, and what is then to be done."""
+SWITCHES = {
+    **dict.fromkeys(("yes", "on", "1", "true"), "true"),
+    **dict.fromkeys(("no", "off", "0", "false"), "false"),
+}
+"""A word for a switch -> what it means."""
+NOT_SIMULATED: Mapping[str, str] = {
+    "blooming": "charge beyond the full well is drained, and spills to no neighbor",
+    "smear": "charge is transferred in no time, and collects no light meanwhile",
+    "crosstalk": "pixels share light and charge by pixel.photodetector.charge_diffusion alone",
+    "distortion": "the lens images straight lines as straight lines",
+    "lateral_color": "the lens images all wavelengths in one size",
+    "chromatic_aberration": "wavefronts in optics.zernike are the same length at all wavelengths",
+    "motion_blur": "nothing moves during the exposure",
+    "flash": "the light of the scene is scene.illuminant at one level",
+}
+"""What cameras have and this file cannot say -> what is simulated in its place."""
 AT_MOST_1 = "it must be at most 1"
 """What is said of a fraction that is too large, mostly since it is in percent."""
 _PICTURES = {".png", ".jpg", ".jpeg", ".tif", ".tiff", ".exr", ".hdr", ".bmp", ".webp", ".pfm"}
@@ -191,6 +224,8 @@ def advise(problem: Problem, given: object) -> Problem:
 def _meant_key(path: Path, given: object) -> str:
     """Return which key is meant by one that is not there; "" for none that is known."""
     word, above = _plain(path[-1]), tuple(path[:-1])
+    if word in NOT_SIMULATED:
+        return f"remove it, as this is not simulated: {NOT_SIMULATED[word]}"
     here = [key.name for key in index() if key.path[:-1] == above]
     if said := ELSEWHERE.get(above, {}).get(word):
         return f"write {_with_value(said, given)}"
@@ -275,7 +310,12 @@ def _meant_value(problem: Problem, given: object) -> str:
     if (plain := in_electrons(word)) != word and " unit " in problem.message:
         return f"write {plain}"
     if problem.remedy == AT_MOST_1 and isinstance(given, (int, float)) and 1 < given <= 100:
-        return f"write {word} %, or {given / 100:g}"
+        percent = f"write {word} %, or {given / 100:g}"
+        return percent if given >= 2 else f"{AT_MOST_1}; if a percentage is meant, {percent}"
+    if "is not true or false" in problem.message and _plain(word) in SWITCHES:
+        return f"write {SWITCHES[_plain(word)]}"
+    if problem.path[0] == "effects" and len(problem.path) == 2 and _plain(word) in SWITCHES:
+        return f"write {'on' if SWITCHES[_plain(word)] == 'true' else 'off'}"
     if path == "scene.source":
         if PurePath(word).suffix.lower() in _PICTURES:
             return f"write {{kind: image, file: {word}}}"

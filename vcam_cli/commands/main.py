@@ -168,6 +168,8 @@ def _suggest_key(error: Any) -> None:
     if said := OPTIONS.get(option):
         error.possibilities = [said]
         return
+    if any(name.startswith(option) for name in getattr(error, "possibilities", None) or ()):
+        return  # an option that was not written to its end
     from vcam_cli.camera.hints import set_option
 
     if meant := set_option(option):
