@@ -45,6 +45,17 @@ def test_the_thesis_s_tables():
     assert numbers(rows["wavelengths"])[:3] == [31, 400, 700]
 
 
+def test_depth_of_field_for_a_pixel():
+    """f^2 / (N c) + f, and where 1 / d is N c / (f v) away from 1 / s (v: image distance)."""
+    rows = printed()
+    image = 1 / (1 / 8e-3 - 1 / 0.5)
+    away = 4 * 10e-6 / (8e-3 * image)
+    near, far, circle = numbers(rows["depth of field"])
+    assert circle == 10
+    assert (near, far) == pytest.approx((1 / (1 / 0.5 + away), 1 / (1 / 0.5 - away)), rel=1e-4)
+    assert numbers(rows["hyperfocal distance"])[0] == pytest.approx(1.6 + 8e-3, rel=1e-4)
+
+
 def test_samples_end_where_the_frequencies_do():
     """Of samples p apart the highest frequency is 1 / 2p; of a side w they are 1 / 2w apart."""
     rows = printed()

@@ -58,6 +58,10 @@ def _optics(g: Mapping[str, float]) -> Iterator[Row]:
     yield "clear aperture", f"{g['clear_aperture_area'] * 1e6:.6g} mm2"
     yield "field of view", f"{_angle(g['field_of_view_diagonal'])} on the diagonal"
     yield "image distance", f"{g['image_distance'] * 1e3:.6g} mm"
+    circle = f"for a blur of {g['circle_of_confusion'] * 1e6:.4g} um, a pixel's pitch"
+    near, far = _length(g["depth_of_field_near"]), _length(g["depth_of_field_far"])
+    yield "depth of field", f"{near} to {far}, {circle}"
+    yield "hyperfocal distance", _length(g["hyperfocal_distance"])
     yield "cut-off at 550 nm", f"{g['diffraction_cutoff_550nm'] / 1e3:.5g} lp/mm"
 
 

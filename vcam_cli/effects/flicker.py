@@ -21,7 +21,7 @@ class Flicker(TemporalGain):
     lines: LineTimes
 
     name = "flicker"
-    reference = "CIE TN 006:2016, section 2.4; the mean over an exposure is in closed form"
+    reference = "CIE TN 006:2016; the mean over an exposure is in closed form"
     absent = "the file gives no scene.illuminant.flicker, or a depth of 0"
     seconds_per_pixel = 1e-9
 

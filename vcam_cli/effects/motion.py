@@ -33,7 +33,7 @@ class Motion(ImageMotion):
     """From one row to the next [m]."""
 
     name = "motion"
-    reference = "Goodman, Introduction to Fourier Optics, 3rd ed., 2005, problem 6-9"
+    reference = "mean over the path: Bracewell, The Fourier Transform and Its Applications, 2000"
     absent = "the file gives no motion of its source, and no scene.camera_motion"
 
     @classmethod

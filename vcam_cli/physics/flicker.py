@@ -32,8 +32,8 @@ def sinusoid_mean(
 
     References
     ----------
-    CIE TN 006:2016, section 2.4 (modulation depth); R. N. Bracewell, The Fourier Transform and Its
-    Applications, 3rd ed., 2000, chapter 4 (running mean).
+    CIE TN 006:2016 (modulation depth); R. N. Bracewell, The Fourier Transform and Its Applications,
+    3rd ed., 2000 (running means).
     """
     middle = 2 * np.pi * frequency * (np.asarray(start) + time / 2) + phase
     return np.asarray(1 + depth * np.sinc(frequency * time) * np.cos(middle))
@@ -66,7 +66,7 @@ def pulse_mean(
 
     References
     ----------
-    CIE TN 006:2016, section 2.4 (modulation depth, duty cycle).
+    CIE TN 006:2016 (modulation depth, duty cycle).
     """
     mean = (1 - depth) + 2 * depth * duty
     begin = frequency * np.asarray(start, dtype=float) + phase / (2 * np.pi)

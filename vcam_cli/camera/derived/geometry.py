@@ -25,7 +25,7 @@ from vcam_cli.camera.derived.pixel_layout import (
 )
 from vcam_cli.camera.scene import Extent
 from vcam_cli.errors import Collector, bad
-from vcam_cli.physics import diffraction, radiometry
+from vcam_cli.physics import depth_of_field, diffraction, radiometry
 
 
 @dataclass(frozen=True)
@@ -144,6 +144,7 @@ class Geometry:
             "scene_width": w / -self.magnification if finite else math.inf,
             "scene_height": h / -self.magnification if finite else math.inf,
             "scene_diagonal": math.hypot(w, h) / -self.magnification if finite else math.inf,
+            **self._sharpness(),
             "rows": self.rows,
             "columns": self.columns,
             "sensor_width": w,
@@ -163,6 +164,20 @@ class Geometry:
             "scene_rows": round(h / sample),
             "scene_columns": round(w / sample),
             "highest_frequency": 0.5 / sample if oversampling else math.inf,
+        }
+
+    def _sharpness(self) -> dict[str, float]:
+        """Return what is sharp to a pixel's pitch, along which it is larger [m]."""
+        if not self.has_lens:
+            return {}
+        circle = max(self.pitch_x, self.pitch_y)
+        lens = self.focal_length, self.f_number, circle
+        near, far = depth_of_field.depth_of_field(self.object_distance, *lens)
+        return {
+            "circle_of_confusion": circle,
+            "hyperfocal_distance": depth_of_field.hyperfocal_distance(*lens),
+            "depth_of_field_near": near,
+            "depth_of_field_far": far,
         }
 
 
