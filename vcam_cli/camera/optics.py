@@ -237,6 +237,11 @@ class Optics(Model):
         default=None,
     )
     diffraction: Switch = key("whether the aperture diffracts", default=True)
+    focus: Literal["fixed", "auto"] = key(
+        "auto: by contrast, the image plane is moved to where the middle of the picture is"
+        " sharpest, whatever defocus says; some 18 trials",
+        default="fixed",
+    )
     defocus: Shift = key(
         "shift of the image plane away from the lens, so that the sensor lies in front of it",
         example="0 um",

@@ -28,6 +28,7 @@ from vcam_cli.quality.mse import mse, psnr_db
 from vcam_cli.quality.scielab import cielab_map, s_cielab_map
 from vcam_cli.scenes.hyperspectral import Cube
 from vcam_cli.simulation import remarks, scene_bands
+from vcam_cli.simulation.autofocus import focused
 from vcam_cli.simulation.checks import read_lens
 from vcam_cli.simulation.figures import figures
 from vcam_cli.simulation.frame import Frame, expose
@@ -311,8 +312,9 @@ def prepare(
         stages = Stages(watch=watch or Silent())
         camera = _load_lens(camera, stages)
         picture, notes = _completed(camera, *_picture(camera, stages))
+        camera, told = focused(camera, picture, workers or threads(camera), stages)
         ready = bring_light(camera, picture, workers or threads(camera), stages)
-        return ready, notes + remarks.remarks(ready)
+        return ready, notes + told + remarks.remarks(ready)
     except BadInput as error:
         raise error.with_places(camera.locate) from None
 
@@ -355,6 +357,7 @@ def _completed(camera: Camera, picture: Any, notes: tuple[str, ...]) -> tuple[An
 def _simulate(camera: Camera, workers: int, stages: Stages, shared: Shared) -> Result:
     camera = _load_lens(camera, stages)
     picture, notes = _completed(camera, *shared.picture(camera, lambda: _picture(camera, stages)))
+    camera, told = focused(camera, picture, workers, stages)
     frame = expose(camera, picture, workers, stages, shared.rate_cache)
     context = Context(
         pattern=frame.mosaic.block,
@@ -369,7 +372,7 @@ def _simulate(camera: Camera, workers: int, stages: Stages, shared: Shared) -> R
         layout=frame.layout if frame.layout.is_scattered else None,
     )
     steps = partial(process, frame.picture_dn, context, workers=workers)
-    result = Result(frame, stages, workers, steps, notes + remarks.remarks(frame))
+    result = Result(frame, stages, workers, steps, notes + told + remarks.remarks(frame))
     if needs_picture(camera):  # what is wrong with its steps is said before anything is written
         _ = result.processed
     return result

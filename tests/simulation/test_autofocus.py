@@ -1,0 +1,82 @@
+"""Autofocus by contrast: known defocus is taken out, aberrations by brute force, refusals."""
+
+import numpy as np
+import pytest
+from making import GONE, camera
+
+from vcam_cli.errors import BadInput
+from vcam_cli.progress import Stages
+from vcam_cli.simulation import autofocus
+from vcam_cli.simulation.preparation import prepare as bring_light
+from vcam_cli.simulation.simulate import prepare
+
+EDGE = {
+    "scene.source": {"kind": "chart", "chart": "slanted-edge"},
+    "optics.f_number": 4,
+    "optics.focus": "auto",
+    "array.rows": 32,
+    "array.columns": 32,
+    "pixel.width": "3 um",
+    "accuracy": "standard",
+}
+DEPTH = 550e-9 * 4**2
+"""Half of the depth of focus, N^2 times the wavelength [m]: a quarter of a wave at the rim."""
+
+
+@pytest.mark.parametrize("defocus", ["0 um", "25 um", "-18 um"])
+def test_a_known_defocus_is_taken_out(defocus, tmp_path):
+    """Defocus alone is symmetric: the sharpest place is 0, to within the depth of focus."""
+    ready, notes = prepare(camera(tmp_path, EDGE | {"optics.defocus": defocus}))
+    assert abs(ready.camera.optics.defocus) < DEPTH
+    assert any("focus: auto moves" in note for note in notes)
+
+
+def test_an_aberrated_lens_is_as_sharp_as_anywhere(tmp_path):
+    """Against the same contrast at 41 places, a quarter of the depth of focus apart."""
+    aberrated = EDGE | {"optics.zernike": {11: "0.04 um", 4: "0.06 um"}}
+    ready, _ = prepare(camera(tmp_path, aberrated))
+    found = ready.camera.optics.defocus
+
+    def sharpness(shift):
+        fixed = {"optics.focus": "fixed", "optics.defocus": f"{shift!r} m", "accuracy": "reference"}
+        made = camera(tmp_path, aberrated | fixed)
+        return autofocus.contrast(bring_light(made, None, 1, Stages()).rate, 1, 1)
+
+    best = max(sharpness(float(place)) for place in DEPTH / 4 * np.arange(-20, 21))
+    # trials err by 1e-3 of full signal, and contrast is a square
+    assert sharpness(found) > 0.99 * best
+    assert sharpness(0.0) < sharpness(found), "Z4 moves the sharpest place away from 0"
+
+
+def test_even_light_tells_no_focus(tmp_path):
+    even = EDGE | {"scene.source": {"kind": "chart", "chart": "uniform"}, "optics.defocus": "9 um"}
+    ready, notes = prepare(camera(tmp_path, even))
+    assert ready.camera.optics.defocus == 9e-6
+    assert any("no detail" in note for note in notes)
+
+
+@pytest.mark.parametrize(("changes", "words"), [
+    ({"optics": "none", "scene.distance": GONE}, None),
+    ({"optics.mtf": {"file": "m.csv"}}, "measured blur"),
+])  # fmt: skip
+def test_what_cannot_be_focused_is_refused(changes, words, tmp_path):
+    (tmp_path / "m.csv").write_text("frequency_lp_per_mm,value\n0,1\n100,0.5\n300,0\n")
+    if words is None:
+        assert camera(tmp_path, {**changes}).optics.focus == "fixed", "no lens has nothing to say"
+        return
+    with pytest.raises(BadInput, match=words):
+        prepare(camera(tmp_path, EDGE | changes))
+
+
+def test_contrast_of_colors_is_that_of_neighbors_of_one_color():
+    """A mosaic of two even colors has no contrast; a ramp has that of its steps."""
+    mosaic = np.tile(np.array([[1.0, 5.0], [5.0, 2.0]]), (8, 8))
+    assert autofocus.contrast(mosaic, 2, 2) == 0
+    ramp = np.tile(np.arange(1.0, 17.0), (16, 1))
+    assert autofocus.contrast(ramp, 1, 1) == pytest.approx(1 / 8.5**2)
+    assert autofocus.contrast(np.zeros((8, 8)), 1, 1) == 0
+
+
+def test_the_golden_section_finds_a_maximum():
+    found = autofocus.golden_section(lambda x: -((x - 0.3) ** 2), -1.0, 1.0)
+    assert found == pytest.approx(0.3, abs=2 * autofocus.GOLDEN**autofocus.FINE)

@@ -1,0 +1,160 @@
+"""Autofocus by contrast, offline: the image plane is moved to where the picture is sharpest.
+
+The lens is tried at places of the image plane, first widely apart, then between the best ones; what
+is judged is the noise-free light in the middle of the array, as the pixels see it: the mean square
+of the differences between neighbors of one color, relative to the squared mean. Lens aberrations,
+the scene's detail and the pixels' aperture so have their say in what is sharpest.
+
+References
+----------
+E. Krotkov, "Focusing", Int. J. Computer Vision 1, 223-237, 1987, doi:10.1007/BF00127822 (gradient
+magnitude as criterion function; search of its maximum).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.derived.geometry import geometry
+from vcam_cli.camera.derived.mosaic import mosaic
+from vcam_cli.errors import BadInput, bad
+from vcam_cli.progress import Stages
+from vcam_cli.simulation.preparation import prepare
+
+CIRCLE = 8.0
+"""Width of the circle of confusion at both ends of the range, in pixels."""
+COARSE = 9
+"""Places that are tried first."""
+FINE = 7
+"""Steps of the golden section after them: to 7 % of the distance of the first places."""
+TOLERANCE = 1e-3
+"""Of the trials, relative to full signal: near the best place the contrast hardly changes."""
+GOLDEN = (np.sqrt(5) - 1) / 2
+LEAST_GAIN = 1e-3
+"""Relative gain in contrast below which nothing in the scene tells where it is sharp."""
+
+
+def focused(
+    camera: Camera, picture: Any, workers: int, stages: Stages
+) -> tuple[Camera, tuple[str, ...]]:
+    """Return the camera with its lens where the middle of the picture is sharpest, and notes.
+
+    Parameters
+    ----------
+    camera : Camera
+        The camera, with the samples of its lens.
+    picture : Any
+        What the scene's file holds; None for charts.
+    workers : int
+        Number of threads.
+    stages : Stages
+        Observer of the stages.
+
+    Raises
+    ------
+    BadInput
+        Where no lens, or a measured blur, is to be focused.
+    """
+    if camera.optics.focus == "fixed":
+        return camera, ()
+    if not camera.optics.is_lens or camera.optics.measured_blur:
+        what = "a measured blur is" if camera.optics.is_lens else "without a lens there is nothing"
+        raise bad("optics.focus", f"{what} not to be focused", "write focus: fixed")
+    with stages("autofocus"):
+        return _search(camera, picture, workers)
+
+
+def _search(camera: Camera, picture: Any, workers: int) -> tuple[Camera, tuple[str, ...]]:
+    solved, start = geometry(camera), camera.optics.defocus
+    reach = CIRCLE * max(solved.pitch_x, solved.pitch_y) * solved.working_f_number + abs(start)
+    block = mosaic(camera).block
+    finer = camera.accuracy.model_copy(update={"preset": None, "tolerance": TOLERANCE})
+    trial = camera.model_copy(update={"accuracy": finer})
+
+    def sharpness(shift: float) -> float:
+        moved = _moved(trial, shift)
+        try:
+            ready = prepare(moved, picture, workers, Stages())
+        except BadInput:  # a wavefront too steep to be followed: far from sharp
+            return 0.0
+        return contrast(ready.rate, len(block), len(block[0]))
+
+    places = np.linspace(-reach, reach, COARSE)
+    values = [sharpness(float(place)) for place in places]
+    best = int(np.argmax(values))
+    if values[best] <= (1 + LEAST_GAIN) * min(values):
+        return _moved(camera, start), ("focus: auto finds no detail, and the lens stays put",)
+    step = float(places[1] - places[0])
+    found = golden_section(sharpness, float(places[best]) - step, float(places[best]) + step)
+    note = f"focus: auto moves the image plane by {(found - start) * 1e6:+.4g} um"
+    if best in (0, COARSE - 1):
+        note += ", the end of its range: the lens may be out of focus still"
+    return _moved(camera, found), (note,)
+
+
+def _moved(camera: Camera, shift: float) -> Camera:
+    """Return the camera with its lens fixed, its image plane shifted [m]."""
+    optics = camera.optics.model_copy(update={"defocus": shift, "focus": "fixed"})
+    return camera.model_copy(update={"optics": optics})
+
+
+def contrast(light: NDArray, period_y: int, period_x: int) -> float:
+    """Return how sharp a picture is in its middle half.
+
+    Parameters
+    ----------
+    light : ndarray
+        Light (..., rows, columns), in any unit.
+    period_y, period_x : int
+        Rows and columns after which the colors of pixels repeat: neighbors of one color.
+
+    Returns
+    -------
+    float
+        Mean square of the differences between neighbors, over the squared mean; 0 in the dark.
+    """
+    rows, columns = light.shape[-2:]
+    middle = light[..., rows // 4 : rows - rows // 4, columns // 4 : columns - columns // 4].astype(
+        np.float64
+    )
+    mean = float(middle.mean())
+    if mean <= 0:
+        return 0.0
+    down = middle[..., period_y:, :] - middle[..., :-period_y, :]
+    across = middle[..., period_x:] - middle[..., :-period_x]
+    squares = [float(np.mean(np.square(d))) for d in (down, across) if d.size]
+    return sum(squares) / mean**2
+
+
+def golden_section(function: Callable[[float], float], low: float, high: float) -> float:
+    """Return the place of the maximum of a function with one between two places.
+
+    Parameters
+    ----------
+    function : callable
+        The function.
+    low, high : float
+        Places around its maximum.
+
+    Returns
+    -------
+    float
+        The place, to `GOLDEN` to the power of `FINE` of the range.
+    """
+    left, right = high - GOLDEN * (high - low), low + GOLDEN * (high - low)
+    at_left, at_right = function(left), function(right)
+    for _ in range(FINE):
+        if at_left < at_right:
+            low, left, at_left = left, right, at_right
+            right = low + GOLDEN * (high - low)
+            at_right = function(right)
+        else:
+            high, right, at_right = right, left, at_left
+            left = high - GOLDEN * (high - low)
+            at_left = function(left)
+    return float((low + high) / 2)
