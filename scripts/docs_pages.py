@@ -34,6 +34,7 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
     made = {
         "reference/camera.md": _keys_page(*_camera_keys()),
         "reference/studies.md": _keys_page(*_study_keys()),
+        "reference/measurements.md": _keys_page(*_measurement_keys()),
         "reference/commands.md": "\n".join(_commands()),
         "reference/effects.md": "\n".join(_effects()),
         "cite.md": _cite(),
@@ -78,6 +79,15 @@ def _study_keys() -> tuple[str, str, Iterable[Any], dict[str, Any]]:
     ]
     about = "Every key of a sweep study (`kind: sweep`), then of a schedule (`kind: schedule`)."
     return "Keys of studies", about, found, _definitions("study")
+
+
+def _measurement_keys() -> tuple[str, str, Iterable[Any], dict[str, Any]]:
+    from vcam_cli.config.key_index import keys
+    from vcam_cli.verification.model import Measurement
+
+    about = "Every key of a file of measured signals (`kind: measurement`), for `vcam verify`."
+    found = {key.path: ("measurement", key) for key in keys(Measurement)}
+    return "Keys of measurements", about, found.values(), _definitions("measurement")
 
 
 def _definitions(name: str) -> dict[str, Any]:

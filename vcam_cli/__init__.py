@@ -1,10 +1,16 @@
 """vcam: a digital camera simulator, from scene to raw frame to image quality.
 
-    from vcam_cli import load, simulate
-    camera = load("camera.yaml").with_({"exposure.time": "10 ms"})
-    result = simulate(camera)
-    result.dn, result.electrons, result.render, result.metrics["snr_db"]
-    result.save("out/mine")
+>>> from vcam_cli import load, simulate
+>>> camera = load("starter", ["array.rows=24", "array.columns=32"])  # or a file of yours
+>>> result = simulate(camera.with_({"exposure.time": "10 ms"}))
+>>> result
+<Result starter: 24 x 32 pixels, 10 ms>
+>>> result.dn.shape, result.render.shape
+((24, 32), (24, 32, 3))
+>>> result.metrics.units["snr_db"]
+'dB'
+
+`result.save("out/mine")` writes what `vcam run` writes.
 
 `sweep` and `schedule` run studies and give their tables as rows. `BadInput` and `CannotDo` are
 what all of them raise.

@@ -63,6 +63,14 @@ def parse(text: object, dimension: str) -> float:
     """Return the quantity `text` in the SI unit of `dimension` (a key of `DIMENSIONS`).
 
     Raises ValueError, with a sentence that names the dimension and gives an example.
+
+    >>> parse("6.5 um", "length")
+    6.5e-06
+    >>> parse("1/60 s", "time") == 1 / 60
+    True
+    >>> parse(30, "time")
+    Traceback (most recent call last):
+    ValueError: 30 is a bare number; a time needs its unit, for example 30 ms
     """
     kind = DIMENSIONS[dimension]
     if isinstance(text, (int, float)) and not isinstance(text, bool):

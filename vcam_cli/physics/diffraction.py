@@ -38,6 +38,13 @@ def cutoff_frequency(
     -------
     ndarray
         Spatial frequency on the sensor above which nothing passes [cycles/m].
+
+    Examples
+    --------
+    At f/8 in green light from afar, 250 lp/mm:
+
+    >>> float(cutoff_frequency(500e-9, 8)) / 1e3
+    250.0
     """
     wavelength = np.asarray(wavelength, dtype=np.float64)
     return (1 / (wavelength * effective_f_number(f_number, magnification)))[()]
@@ -70,6 +77,13 @@ def otf_circular(
     ndarray
         OTF in 0..1 [dimensionless]; 1 at frequency 0. Near the cut-off it falls as (1 - nu)^1.5 and
         keeps its relative accuracy there.
+
+    Examples
+    --------
+    At half the cut-off, 39 % of the contrast is left:
+
+    >>> round(float(otf_circular(125e3, 500e-9, 8)), 3)
+    0.391
     """
     wavelength = np.asarray(wavelength, dtype=np.float64)
     scale = wavelength * effective_f_number(f_number, magnification)

@@ -42,6 +42,13 @@ def magnification(focal_length: ArrayLike, object_distance: ArrayLike) -> Floats
     ------
     ValueError
         A focal length is not positive, or a scene lies at or inside it and forms no real image.
+
+    Examples
+    --------
+    A lens of 100 mm before an object 1.1 m away:
+
+    >>> round(float(magnification(0.1, 1.1)), 6)
+    -0.1
     """
     f, distance = _float(focal_length), _float(object_distance)
     if not (f > 0).all():
@@ -83,6 +90,13 @@ def effective_f_number(f_number: ArrayLike, magnification: ArrayLike = 0.0) -> F
     -------
     ndarray
         Working f-number [dimensionless].
+
+    Examples
+    --------
+    At life size a lens of f/2.8 works at f/5.6:
+
+    >>> float(effective_f_number(2.8, -1))
+    5.6
     """
     return (_float(f_number) * (1 - _float(magnification)))[()]
 

@@ -42,6 +42,11 @@ def conversion_gain(capacitance: ArrayLike) -> Floats:
     -------
     ndarray
         Conversion gain [V/e].
+
+    Examples
+    --------
+    >>> round(1e6 * float(conversion_gain(8e-15)), 2)  # uV/e
+    20.03
     """
     return (ELEMENTARY_CHARGE / _float(capacitance))[()]
 
@@ -109,6 +114,11 @@ def well_capacity(voltage_swing: ArrayLike, conversion_gain: ArrayLike) -> Float
     -------
     ndarray
         Electrons that fill the swing [e].
+
+    Examples
+    --------
+    >>> round(float(well_capacity(1.0, 40e-6)))
+    25000
     """
     return (_float(voltage_swing) / _float(conversion_gain))[()]
 
@@ -302,6 +312,13 @@ def snr_db(
     -------
     ndarray
         Signal-to-noise ratio [dB]; -inf without light.
+
+    Examples
+    --------
+    Ten thousand electrons with shot noise alone:
+
+    >>> float(snr_db(10_000, 0, 0))
+    40.0
     """
     light = _float(photo_electrons)
     return _ratio_db(light, _float(read_variance) + light + _float(dark_electrons))

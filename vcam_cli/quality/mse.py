@@ -67,6 +67,11 @@ def psnr_of_mse(error: float, peak: float = 1.0) -> float:
     float
         Ratio [dB]; inf where the error is 0, which is also what the metrics file says of two
         identical pictures.
+
+    Examples
+    --------
+    >>> psnr_of_mse(0.01)
+    20.0
     """
     if error == 0:
         return math.inf
