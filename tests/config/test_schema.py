@@ -175,26 +175,28 @@ class TestCamera:
         assert not accepts({"extends": "other.yaml", "pixel": {"width": 4}})
 
 
+SWEEP = {
+    "kind": "sweep",
+    "name": "a",
+    "camera": "starter",
+    "vary": {"pixel.width": {"start": "3 um", "stop": "8 um", "count": 3}},
+    "cases": {"dim": {"scene.luminance": "10 cd/m2"}},
+    "repeat": {"seed.frame": [1, 2]},
+    "metrics": ["snr_db"],
+}
+
+
 class TestStudy:
     """Paths of a camera's keys, where a sweep has them, are completed and explained."""
 
     STUDY = jsonschema.Draft202012Validator(SCHEMAS["study.schema.json"])
-    SWEEP = {
-        "kind": "sweep",
-        "name": "a",
-        "camera": "starter",
-        "vary": {"pixel.width": {"start": "3 um", "stop": "8 um", "count": 3}},
-        "cases": {"dim": {"scene.luminance": "10 cd/m2"}},
-        "repeat": {"seed.frame": [1, 2]},
-        "metrics": ["snr_db"],
-    }
 
     def test_shipped_studies_are_valid(self):
         for file in shipped.files("studies").values():
             self.STUDY.validate(plain(file))
 
     def test_paths_are_known_in_all_places(self):
-        assert self.STUDY.is_valid(self.SWEEP)
+        assert self.STUDY.is_valid(SWEEP)
         definitions = SCHEMAS["study.schema.json"]["$defs"]
         for name in ("vary paths", "repeat paths", "Case"):
             about = definitions[name]["properties"]["pixel.width"]
@@ -203,8 +205,8 @@ class TestStudy:
 
     def test_what_is_written_below_a_path_is_checked_as_before(self):
         for key, wrong in (("vary", {"pixel.width": 3}), ("repeat", {"seed.frame": 1})):
-            assert not self.STUDY.is_valid(self.SWEEP | {key: wrong})
-        assert not self.STUDY.is_valid(self.SWEEP | {"cases": {"dim": {"vary": {"x": 3}}}})
+            assert not self.STUDY.is_valid(SWEEP | {key: wrong})
+        assert not self.STUDY.is_valid(SWEEP | {"cases": {"dim": {"vary": {"x": 3}}}})
 
 
 class TestReadable:
