@@ -23,6 +23,7 @@ from vcam_cli.scheduling.comparison_schedules import (
     heuristic_photocurrents,
     uniform_times,
 )
+from vcam_cli.scheduling.flow_bound import least_bounds
 from vcam_cli.scheduling.local_search import assigned_schedule, sqp_schedule
 from vcam_cli.scheduling.objective import Schedule
 from vcam_cli.scheduling.pdf import Floats, Pdf
@@ -34,7 +35,7 @@ from vcam_cli.scheduling.sensor import (
     Sensor,
     first_capture_time,
 )
-from vcam_cli.scheduling.weighted_snr import upper_bounds, weighted_expected_snr
+from vcam_cli.scheduling.weighted_snr import weighted_expected_snr
 
 Schedules = dict[int, Schedule]
 """Schedules by the number of captures."""
@@ -313,8 +314,8 @@ def _upper_bounds(task: Task, method: str, counts: Sequence[int]) -> dict[int, f
     """Return the bounds of the mean SNR: one for all but the weighted estimate."""
     if method != "weighted":
         return dict.fromkeys(counts, task.bound)
-    found = upper_bounds(task.pdf, max(counts), task.sensor, task.constraints)
-    return {n: float(found[n - 1]) for n in counts}
+    found = least_bounds(task.pdf, tuple(counts), task.sensor, task.constraints)
+    return dict(zip(counts, found, strict=True))
 
 
 def study_sensor(study: ScheduleStudy) -> Sensor:

@@ -4,7 +4,8 @@ The mean SNR of a schedule (`weighted_snr`) is no sum over a chain: every captur
 others are good for. The search begins with the best schedule of the last sample before saturation,
 with captures clustered at both ends (what many reads against read noise want), and with the best of
 fewer captures; one capture at a time then moves to where the schedule is worth most. How far the
-result may be from the best is certified by an upper bound, as `gap`.
+result may be from the best is certified by an upper bound, as `gap`: that of `upper_bounds`, or
+for captures at whole frames the closer one of `flow_bound`.
 
 Without read and reset noise the last sample holds all there is to know, and `full_noise` applies.
 """
@@ -15,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcam_cli.scheduling import full_noise
+from vcam_cli.scheduling.flow_bound import least_bounds
 from vcam_cli.scheduling.objective import Schedule
 from vcam_cli.scheduling.pdf import Floats, Pdf
 from vcam_cli.scheduling.sensor import (
@@ -24,7 +26,7 @@ from vcam_cli.scheduling.sensor import (
     Sensor,
     first_capture_time,
 )
-from vcam_cli.scheduling.weighted_snr import ROUGH, mean_snr, upper_bounds, weighted_expected_snr
+from vcam_cli.scheduling.weighted_snr import ROUGH, mean_snr, weighted_expected_snr
 
 SWEEPS = 10
 COARSE_GAIN = 1e-5
@@ -79,14 +81,14 @@ def optimal_schedules(
     starts = full_noise.optimal_schedules(pdf, counts, sensor, constraints)
     if not sensor.noise_floor or not starts:
         return starts
-    bounds = upper_bounds(pdf, max(counts), sensor, constraints)
+    bounds = dict(zip(counts, least_bounds(pdf, tuple(counts), sensor, constraints), strict=True))
     schedules: dict[int, Schedule] = {}
     fewer: Floats = np.empty(0)
     for count in sorted(starts):
         last_sample = starts[count].times
         search = _CoordinateAscent(pdf, sensor, constraints, count, float(last_sample[-1]))
         fewer = search.best_times([last_sample, *search.clustered_times(last_sample), fewer])
-        schedules[count] = _padded_schedule(pdf, fewer, count, sensor, float(bounds[count - 1]))
+        schedules[count] = _padded_schedule(pdf, fewer, count, sensor, bounds[count])
     return {count: schedules[count] for count in starts}
 
 

@@ -98,11 +98,11 @@ def mean_snr(pdf: Pdf, schedules: Floats, sensor: Sensor, order: int = EXACT) ->
     row, low, high, probability, captures = _saturation_segments(pdf, schedules, sensor)
     if not pdf.discrete:
         shift = sensor.dark + sensor.read**2 / schedules.sum(axis=1)[row]
-        part, low, high, share = _split_octaves(low, high, shift)
+        part, low, high, share = split_octaves(low, high, shift)
         row, probability, captures = row[part], probability[part] * share, captures[part]
     total = np.zeros(len(schedules))
     for nodes, chosen in _gauss_orders(pdf, low, high, order):
-        points, weights = _gauss_rule(nodes)
+        points, weights = gauss_rule(nodes)
         half = (high[chosen] - low[chosen]) / 2
         i = (low[chosen] + half)[:, None] + half[:, None] * points
         when, samples = schedules[row[chosen]], captures[chosen]
@@ -155,7 +155,8 @@ def upper_bounds(
 
 
 @cache
-def _gauss_rule(nodes: int) -> tuple[Floats, Floats]:
+def gauss_rule(nodes: int) -> tuple[Floats, Floats]:
+    """Return points and weights of Gauss's rule on [-1, 1]."""
     points, weights = np.polynomial.legendre.leggauss(nodes)
     return points, weights
 
@@ -229,7 +230,7 @@ def _saturation_segments(
     )  # fmt: skip
 
 
-def _split_octaves(
+def split_octaves(
     low: Floats, high: Floats, shift: Floats
 ) -> tuple[Indices, Floats, Floats, Floats]:
     """Split segments until their ends, moved by `shift`, are at most a factor 2 apart.
