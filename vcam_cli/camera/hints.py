@@ -180,8 +180,9 @@ NOT_SIMULATED: Mapping[str, str] = {
 """What cameras have and this file cannot say -> what is simulated in its place."""
 AT_MOST_1 = "it must be at most 1"
 """What is said of a fraction that is too large, mostly since it is in percent."""
-_PICTURES = {".png", ".jpg", ".jpeg", ".tif", ".tiff", ".exr", ".hdr", ".bmp", ".webp", ".pfm"}
-_DATA = _PICTURES | {".csv", ".txt", ".dat", ".npy", ".tsv"}
+PICTURES = {".png", ".jpg", ".jpeg", ".tif", ".tiff", ".exr", ".hdr", ".bmp", ".webp", ".pfm"}
+"""Ends of names of files of pictures."""
+_DATA = PICTURES | {".csv", ".txt", ".dat", ".npy", ".tsv"}
 """Ends of names of files that hold a curve, a table or a point spread function."""
 _SEPARATE = {"name", "kind", "file", "value", "rows", "columns"}
 """Keys that many mappings have: elsewhere they mean something else."""
@@ -317,7 +318,7 @@ def _meant_value(problem: Problem, given: object) -> str:
     if problem.path[0] == "effects" and len(problem.path) == 2 and _plain(word) in SWITCHES:
         return f"write {'on' if SWITCHES[_plain(word)] == 'true' else 'off'}"
     if path == "scene.source":
-        if PurePath(word).suffix.lower() in _PICTURES:
+        if PurePath(word).suffix.lower() in PICTURES:
             return f"write {{kind: image, file: {word}}}"
         chart = nearest(word, CHARTS)
         return f"write {{kind: chart, chart: {chart}}}" if chart else ""

@@ -4,6 +4,7 @@ import re
 from dataclasses import replace
 from pathlib import PurePath
 
+from vcam_cli.camera.hints import PICTURES
 from vcam_cli.config.validation_messages import yaml_text
 from vcam_cli.errors import Path, Problem
 from vcam_cli.sweeps.model import VARY
@@ -13,7 +14,6 @@ MOST_COUNTS = 100
 _RANGE = re.compile(r"(.+?)(?:\s*(?:\bto\b|\.\.\.?|–|:)\s*|\s+-\s+|(?<=[\da-z])-(?=\d))(.+)")
 _BETTER_LARGE = ("snr", "psnr", "range", "iso", "capacity")
 """Parts of names of metrics of which the most is sought."""
-_PICTURES = {".png", ".jpg", ".jpeg", ".tif", ".tiff", ".exr"}
 _SENSOR = {
     "full_well": "well_capacity", "well": "well_capacity", "noise": "read_noise",
     "max": "max_time", "time": "max_time", "exposure_time": "max_time",
@@ -45,7 +45,7 @@ def _meant(path: Path, given: object) -> str:
         return f"{{metric: {text}, goal: {goal}}}"
     if path == ("counts",):
         return _counts(text)
-    if path == ("pdf",) and word and PurePath(text).suffix.lower() in _PICTURES:
+    if path == ("pdf",) and word and PurePath(text).suffix.lower() in PICTURES:
         return "{camera: camera.yaml}: a camera that looks at the picture"
     if path[:1] == ("sensor",) and path[-1] in _SENSOR:
         return f"sensor.{_SENSOR[str(path[-1])]}: {text}"
