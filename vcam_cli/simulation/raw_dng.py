@@ -54,10 +54,11 @@ def check(camera: Camera) -> None:
         raise bad(_PATH, message, "write dng: false")
     place = layout(camera, geometry(camera))
     rows, columns = place.geometry.rows, place.geometry.columns
-    if camera.array.mosaic and place.mosaic.block not in BAYER:
-        size = f"{len(place.mosaic.block)} x {len(place.mosaic.block[0])}"
+    mosaic = place.raw_mosaic
+    if camera.array.mosaic and mosaic.block not in BAYER:
+        size = f"{len(mosaic.block)} x {len(mosaic.block[0])}"
         message = (
-            f"{', '.join(place.mosaic.colors)} in blocks of {size} pixels are no Bayer mosaic, and"
+            f"{', '.join(mosaic.colors)} in blocks of {size} pixels are no Bayer mosaic, and"
             " raw converters read others wrong: LibRaw all of more than 2 x 2, and some of 2 x 2"
         )
         raise bad(_PATH, message, _REMEDY)
