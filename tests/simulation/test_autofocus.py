@@ -2,11 +2,12 @@
 
 import numpy as np
 import pytest
-from making import GONE, camera
+from making import camera
 
 from vcam_cli.errors import BadInput
 from vcam_cli.progress import Stages
 from vcam_cli.simulation import autofocus
+from vcam_cli.simulation.idle_keys import idle_keys
 from vcam_cli.simulation.preparation import prepare as bring_light
 from vcam_cli.simulation.simulate import prepare
 
@@ -31,6 +32,7 @@ def test_a_known_defocus_is_taken_out(defocus, tmp_path):
     assert any("focus: auto moves" in note for note in notes)
 
 
+@pytest.mark.long
 def test_an_aberrated_lens_is_as_sharp_as_anywhere(tmp_path):
     """Against the same contrast at 41 places, a quarter of the depth of focus apart."""
     aberrated = EDGE | {"optics.zernike": {11: "0.04 um", 4: "0.06 um"}}
@@ -55,17 +57,15 @@ def test_even_light_tells_no_focus(tmp_path):
     assert any("no detail" in note for note in notes)
 
 
-@pytest.mark.parametrize(("changes", "words"), [
-    ({"optics": "none", "scene.distance": GONE}, None),
-    ({"optics.mtf": {"file": "m.csv"}}, "measured blur"),
-])  # fmt: skip
-def test_what_cannot_be_focused_is_refused(changes, words, tmp_path):
+def test_a_measured_blur_is_not_focused(tmp_path):
     (tmp_path / "m.csv").write_text("frequency_lp_per_mm,value\n0,1\n100,0.5\n300,0\n")
-    if words is None:
-        assert camera(tmp_path, {**changes}).optics.focus == "fixed", "no lens has nothing to say"
-        return
-    with pytest.raises(BadInput, match=words):
-        prepare(camera(tmp_path, EDGE | changes))
+    with pytest.raises(BadInput, match="measured blur"):
+        prepare(camera(tmp_path, EDGE | {"optics.mtf": {"file": "m.csv"}}))
+
+
+def test_a_defocus_that_is_taken_out_is_told(tmp_path):
+    made = camera(tmp_path, EDGE | {"optics.defocus": "9 um"})
+    assert "optics.defocus" in dict(idle_keys(made))
 
 
 def test_contrast_of_colors_is_that_of_neighbors_of_one_color():

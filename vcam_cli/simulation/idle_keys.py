@@ -107,6 +107,11 @@ RULES = (
         "the automatic exposure goes by another level; write method: percentile",
     ),
     Rule(
+        ("optics.defocus",),
+        lambda camera: camera.optics.focus == "auto",
+        "the autofocus takes it out; write focus: fixed",
+    ),
+    Rule(
         ("scene.distance",),
         lambda camera: not camera.optics.is_lens,
         "the light falls on the bare sensor",
