@@ -464,6 +464,45 @@ class TestKinds:
         assert "pixel.technology.gate.thickness: 0.25 um" in text
 
 
+class TestTunneling:
+    """Traps in the junction's field, as Hurkx has it."""
+
+    def of(self, folder, **choice):
+        c = made(
+            folder, technology={"from": "cmos-0.35um", **choice}, dark_current_density="junction"
+        )
+        return dark_rate(c)
+
+    def test_generation_is_raised_by_the_mean_of_the_factor(self, tmp_path):
+        """Mean over swing and region in small steps, the formula written out."""
+        n, q = 400, CHARGE
+        bias = 2.25 - 1.38 * (np.arange(n) + 0.5) / n
+        width = EPSILON / (0.906e-3 * (1 + bias / 0.8) ** -0.36)
+        field = np.outer(2 * (bias + 0.8) / width, (np.arange(n) + 0.5) / n)
+        unit = math.sqrt(24 * 0.25 * 9.1093837015e-31 * (BOLTZMANN * 300) ** 3)
+        unit /= q * 6.62607015e-34 / (2 * math.pi)
+        r = field / unit
+        factor = float(np.mean(1 + 2 * math.sqrt(3 * math.pi) * r * np.exp(r**2)))
+        plain, raised = self.of(tmp_path), self.of(tmp_path, junction={"tunneling": "traps"})
+        edge = self.of(tmp_path, dark_current={"perimeter": "0 pA/cm"})
+        generation = edge * 0.99943  # all but 0.06 % of eq 2.31 is generation here
+        assert (raised - plain) / generation == pytest.approx(factor - 1, rel=3e-3)
+
+    def test_a_constant_field_keeps_leakage_and_a_constant_voltage_raises_it(self, tmp_path):
+        traps = {"junction": {"tunneling": "traps"}, "layout": {"border": 0, "transistors": 0}}
+        traps["dark_current"] = {"perimeter": "0 pA/cm"}
+        rates = [
+            self.of(tmp_path, **traps, **more)
+            for more in (
+                {},
+                {"feature_size": "0.25 um"},
+                {"feature_size": "0.25 um", "scaling": {"voltages": 0}},
+            )
+        ]
+        assert rates[1] < rates[0], "the same field in a thinner region"
+        assert rates[2] > 1.1 * rates[0], "though the region is thinner, too"
+
+
 # --- dark current --------------------------------------------------------------------------------
 
 

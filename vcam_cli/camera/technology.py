@@ -11,6 +11,7 @@ from vcam_cli.config.model import Model, at_most_one, key
 from vcam_cli.config.quantities import Number, Quantity
 from vcam_cli.config.validation_messages import describe
 from vcam_cli.config.values import (
+    Choice,
     Either,
     Length,
     MaybeFraction,
@@ -66,6 +67,12 @@ class Junction(Model):
     electron_lifetime: MaybeTime = key("of electrons", example="1 us", default=None)
     hole_diffusivity: _Diffusivity = key("of holes", example="12 cm2/s", default=None)
     electron_diffusivity: _Diffusivity = key("of electrons", example="36 cm2/s", default=None)
+    tunneling: Annotated[str | None, Choice("none", "traps")] = key(
+        "traps: the field of diffusions and wells hastens the generation of a dark current junction"
+        " (Hurkx 1992)",
+        example="none",
+        default=None,
+    )
 
 
 class Well(Model):

@@ -17,9 +17,9 @@ from vcam_cli.camera.derived import charge_storage, dark_current, sense_node
 from vcam_cli.camera.derived.electrical import electrical
 from vcam_cli.camera.derived.junction import Depths, depths
 from vcam_cli.camera.derived.pixel_layout import detector
-from vcam_cli.camera.derived.process import Need, process
+from vcam_cli.camera.derived.process import Need, Process, process
 from vcam_cli.errors import BadInput
-from vcam_cli.physics import junction, photodiode, silicon
+from vcam_cli.physics import photodiode, silicon
 
 KINDS = ("ndiff-psub", "nwell-psub", "photogate", "pinned")
 WAVELENGTHS = (450e-9, 550e-9, 650e-9)
@@ -43,17 +43,14 @@ class KindReport:
     """Dark current density by eq 2.31, of the same regions [A/m2]."""
     field: float | None
     """Highest field of the junction after a reset [V/m]; None where no such junction collects."""
+    factor: float
+    """Of tunneling by traps on the generation in the depletion region, over swing and region."""
     area: float
     """Of the photodetector [m2]."""
     capacitance: float
     """Of the node that the voltage is read on [F]."""
     full_well: float
     """[e]"""
-
-    @property
-    def enhancement(self) -> float:
-        """Factor of that field on the generation in the depletion region, by traps."""
-        return 1.0 if self.field is None else float(junction.field_enhancement(self.field, 300.0))
 
 
 def process_report(technology: str) -> Iterator[tuple[str, KindReport | str]]:
@@ -80,12 +77,14 @@ def process_report(technology: str) -> Iterator[tuple[str, KindReport | str]]:
 def _of_kind(camera: Camera, kind: str) -> KindReport:
     made, found, circuit = process(camera), depths(camera, NEED), electrical(camera)
     assert circuit.capacitance is not None
+    transferred = kind in charge_storage.TRANSFERRED
     return KindReport(
         kind=kind,
         depths=found,
         photo=tuple(_collected(camera, found, w) for w in WAVELENGTHS),
         dark=dark_current.junction_parts(camera, made),
-        field=_field(camera) if kind not in charge_storage.TRANSFERRED else None,
+        field=None if transferred else _field_after_reset(camera, made),
+        factor=1.0 if transferred else dark_current.field_factor(camera, made, NEED),
         area=detector(camera).area,
         capacitance=circuit.capacitance,
         full_well=circuit.full_well,
@@ -100,10 +99,6 @@ def _collected(camera: Camera, x: Depths, wavelength: float) -> tuple[float, flo
     return parts[0], parts[1], parts[2]
 
 
-def _field(camera: Camera) -> float:
-    """Return the highest field of an abrupt junction, 2 (V + phi) / W, after a reset [V/m]."""
-    made = process(camera)
-    (area, built_in, grading), _ = sense_node.junction_capacitances(camera, made, NEED)[0]
+def _field_after_reset(camera: Camera, made: Process) -> float:
     reset = sense_node.reset_voltage(camera, made, NEED)
-    per_area = float(junction.capacitance(area, reset, built_in, grading)) / detector(camera).area
-    return 2 * (reset + built_in) / float(junction.depletion_width(per_area))
+    return dark_current.highest_field(camera, made, NEED, reset)

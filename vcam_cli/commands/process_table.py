@@ -54,12 +54,13 @@ def _photocurrents(found: list[KindReport]) -> Iterator[str]:
 def _dark_currents(found: list[KindReport]) -> Iterator[str]:
     yield ""
     yield "dark current density nA/cm2, of the same regions (eq 2.31); the junction's highest field"
-    yield "after a reset, and the factor on generation by traps in it (Hurkx 1992), not counted"
-    yield "kind            n        depletion        p        sum    field MV/m   factor"
+    yield "after a reset; what tunneling by traps makes of the sum (junction.tunneling: traps)"
+    yield "kind            n        depletion        p        sum    field MV/m    with traps"
     for r in found:
         holes, generation, electrons = (part * NA_CM2 for part in r.dark)
         whole = sum(r.dark) * NA_CM2
         line = f"{r.kind:<12}{holes:9.2g} {generation:12.4g} {electrons:11.2g} {whole:9.4g}"
         if r.field is not None:
-            line += f" {r.field / 1e6:11.3g} {r.enhancement:9.3g}"
+            raised = whole + (r.factor - 1) * generation
+            line += f" {r.field / 1e6:11.3g} {raised:13.4g}"
         yield line

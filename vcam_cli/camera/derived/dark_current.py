@@ -6,11 +6,16 @@ References
     2003, section 2.2.2.
 [2] J. R. Janesick, "Scientific Charge-Coupled Devices", SPIE Press, 2001, section 7.1.1 (dark
     current and temperature).
+[3] S. M. Sze, K. K. Ng, "Physics of Semiconductor Devices", 3rd edition, Wiley, 2007, section 2.2.
 """
 
 from __future__ import annotations
 
+import numpy as np
+
 from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.derived import sense_node
+from vcam_cli.camera.derived.charge_storage import TRANSFERRED
 from vcam_cli.camera.derived.junction import depletion_width
 from vcam_cli.camera.derived.pixel_layout import detector
 from vcam_cli.camera.derived.process import Need, Process, process
@@ -19,6 +24,10 @@ from vcam_cli.errors import bad
 from vcam_cli.physics import junction as physics
 from vcam_cli.physics import readout, silicon
 
+STEPS = 65
+"""Biases, and depths of the depletion region, over which the effect of the field is averaged."""
+FIELD_TEMPERATURE = 300.0
+"""At which tunneling by traps is taken [K]; it changes little over tens of kelvins."""
 MOST_DOUBLINGS = 60
 """The rule of a doubling every few kelvin holds over some tens of them, not over hundreds."""
 DOUBLING = 8.0
@@ -85,7 +94,30 @@ def junction_parts(camera: Camera, made: Process) -> tuple[float, float, float]:
     n_i = _intrinsic(camera.pixel.temperature)
     numbers = (n_i, d_p, d_n, n_d, n_a, surface, neutral, x_n, x_p, tau_p, tau_n)
     holes, generation, electrons = physics.dark_current_parts(*numbers)
+    if made.junction.tunneling == "traps" and camera.pixel.photodetector.kind not in TRANSFERRED:
+        generation = generation * field_factor(camera, made, need)
     return float(holes), float(generation), float(electrons)
+
+
+def highest_field(camera: Camera, made: Process, need: Need, bias: float) -> float:
+    """Return the highest field of an abrupt junction of the measured capacitance [V/m], [3].
+
+    It is 2 (V + phi) / W at a reverse bias [V]. Raises BadInput where numbers are missing.
+    """
+    (zero, built_in, grading), _ = sense_node.junction_capacitances(camera, made, need)[0]
+    per_area = float(physics.capacitance(zero, bias, built_in, grading)) / detector(camera).area
+    return 2 * (bias + built_in) / float(physics.depletion_width(per_area))
+
+
+def field_factor(camera: Camera, made: Process, need: Need) -> float:
+    """Return by how much tunneling by traps raises the generation, over the swing and the region.
+
+    In an abrupt junction the field falls straight from its highest value to 0.
+    """
+    biases = np.linspace(*sense_node.bias_range(camera, made, need), STEPS)
+    highest = np.array([highest_field(camera, made, need, float(bias)) for bias in biases])
+    within = (np.arange(STEPS) + 0.5) / STEPS
+    return float(physics.field_enhancement(np.outer(highest, within), FIELD_TEMPERATURE).mean())
 
 
 def _intrinsic(temperature: float) -> float:

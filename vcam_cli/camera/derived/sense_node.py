@@ -60,7 +60,7 @@ def _technology_swing(camera: Camera, made: Process) -> float | None:
     return swing
 
 
-def _bias_range(camera: Camera, made: Process, need: Need) -> tuple[float, float]:
+def bias_range(camera: Camera, made: Process, need: Need) -> tuple[float, float]:
     """Return the reverse bias of the photodiode [V], full and empty.
 
     They are the reset voltage less the swing, and the reset voltage. Raises BadInput where numbers
@@ -128,7 +128,7 @@ def capacitance(camera: Camera) -> float | None:
     made = process(camera)
     need = Need("pixel.photodetector.capacitance", "the capacitance of the junction")
     parts, whole = junction_capacitances(camera, made, need)
-    biases = _bias_range(camera, made, need)
+    biases = bias_range(camera, made, need)
     for zero, built_in, grading in parts:
         whole += float(junction.mean_capacitance(zero, *biases, built_in, grading))
     if whole <= 0:
@@ -177,7 +177,7 @@ def area_capacitance(camera: Camera, made: Process, need: Need) -> float:
     else:
         keys = ("capacitance.area", "capacitance.built_in", "capacitance.grading")
         zero, built_in, grading = made.require(need, *keys)
-    biases = _bias_range(camera, made, need)
+    biases = bias_range(camera, made, need)
     return float(junction.mean_capacitance(zero, *biases, built_in, grading))
 
 
