@@ -27,6 +27,9 @@ CACHE = ROOT / "build" / "gallery"
 """Photographs of former builds, known by a hash of all that they depend on."""
 WIDEST = 480
 """Columns of a photograph in the gallery, at most."""
+LARGE = 4_000_000
+"""Pixels of an array from which on a window of it takes the photograph, to save time."""
+WINDOW = "Here {columns} x {rows} of its pixels take it, with the scene fitted into them."
 
 
 def on_files(files: Files, config: MkDocsConfig) -> Files:
@@ -267,6 +270,8 @@ def _gallery() -> tuple[str, dict[str, bytes]]:
         about = " ".join(_comment(path.read_text("utf-8")))
         lines += [f"## {name}", "", f"![Photograph taken by {name}](gallery/{name}.png)", ""]
         lines += [_escaped(about), "", f"`vcam list cameras {name}` prints the file.", ""]
+        if window := _window(name):
+            lines += [WINDOW.format(**{key.rpartition(".")[2]: n for key, n in window.items()}), ""]
     return "\n".join(lines), photographs
 
 
@@ -297,6 +302,20 @@ def _photograph(name: str) -> bytes:
     return file.read_bytes()
 
 
+def _window(name: str) -> dict[str, int]:
+    """Return the keys of a window of a large array, {} for others."""
+    from vcam_cli import load
+
+    array = load(name).array
+    if array.rows is None or array.columns is None or array.rows * array.columns < LARGE:
+        return {}
+    step = -(-array.columns // (2 * WIDEST))
+    return {
+        "array.rows": array.rows // step // 8 * 8,
+        "array.columns": array.columns // step // 8 * 8,
+    }
+
+
 def take(name: str, file: str) -> None:
     """Take a shipped camera's photograph, shrunk to fit the page, and write it as a PNG."""
     import numpy as np
@@ -304,7 +323,9 @@ def take(name: str, file: str) -> None:
     from vcam_cli import load, simulate
     from vcam_cli.files.png import write_png
 
-    image = simulate(load(name)).render
+    camera = load(name)
+    window = _window(name)
+    image = simulate(camera.with_(window) if window else camera).render
     if image.dtype != np.uint8:
         image = (image >> 8).astype(np.uint8)
     step = -(-image.shape[1] // WIDEST)
