@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from camera_trees import camera, mistakes
 
-from vcam_cli.camera.spectrum import SpectrumSpec
+from vcam_cli.camera.spectrum import Spectral, SpectrumSpec
 from vcam_cli.errors import BadInput
 
 NM = 1e-9
@@ -203,3 +203,28 @@ class TestLamps:
     def test_emitting_images_have_none(self):
         image = {"kind": "image", "file": "a.png", "model": "laser"}
         assert camera(scene__source=image).scene.illuminant is None
+
+
+def test_junctions_of_a_stack_collect_by_eq_230():
+    """Against sums over thin layers of a exp(-a x) times the share that reaches the junction."""
+    from vcam_cli.physics.silicon import absorption
+
+    depths = [(0, 0.15, 0.25, 0.5), (0.25, 0.5, 0.7, 1.7), (0.7, 1.7, 2.3, 5)]
+    spec = Spectral(most=1.0)
+    for wavelength in (450e-9, 550e-9, 650e-9):
+        a = float(absorption(wavelength)) * 1e-6  # per um
+        z = 5 * (np.arange(200_000) + 0.5) / 200_000
+        total = 0.0
+        for d in depths:
+            form = {"silicon": [f"{depth} um" for depth in d]}
+            found = float(spec.read(form).resolve().evaluate(np.array([wavelength]))[0])
+            share = np.interp(z, d, (0, 1, 1, 0), left=0, right=0)
+            assert found == pytest.approx(float(np.mean(a * np.exp(-a * z) * share)) * 5, rel=1e-4)
+            total += found
+        assert total < 1 - np.exp(-a * 5), "no charge is counted twice"
+
+
+@pytest.mark.parametrize("depths", [["0 um", "1 um", "2 um"], ["0 um", "1 um", "1 um", "2 um"]])
+def test_depths_of_silicon_are_two_or_four_that_rise(depths):
+    with pytest.raises(ValueError, match="depths"):
+        Spectral(most=1.0).read({"silicon": depths})

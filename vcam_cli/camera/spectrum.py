@@ -10,6 +10,7 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
+from itertools import pairwise
 from typing import Annotated, Any, Self
 
 import numpy as np
@@ -24,7 +25,7 @@ from vcam_cli.config.validation_messages import describe, refusal
 from vcam_cli.config.values import Choice, File, Gap
 from vcam_cli.config.yaml_type import DEFINED, YamlType, to_yaml
 from vcam_cli.errors import BadInput, Path, bad, data_file_problems
-from vcam_cli.physics import silicon
+from vcam_cli.physics import photodiode, silicon
 from vcam_cli.spectra.spectrum import Outside
 
 Points = tuple[tuple[float, float], ...]
@@ -139,26 +140,38 @@ class SpectrumTable(Model):
 
 
 class SiliconLayer(Model):
-    """The share of the light that silicon absorbs between two depths: a filter of silicon."""
+    """What a layer of silicon collects: a filter of silicon.
 
-    silicon: tuple[Gap, Gap] = key(
-        "two depths, the upper first", unit="um", example=["0 um", "0.4 um"]
+    Two depths: all that is absorbed between them. Four: a junction in a stack, as eq 2.30 has it:
+    all between the middle two, where it is depleted; above and below a share that falls straight to
+    0 at the first and the last, where charge goes to the neighboring junction or is lost.
+    """
+
+    silicon: tuple[Gap, ...] = key(
+        "two depths, or four: the upper first", unit="um", example=["0 um", "0.4 um"]
     )
 
     @model_validator(mode="after")
     def _depths_rise(self) -> Self:
-        if self.silicon[0] >= self.silicon[1]:
+        if len(self.silicon) not in (2, 4):
+            remedy = "write two depths, for example [0 um, 0.4 um], or four"
+            raise refusal(("silicon",), f"has {len(self.silicon)} depths", remedy)
+        if any(upper >= lower for upper, lower in pairwise(self.silicon)):
             remedy = "write the upper depth first, for example [0 um, 0.4 um]"
             raise refusal(("silicon",), "its depths do not rise", remedy)
         return self
 
     def resolve(self, path: Path) -> spectra.Spectrum:
-        """Return the share absorbed, by Beer and Lambert's law, at every whole nanometer."""
-        top, bottom = self.silicon
+        """Return the share collected, by Beer and Lambert's law, at every whole nanometer."""
+        top, *below = self.silicon
         low, high = (round(edge * 1e9) for edge in silicon.ABSORPTION_RANGE)
         wavelength = np.arange(low, high + 1) * 1e-9
         absorption = silicon.absorption(np.clip(wavelength, *silicon.ABSORPTION_RANGE))
-        share = np.exp(-absorption * top) * -np.expm1(-absorption * (bottom - top))
+        if len(below) == 1:
+            share = -np.expm1(-absorption * (below[0] - top))
+        else:
+            share = photodiode.quantum_efficiency(absorption, *(depth - top for depth in below))
+        share = np.exp(-absorption * top) * share
         return spectra.Spectrum.from_samples(wavelength, share)
 
 
