@@ -2,6 +2,7 @@
 
 import json
 import math
+from inspect import isabstract
 from typing import Annotated
 
 import pytest
@@ -755,7 +756,8 @@ class TestOrigin:
 
 
 def test_steps_have_one_key_each():
-    assert all(len(step.model_fields) == 1 for step in Step.__subclasses__())
+    own = [step for step in Step.__subclasses__() if not isabstract(step)]
+    assert all(len(step.model_fields) == 1 for step in own)
 
 
 def test_metrics_of_the_contract():

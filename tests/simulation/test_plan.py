@@ -93,6 +93,7 @@ CAMERAS = {
     | EDGE,
     "a lamp in the picture, and a little stray light": {
         "scene.source": {"kind": "chart", "chart": "hdr-patches"},
+        "scene.camera_motion": {"pan": "1 deg/s"},
         "scene.radiance": radiance_for(3e6),
         "accuracy": "draft",
         "optics.diffraction": False,
@@ -232,6 +233,7 @@ def test_noise_is_weighed_against_the_noise_that_runs(tmp_path):
 # --- on, off, all --------------------------------------------------------------------------------
 
 EVERYTHING = NOISE | {DARK: "100 e/s", "optics.off_axis": "exact"}
+MOVING = "a lamp in the picture, and a little stray light"
 IN_EVERYTHING = {
     *("diffraction", "pixel_aperture", "off_axis", "dark_current", "shot_noise", "fpn"),
     *("reset_noise", "read_noise", "saturation", "quantization"),
@@ -239,9 +241,9 @@ IN_EVERYTHING = {
 
 
 def test_all_is_on_for_everything_described(run):
-    """No camera has all effects: a ccd, which transfers charge, has no reset noise."""
+    """No camera has all effects: a ccd has no reset noise, and no shutter that rolls."""
     everything = set()
-    for name in ("all traces", "a ccd in stray light"):
+    for name in ("all traces", "a ccd in stray light", MOVING):
         result = run(name, effects="all")
         described = [d.name for d in result.frame.plan.decisions if d.by != "camera"]
         assert [e.name for e in result.frame.plan.active] == described
@@ -252,7 +254,8 @@ def test_all_is_on_for_everything_described(run):
 
 @pytest.mark.parametrize("name", NAMES)
 def test_off_leaves_out_that_one_alone(name, tmp_path):
-    described = EVERYTHING if name in IN_EVERYTHING else CAMERAS["a ccd in stray light"]
+    other = MOVING if name in ("flicker", "motion") else "a ccd in stray light"
+    described = EVERYTHING if name in IN_EVERYTHING else CAMERAS[other]
     chosen = described | {"effects": {name: "off"}, "accuracy": "reference"}
     found = decisions(simulate(camera(tmp_path, chosen)))
     assert (found[name].state, found[name].by) == ("off", "user")

@@ -38,7 +38,7 @@ class TelegraphNoise(Model):
         "step of a filled trap, mean over the traps, whose steps are distributed exponentially",
         example="10 e",
     )
-    occupancy: Percent = key("share of the time that a trap is filled", default=0.5)
+    occupancy: Percent = key("share of the time that a trap is filled", example="50 %", default=0.5)
 
 
 class PatternShading(Model):
