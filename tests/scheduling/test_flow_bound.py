@@ -90,22 +90,23 @@ def test_no_schedule_exceeds_it_and_the_best_comes_close(name, pdf, reset, gap):
             if (np.diff(numbers) >= least).all():
                 best = max(best, weighted_expected_snr(pdf, numbers * FRAME, sensor))
         assert best <= bounds[count] * (1 + 1e-9)
-        assert bounds[count] <= best * 1.06, (count, bounds[count] / best)
-        if count == 1:  # every pixel sees the one read
-            assert bounds[count] == pytest.approx(best, rel=1e-9)
+        assert bounds[count] <= best * 1.03, (count, bounds[count] / best)
+        if count == 1:  # every pixel sees the one read; sums of 32-bit numbers are rounded up
+            assert bounds[count] == pytest.approx(best, rel=1e-5)
 
 
-def test_it_closes_the_gap_of_the_study_in_low_light():
-    """Four captures and fewer to 1 %, eight to 2 %; 4 to 20 % by the bound of chains alone."""
+@pytest.mark.parametrize(
+    ("frame", "counts"),
+    [(20e-3, [2, 4]), pytest.param(5e-3, [2, 3, 4, 6, 8, 12], marks=pytest.mark.long)],
+)
+def test_it_closes_the_gap_of_the_study_in_low_light(frame, counts):
+    """Below 1 % for all; 4 to 21 % by the bound of chains alone."""
     pdf = Pdf.segments([0, 500], [500, 5000], [0.8, 0.2])
-    sensor, constraints = Sensor(1000, 20, 10, 20, 1.0), Constraints(0.0, 5e-3)
-    found = weighted_schedules.optimal_schedules(pdf, [2, 3, 4, 8], sensor, constraints)
-    gaps = {count: schedule.gap for count, schedule in found.items()}
-    assert gaps[2] < 1e-4
-    assert max(gaps[3], gaps[4]) < 0.01
-    assert gaps[8] < 0.02
-    chains = upper_bounds(pdf, 8, sensor, constraints)
-    assert chains[7] / found[8].expected_snr > 1.15
+    sensor, constraints = Sensor(1000, 20, 10, 20, 1.0), Constraints(0.0, frame)
+    found = weighted_schedules.optimal_schedules(pdf, counts, sensor, constraints)
+    assert max(schedule.gap for schedule in found.values()) < 0.01
+    chains = upper_bounds(pdf, 4, sensor, constraints)
+    assert chains[3] / found[4].expected_snr > 1.1
 
 
 @pytest.mark.parametrize(

@@ -10,16 +10,18 @@ w = (K + read^2 / X)^-1 t.
 
 A schedule is a path through the frames. Pixels that never saturate see all of it: their part of the
 mean SNR is concave in the mean x of a mixture of paths. A pixel that saturates between the k-th
-capture, at a, and the next sees k captures, the first and the last of them known: its precision
-is at most V_k(a), that of the k - 2 others where they are best for this very pixel. So a step of a
-path from a to b earns the sum of V_k(a) over the pixels that saturate between the two, and
+capture, at a, and the next sees k captures. With the first and the last two known, at a' and a,
+its precision is at most V_k(a', a), that of the k - 3 others where they are best for this very
+pixel (beyond PAIRED captures, V_k(a) with the last one known). So a step of a path from a to b
+earns the sum of V_k over the pixels that saturate between the two, and
 
     bound = max over mixtures of paths of  concave(mean x) + mean of the steps' earnings.
 
-The best path for given derivatives is found by dynamic programming, the best mixture by adding
-paths one at a time (simplicial decomposition, [3]_). At each step concavity gives a bound: the
-value, plus what the best path is worth above the mixture. V_k itself is bounded the same way, from
-reads at both ends of the range, which are nearly the best ones.
+The best path for given derivatives is found by dynamic programming over pairs of frames, the best
+mixture by adding paths one at a time (simplicial decomposition, [3]_). At each step concavity gives
+a bound: the value, plus what the best path is worth above the mixture. V_k itself is bounded the
+same way, from reads at both ends of the range, which are nearly the best ones: t - K w is linear
+between two reads, so that its square is largest beside one of them.
 
 References
 ----------
@@ -42,8 +44,12 @@ from vcam_cli.scheduling.pdf import Floats, Indices, Pdf
 from vcam_cli.scheduling.sensor import SLACK, Constraints, Sensor, first_capture_time
 from vcam_cli.scheduling.weighted_snr import NARROW, ROUGH, gauss_rule, split_octaves, upper_bounds
 
-MOST_FRAMES, MOST_PIXELS = 256, 4096
+MOST_FRAMES, MOST_PIXELS = 200, 4096
 """Frames and kinds of pixels up to which the bound is worked out: a few seconds."""
+PAIRED = 8
+"""Captures up to which the last two are known to the bound of a pixel's precision."""
+ROUNDED = 1 + 2e-6
+"""Factor that makes sums of 32-bit numbers no smaller than what they are rounded from."""
 MOST_PATHS = 60
 """Paths that are mixed, at most."""
 CLOSE = 2e-4
@@ -182,12 +188,14 @@ class _Flow:
         size = len(frames)
         self.lasting = pixels.chosen(pixels.last == size - 1)
         saturating = pixels.chosen((pixels.last >= 0) & (pixels.last < size - 1))
-        self.earned = [
-            _step_earnings(self._best_precision(saturating, k), saturating)
-            for k in range(1, most + 1)
-        ]
         own = np.arange(size)
         self.allowed = own[None, :] >= own[:, None] + gap
+        self.earned = [
+            self._paired_earnings(saturating, k)
+            if 3 <= k <= PAIRED
+            else self._single_earnings(saturating, k)
+            for k in range(1, most + 1)
+        ]
 
     def bound(self, count: int) -> float:
         """Return what no schedule of `count` captures exceeds, which fit."""
@@ -211,19 +219,28 @@ class _Flow:
         return least
 
     def _best_path(self, count: int, slope: Floats) -> tuple[list[int], float, float]:
-        """Return the path that earns most with `slope` for each read: frames, earnings, total."""
-        value = self.earned[count - 1][:, -1] + slope
+        """Return the path that earns most with `slope` for each read: frames, earnings, total.
+
+        Values and choices are (1 or T, T): by the frame before, where it counts, and the frame.
+        """
+        slope = slope.astype(np.float32)
+        value = self.earned[count - 1][:, :, -1] + slope
         choices = []
         for earned in reversed(self.earned[: count - 1]):
-            ahead = np.where(self.allowed, earned[:, :-1] + value, -np.inf)
-            choices.append(ahead.argmax(axis=1))
-            value = ahead.max(axis=1) + slope
-        path = [0]
+            ahead = earned[:, :, :-1] + value
+            chosen = ahead.argmax(axis=2)
+            choices.append(chosen)
+            value = np.take_along_axis(ahead, chosen[:, :, None], axis=2)[:, :, 0] + slope
+        path, before = [0], 0
         for choice in reversed(choices):
-            path.append(int(choice[path[-1]]))
+            row = choice[before if len(choice) > 1 else 0]
+            before = path[-1]
+            path.append(int(row[before]))
         ends = [*path[1:], len(self.frames)]
-        earned_by = [self.earned[k][a, b] for k, (a, b) in enumerate(zip(path, ends, strict=True))]
-        return path, float(sum(earned_by)), float(value[0])
+        total = 0.0
+        for earned, before, a, b in zip(self.earned, [0, *path], path, ends, strict=False):
+            total += float(earned[before if len(earned) > 1 else 0, a, b])
+        return path, total, float(value[0, 0]) * ROUNDED
 
     def _lasting_value(self, reads: Floats) -> tuple[float, Floats]:
         """Return what the pixels that never saturate add for (T,) reads, and its derivative."""
@@ -232,71 +249,71 @@ class _Flow:
         slopes = residuals**2 @ self.lasting.weight / self.sensor.read**2
         return float(precision @ self.lasting.weight), slopes
 
-    def _best_precision(self, pixels: Pixels, count: int) -> Floats:
-        """Return V_k(a) for each last frame a and pixel, (T, M); 0 where k reads do not fit."""
+    def _single_earnings(self, pixels: Pixels, count: int) -> NDArray[np.float32]:
+        """Return (1, T, T + 1) what the step from capture `count` at a to the next at b earns."""
         size = len(self.frames)
-        best, chosen = np.zeros((size, len(pixels.rate))), np.zeros((size, len(pixels.rate)), int)
+        every = np.arange(size)
+        most = np.full((size, len(pixels.rate)), np.inf)
         for early in range(1, max(count, 2)):
-            ends = self._ends(early, count)
-            value, _ = self._end_reads(ends, early, count, pixels.rate)
-            better = value > best[ends]
-            best[ends] = np.where(better, value, best[ends])
-            chosen[ends] = np.where(better, early, chosen[ends])
-        alive = pixels.last >= np.arange(size)[:, None]
-        if count > 2:
-            for early in range(1, count):
-                ends = self._ends(early, count)
-                _, residuals = self._end_reads(ends, early, count, pixels.rate)
-                for row, end in enumerate(ends):
-                    which = alive[end] & (chosen[end] == early)
-                    if which.any():
-                        reads = _end_frames(ends[row : row + 1], early, count - early)[0]
-                        own = residuals[:, row, which]
-                        best[end, which] += self._slack(reads, own, pixels.rate[which])
-        return np.where(alive, best, 0.0)
+            ends = every[:1] if count == 1 else every[every - (count - early) + 1 >= early]
+            reads = _end_frames(ends, early, count - early)
+            found = self._most_precision(reads, early, 1, pixels.rate)
+            most[ends] = np.minimum(most[ends], found)
+        most[~(np.isfinite(most) & (pixels.last >= every[:, None]))] = 0.0
+        earned = self._step_earnings(most, every, pixels)[None] * ROUNDED
+        return earned.astype(np.float32)
 
-    def _ends(self, early: int, count: int) -> Indices:
-        """Return the last frames up to which so many reads fit, `early` of them at the start."""
-        every = np.arange(len(self.frames))
-        return every[:1] if count == 1 else every[every - (count - early) + 1 >= early]
+    def _paired_earnings(self, pixels: Pixels, count: int) -> NDArray[np.float32]:
+        """Return (T, T, T + 1) the same by the frame of the capture before, 32 bits."""
+        size = len(self.frames)
+        earned = np.full((size, size, size + 1), -np.inf, np.float32)
+        for a in range(count - 1, size):
+            alive = pixels.chosen(pixels.last >= a)
+            before = np.arange(count - 2, a)
+            most = np.full((len(before), len(alive.rate)), np.inf)
+            for early in range(1, count - 1):
+                fits = before - (count - 1 - early) + 1 >= early
+                reads = _end_frames(before[fits], early, count - 1 - early)
+                reads = np.concatenate([reads, np.full((len(reads), 1), a)], axis=1)
+                found = self._most_precision(reads, early, 2, alive.rate)
+                most[fits] = np.minimum(most[fits], found)
+            ends = np.full(len(before), a)
+            earned[before, a] = self._step_earnings(most, ends, alive) * ROUNDED
+        return earned
 
-    def _end_reads(
-        self, ends: Indices, early: int, count: int, rate: Floats
-    ) -> tuple[Floats, Floats]:
-        """Return the precision of reads at both ends (E, M), and their residuals (k, E, M)."""
-        times = self.frames[_end_frames(ends, early, count - early).T][:, :, None]
-        return _filter(times, np.ones((count, 1, 1)), rate[None, :], self.sensor)
+    def _most_precision(self, reads: Indices, early: int, known: int, rate: Floats) -> Floats:
+        """Return the most precision (E, M) of as many reads as (E, k), others in place of some.
 
-    def _slack(self, reads: Indices, residuals: Floats, rate: Floats) -> Floats:
-        """Return how much more than these reads, others between their ends would give, at most.
-
-        The derivative at any frame follows from the residuals (k, M) at the reads.
+        The first and the last `known` stay. Of the rest, some are the first `early` reads, others
+        lie side by side up to the known ones: what lies between the two is the only gap.
         """
-        noise, end = self.sensor.read**2, int(reads[-1])
-        weights = residuals / noise
-        shared = np.minimum(self.frames[1:end, None], self.frames[reads]) @ weights
-        explained = rate * shared + self.sensor.reset**2 * weights.sum(axis=0)
-        slopes = (self.frames[1:end, None] - explained) ** 2 / noise
-        count = len(reads) - 2
-        taken = (residuals[1:-1] ** 2).sum(axis=0) / noise
-        most = np.partition(slopes, -count, axis=0)[-count:].sum(axis=0)
-        return np.asarray(np.maximum(most - taken, 0.0))
+        noise, count = self.sensor.read**2, reads.shape[1]
+        times = self.frames[reads.T][:, :, None]
+        precision, residuals = _filter(times, np.ones((count, 1, 1)), rate[None, :], self.sensor)
+        if count <= 1 + known:
+            return precision
+        width = (reads[:, early] - reads[:, early - 1])[:, None]
+        left, right = residuals[early - 1], residuals[early]
+        step = (right - left) / width
+        beside = np.maximum((left + step) ** 2, (right - step) ** 2) / noise
+        beside = np.where(width > 1, beside, 0.0)
+        gains = np.maximum(beside - residuals[1 : count - known] ** 2 / noise, 0.0)
+        return np.asarray(precision + gains.sum(axis=0))
+
+    def _step_earnings(self, precision: Floats, ends: Indices, pixels: Pixels) -> Floats:
+        """Return (E, T + 1) what steps from `ends` to each frame earn; -inf where none may go."""
+        size = len(self.frames)
+        by_last = np.zeros((size, len(ends)))
+        np.add.at(by_last, pixels.last, (precision * pixels.weight).T)
+        earned = np.concatenate([np.zeros((len(ends), 1)), np.cumsum(by_last.T, axis=1)], axis=1)
+        earned[:, :-1][~self.allowed[ends]] = -np.inf
+        return earned
 
 
 def _end_frames(ends: Indices, early: int, late: int) -> Indices:
     """Return (E, early + late) frames: the first `early` ones, and `late` ones up to each end."""
     begin = np.broadcast_to(np.arange(early), (len(ends), early))
     return np.concatenate([begin, ends[:, None] - np.arange(late)[::-1]], axis=1)
-
-
-def _step_earnings(precision: Floats, pixels: Pixels) -> Floats:
-    """Return (T, T + 1) what a step from frame a to b earns: of pixels last alive in a..b-1."""
-    size = len(precision)
-    by_last = np.zeros((size, size))
-    np.add.at(by_last.T, pixels.last, (precision * pixels.weight).T)
-    below = np.concatenate([np.zeros((size, 1)), np.cumsum(by_last, axis=1)], axis=1)
-    own = np.arange(size)
-    return np.asarray(below - below[own, own][:, None])
 
 
 def _filter(times: Floats, reads: Floats, rate: Floats, sensor: Sensor) -> tuple[Floats, Floats]:
