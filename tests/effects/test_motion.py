@@ -156,6 +156,19 @@ def test_the_plan_leaves_motion_out_where_nothing_is_seen_to_move(tmp_path):
     assert states == ["off", "off", "on", "on"]
 
 
+def test_what_is_not_in_the_file_is_said(tmp_path):
+    """Of a picture that ends, its mirror image; of a pan, how much faster corners move."""
+    source = picture(tmp_path / "moving.exr")
+    source["scene.source"]["motion"] = motion((4.0, 0.0))
+    notes = simulate(camera(tmp_path, STILL | source)).notes
+    assert any("up to 2 pixels, is its mirror image" in note for note in notes)
+    edge = {"scene.source": {"kind": "chart", "chart": "slanted-edge"}}
+    turn = {"scene.camera_motion": {"pan": "20 deg/s"}}
+    [note] = [n for n in simulate(camera(tmp_path, STILL | edge | turn)).notes if "corners" in n]
+    corner = math.hypot(ROWS, COLUMNS) / 2 * PITCH / (SCALE * 1.0)
+    assert f"{100 * corner**2:.2g} %" in note
+
+
 def test_without_speed_the_bytes_are_those_of_a_still_scene(tmp_path):
     source = {"kind": "chart", "chart": "dead-leaves"}
     still = mean(tmp_path, {"scene.source": source})

@@ -135,6 +135,12 @@ class Exposure(Model):
         " down}}: line after line",
         default="global",
     )
+    start: Annotated[float, Quantity("time", least=0, most=1e9)] = key(
+        "when the exposure begins, for what changes with time: flicker and motion",
+        unit="ms",
+        example="0 s",
+        default=0.0,
+    )
     captures: Annotated[
         tuple[float, ...] | CaptureSchedule | None,
         Either(

@@ -113,6 +113,14 @@ Accuracy = Annotated[
         help="draft, standard, reference, or a tolerance such as 0.01.",
     ),
 ]
+Frames = Annotated[
+    int | None,
+    typer.Option("--frames", metavar="N", min=1, max=9999, help="Take a sequence; with --fps."),
+]
+FrameRate = Annotated[
+    float | None,
+    typer.Option("--fps", metavar="F", min=1e-6, max=1e6, help="Frames a second, of --frames."),
+]
 Json = Annotated[
     bool, typer.Option("--json", help="Machine-readable summary on stdout, nothing else there.")
 ]

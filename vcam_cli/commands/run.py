@@ -2,6 +2,8 @@
 
 from pathlib import Path
 
+import typer
+
 from vcam_cli.commands import options
 from vcam_cli.commands.progress import Progress
 from vcam_cli.reports.run_facts import spoken
@@ -17,8 +19,12 @@ def run(
     quiet: options.Quiet = False,
     workers: options.Workers = None,
     report: options.Report = False,
+    frames: options.Frames = None,
+    fps: options.FrameRate = None,
 ) -> None:
     """Simulate a camera and write raw.exr, render.png, metrics.csv and run.json.
+
+    With --frames and --fps a sequence: frames/raw_0001.exr and so on, frames.csv and strip.png.
 
     \b
     Example:
@@ -30,18 +36,25 @@ def run(
     from vcam_cli.simulation.checks import load
 
     start = time.perf_counter()
+    if (frames is None) != (fps is None):
+        raise typer.BadParameter("--frames and --fps go together: --frames 30 --fps 30")
     asked = ["output.report=true"] if report else []
     model = load(camera, [*options.overrides(set_, seed, accuracy), *asked])
     from vcam_cli.files.folder import OutputFolder
     from vcam_cli.files.report import to_json
     from vcam_cli.simulation import outputs, provenance
+    from vcam_cli.simulation.sequence import write_sequence
     from vcam_cli.simulation.simulate import simulate
 
     inputs = provenance.inputs(model)
     place = OutputFolder(out or Path("out") / model.name, inputs=inputs)
     with place as folder, Progress(quiet) as progress:
-        result = simulate(model, workers, progress)
-        outputs.write(result, folder)
+        if frames is None:
+            result = simulate(model, workers, progress)
+            outputs.write(result, folder)
+        else:
+            assert fps is not None
+            result = write_sequence(model, frames, fps, folder, workers, progress)
         record = outputs.finish(result, folder, inputs, lambda: time.perf_counter() - start)
     for note in result.notes:
         options.say(note, quiet)
@@ -120,6 +133,10 @@ FILES = {
     "volts.mat": "for ISETCam",
     "captures/raw_001.exr": "first sample",
     "hdr.exr": "photocurrent",
+    "frames/render_0001.png": "first frame",
+    "frames/raw_0001.exr": "first raw frame",
+    "frames.csv": "all frames",
+    "strip.png": "strip",
     "report.html": "report",
 }
 """Files to look at that a run may write -> their descriptions."""

@@ -313,6 +313,11 @@ class ImageMotion(Effect):
 
     @property
     @abstractmethod
+    def displacement(self) -> tuple[float, float]:
+        """Displacement of the image in the array's middle, along x and y [m]."""
+
+    @property
+    @abstractmethod
     def travel(self) -> float:
         """How far from its place light comes to lie [m]."""
 

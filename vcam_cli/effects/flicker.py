@@ -19,6 +19,8 @@ class Flicker(TemporalGain):
 
     lamp: FlickerSpec
     lines: LineTimes
+    begin: float = 0.0
+    """When the exposure of the first line begins [s]."""
 
     name = "flicker"
     reference = "CIE TN 006:2016; the mean over an exposure is in closed form"
@@ -31,7 +33,7 @@ class Flicker(TemporalGain):
         lamp = camera.scene.illuminant
         if lamp is None or lamp.flicker is None or lamp.flicker.depth == 0:
             return None
-        return cls(lamp.flicker, line_times(camera, geometry))
+        return cls(lamp.flicker, line_times(camera, geometry), camera.exposure.start)
 
     def describe(self) -> str:
         """Return a short clause with this camera's numbers and units."""
@@ -44,7 +46,8 @@ class Flicker(TemporalGain):
 
     def gain(self, x, y, start, stop):
         """Return the mean light from `start` to `stop` after a line's exposure begins [s]."""
-        begin, time, lamp = self.lines.starts(x, y) + start, stop - start, self.lamp
+        time, lamp = stop - start, self.lamp
+        begin = self.lines.starts(x, y) + (self.begin + start)
         known = (lamp.frequency, lamp.depth)
         if lamp.duty is None:
             return flicker.sinusoid_mean(begin, time, *known, lamp.phase)

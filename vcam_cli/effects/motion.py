@@ -1,6 +1,7 @@
 """Motion of the scene or the camera in the exposure: blur, and skew by a rolling shutter.
 
-The scene is where its file says in the middle of the exposure of the array's middle.
+The scene is where its file says in the middle of the exposure of the array's middle, where that
+begins at 0 s.
 """
 
 from __future__ import annotations
@@ -27,6 +28,9 @@ class Motion(ImageMotion):
     drift_x: float
     drift_y: float
     """Displacement of the image per length down the sensor, by the rows' own times."""
+    moved_x: float
+    moved_y: float
+    """Displacement of the image before the exposure begins [m]."""
     height: float
     """Height of the sensor [m]."""
     pitch: float
@@ -49,7 +53,9 @@ class Motion(ImageMotion):
             drift = sign * rolling.line_time / geometry.pitch_y
         sides = geometry.sensor_height, geometry.pitch_y
         kind = MotionAlongAxis if vx == 0 or vy == 0 else ObliqueMotion
-        return kind(vx * time, vy * time, vx * drift, vy * drift, *sides)
+        start = camera.exposure.start
+        moved = vx * start, vy * start
+        return kind(vx * time, vy * time, vx * drift, vy * drift, *moved, *sides)
 
     def describe(self) -> str:
         """Return a short clause with this camera's numbers and units."""
@@ -64,11 +70,15 @@ class Motion(ImageMotion):
         return self.drift_x, self.drift_y
 
     @property
+    def displacement(self) -> tuple[float, float]:
+        """Displacement of the image in the array's middle, along x and y [m]."""
+        return self.moved_x, self.moved_y
+
+    @property
     def travel(self) -> float:
         """How far from its place in the middle light comes to lie [m]."""
-        return 0.5 * float(
-            np.hypot(self.path_x, self.path_y) + np.hypot(self.drift_x, self.drift_y) * self.height
-        )
+        path, drift = np.hypot(self.path_x, self.path_y), np.hypot(self.drift_x, self.drift_y)
+        return float(np.hypot(self.moved_x, self.moved_y) + 0.5 * (path + drift * self.height))
 
     def mean_error(self, signal) -> float:
         """Return the most that leaving it out can change, light in place of dark [electrons]."""
@@ -78,11 +88,13 @@ class Motion(ImageMotion):
         """Return a transfer that loses as much, rms over all rows: (m, n).
 
         Of a wave that a row sees displaced by s, sinc(b) exp(2 pi i f s) is left; over all rows
-        the exponential is sinc(f S) in the mean, S being the displacement from first row to last.
+        the exponential is sinc(f S) exp(2 pi i f D) in the mean, S being the displacement from
+        first row to last, D that in the middle.
         """
         x, y = fx[None, :], fy[:, None]
         blur = np.sinc(x * self.path_x + y * self.path_y)
         shift = np.sinc((x * self.drift_x + y * self.drift_y) * self.height)
+        shift = shift * np.cos(2 * np.pi * (x * self.moved_x + y * self.moved_y))
         return np.asarray(1 - np.sqrt(np.maximum(1 - 2 * blur * shift + blur**2, 0)))
 
 

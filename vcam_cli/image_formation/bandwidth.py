@@ -240,18 +240,24 @@ def axes(path: OpticalPath, scene: SampledScene, highest: float) -> tuple[Axis, 
     ny, nx = scene.shape
     squares = scene.samples == "squares"
 
-    drift_x, drift_y = path.drift
+    (drift_x, drift_y), (moved_x, moved_y) = path.drift, path.displacement
 
     def axis(
-        samples: int, pitch: float, pixels: int, pixel: float, shift: float, seen: float = 1.0
+        samples: int,
+        pitch: float,
+        pixels: int,
+        pixel: float,
+        shift: float,
+        moved: float,
+        seen: float = 1.0,
     ) -> Axis:
-        first = samples * pitch / 2 + seen * ((0.5 - pixels / 2) * pixel + shift)
+        first = samples * pitch / 2 + seen * ((0.5 - pixels / 2) * pixel + shift) - moved
         bandwidth = min(highest * 0.5 / pixel, cutoff)
         return Axis(samples, pitch, pixels, seen * pixel, first, squares, bandwidth)
 
-    x = axis(nx, scene.pitch_x, g.columns, g.pitch_x * g.sampling_scale, g.collecting_x)
-    pitch_y = g.pitch_y * g.sampling_scale
-    y = axis(ny, scene.pitch_y, g.rows, pitch_y, g.collecting_y, 1 - drift_y)
+    pitch_x, pitch_y = g.pitch_x * g.sampling_scale, g.pitch_y * g.sampling_scale
+    x = axis(nx, scene.pitch_x, g.columns, pitch_x, g.collecting_x, moved_x)
+    y = axis(ny, scene.pitch_y, g.rows, pitch_y, g.collecting_y, moved_y, 1 - drift_y)
     if drift_x:
         _, rows = pixel_centers(g, detector=True)
         x = replace(x, row_shifts=-drift_x * rows)

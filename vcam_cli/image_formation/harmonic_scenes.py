@@ -52,10 +52,10 @@ def wave_layers(path: OpticalPath, scene: WaveScene) -> tuple[Layers, SpectrumRe
         Changes by leaving out effects.
     """
     x, y = pixel_centers(path.geometry, detector=True)
-    drift_x, drift_y = path.drift
+    (drift_x, drift_y), (moved_x, moved_y) = path.drift, path.displacement
     shapes = [
         (
-            np.exp(1j * (2 * np.pi * w.fx * x + w.phase)),
+            np.exp(1j * (2 * np.pi * (w.fx * (x - moved_x) - w.fy * moved_y) + w.phase)),
             np.exp(2j * np.pi * (w.fy * (1 - drift_y) - w.fx * drift_x) * y),
         )
         for w in scene.waves

@@ -52,6 +52,17 @@ class OpticalPath:
         return sum(x for x, _ in drifts), sum(y for _, y in drifts)
 
     @property
+    def displacement(self) -> tuple[float, float]:
+        """Displacement of the image in the array's middle, along x and y [m]."""
+        moved = [motion.displacement for motion in of_kind(self.effects, ImageMotion)]
+        return sum(x for x, _ in moved), sum(y for _, y in moved)
+
+    @property
+    def is_displaced(self) -> bool:
+        """Whether photodetectors see the image at other places than their own."""
+        return any((*self.drift, *self.displacement))
+
+    @property
     def travel(self) -> float:
         """How far motion takes light from its place [m]."""
         return sum((motion.travel for motion in of_kind(self.effects, ImageMotion)), 0.0)

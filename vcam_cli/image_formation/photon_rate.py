@@ -201,7 +201,7 @@ def photo_rate(path: OpticalPath, scene: Scene, planes: bool = False) -> Rate:
     plan = light_plan(path, scene)
     path = plan.reduced(path)
     layers, report = image_layers(path, scene)
-    if any(path.drift):  # more changes than the blur, of which the report knows
+    if path.is_displaced:  # more changes than the blur, of which the report knows
         moved = {motion.name for motion in of_kind(path.effects, ImageMotion)}
         known = {name: change for name, change in report.changes.items() if name not in moved}
         report = replace(report, changes=known)

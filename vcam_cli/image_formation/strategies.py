@@ -73,7 +73,7 @@ def image_layers(path: OpticalPath, scene: Scene) -> tuple[Layers, SpectrumRepor
     if isinstance(scene, WaveScene):
         return wave_layers(path, scene)
     if isinstance(scene, HarmonicScene):
-        count = None if any(path.drift) else harmonics_count(path, scene)
+        count = None if path.is_displaced else harmonics_count(path, scene)
         if count is not None:
             return harmonic_layers(path, scene, count)
         scene = scene.chart

@@ -117,9 +117,9 @@ RULES = (
         "the light falls on the bare sensor",
     ),
     Rule(
-        ("exposure.shutter",),
+        ("exposure.shutter", "exposure.start"),
         lambda camera: not (_is_lit_by_flicker(camera) or camera.scene.moves),
-        "nothing in this scene changes while the lines are exposed; give scene.illuminant.flicker"
+        "nothing in this scene changes with time; give scene.illuminant.flicker"
         " or scene.source.motion",
     ),
     Rule(

@@ -76,7 +76,9 @@ def write(result: Result, folder: OutputFolder) -> None:
         try:
             if camera.output.render:
                 render = result.render
-                jobs.append(pool.submit(lambda: _render(result, folder.new("render.png"), render)))
+                jobs.append(
+                    pool.submit(lambda: write_render(result, folder.new("render.png"), render))
+                )
                 compressed = result.processed.jpeg()
                 if compressed is not None:
                     atomic.write_bytes(folder.new("render.jpg"), compressed)
@@ -96,7 +98,7 @@ def write(result: Result, folder: OutputFolder) -> None:
     if camera.output.steps:
         for name, shown in result.renders_of_steps():
             with result.stages("files"):
-                _render(result, folder.new(name), shown)
+                write_render(result, folder.new(name), shown)
     if camera.output.irradiance:
         with result.stages("irradiance"):
             _irradiance(result, folder.new("irradiance.exr"))
@@ -107,7 +109,7 @@ def write(result: Result, folder: OutputFolder) -> None:
     write_metrics(folder.new("metrics.csv"), metrics.rows)
 
 
-def _render(result: Result, path: Path, render: NDArray) -> None:
+def write_render(result: Result, path: Path, render: NDArray) -> None:
     """Write the render, and how it was taken as its description."""
     taken = raw_file.photograph(result.frame)
     write_png(path, render, "; ".join(f"{name} {value}" for name, value in taken.items()))

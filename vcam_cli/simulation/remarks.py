@@ -7,6 +7,7 @@ from vcam_cli.camera.derived import photodiode
 from vcam_cli.camera.derived.dark_noise import SIGMAS, dark_noise
 from vcam_cli.camera.processing import SHOWN
 from vcam_cli.camera.scene import ImageFile
+from vcam_cli.effects.base import ImageMotion, of_kind
 from vcam_cli.effects.order import quantizer
 from vcam_cli.scenes.build import picture_model
 from vcam_cli.scenes.hyperspectral import CubeScene
@@ -39,6 +40,7 @@ def remarks(ready: Prepared) -> tuple[str, ...]:
         *_overflow(ready),
         *_colors_of_picture(ready),
         *_cropped(ready),
+        *_motion(ready),
         *_steps_not_shown(ready),
     )
     if not isinstance(scene, CubeScene):
@@ -61,6 +63,25 @@ def _blind_colors(ready: Prepared) -> tuple[str, ...]:
     if len(blind) == len(ready.mosaic.colors):
         return ("no light reaches the electrons: this is a dark frame",)
     return (f"no light reaches the electrons of {', '.join(blind)}",) if blind else ()
+
+
+def _motion(ready: Prepared) -> tuple[str, ...]:
+    """Return what motion brings in that the file does not have, and what is left out of it."""
+    g, turn = ready.geometry, ready.camera.scene.camera_motion
+    notes = []
+    pixels = sum((e.travel for e in of_kind(ready.plan.active, ImageMotion)), 0.0) / g.pitch_x
+    if pixels >= 1 and isinstance(ready.scene, ImageScene | CubeScene):
+        notes.append(
+            f"the scene's file ends at the border: what moves in, up to {pixels:.0f} pixels, is its"
+            " mirror image"
+        )
+    if pixels and turn is not None and (turn.pan or turn.tilt):
+        corner = float(np.hypot(g.sensor_width, g.sensor_height)) / 2 / g.image_distance
+        notes.append(
+            f"the camera's turn is simulated as on the axis; in the corners the image moves up to"
+            f" {100 * corner**2:.2g} % faster"
+        )
+    return tuple(notes)
 
 
 def _clipped_dark(ready: Prepared) -> tuple[str, ...]:

@@ -1,0 +1,101 @@
+"""Sequences: time goes on, temporal noise is new, the sensor stays."""
+
+import csv
+
+import numpy as np
+import pytest
+from making import QUIET, camera, radiance_for
+from typer.testing import CliRunner
+
+from vcam_cli import simulate
+from vcam_cli.commands.main import app
+from vcam_cli.errors import BadInput
+from vcam_cli.files.images import read_picture
+from vcam_cli.simulation.sequence import frame_cameras
+
+WAVE = {"kind": "chart", "chart": "sinusoid", "frequency": "20 lp/mm"}
+
+
+def test_the_first_frame_is_the_camera_s_own(tmp_path):
+    made = camera(tmp_path, {"pixel.fpn": {"dsnu": "20 e"}})
+    [first] = frame_cameras(made, 1, 30)
+    assert simulate(first).electrons.tobytes() == simulate(made).electrons.tobytes()
+
+
+def test_noise_is_new_and_the_pattern_stays(tmp_path):
+    """Differences of frames have twice the temporal variance and none of the pattern."""
+    made = camera(
+        tmp_path,
+        {"scene.radiance": radiance_for(900), "pixel.fpn": {"dsnu": "60 e"}, "effects": "all"},
+    )
+    a, b = (simulate(each).electrons.astype(float) for each in frame_cameras(made, 2, 30))
+    # 3072 pixels: five standard errors of a variance are 5 sqrt(2 / 3072) = 13 %
+    assert np.var(a - b) / 2 == pytest.approx(900, rel=0.13)
+    assert np.var(a) == pytest.approx(900 + 3600, rel=0.13)
+
+
+@pytest.mark.parametrize("speed", [(0.05, 0.0), (0.03, -0.02)])
+def test_what_moves_has_moved_on(speed, tmp_path):
+    """Frame k shows the wave v k / F further on, in closed form."""
+    source = WAVE | {"orientation": "30 deg"}
+    source["motion"] = {"x": f"{speed[0]} m/s", "y": f"{speed[1]} m/s"}
+    made = camera(tmp_path, {"scene.source": source, "effects": QUIET})
+    frames = [simulate(each).mean_electrons for each in frame_cameras(made, 4, 40)]
+    scale = 5e-3 / (1 - 5e-3)
+    x, y = (np.arange(64) - 31.5) * 5e-6, ((np.arange(48) - 23.5) * 5e-6)[:, None]
+    fx, fy = 20e3 * np.cos(np.pi / 6), -20e3 * np.sin(np.pi / 6)
+
+    def wave(time):
+        dx, dy = (v * scale * time for v in speed)
+        return np.cos(2 * np.pi * (fx * (x - dx) + fy * (y - dy)))
+
+    basis = np.stack([np.ones(x.size * y.size), wave(0).ravel()], axis=1)
+    level, amplitude = np.linalg.lstsq(basis, frames[0].ravel(), rcond=None)[0]
+    for number, frame in enumerate(frames):
+        np.testing.assert_allclose(frame, level + amplitude * wave(number / 40), rtol=1e-9)
+
+
+def test_a_picture_that_moves_by_whole_pixels_is_the_picture_moved(tmp_path):
+    """Painted charts, too: what frame k shows is frame 0, so many columns further on."""
+    per_second = 5e-6 / (5e-3 / (1 - 5e-3)) * 3 * 40  # 3 pixels a frame at 40 frames a second
+    source = {"kind": "chart", "chart": "slanted-edge", "motion": {"x": f"{per_second!r} m/s"}}
+    made = camera(tmp_path, {"scene.source": source, "effects": QUIET})
+    first, *_, last = (simulate(each).mean_electrons for each in frame_cameras(made, 3, 40))
+    # the promise at `reference`, for both of them
+    error = last[:, 6:] - first[:, :-6]
+    assert np.sqrt(np.mean(error**2)) < 2 * 2e-4 * first.max()
+
+
+def test_a_lamp_flickers_on(tmp_path):
+    lamp = {"monochromatic": "550 nm", "flicker": {"frequency": "100 Hz", "depth": "40 %"}}
+    made = camera(tmp_path, {"scene.illuminant": lamp, "effects": QUIET, "exposure.time": "2 ms"})
+    frames = [simulate(each).mean_electrons.mean() for each in frame_cameras(made, 5, 30)]
+    middle = 2 * np.pi * 100 * (np.arange(5) / 30 + 1e-3)
+    light = 1 + 0.4 * np.sinc(100 * 2e-3) * np.cos(middle)
+    np.testing.assert_allclose(frames / np.mean(frames), light / light.mean(), rtol=1e-9)
+
+
+def test_exposures_have_to_fit(tmp_path):
+    made = camera(tmp_path, {"exposure.time": "20 ms"})
+    with pytest.raises(BadInput, match="do not fit 60 frames a second"):
+        list(frame_cameras(made, 2, 60))
+
+
+def test_the_command_writes_numbered_frames(tmp_path):
+    camera(tmp_path, {"output": {"raw": ["dn"]}})
+    made, out = str(tmp_path / "made.yaml"), tmp_path / "out"
+    arguments = ["run", made, "-o", str(out), "-q", "--frames", "3", "--fps", "25"]
+    done = CliRunner().invoke(app, arguments)
+    assert done.exit_code == 0, done.output
+    names = sorted(path.name for path in (out / "frames").iterdir())
+    assert names == [f"{kind}_000{n}.{end}" for kind, end in FILES for n in (1, 2, 3)]
+    with (out / "frames.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert [float(row["start [s]"]) for row in rows] == [0, 0.04, 0.08]
+    assert [row["seed"] for row in rows] == ["1", "2", "3"]
+    assert read_picture(str(out / "strip.png"), "srgb", 1.0, ()).data.shape[:2] == (48, 3 * 64)
+    alone = CliRunner().invoke(app, ["run", made, "-o", str(out), "--frames", "3"])
+    assert alone.exit_code == 2
+
+
+FILES = (("raw", "exr"), ("render", "png"))

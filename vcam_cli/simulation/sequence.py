@@ -1,0 +1,124 @@
+"""Frames one after the other: each with noise of its own, all with the same sensor.
+
+A frame is a camera whose exposure begins later and whose frame seed is another: what moves has
+moved on, and a lamp that flickers is at another phase. Each frame is exposed by itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.derived.geometry import geometry
+from vcam_cli.camera.derived.line_times import line_times
+from vcam_cli.errors import bad
+from vcam_cli.files.folder import OutputFolder
+from vcam_cli.files.png import write_png
+from vcam_cli.files.tables import write_table
+from vcam_cli.progress import Observer
+from vcam_cli.simulation import outputs
+from vcam_cli.simulation.shared import Shared
+from vcam_cli.simulation.simulate import Result, simulate
+from vcam_cli.units import render
+
+STRIP = 8
+"""Frames of a strip, at most."""
+STRIP_WIDTH = 240
+"""Columns of each of them, at most."""
+
+
+def frame_cameras(camera: Camera, count: int, rate: float) -> Iterator[Camera]:
+    """Yield the camera of every frame of a sequence.
+
+    Parameters
+    ----------
+    camera : Camera
+        The camera of the first frame.
+    count : int
+        Number of frames.
+    rate : float
+        Frames per second [Hz].
+
+    Raises
+    ------
+    BadInput
+        For exposures that do not fit between frames.
+    """
+    _require_room(camera, rate)
+    exposure, seed = camera.exposure, camera.seed
+    for number in range(count):
+        later = exposure.model_copy(update={"start": exposure.start + number / rate})
+        drawn = seed.model_copy(update={"frame": seed.frame + number})
+        yield camera.model_copy(update={"exposure": later, "seed": drawn})
+
+
+def _require_room(camera: Camera, rate: float) -> None:
+    auto, last = camera.exposure.auto, line_times(camera, geometry(camera)).line_time
+    longest = auto.max if auto is not None else camera.exposure.longest
+    assert longest is not None
+    if longest + last > (1 + 1e-9) / rate:
+        key = "auto.max" if auto is not None else "time"
+        raise bad(
+            f"exposure.{key}" if camera.exposure.captures is None else "exposure.captures",
+            f"{render(longest, 'time')} do not fit {rate:g} frames a second",
+            f"make it shorter than {render(float(f'{1 / rate - last:.3g}'), 'time')},"
+            " or --fps lower",
+        )
+
+
+def write_sequence(
+    camera: Camera,
+    count: int,
+    rate: float,
+    folder: OutputFolder,
+    workers: int | None,
+    watch: Observer,
+) -> Result:
+    """Write frames/raw_0001.exr, frames/render_0001.png and so on, frames.csv and strip.png.
+
+    Parameters
+    ----------
+    camera : Camera
+        The camera of the first frame.
+    count : int
+        Number of frames.
+    rate : float
+        Frames per second [Hz].
+    folder : OutputFolder
+        Folder that they go to.
+    workers : int or None
+        Number of threads; results do not depend on it.
+    watch : Observer
+        Observer of stages.
+
+    Returns
+    -------
+    Result
+        The first frame.
+    """
+    shared, rows, shown = Shared(), [], list[NDArray]()
+    chosen = set(np.linspace(0, count - 1, min(count, STRIP)).round().astype(int).tolist())
+    first: Result | None = None
+    for number, each in enumerate(frame_cameras(camera, count, rate)):
+        result = simulate(each, workers, watch, shared)
+        name = f"{number + 1:04d}"
+        outputs.write_raw(result, folder.new(f"frames/raw_{name}.exr"))
+        if camera.output.render:
+            outputs.write_render(result, folder.new(f"frames/render_{name}.png"), result.render)
+            if number in chosen:
+                step = -(-result.render.shape[1] // STRIP_WIDTH)
+                shown.append(result.render[::step, ::step])
+        columns = ("frame", "start [s]", "seed", *result.metrics)
+        told = (number + 1, each.exposure.start, each.seed.frame)
+        rows.append((*told, *result.metrics.values()))
+        first = first or result
+    assert first is not None
+    if shown:
+        write_png(
+            folder.new("strip.png"), np.concatenate(shown, axis=1), f"{rate:g} frames a second"
+        )
+    write_table(folder.new("frames.csv"), columns, rows)
+    return first
