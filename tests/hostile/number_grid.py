@@ -27,7 +27,7 @@ from vcam_cli.errors import Path as Keys
 from vcam_cli.simulation.checks import load
 from vcam_cli.simulation.simulate import simulate
 
-ROWS, COLUMNS = 8, 9
+ROWS, COLUMNS = 8, 12
 SIZES, LARGEST = (("array", "rows"), ("array", "columns")), 10**4
 FACTORS = (1e6, 1e-6, -1e6)
 
