@@ -32,7 +32,7 @@ thesis, Stanford University, 2003, with the command or test that answers it.
 | reproduced | predicted, within what the thesis prints or its axis shows; or held by a test |
 | calibrated | within it, but a number was fitted to this very result |
 | chosen | within it, with a reading or number that the thesis leaves open |
-| contradicts | outside; README says why where that is known |
+| contradicts | outside; [the study](studies/pixel-size.md) says why where that is known |
 | not simulated | a drawing or photograph, or data that the thesis does not print |
 
 """
