@@ -1,6 +1,5 @@
 """`vcam characterize`: a camera measured by EMVA 1288 and ISO 12233."""
 
-import sys
 from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
@@ -131,13 +130,7 @@ def report_arguments(found: "Characterization") -> dict[str, Any]:
 
 def print_report(found: "Characterization", path: Path) -> None:
     """Print the table: measured and expected values of every color side by side."""
-    from rich import box
-    from rich.console import Console
-    from rich.table import Table
-
-    width = None if sys.stdout.isatty() else 120
-    console = Console(width=width, soft_wrap=True, highlight=False)
-    table = Table(box=box.SIMPLE_HEAD if console.is_terminal else None, pad_edge=False)
+    console, table = options.open_table()
     colors = [channel.color for channel in found.channels]
     table.add_column("quantity", no_wrap=True)
     for color in colors:

@@ -7,7 +7,7 @@ import json
 import sys
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -197,6 +197,17 @@ def say(message: object, quiet: bool = False) -> None:
     """Print a line for the user on stderr."""
     if not quiet:
         print(message, file=sys.stderr, flush=True)
+
+
+def open_table() -> tuple[Any, Any]:
+    """Return a console on stdout and an empty table for it, plain where it is no terminal."""
+    from rich import box
+    from rich.console import Console
+    from rich.table import Table
+
+    width = None if sys.stdout.isatty() else 120
+    console = Console(width=width, soft_wrap=True, highlight=False)
+    return console, Table(box=box.SIMPLE_HEAD if console.is_terminal else None, pad_edge=False)
 
 
 def write_json(value: object) -> None:

@@ -1,6 +1,5 @@
 """`vcam verify`: what a camera file predicts beside what was measured."""
 
-import sys
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -104,13 +103,7 @@ def report_arguments(found: "Verification") -> dict[str, Any]:
 
 def print_report(found: "Verification", path: Path) -> None:
     """Print the table: measured, predicted, error."""
-    from rich import box
-    from rich.console import Console
-    from rich.table import Table
-
-    width = None if sys.stdout.isatty() else 120
-    console = Console(width=width, soft_wrap=True, highlight=False)
-    table = Table(box=box.SIMPLE_HEAD if console.is_terminal else None, pad_edge=False)
+    console, table = options.open_table()
     for name in ("frame", "channel", "quantity"):
         table.add_column(name, no_wrap=True)
     for name in ("measured", "predicted", "error"):
