@@ -42,6 +42,7 @@ FLOORS = (
     {"sweeps"},
     {"capture_schedules"},
     {"verification"},
+    {"fitting"},
     {"commands"},
 )
 """From the bottom: a module imports from floors below its own, and from its own room (package)."""

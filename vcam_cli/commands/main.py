@@ -42,6 +42,7 @@ COMMANDS = {
     "sweep": "sweep:sweep",
     "schedule": "schedule:schedule",
     "characterize": "characterize:characterize",
+    "fit": "fit:fit",
     "verify": "verify:verify",
     "compare": "compare:compare",
     "report": "report:report",

@@ -8,13 +8,15 @@ from pydantic import model_validator
 from pydantic_core import InitErrorDetails
 
 from vcam_cli import units
-from vcam_cli.camera.illuminant import Illuminant, IlluminantSpec
+from vcam_cli.camera.illuminant import IlluminantSpec
 from vcam_cli.config.lists import check_list, read_items
 from vcam_cli.config.model import FileModel, Model, at_most_one, key
 from vcam_cli.config.quantities import Number, Percentage, Quantity
 from vcam_cli.config.validation_messages import describe, fault, refusal
-from vcam_cli.config.values import TIME, Either, Text, Word
+from vcam_cli.config.values import TIME, Either, Text, Word, mapping
 from vcam_cli.config.yaml_type import YamlType, to_yaml
+from vcam_cli.verification.frame_sets import PATTERNS, FrameSet, Levels, MeasuredPixel
+from vcam_cli.verification.light import Light
 
 DIMENSIONS = {"volts": "voltage", "dn": "dn", "electrons": "charge"}
 """What a signal may be counted in -> its dimension."""
@@ -52,23 +54,6 @@ class SignalType(YamlType):
     def write(self, value: Signal) -> str:
         """Return the signal with its unit."""
         return units.render(value.value, DIMENSIONS[value.channel])
-
-
-class Light(Illuminant):
-    """The type of the light of a measurement: a lamp, or none."""
-
-    def read(self, given: Any) -> IlluminantSpec | None:  # type: ignore[override]
-        """Return the lamp; None for none."""
-        return None if given is None or given == "none" else super().read(given)
-
-    def write(self, value: IlluminantSpec | None) -> Any:
-        """Return the YAML form."""
-        return "none" if value is None else value.to_yaml()
-
-    def json_schema(self, forms: dict[str, Any]) -> dict[str, Any]:
-        """Return the JSON Schema of a lamp, or of none."""
-        lamp = super().json_schema(forms)
-        return {"anyOf": [{"const": "none"}, *lamp["anyOf"]]}
 
 
 def _is_lit(given: Mapping[str, Any]) -> Iterator[InitErrorDetails]:
@@ -131,9 +116,14 @@ class Point(Model):
         return self
 
 
-def _points(given: Any) -> tuple[Point, ...]:
+def _entries(given: Any) -> tuple[Point | FrameSet, ...]:
     check_list(given, "[{signal: 0.42 V, exposure: 30 ms}]", 1, "a list of measured points")
-    return tuple(read_items(enumerate(given), Point.model_validate))
+    return tuple(read_items(enumerate(given), _entry))
+
+
+def _entry(given: Any) -> Point | FrameSet:
+    of_frames = isinstance(given, FrameSet) or (isinstance(given, Mapping) and "files" in given)
+    return FrameSet.model_validate(given) if of_frames else Point.model_validate(given)
 
 
 class Measurement(FileModel):
@@ -145,14 +135,37 @@ class Measurement(FileModel):
         example="my-sensor",
         default="measurement",
     )
-    frames: Annotated[tuple[Point, ...], Either(_points, list[Point], yaml_form=to_yaml)] = key(
-        "what was measured, one entry a condition",
+    frames: Annotated[
+        tuple[Point | FrameSet, ...],
+        Either(_entries, list[Point | FrameSet], yaml_form=to_yaml),
+    ] = key(
+        "what was measured, one entry a condition: a mean signal, or files of raw frames",
         example=[{"signal": "0.42 V", "exposure": "30 ms"}],
+    )
+    levels: Annotated[Levels | None, mapping(Levels)] = key(
+        "codes of the frames; needed for files", example={"bits": 12}, default=None
+    )
+    pixel: Annotated[MeasuredPixel | None, mapping(MeasuredPixel)] = key(
+        "pixels of the frames; needed for files", example={"width": "3.45 um"}, default=None
+    )
+    pattern: PATTERNS = key("color filter array of the frames", default="monochrome")
+    hold_out: Annotated[float, Percentage(least=0, below=1)] = key(
+        "frames of every entry that are not fitted, the last ones", example="20 %", default=0.0
     )
     tolerance: Annotated[float | None, Percentage(above=0, most=1)] = key(
         "largest error of a prediction; default none is asked for", example="8 %", default=None
     )
     source: Text = key("where the numbers come from", example="bench of ...", default="")
+
+    @property
+    def points(self) -> tuple[Point, ...]:
+        """The entries that are mean signals."""
+        return tuple(entry for entry in self.frames if isinstance(entry, Point))
+
+    @property
+    def frame_sets(self) -> tuple[FrameSet, ...]:
+        """The entries that are files of raw frames."""
+        return tuple(entry for entry in self.frames if isinstance(entry, FrameSet))
 
     def label(self, number: int) -> str:
         """Return the name of an entry, or its number from 1."""

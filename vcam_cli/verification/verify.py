@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from vcam_cli.camera.camera import Camera
 from vcam_cli.errors import BadInput, Collector
 from vcam_cli.progress import Observer, Silent
+from vcam_cli.verification.frame_sets import FrameSet
 from vcam_cli.verification.model import UNITS, Measurement
 from vcam_cli.verification.prediction import check, predict
 
@@ -122,6 +123,11 @@ def verify(camera: Camera, measurement: Measurement, watch: Observer | None = No
 def _check_all(camera: Camera, measurement: Measurement) -> None:
     problems = Collector()
     for number, point in enumerate(measurement.frames):
+        if isinstance(point, FrameSet):
+            message = "vcam verify predicts mean signals, and these are frames"
+            remedy = "give signal, or estimate a camera from the frames by vcam fit"
+            problems.add(("frames", number, "files"), message, remedy)
+            continue
         try:
             check(camera, point)
         except BadInput as error:
@@ -134,8 +140,8 @@ def _check_all(camera: Camera, measurement: Measurement) -> None:
 
 
 def _rows(camera: Camera, measurement: Measurement, watch: Observer) -> Iterator[Row]:
-    for number, point in enumerate(measurement.frames):
-        watch.step(number, len(measurement.frames))
+    for number, point in enumerate(measurement.points):
+        watch.step(number, len(measurement.points))
         tolerance = measurement.tolerance if point.tolerance is None else point.tolerance
         yield Row(
             measurement.label(number),

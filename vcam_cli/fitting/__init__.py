@@ -1,0 +1,1 @@
+"""Estimation of a camera file from raw frames: what `vcam fit` does."""

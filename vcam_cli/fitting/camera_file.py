@@ -1,0 +1,115 @@
+"""The camera file of a fitted sensor: a bare sensor under the light of its flat frames."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from vcam_cli import units
+from vcam_cli.fitting.conditions import Conditions
+from vcam_cli.fitting.sensor import Transfer
+
+if TYPE_CHECKING:
+    from vcam_cli.fitting.fit import Fit
+
+BLACK = 1.0
+"""Quantum efficiency that stands for one that is not known."""
+
+
+def tree(found: Fit, conditions: Conditions, curves: list[Transfer]) -> dict[str, Any]:
+    """Return the camera file as YAML has it; adds to `found.unknown` what is left at a default."""
+    measurement = found.measurement
+    assert measurement.levels is not None
+    assert measurement.pixel is not None
+    assert measurement.pixel.width is not None
+    entry = curves[0].conditions[len(curves[0].conditions) // 2].entry
+    pixel = measurement.pixel
+    gain, black = found.value("system_gain") or 0.0, found.value("black_level") or 0.0
+    offset = max(0, round(black))
+    well = found.value("full_well") or (2**measurement.levels.bits - 1 - offset) / gain
+    readout = {"full_well": _charge(well), **_noise(found)}
+    if abs(black - offset) > 0.05:
+        found.notes.append(f"the black level {black:.3f} DN is rounded to {offset} in the camera")
+    height = {} if pixel.height is None else {"height": units.render(pixel.height, "length")}
+    detector: dict[str, Any] = {"fill_factor": 1.0, "quantum_efficiency": BLACK}
+    efficiencies = _efficiencies(found, curves)
+    detector["quantum_efficiency"] = max(efficiencies.values())
+    if found.value("dark_current"):
+        detector["dark_current"] = f"{max(found.value('dark_current') or 0, 0):.6g} e/s"
+    scene: dict[str, Any] = {
+        "source": {"kind": "chart", "chart": "uniform"},
+        "illuminant": entry.light.to_yaml() if entry.light else "equal-energy",
+        "irradiance": units.render(entry.irradiance or 0.01, "irradiance"),
+    }
+    if entry.irradiance is None:
+        found.unknown.append("irradiance of the flat frames: 0.01 W/m2 stands in the camera file")
+    array: dict[str, Any] = {
+        "rows": conditions.shape[0],
+        "columns": conditions.shape[1],
+        "pattern": measurement.pattern,
+    }
+    if measurement.pattern != "monochrome":
+        top = max(efficiencies.values())
+        array["filters"] = {color: value / top for color, value in efficiencies.items()}
+    fpn = {"offset_pixel": _charge(found.value("offset_pixel")),
+           "offset_column": _charge(found.value("offset_column")),
+           "gain_pixel": _percent(found.value("gain_pixel")),
+           "gain_column": _percent(found.value("gain_column"))}  # fmt: skip
+    return {
+        "name": measurement.name,
+        "scene": scene,
+        "optics": "none",
+        "pixel": {
+            "width": units.render(pixel.width, "length"),
+            **height,
+            "photodetector": detector,
+            "readout": readout,
+            "fpn": fpn,
+            "defects": {"hot": found.value("hot") or 0, "dead": found.value("dead") or 0},
+        },
+        "array": array,
+        "exposure": {"time": units.render(entry.exposure, "time")},
+        "adc": {
+            "bits": measurement.levels.bits,
+            "offset": f"{offset} DN",
+            "gain": f"{gain:.6g} DN/e",
+        },
+        "processing": [],
+    }
+
+
+def _noise(found: Fit) -> dict[str, Any]:
+    """Return the keys of the readout's temporal noise."""
+    out: dict[str, Any] = {"column_noise": _charge(found.value("column_noise"))}
+    shape, correlation = found.value("read_noise_shape"), found.value("row_correlation")
+    read, row = (_charge(found.value(name)) for name in ("read_noise", "row_noise"))
+    if shape is None:
+        out["read_noise"] = read
+    else:
+        out["heavy_tailed_noise"] = {"rms": read, "shape": round(shape, 6)}
+    if correlation is None:
+        out["row_noise"] = row
+    else:
+        out["correlated_row_noise"] = {"rms": row, "correlation": round(correlation, 6)}
+    return out
+
+
+def _efficiencies(found: Fit, curves: list[Transfer]) -> dict[str, float]:
+    """Return the quantum efficiency of every color in the first light, at most 1."""
+    first = [curve for curve in curves if curve.light == curves[0].light]
+    known = {c.color: c.efficiency.value for c in first if c.efficiency is not None}
+    if len(known) < len(first):
+        steps = {c.color: c.result.responsivity for c in first}
+        found.unknown.append("quantum efficiency: colors have that relative to the best, which is"
+                             " set to 1")  # fmt: skip
+        return {color: value / max(steps.values()) for color, value in steps.items()}
+    if max(known.values()) > 1:
+        found.notes.append("the quantum efficiency is above 1: irradiance or photons are too low")
+    return {color: min(value, 1.0) for color, value in known.items()}
+
+
+def _charge(value: float | None) -> str:
+    return f"{value or 0.0:.6g} e"
+
+
+def _percent(value: float | None) -> str:
+    return f"{100 * (value or 0.0):.6g} %"

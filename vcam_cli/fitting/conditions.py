@@ -1,0 +1,178 @@
+"""The statistics of all stacks of a measurement, color by color, and which pixels are defective."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcam_cli.fitting.frames import color_block, stacks
+from vcam_cli.fitting.statistics import (
+    Estimate,
+    Pattern,
+    StackStatistics,
+    combine,
+    pattern,
+    stack_statistics,
+)
+from vcam_cli.progress import Observer
+from vcam_cli.spectra import integral, photons
+from vcam_cli.verification.frame_sets import FrameSet
+from vcam_cli.verification.model import Measurement
+
+DEAD, HOT = 0.1, 0.5
+"""Signal of a dead pixel, over the others' in light, is less; that of a hot one, over saturation in
+the dark, is more."""
+CLIPPED = 0.005
+"""Share of pixels at the ends of the codes above which a stack counts as clipped (EMVA 1288)."""
+DRIFT = 0.01
+"""Relative change of the light within a stack from which it is said."""
+BAND = 300e-9, 1100e-9
+"""Wavelengths over which a lamp's photons are counted [m]."""
+
+
+@dataclass(frozen=True)
+class Condition:
+    """A stack of flat or dark frames, color by color."""
+
+    entry: FrameSet
+    label: str
+    planes: dict[str, tuple[StackStatistics, ...]]
+    """Color -> statistics of each of its places in the block."""
+    patterns: dict[str, Pattern]
+    at_zero: float
+    at_most: float
+    """Shares of the codes that are 0, and the highest."""
+
+    def mean(self, color: str) -> Estimate:
+        """Return the mean of a color [DN]."""
+        return combine([plane.mean for plane in self.planes[color]])
+
+    def variance(self, color: str) -> Estimate:
+        """Return the temporal variance of a color's pixels by themselves [DN^2]."""
+        return combine([plane.pixel for plane in self.planes[color]])
+
+    def every(self, name: str) -> Estimate:
+        """Return a statistic in the mean over all planes."""
+        listed = [plane for planes in self.planes.values() for plane in planes]
+        return combine([getattr(plane, name) for plane in listed])
+
+
+@dataclass(frozen=True)
+class Conditions:
+    """All stacks of a measurement."""
+
+    dark: tuple[Condition, ...]
+    """By exposure time."""
+    flat: tuple[Condition, ...]
+    hot: float
+    dead: float | None
+    """Fractions of the pixels; None where no frame has light enough to tell."""
+    shape: tuple[int, int]
+    notes: tuple[str, ...]
+
+    @property
+    def colors(self) -> tuple[str, ...]:
+        """The colors of the array."""
+        return tuple(self.dark[0].planes)
+
+
+def measure(measurement: Measurement, watch: Observer) -> Conditions:
+    """Return the statistics of all dark and flat stacks.
+
+    The files are read twice: what pixels are defective has to be known before variances are.
+
+    Raises BadInput where a file is no frame.
+    """
+    assert measurement.levels is not None
+    highest = 2**measurement.levels.bits - 1
+    averages: list[tuple[FrameSet, NDArray]] = []
+    notes: list[str] = []
+    for stack in stacks(measurement):
+        if stack.entry.target == "flat":
+            averages.append((stack.entry, stack.frames.mean(axis=0)))
+        notes += [f"{stack.label}: {name} is unlike the others and left out"
+                  for name in stack.dropped]  # fmt: skip
+        if stack.drift > DRIFT and not stack.entry.is_dark:
+            notes.append(
+                f"{stack.label}: the light drifts by {stack.drift:.1%}, which is taken out"
+            )
+    hot, dead = _defects(averages, highest)
+    good = ~hot if dead is None else ~(hot | dead)
+    found: list[Condition] = []
+    flats = len(averages)
+    for stack in stacks(measurement):
+        if stack.entry.target == "flat":
+            watch.step(len(found), flats)
+            found.append(_condition(stack.entry, stack.label, stack.frames, good, measurement))
+    return Conditions(
+        tuple(sorted((c for c in found if c.entry.is_dark), key=lambda c: c.entry.exposure)),
+        tuple(c for c in found if not c.entry.is_dark),
+        float(hot.mean()),
+        None if dead is None else float(dead.mean()),
+        good.shape,
+        tuple(notes),
+    )
+
+
+def _defects(
+    averages: Iterable[tuple[FrameSet, NDArray]], highest: int
+) -> tuple[NDArray, NDArray | None]:
+    """Return which pixels are hot, and which dead; None where no light is bright enough."""
+    listed = list(averages)
+    dark = [(entry.exposure, mean) for entry, mean in listed if entry.is_dark]
+    unlit = min(dark, key=lambda each: each[0])[1]
+    black = float(np.median(unlit))
+    full = max((float(np.median(mean)) for _, mean in listed), default=float(highest))
+    hot = unlit > black + HOT * (full - black)
+    half = black + 0.3 * (full - black)
+    lit = [mean for entry, mean in listed if not entry.is_dark and np.median(mean) > half]
+    if not lit or full - black < 0.05 * highest:
+        return hot, None
+    light = lit[0] - black
+    return hot, light < DEAD * np.median(light)
+
+
+def _condition(
+    entry: FrameSet, label: str, frames: NDArray, good: NDArray, measurement: Measurement
+) -> Condition:
+    block = color_block(measurement)
+    size = len(block), len(block[0])
+    planes: dict[str, list[StackStatistics]] = {}
+    patterns: dict[str, list[Pattern]] = {}
+    for r, line in enumerate(block):
+        for c, color in enumerate(line):
+            here = good[r :: size[0], c :: size[1]]
+            told = stack_statistics(frames[:, r :: size[0], c :: size[1]], here)
+            planes.setdefault(color, []).append(told)
+            patterns.setdefault(color, []).append(pattern(told, here))
+    assert measurement.levels is not None
+    return Condition(
+        entry,
+        label,
+        {color: tuple(each) for color, each in planes.items()},
+        {color: _mean_pattern(each) for color, each in patterns.items()},
+        float(np.mean(frames[:, good] == 0)),
+        float(np.mean(frames[:, good] == 2**measurement.levels.bits - 1)),
+    )
+
+
+def _mean_pattern(patterns: list[Pattern]) -> Pattern:
+    names = ("total", "pixel", "column", "row")
+    return Pattern(*(combine([getattr(p, name) for p in patterns]) for name in names))
+
+
+def photons_per_pixel(entry: FrameSet, measurement: Measurement) -> float | None:
+    """Return the photons on the whole area of a pixel in the exposure; None where not known."""
+    if entry.photons is not None:
+        return entry.photons
+    if entry.irradiance is None or entry.light is None or measurement.pixel is None:
+        return None
+    pixel = measurement.pixel
+    assert pixel.width is not None
+    area = pixel.width * (pixel.height or pixel.width)
+    lamp = entry.light.resolve()
+    per_joule = integral(photons(lamp), *BAND) / integral(lamp, *BAND)
+    return entry.irradiance * area * entry.exposure * per_joule

@@ -1,0 +1,248 @@
+"""`vcam fit`: a camera file from raw frames, every number with its interval.
+
+measurement file -> frames (`frames`) -> statistics of each stack (`conditions`, `statistics`)
+-> gain, noise, pattern, range (`sensor`) and MTF50 (`edge`) -> parameters and camera (here)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from vcam_cli.errors import BadInput, Collector
+from vcam_cli.fitting import camera_file, edge, sensor
+from vcam_cli.fitting.conditions import CLIPPED, Conditions, measure
+from vcam_cli.fitting.frames import color_block, paths, stacks
+from vcam_cli.fitting.noise_shape import is_significant, neighbor_correlation, tail_shape
+from vcam_cli.fitting.parameters import COLUMNS, SIGMAS, Parameter, deviation, parameter
+from vcam_cli.fitting.statistics import Estimate, combine
+from vcam_cli.progress import Observer, Silent
+from vcam_cli.verification.model import Measurement
+
+
+@dataclass
+class Fit:
+    """A sensor as its frames tell it."""
+
+    measurement: Measurement
+    parameters: list[Parameter] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+    unknown: list[str] = field(default_factory=list)
+    """What the frames cannot tell, and is left at its default."""
+    camera: dict[str, Any] = field(default_factory=dict)
+    """The camera file."""
+
+    def value(self, name: str) -> float | None:
+        """Return an estimate, None where there is none."""
+        return next((p.value for p in self.parameters if p.name == name), None)
+
+    def report(self) -> dict[str, Any]:
+        """Return what `fit.json` and `--json` say."""
+        return {
+            "name": self.measurement.name,
+            "parameters": [dict(zip(COLUMNS, p.cells, strict=True)) for p in self.parameters],
+            "notes": self.notes,
+            "unknown": self.unknown,
+            "camera": self.camera,
+        }
+
+
+def fit(measurement: Measurement, watch: Observer | None = None) -> Fit:
+    """Estimate a sensor from its frames.
+
+    Parameters
+    ----------
+    measurement : Measurement
+        Files and conditions. Dark frames are needed, and flat frames of three levels or more.
+    watch : Observer, optional
+        Told of the progress.
+
+    Returns
+    -------
+    Fit
+        Parameters, notes, what is not known, and the camera file.
+
+    Raises
+    ------
+    BadInput
+        Frames are missing or unusable, or too few to tell the gain.
+    """
+    _check(measurement)
+    out = Fit(measurement)
+    found = measure(measurement, watch or Silent())
+    out.notes += found.notes
+    line = sensor.dark_line(found.dark)
+    curves, against = sensor.transfers(found, measurement, line)
+    out.notes += against
+    if not curves:
+        raise _refusal(measurement, ("frames",), "; ".join(against) or "there are no flat frames",
+                       "add flat frames at five levels or more, dark frames of their exposure"
+                       " time beside them")  # fmt: skip
+    gain = sensor.pooled_gain(curves)
+    _of_dark(out, found, line, gain)
+    _of_gain(out, curves, gain)
+    _of_patterns(out, found, curves, gain)
+    _of_range(out, curves, line, gain)
+    _of_edge(out, measurement)
+    out.camera = camera_file.tree(out, found, curves)
+    return out
+
+
+def _check(measurement: Measurement) -> None:
+    """Raise BadInput where a key is missing, or the frames of a kind."""
+    problems = Collector()
+    if measurement.levels is None:
+        problems.add("levels", "the ADC's bits are missing", "add levels: {bits: 12}")
+    if measurement.pixel is None:
+        problems.add("pixel", "the size of the pixels is missing", "add pixel: {width: 3.45 um}")
+    if not any(entry.is_dark for entry in measurement.frame_sets):
+        remedy = "add {files: dark_*.tif, exposure: 10 ms, light: none}"
+        problems.add("frames", "there are no dark frames", remedy)
+    try:
+        problems.raise_if_any()
+    except BadInput as error:
+        raise error.with_places(measurement.locate) from None
+    paths(measurement)
+
+
+def _refusal(measurement: Measurement, path: tuple, message: str, remedy: str) -> BadInput:
+    problems = Collector()
+    problems.add(path, message, remedy)
+    return BadInput(problems.problems).with_places(measurement.locate)
+
+
+def _of_dark(out: Fit, found: Conditions, line: sensor.Dark, gain: Estimate) -> None:
+    first = found.dark[0]
+    add = out.parameters.append
+    add(parameter("black_level", line.black, "DN", "mean of dark frames at no exposure time"))
+    stated = out.measurement.levels.black if out.measurement.levels else None
+    if stated is not None and abs(stated - line.black.value) > 5 * line.black.error + 0.5:
+        out.notes.append(f"levels.black is {stated:g}, but dark frames have {line.black.value:.2f}")
+    if first.at_zero > CLIPPED:
+        out.notes.append(f"{first.label}: {first.at_zero:.1%} of the dark codes are 0, so that"
+                         " read noise and black level are not what they seem")  # fmt: skip
+    if line.current is None:
+        out.unknown.append("dark current: all dark frames have one exposure time; it is part of"
+                           " black level and read noise")  # fmt: skip
+    else:
+        current = line.current / gain
+        add(parameter("dark_current", current, "e/s", "EMVA 1288 R4 eq 57, slope of the means"))
+    read = sensor.read_variance(first, line, gain)
+    if read.value <= 0 or first.every("pixel").value < 0.24:
+        out.notes.append("noise of the readout is lost in the rounding of the ADC")
+    add(deviation("read_noise", read, gain, "e", "EMVA 1288 R4 eq 53, without rounding and shot"
+                  " noise of the dark current, of pixels by themselves"))  # fmt: skip
+    rows_apart = len(color_block(out.measurement))
+    lag_one, excess = first.every("row_correlation"), first.every("excess")
+    r = lag_one.value if is_significant(lag_one) else 0.0
+    bands = ((1 + r**2) / (1 - min(r, 0.999) ** 2)) ** 0.5  # Bartlett: rows that tell the same
+    for name, wider in (("row", bands), ("column", 1.0)):
+        variance = first.every(name)
+        method = f"temporal variance of {name} means less the pixels' share"
+        told = replace(variance, error=variance.error * wider)
+        add(deviation(f"{name}_noise", told, gain, "e", method))
+    if r:
+        reach = SIGMAS * lag_one.error
+        value, low, high = (
+            neighbor_correlation(lag, rows_apart) for lag in (r, r - reach, r + reach)
+        )
+        method = "of neighboring rows, from their means"
+        add(Parameter("row_correlation", value, low, high, "1", method))
+    if is_significant(excess):
+        reach = SIGMAS * excess.error
+        value, low, high = (tail_shape(excess.value + step) for step in (0.0, reach, -reach))
+        method = "Tukey's lambda of the pixels' kurtosis"
+        add(Parameter("read_noise_shape", value, low, high, "1", method))
+        out.notes.append(
+            "read noise has heavy tails; the frames do not tell whether those are all pixels' or"
+            " those of few that have traps"
+        )
+
+
+def _of_gain(out: Fit, curves: list[sensor.Transfer], gain: Estimate) -> None:
+    add = out.parameters.append
+    add(parameter("system_gain", gain, "DN/e", "EMVA 1288 R4 eq 50, variance over mean"))
+    for curve in curves:
+        where = f"{curve.color}, {curve.light}"
+        if curve.efficiency is None:
+            out.unknown.append(f"quantum efficiency of {where}: no photons or irradiance given")
+        else:
+            method = f"EMVA 1288 R4 eq 52, whole pixel, {curve.light}"
+            add(parameter(f"quantum_efficiency.{curve.color}", curve.efficiency, "1", method))
+        if curve.linearity_error is not None:
+            error = curve.linearity_error
+            method = f"EMVA 1288 R4 eq 63, {curve.light}; no interval"
+            add(Parameter(f"linearity_error.{curve.color}", error, error, error, "1", method))
+
+
+def _of_patterns(
+    out: Fit, found: Conditions, curves: list[sensor.Transfer], gain: Estimate
+) -> None:
+    add = out.parameters.append
+    dark = list(found.dark[0].patterns.values())
+    for name in ("pixel", "column", "total"):
+        variance = combine([getattr(pattern, name) for pattern in dark])
+        key = "dsnu" if name == "total" else f"offset_{name}"
+        add(deviation(key, variance, gain, "e", "EMVA 1288 R4 eq 66, of dark frames"))
+    gains = []
+    for curve in curves:
+        signal = curve.result.series.signal
+        top = signal[curve.result.series.saturation_index]
+        index = int(abs(signal - 0.5 * top).argmin())
+        lit = curve.conditions[index]
+        gains.append(sensor.gain_variances(lit, found.dark[0], curve.color, float(signal[index])))
+    for number, name in enumerate(("gain_pixel", "gain_column")):
+        variance = combine([each[number] for each in gains])
+        one = Estimate(1.0, 0.0)
+        add(deviation(name, variance, one, "1", "EMVA 1288 R4 eq 67, near half of saturation"))
+    fractions = {"hot": found.hot, "dead": found.dead}
+    for name, share in fractions.items():
+        if share is None:
+            out.unknown.append(f"{name} pixels: no flat frames are bright enough")
+            continue
+        n = found.shape[0] * found.shape[1]
+        center = (share + SIGMAS**2 / (2 * n)) / (1 + SIGMAS**2 / n)
+        reach = (
+            SIGMAS / (1 + SIGMAS**2 / n) * ((share * (1 - share) + SIGMAS**2 / (4 * n)) / n) ** 0.5
+        )
+        ends = max(center - reach, 0.0), center + reach
+        told = Parameter(name, share, *ends, "1", f"share of {n} pixels, Wilson's interval")
+        add(told)
+
+
+def _of_range(out: Fit, curves: list[sensor.Transfer], line: sensor.Dark, gain: Estimate) -> None:
+    full = [curve for curve in curves if curve.saturated is not None]
+    if not full:
+        out.unknown.append("full well: no flat frames are saturated; it is set where the ADC is"
+                           " full")  # fmt: skip
+        return
+    levels = []
+    for curve in full:
+        assert curve.saturated is not None
+        mean = curve.saturated.mean(curve.color)
+        if curve.saturated.at_most > 0.5:
+            out.unknown.append("full well: the ADC is full before the pixel is")
+            return
+        levels.append(replace(mean, error=max(mean.error, 12**-0.5)))  # rounding of one code
+    well = (combine(levels) - line.black) / gain
+    out.parameters.append(parameter("full_well", well, "e", "mean of saturated frames over K"))
+
+
+def _of_edge(out: Fit, measurement: Measurement) -> None:
+    tell: Callable[[str], None] = out.unknown.append
+    edges = [stack for stack in stacks(measurement) if stack.entry.target == "slanted-edge"]
+    if not edges:
+        tell("sharpness: there are no frames of an edge")
+    for stack in edges:
+        try:
+            found = edge.mtf50(stack, measurement)
+        except ValueError as error:
+            tell(f"sharpness, {stack.label}: {error}")
+            continue
+        for color, value in found.items():
+            if value is None:
+                tell(f"MTF50 of {color}: two frames of an edge at least, sharp enough, are needed")
+                continue
+            method = "ISO 12233 e-SFR, mean over the frames"
+            out.parameters.append(parameter(f"mtf50.{color}", value * 1e-3, "lp/mm", method))

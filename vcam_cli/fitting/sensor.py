@@ -1,0 +1,203 @@
+"""Gain, noise, pattern, range and efficiency of a sensor from the statistics of its frames.
+
+Gain and responsivity are those of EMVA 1288, by the estimators that `vcam characterize` uses
+(`quality.photon_transfer`); the standard errors beside them follow from those of the variances.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from vcam_cli.fitting.conditions import Condition, Conditions, photons_per_pixel
+from vcam_cli.fitting.statistics import Estimate, combine
+from vcam_cli.quality.photon_transfer import (
+    GAIN_RANGE,
+    ROUNDING,
+    PhotonTransfer,
+    Series,
+    linearity,
+    photon_transfer,
+)
+from vcam_cli.verification.model import Measurement
+
+
+@dataclass(frozen=True)
+class Dark:
+    """What dark frames say, in the mean over all colors."""
+
+    black: Estimate
+    """Mean code at no exposure time [DN]."""
+    current: Estimate | None
+    """[DN/s]; None where all dark frames have one exposure time."""
+
+    def mean(self, seconds: float) -> float:
+        """Return the mean dark signal in an exposure, black level left out [DN]."""
+        return 0.0 if self.current is None else self.current.value * seconds
+
+
+def dark_line(dark: tuple[Condition, ...]) -> Dark:
+    """Return black level and dark current, by a weighted straight line of the means over time.
+
+    The fixed pattern is the same at all times, so that it is no error of the slope; of the black
+    level it is.
+    """
+    times = np.array([c.entry.exposure for c in dark])
+    means = [c.every("mean") for c in dark]
+    shortest = dark[0].patterns.values()
+    rows, columns = next(iter(dark[0].planes.values()))[0].average.shape
+    patterns = [p.pixel.value / (rows * columns) + max(p.column.value, 0) / columns
+                for p in shortest]  # fmt: skip
+    fixed = math.sqrt(max(float(np.mean(patterns)), 0.0))
+    if len(np.unique(times)) < 2:
+        return Dark(Estimate(means[0].value, math.hypot(means[0].error, fixed)), None)
+    weights = np.array([1 / m.error**2 for m in means])
+    design = np.stack([np.ones_like(times), times], 1)
+    covariance = np.linalg.inv(design.T @ (weights[:, None] * design))
+    level, slope = covariance @ design.T @ (weights * np.array([m.value for m in means]))
+    errors = np.sqrt(np.diag(covariance))
+    black = Estimate(float(level), math.hypot(float(errors[0]), fixed))
+    return Dark(black, Estimate(float(slope), float(errors[1])))
+
+
+@dataclass(frozen=True)
+class Transfer:
+    """The photon transfer of one color in one light."""
+
+    color: str
+    light: str
+    result: PhotonTransfer
+    gain: Estimate
+    """System gain K [DN/e]."""
+    efficiency: Estimate | None
+    """Quantum efficiency of the whole pixel; None where the photons are not known."""
+    linearity_error: float | None
+    conditions: tuple[Condition, ...]
+    """By signal, rising."""
+
+    @property
+    def saturated(self) -> Condition | None:
+        """The brightest stack beyond saturation, whose noise is clipped; None without one."""
+        last = self.conditions[-1]
+        peak = float(self.result.series.variance.max())
+        clipped = float(self.result.series.variance[-1]) < 0.2 * peak
+        return last if clipped else None
+
+
+def transfers(
+    found: Conditions, measurement: Measurement, line: Dark
+) -> tuple[list[Transfer], list[str]]:
+    """Return the photon transfer of every color in every light, and what stands against some."""
+    groups: dict[str, list[Condition]] = {}
+    for condition in found.flat:
+        lamp = condition.entry.light
+        assert lamp is not None  # else the frames are dark
+        named = str(lamp.to_yaml()).translate(str.maketrans("", "", "{}'"))
+        groups.setdefault(named, []).append(condition)
+    out, notes = [], []
+    for light, conditions in groups.items():
+        for color in found.colors:
+            try:
+                out.append(_transfer(color, light, conditions, found, measurement, line))
+            except ValueError as error:
+                notes.append(f"{light}, {color}: no photon transfer, {error}")
+    return out, notes
+
+
+def _transfer(
+    color: str,
+    light: str,
+    conditions: list[Condition],
+    found: Conditions,
+    measurement: Measurement,
+    line: Dark,
+) -> Transfer:
+    ordered = tuple(sorted(conditions, key=lambda c: c.mean(color).value))
+    amounts = [photons_per_pixel(c.entry, measurement) for c in ordered]
+    known = all(a is not None for a in amounts)
+    unlit = [_dark_of(c, found.dark, color, line) for c in ordered]
+    first = unlit[0]
+    # As if all had the exposure time of the first: the others' dark signal is taken out.
+    mean = np.array(
+        [c.mean(color).value - d[0] + first[0] for c, d in zip(ordered, unlit, strict=True)]
+    )
+    variance = np.array(
+        [c.variance(color).value - d[1].value + first[1].value
+         for c, d in zip(ordered, unlit, strict=True)]
+    )  # fmt: skip
+    signal = mean - first[0]
+    scale = np.array([float(a or 0) for a in amounts]) if known else signal
+    series = Series(scale, mean, variance, first[0], first[1].value)
+    result = photon_transfer(series)
+    used = (signal <= GAIN_RANGE * signal[series.saturation_index]) & (
+        np.arange(len(signal)) <= series.saturation_index
+    )
+    s = signal[used]
+    errors = np.array([c.variance(color).error for c in ordered])[used]
+    square = float(s @ s)
+    error = math.hypot(float(np.linalg.norm(s * errors)), float(s.sum()) * first[1].error) / square
+    spread = _mean_gain_error(ordered, signal, color, found)
+    gain = Estimate(result.gain, math.hypot(error, result.gain * spread))
+    efficiency = None
+    if known:
+        responsivity = Estimate(result.responsivity, result.responsivity * spread)
+        alone = Estimate(result.gain, error)  # the pattern's mean gain is in both
+        efficiency = responsivity / alone
+    try:
+        deviation = linearity(series).error if known else None
+    except ValueError:
+        deviation = None
+    return Transfer(color, light, result, gain, efficiency, deviation, ordered)
+
+
+def _mean_gain_error(
+    ordered: tuple[Condition, ...], signal: np.ndarray, color: str, found: Conditions
+) -> float:
+    """Return how far the mean gain of so many pixels and columns is from that of all sensors."""
+    half = int(np.argmin(abs(signal - 0.5 * signal.max())))
+    pixel, column = gain_variances(ordered[half], found.dark[0], color, float(signal[half]))
+    rows, columns = ordered[half].planes[color][0].average.shape
+    planes = len(ordered[half].planes[color])
+    variance = max(pixel.value, 0) / (rows * columns * planes) + max(column.value, 0) / columns
+    return math.sqrt(variance)
+
+
+def gain_variances(
+    lit: Condition, dark: Condition, color: str, signal: float
+) -> tuple[Estimate, Estimate]:
+    """Return the relative variances of gains of pixels and of columns, eq 67 of EMVA 1288."""
+    bright, unlit = lit.patterns[color], dark.patterns[color]
+    scale = 1 / signal**2
+    return (bright.pixel - unlit.pixel) * scale, (bright.column - unlit.column) * scale
+
+
+def _dark_of(
+    flat: Condition, dark: tuple[Condition, ...], color: str, line: Dark
+) -> tuple[float, Estimate]:
+    """Return mean and variance without light at the exposure time of a flat stack [DN, DN^2].
+
+    From dark frames of the nearest time, their mean carried along the line.
+    """
+    near = min(dark, key=lambda c: abs(math.log(c.entry.exposure / flat.entry.exposure)))
+    moved = line.mean(flat.entry.exposure) - line.mean(near.entry.exposure)
+    return near.mean(color).value + moved, near.variance(color)
+
+
+def pooled_gain(found: list[Transfer]) -> Estimate:
+    """Return the system gain in the mean over colors and lights, weighted by their errors."""
+    weights = np.array([1 / max(t.gain.error, 1e-12) ** 2 for t in found])
+    values = np.array([t.gain.value for t in found])
+    return Estimate(float(values @ weights / weights.sum()), float(weights.sum() ** -0.5))
+
+
+def read_variance(dark: Condition, line: Dark, gain: Estimate) -> Estimate:
+    """Return the variance of a pixel's readout [DN^2], without rounding and dark current's shot."""
+    found = combine([dark.variance(color) for color in dark.planes])
+    shot = gain.value * line.mean(dark.entry.exposure)
+    shot_error = (
+        0.0 if line.current is None else (gain.value * line.current.error * dark.entry.exposure)
+    )
+    without = replace(found, value=found.value - ROUNDING - shot)
+    return replace(without, error=math.hypot(without.error, shot_error))

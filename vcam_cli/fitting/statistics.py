@@ -1,0 +1,181 @@
+"""What a stack of frames says of noise and pattern: variances of pixels, columns and rows.
+
+A frame's residual is what it differs from the mean of its stack, its own mean taken out, since
+that is light that drifts. Means over its rows and columns hold the noise of these and a share of
+the pixels'; what is left of them is the pixels' own. All divisors are degrees of freedom, so that
+the variances do not depend on how many frames and pixels there are.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcam_cli.quality import nonuniformity
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A number and its standard error."""
+
+    value: float
+    error: float
+
+    def __add__(self, other: Estimate) -> Estimate:
+        """Return the sum of two numbers of independent errors."""
+        return Estimate(self.value + other.value, math.hypot(self.error, other.error))
+
+    def __sub__(self, other: Estimate) -> Estimate:
+        """Return the difference of two numbers of independent errors."""
+        return self + other * -1.0
+
+    def __mul__(self, factor: float) -> Estimate:
+        """Return a multiple."""
+        return Estimate(self.value * factor, self.error * abs(factor))
+
+    def __truediv__(self, other: Estimate) -> Estimate:
+        """Return the ratio of two numbers of independent errors."""
+        ratio = self.value / other.value
+        return Estimate(ratio, math.hypot(self.error, ratio * other.error) / abs(other.value))
+
+
+def combine(estimates: list[Estimate]) -> Estimate:
+    """Return the mean of independent estimates of one number."""
+    total = sum(estimates[1:], estimates[0])
+    return total * (1 / len(estimates))
+
+
+@dataclass(frozen=True)
+class StackStatistics:
+    """A plane of one color of a stack: means, and variances with their errors [DN, DN^2]."""
+
+    frames: int
+    average: NDArray
+    """Mean of the frames (rows, columns) [DN]."""
+    mean: Estimate
+    """Mean of the good pixels [DN]."""
+    pixel: Estimate
+    """Temporal variance of pixels by themselves [DN^2]."""
+    row: Estimate
+    """Temporal variance of rows [DN^2]."""
+    column: Estimate
+    """Temporal variance of columns [DN^2]."""
+    row_correlation: Estimate
+    """Correlation of neighboring rows of the plane."""
+    excess: Estimate
+    """Excess kurtosis of the pixels' noise."""
+
+    @property
+    def temporal(self) -> float:
+        """Temporal variance of all kinds together [DN^2]."""
+        return self.pixel.value + max(self.row.value, 0.0) + max(self.column.value, 0.0)
+
+
+def stack_statistics(frames: NDArray, good: NDArray) -> StackStatistics:
+    """Return the statistics of a stack of two frames or more.
+
+    Parameters
+    ----------
+    frames : NDArray
+        Codes (n, rows, columns) [DN].
+    good : NDArray
+        Which pixels count (rows, columns).
+
+    Returns
+    -------
+    StackStatistics
+        Means and variances; those of normal noise have the error of a chi-squared number.
+    """
+    n, rows, columns = frames.shape
+    average = frames.mean(axis=0)
+    second = fourth = by_row = by_column = lagged = 0.0
+    share = float(good.mean())
+    for frame in frames:
+        residual = np.where(good, frame - average, 0.0)
+        residual -= np.where(good, residual.sum() / good.sum(), 0.0)
+        row_means, column_means = residual.mean(1) / share, residual.mean(0) / share
+        by_row += float((row_means**2).sum())
+        lagged += float((row_means[1:] * row_means[:-1]).sum())
+        by_column += float((column_means**2).sum())
+        residual -= np.where(good, row_means[:, None] + column_means, 0.0)
+        square = residual**2
+        second += float(square.sum())
+        fourth += float((square**2).sum())
+    freedom = (n - 1) * ((rows - 1) * (columns - 1) - float((~good).sum()))
+    pixel = second / freedom
+    count = n * float(good.sum())
+    # of the residuals of n frames; fourth cumulants shrink by this factor, variances by (n-1)/n
+    shrink = ((1 - 1 / n) ** 4 + (n - 1) / n**4) / (1 - 1 / n) ** 2
+    excess = ((fourth / count) / (second / count) ** 2 - 3) / shrink if second else 0.0
+    spread = math.sqrt(max(2 + excess, 0.1) / freedom)
+    row = by_row / ((n - 1) * (rows - 1))
+    column = by_column / ((n - 1) * (columns - 1))
+    own_row = row - pixel / columns
+    correlation = lagged / ((n - 1) * (rows - 1)) / own_row if own_row > 0 else 0.0
+    correlation_error = (row / own_row if own_row > 0 else 1.0) / math.sqrt((n - 1) * rows)
+    mean_error = math.sqrt(max(pixel, 1 / 12) / (n * rows * columns) + _share(row, rows, n)
+                           + _share(column, columns, n))  # fmt: skip
+    return StackStatistics(
+        n,
+        average,
+        Estimate(float(average[good].mean()), mean_error),
+        Estimate(pixel, pixel * spread),
+        Estimate(own_row, row * math.sqrt(2 / ((n - 1) * (rows - 1)))),
+        Estimate(column - pixel / rows, column * math.sqrt(2 / ((n - 1) * (columns - 1)))),
+        Estimate(correlation, correlation_error),
+        Estimate(excess, math.sqrt(24 / freedom) / shrink),
+    )
+
+
+def _share(line_variance: float, lines: int, frames: int) -> float:
+    return max(line_variance, 0.0) / (lines * frames)
+
+
+@dataclass(frozen=True)
+class Pattern:
+    """Spatial variances of a stack with their errors [DN^2]."""
+
+    total: Estimate
+    pixel: Estimate
+    column: Estimate
+    row: Estimate
+
+
+def pattern(stack: StackStatistics, good: NDArray) -> Pattern:
+    """Return the spatial variances, freed of the temporal noise that is left in the mean.
+
+    Parameters
+    ----------
+    stack : StackStatistics
+        The stack.
+    good : NDArray
+        Which pixels count; the others take the mean of all.
+
+    Returns
+    -------
+    Pattern
+        Variances by eqs 36 and 42 of EMVA 1288 release 4.0 (`quality.nonuniformity`).
+    """
+    rows, columns = good.shape
+    filled = np.where(good, stack.average, stack.mean.value)
+    left = nonuniformity.Stack(stack.frames, filled, stack.pixel.value)
+    found = nonuniformity.spatial_variance(left)
+    n, share = stack.frames, float(good.mean())
+    pixel_seen = (found.pixel + stack.pixel.value / n) / share
+    column = found.column - max(stack.column.value, 0.0) / n
+    row = found.row - max(stack.row.value, 0.0) / n
+    pixel = found.pixel / share
+    return Pattern(
+        total=Estimate(pixel + row + column, _chi(pixel_seen, rows * columns)),
+        pixel=Estimate(pixel, _chi(pixel_seen, (rows - 1) * (columns - 1))),
+        column=Estimate(column, _chi(found.column + pixel_seen / rows, columns - 1)),
+        row=Estimate(row, _chi(found.row + pixel_seen / columns, rows - 1)),
+    )
+
+
+def _chi(variance: float, freedom: int) -> float:
+    """Return the standard error of a variance of normal numbers."""
+    return abs(variance) * math.sqrt(2 / max(freedom, 1))

@@ -1,0 +1,60 @@
+"""What a measurement file says of frames: files, conditions they were taken under, the sensor."""
+
+from typing import Annotated, Literal
+
+from vcam_cli.camera.illuminant import IlluminantSpec
+from vcam_cli.config.model import Model, at_most_one, key
+from vcam_cli.config.quantities import Number, Quantity, Whole
+from vcam_cli.config.values import TIME, MaybePositive, Text
+from vcam_cli.verification.light import Light
+
+PixelSize = Annotated[float | None, Quantity("length", above=0, least=1e-9, most=1e-2)]
+PATTERNS = Literal["monochrome", "bayer-rggb", "bayer-grbg", "bayer-gbrg", "bayer-bggr"]
+
+
+class FrameSet(Model):
+    """Raw frames that were taken under the same conditions."""
+
+    files: Text = key(
+        "the frames, *.tif for several: whole numbers in TIFF, PNG, npy, or EXR as vcam writes it",
+        example="dark_10ms_*.tif",
+    )
+    name: Text = key("name in tables; default its number", example="dark, shortest", default="")
+    exposure: Annotated[float, TIME] = key("exposure time", example="10 ms")
+    light: Annotated[IlluminantSpec | None, Light()] = key(
+        "the light on the sensor, as scene.illuminant has it; none for dark frames",
+        example={"monochromatic": "532 nm"},
+        default=None,
+    )
+    irradiance: Annotated[float | None, Quantity("irradiance", above=0)] = key(
+        "on the sensor", example="0.12 W/m2", default=None
+    )
+    photons: MaybePositive = key(
+        "on the whole area of a pixel in the exposure, in place of irradiance (EMVA 1288)",
+        example=4500,
+        default=None,
+    )
+    target: Literal["flat", "slanted-edge"] = key("what was taken", default="flat")
+
+    rules = (at_most_one("irradiance", "photons"),)
+
+    @property
+    def is_dark(self) -> bool:
+        """Whether there was no light."""
+        return self.target == "flat" and self.light is None
+
+
+class Levels(Model):
+    """The codes of the frames."""
+
+    bits: Annotated[int, Whole(least=1, most=32, example="12")] = key("of the ADC", example=12)
+    black: Annotated[float | None, Number(least=0, example="64", words={"auto": None})] = key(
+        "code without light, to be checked; auto: estimated", example=64, default=None
+    )
+
+
+class MeasuredPixel(Model):
+    """What is known of the pixels."""
+
+    width: PixelSize = key("pitch of the pixels", example="3.45 um")
+    height: PixelSize = key("default the width", example="3.45 um", default=None)
