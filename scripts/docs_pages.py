@@ -88,7 +88,10 @@ def _measurement_keys() -> tuple[str, str, Iterable[Any], dict[str, Any]]:
     from vcam_cli.config.key_index import keys
     from vcam_cli.verification.model import Measurement
 
-    about = "Every key of a file of measured signals (`kind: measurement`), for `vcam verify`."
+    about = (
+        "Every key of a file of measured signals or frames (`kind: measurement`), for `vcam verify`"
+        " and `vcam fit`."
+    )
     found = {key.path: ("measurement", key) for key in keys(Measurement)}
     return "Keys of measurements", about, found.values(), _definitions("measurement")
 

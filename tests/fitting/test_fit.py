@@ -235,13 +235,16 @@ def test_what_cannot_be_fitted_is_refused_with_its_place(taken, changes, path):
 
 
 @pytest.mark.long
-def test_intervals_hold_the_truth_of_twenty_cameras(tmp_path):
-    """90 % intervals of 240 parameters: 86 to 94 %, as asked for; errors of the mean under 2 %."""
+def test_intervals_hold_the_truth_of_sixty_cameras(tmp_path):
+    """90 % intervals of 720 parameters: 86 to 94 % of them; errors of the mean under 2 %.
+
+    Twenty would not do: errors of gain, efficiency and well of a camera are one and the same.
+    """
     held, errors = [], {}
-    for number in range(20):
+    for number in range(60):
         folder = tmp_path / str(number)
         folder.mkdir()
-        known, found = blind.blind_fit(number, folder, 256, 16)
+        known, found = blind.blind_fit(number, folder, 128, 8)
         for p in found.parameters:
             if p.name in known:
                 held.append(p.low <= known[p.name] <= p.high)
