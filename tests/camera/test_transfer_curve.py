@@ -140,6 +140,15 @@ def test_what_cannot_be_is_refused(curve, more, path, words, tmp_path):
     assert all(p.remedy for p in problems)
 
 
+def test_beyond_its_ends_the_curve_is_straight(tmp_path):
+    curve = electrical(bent(tmp_path, {"follower": FOLLOWER, "reset_voltage": "1.8 V"})).curve
+    for start, step in ((0.0, -1e3), (curve.electrons[-1], 1e15)):
+        near, far = curve.volts_of(np.array([start, start + step]))
+        slope = np.diff(curve.volts_of(np.array([start, start + 1e-3 * np.sign(step)])))[0]
+        assert (far - near) / step == pytest.approx(slope / (1e-3 * np.sign(step)), rel=1e-5)
+        assert float(curve.electrons_of(far)) == pytest.approx(start + step, rel=1e-9)
+
+
 def test_a_file_of_the_curve_is_read(tmp_path):
     (tmp_path / "curve.csv").write_text("input_v,output_v\n0.4,0.05\n1.0,0.5\n1.6,0.9\n")
     curve = {"follower": {"file": "curve.csv"}, "reset_voltage": "1.5 V"}

@@ -27,8 +27,6 @@ from vcam_cli.spectra.text import read_rows
 
 POINTS = 1025
 """Voltages at which a curve is known: between them a line is good to 1e-7 of the swing."""
-FAR = 1e6
-"""Full wells, and swings, up to which a curve goes on as straight as it ends."""
 HEADER = ("input_v", "output_v")
 PATH = "pixel.readout.transfer_curve"
 SLACK = 1e-9
@@ -48,11 +46,11 @@ class Curve:
 
     def volts_of(self, electrons: float | NDArray) -> NDArray[np.float64]:
         """Return the output of charges, of any shape [V]."""
-        return np.interp(np.asarray(electrons), *_extended(self.electrons, self.volts))
+        return _straight_beyond(electrons, self.electrons, self.volts)
 
     def electrons_of(self, volts: float | NDArray) -> NDArray[np.float64]:
         """Return the charges of outputs, of any shape [e]."""
-        return np.interp(np.asarray(volts), *_extended(self.electrons, self.volts)[::-1])
+        return _straight_beyond(volts, self.volts, self.electrons)
 
     @property
     def slope(self) -> float:
@@ -66,14 +64,14 @@ class Curve:
         return float(np.abs(np.array(self.volts) / self.volts[-1] - line).max())
 
 
-def _extended(
-    x: tuple[float, ...], y: tuple[float, ...]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Return the points with one far away at each end, along the slopes there."""
+def _straight_beyond(
+    value: float | NDArray, x: tuple[float, ...], y: tuple[float, ...]
+) -> NDArray[np.float64]:
+    """Return the line through the points at some values, which goes on beyond both ends."""
+    at = np.asarray(value, np.float64)
     first, last = (y[1] - y[0]) / (x[1] - x[0]), (y[-1] - y[-2]) / (x[-1] - x[-2])
-    reach = FAR * x[-1]
-    at = np.array([x[0] - reach, *x, x[-1] + reach])
-    return at, np.array([y[0] - first * reach, *y, y[-1] + last * reach])
+    below, above = np.minimum(at - x[0], 0.0), np.maximum(at - x[-1], 0.0)
+    return np.interp(at, x, y) + first * below + last * above
 
 
 def transfer_curve(camera: Camera, swing: float, full_well: float) -> Curve | None:
