@@ -88,6 +88,13 @@ REASONS: dict[str, tuple[str, Callable[[Result], bool]]] = {
         "no color responds there",
         lambda r: _is_dark_at(r.frame.camera.scene.wavelengths.stop, r),
     ),
+    **{
+        f"pixel.{key}": (
+            "even light falls on a bare sensor: the photodetectors alone matter",
+            lambda r: not r.frame.camera.optics.is_lens,
+        )
+        for key in ("width", "height", "gap_x", "gap_y")
+    },
     "display.width": ("the few pixels of the search are too large to be blurred", _is_coarse),
     "display.viewing_distance": ("so they are", _is_coarse),
 }
