@@ -40,8 +40,8 @@ HEADER = """\
 # yaml-language-server: $schema=../../schemas/measurement.schema.json
 # Fifteen signals of a test pixel behind five filters at three intensities, as in Chen 2003, section
 # 2.4.2. SIMULATED, not measured: scripts/make_test_pixel_measurement.py draws the sensor's numbers,
-# which differ from those of test-pixel-0.18um by some 3 %. The tolerance is that of the thesis, whose
-# predictions all came within 8 %.
+# which differ from those of test-pixel-0.18um by some 3 %. The tolerance is that of the thesis:
+# all predictions came within 8 %.
 kind: measurement
 name: test-pixel-simulated
 tolerance: 8 %
