@@ -290,7 +290,7 @@ def _dimensions() -> dict[str, Dimension]:
         Dimension("time", "a time", "s", time, ("ns", "us", "ms", "s"), "30 ms"),
         Dimension("speed", "a speed", "m/s",
                   _per(length, {"s": Fraction(1)}) | {"km/h": Fraction(10, 36)},
-                  ("um/s", "mm/s", "m/s"), "0.5 m/s"),
+                  ("m/s",), "0.5 m/s"),
         Dimension("turning_speed", "a turning speed", "rad/s",
                   {f"{name}/s": size for name, size in angle.items()}, ("deg/s",), "10 deg/s"),
         Dimension("frequency", "a frequency", "Hz", _prefixed_units("Hz", "-kM"),

@@ -192,7 +192,9 @@ class TestStudiesElsewhere:
 
     def test_init_writes_a_study_that_is_valid_beside_its_camera(self):
         vcam("init", "new")
-        assert sorted(p.name for p in Path("new").iterdir()) == ["camera.yaml", "study.yaml"]
+        assert sorted(p.name for p in Path("new").iterdir()) == [
+            *("camera.yaml", "schemas", "study.yaml")
+        ]
         assert vcam("validate", "new/study.yaml").exit_code == 0
         assert "camera: camera.yaml" in Path("new/study.yaml").read_text()
 

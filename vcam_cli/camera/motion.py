@@ -36,7 +36,7 @@ class CameraMotion(Model):
     """Turning of the camera about its lens."""
 
     pan: TurningSpeed = key("to the right", example="10 deg/s", default=0.0)
-    tilt: TurningSpeed = key("up", example="10 deg/s", default=0.0)
+    tilt: TurningSpeed = key("upward", example="10 deg/s", default=0.0)
     roll: TurningSpeed = key(
         "about the optical axis: not built yet", example="0 deg/s", default=0.0
     )

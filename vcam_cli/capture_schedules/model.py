@@ -86,7 +86,7 @@ def _segments(given: Any) -> tuple[int, ...]:
 
 def _densities(given: Any) -> tuple[str, ...]:
     """Return names of estimators; of one, or a list."""
-    return distinct_words([given] if isinstance(given, str) else given, DENSITIES)
+    return distinct_words(given if isinstance(given, (list, tuple)) else [given], DENSITIES)
 
 
 def _or_null(read: Callable[[Any], Any]) -> Callable[[Any], Any]:
