@@ -60,8 +60,9 @@ def explanations(name: str) -> Iterator[dict[str, Any]]:
     yield from _of_chart(word)
     found = _keys_called(word)
     meant = hints.KEYS.get(word.replace("-", "_"))
-    if not found and meant:
-        found = _keys_called(meant.partition(": ")[0])
+    if meant:  # what most people mean by the word comes first
+        first = _keys_called(meant.partition(": ")[0])
+        found = [*first, *(key for key in found if key not in first)]
     yield from (_of_key(where, key) for where, key in found)
 
 
