@@ -223,7 +223,7 @@ def _busiest(path: OpticalPath, scene: ChartScene, level: NDArray) -> NDArray:
     )
     light = scene.values_at(x, y, level[None])[0].reshape(BLOCKS, POINTS, BLOCKS, POINTS)
     contrasts = [light.var(axis=(1, 3)).ravel()]
-    if light.max() > path.ceiling:
+    if float(light.max()) > path.ceiling:
         contrasts.append(np.minimum(light, path.ceiling).var(axis=(1, 3)).ravel())
     order = np.concatenate([np.argsort(contrast)[::-1][:FEW] for contrast in contrasts])
     centers = (np.stack([order % BLOCKS, order // BLOCKS], axis=1) + 0.5) / BLOCKS - 0.5

@@ -27,6 +27,8 @@ from vcam_cli.spectra.text import read_rows
 
 POINTS = 1025
 """Voltages at which a curve is known: between them a line is good to 1e-7 of the swing."""
+SMALLEST_SWING = 1e-9
+"""Swing over the reset voltage, at least: what is smaller is lost to rounding."""
 HEADER = ("input_v", "output_v")
 PATH = "pixel.readout.transfer_curve"
 SLACK = 1e-9
@@ -96,6 +98,9 @@ def transfer_curve(camera: Camera, swing: float, full_well: float) -> Curve | No
         return None
     fall = np.linspace(0, swing, POINTS)
     reset = _reset_voltage(camera, swing)
+    if swing < SMALLEST_SWING * abs(reset):
+        message = f"a swing of {swing:.4g} V is nothing beside a reset voltage of {reset:.4g} V"
+        raise bad(PATH, message, "give a larger full well or voltage swing")
     electrons = fall / swing * full_well
     if given.capacitance == "junction":
         charge = _junction_charge(camera, reset - fall, reset)
