@@ -244,12 +244,16 @@ def test_crops_of_small_arrays(shape, measured):
     assert cells >= 1
 
 
-@pytest.mark.parametrize("chart", ["hdr-patches", "dead-leaves"])
-def test_light_far_beyond_the_well_does_not_ring_into_dark_pixels(chart):
+@pytest.mark.parametrize(
+    ("chart", "rows", "columns"),
+    [("hdr-patches", 48, 64), ("hdr-patches", 72, 96), ("dead-leaves", 48, 64)],
+)
+def test_light_far_beyond_the_well_does_not_ring_into_dark_pixels(chart, rows, columns):
     """White fills a pixel thousands of times over; where it does not, no light of it may show."""
-    sets = ["array.rows=48", "array.columns=64", f"scene.source={{kind: chart, chart: {chart}}}"]
-    camera = load("low-light", [*sets, "scene.luminance=20000 cd/m2", "accuracy=standard"])
-    fine = {"preset": "standard", "oversampling": 13}
+    size = [f"array.rows={rows}", f"array.columns={columns}"]
+    source = f"scene.source={{kind: chart, chart: {chart}}}"
+    camera = load("low-light", [*size, source, "scene.luminance=20000 cd/m2", "accuracy=standard"])
+    fine = {"preset": "standard", "oversampling": 17}
     truth, found = (
         ablation.mean_raw(prepare(each, 1)[0]) for each in (with_accuracy(camera, **fine), camera)
     )

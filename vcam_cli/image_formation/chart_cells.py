@@ -45,6 +45,9 @@ photodetectors do, and err less there than on the whole."""
 OVEREXPOSED = 2.0
 """Cells of charts that fill pixels, at least: fewer end the spectrum within that of the pixels, and
 bright light rings into dark pixels that are on none of the crops."""
+OVEREXPOSED_SHARE = 0.3
+"""Part of that share where light fills pixels: the error of the whole is then that of few pixels,
+which hardly any crop shows."""
 COPRIME = 1.37
 """Cells of a crop's reference over those that reach the cut-off."""
 CROP, SMALLEST_CROP = 24, 12
@@ -129,7 +132,9 @@ def cells_per_pixel(path: OpticalPath, scene: ChartScene, highest: float) -> Cho
     budget = CELLS_SHARE * path.settings.tolerance * full
     whole = math.prod(cell_grid(scene, path.geometry, 1.0))
     most = min(finest, max(1.0, math.sqrt(MOST / whole)))
-    least = OVEREXPOSED if converged.max() > path.ceiling else 0.0
+    least = 0.0
+    if converged.max() > path.ceiling:
+        least, budget = OVEREXPOSED, OVEREXPOSED_SHARE * budget
     cells, error, trials = most, budget, 1
     for cells in [c for c in LADDER if least <= c <= min(most, reference / COPRIME)]:
         trials += 1
