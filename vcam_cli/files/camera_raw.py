@@ -9,14 +9,12 @@ from __future__ import annotations
 import logging
 from collections.abc import Iterator
 from contextlib import contextmanager
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from vcam_cli import memory
-from vcam_cli.errors import CannotDo
 from vcam_cli.files.file_checks import (
     UnusableFile,
     check_file,
@@ -25,6 +23,7 @@ from vcam_cli.files.file_checks import (
     truncated_file,
 )
 from vcam_cli.files.images import LinearImage
+from vcam_cli.files.optional_library import optional_library
 
 SUFFIXES = (
     ".dng", ".cr2", ".cr3", ".nef", ".arw", ".raf", ".orf", ".rw2", ".pef", ".srw", ".3fr", ".iiq",
@@ -87,11 +86,7 @@ def open_raw(path: Path) -> Iterator[Any]:
 
 def library(name: str) -> Any:
     """Return a library that reads raw files. Raise CannotDo where it is not installed."""
-    try:
-        return import_module(name)
-    except ImportError as error:
-        message = f"raw files of cameras need {name}, which is not installed"
-        raise CannotDo(message, "pip install 'vcam-cli[raw]'") from error
+    return optional_library(name, "raw files of cameras", "raw")
 
 
 def _words(error: Exception) -> str:

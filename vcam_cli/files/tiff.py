@@ -7,7 +7,6 @@ tifffile writes any tag of any type, which OpenImageIO does not; it comes with
 from __future__ import annotations
 
 from collections.abc import Sequence
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -15,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 import vcam_cli
-from vcam_cli.errors import CannotDo
 from vcam_cli.files.atomic import write_whole
+from vcam_cli.files.optional_library import optional_library
 
 Tag = tuple[int, str, int, Any]
 """Number, type as `struct` writes it, count, and value of a tag; rationals are flat pairs "2I",
@@ -76,8 +75,4 @@ def whole_numbers(values: NDArray, highest: float) -> NDArray:
 
 def library(name: str) -> Any:
     """Return a library that writes raw files. Raise CannotDo where it is not installed."""
-    try:
-        return import_module(name)
-    except ImportError as error:
-        message = f"TIFF and DNG files need {name}, which is not installed"
-        raise CannotDo(message, "pip install 'vcam-cli[dng]'") from error
+    return optional_library(name, "TIFF and DNG files", "dng")
