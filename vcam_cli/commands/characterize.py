@@ -106,7 +106,7 @@ def characterize(
 
 def report_arguments(found: "Characterization") -> dict[str, Any]:
     """Return title, text, facts and captions of the report."""
-    from vcam_cli.reports.page import Facts
+    from vcam_cli.reports.page import Facts, note_facts
 
     def measured(color: str) -> Iterator[tuple[str, str]]:
         for name in SHOWN:
@@ -114,8 +114,7 @@ def report_arguments(found: "Characterization") -> dict[str, Any]:
             yield name, f"{q.measured:.4g} (expected {q.expected:.4g}) {q.unit}".rstrip()
 
     cards = [Facts(channel.color, list(measured(channel.color))) for channel in found.channels]
-    if found.notes:
-        cards.append(Facts("Notes", [("", note) for note in found.notes]))
+    cards += note_facts(found.notes)
     captions = {
         "characterize.csv": "What the bench measured beside what the camera file says.",
         "photon_transfer.png": "Temporal variance over the mean, whose slope is the system gain K",

@@ -86,12 +86,11 @@ def verify(
 
 def report_arguments(found: "Verification") -> dict[str, Any]:
     """Return title, text, facts and captions of the report."""
-    from vcam_cli.reports.page import Facts
+    from vcam_cli.reports.page import Facts, note_facts
 
     numbers = found.summary().items()
     cards = [Facts("Errors", [(name.replace("_", " "), f"{value:.4g}") for name, value in numbers])]
-    if found.notes:
-        cards.append(Facts("Notes", [("", note) for note in found.notes]))
+    cards += note_facts(found.notes)
     captions = {
         "verify.csv": "What was measured beside what the camera file predicts.",
         "errors.png": "How many predictions have which error",

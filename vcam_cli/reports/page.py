@@ -70,6 +70,11 @@ class Facts:
     rows: Sequence[tuple[str, str]]
 
 
+def note_facts(notes: Sequence[str]) -> list[Facts]:
+    """Return the card of a study's notes; none where there are none."""
+    return [Facts("Notes", [("", note) for note in notes])] if notes else []
+
+
 @dataclass(frozen=True)
 class Text:
     """A text as it was written, such as a file."""
