@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,6 +41,17 @@ def tukey_lambda(chance: NDArray, shape: float) -> NDArray:
     return (np.expm1(shape * below) - np.expm1(shape * above)) / shape
 
 
+@lru_cache(maxsize=64)
+def tukey_lambda_spread(shape: float) -> float:
+    """Return the standard deviation of Tukey's lambda distribution without scale.
+
+    It is the same for every block of a frame.
+    """
+    from scipy.stats import tukeylambda
+
+    return float(tukeylambda.std(shape))
+
+
 @dataclass(frozen=True)
 class HeavyTailedNoise(NoiseSource):
     """Independent noise of every pixel and readout, by Tukey's lambda distribution.
@@ -75,16 +87,9 @@ class HeavyTailedNoise(NoiseSource):
         # 64 bits whatever the rest is computed in: tails end where the generator's steps begin.
         chance = site.stream(self.name).random((site.rows, site.columns))
         z = tukey_lambda(np.maximum(chance, LEAST_CHANCE), self.shape)
-        z *= self.rms / self._spread
+        z *= self.rms / tukey_lambda_spread(self.shape)
         electrons += z.astype(electrons.dtype)
         return electrons
-
-    @property
-    def _spread(self) -> float:
-        """Return the standard deviation of the distribution without scale."""
-        from scipy.stats import tukeylambda
-
-        return float(tukeylambda.std(self.shape))
 
     def variance(self, mean, dark=0.0):
         """Return the variance that it adds to a pixel [electrons squared]."""
