@@ -10,6 +10,7 @@ from making import GONE, camera
 
 from vcam_cli import simulate, spectra
 from vcam_cli.errors import BadInput
+from vcam_cli.simulation.idle_keys import idle_keys
 
 NM = np.array([380.0, 450.5, 550.0, 800.0])
 VALUES = {"R": np.array([0.01, 0.02, 0.3, 0.9]), "G": np.array([0.1, 0.2, 0.8, 0.05]),
@@ -135,3 +136,66 @@ def test_what_does_not_fit_is_refused(spectrum, says, tmp_path):
     with pytest.raises(BadInput) as caught:
         camera(tmp_path, {"pixel.photodetector.quantum_efficiency": spectrum})
     assert says in str(caught.value)
+
+
+SHORT = {"table": {500: 0.4, 600: 0.4}}
+"""Ends within 400 to 700 nm."""
+LINE = LIT | {"scene.illuminant": {"monochromatic": "680 nm"}, "array.pattern": "monochrome"}
+
+
+def at_680(tmp_path, outside, spectrum):
+    changes = {
+        "scene.wavelengths.outside": outside,
+        "pixel.photodetector.quantum_efficiency": spectrum,
+    }
+    return camera(tmp_path, LINE | changes)
+
+
+@pytest.mark.parametrize(
+    ("outside", "spectrum", "flat"),
+    [
+        ("hold", SHORT, 0.4),
+        ("zero", SHORT, 0.0),
+        ("zero", SHORT | {"outside": "hold"}, 0.4),
+        ("hold", SHORT | {"outside": "zero"}, 0.0),
+        ("hold", {"pixel": SHORT}, {"pixel": 0.4}),
+    ],
+)
+def test_the_camera_says_once_what_holds_beyond_tables(outside, spectrum, flat, tmp_path):
+    """A line beyond the table's end is seen as by the even spectrum of the value stated."""
+    found = simulate(at_680(tmp_path, outside, spectrum)).mean_electrons
+    even = simulate(at_680(tmp_path, "error", flat)).mean_electrons
+    np.testing.assert_allclose(found, even, rtol=1e-6)
+
+
+def test_every_measured_spectrum_of_the_camera_heeds_it(tmp_path):
+    for color in VALUES:
+        (tmp_path / f"{color}.csv").write_text("450,0.5\n650,0.7\n", encoding="utf-8")
+    (tmp_path / "lamp.csv").write_text("450,3\n650,4\n", encoding="utf-8")
+    short = {
+        "scene.illuminant": [{"file": "lamp.csv"}, {"table": {450: 0.9, 650: 0.8}}],
+        "optics.transmittance": [0.9, {"table": {420: 0.8, 690: 0.9}}],
+        "pixel.photodetector.quantum_efficiency": SHORT,
+        "array.filters": {color: {"file": f"{color}.csv"} for color in VALUES},
+    }
+    with pytest.raises(BadInput) as caught:
+        camera(tmp_path, LIT | short)
+    assert len(caught.value.problems) == 6
+    assert "scene.wavelengths: {outside: hold}" in str(caught.value)
+    made = camera(tmp_path, LIT | short | {"scene.wavelengths.outside": "hold"})
+    assert simulate(made).mean_electrons.min() > 0
+    with pytest.raises(BadInput):
+        made.with_({"scene.wavelengths.outside": "error"})
+
+
+def test_physics_is_not_extended(tmp_path):
+    layer = {"silicon": ["0 um", "2 um"]}
+    far = {"scene.wavelengths": {"start": "400 nm", "stop": "1500 nm", "outside": "hold"}}
+    with pytest.raises(BadInput, match=r"350-1100 nm.*narrow scene\.wavelengths"):
+        camera(tmp_path, LIT | far | {"pixel.photodetector.quantum_efficiency": layer})
+
+
+@pytest.mark.parametrize(("table", "idle"), [(SHORT, False), ({"table": {400: 1, 700: 1}}, True)])
+def test_a_note_where_all_tables_cover_the_wavelengths(table, idle, tmp_path):
+    told = [path for path, _ in idle_keys(at_680(tmp_path, "hold", table))]
+    assert ("scene.wavelengths.outside" in told) == idle

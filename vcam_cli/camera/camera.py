@@ -28,6 +28,7 @@ from vcam_cli.camera.simulation import ACCURACY, Accuracy, Effects, Output, Seed
 from vcam_cli.config.model import FileModel, key
 from vcam_cli.config.validation_messages import failure, fault
 from vcam_cli.config.values import Word
+from vcam_cli.spectra.spectrum import Outside
 
 
 class Camera(FileModel):
@@ -82,6 +83,8 @@ class Camera(FileModel):
         if "processing" not in self.model_fields_set:
             emits = self.scene.emits
             self._fill(processing=default_steps(array.mosaic, colors == 1, emits))
+        if (outside := self.scene.wavelengths.outside) != "error":
+            self._extend_spectra(outside)
         render = self.output.render
         mistakes = [
             *order_mistakes(self.processing, array.mosaic, colors, array.is_scattered),
@@ -93,6 +96,22 @@ class Camera(FileModel):
         if mistakes:
             raise failure(mistakes)
         return self
+
+    def _extend_spectra(self, outside: Outside) -> None:
+        """Tell every measured spectrum what holds beyond its table, where it does not say."""
+        lamp, optics, pixel = self.scene.illuminant, self.optics, self.pixel
+        detector, filters = pixel.photodetector, self.array.filters
+        efficiency = detector.quantum_efficiency.with_outside(outside)
+        self._fill(
+            scene=self.scene.with_derived(illuminant=lamp and lamp.with_outside(outside)),
+            optics=optics.with_derived(transmittance=optics.transmittance.with_outside(outside)),
+            pixel=pixel.with_derived(
+                photodetector=detector.with_derived(quantum_efficiency=efficiency)
+            ),
+            array=self.array.with_derived(
+                filters={color: spec.with_outside(outside) for color, spec in filters.items()}
+            ),
+        )
 
     def _capture_mistakes(self) -> Iterator[InitErrorDetails]:
         """Yield why pixels cannot be read several times in an integration, where they are to be."""

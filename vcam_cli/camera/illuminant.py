@@ -12,6 +12,7 @@ from vcam_cli.config.validation_messages import describe
 from vcam_cli.config.values import Angle, Percent, Temperature, Wavelength, mapping
 from vcam_cli.config.yaml_type import DEFINED, YamlType, to_yaml
 from vcam_cli.errors import Path, bad
+from vcam_cli.spectra.spectrum import Outside
 
 _FORMS = (
     "a CIE name such as D65, equal-energy, {blackbody: 5500 K}, {monochromatic: 550 nm}, "
@@ -105,6 +106,8 @@ class IlluminantSpec:
     lamp: str | Named | Blackbody | Monochromatic | LampFile
     filters: tuple[SpectrumSpec, ...] = ()
     """What its light goes through; a stated level is that behind them."""
+    outside: Outside = "error"
+    """What holds beyond a file that does not say it."""
 
     def resolve(self, path: Path = ()) -> spectra.Spectrum:
         """Return its relative spectral power. Raises BadInput, at `path`."""
@@ -123,7 +126,7 @@ class IlluminantSpec:
         if isinstance(lamp, Monochromatic):
             return spectra.Spectrum.line(lamp.monochromatic)
         assert isinstance(lamp, LampFile)
-        return lamp.resolve(path)
+        return lamp.resolve(path, self.outside)
 
     @property
     def flicker(self) -> FlickerSpec | None:
@@ -148,6 +151,11 @@ class IlluminantSpec:
     def is_measured(self) -> bool:
         """Whether it is a file, which may have units."""
         return isinstance(self.lamp, LampFile)
+
+    def with_outside(self, outside: Outside) -> "IlluminantSpec":
+        """Return the same, where `outside` holds beyond the files that do not say it."""
+        filters = tuple(glass.with_outside(outside) for glass in self.filters)
+        return replace(self, filters=filters, outside=outside)
 
     def to_yaml(self) -> Any:
         """Return the YAML form."""

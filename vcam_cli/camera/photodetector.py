@@ -1,7 +1,7 @@
 """The photodetector: size, quantum efficiency, dark current, capacitance, junction."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Annotated, Any, Literal
 
 from vcam_cli.camera.spectrum import Spectral, SpectrumSpec
@@ -16,6 +16,7 @@ from vcam_cli.config.values import (
     MaybeSiliconTemperature,
     word_or,
 )
+from vcam_cli.spectra.spectrum import Outside
 
 _EFFICIENCY = Spectral(most=1.0)
 
@@ -28,6 +29,10 @@ class QuantumEfficiency:
     """Spectrum of the file; None where the QE follows from the junction."""
     per_pixel: bool = False
     """Whether it is that of the pixel's area, fill factor included, and not the photodetector's."""
+
+    def with_outside(self, outside: Outside) -> "QuantumEfficiency":
+        """Return the same, where `outside` holds beyond the tables that do not say it."""
+        return self if self.given is None else replace(self, given=self.given.with_outside(outside))
 
     def to_yaml(self) -> Any:
         """Return the YAML form."""

@@ -8,7 +8,7 @@ when the model is built, so that a model is no more than what was written.
 import math
 import os
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import pairwise
 from typing import Annotated, Any, Self
@@ -33,7 +33,11 @@ Points = tuple[tuple[float, float], ...]
 
 NAME = r"^[A-Za-z0-9._-]{1,64}$"
 MOST_FACTORS = 64
-_OUTSIDE = "what holds beyond the table: an error, zero, or the end values"
+OUTSIDE = Choice("error", "zero", "hold")
+_BEYOND = (
+    "what holds beyond the table: an error, zero, or the end values; default an error, or what a "
+    "camera says in scene.wavelengths.outside"
+)
 _FORMS = (
     "0.95, a shipped name, {file: x.csv}, {table: {400: 0.1, 700: 0.3}}, {silicon: [0 um, 0.4 um]}"
     ", or a list of these"
@@ -118,11 +122,14 @@ class SpectrumFile(Model):
         example="nm",
         default=None,
     )
-    outside: Outside = key(_OUTSIDE, example="hold", default="error")
+    outside: Annotated[Outside | None, OUTSIDE] = key(_BEYOND, example="hold", default=None)
 
-    def resolve(self, path: Path) -> spectra.Spectrum:
-        """Return the spectrum of the file. Raises BadInput, about `path`."""
-        return _read_file(self, (*path, "file"))
+    def resolve(self, path: Path, outside: Outside) -> spectra.Spectrum:
+        """Return the spectrum of the file, beyond which `outside` holds if it does not say.
+
+        Raises BadInput, about `path`.
+        """
+        return _read_file(self, self.outside or outside, (*path, "file"))
 
 
 class SpectrumTable(Model):
@@ -131,12 +138,12 @@ class SpectrumTable(Model):
     table: Annotated[Points, PointTable()] = key(
         "wavelength in nm -> value, straight lines between", unit="nm", example={400: 0.1, 700: 0.3}
     )
-    outside: Outside = key(_OUTSIDE, example="hold", default="error")
+    outside: Annotated[Outside | None, OUTSIDE] = key(_BEYOND, example="hold", default=None)
 
-    def resolve(self, path: Path) -> spectra.Spectrum:
-        """Return the spectrum of the table."""
+    def resolve(self, path: Path, outside: Outside) -> spectra.Spectrum:
+        """Return the spectrum of the table, beyond which `outside` holds if it does not say."""
         wavelength, value = np.array(self.table).T
-        return spectra.Spectrum.from_samples(wavelength / 1e9, value, self.outside)
+        return spectra.Spectrum.from_samples(wavelength / 1e9, value, self.outside or outside)
 
 
 class SiliconLayer(Model):
@@ -161,8 +168,11 @@ class SiliconLayer(Model):
             raise refusal(("silicon",), "its depths do not rise", remedy)
         return self
 
-    def resolve(self, path: Path) -> spectra.Spectrum:
-        """Return the share collected, by Beer and Lambert's law, at every whole nanometer."""
+    def resolve(self, path: Path, outside: Outside) -> spectra.Spectrum:
+        """Return the share collected, by Beer and Lambert's law, at every whole nanometer.
+
+        Beyond the known absorption of silicon it is unknown, whatever holds beyond measured tables.
+        """
         top, *below = self.silicon
         low, high = (round(edge * 1e9) for edge in silicon.ABSORPTION_RANGE)
         wavelength = np.arange(low, high + 1) * 1e-9
@@ -189,6 +199,8 @@ class SpectrumSpec:
 
     factors: tuple[Factor, ...]
     most: float | None = None
+    outside: Outside = "error"
+    """What holds beyond the factors that do not say it."""
 
     def resolve(self, path: Path = ()) -> spectra.Spectrum:
         """Return the spectrum, dimensionless.
@@ -205,7 +217,7 @@ class SpectrumSpec:
         """
         several = len(self.factors) > 1
         parts = [
-            _resolve(factor, (*path, i) if several else path)
+            _resolve(factor, (*path, i) if several else path, self.outside)
             for i, factor in enumerate(self.factors)
         ]
         product = spectra.Spectrum.flat(1.0).multiply(*parts)
@@ -214,6 +226,10 @@ class SpectrumSpec:
             message = f"reaches {_largest(product):.4g}, more than {self.most:g}"
             raise bad(path, message, "give fractions, not percent")
         return product
+
+    def with_outside(self, outside: Outside) -> "SpectrumSpec":
+        """Return the same, where `outside` holds beyond the factors that do not say it."""
+        return replace(self, outside=outside)
 
     def to_yaml(self) -> Any:
         """Return the YAML form."""
@@ -226,12 +242,12 @@ def flat(value: float, most: float | None = 1.0) -> SpectrumSpec:
     return SpectrumSpec((value,), most)
 
 
-def _read_file(given: SpectrumFile, path: Path) -> spectra.Spectrum:
+def _read_file(given: SpectrumFile, outside: Outside, path: Path) -> spectra.Spectrum:
     file, remedy = given.file, "write rows of wavelength and value, such as 400,0.31"
     with data_file_problems(file, path, remedy):
         state = os.stat(file)
         changed = (state.st_mtime_ns, state.st_size, state.st_ino)
-        table = _read_table(file, given.outside, given.column, given.unit, changed)
+        table = _read_table(file, outside, given.column, given.unit, changed)
     return spectra.Spectrum(tables=(table,))
 
 
@@ -243,12 +259,13 @@ def _read_table(
     return spectra.read_spectrum(file, outside, column, unit)
 
 
-def _resolve(factor: Factor, path: Path) -> spectra.Spectrum:
+def _resolve(factor: Factor, path: Path, outside: Outside) -> spectra.Spectrum:
     if isinstance(factor, float):
         return spectra.Spectrum.flat(factor)
     if isinstance(factor, str):
-        return _read_file(SpectrumFile(file=str(shipped.find("spectra", factor, path))), path)
-    return factor.resolve(path)
+        file = SpectrumFile(file=str(shipped.find("spectra", factor, path)))
+        return _read_file(file, outside, path)
+    return factor.resolve(path, outside)
 
 
 def _bound(spectrum: spectra.Spectrum) -> float:

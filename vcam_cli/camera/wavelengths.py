@@ -8,6 +8,7 @@ from vcam_cli.config.model import Model, key
 from vcam_cli.config.quantities import Quantity
 from vcam_cli.config.validation_messages import refusal
 from vcam_cli.config.values import Wavelength
+from vcam_cli.spectra.spectrum import Outside
 
 
 class Wavelengths(Model):
@@ -20,6 +21,12 @@ class Wavelengths(Model):
         unit="nm",
         example="auto",
         default=None,
+    )
+    outside: Outside = key(
+        "what holds where the table of a measured spectrum ends within start..stop: an error, "
+        "zero, or its end values; a spectrum may say it for itself",
+        example="hold",
+        default="error",
     )
 
     @model_validator(mode="after")

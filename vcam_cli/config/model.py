@@ -83,6 +83,12 @@ class Model(BaseModel):
         """Set defaults that depend on other keys; validators call it while they build a model."""
         self.__dict__.update(values)
 
+    def with_derived(self, **values: Any) -> Self:
+        """Return the same model with values that follow from other keys, and so are not given."""
+        model = self.model_copy()
+        model._fill(**values)
+        return model
+
 
 class FileModel(Model):
     """A model of a whole file, which knows where it was read from."""

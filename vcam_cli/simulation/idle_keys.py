@@ -15,7 +15,7 @@ import numpy as np
 
 from vcam_cli.camera.architecture import ARCHITECTURES
 from vcam_cli.camera.camera import Camera
-from vcam_cli.camera.derived import photodiode
+from vcam_cli.camera.derived import named_spectra, photodiode
 from vcam_cli.camera.derived.dark_current import dark_rate
 from vcam_cli.camera.derived.electrical import Electrical, electrical
 from vcam_cli.camera.derived.pixel_layout import detector
@@ -110,6 +110,11 @@ RULES = (
         ("optics.defocus",),
         lambda camera: camera.optics.focus == "auto",
         "the autofocus takes it out; write focus: fixed",
+    ),
+    Rule(
+        ("scene.wavelengths.outside",),
+        named_spectra.are_covered,
+        "all spectra cover the wavelengths, or say it themselves",
     ),
     Rule(
         ("scene.distance",),

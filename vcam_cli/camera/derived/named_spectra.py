@@ -8,6 +8,7 @@ from vcam_cli.physics.silicon import ABSORPTION_RANGE
 from vcam_cli.spectra.spectrum import SAME_WAVELENGTH, range_text
 
 Spec = SpectrumSpec | IlluminantSpec
+EVERYWHERE = "scene.wavelengths: {outside: hold}"
 
 
 def spectra(camera: Camera) -> tuple[tuple[Path, Spec], ...]:
@@ -50,7 +51,17 @@ def _check(spec: Spec, path: Path, start: float, stop: float) -> None:
         spectrum.require(start, stop)
     except ValueError as error:
         message, _, remedy = str(error).partition("; ")
+        remedy = f"{remedy}; for all spectra at once {EVERYWHERE}"
+        if spec.outside != "error":
+            remedy = "narrow scene.wavelengths"
         raise bad(path, message, remedy) from None
+
+
+def are_covered(camera: Camera) -> bool:
+    """Return whether all tables cover the wavelengths, whatever the camera says holds beyond."""
+    start, stop = camera.scene.wavelengths.start, camera.scene.wavelengths.stop
+    specs = (spec.with_outside("error") for _, spec in spectra(camera))
+    return all(spec.resolve().covers(start, stop) for spec in specs)
 
 
 def _asks_silicon(camera: Camera) -> bool:
