@@ -254,3 +254,11 @@ def test_where_charge_beyond_the_well_goes_is_told(architecture: str, tmp_path) 
     assert "blooming" in note
     assert ("smear" in note) == (architecture == "ccd")
     assert not notes(tmp_path, kind | {"scene.radiance": radiance_for(WELL)}, "full well")
+
+
+@pytest.mark.parametrize("wells", [2.0, 9.9e4, 1.02e5, 3e6])
+def test_light_too_bright_for_the_promise_is_told(wells: float, tmp_path) -> None:
+    """In closed form: beyond a hundred thousand wells the note gives how often a well is filled."""
+    found = notes(tmp_path, {"scene.radiance": radiance_for(wells * WELL)}, "than the tolerance")
+    assert len(found) == (wells > 1e5)
+    assert all(f"would fill a pixel {wells:.0f} times" in note for note in found)

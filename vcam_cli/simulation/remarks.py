@@ -23,6 +23,9 @@ VISIBLE_OVERFLOW = 0.01
 """Charge beyond the wells that is worth a word, over what all wells hold."""
 PIXELS_AT_ONCE = 1 << 20
 """Pixels that are looked at together, so that no copy of the frame is needed."""
+FAR_OVEREXPOSED = 1e5
+"""Brightest light, over what fills a pixel, up to which the accuracy promise was found to hold:
+beyond it, ringing of less than a hundred-thousandth of that light is a pixel's full signal."""
 VISIBLE_CROP = 5e-4
 """Part of a picture that is worth a word when it is cut off."""
 
@@ -38,6 +41,7 @@ def remarks(ready: Prepared) -> tuple[str, ...]:
         *_clipped_dark(ready),
         *_unused_codes(ready),
         *_overflow(ready),
+        *_far_overexposed(ready),
         *_colors_of_picture(ready),
         *_cropped(ready),
         *_motion(ready),
@@ -134,6 +138,18 @@ def _overflow(ready: Prepared) -> tuple[str, ...]:
     return (
         f"charge beyond the full well, {share:.3g} times what all wells hold, is drained: none"
         f" spills to neighbors (blooming){smear}",
+    )
+
+
+def _far_overexposed(ready: Prepared) -> tuple[str, ...]:
+    """Return that light is too far beyond the wells for the promise on dark pixels."""
+    brightest = float(ready.rate.max(initial=0.0)) * ready.exposure_time
+    times = brightest / ready.electrical.full_well
+    if times <= FAR_OVEREXPOSED:
+        return ()
+    return (
+        f"the brightest light would fill a pixel {times:.0f} times: beyond {FAR_OVEREXPOSED:.0f}"
+        " times the mean of darker pixels may be off by more than the tolerance",
     )
 
 
