@@ -146,6 +146,15 @@ class TestParts:
         assert (camera.optics.f_number, camera.optics.off_axis) == (8, "cos4")
         assert camera.locate(("optics", "f_number")) == "camera.yaml:4:31"
 
+    def test_an_override_changes_the_part_that_one_before_it_names(self, folder):
+        camera = load("csf-0.35um", ["optics=f8-landscape", "optics.transmittance=0.5"])
+        assert camera.optics == load("csf-0.35um", ["optics=f8-landscape"]).optics.model_copy(
+            update={"transmittance": camera.optics.transmittance}
+        )
+        assert camera.optics.f_number == 8
+        with pytest.raises(BadInput, match="optics: the lens is not determined"):
+            load("csf-0.35um", ["optics=none", "optics.focus=auto"])
+
     def test_a_part_may_extend_and_use_parts(self, folder):
         self.part("parts/base.yaml", "{rows: 3, columns: 4, filters: set}\n")
         self.part("parts/set.yaml", "{R: 0.1, G: 0.2, B: 0.3}\n")

@@ -53,6 +53,39 @@ def test_what_follows_an_empty_mapping_stands_alone():
 
 
 @pytest.mark.parametrize(
+    ("first", "second", "result"),
+    [
+        ("{optics: none}", "{optics: {focus: auto}}", {"optics": {"focus": "auto"}}),
+        (
+            "{optics: f8-landscape}",
+            "{optics: {focus: auto}}",
+            {"optics": {"use": "f8-landscape", "focus": "auto"}},
+        ),
+        ("{optics: a}", "{optics: {use: b}}", {"optics": {"use": "b"}}),
+        (
+            "{pixel: {technology: cmos-0.18um}}",
+            "{pixel: {technology: {supply: 2 V}}}",
+            {"pixel": {"technology": {"from": "cmos-0.18um", "supply": "2 V"}}},
+        ),
+        (
+            "{scene: {illuminant: D65}}",
+            "{scene: {illuminant: {blackbody: 1 K}}}",
+            {"scene": {"illuminant": {"blackbody": "1 K"}}},
+        ),
+    ],
+)
+def test_keys_over_a_name_mean_the_same_before_a_file_has_its_say(first, second, result):
+    """Two overrides, one after the other, over a file that has something else there."""
+    base = tree(
+        "{optics: {f_number: 2}, pixel: {technology: {from: x, x: 1}},"
+        " scene: {illuminant: {lamp: A, flicker: 1}}}"
+    )
+    over = merge(tree(first), tree(second), MERGE_RULES)
+    (section,) = result
+    assert merge(base, over, MERGE_RULES).plain()[section] == result[section]
+
+
+@pytest.mark.parametrize(
     ("base", "over", "result"),
     [
         ("{luminance: 1 cd/m2, x: 1}", "{radiance: 2}", {"x": 1, "radiance": 2}),

@@ -5,6 +5,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+from vcam_cli import errors
 from vcam_cli.arguments import require_name, require_overrides
 from vcam_cli.camera import hints
 from vcam_cli.camera.camera import Camera
@@ -23,7 +24,7 @@ from vcam_cli.config.document import Document
 from vcam_cli.config.file_format import Check, FileFormat
 from vcam_cli.config.file_names import current_folder
 from vcam_cli.config.merge import Alternatives, MergeRules
-from vcam_cli.config.yaml_tree import Node
+from vcam_cli.config.yaml_tree import Key, Node
 from vcam_cli.errors import BadInput
 from vcam_cli.floats import own_float_errors
 
@@ -51,10 +52,22 @@ _EXCLUSIVE = (
     "lamp | blackbody | monochromatic | file | table | pixel",
     "block | positions",
 )
+_PARTS: dict[errors.Path, str] = {
+    ("scene",): "scenes",
+    ("optics",): "optics",
+    ("pixel",): "pixels",
+    ("array",): "arrays",
+    ("array", "filters"): "filters",
+    ("pixel", "technology", "from"): "technologies",
+}
+_WORDS: dict[errors.Path, str] = {("optics",): "none"}
+_SHORTHANDS: dict[errors.Path, Key] = {("pixel", "technology"): "from"}
 MERGE_RULES = MergeRules(
     alternatives=tuple(map(Alternatives.parse, _EXCLUSIVE)),
     variants={("scene", "source"): ("kind", "chart")},
     single_values=frozenset({"table"}),
+    part_keys={**dict.fromkeys(_PARTS, "use"), **_SHORTHANDS},
+    words=_WORDS,
 )
 
 
@@ -76,16 +89,9 @@ def _refuse_study(root: Node) -> None:
 FORMAT = FileFormat(
     model=Camera,
     kind="cameras",
-    parts={
-        ("scene",): "scenes",
-        ("optics",): "optics",
-        ("pixel",): "pixels",
-        ("array",): "arrays",
-        ("array", "filters"): "filters",
-        ("pixel", "technology", "from"): "technologies",
-    },
-    words={("optics",): "none"},
-    shorthands={("pixel", "technology"): "from"},
+    parts=_PARTS,
+    words=_WORDS,
+    shorthands=_SHORTHANDS,
     file_keys=FILE_KEYS,
     merge_rules=MERGE_RULES,
     refuse=_refuse_study,

@@ -1,6 +1,7 @@
 """Lays one YAML tree over another: what `extends`, `use` and `--set` mean.
 
 Mappings are merged key by key, anything else is replaced; an empty mapping under a key empties it.
+Keys laid over the name of a part change that part.
 `MergeRules` keep an override from meaning what nobody wrote.
 """
 
@@ -36,6 +37,10 @@ class MergeRules:
     one leaves nothing of the base but the keys before it."""
     single_values: frozenset[Key] = frozenset()
     """Keys of mappings that are one value, and not merged."""
+    part_keys: Mapping[errors.Path, Key] = field(default_factory=dict)
+    """Where the name of a part may stand -> the key that has it beside changes of that part."""
+    words: Mapping[errors.Path, str] = field(default_factory=dict)
+    """Where the name of a part may stand -> a word that names none."""
 
 
 NO_RULES = MergeRules()
@@ -51,7 +56,7 @@ def merge(base: Node, over: Node, rules: MergeRules = NO_RULES, path: errors.Pat
     if isinstance(base.value, list) and over.mapping and all(type(k) is int for k in over.mapping):
         return _merge_list(base, over, rules, path)
     if base.mapping is None:
-        return over
+        return _over_value(base, over, rules, path)
     kept = _remaining_entries(base.mapping, over.mapping, rules, path)
     merged = dict(kept)
     for key, node in over.mapping.items():
@@ -59,6 +64,15 @@ def merge(base: Node, over: Node, rules: MergeRules = NO_RULES, path: errors.Pat
         merged[key] = _merge_entry(kept[key], node, rules, child_path(path, key)) if both else node
     keys = {key: node for key, node in (base.keys | over.keys).items() if key in merged}
     return replace(base, value=merged, keys=keys)
+
+
+def _over_value(base: Node, over: Node, rules: MergeRules, path: errors.Path) -> Node:
+    """Lay a mapping over what is none: it stands alone, but beside the name of a part."""
+    assert over.mapping is not None
+    key = rules.part_keys.get(path) if isinstance(base.value, str) else None
+    if key is None or base.value == rules.words.get(path):
+        return replace(over, whole=True)
+    return replace(over, value={key: base, **over.mapping}, whole=True)
 
 
 def _merge_entry(base: Node, over: Node, rules: MergeRules, path: errors.Path) -> Node:

@@ -101,7 +101,7 @@ class PartReader:
         try:
             part = self._part(name, self.format.parts[path], path, chain)
             if name is not node:
-                own = self.expand(node.drop("use"), path, chain)
+                own = self.expand(replace(node.drop("use"), whole=False), path, chain)
                 part = merge(part, own, self.format.merge_rules, path)
             return replace(part, whole=True)
         except BadInput as error:
