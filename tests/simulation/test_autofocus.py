@@ -4,9 +4,10 @@ import numpy as np
 import pytest
 from making import camera
 
+from vcam_cli import load
 from vcam_cli.errors import BadInput
-from vcam_cli.progress import Stages
-from vcam_cli.simulation import autofocus
+from vcam_cli.progress import Silent, Stages
+from vcam_cli.simulation import autofocus, cost_model
 from vcam_cli.simulation.idle_keys import idle_keys
 from vcam_cli.simulation.preparation import prepare as bring_light
 from vcam_cli.simulation.simulate import prepare
@@ -66,6 +67,39 @@ def test_a_measured_blur_is_not_focused(tmp_path):
 def test_a_defocus_that_is_taken_out_is_told(tmp_path):
     made = camera(tmp_path, EDGE | {"optics.defocus": "9 um"})
     assert "optics.defocus" in dict(idle_keys(made))
+
+
+def test_without_a_lens_there_is_nothing_to_focus(tmp_path):
+    """A camera file cannot say it; an override of such a file is told what is missing."""
+    bare = load("test-pixel-0.18um")
+    with pytest.raises(BadInput, match="the lens is not determined"):
+        bare.with_({"optics.focus": "auto"})
+    optics = bare.optics.model_copy(update={"focus": "auto"})
+    with pytest.raises(BadInput, match="without a lens there is nothing"):
+        prepare(bare.model_copy(update={"optics": optics}))
+
+
+def test_the_plan_counts_the_seconds_of_the_search(tmp_path):
+    """At least what each trial costs whatever its size."""
+    auto, fixed = (
+        prepare(camera(tmp_path, EDGE | {"optics.focus": focus}), workers=1)[0].plan
+        for focus in ("auto", "fixed")
+    )
+    least = autofocus.TRIALS * cost_model.FIXED * cost_model.slowness()
+    assert auto.seconds - fixed.seconds > least
+    assert auto.seconds_of_all - fixed.seconds_of_all > least
+
+
+def test_the_search_is_followed_step_by_step(tmp_path):
+    steps = []
+
+    class Follower(Silent):
+        def step(self, done, total):
+            steps.append((done, total))
+
+    prepare(camera(tmp_path, EDGE), watch=Follower())
+    trials = [done for done, total in steps if total == autofocus.TRIALS]
+    assert trials == list(range(autofocus.TRIALS))
 
 
 def test_contrast_of_colors_is_that_of_neighbors_of_one_color():

@@ -239,7 +239,7 @@ class Optics(Model):
     diffraction: Switch = key("whether the aperture diffracts", default=True)
     focus: Literal["fixed", "auto"] = key(
         "auto: by contrast, the image plane is moved to where the middle of the picture is"
-        " sharpest, whatever defocus says; some 18 trials",
+        " sharpest, whatever defocus says; 18 trials, counted in the plan's time",
         default="fixed",
     )
     defocus: Shift = key(

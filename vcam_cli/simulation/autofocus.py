@@ -24,6 +24,7 @@ from vcam_cli.camera.derived.geometry import geometry
 from vcam_cli.camera.derived.mosaic import mosaic
 from vcam_cli.errors import BadInput, bad
 from vcam_cli.progress import Stages
+from vcam_cli.simulation.cost_model import trial_seconds
 from vcam_cli.simulation.preparation import prepare
 
 CIRCLE = 8.0
@@ -32,6 +33,8 @@ COARSE = 9
 """Places that are tried first."""
 FINE = 7
 """Steps of the golden section after them: to 7 % of the distance of the first places."""
+TRIALS = COARSE + 2 + FINE
+"""Places that are tried in all."""
 TOLERANCE = 1e-3
 """Of the trials, relative to full signal: near the best place the contrast hardly changes."""
 GOLDEN = (np.sqrt(5) - 1) / 2
@@ -41,8 +44,8 @@ LEAST_GAIN = 1e-3
 
 def focused(
     camera: Camera, picture: Any, workers: int, stages: Stages
-) -> tuple[Camera, tuple[str, ...]]:
-    """Return the camera with its lens where the middle of the picture is sharpest, and notes.
+) -> tuple[Camera, tuple[str, ...], float]:
+    """Return the camera with its lens where the middle of the picture is sharpest.
 
     Parameters
     ----------
@@ -55,46 +58,74 @@ def focused(
     stages : Stages
         Observer of the stages.
 
+    Returns
+    -------
+    camera : Camera
+        The camera, its focus fixed.
+    notes : tuple of str
+        How far the lens was moved, and what keeps it from being sharp.
+    seconds : float
+        Estimated time of the search, as the plan counts it [s].
+
     Raises
     ------
     BadInput
         Where no lens, or a measured blur, is to be focused.
     """
     if camera.optics.focus == "fixed":
-        return camera, ()
+        return camera, (), 0.0
     if not camera.optics.is_lens or camera.optics.measured_blur:
         what = "a measured blur is" if camera.optics.is_lens else "without a lens there is nothing"
         raise bad("optics.focus", f"{what} not to be focused", "write focus: fixed")
     with stages("autofocus"):
-        return _search(camera, picture, workers)
+        trials = _Trials(camera, picture, workers, stages)
+        place, notes = _search(camera, trials)
+        return _moved(camera, place), notes, trials.seconds
 
 
-def _search(camera: Camera, picture: Any, workers: int) -> tuple[Camera, tuple[str, ...]]:
-    solved, start = geometry(camera), camera.optics.defocus
-    reach = CIRCLE * max(solved.pitch_x, solved.pitch_y) * solved.working_f_number + abs(start)
-    block = mosaic(camera).block
-    finer = camera.accuracy.model_copy(update={"preset": None, "tolerance": TOLERANCE})
-    trial = camera.model_copy(update={"accuracy": finer})
+class _Trials:
+    """The sharpness of a camera at places of its image plane, and what trying them takes."""
 
-    def sharpness(shift: float) -> float:
-        moved = _moved(trial, shift)
+    def __init__(self, camera: Camera, picture: Any, workers: int, stages: Stages) -> None:
+        finer = camera.accuracy.model_copy(update={"preset": None, "tolerance": TOLERANCE})
+        self._camera = camera.model_copy(update={"accuracy": finer})
+        self._block = mosaic(camera).block
+        self._picture, self._workers, self._stages = picture, workers, stages
+        self._count = 0
+        self.seconds = 0.0
+        """Estimated time of the trials so far [s]."""
+
+    def sharpness(self, shift: float) -> float:
+        """Return the contrast with the image plane at a place [m]."""
+        self._stages.watch.step(self._count, TRIALS)
+        self._count += 1
+        moved = _moved(self._camera, shift)
         try:
-            ready = prepare(moved, picture, workers, Stages())
+            ready = prepare(moved, self._picture, self._workers, Stages())
         except BadInput:  # a wavefront too steep to be followed: far from sharp
             return 0.0
-        return contrast(ready.rate, len(block), len(block[0]))
+        self.seconds += trial_seconds(
+            ready.layout.lattice, ready.layout.mosaic, ready.spectrum, self._workers
+        )
+        return contrast(ready.rate, len(self._block), len(self._block[0]))
 
+
+def _search(camera: Camera, trials: _Trials) -> tuple[float, tuple[str, ...]]:
+    """Return the sharpest place [m], and notes."""
+    solved, start = geometry(camera), camera.optics.defocus
+    reach = CIRCLE * max(solved.pitch_x, solved.pitch_y) * solved.working_f_number + abs(start)
     places = np.linspace(-reach, reach, COARSE)
-    values = [sharpness(float(place)) for place in places]
+    values = [trials.sharpness(float(place)) for place in places]
     best = int(np.argmax(values))
     if values[best] <= (1 + LEAST_GAIN) * min(values):
-        return _moved(camera, start), ("focus: auto finds no detail, and the lens stays put",)
+        return start, ("focus: auto finds no detail, and the lens stays put",)
     step = float(places[1] - places[0])
-    found = golden_section(sharpness, float(places[best]) - step, float(places[best]) + step)
+    low, high = float(places[best]) - step, float(places[best]) + step
+    found = golden_section(trials.sharpness, low, high)
     note = f"focus: auto moves the image plane by {(found - start) * 1e6:+.4g} um"
     if best in (0, COARSE - 1):
         note += ", the end of its range: the lens may be out of focus still"
-    return _moved(camera, found), (note,)
+    return found, (note,)
 
 
 def _moved(camera: Camera, shift: float) -> Camera:

@@ -165,6 +165,13 @@ def first_estimate(camera: Camera, geometry: Geometry, mosaic: Mosaic, workers: 
     return core * slowness() / threads(workers)
 
 
+def trial_seconds(
+    geometry: Geometry, mosaic: Mosaic, report: SpectrumReport, workers: int
+) -> float:
+    """Return the seconds of the light alone, as the autofocus tries it."""
+    return image_seconds(geometry, mosaic, report) * slowness() / threads(workers)
+
+
 def frame_seconds(
     camera: Camera,
     geometry: Geometry,

@@ -188,6 +188,7 @@ def expose(
     workers: int | None,
     stages: Stages,
     rate_cache: RateCache | None = None,
+    earlier: float = 0.0,
 ) -> Frame:
     """Simulate one frame of `camera`, from its scene on.
 
@@ -201,8 +202,10 @@ def expose(
         Number of threads; all processors by default.
     stages : Stages
         Observer of the stages.
-    lights : Lights, optional
+    rate_cache : RateCache, optional
         Cache of the light for further cameras.
+    earlier : float
+        Estimated time of what came before, which the plan counts [s].
 
     Raises
     ------
@@ -212,7 +215,8 @@ def expose(
         Where memory does not suffice.
     """
     workers = workers or available_workers()
-    return take_frame(prepare(camera, picture, workers, stages, rate_cache), workers, stages)
+    ready = prepare(camera, picture, workers, stages, rate_cache, earlier)
+    return take_frame(ready, workers, stages)
 
 
 def take_frame(ready: Prepared, workers: int, stages: Stages | None = None) -> Frame:

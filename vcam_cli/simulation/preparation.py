@@ -81,6 +81,7 @@ def prepare(
     workers: int,
     stages: Stages,
     rate_cache: RateCache | None = None,
+    earlier: float = 0.0,
 ) -> Prepared:
     """Bring the light of a scene to the pixels, time the exposure and plan what will run.
 
@@ -96,6 +97,8 @@ def prepare(
         Observer of the stages.
     rate_cache : RateCache, optional
         Cache of the light for further cameras.
+    earlier : float
+        Estimated time of what came before, such as the autofocus; the plan counts it [s].
 
     Returns
     -------
@@ -155,7 +158,7 @@ def prepare(
         decided = plan.make(
             camera, solved, knobs, exposed.light_plan, exposed.signal, needed, changes
         )
-        decided = _with_seconds(camera, solved, place, knobs, light, decided, workers)
+        decided = _with_seconds(camera, solved, place, knobs, light, decided, workers, earlier)
         stages.watch.expect(decided.seconds)
     return Prepared(
         camera=camera,
@@ -191,6 +194,7 @@ def _with_seconds(
     light: photon_rate.Rate,
     decided: plan.Plan,
     workers: int,
+    earlier: float,
 ) -> plan.Plan:
     """Return the plan with the seconds of the frame, and of one with everything on."""
     spectrum = light.spectrum
@@ -199,7 +203,7 @@ def _with_seconds(
         spectrum = cost_model.usual_spectrum(place.lattice)
     whole = replace(decided, seconds=decided.seconds + sum(d.saved for d in decided.decisions))
     every = cost_model.frame_seconds(camera, solved, place, knobs, spectrum, whole, workers)
-    return replace(decided, seconds=seconds, seconds_of_all=every)
+    return replace(decided, seconds=earlier + seconds, seconds_of_all=earlier + every)
 
 
 def _require_memory(camera: Camera, place: Layout, knobs: Settings, solved: Geometry) -> int:

@@ -312,8 +312,9 @@ def prepare(
         stages = Stages(watch=watch or Silent())
         camera = _load_lens(camera, stages)
         picture, notes = _completed(camera, *_picture(camera, stages))
-        camera, told = focused(camera, picture, workers or threads(camera), stages)
-        ready = bring_light(camera, picture, workers or threads(camera), stages)
+        workers = workers or threads(camera)
+        camera, told, seconds = focused(camera, picture, workers, stages)
+        ready = bring_light(camera, picture, workers, stages, earlier=seconds)
         return ready, notes + told + remarks.remarks(ready)
     except BadInput as error:
         raise error.with_places(camera.locate) from None
@@ -357,8 +358,8 @@ def _completed(camera: Camera, picture: Any, notes: tuple[str, ...]) -> tuple[An
 def _simulate(camera: Camera, workers: int, stages: Stages, shared: Shared) -> Result:
     camera = _load_lens(camera, stages)
     picture, notes = _completed(camera, *shared.picture(camera, lambda: _picture(camera, stages)))
-    camera, told = focused(camera, picture, workers, stages)
-    frame = expose(camera, picture, workers, stages, shared.rate_cache)
+    camera, told, seconds = focused(camera, picture, workers, stages)
+    frame = expose(camera, picture, workers, stages, shared.rate_cache, seconds)
     context = Context(
         pattern=frame.mosaic.block,
         colors=frame.mosaic.colors,
