@@ -61,6 +61,7 @@ def test_a_uniform_scene_has_the_photons_of_the_closed_forms(tmp_path):
     np.testing.assert_allclose(scene.illuminant.data.photons, photons(0.1 / BAND, nm), rtol=1e-9)
     assert scene.distance == 1.0
     assert (image.optics.fNumber, image.optics.focalLength) == (4.0, 0.005)
+    np.testing.assert_array_equal(image.depthMap, np.ones((48, 64)))
 
 
 def test_the_sensor_has_volts_codes_and_its_mosaic(tmp_path):
@@ -73,6 +74,9 @@ def test_the_sensor_has_volts_codes_and_its_mosaic(tmp_path):
     assert sensor.cfa.pattern.tolist() == [[2, 1], [3, 2]]  # MATLAB counts from 1
     assert (sensor.rows, sensor.cols, sensor.integrationTime) == (48, 64, 0.01)
     assert sensor.pixel.width == 5e-6
+    side = 5e-6 * math.sqrt(0.5)
+    assert sensor.pixel.pdWidth == pytest.approx(side)
+    assert sensor.pixel.pdXpos == pytest.approx((5e-6 - side) / 2)
     assert sensor.pixel.voltageSwing == pytest.approx(2.0)
 
 

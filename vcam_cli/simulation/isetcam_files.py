@@ -109,6 +109,7 @@ def _optical_image(
             yield plane
 
     shape = frame.layout.geometry.rows, frame.layout.geometry.columns
+    distance = g.object_distance
     return {
         "type": "opticalimage",
         "name": frame.camera.name,
@@ -122,6 +123,8 @@ def _optical_image(
             "focalLength": g.focal_length,
         },
         "wAngular": _field_of_view(frame),
+        # From it follow the distance of the image and so the spacing of its samples.
+        **({"depthMap": np.full(shape, distance)} if math.isfinite(distance) else {}),
     }
 
 
@@ -145,6 +148,10 @@ def _sensor(frame: Frame) -> dict[str, Any]:
             "height": g.pixel_height,
             "widthGap": g.pitch_x - g.pixel_width,
             "heightGap": g.pitch_y - g.pixel_height,
+            "pdWidth": g.detector_width,
+            "pdHeight": g.detector_height,
+            "pdXpos": (g.pixel_width - g.detector_width) / 2 + g.detector_x,
+            "pdYpos": (g.pixel_height - g.detector_height) / 2 + g.detector_y,
             "conversionGain": e.conversion_gain,
             "voltageSwing": e.full_well * e.conversion_gain,
         },
