@@ -7,7 +7,10 @@ look there too, and tifffile writes no directory of EXIF.
 Samples are lossless JPEG (ITU-T T.81, process 14) in tiles. Neighbors in a row are two components,
 as they are in other cameras' files, so that each is predicted from one of its own color: 12
 megapixels of a noisy mosaic are 0.6 to 0.9 times as large with it as without. Tiles are encoded by
-as many threads as there are processors.
+as many threads as there are processors, 12 megapixels in 0.30 to 0.37 s of one.
+
+Every reader knows predictor 1. liblj92 encodes in two thirds of the time with predictor 6, which
+darktable 4.2 refuses; deflate is for floating point alone (specification, tag Compression).
 """
 
 from __future__ import annotations
