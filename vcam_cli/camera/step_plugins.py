@@ -92,11 +92,12 @@ def origin(point: EntryPoint) -> str:
 
 def code(steps: Iterable[Step]) -> dict[str, str]:
     """Return what the numbers of plug-in steps depend on: package, version, hash of the module."""
-    points = registered()
+    foreign = [step for step in steps if isinstance(step, PluginStep)]
+    points = registered() if foreign else {}
     return {
         step.name: f"{origin(points[step.name])} {_file_hash(type(step))}"
-        for step in steps
-        if isinstance(step, PluginStep) and step.name in points
+        for step in foreign
+        if step.name in points
     }
 
 

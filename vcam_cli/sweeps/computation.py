@@ -61,8 +61,6 @@ def computed_sweep(
     hashes = {str(path): hash_file(path) for path in grid.inputs}
     for refused in grid.problems:
         tell(str(refused))
-    if differences := effect_differences(grid.points):
-        tell(differences)
     whole = provenance.versions()
     versions = {name: whole[name] for name in LIBRARIES}
     with SweepFolder(out) as folder:
@@ -75,6 +73,8 @@ def computed_sweep(
             names, shown = list(folder.corrupted), ", ".join(list(folder.corrupted)[:3])
             tell(f"computed again, since corrupted: {POINTS}/{shown}" + _more_text(names, 3))
         computed = _compute(points, execution, watch, tell)
+        if differences := effect_differences(grid.points):
+            tell(differences)
         findings = Findings(grid, points.outcomes)
         compared = tuple(each.result(findings) for each in expected)
         result = sweep_tables.result(findings, out, compared, computed)
