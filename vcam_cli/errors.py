@@ -9,6 +9,7 @@ problems of a file before it raises (`Collector`).
 """
 
 import difflib
+import re
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -141,9 +142,13 @@ def dotted_path(path: Path) -> str:
 
 
 def split(path: Path | str) -> Path:
-    """Return the path that `dotted_path` wrote; parts that are whole numbers become int."""
+    """Return the path that `dotted_path` wrote; parts that are whole numbers become int.
+
+    Elements of lists may be in brackets, as in "processing[1].demosaic".
+    """
     if isinstance(path, tuple):
         return path
+    path = re.sub(r"\[(\d+)\]", r".\1", path)
     return tuple(int(p) if p.isascii() and p.isdigit() else p for p in path.split(".") if p)
 
 

@@ -265,7 +265,48 @@ class TestSet:
         change(folder, "exposure:", "processing: [black_level: subtract, gamma: 2.2]\nexposure:")
         steps = load("camera.yaml", ["processing.1.gamma=srgb"]).processing
         assert [step.value for step in steps] == ["subtract", "srgb"]
-        assert "use 0 to 1" in problems(sets=["processing.2.gamma=srgb"])[0]
+        assert "use 0 to 1" in problems(sets=["processing.2=1"])[0]
+
+    @pytest.mark.parametrize(
+        "item", ["processing.gamma=srgb", "processing[1].gamma=srgb", "processing={gamma: srgb}"]
+    )
+    def test_a_step_by_its_name(self, folder, item):
+        change(folder, "exposure:", "processing: [black_level: subtract, gamma: 2.2]\nexposure:")
+        steps = load("camera.yaml", [item]).processing
+        assert [step.value for step in steps] == ["subtract", "srgb"]
+
+    def test_a_step_by_its_name_in_the_file_of_another_camera(self, folder):
+        change(folder, "exposure:", "processing: [black_level: subtract, gamma: 2.2]\nexposure:")
+        Path("other.yaml").write_text("extends: camera.yaml\nprocessing: {gamma: 1.8}\n")
+        steps = load("other.yaml").processing
+        assert [step.value for step in steps] == ["subtract", 1.8]
+
+    @pytest.mark.parametrize(
+        ("item", "remedy"),
+        [
+            ("processing.0.gamma=2", "write processing.gamma"),
+            ("processing.gama=2", "write processing.gamma"),
+            ("processing.7.gamma=2", "write processing.gamma"),
+            ("processing.jpeg=90", "give the whole list, with jpeg where it belongs"),
+            ("processing.sharpen=1", "write processing.1.sharpen or processing.3.sharpen"),
+        ],
+    )
+    def test_a_step_that_is_not_there(self, folder, item, remedy):
+        sharpen = "sharpen: {radius: 1 px, amount: 0.5}"
+        steps = f"[black_level: subtract, {sharpen}, gamma: 2.2, {sharpen}]"
+        change(folder, "exposure:", f"processing: {steps}\nexposure:")
+        (said,) = problems(sets=[item])
+        assert remedy in said
+        assert item in said
+
+    def test_a_step_of_the_usual_list(self, folder):
+        """Where the file gives none, the remedy is the usual one, with the step that was asked."""
+        change(folder, "monochrome", "bayer-rggb")
+        (said,) = problems(sets=["processing.gamma=2"])
+        assert "is not a list of steps" in said
+        listed = said.partition("a list such as ")[2]
+        steps = load("camera.yaml", [f"processing={listed}"]).processing
+        assert steps[-1].value == 2
 
     @pytest.mark.parametrize(
         ("item", "said"),

@@ -68,6 +68,7 @@ MERGE_RULES = MergeRules(
     single_values=frozenset({"table"}),
     part_keys={**dict.fromkeys(_PARTS, "use"), **_SHORTHANDS},
     words=_WORDS,
+    step_lists=frozenset({("processing",)}),
 )
 
 

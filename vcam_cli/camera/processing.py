@@ -22,7 +22,7 @@ from vcam_cli.camera.processing_steps import (
 )
 from vcam_cli.camera.step_plugins import plugin, registered
 from vcam_cli.config.lists import read_items
-from vcam_cli.config.validation_messages import describe, fault, one_of, refusal
+from vcam_cli.config.validation_messages import describe, fault, one_of, refusal, yaml_text
 from vcam_cli.config.values import Either
 from vcam_cli.config.yaml_type import to_yaml
 
@@ -48,8 +48,16 @@ STEPS: dict[str, type[Step]] = {next(iter(step.model_fields)): step for step in 
 def _steps(given: Any) -> Steps:
     if not isinstance(given, (list, tuple)):
         message = f"{describe(given)} is not a list of steps"
-        raise refusal((), message, "write [] or a list such as [gamma: srgb]", given)
+        raise refusal((), message, f"write [] or a list such as {_example(given)}", given)
     return tuple(read_items(enumerate(given), _step))
+
+
+def _example(given: Any) -> str:
+    """Return the usual list of steps, those that were given as a mapping as they are there."""
+    usual = {step.name: to_yaml(step)[step.name] for step in default_steps(True, False)}
+    if not isinstance(given, Mapping) or not usual.keys() >= given.keys():
+        return "[gamma: srgb]"
+    return yaml_text([{name: value} for name, value in {**usual, **given}.items()])
 
 
 def _step(given: Any) -> Step:

@@ -41,6 +41,8 @@ class MergeRules:
     """Where the name of a part may stand -> the key that has it beside changes of that part."""
     words: Mapping[errors.Path, str] = field(default_factory=dict)
     """Where the name of a part may stand -> a word that names none."""
+    step_lists: frozenset[errors.Path] = frozenset()
+    """Paths of lists of steps, mappings of one key: an override may name a step by this key."""
 
 
 NO_RULES = MergeRules()
@@ -51,15 +53,19 @@ def merge(base: Node, over: Node, rules: MergeRules = NO_RULES, path: errors.Pat
 
     Raises BadInput where `over` names an element that a list of `base` does not have.
     """
-    if over.whole or over.mapping is None:
+    entries = over.mapping
+    if over.whole or entries is None:
         return over
-    if isinstance(base.value, list) and over.mapping and all(type(k) is int for k in over.mapping):
-        return _merge_list(base, over, rules, path)
+    if isinstance(base.value, list) and entries:
+        if path in rules.step_lists:
+            entries = _by_numbers(base.value, entries, path)
+        if all(type(key) is int for key in entries):
+            return _merge_list(base, entries, rules, path)
     if base.mapping is None:
         return _over_value(base, over, rules, path)
-    kept = _remaining_entries(base.mapping, over.mapping, rules, path)
+    kept = _remaining_entries(base.mapping, entries, rules, path)
     merged = dict(kept)
-    for key, node in over.mapping.items():
+    for key, node in entries.items():
         both = key in kept and key not in rules.single_values
         merged[key] = _merge_entry(kept[key], node, rules, child_path(path, key)) if both else node
     keys = {key: node for key, node in (base.keys | over.keys).items() if key in merged}
@@ -99,11 +105,48 @@ def _remaining_entries(
     return {key: node for key, node in base.items() if key not in dropped}
 
 
-def _merge_list(base: Node, over: Node, rules: MergeRules, path: errors.Path) -> Node:
+def _by_numbers(steps: list[Node], over: dict[Key, Node], path: errors.Path) -> dict[Key, Node]:
+    """Return what is laid over steps of a list by their numbers: `--set processing.gamma=2`.
+
+    Raises BadInput for a step that the list does not have, or not at the number given.
+    """
+    names = [str(next(iter(step.mapping or {}), "")) for step in steps]
+    entries: dict[Key, Node] = {}
+    for key, node in over.items():
+        if not isinstance(key, int):
+            name = str(key)
+            there = names.count(name) == 1
+            index, node = names.index(name) if there else -1, replace(node, value={name: node})
+        else:
+            index, name = key, str(next(iter(node.mapping or {}), ""))
+            there = not name or name in names[key : key + 1]
+        if not there:
+            raise BadInput([node.problem(child_path(path, key), *_which_step(name, names, path))])
+        entries[index] = node
+    return entries
+
+
+def _which_step(name: str, names: list[str], path: errors.Path) -> tuple[str, str]:
+    """Return which steps there are, and how an override says which one is meant."""
+    listed = ", ".join(names) or "none"
+    numbers = [i for i, other in enumerate(names) if other == name]
+    if not numbers:
+        message = f"there is no step {name} in this list, which has {listed}"
+        if close := errors.nearest(name, names):
+            return message, f"write {errors.dotted_path((*path, close))}"
+        return message, f"give the whole list, with {name} where it belongs"
+    meant = [(*path, name)] if len(numbers) == 1 else [(*path, i, name) for i in numbers]
+    return (
+        f"the steps of this list are {listed}",
+        f"write {' or '.join(map(errors.dotted_path, meant))}",
+    )
+
+
+def _merge_list(base: Node, over: dict[Key, Node], rules: MergeRules, path: errors.Path) -> Node:
     """Lay over elements of a list by their numbers: `--set processing.1.demosaic=...`."""
-    assert isinstance(base.value, list) and over.mapping is not None
+    assert isinstance(base.value, list)
     elements = list(base.value)
-    for index, node in over.mapping.items():
+    for index, node in over.items():
         if not isinstance(index, int) or not 0 <= index < len(elements):
             message = f"there is no element {index} in this list of {len(elements)}"
             remedy = f"use 0 to {len(elements) - 1}" if elements else "give the whole list"

@@ -158,10 +158,11 @@ def usual_spectrum(geometry: Geometry) -> SpectrumReport:
     return SpectrumReport(cells=samples, terms=samples, planes=3, filters=1)
 
 
-def first_estimate(camera: Camera, geometry: Geometry, mosaic: Mosaic, workers: int) -> float:
+def first_estimate(camera: Camera, place: Layout, workers: int) -> float:
     """Return the seconds of a whole run, before anything is known of its scene."""
-    guess = usual_spectrum(geometry)
-    core = image_seconds(geometry, mosaic, guess) + output_seconds(camera, geometry, mosaic)
+    guess = usual_spectrum(place.lattice)
+    core = image_seconds(place.lattice, place.mosaic, guess)
+    core += output_seconds(camera, place.geometry, place.mosaic)
     return core * slowness() / threads(workers)
 
 
@@ -206,7 +207,7 @@ def frame_seconds(
         Seconds on this machine.
     """
     core = decided.seconds + image_seconds(place.lattice, place.mosaic, report)
-    core += output_seconds(camera, geometry, place.mosaic)
-    core += sample_seconds(camera, geometry, decided.active)
+    core += output_seconds(camera, place.geometry, place.mosaic)
+    core += sample_seconds(camera, place.geometry, decided.active)
     core += irradiance_seconds(camera, geometry, knobs, report)
     return core * slowness() / threads(workers)

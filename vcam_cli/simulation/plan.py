@@ -33,6 +33,7 @@ from vcam_cli.effects.signal_chain import (
     ElectronEffect,
     Limit,
     NoiseSource,
+    Quantizer,
     noise_sources,
     total_variance,
 )
@@ -275,6 +276,14 @@ class _Weighing:
     shares: Mapping[str, float]
     pixels: int
 
+    def places(self, kind: type[Effect]) -> int:
+        """Return how many pixels an effect acts on: those whose charge is joined count as one."""
+        binning = self.signal.binning
+        joined = binning is not None and binning.kind == "charge"
+        if binning is None or not joined or not issubclass(kind, ElectronEffect | Quantizer):
+            return self.pixels
+        return self.pixels // binning.count
+
     def contribution(self, effect: Effect) -> tuple[float | None, str]:
         """How much leaving it out would change, and of what."""
         if effect.name in self.shares:
@@ -298,7 +307,7 @@ def _decide(
     allowed = None if contribution is None else part * camera.accuracy.tolerance
     weighed = contribution, allowed, unit
     wish, what = _wish(camera, effect), effect.describe()
-    seconds = kind.seconds_per_pixel * weigh.pixels
+    seconds = kind.seconds_per_pixel * weigh.places(kind)
     if wish == "off":
         return Decision(kind.name, "off", "user", "switched off in effects", *weighed, 0.0)
     if effect in omitted:

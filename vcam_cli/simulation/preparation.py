@@ -119,7 +119,7 @@ def prepare(
     circuit = electrical(camera)
     knobs = place.settings(settings(camera))
     frame_bytes = _require_memory(camera, place, knobs, solved)
-    stages.watch.expect(cost_model.first_estimate(camera, solved, place.mosaic, workers))
+    stages.watch.expect(cost_model.first_estimate(camera, place, workers))
 
     effects = plan.mean_signal_effects(camera, solved)
     with stages("scene"):
