@@ -54,6 +54,16 @@ def test_what_ends_the_spectrum_of_others_stays_and_is_free(tmp_path):
     assert states(tmp_path, changes)["diffraction"] == "free"
 
 
+def test_the_photodetector_stays_and_is_free_where_the_lens_counts(tmp_path):
+    """Its average counts for nothing in a coarse wedge; without it more frequencies are followed."""
+    changes = SIZE | WEDGE | {"optics.f_number": 11, "accuracy": "draft"}
+    kept = prepare(camera(tmp_path, changes | {"effects": "auto"}), 1)[0]
+    found = {d.name: "free" if d.free else d.state for d in kept.plan.decisions}
+    assert (found["diffraction"], found["pixel_aperture"]) == ("on", "free")
+    without = {"effects": {"diffraction": "on", "pixel_aperture": "off"}}
+    assert kept.spectrum.terms < prepare(camera(tmp_path, changes | without), 1)[0].spectrum.terms
+
+
 @pytest.mark.parametrize(("fraction", "state"), [(1e-4, "off"), (0.03, "on")])
 def test_glare_is_left_out_where_it_shifts_nothing(fraction, state, tmp_path):
     edge = {"scene.source": {"kind": "chart", "chart": "slanted-edge", "contrast": 0.2}}

@@ -186,12 +186,18 @@ def _levels_stay(path: OpticalPath, detail: SceneDetail | None, effect: Effect) 
 
 
 def _bounding_blurs(path: OpticalPath, chosen: Collection[Effect]) -> tuple[Effect, ...]:
-    """Return blurs that could go, but without which others would have no last frequency."""
+    """Return blurs that could go, but without which the spectrum of others would reach further.
+
+    Where it is followed for another blur, the transfer of the pixel costs nothing and ends it
+    earlier. Where no other blur has a last frequency, those that have one stay.
+    """
     wavelength = float(path.transfer.wavelengths[-1])
-    blurs = of_kind(path.effects, Blur)
-    kept = [blur for blur in blurs if blur not in chosen]
+    kept = [blur for blur in of_kind(path.effects, Blur) if blur not in chosen]
     if not (kept or path.field not in (None, *chosen)):
         return ()
-    if any(math.isfinite(blur.cutoff(wavelength)) for blur in kept):
-        return ()
-    return tuple(b for b in blurs if b in chosen and math.isfinite(b.cutoff(wavelength)))
+    bounded = any(math.isfinite(blur.cutoff(wavelength)) for blur in kept)
+    bounds = [] if bounded else of_kind(chosen, Blur)
+    return (
+        *of_kind(chosen, SeparableTransfer),
+        *(blur for blur in bounds if math.isfinite(blur.cutoff(wavelength))),
+    )
