@@ -55,7 +55,7 @@ def test_what_ends_the_spectrum_of_others_stays_and_is_free(tmp_path):
 
 
 def test_the_photodetector_stays_and_is_free_where_the_lens_counts(tmp_path):
-    """Its average counts for nothing in a coarse wedge; without it more frequencies are followed."""
+    """Its average counts for nothing in a coarse wedge; without it the spectrum is longer."""
     changes = SIZE | WEDGE | {"optics.f_number": 11, "accuracy": "draft"}
     kept = prepare(camera(tmp_path, changes | {"effects": "auto"}), 1)[0]
     found = {d.name: "free" if d.free else d.state for d in kept.plan.decisions}
