@@ -42,10 +42,10 @@ def fit(
     from vcam_cli.files.atomic import write_text
     from vcam_cli.files.folder import OutputFolder
     from vcam_cli.fitting import fit as fitting
-    from vcam_cli.fitting.frames import paths
     from vcam_cli.fitting.parameters import COLUMNS
     from vcam_cli.simulation import provenance
     from vcam_cli.verification import measurement_file
+    from vcam_cli.verification.frames import paths
 
     measured = measurement_file.read(measurement)
     frames = [file for files in paths(measured).values() for file in files]

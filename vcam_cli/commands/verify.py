@@ -37,9 +37,10 @@ def verify(
 ) -> None:
     """Predict measured signals from a camera file, and show the errors.
 
-    Mean signals under even light of known irradiance are predicted as the camera's pixels give
-    them, its lens left out. Write verify.csv, verify.json and errors.png, a histogram of the
-    errors. The exit code is 4 where an error is larger than the measurement's tolerance.
+    Mean signals under even light of known irradiance, stated or of raw frames, are predicted as
+    the camera's pixels give them, its lens left out. Write verify.csv, verify.json and
+    errors.png, a histogram of the errors. The exit code is 4 where an error is larger than the
+    measurement's tolerance.
 
     \b
     Example:
@@ -53,11 +54,13 @@ def verify(
     from vcam_cli.simulation.checks import load
     from vcam_cli.verification import measurement_file
     from vcam_cli.verification import verify as comparison
+    from vcam_cli.verification.frames import paths
     from vcam_cli.verification.plots import draw_errors
 
     model = load(camera, options.overrides(set_, None, accuracy))
     measured = measurement_file.read(measurement)
-    inputs = (*provenance.inputs(model), *measured.files)
+    frames = [file for files in paths(measured, held_out=True).values() for file in files]
+    inputs = (*provenance.inputs(model), *measured.files, *frames)
     path = out or Path("out") / measured.name
     with OutputFolder(path, record="verify.json", inputs=inputs) as folder, Progress(quiet) as bar:
         found = comparison.verify(model, measured, bar)

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vcam_cli import memory
 from vcam_cli.files.file_checks import (
@@ -69,6 +70,25 @@ def develop(path: Path, yaml_path: tuple[str | int, ...] | str) -> LinearImage:
     said = "developed by LibRaw, with the camera's white balance and color matrix"
     more = f", brightened by the file's {stops:+.2f} EV" if stops else ""
     return LinearImage(light, ("R", "G", "B"), (said + more,))
+
+
+def read_codes(path: Path) -> tuple[NDArray, str]:
+    """Return the codes of a raw file, and the colors of its first 2 x 2 pixels.
+
+    Codes are uint16 (rows, columns), or (rows, columns, 3) where every pixel has all colors,
+    without what a camera masks at the borders; with a linearization table they are linear.
+    Colors are four letters row by row; "" for gray and for full color. Raise UnusableFile for what
+    is no raw file, and CannotDo where LibRaw is not installed.
+    """
+    _baseline_exposure(path)  # refuses a DNG that is cut off
+    with open_raw(path) as file:
+        codes = np.array(file.raw_image_visible)
+        if codes.ndim == 3:
+            return codes[:, :, :3], ""
+        colors = file.color_desc.decode("ascii", "replace")
+        is_gray = file.num_colors == 1 or file.raw_pattern is None
+        corner = np.ravel(file.raw_colors_visible[: 0 if is_gray else 2, :2])
+    return codes, "".join(colors[number] for number in corner)
 
 
 @contextmanager

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from vcam_cli.fitting.frames import color_block, stacks
 from vcam_cli.fitting.statistics import (
     Estimate,
     Pattern,
@@ -20,6 +19,7 @@ from vcam_cli.fitting.statistics import (
 from vcam_cli.progress import Observer
 from vcam_cli.spectra import integral, photons
 from vcam_cli.verification.frame_sets import FrameSet
+from vcam_cli.verification.frames import color_block, stacks
 from vcam_cli.verification.model import Measurement
 
 DEAD, HOT = 0.1, 0.5
@@ -93,8 +93,7 @@ def measure(measurement: Measurement, watch: Observer) -> Conditions:
     for stack in stacks(measurement):
         if stack.entry.target == "flat":
             averages.append((stack.entry, stack.frames.mean(axis=0)))
-        notes += [f"{stack.label}: {name} is unlike the others and left out"
-                  for name in stack.dropped]  # fmt: skip
+        notes += stack.notes
         if stack.drift > DRIFT and not stack.entry.is_dark:
             notes.append(
                 f"{stack.label}: the light drifts by {stack.drift:.1%}, which is taken out"

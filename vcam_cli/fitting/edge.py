@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 
-from vcam_cli.fitting.frames import Stack, color_block
 from vcam_cli.fitting.statistics import Estimate
 from vcam_cli.quality.mtf import Lattice, slanted_edge_sfr
+from vcam_cli.verification.frames import Stack, color_block
 from vcam_cli.verification.model import Measurement
 
 REACH = 16.0

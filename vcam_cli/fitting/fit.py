@@ -13,11 +13,11 @@ from typing import Any
 from vcam_cli.errors import BadInput, Collector
 from vcam_cli.fitting import camera_file, edge, sensor
 from vcam_cli.fitting.conditions import CLIPPED, Conditions, measure
-from vcam_cli.fitting.frames import color_block, paths, stacks
 from vcam_cli.fitting.noise_shape import is_significant, neighbor_correlation, tail_shape
 from vcam_cli.fitting.parameters import COLUMNS, SIGMAS, Parameter, deviation, parameter
 from vcam_cli.fitting.statistics import Estimate, combine
 from vcam_cli.progress import Observer, Silent
+from vcam_cli.verification.frames import color_block, paths, stacks
 from vcam_cli.verification.model import Measurement
 
 

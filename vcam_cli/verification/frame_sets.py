@@ -16,7 +16,8 @@ class FrameSet(Model):
     """Raw frames that were taken under the same conditions."""
 
     files: Text = key(
-        "the frames, *.tif for several: whole numbers in TIFF, PNG, npy, or EXR as vcam writes it",
+        "the frames, *.tif for several: whole numbers in TIFF, PNG, npy, EXR as vcam writes it, DNG"
+        " or another raw file of a camera",
         example="dark_10ms_*.tif",
     )
     name: Text = key("name in tables; default its number", example="dark, shortest", default="")

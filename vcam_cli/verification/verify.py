@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from vcam_cli.camera.camera import Camera
 from vcam_cli.errors import BadInput, Collector
 from vcam_cli.progress import Observer, Silent
-from vcam_cli.verification.frame_sets import FrameSet
+from vcam_cli.verification.frames import raise_if_any
+from vcam_cli.verification.measured_points import Points, measured_points
 from vcam_cli.verification.model import UNITS, Measurement
 from vcam_cli.verification.prediction import check, predict
 
@@ -111,37 +112,32 @@ def verify(camera: Camera, measurement: Measurement, watch: Observer | None = No
     BadInput
         With every entry that the camera cannot predict.
     """
-    _check_all(camera, measurement)
+    points, notes = measured_points(camera, measurement)
+    _check_all(camera, measurement, points)
     return Verification(
         camera,
         measurement,
-        tuple(_rows(camera, measurement, watch or Silent())),
-        tuple(_notes(camera)),
+        tuple(_rows(camera, measurement, points, watch or Silent())),
+        (*_notes(camera), *notes),
     )
 
 
-def _check_all(camera: Camera, measurement: Measurement) -> None:
+def _check_all(camera: Camera, measurement: Measurement, points: Points) -> None:
     problems = Collector()
-    for number, point in enumerate(measurement.frames):
-        if isinstance(point, FrameSet):
-            message = "vcam verify predicts mean signals, and these are frames"
-            remedy = "give signal, or estimate a camera from the frames by vcam fit"
-            problems.add(("frames", number, "files"), message, remedy)
-            continue
+    for number, point in points:
         try:
             check(camera, point)
         except BadInput as error:
             for p in error.problems:
                 problems.add(("frames", number, *p.path), p.message, p.remedy)
-    try:
-        problems.raise_if_any()
-    except BadInput as error:
-        raise error.with_places(measurement.locate) from None
+    raise_if_any(problems, measurement)
 
 
-def _rows(camera: Camera, measurement: Measurement, watch: Observer) -> Iterator[Row]:
-    for number, point in enumerate(measurement.points):
-        watch.step(number, len(measurement.points))
+def _rows(
+    camera: Camera, measurement: Measurement, points: Points, watch: Observer
+) -> Iterator[Row]:
+    for done, (number, point) in enumerate(points):
+        watch.step(done, len(points))
         tolerance = measurement.tolerance if point.tolerance is None else point.tolerance
         yield Row(
             measurement.label(number),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import glob
+import itertools
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 
 from vcam_cli.camera.derived.mosaic import BLOCKS
 from vcam_cli.errors import BadInput, Collector, bad
+from vcam_cli.files.camera_raw import is_raw, read_codes
 from vcam_cli.files.exr import read_exr
 from vcam_cli.files.file_checks import UnusableFile
 from vcam_cli.files.images import open_image, read_samples
@@ -23,6 +25,8 @@ OUTLIER = 10.0
 """Deviations of a frame's mean from the others' (scaled median deviation) that make it bad."""
 LEAST_OUTLIER = 0.02
 """The same relative to the mean, whatever the others do."""
+
+_FORMATS = "give TIFF, PNG, npy, EXR, DNG or other raw files of cameras"
 
 
 @dataclass(frozen=True)
@@ -38,6 +42,11 @@ class Stack:
     drift: float
     """Largest less smallest mean of a frame over their mean."""
 
+    @property
+    def notes(self) -> list[str]:
+        """What the user is told of frames that are left out."""
+        return [f"{self.label}: {name} is unlike the others and left out" for name in self.dropped]
+
     def plane(self, row: int, column: int, block: tuple[int, int]) -> NDArray:
         """Return the frames' pixels of one place of the color filter array (n, rows, columns)."""
         return self.frames[:, row :: block[0], column :: block[1]]
@@ -48,38 +57,56 @@ def color_block(measurement: Measurement) -> tuple[tuple[str, ...], ...]:
     return BLOCKS[measurement.pattern]
 
 
-def paths(measurement: Measurement) -> dict[int, list[Path]]:
+def paths(measurement: Measurement, held_out: bool = False) -> dict[int, list[Path]]:
     """Return the files of every entry that is to be fitted: number of the entry -> files.
 
-    Raises BadInput where an entry has fewer than two frames besides those held out.
+    held_out: those that are to be predicted instead: all where none are held out; none of edges.
+
+    Raises BadInput where an entry has too few: one to predict, two to fit.
     """
     folder = measurement.origin.parent if measurement.origin else Path()
     found, problems = {}, Collector()
     for number, entry in enumerate(measurement.frames):
-        if not isinstance(entry, FrameSet):
+        is_edge = isinstance(entry, FrameSet) and entry.target == "slanted-edge"
+        if not isinstance(entry, FrameSet) or (held_out and is_edge):
             continue
         files = [Path(name) for name in sorted(glob.glob(str(folder / entry.files)))]
-        kept = files[: len(files) - math.floor(measurement.hold_out * len(files))]
-        found[number] = kept
-        least = 1 if entry.target == "slanted-edge" else 2
-        if len(kept) < least:
+        kept = len(files) - math.floor(measurement.hold_out * len(files))
+        found[number] = files[:kept] if not held_out else files[kept:] or files
+        least = 1 if held_out or is_edge else 2
+        if len(found[number]) < least:
             where = ("frames", number, "files")
-            message = f"{len(files)} files in {folder} are {entry.files}, of which {len(kept)} fit"
+            message = f"{len(files)} files in {folder} are {entry.files}, of which {kept} fit"
             problems.add(where, message, f"give {least} frames or more that are not held out")
+    raise_if_any(problems, measurement)
+    return found
+
+
+def raise_if_any(problems: Collector, measurement: Measurement) -> None:
+    """Raise BadInput with all problems, at their places in the measurement's file."""
     try:
         problems.raise_if_any()
     except BadInput as error:
         raise error.with_places(measurement.locate) from None
-    return found
 
 
 def stacks(measurement: Measurement) -> Iterator[Stack]:
-    """Yield the stack of every entry, one after the other: only one is in memory.
+    """Yield the stack of every entry that is fitted, one after the other: only one is in memory.
+
+    Raises BadInput where a file is no frame, or frames differ in size.
+    """
+    return (stack for _, stack in numbered_stacks(measurement, paths(measurement)))
+
+
+def numbered_stacks(
+    measurement: Measurement, files_of: dict[int, list[Path]]
+) -> Iterator[tuple[int, Stack]]:
+    """Yield number and stack of entries, likewise.
 
     Raises BadInput where a file is no frame, or frames differ in size.
     """
     shape: tuple[int, ...] | None = None
-    for number, files in paths(measurement).items():
+    for number, files in files_of.items():
         entry = measurement.frames[number]
         assert isinstance(entry, FrameSet)
         frames = []
@@ -90,7 +117,8 @@ def stacks(measurement: Measurement) -> Iterator[Stack]:
                 message = f"{file.name} has {frame.shape} pixels, the first frame {shape}"
                 raise _refusal(measurement, number, message, "give frames of one size")
             frames.append(frame)
-        yield _without_outliers(entry, measurement.label(number), files, np.stack(frames))
+        stack = _without_outliers(entry, measurement.label(number), files, np.stack(frames))
+        yield number, stack
 
 
 def _without_outliers(entry: FrameSet, label: str, files: list[Path], frames: NDArray) -> Stack:
@@ -107,10 +135,10 @@ def _without_outliers(entry: FrameSet, label: str, files: list[Path], frames: ND
 
 def _read(file: Path, measurement: Measurement, number: int) -> NDArray:
     try:
-        codes = _codes(file)
+        codes = _codes(file, measurement)
     except (UnusableFile, OSError, ValueError) as error:
         message = f"{file.name} cannot be read: {error}"
-        raise _refusal(measurement, number, message, "give TIFF, PNG, npy or EXR") from None
+        raise _refusal(measurement, number, message, _FORMATS) from None
     assert measurement.levels is not None
     highest = 2**measurement.levels.bits - 1
     if codes.ndim != 2 or not np.array_equal(codes, np.rint(codes)):
@@ -122,8 +150,14 @@ def _read(file: Path, measurement: Measurement, number: int) -> NDArray:
     return codes.astype(np.uint16 if highest < 1 << 16 else np.uint32)
 
 
-def _codes(file: Path) -> NDArray:
+def _codes(file: Path, measurement: Measurement) -> NDArray:
     """Return the numbers of a file, (rows, columns) where it has one channel."""
+    if is_raw(file):
+        codes, colors = read_codes(file)
+        meant = "".join(itertools.chain(*color_block(measurement)))
+        if colors and colors != meant:
+            raise UnusableFile(f"its pixels are {colors}, and pattern says {meant}")
+        return codes
     if file.suffix == ".npy":
         return np.load(file, allow_pickle=False)
     if file.suffix == ".exr":
