@@ -186,6 +186,14 @@ optics: {f_number: 2.8}
 array: {rows: 60, columns: 80}
 exposure: {time: 20 ms, shutter: {rolling: {line_time: 100 us}}}
 """,
+    "turning": """
+scene:
+  source: {kind: image, file: color.png, motion: {rotate: 90 deg/s}}
+  camera_motion: {roll: -20 deg/s, pan: 2 deg/s}
+optics: {f_number: 2.8}
+array: {rows: 60, columns: 80, pattern: bayer-rggb}
+exposure: {time: 20 ms, shutter: {rolling: {line_time: 100 us, direction: left}}}
+""",
     "changing field": """
 scene:
   source: {kind: image, file: color.png, model: laser}

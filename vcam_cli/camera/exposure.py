@@ -141,6 +141,13 @@ class Exposure(Model):
         example="0 s",
         default=0.0,
     )
+    reference: Annotated[float | None, Quantity("time", least=0, most=1e9)] = key(
+        "when what moves is where its file says; default the middle of the exposure of the array's"
+        " middle, of an exposure that starts at 0 s",
+        unit="ms",
+        example="5 ms",
+        default=None,
+    )
     captures: Annotated[
         tuple[float, ...] | CaptureSchedule | None,
         Either(
@@ -206,6 +213,18 @@ class Exposure(Model):
         if self.schedule:
             return self.schedule.max
         return self.samples[-1] if self.samples else self.time
+
+    @property
+    def longest_allowed(self) -> float:
+        """Longest time of an exposure or a sample, that of an automatic exposure included [s]."""
+        longest = self.auto.max if self.auto is not None else self.longest
+        assert longest is not None
+        return longest
+
+    @property
+    def is_timed_by_scene(self) -> bool:
+        """Whether the camera chooses times for its scene."""
+        return self.auto is not None or self.schedule is not None
 
     def single(self, time: float, gain: float | None = None) -> "Exposure":
         """Return one exposure of that time [s] in place of whatever the file says.

@@ -174,7 +174,6 @@ NOT_SIMULATED: Mapping[str, str] = {
     "distortion": "the lens images straight lines as straight lines",
     "lateral_color": "the lens images all wavelengths in one size",
     "chromatic_aberration": "wavefronts in optics.zernike are the same length at all wavelengths",
-    "motion_blur": "nothing moves during the exposure",
     "flash": "the light of the scene is scene.illuminant at one level",
 }
 """What cameras have and this file cannot say -> what is simulated in its place."""

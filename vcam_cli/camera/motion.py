@@ -1,6 +1,6 @@
 """How a scene and its camera move while a frame is exposed."""
 
-from typing import Annotated, Any, Self
+from typing import Annotated, Self
 
 from pydantic import model_validator
 
@@ -14,17 +14,20 @@ TurningSpeed = Annotated[float, Quantity("turning_speed", least=-1e6, most=1e6)]
 
 
 class SceneMotion(Model):
-    """Straight motion of a scene across the view, as it is seen in the picture."""
+    """Motion of a scene across the view, as it is seen in the picture."""
 
     x: Speed = key("to the right, in the scene's plane", example="0.5 m/s", default=0.0)
     y: Speed = key("down, in the scene's plane", example="0.5 m/s", default=0.0)
     rotate: TurningSpeed = key(
-        "about the picture's center: not built yet", example="0 deg/s", default=0.0
+        "clockwise, about the scene's point in the picture's center",
+        example="5 deg/s",
+        default=0.0,
     )
 
-    @model_validator(mode="after")
-    def _is_built(self) -> Self:
-        return _refuse(self, "rotate", "write x and y")
+    @property
+    def moves(self) -> bool:
+        """Whether it is any motion."""
+        return bool(self.x or self.y or self.rotate)
 
 
 MaybeMotion = Annotated[SceneMotion | None, mapping(SceneMotion)]
@@ -33,26 +36,30 @@ MOTION = key("how it moves during the exposure", example={"x": "0.5 m/s"}, defau
 
 
 class CameraMotion(Model):
-    """Turning of the camera about its lens."""
+    """Turning of the camera about its lens, at constant speeds or as a gyroscope recorded it."""
 
     pan: TurningSpeed = key("to the right", example="10 deg/s", default=0.0)
     tilt: TurningSpeed = key("upward", example="10 deg/s", default=0.0)
     roll: TurningSpeed = key(
-        "about the optical axis: not built yet", example="0 deg/s", default=0.0
+        "about the optical axis, clockwise for the photographer", example="5 deg/s", default=0.0
     )
     file: Annotated[str | None, FileName()] = key(
-        "angles over time, of a gyroscope: not built yet", example="imu.csv", default=None
+        "angles or rates over time in place of constant speeds: a CSV file with a column of time"
+        " (time_s, timestamp [ns]) and some of pan, tilt, roll (pan_deg) or gyro_x, gyro_y, gyro_z"
+        " (gyro_x [rad/s]; x right, y down, z forward)",
+        example="imu.csv",
+        default=None,
     )
 
     @model_validator(mode="after")
-    def _is_built(self) -> Self:
-        for name in ("roll", "file"):
-            _refuse(self, name, "write pan and tilt")
+    def _is_one(self) -> Self:
+        for name in ("pan", "tilt", "roll"):
+            if self.file is not None and getattr(self, name):
+                message = "is a constant speed beside a file of angles"
+                raise refusal((name,), message, "take one of them out")
         return self
 
-
-def _refuse(model: Any, name: str, remedy: str) -> Any:
-    """Refuse a key that is named in files but does nothing yet."""
-    if getattr(model, name):
-        raise refusal((name,), "is not built yet", f"{remedy}, and leave it out")
-    return model
+    @property
+    def moves(self) -> bool:
+        """Whether it is any motion, as far as that is known without its file."""
+        return bool(self.pan or self.tilt or self.roll or self.file)

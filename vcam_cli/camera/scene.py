@@ -325,7 +325,7 @@ class Scene(Model):
     def moves(self) -> bool:
         """Whether scene or camera move while a frame is exposed."""
         motion, turn = self.source.motion, self.camera_motion
-        return bool((motion and (motion.x or motion.y)) or (turn and (turn.pan or turn.tilt)))
+        return bool((motion and motion.moves) or (turn and turn.moves))
 
     @property
     def emits(self) -> bool:

@@ -6,7 +6,8 @@ kind says in mathematics what it does, and so where in the order it acts (`order
     Blur               multiplies the spectrum of the image, H(f, wavelength)   no unit
     FieldTransfer      does so by another blur in every place of the field      no unit
     SeparableTransfer  does so by a product, H_x(fx) H_y(fy)                    no unit
-    ImageMotion        is one of these, and displaces what every row sees       no unit
+    ImageMotion        is one of these, and displaces what every row sees; or   no unit
+                       a mean over instants of the image elsewhere
     Gain               multiplies the signal, pixel by pixel                    no unit
     VeilingGlare       spreads part of the light over the whole sensor          no unit
     TemporalGain       multiplies the signal by the light of each line's time   no unit
@@ -164,6 +165,14 @@ class Effect(ABC):
         """
         return None
 
+    def during(self, start: float, stop: float) -> Effect:
+        """Return what of it acts from `start` to `stop` after a line's exposure begins [s]."""
+        return self
+
+    def seen_by_turned(self, angle: float) -> Effect:
+        """Return it as a scene meets it that is turned clockwise by an angle [rad]."""
+        return self
+
     def parts_in_pixels(self) -> tuple[Effect, ...]:
         """Return the parts of it that act in the pixels, before their voltages are joined."""
         return (self,)
@@ -320,6 +329,10 @@ class ImageMotion(Effect):
     @abstractmethod
     def travel(self) -> float:
         """How far from its place light comes to lie [m]."""
+
+    def mean_error(self, signal: SignalLevels) -> float:
+        """Return the most that leaving it out can change, light in place of dark [electrons]."""
+        return float(signal.full_signal)
 
 
 class Gain(Effect):

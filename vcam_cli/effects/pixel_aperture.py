@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vcam_cli.effects.base import SeparableTransfer
+from vcam_cli.effects.turned_transfer import TurnedTransfer
 
 
 @dataclass(frozen=True)
@@ -28,6 +29,10 @@ class PixelAperture(SeparableTransfer):
     def describe(self) -> str:
         """Return a short clause with this camera's numbers and units."""
         return f"averages over {self.width * 1e6:.4g} x {self.height * 1e6:.4g} um"
+
+    def seen_by_turned(self, angle):
+        """Return the aperture as a scene meets it that is turned clockwise by an angle [rad]."""
+        return TurnedTransfer(self, angle)
 
     @property
     def box(self) -> tuple[float, float]:

@@ -28,6 +28,7 @@ from vcam_cli.effects.base import (
     VeilingGlare,
     of_kind,
 )
+from vcam_cli.effects.sub_exposed_motion import SubExposedMotion
 from vcam_cli.image_formation.optical_path import OpticalPath
 from vcam_cli.image_formation.scene_detail import (
     SceneDetail,
@@ -46,7 +47,7 @@ LEVEL_SHARE = 0.5
 noise has the variance of the signal."""
 PERCENTILES = (1, 10, 50, 90, 99)
 """Percentiles of the scene's own light at which noise is promised."""
-BLURS = (Blur, SeparableTransfer, FieldTransfer)
+BLURS = (Blur, SeparableTransfer, FieldTransfer, SubExposedMotion)
 """Kinds of effects that blur the light."""
 KINDS = (*BLURS, Gain, VeilingGlare, Transport)
 """Kinds of effects on the light, and on the charge that it makes."""

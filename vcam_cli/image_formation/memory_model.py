@@ -99,6 +99,27 @@ def _values(
     return samples + series * (y.folded_terms * x.folded_terms + evaluated)
 
 
+def sub_exposure_bytes(geometry: Geometry, knobs: Settings, colors: int) -> int:
+    """Return the memory of a still image at places finer than the pixels, beside its spectrum.
+
+    Parameters
+    ----------
+    geometry : Geometry
+        Geometry of the places, as if they were pixels.
+    knobs : Settings
+        Settings of image formation.
+    colors : int
+        Number of colors.
+
+    Returns
+    -------
+    int
+        Bytes, at least those measured: the image, and copies of a plane while it is filtered.
+    """
+    width = knobs.float_width // 8
+    return round(SLACK * geometry.rows * geometry.columns * (colors * width + 2 * 8))
+
+
 def box_average_bytes(samples: int, planes: int, geometry: Geometry, knobs: Settings) -> int:
     """Return the memory of means over boxes.
 

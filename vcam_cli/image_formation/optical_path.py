@@ -135,6 +135,13 @@ class SpectrumReport:
     """Transfer function -> rms change of the signal by leaving it out [electrons / s]."""
     filters: int = 0
     """Times that the spectrum was filtered: for each parity, and for each mode of the field."""
+    sub_exposures: int = 0
+    """Instants whose mean an exposure is; 0 where it is no such mean."""
+    sub_exposure_error: float = 0.0
+    """Estimated rms error by them and by the places at which the still image is known, relative to
+    full signal."""
+    fine_pixels: int = 0
+    """Those places; 0 where there is no need for them."""
     table_values: int = 0
     """Values of transfer functions of fx and fy that were computed."""
     peak: float = 0.0

@@ -36,6 +36,7 @@ from vcam_cli.image_formation.harmonic_scenes import (
 from vcam_cli.image_formation.optical_path import Layer, Layers, OpticalPath, SpectrumReport
 from vcam_cli.image_formation.scene_sampling import sampled_image, with_sufficient_precision
 from vcam_cli.image_formation.scene_spectrum import SceneSpectrum
+from vcam_cli.image_formation.sub_exposures import sub_exposed_layers, sub_exposed_motion
 from vcam_cli.image_formation.transfer_tables import Tables, mixtures, tabulate
 from vcam_cli.scenes.base import ChartScene, HarmonicScene, SampledScene, Scene
 from vcam_cli.scenes.waves import WaveScene
@@ -70,6 +71,8 @@ def image_layers(path: OpticalPath, scene: Scene) -> tuple[Layers, SpectrumRepor
     """
     if path.transfer.is_dark:
         return _dark_layers(path)
+    if motion := sub_exposed_motion(path):
+        return sub_exposed_layers(path, scene, motion, image_layers)
     if isinstance(scene, WaveScene):
         return wave_layers(path, scene)
     if isinstance(scene, HarmonicScene):

@@ -43,6 +43,12 @@ INTERPOLATE = 1.5e-6
 """One color of a scattered pixel onto the picture's grid [s]."""
 TERM = 1.3e-9
 """Filtering one term of the spectrum for one plane and color [s]."""
+SPLINE = 40e-9
+"""One value of the still image behind sub-exposures into coefficients of splines [s]."""
+LOOK = 110e-9
+"""One pixel of one color at one instant of its exposure [s]."""
+PROBED = 4
+"""Instants on all of the array that as much work as their choice would be."""
 TABLE = 1e-6
 """One value of a transfer function of fx and fy, its part of the pupil's transforms too [s]."""
 EVALUATE = 5e-9
@@ -88,9 +94,12 @@ def image_seconds(geometry: Geometry, mosaic: Mosaic, report: SpectrumReport) ->
     """Return the core seconds of image formation."""
     pixels, colors = geometry.rows * geometry.columns, len(mosaic.colors)
     if not report.terms:
-        return FIXED + WAVE * pixels * colors
+        return (
+            FIXED + WAVE * pixels * colors + _sub_exposure_seconds(pixels * colors, colors, report)
+        )
     return (
         FIXED
+        + _sub_exposure_seconds(pixels * colors, colors, report)
         + (SAMPLE + PAINT * report.is_painted) * report.cells * report.planes
         + report.edge_seconds * (1 + TRIAL_EDGES * report.trials)
         + TRIAL * report.trials
@@ -99,6 +108,18 @@ def image_seconds(geometry: Geometry, mosaic: Mosaic, report: SpectrumReport) ->
         + (SAMPLE + PAINT + TERM * colors * report.filters) * report.far_cells * report.planes
         + TABLE * report.table_values
     )
+
+
+def _sub_exposure_seconds(values: int, colors: int, report: SpectrumReport) -> float:
+    """Return the core seconds of the mean over the instants of an exposure.
+
+    `values` are the pixels' values of all colors; a mosaic needs about half of them.
+    """
+    if not report.sub_exposures:
+        return 0.0
+    half = 0.5 if colors > 1 else 1.0
+    fine = (EVALUATE + SPLINE) * report.fine_pixels * colors
+    return fine + LOOK * values * half * (report.sub_exposures + PROBED)
 
 
 def output_seconds(camera: Camera, geometry: Geometry, mosaic: Mosaic) -> float:
@@ -156,6 +177,11 @@ def usual_spectrum(geometry: Geometry) -> SpectrumReport:
     """Return the spectrum that a scene in color with much detail would have."""
     samples = 2 * geometry.rows * geometry.columns
     return SpectrumReport(cells=samples, terms=samples, planes=3, filters=1)
+
+
+def light_seconds(place: Layout, report: SpectrumReport, workers: int) -> float:
+    """Return the seconds of image formation alone, on this machine."""
+    return image_seconds(place.lattice, place.mosaic, report) * slowness() / threads(workers)
 
 
 def first_estimate(camera: Camera, place: Layout, workers: int) -> float:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -14,7 +14,14 @@ from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.electrical import Electrical
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.camera.derived.mosaic import Mosaic
-from vcam_cli.effects.base import Effect, SignalLevels, TemporalGain, Transport, of_kind
+from vcam_cli.effects.base import (
+    Effect,
+    ImageMotion,
+    SignalLevels,
+    TemporalGain,
+    Transport,
+    of_kind,
+)
 from vcam_cli.effects.order import quantizer
 from vcam_cli.effects.signal_chain import Limit, NoiseSource, extreme_signal
 from vcam_cli.errors import bad
@@ -57,8 +64,13 @@ def expose(
     effects: Sequence[Effect],
     optional: Sequence[Effect],
     knobs: Settings,
+    light_during: Callable[[float, float], NDArray],
 ) -> ExposedLight:
-    """Return the light of an exposure whose time is given or chosen for the scene."""
+    """Return the light of an exposure whose time is given or chosen for the scene.
+
+    `light_during` gives the light between two times after a line's exposure begins [s], in the
+    shape of `light`, which is that of the whole exposure.
+    """
     groups, white = place.binning_groups, float(white_rate.max())
     enabled = plan.enabled_effects(camera, solved)
     dark = exposure.mean_dark(1.0, enabled)
@@ -75,16 +87,16 @@ def expose(
     light_plan = timed_gains.light_plan(light.plan, effects, optional, time, knobs.tolerance)
     timed = tuple(e for e in of_kind(effects, TemporalGain) if e not in light_plan.omitted)
 
-    def collect(start: float, stop: float) -> NDArray:
-        lit = collected
+    def collect(values: NDArray, start: float, stop: float) -> NDArray:
+        lit = collected if values is light.values else place.select_pixels(values)
         if timed:
-            found = timed_gains.apply(light.values, timed, place.lattice, start, stop)
-            lit = place.select_pixels(found)
+            lit = place.select_pixels(timed_gains.apply(values, timed, place.lattice, start, stop))
         return groups.collect(_transport(lit, dark / groups.summed_charges, effects, held))
 
-    rate = collect(0.0, time)
-    steps = pairwise((0.0, *times)) if timed else ()
-    step_rates = tuple(collect(start, stop) for start, stop in steps)
+    rate = collect(light.values, 0.0, time)
+    moving = of_kind(effects, ImageMotion)
+    steps = pairwise((0.0, *times)) if timed or moving else ()
+    step_rates = tuple(collect(light_during(start, stop), start, stop) for start, stop in steps)
     peak = (float(rate.max()) + dark) * time
     refuse_too_much(max(peak, white * time, dark))
     lit = timed_gains.apply(light.values, timed, place.lattice, 0.0, time)

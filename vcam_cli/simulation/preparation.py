@@ -15,7 +15,7 @@ from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.electrical import Electrical, electrical
 from vcam_cli.camera.derived.geometry import Geometry, geometry
 from vcam_cli.camera.derived.mosaic import Mosaic
-from vcam_cli.effects.base import Effect
+from vcam_cli.effects.base import Effect, ImageMotion, of_kind
 from vcam_cli.errors import bad
 from vcam_cli.image_formation import bandwidth, memory_model, photon_rate
 from vcam_cli.image_formation.optical_path import OpticalPath, SpectrumReport
@@ -112,6 +112,46 @@ def prepare(
     CannotDo
         Where memory does not suffice.
     """
+    if not (camera.scene.moves and camera.exposure.is_timed_by_scene):
+        return _prepare(camera, picture, workers, stages, rate_cache, earlier)
+    with stages("metering"):
+        metered = _prepare(_standing_still(camera), picture, workers, Stages(), rate_cache)
+    earlier += cost_model.light_seconds(metered.layout, metered.spectrum, workers)
+    timed = _timed(camera, metered)
+    ready = _prepare(timed, picture, workers, stages, rate_cache, earlier)
+    timed = ready.camera.model_copy(update={"exposure": camera.exposure})
+    return replace(ready, camera=timed, exposure_limit=metered.exposure_limit)
+
+
+def _standing_still(camera: Camera) -> Camera:
+    """Return the camera that meters before it exposes: what moves stands where its file says."""
+    source = camera.scene.source.model_copy(update={"motion": None})
+    scene = camera.scene.model_copy(update={"source": source, "camera_motion": None})
+    effects = camera.effects
+    if isinstance(effects, dict):
+        effects = {name: wish for name, wish in effects.items() if name != "motion"}
+    return camera.model_copy(update={"scene": scene, "effects": effects})
+
+
+def _timed(camera: Camera, metered: Prepared) -> Camera:
+    """Return the camera with the times, and the gain, that it chose by what it metered."""
+    if camera.exposure.schedule is not None:
+        times = camera.exposure.model_copy(update={"captures": metered.times})
+        return camera.model_copy(update={"exposure": times})
+    gain = metered.camera.exposure_gain
+    fixed = camera.exposure.single(metered.exposure_time, gain)
+    return camera.model_copy(update={"exposure": fixed})
+
+
+def _prepare(
+    camera: Camera,
+    picture: NDArray | None,
+    workers: int,
+    stages: Stages,
+    rate_cache: RateCache | None,
+    earlier: float = 0.0,
+) -> Prepared:
+    """Return the same where times are given, or nothing moves."""
     solved = geometry(camera)
     place = layout(camera, solved)
     base_iso = iso_speed.base_iso(camera, solved, place)
@@ -149,8 +189,9 @@ def prepare(
         effects = tuple(effect for effect in effects if effect not in light.plan.omitted)
         white_rate = white_rate * summed / (light.plan.on_axis or 1.0)
     with stages("exposure"):
+        during = partial(_light_during, path, scene, place, light)
         exposed = exposed_light.expose(
-            *(camera, solved, circuit, place, light, white_rate, effects, optional, knobs)
+            *(camera, solved, circuit, place, light, white_rate, effects, optional, knobs, during)
         )
         camera = camera.with_exposure_gain(exposed.settings.gain)
         needed = max(frame_bytes, light.spectrum.memory) + getattr(picture, "nbytes", 0)
@@ -158,6 +199,9 @@ def prepare(
         decided = plan.make(
             camera, solved, knobs, exposed.light_plan, exposed.signal, needed, changes
         )
+        if of_kind(effects, ImageMotion):  # every sample of an integration has light of its own
+            once = cost_model.light_seconds(place, light.spectrum, workers)
+            earlier += len(exposed.times) * once
         decided = _with_seconds(camera, solved, place, knobs, light, decided, workers, earlier)
         stages.watch.expect(decided.seconds)
     return Prepared(
@@ -179,6 +223,26 @@ def prepare(
         plan=decided,
         step_rates=exposed.step_rates,
     )
+
+
+def _light_during(
+    path: OpticalPath,
+    scene: Scene,
+    place: Layout,
+    light: photon_rate.Rate,
+    start: float,
+    stop: float,
+) -> NDArray:
+    """Return the light from `start` to `stop` after a line's exposure begins [s], as `light` is.
+
+    It is that of the whole exposure where nothing is simulated to move.
+    """
+    whole = light.plan.reduced(path)
+    if not of_kind(whole.effects, ImageMotion):
+        return light.values
+    effects = tuple(effect.during(start, stop) for effect in whole.effects)
+    part = replace(whole, effects=effects, transfer=whole.transfer.with_effects(effects))
+    return photon_rate.photo_rate(part, scene, place.planes).values
 
 
 def _brightest(scene: Scene) -> float:
@@ -214,7 +278,7 @@ def _require_memory(camera: Camera, place: Layout, knobs: Settings, solved: Geom
     colors = len(place.mosaic.colors)
     samples = camera.exposure.count * (colors if place.full_color else 1)
     lamp = camera.scene.illuminant
-    if lamp is not None and lamp.flicker is not None:
+    if camera.scene.moves or (lamp is not None and lamp.flicker is not None):
         samples *= 2  # each has a rate of its own
     scattered = solved.rows * solved.columns if place.is_scattered else 0
     judged = bool(camera.quality)

@@ -1,9 +1,13 @@
 """Notes of a run: what it chose, left out or took for granted where the file left that open."""
 
+import math
+from pathlib import Path
+
 import numpy as np
 
 from vcam_cli.camera.architecture import ARCHITECTURES
 from vcam_cli.camera.derived import photodiode
+from vcam_cli.camera.derived.camera_angles import camera_angles
 from vcam_cli.camera.derived.dark_noise import SIGMAS, dark_noise
 from vcam_cli.camera.processing import SHOWN
 from vcam_cli.camera.scene import ImageFile
@@ -79,13 +83,35 @@ def _motion(ready: Prepared) -> tuple[str, ...]:
             f"the scene's file ends at the border: what moves in, up to {pixels:.0f} pixels, is its"
             " mirror image"
         )
-    if pixels and turn is not None and (turn.pan or turn.tilt):
+    if ready.spectrum.sub_exposures:
+        notes.append(_sub_exposures(ready))
+    if ready.camera.exposure.is_timed_by_scene and pixels:
+        notes.append("the exposure is metered on the scene as it stands where its file says")
+    if turn is not None and turn.file is not None:
+        read = camera_angles(turn.file)
+        left = f"; {', '.join(read.ignored)} are left aside" if read.ignored else ""
+        notes.append(
+            f"{Path(turn.file).name}: the camera's path is that of {', '.join(read.columns)}{left}"
+        )
+    if pixels and turn is not None and (turn.pan or turn.tilt or turn.file):
         corner = float(np.hypot(g.sensor_width, g.sensor_height)) / 2 / g.image_distance
         notes.append(
             f"the camera's turn is simulated as on the axis; in the corners the image moves up to"
             f" {100 * corner**2:.2g} % faster"
         )
     return tuple(notes)
+
+
+def _sub_exposures(ready: Prepared) -> str:
+    """Return of how many sub-exposures the light is a mean, and the error that they leave."""
+    found = ready.spectrum
+    many = f"{found.sub_exposures} sub-exposures" if found.sub_exposures > 1 else "one look"
+    fine = math.sqrt(found.fine_pixels / (ready.layout.lattice.rows * ready.layout.lattice.columns))
+    return (
+        f"motion is computed as {many} of the still image, known at {fine:.2g} places along each"
+        f" side of a pixel; they leave an error of {100 * found.sub_exposure_error:.2g} % of full"
+        " signal"
+    )
 
 
 def _clipped_dark(ready: Prepared) -> tuple[str, ...]:

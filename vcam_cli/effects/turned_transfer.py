@@ -1,0 +1,58 @@
+"""A blur of the camera as a scene meets it that is turned."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcam_cli.effects.base import PlaneTransfer, SeparableTransfer
+
+
+@dataclass(frozen=True)
+class TurnedTransfer(PlaneTransfer):
+    """A separable transfer as a scene meets it that is turned by an angle."""
+
+    still: SeparableTransfer
+    angle: float
+    """Turn of the scene, clockwise [rad]."""
+
+    absent = ""
+
+    @property
+    def name(self) -> str:  # type: ignore[override]
+        """Name of the effect that it is."""
+        return self.still.name
+
+    @property
+    def reference(self) -> str:  # type: ignore[override]
+        """Where that comes from."""
+        return self.still.reference
+
+    @classmethod
+    def from_camera(cls, camera, geometry):
+        """Return nothing: it is made of another effect."""
+        return
+
+    def describe(self) -> str:
+        """Return what the effect does."""
+        return self.still.describe()
+
+    def cutoff(self, wavelength: float) -> float:
+        """Return the frequency from which the transfer is zero, or inf [cycles/m]."""
+        return math.inf
+
+    @property
+    def reach(self) -> float:
+        """How far it throws light [m]."""
+        width, height = self.still.box or (0.0, 0.0)
+        return math.hypot(width, height) / 2
+
+    def otf_plane(self, fx: NDArray, fy: NDArray, wavelength: float) -> NDArray:
+        """Return the transfer at all pairs of fx (n,) and fy (m,) [cycles/m]: (m, n)."""
+        cosine, sine = math.cos(self.angle), math.sin(self.angle)
+        x, y = fx[None, :], fy[:, None]
+        along_x = self.still.along_x(cosine * x - sine * y)
+        return np.asarray(along_x * self.still.along_y(sine * x + cosine * y))

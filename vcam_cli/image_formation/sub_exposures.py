@@ -1,0 +1,311 @@
+"""An image that turns or shakes while it is exposed: the mean of the still image at other places.
+
+The still image is computed once, on places finer than the pixels, each of which sees it as a pixel
+there would. At every instant of the exposure a pixel looks where in that image it is just then, by
+splines. Two errors are left, each measured and kept below its share of the tolerance:
+
+- places between the fine ones: known by leaving every second of them out and asking the others;
+- instants between those that are taken: known by taking half as many again.
+
+A lens's blur that is not round is taken to turn with the scene; the pixels' own aperture stays as
+it is with the camera.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Final
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from vcam_cli import memory
+from vcam_cli.camera.derived.geometry import Geometry, pixel_centers
+from vcam_cli.effects.base import Effect, of_kind
+from vcam_cli.effects.sub_exposed_motion import SubExposedMotion
+from vcam_cli.image_formation import memory_model
+from vcam_cli.image_formation.optical_path import Layer, Layers, OpticalPath, SpectrumReport
+from vcam_cli.parallel import each
+from vcam_cli.rng import blocks
+from vcam_cli.scenes.base import Scene
+from vcam_cli.scenes.waves import WaveScene
+
+PLACE_SHARE = 0.1
+INSTANT_SHARE = 0.1
+"""Parts of the tolerance that places and instants may use."""
+ORDER: Final = 5
+"""Order of the splines."""
+FEWEST_PLACES, MOST_PLACES = 2, 24
+"""Fine places along each side of a pixel."""
+DECAY = 1.0
+"""An error of places falls with their number at least to this power: it is measured at half of
+them. Edges behind a pixel's aperture alone have 1.5, the lens adds to that."""
+PER_WAVE = 6
+"""Fine places in a period of a scene's own wave: the splines then err by 1e-4 of it."""
+FEWEST_INSTANTS, MOST_INSTANTS = 4, 2048
+GROWTH = 1.5
+"""Places over those tried before, and instants over those that they are compared with."""
+PROBES = 12
+"""Rows of the array at which instants are compared."""
+LINES = 192
+"""Rows of the fine image at which places are compared."""
+
+FormImage = Callable[[OpticalPath, Scene], tuple[Layers, SpectrumReport]]
+
+
+@dataclass(frozen=True)
+class FineImage:
+    """The still image as pixels at closely spaced places see it, as coefficients of splines."""
+
+    coefficients: NDArray
+    """(C, rows, columns) [e/s]"""
+    geometry: Geometry
+    """Of the places, as if they were pixels."""
+    error: float
+    """Rms error of places between them [e/s]."""
+    full_signal: float
+    """Largest signal that counts [e/s]."""
+
+    def look(self, color: int, x: NDArray, y: NDArray) -> NDArray:
+        """Return the signal of a color at places x, y of one shape [m], in that shape [e/s]."""
+        g = self.geometry
+        pitches = g.pitch_x * g.sampling_scale, g.pitch_y * g.sampling_scale
+        column = (x - g.collecting_x) / pitches[0] + (g.columns - 1) / 2
+        row = (y - g.collecting_y) / pitches[1] + (g.rows - 1) / 2
+        plane = self.coefficients[color]
+        found = ndimage.map_coordinates(
+            plane, [row, column], order=ORDER, prefilter=False, mode="mirror", output=plane.dtype
+        )
+        return np.asarray(found)
+
+
+def sub_exposed_motion(path: OpticalPath) -> SubExposedMotion | None:
+    """Return the motion of a path that asks for sub-exposures; None where there is none."""
+    found = of_kind(path.effects, SubExposedMotion)
+    return found[0] if found else None
+
+
+def sub_exposed_layers(
+    path: OpticalPath, scene: Scene, motion: SubExposedMotion, form_image: FormImage
+) -> tuple[Layers, SpectrumReport]:
+    """Return the light of an exposure as the mean over its instants.
+
+    Parameters
+    ----------
+    path : OpticalPath
+        Lens, pixels and settings.
+    scene : Scene
+        The scene.
+    motion : SubExposedMotion
+        Its motion, one of the path's effects.
+    form_image : callable
+        Function that returns the light of a path without such motion: layers and report.
+
+    Returns
+    -------
+    layers : Layers
+        The signal, as a single layer.
+    report : SpectrumReport
+        How it was computed.
+
+    Raises
+    ------
+    CannotDo
+        Where memory does not suffice.
+    """
+    still = _still_path(path, motion)
+    image, report = _fine_image(still, scene, motion, path, form_image)
+    x, y = pixel_centers(path.geometry, detector=True)
+    probe = y[:: max(1, len(y) // PROBES)]
+    count, left = _instants(path, image, motion, x, probe)
+    exposure = _Exposure(image, motion, *_quadrature(count))
+    layer = Layer(lambda color, rows: exposure.signal(color, x, y[rows]))
+    full = image.full_signal or 1.0
+    told = replace(
+        report,
+        oversampling=report.oversampling * path.geometry.pitch_x / image.geometry.pitch_x,
+        lost_rms=math.hypot(report.lost_rms, image.error, left),
+        sub_exposures=count,
+        sub_exposure_error=math.hypot(image.error, left) / full,
+        fine_pixels=image.geometry.rows * image.geometry.columns,
+    )
+    return iter([layer]), told
+
+
+def _still_path(path: OpticalPath, motion: SubExposedMotion) -> OpticalPath:
+    """Return the path to the still image: without the motion, but with its blur where it has one.
+
+    The pixels' aperture meets the scene turned as it is in the middle of the exposure.
+    """
+    kept: list[Effect] = [effect for effect in path.effects if effect is not motion]
+    if motion.blur is not None:
+        kept.append(motion.blur)
+    turn = motion.mean_turn
+    if abs(turn) > path.settings.tolerance:
+        kept = [effect.seen_by_turned(turn) for effect in kept]
+    effects = tuple(kept)
+    return replace(path, effects=effects, transfer=path.transfer.with_effects(effects))
+
+
+def _fine_image(
+    still: OpticalPath,
+    scene: Scene,
+    motion: SubExposedMotion,
+    path: OpticalPath,
+    form_image: FormImage,
+) -> tuple[FineImage, SpectrumReport]:
+    """Return the still image on places as fine as the tolerance asks for."""
+    per_pixel = FEWEST_PLACES
+    if isinstance(scene, WaveScene):
+        highest = max((math.hypot(w.fx, w.fy) for w in scene.waves), default=0.0)
+        highest = min(highest, path.transfer.cutoff)
+        pitch = max(path.geometry.pitch_x, path.geometry.pitch_y)
+        per_pixel = min(max(per_pixel, math.ceil(PER_WAVE * highest * pitch)), MOST_PLACES)
+    while True:
+        image, report = _image_on(still, scene, motion, per_pixel, form_image)
+        allowed = PLACE_SHARE * path.settings.tolerance * image.full_signal
+        if image.error <= allowed or per_pixel >= MOST_PLACES:
+            return image, report
+        per_pixel = min(math.ceil(GROWTH * per_pixel), MOST_PLACES)
+
+
+def _image_on(
+    still: OpticalPath,
+    scene: Scene,
+    motion: SubExposedMotion,
+    per_pixel: int,
+    form_image: FormImage,
+) -> tuple[FineImage, SpectrumReport]:
+    """Return the still image on so many places along each side of a pixel."""
+    g = still.geometry
+    border = math.ceil(motion.travel / min(g.pitch_x, g.pitch_y)) + 1
+    rows, columns = (per_pixel * (count + 2 * border) for count in (g.rows, g.columns))
+    fine = replace(
+        g,
+        rows=rows,
+        columns=columns,
+        pitch_x=g.pitch_x / per_pixel,
+        pitch_y=g.pitch_y / per_pixel,
+        sensor_width=columns * g.pitch_x / per_pixel,
+        sensor_height=rows * g.pitch_y / per_pixel,
+    )
+    knobs = still.settings
+    if knobs.oversampling is not None:
+        knobs = replace(knobs, oversampling=max(1.0, knobs.oversampling / per_pixel))
+    there = replace(still, geometry=fine, settings=knobs)
+    count = len(still.mosaic.colors)
+    needed = memory_model.sub_exposure_bytes(fine, knobs, count)
+    memory.require(needed, g.rows, g.columns)
+    layers, report = form_image(there, scene)
+    values: NDArray = np.zeros((count, rows, columns), knobs.dtype)
+    x, y = (axis.astype(values.dtype) for axis in pixel_centers(fine))
+    for layer in layers:
+        each(partial(_add, values, layer, x, y), blocks(rows), still.workers)
+    full = min(float(values.max(initial=0.0)), still.ceiling)
+    error = max(_error_between(plane) for plane in values) / 2**DECAY
+    each(partial(_filter_plane, values), list(range(count)), still.workers)
+    needed += report.memory
+    return FineImage(values, fine, error, full), replace(report, memory=needed)
+
+
+def _add(values: NDArray, layer: Layer, x: NDArray, y: NDArray, rows: slice) -> None:
+    """Add a layer to rows of the fine image of every color."""
+    for color, plane in enumerate(values):
+        tile = layer.values(color, rows)
+        plane[rows] += tile if layer.weight is None else tile * layer.weight(x, y[rows])
+
+
+def _filter_plane(values: NDArray, color: int) -> None:
+    """Put the coefficients of splines in the place of the values of a color."""
+    values[color] = ndimage.spline_filter(
+        values[color], order=ORDER, output=values.dtype, mode="mirror"
+    )
+
+
+def _error_between(plane: NDArray) -> float:
+    """Return the rms error of splines through every second value at those left out.
+
+    Along each axis by itself, on some lines; of the two together the sum of squares.
+    """
+    squares = 0.0
+    for values in (plane, plane.T):
+        some = values[:: max(1, len(values) // LINES)]
+        odd = some.shape[1] - some.shape[1] % 2
+        known = ndimage.spline_filter1d(
+            some[:, 0:odd:2].astype(float), order=ORDER, axis=1, mode="mirror"
+        )
+        found = _between(known, np.arange(odd // 2) + 0.5)
+        inner = slice(ORDER, -ORDER if odd // 2 > 2 * ORDER else None)
+        missed = (found - some[:, 1:odd:2])[:, inner]
+        squares += float(np.square(missed, dtype=np.float64).mean()) if missed.size else 0.0
+    return math.sqrt(squares)
+
+
+def _between(coefficients: NDArray, at: NDArray) -> NDArray:
+    """Return splines along the second axis, of coefficients (m, n), at places (p,): (m, p)."""
+    return np.array(
+        [
+            ndimage.map_coordinates(line, [at], order=ORDER, prefilter=False, mode="mirror")
+            for line in coefficients
+        ]
+    )
+
+
+@dataclass(frozen=True)
+class _Exposure:
+    """The mean over instants."""
+
+    image: FineImage
+    motion: SubExposedMotion
+    shares: NDArray
+    weights: NDArray
+
+    def signal(self, color: int, x: NDArray, y: NDArray) -> NDArray:
+        """Return the signal of a color in rows y (rows,) and columns x (columns,) [e/s]."""
+        out = np.zeros((len(y), len(x)), self.image.coefficients.dtype)
+        for share, weight in self.instants():
+            at_x, at_y = np.broadcast_arrays(*self.motion.still_places(x, y, share))
+            at_x, at_y = (np.broadcast_to(at, out.shape) for at in (at_x, at_y))
+            out += out.dtype.type(weight) * self.image.look(color, at_x, at_y)
+        return out
+
+    def instants(self) -> Iterator[tuple[float, float]]:
+        """Yield instants as shares of the exposure, and their weights."""
+        yield from zip(self.shares.tolist(), self.weights.tolist(), strict=True)
+
+
+def _quadrature(count: int) -> tuple[NDArray, NDArray]:
+    """Return instants of the exposure as shares of it, and their weights."""
+    nodes, weights = np.polynomial.legendre.leggauss(count)
+    return (nodes + 1) / 2, weights / 2
+
+
+def _instants(
+    path: OpticalPath, image: FineImage, motion: SubExposedMotion, x: NDArray, y: NDArray
+) -> tuple[int, float]:
+    """Return the fewest instants whose error is within its share, and that error [e/s]."""
+    if motion.blur is not None:
+        return 1, 0.0
+    allowed = INSTANT_SHARE * path.settings.tolerance * image.full_signal
+    pitch = min(path.geometry.pitch_x, path.geometry.pitch_y)
+    least = max(FEWEST_INSTANTS, math.ceil(motion.longest_path / pitch))
+    count = min(least, MOST_INSTANTS)
+    colors = range(len(image.coefficients))
+
+    def rows(count: int) -> NDArray:
+        exposure = _Exposure(image, motion, *_quadrature(count))
+        return np.array([exposure.signal(color, x, y) for color in colors])
+
+    coarse = rows(count)
+    while True:
+        more = math.ceil(GROWTH * count)
+        fine = rows(more)
+        squares = np.square(fine - coarse, dtype=np.float64).mean(axis=(1, 2))
+        error = math.sqrt(float(squares.max()))
+        if error <= allowed or more > MOST_INSTANTS:
+            return count, error
+        count, coarse = more, fine
