@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from vcam_cli.scheduling import flow_bound, weighted_schedules
+from vcam_cli.scheduling.chain_bound import upper_bounds
 from vcam_cli.scheduling.mixtures import best_mixture
 from vcam_cli.scheduling.pdf import Pdf
 from vcam_cli.scheduling.sensor import Constraints, Sensor
-from vcam_cli.scheduling.weighted_snr import upper_bounds, weighted_expected_snr
+from vcam_cli.scheduling.weighted_snr import weighted_expected_snr
 
 FRAME = 10e-3
 
@@ -100,13 +101,13 @@ def test_no_schedule_exceeds_it_and_the_best_comes_close(name, pdf, reset, gap):
     [(20e-3, [2, 4]), pytest.param(5e-3, [2, 3, 4, 6, 8, 12], marks=pytest.mark.long)],
 )
 def test_it_closes_the_gap_of_the_study_in_low_light(frame, counts):
-    """Below 1 % for all; 4 to 21 % by the bound of chains alone."""
+    """Below 1 % for all; 9 % for four captures by the bound of chains alone."""
     pdf = Pdf.segments([0, 500], [500, 5000], [0.8, 0.2])
     sensor, constraints = Sensor(1000, 20, 10, 20, 1.0), Constraints(0.0, frame)
     found = weighted_schedules.optimal_schedules(pdf, counts, sensor, constraints)
     assert max(schedule.gap for schedule in found.values()) < 0.01
     chains = upper_bounds(pdf, 4, sensor, constraints)
-    assert chains[3] / found[4].expected_snr > 1.1
+    assert chains[3] / found[4].expected_snr > 1.05
 
 
 @pytest.mark.parametrize(

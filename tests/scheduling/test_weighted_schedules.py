@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 
 from vcam_cli.scheduling import full_noise, objective
+from vcam_cli.scheduling.chain_bound import upper_bounds
 from vcam_cli.scheduling.estimators import weighted_variance
 from vcam_cli.scheduling.pdf import Pdf
 from vcam_cli.scheduling.sensor import UNCONSTRAINED, Constraints, Sensor, first_capture_time
 from vcam_cli.scheduling.weighted_schedules import optimal_schedules
-from vcam_cli.scheduling.weighted_snr import upper_bounds, weighted_expected_snr
+from vcam_cli.scheduling.weighted_snr import weighted_expected_snr
 
 DATA = json.loads((Path(__file__).parents[1] / "data/capture_schedules_noise.json").read_text())
 SEGMENTS = np.array(DATA["segments_e"]).T

@@ -77,36 +77,12 @@ class Rewards:
 
 def last_sample_rewards(pdf: Pdf, times: Floats, sensor: Sensor) -> Rewards:
     """Return the rewards under eq 4.1 with the last sample before saturation; times rise [s]."""
-    exposures = [(times, sensor.dark + sensor.noise_floor / times)]
-    return rewards_of_exposures(pdf, times, exposures, sensor)[0]
-
-
-def rewards_of_exposures(
-    pdf: Pdf, times: Floats, exposures: list[tuple[Floats, Floats]], sensor: Sensor
-) -> list[Rewards]:
-    """Return the rewards t i^2 / (i + c) for several pairs of exposures and noises.
-
-    Parameters
-    ----------
-    pdf : Pdf
-        Photocurrents of the scene [e/s].
-    times : (G,) array
-        Rising times that decide which photocurrents are saturated [s].
-    exposures : list of pairs of (G,) arrays
-        Exposures t [s] and noises c [e/s]. All of them share one table.
-    sensor : Sensor
-        The pixel.
-    """
-    noises = np.concatenate([noise for _, noise in exposures])
-    distinct, inverse = np.unique(noises, return_inverse=True)
-    nodes, block, weights = _interpolation(distinct)
+    noise, inverse = np.unique(sensor.dark + sensor.noise_floor / times, return_inverse=True)
+    nodes, block, weights = _interpolation(noise)
     sums = _cumulative_integrals(pdf, times, sensor, nodes)
-    rewards = []
-    for (exposure, _), part in zip(exposures, np.split(inverse, len(exposures)), strict=True):
-        weight = weights[part] * exposure[:, None]
-        own = np.einsum("gp,gp->g", weight, sums[np.arange(len(times)), block[part]])
-        rewards.append(Rewards(np.asarray(own), block[part], weight, sums))
-    return rewards
+    block, weights = block[inverse], weights[inverse] * times[:, None]
+    own = np.einsum("gp,gp->g", weights, sums[np.arange(len(times)), block])
+    return Rewards(np.asarray(own), block, weights, sums)
 
 
 @dataclass(frozen=True)

@@ -33,16 +33,16 @@ References
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vcam_cli.scheduling.chain_bound import upper_bounds
 from vcam_cli.scheduling.mixtures import best_mixture
 from vcam_cli.scheduling.pdf import Floats, Indices, Pdf
-from vcam_cli.scheduling.sensor import SLACK, Constraints, Sensor, first_capture_time
-from vcam_cli.scheduling.weighted_snr import NARROW, ROUGH, gauss_rule, split_octaves, upper_bounds
+from vcam_cli.scheduling.sensor import Constraints, Sensor, first_capture_time
+from vcam_cli.scheduling.weighted_snr import Pixels, pixels_by_saturation
 
 MOST_FRAMES, MOST_PIXELS = 200, 4096
 """Frames and kinds of pixels up to which the bound is worked out: a few seconds."""
@@ -56,34 +56,11 @@ CLOSE = 2e-4
 """Relative distance of a mixture from the best one that ends the search."""
 
 
-@dataclass(frozen=True)
-class Pixels:
-    """Kinds of pixels: nodes of a quadrature over the pdf.
-
-    Parameters
-    ----------
-    rate : (M,) array
-        Photocurrent and dark current [e/s].
-    weight : (M,) array
-        Probability times i^2.
-    last : (M,) array
-        Index of the last frame before saturation.
-    """
-
-    rate: Floats
-    weight: Floats
-    last: Indices
-
-    def chosen(self, which: NDArray[np.bool_]) -> "Pixels":
-        """Return some of the pixels."""
-        return Pixels(self.rate[which], self.weight[which], self.last[which])
-
-
 @lru_cache(maxsize=8)
 def least_bounds(
     pdf: Pdf, counts: tuple[int, ...], sensor: Sensor, constraints: Constraints
 ) -> tuple[float, ...]:
-    """Return the lower of `flow_bounds` and `weighted_snr.upper_bounds` for each count.
+    """Return the lower of `flow_bounds` and `chain_bound.upper_bounds` for each count.
 
     Parameters
     ----------
@@ -136,7 +113,7 @@ def flow_bounds(
     if end - first >= MOST_FRAMES:
         return unknown
     frames = np.arange(first, end + 1, dtype=np.float64) * constraints.frame_time
-    pixels = _pixels(pdf, frames, sensor)
+    pixels = pixels_by_saturation(pdf, frames, sensor)
     if len(pixels.rate) > MOST_PIXELS:
         return unknown
     gap = max(1, round(constraints.read_interval / constraints.frame_time))
@@ -147,39 +124,6 @@ def flow_bounds(
     return unknown | {count: problem.bound(count) for count in fitting}
 
 
-def _pixels(pdf: Pdf, frames: Floats, sensor: Sensor) -> Pixels:
-    """Return nodes of a quadrature that is good to 1e-9, as in `weighted_snr.mean_snr`."""
-    if pdf.discrete:
-        i, share = pdf.low, pdf.probability
-    else:
-        limits = sensor.saturation_limit(frames)
-        inside = limits[(limits > pdf.low[0]) & (limits < pdf.high[-1])]
-        edges = np.unique(np.concatenate([pdf.low, pdf.high, inside]))
-        low, high = edges[:-1], edges[1:]
-        middle = low + (high - low) / 2
-        segment = np.minimum(np.searchsorted(pdf.high, middle, side="right"), len(pdf.low) - 1)
-        density = np.where(pdf.low[segment] <= middle, pdf.density[segment], 0.0)
-        shift = np.full(len(low), sensor.dark + sensor.read**2 / frames.sum())
-        part, low, high, _ = split_octaves(low, high, shift)
-        i, share = _nodes(low, high, density[part])
-    used = (share > 0) & (i > 0)
-    rate = i[used] + sensor.dark
-    filled = sensor.well * (1 + SLACK) / frames  # the largest rate that each frame holds
-    last = len(frames) - 1 - np.searchsorted(filled[::-1], rate * (1 - SLACK), side="left")
-    return Pixels(rate, share[used] * i[used] ** 2, last)
-
-
-def _nodes(low: Floats, high: Floats, density: Floats) -> tuple[Floats, Floats]:
-    """Return photocurrents and probabilities, fewer of them in narrow segments."""
-    parts = []
-    for order, which in ((3, high <= NARROW * low), (ROUGH, high > NARROW * low)):
-        points, weights = gauss_rule(order)
-        half = (high[which] - low[which]) / 2
-        i = (low[which] + half)[:, None] + half[:, None] * points
-        parts.append((i.ravel(), ((density[which] * half)[:, None] * weights).ravel()))
-    return np.concatenate([i for i, _ in parts]), np.concatenate([share for _, share in parts])
-
-
 class _Flow:
     """The relaxed problem: mixtures of paths through the frames."""
 
@@ -187,7 +131,7 @@ class _Flow:
         self.frames, self.sensor = frames, sensor
         size = len(frames)
         self.lasting = pixels.chosen(pixels.last == size - 1)
-        saturating = pixels.chosen((pixels.last >= 0) & (pixels.last < size - 1))
+        saturating = pixels.chosen(pixels.last < size - 1)
         own = np.arange(size)
         self.allowed = own[None, :] >= own[:, None] + gap
         self.earned = [

@@ -1,4 +1,4 @@
-"""The mean SNR of the best linear estimate from all samples before saturation, and its bound.
+"""The mean SNR of the best linear estimate from all samples before saturation; pixels for bounds.
 
 With k samples of one integration before saturation the estimate's SNR is i^2 t' C^-1 t, with
 
@@ -12,35 +12,22 @@ real, negative and at least read^2 / (t_1 + .. + t_k) from 0: generalized eigenv
 min(t_j, t_l). Segments whose ends are at most a factor 2 apart, counted from that distance, have
 their poles three half-widths from their middle, where each node gains a factor 34.
 
-The bound: after k captures, the last at T, the estimate's variance is the least of
-s w' m w + w' N w over weights with w' t = 1, m = min(t_j, t_l), N = read^2 + reset^2 11'. Apart,
-the two are at least s / T (the last sample, free of noise) and 1 / B_k,
-
-    B_k = max t' N^-1 t over the times of captures 2..k in [t_1, T]:
-
-a convex function, greatest where each is at one end. So
-
-    SNR <= i^2 / (s / T + 1 / B_k(T)) = T i^2 / (i + c_k),   c_k = dark + T / B_k(T),
-
-which grows with T and k: a chain of rewards again, one stage a capture, with a global optimum.
-
 References
 ----------
 .. [1] X. Liu and A. El Gamal, "Synthesis of high dynamic range motion blur free image from multiple
    captures", IEEE Trans. Circuits Syst. I 50(4), 2003, doi:10.1109/TCSI.2003.809815.
 """
 
+from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from vcam_cli.scheduling import objective
-from vcam_cli.scheduling.candidates import Candidates, candidate_times, level_candidates
-from vcam_cli.scheduling.chains import Rewards, rewards_of_exposures, row_maxima
 from vcam_cli.scheduling.objective import TINY, sorted_times
 from vcam_cli.scheduling.pdf import Floats, Indices, Pdf
-from vcam_cli.scheduling.sensor import SLACK, UNCONSTRAINED, Constraints, Sensor
+from vcam_cli.scheduling.sensor import SLACK, Sensor
 
 EXACT = 11
 """Gauss points for a relative error of 1e-16."""
@@ -109,49 +96,6 @@ def mean_snr(pdf: Pdf, schedules: Floats, sensor: Sensor, order: int = EXACT) ->
         value = i * i * _precision(i + sensor.dark, when, samples, sensor) @ (weights / 2)
         total += np.bincount(row[chosen], probability[chosen] * value, len(schedules))
     return total
-
-
-def upper_bounds(
-    pdf: Pdf, most: int, sensor: Sensor, constraints: Constraints = UNCONSTRAINED
-) -> Floats:
-    """Return the mean SNR that no schedule of 1, 2, .. captures exceeds.
-
-    A capture inside a cell of candidates is given the exposure of the cell's end and the
-    saturation of its beginning, which is only more.
-
-    Parameters
-    ----------
-    pdf : Pdf
-        Photocurrents of the scene [e/s].
-    most : int
-        The largest number of captures, at least 1.
-    sensor : Sensor
-        The pixel.
-    constraints : Constraints
-        What the readout demands.
-
-    Returns
-    -------
-    (most,) array
-        Upper bounds, as power ratios.
-
-    Raises
-    ------
-    ValueError
-        If `most` is below 1, or no whole frame is as short as the first capture must be.
-    """
-    if most < 1:
-        raise ValueError("at least one capture is needed")
-    cells = _bound_cells(pdf, sensor, constraints)
-    exposures = [
-        (reach, sensor.dark + reach / _information(k, cells.times[0], reach, sensor))
-        for k, reach in enumerate([cells.times, *[cells.end] * (most - 1)], start=1)
-    ]
-    stages = rewards_of_exposures(pdf, cells.times, exposures, sensor)
-    last = _last_predecessors(cells, constraints.read_interval)
-    best = np.maximum.accumulate(_chain_values(stages, last))
-    full_wells = cells.tail * (1 + sensor.noise_floor / sensor.well)  # the tail at a full well each
-    return np.asarray(best + full_wells)
 
 
 @cache
@@ -249,64 +193,74 @@ def split_octaves(
     return source, bottom, top, (top - bottom) / (high - low)[source]
 
 
-def _bound_cells(pdf: Pdf, sensor: Sensor, constraints: Constraints) -> Candidates:
-    if pdf.discrete:
-        return level_candidates(pdf, sensor, constraints)
-    frames = Constraints(0.0, constraints.frame_time)
-    cells = candidate_times(pdf, sensor, frames, 1)
-    return Candidates(cells.times, cells.times, cells.end, tail=cells.tail)
+@dataclass(frozen=True)
+class Pixels:
+    """Kinds of pixels: nodes of a quadrature over the pdf.
 
-
-def _information(k: int, first: float, last: Floats, sensor: Sensor) -> Floats:
-    """Return B_k(T) of the formula above for T = `last` (G,) and t_1 = `first`; may be infinite."""
-    read, reset = sensor.read**2, sensor.reset**2
-    if k == 1:
-        return last**2 / sensor.noise_floor if sensor.noise_floor else np.full(last.shape, np.inf)
-    if not read:
-        same = first**2 / reset if reset else np.inf
-        return np.where(last > first, np.inf, same)  # the difference of two is free of reset
-    early = np.arange(1, k)[:, None]
-    square = early * first**2 + (k - early) * last**2
-    total = early * first + (k - early) * last
-    values = (square - total**2 * (reset / (read + k * reset))) / read
-    return np.asarray(values.max(axis=0))
-
-
-def _last_predecessors(cells: Candidates, gap: float) -> Indices:
-    """Return the last candidate that each may follow; -1 where it may follow none."""
-    own = np.arange(len(cells.times))
-    if not gap:
-        return own
-    latest = np.searchsorted(cells.begin, cells.end * (1 + SLACK) - gap, side="right") - 1
-    return np.minimum(latest, own)
-
-
-def _chain_values(stages: list[Rewards], last: Indices) -> Floats:
-    """Return (N,) the best value of chains of exactly 1..N captures; -inf where they do not fit.
-
-    ahead[l]: value of all captures before the one at l. Rows l >= `start` can be reached.
+    Parameters
+    ----------
+    rate : (M,) array
+        Photocurrent and dark current [e/s].
+    weight : (M,) array
+        Probability times i^2.
+    last : (M,) array
+        Index of the last time before saturation.
     """
-    size = len(last)
-    values = np.full(len(stages), -np.inf)
-    values[0] = stages[0].own[0]
-    ahead, start = np.zeros(1), 0
-    for k in range(1, len(stages)):
-        begin = int(np.searchsorted(last, start, side="left"))
-        if begin == size:
-            break
-        ahead = _advance(stages[k - 1], ahead, start, last, begin)
-        start = begin
-        values[k] = float(np.max(ahead + stages[k].own[start:]))
-    return values
+
+    rate: Floats
+    weight: Floats
+    last: Indices
+
+    def chosen(self, which: NDArray[np.bool_]) -> "Pixels":
+        """Return some of the pixels."""
+        return Pixels(self.rate[which], self.weight[which], self.last[which])
 
 
-def _advance(before: Rewards, ahead: Floats, start: int, last: Indices, begin: int) -> Floats:
-    """Return `ahead` of rows `begin` on, from that of columns `start` on, of the capture before."""
+def pixels_by_saturation(pdf: Pdf, times: Floats, sensor: Sensor, order: int = ROUGH) -> Pixels:
+    """Return nodes of a quadrature as in `mean_snr`, of lit pixels.
 
-    def value(rows: Indices, columns: Indices) -> Floats:
-        earned = before.own[columns] - before.loss(columns, rows + begin)
-        return ahead[columns - start] + earned
+    Parameters
+    ----------
+    pdf : Pdf
+        Photocurrents of the scene [e/s].
+    times : (T,) array
+        Rising times, in one of which each pixel shall saturate or not as a whole [s].
+    sensor : Sensor
+        The pixel.
+    order : int
+        Number of Gauss points on a segment.
 
-    lower = np.full(len(last) - begin, start)
-    upper = np.minimum(last[begin:], start + len(ahead) - 1)
-    return row_maxima(value, lower, upper)[0]
+    Returns
+    -------
+    Pixels
+        Those that do not saturate in the first of the times.
+    """
+    if pdf.discrete:
+        i, share = pdf.low, pdf.probability
+    else:
+        limits = sensor.saturation_limit(times)
+        inside = limits[(limits > pdf.low[0]) & (limits < pdf.high[-1])]
+        edges = np.unique(np.concatenate([pdf.low, pdf.high, inside]))
+        low, high = edges[:-1], edges[1:]
+        middle = low + (high - low) / 2
+        segment = np.minimum(np.searchsorted(pdf.high, middle, side="right"), len(pdf.low) - 1)
+        density = np.where(pdf.low[segment] <= middle, pdf.density[segment], 0.0)
+        shift = np.full(len(low), sensor.dark + sensor.read**2 / times.sum())
+        part, low, high, _ = split_octaves(low, high, shift)
+        i, share = _nodes(low, high, density[part], order)
+    rate = i + sensor.dark
+    filled = sensor.well * (1 + SLACK) / times  # the largest rate that each time holds
+    last = len(times) - 1 - np.searchsorted(filled[::-1], rate * (1 - SLACK), side="left")
+    used = (share > 0) & (i > 0) & (last >= 0)
+    return Pixels(rate[used], share[used] * i[used] ** 2, last[used])
+
+
+def _nodes(low: Floats, high: Floats, density: Floats, order: int) -> tuple[Floats, Floats]:
+    """Return photocurrents and probabilities, fewer of them in narrow segments."""
+    parts = []
+    for nodes, which in ((3, high <= NARROW * low), (order, high > NARROW * low)):
+        points, weights = gauss_rule(nodes)
+        half = (high[which] - low[which]) / 2
+        i = (low[which] + half)[:, None] + half[:, None] * points
+        parts.append((i.ravel(), ((density[which] * half)[:, None] * weights).ravel()))
+    return np.concatenate([i for i, _ in parts]), np.concatenate([share for _, share in parts])
