@@ -15,7 +15,7 @@ from vcam_cli import load, simulate, sweep
 from vcam_cli.errors import BadInput, CannotDo
 from vcam_cli.files import atomic
 from vcam_cli.files.points_store import SweepFolder
-from vcam_cli.sweeps import computation, point_work, workers
+from vcam_cli.sweeps import point_execution, point_work, workers
 from vcam_cli.sweeps.sweep import Share
 
 TABLES = ("points.csv", "optimum.csv")
@@ -112,7 +112,7 @@ def test_points_of_other_machines_add_up_where_they_are_brought_together(long, t
 @pytest.mark.parametrize("of", [1, 2, 3, 8, 20])
 def test_every_point_is_in_one_share(groups, of):
     made = [[f"{g}-{i}" for i in range(n)] for g, n in enumerate(groups)]
-    shares = [computation._groups_of_share(made, Share(i + 1, of)) for i in range(of)]
+    shares = [point_execution.groups_of_share(made, Share(i + 1, of)) for i in range(of)]
     flat = [job for share in shares for group in share for job in group]
     assert sorted(flat) == sorted(job for group in made for job in group)
 

@@ -1,5 +1,7 @@
 """The finished points of a sweep: a small file each, in the folder `points` of its output.
 
+The frames of a data set are such points, too.
+
 A file is written whole, under the hash of all that the point depends on, with a check of its own
 and the hashes of the files beside it: what is there and agrees is finished, whoever wrote it. So a
 sweep may be killed at any moment, and several processes may work in one folder. They share the work
@@ -26,13 +28,13 @@ from vcam_cli.files.records import PROGRAM, Fingerprint, Proofs, fingerprint, re
 from vcam_cli.files.report import file_digest, hash_text, to_json
 
 RECORD = "study.json"
-_KEPT = r"[0-9a-f]{32}\.(json|raw\.exr|render\.png)"
+_KEPT = r"[0-9a-f]{32}\.(json|raw\.exr|render\.png|npz)"
 _UNFINISHED = re.compile(rf"\.{_KEPT}\.\d+-[0-9a-f]{{8}}\.part")
 _POINT_FILE = re.compile(rf"{_KEPT}|\.claims|\..*\.part")
 """The names in the folder of points."""
-_STARTING, _FINISHING = (1 << 61) + 1, (1 << 61) + 2
-"""Bytes that a process holds while it looks for other studies, and while it replaces tables."""
-_LARGEST = 1 << 20
+_STARTING, _FINISHING, _PACKING = (1 << 61) + 1, (1 << 61) + 2, (1 << 61) + 3
+"""Bytes that a process holds while it looks for other studies, replaces tables, packs points."""
+_LARGEST = 1 << 26
 """The most bytes that a point's own file can have."""
 _ABANDONED = 3600.0
 """Seconds after which nobody writes a temporary file any more."""
@@ -49,15 +51,16 @@ class SweepFolder:
     Raises on entry BadInput for a folder that is not vcam's, CannotDo where it cannot be made.
     """
 
-    def __init__(self, path: Path | str) -> None:
+    def __init__(self, path: Path | str, record: str = RECORD) -> None:
         self.path = Path(path)
+        self._record = record
         self.corrupted: dict[str, None] = {}
         """Names of files of points that are not as they were written, in the order of reading."""
 
     def __enter__(self) -> Self:
         try:
             if is_foreign(self.path) and not self._holds_only_points():
-                message = f"{self.path} is not empty and holds no {RECORD} of vcam"
+                message = f"{self.path} is not empty and holds no {self._record} of vcam"
                 raise bad("--out", message, "choose a new or empty folder")
             (self.path / POINTS).mkdir(parents=True, exist_ok=True)
             flags = os.O_RDWR | os.O_CREAT | os.O_CLOEXEC | os.O_NOFOLLOW
@@ -77,7 +80,7 @@ class SweepFolder:
     def _holds_only_points(self) -> bool:
         """Tell whether the folder is of a sweep without a record yet, or of other machines."""
         names = set(os.listdir(self.path))
-        if RECORD in names:  # another process has written it since it was looked for
+        if self._record in names:  # another process has written it since it was looked for
             return not is_foreign(self.path)
         if not (self.path / POINTS).is_dir():
             return False
@@ -95,11 +98,11 @@ class SweepFolder:
             self._claim_study(STUDIES + _byte(study))
             require_no_run(self.path)
         with self._locked(_FINISHING):
-            if not os.path.lexists(self.path / RECORD):
+            if not os.path.lexists(self.path / self._record):
                 self._write_record(record, [])
-            former = read_record(self.path / RECORD)
+            former = read_record(self.path / self._record)
             if former is None:
-                message = f"{self.path / RECORD} is no record of vcam"
+                message = f"{self.path / self._record} is no record of vcam"
                 raise bad("--out", message, "move it away, or choose another folder")
             proofs = Proofs(self.path, former)
             proofs.require(proofs.names)
@@ -120,7 +123,7 @@ class SweepFolder:
 
         files: names of files that must have been written with it.
         """
-        path = self._file(key, "json")
+        path = self.file(key, "json")
         try:
             with open(path, "rb") as file:
                 entry = json.loads(file.read(_LARGEST))
@@ -129,7 +132,7 @@ class SweepFolder:
             if not entry["hashes"].keys() >= set(files):
                 return None
             for name, digest in entry["hashes"].items():
-                path = self._file(key, name)
+                path = self.file(key, name)
                 if file_digest(path) != digest:
                     raise ValueError(name)
         except (FileNotFoundError, IsADirectoryError):
@@ -150,20 +153,33 @@ class SweepFolder:
         Raise BadInput where a folder is in the place of one of them, CannotDo.
         """
         for name in ("json", *(files or {})):
-            path = self._file(key, name)
+            path = self.file(key, name)
             if path.is_dir() and not path.is_symlink():
                 raise bad((), f"{POINTS}/{path.name} is a folder", "move it away")
         hashes = {}
         for name, data in (files or {}).items():
             hashes[name] = hashlib.sha256(data).hexdigest()
-            atomic.write_bytes(self._file(key, name), data)
+            atomic.write_bytes(self.file(key, name), data)
         entry = {"program": PROGRAM, "id": key, "point": content, "hashes": hashes}
         entry = json.loads(to_json(entry))  # numbers as they are read back
         text = to_json(entry | {"check": record_check(entry)})
-        atomic.write_text(self._file(key, "json"), text)
+        atomic.write_text(self.file(key, "json"), text)
 
-    def _file(self, key: str, name: str) -> Path:
+    def file(self, key: str, name: str) -> Path:
+        """Return the file of a name that is kept beside a point."""
         return self.path / POINTS / f"{key}.{name}"
+
+    def discard(self, key: str, names: Sequence[str]) -> None:
+        """Remove files of a point."""
+        for name in names:
+            with suppress(OSError):
+                self.file(key, name).unlink(missing_ok=True)
+
+    @contextmanager
+    def packing(self) -> Iterator[None]:
+        """Wait until no other process packs points of this folder, and do it alone."""
+        with self._locked(_PACKING):
+            yield
 
     def claim(self, point: str) -> bool:
         """Claim a point for this process; False where another process has it."""
@@ -204,16 +220,17 @@ class SweepFolder:
         record: Mapping[str, Any],
         inputs: Sequence[Path] = (),
         report: Callable[[Mapping[str, bytes]], Mapping[str, bytes]] | None = None,
+        there: Mapping[str, Fingerprint] | None = None,
     ) -> None:
         """Write tables and plots, each whole, then the record; remove those of former studies.
 
         writers: name of a file -> function that writes it; report: from the bytes of all of these
-        to those of further files. Raise BadInput where one of them would
-        replace an input, or a file that is not as vcam wrote it, CannotDo where one cannot be
-        written.
+        to those of further files; there: further files that have been written already. Raise
+        BadInput where one of them would replace an input, or a file that is not as vcam wrote it,
+        CannotDo where one cannot be written.
         """
         protected = {os.path.realpath(path) for path in inputs}
-        for path in (self.path / name for name in (*writers, RECORD)):
+        for path in (self.path / name for name in (*writers, self._record)):
             if os.path.realpath(path) in protected:
                 message = f"{path} is an input of this study and would be replaced"
                 raise bad("--out", message, "choose another folder")
@@ -221,7 +238,8 @@ class SweepFolder:
         contents |= report(contents) if report else {}
         written = {name: fingerprint(data) for name, data in contents.items()}
         with self._locked(_FINISHING):
-            self._replace(contents, written)
+            self._replace(contents, {**written, **(there or {})})
+            written |= there or {}
             self._write_record(record, sorted(written), written=written)
         self._remove_abandoned()
 
@@ -231,7 +249,7 @@ class SweepFolder:
         Meanwhile the record knows both, so that a sweep after a power cut knows which files are
         vcam's. A file that is as the new one, perhaps of another process, is as good.
         """
-        former = read_record(self.path / RECORD) or {"files": []}
+        former = read_record(self.path / self._record) or {"files": []}
         proofs = Proofs(self.path, former, {"files": [], "written": written})
         proofs.require(proofs.names)
         there = [name for name in former["files"] if name in written]
@@ -255,7 +273,9 @@ class SweepFolder:
         whole = {**record, "program": PROGRAM, "files": names, **more}
         if "pending" not in more:
             whole.pop("pending", None)
-        atomic.write_text(self.path / RECORD, to_json({**whole, "check": record_check(whole)}))
+        atomic.write_text(
+            self.path / self._record, to_json({**whole, "check": record_check(whole)})
+        )
 
 
 def record_check(record: Mapping[str, Any]) -> str:

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import closing
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 from vcam_cli.camera.camera import Camera
-from vcam_cli.errors import BadInput
 from vcam_cli.files.in_use import POINTS
 from vcam_cli.files.plots import in_formats
 from vcam_cli.files.points_store import SweepFolder
@@ -24,12 +22,17 @@ from vcam_cli.sweeps import (
     sweep_points,
     sweep_report,
     sweep_tables,
-    workers,
 )
 from vcam_cli.sweeps.point_effects import effect_differences
-from vcam_cli.sweeps.point_work import Job
+from vcam_cli.sweeps.point_execution import (
+    claim_point,
+    compute,
+    groups_of_share,
+    keep_outcome,
+)
+from vcam_cli.sweeps.point_work import Job, Task
 from vcam_cli.sweeps.study_cameras import StudyCameras
-from vcam_cli.sweeps.sweep import Execution, Share
+from vcam_cli.sweeps.sweep import Execution
 from vcam_cli.sweeps.sweep_file import StudyFile
 from vcam_cli.sweeps.sweep_points import LIBRARIES, Grid
 from vcam_cli.sweeps.sweep_result import (
@@ -37,11 +40,10 @@ from vcam_cli.sweeps.sweep_result import (
     Extras,
     Outcome,
     SweepResult,
-    error_cell,
     read_outcome,
 )
 from vcam_cli.sweeps.sweep_tables import Findings
-from vcam_cli.sweeps.workers import Verdict
+from vcam_cli.sweeps.workers import Groups, Verdict
 
 
 def computed_sweep(
@@ -72,7 +74,7 @@ def computed_sweep(
         if folder.corrupted:
             names, shown = list(folder.corrupted), ", ".join(list(folder.corrupted)[:3])
             tell(f"computed again, since corrupted: {POINTS}/{shown}" + _more_text(names, 3))
-        computed = _compute(points, execution, watch, tell)
+        computed = 0 if points.are_final else _compute(points, execution, watch, tell)
         if differences := effect_differences(grid.points):
             tell(differences)
         findings = Findings(grid, points.outcomes)
@@ -143,29 +145,18 @@ class _Points:
             groups.setdefault(lights[point.content], []).append(job)
         return list(groups.values())
 
-    def unfinished_points(self, groups: list[list[Job]]) -> list[list[Job]]:
+    def unfinished_points(self, groups: Groups) -> list[list[Task]]:
         """Return the points of these groups that are not finished."""
         final = {point for point, outcome in self.outcomes.items() if outcome.final}
         return [[job for job in group if job.id not in final] for group in groups]
 
-    def ask(self, job: Job) -> Verdict:
+    def ask(self, job: Task) -> Verdict:
         """Return whether a point is still to be computed, and claim it then."""
-        if not self._folder.claim(job.id):
-            return "claimed"
-        if not self._fresh and self._read(job.id):
-            self._folder.release(job.id)
-            return "finished"
-        return "compute"
+        return claim_point(self._folder, job.id, lambda: not self._fresh and self._read(job.id))
 
     def keep(self, outcome: Outcome) -> None:
         """Keep the outcome of a point; one that cannot be kept ends with an error."""
-        content = outcome.content() | {"code": self._versions["code"]}
-        try:
-            self._folder.write(outcome.id, content, outcome.frames)
-        except BadInput as error:
-            outcome = Outcome(outcome.id, error=error_cell(error.problems), final=False)
-        self._folder.release(outcome.id)
-        self.outcomes[outcome.id] = replace(outcome, frames={})
+        self.outcomes[outcome.id] = keep_outcome(self._folder, outcome, self._versions["code"])
 
 
 def _changes(former: Any, versions: dict[str, str]) -> str:
@@ -185,59 +176,12 @@ def _without_texts(camera: Camera) -> Camera:
     return bare
 
 
-def _groups_of_share(groups: list[list[Job]], share: Share | None) -> list[list[Job]]:
-    """Return the groups of a share: whole groups where there are enough, parts of them otherwise.
-
-    They depend on the study alone: a point that is finished keeps its place.
-    """
-    if share is None:
-        return groups
-    last, count = share.number, share.count
-    if len(groups) >= count:
-        return groups[last - 1 :: count]
-    ends = [(len(g) * (last - 1) // count, len(g) * last // count) for g in groups]
-    return [group[start:end] for group, (start, end) in zip(groups, ends, strict=True)]
-
-
 def _compute(
     points: _Points, execution: Execution, watch: Observer, tell: Callable[[str], None]
 ) -> int:
-    """Compute what is left, and return the number of points computed."""
-    if points.are_final:
-        return 0
-    groups = points.unfinished_points(_groups_of_share(points.groups(), execution.share))
-    total = sum(len(group) for group in groups)
-    if not total:
-        return 0
-    watch.begin("sweep")
-    watch.step(0, total)
-    computed, has_told = 0, False
-    outcomes = _outcomes(groups, total, points, execution, tell)
-    with closing(outcomes):  # type: ignore[type-var]
-        for outcome in outcomes:
-            points.keep(outcome)
-            computed += 1
-            watch.step(computed, total)
-            if outcome.trace and not has_told:
-                tell(outcome.trace)
-                has_told = True
-    return computed
-
-
-def _outcomes(
-    groups: list[list[Job]],
-    total: int,
-    points: _Points,
-    execution: Execution,
-    tell: Callable[[str], None],
-) -> Iterator[Outcome]:
-    """Yield the outcomes of points as they are computed, on a cluster or on this machine."""
-    if execution.scheduler is not None:
-        return workers.compute_on_dask(groups, points.ask, execution.scheduler, tell)
-    processes, threads = workers.processes_and_threads(execution.workers, total)
-    if processes == 1:
-        return workers.compute_here(groups, points.ask, threads)
-    return workers.compute_in_processes(groups, points.ask, processes, threads)
+    """Compute what is left of a share, and return the number of points computed."""
+    groups = points.unfinished_points(groups_of_share(points.groups(), execution.share))
+    return compute(groups, points, execution, watch, tell)
 
 
 def _more_text(names: Sequence[str], shown: int) -> str:

@@ -1,10 +1,11 @@
-"""Computing a point of a sweep: wherever it runs, the same numbers come back."""
+"""Computing a point of a sweep, or a frame of a data set: wherever it runs, the same comes back."""
 
 from __future__ import annotations
 
 import time
 import traceback
 from dataclasses import dataclass
+from typing import Protocol
 
 from vcam_cli.camera.camera import Camera
 from vcam_cli.errors import BadInput, CannotDo, one_line
@@ -21,6 +22,21 @@ from vcam_cli.sweeps.point_effects import with_every_effect
 from vcam_cli.sweeps.sweep_result import FRAMES, Outcome, error_cell
 
 
+class Task(Protocol):
+    """What a worker computes."""
+
+    @property
+    def id(self) -> str:
+        """The hash of all that its numbers depend on."""
+
+    @property
+    def versions(self) -> dict[str, str]:
+        """The hash of the code, and the versions of the libraries, of the process that asks."""
+
+    def compute(self, threads: int, shared: Shared) -> tuple[dict[str, float], dict[str, bytes]]:
+        """Return its numbers, and the files that are kept of it."""
+
+
 @dataclass(frozen=True)
 class Job:
     """A point to compute."""
@@ -35,15 +51,27 @@ class Job:
     versions: dict[str, str]
     """The hash of the code, and the versions of the libraries, of the process that asks."""
 
+    def compute(self, threads: int, shared: Shared) -> tuple[dict[str, float], dict[str, bytes]]:
+        """Return the metrics of the point, and the files that are kept of it."""
+        camera = with_every_effect(self.camera)
+        if "render" not in self.keep:
+            output = camera.output.model_copy(update={"render": None})
+            camera = camera.model_copy(update={"output": output})
+        result = simulate(camera, threads, shared=shared)
+        metrics = {name: result.metrics[name] for name in self.metrics}
+        return metrics, {FRAMES[what]: _frame(what, result) for what in self.keep}
+
 
 @own_float_errors
-def compute_point(job: Job, threads: int, shared: Shared) -> Outcome:
+def compute_point(job: Task, threads: int, shared: Shared) -> Outcome:
     """Return the outcome of a point; an error is one, an interrupt is not."""
     start = time.perf_counter()
     trace, final = "", True
     try:
         with restore_interrupt():
-            metrics, frames = _simulate_point(job, threads, shared)
+            _check_versions(job)
+            metrics, frames = job.compute(threads, shared)
+            _check_versions(job)  # modules are loaded where they are first needed
         return Outcome(job.id, metrics, seconds=time.perf_counter() - start, frames=frames)
     except BadInput as error:
         message = error_cell(error.problems)
@@ -58,30 +86,15 @@ def compute_point(job: Job, threads: int, shared: Shared) -> Outcome:
     return Outcome(job.id, error=message, final=final, seconds=seconds, trace=trace)
 
 
-def _simulate_point(
-    job: Job, threads: int, shared: Shared
-) -> tuple[dict[str, float], dict[str, bytes]]:
-    """Return the metrics of a point, and the files that are kept of it."""
-    _check_versions(job)
-    camera = with_every_effect(job.camera)
-    if "render" not in job.keep:
-        output = camera.output.model_copy(update={"render": None})
-        camera = camera.model_copy(update={"output": output})
-    result = simulate(camera, threads, shared=shared)
-    _check_versions(job)  # modules are loaded where they are first needed
-    metrics = {name: result.metrics[name] for name in job.metrics}
-    return metrics, {FRAMES[what]: _frame(what, result) for what in job.keep}
-
-
 _SHARED = Shared()
 
 
-def compute_on_cluster(job: Job, tasks: int) -> Outcome:
+def compute_on_cluster(job: Task, tasks: int) -> Outcome:
     """Compute a point in a process of a cluster that runs so many tasks at once."""
     return compute_point(job, max(1, available_workers() // max(1, tasks)), _SHARED)
 
 
-def _check_versions(job: Job) -> None:
+def _check_versions(job: Task) -> None:
     """Raise CannotDo where this process has other code or versions than the one that asks."""
     own = versions()
     for name, wanted in job.versions.items():

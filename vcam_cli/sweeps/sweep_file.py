@@ -232,6 +232,8 @@ def refuse_others(tree: Node, wanted: str) -> None:
         message, remedy = "this is a camera file, not a study", "give it to vcam run"
         raise BadInput([tree.problem((), message, remedy)])
     other, message = OTHERS[wanted]
+    if kind is not None and kind.value == "dataset":
+        raise BadInput([kind.problem(("kind",), "this is a data set", "give it to vcam dataset")])
     if kind is not None and kind.value == other:
         raise BadInput([kind.problem(("kind",), message, f"give it to vcam {other}")])
 

@@ -30,14 +30,14 @@ from typing import Any, Literal
 from vcam_cli.errors import CannotDo
 from vcam_cli.parallel import ThreadPool, available_workers
 from vcam_cli.simulation.shared import Shared
-from vcam_cli.sweeps.point_work import Job, compute_on_cluster, compute_point
+from vcam_cli.sweeps.point_work import Task, compute_on_cluster, compute_point
 from vcam_cli.sweeps.sweep_result import Outcome
 
 Verdict = Literal["compute", "finished", "claimed"]
-Ask = Callable[[Job], Verdict]
+Ask = Callable[[Task], Verdict]
 """Tells whether a point is to be computed, is finished, or is claimed by another process."""
-Groups = Sequence[Sequence[Job]]
-Submit = Callable[[int, Job], "Future[Outcome]"]
+Groups = Sequence[Sequence[Task]]
+Submit = Callable[[int, Task], "Future[Outcome]"]
 """Starts to compute a point on the worker of a number."""
 
 SERVE = "import sys; sys.path[:] = {}; from vcam_cli.sweeps.workers import serve; serve({}, {})"
@@ -61,15 +61,15 @@ class JobQueue:
     def __init__(self, groups: Groups, ask: Ask) -> None:
         self._groups = deque(deque(group) for group in groups if group)
         self._ask = ask
-        self._own: dict[int, deque[Job]] = {}
-        self._claimed: deque[Job] = deque()
+        self._own: dict[int, deque[Task]] = {}
+        self._claimed: deque[Task] = deque()
 
     @property
     def waiting(self) -> bool:
         """Whether points of this sweep are claimed by other processes."""
         return bool(self._claimed)
 
-    def next(self, worker: int) -> Job | None:
+    def next(self, worker: int) -> Task | None:
         """Return the next point of a worker; None while there is none."""
         for job in self._candidates(worker):
             verdict = self._ask(job)
@@ -79,14 +79,14 @@ class JobQueue:
                 self._claimed.append(job)
         return None
 
-    def _candidates(self, worker: int) -> Iterator[Job]:
+    def _candidates(self, worker: int) -> Iterator[Task]:
         claimed = len(self._claimed)
         while group := self._group(worker):
             yield group.popleft()
         for _ in range(claimed):
             yield self._claimed.popleft()
 
-    def _group(self, worker: int) -> deque[Job]:
+    def _group(self, worker: int) -> deque[Task]:
         """Return the group of a worker; where none is left, the longest of the others to share."""
         if not self._own.get(worker):
             longest = max(self._own.values(), key=len, default=deque())
@@ -98,7 +98,7 @@ def compute_here(groups: Groups, ask: Ask, threads: int) -> Iterator[Outcome]:
     """Compute one point after the other in this process."""
     shared = Shared()
 
-    def submit(_: int, job: Job) -> Future[Outcome]:
+    def submit(_: int, job: Task) -> Future[Outcome]:
         future: Future[Outcome] = Future()
         future.set_result(compute_point(job, threads, shared))
         return future
@@ -112,7 +112,7 @@ def compute_in_processes(groups: Groups, ask: Ask, count: int, threads: int) -> 
     processes = [WorkerProcess(threads) for _ in range(count)]
     with ThreadPool(count) as pool:
 
-        def submit(worker: int, job: Job) -> Future[Outcome]:
+        def submit(worker: int, job: Task) -> Future[Outcome]:
             return pool.submit(processes[worker].compute, job)
 
         try:
@@ -145,7 +145,7 @@ def _compute_on_dask(
             for name, _ in slots
         ]
 
-        def submit(slot: int, job: Job) -> Future[Outcome]:
+        def submit(slot: int, job: Task) -> Future[Outcome]:
             return executors[slot].submit(compute_on_cluster, job, slots[slot][1])
 
         # Every slot has two points, so that it does not wait for the next one to be sent.
@@ -161,10 +161,10 @@ def _compute_on_dask(
 
 def _run_points(
     queue: JobQueue, workers: Sequence[int], submit: Submit
-) -> Iterator[tuple[Job, Future[Outcome]]]:
+) -> Iterator[tuple[Task, Future[Outcome]]]:
     """Keep workers busy until no point is left; each number is there as often as it has points."""
     idle = deque(workers)
-    running: dict[Future[Outcome], tuple[int, Job]] = {}
+    running: dict[Future[Outcome], tuple[int, Task]] = {}
     while True:
         for worker in [idle.popleft() for _ in range(len(idle))]:
             job = queue.next(worker)
@@ -194,7 +194,7 @@ class WorkerProcess:
         self._process: subprocess.Popen | None = None
         self._connection: Connection
 
-    def compute(self, job: Job) -> Outcome:
+    def compute(self, job: Task) -> Outcome:
         """Compute a point; called by one thread at a time."""
         how = ""
         for _ in range(TRIES):
@@ -253,7 +253,7 @@ def serve(descriptor: int, threads: int) -> None:
             connection.send(compute_point(connection.recv(), threads, shared))
 
 
-def _outcome(job: Job, future: Any, lost: str) -> Outcome:
+def _outcome(job: Task, future: Any, lost: str) -> Outcome:
     """Return the outcome of a point that a cluster has, or has not, computed."""
     if future.cancelled():
         raise CannotDo(lost, "run the same command again")
