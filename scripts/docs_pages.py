@@ -73,14 +73,18 @@ def _camera_keys() -> tuple[str, str, Iterable[Any], dict[str, Any]]:
 def _study_keys() -> tuple[str, str, Iterable[Any], dict[str, Any]]:
     from vcam_cli.capture_schedules.model import ScheduleStudy
     from vcam_cli.config.key_index import keys
+    from vcam_cli.datasets.model import Dataset
     from vcam_cli.sweeps.model import Sweep
 
     found = [
         (kind, key)
-        for kind, model in (("sweep", Sweep), ("schedule", ScheduleStudy))
+        for kind, model in (("sweep", Sweep), ("schedule", ScheduleStudy), ("dataset", Dataset))
         for key in {key.path: key for key in keys(model)}.values()
     ]
-    about = "Every key of a sweep study (`kind: sweep`), then of a schedule (`kind: schedule`)."
+    about = (
+        "Every key of a sweep study (`kind: sweep`), of a schedule (`kind: schedule`), and of a"
+        " data set (`kind: dataset`)."
+    )
     return "Keys of studies", about, found, _definitions("study")
 
 

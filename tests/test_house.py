@@ -41,6 +41,7 @@ FLOORS = (
     {"characterization"},
     {"sweeps"},
     {"capture_schedules"},
+    {"datasets"},
     {"verification"},
     {"fitting"},
     {"commands"},

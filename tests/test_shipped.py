@@ -18,6 +18,7 @@ from vcam_cli.capture_schedules import schedule_file
 from vcam_cli.commands.list_ import first_comment
 from vcam_cli.commands.main import app
 from vcam_cli.config import shipped
+from vcam_cli.datasets import dataset_file
 from vcam_cli.sweeps import expectations, figures, sweep_file, sweep_points
 from vcam_cli.sweeps.study_cameras import StudyCameras
 
@@ -212,6 +213,11 @@ def test_studies_make_their_cameras_and_one_of_each_case_runs(name):
     file = shipped.find("studies", name)
     if "kind: schedule" in file.read_text(encoding="utf-8"):
         assert schedule_file.read(name).model.name == name
+        return
+    if "kind: dataset" in file.read_text(encoding="utf-8"):
+        found = dataset_file.read(name)
+        assert found.model.name == name
+        assert simulate(found.frame(0).camera(found.base)).dn.std() > 0
         return
     grid = sweep_points.grid(sweep_file.read(name))
     cameras = StudyCameras(grid)

@@ -81,7 +81,7 @@ def example() -> Camera:
 def _refuse_study(root: Node) -> None:
     """Raise BadInput where the file is a study and not a camera."""
     kind = root.get("kind")
-    if kind is not None and kind.value in ("sweep", "schedule"):
+    if kind is not None and kind.value in ("sweep", "schedule", "dataset"):
         message, remedy = f"this is a study (kind: {kind.value})", "give a camera file"
         remedy += f", or run the study with vcam {kind.value}"
         raise BadInput([kind.problem(("kind",), message, remedy)])

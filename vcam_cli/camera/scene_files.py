@@ -8,9 +8,9 @@ from pydantic import model_validator
 
 from vcam_cli.camera.motion import MOTION, MaybeMotion
 from vcam_cli.config.model import Model, key
-from vcam_cli.config.quantities import Quantity
+from vcam_cli.config.quantities import Quantity, Whole
 from vcam_cli.config.validation_messages import describe, refusal
-from vcam_cli.config.values import Choice, Either, File, FileName, Positive, Wavelength
+from vcam_cli.config.values import Choice, Either, File, FileName, Positive, Wavelength, mapping
 
 DEPTH = key(
     "distance along the axis [m] at every sample: not built yet", example="depth.exr", default=None
@@ -22,6 +22,25 @@ def refuse_depth(source: Any) -> None:
     """Refuse the depth of a scene that is a file: only flat scenes are built."""
     if source.depth is not None:
         raise refusal(("depth",), "scenes with depth are not built yet", "leave it out")
+
+
+_SAMPLE = Whole(least=0, most=10**9, example="0")
+_COUNT = Whole(least=1, most=10**9, example="512")
+
+
+class Crop(Model):
+    """A rectangle of a picture, upright, in its samples."""
+
+    row: Annotated[int, _SAMPLE] = key("the first row, from 0 at the top", example=0, default=0)
+    column: Annotated[int, _SAMPLE] = key("the first column, from 0 left", example=0, default=0)
+    rows: Annotated[int, _COUNT] = key("number of rows", example=512)
+    columns: Annotated[int, _COUNT] = key("number of columns", example=512)
+
+    @property
+    def window(self) -> tuple[slice, slice]:
+        """Return its rows and columns."""
+        rows = slice(self.row, self.row + self.rows)
+        return rows, slice(self.column, self.column + self.columns)
 
 
 class ImageFile(Model):
@@ -42,6 +61,11 @@ class ImageFile(Model):
         "primaries of the camera file's display), mallett (the smooth reflectances that "
         "have these sRGB colors under D65)",
         default="auto",
+    )
+    crop: Annotated[Crop | None, mapping(Crop)] = key(
+        "the part of the picture that is the scene; default all of it",
+        example={"row": 100, "column": 200, "rows": 512, "columns": 512},
+        default=None,
     )
 
     depth: Annotated[str | None, FileName()] = DEPTH

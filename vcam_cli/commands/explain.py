@@ -72,10 +72,16 @@ def _all_keys() -> tuple[tuple[str, Any], ...]:
     from vcam_cli.camera.hints import index
     from vcam_cli.capture_schedules.model import ScheduleStudy
     from vcam_cli.config.key_index import keys
+    from vcam_cli.datasets.model import Dataset
     from vcam_cli.sweeps.model import Sweep
 
     found = [("camera file", key) for key in index()]
-    for where, model in (("sweep study", Sweep), ("schedule study", ScheduleStudy)):
+    studies: dict[str, Any] = {
+        "sweep study": Sweep,
+        "schedule study": ScheduleStudy,
+        "data set": Dataset,
+    }
+    for where, model in studies.items():
         found += [(where, key) for key in {key.path: key for key in keys(model)}.values()]
     return tuple(found)
 

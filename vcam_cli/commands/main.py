@@ -44,6 +44,7 @@ COMMANDS = {
     "characterize": "characterize:characterize",
     "fit": "fit:fit",
     "verify": "verify:verify",
+    "dataset": "dataset:dataset",
     "compare": "compare:compare",
     "report": "report:report",
     "validate": "validate:validate",

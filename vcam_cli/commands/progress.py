@@ -47,6 +47,7 @@ WORDS = {
     "isetcam": "light for ISETCam",
     "points": "checking all points",
     "sweep": "computing points",
+    "frames": "computing frames",
     "figures": "computing figures",
     "tables": "writing tables",
 }

@@ -16,6 +16,7 @@ from vcam_cli.config.schema import (
     reference,
     with_parts,
 )
+from vcam_cli.datasets.model import Dataset
 from vcam_cli.sweeps.model import KINDS, Case, Sweep
 from vcam_cli.verification.model import Measurement
 
@@ -41,14 +42,15 @@ def schemas() -> dict[str, Schema]:
 def _complete_paths(definitions: Schema) -> None:
     """Add the paths of a camera's keys where a sweep has them, to be completed and explained."""
     paths = {key.dotted: _about(key) for key in keys(Camera)}
-    sweep, case = (definitions[model.__name__]["properties"] for model in (Sweep, Case))
-    for name, mappings in (("vary", (sweep, case)), ("repeat", (sweep,))):
-        value = sweep[name]["additionalProperties"]
+    sweep, case, drawn = (definitions[m.__name__]["properties"] for m in (Sweep, Case, Dataset))
+    listed = (("vary", "", (sweep, case)), ("repeat", "", (sweep,)), ("vary", "drawn ", (drawn,)))
+    for name, kind, mappings in listed:
+        value = mappings[0][name]["additionalProperties"]
         known = {path: about | value for path, about in paths.items()}
-        definitions[f"{name} paths"] = {"properties": known, "additionalProperties": value}
+        definitions[f"{kind}{name} paths"] = {"properties": known, "additionalProperties": value}
         for properties in mappings:
             del properties[name]["additionalProperties"]
-            properties[name] |= {"$ref": reference(f"{name} paths")}
+            properties[name] |= {"$ref": reference(f"{kind}{name} paths")}
     case |= {path: about for path, about in paths.items() if path not in case}
 
 
@@ -60,18 +62,26 @@ def _about(key: Key) -> Schema:
 
 
 def _study_schema() -> Schema:
-    """Return the schema of a study file: of capture schedules where it says so, else a sweep."""
+    """Return the schema of a study file: the kind that it says it is, else a sweep."""
     definitions: Schema = {}
-    for model in (Sweep, ScheduleStudy):
+    for model in (Sweep, ScheduleStudy, Dataset):
         schema = model_schema(model)
         definitions |= schema.pop("$defs") | {model.__name__: schema}
     _complete_paths(definitions)
     either: Schema = {
         "$defs": definitions,
         "type": "object",
-        "properties": {"kind": {"enum": list(KINDS)}},
-        "if": {"properties": {"kind": {"const": "schedule"}}, "required": ["kind"]},
-        "then": {"$ref": reference(ScheduleStudy.__name__)},
-        "else": {"$ref": reference(Sweep.__name__)},
+        "properties": {"kind": {"enum": [*KINDS, "dataset"]}},
+        **_choice("schedule", ScheduleStudy, _choice("dataset", Dataset, _of(Sweep))),
     }
     return file_schema(either, "a study file")
+
+
+def _of(model: type) -> Schema:
+    return {"$ref": reference(model.__name__)}
+
+
+def _choice(kind: str, model: type, other: Schema) -> Schema:
+    """Return the schema of a model where a file says that it is of a kind, else another one."""
+    says_so = {"properties": {"kind": {"const": kind}}, "required": ["kind"]}
+    return {"if": says_so, "then": _of(model), "else": other}

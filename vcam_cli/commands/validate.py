@@ -84,6 +84,10 @@ def _checked_name(file: str, sets: list[str]) -> str:
         from vcam_cli.verification import measurement_file
 
         return measurement_file.read(file).name
+    if kind == "dataset":
+        from vcam_cli.datasets import dataset_file
+
+        return dataset_file.read(file, sets).model.name
     if kind == "schedule":
         return schedule_file.read(file, sets).model.name
     grid = sweep_points.grid(sweep_file.read(file), sets)
@@ -110,4 +114,8 @@ def _study_kind(file: str) -> str | None:
         kind = read_file(path).get("kind")
     except VcamError:  # said when it is read as a camera
         return None
-    return str(kind.value) if kind is not None and kind.value in (*KINDS, MEASUREMENT) else None
+    return (
+        str(kind.value)
+        if kind is not None and kind.value in (*KINDS, "dataset", MEASUREMENT)
+        else None
+    )

@@ -98,6 +98,21 @@ def color_channels(
             return len(_header(source.spec(), channels)[0])
 
 
+def picture_size(path: Path | str, yaml_path: tuple[str | int, ...] | str) -> tuple[int, int]:
+    """Return rows and columns of what `read_picture` gives, by the header; raise the same."""
+    path = Path(path)
+    with convert_errors(path, yaml_path, _CONVERT):
+        check_file(path)
+        with open_image(path) as source:
+            spec = source.spec()
+            _header(spec, _RGB)
+            size = spec.height, spec.width
+            if source.format_name() == "openexr":
+                size = spec.full_height, spec.full_width
+            is_turned = 5 <= spec.get_int_attribute("Orientation", 1) <= 8
+            return size[::-1] if is_turned else size
+
+
 def decode_srgb(code: np.ndarray) -> np.ndarray:
     """Return the linear light of sRGB-coded values (1 = white), IEC 61966-2-1, float64."""
     code = np.asarray(code)

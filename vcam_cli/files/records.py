@@ -27,6 +27,8 @@ RECORDS = (
     "compare.json",
     "scenes.json",
     "verify.json",
+    "fit.json",
+    "dataset.json",
 )
 """The records of vcam's commands: each may add its files to the folder of another."""
 _LARGEST_RECORD = 1 << 26  # bytes

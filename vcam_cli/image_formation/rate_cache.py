@@ -73,6 +73,12 @@ def light_key(camera: Camera) -> str:
     return json.dumps(form, sort_keys=True)
 
 
+def changes_light(path: str) -> bool:
+    """Return whether a key of a camera, by its dotted path, changes the light on the sensor."""
+    keys = tuple(path.split("."))
+    return not any(keys[: len(known)] == known for known in INDEPENDENT_KEYS)
+
+
 def _drop(form: Any, path: tuple[str, ...]) -> None:
     *parents, last = path
     for name in parents:

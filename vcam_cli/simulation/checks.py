@@ -19,6 +19,7 @@ from vcam_cli.camera.derived.image_motion import check_motion
 from vcam_cli.camera.derived.lattice import places
 from vcam_cli.camera.derived.line_times import check_shutter
 from vcam_cli.camera.processing import SHOWN
+from vcam_cli.camera.scene_files import Crop
 from vcam_cli.effects import aberration, point_spread
 from vcam_cli.errors import bad, split
 from vcam_cli.processing import check as check_steps
@@ -97,15 +98,25 @@ def check_picture(camera: Camera) -> None:
     """Refuse a picture that is unreadable or contradicts its description (BadInput)."""
     source, path = camera.scene.source, (*SOURCE, "file")
     if source.kind == "image":
-        from vcam_cli.files.images import color_channels
+        from vcam_cli.files.images import color_channels, picture_size
 
         check_channels(source.model, color_channels(source.file, path))
+        if source.crop is not None:
+            _check_crop(source.crop, picture_size(source.file, path))
     if source.kind == "hyperspectral":
         from vcam_cli.files.spectral.hyperspectral import read_bands
 
         bands = read_bands(source.file, path, source.channels)
         check_place(bands, camera.optics.is_lens)
         check_bands(camera.scene, bands)
+
+
+def _check_crop(crop: Crop, size: tuple[int, int]) -> None:
+    """Refuse a crop that goes beyond its picture of so many rows and columns (BadInput)."""
+    for name, part, whole in zip(("rows", "columns"), crop.window, size, strict=True):
+        if part.stop > whole:
+            message = f"the crop ends at {part.stop}, the picture has {whole} {name}"
+            raise bad((*SOURCE, "crop", name), message, "take a smaller crop, or begin it earlier")
 
 
 def check_spectral_file(camera: Camera) -> None:
@@ -149,10 +160,18 @@ LIBRARIES = {"dng": ("tifffile", "imagecodecs"), "tiff": ("tifffile",)}
 def check_formats(camera: Camera) -> None:
     """Refuse formats of the raw frame whose libraries are not installed (BadInput)."""
     for asked in LIBRARIES:
-        for library in LIBRARIES[asked] if getattr(camera.output, asked) else ():
-            if not find_spec(library):
-                message = f"needs the library {library}, which is not installed"
-                raise bad(("output", asked), message, "pip install 'vcam-cli[dng]'")
+        missing = missing_library(asked) if getattr(camera.output, asked) else None
+        if missing is not None:
+            raise bad(("output", asked), *missing)
+
+
+def missing_library(asked: str) -> tuple[str, str] | None:
+    """Return which library a format of the raw frame lacks, and the remedy; None where none."""
+    for library in LIBRARIES[asked]:
+        if not find_spec(library):
+            message = f"needs the library {library}, which is not installed"
+            return message, "pip install 'vcam-cli[dng]'"
+    return None
 
 
 CHECKS: tuple[files.CameraCheck, ...] = (

@@ -166,6 +166,18 @@ class Frame(Prepared):
         )
         return np.asarray(levels.T * self.layout.binning_groups.signal_ratio)
 
+    @property
+    def clean_dn(self) -> NDArray:
+        """Codes without noise and without rounding, in the shape of `dn` [DN].
+
+        They end where the well and the ADC are full, as those of `dn` do.
+        """
+        n, circuit = self.summed_codes, self.electrical
+        well = self.mean_electrons.dtype.type(n * circuit.full_well)
+        return np.clip(
+            self.to_dn(np.minimum(self.mean_electrons, well)), 0, n * circuit.highest_code
+        )
+
     def ideal_dn(self) -> NDArray:
         """Return the scene point-sampled at the pixels' centers, all colors everywhere [DN].
 

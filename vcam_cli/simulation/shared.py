@@ -24,8 +24,8 @@ class Shared:
     _last: tuple[str, Picture] | None = None
 
     def picture(self, camera: Camera, read: Callable[[], Picture]) -> Picture:
-        """Return what `read` gives, or gave for a camera before with the same source of scene."""
-        key = camera.scene.source.model_dump_json()
+        """Return what `read` gives, or gave for a camera before with the same file as its scene."""
+        key = camera.scene.source.model_dump_json(exclude={"crop"})
         if self._last is None or self._last[0] != key:
             self._last = (key, read())
         return self._last[1]

@@ -102,6 +102,11 @@ class Result:
         return self._displayed(self.frame.mean_electrons)
 
     @property
+    def clean_dn(self) -> NDArray:
+        """Raw digital numbers without noise and without rounding, clipped as `dn` is [DN]."""
+        return self._displayed(self.frame.clean_dn)
+
+    @property
     def exposure_time(self) -> float:
         """Exposure time [s]."""
         return self.frame.exposure_time
@@ -348,9 +353,13 @@ def _picture(camera: Camera, stages: Stages) -> tuple[Any, tuple[str, ...]]:
 
 
 def _completed(camera: Camera, picture: Any, notes: tuple[str, ...]) -> tuple[Any, tuple[str, ...]]:
-    """Return what the scene's file holds, dark where it ends and the camera hardly sees."""
+    """Return the part of the scene's file that is the scene, and notes.
+
+    Spectra are dark where their file ends and the camera hardly sees.
+    """
     if not isinstance(picture, Cube):
-        return picture, notes
+        crop = getattr(camera.scene.source, "crop", None)
+        return picture if crop is None else picture[crop.window], notes
     cube, more = scene_bands.completed(camera, picture)
     return cube, (*notes, *more)
 

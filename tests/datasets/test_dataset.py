@@ -1,0 +1,366 @@
+"""Data sets that are made: labels, the same bytes for all workers and after a kill, shares."""
+
+import csv
+import hashlib
+import json
+import shutil
+import signal
+import subprocess
+import sys
+import time
+import types
+
+import numpy as np
+import pytest
+import tifffile
+import yaml
+from making import tree
+from sweeping import ROOT, VCAM, environment
+from typer.testing import CliRunner
+
+from vcam_cli import load, simulate
+from vcam_cli.commands.main import app
+from vcam_cli.datasets import dataset_file
+from vcam_cli.datasets.dataset import dataset
+from vcam_cli.errors import BadInput
+from vcam_cli.files.png import write_png
+from vcam_cli.sweeps.sweep import Execution, Share
+
+STUDY = {
+    "kind": "dataset",
+    "name": "pairs",
+    "camera": "camera.yaml",
+    "scenes": {"files": "photos/*.png", "frames_each": 3},
+    "vary": {
+        "exposure.time": {"log_uniform": ["5 ms", "50 ms"]},
+        "exposure.gain": {"choice": [1, 4]},
+        "optics.f_number": {"uniform": [2.8, 8]},
+    },
+    "frames": 10,
+    "size": {"rows": 20, "columns": 24},
+    "shards": 3,
+}
+CAMERA = {
+    "scene.illuminant": "D65",
+    "scene.radiance": "0.02 W/(sr m2)",
+    "pixel.readout.read_noise": "6 e",
+    "pixel.readout.row_noise": "3 e",
+    "pixel.fpn.gain_pixel": "1 %",
+    "pixel.photodetector.dark_current": "300 e/s",
+    "adc.offset": "40 DN",
+    "accuracy": "standard",
+}
+
+
+def written(folder, **changes):
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "photos").mkdir(exist_ok=True)
+    for n in range(2):
+        colors = np.random.default_rng(n).integers(0, 256, (10, 14, 3)).repeat(6, 0).repeat(5, 1)
+        write_png(folder / "photos" / f"{n}.png", colors.astype(np.uint8))
+    (folder / "camera.yaml").write_text(yaml.safe_dump(tree(CAMERA | changes.pop("camera", {}))))
+    (folder / "study.yaml").write_text(yaml.safe_dump(STUDY | changes, sort_keys=False))
+    return folder / "study.yaml"
+
+
+def made(study, out, sets=(), **execution):
+    return dataset(dataset_file.read(study, sets), out, Execution(**{"workers": 1, **execution}))
+
+
+def rows(out):
+    with open(out / "manifest.csv", newline="", encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+def contents(out):
+    """The bytes of shards and manifest."""
+    names = [p for p in sorted(out.rglob("*")) if p.suffix in (".npz", ".tif", ".csv")]
+    return {str(p.relative_to(out)): hashlib.sha256(p.read_bytes()).hexdigest() for p in names}
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    """A data set that one process has made without a stop."""
+    folder = tmp_path_factory.mktemp("whole")
+    study = written(folder, write=["raw", "clean", "ideal"])
+    assert made(study, folder / "out").computed == 10
+    return study, folder / "out"
+
+
+def test_a_frame_is_what_a_run_of_its_row_gives(whole):
+    """A camera file is made of the row by hand, and run."""
+    study, out = whole
+    for row in rows(out)[::4]:
+        camera = load(
+            study.parent / "camera.yaml",
+            [
+                f"scene.source={{kind: image, file: '{study.parent}/photos/{row['scene']}'}}",
+                f"scene.source.crop={{row: {row['crop_row']}, column: {row['crop_column']},"
+                " rows: 20, columns: 24}",
+                "array.rows=20",
+                "array.columns=24",
+                f"exposure.time={row['exposure.time [ms]']} ms",
+                f"exposure.gain={float(row['exposure.gain']):g}",
+                f"optics.f_number={row['optics.f_number']}",
+                f"seed.frame={row['seed_frame']}",
+                "effects=all",
+            ],
+        )
+        run = simulate(camera)
+        with np.load(out / f"shard_{int(row['shard']):04d}.npz") as shard:
+            arrays = {kind: shard[f"{row['frame']}.{kind}"] for kind in ("raw", "clean", "ideal")}
+        assert np.array_equal(arrays["raw"], run.dn)
+        assert arrays["raw"].dtype == np.uint16
+        assert arrays["ideal"].shape == (20, 24, 1)
+        for kind, values in arrays.items():
+            assert row[f"sha256_{kind}"] == hashlib.sha256(values.tobytes()).hexdigest()
+
+
+def test_a_crop_is_that_part_of_the_picture(tmp_path):
+    """Beside a file that holds nothing but these samples: the same frame, to the bit."""
+    from vcam_cli.files.images import read_picture
+
+    study = written(tmp_path)
+    window = {"row": 7, "column": 11, "rows": 20, "columns": 24}
+    part = read_picture(tmp_path / "photos" / "0.png", "srgb", 1.0, ()).data[7:27, 11:35]
+    codes = np.where(part <= 0.0031308, 12.92 * part, 1.055 * part ** (1 / 2.4) - 0.055)
+    write_png(tmp_path / "part.png", np.rint(255 * codes).astype(np.uint8))
+    camera = load(study.parent / "camera.yaml", ["array.rows=20", "array.columns=24"])
+    cropped, alone = (
+        camera.with_({"scene.source": {"kind": "image", "file": str(tmp_path / name), **more}})
+        for name, more in (("photos/0.png", {"crop": window}), ("part.png", {}))
+    )
+    assert np.array_equal(simulate(cropped).dn, simulate(alone).dn)
+    beyond = window | {"row": 41}
+    changes = {
+        "scene.source": {"kind": "image", "file": str(tmp_path / "part.png"), "crop": beyond}
+    }
+    (tmp_path / "beyond.yaml").write_text(yaml.safe_dump(tree(CAMERA | changes)))
+    result = CliRunner().invoke(app, ["validate", str(tmp_path / "beyond.yaml")])
+    assert result.exit_code == 2
+    assert "the crop ends at 61, the picture has 20 rows" in result.output
+
+
+def test_labels_are_the_moments_of_the_noise(tmp_path):
+    """An even chart: variance over pixels is dark_variance + K (clean - black) to five errors."""
+    study = written(
+        tmp_path,
+        camera={"pixel.fpn.gain_pixel": "0 %", "pixel.readout.row_noise": "0 e"},
+        scenes={"charts": ["uniform"]},
+        vary={"exposure.time": {"choice": ["10 ms", "20 ms"]}, "exposure.gain": {"choice": [1, 2]}},
+        size={"rows": 160, "columns": 160},
+        frames=4,
+        shards=1,
+    )
+    made(study, tmp_path / "out")
+    with np.load(tmp_path / "out" / "shard_0000.npz") as shard:
+        for row in rows(tmp_path / "out"):
+            raw, clean = (
+                shard[f"{row['frame']}.{kind}"].astype(float) for kind in ("raw", "clean")
+            )
+            told = {key: float(value) for key, value in row.items() if key.endswith("]") and value}
+            light = clean.mean() - told["black_level [DN]"]
+            variance = told["dark_variance [DN2]"] + told["system_gain [DN/e]"] * light
+            assert np.ptp(clean) < 1e-3 * clean.mean()
+            assert raw.mean() == pytest.approx(clean.mean(), abs=5 * np.sqrt(variance) / 160)
+            assert raw.var() == pytest.approx(variance, rel=5 * np.sqrt(2) / 160)
+
+
+def test_workers_kills_and_order_change_no_byte(whole, tmp_path):
+    """Two workers, killed as soon as three frames are there; then again, to the end."""
+    study, out = whole
+    command = [*VCAM, "dataset", str(study), "-o", str(tmp_path / "out"), "--workers", "2", "-q"]
+    process = subprocess.Popen(command, env=environment())
+    points = tmp_path / "out" / "points"
+    deadline = time.monotonic() + 120
+    while len(list(points.glob("*.json"))) < 3 and process.poll() is None:
+        assert time.monotonic() < deadline
+        time.sleep(0.002)
+    process.send_signal(signal.SIGKILL)
+    process.wait()
+    assert not (tmp_path / "out" / "manifest.csv").exists()
+    result = made(study, tmp_path / "out", workers=2)
+    assert 0 < result.computed <= 7
+    assert contents(tmp_path / "out") == contents(out)
+    assert not list(points.glob("*.npz"))
+    assert made(study, tmp_path / "out").computed == 0
+
+
+def test_shares_add_up(whole, tmp_path):
+    """Each in a folder of its own, as on machines of their own; put together, to the byte."""
+    study, out = whole
+    for n in (1, 2):
+        part = made(study, tmp_path / str(n), share=Share(n, 2))
+        assert part.missing == (3, 7)[n - 1]
+    shutil.copytree(tmp_path / "2", tmp_path / "1", dirs_exist_ok=True)
+    result = made(study, tmp_path / "1")
+    assert (result.computed, result.missing) == (0, 0)
+    assert contents(tmp_path / "1") == contents(out)
+    with pytest.raises(BadInput, match="3 shards cannot be divided among 4"):
+        made(study, tmp_path / "1", share=Share(1, 4))
+
+
+def test_more_frames_or_keys_leave_the_others_as_they_were(whole, tmp_path):
+    out = whole[1]
+    vary = {"pixel.readout.read_noise": {"uniform": ["1 e", "9 e"]}} | STUDY["vary"]
+    made(written(tmp_path, vary=vary, frames=12, shards=1), tmp_path / "out")
+    names = [name for name in rows(out)[0] if name.startswith(("exposure.", "optics", "crop"))]
+    kept = rows(tmp_path / "out")[:10]
+    assert [[r[n] for n in names] for r in kept] == [[r[n] for n in names] for r in rows(out)]
+
+
+def test_scenes_come_equally_often_and_share_their_light(whole):
+    listed = rows(whole[1])
+    for n in range(0, 9, 3):
+        same = listed[n : n + 3]
+        for key in ("scene", "crop_row", "crop_column", "optics.f_number"):
+            assert len({row[key] for row in same}) == 1
+        assert len({row["exposure.time [ms]"] for row in same}) == 3
+    assert {row["scene"] for row in listed[:6]} == {"0.png", "1.png"}
+    assert len({row["seed_frame"] for row in listed}) == 10
+
+
+def test_tiff_has_the_same_numbers(whole, tmp_path):
+    out = whole[1]
+    other = written(tmp_path, format="tiff", frames=4, shards=2)
+    made(other, tmp_path / "out")
+    scale = json.loads((tmp_path / "out" / "dataset.json").read_text())["scale"]["clean"]
+    assert scale == 16
+    with np.load(out / "shard_0000.npz") as shard:
+        for number in range(2):
+            raw, clean = (
+                tifffile.imread(tmp_path / "out" / "shard_0000" / f"{number:06d}_{kind}.tif")
+                for kind in ("raw", "clean")
+            )
+            assert raw.dtype == clean.dtype == np.uint16
+            assert np.array_equal(raw, shard[f"{number:06d}.raw"])
+            assert np.abs(clean / scale - shard[f"{number:06d}.clean"]).max() <= 0.5 / scale
+    assert made(other, tmp_path / "out").computed == 0
+
+
+def test_a_changed_shard_is_refused_and_former_ones_go(whole, tmp_path):
+    folder = tmp_path / "out"
+    made(written(tmp_path), folder)
+    made(written(tmp_path, shards=2), folder)
+    assert sorted(p.name for p in folder.glob("*.npz")) == ["shard_0000.npz", "shard_0001.npz"]
+    (folder / "shard_0001.npz").write_bytes(b"mine")
+    with pytest.raises(BadInput, match="shard_0001"):
+        made(tmp_path / "study.yaml", folder)
+
+
+def test_a_frame_that_fails_is_a_row_with_its_error(tmp_path):
+    """Each of two times is right beside one of the other's, and the first frame has these."""
+    vary = {
+        "exposure.auto.min": {"choice": ["0 ms", "50 ms"]},
+        "exposure.auto.max": {"choice": ["100 ms", "10 ms"]},
+    }
+    camera = {"exposure": {"auto": {"max": "100 ms"}}}
+    study = written(tmp_path, vary=vary, camera=camera, frames=8, shards=2, seed=3)
+    result = made(study, tmp_path / "out")
+    listed = rows(tmp_path / "out")
+    wrong = [row for row in listed if row["error"]]
+    assert [row["exposure.auto.min [ms]"] for row in wrong] == ["50.0"] * len(wrong)
+    assert [row["exposure.auto.max [ms]"] for row in wrong] == ["10.0"] * len(wrong)
+    assert result.failed == len(wrong) > 0
+    assert result.exit_code == 4
+    with np.load(tmp_path / "out" / "shard_0000.npz") as shard:
+        named = {name.partition(".")[0] for name in shard.files}
+    assert named == {row["frame"] for row in listed[:4] if not row["error"]}
+    again = made(study, tmp_path / "out")
+    assert (again.computed, again.failed) == (0, len(wrong))
+
+
+@pytest.mark.parametrize(
+    ("changes", "place", "said"),
+    [
+        ({"size": {"rows": 200, "columns": 24}}, "scenes.files", "a crop 200 x 24"),
+        ({"scenes": {"files": "no/*.png"}}, "scenes.files", "no files in"),
+        ({"vary": {"exposure.tim": {"choice": [1]}}}, "exposure.tim", "no such key"),
+        ({"vary": {"exposure.time": {"uniform": ["1 ms", "-5 ms"]}}}, "vary", "not below"),
+        ({"vary": {"optics.f_number": {"uniform": [-1, 4]}}}, "optics.f_number", ""),
+        ({"vary": {"seed.frame": {"integers": [1, 9]}}}, "vary.seed.frame", "the key seed"),
+        ({"vary": {"exposure.gain": {}}}, "vary.exposure.gain", "is missing"),
+        ({"shards": 11}, "shards", "10 frames do not fill 11 shards"),
+        ({"write": ["depth"]}, "write", "the scene has no depth"),
+        ({"scenes": {"files": "photos/*.png", "charts": ["csf"]}}, "scenes", "cannot both"),
+        ({"camera": "nowhere.yaml"}, "camera", ""),
+    ],
+)
+def test_what_is_wrong_is_said_with_its_place(tmp_path, changes, place, said):
+    study = written(tmp_path, **{k: v for k, v in changes.items() if k != "camera"})
+    if "camera" in changes:
+        study.write_text(yaml.safe_dump(STUDY | changes))
+    result = CliRunner().invoke(app, ["validate", str(study)])
+    assert result.exit_code == 2, result.output
+    assert place in result.output
+    assert said in result.output
+    assert "study.yaml:" in result.output
+
+
+def test_the_command_prints_a_summary(tmp_path):
+    study = written(tmp_path, frames=3, shards=1)
+    command = ["dataset", str(study), "-o", str(tmp_path / "out"), "--workers", "1", "--json"]
+    told = json.loads(CliRunner().invoke(app, [*command, "--seed", "5"]).stdout)
+    assert (told["frames"], told["computed"], told["shards"], told["failed"]) == (3, 3, 1, 0)
+    first = rows(tmp_path / "out")
+    CliRunner().invoke(app, [*command, "--seed", "6"])
+    assert rows(tmp_path / "out")[0]["seed_frame"] != first[0]["seed_frame"]
+    for name, kind in (("sweep", "vcam dataset"), ("run", "vcam dataset")):
+        assert kind in CliRunner().invoke(app, [name, str(study)]).output
+
+
+def test_the_documented_reader_reads(whole, monkeypatch):
+    """With what it takes of PyTorch in its place, which vcam does not need."""
+    page = (ROOT / "docs" / "howto" / "dataset.md").read_text("utf-8")
+    code = page.partition("```python\n")[2].partition("```")[0]
+    data = types.SimpleNamespace(Dataset=object)
+    torch = types.SimpleNamespace(utils=types.SimpleNamespace(data=data), from_numpy=np.asarray)
+    monkeypatch.setitem(sys.modules, "torch", torch)
+    names = {}
+    exec(code, names)
+    pairs = names["Pairs"](whole[1])
+    assert len(pairs) == 10
+    raw, clean, gain, variance = pairs[7]
+    with np.load(whole[1] / "shard_0002.npz") as shard:
+        assert np.array_equal(raw, shard["000007.raw"])
+        assert np.array_equal(clean, shard["000007.clean"])
+    assert gain == float(rows(whole[1])[7]["system_gain [DN/e]"])
+    assert variance > 1 / 12
+    pairs.shards.popitem()[1].close()
+
+
+PEAK = """
+import resource, sys
+from pathlib import Path
+from vcam_cli.datasets import dataset_file
+from vcam_cli.datasets.dataset import dataset
+from vcam_cli.sweeps.sweep import Execution
+dataset(dataset_file.read(sys.argv[1]), Path(sys.argv[2]), Execution(workers=1))
+print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
+"""
+
+
+@pytest.mark.long
+def test_memory_does_not_grow_with_the_number_of_frames(tmp_path):
+    """400 frames take at most 20 MB more than 50; the frames themselves are 1.5 GB."""
+    peaks = []
+    for frames in (50, 400):
+        study = written(
+            tmp_path / str(frames),
+            frames=frames,
+            shards=4,
+            scenes={"charts": ["uniform"], "frames_each": 50},
+            vary={"exposure.time": STUDY["vary"]["exposure.time"]},
+            size={"rows": 800, "columns": 800},
+        )
+        out = tmp_path / str(frames) / "out"
+        told = subprocess.run(
+            [sys.executable, "-c", PEAK, str(study), str(out)],
+            env=environment(),
+            capture_output=True,
+            text=True,
+            check=True,
+        )
+        peaks.append(int(told.stdout.split()[-1]) / 1024)
+        shutil.rmtree(out)
+    assert peaks[1] < peaks[0] + 20

@@ -1,0 +1,75 @@
+"""`vcam dataset`: labeled frames for learning and testing."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import typer
+
+from vcam_cli.commands import options
+from vcam_cli.commands.progress import Progress
+from vcam_cli.commands.sweep import Fresh, Processes, Scheduler, Shard, Study
+from vcam_cli.interrupts import INTERRUPTED, restore_interrupt
+
+if TYPE_CHECKING:
+    from vcam_cli.datasets.dataset import DatasetResult
+
+
+def dataset(
+    study: Study,
+    out: options.Out = None,
+    set_: options.Set = None,
+    seed: options.Seed = None,
+    accuracy: options.Accuracy = None,
+    as_json: options.Json = False,
+    quiet: options.Quiet = False,
+    workers: Processes = None,
+    scheduler: Scheduler = None,
+    shard: Shard = None,
+    fresh: Fresh = False,
+) -> None:
+    """Write frames of a camera whose parameters are drawn, with every label.
+
+    Write shards of raw codes and of the same without noise, manifest.csv with all that was drawn,
+    the noise model's numbers and hashes, and dataset.json. Finished frames are kept: what was
+    stopped goes on when it is started again. --seed is that of all that is drawn.
+
+    \b
+    Example:
+      vcam dataset noise-pairs
+      vcam dataset pairs.yaml --workers 4 -o out/pairs
+    """
+    from vcam_cli.datasets import dataset as work
+    from vcam_cli.datasets import dataset_file
+    from vcam_cli.files.report import to_json
+    from vcam_cli.sweeps.sweep import Execution, Share
+
+    number, count = (int(part) for part in (shard or "1/1").split("/"))
+    share = Share(number, count) if shard else None
+    execution = Execution(share, workers, scheduler, fresh)
+    file = dataset_file.read(study, set_ or (), seed, accuracy)
+    path = out or Path("out") / file.model.name
+    with Progress(quiet, log="frames") as progress:
+        try:
+            with restore_interrupt():
+                found = work.dataset(
+                    file, path, execution, progress, lambda message: options.say(message, quiet)
+                )
+        except KeyboardInterrupt as error:
+            options.say("interrupted; finished frames are kept, the same command goes on with them")
+            raise typer.Exit(INTERRUPTED) from error
+    if as_json:
+        print(to_json(found.summary()), end="")
+    elif not quiet:
+        print(report(found))
+    raise typer.Exit(found.exit_code)
+
+
+def report(found: "DatasetResult") -> str:
+    """Return the report of a data set: numbers of frames and shards, and the folder."""
+    lines = [f"{found.frames} frames, {found.computed} computed in {found.seconds:.1f} s"]
+    if found.failed:
+        lines.append(f"{found.failed} failed: see the column error of manifest.csv")
+    if found.missing:
+        lines.append(f"{found.missing} are left to other shares")
+    lines.append(f"{found.name}: {found.out}/, {found.shards} shards, manifest.csv")
+    return "\n".join(lines)

@@ -1,0 +1,1 @@
+"""Labeled frames for learning and testing: what is drawn, computed, packed into shards."""

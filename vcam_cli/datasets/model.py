@@ -1,0 +1,199 @@
+"""What a file of a data set may say: a camera, scenes, what is drawn, what is written."""
+
+from collections.abc import Iterator, Mapping
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import model_validator
+
+from vcam_cli import units
+from vcam_cli.config.lists import check_list, list_of_any, words_of
+from vcam_cli.config.model import FileModel, Model, at_most_one, exactly_one, key
+from vcam_cli.config.quantities import Number, Whole
+from vcam_cli.config.validation_messages import describe, failure, fault, refusal
+from vcam_cli.config.values import Either, Text, Word, mapping
+
+KINDS = ("raw", "clean", "ideal", "depth")
+"""What may be written of a frame."""
+MOST_FRAMES = 10_000_000
+
+_SIZE = Whole(least=1, most=1 << 20, example="512")
+
+
+def _range(given: Any) -> tuple[Any, Any]:
+    if not isinstance(given, (list, tuple)) or len(given) != 2:
+        raise ValueError(f"{describe(given)} is not two ends; write for example [1 ms, 100 ms]")
+    low, unit = units.split(given[0])
+    high = units.convert(*units.split(given[1]), unit)
+    if not low < high:
+        raise ValueError("the first end is not below the second; write for example [1 ms, 100 ms]")
+    return given[0], given[1]
+
+
+def _logarithmic(given: Any) -> tuple[Any, Any]:
+    low, high = _range(given)
+    if units.split(low)[0] <= 0:
+        raise ValueError("equal ratios need ends above zero; write uniform")
+    return low, high
+
+
+def _whole_ends(given: Any) -> tuple[int, int]:
+    if not isinstance(given, (list, tuple)) or [type(end) for end in given] != [int, int]:
+        raise ValueError(f"{describe(given)} is not two whole numbers; write for example [1, 1000]")
+    if given[0] > given[1]:
+        raise ValueError("the first number is above the second; write the smaller one first")
+    return given[0], given[1]
+
+
+_ENDS = list[str | float]
+
+
+class Distribution(Model):
+    """What a parameter is drawn from."""
+
+    uniform: Annotated[tuple[Any, Any] | None, Either(_range, _ENDS)] = key(
+        "all values between two ends are equally probable",
+        unit="",
+        example=["10 ms", "30 ms"],
+        default=None,
+    )
+    log_uniform: Annotated[tuple[Any, Any] | None, Either(_logarithmic, _ENDS)] = key(
+        "all ratios between two ends are equally probable",
+        unit="",
+        example=["1 ms", "100 ms"],
+        default=None,
+    )
+    integers: Annotated[tuple[int, int] | None, Either(_whole_ends, list[int])] = key(
+        "whole numbers between two ends, both included", example=[1, 1000], default=None
+    )
+    choice: Annotated[tuple[Any, ...] | None, list_of_any("[1, 4, 16]")] = key(
+        "one of these values, equally probable", example=[1, 4, 16], default=None
+    )
+
+    rules = (
+        exactly_one(
+            *("uniform", "log_uniform", "integers", "choice"),
+            of="what it is drawn from",
+            remedy="write {uniform: [10 ms, 30 ms]}",
+        ),
+    )
+
+
+def _patterns(given: Any) -> tuple[str, ...]:
+    found = given if isinstance(given, (list, tuple)) else [given]
+    check_list(found, '["photos/*.png"]', 1)
+    for item in found:
+        if not isinstance(item, str) or not item:
+            raise ValueError(f"{describe(item)} names no files; write for example photos/*.png")
+    return tuple(found)
+
+
+def _charts(given: Any) -> tuple[Any, ...]:
+    check_list(given, "[dead-leaves, colorchecker]", 1, "a list of charts")
+    for item in given:
+        if not isinstance(item, (str, Mapping)):
+            message = f"{describe(item)} is no chart"
+            raise ValueError(f"{message}; write for example dead-leaves, or a scene.source")
+    return tuple(given)
+
+
+class Scenes(Model):
+    """What the frames show."""
+
+    files: Annotated[tuple[str, ...], Either(_patterns, str | list[str])] = key(
+        "pictures, of which each scene is a crop at random",
+        example="photos/*.png",
+        default=(),
+    )
+    charts: Annotated[tuple[Any, ...], Either(_charts, list[str | dict[str, Any]])] = key(
+        "charts in place of files: names, or mappings as scene.source has them",
+        example=["dead-leaves", "colorchecker"],
+        default=(),
+    )
+    samples_per_pixel: Annotated[float, Number(above=0, most=64, example="1")] = key(
+        "samples of a picture over the width of a pixel: how much of it a crop takes", default=1.0
+    )
+    frames_each: Annotated[int, Whole(least=1, most=MOST_FRAMES, example="4")] = key(
+        "frames in a row of one scene, for which crop and light are drawn once", default=1
+    )
+
+    rules = (at_most_one("files", "charts"),)
+
+
+class Size(Model):
+    """The size of the frames."""
+
+    rows: Annotated[int, _SIZE] = key("number of rows", example=512)
+    columns: Annotated[int, _SIZE] = key("number of columns", example=512)
+
+
+class Dataset(FileModel):
+    """A data set: frames of a camera whose parameters are drawn, with every label."""
+
+    kind: Literal["dataset"] = key("the kind of study", example="dataset")
+    name: Word = key(
+        "name of the data set and of its output folder; default the file's",
+        example="noise-pairs",
+        default="dataset",
+    )
+    camera: Text = key("name or path of a camera file", example="starter")
+    scenes: Annotated[Scenes | None, mapping(Scenes)] = key(
+        "what the frames show; default the camera's own scene",
+        example={"files": "photos/*.png"},
+        default=None,
+    )
+    vary: dict[str, Distribution] = key(
+        "path in the camera -> what it is drawn from",
+        example={"exposure.time": {"log_uniform": ["1 ms", "100 ms"]}},
+        default=dict,
+    )
+    frames: Annotated[int, Whole(least=1, most=MOST_FRAMES, example="1000")] = key(
+        "number of frames", example=1000
+    )
+    size: Annotated[Size | None, mapping(Size)] = key(
+        "of every frame; default the camera's array",
+        example={"rows": 512, "columns": 512},
+        default=None,
+    )
+    write: Annotated[tuple[str, ...], words_of(KINDS, 1)] = key(
+        "what is written of a frame: raw (codes), clean (the same without noise and rounding),"
+        " ideal (the scene at the pixels' centers, all colors, in codes), depth",
+        example=["raw", "clean"],
+        default=("raw", "clean"),
+    )
+    shards: Annotated[int, Whole(least=1, most=100_000, example="8")] = key(
+        "files, or folders of TIFF, among which the frames are divided", example=8, default=1
+    )
+    format: Literal["npz", "tiff"] = key(
+        "npz: shards in NumPy's format; tiff: whole numbers, a file a frame and kind",
+        default="npz",
+    )
+    seed: Annotated[int, Whole(least=0, most=2**63 - 1, example="1")] = key(
+        "of all that is drawn; the frames' own seeds follow from it", default=1
+    )
+
+    @model_validator(mode="after")
+    def _agrees(self) -> Self:
+        mistakes = list(self._wrong_paths())
+        if mistakes:
+            raise failure(mistakes)
+        if self.scenes is not None and self.scenes.files and self.size is None:
+            message = "the size of the frames is missing, which is that of the crops"
+            raise refusal((), message, "add size: {rows: 512, columns: 512}")
+        if self.shards > self.frames:
+            message = f"{self.frames} frames do not fill {self.shards} shards"
+            raise refusal(("shards",), message, "ask for fewer shards")
+        return self
+
+    def _wrong_paths(self) -> Iterator[Any]:
+        taken = {"seed.frame": "the seeds follow from the key seed"}
+        if self.size is not None:
+            taken |= dict.fromkeys(("array.rows", "array.columns", "array.die"), "size sets it")
+        if self.scenes is not None and self.scenes.files:
+            taken["scene.source"] = "the scene is a crop of a file"
+        for path in self.vary:
+            if not path or "" in path.split("."):
+                message = f"{describe(path)} is not a path of a camera"
+                yield fault(("vary", path), message, "write for example exposure.time")
+            for other, why in taken.items():
+                if path == other or path.startswith(f"{other}."):
+                    yield fault(("vary", path), why, "remove this key")
