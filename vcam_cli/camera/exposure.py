@@ -43,6 +43,11 @@ class AutoExposure(Model):
     percentile: Annotated[float, Number(least=0, most=100, example="99.9")] = key(
         "which percentile, for that method", default=99.9
     )
+    follow: Annotated[float, Number(above=0, most=1, example="0.5")] = key(
+        "of sequences: part of the way, in EV, that a frame's exposure goes toward what the frame"
+        " before would have needed; 1: all of it",
+        default=0.5,
+    )
 
     @model_validator(mode="after")
     def _check_order(self) -> Self:

@@ -24,7 +24,8 @@ def run(
 ) -> None:
     """Simulate a camera and write raw.exr, render.png, metrics.csv and run.json.
 
-    With --frames and --fps a sequence: frames/raw_0001.exr and so on, frames.csv and strip.png.
+    With --frames and --fps a sequence: frames/raw_0001.exr and so on, frames.csv, strip.png
+    and, where ffmpeg is installed, sequence.mp4.
 
     \b
     Example:
@@ -137,6 +138,7 @@ FILES = {
     "frames/raw_0001.exr": "first raw frame",
     "frames.csv": "all frames",
     "strip.png": "strip",
+    "sequence.mp4": "video",
     "report.html": "report",
 }
 """Files to look at that a run may write -> their descriptions."""

@@ -1,12 +1,15 @@
 """Frames one after the other: each with noise of its own, all with the same sensor.
 
 A frame is a camera whose exposure begins later and whose frame seed is another: what moves has
-moved on, and a lamp that flickers is at another phase. Each frame is exposed by itself.
+moved on, and a lamp that flickers is at another phase. An automatic exposure follows from frame to
+frame.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from contextlib import ExitStack
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,12 +21,17 @@ from vcam_cli.errors import bad
 from vcam_cli.files.folder import OutputFolder
 from vcam_cli.files.png import write_png
 from vcam_cli.files.tables import write_table
+from vcam_cli.files.video import VideoWriter, ffmpeg
 from vcam_cli.progress import Observer
-from vcam_cli.simulation import outputs
+from vcam_cli.simulation import exposure_control, outputs
 from vcam_cli.simulation.shared import Shared
 from vcam_cli.simulation.simulate import Result, simulate
 from vcam_cli.units import render
 
+NO_VIDEO = (
+    "no sequence.mp4 is written, since there is no ffmpeg on the PATH; frames/render_*.png and"
+    " strip.png show the sequence"
+)
 STRIP = 8
 """Frames of a strip, at most."""
 STRIP_WIDTH = 240
@@ -69,6 +77,42 @@ def _require_room(camera: Camera, rate: float) -> None:
         )
 
 
+def frames(
+    camera: Camera, count: int, rate: float, workers: int | None, watch: Observer
+) -> Iterator[tuple[Camera, Result]]:
+    """Yield the camera of every frame of a sequence, and what it takes.
+
+    An automatic exposure follows: the first frame is exposed for its own scene, in the mean light
+    of its lamp, every other by what the one before metered (`exposure_control`).
+
+    Parameters
+    ----------
+    camera : Camera
+        The camera of the first frame.
+    count : int
+        Number of frames.
+    rate : float
+        Frames per second [Hz].
+    workers : int or None
+        Number of threads; results do not depend on it.
+    watch : Observer
+        Observer of stages.
+    """
+    shared, settings, reference = Shared(), None, camera.exposure.reference
+    lines = line_times(camera, geometry(camera))
+    for each in frame_cameras(camera, count, rate):
+        if settings is not None:
+            each = exposure_control.exposed(each, settings)
+            timed = each.exposure.model_copy(update={"reference": reference})
+            each = each.model_copy(update={"exposure": timed})
+        result = simulate(each, workers, watch, shared)
+        if camera.exposure.auto is not None:
+            if reference is None:  # where the first frame has it, all others do
+                reference = result.exposure_time / 2 + lines.last / 2
+            settings = exposure_control.next_exposure(camera, result.frame)
+        yield each, result
+
+
 def write_sequence(
     camera: Camera,
     count: int,
@@ -78,6 +122,8 @@ def write_sequence(
     watch: Observer,
 ) -> Result:
     """Write frames/raw_0001.exr, frames/render_0001.png and so on, frames.csv and strip.png.
+
+    Where ffmpeg is installed sequence.mp4 shows the renders, too.
 
     Parameters
     ----------
@@ -97,24 +143,36 @@ def write_sequence(
     Returns
     -------
     Result
-        The first frame.
+        The first frame, with a note where there is no video.
     """
-    shared, rows, shown = Shared(), [], list[NDArray]()
+    rows, shown = [], list[NDArray]()
     chosen = set(np.linspace(0, count - 1, min(count, STRIP)).round().astype(int).tolist())
     first: Result | None = None
-    for number, each in enumerate(frame_cameras(camera, count, rate)):
-        result = simulate(each, workers, watch, shared)
-        name = f"{number + 1:04d}"
-        outputs.write_raw(result, folder.new(f"frames/raw_{name}.exr"))
-        if camera.output.render:
-            outputs.write_render(result, folder.new(f"frames/render_{name}.png"), result.render)
-            if number in chosen:
-                step = -(-result.render.shape[1] // STRIP_WIDTH)
-                shown.append(result.render[::step, ::step])
-        columns = ("frame", "start [s]", "seed", *result.metrics)
-        told = (number + 1, each.exposure.start, each.seed.frame)
-        rows.append((*told, *result.metrics.values()))
-        first = first or result
+    program = ffmpeg()
+    with ExitStack() as stack:
+        video: VideoWriter | None = None
+        for number, (each, result) in enumerate(frames(camera, count, rate, workers, watch)):
+            if first is None:
+                missing = bool(camera.output.render) and program is None
+                told = result.remarks + ((NO_VIDEO,) if missing else ())
+                result = first = replace(result, remarks=told)
+            name = f"{number + 1:04d}"
+            outputs.write_raw(result, folder.new(f"frames/raw_{name}.exr"))
+            if camera.output.render:
+                render = result.render
+                outputs.write_render(result, folder.new(f"frames/render_{name}.png"), render)
+                if program is not None:
+                    if video is None:
+                        path, shape = folder.new("sequence.mp4"), render.shape[:2]
+                        video = stack.enter_context(VideoWriter(path, program, shape, rate))
+                    video.write(render)
+                if number in chosen:
+                    step = -(-render.shape[1] // STRIP_WIDTH)
+                    shown.append(render[::step, ::step])
+            columns = ("frame", "start [s]", "gain", "seed", *result.metrics)
+            gain = result.frame.camera.exposure_gain
+            facts = (number + 1, each.exposure.start, gain, each.seed.frame)
+            rows.append((*facts, *result.metrics.values()))
     assert first is not None
     if shown:
         write_png(
