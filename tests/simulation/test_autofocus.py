@@ -5,7 +5,9 @@ import pytest
 from making import camera
 
 from vcam_cli import load
+from vcam_cli.camera.optics import FocusWindow
 from vcam_cli.errors import BadInput
+from vcam_cli.files.png import write_png
 from vcam_cli.progress import Silent, Stages
 from vcam_cli.simulation import autofocus, cost_model
 from vcam_cli.simulation.idle_keys import idle_keys
@@ -49,6 +51,44 @@ def test_an_aberrated_lens_is_as_sharp_as_anywhere(tmp_path):
     # trials err by 1e-3 of full signal, and contrast is a square
     assert sharpness(found) > 0.99 * best
     assert sharpness(0.0) < sharpness(found), "Z4 moves the sharpest place away from 0"
+
+
+def test_the_window_says_what_has_to_be_sharp(tmp_path):
+    """Astigmatism: upright lines are sharp in front of the lens's focus, level ones behind it.
+
+    A picture has both, in its halves; each window takes the lens to its own, on either side.
+    """
+    rows = np.full((64, 64), 0.5)
+    rows[:, :32] += 0.4 * np.where(np.arange(32) // 4 % 2, 1, -1)
+    rows[:, 32:] += 0.4 * np.where(np.arange(64) // 4 % 2, 1, -1)[:, None]
+    file = tmp_path / "lines.png"
+    write_png(file, (rows * 255).astype(np.uint8))
+    source = {"kind": "image", "file": str(file), "model": "reflectance", "encoding": "linear"}
+    lens = EDGE | {"optics.zernike": {6: "0.12 um"}, "scene.source": source}
+    found = []
+    for x in (0.2, 0.8):
+        window = {"optics.focus_window": {"x": x, "width": 0.3}}
+        found.append(prepare(camera(tmp_path, lens | window))[0].camera.optics.defocus)
+    assert abs(found[0] - found[1]) > 2 * DEPTH
+    assert found[0] * found[1] < 0
+
+
+def test_a_window_keeps_to_the_picture():
+    """The middle half, corners, and one smaller than a pixel."""
+    for n in range(1, 40):
+        middle = slice(n // 4, n - n // 4)
+        assert FocusWindow().slices(n, n) == (middle, middle)
+    corner = FocusWindow(x=1.0, y=0.0, width=0.2, height=0.1)
+    assert corner.slices(100, 50) == (slice(0, 5), slice(45, 50))
+    assert FocusWindow(x=0.999, width=1e-9).slices(10, 10)[1] == slice(9, 10)
+
+
+def test_motion_does_not_disturb_the_focus(tmp_path):
+    turning = EDGE | {"optics.defocus": "20 um", "scene.camera_motion": {"roll": "300 deg/s"}}
+    still = prepare(camera(tmp_path, EDGE | {"optics.defocus": "20 um"}))[0]
+    assert (
+        prepare(camera(tmp_path, turning))[0].camera.optics.defocus == still.camera.optics.defocus
+    )
 
 
 def test_even_light_tells_no_focus(tmp_path):

@@ -19,9 +19,29 @@ from vcam_cli.config.values import (
     MaybeLength,
     Shift,
     Switch,
+    mapping,
     word_or,
 )
 from vcam_cli.config.yaml_type import YamlType
+
+
+class FocusWindow(Model):
+    """The part of the picture that an autofocus judges."""
+
+    x: Fraction = key("its center from the left edge, of the picture's width", default=0.5)
+    y: Fraction = key("its center from the upper edge, of the picture's height", default=0.5)
+    width: Annotated[float, Number(above=0, most=1)] = key(
+        "its width, of the picture's; what lies outside is left away", default=0.5
+    )
+    height: Annotated[float, Number(above=0, most=1)] = key("the same of its height", default=0.5)
+
+    def slices(self, rows: int, columns: int) -> tuple[slice, slice]:
+        """Return its rows and columns of a picture: at least one of each."""
+        sides = (self.y, self.height, rows), (self.x, self.width, columns)
+        first = [min(max(math.floor(n * (at - size / 2)), 0), n - 1) for at, size, n in sides]
+        last = [min(math.ceil(n * (at + size / 2)), n) for at, size, n in sides]
+        down, across = (slice(a, max(b, a + 1)) for a, b in zip(first, last, strict=True))
+        return down, across
 
 
 class FalloffFile(Model):
@@ -238,9 +258,14 @@ class Optics(Model):
     )
     diffraction: Switch = key("whether the aperture diffracts", default=True)
     focus: Literal["fixed", "auto"] = key(
-        "auto: by contrast, the image plane is moved to where the middle of the picture is"
-        " sharpest, whatever defocus says; 18 trials, counted in the plan's time",
+        "auto: by contrast, the image plane is moved to where focus_window is sharpest, whatever"
+        " defocus says, with nothing in motion; 18 trials, counted in the plan's time",
         default="fixed",
+    )
+    focus_window: Annotated[FocusWindow, mapping(FocusWindow)] = key(
+        "what focus: auto judges; default the middle half of the picture's width and height",
+        example={"x": 0.3, "y": 0.7, "width": 0.1, "height": 0.1},
+        default=FocusWindow,
     )
     defocus: Shift = key(
         "shift of the image plane away from the lens, so that the sensor lies in front of it",

@@ -1,7 +1,7 @@
 """Autofocus by contrast, offline: the image plane is moved to where the picture is sharpest.
 
 The lens is tried at places of the image plane, first widely apart, then between the best ones; what
-is judged is the noise-free light in the middle of the array, as the pixels see it: the mean square
+is judged is the noise-free light in a window of the array, as the pixels see it: the mean square
 of the differences between neighbors of one color, relative to the squared mean. Lens aberrations,
 the scene's detail and the pixels' aperture so have their say in what is sharpest.
 
@@ -22,10 +22,11 @@ from numpy.typing import NDArray
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import geometry
 from vcam_cli.camera.derived.mosaic import mosaic
+from vcam_cli.camera.optics import FocusWindow
 from vcam_cli.errors import BadInput, bad
 from vcam_cli.progress import Stages
 from vcam_cli.simulation.cost_model import trial_seconds
-from vcam_cli.simulation.preparation import prepare
+from vcam_cli.simulation.preparation import prepare, standing_still
 
 CIRCLE = 8.0
 """Width of the circle of confusion at both ends of the range, in pixels."""
@@ -88,7 +89,8 @@ class _Trials:
 
     def __init__(self, camera: Camera, picture: Any, workers: int, stages: Stages) -> None:
         finer = camera.accuracy.model_copy(update={"preset": None, "tolerance": TOLERANCE})
-        self._camera = camera.model_copy(update={"accuracy": finer})
+        self._camera = standing_still(camera).model_copy(update={"accuracy": finer})
+        self._window = camera.optics.focus_window
         self._block = mosaic(camera).block
         self._picture, self._workers, self._stages = picture, workers, stages
         self._count = 0
@@ -107,7 +109,7 @@ class _Trials:
         self.seconds += trial_seconds(
             ready.layout.lattice, ready.layout.mosaic, ready.spectrum, self._workers
         )
-        return contrast(ready.rate, len(self._block), len(self._block[0]))
+        return contrast(ready.rate, len(self._block), len(self._block[0]), self._window)
 
 
 def _search(camera: Camera, trials: _Trials) -> tuple[float, tuple[str, ...]]:
@@ -134,8 +136,10 @@ def _moved(camera: Camera, shift: float) -> Camera:
     return camera.model_copy(update={"optics": optics})
 
 
-def contrast(light: NDArray, period_y: int, period_x: int) -> float:
-    """Return how sharp a picture is in its middle half.
+def contrast(
+    light: NDArray, period_y: int, period_x: int, window: FocusWindow | None = None
+) -> float:
+    """Return how sharp a picture is in a window.
 
     Parameters
     ----------
@@ -143,16 +147,16 @@ def contrast(light: NDArray, period_y: int, period_x: int) -> float:
         Light (..., rows, columns), in any unit.
     period_y, period_x : int
         Rows and columns after which the colors of pixels repeat: neighbors of one color.
+    window : FocusWindow, optional
+        The window; by default the middle half.
 
     Returns
     -------
     float
         Mean square of the differences between neighbors, over the squared mean; 0 in the dark.
     """
-    rows, columns = light.shape[-2:]
-    middle = light[..., rows // 4 : rows - rows // 4, columns // 4 : columns - columns // 4].astype(
-        np.float64
-    )
+    rows, columns = (window or FocusWindow()).slices(*light.shape[-2:])
+    middle = light[..., rows, columns].astype(np.float64)
     mean = float(middle.mean())
     if mean <= 0:
         return 0.0

@@ -117,12 +117,17 @@ RULES = (
         "all spectra cover the wavelengths, or say it themselves",
     ),
     Rule(
+        ("optics.focus_window",),
+        lambda camera: camera.optics.focus == "fixed",
+        "the lens stays as it is; write focus: auto",
+    ),
+    Rule(
         ("scene.distance",),
         lambda camera: not camera.optics.is_lens,
         "the light falls on the bare sensor",
     ),
     Rule(
-        ("exposure.shutter", "exposure.start"),
+        ("exposure.shutter", "exposure.start", "exposure.reference"),
         lambda camera: not (_is_lit_by_flicker(camera) or camera.scene.moves),
         "nothing in this scene changes with time; give scene.illuminant.flicker"
         " or scene.source.motion",

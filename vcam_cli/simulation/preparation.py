@@ -115,7 +115,7 @@ def prepare(
     if not (camera.scene.moves and camera.exposure.is_timed_by_scene):
         return _prepare(camera, picture, workers, stages, rate_cache, earlier)
     with stages("metering"):
-        metered = _prepare(_standing_still(camera), picture, workers, Stages(), rate_cache)
+        metered = _prepare(standing_still(camera), picture, workers, Stages(), rate_cache)
     earlier += cost_model.light_seconds(metered.layout, metered.spectrum, workers)
     timed = _timed(camera, metered)
     ready = _prepare(timed, picture, workers, stages, rate_cache, earlier)
@@ -123,8 +123,8 @@ def prepare(
     return replace(ready, camera=timed, exposure_limit=metered.exposure_limit)
 
 
-def _standing_still(camera: Camera) -> Camera:
-    """Return the camera that meters before it exposes: what moves stands where its file says."""
+def standing_still(camera: Camera) -> Camera:
+    """Return the camera as it meters and focuses: what moves stands where its file says."""
     source = camera.scene.source.model_copy(update={"motion": None})
     scene = camera.scene.model_copy(update={"source": source, "camera_motion": None})
     effects = camera.effects
