@@ -42,6 +42,9 @@ MOST = 1 << 26
 LADDER = (1.1, 1.6, 2.2, 2.7, 3.3, 4.2, 5.3, 6.6, 8.3, 10.4, 13.1, 16.4, 24.2, 32.3, 48.1)
 """Cells per pixel pitch that are tried on crops. Whole numbers of them would lie in a crop as its
 photodetectors do, and err less there than on the whole."""
+FASTEST_FALL = 4.0
+"""Power of the cells with which their error falls, at most: numbers of cells that would need a
+faster fall from those tried before are not tried."""
 OVEREXPOSED = 2.0
 """Cells of charts that fill pixels, at least: fewer end the spectrum within that of the pixels, and
 bright light rings into dark pixels that are on none of the crops."""
@@ -135,9 +138,11 @@ def cells_per_pixel(path: OpticalPath, scene: ChartScene, highest: float) -> Cho
     least = 0.0
     if converged.max() > path.ceiling:
         least, budget = OVEREXPOSED, OVEREXPOSED_SHARE * budget
-    cells, error, trials = most, budget, 1
+    tried, error, trials = most, budget, 1
     for cells in [c for c in LADDER if least <= c <= min(most, reference / COPRIME)]:
-        trials += 1
+        if trials > 1 and error * (tried / cells) ** FASTEST_FALL > budget:
+            continue
+        tried, trials = cells, trials + 1
         found = _signals(path, crops, cells, level, otf)
         # Few pixels may have no error by chance; many around them may hide theirs.
         error = _error_that_counts(found, converged, path.ceiling)
@@ -147,8 +152,8 @@ def cells_per_pixel(path: OpticalPath, scene: ChartScene, highest: float) -> Cho
             rows = crops[0].pitch_y / g.pitch_y
             return ChosenCells(max(cells, cell_grid(crops[0], g, cells)[0] / rows), error, trials)
     # It falls with the square of the cells, about: faster than is reckoned here.
-    enough = min(cells * error / budget, most)
-    return ChosenCells(enough, error * cells / enough, trials)
+    enough = min(tried * error / budget, most)
+    return ChosenCells(enough, error * tried / enough, trials)
 
 
 def _error_that_counts(found: NDArray, converged: NDArray, ceiling: float) -> float:
