@@ -152,9 +152,10 @@ def split(path: Path | str) -> Path:
     return tuple(int(p) if p.isascii() and p.isdigit() else p for p in path.split(".") if p)
 
 
-def nearest(word: object, allowed: Iterable[object]) -> str | None:
+def nearest(word: object, allowed: Iterable[object], least: float = 0.6) -> str | None:
     """Return the allowed name closest to `word`, case, `-` and `_` aside, or None.
 
+    It must be alike to the ratio `least` of `difflib`.
     One that begins with the whole word, such as snr_db with snr, is closer than any other.
     """
     if not isinstance(word, str):
@@ -163,7 +164,7 @@ def nearest(word: object, allowed: Iterable[object]) -> str | None:
     begun = [name for name in names if name.startswith(f"{_plain(word)}_")]
     if begun and _plain(word) not in names:
         return names[min(begun, key=len)]
-    found = difflib.get_close_matches(_plain(word[:100]), names, n=1, cutoff=0.6)
+    found = difflib.get_close_matches(_plain(word[:100]), names, n=1, cutoff=least)
     return names[found[0]] if found else None
 
 

@@ -7,8 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from vcam_cli.camera import hints
+from vcam_cli.camera import hint_tables, hints
 from vcam_cli.camera.load import load
+from vcam_cli.camera.scene import CHARTS
 from vcam_cli.errors import BadInput
 
 BASE = """
@@ -22,6 +23,7 @@ array: {rows: 48, columns: 64}
 exposure: {time: 60 ms}
 """
 """A camera that leaves open what it can."""
+STEPS = "processing=[demosaic: bilinear, white_balance: illuminant]"
 GUESSES = {
     "iso=800": "exposure.iso: 800",
     "ev=1 EV": "exposure: {auto: {max: 100 ms}, compensation: 1 EV}",
@@ -82,6 +84,43 @@ GUESSES = {
     "adc=12-bit": "adc: {bits: 12}",
     "array=640x480": "array: {columns: 640, rows: 480}",
     "optics=f/1.8": "optics: {f_number: 1.8, focal_length: 4.5 mm}",
+    # numbers among letters, units that files do not have
+    "exposure.iso=ISO800": "exposure.iso: 800",
+    "adc.bits=10 bit": "adc.bits: 10",
+    "array.rows=48 px": "array.rows: 48",
+    "array.rows=3k": "array.rows: 3000",
+    "array.columns=64.0": "array.columns: 64",
+    "scene.distance=10 feet": "scene.distance: 3.048 m",
+    "scene.illuminance=10 footcandles": "scene.illuminance: 107.639 lx",
+    "scene.distance=inf": "scene.distance: infinity",
+    "adc.offset=64": "adc.offset: 64 DN",
+    "optics.fov=80": "optics.field_of_view: 80 deg",
+    "optics.field_of_view=80": "optics.field_of_view: 80 deg",
+    "name=my phone": "name: my-phone",
+    "name=“phone”": "name: phone",
+    # what telephones are sold with
+    "array.resolution=12MP": "array.columns: 4000 and array.rows: 3000",
+    "array.megapixels=12": "array.columns: 4000 and array.rows: 3000",
+    "array.size=4032x3024": "array.columns: 4032 and array.rows: 3024",
+    "optics.focal_length=26 mm equivalent": "optics.field_of_view: 79.5 deg",
+    "optics.equivalent_focal_length=26 mm": "optics.field_of_view: 79.5 deg",
+    "optics.focal_length_35mm=26": "optics.field_of_view: 79.5 deg",
+    # parts of a camera by names of their own
+    "sensor.width=3 um": "pixel.width: 3 um",
+    "sensor.rows=48": "array.rows: 48",
+    "sensor.qe=0.6": "pixel.photodetector.quantum_efficiency: 0.6",
+    "lens.f_number=2": "optics.f_number: 2",
+    "camera.iso=100": "exposure.iso: 100",
+    # words for values
+    "scene.source=macbeth": "scene.source: {kind: chart, chart: colorchecker}",
+    "scene.source.chart=macbeth": "scene.source.chart: colorchecker",
+    "scene.illuminant=LED": "scene.illuminant: LED-B3",
+    "scene.illuminant=CWF": "scene.illuminant: FL2",
+    "processing=none": "processing: []",
+    "processing.demosaic=malvar": "processing.demosaic: edge-aware",
+    "processing.white_balance=awb": "processing.white_balance: gray-world",
+    "accuracy=high": "accuracy: reference",
+    "temperature=300": "pixel.temperature: 300 K",
     # a file in place of what names it
     "array.filters=qe.csv": "array.filters: {file: qe.csv}",
     "scene.illuminant=lamp.csv": "scene.illuminant: {file: lamp.csv}",
@@ -108,7 +147,7 @@ def folder(tmp_path, monkeypatch):
 def remedy_of(guess):
     """The remedy's own words, and the path that they begin at where they name no other."""
     with pytest.raises(BadInput) as caught:
-        load("camera.yaml", [guess])
+        load_with(guess)
     problem = caught.value.problems[0]
     return problem.remedy, guess.partition("=")[0]
 
@@ -128,19 +167,55 @@ def test_what_is_meant_is_right(meant):
     assert accepted(meant)
 
 
+@pytest.mark.parametrize(
+    ("wrong", "meant"),
+    [
+        ("pixel:\n  width:3 um", "write width: 3 um, with a space behind the colon"),
+        ("optics: {f_number: 2,8}", "write numbers with a decimal point, as in 2.8"),
+        ("pixel: {width: “3 um”}", "write 3 um, with straight quotes or none"),
+        ("kind: camera", "remove it: a file without kind is a camera"),
+    ],
+)
+def test_yaml_that_is_not_quite(wrong, meant):
+    Path("mine.yaml").write_text(f"extends: camera.yaml\n{wrong}\n", encoding="utf-8")
+    with pytest.raises(BadInput) as caught:
+        load("mine.yaml")
+    assert caught.value.problems[0].remedy == meant
+
+
+def test_a_field_of_view_is_that_of_film():
+    """50 mm on 36 mm x 24 mm see 46.8 deg from corner to corner, as lenses are specified."""
+    remedy, _ = remedy_of("optics.focal_length=50 mm (35mm equivalent)")
+    assert remedy.startswith("write optics.field_of_view: 46.8 deg")
+
+
+def test_a_far_word_is_not_led_astray():
+    remedy, _ = remedy_of("optics.lens=none")
+    assert "write one of the allowed keys" in remedy
+
+
 def accepted(entry):
     """Whether a camera of that shipped camera takes entries "path: value and path: value"."""
     for one in re.split(" and (?=[a-z]+[.:])", entry):
         path, _, value = one.partition(": ")
         ccd = ["pixel.architecture=ccd"] if "charge_transfer" in path else []
-        load("camera.yaml", [*ccd, f"{path}={value}"])
+        load_with(*ccd, f"{path}={value}")
     return True
+
+
+def load_with(*sets):
+    """The camera, with steps where one of them is asked for."""
+    named = any(item.startswith("processing.") for item in sets)
+    return load("camera.yaml", [*([STEPS] if named else []), *sets])
 
 
 @pytest.mark.parametrize(
     "entry",
     sorted(
-        {*hints.KEYS.values(), *(e for words in hints.ELSEWHERE.values() for e in words.values())}
+        {
+            *hint_tables.KEYS.values(),
+            *(e for words in hint_tables.ELSEWHERE.values() for e in words.values()),
+        }
     ),
 )
 def test_every_key_that_is_named_exists_and_takes_its_value(entry):
@@ -149,10 +224,15 @@ def test_every_key_that_is_named_exists_and_takes_its_value(entry):
 
 @pytest.mark.parametrize(
     ("path", "value"),
-    sorted({(path, value) for path, words in hints.VALUES.items() for value in words.values()}),
+    sorted(
+        {(path, value) for path, words in hint_tables.VALUES.items() for value in words.values()}
+    ),
 )
 def test_every_value_that_is_named_is_taken(path, value):
-    load("camera.yaml", [f"{path}={value}"])
+    if path == "scene.source.chart":  # some charts need more keys
+        assert value in CHARTS
+    else:
+        load_with(f"{path}={value}")
 
 
 def test_a_mosaic_by_its_letters():
@@ -166,7 +246,7 @@ def test_a_photograph_is_an_image(kind):
     assert remedy == "write image"
 
 
-@pytest.mark.parametrize("word", hints.NOT_SIMULATED)
+@pytest.mark.parametrize("word", hint_tables.NOT_SIMULATED)
 def test_what_is_not_simulated_is_said(word):
     """And is no key anywhere: what comes to be simulated leaves this table."""
     assert word not in {key.name for key in hints.index()}
@@ -176,7 +256,7 @@ def test_what_is_not_simulated_is_said(word):
 
 def test_no_word_of_the_table_is_a_key_of_that_place():
     """A word that is a key somewhere is led elsewhere only where it is none."""
-    for above, words in hints.ELSEWHERE.items():
+    for above, words in hint_tables.ELSEWHERE.items():
         here = {key.name for key in hints.index() if key.path[:-1] == above}
         assert not here & set(words), above
 

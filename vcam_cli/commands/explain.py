@@ -43,23 +43,23 @@ def explain(
 
 def names() -> list[str]:
     """Return all that can be explained."""
-    from vcam_cli.camera import hints
+    from vcam_cli.camera import hint_tables
     from vcam_cli.camera.scene import CHARTS
 
     found = [key.dotted for _, key in _all_keys()] + [key.name for _, key in _all_keys()]
-    return [*found, *_effects(), *_metrics(), *CHARTS, *hints.KEYS]
+    return [*found, *_effects(), *_metrics(), *CHARTS, *hint_tables.KEYS]
 
 
 def explanations(name: str) -> Iterator[dict[str, Any]]:
     """Yield what there is to say of a name: title, about, and further lines by their headings."""
-    from vcam_cli.camera import hints
+    from vcam_cli.camera import hint_tables
 
     word = name.strip().lower().replace(" ", "_")
     yield from _of_effect(word)
     yield from _of_metric(word)
     yield from _of_chart(word)
     found = _keys_called(word)
-    meant = hints.KEYS.get(word.replace("-", "_"))
+    meant = hint_tables.KEYS.get(word.replace("-", "_"))
     if meant:  # what most people mean by the word comes first
         first = _keys_called(meant.partition(": ")[0])
         found = [*first, *(key for key in found if key not in first)]

@@ -4,7 +4,7 @@ import re
 from dataclasses import replace
 from pathlib import PurePath
 
-from vcam_cli.camera.hints import PICTURES
+from vcam_cli.camera.hint_tables import PICTURES
 from vcam_cli.config.validation_messages import yaml_text
 from vcam_cli.errors import Path, Problem
 from vcam_cli.sweeps.model import VARY

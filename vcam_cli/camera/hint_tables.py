@@ -1,0 +1,244 @@
+"""Words of photographers, data sheets and other simulators, and the keys that they mean.
+
+What is written first is mostly a right word in the wrong place, another word of the trade, or a
+value as one says it. `hints` looks them up here. A test reads every key and value that is named.
+"""
+
+from collections.abc import Mapping
+from fractions import Fraction
+
+from vcam_cli.errors import Path
+
+KEYS: Mapping[str, str] = {
+    "iso": "exposure.iso: 800",
+    "gain": "exposure.gain: 8",
+    "analog_gain": "exposure.gain: 8",
+    "ev": "exposure: {auto: {max: 100 ms}, compensation: 1 EV}",
+    "exposure_compensation": "exposure: {auto: {max: 100 ms}, compensation: 1 EV}",
+    "shutter": "exposure.time: 1/60 s",
+    "shutter_speed": "exposure.time: 1/60 s",
+    "shutter_time": "exposure.time: 1/60 s",
+    "exposure_time": "exposure.time: 30 ms",
+    "integration_time": "exposure.time: 30 ms",
+    "auto_exposure": "exposure.auto: {max: 100 ms}",
+    "aperture": "optics.f_number: 2.8",
+    "f": "optics.f_number: 2.8",
+    "f_stop": "optics.f_number: 2.8",
+    "fstop": "optics.f_number: 2.8",
+    "fnumber": "optics.f_number: 2.8",
+    "n": "optics.f_number: 2.8",
+    "fov": "optics.field_of_view: 60 deg",
+    "na": "optics.numerical_aperture: 0.2",
+    "transmission": "optics.transmittance: 0.95",
+    "vignetting": "optics.off_axis: exact",
+    "relative_illumination": "optics.off_axis: exact",
+    "aberrations": "optics.zernike: {4: 0.05 um}",
+    "size": "pixel.width: 3 um",
+    "pixel_size": "pixel.width: 3 um",
+    "pixel_pitch": "pixel.width: 3 um",
+    "pitch": "pixel.width: 3 um",
+    "qe": "pixel.photodetector.quantum_efficiency: 0.5",
+    "noise": "pixel.readout.read_noise: 5 e",
+    "readout_noise": "pixel.readout.read_noise: 5 e",
+    "fwc": "pixel.readout.full_well: 20 ke",
+    "well": "pixel.readout.full_well: 20 ke",
+    "well_capacity": "pixel.readout.full_well: 20 ke",
+    "full_well_capacity": "pixel.readout.full_well: 20 ke",
+    "saturation_capacity": "pixel.readout.full_well: 20 ke",
+    "cte": "pixel.readout.charge_transfer: {inefficiency: 3e-5, phases: 3}",
+    "cti": "pixel.readout.charge_transfer: {inefficiency: 3e-5, phases: 3}",
+    "hot_pixels": "pixel.defects.hot: 0.0001",
+    "dead_pixels": "pixel.defects.dead: 0.0001",
+    "bit_depth": "adc.bits: 12",
+    "bitdepth": "adc.bits: 12",
+    **dict.fromkeys(
+        ("resolution", "pixels", "megapixels", "mp", "image_size"),
+        "array.columns: 640 and array.rows: 480",
+    ),
+    "cfa": "array.pattern: bayer-rggb",
+    "bayer": "array.pattern: bayer-rggb",
+    "color": "array.pattern: bayer-rggb",
+    "lux": "scene.illuminance: 300 lx",
+    "light": "scene.illuminant: D65",
+    "lamp": "scene.illuminant: D65",
+    "brightness": "scene.luminance: 100 cd/m2",
+    "image": "scene.source: {kind: image, file: photo.png}",
+    "photo": "scene.source: {kind: image, file: photo.png}",
+    "picture": "scene.source: {kind: image, file: photo.png}",
+    "chart": "scene.source: {kind: chart, chart: colorchecker}",
+    "metrics": "quality: [mse, s-cielab]",
+}
+"""A word where there is no such key -> what is meant, as a path and a value."""
+ELSEWHERE: Mapping[Path, Mapping[str, str]] = {
+    ("array",): {
+        "width": "array.columns: 640",
+        "height": "array.rows: 480",
+        "size": "array.columns: 640 and array.rows: 480",
+    },
+    ("adc",): {"black_level": "adc.offset: 64 DN"},
+    ("effects",): {"noise": "effects: {shot_noise: off, read_noise: off, fpn: off}"},
+    (): {
+        "rows": "array.rows: 480",
+        "columns": "array.columns: 640",
+        "lens": "optics: {f_number: 2.8, focal_length: 4.5 mm}",
+        "sensor": "pixel: {width: 4 um} and array: {rows: 480, columns: 640}",
+        "noise": "effects: {shot_noise: off, read_noise: off, fpn: off}",
+    },
+    ("scene", "source"): dict.fromkeys(
+        ("path", "filename", "name"), "scene.source: {kind: image, file: photo.png}"
+    ),
+}
+"""The same where a section gives the word another meaning."""
+VALUES: Mapping[str, Mapping[str, str]] = {
+    "array.pattern": {
+        **dict.fromkeys(("bayer", "rggb", "color", "rgb"), "bayer-rggb"),
+        **{order: f"bayer-{order}" for order in ("grbg", "gbrg", "bggr")},
+        **dict.fromkeys(("mono", "gray", "grey", "none", "bw"), "monochrome"),
+        **dict.fromkeys(("foveon", "x3"), "stacked"),
+        **dict.fromkeys(("quad", "tetracell", "quadra"), "quad-bayer"),
+    },
+    "scene.illuminant": {
+        **dict.fromkeys(("daylight", "white", "day"), "D65"),
+        **dict.fromkeys(("sun", "sunlight"), "D55"),
+        **dict.fromkeys(("tungsten", "incandescent", "halogen", "bulb"), "A"),
+        **dict.fromkeys(("fluorescent", "office", "cwf", "cool_white"), "FL2"),
+        **dict.fromkeys(("led", "white_led"), "LED-B3"),
+        **dict.fromkeys(("tl84", "tl_84"), "FL11"),
+        **dict.fromkeys(("u30", "tl83"), "FL12"),
+        **dict.fromkeys(("shade", "shadow", "blue_sky"), "D75"),
+        **dict.fromkeys(("candle", "candlelight"), "{blackbody: 1900 K}"),
+        **dict.fromkeys(("flash", "strobe", "xenon"), "D55"),
+        "horizon": "{blackbody: 2300 K}",
+    },
+    "scene.source.chart": {
+        **dict.fromkeys(
+            ("macbeth", "xrite", "x_rite", "color_checker", "colour_checker", "colourchecker"),
+            "colorchecker",
+        ),
+        **dict.fromkeys(("flat", "gray", "grey", "white", "flat_field"), "uniform"),
+        **dict.fromkeys(("edge", "iso12233", "iso_12233", "sfr"), "slanted-edge"),
+        **dict.fromkeys(("sine", "grating", "sinus"), "sinusoid"),
+        **dict.fromkeys(("star", "siemens", "spokes"), "siemens-star"),
+        **dict.fromkeys(("points", "dots", "stars", "pinholes"), "point-grid"),
+        **dict.fromkeys(("letters", "text", "snellen"), "eye-chart"),
+        **dict.fromkeys(("wedge", "grayscale", "stouffer", "step_chart"), "step-wedge"),
+        **dict.fromkeys(("hdr", "patches"), "hdr-patches"),
+        **dict.fromkeys(("natural", "texture", "leaves"), "dead-leaves"),
+        **dict.fromkeys(("black", "none", "cap"), "dark"),
+    },
+    "accuracy": {
+        **dict.fromkeys(("high", "best", "exact", "full", "max", "precise"), "reference"),
+        **dict.fromkeys(("low", "fast", "quick", "coarse", "preview"), "draft"),
+        **dict.fromkeys(("normal", "default", "medium", "auto"), "standard"),
+    },
+    "processing.demosaic": {
+        **dict.fromkeys(("linear", "nearest", "simple"), "bilinear"),
+        **dict.fromkeys(("malvar", "vng", "menon", "ppg", "amaze", "edge"), "edge-aware"),
+    },
+    "processing.white_balance": {
+        **dict.fromkeys(("auto", "awb", "gray", "grey_world", "on"), "gray-world"),
+        **dict.fromkeys(("daylight", "d65", "as_shot", "known", "perfect"), "illuminant"),
+        **dict.fromkeys(("white_patch", "max", "brightest"), "bright-block"),
+        "off": "none",
+    },
+    "processing": dict.fromkeys(("none", "off", "raw"), "[]"),
+    "exposure": {"auto": "{auto: {max: 100 ms}}"},
+    "exposure.auto": dict.fromkeys(("true", "on", "yes", "auto"), "{max: 100 ms}"),
+    "effects": {"none": "{shot_noise: off, read_noise: off, fpn: off}"},
+    "pixel.readout.reset_noise": {"cds": "none"},
+}
+"""A key -> what stands there and is not allowed -> what to write."""
+BARE: Mapping[str, str] = {
+    unit: unit.removeprefix("k")
+    for unit in ("e", "ke", "e/s", "um", "lx", "cd/m2", "%", "deg", "DN")
+}
+"""Unit of a key -> unit that a number without one has, where no other is usual."""
+FOREIGN: Mapping[str, tuple[Fraction, str]] = {
+    **dict.fromkeys(("ft", "foot", "feet"), (Fraction("0.3048"), "m")),
+    **dict.fromkeys(("inch", "inches"), (Fraction(1), "in")),
+    **dict.fromkeys(("Å", "angstrom", "angstroms"), (Fraction("0.1"), "nm")),
+    **dict.fromkeys(("min", "minutes"), (Fraction(60), "s")),
+    **dict.fromkeys(("fc", "footcandle", "footcandles"), (Fraction("10.7639"), "lx")),
+    **dict.fromkeys(("fL", "footlambert", "footlamberts"), (Fraction("3.42626"), "cd/m2")),
+}
+"""A unit that files do not have -> its size in one that they have."""
+SECTIONS: Mapping[str, tuple[str, ...]] = {
+    "lens": ("optics",),
+    "sensor": ("pixel", "array", "adc"),
+    "camera": ("exposure", "optics", "pixel", "array", "adc"),
+    "isp": ("processing",),
+    "readout": ("pixel",),
+    "photodetector": ("pixel",),
+    "photodiode": ("pixel",),
+    "light": ("scene",),
+    "image": ("array", "output"),
+}
+"""A word for a part of a camera -> sections that are of it, those that most is said of first."""
+_NUMBER = r"(\d+(?:\.\d+)?)"
+FORMS: Mapping[str, tuple[tuple[str, str], ...]] = {
+    "optics.f_number": ((rf"[fF] ?/? ?{_NUMBER}", r"write \1"),),
+    "exposure": (
+        (r"(1/\d+|[\d.]+) ?(s|ms|us)", r"write {time: \g<0>}"),
+        (r"1/\d+", r"write {time: \g<0> s}"),
+        (r"(?i)iso ?(\d+)", r"write {time: 30 ms, iso: \1}"),
+    ),
+    "adc": ((r"(\d+)[ -]?(bits?)?", r"write {bits: \1}"),),
+    "array": ((r"(\d+) ?[xX*×] ?(\d+)", r"write {columns: \1, rows: \2}"),),
+    "pixel": ((rf"{_NUMBER} ?[uµμ]m", r"write width: \1 um below it"),),
+    "optics": ((rf"[fF] ?/? ?{_NUMBER}", r"write {f_number: \1, focal_length: 4.5 mm}"),),
+    "scene": ((r".*\.(png|jpe?g|tiff?|exr)", r"write {source: {kind: image, file: \g<0>}, ...}"),),
+    "exposure.shutter": ((r"(1/\d+(\.\d+)?) ?s?", r"write exposure.time: \1 s, in its place"),),
+    "exposure.time": (
+        (r"1/\d+(\.\d+)?", r"write \g<0> s"),
+        ("auto", "write exposure: {auto: {max: 100 ms}}"),
+    ),
+    "scene.luminance": ((rf"{_NUMBER} ?(lx|lux)", r"write illuminance: \1 lx, in its place"),),
+    "scene.illuminance": (
+        (rf"{_NUMBER} ?(cd/m2|nits?)", r"write luminance: \1 cd/m2, in its place"),
+    ),
+    "scene.illuminant": (
+        (rf"{_NUMBER} ?[kK]", r"write {blackbody: \1 K}"),
+        (rf"{_NUMBER} ?nm", r"write {monochromatic: \1 nm}"),
+    ),
+    "array.pattern": (
+        ("(?i)x-?trans", "write {block: [[R, G], [G, B]]} with its own block"),
+        (
+            "([RGBWCY])" * 4,
+            r"write {block: [[\1, \2], [\3, \4]]}, with a spectrum for each in filters",
+        ),
+    ),
+    "seed": ((r"\d+", r"write {frame: \g<0>}"),),
+    "quality": ((r"mse|psnr|cielab|s-cielab", r"write [\g<0>]"),),
+    "output.raw": (
+        (r"dn|electrons|volts", r"write [\g<0>]"),
+        (r"dng|tiff", r"write output: {\g<0>: true}"),
+    ),
+    "scene.source.kind": (
+        (r"(?i)photo|picture|file|jpe?g|png|exr", "write image"),
+        (r"(?i)(multi)?spectral|cube", "write hyperspectral"),
+    ),
+}
+"""A key -> expressions that a value there may match, and what is then to be done."""
+SWITCHES = {
+    **dict.fromkeys(("yes", "on", "1", "true"), "true"),
+    **dict.fromkeys(("no", "off", "0", "false"), "false"),
+}
+"""A word for a switch -> what it means."""
+NOT_SIMULATED: Mapping[str, str] = {
+    "blooming": "charge beyond the full well is drained, and spills to no neighbor",
+    "smear": "charge is transferred in no time, and collects no light meanwhile",
+    "crosstalk": "pixels share light and charge by pixel.photodetector.charge_diffusion alone",
+    "distortion": "the lens images straight lines as straight lines",
+    "lateral_color": "the lens images all wavelengths in one size",
+    "chromatic_aberration": "wavefronts in optics.zernike are the same length at all wavelengths",
+    "flash": "the light of the scene is scene.illuminant at one level",
+    **dict.fromkeys(
+        ("stabilization", "image_stabilization", "optical_stabilization"),
+        "the camera moves as scene.camera_motion says",
+    ),
+}
+"""What cameras have and this file cannot say -> what is simulated in its place."""
+PICTURES = {".png", ".jpg", ".jpeg", ".tif", ".tiff", ".exr", ".hdr", ".bmp", ".webp", ".pfm"}
+"""Ends of names of files of pictures."""
+DATA = PICTURES | {".csv", ".txt", ".dat", ".npy", ".tsv"}
+"""Ends of names of files that hold a curve, a table or a point spread function."""
