@@ -287,14 +287,3 @@ def test_an_option_that_is_a_key_is_led_to_set(option, meant):
     assert done.returncode == 2
     assert f'--set {path}="{value}"' in done.stderr
     load("camera.yaml", [meant])
-
-
-@pytest.mark.parametrize(
-    ("option", "meant"),
-    [("--resume", "the same command goes on"), ("--jobs", "--workers"), ("--exposure", "--set")],
-)
-def test_an_option_of_other_programs(option, meant):
-    line = [sys.executable, "-m", "vcam_cli.commands.main", "run", "camera.yaml", option, "1"]
-    done = subprocess.run(line, capture_output=True, text=True)
-    assert done.returncode == 2
-    assert meant in done.stderr

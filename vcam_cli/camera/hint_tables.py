@@ -121,7 +121,6 @@ VALUES: Mapping[str, Mapping[str, str]] = {
         **dict.fromkeys(("star", "siemens", "spokes"), "siemens-star"),
         **dict.fromkeys(("points", "dots", "stars", "pinholes"), "point-grid"),
         **dict.fromkeys(("letters", "text", "snellen"), "eye-chart"),
-        **dict.fromkeys(("wedge", "grayscale", "stouffer", "step_chart"), "step-wedge"),
         **dict.fromkeys(("hdr", "patches"), "hdr-patches"),
         **dict.fromkeys(("natural", "texture", "leaves"), "dead-leaves"),
         **dict.fromkeys(("black", "none", "cap"), "dark"),

@@ -18,6 +18,7 @@ from vcam_cli.camera.derived import (
     named_spectra,
     photodiode,
 )
+from vcam_cli.camera.hint_tables import PICTURES
 from vcam_cli.config import document, overrides, shipped
 from vcam_cli.config import merge as merging
 from vcam_cli.config.document import Document
@@ -25,7 +26,7 @@ from vcam_cli.config.file_format import Check, FileFormat
 from vcam_cli.config.file_names import current_folder
 from vcam_cli.config.merge import Alternatives, MergeRules
 from vcam_cli.config.yaml_tree import Key, Node
-from vcam_cli.errors import BadInput
+from vcam_cli.errors import BadInput, bad
 from vcam_cli.floats import own_float_errors
 
 EXAMPLE = "starter"
@@ -162,6 +163,9 @@ def read(camera: str | Path, folder: Path) -> Document[Camera]:
 
     Raises BadInput, CannotDo.
     """
+    if Path(camera).suffix.lower() in PICTURES:
+        remedy = f'write --set scene.source="{{kind: image, file: {camera}}}" behind a camera'
+        raise bad((), f"{str(camera)!r} is a picture, not a camera", remedy)
     return document.read(camera, folder, FORMAT)
 
 

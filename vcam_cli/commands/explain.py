@@ -54,7 +54,7 @@ def explanations(name: str) -> Iterator[dict[str, Any]]:
     """Yield what there is to say of a name: title, about, and further lines by their headings."""
     from vcam_cli.camera import hint_tables
 
-    word = name.strip().lower().replace(" ", "_")
+    word = re.sub(r"^f/[\d.]*$", "f_number", name.strip().lower().replace(" ", "_"))
     yield from _of_effect(word)
     yield from _of_metric(word)
     yield from _of_chart(word)
@@ -170,9 +170,11 @@ def _metrics() -> dict[str, str]:
 
 
 def _of_metric(word: str) -> Iterator[dict[str, Any]]:
-    about = _metrics().get(word) or _metrics().get(word.replace("_", "-"))
-    if about:
-        yield {"title": f"{word} (metric)", "about": f"{about[:1].upper()}{about[1:]}."}
+    names = (word, word.replace("_", "-"), f"{word}_db")
+    called = next((name for name in names if name in _metrics()), None)
+    if called is not None:
+        about = _metrics()[called]
+        yield {"title": f"{called} (metric)", "about": f"{about[:1].upper()}{about[1:]}."}
 
 
 def _of_chart(word: str) -> Iterator[dict[str, Any]]:

@@ -62,7 +62,7 @@ def list_(
         raise bad((), message, "write for example vcam list technologies cmos-0.18um --report")
 
     if kind is not None and kind not in KINDS:
-        near = nearest(kind, KINDS)
+        near = WORDS.get(kind.lower()) or nearest(kind, KINDS)
         remedy = f"did you mean {near}?" if near else f"kinds: {', '.join(KINDS)}"
         raise bad((), f"{kind!r} is not a kind of thing that ships", remedy)
     found = {k: list(KINDS[k]()) for k in ([kind] if kind else KINDS)}
@@ -234,6 +234,16 @@ def _metrics() -> list[Item]:
     return [Item(name, about) for name, about in (always | sampled | asked).items()]
 
 
+WORDS = {
+    **dict.fromkeys(("lens", "lenses", "optics", "pixels", "arrays", "scenes", "sensors"), "parts"),
+    **dict.fromkeys(("lamp", "lamps", "lights", "light"), "illuminants"),
+    **dict.fromkeys(("spectra", "spectrum", "qe", "curves", "cfa"), "filters"),
+    **dict.fromkeys(("processing", "isp", "pipeline"), "steps"),
+    **dict.fromkeys(("sources", "targets"), "charts"),
+    **dict.fromkeys(("processes", "process"), "technologies"),
+    "sensor": "cameras",
+}
+"""A word for a kind of things that ship -> the kind."""
 KINDS: dict[str, Callable[[], list[Item]]] = {
     "cameras": lambda: _files("cameras"),
     "parts": lambda: _files(*PARTS),

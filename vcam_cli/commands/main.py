@@ -54,14 +54,6 @@ COMMANDS = {
     "schema": "schema:schema",
 }  # command -> module in this package : function
 
-
-OPTIONS = {
-    **dict.fromkeys(("--resume", "--continue"), "none; the same command goes on where it stopped"),
-    **dict.fromkeys(("--jobs", "--threads", "--cores", "--processes"), "--workers"),
-    **dict.fromkeys(("--output", "--output-dir", "--dir"), "--out"),
-    **dict.fromkeys(("--verbose", "--debug"), "none; vcam plan says what a run does, and why"),
-}
-"""An option of other programs -> the one of this."""
 UsageError: type[Exception] = typer.BadParameter.__mro__[1]
 """Of wrong arguments: typer exports only errors below it."""
 
@@ -93,6 +85,10 @@ class Commands(TyperGroup):
     def resolve_command(self, ctx: Any, args: list[str]) -> Any:
         """Find the command that the arguments call."""
         if args and args[0] not in COMMANDS:
+            from vcam_cli.commands.usage_hints import meant_command
+
+            if meant := meant_command(args[0]):
+                ctx.fail(f"No such command {args[0]!r}; write {meant}")
             for name in COMMANDS:  # so that the nearest one can be suggested
                 self.get_command(ctx, name)
         return super().resolve_command(ctx, args)
@@ -148,7 +144,9 @@ def report_failures() -> Iterator[None]:
         with interrupts.restore_interrupt():
             yield
     except UsageError as error:
-        _suggest_key(error)
+        from vcam_cli.commands.usage_hints import advise
+
+        advise(error)
         raise
     except VcamError as error:
         _exit(str(error), error.exit_code, error)
@@ -160,22 +158,6 @@ def report_failures() -> Iterator[None]:
             interrupts.INTERRUPTED,
             error,
         )
-
-
-def _suggest_key(error: Any) -> None:
-    """Suggest the key of a camera file where an option is not there, such as --iso."""
-    option = getattr(error, "option_name", None)
-    if option is None:
-        return
-    if said := OPTIONS.get(option):
-        error.possibilities = [said]
-        return
-    if any(name.startswith(option) for name in getattr(error, "possibilities", None) or ()):
-        return  # an option that was not written to its end
-    from vcam_cli.camera.hints import set_option
-
-    if meant := set_option(option):
-        error.possibilities = [meant]
 
 
 def _exit(message: str, code: int, error: BaseException) -> None:

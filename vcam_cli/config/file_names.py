@@ -15,6 +15,12 @@ from vcam_cli.config.yaml_reader import display_path
 from vcam_cli.config.yaml_tree import Node
 from vcam_cli.errors import BadInput, CannotDo, bad, nearest
 
+COMMANDS = {
+    "cameras": "vcam run",
+    "studies": "vcam sweep, or vcam schedule",
+    "measurements": "vcam verify, or vcam fit",
+}
+"""What ships and commands take -> the commands."""
 SUFFIXES = (".yaml", ".yml")
 
 
@@ -26,6 +32,7 @@ def argument_file(argument: str | Path, folder: Path, kind: str) -> Path:
     text = str(argument)
     path = folder / text
     if not (isinstance(argument, Path) or looks_like_path(text) or is_file(path)):
+        _refuse_other_kind(text, kind)
         return shipped.find(kind, text)
     try:
         return existing_file(path, text)
@@ -35,6 +42,14 @@ def argument_file(argument: str | Path, folder: Path, kind: str) -> Path:
             raise
         message = error.problems[0].message
         raise bad((), message, f"{shipped.KINDS[kind]} {near!r} ships") from None
+
+
+def _refuse_other_kind(name: str, kind: str) -> None:
+    """Raise BadInput for the name of something that ships and another command takes."""
+    for other, commands in COMMANDS.items():
+        if other != kind and name in shipped.names(other) and name not in shipped.names(kind):
+            message = f"{name!r} is {shipped.KINDS[other]}, not {shipped.KINDS[kind]}"
+            raise bad((), message, f"give it to {commands}")
 
 
 def referenced_file(name: Node, kind: str, chain: tuple[Path, ...] = ()) -> Path:

@@ -1,5 +1,6 @@
 """Overrides "PATH=VALUE" of the command line, and those of Python callers, as a tree."""
 
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -52,11 +53,18 @@ def overlay_values(changes: Mapping[str, Any], folder: Path, rules: MergeRules) 
     return whole
 
 
+def _example(item: str) -> str:
+    """Return an override as it is written, with the path and value given, if these can be told."""
+    if match := re.fullmatch(r"\s*([a-z_]\w*(?:\.\w+)*)\s*(?:[=:]\s*(\S.*)?|\s(\S.*))?", item):
+        return f'{match[1]}="{match[2] or match[3] or "VALUE"}"'
+    return "pixel.width=8um"
+
+
 def _override(item: str, folder: Path) -> Node:
     path, _, text = item.partition("=")
     keys = errors.split(path.strip())
     if "" in path.strip().split(".") or not text.strip():
         message = f"{item!r} is not PATH=VALUE"
-        raise BadInput([Problem((), message, "write pixel.width=8um", "--set")])
+        raise BadInput([Problem((), message, f"write {_example(item)}", "--set")])
     source = Source(f"--set {one_line(item)}", folder, lines=False)
     return tree_at(keys, read_text(text, source))
