@@ -29,6 +29,7 @@ def said(tmp_path, *arguments):
         ("mine.yaml", "write vcam run mine.yaml"),
         ("pixel-size", "write vcam sweep pixel-size"),
         ("captures", "write vcam schedule captures"),
+        ("noise-pairs", "write vcam dataset noise-pairs"),
         ("run pixel-size", "is a study, not a camera; give it to vcam sweep"),
         ("sweep starter", "is a camera, not a study; give it to vcam run"),
         ("run photo.jpg", '--set scene.source="{kind: image, file: photo.jpg}"'),

@@ -1,5 +1,6 @@
 """What is meant by arguments that no command takes: verbs and options of other programs."""
 
+import re
 from pathlib import PurePath
 from typing import Any
 
@@ -38,8 +39,8 @@ def meant_command(word: str) -> str:
     if word in shipped.names("cameras"):
         return f"vcam run {word}"
     if study := shipped.files("studies").get(word):
-        is_schedule = "\nkind: schedule" in study.read_text("utf-8")
-        return f"vcam {'schedule' if is_schedule else 'sweep'} {word}"
+        kind = re.search(r"^kind: (\w+)", study.read_text("utf-8"), re.MULTILINE)
+        return f"vcam {kind[1]} {word}" if kind else ""
     return f"vcam run {word}" if word.endswith(SUFFIXES) else ""
 
 

@@ -17,7 +17,7 @@ from vcam_cli.errors import BadInput, CannotDo, bad, nearest
 
 COMMANDS = {
     "cameras": "vcam run",
-    "studies": "vcam sweep, or vcam schedule",
+    "studies": "vcam sweep, vcam schedule or vcam dataset",
     "measurements": "vcam verify, or vcam fit",
 }
 """What ships and commands take -> the commands."""
