@@ -13,11 +13,13 @@ import os
 import re
 import subprocess
 import sys
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from functools import partial
 from pathlib import Path
 from typing import Any
 
+import effect_pictures
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
 from mkdocs.structure.pages import Page
@@ -39,16 +41,15 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
         "reference/studies.md": _keys_page(*_study_keys()),
         "reference/measurements.md": _keys_page(*_measurement_keys()),
         "reference/commands.md": "\n".join(_commands()),
-        "reference/effects.md": "\n".join(_effects()),
         "cite.md": _cite(),
     }
     if "thesis.md" not in files.src_uris:
         made["thesis.md"] = "# Thesis, line by line\n\nThis page is not written yet.\n"
-    gallery, photographs = _gallery()
-    made["gallery.md"] = gallery
+    made["gallery.md"], photographs = _gallery()
+    made["reference/effects.md"], pictures = _effects()
     for name, text in made.items():
         files.append(File.generated(config, name, content=text))
-    for name, data in photographs.items():
+    for name, data in {**photographs, **pictures}.items():
         files.append(File.generated(config, name, content=data))
     return files
 
@@ -209,22 +210,43 @@ def _escaped(text: str) -> str:
 # Effects and commands
 
 
-def _effects() -> Iterator[str]:
+def _effects() -> tuple[str, dict[str, bytes]]:
+    """Return the page of all effects, and their pictures by name."""
     from vcam_cli.effects.order import ORDER
 
-    yield "# Effects and their equations\n"
-    yield "In the order in which they act on the light. Numbers of equations without another source"
-    yield "are those of Chen's thesis. `vcam plan CAMERA` says which of them a scene calls for.\n"
-    for effect in ORDER:
-        yield f"## {effect.name.replace('_', ' ')} {{ #{effect.name} }}\n"
-        yield _prose(effect.__doc__) + "\n"
-        module = inspect.getdoc(inspect.getmodule(effect)) or ""
-        text = module.partition("\n\n")[2].split("\nReferences\n")[0]
-        if text.strip():
-            yield _blocks(text) + "\n"
-        yield f"- equation and source: {_escaped(effect.reference)}"
-        yield f"- not where {_escaped(effect.absent)}"
-        yield f"- switched off by `effects: {{{effect.name}: off}}`\n"
+    pictures = {f"effects/{effect.name}.png": _effect_picture(effect.name) for effect in ORDER}
+    lines = [
+        "# Effects and their equations\n",
+        "In the order in which they act on the light. Numbers of equations without another source",
+        "are those of Chen's thesis. `vcam plan CAMERA` says which of them a scene calls for.\n",
+        "Each has two photographs, without it at the left and with it at the right, by a shipped",
+        "camera that was changed until the effect is large: most cameras have less of it.\n",
+    ]
+    return "\n".join([*lines, *(line for effect in ORDER for line in _effect(effect))]), pictures
+
+
+def _effect_picture(name: str) -> bytes:
+    cameras = effect_pictures.cameras(name)
+    return _cached(f"effect-{name}", cameras, partial(effect_pictures.draw, name))
+
+
+def _effect(effect: Any) -> Iterator[str]:
+    name = effect.name
+    yield f"## {name.replace('_', ' ')} {{ #{name} }}\n"
+    yield _prose(effect.__doc__) + "\n"
+    shown = effect_pictures.EXAMPLES[name]
+    yield f"![Without {name.replace('_', ' ')}, and with it](../effects/{name}.png)\n"
+    yield f"{_escaped(shown.shows)}\n"
+    yield '??? note "The command"\n\n    ```text'
+    yield from (f"    {line}" for line in effect_pictures.command(name).splitlines())
+    yield "    ```\n"
+    module = inspect.getdoc(inspect.getmodule(effect)) or ""
+    text = module.partition("\n\n")[2].split("\nReferences\n")[0]
+    if text.strip():
+        yield _blocks(text) + "\n"
+    yield f"- equation and source: {_escaped(effect.reference)}"
+    yield f"- not where {_escaped(effect.absent)}"
+    yield f"- switched off by `effects: {{{name}: off}}`\n"
 
 
 def _prose(text: str | None) -> str:
@@ -294,18 +316,33 @@ def _comment(text: str) -> Iterator[str]:
 def _photograph(name: str) -> bytes:
     """Return the photograph of a camera, from a former build where nothing has changed."""
     from vcam_cli import load
+
+    return _cached(name, (load(name),), partial(_take_apart, name))
+
+
+def _take_apart(name: str, file: Path) -> None:
+    """Take a photograph in a process of its own, so that several are taken at once."""
+    code = f"from docs_pages import take; take({name!r}, {str(file)!r})"
+    env = os.environ | {"PYTHONPATH": str(Path(__file__).parent), "OMP_NUM_THREADS": "1"}
+    subprocess.run([sys.executable, "-c", code], check=True, cwd=ROOT, env=env)
+
+
+def _cached(name: str, cameras: Sequence[Any], make: Callable[[Path], None]) -> bytes:
+    """Return a picture that cameras take, from a former build where nothing has changed.
+
+    make: writes it to a file.
+    """
     from vcam_cli.files.report import hash_text, to_json
     from vcam_cli.simulation.provenance import inputs, versions
 
-    camera = load(name)
-    digests = [hashlib.sha256(path.read_bytes()).hexdigest() for path in inputs(camera)]
-    known = hash_text(to_json([camera.model_dump(mode="json"), digests, versions()]))
+    files = [path for camera in cameras for path in inputs(camera)]
+    digests = [hashlib.sha256(path.read_bytes()).hexdigest() for path in files]
+    models = [camera.model_dump(mode="json") for camera in cameras]
+    known = hash_text(to_json([*models, digests, versions()]))
     file = CACHE / f"{name}-{known[:16]}.png"
     if not file.exists():
         CACHE.mkdir(parents=True, exist_ok=True)
-        code = f"from scripts.docs_pages import take; take({name!r}, {str(file)!r})"
-        env = os.environ | {"PYTHONPATH": str(ROOT), "OMP_NUM_THREADS": "1"}
-        subprocess.run([sys.executable, "-c", code], check=True, cwd=ROOT, env=env)
+        make(file)
     return file.read_bytes()
 
 

@@ -1,0 +1,221 @@
+"""Every effect in two photographs, without it and with it, for the page of the effects.
+
+A shipped camera takes both. What is changed of it makes the effect large enough to be seen at a
+glance; real cameras have most of them smaller.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+    from vcam_cli.camera.camera import Camera
+
+ENLARGED = 2
+"""Rows and columns on the page for one of a photograph: single pixels are to be seen."""
+GAP = 4
+"""Columns between the photographs."""
+SIZE = ("array.rows=120", "array.columns=160")
+GRAY = ("array.pattern=monochrome", "processing=[black_level: subtract, gamma: srgb]")
+ABSOLUTE = "processing=[black_level: subtract, tone: {white: sensor}, gamma: srgb]"
+"""Brightness is the share of the full well, and not of the scene's white."""
+DIM = ("scene.luminance=4 cd/m2", "exposure.time=15 ms", "adc.full_scale=20 mV")
+"""So little light that noise of some electrons shows, white is 180, and an ADC for it."""
+QUIET = (
+    "pixel.readout.read_noise=1 e",
+    "pixel.fpn={offset_pixel: 0 e}",
+    "effects={shot_noise: off}",
+)
+"""No other noise beside the one that is shown."""
+
+
+@dataclass(frozen=True)
+class Example:
+    """A camera in which an effect is large."""
+
+    sets: tuple[str, ...]
+    """What is changed of it, as `--set` has it."""
+    shows: str
+    """What is seen, in a sentence."""
+    camera: str = "starter"
+    without: tuple[str, ...] = ()
+    """What is changed instead for the photograph at the left; () where the effect is left out."""
+
+
+def _chart(name: str) -> tuple[str, ...]:
+    return (f"scene.source={{kind: chart, chart: {name}}}",)
+
+
+def _noise(*sets: str) -> tuple[str, ...]:
+    return (*DIM, *GRAY, *QUIET, *sets)
+
+
+WALL = (*_chart("uniform"), GRAY[0], ABSOLUTE)
+
+
+EXAMPLES = {
+    "diffraction": Example(
+        (*_chart("siemens-star"), *GRAY, "optics.f_number=16", "pixel.width=2 um"),
+        "f/16 before pixels of 2 um: fine spokes lose contrast, and nothing aliases.",
+    ),
+    "aberration": Example(
+        (*_chart("eye-chart"), *GRAY, "optics.zernike={4: 0.4 um, 7: 0.3 um}"),
+        "0.4 um of defocus and 0.3 um of coma.",
+    ),
+    "motion": Example(
+        (*_chart("eye-chart"), *GRAY, "scene.camera_motion={pan: 60 deg/s}", "exposure.time=5 ms"),
+        "A camera that is turned by 0.3 degrees while it exposes.",
+    ),
+    "pixel_aperture": Example(
+        (
+            *_chart("siemens-star"),
+            *GRAY,
+            "pixel.photodetector.fill_factor=1",
+            "optics.f_number=1.4",
+        ),
+        "Without it every pixel takes the light of one point, and fine spokes alias at full"
+        " contrast; photodetectors of the pixel's whole width average over them.",
+    ),
+    "charge_diffusion": Example(
+        (
+            *_chart("siemens-star"),
+            *GRAY,
+            "pixel.width=2 um",
+            "pixel.photodetector.fill_factor=1",
+            "scene.illuminant={monochromatic: 650 nm}",
+            "pixel.photodetector.charge_diffusion="
+            "{diffusion_length: 50 um, depletion_width: 1 um, substrate_depth: 10 um}",
+        ),
+        "Red light is absorbed deep in the silicon; its charge wanders to the neighbors.",
+    ),
+    "off_axis": Example(
+        (*WALL, "optics.focal_length=0.4 mm", "exposure.time=3 ms"),
+        "An even wall through a lens of 90 degrees from corner to corner.",
+    ),
+    "stray_light": Example(
+        (*_chart("eye-chart"), *GRAY, "optics.stray_light=0.15"),
+        "15 % of the light is spread evenly: black is no longer black.",
+    ),
+    "pixel_vignetting": Example(
+        (
+            *WALL,
+            "optics.focal_length=0.6 mm",
+            "exposure.time=3 ms",
+            "optics.off_axis=none",
+            "pixel.stack={passivation: {thickness: 0.7 um, index: 2.0},"
+            " oxide: {thickness: 6 um, index: 1.46}}",
+        ),
+        "An even wall: toward the border light meets the walls of the tunnels above the"
+        " photodetectors.",
+    ),
+    "microlens": Example(
+        (
+            *WALL,
+            "optics.focal_length=0.6 mm",
+            "exposure.time=2 ms",
+            "optics.off_axis=none",
+            "pixel.microlens={gain: 1.8, shift: optimal}",
+        ),
+        "An even wall: 1.8 times the light on the same photodetectors.",
+    ),
+    "flicker": Example(
+        (
+            *_chart("colorchecker"),
+            "scene.illuminant={lamp: D65, flicker: {frequency: 100 Hz, depth: 60 %}}",
+            "exposure.time=3 ms",
+            "exposure.shutter={rolling: {line_time: 200 us}}",
+        ),
+        "A lamp that flickers at 100 Hz, rows read 0.2 ms apart.",
+    ),
+    "dark_current": Example(
+        (
+            *_chart("step-wedge"),
+            *GRAY,
+            "scene.luminance=4 cd/m2",
+            "exposure.time=300 ms",
+            "pixel.photodetector.dark_current_density=2 nA/cm2",
+            "pixel.fpn.dark=30 %",
+        ),
+        "0.3 s of 2 nA/cm2: the processing subtracts the mean, and not the noise, nor how pixels"
+        " differ.",
+    ),
+    "charge_transfer": Example(
+        (*_chart("eye-chart"), "pixel.readout.charge_transfer={inefficiency: 5e-3, phases: 3}"),
+        "A CCD that leaves 0.5 % of a packet behind at every step: smear away from the amplifier.",
+        "kai-02170",
+    ),
+    "shot_noise": Example(
+        _noise("effects={}"), "The noise of light itself, 180 electrons in white."
+    ),
+    "fpn": Example(
+        _noise("pixel.fpn={offset_pixel: 3 e, offset_column: 5 e}"),
+        "Columns that differ by 5 electrons rms, the same in every frame.",
+    ),
+    "fpn_shading": Example(
+        _noise("pixel.fpn.shading={offset: 8 e, cycles: 3}"),
+        "Slow offsets of 8 electrons rms, the same in every frame.",
+    ),
+    "reset_noise": Example(
+        _noise("pixel.readout.reset_noise=12 e"), "12 electrons rms of uncertain reset."
+    ),
+    "read_noise": Example(
+        _noise("pixel.readout.read_noise=8 e", "pixel.readout.row_noise=4 e"),
+        "8 electrons rms in every pixel, 4 in every row.",
+    ),
+    "heavy_tailed_noise": Example(
+        _noise("pixel.readout.heavy_tailed_noise={rms: 8 e, shape: -0.3}"),
+        "8 electrons rms, most of it in few pixels.",
+    ),
+    "correlated_row_noise": Example(
+        _noise("pixel.readout.correlated_row_noise={rms: 6 e, correlation: 0.9}"),
+        "Bands of 6 electrons rms.",
+    ),
+    "telegraph_noise": Example(
+        _noise("pixel.readout.telegraph_noise={fraction: 3 %, amplitude: 30 e}"),
+        "3 % of the pixels have a trap that shifts them by 30 electrons.",
+    ),
+    "saturation": Example(
+        (*_chart("step-wedge"), *GRAY, "exposure.time=40 ms", "adc.full_scale=6 V"),
+        "Pixels that are full take no more: the brightest steps become one.",
+    ),
+    "quantization": Example(
+        (*_chart("step-wedge"), *GRAY, "adc.bits=3"),
+        "An ADC of 14 bits at the left, of 3 bits at the right: 8 levels are left.",
+        without=("adc.bits=14",),
+    ),
+}
+"""Name of an effect -> what shows it."""
+
+
+def command(name: str) -> str:
+    """Return the command that takes the photograph with an effect."""
+    example = EXAMPLES[name]
+    sets = "".join(f' \\\n    --set "{given}"' for given in (*SIZE, *example.sets))
+    return f"vcam run {example.camera} -o out/{name}{sets}"
+
+
+def cameras(name: str) -> tuple[Camera, Camera]:
+    """Return the camera without an effect, and the one with it."""
+    from vcam_cli.simulation.checks import load
+
+    example = EXAMPLES[name]
+    sets = (*SIZE, "quality=[]", *example.sets)
+    left, right = example.without or (f"effects.{name}=off",), (f"effects.{name}=on",)
+    return load(example.camera, (*sets, *left)), load(example.camera, (*sets, *right))
+
+
+def draw(name: str, file: Path) -> None:
+    """Write both photographs of an effect side by side, without it at the left, as a PNG."""
+    import numpy as np
+
+    from vcam_cli import simulate
+    from vcam_cli.files.png import write_png
+
+    images = [np.atleast_3d(simulate(camera).render) for camera in cameras(name)]
+    pair = [np.kron(each, np.ones((ENLARGED, ENLARGED, 1), np.uint8)) for each in images]
+    gap = np.full((pair[0].shape[0], GAP * ENLARGED, pair[0].shape[2]), 255, np.uint8)
+    both = np.concatenate([pair[0], gap, pair[1]], axis=1)
+    write_png(file, both[:, :, 0] if both.shape[2] == 1 else both)

@@ -1,0 +1,34 @@
+"""The documentation shows every effect, by photographs in which it is the only difference."""
+
+import numpy as np
+import pytest
+
+from scripts import effect_pictures
+from vcam_cli import simulate
+from vcam_cli.effects.order import ORDER
+
+NAMES = [effect.name for effect in ORDER]
+
+
+def test_every_effect_has_a_picture():
+    assert sorted(effect_pictures.EXAMPLES) == sorted(NAMES)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_both_cameras_of_a_picture_differ_in_the_effect_alone(name):
+    first, second = (camera.model_dump() for camera in effect_pictures.cameras(name))
+    effects = [camera.pop("effects") for camera in (first, second)]
+    if effect_pictures.EXAMPLES[name].without:  # an ADC there must be
+        assert first.pop("adc") != second.pop("adc")
+    else:
+        assert effects[0][name] == "off"
+    assert effects[1][name] == "on"
+    assert first == second
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", NAMES)
+def test_the_effect_is_seen(name):
+    """The photographs differ by 2 % of white rms, at least."""
+    pair = [simulate(camera).render.astype(float) for camera in effect_pictures.cameras(name)]
+    assert np.sqrt(np.mean((pair[0] - pair[1]) ** 2)) > 0.02 * 255
