@@ -244,7 +244,7 @@ def _effect(effect: Any) -> Iterator[str]:
     text = module.partition("\n\n")[2].split("\nReferences\n")[0]
     if text.strip():
         yield _blocks(text) + "\n"
-    yield f"- equation and source: {_escaped(effect.reference)}"
+    yield f"- source: {_escaped(effect.reference)}"
     yield f"- not where {_escaped(effect.absent)}"
     yield f"- switched off by `effects: {{{name}: off}}`\n"
 

@@ -5,6 +5,7 @@ import pytest
 
 from scripts import effect_pictures
 from vcam_cli import simulate
+from vcam_cli.commands.explain import explanations
 from vcam_cli.effects.order import ORDER
 
 NAMES = [effect.name for effect in ORDER]
@@ -32,3 +33,9 @@ def test_the_effect_is_seen(name):
     """The photographs differ by 2 % of white rms, at least."""
     pair = [simulate(camera).render.astype(float) for camera in effect_pictures.cameras(name)]
     assert np.sqrt(np.mean((pair[0] - pair[1]) ** 2)) > 0.02 * 255
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_effect_has_its_equation(name):
+    entry = next(iter(explanations(name)))
+    assert " = " in entry["equation"]

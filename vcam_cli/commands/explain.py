@@ -150,7 +150,8 @@ def _of_effect(word: str) -> Iterator[dict[str, Any]]:
     yield {
         "title": f"{effect.name} (effect of the {effect.origin})",
         "about": " ".join(inspect.cleandoc(effect.__doc__ or "").split()),
-        "equation and source": effect.reference,
+        "equation": equation(effect),
+        "source": effect.reference,
         "when it matters": f"not where {effect.absent}"
         + (
             "; else `vcam plan CAMERA` says how much it changes for that scene"
@@ -161,6 +162,14 @@ def _of_effect(word: str) -> Iterator[dict[str, Any]]:
         "keys": ", ".join(keys) or "none of its own",
         "switch": f"effects: {{{effect.name}: off}}",
     }
+
+
+def equation(effect: Any) -> str:
+    """Return the equation of an effect: what is indented first in its module's docstring."""
+    import inspect
+
+    paragraphs = (inspect.getdoc(inspect.getmodule(effect)) or "").split("\n\n")
+    return next(" ".join(text.split()) for text in paragraphs if text.startswith("    "))
 
 
 def _metrics() -> dict[str, str]:

@@ -1,5 +1,10 @@
 """Blur by the lens's aberrations: defocus, Zernike wavefronts, or what was measured.
 
+    H(f) = mean of exp(2 pi i (W(p + s / 2) - W(p - s / 2)) / lambda)
+
+over the points p that two pupils share which lie s = lambda N (1 - m) f diameters apart, W the
+wavefront. A measured PSF has its Fourier transform for H, a measured MTF its own value.
+
 `Diffraction` says what diffraction leaves of contrast; an aberration is the factor that makes it
 less. Which kind of blur a camera has depends on its file:
 

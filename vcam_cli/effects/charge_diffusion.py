@@ -1,5 +1,12 @@
 """Blur by charge that wanders sideways in the silicon before it is collected.
 
+    MTF(f) = D(f) / D(0),   1 / L_f^2 = 1 / L_n^2 + (2 pi f)^2
+    D(f) = 1 - e^(-a L) + e^(-a L) integral_0^L_d a e^(-a z) sinh((L_d - z) / L_f) dz
+                          / sinh(L_d / L_f)
+
+a is the absorption of silicon, L_n the diffusion length, L and L_d the depths of the depletion
+region and of the neutral one below it.
+
 Long waves go deep, below the field of the junction, so red light blurs more than blue. The transfer
 never falls to zero: what the depletion region absorbs is collected where it is born.
 

@@ -1,4 +1,10 @@
-"""Charge that a ccd leaves behind on the way to its amplifier."""
+"""Charge that a ccd leaves behind on the way to its amplifier.
+
+    w_k = C(n + k - 1, k) e^k (1 - e)^n
+
+is the share of a packet that arrives k packets late after n transfers, each of which leaves the
+share e behind.
+"""
 
 from __future__ import annotations
 

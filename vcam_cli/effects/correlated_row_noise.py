@@ -1,4 +1,9 @@
-"""Noise of whole rows that neighboring rows share in part: horizontal bands."""
+"""Noise of whole rows that neighboring rows share in part: horizontal bands.
+
+    x_k = r x_(k-1) + sqrt(1 - r^2) z_k
+
+is the noise of row k over its rms, r the correlation of neighbors, z normal numbers.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,9 @@
-"""Electrons that heat makes."""
+"""Electrons that heat makes.
+
+    electrons = rate T,   rate(temperature) = rate(T_0) 2^((temperature - T_0) / doubling)
+
+T is the exposure time. The rate is the density times the photodetector's area, or the pixel's own.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,10 @@
-"""Flicker of the lamp: every line sees the light of its own time."""
+"""Flicker of the lamp: every line sees the light of its own time.
+
+    E / mean = 1 + depth sinc(F T) cos(2 pi F (t + T / 2) + phase)
+
+F is the lamp's frequency, t the start of the line's exposure and T its length: an exposure of a
+whole number of periods sees steady light. A lamp with `duty` is on for that part of each period.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,9 @@
-"""Fixed-pattern noise: no two pixels, and no two columns, are alike; and some do not work."""
+"""Fixed-pattern noise: no two pixels, and no two columns, are alike; and some do not work.
+
+    electrons = signal (1 + g_pixel z_1 + g_column z_2) + o_pixel z_3 + o_column z_4
+
+z are normal numbers of pixels (1, 3) and columns (2, 4), the same in every frame.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,9 @@
-"""The slow part of the fixed pattern: offsets and gains that drift over the array."""
+"""The slow part of the fixed pattern: offsets and gains that drift over the array.
+
+    offset(x, y) = sum_jk a_jk cos(pi j x / W) cos(pi k y / H),   likewise gain(x, y) - 1
+
+a are drawn from the sensor seed and scaled to the rms, W and H are the sides of the array.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,10 @@
-"""Noise of the readout whose large values are more frequent than those of normal noise."""
+"""Noise of the readout whose large values are more frequent than those of normal noise.
+
+    noise = rms Q(u) / std(Q),   Q(u) = (u^s - (1 - u)^s) / s
+
+u is a number drawn evenly from 0 to 1 and s the shape: 0.14 is close to normal, 0 is
+logistic, and below tails are heavier.
+"""
 
 from __future__ import annotations
 

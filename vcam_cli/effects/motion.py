@@ -1,5 +1,10 @@
 """Motion of the scene or the camera in the exposure: blur, and skew by a rolling shutter.
 
+    H(f) = sinc(f_x v_x T + f_y v_y T),   sinc(u) = sin(pi u) / (pi u)
+
+v is the velocity of the image on the sensor, T the exposure time; of other paths H is the mean of
+exp(-2 pi i f x(t)) over them.
+
 The scene is where its file says at the reference time: by default in the middle of the exposure of
 the array's middle, where that begins at 0 s. What an image does decides how it is computed:
 

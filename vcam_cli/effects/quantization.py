@@ -1,4 +1,9 @@
-"""The ADC, linear or logarithmic, and the curve of the readout in front of it."""
+"""The ADC, linear or logarithmic, and the curve of the readout in front of it.
+
+    dn = clip(round(offset + electrons / electrons_per_dn), 0, 2^bits - 1)
+
+A logarithmic ADC takes the logarithm of 1 + electrons / bend in place of the electrons.
+"""
 
 from __future__ import annotations
 

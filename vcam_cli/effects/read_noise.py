@@ -1,4 +1,9 @@
-"""Noise of the readout chain: of every pixel, of every column, of every row."""
+"""Noise of the readout chain: of every pixel, of every column, of every row.
+
+    variance = r_pixel^2 + r_column^2 + r_row^2   [electrons squared]
+
+A column and a row have one draw each in a frame.
+"""
 
 from __future__ import annotations
 

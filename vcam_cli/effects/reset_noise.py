@@ -1,4 +1,9 @@
-"""Charge that the reset leaves uncertain."""
+"""Charge that the reset leaves uncertain.
+
+    variance = k T C / q^2   [electrons squared]
+
+C is the capacitance that is reset, T its temperature.
+"""
 
 from __future__ import annotations
 

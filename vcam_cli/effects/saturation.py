@@ -1,4 +1,9 @@
-"""A well holds so many electrons and no more."""
+"""A well holds so many electrons and no more.
+
+    electrons = min(signal + noise, full well)
+
+Noise has been added by then, so that pixels that are full show none.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,9 @@
-"""Light and dark current arrive one by one."""
+"""Light and dark current arrive one by one.
+
+    P(n) = e^(-mu) mu^n / n!,   variance = mean = mu
+
+mu is the mean number of electrons of light and dark current together.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,9 @@
-"""Light that lens and housing scatter over the whole sensor."""
+"""Light that lens and housing scatter over the whole sensor.
+
+    E' = (1 - s) E + s mean(E)
+
+s is the share that is spread, the mean is that of a color over the array.
+"""
 
 from __future__ import annotations
 

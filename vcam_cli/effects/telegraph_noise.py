@@ -1,4 +1,10 @@
-"""Random telegraph noise: traps in the transistors of some pixels, now filled, now empty."""
+"""Random telegraph noise: traps in the transistors of some pixels, now filled, now empty.
+
+    noise = A (b - p)   or, double sampled,   A (b_1 - b_2)
+
+b is 1 with the probability p that the trap is filled, else 0; steps A are exponentially
+distributed.
+"""
 
 from __future__ import annotations
 
