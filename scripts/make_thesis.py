@@ -19,7 +19,8 @@ import yaml
 ROOT = Path(__file__).parent.parent
 ROWS = Path(__file__).parent / "thesis_rows.yaml"
 PAGE = ROOT / "docs/thesis.md"
-VERDICTS = ("reproduced", "calibrated", "chosen", "contradicts", "not simulated")
+VERDICTS = ("reproduced", "calibrated", "chosen", "contradicts", "not simulated", "drawing")
+KINDS = ("expect", "cell", "check", "held_by", "told", "not", "drawing")
 HEAD = """# The thesis, row by row
 
 <!-- Written by `make thesis` from the runs; tests/test_thesis_page.py holds it to them. -->
@@ -33,7 +34,8 @@ thesis, Stanford University, 2003, with the command or test that answers it.
 | calibrated | within it, but a number was fitted to this very result |
 | chosen | within it, with a reading or number that the thesis leaves open |
 | contradicts | outside; [the study](studies/pixel-size.md) says why where that is known |
-| not simulated | a drawing or photograph, or data that the thesis does not print |
+| not simulated | data that the thesis does not print |
+| drawing | a drawing or photograph; what it explains has rows of its own, or is named |
 
 """
 
@@ -48,10 +50,8 @@ class Row:
 
     @property
     def kind(self) -> str:
-        """Which of expect, cell, check, held_by, told and not it has."""
-        return next(
-            k for k in ("expect", "cell", "check", "held_by", "told", "not") if k in self.given
-        )
+        """Which of `KINDS` it has."""
+        return next(k for k in KINDS if k in self.given)
 
     @property
     def is_quick(self) -> bool:
@@ -65,7 +65,7 @@ class Row:
             return f"`{self.given['held_by']}`"
         if self.kind == "check":
             return f"`scripts/thesis_checks.py`: {self.given['check'].replace('_', ' ')}"
-        if self.kind in ("told", "not"):
+        if self.kind in ("told", "not", "drawing"):
             return str(self.given.get("told", ""))
         whole = self.given.get("expect") or self.given["cell"]["file"]
         study = whole.partition("/")[0]
@@ -79,7 +79,7 @@ class Row:
             return _cell(**self.given["cell"])
         if self.kind == "check":
             return float(getattr(thesis_checks, self.given["check"])())
-        return str(self.given.get("says") or self.given["not"])
+        return str(self.given.get("says") or self.given[self.kind])
 
     def _expected_value(self) -> float:
         study, _, name = self.given["expect"].partition("/")
@@ -107,8 +107,8 @@ class Row:
 
     def verdict(self, value: float | str) -> str:
         """Return the verdict on a number, or on a row without one."""
-        if self.kind == "not":
-            return "not simulated"
+        if self.kind in ("not", "drawing"):
+            return {"not": "not simulated"}.get(self.kind, self.kind)
         if isinstance(value, str):
             return str(self.given.get("verdict", "reproduced"))
         low, high = self.band

@@ -15,6 +15,9 @@ import yaml
 from vcam_cli import load, schedule, simulate
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.electrical import electrical
+from vcam_cli.camera.derived.frame_rate import frame_rate
+from vcam_cli.verification import measurement_file
+from vcam_cli.verification.verify import verify
 
 PLANCK, LIGHT, CHARGE = 6.62607015e-34, 299792458.0, 1.602176634e-19
 F_NUMBER, FOCAL, DISTANCE, PITCH, WAVELENGTH, TIME = 2.0, 5e-3, 1.0, 5e-6, 550e-9, 0.01
@@ -99,6 +102,29 @@ def voltage_swing() -> float:
     camera = load("csf-0.35um").with_({"pixel.technology.thresholds": thresholds,
                                        "pixel.technology.supply": "3.3 V"})  # fmt: skip
     return float(electrical(camera).voltage_swing / ((3.3 - 0.8 - 0.9) - (0.9 - 0.6)))
+
+
+def ccd_frame_rate() -> float:
+    """Frames a second of a CCD of 1024 x 1024, as section 1.2.1 describes it."""
+    transfer = {"inefficiency": 3e-5, "phases": 3}
+    size = {"pixel.width": "12 um", "array.rows": 1024, "array.columns": 1024}
+    ccd = {"pixel.architecture": "ccd", "pixel.readout.charge_transfer": transfer}
+    found = frame_rate(_camera(**size, **ccd))
+    assert found is not None
+    return found.rate()
+
+
+def follower_slope() -> float:
+    """Change of the output over that of the photodiode's voltage, of the test pixel."""
+    pixel = electrical(load("test-pixel-0.18um"))
+    low, high = pixel.volts_of(np.array([0.0, pixel.full_well]))
+    return float((high - low) / pixel.voltage_swing)
+
+
+def largest_prediction_error() -> float:
+    """Largest error of the fifteen predictions of section 2.4."""
+    found = verify(load("test-pixel-0.18um"), measurement_file.read("test-pixel-simulated"))
+    return found.summary()["largest_error_percent"] / 100
 
 
 def swing_035() -> float:
