@@ -27,6 +27,7 @@ STEPS = "processing=[demosaic: bilinear, white_balance: illuminant]"
 GUESSES = {
     "iso=800": "exposure.iso: 800",
     "ev=1 EV": "exposure: {auto: {max: 100 ms}, compensation: 1 EV}",
+    "ev=1": "exposure: {auto: {max: 100 ms}, compensation: 1 EV}",
     "exposure.analog_gain=8": "exposure.gain: 8",
     "array.pattern=bayer": "array.pattern: bayer-rggb",
     "array.pattern=RGGB": "array.pattern: bayer-rggb",

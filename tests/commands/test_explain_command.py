@@ -73,3 +73,12 @@ def test_the_models_of_a_picture_are_listed():
     assert set(PICTURE_MODELS) == set(ImageFile.model_fields["model"].annotation.__args__)
     shown = CliRunner().invoke(app, ["list", "models"]).stdout
     assert all(f"\n{name} " in f"\n{shown}" for name in PICTURE_MODELS)
+
+
+def test_what_is_not_simulated_is_told():
+    assert vcam("blooming").stdout.startswith("blooming (not simulated)\n  Charge beyond the full")
+
+
+def test_a_metric_by_its_name_without_unit():
+    assert vcam("snr").stdout.startswith("snr_db (metric)")
+    assert vcam("dynamic range").stdout.startswith("dynamic_range_db (metric)")

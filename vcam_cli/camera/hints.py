@@ -167,7 +167,7 @@ def _place(key: Key, given: object) -> str:
 
 def _value(given: object, key: Key, example: str) -> str:
     """Return the value that was given, where it may be one of the key, or else an example."""
-    if isinstance(given, bool) or not isinstance(given, (str, int, float)):
+    if isinstance(given, bool) or not isinstance(given, (str, int, float)) or example[:1] in "[{":
         return example
     text = in_electrons(yaml_text(given))
     if key.name == "f_number":

@@ -64,6 +64,8 @@ def explanations(name: str) -> Iterator[dict[str, Any]]:
         first = _keys_called(meant.partition(": ")[0])
         found = [*first, *(key for key in found if key not in first)]
     yield from (_of_key(where, key) for where, key in found)
+    if about := hint_tables.NOT_SIMULATED.get(word.replace("-", "_")):
+        yield {"title": f"{word} (not simulated)", "about": f"{about[:1].upper()}{about[1:]}."}
 
 
 @cache
