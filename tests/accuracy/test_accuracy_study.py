@@ -54,7 +54,12 @@ def test_every_preset_knob_and_effect_is_there(measured):
     assert {knob.name for knob in KNOBS} == (knobs | set(measured.absent)) & {
         knob.name for knob in KNOBS
     }
-    assert set(measured.absent) == {"vignetting_points", "spectral_rank", "field_zones"}
+    assert set(measured.absent) == {
+        "vignetting_points",
+        "spectral_rank",
+        "field_zones",
+        "sub_exposures",
+    }
     assert set(of(measured, "tolerance")) == {"1 %", "0.1 %"}
     assert set(of(measured, "preset")) == {"draft", "standard", "reference"}
     assert set(of(measured, "auto")) == set(of(measured, "all")) == set(of(measured, "preset"))

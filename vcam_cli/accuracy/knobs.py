@@ -60,6 +60,11 @@ def _no_field_blur(ready: Prepared) -> str:
     return "" if there else "the lens's blur is the same all over the field"
 
 
+def _no_sub_exposures(ready: Prepared) -> str:
+    taken = ready.spectrum.sub_exposures
+    return "" if taken > 1 else "no motion asks for sub-exposures"
+
+
 def _no_effect(name: str, without: str) -> Callable[[Prepared], str]:
     def absent(ready: Prepared) -> str:
         return "" if any(e.name == name for e in ready.plan.active) else without
@@ -103,6 +108,7 @@ KNOBS: tuple[Knob, ...] = (
         _no_field_blur,
         ({"field_zones": 16}, {"field_zones": 32}),
     ),
+    Knob("sub_exposures", _by_label(1, 2, 3, 4, 6), None, _no_sub_exposures),
     Knob(
         "shot_noise",
         _by_label("gaussian", "exact"),

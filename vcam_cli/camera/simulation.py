@@ -102,6 +102,11 @@ class Accuracy(Model):
         example=9,
         default=None,
     )
+    sub_exposures: Annotated[int | None, Whole(least=1, most=2048, example="16")] = key(
+        "instants whose mean an exposure is, where no transfer function has all of its motion",
+        example=16,
+        default=None,
+    )
     float_width: Annotated[int | None, Choice(32, 64)] = key(
         "bits of the numbers computed with", example=32, default=None
     )

@@ -42,6 +42,8 @@ class Settings:
     vignetting_points: int | None = None
     """Places along each half of the array at which pixel vignetting is integrated; None: as many
     as needed."""
+    sub_exposures: int | None = None
+    """Instants whose mean an exposure in motion is, where it is one; None: as many as needed."""
     tolerance: float = 0.005
     """Error that these settings have to keep, relative to full signal."""
     margin_scale: float = 1.0

@@ -39,12 +39,16 @@ INSTANT_SHARE = 0.1
 """Parts of the tolerance that places and instants may use."""
 ORDER: Final = 5
 """Order of the splines."""
-FEWEST_PLACES, MOST_PLACES = 2, 24
-"""Fine places along each side of a pixel."""
-DECAY = 1.0
-"""An error of places falls with their number at least to this power: it is measured at half of
-them. Edges behind a pixel's aperture alone have 1.5, the lens adds to that."""
-PER_WAVE = 6
+FEWEST_PLACES, MOST_PLACES = 3, 12
+"""Fine places along each side of a pixel, but for waves, which may ask for more: behind a pixel's
+aperture 12 leave less than 2e-5 of full signal between sharp edges."""
+FINER = 0.002
+"""Tolerance below which twice the fewest are tried first."""
+DECAY = 2.0
+"""An error of places falls with their number to this power: it is measured at half of them, midway
+between two, where it is largest. Edges behind a pixel's aperture alone have 1.5, the lens adds to
+that; over all places in the mean it is 0.7 of that midway."""
+PER_WAVE, MOST_FOR_WAVES = 6, 48
 """Fine places in a period of a scene's own wave: the splines then err by 1e-4 of it."""
 FEWEST_INSTANTS, MOST_INSTANTS = 4, 2048
 GROWTH = 1.5
@@ -159,12 +163,12 @@ def _fine_image(
     form_image: FormImage,
 ) -> tuple[FineImage, SpectrumReport]:
     """Return the still image on places as fine as the tolerance asks for."""
-    per_pixel = FEWEST_PLACES
+    per_pixel = FEWEST_PLACES * (1 if path.settings.tolerance >= FINER else 2)
     if isinstance(scene, WaveScene):
         highest = max((math.hypot(w.fx, w.fy) for w in scene.waves), default=0.0)
         highest = min(highest, path.transfer.cutoff)
         pitch = max(path.geometry.pitch_x, path.geometry.pitch_y)
-        per_pixel = min(max(per_pixel, math.ceil(PER_WAVE * highest * pitch)), MOST_PLACES)
+        per_pixel = max(per_pixel, min(math.ceil(PER_WAVE * highest * pitch), MOST_FOR_WAVES))
     while True:
         image, report = _image_on(still, scene, motion, per_pixel, form_image)
         allowed = PLACE_SHARE * path.settings.tolerance * image.full_signal
@@ -293,7 +297,8 @@ def _instants(
     allowed = INSTANT_SHARE * path.settings.tolerance * image.full_signal
     pitch = min(path.geometry.pitch_x, path.geometry.pitch_y)
     least = max(FEWEST_INSTANTS, math.ceil(motion.longest_path / pitch))
-    count = min(least, MOST_INSTANTS)
+    asked = path.settings.sub_exposures
+    count = min(least, MOST_INSTANTS) if asked is None else asked
     colors = range(len(image.coefficients))
 
     def rows(count: int) -> NDArray:
@@ -306,6 +311,6 @@ def _instants(
         fine = rows(more)
         squares = np.square(fine - coarse, dtype=np.float64).mean(axis=(1, 2))
         error = math.sqrt(float(squares.max()))
-        if error <= allowed or more > MOST_INSTANTS:
+        if error <= allowed or more > MOST_INSTANTS or asked is not None:
             return count, error
         count, coarse = more, fine
