@@ -39,8 +39,9 @@ def verify(
 
     Mean signals under even light of known irradiance, stated or of raw frames, are predicted as
     the camera's pixels give them, its lens left out. Write verify.csv, verify.json and
-    errors.png, a histogram of the errors. The exit code is 4 where an error is larger than the
-    measurement's tolerance.
+    errors.png, a histogram of the errors. Of raw frames variances, spectra of rows and columns,
+    tails and patterns are predicted, too, and judged by what is chance. The exit code is 4 where
+    an error is larger than the measurement's tolerance, and more than chance.
 
     \b
     Example:
@@ -104,20 +105,28 @@ def report_arguments(found: "Verification") -> dict[str, Any]:
 
 
 def print_report(found: "Verification", path: Path) -> None:
-    """Print the table: measured, predicted, error."""
+    """Print the table of means, and of what differs: measured, predicted, error."""
+    from vcam_cli.verification.stack_prediction import FALSE_ALARMS
+
     console, table = options.open_table()
     for name in ("frame", "channel", "quantity"):
         table.add_column(name, no_wrap=True)
     for name in ("measured", "predicted", "error"):
         table.add_column(name, justify="right", no_wrap=True)
-    for row in found.rows:
-        late = " missed" if row.missed else ""
+    shown = [r for r in found.rows if r.quantity.startswith("mean") or r.verdict != "agrees"]
+    for row in shown:
+        late = f" {row.verdict}" if row.verdict in ("missed", "differs") else ""
         numbers = f"{row.measured:.5g}", f"{row.predicted:.5g}", f"{100 * row.error:+.2f} %{late}"
         table.add_row(row.frame, row.channel, row.quantity, *numbers)
     console.print(table)
     all_ = found.summary()
     console.print(
-        f"errors: mean {all_['mean_error_percent']:+.2f} %, rms {all_['rms_error_percent']:.2f} %,"
-        f" largest {all_['largest_error_percent']:.2f} %"
+        f"errors of means: mean {all_['mean_error_percent']:+.2f} %,"
+        f" rms {all_['rms_error_percent']:.2f} %, largest {all_['largest_error_percent']:.2f} %"
     )
+    if found.judged:
+        console.print(
+            f"{all_['differing']} of {all_['judged']} quantities of frames differ by more than"
+            f" chance ({FALSE_ALARMS:.0%} of right camera files have one)"
+        )
     console.print(f"{path}/verify.csv, errors.png")

@@ -8,7 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from vcam_cli.fitting.statistics import (
+from vcam_cli.progress import Observer
+from vcam_cli.spectra import integral, photons
+from vcam_cli.verification.frame_sets import FrameSet
+from vcam_cli.verification.frames import color_block, stacks
+from vcam_cli.verification.model import Measurement
+from vcam_cli.verification.stack_statistics import (
     Estimate,
     Pattern,
     StackStatistics,
@@ -16,11 +21,6 @@ from vcam_cli.fitting.statistics import (
     pattern,
     stack_statistics,
 )
-from vcam_cli.progress import Observer
-from vcam_cli.spectra import integral, photons
-from vcam_cli.verification.frame_sets import FrameSet
-from vcam_cli.verification.frames import color_block, stacks
-from vcam_cli.verification.model import Measurement
 
 DEAD, HOT = 0.1, 0.5
 """Signal of a dead pixel, over the others' in light, is less; that of a hot one, over saturation in

@@ -6,10 +6,10 @@ import math
 
 import numpy as np
 
-from vcam_cli.fitting.statistics import Estimate
 from vcam_cli.quality.mtf import Lattice, slanted_edge_sfr
 from vcam_cli.verification.frames import Stack, color_block
 from vcam_cli.verification.model import Measurement
+from vcam_cli.verification.stack_statistics import Estimate
 
 REACH = 16.0
 """Half the width of the window around the edge [pixels]."""

@@ -10,15 +10,20 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
+import numpy as np
+
 from vcam_cli.errors import BadInput, Collector
 from vcam_cli.fitting import camera_file, edge, sensor
 from vcam_cli.fitting.conditions import CLIPPED, Conditions, measure
 from vcam_cli.fitting.noise_shape import is_significant, neighbor_correlation, tail_shape
 from vcam_cli.fitting.parameters import COLUMNS, SIGMAS, Parameter, deviation, parameter
-from vcam_cli.fitting.statistics import Estimate, combine
 from vcam_cli.progress import Observer, Silent
 from vcam_cli.verification.frames import color_block, paths, stacks
 from vcam_cli.verification.model import Measurement
+from vcam_cli.verification.stack_statistics import Estimate, combine
+
+NEAR = 0.15
+"""How far from half of saturation a stack may be that tells the spread of gains."""
 
 
 @dataclass
@@ -82,7 +87,7 @@ def fit(measurement: Measurement, watch: Observer | None = None) -> Fit:
     gain = sensor.pooled_gain(curves)
     _of_dark(out, found, line, gain)
     _of_gain(out, curves, gain)
-    _of_patterns(out, found, curves, gain)
+    _of_patterns(out, found, curves, line, gain)
     _of_range(out, curves, line, gain)
     _of_edge(out, measurement)
     out.camera = camera_file.tree(out, found, curves)
@@ -177,7 +182,7 @@ def _of_gain(out: Fit, curves: list[sensor.Transfer], gain: Estimate) -> None:
 
 
 def _of_patterns(
-    out: Fit, found: Conditions, curves: list[sensor.Transfer], gain: Estimate
+    out: Fit, found: Conditions, curves: list[sensor.Transfer], line: sensor.Dark, gain: Estimate
 ) -> None:
     add = out.parameters.append
     dark = list(found.dark[0].patterns.values())
@@ -185,13 +190,7 @@ def _of_patterns(
         variance = combine([getattr(pattern, name) for pattern in dark])
         key = "dsnu" if name == "total" else f"offset_{name}"
         add(deviation(key, variance, gain, "e", "EMVA 1288 R4 eq 66, of dark frames"))
-    gains = []
-    for curve in curves:
-        signal = curve.result.series.signal
-        top = signal[curve.result.series.saturation_index]
-        index = int(abs(signal - 0.5 * top).argmin())
-        lit = curve.conditions[index]
-        gains.append(sensor.gain_variances(lit, found.dark[0], curve.color, float(signal[index])))
+    gains = [_gain_variances(curve, found, line) for curve in curves]
     for number, name in enumerate(("gain_pixel", "gain_column")):
         variance = combine([each[number] for each in gains])
         one = Estimate(1.0, 0.0)
@@ -209,6 +208,22 @@ def _of_patterns(
         ends = max(center - reach, 0.0), center + reach
         told = Parameter(name, share, *ends, "1", f"share of {n} pixels, Wilson's interval")
         add(told)
+
+
+def _gain_variances(
+    curve: sensor.Transfer, found: Conditions, line: sensor.Dark
+) -> tuple[Estimate, Estimate]:
+    """Return the variances of gains from the stack near half of saturation that tells most."""
+    signal = curve.result.series.signal
+    part = signal / signal[curve.result.series.saturation_index]
+    near = np.flatnonzero(abs(part - 0.5) <= max(NEAR, float(abs(part - 0.5).min())))
+    each = [
+        sensor.gain_variances(
+            curve.conditions[i], found.dark[0], curve.color, float(signal[i]), line
+        )
+        for i in near
+    ]
+    return min(each, key=lambda variances: variances[0].error)
 
 
 def _of_range(out: Fit, curves: list[sensor.Transfer], line: sensor.Dark, gain: Estimate) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from vcam_cli.fitting.statistics import Estimate
+from vcam_cli.verification.stack_statistics import Estimate
 
 SIGNIFICANT = 5.0
 """Standard errors from which tails, or a correlation of rows, are more than chance."""

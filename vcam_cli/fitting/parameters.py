@@ -5,7 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from vcam_cli.fitting.statistics import Estimate
+from vcam_cli.fitting.noise_shape import is_significant
+from vcam_cli.verification.stack_statistics import Estimate
 
 SIGMAS = 1.6448536269514722
 """Standard errors to either side that hold 90 % of a normal distribution."""
@@ -38,14 +39,17 @@ def parameter(name: str, found: Estimate, unit: str, method: str) -> Parameter:
 def deviation(name: str, variance: Estimate, scale: Estimate, unit: str, method: str) -> Parameter:
     """Return a standard deviation, sqrt(variance) / scale; 0 where the variance is not above 0.
 
-    The interval's ends are those of the variance, which is nearly normal where its root is not.
+    The interval's ends are those of the variance: of its logarithm, which of a chi-squared number
+    is the more nearly normal, where it is well above 0; of itself near 0, where its root and
+    logarithm are far from normal.
     """
     reach = SIGMAS * variance.error
+    ends = variance.value - reach, variance.value + reach
+    if is_significant(variance):
+        factor = math.exp(reach / variance.value)
+        ends = variance.value / factor, variance.value * factor
     relative = SIGMAS * scale.error / scale.value
-    value, low, high = (
-        math.sqrt(max(v, 0.0)) / scale.value
-        for v in (variance.value, variance.value - reach, variance.value + reach)
-    )
+    value, low, high = (math.sqrt(max(v, 0.0)) / scale.value for v in (variance.value, *ends))
     low = value - math.hypot(value - low, value * relative)
     high = value + math.hypot(high - value, value * relative)
     return Parameter(name, value, max(low, 0.0), high, unit, method)

@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from vcam_cli.fitting.conditions import Condition, Conditions, photons_per_pixel
-from vcam_cli.fitting.statistics import Estimate, combine
 from vcam_cli.quality.photon_transfer import (
     GAIN_RANGE,
     ROUNDING,
@@ -22,6 +21,7 @@ from vcam_cli.quality.photon_transfer import (
     photon_transfer,
 )
 from vcam_cli.verification.model import Measurement
+from vcam_cli.verification.stack_statistics import Estimate, combine
 
 
 @dataclass(frozen=True)
@@ -138,7 +138,7 @@ def _transfer(
     errors = np.array([c.variance(color).error for c in ordered])[used]
     square = float(s @ s)
     error = math.hypot(float(np.linalg.norm(s * errors)), float(s.sum()) * first[1].error) / square
-    spread = _mean_gain_error(ordered, signal, color, found)
+    spread = _mean_gain_error(ordered, signal, color, found, line)
     gain = Estimate(result.gain, math.hypot(error, result.gain * spread))
     efficiency = None
     if known:
@@ -153,11 +153,15 @@ def _transfer(
 
 
 def _mean_gain_error(
-    ordered: tuple[Condition, ...], signal: np.ndarray, color: str, found: Conditions
+    ordered: tuple[Condition, ...],
+    signal: np.ndarray,
+    color: str,
+    found: Conditions,
+    line: Dark,
 ) -> float:
     """Return how far the mean gain of so many pixels and columns is from that of all sensors."""
     half = int(np.argmin(abs(signal - 0.5 * signal.max())))
-    pixel, column = gain_variances(ordered[half], found.dark[0], color, float(signal[half]))
+    pixel, column = gain_variances(ordered[half], found.dark[0], color, float(signal[half]), line)
     rows, columns = ordered[half].planes[color][0].average.shape
     planes = len(ordered[half].planes[color])
     variance = max(pixel.value, 0) / (rows * columns * planes) + max(column.value, 0) / columns
@@ -165,11 +169,16 @@ def _mean_gain_error(
 
 
 def gain_variances(
-    lit: Condition, dark: Condition, color: str, signal: float
+    lit: Condition, dark: Condition, color: str, signal: float, line: Dark
 ) -> tuple[Estimate, Estimate]:
-    """Return the relative variances of gains of pixels and of columns, eq 67 of EMVA 1288."""
+    """Return the relative variances of gains of pixels and of columns, eq 67 of EMVA 1288.
+
+    A gain is that of all electrons, the dark current's too: what the two stacks have of these
+    counts as signal. That of the light alone would be short by their share.
+    """
     bright, unlit = lit.patterns[color], dark.patterns[color]
-    scale = 1 / signal**2
+    dim, light = (line.mean(stack.entry.exposure) for stack in (dark, lit))
+    scale = 1 / ((signal + light) ** 2 - dim**2)
     return (bright.pixel - unlit.pixel) * scale, (bright.column - unlit.column) * scale
 
 

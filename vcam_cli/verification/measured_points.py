@@ -3,22 +3,43 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.lattice import places
 from vcam_cli.errors import Collector
+from vcam_cli.verification import stack_quantities
 from vcam_cli.verification.frame_sets import FrameSet
 from vcam_cli.verification.frames import Stack, color_block, numbered_stacks, paths, raise_if_any
 from vcam_cli.verification.model import Measurement, Point, Signal
 
+WINDOW = 256
+"""Rows and columns in the middle of larger frames, whose noise is judged."""
 Points = list[tuple[int, Point]]
 """Number of an entry of the measurement, and a signal of it."""
 
 
-def measured_points(camera: Camera, measurement: Measurement) -> tuple[Points, list[str]]:
-    """Return all mean signals, in the order of the entries, and what the user is to be told.
+@dataclass(frozen=True)
+class Taken:
+    """Frames of an entry, of which the noise is judged."""
+
+    number: int
+    """Of the entry."""
+    point: Point
+    """The conditions."""
+    frames: NDArray
+    """Codes in the middle (n, rows, columns) [DN]."""
+    shape: tuple[int, int]
+    """Rows and columns of the whole frames."""
+
+
+def measured_points(
+    camera: Camera, measurement: Measurement
+) -> tuple[Points, list[Taken], list[str]]:
+    """Return all mean signals, in the order of the entries, frames, and what the user is told.
 
     Of frames there is one signal a color, over the frames that are held out from fitting, or all
     of them where none are. Frames of edges have none.
@@ -40,8 +61,9 @@ def measured_points(camera: Camera, measurement: Measurement) -> tuple[Points, l
         for number, entry in enumerate(measurement.frames)
         if isinstance(entry, Point)
     ]
+    taken: list[Taken] = []
     if not measurement.frame_sets:
-        return points, []
+        return points, taken, []
     _check(camera, measurement)
     notes = [
         f"{measurement.label(number)}: frames of an edge are not predicted"
@@ -50,8 +72,42 @@ def measured_points(camera: Camera, measurement: Measurement) -> tuple[Points, l
     ]
     for number, stack in numbered_stacks(measurement, paths(measurement, held_out=True)):
         notes += stack.notes
-        points += [(number, point) for point in _points(stack, measurement)]
-    return sorted(points, key=lambda each: each[0]), notes
+        signals = _points(stack, measurement)
+        points += [(number, point) for point in signals]
+        inner, whole = middle(stack.frames, measurement), stack.frames.shape[1:]
+        taken.append(Taken(number, signals[0], inner, (whole[0], whole[1])))
+        if whole != inner.shape[1:] and len(taken) == 1:
+            notes.append(f"noise is judged in the middle {WINDOW} x {WINDOW} pixels")
+        if len(stack.frames) < 2:
+            notes.append(f"{stack.label}: one frame is left to be predicted, and its temporal noise"
+                         " is not judged; hold out more")  # fmt: skip
+    return sorted(points, key=lambda each: each[0]), taken, notes
+
+
+def middle(frames: NDArray, measurement: Measurement) -> NDArray:
+    """Return the middle of frames, of whole blocks of the color filter array."""
+    block = color_block(measurement)
+    cuts = []
+    for length, step in zip(frames.shape[1:], (len(block), len(block[0])), strict=True):
+        kept = min(length, WINDOW) // step * step
+        start = (length - kept) // 2 // step * step
+        cuts.append(slice(start, start + kept))
+    return frames[:, cuts[0], cuts[1]].copy()
+
+
+def quantities_of_colors(
+    measurement: Measurement, frames: NDArray
+) -> dict[str, list[stack_quantities.Quantity]]:
+    """Return what the middle of a stack is judged by, color by color; "" of the only one."""
+    assert measurement.levels is not None
+    frames = middle(frames, measurement)
+    block, highest = color_block(measurement), 2**measurement.levels.bits - 1
+    planes: dict[str, list[list[stack_quantities.Quantity]]] = {}
+    for row, column in np.ndindex(len(block), len(block[0])):
+        plane = frames[:, row :: len(block), column :: len(block[0])]
+        color = block[row][column] if len(block) * len(block[0]) > 1 else ""
+        planes.setdefault(color, []).append(stack_quantities.quantities(plane, highest))
+    return {color: stack_quantities.mean_of_planes(each) for color, each in planes.items()}
 
 
 def _check(camera: Camera, measurement: Measurement) -> None:

@@ -155,6 +155,11 @@ class Measurement(FileModel):
     tolerance: Annotated[float | None, Percentage(above=0, most=1)] = key(
         "largest error of a prediction; default none is asked for", example="8 %", default=None
     )
+    noise_tolerance: Annotated[float | None, Percentage(above=0, most=10)] = key(
+        "largest error of a prediction of variances, spectra and tails of frames; default none",
+        example="20 %",
+        default=None,
+    )
     source: Text = key("where the numbers come from", example="bench of ...", default="")
 
     @property

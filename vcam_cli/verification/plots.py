@@ -1,6 +1,7 @@
 """The histogram of the errors, as figure 2.19 of Chen 2003."""
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -11,15 +12,22 @@ LEAST_BINS, MOST_BINS = 10, 60
 
 
 def draw_errors(path: Path, result: Verification) -> None:
-    """Draw how many predictions have which error [%], and the tolerance that all share."""
+    """Draw how many means have which error [%], and the tolerance that all share.
+
+    Where noise is judged, also draw how far all quantities are from what is predicted.
+    """
     percent = 100 * result.errors[np.isfinite(result.errors)]
-    tolerances = {row.tolerance for row in result.rows if row.tolerance is not None}
+    means = [row for row in result.rows if row.quantity.startswith("mean")]
+    tolerances = {row.tolerance for row in means if row.tolerance is not None}
     reach = max([*np.abs(percent), *(100 * t for t in tolerances), 1e-3]) * 1.02
     width = _round_width(2 * reach / LEAST_BINS, 2 * reach / MOST_BINS)
     ends = np.ceil(reach / width) * width
     edges = np.arange(-ends, ends + width / 2, width)
-    with plot_figure(path, (5.4, 3.2)) as figure:
-        axes = figure.subplots()
+    with plot_figure(path, (5.4, 6.2 if result.judged else 3.2)) as figure:
+        panels = figure.subplots(2 if result.judged else 1, squeeze=False)[:, 0]
+        if result.judged:
+            _draw_deviations(panels[1], result)
+        axes = panels[0]
         axes.hist(percent, edges, color=COLORS[0], edgecolor="white", linewidth=0.8)
         axes.set_xlabel("error of the prediction [%]")
         axes.set_ylabel("number of predictions")
@@ -30,7 +38,23 @@ def draw_errors(path: Path, result: Verification) -> None:
                 axes.axvline(side, color=COLORS[1], linewidth=1, linestyle="--")
         names = f"{result.measurement.name} against {result.camera.name}"
         largest = f"largest error {np.abs(percent).max():.2g} %" if percent.size else "no errors"
-        axes.set_title(f"{names}\n{len(result.rows)} predictions, {largest}")
+        axes.set_title(f"{names}\n{len(means)} predictions, {largest}")
+
+
+def _draw_deviations(axes: Any, result: Verification) -> None:
+    """Draw how many quantities deviate by how many standard errors, and the bound of chance."""
+    rows = result.judged
+    limit = max(row.bound or 0.0 for row in rows)
+    ends = 1.25 * limit
+    values = np.clip([row.deviation or 0.0 for row in rows], -ends, ends)
+    axes.hist(values, np.linspace(-ends, ends, 41), color=COLORS[0], edgecolor="white")
+    for side in (-limit, limit):
+        axes.axvline(side, color=COLORS[1], linewidth=1, linestyle="--")
+    axes.set_xlabel("deviation [standard errors]; those beyond the ends stand there")
+    axes.set_ylabel("number of quantities")
+    axes.yaxis.get_major_locator().set_params(integer=True)
+    differing = sum(row.differs for row in rows)
+    axes.set_title(f"{len(rows)} quantities of frames, {differing} differ by more than chance")
 
 
 def _round_width(most: float, least: float) -> float:

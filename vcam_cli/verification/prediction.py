@@ -38,8 +38,11 @@ def check(camera: Camera, point: Point) -> None:
         raise bad(("signal",), message, remedy)
 
 
-def conditions(camera: Camera, point: Point) -> Camera:
+def conditions(camera: Camera, point: Point, shape: tuple[int, ...] | None = None) -> Camera:
     """Return the camera as it was when a signal was measured.
+
+    shape: rows and columns; by default as many as are enough for a mean.
+
 
     Raises BadInput where the camera cannot be brought there.
     """
@@ -56,7 +59,10 @@ def conditions(camera: Camera, point: Point) -> Camera:
     }
     array, transfers = camera.array, camera.pixel.architecture == "ccd"
     large = array.die is None and min(array.rows or 0, array.columns or 0) > SIZE
-    if large and not (transfers or array.is_scattered or array.binning):
+    plain = not (transfers or array.is_scattered or array.binning)
+    if shape is not None:
+        changes["array"] = {"rows": shape[0], "columns": shape[1]}
+    elif large and plain:
         changes["array"] = {"rows": SIZE, "columns": SIZE}
     return camera.with_(changes)
 

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -13,11 +14,15 @@ from vcam_cli.camera.camera import Camera
 from vcam_cli.errors import BadInput, Collector
 from vcam_cli.progress import Observer, Silent
 from vcam_cli.verification.frames import raise_if_any
-from vcam_cli.verification.measured_points import Points, measured_points
+from vcam_cli.verification.measured_points import Points, measured_points, quantities_of_colors
 from vcam_cli.verification.model import UNITS, Measurement
 from vcam_cli.verification.prediction import check, predict
+from vcam_cli.verification.stack_prediction import Judged, bound, judge
 
-COLUMNS = ("frame", "channel", "quantity", "measured", "predicted", "error_percent")
+COLUMNS = (
+    *("frame", "channel", "quantity", "measured", "predicted", "error_percent"),
+    *("deviation", "bound", "verdict"),
+)
 
 
 @dataclass(frozen=True)
@@ -34,6 +39,10 @@ class Row:
     predicted: float
     tolerance: float | None
     """Largest error that is asked for, relative; None for none."""
+    deviation: float | None = None
+    """Student's t of what was measured among what is predicted; None of a mean without noise."""
+    bound: float | None = None
+    """The deviation beyond which the two differ."""
 
     @property
     def error(self) -> float:
@@ -43,15 +52,28 @@ class Row:
         return (self.predicted - self.measured) / abs(self.measured)
 
     @property
+    def differs(self) -> bool:
+        """Whether the difference is more than chance; unknown counts as yes."""
+        return self.deviation is None or self.bound is None or abs(self.deviation) > self.bound
+
+    @property
     def missed(self) -> bool:
-        """Whether the error is larger than its tolerance."""
-        return self.tolerance is not None and abs(self.error) > self.tolerance
+        """Whether the error is larger than its tolerance, and more than chance."""
+        return self.tolerance is not None and abs(self.error) > self.tolerance and self.differs
+
+    @property
+    def verdict(self) -> str:
+        """missed, differs (more than chance), agrees; "" where nothing is known of chance."""
+        if self.missed:
+            return "missed"
+        return "" if self.deviation is None else "differs" if self.differs else "agrees"
 
     @property
     def cells(self) -> tuple[str | float, ...]:
         """The row of verify.csv."""
         named = (self.frame, self.channel, self.quantity)
-        return (*named, self.measured, self.predicted, 100 * self.error)
+        told = ["" if v is None else v for v in (self.deviation, self.bound)]
+        return (*named, self.measured, self.predicted, 100 * self.error, *told, self.verdict)
 
 
 @dataclass(frozen=True)
@@ -65,23 +87,34 @@ class Verification:
 
     @property
     def errors(self) -> NDArray:
-        """The errors of all rows, relative."""
-        return np.array([row.error for row in self.rows])
+        """The errors of all means, relative."""
+        return np.array([row.error for row in self.rows if row.quantity.startswith("mean")])
 
     @property
     def missed(self) -> tuple[Row, ...]:
         """The rows whose tolerance is missed."""
         return tuple(row for row in self.rows if row.missed)
 
+    @property
+    def judged(self) -> tuple[Row, ...]:
+        """The rows of which it is known what is chance."""
+        return tuple(row for row in self.rows if row.deviation is not None)
+
     def summary(self) -> dict[str, float | int]:
-        """Return numbers of the errors [%]: mean, rms, largest; how many rows miss a tolerance."""
+        """Return numbers of the errors of means [%], and counts of rows.
+
+        These are all, those that miss a tolerance, those of which it is known what is chance, and
+        those that differ by more than that.
+        """
         percent = 100 * self.errors
         return {
-            "count": len(percent),
+            "count": len(self.rows),
             "mean_error_percent": float(percent.mean()),
             "rms_error_percent": float(np.sqrt(np.mean(percent**2))),
             "largest_error_percent": float(np.abs(percent).max()),
             "missed": len(self.missed),
+            "judged": sum(row.deviation is not None for row in self.rows),
+            "differing": sum(row.verdict != "agrees" for row in self.judged),
         }
 
     def report(self) -> dict[str, Any]:
@@ -112,14 +145,49 @@ def verify(camera: Camera, measurement: Measurement, watch: Observer | None = No
     BadInput
         With every entry that the camera cannot predict.
     """
-    points, notes = measured_points(camera, measurement)
+    watch = watch or Silent()
+    points, taken, notes = measured_points(camera, measurement)
     _check_all(camera, measurement, points)
-    return Verification(
-        camera,
-        measurement,
-        tuple(_rows(camera, measurement, points, watch or Silent())),
-        (*_notes(camera), *notes),
-    )
+    means = list(_rows(camera, measurement, points, watch))
+    watch.begin("stacks")
+    judged: dict[int, list[Judged]] = {}
+    for done, stack in enumerate(taken):
+        watch.step(done, len(taken))
+        measure = partial(quantities_of_colors, measurement)
+        judged[stack.number] = judge(
+            camera, stack.point, stack.frames, stack.shape, measure, stack.number
+        )
+    limit = bound(sum(map(len, judged.values())))
+    rows = _with_noise(measurement, means, judged, limit)
+    return Verification(camera, measurement, tuple(rows), (*_notes(camera), *notes))
+
+
+def _with_noise(
+    measurement: Measurement,
+    means: list[tuple[int, Row]],
+    judged: dict[int, list[Judged]],
+    limit: float,
+) -> Iterator[Row]:
+    """Yield the rows of means, each followed by those of the noise of its entry and color."""
+    for number, row in means:
+        own = [each for each in judged.get(number, ()) if each.channel == row.channel]
+        for each in own:
+            if each.name == row.quantity:
+                yield replace(row, deviation=each.deviation, bound=limit)
+        if not own:
+            yield row
+        for each in own:
+            if each.name != row.quantity:
+                yield Row(
+                    row.frame,
+                    row.channel,
+                    each.name,
+                    each.measured,
+                    each.predicted,
+                    measurement.noise_tolerance,
+                    each.deviation,
+                    limit,
+                )
 
 
 def _check_all(camera: Camera, measurement: Measurement, points: Points) -> None:
@@ -135,11 +203,11 @@ def _check_all(camera: Camera, measurement: Measurement, points: Points) -> None
 
 def _rows(
     camera: Camera, measurement: Measurement, points: Points, watch: Observer
-) -> Iterator[Row]:
+) -> Iterator[tuple[int, Row]]:
     for done, (number, point) in enumerate(points):
         watch.step(done, len(points))
         tolerance = measurement.tolerance if point.tolerance is None else point.tolerance
-        yield Row(
+        row = Row(
             measurement.label(number),
             point.channel,
             f"mean [{UNITS[point.signal.channel]}]",
@@ -147,6 +215,7 @@ def _rows(
             predict(camera, point).value,
             tolerance,
         )
+        yield number, row
 
 
 def _notes(camera: Camera) -> Iterator[str]:

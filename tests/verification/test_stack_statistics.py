@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from vcam_cli.fitting.noise_shape import tail_shape
-from vcam_cli.fitting.statistics import Estimate, pattern, stack_statistics
+from vcam_cli.verification.stack_statistics import Estimate, pattern, stack_statistics
 
 N, ROWS, COLUMNS = 8, 120, 100
 PIXEL, ROW, COLUMN, OFFSET, OFFSET_COLUMN = 3.0, 1.5, 2.0, 5.0, 2.5
@@ -90,3 +90,20 @@ def test_kurtosis_of_a_short_stack_is_that_of_the_noise():
     frames = np.random.default_rng(2).laplace(size=(3, 1000, 700))
     told = stack_statistics(frames, np.ones((1000, 700), bool))
     assert told.excess.value == pytest.approx(3, abs=0.1)
+
+
+def test_pattern_of_two_noisy_frames_has_the_error_of_what_is_taken_out():
+    """Noise of which half is left, nine times the pattern's variance: its own error is most."""
+    found = []
+    good = np.ones((ROWS, COLUMNS), bool)
+    for seed in range(60):
+        rng = np.random.default_rng([2, seed])
+        frames = 500 + rng.standard_normal((ROWS, COLUMNS))
+        frames = frames + 3 * math.sqrt(2) * rng.standard_normal((2, ROWS, COLUMNS))
+        found.append(pattern(stack_statistics(frames, good), good).pixel)
+    values, errors = (np.array([getattr(each, name) for each in found])
+                      for name in ("value", "error"))  # fmt: skip
+    assert values.mean() == pytest.approx(1, abs=5 * errors.mean() / math.sqrt(60))
+    known = math.sqrt(2 * (10**2 + 9**2) / (ROWS * COLUMNS))
+    assert errors.mean() == pytest.approx(known, rel=0.05)
+    assert values.std(ddof=1) / known == pytest.approx(1, abs=5 / math.sqrt(2 * 59))

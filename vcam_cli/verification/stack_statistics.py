@@ -147,6 +147,9 @@ class Pattern:
 def pattern(stack: StackStatistics, good: NDArray) -> Pattern:
     """Return the spatial variances, freed of the temporal noise that is left in the mean.
 
+    What is taken out has an error of its own, which is independent of that of the mean: of n
+    frames it is 1 / (n - 1) of the variance of what is left, and so of weight in short stacks.
+
     Parameters
     ----------
     stack : StackStatistics
@@ -161,18 +164,26 @@ def pattern(stack: StackStatistics, good: NDArray) -> Pattern:
     """
     rows, columns = good.shape
     filled = np.where(good, stack.average, stack.mean.value)
-    left = nonuniformity.Stack(stack.frames, filled, stack.pixel.value)
-    found = nonuniformity.spatial_variance(left)
+    found = nonuniformity.spatial_variance(
+        nonuniformity.Stack(stack.frames, filled, stack.pixel.value)
+    )
     n, share = stack.frames, float(good.mean())
     pixel_seen = (found.pixel + stack.pixel.value / n) / share
     column = found.column - max(stack.column.value, 0.0) / n
     row = found.row - max(stack.row.value, 0.0) / n
     pixel = found.pixel / share
+    errors = {
+        "pixel": _chi(pixel_seen, (rows - 1) * (columns - 1)),
+        "column": _chi(found.column + pixel_seen / rows, columns - 1),
+        "row": _chi(found.row + pixel_seen / columns, rows - 1),
+    }
+    left = {"pixel": stack.pixel, "column": stack.column, "row": stack.row}
+    whole = {name: math.hypot(error, left[name].error / n) for name, error in errors.items()}
     return Pattern(
-        total=Estimate(pixel + row + column, _chi(pixel_seen, rows * columns)),
-        pixel=Estimate(pixel, _chi(pixel_seen, (rows - 1) * (columns - 1))),
-        column=Estimate(column, _chi(found.column + pixel_seen / rows, columns - 1)),
-        row=Estimate(row, _chi(found.row + pixel_seen / columns, rows - 1)),
+        total=Estimate(pixel + row + column, math.hypot(*whole.values())),
+        pixel=Estimate(pixel, whole["pixel"]),
+        column=Estimate(column, whole["column"]),
+        row=Estimate(row, whole["row"]),
     )
 
 

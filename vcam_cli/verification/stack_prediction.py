@@ -1,0 +1,131 @@
+"""Stacks of frames that a camera file predicts, and whether a measured one could be among them.
+
+The camera takes the stack again and again, each time as another sensor with other noise. Where the
+file is right, the measured stack is one more of these, so that the difference of a quantity from
+their mean, over their standard deviation and (1 + 1/R)^1/2 of R stacks, is a number of Student's
+distribution of R - 1 degrees of freedom: a test that is exact for normal quantities, whatever
+their errors are. It is asked for with 1 % for all quantities together (Bonferroni), so that of a
+hundred right camera files one is said to differ.
+
+References
+----------
+.. [1] W. S. Gosset ("Student"), The probable error of a mean, Biometrika 6, 1908.
+.. [2] EMVA Standard 1288, Release 4.0 Linear, 2021, on what the quantities are.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.simulation import Seed
+from vcam_cli.simulation.frame import take_frame
+from vcam_cli.simulation.preparation import Prepared
+from vcam_cli.simulation.simulate import prepare
+from vcam_cli.sweeps.point_effects import with_every_effect
+from vcam_cli.verification.model import Point
+from vcam_cli.verification.prediction import conditions
+from vcam_cli.verification.stack_quantities import Quantity
+
+STACKS = 20
+"""Number of stacks that are predicted."""
+FALSE_ALARMS = 0.01
+"""Share of right camera files of which any quantity is said to differ."""
+LEAST_DEVIATION = 1e-9
+"""Least standard deviation of a quantity, relative to its mean: rounding."""
+COUNT_DEVIATION = 0.5
+"""Least standard deviation of the root of a count: that of a Poisson number."""
+Measure = Callable[[NDArray], dict[str, list[Quantity]]]
+"""From frames (n, rows, columns) to the quantities of each color."""
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A quantity of a measured stack beside those of predicted ones."""
+
+    channel: str
+    name: str
+    measured: float
+    predicted: float
+    """Mean over the predicted stacks."""
+    deviation: float
+    """Student's t of the measured one."""
+
+
+def judge(
+    camera: Camera,
+    point: Point,
+    frames: NDArray,
+    shape: tuple[int, int],
+    measure: Measure,
+    number: int,
+) -> list[Judged]:
+    """Return the quantities of a stack beside those that a camera file predicts.
+
+    Parameters
+    ----------
+    camera : Camera
+        The camera.
+    point : Point
+        The conditions of the frames.
+    frames : NDArray
+        Measured codes (n, rows, columns), the middle of the frames where these are large [DN].
+    shape : tuple of int
+        Rows and columns of the whole frames.
+    measure : callable
+        What gives the quantities of the middle of frames.
+    number : int
+        Number of the stack, which its seeds follow from.
+
+    Raises
+    ------
+    BadInput
+        The camera cannot be brought under the conditions.
+    """
+    # Shading is slow beside the whole array; all else is the same in a part of it.
+    size = frames.shape[1:] if camera.pixel.fpn.shading is None else shape
+    here = with_every_effect(conditions(camera, point, size))
+    ready, _ = prepare(here, 1)
+    predicted = [
+        measure(_stack(ready, len(frames), number * STACKS + turn)) for turn in range(STACKS)
+    ]
+    found = []
+    for channel, listed in measure(frames).items():
+        for place, quantity in enumerate(listed):
+            others = [each[channel][place] for each in predicted]
+            found.append(_judged(channel, quantity, others))
+    return found
+
+
+def _stack(ready: Prepared, count: int, turn: int) -> NDArray:
+    """Return frames of one more sensor (n, rows, columns) [DN]."""
+    first = ready.camera.seed
+    frames = []
+    for frame in range(count):
+        seed = Seed(sensor=first.sensor + 1 + turn, frame=first.frame + (turn + 1) * count + frame)
+        camera = ready.camera.model_copy(update={"seed": seed})
+        frames.append(take_frame(replace(ready, camera=camera), 1).dn)
+    return np.stack(frames)
+
+
+def _judged(channel: str, measured: Quantity, predicted: list[Quantity]) -> Judged:
+    forms = np.array([q.normal for q in predicted])
+    least = LEAST_DEVIATION * max(abs(float(forms.mean())), 1.0)
+    if measured.name.endswith("[1]") and "kurtosis" not in measured.name:
+        least = COUNT_DEVIATION
+    spread = max(float(forms.std(ddof=1)), least) * math.sqrt(1 + 1 / len(forms))
+    mean = float(np.mean([q.value for q in predicted]))
+    deviation = (measured.normal - float(forms.mean())) / spread
+    return Judged(channel, measured.name, measured.value, mean, deviation)
+
+
+def bound(count: int) -> float:
+    """Return the deviation beyond which one of so many quantities differs; see `FALSE_ALARMS`."""
+    from scipy.stats import t
+
+    return float(t.isf(FALSE_ALARMS / (2 * max(count, 1)), STACKS - 1))
