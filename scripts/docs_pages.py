@@ -1,7 +1,8 @@
 """Pages of the documentation that are made from the program: MkDocs calls this while it builds.
 
 Keys come from the models and their JSON Schemas, effects from their docstrings, commands from their
-help, and the gallery from photographs that every shipped camera takes during the build.
+help, the gallery from photographs that every shipped camera takes during the build, and pages of
+notebooks from running them.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from pathlib import Path
 from typing import Any
 
 import effect_pictures
+import notebooks
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
 from mkdocs.structure.pages import Page
@@ -47,6 +49,9 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
         made["thesis.md"] = "# Thesis, line by line\n\nThis page is not written yet.\n"
     made["gallery.md"], photographs = _gallery()
     made["reference/effects.md"], pictures = _effects()
+    for path in sorted(notebooks.FOLDER.glob("*.ipynb")):
+        made[f"notebooks/{path.stem}.md"], figures = notebooks.page(path)
+        pictures |= {f"notebooks/{name}": data for name, data in figures.items()}
     for name, text in made.items():
         files.append(File.generated(config, name, content=text))
     for name, data in {**photographs, **pictures}.items():

@@ -6,6 +6,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
@@ -40,10 +41,24 @@ def test_the_camera_files_of_a_page_are_valid(page, tmp_path, monkeypatch):
         assert done.exit_code == 0, done.output
 
 
+@pytest.mark.parametrize("name", ["python.md", "howto/noise-model.md"])
+def test_the_python_of_a_page_runs(name, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    text = documents.read(ROOT / "docs" / name)
+    given = [block.text for block in documents.blocks(text) if block.language == "python"]
+    assert given
+    names: dict[str, object] = {}
+    for block in given:
+        exec(block, names)
+    if "noisy" in names:
+        assert not np.array_equal(names["noisy"], names["again"])
+        assert not np.array_equal(names["noisy"], names["other"])
+
+
 @pytest.mark.parametrize("page", documents.pages(), ids=["README.md", *NAMES])
 def test_links_to_files_lead_somewhere(page):
     """Pages that the build makes have no file; MkDocs checks those, and anchors."""
-    made = {"reference", "gallery", "gallery.md", "cite.md", "thesis.md"}
+    made = {"reference", "gallery", "gallery.md", "cite.md", "thesis.md", "notebooks"}
     text = re.sub(r"^```.*?^```", "", documents.read(page), flags=re.DOTALL | re.MULTILINE)
     for link in re.findall(r"\]\(([^)#]+)(?:#[^)]*)?\)", text):
         if re.match(r"\w+:", link) or link.removeprefix("../").split("/")[0] in made:
