@@ -46,4 +46,5 @@ def test_a_fit_finds_the_hidden_sensor():
         p = found[name]
         assert abs(p.value - value) <= p.high - p.low, name
     assert max(abs(names["predicted"].errors)) < 0.005
-    assert len(names["predicted"].rows) == 12
+    assert len(names["predicted"].errors) == 12
+    assert not [row for row in names["predicted"].rows if row.differs]
