@@ -3,6 +3,7 @@
 import csv
 import importlib.util
 from pathlib import Path
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -141,7 +142,7 @@ def test_mean_snr_of_one_level(tmp_path):
 
 def test_files(found, asked, made, tmp_path):
     with OutputFolder(tmp_path / "out", "study.json") as folder:
-        frames.write_frames(found, asked, folder, "made")
+        frames.write_frames(found, asked, folder, "made", ("svg", "pdf"))
         folder.finish({})
     out = tmp_path / "out"
     rows = list(csv.DictReader((out / "frames.csv").read_text("utf-8").splitlines()))
@@ -156,6 +157,8 @@ def test_files(found, asked, made, tmp_path):
         assert (out / "frames" / f"{shot.name}-{shot.estimator}.png").stat().st_size > 500
     for name in ("frames_lsbs.png", "noise_weighted.png"):
         assert (out / name).stat().st_size > 10_000
+        assert ElementTree.parse((out / name).with_suffix(".svg")).getroot().tag.endswith("svg")
+        assert (out / name).with_suffix(".pdf").read_bytes().startswith(b"%PDF")
 
 
 def test_a_camera_that_takes_one_sample_is_refused(asked, tmp_path):

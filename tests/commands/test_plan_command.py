@@ -1,11 +1,13 @@
 """`vcam plan`: what it says, and that it says the same as the run does."""
 
 import json
+import re
 
 import pytest
 from typer.testing import CliRunner
 
 from vcam_cli.commands.main import app
+from vcam_cli.config import shipped
 from vcam_cli.effects.order import ORDER
 
 SMALL = ["--set", "array.rows=48", "--set", "array.columns=64"]
@@ -42,12 +44,44 @@ def test_the_run_does_what_the_plan_says(tmp_path):
 
 @pytest.mark.long
 def test_a_person_reads_every_effect_with_its_reason():
-    text = plan("--set", "effects={read_noise: off}")
+    text = plan("--set", "effects={read_noise: off}", "--details")
     for kind in ORDER:
         assert kind.name in text
     assert "switched off in effects" in text
     assert "% of full signal" in text
     assert "10 nm" in text
+
+
+def story(camera, *arguments):
+    done = CliRunner().invoke(app, ["plan", camera, *arguments])
+    assert done.exit_code == 0, done.output
+    lines = done.stdout.splitlines()
+    assert len(lines) <= 40
+    assert all(len(line) <= 80 for line in lines)
+    return done.stdout
+
+
+def test_the_story_names_every_effect_once_under_what_became_of_it():
+    text = story("still-life", *SMALL, "--set", "effects={read_noise: off}")
+    on, _, rest = text.partition("left out: this scene does not call for it")
+    gone, _, rest = rest.partition("left out: the file says off")
+    off, _, absent = rest.partition("not in this camera")
+    assert "shot_noise" in on
+    assert "saturation" in gone
+    assert "read_noise" in off
+    assert "microlens" in absent
+    words = re.findall(r"[a-z_]+", text)
+    assert all(words.count(kind.name) == 1 for kind in ORDER if "_" in kind.name)
+    told = json.loads(plan("--set", "effects={read_noise: off}", "--json"))
+    shot = next(e for e in told["effects"] if e["name"] == "shot_noise")
+    assert f"{100 * shot['contribution']:.3g} % of noise" in on
+    assert "vcam plan still-life --details" in text
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("camera", shipped.names("cameras"))
+def test_the_story_of_a_shipped_camera_fits_a_screen(camera):
+    story(camera)
 
 
 @pytest.mark.long

@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -293,14 +294,19 @@ class TestList:
         items = json.loads(vcam("list", kind, "--json").stdout)[kind]
         assert [line.split("  ")[0] for line in lines] == [item["name"] for item in items]
 
-    def test_a_terminal_gets_columns_that_fit(self, monkeypatch):
+    @pytest.mark.parametrize("kind", [None, "cameras", "illuminants"])
+    def test_a_terminal_gets_columns_that_fit(self, kind, monkeypatch, capsys):
+        """Nothing is cut, and brackets of names are no markup."""
         monkeypatch.setattr("sys.stdout.isatty", lambda: True, raising=False)
         monkeypatch.setenv("COLUMNS", "72")
-        head, text = "effects:      ", ", ".join(["diffraction"] * 20)
-        lines = list_._fitted(head, text).splitlines()
-        assert len(lines) > 2
+        list_.list_(kind)
+        lines = re.sub(r"\x1b\[[0-9;]*m", "", capsys.readouterr().out).splitlines()
         assert all(len(line) <= 72 for line in lines)
-        assert lines[1].startswith(" " * len(head) + "diffraction")
+        words = " ".join(lines).split()
+        for k in list_.KINDS if kind is None else [kind]:
+            for item in list_.KINDS[k]():
+                said = item.name if kind is None else f"{item.name} {item.about}"
+                assert all(any(word in told for told in words) for word in said.split())
 
     def test_all(self):
         text = vcam("list").stdout

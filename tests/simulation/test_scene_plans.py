@@ -37,7 +37,9 @@ def test_the_command_writes_a_table_and_a_picture(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     sets = [word for each in SMALL for word in ("--set", each)]
     scenes = ["--scenes", "slanted-edge", "--scenes", "colorchecker"]
-    done = CliRunner().invoke(app, ["plan", "starter", *sets, *scenes, "-o", "plans"])
+    done = CliRunner().invoke(
+        app, ["plan", "starter", *sets, *scenes, "-o", "plans", "--format", "svg"]
+    )
     assert done.exit_code == 0, done.output
     assert "slanted-edge" in done.stdout
     with (tmp_path / "plans" / "scenes.csv").open(encoding="utf-8") as file:
@@ -47,6 +49,7 @@ def test_the_command_writes_a_table_and_a_picture(tmp_path, monkeypatch):
     assert {row["state"] for row in rows} <= {"on", "off"}
     assert all(float(row["seconds"]) >= 0 for row in rows)
     assert (tmp_path / "plans" / "scenes.png").stat().st_size > 10_000
+    assert "<svg" in (tmp_path / "plans" / "scenes.svg").read_text("utf-8")
 
 
 def test_a_scene_that_is_not_there_is_told(tmp_path):

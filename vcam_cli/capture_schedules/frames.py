@@ -13,8 +13,10 @@ References
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +31,7 @@ from vcam_cli.effects.order import quantizer
 from vcam_cli.errors import bad
 from vcam_cli.files.exr import write_exr
 from vcam_cli.files.folder import OutputFolder
+from vcam_cli.files.plots import in_formats
 from vcam_cli.files.tables import write_table
 from vcam_cli.parallel import available_workers
 from vcam_cli.progress import Observer, Silent
@@ -184,7 +187,13 @@ def check_camera(camera: Camera) -> None:
         raise bad("frames.camera", "takes a single sample of an exposure", remedy)
 
 
-def write_frames(frames: Frames, asked: ScheduleFrames, folder: OutputFolder, name: str) -> None:
+def write_frames(
+    frames: Frames,
+    asked: ScheduleFrames,
+    folder: OutputFolder,
+    name: str,
+    formats: Sequence[str] = (),
+) -> None:
     """Write frames.csv, the reconstructions as EXR and PNG, and the pictures side by side.
 
     Also frames_ESTIMATOR.png and noise_ESTIMATOR.png.
@@ -199,6 +208,8 @@ def write_frames(frames: Frames, asked: ScheduleFrames, folder: OutputFolder, na
         The study's folder.
     name : str
         The study's name, for the titles.
+    formats : sequence of str
+        Further formats of the last two.
     """
     write_table(folder.new("frames.csv"), COLUMNS, frames.rows())
     low, high = frames_plots.tone_limits(frames.rate)
@@ -208,9 +219,12 @@ def write_frames(frames: Frames, asked: ScheduleFrames, folder: OutputFolder, na
         channels = {"photocurrent": shot.photocurrent}
         write_exr(folder.new(f"{base}.exr"), channels, _exr_attributes(shot))
         frames_plots.write_tones(folder.new(f"{base}.png"), shot.photocurrent, low, high)
+    plots: dict[str, Callable[[Path], None]] = {}
     for estimator in asked.estimators:
-        _plot_details(frames, asked, estimator, folder, name)
-        _plot_noise(frames, estimator, folder, name)
+        plots[f"frames_{estimator}.png"] = _details_plot(frames, asked, estimator, name)
+        plots[f"noise_{estimator}.png"] = _noise_plot(frames, estimator, name)
+    for file, draw in in_formats(plots, formats).items():
+        draw(folder.new(file))
 
 
 def _schedules(
@@ -274,22 +288,27 @@ def _exr_attributes(shot: Shot) -> dict[str, str | float]:
     }
 
 
-def _plot_details(
-    frames: Frames, asked: ScheduleFrames, estimator: str, folder: OutputFolder, name: str
-) -> None:
-    """Plot the details of all schedules of one estimator."""
+def _details_plot(
+    frames: Frames, asked: ScheduleFrames, estimator: str, name: str
+) -> Callable[[Path], None]:
+    """Return what draws the details of all schedules of one estimator."""
     pictures = []
     for shot in (shot for shot in frames.shots if shot.estimator == estimator):
         count = "1 capture" if len(shot.times) == 1 else f"{len(shot.times)} captures"
         below = -frames.db_below_best(shot) + 0.0  # no minus sign before 0
         text = f"{count} to {1000 * shot.times[-1]:.4g} ms, {below:.2f} dB"
         pictures.append(Picture(shot.name, text, shot.photocurrent))
-    path, title = folder.new(f"frames_{estimator}.png"), f"{name}: photocurrents, {estimator}"
-    frames_plots.plot_details(path, title, frames.rate, _detail_square(asked, frames), pictures)
+    return partial(
+        frames_plots.plot_details,
+        title=f"{name}: photocurrents, {estimator}",
+        scene=frames.rate,
+        square=_detail_square(asked, frames),
+        pictures=pictures,
+    )
 
 
-def _plot_noise(frames: Frames, estimator: str, folder: OutputFolder, name: str) -> None:
-    """Plot the relative errors of all schedules of one estimator."""
+def _noise_plot(frames: Frames, estimator: str, name: str) -> Callable[[Path], None]:
+    """Return what draws the relative errors of all schedules of one estimator."""
     truth = np.maximum(frames.rate, 1e-300)
     pictures, reach = [], []
     for shot in (shot for shot in frames.shots if shot.estimator == estimator):
@@ -297,8 +316,8 @@ def _plot_noise(frames: Frames, estimator: str, folder: OutputFolder, name: str)
         text = f"two thirds within {np.percentile(np.abs(error), 68.27):.2f} %"
         pictures.append(Picture(shot.name, text, error))
         reach.append(np.percentile(np.abs(error), 97))
-    path, title = folder.new(f"noise_{estimator}.png"), f"{name}: relative errors, {estimator}"
-    frames_plots.plot_noise(path, title, pictures, float(np.ceil(np.median(reach))))
+    title, limit = f"{name}: relative errors, {estimator}", float(np.ceil(np.median(reach)))
+    return partial(frames_plots.plot_noise, title=title, pictures=pictures, limit=limit)
 
 
 def _detail_square(asked: ScheduleFrames, frames: Frames) -> frames_plots.Square:

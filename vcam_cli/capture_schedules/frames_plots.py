@@ -75,7 +75,7 @@ def plot_details(
     Parameters
     ----------
     path : Path or str
-        The PNG.
+        The PNG, SVG or PDF.
     title : str
         Title of the figure.
     scene : (rows, columns) array
@@ -113,7 +113,7 @@ def plot_noise(path: Path | str, title: str, pictures: Sequence[Picture], limit:
     Parameters
     ----------
     path : Path or str
-        The PNG.
+        The PNG, SVG or PDF.
     title : str
         Title of the figure.
     pictures : sequence of Picture

@@ -222,7 +222,7 @@ def schedule(
         watch.begin("tables and plots")
         for name, write in in_formats(tables.writers(result), formats).items():
             write(folder.new(name))
-        result = replace(result, frames=_take_frames(read, folder, workers, watch))
+        result = replace(result, frames=_take_frames(read, folder, workers, watch, formats))
         result = replace(result, seconds=time.perf_counter() - start)
         if report:
             schedule_report.write(result, folder)
@@ -241,7 +241,11 @@ def _check_frames_camera(study: ScheduleFile) -> None:
 
 
 def _take_frames(
-    study: ScheduleFile, folder: OutputFolder, workers: int | None, watch: Observer
+    study: ScheduleFile,
+    folder: OutputFolder,
+    workers: int | None,
+    watch: Observer,
+    formats: Sequence[str],
 ) -> Frames | None:
     """Take and write the pictures that the study asks for."""
     asked, camera = study.model.frames, study.frames_camera
@@ -251,7 +255,7 @@ def _take_frames(
         pictures = frames.take_frames(asked, camera, workers, watch)
     except BadInput as error:
         raise error.with_places(study.locate) from None
-    frames.write_frames(pictures, asked, folder, study.model.name)
+    frames.write_frames(pictures, asked, folder, study.model.name, formats)
     return pictures
 
 

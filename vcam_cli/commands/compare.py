@@ -160,7 +160,9 @@ def compare(
     if as_json:
         print(to_json(report | {"out": None if out is None else str(out)}), end="")
     else:
-        print("\n".join(f"{n:<20} {v:>12.6g} {unit}".rstrip() for n, v, unit in found.metrics))
+        rows = [(name, f"{value:.6g}", unit) for name, value, unit in found.metrics]
+        plain = "\n".join(f"{n:<20} {v:>12} {unit}".rstrip() for n, v, unit in rows)
+        options.print_rows(("metric", ">value", "unit"), rows, plain)
         if out is not None:
             print(f"map and numbers: {out}/")
 

@@ -72,6 +72,12 @@ def fit(
 
 def print_fit(found: "Fit", path: Path) -> None:
     """Print the parameters with their intervals."""
-    for p in found.parameters:
-        print(f"{p.name:<24} {p.value:>11.5g}  {p.low:>11.5g} .. {p.high:<11.5g} {p.unit}")
+    rows = [
+        (p.name, f"{p.value:.5g}", f"{p.low:.5g}", f"{p.high:.5g}", p.unit)
+        for p in found.parameters
+    ]
+    plain = "\n".join(
+        f"{n:<24} {v:>11}  {low:>11} .. {high:<11} {u}" for n, v, low, high, u in rows
+    )
+    options.print_rows(("parameter", ">value", ">from", ">to", "unit"), rows, plain)
     print(f"{path}/camera.yaml, parameters.csv, fit.json")

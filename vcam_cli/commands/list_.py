@@ -77,10 +77,10 @@ def list_(
     elif as_json:
         options.write_json({k: [_plain(item) for item in items] for k, items in found.items()})
     elif kind is not None:
-        _table(found[kind])
+        _print_table(kind, [(item.name, item.about) for item in found[kind]])
     else:
-        for k, items in found.items():
-            print(_fitted(f"{k + ':':14}", ", ".join(item.name for item in items) or "(none yet)"))
+        listed = {k: ", ".join(item.name for item in items) for k, items in found.items()}
+        _print_table("kind", [(k, names or "(none yet)") for k, names in listed.items()], ":")
 
 
 def _choose(kind: str, name: str, items: list[Item]) -> Item:
@@ -103,29 +103,14 @@ def _show(kind: str, item: Item, as_json: bool) -> None:
         print(text.rstrip() if text else f"{item.name}: {item.about}")
 
 
-def _table(items: list[Item]) -> None:
-    width = max((len(item.name) for item in items), default=0)
-    for item in items:
-        print(_fitted(f"{item.name:{width}}  ", item.about))
+def _print_table(heading: str, rows: list[tuple[str, str]], mark: str = "") -> None:
+    """Print names and what is said of them: a table in a terminal, elsewhere a line each.
 
-
-def _fitted(head: str, text: str) -> str:
-    """Return a head and its text, in a terminal wrapped beside the head; elsewhere a line."""
-    import shutil
-    import sys
-    import textwrap
-
-    columns = shutil.get_terminal_size().columns
-    if not sys.stdout.isatty() or columns < len(head) + 24:
-        return f"{head}{text}".rstrip()
-    return textwrap.fill(
-        text,
-        columns,
-        initial_indent=head,
-        subsequent_indent=" " * len(head),
-        break_long_words=False,
-        break_on_hyphens=False,
-    )
+    mark: what stands behind a name there.
+    """
+    width = max((len(name) for name, _ in rows), default=0) + len(mark)
+    plain = "\n".join(f"{name + mark:{width}}  {about}".rstrip() for name, about in rows)
+    options.print_rows((heading, ""), rows, plain)
 
 
 def _plain(item: Item) -> dict[str, str]:

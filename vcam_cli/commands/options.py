@@ -199,15 +199,42 @@ def say(message: object, quiet: bool = False) -> None:
         print(message, file=sys.stderr, flush=True)
 
 
-def open_table() -> tuple[Any, Any]:
-    """Return a console on stdout and an empty table for it, plain where it is no terminal."""
+def open_table(plain_width: int = 120) -> tuple[Any, Any]:
+    """Return a console on stdout and an empty table for it, plain where it is no terminal.
+
+    plain_width: columns that lines may take there.
+    """
     from rich import box
     from rich.console import Console
     from rich.table import Table
 
-    width = None if sys.stdout.isatty() else 120
+    width = None if sys.stdout.isatty() else plain_width
     console = Console(width=width, soft_wrap=True, highlight=False)
     return console, Table(box=box.SIMPLE_HEAD if console.is_terminal else None, pad_edge=False)
+
+
+def print_rows(columns: Sequence[str], rows: Sequence[Sequence[str]], plain: str) -> None:
+    """Print rows as a table in a terminal, elsewhere as plain text.
+
+    columns: headings, those of numbers beginning with ">"; cells wrap where the terminal is narrow;
+    plain: the text that stands for all of them.
+    """
+    if not sys.stdout.isatty():
+        print(plain)
+        return
+    from rich.text import Text
+
+    console, table = open_table()
+    for i, name in enumerate(columns):
+        right = name.startswith(">")
+        table.add_column(
+            name.lstrip(">"),
+            justify="right" if right else "left",
+            no_wrap=right or i == 0,
+        )
+    for row in rows:
+        table.add_row(*map(Text, row))  # names may hold brackets, which are no markup
+    console.print(table, soft_wrap=False)
 
 
 def write_json(value: object) -> None:

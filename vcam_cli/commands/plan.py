@@ -1,6 +1,7 @@
 """`vcam plan`: what a run would simulate, what not, why, and at what cost."""
 
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -32,6 +33,14 @@ Geometry = Annotated[
 ]
 
 
+Details = Annotated[
+    bool,
+    typer.Option(
+        "--details", help="Print every effect with who decided it and why, and all settings."
+    ),
+]
+
+
 def plan(
     camera: options.Camera,
     set_: options.Set = None,
@@ -42,6 +51,8 @@ def plan(
     scenes: Scenes = None,
     out: options.Out = None,
     geometry: Geometry = False,
+    details: Details = False,
+    formats: options.Formats = None,
 ) -> None:
     """Show which effects a run simulates, which not and why, and what it costs.
 
@@ -52,6 +63,7 @@ def plan(
     Example:
       vcam plan still-life
       vcam plan camera.yaml --accuracy 0.001 --json
+      vcam plan starter --details
       vcam plan starter --geometry
       vcam plan starter --scenes all
       vcam plan starter --scenes still-life --scenes my-scene.yaml
@@ -60,10 +72,11 @@ def plan(
         raise typer.BadParameter("--geometry is of one scene; leave out --scenes")
     if scenes:
         _plan_scenes(
-            camera, scenes, out, options.overrides(set_, accuracy=accuracy), quiet, workers
+            camera, scenes, out, options.overrides(set_, accuracy=accuracy), quiet, workers, formats
         )
         return
     from vcam_cli.camera.derived.frame_rate import frame_rate
+    from vcam_cli.commands.plan_story import print_story
     from vcam_cli.files.report import to_json
     from vcam_cli.simulation.checks import load
     from vcam_cli.simulation.simulate import prepare
@@ -91,8 +104,12 @@ def plan(
         step = report["settings"]["wavelength_step"]
         print(geometry_table(solved, step, (band.start, band.stop)))
     else:
-        print(table(report))
-        print(facts(report, solved, ready.exposure_time, ready.times, rate_of_frames))
+        told = facts(report, solved, ready.exposure_time, ready.times, rate_of_frames)
+        if details:
+            print("\n".join((table(report), "", settings_line(report))))
+            print("\n".join(f"{heading:<10} {text}" for heading, text in told))
+        else:
+            print_story(camera, report, told)
 
 
 def _plan_scenes(
@@ -102,9 +119,11 @@ def _plan_scenes(
     overrides: list[str],
     quiet: bool,
     workers: int | None,
+    formats: Sequence[str] | None,
 ) -> None:
     """Write and print the table of effects by scenes."""
     from vcam_cli.files.folder import OutputFolder
+    from vcam_cli.files.plots import in_formats
     from vcam_cli.files.tables import write_table
     from vcam_cli.simulation import provenance, scene_plans
     from vcam_cli.simulation.checks import load
@@ -117,25 +136,30 @@ def _plan_scenes(
         plans = list(scene_plans.plan_scenes(camera, overrides, scenes, workers))
         rows = list(scene_plans.rows(plans))
         write_table(folder.new("scenes.csv"), scene_plans.COLUMNS, rows)
-        plot_scene_plans(folder.new("scenes.png"), f"{model.name}: what scenes call for", plans)
+        title = f"{model.name}: what scenes call for"
+        drawn = {"scenes.png": partial(plot_scene_plans, title=title, plans=plans)}
+        for name, draw in in_formats(drawn, formats or ()).items():
+            draw(folder.new(name))
         folder.finish({"name": model.name, "scenes": [each.scene for each in plans]})
     if not quiet:
-        print(scene_table(plans))
+        print_scenes(plans)
         print(f"{model.name}: {folder.path / 'scenes.csv'}, {folder.path / 'scenes.png'}")
 
 
-def scene_table(plans: "Sequence[ScenePlan]") -> str:
-    """Return effects by scenes as text: on, off, or free, one line a scene."""
+def print_scenes(plans: "Sequence[ScenePlan]") -> None:
+    """Print effects by scenes: on, off, or free; a line a scene, in a terminal a line an effect."""
     from vcam_cli.simulation.scene_plans import effect_names
 
     names = effect_names(plans)
     width = max(len(each.scene) for each in plans)
-    lines = [f"{'':<{width}}  " + " ".join(names)]
+    lines, columns = [f"{'':<{width}}  " + " ".join(names)], []
     for each in plans:
         states = {d.name: "free" if d.free else d.state for d in each.decisions}
-        cells = (f"{states.get(name, '-'):<{len(name)}}" for name in names)
+        columns.append([states.get(name, "-") for name in names])
+        cells = (f"{state:<{len(name)}}" for name, state in zip(names, columns[-1], strict=True))
         lines.append(f"{each.scene:<{width}}  " + " ".join(cells).rstrip())
-    return "\n".join(lines)
+    rows = [(name, *states) for name, *states in zip(names, *columns, strict=True)]
+    options.print_rows(("effect", *(each.scene for each in plans)), rows, "\n".join(lines))
 
 
 def table(report: dict) -> str:
@@ -150,31 +174,33 @@ def table(report: dict) -> str:
     return "\n".join(lines)
 
 
+def settings_line(report: dict) -> str:
+    """Return the settings of image formation as a line."""
+    from vcam_cli.units import render
+
+    named = dict(report["settings"])
+    named["wavelength_step"] = render(named["wavelength_step"], "length")
+    return f"settings   {', '.join(f'{name} {value}' for name, value in named.items())}"
+
+
 def facts(
     report: dict,
     geometry: dict,
     exposure_time: float,
     samples: tuple[float, ...] = (),
     frame_rate: str = "",
-) -> str:
-    """Return settings, geometry, exposure, frame rate and cost as text, in a few lines."""
-    from vcam_cli.units import render
-
-    named = dict(report["settings"])
-    named["wavelength_step"] = render(named["wavelength_step"], "length")
-    knobs = ", ".join(f"{name} {value}" for name, value in named.items())
+) -> list[tuple[str, str]]:
+    """Return geometry, exposure, frame rate, accuracy and cost: names and texts."""
     several = f", {len(samples)} samples from {samples[0]:.4g} s on" if samples else ""
     seen = f"{geometry['scene_width']:.4g} x {geometry['scene_height']:.4g} m"
     place = f"pixels see {seen} at magnification {geometry['magnification']:.4g}"
     if geometry["f_number"] == float("inf"):
         place = "pixels without a lens"
-    return "\n".join(
-        (
-            "",
-            f"settings   {knobs}",
-            f"geometry   {geometry['rows']} x {geometry['columns']} {place}",
-            f"exposure   {exposure_time:.4g} s{several}",
-            *([f"readout    {frame_rate}"] if frame_rate else []),
-            f"cost       about {report['seconds']:.2g} s and {report['memory_bytes'] / 1e6:.0f} MB",
-        )
-    )
+    seconds, memory = report["seconds"], report["memory_bytes"] / 1e6
+    return [
+        ("geometry", f"{geometry['rows']} x {geometry['columns']} {place}"),
+        ("exposure", f"{exposure_time:.4g} s{several}"),
+        *([("readout", frame_rate)] if frame_rate else []),
+        ("accuracy", f"rms error within {100 * report['settings']['tolerance']:.3g} % of signal"),
+        ("cost", f"about {seconds:.2g} s and {memory:.0f} MB"),
+    ]

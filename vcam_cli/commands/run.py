@@ -62,7 +62,7 @@ def run(
     if as_json:
         print(to_json(summary(record, folder.path)), end="")
     elif not quiet:
-        print(summary_text(result.metrics.rows, record, folder.path, folder.names))
+        print_summary(result.metrics.rows, record, folder.path, folder.names)
 
 
 def summary(record: dict, path: Path) -> dict:
@@ -71,15 +71,14 @@ def summary(record: dict, path: Path) -> dict:
     return {"out": str(path), **{name: record[name] for name in names}}
 
 
-def summary_text(
+def print_summary(
     metrics: tuple[tuple[str, float, str], ...], record: dict, path: Path, files: tuple[str, ...]
-) -> str:
-    """Return what a run prints: metrics, effects, time and files."""
-    lines = [
-        f"{name:<26} {value:>12.6g} {unit:<4} {LABELS.get(name, '')}".rstrip()
-        for name, value, unit in metrics
-    ]
-    lines += ["", *exposure_lines(record["exposure"])]
+) -> None:
+    """Print what a run found: metrics, effects, time and files."""
+    rows = [(name, f"{value:.6g}", unit, LABELS.get(name, "")) for name, value, unit in metrics]
+    plain = "\n".join(f"{n:<26} {v:>12} {u:<4} {said}".rstrip() for n, v, u, said in rows)
+    options.print_rows(("metric", ">value", "unit", ""), rows, plain)
+    lines = ["", *exposure_lines(record["exposure"])]
     estimate, measured = record["plan"]["seconds"], sum(record["stages"].values())
     lines.append("")
     lines.append(
@@ -89,7 +88,7 @@ def summary_text(
     lines += [f"{about:<12} {path / name}" for name, about in FILES.items() if name in files]
     lines.append(f"{record['name']}: {path}/")
     lines += ["", *wrap(simulated_effects(record["plan"], measured))]
-    return "\n".join(lines)
+    print("\n".join(lines))
 
 
 LABELS = {
