@@ -222,7 +222,9 @@ def schedule(
         watch.begin("tables and plots")
         for name, write in in_formats(tables.writers(result), formats).items():
             write(folder.new(name))
-        result = replace(result, frames=_take_frames(read, folder, workers, watch, formats))
+        result = replace(result, frames=_take_frames(read, workers, watch))
+        if result.frames is not None and (asked := read.model.frames) is not None:
+            frames.write_frames(result.frames, asked, folder, read.model.name, formats)
         result = replace(result, seconds=time.perf_counter() - start)
         if report:
             schedule_report.write(result, folder)
@@ -240,23 +242,15 @@ def _check_frames_camera(study: ScheduleFile) -> None:
         raise error.with_places(study.locate) from None
 
 
-def _take_frames(
-    study: ScheduleFile,
-    folder: OutputFolder,
-    workers: int | None,
-    watch: Observer,
-    formats: Sequence[str],
-) -> Frames | None:
-    """Take and write the pictures that the study asks for."""
+def _take_frames(study: ScheduleFile, workers: int | None, watch: Observer) -> Frames | None:
+    """Take the pictures that the study asks for."""
     asked, camera = study.model.frames, study.frames_camera
     if asked is None or camera is None:
         return None
     try:
-        pictures = frames.take_frames(asked, camera, workers, watch)
+        return frames.take_frames(asked, camera, workers, watch)
     except BadInput as error:
         raise error.with_places(study.locate) from None
-    frames.write_frames(pictures, asked, folder, study.model.name, formats)
-    return pictures
 
 
 class _StudyRun:
