@@ -91,6 +91,29 @@ def test_motion_does_not_disturb_the_focus(tmp_path):
     )
 
 
+@pytest.mark.parametrize(
+    "array",
+    [
+        {"pattern": "stacked", "filters": {"R": 0.4, "G": 0.5, "B": 0.3}},
+        {"pattern": "honeycomb", "filters": {"R": 0.4, "G": 0.5, "B": 0.3}},
+        {"pattern": {"positions": "places.csv"}, "filters": {"R": 0.4, "G": 0.5}},
+        {"pattern": "monochrome", "binning": {"rows": 2, "columns": 2, "kind": "charge"}},
+    ],
+)
+def test_all_kinds_of_arrays_are_focused(array, tmp_path):
+    """To within the depth of focus that goes with the pixels; in light of one wavelength."""
+    draws = np.random.default_rng(3).uniform(-48, 48, (900, 2))
+    lines = (f"{x},{y},{'RG'[k % 2]}" for k, (x, y) in enumerate(draws))
+    (tmp_path / "places.csv").write_text("x_um,y_um,color\n" + "\n".join(lines) + "\n")
+    size = {} if "positions" in array["pattern"] else {"rows": 32, "columns": 32}
+    whole = {"array": size | array, "output.render": "none"}
+    changes = {k: v for k, v in EDGE.items() if not k.startswith("array")}
+    made = camera(tmp_path, changes | whole | {"optics.defocus": "40 um"})
+    ready, notes = prepare(made, workers=1)
+    assert any("focus: auto moves" in note for note in notes)
+    assert abs(ready.camera.optics.defocus) < 2 * DEPTH
+
+
 def test_even_light_tells_no_focus(tmp_path):
     even = EDGE | {"scene.source": {"kind": "chart", "chart": "uniform"}, "optics.defocus": "9 um"}
     ready, notes = prepare(camera(tmp_path, even))

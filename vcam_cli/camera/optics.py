@@ -5,6 +5,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar, Literal
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic_core import InitErrorDetails
 
 from vcam_cli.camera.spectrum import Spectral, SpectrumSpec, flat
@@ -42,6 +44,11 @@ class FocusWindow(Model):
         last = [min(math.ceil(n * (at + size / 2)), n) for at, size, n in sides]
         down, across = (slice(a, max(b, a + 1)) for a, b in zip(first, last, strict=True))
         return down, across
+
+    def contains(self, across: NDArray, down: NDArray) -> NDArray[np.bool_]:
+        """Return which places lie in it, given from the upper-left corner as 0 to 1."""
+        inside_x = np.abs(across - self.x) <= self.width / 2
+        return np.asarray(inside_x & (np.abs(down - self.y) <= self.height / 2))
 
 
 class FalloffFile(Model):

@@ -2,8 +2,9 @@
 
 The lens is tried at places of the image plane, first widely apart, then between the best ones; what
 is judged is the noise-free light in a window of the array, as the pixels see it: the mean square
-of the differences between neighbors of one color, relative to the squared mean. Lens aberrations,
-the scene's detail and the pixels' aperture so have their say in what is sharpest.
+of the differences between neighbors of one color, relative to the squared mean; of pixels at places
+of their own, the variance of each color. Lens aberrations, the scene's detail and the pixels'
+aperture so have their say in what is sharpest.
 
 References
 ----------
@@ -21,12 +22,11 @@ from numpy.typing import NDArray
 
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import geometry
-from vcam_cli.camera.derived.mosaic import mosaic
 from vcam_cli.camera.optics import FocusWindow
 from vcam_cli.errors import BadInput, bad
 from vcam_cli.progress import Stages
 from vcam_cli.simulation.cost_model import trial_seconds
-from vcam_cli.simulation.preparation import prepare, standing_still
+from vcam_cli.simulation.preparation import Prepared, prepare, standing_still
 
 CIRCLE = 8.0
 """Width of the circle of confusion at both ends of the range, in pixels."""
@@ -91,7 +91,6 @@ class _Trials:
         finer = camera.accuracy.model_copy(update={"preset": None, "tolerance": TOLERANCE})
         self._camera = standing_still(camera).model_copy(update={"accuracy": finer})
         self._window = camera.optics.focus_window
-        self._block = mosaic(camera).block
         self._picture, self._workers, self._stages = picture, workers, stages
         self._count = 0
         self.seconds = 0.0
@@ -109,7 +108,7 @@ class _Trials:
         self.seconds += trial_seconds(
             ready.layout.lattice, ready.layout.mosaic, ready.spectrum, self._workers
         )
-        return contrast(ready.rate, len(self._block), len(self._block[0]), self._window)
+        return _contrast_of_pixels(ready, self._window)
 
 
 def _search(camera: Camera, trials: _Trials) -> tuple[float, tuple[str, ...]]:
@@ -134,6 +133,36 @@ def _moved(camera: Camera, shift: float) -> Camera:
     """Return the camera with its lens fixed, its image plane shifted [m]."""
     optics = camera.optics.model_copy(update={"defocus": shift, "focus": "fixed"})
     return camera.model_copy(update={"optics": optics})
+
+
+def _contrast_of_pixels(ready: Prepared, window: FocusWindow) -> float:
+    """Return how sharp the light on the pixels is."""
+    layout = ready.layout
+    if layout.places is not None:
+        across, down = ((at - at.min()) / max(np.ptp(at), 1e-12) for at in (layout.x, layout.y))
+        seen = window.contains(across, down)
+        return spread(ready.rate[seen], layout.color[seen])
+    block = (("",),) if layout.full_color else layout.raw_mosaic.block
+    return contrast(ready.rate, len(block), len(block[0]), window)
+
+
+def spread(light: NDArray, color: NDArray) -> float:
+    """Return how sharp a picture is whose pixels have no neighbors.
+
+    Parameters
+    ----------
+    light : ndarray
+        Light (N,) of the pixels, in any unit.
+    color : ndarray
+        Index (N,) of each pixel's color.
+
+    Returns
+    -------
+    float
+        Variance of the pixels of a color over their squared mean, summed over the colors.
+    """
+    planes = [light[color == index].astype(np.float64) for index in np.unique(color)]
+    return sum(float(plane.var() / plane.mean() ** 2) for plane in planes if plane.mean() > 0)
 
 
 def contrast(
