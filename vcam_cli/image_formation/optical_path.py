@@ -142,6 +142,8 @@ class SpectrumReport:
     full signal."""
     fine_pixels: int = 0
     """Those places; 0 where there is no need for them."""
+    places_per_pixel: int = 0
+    """How many of them lie along each side of a pixel."""
     table_values: int = 0
     """Values of transfer functions of fx and fy that were computed."""
     peak: float = 0.0

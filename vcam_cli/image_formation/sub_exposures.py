@@ -135,6 +135,7 @@ def sub_exposed_layers(
         lost_rms=math.hypot(report.lost_rms, image.error, left),
         sub_exposures=count,
         sub_exposure_error=math.hypot(image.error, left) / full,
+        places_per_pixel=round(path.geometry.pitch_x / image.geometry.pitch_x),
         fine_pixels=image.geometry.rows * image.geometry.columns,
     )
     return iter([layer]), told

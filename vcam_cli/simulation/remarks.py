@@ -1,6 +1,5 @@
 """Notes of a run: what it chose, left out or took for granted where the file left that open."""
 
-import math
 from pathlib import Path
 
 import numpy as np
@@ -105,12 +104,11 @@ def _motion(ready: Prepared) -> tuple[str, ...]:
 def _sub_exposures(ready: Prepared) -> str:
     """Return of how many sub-exposures the light is a mean, and the error that they leave."""
     found = ready.spectrum
-    many = f"{found.sub_exposures} sub-exposures" if found.sub_exposures > 1 else "one look"
-    fine = math.sqrt(found.fine_pixels / (ready.layout.lattice.rows * ready.layout.lattice.columns))
+    many = f"{found.sub_exposures} sub-exposures" if found.sub_exposures > 1 else "one exposure"
     return (
-        f"motion is computed as {many} of the still image, known at {fine:.2g} places along each"
-        f" side of a pixel; they leave an error of {100 * found.sub_exposure_error:.2g} % of full"
-        " signal"
+        f"motion is computed as {many} of the still image, known at {found.places_per_pixel} places"
+        " along each side of a pixel; they leave an error of"
+        f" {100 * found.sub_exposure_error:.2g} % of full signal"
     )
 
 
