@@ -7,14 +7,15 @@
 
 The set's descriptor has a line `n BITS COLUMNS ROWS`, then `b TIME PHOTONS` or `d TIME` for bright
 and dark frames, times in ns, each followed by lines `i FILE`. Every second level of light goes to
-fit.yaml, with all dark frames; the mean signals of the others, not fitted, to verify.yaml. The set
-names neither the pixel's size nor the wavelength. With light in photons on a pixel no signal
-depends on them; 5 um and 545 nm stand there.
+fit.yaml, with all dark frames; the others, which are not fitted, to verify.yaml. The set names
+neither the pixel's size nor the wavelength. With light in photons on a pixel no signal depends on
+them; 5 um and 545 nm stand there.
 """
 
 import sys
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import yaml
@@ -23,7 +24,7 @@ from PIL import Image
 LIGHT = {"monochromatic": "545 nm"}
 LINEAR = 0.7
 """Share of the highest code above which no signal is predicted: as EMVA 1288 fits the response."""
-TOLERANCE = "2 %"
+TOLERANCES = {"tolerance": "2 %", "noise_tolerance": "10 %"}
 
 
 @dataclass
@@ -40,12 +41,13 @@ class Level:
         """Return the mean code of all frames [DN]."""
         return float(np.mean([np.asarray(Image.open(file)).mean() for file in self.files]))
 
-    def entry(self, folder: Path) -> dict[str, object]:
+    def entry(self) -> dict[str, object]:
         """Return what a measurement file says of the frames, given as a pattern."""
         pattern = self.files[0].stem.rpartition("_")[0] + "_*" + self.files[0].suffix
         light = {"light": LIGHT, "photons": self.photons} if self.photons else {"light": "none"}
         files = self.files[0].resolve().with_name(pattern)
-        return {"files": str(files), "exposure": f"{self.time!r} s", **light}
+        name = f"{self.photons:g} photons" if self.photons else f"dark, {self.time * 1e3:g} ms"
+        return {"name": name, "files": str(files), "exposure": f"{self.time!r} s", **light}
 
 
 def read(folder: Path) -> tuple[int, list[Level]]:
@@ -63,26 +65,21 @@ def read(folder: Path) -> tuple[int, list[Level]]:
     return bits, levels
 
 
-def measurements(folder: Path) -> tuple[dict[str, object], dict[str, object]]:
+def measurements(folder: Path) -> tuple[dict[str, Any], dict[str, Any]]:
     """Return the trees of fit.yaml and verify.yaml."""
     bits, levels = read(folder)
     dark = [level for level in levels if not level.photons]
     lit = sorted((level for level in levels if level.photons), key=lambda level: level.photons or 0)
     source = f"frames of {folder.name}, github.com/EMVA1288/datasets, CC BY-SA 3.0"
-    about = {"kind": "measurement", "source": source}
     sensor = {"levels": {"bits": bits}, "pixel": {"width": "5 um"}}
-    points: list[dict[str, object]] = []
-    for level in lit[1::2]:
-        mean = level.mean()
-        if mean <= LINEAR * (2**bits - 1):
-            light = {"light": LIGHT, "photons": level.photons}
-            name = f"{level.photons:g} photons"
-            points.append({"name": name, "signal": f"{mean:.2f} DN",
-                           "exposure": f"{level.time!r} s", **light})  # fmt: skip
-    frames = [level.entry(folder) for level in [*dark, *lit[::2]]]
+    about = {"kind": "measurement", "source": source, **sensor}
+    held = [level for level in lit[1::2] if level.mean() <= LINEAR * (2**bits - 1)]
+    fitted, predicted = (
+        [level.entry() for level in levels] for levels in ([*dark, *lit[::2]], held)
+    )
     return (
-        {**about, "name": "emva-fit", "frames": frames, **sensor},
-        {**about, "name": "emva-verify", "tolerance": TOLERANCE, "frames": points},
+        {**about, "name": "emva-fit", "frames": fitted},
+        {**about, "name": "emva-verify", "frames": predicted, **TOLERANCES},
     )
 
 
