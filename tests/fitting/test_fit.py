@@ -158,6 +158,35 @@ def test_tails_bands_and_defects_are_found(tmp_path):
     assert load(tmp_path / "found.yaml").pixel.readout.correlated_row_noise.correlation < 1
 
 
+def test_traps_and_shading_are_found(tmp_path):
+    """Each within five standard errors; the other noise is as it would be without them."""
+    known = blind.truth(102)
+    changes = {
+        "pixel.readout.telegraph_noise": {
+            "fraction": "4 %", "amplitude": "60 e", "occupancy": "30 %",
+        },
+        "pixel.fpn.shading": {"offset": "8 e", "gain": "2 %"},
+    }  # fmt: skip
+    found = fitted(tmp_path, blind.bench(known, tmp_path, ROWS, FRAMES, 8, changes))
+    named = {p.name: p for p in found.parameters}
+    truth = known | {
+        "telegraph_fraction": 0.04,
+        "telegraph_amplitude": 60,
+        "telegraph_occupancy": 0.3,
+        "shading_offset": 8,
+        "shading_gain": 0.02,
+    }
+    for name, value in truth.items():
+        p = named[name]
+        assert abs(p.value - value) <= 5 / 1.645 * (p.high - p.low) / 2, name
+    assert "read_noise_shape" not in named
+    assert "flat frames are not even" in " ".join(found.notes)
+    (tmp_path / "found.yaml").write_text(yaml.safe_dump(found.camera))
+    told = load(tmp_path / "found.yaml").pixel
+    assert told.readout.telegraph_noise.occupancy == pytest.approx(0.3, abs=0.1)
+    assert told.fpn.shading.gain == pytest.approx(0.02, rel=0.1)
+
+
 def edge(pitch: float, blur: float, rng: np.random.Generator, rows: int = 120) -> np.ndarray:
     """An edge of 5 degrees behind a Gaussian blur [m], averaged over 5 x 5 points of each pixel."""
     from scipy.special import erf
@@ -178,12 +207,12 @@ def test_a_gain_is_that_of_all_electrons():
 
     def stack(electrons, seconds):
         variance = Estimate(9 + (0.02 * electrons) ** 2, 0.1)
-        patterns = {"Y": SimpleNamespace(pixel=variance, column=variance)}
+        patterns = {"Y": SimpleNamespace(pixel=variance, column=variance, slow=variance)}
         return SimpleNamespace(patterns=patterns, entry=SimpleNamespace(exposure=seconds))
 
     line = sensor.Dark(Estimate(64, 0.1), Estimate(1000, 1))
     found = sensor.gain_variances(stack(1000, 0.1), stack(10, 0.01), "Y", 900, line)
-    assert [each.value for each in found] == pytest.approx([0.02**2] * 2, rel=1e-12)
+    assert [each.value for each in found] == pytest.approx([0.02**2] * 3, rel=1e-12)
 
 
 def test_sharpness_of_an_edge(taken):
@@ -221,6 +250,7 @@ def test_the_command_writes_camera_table_and_json(taken, tmp_path):
     folder, _, form = taken
     (folder / "bench.yaml").write_text(yaml.safe_dump(form | {"hold_out": "20 %"}))
     arguments = ["fit", str(folder / "bench.yaml"), "-o", str(tmp_path / "out"), "--json"]
+    arguments += ["--report", "--format", "svg"]
     result = INVOKE.invoke(app, arguments)
     assert result.exit_code == 0, result.output
     told = json.loads(result.stdout)
@@ -229,6 +259,12 @@ def test_the_command_writes_camera_table_and_json(taken, tmp_path):
     assert list(rows[0]) == ["parameter", "value", "low", "high", "unit", "method"]
     assert [r["parameter"] for r in rows] == [p["parameter"] for p in told["parameters"]]
     assert load(tmp_path / "out" / "camera.yaml").optics.is_lens is False
+    page = (tmp_path / "out" / "report.html").read_text("utf-8")
+    for name in ("photon_transfer", "dark_signal", "intervals"):
+        assert (tmp_path / "out" / f"{name}.png").stat().st_size > 1000
+        assert (tmp_path / "out" / f"{name}.svg").read_text("utf-8").startswith("<?xml")
+        assert page.count(f"{name}.png") > 0
+    assert "not told by the frames: sharpness" in page
     assert json.loads((tmp_path / "out" / "fit.json").read_text())["unknown"]
 
 

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from vcam_cli.fitting.noise_shape import tail_shape
-from vcam_cli.verification.stack_statistics import Estimate, pattern, stack_statistics
+from vcam_cli.fitting.pattern import pattern
+from vcam_cli.verification.stack_statistics import Estimate, stack_statistics
 
 N, ROWS, COLUMNS = 8, 120, 100
 PIXEL, ROW, COLUMN, OFFSET, OFFSET_COLUMN = 3.0, 1.5, 2.0, 5.0, 2.5

@@ -1,7 +1,7 @@
 """`vcam fit`: a camera file from raw frames of a sensor."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -23,13 +23,16 @@ def fit(
         ),
     ],
     out: options.Out = None,
+    wants_report: options.Report = False,
+    formats: options.Formats = None,
     as_json: options.Json = False,
     quiet: options.Quiet = False,
 ) -> None:
     """Estimate a camera from dark frames, flat frames and edges, every number with its interval.
 
     Write camera.yaml, which runs as it is, parameters.csv with 90 % intervals and methods (EMVA
-    1288 release 4.0 where it defines one), and fit.json. What the frames cannot tell is listed.
+    1288 release 4.0 where it defines one), plots of photon transfer, dark signal and intervals,
+    and fit.json. What the frames cannot tell is listed.
 
     \b
     Example:
@@ -38,11 +41,13 @@ def fit(
     """
     import yaml
 
-    from vcam_cli.files import report, tables
+    from vcam_cli.files import plots, report, tables
     from vcam_cli.files.atomic import write_text
     from vcam_cli.files.folder import OutputFolder
     from vcam_cli.fitting import fit as fitting
     from vcam_cli.fitting.parameters import COLUMNS
+    from vcam_cli.fitting.plots import plots as plots_of
+    from vcam_cli.reports import study_report
     from vcam_cli.simulation import provenance
     from vcam_cli.verification import measurement_file
     from vcam_cli.verification.frames import paths
@@ -58,6 +63,10 @@ def fit(
         tables.write_table(
             folder.new("parameters.csv"), COLUMNS, (p.cells for p in found.parameters)
         )
+        for name, draw in plots.in_formats(plots_of(found), formats or ()).items():
+            draw(folder.new(name))
+        if wants_report:
+            study_report.write(folder, **report_arguments(found))
         form = {"measurement": measured.model_dump(mode="json")}
         folder.finish(found.report() | form | {"versions": provenance.versions()})
     for note in found.notes:
@@ -70,6 +79,25 @@ def fit(
         print_fit(found, path)
 
 
+def report_arguments(found: "Fit") -> dict[str, Any]:
+    """Return title, text, facts and captions of the report."""
+    from vcam_cli.reports.page import note_facts
+
+    unknown = [f"not told by the frames: {name}" for name in found.unknown]
+    captions = {
+        "parameters.csv": "Every number with its 90 % interval and its method.",
+        "photon_transfer.png": "Temporal variance over signal, from which the gain follows",
+        "dark_signal.png": "Dark frames: black level and dark current",
+        "intervals.png": "How sure each number is",
+    }
+    return {
+        "title": f"{found.measurement.name}: a camera from its frames",
+        "about": "Estimated by vcam fit from raw frames; definitions of EMVA 1288 release 4.0.",
+        "facts": note_facts((*found.notes, *unknown)),
+        "captions": captions,
+    }
+
+
 def print_fit(found: "Fit", path: Path) -> None:
     """Print the parameters with their intervals."""
     rows = [
@@ -80,4 +108,4 @@ def print_fit(found: "Fit", path: Path) -> None:
         f"{n:<24} {v:>11}  {low:>11} .. {high:<11} {u}" for n, v, low, high, u in rows
     )
     options.print_rows(("parameter", ">value", ">from", ">to", "unit"), rows, plain)
-    print(f"{path}/camera.yaml, parameters.csv, fit.json")
+    print(f"{path}/camera.yaml, parameters.csv, photon_transfer.png, fit.json")

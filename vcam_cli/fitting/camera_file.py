@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from vcam_cli import units
 from vcam_cli.fitting.conditions import Conditions
+from vcam_cli.fitting.pattern import CYCLES
 from vcam_cli.fitting.sensor import Transfer
 
 if TYPE_CHECKING:
@@ -50,10 +51,13 @@ def tree(found: Fit, conditions: Conditions, curves: list[Transfer]) -> dict[str
     if measurement.pattern != "monochrome":
         top = max(efficiencies.values())
         array["filters"] = {color: value / top for color, value in efficiencies.items()}
-    fpn = {"offset_pixel": _charge(found.value("offset_pixel")),
+    fpn: dict[str, Any] = {"offset_pixel": _charge(found.value("offset_pixel")),
            "offset_column": _charge(found.value("offset_column")),
            "gain_pixel": _percent(found.value("gain_pixel")),
            "gain_column": _percent(found.value("gain_column"))}  # fmt: skip
+    uneven, slow = found.value("shading_offset"), found.value("shading_gain")
+    if uneven or slow:
+        fpn["shading"] = {"offset": _charge(uneven), "gain": _percent(slow), "cycles": CYCLES}
     return {
         "name": measurement.name,
         "scene": scene,
@@ -86,6 +90,13 @@ def _noise(found: Fit) -> dict[str, Any]:
         out["read_noise"] = read
     else:
         out["heavy_tailed_noise"] = {"rms": read, "shape": round(shape, 6)}
+    fraction = found.value("telegraph_fraction")
+    if fraction:
+        out["telegraph_noise"] = {
+            "fraction": _percent(fraction),
+            "amplitude": _charge(found.value("telegraph_amplitude")),
+            "occupancy": _percent(found.value("telegraph_occupancy")),
+        }
     if correlation is None:
         out["row_noise"] = row
     else:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vcam_cli.fitting.pattern import Pattern, pattern
+from vcam_cli.fitting.traps import PixelMoments, pixel_moments
 from vcam_cli.progress import Observer
 from vcam_cli.spectra import integral, photons
 from vcam_cli.verification.frame_sets import FrameSet
@@ -15,10 +17,8 @@ from vcam_cli.verification.frames import color_block, stacks
 from vcam_cli.verification.model import Measurement
 from vcam_cli.verification.stack_statistics import (
     Estimate,
-    Pattern,
     StackStatistics,
     combine,
-    pattern,
     stack_statistics,
 )
 
@@ -45,6 +45,8 @@ class Condition:
     at_zero: float
     at_most: float
     """Shares of the codes that are 0, and the highest."""
+    moments: tuple[PixelMoments, ...] = ()
+    """Of the pixels of each plane, of the dark frames of the shortest exposure time."""
 
     def mean(self, color: str) -> Estimate:
         """Return the mean of a color [DN]."""
@@ -102,10 +104,15 @@ def measure(measurement: Measurement, watch: Observer) -> Conditions:
     good = ~hot if dead is None else ~(hot | dead)
     found: list[Condition] = []
     flats = len(averages)
+    shortest = min(entry.exposure for entry, _ in averages if entry.is_dark)
     for stack in stacks(measurement):
         if stack.entry.target == "flat":
             watch.step(len(found), flats)
-            found.append(_condition(stack.entry, stack.label, stack.frames, good, measurement))
+            condition = _condition(stack.entry, stack.label, stack.frames, good, measurement)
+            if stack.entry.is_dark and stack.entry.exposure == shortest:
+                planes = _planes(stack.frames, good, measurement)
+                condition = replace(condition, moments=tuple(map(pixel_moments, *planes)))
+            found.append(condition)
     return Conditions(
         tuple(sorted((c for c in found if c.entry.is_dark), key=lambda c: c.entry.exposure)),
         tuple(c for c in found if not c.entry.is_dark),
@@ -159,7 +166,7 @@ def _condition(
 
 
 def _mean_pattern(patterns: list[Pattern]) -> Pattern:
-    names = ("total", "pixel", "column", "row")
+    names = ("total", "pixel", "column", "row", "slow")
     return Pattern(*(combine([getattr(p, name) for p in patterns]) for name in names))
 
 
@@ -175,3 +182,14 @@ def photons_per_pixel(entry: FrameSet, measurement: Measurement) -> float | None
     lamp = entry.light.resolve()
     per_joule = integral(photons(lamp), *BAND) / integral(lamp, *BAND)
     return entry.irradiance * area * entry.exposure * per_joule
+
+
+def _planes(
+    frames: NDArray, good: NDArray, measurement: Measurement
+) -> tuple[list[NDArray], list[NDArray]]:
+    """Return the planes of the places of the color filter array, and which pixels count there."""
+    block = color_block(measurement)
+    places = [(r, c) for r in range(len(block)) for c in range(len(block[0]))]
+    down, across = len(block), len(block[0])
+    cut = [(slice(r, None, down), slice(c, None, across)) for r, c in places]
+    return [frames[:, rows, columns] for rows, columns in cut], [good[place] for place in cut]

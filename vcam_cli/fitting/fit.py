@@ -14,9 +14,11 @@ import numpy as np
 
 from vcam_cli.errors import BadInput, Collector
 from vcam_cli.fitting import camera_file, edge, sensor
-from vcam_cli.fitting.conditions import CLIPPED, Conditions, measure
+from vcam_cli.fitting.conditions import CLIPPED, Condition, Conditions, measure
 from vcam_cli.fitting.noise_shape import is_significant, neighbor_correlation, tail_shape
 from vcam_cli.fitting.parameters import COLUMNS, SIGMAS, Parameter, deviation, parameter
+from vcam_cli.fitting.pattern import CYCLES
+from vcam_cli.fitting.traps import LEAST_FRAMES, Traps, find_traps
 from vcam_cli.progress import Observer, Silent
 from vcam_cli.verification.frames import color_block, paths, stacks
 from vcam_cli.verification.model import Measurement
@@ -37,6 +39,12 @@ class Fit:
     """What the frames cannot tell, and is left at its default."""
     camera: dict[str, Any] = field(default_factory=dict)
     """The camera file."""
+    dark: tuple[Condition, ...] = ()
+    """The dark stacks, by exposure time."""
+    line: sensor.Dark | None = None
+    """The line of their means over time."""
+    curves: list[sensor.Transfer] = field(default_factory=list)
+    """The photon transfer of every color in every light."""
 
     def value(self, name: str) -> float | None:
         """Return an estimate, None where there is none."""
@@ -90,6 +98,7 @@ def fit(measurement: Measurement, watch: Observer | None = None) -> Fit:
     _of_patterns(out, found, curves, line, gain)
     _of_range(out, curves, line, gain)
     _of_edge(out, measurement)
+    out.dark, out.line, out.curves = found.dark, line, curves
     out.camera = camera_file.tree(out, found, curves)
     return out
 
@@ -133,7 +142,8 @@ def _of_dark(out: Fit, found: Conditions, line: sensor.Dark, gain: Estimate) -> 
     else:
         current = line.current / gain
         add(parameter("dark_current", current, "e/s", "EMVA 1288 R4 eq 57, slope of the means"))
-    read = sensor.read_variance(first, line, gain)
+    traps = find_traps(list(first.moments))
+    read = sensor.read_variance(first, line, gain, traps.core if traps else None)
     if read.value <= 0 or first.every("pixel").value < 0.24:
         out.notes.append("noise of the readout is lost in the rounding of the ADC")
     add(deviation("read_noise", read, gain, "e", "EMVA 1288 R4 eq 53, without rounding and shot"
@@ -154,15 +164,26 @@ def _of_dark(out: Fit, found: Conditions, line: sensor.Dark, gain: Estimate) -> 
         )
         method = "of neighboring rows, from their means"
         add(Parameter("row_correlation", value, low, high, "1", method))
-    if is_significant(excess):
+    if traps is not None:
+        _of_traps(out, traps, gain)
+    elif is_significant(excess):
         reach = SIGMAS * excess.error
         value, low, high = (tail_shape(excess.value + step) for step in (0.0, reach, -reach))
         method = "Tukey's lambda of the pixels' kurtosis"
         add(Parameter("read_noise_shape", value, low, high, "1", method))
-        out.notes.append(
-            "read noise has heavy tails; the frames do not tell whether those are all pixels' or"
-            " those of few that have traps"
-        )
+        if first.moments[0].frames < LEAST_FRAMES:
+            out.notes.append(
+                "read noise has heavy tails; so few dark frames do not tell whether those are all"
+                " pixels' or those of few that have traps"
+            )
+
+
+def _of_traps(out: Fit, traps: Traps, gain: Estimate) -> None:
+    add = out.parameters.append
+    method = "maximum likelihood of the pixels' variances, shortest dark frames"
+    add(parameter("telegraph_fraction", traps.fraction, "1", method))
+    add(parameter("telegraph_amplitude", traps.amplitude / gain, "e", f"mean step, {method}"))
+    add(parameter("telegraph_occupancy", traps.occupancy, "1", method))
 
 
 def _of_gain(out: Fit, curves: list[sensor.Transfer], gain: Estimate) -> None:
@@ -195,6 +216,17 @@ def _of_patterns(
         variance = combine([each[number] for each in gains])
         one = Estimate(1.0, 0.0)
         add(deviation(name, variance, one, "1", "EMVA 1288 R4 eq 67, near half of saturation"))
+    slow = {
+        "shading_offset": (combine([pattern.slow for pattern in dark]), gain, "e"),
+        "shading_gain": (combine([each[2] for each in gains]), Estimate(1.0, 0.0), "1"),
+    }
+    method = f"of cosines up to {CYCLES} cycles over the array"
+    for key, (variance, scale, unit) in slow.items():
+        if is_significant(variance):
+            add(deviation(key, variance, scale, unit, method))
+    if is_significant(slow["shading_gain"][0]):
+        out.notes.append("flat frames are not even: what is slow over the array is written as"
+                         " shading of gains, and may be that of the light")  # fmt: skip
     fractions = {"hot": found.hot, "dead": found.dead}
     for name, share in fractions.items():
         if share is None:
@@ -212,7 +244,7 @@ def _of_patterns(
 
 def _gain_variances(
     curve: sensor.Transfer, found: Conditions, line: sensor.Dark
-) -> tuple[Estimate, Estimate]:
+) -> tuple[Estimate, Estimate, Estimate]:
     """Return the variances of gains from the stack near half of saturation that tells most."""
     signal = curve.result.series.signal
     part = signal / signal[curve.result.series.saturation_index]

@@ -161,7 +161,9 @@ def _mean_gain_error(
 ) -> float:
     """Return how far the mean gain of so many pixels and columns is from that of all sensors."""
     half = int(np.argmin(abs(signal - 0.5 * signal.max())))
-    pixel, column = gain_variances(ordered[half], found.dark[0], color, float(signal[half]), line)
+    pixel, column, _ = gain_variances(
+        ordered[half], found.dark[0], color, float(signal[half]), line
+    )
     rows, columns = ordered[half].planes[color][0].average.shape
     planes = len(ordered[half].planes[color])
     variance = max(pixel.value, 0) / (rows * columns * planes) + max(column.value, 0) / columns
@@ -170,8 +172,8 @@ def _mean_gain_error(
 
 def gain_variances(
     lit: Condition, dark: Condition, color: str, signal: float, line: Dark
-) -> tuple[Estimate, Estimate]:
-    """Return the relative variances of gains of pixels and of columns, eq 67 of EMVA 1288.
+) -> tuple[Estimate, Estimate, Estimate]:
+    """Return the relative variances of gains, eq 67 of EMVA 1288: of pixels, columns, slow ones.
 
     A gain is that of all electrons, the dark current's too: what the two stacks have of these
     counts as signal. That of the light alone would be short by their share.
@@ -179,7 +181,11 @@ def gain_variances(
     bright, unlit = lit.patterns[color], dark.patterns[color]
     dim, light = (line.mean(stack.entry.exposure) for stack in (dark, lit))
     scale = 1 / ((signal + light) ** 2 - dim**2)
-    return (bright.pixel - unlit.pixel) * scale, (bright.column - unlit.column) * scale
+    return (
+        (bright.pixel - unlit.pixel) * scale,
+        (bright.column - unlit.column) * scale,
+        (bright.slow - unlit.slow) * scale,
+    )
 
 
 def _dark_of(
@@ -201,9 +207,14 @@ def pooled_gain(found: list[Transfer]) -> Estimate:
     return Estimate(float(values @ weights / weights.sum()), float(weights.sum() ** -0.5))
 
 
-def read_variance(dark: Condition, line: Dark, gain: Estimate) -> Estimate:
-    """Return the variance of a pixel's readout [DN^2], without rounding and dark current's shot."""
-    found = combine([dark.variance(color) for color in dark.planes])
+def read_variance(
+    dark: Condition, line: Dark, gain: Estimate, core: Estimate | None = None
+) -> Estimate:
+    """Return the variance of a pixel's readout [DN^2], without rounding and dark current's shot.
+
+    core: variance of pixels without traps, where some have them.
+    """
+    found = core or combine([dark.variance(color) for color in dark.planes])
     shot = gain.value * line.mean(dark.entry.exposure)
     shot_error = (
         0.0 if line.current is None else (gain.value * line.current.error * dark.entry.exposure)

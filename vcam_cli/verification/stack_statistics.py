@@ -14,8 +14,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from vcam_cli.quality import nonuniformity
-
 
 @dataclass(frozen=True)
 class Estimate:
@@ -132,61 +130,3 @@ def stack_statistics(frames: NDArray, good: NDArray) -> StackStatistics:
 
 def _share(line_variance: float, lines: int, frames: int) -> float:
     return max(line_variance, 0.0) / (lines * frames)
-
-
-@dataclass(frozen=True)
-class Pattern:
-    """Spatial variances of a stack with their errors [DN^2]."""
-
-    total: Estimate
-    pixel: Estimate
-    column: Estimate
-    row: Estimate
-
-
-def pattern(stack: StackStatistics, good: NDArray) -> Pattern:
-    """Return the spatial variances, freed of the temporal noise that is left in the mean.
-
-    What is taken out has an error of its own, which is independent of that of the mean: of n
-    frames it is 1 / (n - 1) of the variance of what is left, and so of weight in short stacks.
-
-    Parameters
-    ----------
-    stack : StackStatistics
-        The stack.
-    good : NDArray
-        Which pixels count; the others take the mean of all.
-
-    Returns
-    -------
-    Pattern
-        Variances by eqs 36 and 42 of EMVA 1288 release 4.0 (`quality.nonuniformity`).
-    """
-    rows, columns = good.shape
-    filled = np.where(good, stack.average, stack.mean.value)
-    found = nonuniformity.spatial_variance(
-        nonuniformity.Stack(stack.frames, filled, stack.pixel.value)
-    )
-    n, share = stack.frames, float(good.mean())
-    pixel_seen = (found.pixel + stack.pixel.value / n) / share
-    column = found.column - max(stack.column.value, 0.0) / n
-    row = found.row - max(stack.row.value, 0.0) / n
-    pixel = found.pixel / share
-    errors = {
-        "pixel": _chi(pixel_seen, (rows - 1) * (columns - 1)),
-        "column": _chi(found.column + pixel_seen / rows, columns - 1),
-        "row": _chi(found.row + pixel_seen / columns, rows - 1),
-    }
-    left = {"pixel": stack.pixel, "column": stack.column, "row": stack.row}
-    whole = {name: math.hypot(error, left[name].error / n) for name, error in errors.items()}
-    return Pattern(
-        total=Estimate(pixel + row + column, math.hypot(*whole.values())),
-        pixel=Estimate(pixel, whole["pixel"]),
-        column=Estimate(column, whole["column"]),
-        row=Estimate(row, whole["row"]),
-    )
-
-
-def _chi(variance: float, freedom: int) -> float:
-    """Return the standard error of a variance of normal numbers."""
-    return abs(variance) * math.sqrt(2 / max(freedom, 1))

@@ -1,0 +1,67 @@
+"""Telegraph noise that is drawn here, found again; none where there is none."""
+
+import math
+
+import numpy as np
+import pytest
+
+from vcam_cli.fitting import traps
+from vcam_cli.fitting.traps import find_traps, pixel_moments
+
+N, ROWS, COLUMNS = 10, 150, 140
+GOOD = np.ones((ROWS, COLUMNS), bool)
+
+
+def drawn(seed, fraction=0.03, step=9.0, occupancy=0.35, frames=N):
+    """Codes of pixels of which some have a trap, and of rows with noise of their own."""
+    rng = np.random.default_rng([5, seed])
+    shape = frames, ROWS, COLUMNS
+    steps = rng.exponential(step, shape[1:]) * (rng.random(shape[1:]) < fraction)
+    noise = 1.4 * rng.standard_normal(shape) + 0.6 * rng.standard_normal((frames, ROWS, 1))
+    return np.rint(100 + noise + steps * (rng.random(shape) < occupancy)).astype(np.uint16)
+
+
+@pytest.mark.parametrize(("fraction", "step", "occupancy"), [(0.03, 9.0, 0.35), (0.01, 20.0, 0.8)])
+def test_traps_are_found_with_their_errors(fraction, step, occupancy):
+    """Within five standard errors, which are 15 % at most; the others' variance to 2 %."""
+    found = find_traps([pixel_moments(drawn(1, fraction, step, occupancy), GOOD)])
+    known = {"fraction": fraction, "amplitude": step, "occupancy": occupancy}
+    for name, value in known.items():
+        estimate = getattr(found, name)
+        assert abs(estimate.value - value) < 5 * estimate.error, name
+        assert estimate.error < 0.15 * value
+    assert found.core.value == pytest.approx(1.4**2 + 1 / 12, rel=0.02)
+    added = fraction * 2 * step**2 * occupancy * (1 - occupancy)
+    assert found.variance == pytest.approx(added, rel=0.4)
+
+
+def test_probabilities_are_those_of_numbers_drawn():
+    """Of a million pixels with traps: every bin to five standard errors of its count, and 2 %."""
+    rng = np.random.default_rng(3)
+    count, step, occupancy = 1_000_000, 6.0, 0.3
+    variance, third = np.empty(count), np.empty(count)
+    for part in np.array_split(np.arange(count), 20):
+        filled = rng.random((N, len(part))) < occupancy
+        each = rng.standard_normal((N, len(part))) + rng.exponential(step, len(part)) * filled
+        each -= each.mean(axis=0)
+        variance[part], third[part] = each.var(axis=0, ddof=1), (each**3).sum(axis=0)
+    counts = traps._histogram(variance, third).sum(axis=0)
+    place = np.array([0.0, -1e-12, math.log(step), math.log(occupancy / (1 - occupancy))])
+    known = traps._probabilities(place, N)
+    assert known.sum() == pytest.approx(1, abs=1e-9)
+    expected = known.sum(axis=0) * count
+    close = (abs(counts - expected) <= 5 * np.sqrt(expected + 1) + 0.02 * expected)[:-6]
+    assert close.all()
+
+
+@pytest.mark.parametrize("tails", [False, True])
+def test_there_are_none_where_pixels_are_alike(tails):
+    rng = np.random.default_rng(8)
+    noise = (
+        rng.standard_t(4, (N, ROWS, COLUMNS)) if tails else rng.standard_normal((N, ROWS, COLUMNS))
+    )
+    assert find_traps([pixel_moments(np.rint(100 + 1.5 * noise), GOOD)]) is None
+
+
+def test_few_frames_do_not_tell():
+    assert find_traps([pixel_moments(drawn(2, frames=4), GOOD)]) is None

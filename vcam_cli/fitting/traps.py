@@ -1,0 +1,212 @@
+"""Random telegraph noise from a stack of dark frames: pixels with traps, by maximum likelihood.
+
+Where the noise of a pixel is normal with variance s^2, the sum of squares of its n values about
+their mean is s^2 times a chi-squared number of n - 1 degrees of freedom. Where a trap of step A was
+filled in k of the n frames it is a noncentral one, of noncentrality A^2 k (n - k) / (n s^2). k is
+binomial, A is distributed exponentially, as `effects/telegraph_noise.py` has them. So the histogram
+of the pixels' variances tells s^2, the share of pixels with traps and their mean step; and whether
+few or most values of a pixel are high, the third moment's sign, tells how often a trap is filled.
+
+Noise with heavy tails makes variances large, too, but not of the same pixels again and again: traps
+are only looked for where the variances of a pixel in two halves of the stack go together.
+
+References
+----------
+.. [1] Wang, Rao, Mierop and Theuwissen, Random telegraph signal in CMOS image sensor pixels, IEDM
+   2006, doi:10.1109/IEDM.2006.346973.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcam_cli.verification.stack_statistics import Estimate
+
+LEAST_FRAMES = 6
+"""Frames of a stack that tells traps: three in each half."""
+RARE = 0.01
+"""Share of the pixels whose variance in half of the stack counts as large."""
+SURE = 5.0
+"""Standard deviations by which more pixels than by chance have two large variances."""
+CLEAR = 12.0
+"""Variance over that of the median pixel from which the third moment's sign tells the state."""
+EDGES = np.concatenate([[0.0], np.linspace(0.2, 3, 29), np.geomspace(3.3, 1000, 30), [np.inf]])
+"""Edges of the histogram, over the median pixel's variance."""
+NODES = 110
+"""Steps over which the exponential distribution is summed."""
+
+
+@dataclass(frozen=True)
+class Traps:
+    """Telegraph noise of a sensor."""
+
+    fraction: Estimate
+    amplitude: Estimate
+    """Mean of the steps [DN]."""
+    occupancy: Estimate
+    core: Estimate
+    """Variance of pixels without traps [DN^2]."""
+
+    @property
+    def variance(self) -> float:
+        """What traps add to the variance of pixels in the mean [DN^2]."""
+        p = self.occupancy.value
+        return self.fraction.value * 2 * self.amplitude.value**2 * p * (1 - p)
+
+
+@dataclass(frozen=True)
+class PixelMoments:
+    """Moments of the temporal noise of every pixel (pixels,)."""
+
+    frames: int
+    variance: NDArray
+    """Of all frames [DN^2]."""
+    halves: tuple[NDArray, NDArray]
+    """Of each half of the stack [DN^2]."""
+    third: NDArray
+    """Sum of cubes [DN^3]."""
+
+
+def pixel_moments(frames: NDArray, good: NDArray) -> PixelMoments:
+    """Return the moments of the good pixels, noise of frames, rows and columns taken out.
+
+    Parameters
+    ----------
+    frames : NDArray
+        Codes (n, rows, columns) [DN].
+    good : NDArray
+        Which pixels count (rows, columns).
+    """
+    residual = np.where(good, frames - frames.mean(axis=0), 0.0)
+    residual -= residual.mean(axis=(1, 2), keepdims=True)
+    residual -= residual.mean(axis=2, keepdims=True) + residual.mean(axis=1, keepdims=True)
+    each = residual[:, good]
+    each -= each.mean(axis=0)
+    half = len(frames) // 2
+    halves = each[:half].var(axis=0, ddof=1), each[half:].var(axis=0, ddof=1)
+    return PixelMoments(len(frames), each.var(axis=0, ddof=1), halves, (each**3).sum(axis=0))
+
+
+def find_traps(moments: list[PixelMoments]) -> Traps | None:
+    """Return the telegraph noise of pixels; None where none is more than chance.
+
+    Parameters
+    ----------
+    moments : list of PixelMoments
+        Of the planes of a stack; of fewer than `LEAST_FRAMES` frames there is no answer.
+
+    Returns
+    -------
+    Traps or None
+        Share, mean step, occupancy, each with its standard error by the curvature of the
+        likelihood.
+    """
+    from scipy.optimize import minimize
+
+    frames = moments[0].frames
+    if frames < LEAST_FRAMES or not _go_together(moments):
+        return None
+    variance = np.concatenate([m.variance for m in moments])
+    third = np.concatenate([m.third for m in moments])
+    unit = float(np.median(variance))
+    counts = _histogram(variance / unit, third)
+
+    def cost(place: NDArray) -> float:
+        expected = _probabilities(place, frames)
+        return -float((counts * np.log(np.maximum(expected, 1e-300))).sum())
+
+    begin = np.array([0.0, math.log(0.02), math.log(5.0), 0.0])
+    found = minimize(cost, begin, method="Nelder-Mead", options={"xatol": 1e-4, "fatol": 1e-4})
+    values, errors = _values(found.x), _errors(cost, found.x)
+    scales = unit, 1.0, math.sqrt(unit), 1.0
+    core, fraction, amplitude, occupancy = (
+        Estimate(value * scale, error * slope * scale)
+        for value, error, slope, scale in zip(values, errors, _slopes(found.x), scales, strict=True)
+    )
+    return Traps(fraction, amplitude, occupancy, core)
+
+
+def _go_together(moments: list[PixelMoments]) -> bool:
+    """Return whether more pixels than by chance have large variances in both halves."""
+    first, second = (np.concatenate([m.halves[h] for m in moments]) for h in (0, 1))
+    large = [each > np.quantile(each, 1 - RARE) for each in (first, second)]
+    chance = float(large[0].mean() * large[1].mean()) * len(first)
+    return float((large[0] & large[1]).sum()) > chance + SURE * math.sqrt(max(chance, 1.0))
+
+
+def _histogram(variance: NDArray, third: NDArray) -> NDArray:
+    """Return counts (2, bins): below and above 0 is the third moment where it tells the state."""
+    number = np.clip(np.searchsorted(EDGES, variance, "right") - 1, 0, len(EDGES) - 2)
+    sign = ((third > 0) & (EDGES[number] >= CLEAR)).astype(int)
+    counts = np.zeros((2, len(EDGES) - 1))
+    np.add.at(counts, (sign, number), 1)
+    return counts
+
+
+def _values(place: NDArray) -> tuple[float, float, float, float]:
+    """Return core variance, fraction, mean step and occupancy, in units of the median pixel."""
+    core, fraction, amplitude, occupancy = map(float, place)
+    return (
+        math.exp(core),
+        min(math.exp(fraction), 1.0),
+        math.exp(amplitude),
+        1 / (1 + math.exp(-occupancy)),
+    )
+
+
+def _slopes(place: NDArray) -> tuple[float, float, float, float]:
+    """Return how fast the values change with the place."""
+    core, fraction, amplitude, occupancy = _values(place)
+    return core, fraction, amplitude, occupancy * (1 - occupancy)
+
+
+def _probabilities(place: NDArray, frames: int) -> NDArray:
+    """Return the probability of every bin of the histogram (2, bins)."""
+    from scipy.special import chdtr, chndtr
+    from scipy.stats import binom
+
+    core, fraction, amplitude, occupancy = _values(place)
+    freedom = frames - 1
+    scaled = EDGES[1:-1] * freedom / core
+    plain = np.diff(np.concatenate([[0.0], chdtr(freedom, scaled), [1.0]]))
+    filled = np.arange(frames + 1)
+    share = binom.pmf(filled, frames, occupancy)
+    # Few noncentralities stand for all: between them the distribution is smooth.
+    centers = np.concatenate([[0.0], np.geomspace(0.05, 4e4, NODES)])
+    table = chndtr(scaled, freedom, centers[:, None])
+    table = np.diff(np.concatenate([np.zeros((len(centers), 1)), table,
+                                    np.ones((len(centers), 1))], axis=1))  # fmt: skip
+    out = np.zeros((2, len(plain)))
+    clear = EDGES[:-1] >= CLEAR
+    for k in filled:
+        # The share of steps A up to each noncentrality A^2 k (n - k) / (n core).
+        lever = k * (frames - k) / (frames * core)
+        own = table[0]
+        if lever:
+            steps = np.sqrt(centers / lever)
+            mass = -np.diff(np.concatenate([np.exp(-steps / amplitude), [0.0]]))
+            middle = (table[:-1] + table[1:]) / 2
+            own = mass[:-1] @ middle + mass[-1] * table[-1]
+        upper = 0.5 if 2 * k == frames else float(2 * k < frames)  # few high: third moment above 0
+        out[1] += share[k] * own * upper * clear
+        out[0] += share[k] * own * np.where(clear, 1 - upper, 1.0)
+    plain_part = np.stack([plain * np.where(clear, 0.5, 1.0), plain * 0.5 * clear])
+    return (1 - fraction) * plain_part + fraction * out
+
+
+def _errors(cost, place: NDArray) -> NDArray:
+    """Return standard errors from the curvature of the negative logarithm of the likelihood."""
+    size, step = len(place), 0.02
+    hessian = np.empty((size, size))
+    moved = np.eye(size) * step
+    for i in range(size):
+        for j in range(i + 1):
+            corners = [cost(place + a * moved[i] + b * moved[j]) for a, b in
+                       ((1, 1), (1, -1), (-1, 1), (-1, -1))]  # fmt: skip
+            value = (corners[0] - corners[1] - corners[2] + corners[3]) / (4 * step**2)
+            hessian[i, j] = hessian[j, i] = value
+    return np.sqrt(np.maximum(np.diag(np.linalg.pinv(hessian)), 0))
