@@ -330,6 +330,11 @@ class ImageMotion(Effect):
     def travel(self) -> float:
         """How far from its place light comes to lie [m]."""
 
+    @property
+    def needs_survey(self) -> bool:
+        """Whether image formation cannot tell what it changes: it knows of blurs alone."""
+        return any((*self.drift, *self.displacement))
+
     def mean_error(self, signal: SignalLevels) -> float:
         """Return the most that leaving it out can change, light in place of dark [electrons]."""
         return float(signal.full_signal)

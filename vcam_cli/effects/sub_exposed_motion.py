@@ -100,6 +100,11 @@ class SubExposedMotion(ImageMotion):
         return 0.0, 0.0
 
     @property
+    def needs_survey(self) -> bool:
+        """Whether image formation cannot tell what it changes: it knows the image with its blur."""
+        return self.blur_kind is not None
+
+    @property
     def travel(self) -> float:
         """How far from its place light comes to lie [m]."""
         return float(np.hypot(*self._moved()).max())

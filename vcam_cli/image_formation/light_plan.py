@@ -100,12 +100,15 @@ def light_plan(path: OpticalPath, scene: Scene) -> LightPlan:
         return LightPlan(candidates, shares=dict.fromkeys((e.name for e in candidates), 0.0))
     budget = LIGHT_SHARE * path.settings.tolerance
     functions: dict[Effect, NDArray] = {}
+    surveyed = tuple(e for e in of_kind(candidates, ImageMotion) if e.needs_survey)
 
     def every_blur_counts(found: SceneDetail) -> bool:
         if not functions:
             functions.update(transfer_functions(path, found))
         blurs = of_kind(candidates, *BLURS)
-        return all(_share(found, functions, blur) > CLEAR * budget for blur in blurs)
+        return not surveyed and all(
+            _share(found, functions, blur) > CLEAR * budget for blur in blurs
+        )
 
     detail = scene_detail(path, scene, every_blur_counts)
     if detail is not None and not functions:
@@ -120,7 +123,7 @@ def light_plan(path: OpticalPath, scene: Scene) -> LightPlan:
             chosen = together
     free = _bounding_blurs(path, chosen)
     omitted = tuple(effect for effect in chosen if effect not in free)
-    told = (*chosen, *of_kind(candidates, ImageMotion))
+    told = (*chosen, *surveyed)
     return LightPlan(omitted, free, {effect.name: shares[effect] for effect in told})
 
 

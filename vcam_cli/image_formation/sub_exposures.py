@@ -127,15 +127,21 @@ def sub_exposed_layers(
     probe = y[:: max(1, len(y) // PROBES)]
     count, left = _instants(path, image, motion, x, probe)
     exposure = _Exposure(image, motion, *_quadrature(count))
+    changes = {}
+    if not motion.needs_survey:
+        changes[motion.name] = _change(image, exposure, x, probe)
     layer = Layer(lambda color, rows: exposure.signal(color, x, y[rows]))
     full = image.full_signal or 1.0
+    places = path.geometry.pitch_x / image.geometry.pitch_x
     told = replace(
         report,
-        oversampling=report.oversampling * path.geometry.pitch_x / image.geometry.pitch_x,
+        oversampling=report.oversampling * places,
+        cells_per_pixel=report.cells_per_pixel * places,
         lost_rms=math.hypot(report.lost_rms, image.error, left),
+        changes=report.changes | changes,
         sub_exposures=count,
         sub_exposure_error=math.hypot(image.error, left) / full,
-        places_per_pixel=round(path.geometry.pitch_x / image.geometry.pitch_x),
+        places_per_pixel=round(places),
         fine_pixels=image.geometry.rows * image.geometry.columns,
     )
     return iter([layer]), told
@@ -281,6 +287,16 @@ class _Exposure:
     def instants(self) -> Iterator[tuple[float, float]]:
         """Yield instants as shares of the exposure, and their weights."""
         yield from zip(self.shares.tolist(), self.weights.tolist(), strict=True)
+
+
+def _change(image: FineImage, exposure: _Exposure, x: NDArray, y: NDArray) -> float:
+    """Return the rms change of some rows by the motion, in the color where it is most [e/s]."""
+    at_x, at_y = np.broadcast_arrays(x[None, :], y[:, None])
+    found = []
+    for color in range(len(image.coefficients)):
+        change = exposure.signal(color, x, y) - image.look(color, at_x, at_y)
+        found.append(float(np.square(change, dtype=np.float64).mean()))
+    return math.sqrt(max(found))
 
 
 def _quadrature(count: int) -> tuple[NDArray, NDArray]:
