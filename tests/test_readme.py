@@ -43,14 +43,6 @@ def test_the_camera_file_runs(tmp_path, monkeypatch):
     assert Path("out/example/render.png").exists()
 
 
-@pytest.mark.long
-def test_the_python_lines_work(tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path)
-    page = documents.read(ROOT / "docs" / "python.md")
-    code = next(block.text for block in documents.blocks(page) if block.language == "python")
-    exec(code.replace('"still-life"', '"still-life", ["array.rows=48", "array.columns=64"]'), {})
-
-
 def test_every_command_is_in_the_table():
     named = set(re.findall(r"^\| `vcam (\w+)", README, re.MULTILINE))
     assert named == set(COMMANDS)

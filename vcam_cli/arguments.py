@@ -36,14 +36,6 @@ def require_whole(given: Any, name: str, least: int) -> None:
         raise ValueError(f"{name}={given} is less than {least}; write {name}={max(least, 1)}")
 
 
-def require_observer(given: Any) -> None:
-    """Raise TypeError for what cannot follow a run (`progress.Observer`)."""
-    names = ("begin", "expect", "step")
-    if not all(callable(getattr(given, name, None)) for name in names):
-        message = f"watch={brief(given)} cannot follow a run"
-        raise TypeError(f"{message}; give an object with the methods {', '.join(names)}")
-
-
 def brief(given: Any) -> str:
     """Return how a value reads in a message, at most a line long."""
     text = repr(given)

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from vcam_cli.arguments import (
     require_folder,
     require_name,
-    require_observer,
     require_overrides,
     require_whole,
 )
@@ -44,7 +43,7 @@ from vcam_cli.files.folder import OutputFolder
 from vcam_cli.files.plots import in_formats
 from vcam_cli.files.points_store import RECORD
 from vcam_cli.floats import own_float_errors
-from vcam_cli.progress import Observer, Silent
+from vcam_cli.progress import Callback, Observer, observer
 from vcam_cli.scheduling.local_search import assignment_count
 from vcam_cli.scheduling.pdf import Pdf
 
@@ -164,7 +163,7 @@ def schedule(
     seed: int = 0,
     accuracy: str | None = None,
     workers: int | None = None,
-    watch: Observer | None = None,
+    watch: Observer | Callback | None = None,
     tell: Callable[[str], None] | None = None,
     report: bool = False,
     formats: Sequence[str] = (),
@@ -183,7 +182,7 @@ def schedule(
         Seed of random starts and simulated noise.
     accuracy, workers : optional
         Accuracy and threads of the camera whose photocurrents are wanted.
-    watch : Observer, optional
+    watch : callable or Observer, optional
         Told of the progress.
     tell : callable, optional
         Gets messages.
@@ -209,9 +208,7 @@ def schedule(
     require_whole(seed, "seed", 0)
     if workers is not None:
         require_whole(workers, "workers", 1)
-    if watch is not None:
-        require_observer(watch)
-    watch, tell = watch or Silent(), tell or (lambda _: None)
+    watch, tell = observer(watch), tell or (lambda _: None)
     read = schedule_file.read(study, sets, accuracy)
     _check_frames_camera(read)
     place = Path(out) if out is not None else Path("out") / read.model.name

@@ -17,6 +17,7 @@ import time
 from typing import Any, Self
 
 from vcam_cli.interrupts import defer_interrupts
+from vcam_cli.progress import Timekeeper
 
 AFTER = 2.0
 """Seconds before the bar appears."""
@@ -60,7 +61,7 @@ def may_draw(quiet: bool = False) -> bool:
     return not quiet and not plain and sys.stderr.isatty()
 
 
-class Progress:
+class Progress(Timekeeper):
     """Context around some work, and its observer (see `vcam_cli.progress.Observer`).
 
         with Progress(quiet) as progress:
@@ -70,11 +71,9 @@ class Progress:
     """
 
     def __init__(self, quiet: bool = False, log: str = "") -> None:
-        self._start = self._stage_start = time.monotonic()
-        self._stage, self._log = "", log
+        super().__init__()
+        self._log = log
         self._begun: queue.SimpleQueue[str] = queue.SimpleQueue()
-        self._expected = 0.0
-        self._steps = (0, 0)
         self._over = threading.Event()
         show = self._draw_bar if may_draw(quiet) else None if quiet else self._write_log
         self._thread = threading.Thread(target=show, daemon=True) if show else None
@@ -97,25 +96,7 @@ class Progress:
         """Note that a stage begins."""
         if stage != self._stage:
             self._begun.put(stage)
-        self._stage, self._stage_start, self._steps = stage, time.monotonic(), (0, 0)
-
-    def expect(self, seconds: float) -> None:
-        """Note how long all stages together will take [s]."""
-        self._expected = seconds
-
-    def step(self, done: int, total: int) -> None:
-        """Note how many of the stage's steps are done."""
-        self._steps = (done, total)
-
-    def seconds_left(self, now: float) -> float | None:
-        """Return the seconds left at a time of the clock; None where they are unknown or overdue.
-
-        Steps that are done say more than the time that was estimated.
-        """
-        done, total = self._steps
-        if done:
-            return (now - self._stage_start) * (total - done) / done
-        return self._start + self._expected - now if now < self._start + self._expected else None
+        super().begin(stage)
 
     def _draw_bar(self) -> None:
         if self._over.wait(AFTER):
@@ -136,18 +117,13 @@ class Progress:
     def _state(self, now: float) -> dict[str, Any]:
         """Return what the bar shows: no share of work of unknown length, 95 % of overdue work."""
         left, done = self.seconds_left(now), now - self._start
-        total = None if not self._is_foretold else done / 0.95 if left is None else done + left
+        total = None if not self.is_foretold else done / 0.95 if left is None else done + left
         return {
             "description": WORDS.get(self._stage, self._stage),
             "completed": done,
             "total": total,
-            "left": time_left_text(left) if self._is_foretold else "",
+            "left": time_left_text(left) if self.is_foretold else "",
         }
-
-    @property
-    def _is_foretold(self) -> bool:
-        """Whether anything is known of the time that is left."""
-        return bool(self._expected or self._steps[0])
 
     def _write_log(self) -> None:
         """Write a line for every stage of work that takes long, and every minute of steps."""
@@ -180,7 +156,7 @@ class Progress:
     def _left_text(self) -> str:
         """Return the time left as the end of a line; "" where nothing is known of it."""
         left = self.seconds_left(time.monotonic())
-        return "" if left is None or not self._is_foretold else f", {time_left_text(left)}"
+        return "" if left is None or not self.is_foretold else f", {time_left_text(left)}"
 
 
 def time_left_text(left: float | None) -> str:

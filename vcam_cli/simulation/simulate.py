@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vcam_cli.arguments import brief, require_folder, require_observer, require_whole
+from vcam_cli.arguments import brief, require_folder, require_whole
 from vcam_cli.camera.array import Positions
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.electrical import no_volts
@@ -21,7 +21,7 @@ from vcam_cli.errors import BadInput
 from vcam_cli.floats import own_float_errors
 from vcam_cli.parallel import suitable_workers
 from vcam_cli.processing import Context, Patches, ProcessedPicture, process
-from vcam_cli.progress import Observer, Silent, Stages
+from vcam_cli.progress import Callback, Observer, Stages, observer
 from vcam_cli.quality import display
 from vcam_cli.quality.metrics import Metrics
 from vcam_cli.quality.mse import mse, psnr_db
@@ -250,6 +250,12 @@ class Result:
 
         return save(self, require_folder(folder))
 
+    def to_xarray(self) -> Any:
+        """Return the raw frame as an `xarray.Dataset`: see `labeled_frame.frame_dataset`."""
+        from vcam_cli.simulation.labeled_frame import frame_dataset
+
+        return frame_dataset(self)
+
     def __repr__(self) -> str:
         """Return a line: name, shape of the raw frame, exposure time."""
         shape = " x ".join(map(str, self.dn.shape))
@@ -258,10 +264,7 @@ class Result:
 
 
 def threads(camera: Camera) -> int:
-    """Return the number of threads for a camera's frame: all processors, but for small frames.
-
-    It raises BadInput where the camera's size contradicts itself.
-    """
+    """Return the threads for a frame: all processors, fewer for small ones. Raises BadInput."""
     g = geometry(camera)
     return suitable_workers(g.rows * g.columns)
 
@@ -270,7 +273,7 @@ def threads(camera: Camera) -> int:
 def simulate(
     camera: Camera,
     workers: int | None = None,
-    watch: Observer | None = None,
+    watch: Observer | Callback | None = None,
     shared: Shared | None = None,
 ) -> Result:
     """Simulate `camera` looking at its scene.
@@ -281,8 +284,8 @@ def simulate(
         The camera and its scene.
     workers : int, optional
         Number of threads, by default `threads`; results do not depend on it.
-    watch : Observer, optional
-        Observer of stages, here and while the result's properties are computed.
+    watch : callable or Observer, optional
+        Follows the run, and later the result's properties: see `vcam_cli.progress.observer`.
     shared : Shared, optional
         What cameras before this one had in common with it; results do not depend on it.
 
@@ -299,10 +302,8 @@ def simulate(
         raise TypeError(f'{brief(camera)} is no camera; write simulate(load("camera.yaml"))')
     if workers is not None:
         require_whole(workers, "workers", 1)
-    if watch is not None:
-        require_observer(watch)
+    stages = Stages(watch=observer(watch))
     try:
-        stages = Stages(watch=watch or Silent())
         return _simulate(camera, workers or threads(camera), stages, shared or Shared())
     except BadInput as error:
         raise error.with_places(camera.locate) from None
@@ -310,11 +311,11 @@ def simulate(
 
 @own_float_errors
 def prepare(
-    camera: Camera, workers: int | None = None, watch: Observer | None = None
+    camera: Camera, workers: int | None = None, watch: Observer | Callback | None = None
 ) -> tuple[Prepared, tuple[str, ...]]:
     """Return the camera ready to take its frame, and notes: what `vcam plan` shows."""
     try:
-        stages = Stages(watch=watch or Silent())
+        stages = Stages(watch=observer(watch))
         camera = _load_lens(camera, stages)
         picture, notes = _completed(camera, *_picture(camera, stages))
         workers = workers or threads(camera)

@@ -18,13 +18,12 @@ from vcam_cli.arguments import (
     brief,
     require_folder,
     require_name,
-    require_observer,
     require_overrides,
     require_whole,
 )
 from vcam_cli.errors import bad
 from vcam_cli.floats import own_float_errors
-from vcam_cli.progress import Observer, Silent
+from vcam_cli.progress import Callback, Observer, observer
 from vcam_cli.sweeps import sweep_file
 from vcam_cli.sweeps.sweep_result import Extras, SweepResult, finished_result, request_hash
 
@@ -62,7 +61,7 @@ class Execution:
 
 
 def _check_arguments(
-    study: object, out: object, sets: object, workers: object, shard: object, watch: object
+    study: object, out: object, sets: object, workers: object, shard: object
 ) -> None:
     """Raise TypeError or ValueError for arguments of Python callers that are of no use."""
     require_name(study, "study")
@@ -76,8 +75,6 @@ def _check_arguments(
             raise TypeError(f"shard={brief(shard)} is no share; write shard=(1, 4)")
         for part in shard:
             require_whole(part, "share", -sys.maxsize)
-    if watch is not None:
-        require_observer(watch)
 
 
 def _check_address(address: str) -> None:
@@ -102,7 +99,7 @@ def sweep(
     scheduler: str | None = None,
     shard: tuple[int, int] | None = None,
     fresh: bool = False,
-    watch: Observer | None = None,
+    watch: Observer | Callback | None = None,
     tell: Callable[[str], None] | None = None,
     report: bool = False,
     formats: Sequence[str] = (),
@@ -112,15 +109,15 @@ def sweep(
     study: a file, or the name of a shipped study; out: folder, default out/NAME; sets: overrides
     "PATH=VALUE" laid over every camera; workers: processes, default all processors; scheduler:
     address of a Dask scheduler in their place; shard: (i, n), the i-th of n shares of the points;
-    fresh: computes all of them again. watch is told of the progress, tell gets messages; report:
-    also writes report.html; formats: "svg", "pdf" of plots, beside PNG. Raises
-    BadInput (wrong study, or no camera of it is valid), CannotDo (disk, scheduler), and TypeError
-    or ValueError for arguments that are none of these.
+    fresh: computes all of them again; watch follows the progress, as that of `simulate` does;
+    tell gets messages; report: also writes report.html; formats: "svg", "pdf" of plots, beside
+    PNG. Raises BadInput (wrong study, or no camera of it is valid), CannotDo (disk, scheduler), and
+    TypeError or ValueError for arguments that are none of these.
     """
     start = time.perf_counter()
-    _check_arguments(study, out, sets, workers, shard, watch)
+    _check_arguments(study, out, sets, workers, shard)
     execution = Execution(Share(*shard) if shard else None, workers, scheduler, fresh)
-    watch, tell = watch or Silent(), tell or (lambda _: None)
+    watch, tell = observer(watch), tell or (lambda _: None)
     watch.begin("points")
     file = sweep_file.read(study)
     place = Path(out) if out is not None else Path("out") / file.model.name

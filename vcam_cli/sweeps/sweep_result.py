@@ -180,6 +180,12 @@ class SweepResult:
         """The rows of optimum.csv, None where a cell is empty."""
         return [{k: o.plain[k] for k in OPTIMUM_COLUMNS} for o in self.optima]
 
+    def to_xarray(self) -> Any:
+        """Return metrics over all parameters as an `xarray.Dataset`: see `labeled_table`."""
+        from vcam_cli.sweeps.labeled_table import sweep_dataset
+
+        return sweep_dataset(self.points)
+
     def __repr__(self) -> str:
         """Return a line: name, points, those that failed."""
         failed = f", {self.failed} failed" if self.failed else ""
