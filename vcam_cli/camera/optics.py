@@ -266,7 +266,7 @@ class Optics(Model):
     diffraction: Switch = key("whether the aperture diffracts", default=True)
     focus: Literal["fixed", "auto"] = key(
         "auto: by contrast, the image plane is moved to where focus_window is sharpest, whatever"
-        " defocus says, with nothing in motion; 18 trials, counted in the plan's time",
+        " defocus says, with nothing in motion; 18 trials at most, counted in the plan's time",
         default="fixed",
     )
     focus_window: Annotated[FocusWindow, mapping(FocusWindow)] = key(

@@ -35,7 +35,7 @@ COARSE = 9
 FINE = 7
 """Steps of the golden section after them: to 7 % of the distance of the first places."""
 TRIALS = COARSE + 2 + FINE
-"""Places that are tried in all."""
+"""Places that are tried, at most; one fewer where two are equally sharp."""
 TOLERANCE = 1e-3
 """Of the trials, relative to full signal: near the best place the contrast hardly changes."""
 GOLDEN = (np.sqrt(5) - 1) / 2
@@ -208,17 +208,27 @@ def golden_section(function: Callable[[float], float], low: float, high: float) 
     Returns
     -------
     float
-        The place, to `GOLDEN` to the power of `FINE` of the range.
+        The place, to `GOLDEN` to the power of `FINE` of the range; of a plateau, a place near its
+        middle.
     """
     left, right = high - GOLDEN * (high - low), low + GOLDEN * (high - low)
     at_left, at_right = function(left), function(right)
-    for _ in range(FINE):
-        if at_left < at_right:
+    trials = FINE
+    while trials > 0:
+        if at_left == at_right:
+            low, high = left, right
+            left, right = high - GOLDEN * (high - low), low + GOLDEN * (high - low)
+            if trials > 1:
+                at_left, at_right = function(left), function(right)
+            trials -= 2
+        elif at_left < at_right:
             low, left, at_left = left, right, at_right
             right = low + GOLDEN * (high - low)
             at_right = function(right)
+            trials -= 1
         else:
             high, right, at_right = right, left, at_left
             left = high - GOLDEN * (high - low)
             at_left = function(left)
+            trials -= 1
     return float((low + high) / 2)
