@@ -28,7 +28,10 @@ from vcam_cli.physics.motion_blur import path_transfer
 
 
 class Motion(Effect):
-    """The effect's name and place in the order; `from_camera` returns the kind of a camera."""
+    """Motion of the scene or the camera while a frame is exposed: blur, skew and wobble.
+
+    `from_camera` returns the kind of it that a camera has.
+    """
 
     name = "motion"
     reference = "mean over the path: Bracewell, The Fourier Transform and Its Applications, 2000"
