@@ -2,7 +2,7 @@
 
 An effect that changes the light at the pixels by next to nothing is left out, as long as all that
 are left out together stay within their share of the tolerance: transfer functions of a scene with
-little detail, gains and veiling glare whose change of the surveyed light is small. What is left out
+little detail, gains and veiling glare whose change of the displacing light is small. What is left out
 saves its work; without any blur, the light is a mean over the photodetectors, and no spectrum is
 computed.
 """
@@ -100,13 +100,13 @@ def light_plan(path: OpticalPath, scene: Scene) -> LightPlan:
         return LightPlan(candidates, shares=dict.fromkeys((e.name for e in candidates), 0.0))
     budget = LIGHT_SHARE * path.settings.tolerance
     functions: dict[Effect, NDArray] = {}
-    surveyed = tuple(e for e in of_kind(candidates, ImageMotion) if e.needs_survey)
+    displacing = tuple(e for e in of_kind(candidates, ImageMotion) if e.needs_survey)
 
     def every_blur_counts(found: SceneDetail) -> bool:
         if not functions:
             functions.update(transfer_functions(path, found))
         blurs = of_kind(candidates, *BLURS)
-        return not surveyed and all(
+        return not displacing and all(
             _share(found, functions, blur) > CLEAR * budget for blur in blurs
         )
 
@@ -123,7 +123,7 @@ def light_plan(path: OpticalPath, scene: Scene) -> LightPlan:
             chosen = together
     free = _bounding_blurs(path, chosen)
     omitted = tuple(effect for effect in chosen if effect not in free)
-    told = (*chosen, *surveyed)
+    told = (*chosen, *displacing)
     return LightPlan(omitted, free, {effect.name: shares[effect] for effect in told})
 
 
@@ -164,9 +164,9 @@ def _joint_share(
 
 
 def _light_behind(detail: SceneDetail, effect: Effect) -> tuple[NDArray, NDArray]:
-    """Return the surveyed light behind a gain or veiling glare, and without it.
+    """Return the displacing light behind a gain or veiling glare, and without it.
 
-    The light that was surveyed has the gain of the axis in it.
+    The light that was displacing has the gain of the axis in it.
     """
     behind = without = detail.light
     for gain in of_kind([effect], Gain):
