@@ -18,6 +18,8 @@ from vcam_cli.errors import BadInput
 from vcam_cli.fitting import sensor
 from vcam_cli.fitting.fit import fit
 from vcam_cli.verification import measurement_file
+from vcam_cli.verification.measured_points import measured_points
+from vcam_cli.verification.prediction import predict
 from vcam_cli.verification.stack_statistics import Estimate
 
 ROWS, FRAMES = 96, 8
@@ -185,6 +187,45 @@ def test_traps_and_shading_are_found(tmp_path):
     told = load(tmp_path / "found.yaml").pixel
     assert told.readout.telegraph_noise.occupancy == pytest.approx(0.3, abs=0.1)
     assert told.fpn.shading.gain == pytest.approx(0.02, rel=0.1)
+
+
+def test_dark_current_over_temperature(tmp_path):
+    """Doubled every 7 K: within five standard errors; verify predicts the warm frames."""
+    known = blind.truth(103)
+    density = known["dark_current"] * 1.602176634e-19 / 16e-12
+    camera = {
+        "pixel.photodetector.dark_current_density": {
+            "value": f"{density!r} A/m2",
+            "temperature": "300 K",
+            "doubling": "7 K",
+        }
+    }
+    form = blind.bench(known, tmp_path, ROWS, FRAMES, 9, camera)
+    for kelvin in (290, 310):
+        warm = tmp_path / str(kelvin)
+        warm.mkdir()
+        at = camera | {"pixel.temperature": f"{kelvin} K"}
+        taken = blind.bench(known, warm, ROWS, FRAMES, 9, at)["frames"]
+        form["frames"] += [
+            entry | {"files": f"{kelvin}/{entry['files']}", "temperature": f"{kelvin} K"}
+            for entry in taken
+            if entry["name"] in ("dark1", "dark400")
+        ]
+    without = {"frames": form["frames"]}
+    with pytest.raises(BadInput, match="the flat frames give no temperature"):
+        fitted(tmp_path, form, **without)
+    for entry in form["frames"]:
+        entry.setdefault("temperature", "300 K")
+    found = fitted(tmp_path, form)
+    named = {p.name: p for p in found.parameters}
+    for name, value in (known | {"dark_current_doubling": 7.0}).items():
+        p = named[name]
+        assert abs(p.value - value) <= 5 / 1.645 * (p.high - p.low) / 2, name
+    (tmp_path / "found.yaml").write_text(yaml.safe_dump(found.camera))
+    camera = load(tmp_path / "found.yaml")
+    points, *_ = measured_points(camera, measurement_file.read(tmp_path / "bench.yaml"))
+    for _, point in points[-4:]:
+        assert predict(camera, point).value == pytest.approx(point.signal.value, rel=0.01)
 
 
 def edge(pitch: float, blur: float, rng: np.random.Generator, rows: int = 120) -> np.ndarray:

@@ -5,9 +5,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from vcam_cli import units
-from vcam_cli.fitting.conditions import Conditions
+from vcam_cli.fitting.conditions import Conditions, usual_temperature
 from vcam_cli.fitting.pattern import CYCLES
 from vcam_cli.fitting.sensor import Transfer
+from vcam_cli.physics.readout import ELEMENTARY_CHARGE
 
 if TYPE_CHECKING:
     from vcam_cli.fitting.fit import Fit
@@ -35,7 +36,7 @@ def tree(found: Fit, conditions: Conditions, curves: list[Transfer]) -> dict[str
     efficiencies = _efficiencies(found, curves)
     detector["quantum_efficiency"] = max(efficiencies.values())
     if found.value("dark_current"):
-        detector["dark_current"] = f"{max(found.value('dark_current') or 0, 0):.6g} e/s"
+        detector |= _dark_current(found)
     scene: dict[str, Any] = {
         "source": {"kind": "chart", "chart": "uniform"},
         "illuminant": entry.light.to_yaml() if entry.light else "equal-energy",
@@ -43,6 +44,7 @@ def tree(found: Fit, conditions: Conditions, curves: list[Transfer]) -> dict[str
     }
     if entry.irradiance is None:
         found.unknown.append("irradiance of the flat frames: 0.01 W/m2 stands in the camera file")
+    usual = usual_temperature(measurement)
     array: dict[str, Any] = {
         "rows": conditions.shape[0],
         "columns": conditions.shape[1],
@@ -68,6 +70,7 @@ def tree(found: Fit, conditions: Conditions, curves: list[Transfer]) -> dict[str
             "photodetector": detector,
             "readout": readout,
             "fpn": fpn,
+            **({} if usual is None else {"temperature": units.render(usual, "temperature")}),
             "defects": {"hot": found.value("hot") or 0, "dead": found.value("dead") or 0},
         },
         "array": array,
@@ -79,6 +82,23 @@ def tree(found: Fit, conditions: Conditions, curves: list[Transfer]) -> dict[str
         },
         "processing": [],
     }
+
+
+def _dark_current(found: Fit) -> dict[str, Any]:
+    """Return the dark current: of the pixel, or where it is known over temperature its density."""
+    current, rise = max(found.value("dark_current") or 0, 0), found.value("dark_current_doubling")
+    pixel, usual = found.measurement.pixel, usual_temperature(found.measurement)
+    if rise is None or usual is None:
+        return {"dark_current": f"{current:.6g} e/s"}
+    assert pixel is not None
+    assert pixel.width is not None
+    area = pixel.width * (pixel.height or pixel.width)
+    density = {
+        "value": units.render(current * ELEMENTARY_CHARGE / area, "current_density"),
+        "temperature": units.render(usual, "temperature"),
+        "doubling": f"{rise:.6g} K",
+    }
+    return {"dark_current_density": density}
 
 
 def _noise(found: Fit) -> dict[str, Any]:

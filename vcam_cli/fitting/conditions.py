@@ -68,6 +68,8 @@ class Conditions:
 
     dark: tuple[Condition, ...]
     """By exposure time."""
+    warm: tuple[Condition, ...]
+    """Dark frames at other temperatures than that of the flat frames."""
     flat: tuple[Condition, ...]
     hot: float
     dead: float | None
@@ -100,27 +102,38 @@ def measure(measurement: Measurement, watch: Observer) -> Conditions:
             notes.append(
                 f"{stack.label}: the light drifts by {stack.drift:.1%}, which is taken out"
             )
-    hot, dead = _defects(averages, highest)
+    usual = usual_temperature(measurement)
+    here = [(entry, mean) for entry, mean in averages if entry.temperature in (None, usual)]
+    hot, dead = _defects(here, highest)
     good = ~hot if dead is None else ~(hot | dead)
     found: list[Condition] = []
     flats = len(averages)
-    shortest = min(entry.exposure for entry, _ in averages if entry.is_dark)
+    shortest = min(entry.exposure for entry, _ in here if entry.is_dark)
     for stack in stacks(measurement):
         if stack.entry.target == "flat":
             watch.step(len(found), flats)
             condition = _condition(stack.entry, stack.label, stack.frames, good, measurement)
-            if stack.entry.is_dark and stack.entry.exposure == shortest:
+            is_usual = stack.entry.temperature in (None, usual)
+            if stack.entry.is_dark and is_usual and stack.entry.exposure == shortest:
                 planes = _planes(stack.frames, good, measurement)
                 condition = replace(condition, moments=tuple(map(pixel_moments, *planes)))
             found.append(condition)
+    dark = sorted((c for c in found if c.entry.is_dark), key=lambda c: c.entry.exposure)
     return Conditions(
-        tuple(sorted((c for c in found if c.entry.is_dark), key=lambda c: c.entry.exposure)),
+        tuple(c for c in dark if c.entry.temperature in (None, usual)),
+        tuple(c for c in dark if c.entry.temperature not in (None, usual)),
         tuple(c for c in found if not c.entry.is_dark),
         float(hot.mean()),
         None if dead is None else float(dead.mean()),
         good.shape,
         tuple(notes),
     )
+
+
+def usual_temperature(measurement: Measurement) -> float | None:
+    """Return the temperature of the flat frames [K]; None where they give none."""
+    flats = (e for e in measurement.frame_sets if e.target == "flat" and not e.is_dark)
+    return next((e.temperature for e in flats if e.temperature is not None), None)
 
 
 def _defects(

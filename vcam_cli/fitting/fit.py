@@ -14,12 +14,19 @@ import numpy as np
 
 from vcam_cli.errors import BadInput, Collector
 from vcam_cli.fitting import camera_file, edge, sensor
-from vcam_cli.fitting.conditions import CLIPPED, Condition, Conditions, measure
+from vcam_cli.fitting.conditions import (
+    CLIPPED,
+    Condition,
+    Conditions,
+    measure,
+    usual_temperature,
+)
 from vcam_cli.fitting.noise_shape import is_significant, neighbor_correlation, tail_shape
 from vcam_cli.fitting.parameters import COLUMNS, SIGMAS, Parameter, deviation, parameter
 from vcam_cli.fitting.pattern import CYCLES
 from vcam_cli.fitting.traps import LEAST_FRAMES, Traps, find_traps
 from vcam_cli.progress import Observer, Silent
+from vcam_cli.verification.frame_sets import FrameSet
 from vcam_cli.verification.frames import color_block, paths, stacks
 from vcam_cli.verification.model import Measurement
 from vcam_cli.verification.stack_statistics import Estimate, combine
@@ -110,7 +117,18 @@ def _check(measurement: Measurement) -> None:
         problems.add("levels", "the ADC's bits are missing", "add levels: {bits: 12}")
     if measurement.pixel is None:
         problems.add("pixel", "the size of the pixels is missing", "add pixel: {width: 3.45 um}")
-    if not any(entry.is_dark for entry in measurement.frame_sets):
+    usual = usual_temperature(measurement)
+    for number, entry in enumerate(measurement.frames):
+        if not isinstance(entry, FrameSet) or entry.temperature in (None, usual):
+            continue
+        where = ("frames", number, "temperature")
+        if usual is None:
+            message = "the flat frames give no temperature"
+            problems.add(where, message, "give temperature to one of them, too")
+        elif not entry.is_dark:
+            message = "flat frames are fitted at one temperature"
+            problems.add(where, message, "leave the others out")
+    if not any(e.is_dark and e.temperature in (None, usual) for e in measurement.frame_sets):
         remedy = "add {files: dark_*.tif, exposure: 10 ms, light: none}"
         problems.add("frames", "there are no dark frames", remedy)
     try:
@@ -143,6 +161,7 @@ def _of_dark(out: Fit, found: Conditions, line: sensor.Dark, gain: Estimate) -> 
         current = line.current / gain
         add(parameter("dark_current", current, "e/s", "EMVA 1288 R4 eq 57, slope of the means"))
     traps = find_traps(list(first.moments))
+    _of_temperature(out, found, line, gain)
     read = sensor.read_variance(first, line, gain, traps.core if traps else None)
     if read.value <= 0 or first.every("pixel").value < 0.24:
         out.notes.append("noise of the readout is lost in the rounding of the ADC")
@@ -176,6 +195,21 @@ def _of_dark(out: Fit, found: Conditions, line: sensor.Dark, gain: Estimate) -> 
                 "read noise has heavy tails; so few dark frames do not tell whether those are all"
                 " pixels' or those of few that have traps"
             )
+
+
+def _of_temperature(out: Fit, found: Conditions, line: sensor.Dark, gain: Estimate) -> None:
+    """Add how dark current rises with temperature, where dark frames of others tell it."""
+    usual = usual_temperature(out.measurement)
+    if not found.warm or usual is None:
+        return
+    told = sensor.doubling(found.warm, line, usual)
+    if told is None:
+        out.unknown.append("dark current over temperature: dark frames of two exposure times are"
+                           " needed at two temperatures, beyond their noise")  # fmt: skip
+        return
+    out.parameters.append(
+        parameter("dark_current_doubling", told, "K", "straight line of ln(dark current) over T")
+    )
 
 
 def _of_traps(out: Fit, traps: Traps, gain: Estimate) -> None:

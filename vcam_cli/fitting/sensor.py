@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from vcam_cli.fitting.conditions import Condition, Conditions, photons_per_pixel
+from vcam_cli.fitting.noise_shape import is_significant
 from vcam_cli.quality.photon_transfer import (
     GAIN_RANGE,
     ROUNDING,
@@ -60,6 +61,40 @@ def dark_line(dark: tuple[Condition, ...]) -> Dark:
     errors = np.sqrt(np.diag(covariance))
     black = Estimate(float(level), math.hypot(float(errors[0]), fixed))
     return Dark(black, Estimate(float(slope), float(errors[1])))
+
+
+def doubling(warm: tuple[Condition, ...], line: Dark, usual: float) -> Estimate | None:
+    """Return the rise of temperature that doubles the dark current; None where it is not told.
+
+    Parameters
+    ----------
+    warm : tuple of Condition
+        Dark stacks at other temperatures.
+    line : Dark
+        What those at the usual temperature say.
+    usual : float
+        That temperature [K].
+
+    Returns
+    -------
+    Estimate or None
+        Rise [K], by a weighted straight line of the logarithm over the temperature.
+    """
+    currents = {usual: line.current}
+    for temperature in {c.entry.temperature for c in warm}:
+        assert temperature is not None
+        group = tuple(c for c in warm if c.entry.temperature == temperature)
+        currents[temperature] = dark_line(group).current
+    told = {t: c for t, c in currents.items() if c is not None and is_significant(c)}
+    if len(told) < 2:
+        return None
+    kelvin = np.array(sorted(told))
+    weights = np.array([(told[t].value / told[t].error) ** 2 for t in kelvin])
+    logs = np.log([told[t].value for t in kelvin])
+    apart = kelvin - weights @ kelvin / weights.sum()
+    spread = float(weights @ apart**2)
+    slope = Estimate(float(weights @ (apart * logs)) / spread, spread**-0.5)
+    return Estimate(math.log(2), 0.0) / slope if is_significant(slope) else None
 
 
 @dataclass(frozen=True)

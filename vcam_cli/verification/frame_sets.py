@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 from vcam_cli.camera.illuminant import IlluminantSpec
 from vcam_cli.config.model import Model, at_most_one, key
 from vcam_cli.config.quantities import Number, Quantity, Whole
-from vcam_cli.config.values import TIME, MaybePositive, Text
+from vcam_cli.config.values import TIME, MaybePositive, MaybeSiliconTemperature, Text
 from vcam_cli.verification.light import Light
 
 PixelSize = Annotated[float | None, Quantity("length", above=0, least=1e-9, most=1e-2)]
@@ -36,6 +36,9 @@ class FrameSet(Model):
         default=None,
     )
     target: Literal["flat", "slanted-edge"] = key("what was taken", default="flat")
+    temperature: MaybeSiliconTemperature = key(
+        "of the sensor; default that of the flat frames", example="310 K", default=None
+    )
 
     rules = (at_most_one("irradiance", "photons"),)
 

@@ -152,6 +152,7 @@ def _points(stack: Stack, measurement: Measurement) -> list[Point]:
             light=entry.light,
             irradiance=entry.irradiance,
             photons=entry.photons,
+            temperature=entry.temperature,
         )
         for color, each in codes.items()
     ]

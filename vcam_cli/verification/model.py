@@ -13,7 +13,7 @@ from vcam_cli.config.lists import check_list, read_items
 from vcam_cli.config.model import FileModel, Model, at_most_one, key
 from vcam_cli.config.quantities import Number, Percentage, Quantity
 from vcam_cli.config.validation_messages import describe, fault, refusal
-from vcam_cli.config.values import TIME, Either, Text, Word, mapping
+from vcam_cli.config.values import TIME, Either, MaybeSiliconTemperature, Text, Word, mapping
 from vcam_cli.config.yaml_type import YamlType, to_yaml
 from vcam_cli.verification.frame_sets import PATTERNS, FrameSet, Levels, MeasuredPixel
 from vcam_cli.verification.light import Light
@@ -101,6 +101,9 @@ class Point(Model):
         "on the whole area of a pixel in the exposure, in place of irradiance (EMVA 1288)",
         example=4500,
         default=None,
+    )
+    temperature: MaybeSiliconTemperature = key(
+        "of the sensor; default the camera's", example="310 K", default=None
     )
     tolerance: Annotated[float | None, Percentage(above=0, most=1)] = key(
         "of this signal; default the measurement's", example="8 %", default=None

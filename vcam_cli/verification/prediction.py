@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from vcam_cli import units
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.electrical import electrical
 from vcam_cli.camera.derived.geometry import geometry
@@ -50,13 +51,15 @@ def conditions(camera: Camera, point: Point, shape: tuple[int, ...] | None = Non
     if point.light is not None:
         level = {"illuminant": point.light.to_yaml(), "irradiance": _irradiance(camera, point)}
         scene = EVEN | level
-    changes = {
+    changes: dict[str, Any] = {
         "scene": scene | {"extent": "sensor"},
         "optics": "none",
         "exposure": {"time": f"{point.exposure!r} s"},
         "quality": [],
         "output": {"render": "none"},
     }
+    if point.temperature is not None:
+        changes["pixel.temperature"] = units.render(point.temperature, "temperature")
     array, transfers = camera.array, camera.pixel.architecture == "ccd"
     large = array.die is None and min(array.rows or 0, array.columns or 0) > SIZE
     plain = not (transfers or array.is_scattered or array.binning)
