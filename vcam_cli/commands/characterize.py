@@ -63,7 +63,7 @@ def characterize(
     \b
     Example:
       vcam characterize starter
-      vcam characterize camera.yaml --set scene.illuminant="{monochromatic: 525 nm}"
+      vcam characterize camera.yaml --set scene.illuminant=FL2
       vcam characterize kac-12040 --keep-frames
     """
     from vcam_cli.characterization import characterize as study

@@ -84,7 +84,7 @@ def sweep(
 
     \b
     Example:
-      vcam sweep aperture-and-noise
+      vcam sweep exposure-and-noise
       vcam sweep study.yaml --workers 4 -o out/study
     """
     from vcam_cli.files.report import to_json
