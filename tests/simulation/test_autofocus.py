@@ -182,7 +182,7 @@ def test_the_golden_section_finds_a_maximum():
 
 @pytest.mark.parametrize("middle", [0.0, 0.17, -0.4])
 def test_of_a_plateau_it_finds_the_inside(middle):
-    """Where the blur is too small to matter, trials are equal; the lens shall not go to its edge."""
+    """Where blur is too small to matter, trials are equal; the lens shall not go to the edge."""
     tried = []
 
     def flat_top(x):
