@@ -32,6 +32,9 @@ KEYS: Mapping[str, str] = {
     "transmission": "optics.transmittance: 0.95",
     "vignetting": "optics.off_axis: exact",
     "relative_illumination": "optics.off_axis: exact",
+    "autofocus": "optics.focus: auto",
+    "auto_focus": "optics.focus: auto",
+    "contrast_detection": "optics.focus: auto",
     "aberrations": "optics.zernike: {4: 0.05 um}",
     "size": "pixel.width: 3 um",
     "pixel_size": "pixel.width: 3 um",
@@ -231,6 +234,10 @@ NOT_SIMULATED: Mapping[str, str] = {
     "lateral_color": "the lens images all wavelengths in one size",
     "chromatic_aberration": "wavefronts in optics.zernike are the same length at all wavelengths",
     "flash": "the light of the scene is scene.illuminant at one level",
+    **dict.fromkeys(
+        ("phase_detection", "pdaf", "dual_pixel"),
+        "the autofocus, optics.focus: auto, goes by contrast",
+    ),
     **dict.fromkeys(
         ("stabilization", "image_stabilization", "optical_stabilization"),
         "the camera moves as scene.camera_motion says",
