@@ -2,9 +2,9 @@
 
 An effect that changes the light at the pixels by next to nothing is left out, as long as all that
 are left out together stay within their share of the tolerance: transfer functions of a scene with
-little detail, gains and veiling glare whose change of the displacing light is small. What is left out
-saves its work; without any blur, the light is a mean over the photodetectors, and no spectrum is
-computed.
+little detail, gains and veiling glare whose change of the displacing light is small. What is left
+out saves its work; without any blur, the light is a mean over the photodetectors, and no spectrum
+is computed.
 """
 
 from __future__ import annotations
