@@ -9,12 +9,11 @@ from __future__ import annotations
 
 import hashlib
 import inspect
-import json
 import os
 import re
 import subprocess
 import sys
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
@@ -22,6 +21,7 @@ from typing import Any
 
 import effect_pictures
 import notebooks
+from key_pages import camera_keys, escaped, keys_page, measurement_keys, sentence, study_keys
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
 from mkdocs.structure.pages import Page
@@ -33,16 +33,28 @@ WIDEST = 480
 """Columns of a photograph in the gallery, at most."""
 LARGE = 4_000_000
 """Pixels of an array from which on a window of it takes the photograph, to save time."""
+BOOST = {"camera": 3, "metrics": 2, "not-simulated": 2, "effects": 1.5}
+"""Page of the reference -> how much the search prefers it."""
+EXIT_CODES = {
+    0: "done",
+    2: "bad input or usage; the message has file, line, key and remedy",
+    3: "the machine cannot do it: memory, disk, permission, a folder in use",
+    4: "finished, and some points failed or some predictions missed their tolerance",
+    1: "a mistake in vcam; only then there is a traceback",
+    130: "interrupted; what is finished is kept, and the same command goes on",
+}
 WINDOW = "Here {columns} x {rows} of its pixels take it, with the scene fitted into them."
 
 
 def on_files(files: Files, config: MkDocsConfig) -> Files:
     """Add the pages that are made."""
     made = {
-        "reference/camera.md": _keys_page(*_camera_keys()),
-        "reference/studies.md": _keys_page(*_study_keys()),
-        "reference/measurements.md": _keys_page(*_measurement_keys()),
+        "reference/camera.md": keys_page(*camera_keys()),
+        "reference/studies.md": keys_page(*study_keys()),
+        "reference/measurements.md": keys_page(*measurement_keys()),
         "reference/commands.md": "\n".join(_commands()),
+        "reference/metrics.md": "\n".join(_metrics()),
+        "reference/not-simulated.md": "\n".join(_not_simulated()),
         "cite.md": _cite(),
     }
     if "thesis.md" not in files.src_uris:
@@ -53,7 +65,9 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
         made[f"notebooks/{path.stem}.md"], figures = notebooks.page(path)
         pictures |= {f"notebooks/{name}": data for name, data in figures.items()}
     for name, text in made.items():
-        files.append(File.generated(config, name, content=text))
+        boost = BOOST.get(Path(name).stem) if name.startswith("reference/") else None
+        first = f"---\nsearch:\n  boost: {boost}\n---\n\n" if boost else ""
+        files.append(File.generated(config, name, content=first + text))
     for name, data in {**photographs, **pictures}.items():
         files.append(File.generated(config, name, content=data))
     return files
@@ -64,152 +78,6 @@ def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Fil
     depth = page.file.src_uri.count("/")
     outside = r"\[([^\]]+)\]\(" + r"\.\./" * (depth + 1) + r"[^)]+\)"
     return re.sub(outside, lambda link: f"`{link[1].strip('`')}`", markdown)
-
-
-# Keys
-
-
-def _camera_keys() -> tuple[str, str, Iterable[Any], dict[str, Any]]:
-    from vcam_cli.camera.hints import index
-
-    about = "Every key of a camera file. `vcam explain KEY` says the same in a terminal."
-    return "Keys of a camera file", about, index(), _definitions("camera")
-
-
-def _study_keys() -> tuple[str, str, Iterable[Any], dict[str, Any]]:
-    from vcam_cli.capture_schedules.model import ScheduleStudy
-    from vcam_cli.config.key_index import keys
-    from vcam_cli.datasets.model import Dataset
-    from vcam_cli.sweeps.model import Sweep
-
-    found = [
-        (kind, key)
-        for kind, model in (("sweep", Sweep), ("schedule", ScheduleStudy), ("dataset", Dataset))
-        for key in {key.path: key for key in keys(model)}.values()
-    ]
-    about = (
-        "Every key of a sweep study (`kind: sweep`), of a schedule (`kind: schedule`), and of a"
-        " data set (`kind: dataset`)."
-    )
-    return "Keys of studies", about, found, _definitions("study")
-
-
-def _measurement_keys() -> tuple[str, str, Iterable[Any], dict[str, Any]]:
-    from vcam_cli.config.key_index import keys
-    from vcam_cli.verification.model import Measurement
-
-    about = (
-        "Every key of a file of measured signals or frames (`kind: measurement`), for `vcam verify`"
-        " and `vcam fit`."
-    )
-    found = {key.path: ("measurement", key) for key in keys(Measurement)}
-    return "Keys of measurements", about, found.values(), _definitions("measurement")
-
-
-def _definitions(name: str) -> dict[str, Any]:
-    schema = json.loads((ROOT / "schemas" / f"{name}.schema.json").read_text("utf-8"))
-    return dict(schema["$defs"])
-
-
-def _keys_page(title: str, about: str, keys: Iterable[Any], definitions: dict[str, Any]) -> str:
-    lines, section = [f"# {title}", "", about, ""], ""
-    for item in keys:
-        kind, key = item if isinstance(item, tuple) else ("", item)
-        first = kind or str(key.path[0])
-        if first != section:
-            lines += [f"## {first}", ""]
-            section = first
-        anchor = f"{kind}.{key.dotted}" if kind else key.dotted
-        lines += [f"### `{key.dotted}` {{ #{anchor} }}", "", *_key_lines(key, definitions), ""]
-    return "\n".join(lines)
-
-
-def _key_lines(key: Any, definitions: dict[str, Any]) -> Iterator[str]:
-    from vcam_cli.config.validation_messages import yaml_text
-
-    yield _sentence(_escaped(key.description)) + "\n"
-    if key.unit:
-        yield f"- unit: `{key.unit}`"
-    if key.required:
-        yield "- must be given"
-    elif key.default is not None:
-        yield f"- default: `{yaml_text(key.default)}`"
-    else:
-        yield "- default: not given"
-    field = definitions.get(key.model.__name__, {}).get("properties", {}).get(key.name)
-    allowed = _allowed(field, definitions) if field else ""
-    if allowed:
-        yield f"- allowed: {allowed}"
-    if key.example:
-        yield f"- example: `{key.name}: {key.example}`"
-    effects = _effects_of(key)
-    if effects:
-        yield "- effect: " + ", ".join(f"[{name}](effects.md#{name})" for name in effects)
-
-
-def _effects_of(key: Any) -> list[str]:
-    from vcam_cli.commands.explain import concerns
-    from vcam_cli.effects.order import ORDER
-
-    if key.path[0] in ("effects", "kind", "vary", "pdf", "sensor"):
-        return []
-    return [effect.name for effect in ORDER if concerns(effect, key)]
-
-
-def _allowed(field: dict[str, Any], definitions: dict[str, Any]) -> str:
-    """Return what a field's schema allows, in words."""
-    forms = [_form(form, definitions) for form in field.get("anyOf", [field])]
-    mappings = [form for form in forms if form.startswith("a mapping")]
-    if len(mappings) > 2:
-        forms = [form for form in forms if form not in mappings] + ["one of several mappings"]
-    return " or ".join(dict.fromkeys(form for form in forms if form))
-
-
-def _form(form: dict[str, Any], definitions: dict[str, Any]) -> str:
-    if "const" in form:
-        return f"`{form['const']}`"
-    if "enum" in form:
-        return ", ".join(f"`{json.dumps(word).strip(chr(34))}`" for word in form["enum"])
-    if "$ref" in form:
-        return _referred(form["$ref"].rpartition("/")[2], definitions)
-    kind = form.get("type")
-    if kind in ("number", "integer"):
-        return _range(form, kind)
-    words = {"boolean": "`true`, `false`", "array": "a list", "object": "a mapping"}
-    if kind == "array" and "items" in form:
-        inside = _allowed(form["items"], definitions)
-        return f"a list of {inside}" if inside else "a list"
-    if kind == "string" and "%" in form.get("pattern", ""):
-        return "a percentage"
-    return words.get(str(kind), "")
-
-
-def _referred(name: str, definitions: dict[str, Any]) -> str:
-    if definitions.get(name, {}).get("properties"):
-        return f"a mapping of {', '.join(f'`{k}`' for k in definitions[name]['properties'])}"
-    if name.startswith("spectrum"):
-        return "a [spectrum](../camera-file.md#spectra)" + " of at most 1" * name.endswith("_1")
-    return f"a {name.replace('_', ' ')} with its unit"
-
-
-def _range(form: dict[str, Any], kind: str) -> str:
-    low, high = form.get("minimum"), form.get("maximum")
-    above, below = form.get("exclusiveMinimum"), form.get("exclusiveMaximum")
-    name = "a whole number" if kind == "integer" else "a number"
-    limits = [
-        f"from {low:g}" if low is not None else f"above {above:g}" if above is not None else ""
-    ]
-    limits.append(f"to {high:g}" if high is not None else f"below {below:g}" if below else "")
-    return " ".join([name, *filter(None, limits)])
-
-
-def _sentence(text: str) -> str:
-    return f"{text[:1].upper()}{text[1:].rstrip('.')}."
-
-
-def _escaped(text: str) -> str:
-    """Return text that Markdown shows as it is."""
-    return re.sub(r"([*_<>\[\]{}|#])", r"\\\1", text)
 
 
 # Effects and commands
@@ -241,7 +109,7 @@ def _effect(effect: Any) -> Iterator[str]:
     yield _prose(effect.__doc__) + "\n"
     shown = effect_pictures.EXAMPLES[name]
     yield f"![Without {name.replace('_', ' ')}, and with it](../effects/{name}.png)\n"
-    yield f"{_escaped(shown.shows)}\n"
+    yield f"{escaped(shown.shows)}\n"
     yield '??? note "The command"\n\n    ```text'
     yield from (f"    {line}" for line in effect_pictures.command(name).splitlines())
     yield "    ```\n"
@@ -249,13 +117,13 @@ def _effect(effect: Any) -> Iterator[str]:
     text = module.partition("\n\n")[2].split("\nReferences\n")[0]
     if text.strip():
         yield _blocks(text) + "\n"
-    yield f"- source: {_escaped(effect.reference)}"
-    yield f"- not where {_escaped(effect.absent)}"
+    yield f"- source: {escaped(effect.reference)}"
+    yield f"- not where {escaped(effect.absent)}"
     yield f"- switched off by `effects: {{{name}: off}}`\n"
 
 
 def _prose(text: str | None) -> str:
-    return _escaped(" ".join(inspect.cleandoc(text or "").split()))
+    return escaped(" ".join(inspect.cleandoc(text or "").split()))
 
 
 def _blocks(text: str) -> str:
@@ -263,7 +131,7 @@ def _blocks(text: str) -> str:
     parts = []
     for block in text.strip("\n").split("\n\n"):
         is_code = all(line.startswith("    ") for line in block.splitlines() if line.strip())
-        parts.append(f"```text\n{inspect.cleandoc(block)}\n```" if is_code else _escaped(block))
+        parts.append(f"```text\n{inspect.cleandoc(block)}\n```" if is_code else escaped(block))
     return "\n\n".join(parts)
 
 
@@ -274,9 +142,36 @@ def _commands() -> Iterator[str]:
 
     yield "# Commands\n"
     yield "What `vcam COMMAND --help` prints.\n"
+    yield "## Exit codes\n\n| code | means |\n|---|---|"
+    yield from (f"| {code} | {means} |" for code, means in EXIT_CODES.items())
+    yield ""
     for command in COMMANDS:
-        shown = CliRunner().invoke(app, [command, "--help"], env={"COLUMNS": "96"}).stdout
+        shown = (
+            CliRunner()
+            .invoke(app, [command, "--help"], prog_name="vcam", env={"COLUMNS": "96"})
+            .stdout
+        )
         yield f"## vcam {command} {{ #{command} }}\n\n```text\n{shown.strip()}\n```\n"
+
+
+def _metrics() -> Iterator[str]:
+    from vcam_cli.commands.list_ import KINDS
+
+    yield "# Metrics\n"
+    yield "What `metrics.csv` and the columns of a sweep may say of a frame. `vcam list metrics`"
+    yield "prints it, `result.metrics` is a mapping of it.\n"
+    for item in KINDS["metrics"]():
+        yield f"## {item.name} {{ #{item.name} }}\n\n{sentence(escaped(item.about))}\n"
+
+
+def _not_simulated() -> Iterator[str]:
+    from vcam_cli.camera.hint_tables import NOT_SIMULATED
+
+    yield "# What is not simulated\n"
+    yield "What cameras have and a camera file cannot say, and what is simulated in its place.\n"
+    for name, about in NOT_SIMULATED.items():
+        title = name.replace("_", " ")
+        yield f"## {title} {{ #{name} }}\n\n{sentence(escaped(about))}\n"
 
 
 def _cite() -> str:
@@ -303,7 +198,7 @@ def _gallery() -> tuple[str, dict[str, bytes]]:
         path = shipped.find("cameras", name)
         about = " ".join(_comment(path.read_text("utf-8")))
         lines += [f"## {name}", "", f"![Photograph taken by {name}](gallery/{name}.png)", ""]
-        lines += [_escaped(about), "", f"`vcam list cameras {name}` prints the file.", ""]
+        lines += [escaped(about), "", f"`vcam list cameras {name}` prints the file.", ""]
         if window := _window(name):
             lines += [WINDOW.format(**{key.rpartition(".")[2]: n for key, n in window.items()}), ""]
     return "\n".join(lines), photographs

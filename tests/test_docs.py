@@ -1,5 +1,6 @@
 """The documentation is kept true: commands run, files are valid, links lead somewhere."""
 
+import json
 import re
 import shutil
 import subprocess
@@ -16,6 +17,22 @@ from vcam_cli.commands.main import app
 
 PAGES = [page for page in documents.pages() if page.name != "README.md"]
 NAMES = [str(page.relative_to(ROOT)) for page in PAGES]
+
+FACTS = {
+    "camera.html#pixel.readout.read_noise",
+    "camera.html#exposure.iso",
+    "camera.html#array.pattern",
+    "camera.html#output.dng",
+    "camera.html#pixel.photodetector.quantum_efficiency",
+    "camera.html#exposure.shutter.rolling.line_time",
+    "camera.html#pixel.readout.full_well",
+    "camera.html#seed.frame",
+    "commands.html#exit-codes",
+    "effects.html#dark_current",
+    "metrics.html#snr_db",
+    "not-simulated.html#crosstalk",
+}
+"""Places of the reference that the search must know."""
 
 
 @pytest.mark.long
@@ -95,6 +112,9 @@ def test_the_documentation_builds_without_a_warning_and_loads_nothing(tmp_path):
     loads = r'<(?:script|img|link|iframe)[^>]+(?:src|href)="(https?:)?//'
     for page in pages:
         assert not re.search(loads, page.read_text("utf-8")), page
+    found = json.loads((tmp_path / "site" / "search" / "search_index.json").read_text("utf-8"))
+    places = {each["location"] for each in found["docs"]}
+    assert {place.removeprefix("reference/") for place in places} >= FACTS
     keys = (tmp_path / "site" / "reference" / "camera.html").read_text("utf-8")
     for key in ("pixel.readout.read_noise", "optics.f_number", "output.report"):
         assert f'id="{key}"' in keys

@@ -233,6 +233,7 @@ NOT_SIMULATED: Mapping[str, str] = {
     "distortion": "the lens images straight lines as straight lines",
     "lateral_color": "the lens images all wavelengths in one size",
     "chromatic_aberration": "wavefronts in optics.zernike are the same length at all wavelengths",
+    "dual_conversion_gain": "every pixel is read with one gain, pixel.readout.gain",
     "flash": "the light of the scene is scene.illuminant at one level",
     **dict.fromkeys(
         ("phase_detection", "pdaf", "dual_pixel"),
