@@ -58,7 +58,9 @@ def test_the_camera_files_of_a_page_are_valid(page, tmp_path, monkeypatch):
         assert done.exit_code == 0, done.output
 
 
-@pytest.mark.parametrize("name", ["python.md", "howto/noise-model.md"])
+@pytest.mark.parametrize(
+    "name", [pytest.param("python.md", marks=pytest.mark.long), "howto/noise-model.md"]
+)
 def test_the_python_of_a_page_runs(name, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     text = documents.read(ROOT / "docs" / name)
