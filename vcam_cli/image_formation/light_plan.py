@@ -2,9 +2,9 @@
 
 An effect that changes the light at the pixels by next to nothing is left out, as long as all that
 are left out together stay within their share of the tolerance: transfer functions of a scene with
-little detail, gains and veiling glare whose change of the displacing light is small. What is left
-out saves its work; without any blur, the light is a mean over the photodetectors, and no spectrum
-is computed.
+little detail, gains and veiling glare whose change of the surveyed light is small. What is left out
+saves its work; without any blur, the light is a mean over the photodetectors, and no spectrum is
+computed.
 """
 
 from __future__ import annotations
@@ -164,9 +164,9 @@ def _joint_share(
 
 
 def _light_behind(detail: SceneDetail, effect: Effect) -> tuple[NDArray, NDArray]:
-    """Return the displacing light behind a gain or veiling glare, and without it.
+    """Return the surveyed light behind a gain or veiling glare, and without it.
 
-    The light that was displacing has the gain of the axis in it.
+    The light that was surveyed has the gain of the axis in it.
     """
     behind = without = detail.light
     for gain in of_kind([effect], Gain):
