@@ -99,7 +99,7 @@ def test_edges_are_left_out_with_a_word(taken):
     edge = {"files": "flat_*.npy", "exposure": "10 ms", "target": "slanted-edge", "name": "edge"}
     found = verify(made, measured(folder, ENTRY, frames=[ENTRY, edge]))
     assert sum(row.quantity == "mean [DN]" for row in found.rows) == 3
-    assert "edge: frames of an edge are not predicted" in found.notes
+    assert "edge: frames of an edge are not predicted, the camera has no lens" in found.notes
 
 
 @pytest.mark.parametrize(

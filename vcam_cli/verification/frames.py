@@ -57,10 +57,13 @@ def color_block(measurement: Measurement) -> tuple[tuple[str, ...], ...]:
     return BLOCKS[measurement.pattern]
 
 
-def paths(measurement: Measurement, held_out: bool = False) -> dict[int, list[Path]]:
+def paths(
+    measurement: Measurement, held_out: bool = False, edges: bool = False
+) -> dict[int, list[Path]]:
     """Return the files of every entry that is to be fitted: number of the entry -> files.
 
-    held_out: those that are to be predicted instead: all where none are held out; none of edges.
+    held_out: those that are to be predicted instead: all where none are held out; of edges alone
+    where `edges` says so, else of all others.
 
     Raises BadInput where an entry has too few: one to predict, two to fit.
     """
@@ -68,7 +71,7 @@ def paths(measurement: Measurement, held_out: bool = False) -> dict[int, list[Pa
     found, problems = {}, Collector()
     for number, entry in enumerate(measurement.frames):
         is_edge = isinstance(entry, FrameSet) and entry.target == "slanted-edge"
-        if not isinstance(entry, FrameSet) or (held_out and is_edge):
+        if not isinstance(entry, FrameSet) or (held_out and is_edge != edges):
             continue
         files = [Path(name) for name in sorted(glob.glob(str(folder / entry.files)))]
         kept = len(files) - math.floor(measurement.hold_out * len(files))

@@ -65,11 +65,7 @@ def measured_points(
     if not measurement.frame_sets:
         return points, taken, []
     _check(camera, measurement)
-    notes = [
-        f"{measurement.label(number)}: frames of an edge are not predicted"
-        for number, entry in enumerate(measurement.frames)
-        if isinstance(entry, FrameSet) and entry.target == "slanted-edge"
-    ]
+    notes: list[str] = []
     for number, stack in numbered_stacks(measurement, paths(measurement, held_out=True)):
         notes += stack.notes
         signals = _points(stack, measurement)

@@ -92,17 +92,17 @@ def judge(
     here = with_every_effect(conditions(camera, point, size))
     ready, _ = prepare(here, 1)
     predicted = [
-        measure(_stack(ready, len(frames), number * STACKS + turn)) for turn in range(STACKS)
+        measure(take_stack(ready, len(frames), number * STACKS + turn)) for turn in range(STACKS)
     ]
     found = []
     for channel, listed in measure(frames).items():
         for place, quantity in enumerate(listed):
             others = [each[channel][place] for each in predicted]
-            found.append(_judged(channel, quantity, others))
+            found.append(compare(channel, quantity, others))
     return found
 
 
-def _stack(ready: Prepared, count: int, turn: int) -> NDArray:
+def take_stack(ready: Prepared, count: int, turn: int) -> NDArray:
     """Return frames of one more sensor (n, rows, columns) [DN]."""
     first = ready.camera.seed
     frames = []
@@ -113,10 +113,11 @@ def _stack(ready: Prepared, count: int, turn: int) -> NDArray:
     return np.stack(frames)
 
 
-def _judged(channel: str, measured: Quantity, predicted: list[Quantity]) -> Judged:
+def compare(channel: str, measured: Quantity, predicted: list[Quantity]) -> Judged:
+    """Return a measured quantity beside those of predicted stacks."""
     forms = np.array([q.normal for q in predicted])
     least = LEAST_DEVIATION * max(abs(float(forms.mean())), 1.0)
-    if measured.name.endswith("[1]") and "kurtosis" not in measured.name:
+    if measured.is_count:
         least = COUNT_DEVIATION
     spread = max(float(forms.std(ddof=1)), least) * math.sqrt(1 + 1 / len(forms))
     mean = float(np.mean([q.value for q in predicted]))

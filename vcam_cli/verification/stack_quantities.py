@@ -40,6 +40,8 @@ class Quantity:
     value: float
     normal: float
     """The value in a form whose distribution is nearly normal."""
+    is_count: bool = False
+    """Whether that is the root of a count."""
 
 
 def quantities(frames: NDArray, highest: int) -> list[Quantity]:
@@ -83,7 +85,7 @@ def _variance(name: str, value: float) -> Quantity:
 def _share(name: str, where: NDArray) -> Quantity:
     """Return a share; the root of a count of Poisson has a variance of 1/4 (Anscombe 1948)."""
     count = int(where.sum())
-    return Quantity(f"{name} [1]", count / where.size, math.sqrt(count + 3 / 8))
+    return Quantity(f"{name} [1]", count / where.size, math.sqrt(count + 3 / 8), True)
 
 
 def _temporal(frames: NDArray, good: NDArray) -> Iterator[Quantity]:
@@ -162,6 +164,7 @@ def mean_of_planes(planes: list[list[Quantity]]) -> list[Quantity]:
             each[0].name,
             float(np.mean([q.value for q in each])),
             float(np.mean([q.normal for q in each])),
+            each[0].is_count,
         )
         for each in zip(*planes, strict=True)
     ]

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from vcam_cli.camera.camera import Camera
 from vcam_cli.errors import BadInput, Collector
 from vcam_cli.progress import Observer, Silent
-from vcam_cli.verification.frames import raise_if_any
+from vcam_cli.verification.edges import judge_edge
+from vcam_cli.verification.frames import numbered_stacks, paths, raise_if_any
 from vcam_cli.verification.measured_points import Points, measured_points, quantities_of_colors
 from vcam_cli.verification.model import UNITS, Measurement
 from vcam_cli.verification.prediction import check, predict
@@ -157,9 +158,40 @@ def verify(camera: Camera, measurement: Measurement, watch: Observer | None = No
         judged[stack.number] = judge(
             camera, stack.point, stack.frames, stack.shape, measure, stack.number
         )
-    limit = bound(sum(map(len, judged.values())))
-    rows = _with_noise(measurement, means, judged, limit)
-    return Verification(camera, measurement, tuple(rows), (*_notes(camera), *notes))
+    edges, more = _edges(camera, measurement)
+    limit = bound(sum(map(len, (*judged.values(), *edges.values()))))
+    rows = [*_with_noise(measurement, means, judged, limit)]
+    for number, listed in edges.items():
+        rows += [_judged_row(measurement, number, each, limit) for each in listed]
+    return Verification(camera, measurement, tuple(rows), (*_notes(camera, points), *notes, *more))
+
+
+def _edges(camera: Camera, measurement: Measurement) -> tuple[dict[int, list[Judged]], list[str]]:
+    """Return what is judged of frames of edges, by the number of the entry, and notes."""
+    files = paths(measurement, held_out=True, edges=True)
+    if files and not camera.optics.is_lens:
+        labels = ", ".join(map(measurement.label, files))
+        return {}, [f"{labels}: frames of an edge are not predicted, the camera has no lens"]
+    found, notes = {}, []
+    for number, stack in numbered_stacks(measurement, files):
+        try:
+            found[number] = judge_edge(camera, stack, measurement, number)
+        except ValueError as error:
+            notes.append(f"{stack.label}: {error}")
+    return found, notes
+
+
+def _judged_row(measurement: Measurement, number: int, each: Judged, limit: float) -> Row:
+    return Row(
+        measurement.label(number),
+        each.channel,
+        each.name,
+        each.measured,
+        each.predicted,
+        measurement.noise_tolerance,
+        each.deviation,
+        limit,
+    )
 
 
 def _with_noise(
@@ -178,16 +210,7 @@ def _with_noise(
             yield row
         for each in own:
             if each.name != row.quantity:
-                yield Row(
-                    row.frame,
-                    row.channel,
-                    each.name,
-                    each.measured,
-                    each.predicted,
-                    measurement.noise_tolerance,
-                    each.deviation,
-                    limit,
-                )
+                yield _judged_row(measurement, number, each, limit)
 
 
 def _check_all(camera: Camera, measurement: Measurement, points: Points) -> None:
@@ -218,6 +241,6 @@ def _rows(
         yield number, row
 
 
-def _notes(camera: Camera) -> Iterator[str]:
-    if camera.optics.is_lens:
+def _notes(camera: Camera, points: Points) -> Iterator[str]:
+    if camera.optics.is_lens and points:
         yield "the camera's lens is left out: what was measured of light is that on the sensor"
