@@ -209,12 +209,13 @@ def _text(entry: dict[str, Any]) -> str:
     import textwrap
 
     lines = [entry["title"]]
-    lines += textwrap.wrap(entry["about"], 96, initial_indent="  ", subsequent_indent="  ")
+    width = options.line_width()
+    lines += textwrap.wrap(entry["about"], width, initial_indent="  ", subsequent_indent="  ")
     for heading, said in entry.items():
         if heading not in ("title", "about"):
             lines += textwrap.wrap(
                 f"{heading}: {said}",
-                96,
+                width,
                 initial_indent="  ",
                 subsequent_indent="    ",
                 break_long_words=False,

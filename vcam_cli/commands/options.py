@@ -4,6 +4,7 @@ Results go to stdout, everything else to stderr; with `--json` stdout carries on
 """
 
 import json
+import shutil
 import sys
 from collections.abc import Sequence
 from pathlib import Path
@@ -197,6 +198,13 @@ def say(message: object, quiet: bool = False) -> None:
     """Print a line for the user on stderr."""
     if not quiet:
         print(message, file=sys.stderr, flush=True)
+
+
+def line_width(most: int = 96) -> int:
+    """Return the columns that lines of text may take: no more than a terminal has."""
+    if not sys.stdout.isatty():
+        return most
+    return min(most, shutil.get_terminal_size().columns)
 
 
 def open_table(plain_width: int = 120) -> tuple[Any, Any]:

@@ -166,7 +166,7 @@ def _share(effect: dict) -> str:
 
 
 def wrap(text: str) -> list[str]:
-    """Return lines of at most 100 characters."""
+    """Return lines of at most 100 characters, and no wider than a terminal."""
     import textwrap
 
-    return textwrap.wrap(text, 100, break_long_words=False)
+    return textwrap.wrap(text, options.line_width(100), break_long_words=False)
