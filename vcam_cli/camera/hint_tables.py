@@ -62,6 +62,12 @@ KEYS: Mapping[str, str] = {
     "bayer": "array.pattern: bayer-rggb",
     "color": "array.pattern: bayer-rggb",
     "lux": "scene.illuminance: 300 lx",
+    "color_temperature": "scene.illuminant: {blackbody: 5500 K}",
+    "cct": "scene.illuminant: {blackbody: 5500 K}",
+    "rolling_shutter": "exposure.shutter: {rolling: {line_time: 15 us}}",
+    "hdr": "exposure.captures: [5 ms, 30 ms]",
+    "ir_cut": "optics.transmittance: [0.95, ir-cut-650]",
+    "ir_filter": "optics.transmittance: [0.95, ir-cut-650]",
     "light": "scene.illuminant: D65",
     "lamp": "scene.illuminant: D65",
     "brightness": "scene.luminance: 100 cd/m2",
@@ -79,6 +85,14 @@ ELSEWHERE: Mapping[Path, Mapping[str, str]] = {
         "size": "array.columns: 640 and array.rows: 480",
     },
     ("adc",): {"black_level": "adc.offset: 64 DN"},
+    ("scene",): {"temperature": "scene.illuminant: {blackbody: 5500 K}"},
+    ("optics",): {
+        "filter": "optics.transmittance: [0.95, ir-cut-650]",
+        "blur": "optics.defocus: 10 um",
+        "zoom": "optics.focal_length: 8 mm",
+    },
+    ("pixel",): {"shutter": "exposure.shutter: {rolling: {line_time: 15 us}}"},
+    ("output",): dict.fromkeys(("png", "bits", "jpg", "jpeg"), "output.render: 8"),
     ("effects",): {"noise": "effects: {shot_noise: off, read_noise: off, fpn: off}"},
     (): {
         "rows": "array.rows: 480",
@@ -101,7 +115,7 @@ VALUES: Mapping[str, Mapping[str, str]] = {
         **dict.fromkeys(("quad", "tetracell", "quadra"), "quad-bayer"),
     },
     "scene.illuminant": {
-        **dict.fromkeys(("daylight", "white", "day"), "D65"),
+        **dict.fromkeys(("daylight", "white", "day", "cloudy", "overcast"), "D65"),
         **dict.fromkeys(("sun", "sunlight"), "D55"),
         **dict.fromkeys(("tungsten", "incandescent", "halogen", "bulb"), "A"),
         **dict.fromkeys(("fluorescent", "office", "cwf", "cool_white"), "FL2"),
@@ -128,6 +142,11 @@ VALUES: Mapping[str, Mapping[str, str]] = {
         **dict.fromkeys(("natural", "texture", "leaves"), "dead-leaves"),
         **dict.fromkeys(("black", "none", "cap"), "dark"),
     },
+    "pixel.architecture": {
+        **dict.fromkeys(("4t", "cmos", "pinned"), "aps-4t"),
+        "3t": "aps-3t",
+        "passive": "pps",
+    },
     "accuracy": {
         **dict.fromkeys(("high", "best", "exact", "full", "max", "precise"), "reference"),
         **dict.fromkeys(("low", "fast", "quick", "coarse", "preview"), "draft"),
@@ -152,12 +171,13 @@ VALUES: Mapping[str, Mapping[str, str]] = {
 """A key -> what stands there and is not allowed -> what to write."""
 BARE: Mapping[str, str] = {
     unit: unit.removeprefix("k")
-    for unit in ("e", "ke", "e/s", "um", "lx", "cd/m2", "%", "deg", "DN")
+    for unit in ("e", "ke", "e/s", "um", "lx", "cd/m2", "%", "deg", "DN", "EV")
 }
 """Unit of a key -> unit that a number without one has, where no other is usual."""
 FOREIGN: Mapping[str, tuple[Fraction, str]] = {
     **dict.fromkeys(("ft", "foot", "feet"), (Fraction("0.3048"), "m")),
     **dict.fromkeys(("inch", "inches"), (Fraction(1), "in")),
+    "u": (Fraction(1), "um"),
     **dict.fromkeys(("Å", "angstrom", "angstroms"), (Fraction("0.1"), "nm")),
     **dict.fromkeys(("min", "minutes"), (Fraction(60), "s")),
     **dict.fromkeys(("fc", "footcandle", "footcandles"), (Fraction("10.7639"), "lx")),
@@ -184,12 +204,29 @@ FORMS: Mapping[str, tuple[tuple[str, str], ...]] = {
         (r"1/\d+", r"write {time: \g<0> s}"),
         (r"(?i)iso ?(\d+)", r"write {time: 30 ms, iso: \1}"),
     ),
+    "exposure.iso": (("(?i)auto", "write exposure: {auto: {max: 100 ms, max_gain: 16}}"),),
+    "pixel.microlens": (
+        (_NUMBER, r"write {gain: \1}"),
+        ("(?i)true|on|yes", "write {gain: 1.8}"),
+    ),
+    "pixel.fpn": (
+        (rf"{_NUMBER} ?%", r"write {prnu: \1 %}"),
+        (rf"{_NUMBER} ?e-?", r"write {dsnu: \1 e}"),
+    ),
+    "array.binning": (
+        (r"(\d) ?[xX*×] ?(\d)", r"write {rows: \2, columns: \1}"),
+        (r"\d", r"write {rows: \g<0>, columns: \g<0>}"),
+    ),
+    "output": ((r"dng|tiff|report|steps|irradiance", r"write {\g<0>: true}"),),
     "adc": ((r"(\d+)[ -]?(bits?)?", r"write {bits: \1}"),),
-    "array": ((r"(\d+) ?[xX*×] ?(\d+)", r"write {columns: \1, rows: \2}"),),
+    "array": ((r"(\d+) ?[xX*×,] ?(\d+)", r"write {columns: \1, rows: \2}"),),
     "pixel": ((rf"{_NUMBER} ?[uµμ]m", r"write width: \1 um below it"),),
     "optics": ((rf"[fF] ?/? ?{_NUMBER}", r"write {f_number: \1, focal_length: 4.5 mm}"),),
     "scene": ((r".*\.(png|jpe?g|tiff?|exr)", r"write {source: {kind: image, file: \g<0>}, ...}"),),
-    "exposure.shutter": ((r"(1/\d+(\.\d+)?) ?s?", r"write exposure.time: \1 s, in its place"),),
+    "exposure.shutter": (
+        ("rolling", "write {rolling: {line_time: 15 us}}"),
+        (r"(1/\d+(\.\d+)?) ?s?", r"write exposure.time: \1 s, in its place"),
+    ),
     "exposure.time": (
         (r"1/\d+(\.\d+)?", r"write \g<0> s"),
         ("auto", "write exposure: {auto: {max: 100 ms}}"),
@@ -199,7 +236,7 @@ FORMS: Mapping[str, tuple[tuple[str, str], ...]] = {
         (rf"{_NUMBER} ?(cd/m2|nits?)", r"write luminance: \1 cd/m2, in its place"),
     ),
     "scene.illuminant": (
-        (rf"{_NUMBER} ?[kK]", r"write {blackbody: \1 K}"),
+        (rf"{_NUMBER} ?[kK]|(\d{{4,5}})", r"write {blackbody: \1\2 K}"),
         (rf"{_NUMBER} ?nm", r"write {monochromatic: \1 nm}"),
     ),
     "array.pattern": (
@@ -210,7 +247,11 @@ FORMS: Mapping[str, tuple[tuple[str, str], ...]] = {
         ),
     ),
     "seed": ((r"\d+", r"write {frame: \g<0>}"),),
-    "quality": ((r"mse|psnr|cielab|s-cielab", r"write [\g<0>]"),),
+    "quality": (
+        (r"mse|psnr|cielab|s-cielab", r"write [\g<0>]"),
+        ("(?i)all", "write [mse, psnr, cielab, s-cielab]"),
+        ("(?i)delta.?e.*", "write [cielab]"),
+    ),
     "output.raw": (
         (r"dn|electrons|volts", r"write [\g<0>]"),
         (r"dng|tiff", r"write output: {\g<0>: true}"),

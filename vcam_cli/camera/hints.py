@@ -170,6 +170,8 @@ def _value(given: object, key: Key, example: str) -> str:
     if isinstance(given, bool) or not isinstance(given, (str, int, float)) or example[:1] in "[{":
         return example
     text = in_electrons(yaml_text(given))
+    if known := VALUES.get(key.dotted, {}).get(_plain(text)):
+        return known
     if key.name == "f_number":
         text = re.sub(r"^[fF] ?/? ?", "", text)
     try:
@@ -187,7 +189,7 @@ def _value(given: object, key: Key, example: str) -> str:
 
 def in_electrons(text: str) -> str:
     """Return a quantity with electrons as a file writes it: 6 e for 6 e-, 6 e- rms, 6 electrons."""
-    text = re.sub(r" ?rms$", "", text.strip())
+    text = re.sub(r" ?rms$|/(pix|px|pixel)(?=/|$)", "", text.strip())
     return re.sub(r"(?<![a-z])(k?)(e-|electrons?)(?=$|/)", r"\1e", text)
 
 
