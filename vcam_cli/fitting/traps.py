@@ -87,8 +87,13 @@ def pixel_moments(frames: NDArray, good: NDArray) -> PixelMoments:
     each = residual[:, good]
     each -= each.mean(axis=0)
     half = len(frames) // 2
-    halves = each[:half].var(axis=0, ddof=1), each[half:].var(axis=0, ddof=1)
-    return PixelMoments(len(frames), each.var(axis=0, ddof=1), halves, (each**3).sum(axis=0))
+    halves = _variance(each[:half]), _variance(each[half:])
+    return PixelMoments(len(frames), _variance(each), halves, (each**3).sum(axis=0))
+
+
+def _variance(values: NDArray) -> NDArray:
+    """Return the variance of each column (pixels,), 0 of a single frame."""
+    return np.asarray(values.var(axis=0, ddof=min(1, len(values) - 1)))
 
 
 def find_traps(moments: list[PixelMoments]) -> Traps | None:
