@@ -22,7 +22,7 @@ QUANTITIES = ("MTF50 [lp/mm]", "MTF at 0.25 c/px [1]", "edge profile, 10% to 90%
 
 @pytest.fixture(scope="module")
 def taken(tmp_path_factory):
-    """Frames of another sensor before an edge of 7 degrees, brighter than the camera file's light."""
+    """Frames of another sensor before an edge of 7 degrees, in more light than the file has."""
     folder = tmp_path_factory.mktemp("edge")
     made = camera(folder, CHANGES)
     chart = {"kind": "chart", "chart": "slanted-edge", "angle": "7 deg", "contrast": 0.7}

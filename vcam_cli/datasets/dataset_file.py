@@ -21,6 +21,7 @@ from vcam_cli.errors import BadInput, Collector, Problem
 from vcam_cli.files.images import picture_size
 from vcam_cli.floats import own_float_errors
 from vcam_cli.simulation.checks import missing_library
+from vcam_cli.sweeps.model import KINDS
 
 FILES = ("scenes", "files")
 
@@ -28,6 +29,9 @@ FILES = ("scenes", "files")
 def _refuse_others(root: Node) -> None:
     """Raise BadInput where the file is no data set."""
     kind = root.get("kind")
+    if kind is not None and kind.value in KINDS:
+        message, remedy = f"this is a study (kind: {kind.value})", f"give it to vcam {kind.value}"
+        raise BadInput([kind.problem(("kind",), message, remedy)])
     if kind is None or kind.value != "dataset":
         message, remedy = "this is no data set", "write kind: dataset, or give another file"
         raise BadInput([(kind or root).problem(("kind",), message, remedy)])

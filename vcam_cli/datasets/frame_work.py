@@ -14,11 +14,14 @@ from vcam_cli.datasets.drawing import Frame
 from vcam_cli.effects.base import of_kind
 from vcam_cli.effects.signal_chain import NoiseSource
 from vcam_cli.files.frame_archive import archive_bytes
+from vcam_cli.image_formation.rate_cache import RateCache
 from vcam_cli.quality.photon_transfer import ROUNDING
 from vcam_cli.simulation.shared import Shared
 from vcam_cli.simulation.simulate import Result, simulate
 from vcam_cli.sweeps.point_effects import with_every_effect
 
+LIGHT = 1 << 24
+"""Bytes of light that are kept: no frame comes back to the scene of an earlier one."""
 NPZ = "npz"
 """The file of a frame beside its point."""
 ARRAYS: dict[str, Callable[[Result], NDArray]] = {
@@ -42,6 +45,8 @@ class FrameJob:
 
     def compute(self, threads: int, shared: Shared) -> tuple[dict[str, float], dict[str, bytes]]:
         """Return the labels of the frame, and the archive of its arrays."""
+        if shared.rate_cache.limit != LIGHT:
+            shared.rate_cache = RateCache(LIGHT)
         camera = with_every_effect(self.frame.camera(self.base))
         output = camera.output.model_copy(update={"render": None})
         result = simulate(

@@ -100,6 +100,8 @@ class RateCache:
     """The light of the last cameras."""
 
     def __init__(self, limit: int = _LIMIT) -> None:
+        self.limit = limit
+        """Bytes of light that are kept; the newest always."""
         self._rates: ByteCache[_CachedRate] = ByteCache(limit)
         self._transfer: tuple[str, Transfer] | None = None
         self._peaks: dict[str, float] = {}
