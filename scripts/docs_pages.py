@@ -33,8 +33,17 @@ WIDEST = 480
 """Columns of a photograph in the gallery, at most."""
 LARGE = 4_000_000
 """Pixels of an array from which on a window of it takes the photograph, to save time."""
-BOOST = {"camera": 3, "metrics": 2, "not-simulated": 2, "effects": 1.5}
-"""Page of the reference -> how much the search prefers it."""
+BOOST = {
+    "reference/camera.md": 1.5,
+    "reference/metrics.md": 1.5,
+    "reference/not-simulated.md": 1.5,
+    "reference/effects.md": 1.2,
+    "gallery.md": 0.3,
+    "attacks.md": 0.5,
+    "engine_ablation.md": 0.5,
+    "thesis.md": 0.5,
+}
+"""Page -> how much the search prefers it to others."""
 EXIT_CODES = {
     0: "done",
     2: "bad input or usage; the message has file, line, key and remedy",
@@ -65,16 +74,15 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
         made[f"notebooks/{path.stem}.md"], figures = notebooks.page(path)
         pictures |= {f"notebooks/{name}": data for name, data in figures.items()}
     for name, text in made.items():
-        boost = BOOST.get(Path(name).stem) if name.startswith("reference/") else None
-        first = f"---\nsearch:\n  boost: {boost}\n---\n\n" if boost else ""
-        files.append(File.generated(config, name, content=first + text))
+        files.append(File.generated(config, name, content=text))
     for name, data in {**photographs, **pictures}.items():
         files.append(File.generated(config, name, content=data))
     return files
 
 
 def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Files) -> str:
-    """Turn links to files that are no part of the pages into their names."""
+    """Turn links to files outside the pages into their names; rank the page for the search."""
+    page.meta["search"] = {"boost": BOOST.get(page.file.src_uri, 1)}
     depth = page.file.src_uri.count("/")
     outside = r"\[([^\]]+)\]\(" + r"\.\./" * (depth + 1) + r"[^)]+\)"
     return re.sub(outside, lambda link: f"`{link[1].strip('`')}`", markdown)
