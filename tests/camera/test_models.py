@@ -17,8 +17,8 @@ from vcam_cli.camera.photodetector import Photodetector
 from vcam_cli.camera.pixel import Readout
 from vcam_cli.camera.processing import Step
 from vcam_cli.camera.quality import METRICS
-from vcam_cli.camera.scene import CHARTS
 from vcam_cli.camera.simulation import EFFECTS
+from vcam_cli.camera.sources import CHARTS
 from vcam_cli.camera.technology import Technology
 from vcam_cli.config.model import Model
 from vcam_cli.config.quantities import Quantity

@@ -29,12 +29,20 @@ from vcam_cli.effects.base import (
     Transport,
     VeilingGlare,
 )
+from vcam_cli.effects.depth import Depth
 from vcam_cli.effects.order import ORDER
 from vcam_cli.effects.signal_chain import Limit, NoiseSource, Quantizer, Site
 from vcam_cli.rng import BLOCK_ROWS, stream
 
 # Twenty whole periods on the 64 columns of 5 um, so that its rms is that of a whole wave.
 WAVE = {"kind": "chart", "chart": "sinusoid", "frequency": "62.5 lp/mm", "contrast": 1, "mean": 0.5}
+
+
+def two_layers(distance: str) -> dict[str, Any]:
+    """A wave before white, which is in focus."""
+    white = {"source": {"kind": "chart", "chart": "uniform"}, "distance": "1 m"}
+    layers = [{"source": WAVE, "distance": distance}, white]
+    return {"scene.source": {"kind": "layers", "layers": layers}}
 
 
 @dataclass(frozen=True)
@@ -57,6 +65,7 @@ CASES: dict[str, Case] = {
         {"scene.source": WAVE},
         wavelengths=(380e-9, 550e-9, 1e-3),
     ),
+    "depth": Case(two_layers("0.5 m"), two_layers("1 m")),
     "motion": Case(
         {"scene.camera_motion": {"pan": "20 deg/s"}},
         {"scene.camera_motion": {"pan": "0 deg/s"}},
@@ -505,6 +514,8 @@ def test_finite_on_hostile_input(kind, dtype, tmp_path):
     elif isinstance(effect, TemporalGain):
         places = np.array([-1.0, -1e-12, 0, 1e-6, 1e-3], dtype)
         results = [effect.gain(places, places, 0, time) for time in (1e-9, 1e9)]
+    elif isinstance(effect, Depth):
+        results = [np.array(effect.blurs)]
     elif isinstance(effect, VeilingGlare):
         results = [np.array(effect.fraction)]
         assert 0 < effect.fraction <= 1

@@ -187,7 +187,6 @@ def test_meters_a_second_need_a_distance(tmp_path):
 @pytest.mark.parametrize(
     ("wrong", "path"),
     [
-        ({"scene.source": {"kind": "layers", "layers": []}}, "scene.source.kind"),
         (
             {"scene.source": {"kind": "image", "file": "imu.csv", "depth": "imu.csv"}},
             "scene.source.depth",

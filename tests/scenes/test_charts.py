@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from support import brute, scene, view
 
-from vcam_cli.camera.scene import CHARTS
+from vcam_cli.camera.sources import CHARTS
 from vcam_cli.scenes import csf
 from vcam_cli.scenes.base import ChartScene, Frame, HarmonicScene
 from vcam_cli.scenes.build import build

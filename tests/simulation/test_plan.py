@@ -104,6 +104,20 @@ CAMERAS = {
         },
         "exposure": {"time": "4 ms", "shutter": {"rolling": {"line_time": "100 us"}}},
     },
+    "letters near, a star far away": {
+        "scene.source": {
+            "kind": "layers",
+            "layers": [
+                {
+                    "source": {"kind": "chart", "chart": "eye-chart"},
+                    "distance": "0.5 m",
+                    "width": "10 mm",
+                },
+                {"source": {"kind": "chart", "chart": "siemens-star"}, "distance": "3 m"},
+            ],
+        },
+        "scene.radiance": radiance_for(9e4),
+    },
     "highlights far beyond the well, in a ccd": {
         "scene.radiance": radiance_for(2e7),
         "accuracy": "draft",
@@ -233,6 +247,7 @@ def test_noise_is_weighed_against_the_noise_that_runs(tmp_path):
 # --- on, off, all --------------------------------------------------------------------------------
 
 EVERYTHING = NOISE | {DARK: "100 e/s", "optics.off_axis": "exact"}
+LAYERED = "letters near, a star far away"
 MOVING = "a lamp in the picture, and a little stray light"
 IN_EVERYTHING = {
     *("diffraction", "pixel_aperture", "off_axis", "dark_current", "shot_noise", "fpn"),
@@ -243,7 +258,7 @@ IN_EVERYTHING = {
 def test_all_is_on_for_everything_described(run):
     """No camera has all effects: a ccd has no reset noise, and no shutter that rolls."""
     everything = set()
-    for name in ("all traces", "a ccd in stray light", MOVING):
+    for name in ("all traces", "a ccd in stray light", MOVING, LAYERED):
         result = run(name, effects="all")
         described = [d.name for d in result.frame.plan.decisions if d.by != "camera"]
         assert [e.name for e in result.frame.plan.active] == described
@@ -255,6 +270,7 @@ def test_all_is_on_for_everything_described(run):
 @pytest.mark.parametrize("name", NAMES)
 def test_off_leaves_out_that_one_alone(name, tmp_path):
     other = MOVING if name in ("flicker", "motion") else "a ccd in stray light"
+    other = LAYERED if name == "depth" else other
     described = EVERYTHING if name in IN_EVERYTHING else CAMERAS[other]
     chosen = described | {"effects": {name: "off"}, "accuracy": "reference"}
     found = decisions(simulate(camera(tmp_path, chosen)))

@@ -31,7 +31,7 @@ from vcam_cli.floats import own_float_errors
 
 EXAMPLE = "starter"
 """The shipped camera whose sections stand in for those that a file has wrong."""
-FILE_KEYS = frozenset({"file", "positions"})
+FILE_KEYS = frozenset({"file", "positions", "mask", "image.depth"})
 """Keys that hold names of data files."""
 CameraCheck = Check[Camera]
 

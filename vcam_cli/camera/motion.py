@@ -35,6 +35,14 @@ MOTION = key("how it moves during the exposure", example={"x": "0.5 m/s"}, defau
 """The key of every source."""
 
 
+class MovingSource(Model):
+    """A source that may move as a whole."""
+
+    def standing_still(self) -> Self:
+        """Return the same source without motion."""
+        return self.model_copy(update={"motion": None})
+
+
 class CameraMotion(Model):
     """Turning of the camera about its lens, at constant speeds or as a gyroscope recorded it."""
 

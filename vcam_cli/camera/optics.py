@@ -263,6 +263,11 @@ class Optics(Model):
         example="auto",
         default=None,
     )
+    focus_distance: Annotated[float | None, Quantity("distance", above=0)] = key(
+        "from the lens to what it is focused on, or infinity; default scene.distance",
+        example="1 m",
+        default=None,
+    )
     diffraction: Switch = key("whether the aperture diffracts", default=True)
     focus: Literal["fixed", "auto"] = key(
         "auto: by contrast, the image plane is moved to where focus_window is sharpest, whatever"

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import model_validator
 
-from vcam_cli.camera.motion import MOTION, MaybeMotion
+from vcam_cli.camera.motion import MOTION, MaybeMotion, MovingSource
 from vcam_cli.config.model import Model, key
 from vcam_cli.config.quantities import Quantity, Whole
 from vcam_cli.config.validation_messages import describe, refusal
@@ -43,7 +43,7 @@ class Crop(Model):
         return rows, slice(self.column, self.column + self.columns)
 
 
-class ImageFile(Model):
+class ImageFile(MovingSource):
     """A picture, read as the reflectance or the radiance of a flat scene."""
 
     kind: Literal["image"] = key("what kind of source this is", example="image")
@@ -90,7 +90,7 @@ def _channels(given: Any) -> Mapping[str, float]:
     return {str(name): _CHANNEL.read(value) for name, value in given.items()}
 
 
-class Hyperspectral(Model):
+class Hyperspectral(MovingSource):
     """A file of spectra: spectral EXR, ENVI, ISETCam scene, npz, multichannel TIFF."""
 
     kind: Literal["hyperspectral"] = key("what kind of source this is", example="hyperspectral")

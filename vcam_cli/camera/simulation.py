@@ -15,6 +15,7 @@ EFFECTS = {
     "off_axis": "falloff of light away from the axis",
     "diffraction": "blur by the lens's aperture",
     "aberration": "blur by an imperfect lens",
+    "depth": "layers at their own distances, each with its own sharpness",
     "stray_light": "light spread evenly over the sensor",
     "motion": "blur and skew by motion of scene or camera",
     "pixel_aperture": "blur by the photodetector's area",

@@ -57,6 +57,7 @@ def _optics(g: Mapping[str, float]) -> Iterator[Row]:
     yield "clear diameter", f"{g['aperture_diameter'] * 1e3:.6g} mm"
     yield "clear aperture", f"{g['clear_aperture_area'] * 1e6:.6g} mm2"
     yield "field of view", f"{_angle(g['field_of_view_diagonal'])} on the diagonal"
+    yield "focus distance", _length(g["focus_distance"])
     yield "image distance", f"{g['image_distance'] * 1e3:.6g} mm"
     circle = f"for a blur of {g['circle_of_confusion'] * 1e6:.4g} um, a pixel's pitch"
     near, far = _length(g["depth_of_field_near"]), _length(g["depth_of_field_far"])

@@ -16,7 +16,7 @@ from pydantic import ValidationError
 
 from vcam_cli import errors
 from vcam_cli.config import validation_messages
-from vcam_cli.config.file_format import Check, FileFormat, M
+from vcam_cli.config.file_format import Check, FileFormat, M, names_file
 from vcam_cli.config.file_names import absolute_file, argument_file
 from vcam_cli.config.merge import merge
 from vcam_cli.config.parts import Findings, PartReader
@@ -127,8 +127,8 @@ def _with_absolute_files(
     """Return the tree with every data file's name absolute, and the files."""
     files: list[Path] = []
 
-    def visit(node: Node, path: errors.Path) -> Node:
-        if path and path[-1] in keys and isinstance(node.value, str):
+    def visit(node: Node, path: errors.Path, kind: object = None) -> Node:
+        if path and names_file(keys, path[-1], kind) and isinstance(node.value, str):
             try:
                 node = absolute_file(node, path)
                 files.append(Path(str(node.value)))
@@ -136,7 +136,8 @@ def _with_absolute_files(
                 findings.fail(path, error.problems)
             return node
         if isinstance(node.value, dict):
-            entries = {k: visit(child, child_path(path, k)) for k, child in node.value.items()}
+            own = node.value["kind"].value if "kind" in node.value else None
+            entries = {k: visit(child, child_path(path, k), own) for k, child in node.value.items()}
             return replace(node, value=entries)
         if isinstance(node.value, list):
             return replace(node, value=[visit(c, (*path, i)) for i, c in enumerate(node.value)])

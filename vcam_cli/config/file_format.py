@@ -15,6 +15,21 @@ Check = tuple[Callable[[M], None], str]
 """What raises BadInput for a model that is wrong, and the sections that it needs to say so."""
 
 
+def names_file(keys: frozenset[Key], key: Key, kind: object) -> bool:
+    """Return whether a key of a mapping holds the name of a data file.
+
+    Parameters
+    ----------
+    keys : frozenset of str
+        Keys that always do, and "KIND.KEY" for those that do in mappings of one `kind`.
+    key : str
+        The key.
+    kind : object
+        What the mapping has as its `kind`; None where it has none.
+    """
+    return key in keys or f"{kind}.{key}" in keys
+
+
 @dataclass(frozen=True)
 class FileFormat(Generic[M]):
     """The files that describe one model."""
@@ -29,7 +44,7 @@ class FileFormat(Generic[M]):
     shorthands: Mapping[errors.Path, Key] = field(default_factory=dict)
     """Where a text stands for a mapping of this one key -> the key."""
     file_keys: frozenset[Key] = frozenset()
-    """Keys that hold names of data files."""
+    """Keys that hold names of data files: `names_file`."""
     merge_rules: MergeRules = NO_RULES
     refuse: Callable[[Node], None] = lambda root: None
     """What raises BadInput for a file of another format."""

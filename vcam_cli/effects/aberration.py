@@ -55,6 +55,12 @@ def check(camera: Camera, geometry: Geometry) -> None:
     BadInput
         For a wavefront that rises by too many wavelengths over a pupil radius.
     """
+    if camera.optics.measured_blur and geometry.focus_shift:
+        raise bad(
+            ("optics", "focus_distance"),
+            "a measured blur is that of what is in focus, and not known at other distances",
+            "write psf: none and mtf: none, or put the scene in focus",
+        )
     if camera.optics.measured_blur or not Lens.from_camera(camera, geometry).diffracts:
         return
     shortest = camera.scene.wavelengths.start
@@ -63,6 +69,7 @@ def check(camera: Camera, geometry: Geometry) -> None:
     ]
     if max(slopes) > aberration.MAX_SLOPE:
         key = "zernike" if camera.optics.zernike.terms else "defocus"
+        key = "focus_distance" if geometry.focus_shift else key
         raise bad(
             ("optics", key),
             f"gives a wavefront that rises by {max(slopes):.4g} wavelengths of"

@@ -38,6 +38,7 @@ from vcam_cli.effects.charge_diffusion import ChargeDiffusion
 from vcam_cli.effects.charge_transfer import ChargeTransfer
 from vcam_cli.effects.correlated_row_noise import CorrelatedRowNoise
 from vcam_cli.effects.dark_current import DarkCurrent
+from vcam_cli.effects.depth import Depth
 from vcam_cli.effects.diffraction import Diffraction
 from vcam_cli.effects.flicker import Flicker
 from vcam_cli.effects.fpn import FixedPattern
@@ -60,6 +61,7 @@ from vcam_cli.effects.telegraph_noise import TelegraphNoise
 ORDER: tuple[type[Effect], ...] = (
     Diffraction,
     Aberration,
+    Depth,
     Motion,
     PixelAperture,
     ChargeDiffusion,

@@ -82,7 +82,8 @@ def wavefronts(camera: Camera, geometry: Geometry) -> tuple[tuple[float | None, 
 
     They are ((place, terms), ...) by rising place, which is None for the whole field.
     """
-    shift = zernike.defocus(camera.optics.defocus, geometry.working_f_number)
+    moved = camera.optics.defocus + geometry.focus_shift
+    shift = zernike.defocus(moved, geometry.working_f_number)
     places = camera.optics.zernike.terms or ((None, ()),)
     return tuple(
         (place, zernike.combine(terms, shift))

@@ -125,7 +125,7 @@ def cells_per_pixel(path: OpticalPath, scene: ChartScene, highest: float) -> Cho
     reference = min(COPRIME * max(asked, LADDER[1]), MOST_CROP_CELLS / SMALLEST_CROP)
     if math.prod(cell_grid(scene, path.geometry, finest)) <= CHEAP:
         return ChosenCells(finest)
-    level = path.transfer.level[:, int(path.transfer.level.sum(axis=0).argmax())]
+    level = path.judged_weights.sum(axis=1)
     otf = _mean_otf(path, finest)
     crops = _crops(path, scene, reference, level)
     converged = _signals(path, crops, reference, level, otf)
@@ -187,7 +187,7 @@ def _mean_otf(path: OpticalPath, highest: float) -> Table:
     g = path.geometry
     corner = highest * math.hypot(0.5 / g.pitch_x, 0.5 / g.pitch_y)
     f = np.linspace(0, min(path.transfer.cutoff, corner), FREQUENCIES)
-    weights = path.transfer.weights[:, int(path.transfer.level.sum(axis=0).argmax())].sum(axis=0)
+    weights = path.judged_weights.sum(axis=0)
     otf = (weights / (weights.sum() or 1.0)) @ path.transfer.otf_radial(f)
     return f, otf
 

@@ -36,7 +36,7 @@ from vcam_cli.image_formation.scene_detail import (
     scene_detail,
     transfer_functions,
 )
-from vcam_cli.scenes.base import Scene
+from vcam_cli.scenes.layered import AnyScene, LayeredScene
 
 LIGHT_SHARE = 0.3
 """Part of the tolerance that all omitted effects on the light may use together."""
@@ -78,19 +78,21 @@ class LightPlan:
     def reduced(self, path: OpticalPath) -> OpticalPath:
         """Return the path without the omitted effects."""
         kept = tuple(effect for effect in path.effects if effect not in self.omitted)
+        gone = {effect.name for effect in self.omitted}
+        layers = tuple(layer.without(gone) for layer in path.layers)
         transfer = path.transfer.with_effects(kept)
         transfer = replace(transfer, weights=transfer.weights / (self.on_axis or 1.0))
-        return replace(path, transfer=transfer, effects=kept, optional=())
+        return replace(path, transfer=transfer, effects=kept, optional=(), layers=layers)
 
 
-def light_plan(path: OpticalPath, scene: Scene) -> LightPlan:
+def light_plan(path: OpticalPath, scene: AnyScene) -> LightPlan:
     """Decide which of the optional effects of a path its scene does not call for.
 
     Parameters
     ----------
     path : OpticalPath
         Lens and pixels with all effects that are wanted; `optional` names those that may go.
-    scene : Scene
+    scene : AnyScene
         Scene before the lens.
     """
     candidates = of_kind(path.optional, *KINDS)
@@ -110,7 +112,8 @@ def light_plan(path: OpticalPath, scene: Scene) -> LightPlan:
             _share(found, functions, blur) > CLEAR * budget for blur in blurs
         )
 
-    detail = scene_detail(path, scene, every_blur_counts)
+    surveyed = scene.flat if isinstance(scene, LayeredScene) else scene
+    detail = scene_detail(path, surveyed, every_blur_counts)
     if detail is not None and not functions:
         functions.update(transfer_functions(path, detail))
     shares = {effect: _share(detail, functions, effect) for effect in candidates}

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from collections.abc import Callable, Collection, Iterator
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -24,6 +24,23 @@ from vcam_cli.image_formation.transfer_functions import Transfer
 
 
 @dataclass(frozen=True)
+class LayerOptics:
+    """What acts on the light of one layer of a scene."""
+
+    effects: tuple[Effect, ...]
+    radius: float
+    """Of a point's blur by defocus; positive where the layer is nearer than what is in focus [m]"""
+
+    def without(self, names: Collection[str]) -> LayerOptics:
+        """Return the same without some effects."""
+        return replace(self, effects=tuple(e for e in self.effects if e.name not in names))
+
+    def during(self, start: float, stop: float) -> LayerOptics:
+        """Return the same from `start` to `stop` after a line's exposure begins [s]."""
+        return replace(self, effects=tuple(e.during(start, stop) for e in self.effects))
+
+
+@dataclass(frozen=True)
 class OpticalPath:
     """Lens, pixels and settings through which a scene is seen."""
 
@@ -39,6 +56,21 @@ class OpticalPath:
     look alike [e/s]."""
     optional: tuple[Effect, ...] = ()
     """Effects that may be left out where the scene does not call for them."""
+    layers: tuple[LayerOptics, ...] = ()
+    """What acts on each layer of a scene, the nearest first; () where it is seen as flat."""
+    has_opacity: bool = False
+    """Whether it is that of a layer, half of whose colors are its opacity."""
+
+    @property
+    def judged_weights(self) -> NDArray:
+        """Spectral weights (K, J) by which detail is judged: those of the color with most light.
+
+        Of a layer they are those of all colors together: a black one has detail in its opacity.
+        """
+        weights = self.transfer.weights
+        if self.has_opacity:
+            return np.asarray(weights.mean(axis=1))
+        return np.asarray(weights[:, int(self.transfer.level.sum(axis=0).argmax())])
 
     @property
     def separable(self) -> tuple[SeparableTransfer, ...]:
@@ -105,6 +137,19 @@ Layers = Iterator[Layer]
 
 
 @dataclass(frozen=True)
+class DepthReport:
+    """How the layers of a scene were put one before the other."""
+
+    cells: int
+    """Cells along each side of a pixel on which that was done."""
+    order: int
+    """Radial order of the polynomials over the aperture, up to which it was followed what layers
+    out of focus hide of each other; 0 where there was no need to."""
+    error: float
+    """Predicted rms error of both, relative to full signal."""
+
+
+@dataclass(frozen=True)
 class SpectrumReport:
     """How a scene was sampled and filtered, and what each transfer function does to it."""
 
@@ -150,3 +195,5 @@ class SpectrumReport:
     """Bound on the signal before blur: a ceiling above it changes nothing [electrons / s]."""
     memory: int = 0
     """Estimated memory [bytes]."""
+    depth: DepthReport | None = None
+    """How layers were put one before the other; None of a flat scene."""

@@ -28,7 +28,8 @@ from vcam_cli.image_formation.strategies import image_layers
 from vcam_cli.image_formation.transfer_functions import Band, Transfer, transfer
 from vcam_cli.parallel import each
 from vcam_cli.rng import blocks
-from vcam_cli.scenes.base import Scene, View
+from vcam_cli.scenes.base import View
+from vcam_cli.scenes.layered import AnyScene
 from vcam_cli.spectra import Spectrum
 
 
@@ -176,14 +177,14 @@ class Rate:
     """How the scene was sampled and filtered, and what each transfer function does to it."""
 
 
-def photo_rate(path: OpticalPath, scene: Scene, planes: bool = False) -> Rate:
+def photo_rate(path: OpticalPath, scene: AnyScene, planes: bool = False) -> Rate:
     """Return the photo-electrons per second in every place of the lattice, noise-free.
 
     Parameters
     ----------
     path : OpticalPath
         Lens, pixels and settings.
-    scene : Scene
+    scene : AnyScene
         The scene.
     planes : bool, optional
         Whether every place has every color, and not its own alone.

@@ -1,5 +1,6 @@
 """From a scene to the signal of its pixels: each scene by the plainest computation that suits it.
 
+- Layers at their own distances: each by one of these ways, then front to back (`layered.py`).
 - Sinusoids, and patterns that repeat whose harmonics up to the cut-off are few enough to be summed:
   each has its transfer. Exact (`harmonic_scenes.py`).
 - No blur in the lens or in the silicon: means over the photodetectors. Exact (`box_average.py`).
@@ -33,12 +34,14 @@ from vcam_cli.image_formation.harmonic_scenes import (
     harmonics_count,
     wave_layers,
 )
+from vcam_cli.image_formation.layered import layered_image
 from vcam_cli.image_formation.optical_path import Layer, Layers, OpticalPath, SpectrumReport
 from vcam_cli.image_formation.scene_sampling import sampled_image, with_sufficient_precision
 from vcam_cli.image_formation.scene_spectrum import SceneSpectrum
 from vcam_cli.image_formation.sub_exposures import sub_exposed_layers, sub_exposed_motion
 from vcam_cli.image_formation.transfer_tables import Tables, mixtures, tabulate
-from vcam_cli.scenes.base import ChartScene, HarmonicScene, SampledScene, Scene
+from vcam_cli.scenes.base import ChartScene, HarmonicScene, SampledScene
+from vcam_cli.scenes.layered import AnyScene, LayeredScene
 from vcam_cli.scenes.waves import WaveScene
 
 SMOOTH = 16
@@ -47,14 +50,14 @@ PERIODS = 8
 """Parts of a period of a blur's phase over which it is a cubic."""
 
 
-def image_layers(path: OpticalPath, scene: Scene) -> tuple[Layers, SpectrumReport]:
+def image_layers(path: OpticalPath, scene: AnyScene) -> tuple[Layers, SpectrumReport]:
     """Return the light at the photodetectors, and how it was computed.
 
     Parameters
     ----------
     path : OpticalPath
         Lens, pixels and settings.
-    scene : Scene
+    scene : AnyScene
         The scene.
 
     Returns
@@ -71,6 +74,10 @@ def image_layers(path: OpticalPath, scene: Scene) -> tuple[Layers, SpectrumRepor
     """
     if path.transfer.is_dark:
         return _dark_layers(path)
+    if isinstance(scene, LayeredScene):
+        if path.layers:
+            return layered_image(path, scene, image_layers)
+        scene = scene.flat
     if motion := sub_exposed_motion(path):
         return sub_exposed_layers(path, scene, motion, image_layers)
     if isinstance(scene, WaveScene):

@@ -196,10 +196,28 @@ def _chebyshev_series(waves: Floats, slope: float) -> Floats:
 
     count = 32 + 4 * len(waves) + math.ceil(1.1 * 2 * np.pi * slope)
     angle = (np.arange(count) + 0.5) * (np.pi / count)
-    values = [_mean_over_overlap(waves, (math.cos(a) + 1) / 2) for a in angle]
+    half_shifts = (np.cos(angle) + 1) / 2
+    values = (
+        _means_of_defocus(float(waves[1]), half_shifts)
+        if len(waves) == 2
+        else [_mean_over_overlap(waves, h) for h in half_shifts.tolist()]
+    )
     coefficients = dct(np.array(values), type=2) / count
     coefficients[0] /= 2
     return coefficients
+
+
+def _means_of_defocus(waves: float, half_shifts: Floats) -> Floats:
+    """Return the same as `_mean_over_overlap` for all half shifts (n,), for defocus alone.
+
+    Its dW is 8 waves h x: the mean is one along x, of chords of the overlap.
+    """
+    a, weight = _gauss(24 + math.ceil(0.3 * 16 * np.pi * abs(waves)))
+    h = half_shifts[:, None]
+    angle = np.arccos(h) * a
+    chord = weight * np.sin(angle) ** 2
+    mean = (chord * np.cos(16 * np.pi * waves * h * (np.cos(angle) - h))).sum(axis=1)
+    return np.asarray(mean / chord.sum(axis=1))
 
 
 def _mean_over_overlap(waves: Floats, half_shift: float) -> float:

@@ -1,6 +1,8 @@
 """From what the camera file says about the scene to light on the sensor plane."""
 
-from vcam_cli.camera import scene as models
+from vcam_cli.camera import charts
+from vcam_cli.camera.scene import Scene as SceneModel
+from vcam_cli.camera.scene_files import Hyperspectral, ImageFile
 from vcam_cli.errors import BadInput, bad
 from vcam_cli.scenes import (
     colorchecker,
@@ -37,7 +39,7 @@ SOURCE = ("scene", "source")
 
 
 def build(
-    scene: models.Scene,
+    scene: SceneModel,
     view: View,
     picture: Array | Cube | None,
     primaries: str = "crt-brainard",
@@ -46,7 +48,7 @@ def build(
 
     Parameters
     ----------
-    scene : models.Scene
+    scene : SceneModel
         What the camera file says of it.
     view : View
         Rectangle that the scene has to fill.
@@ -68,21 +70,19 @@ def build(
         give, and for sources that are not built.
     """
     source = scene.source
-    if isinstance(source, models.Hyperspectral):
+    if isinstance(source, Hyperspectral):
         if not isinstance(picture, Cube):
             raise ValueError("a hyperspectral source needs its cube")
         return cube_scene(scene, picture, view)
-    if isinstance(source, models.ImageFile):
+    if isinstance(source, ImageFile):
         if picture is None or isinstance(picture, Cube):
             raise ValueError("an image source needs its decoded picture")
         return _image(scene, source.model, view, picture, primaries)
     white = light.white_radiance(scene)
     waves = _waves(source)
-    if waves is not None:
-        if _fills(view):
-            return WaveScene((white,), waves, white)
-        return chart_scene(WaveChart(waves), (white,), white, view)
-    chart, reflectances = _chart(source, view)
+    if waves is not None and _fills(view):
+        return WaveScene((white,), waves, white)
+    chart, reflectances = chart_and_reflectances(source, view)
     spectra = tuple(white.multiply(r) for r in reflectances)
     sampled = chart_scene(chart, spectra, white, view)
     if isinstance(chart, PointGrid) and _fills(view):
@@ -90,14 +90,20 @@ def build(
     return sampled
 
 
+def chart_and_reflectances(source: object, view: View) -> tuple[Chart, tuple[Spectrum, ...]]:
+    """Return a chart on the view's frame, and the reflectances of its parts."""
+    waves = _waves(source)
+    return _chart(source, view) if waves is None else (WaveChart(waves), (Spectrum.flat(1.0),))
+
+
 def _waves(source: object) -> tuple[Wave, ...] | None:
     """Return the source as waves; None where it is none."""
     match source:
-        case models.Uniform():
+        case charts.Uniform():
             return uniform.waves(source.reflectance)
-        case models.Dark():
+        case charts.Dark():
             return uniform.waves(0.0)
-        case models.Sinusoid():
+        case charts.Sinusoid():
             return sinusoid.waves(
                 source.frequency, source.contrast, source.mean, source.orientation, source.phase
             )
@@ -109,31 +115,31 @@ def _chart(source: object, view: View) -> tuple[Chart, tuple[Spectrum, ...]]:
     gray = (Spectrum.flat(1.0),)
     frame = view.frame
     match source:
-        case models.Csf():
+        case charts.Csf():
             return (
                 Csf(frame, source.max_frequency, source.mean, source.max_contrast, source.phase),
                 csf.modulation_colors(source.modulation),
             )
-        case models.SlantedEdge():
+        case charts.SlantedEdge():
             return SlantedEdge(source.angle, source.contrast), gray
-        case models.ColorChecker():
+        case charts.ColorChecker():
             card = colorchecker.largest_card(frame)
             return colorchecker.ColorChecker(card), colorchecker.reflectances()
-        case models.DeadLeaves():
+        case charts.DeadLeaves():
             leaves = dead_leaves.dead_leaves(source.seed, frame)
             if source.colorchecker == 0.0:
                 return leaves, dead_leaves.reflectances()
             card = colorchecker.card_of_height(source.colorchecker, frame)
             return LeavesWithColorChecker(leaves, card), colorchecker.reflectances()
-        case models.StepWedge():
+        case charts.StepWedge():
             return step_wedge.step_wedge(source.steps, source.density_range, frame), gray
-        case models.SiemensStar():
+        case charts.SiemensStar():
             return siemens_star.SiemensStar(source.spokes, source.contrast), gray
-        case models.PointGrid():
+        case charts.PointGrid():
             return PointGrid(source.spacing, source.diameter), gray
-        case models.EyeChart():
+        case charts.EyeChart():
             return eye_chart.eye_chart(source.rows, frame), gray
-        case models.HdrPatches():
+        case charts.HdrPatches():
             return hdr_patches.hdr_patches(
                 source.patches, source.dynamic_range, source.lamp, frame
             ), gray
@@ -141,17 +147,26 @@ def _chart(source: object, view: View) -> tuple[Chart, tuple[Spectrum, ...]]:
 
 
 def _image(
-    scene: models.Scene, model: str, view: View, picture: Array, primaries: str
+    scene: SceneModel, model: str, view: View, picture: Array, primaries: str
 ) -> SampledScene:
-    channels = picture.shape[2] if picture.ndim == 3 else 0
-    check_channels(model, channels)
-    spectra, white = _model(scene, picture_model(model, channels), primaries)
+    spectra, white = _spectra_and_white(scene, model, picture, primaries)
     return image_scene(picture, spectra, white, view)
 
 
-def _model(
-    scene: models.Scene, model: str, primaries: str
+def picture_spectra(scene: SceneModel, model: str, picture: Array) -> tuple[Spectrum, ...]:
+    """Return the radiance of every channel of a lit picture (h, w, channels) where it is 1."""
+    return _spectra_and_white(scene, model, picture, "")[0]
+
+
+def _spectra_and_white(
+    scene: SceneModel, model: str, picture: Array, primaries: str
 ) -> tuple[tuple[Spectrum, ...], Spectrum]:
+    channels = picture.shape[2] if picture.ndim == 3 else 0
+    check_channels(model, channels)
+    return _model(scene, picture_model(model, channels), primaries)
+
+
+def _model(scene: SceneModel, model: str, primaries: str) -> tuple[tuple[Spectrum, ...], Spectrum]:
     """Return the radiance of every channel where it is 1, and of white."""
     match model:
         case "laser":

@@ -18,6 +18,7 @@ from vcam_cli.camera.derived.geometry import geometry
 from vcam_cli.camera.derived.image_motion import check_motion
 from vcam_cli.camera.derived.lattice import places
 from vcam_cli.camera.derived.line_times import check_shutter
+from vcam_cli.camera.derived.scene_layers import check_layers
 from vcam_cli.camera.processing import SHOWN
 from vcam_cli.camera.scene_files import Crop
 from vcam_cli.effects import aberration, point_spread
@@ -178,6 +179,7 @@ CHECKS: tuple[files.CameraCheck, ...] = (
     (check_effects, "optics pixel effects"),
     (check_shutter, "array exposure"),
     (check_motion, "scene optics exposure"),
+    (check_layers, "scene optics pixel array"),
     (check_binning, "pixel array exposure adc"),
     (check_size, "pixel array processing"),
     (check_positions, "pixel array processing"),

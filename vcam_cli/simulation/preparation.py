@@ -27,9 +27,10 @@ from vcam_cli.quality import scielab
 from vcam_cli.quality.display import display_screen
 from vcam_cli.readout import auto_exposure, exposure, iso_speed
 from vcam_cli.readout.layout import Layout, layout
-from vcam_cli.scenes.base import ChartScene, Scene
-from vcam_cli.scenes.build import build
+from vcam_cli.scenes.base import ChartScene
+from vcam_cli.scenes.layered import AnyScene, LayeredScene
 from vcam_cli.simulation import cost_model, exposed_light, plan
+from vcam_cli.simulation.scene_files import ScenePicture, build_scene, layer_optics, scene_bytes
 
 
 @dataclass(frozen=True)
@@ -42,7 +43,7 @@ class Prepared:
     settings: Settings
     mosaic: Mosaic
     layout: Layout
-    scene: Scene
+    scene: AnyScene
     transfer: Transfer
     """Transfer of the scene's components to one pixel of the lattice."""
     white_rate: NDArray
@@ -77,7 +78,7 @@ class Prepared:
 
 def prepare(
     camera: Camera,
-    picture: NDArray | None,
+    picture: ScenePicture,
     workers: int,
     stages: Stages,
     rate_cache: RateCache | None = None,
@@ -89,8 +90,8 @@ def prepare(
     ----------
     camera : Camera
         The camera.
-    picture : NDArray or None
-        Samples of the scene's image file (h, w, channels) in linear light; None for charts.
+    picture : ScenePicture
+        What the scene's files hold.
     workers : int
         Number of threads.
     stages : Stages
@@ -125,7 +126,7 @@ def prepare(
 
 def standing_still(camera: Camera) -> Camera:
     """Return the camera as it meters and focuses: what moves stands where its file says."""
-    source = camera.scene.source.model_copy(update={"motion": None})
+    source = camera.scene.source.standing_still()
     scene = camera.scene.model_copy(update={"source": source, "camera_motion": None})
     effects = camera.effects
     if isinstance(effects, dict):
@@ -145,7 +146,7 @@ def _timed(camera: Camera, metered: Prepared) -> Camera:
 
 def _prepare(
     camera: Camera,
-    picture: NDArray | None,
+    picture: ScenePicture,
     workers: int,
     stages: Stages,
     rate_cache: RateCache | None,
@@ -166,9 +167,9 @@ def _prepare(
         band = camera.scene.wavelengths
         margin = partial(bandwidth.margin, place.lattice, effects, (band.start, band.stop), knobs)
 
-        def scene_within(pixels: int) -> Scene:
+        def scene_within(pixels: int) -> AnyScene:
             view = photon_rate.view(place.lattice, knobs, pixels)
-            return build(camera.scene, view, picture, camera.display.primaries)
+            return build_scene(camera, view, picture)
 
         scene = scene_within(margin())
     with stages("optics"):
@@ -182,7 +183,8 @@ def _prepare(
             scene = scene_within(margin(overexposure))
         optional = plan.optional_effects(camera, effects)
         path = OpticalPath(
-            transfer, place.lattice, knobs, place.mosaic, effects, workers, ceiling, optional
+            *(transfer, place.lattice, knobs, place.mosaic, effects, workers, ceiling, optional),
+            layer_optics(camera, effects),
         )
         photo_rate = partial(photon_rate.photo_rate, path, scene, place.planes)
         light = photo_rate() if rate_cache is None else rate_cache.rate(camera, ceiling, photo_rate)
@@ -194,7 +196,7 @@ def _prepare(
             *(camera, solved, circuit, place, light, white_rate, effects, optional, knobs, during)
         )
         camera = camera.with_exposure_gain(exposed.settings.gain)
-        needed = max(frame_bytes, light.spectrum.memory) + getattr(picture, "nbytes", 0)
+        needed = max(frame_bytes, light.spectrum.memory) + scene_bytes(picture)
         changes = light.spectrum.changes | exposed.changes
         decided = plan.make(
             camera, solved, knobs, exposed.light_plan, exposed.signal, needed, changes
@@ -227,7 +229,7 @@ def _prepare(
 
 def _light_during(
     path: OpticalPath,
-    scene: Scene,
+    scene: AnyScene,
     place: Layout,
     light: photon_rate.Rate,
     start: float,
@@ -238,15 +240,22 @@ def _light_during(
     It is that of the whole exposure where nothing is simulated to move.
     """
     whole = light.plan.reduced(path)
-    if not of_kind(whole.effects, ImageMotion):
+    if not of_kind(whole.effects, ImageMotion) and not any(
+        of_kind(layer.effects, ImageMotion) for layer in whole.layers
+    ):
         return light.values
     effects = tuple(effect.during(start, stop) for effect in whole.effects)
-    part = replace(whole, effects=effects, transfer=whole.transfer.with_effects(effects))
+    layers = tuple(layer.during(start, stop) for layer in whole.layers)
+    part = replace(
+        whole, effects=effects, transfer=whole.transfer.with_effects(effects), layers=layers
+    )
     return photon_rate.photo_rate(part, scene, place.planes).values
 
 
-def _brightest(scene: Scene) -> float:
+def _brightest(scene: AnyScene) -> float:
     """Return the brightest light that a chart has beyond the array, relative to white; else 0."""
+    if isinstance(scene, LayeredScene):
+        scene = scene.flat
     return scene.chart.brightest if isinstance(scene, ChartScene) else 0.0
 
 
@@ -296,7 +305,7 @@ def _transfer(
     camera: Camera,
     solved: Geometry,
     place: Layout,
-    scene: Scene,
+    scene: AnyScene,
     effects: tuple[Effect, ...],
     knobs: Settings,
     rate_cache: RateCache | None,

@@ -15,6 +15,7 @@ from vcam_cli.camera.derived.named_spectra import spectra
 from vcam_cli.camera.load import FILE_KEYS
 from vcam_cli.camera.step_plugins import origin, registered
 from vcam_cli.config import shipped
+from vcam_cli.config.file_format import names_file
 from vcam_cli.files.spectral.hyperspectral import companions
 from vcam_cli.source_code import code_hash
 
@@ -34,7 +35,7 @@ def data_files(camera: Camera, form: dict[str, Any] | None = None) -> tuple[Path
     def describe(value: Any) -> Iterator[str]:
         if isinstance(value, dict):
             for key, item in value.items():
-                if key in FILE_KEYS and isinstance(item, str):
+                if names_file(FILE_KEYS, key, value.get("kind")) and isinstance(item, str):
                     yield item
                 else:
                     yield from describe(item)

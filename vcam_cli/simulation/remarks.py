@@ -9,12 +9,13 @@ from vcam_cli.camera.derived import photodiode
 from vcam_cli.camera.derived.camera_angles import camera_angles
 from vcam_cli.camera.derived.dark_noise import SIGMAS, dark_noise
 from vcam_cli.camera.processing import SHOWN
-from vcam_cli.camera.scene import ImageFile
+from vcam_cli.camera.scene_files import ImageFile
 from vcam_cli.effects.base import ImageMotion, of_kind
 from vcam_cli.effects.order import quantizer
 from vcam_cli.scenes.build import picture_model
 from vcam_cli.scenes.hyperspectral import CubeScene
 from vcam_cli.scenes.image import ImageScene
+from vcam_cli.scenes.layered import LayeredScene
 from vcam_cli.scenes.light import visible_range
 from vcam_cli.simulation import idle_keys
 from vcam_cli.simulation.preparation import Prepared
@@ -48,6 +49,7 @@ def remarks(ready: Prepared) -> tuple[str, ...]:
         *_colors_of_picture(ready),
         *_cropped(ready),
         *_motion(ready),
+        *_depth(ready),
         *_steps_not_shown(ready),
     )
     if not isinstance(scene, CubeScene):
@@ -110,6 +112,27 @@ def _sub_exposures(ready: Prepared) -> str:
         " along each side of a pixel; they leave an error of"
         f" {100 * found.sub_exposure_error:.2g} % of full signal"
     )
+
+
+def _depth(ready: Prepared) -> tuple[str, ...]:
+    """Return how layers were put one before the other, and where the lens was focused unasked."""
+    found, camera, notes = ready.spectrum.depth, ready.camera, []
+    if not isinstance(ready.scene, LayeredScene):
+        return ()
+    if camera.optics.focus_distance is None and "distance" not in camera.scene.model_fields_set:
+        notes.append(
+            f"the lens is focused at {camera.scene.distance:g} m, which is the default of"
+            " scene.distance; give optics.focus_distance"
+        )
+    if found is not None:
+        how = f", covariance over the aperture to order {found.order}" if found.order else ""
+        more = found.error > ready.settings.tolerance
+        notes.append(
+            f"layers are put one before the other on {found.cells} x {found.cells} cells a"
+            f" pixel{how}: predicted error {100 * found.error:.2g} % of full signal"
+            + (", more than accuracy asks for" if more else "")
+        )
+    return tuple(notes)
 
 
 def _clipped_dark(ready: Prepared) -> tuple[str, ...]:

@@ -16,6 +16,7 @@ from vcam_cli.camera.array import Positions
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.electrical import no_volts
 from vcam_cli.camera.derived.geometry import geometry
+from vcam_cli.camera.derived.scene_layers import with_flat_scene
 from vcam_cli.camera.processing_steps import Step
 from vcam_cli.errors import BadInput
 from vcam_cli.floats import own_float_errors
@@ -34,6 +35,7 @@ from vcam_cli.simulation.figures import figures
 from vcam_cli.simulation.frame import Frame, expose
 from vcam_cli.simulation.preparation import Prepared
 from vcam_cli.simulation.preparation import prepare as bring_light
+from vcam_cli.simulation.scene_files import read_scene
 from vcam_cli.simulation.shared import Shared
 
 
@@ -317,7 +319,7 @@ def prepare(
     try:
         stages = Stages(watch=observer(watch))
         camera = _load_lens(camera, stages)
-        picture, notes = _completed(camera, *_picture(camera, stages))
+        picture, notes = _completed(camera, *read_scene(camera, stages))
         workers = workers or threads(camera)
         camera, told, seconds = focused(camera, picture, workers, stages)
         ready = bring_light(camera, picture, workers, stages, earlier=seconds)
@@ -327,30 +329,11 @@ def prepare(
 
 
 def _load_lens(camera: Camera, stages: Stages) -> Camera:
-    """Return the camera with the samples of its point spread function, its wavefront checked."""
+    """Return the camera with what its lens's file holds, checked; one layer alone is flat."""
+    camera = with_flat_scene(camera)
     with stages("read"):
         samples = read_lens(camera)
     return camera.with_samples(samples) if samples else camera
-
-
-def _picture(camera: Camera, stages: Stages) -> tuple[Any, tuple[str, ...]]:
-    """Return what the scene's file holds (samples, or a `Cube`), or None, and notes."""
-    source, path = camera.scene.source, ("scene", "source", "file")
-    if source.kind == "image":
-        from vcam_cli.files.images import read_picture
-
-        with stages("read"):
-            read = read_picture(source.file, source.encoding, source.white, path)
-        return read.data, read.notes
-    if source.kind == "hyperspectral":
-        from vcam_cli.files.spectral.hyperspectral import read_cube
-        from vcam_cli.scenes.hyperspectral import check_place
-
-        with stages("read"):
-            cube, notes = read_cube(source.file, path, source.channels)
-        check_place(cube.bands, camera.optics.is_lens)
-        return cube, notes
-    return None, ()
 
 
 def _completed(camera: Camera, picture: Any, notes: tuple[str, ...]) -> tuple[Any, tuple[str, ...]]:
@@ -367,7 +350,7 @@ def _completed(camera: Camera, picture: Any, notes: tuple[str, ...]) -> tuple[An
 
 def _simulate(camera: Camera, workers: int, stages: Stages, shared: Shared) -> Result:
     camera = _load_lens(camera, stages)
-    picture, notes = _completed(camera, *shared.picture(camera, lambda: _picture(camera, stages)))
+    picture, notes = _completed(camera, *shared.picture(camera, lambda: read_scene(camera, stages)))
     camera, told, seconds = focused(camera, picture, workers, stages)
     frame = expose(camera, picture, workers, stages, shared.rate_cache, seconds)
     context = Context(

@@ -35,11 +35,13 @@ from vcam_cli.image_formation.strategies import image_layers
 from vcam_cli.image_formation.transfer_functions import Band, Transfer
 from vcam_cli.parallel import each
 from vcam_cli.rng import blocks
-from vcam_cli.scenes.base import SampledScene, Scene
+from vcam_cli.scenes.base import SampledScene
 from vcam_cli.scenes.build import build
+from vcam_cli.scenes.layered import AnyScene, LayeredScene
 from vcam_cli.scenes.waves import WaveScene
 from vcam_cli.simulation.cost_model import BANDS_AT_ONCE
 from vcam_cli.simulation.preparation import Prepared
+from vcam_cli.simulation.scene_files import layer_optics
 from vcam_cli.spectra import Spectrum, hat_weights
 
 MARGIN = 32
@@ -98,7 +100,10 @@ def _bands(
     transfer = Transfer(wavelengths, level, of_kind(in_lens, Blur))
     bands = Mosaic((tuple(f"{w * 1e9:.6f}" for w in wavelengths),))
     effects = (*in_lens, PixelAperture(g.pitch_x, g.pitch_y))
-    light = OpticalPath(transfer, g, ready.settings, bands, effects, workers)
+    omitted = {d.name for d in ready.plan.decisions if d.state == "off"}
+    optics = layer_optics(ready.camera, effects)
+    kept = tuple(layer.without(omitted) for layer in optics)
+    light = OpticalPath(transfer, g, ready.settings, bands, effects, workers, layers=kept)
     dtype = ready.settings.dtype
     x, y = pixel_centers(g)
     gains = [e.gain(x.astype(dtype), y.astype(dtype)) for e in of_kind(in_lens, Gain)]
@@ -121,10 +126,10 @@ def _bands(
         yield plane
 
 
-def _scene(ready: Prepared) -> Scene:
+def _scene(ready: Prepared) -> AnyScene:
     """Return the frame's scene, on the picture's grid where the raw frame has another."""
     grid = ready.layout.grid
-    if grid is ready.layout.lattice or isinstance(ready.scene, WaveScene):
+    if grid is ready.layout.lattice or isinstance(ready.scene, WaveScene | LayeredScene):
         return ready.scene
     if isinstance(ready.scene, SampledScene) and ready.scene.samples == "squares":
         return ready.scene

@@ -25,6 +25,7 @@ from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.load import FILE_KEYS, merge
 from vcam_cli.camera.simulation import Seed
 from vcam_cli.config.document import Document
+from vcam_cli.config.file_format import names_file
 from vcam_cli.config.file_names import current_folder
 from vcam_cli.config.validation_messages import NO_SUCH_KEY
 from vcam_cli.config.yaml_tree import Node, Source, tree_at
@@ -232,7 +233,7 @@ def _embed_files(form: Any) -> Any:
     if isinstance(form, dict):
         return {
             key: [_digest(Path(item)), Path(item).suffix.lower()]
-            if key in FILE_KEYS and isinstance(item, str)
+            if names_file(FILE_KEYS, key, form.get("kind")) and isinstance(item, str)
             else _embed_files(item)
             for key, item in form.items()
         }

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.lattice import lattice
-from vcam_cli.camera.derived.lens import lens
+from vcam_cli.camera.derived.lens import lens, scene_distance
 from vcam_cli.camera.derived.pixel_layout import (
     Area,
     check_pupil,
@@ -36,7 +36,13 @@ class Geometry:
     f_number: float
     aperture_diameter: float
     object_distance: float
+    """From the lens to the scene."""
+    focus_distance: float
+    """From the lens to what is in focus."""
     magnification: float
+    """Of what is in focus, negative; the cone of light at the sensor follows from it."""
+    scene_scale: float
+    """Size of the scene's image over that of the scene; 0 of a scene at infinity."""
     rows: int
     columns: int
     pixel_width: float
@@ -69,6 +75,17 @@ class Geometry:
     def image_distance(self) -> float:
         """Distance from the lens to the sensor."""
         return float(radiometry.image_distance(self.focal_length, self.magnification))
+
+    @property
+    def focus_shift(self) -> float:
+        """Shift of the image plane that defocuses as much as the scene's distance does.
+
+        Of a point at d before a lens focused at s it is v^2 (1/d - 1/s): with the image distance v
+        and the aperture A its wavefront and its blur, of the diameter A v |1/d - 1/s|, are exact.
+        """
+        if self.object_distance == self.focus_distance:
+            return 0.0
+        return self.image_distance**2 * (1 / self.object_distance - 1 / self.focus_distance)
 
     @property
     def working_f_number(self) -> float:
@@ -131,8 +148,9 @@ class Geometry:
             "focal_length": self.focal_length,
             "f_number": self.f_number,
             "working_f_number": self.working_f_number,
-            "magnification": self.magnification,
+            "magnification": -self.scene_scale,
             "object_distance": self.object_distance,
+            "focus_distance": self.focus_distance,
             "image_distance": si,
             "exit_pupil_distance": self.exit_pupil_distance,
             "numerical_aperture": self.numerical_aperture,
@@ -141,9 +159,9 @@ class Geometry:
             "field_of_view_horizontal": float(radiometry.field_of_view(w, si)),
             "field_of_view_vertical": float(radiometry.field_of_view(h, si)),
             "field_of_view_diagonal": float(radiometry.field_of_view(math.hypot(w, h), si)),
-            "scene_width": w / -self.magnification if finite else math.inf,
-            "scene_height": h / -self.magnification if finite else math.inf,
-            "scene_diagonal": math.hypot(w, h) / -self.magnification if finite else math.inf,
+            "scene_width": w / self.scene_scale if finite else math.inf,
+            "scene_height": h / self.scene_scale if finite else math.inf,
+            "scene_diagonal": math.hypot(w, h) / self.scene_scale if finite else math.inf,
             **self._sharpness(),
             "rows": self.rows,
             "columns": self.columns,
@@ -159,7 +177,7 @@ class Geometry:
                 diffraction.cutoff_frequency(550e-9, self.f_number, self.magnification)
             ),
             "sample_pitch_sensor": sample,
-            "sample_pitch_scene": sample / -self.magnification if finite else math.inf,
+            "sample_pitch_scene": sample / self.scene_scale if finite else math.inf,
             "sample_pitch_angle": sample / si,
             "scene_rows": round(h / sample),
             "scene_columns": round(w / sample),
@@ -172,7 +190,7 @@ class Geometry:
             return {}
         circle = max(self.pitch_x, self.pitch_y)
         lens = self.focal_length, self.f_number, circle
-        near, far = depth_of_field.depth_of_field(self.object_distance, *lens)
+        near, far = depth_of_field.depth_of_field(self.focus_distance, *lens)
         return {
             "circle_of_confusion": circle,
             "hyperfocal_distance": depth_of_field.hyperfocal_distance(*lens),
@@ -203,8 +221,10 @@ def geometry(camera: Camera) -> Geometry:
         focal_length=optics.focal_length,
         f_number=optics.f_number,
         aperture_diameter=optics.focal_length / optics.f_number if camera.optics.is_lens else 0.0,
-        object_distance=camera.scene.distance if camera.optics.is_lens else math.inf,
+        object_distance=scene_distance(camera) if camera.optics.is_lens else math.inf,
+        focus_distance=optics.focus_distance,
         magnification=optics.magnification,
+        scene_scale=optics.scale_at(scene_distance(camera)),
         rows=pixels.rows,
         columns=pixels.columns,
         pixel_width=pixel.width,
@@ -223,7 +243,7 @@ def geometry(camera: Camera) -> Geometry:
         collecting_y=collecting.y,
         sampling_scale=sampling_scale(camera, pupil, pixels.width, pixels.height),
         exit_pupil_distance=pupil,
-        scene_width_on_sensor=_scene_width(camera, optics.magnification),
+        scene_width_on_sensor=_scene_width(camera, optics.scale_at(scene_distance(camera))),
     )
 
 
@@ -264,17 +284,17 @@ def _areas(camera: Camera) -> tuple[Area, Area]:
     return found, collecting_area(camera, found)
 
 
-def _scene_width(camera: Camera, magnification: float) -> float | None:
+def _scene_width(camera: Camera, scale: float) -> float | None:
     extent = camera.scene.extent
     if not isinstance(extent, Extent):
         return None
     if not camera.optics.is_lens:
         message = "a bare sensor sees its scene on its own plane, where the scene covers it"
         raise bad("scene.extent", message, "use extent: sensor")
-    if magnification == 0:
+    if scale == 0:
         raise bad(
             "scene.extent",
             "a scene at infinity has no width in meters",
             "use extent: sensor, or give scene.distance",
         )
-    return extent.width * -magnification
+    return extent.width * scale

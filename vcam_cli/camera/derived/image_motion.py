@@ -182,7 +182,7 @@ def exposed_motion(camera: Camera, geometry: Geometry) -> ExposedMotion | None:
 def trajectory(camera: Camera, geometry: Geometry, reference: float = 0.0) -> Trajectory:
     """Return the motion of a camera's image, from a time on at which nothing has moved [s]."""
     motion, turn = camera.scene.source.motion, camera.scene.camera_motion
-    scale = -geometry.magnification
+    scale = geometry.scene_scale
     return Trajectory(
         scene_x=motion.x * scale if motion else 0.0,
         scene_y=motion.y * scale if motion else 0.0,

@@ -10,6 +10,7 @@ from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.lattice import lattice
 from vcam_cli.camera.optics import LEAST_F_NUMBER, MOST_F_NUMBER
 from vcam_cli.camera.pixel import AGREE
+from vcam_cli.camera.sources import Layers
 from vcam_cli.errors import bad
 from vcam_cli.physics import radiometry
 
@@ -25,7 +26,30 @@ class Lens:
     f_number: float
     """Focal length over diameter of the entrance pupil."""
     magnification: float
-    """Magnification, negative; 0 for a scene at infinity."""
+    """Magnification of what is in focus, negative; 0 at infinity."""
+    focus_distance: float
+    """From the lens to what is in focus [m]."""
+
+    def scale_at(self, distance: float) -> float:
+        """Return the size of an image over that of what is seen, by the lens's central ray.
+
+        It is 0 at infinity, and the magnification's size for what is in focus.
+        """
+        if distance == self.focus_distance or math.isinf(self.f_number):
+            return -self.magnification
+        return (1 - self.magnification) * self.focal_length / distance
+
+
+def scene_distance(camera: Camera) -> float:
+    """Return the distance from the lens to the scene [m]; layers as a whole are in focus."""
+    layered = isinstance(camera.scene.source, Layers)
+    return focus_distance(camera) if layered else camera.scene.distance
+
+
+def focus_distance(camera: Camera) -> float:
+    """Return the distance from the lens to what is in focus [m]."""
+    given = camera.optics.focus_distance
+    return camera.scene.distance if given is None else given
 
 
 def lens(camera: Camera) -> Lens:
@@ -34,10 +58,10 @@ def lens(camera: Camera) -> Lens:
     Raises BadInput for a lens that is not determined, numbers that disagree, and a scene at or
     inside the focal length.
     """
-    optics, distance = camera.optics, camera.scene.distance
+    optics, distance = camera.optics, scene_distance(camera)
     if not optics.is_lens:
-        return Lens(math.inf, math.inf, 0.0)
-    f = _focal_length(camera)
+        return Lens(math.inf, math.inf, 0.0, math.inf)
+    f, focus = _focal_length(camera), focus_distance(camera)
     if distance <= f:
         raise bad(
             "scene.distance",
@@ -45,7 +69,14 @@ def lens(camera: Camera) -> Lens:
             " and forms no real image",
             "put the scene further away, or use a shorter focal length",
         )
-    m = float(radiometry.magnification(f, distance))
+    if focus <= f:
+        raise bad(
+            "optics.focus_distance",
+            f"{focus:.6g} m lies within the focal length of {f:.6g} m, where nothing can be"
+            " in focus",
+            "focus further away, or use a shorter focal length",
+        )
+    m = float(radiometry.magnification(f, focus))
     found: dict[str, float] = {}
     if optics.f_number is not None:
         found["f_number"] = optics.f_number
@@ -61,7 +92,7 @@ def lens(camera: Camera) -> Lens:
             "the lens is not determined: its f-number is missing",
             "give f_number, aperture_diameter or numerical_aperture beside the focal length",
         )
-    return Lens(f, _common_value(found, "", lambda number: f"f/{number:.5g}"), m)
+    return Lens(f, _common_value(found, "", lambda number: f"f/{number:.5g}"), m, focus)
 
 
 def _require_f_number(number: float, focal_length: float, diameter: float) -> None:
@@ -80,7 +111,7 @@ def _require_f_number(number: float, focal_length: float, diameter: float) -> No
 
 def _focal_length(camera: Camera) -> float:
     """Return the focal length, from every pair that determines it."""
-    optics, distance = camera.optics, camera.scene.distance
+    optics, distance = camera.optics, focus_distance(camera)
     found: dict[str, float] = {}
     if optics.focal_length is not None:
         found["focal_length"] = optics.focal_length

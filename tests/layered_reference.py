@@ -1,0 +1,207 @@
+"""Layered scenes by rays: every ray meets the layers where geometry says, and sees the first.
+
+Nothing here is shared with the package: a thin lens, a sum over points of its aperture and of each
+pixel, pictures of even squares.
+"""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import OpenImageIO as oiio
+
+FOCAL, F_NUMBER, PITCH = 5e-3, 2.0, 5e-6
+SIDE = 32
+"""Pixels along a side of the array."""
+RAYS = 3000
+
+
+@dataclass(frozen=True)
+class Flat:
+    """A layer: light and opacity as squares, its size and place in its own plane [m]."""
+
+    distance: float
+    light: np.ndarray
+    opacity: np.ndarray
+    width: float | None
+    position: tuple[float, float] = (0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Scene:
+    layers: tuple[Flat, ...]
+    focus: float
+
+    @property
+    def image_distance(self) -> float:
+        return 1 / (1 / FOCAL - 1 / self.focus)
+
+    def blur_radius(self, layer: Flat) -> float:
+        """Radius on the sensor of a point of a layer, with its sign: positive when near [m]."""
+        aperture = FOCAL / F_NUMBER
+        return aperture / 2 * self.image_distance * (1 / layer.distance - 1 / self.focus)
+
+    def size(self, layer: Flat) -> tuple[float, float, float, float]:
+        """Width, height and center of a layer's image [m]."""
+        rows, columns = layer.light.shape
+        if layer.width is None:
+            width = SIDE * PITCH * max(1.0, columns / rows)
+            return width, width * rows / columns, 0.0, 0.0
+        scale = self.image_distance / layer.distance
+        width = layer.width * scale
+        return (width, width * rows / columns, *(scale * p for p in layer.position))
+
+
+def lookup(picture: np.ndarray, size, x: np.ndarray, y: np.ndarray, mirrored: bool) -> np.ndarray:
+    """Samples of a picture at places (n,) and (m,): (m, n)."""
+    width, height, cx, cy = size
+    at = []
+    for place, count, length in (
+        (y - cy, picture.shape[0], height),
+        (x - cx, picture.shape[1], width),
+    ):
+        index = np.floor(place / length * count + count / 2).astype(int)
+        inside = (index >= 0) & (index < count)
+        if mirrored:
+            index, inside = index % (2 * count), np.ones(len(index), bool)
+            index = np.where(index < count, index, 2 * count - 1 - index)
+        at.append((np.clip(index, 0, count - 1), inside))
+    (rows, lit_y), (columns, lit_x) = at
+    return picture[np.ix_(rows, columns)] * np.outer(lit_y, lit_x)
+
+
+def composed(scene: Scene, x: np.ndarray, y: np.ndarray, u: float, v: float) -> np.ndarray:
+    """What the rays through the point (u, v) of the aperture see: (len(y), len(x))."""
+    seen, clear = 0.0, 1.0
+    for layer in scene.layers:
+        blur, size = scene.blur_radius(layer), scene.size(layer)
+        place = size, x + blur * u, y + blur * v
+        cover = lookup(layer.opacity, *place, mirrored=layer.width is None)
+        seen = seen + clear * cover * lookup(layer.light, *place, mirrored=True)
+        clear = clear * (1 - cover)
+    return np.asarray(seen)
+
+
+def ray_sum(scene: Scene, rays: int = RAYS, inside: int = 4) -> np.ndarray:
+    """Light (SIDE, SIDE) of pixels that fill their cells, relative to white."""
+    k = np.arange(rays) + 0.5
+    radius, angle = np.sqrt(k / rays), np.pi * (1 + 5**0.5) * k
+    # Rays and the points in the pixels are independent: steps that share no factor.
+    steps = np.array([0.8191725133961645, 0.6710436067037893])
+    jitter = (k[:, None] * steps) % 1
+    total = np.zeros((SIDE, SIDE))
+    for u, v, (jx, jy) in zip(radius * np.cos(angle), radius * np.sin(angle), jitter, strict=True):
+        x, y = (((np.arange(SIDE * inside) + j) / inside - SIDE / 2) * PITCH for j in (jx, jy))
+        seen = composed(scene, x, y, u, v)
+        total += seen.reshape(SIDE, inside, SIDE, inside).mean(axis=(1, 3))
+    return total / rays
+
+
+def random_scene(rng: np.random.Generator, count: int = 3, sharp: bool = False) -> Scene:
+    """Layers of smooth shapes and patches; one in focus where `sharp`."""
+    distances = np.sort(1 / rng.uniform(0.7, 4.5, count))
+    focus = float(rng.choice(distances)) if sharp else float(1 / rng.uniform(1.0, 4.0))
+    layers = []
+    for number, distance in enumerate(distances):
+        last = number == count - 1
+        n = 160 if last else 96
+        light = patches(rng, n)
+        opacity = np.ones((n, n)) if last else shapes(rng, n)
+        scale = 1 / (1 / FOCAL - 1 / focus) / distance
+        width = None if last else float(SIDE * PITCH / scale * rng.uniform(0.5, 1.1))
+        place = (0.0, 0.0) if last else tuple(SIDE * PITCH / scale * rng.uniform(-0.4, 0.4, 2))
+        layers.append(Flat(float(distance), light, opacity, width, place))
+    return Scene(tuple(layers), focus)
+
+
+def patches(rng: np.random.Generator, n: int) -> np.ndarray:
+    """Overlapping discs of light."""
+    y, x = np.mgrid[:n, :n]
+    out = np.full((n, n), 0.5)
+    for _ in range(60):
+        cx, cy, r = rng.random(3) * (n, n, 0.2 * n)
+        out[(x - cx) ** 2 + (y - cy) ** 2 < r * r] = rng.random()
+    return out.astype(np.float32)
+
+
+def shapes(rng: np.random.Generator, n: int) -> np.ndarray:
+    """Opaque discs and bars."""
+    y, x = np.mgrid[:n, :n]
+    out = np.zeros((n, n))
+    for _ in range(4):
+        cx, cy, r = rng.random(3) * (n, n, 0.25 * n)
+        out[(x - cx) ** 2 + (y - cy) ** 2 < r * r] = 1
+    out[:, int(rng.integers(n - 8)) :][:, :8] = 1
+    return out.astype(np.float32)
+
+
+def source(scene: Scene, folder: Path) -> dict:
+    """The scene's `source` of a camera file, its pictures written into a folder."""
+    listed = []
+    for number, layer in enumerate(scene.layers):
+        names = []
+        for kind, picture in (("light", layer.light), ("mask", layer.opacity)):
+            name = str(folder / f"{kind}{number}.exr")
+            spec = oiio.ImageSpec(picture.shape[1], picture.shape[0], 1, "float")
+            out = oiio.ImageOutput.create(name)
+            out.open(name, spec)
+            out.write_image(picture.astype(np.float32)[..., None])
+            out.close()
+            names.append(name)
+        own = {"source": {"kind": "image", "file": names[0]}, "distance": f"{layer.distance!r} m"}
+        if layer.width is not None:
+            own |= {"mask": names[1], "width": f"{layer.width!r} m"}
+            own["position"] = [f"{float(p)!r} m" for p in layer.position]
+        listed.append(own)
+    return {"kind": "layers", "layers": listed}
+
+
+def changes(scene: Scene, folder: Path) -> dict:
+    """What a plain camera has to change to look at the scene."""
+    return {
+        "scene.source": source(scene, folder),
+        "optics": {
+            "f_number": F_NUMBER,
+            "focal_length": f"{FOCAL} m",
+            "transmittance": 1,
+            "off_axis": "none",
+            "focus_distance": f"{scene.focus!r} m",
+        },
+        "pixel.photodetector.fill_factor": 1,
+        "array.rows": SIDE,
+        "array.columns": SIDE,
+    }
+
+
+def pupil_sum(scene: Scene, wavelength: float, points: int = 600, fine: int = 5) -> np.ndarray:
+    """The same with diffraction: a sum over points of the pupil, for incoherent light.
+
+    The transfer of a frequency f is the overlap of the pupil with itself, 2 wavelength N f apart.
+    Of each point amid two that overlap, a defocused layer has the phase of its shift; so the
+    layers' picture through that point counts in all frequencies for which both lie in the pupil
+    (H. H. Hopkins, Proc. R. Soc. A 231, 91, 1955, with layers that hide each other by rays).
+    """
+    beyond = 12
+    n = (SIDE + 2 * beyond) * fine
+    frequency = np.fft.fftfreq(n, PITCH / fine)
+    fx, fy = frequency[None, :], frequency[:, None]
+    number = F_NUMBER * scene.image_distance / FOCAL
+    apart = wavelength * number * frequency  # half of the pupils' distance, in their radii
+    k = np.arange(points) + 0.5
+    radius, angle = np.sqrt(k / points), np.pi * (1 + 5**0.5) * k
+    steps = (k[:, None] * np.array([0.8191725133961645, 0.6710436067037893])) % 1 - 0.5
+    total, count = np.zeros((n, n), complex), np.zeros((n, n))
+    for u, v, (jx, jy) in zip(radius * np.cos(angle), radius * np.sin(angle), steps, strict=True):
+        x, y = (((np.arange(n) + 0.5 + j) / fine - SIDE / 2 - beyond) * PITCH for j in (jx, jy))
+        seen = composed(scene, x, y, u, v)
+        moved = np.exp(-2j * np.pi * (fx * jx + fy * jy) * PITCH / fine)
+        both = [
+            np.hypot(u + sign * apart[None, :], v + sign * apart[:, None]) <= 1 for sign in (1, -1)
+        ]
+        inside = both[0] & both[1]
+        total += np.where(inside, np.fft.fft2(seen) * moved, 0)
+        count += inside
+    count0 = count[0, 0]
+    picture = np.fft.ifft2(total / count0).real
+    inner = slice(beyond * fine, -beyond * fine)
+    return picture[inner, inner].reshape(SIDE, fine, SIDE, fine).mean(axis=(1, 3))

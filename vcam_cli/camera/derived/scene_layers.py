@@ -1,0 +1,71 @@
+"""Layers of a scene as flat scenes: each is what a camera sees that looks at it alone."""
+
+from __future__ import annotations
+
+import math
+
+from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.derived.lens import focus_distance, lens
+from vcam_cli.camera.scene import Extent
+from vcam_cli.camera.sources import Layers
+from vcam_cli.errors import Collector, bad
+
+PATH = ("scene", "source", "layers")
+
+
+def layer_cameras(camera: Camera) -> tuple[Camera, ...]:
+    """Return a camera for each layer of its scene, the nearest first; () for a flat scene.
+
+    It has the same lens, focused as before, and sees the layer alone, at the layer's distance. Its
+    source has the layer's motion, its extent the layer's width.
+    """
+    source = camera.scene.source
+    if not isinstance(source, Layers):
+        return ()
+    optics = camera.optics.model_copy(update={"focus_distance": focus_distance(camera)})
+    effects = camera.effects
+    if isinstance(effects, dict):  # what is wanted of the whole need not be in each layer
+        effects = {name: state for name, state in effects.items() if state != "on"}
+    found = []
+    for layer in source.layers:
+        alone = layer.source.model_copy(update={"motion": layer.motion})
+        extent = "sensor" if layer.width is None else Extent.model_construct(width=layer.width)
+        scene = camera.scene.model_copy(
+            update={"source": alone, "distance": layer.distance, "extent": extent}
+        )
+        found.append(
+            camera.model_copy(update={"scene": scene, "optics": optics, "effects": effects})
+        )
+    return tuple(found)
+
+
+def with_flat_scene(camera: Camera) -> Camera:
+    """Return the camera; with a flat scene where a single layer that hides nothing is all of it."""
+    layers = camera.scene.source.layers if isinstance(camera.scene.source, Layers) else ()
+    if len(layers) != 1 or layers[0].width is not None or layers[0].mask is not None:
+        return camera
+    [alone] = layer_cameras(camera)
+    return alone.model_copy(update={"effects": camera.effects})
+
+
+def check_layers(camera: Camera) -> None:
+    """Refuse layers that no lens images, and sizes that are not known (BadInput)."""
+    source = camera.scene.source
+    if not isinstance(source, Layers):
+        return
+    if not camera.optics.is_lens:
+        message = "without a lens all light falls on the sensor at once, whatever its distance"
+        raise bad(PATH, message, "use a flat source, or give a lens")
+    if isinstance(camera.scene.extent, Extent):
+        message = "every layer has a width of its own"
+        raise bad(("scene", "extent"), message, "remove it, and give the layers' widths")
+    problems, focal = Collector(), lens(camera).focal_length
+    for number, layer in enumerate(source.layers):
+        if layer.distance <= focal:
+            message = f"{layer.distance:.6g} m lies within the focal length of {focal:.6g} m"
+            remedy = "put the layer further away, or use a shorter focal length"
+            problems.add((*PATH, number, "distance"), message, remedy)
+        if math.isinf(layer.distance) and layer.width is not None:
+            message = "what is infinitely far has no width in meters"
+            problems.add((*PATH, number, "width"), message, "remove it: the layer fills the frame")
+    problems.raise_if_any()

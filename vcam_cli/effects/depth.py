@@ -1,0 +1,44 @@
+"""Layers at their own distances: each is out of focus by itself, and hides what is behind it.
+
+The work is done by `image_formation.layered`; without it a scene is a pinhole's picture of all
+layers, seen by a lens that is focused on it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from vcam_cli.camera.derived.geometry import geometry as solve
+from vcam_cli.camera.derived.scene_layers import layer_cameras
+from vcam_cli.effects.base import Effect
+from vcam_cli.physics.depth_of_field import blur_diameter
+
+
+@dataclass(frozen=True)
+class Depth(Effect):
+    """Layers and how far the lens throws a point of each by defocus alone."""
+
+    blurs: tuple[float, ...]
+    """Diameters on the sensor, the nearest layer's first [m]."""
+    pitch: float
+    """Of the pixels [m]."""
+
+    name = "depth"
+    reference = "blur A |1/d - 1/s| v: Ray, Applied Photographic Optics, 3rd ed., 2002"
+    absent = "the scene is flat, or all its layers are in focus; write source: {kind: layers, ...}"
+    origin = "lens"
+
+    @classmethod
+    def from_camera(cls, camera, geometry):
+        """Return the layers of a scene, or None where it is flat, or all of it is in focus."""
+        cameras = layer_cameras(camera)
+        if not cameras:
+            return None
+        lens = geometry.focus_distance, geometry.focal_length, geometry.f_number
+        blurs = [float(blur_diameter(solve(c).object_distance, *lens)) for c in cameras]
+        return cls(tuple(blurs), geometry.pitch_x) if any(blurs) else None
+
+    def describe(self) -> str:
+        """Return a short clause with this camera's numbers and units."""
+        pixels = ", ".join(f"{blur / self.pitch:.3g}" for blur in self.blurs)
+        return f"{len(self.blurs)} layers, points of which become {pixels} pixels wide by defocus"

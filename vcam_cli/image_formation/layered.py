@@ -1,0 +1,283 @@
+"""The image of layers at their own distances: each through its own blur, then front to back.
+
+On a lattice of cells finer than the pixels, layer i has the light L_i and the opacity C_i that the
+lens makes of its light E_i a_i and its opacity a_i, each with the transfer of its distance T_i:
+
+    E = sum_i T_i[E_i a_i] prod_{j < i} (1 - T_j[a_j]).
+
+That is exact where of two layers that overlap at most one is out of focus: a ray through one part
+of the aperture then meets the sharp one in the same place as all others. What is missing
+where both are is the covariance over the aperture.
+
+Each layer's image is formed as that of any flat scene, with the lattice's cells for pixels and its
+opacity for so many more colors. The light on the lattice is then a scene of its own, on the
+sensor's surface, that silicon and photodetectors average.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcam_cli.camera.derived.geometry import Geometry, pixel_centers
+from vcam_cli.camera.derived.mosaic import Mosaic
+from vcam_cli.effects.base import Blur, Effect, FieldTransfer, ImageMotion, of_kind
+from vcam_cli.effects.pixel_aperture import PixelAperture
+from vcam_cli.image_formation.bandwidth import margin
+from vcam_cli.image_formation.layer_covariance import add_covariance
+from vcam_cli.image_formation.layer_lattice import Lattice, Window
+from vcam_cli.image_formation.optical_path import (
+    DepthReport,
+    Layers,
+    OpticalPath,
+    SpectrumReport,
+)
+from vcam_cli.image_formation.transfer_functions import Transfer
+from vcam_cli.scenes.base import ChartScene
+from vcam_cli.scenes.image import ImageScene
+from vcam_cli.scenes.layered import LayeredScene, LayerPart
+from vcam_cli.spectra import Spectrum
+
+FormImage = Callable[[OpticalPath, ChartScene | ImageScene], tuple[Layers, SpectrumReport]]
+"""What forms the image of a flat scene."""
+CELLS_SHARE = 0.2
+"""Part of the tolerance that edges within the cells of the lattice may use."""
+MOST_CELLS = 6
+"""Cells along each side of a pixel, at most."""
+EDGES = 9.5
+"""Heights of two edges in a cell over the rms covariance of both within it: sqrt(90)."""
+PART = 0.5
+"""Part of the tolerance that the image of each layer may use."""
+
+
+@dataclass(frozen=True)
+class _Composite:
+    """Layers put one before the other."""
+
+    lattice: Lattice
+    light: NDArray
+    """Light (C, rows, columns) on the lattice [e/s]."""
+    error: float
+    """Of light and opacity that both change within a cell, rms [e/s]."""
+    reports: list[SpectrumReport]
+    """Of the layers that are seen."""
+
+
+def layered_image(
+    path: OpticalPath, scene: LayeredScene, form: FormImage
+) -> tuple[Layers, SpectrumReport]:
+    """Return the light at the photodetectors of a layered scene, and how it was computed.
+
+    Parameters
+    ----------
+    path : OpticalPath
+        Lens, pixels and settings, with the optics of each layer.
+    scene : LayeredScene
+        The scene.
+    form : callable
+        What forms the image of a flat scene.
+
+    Returns
+    -------
+    layers : Layers
+        Shares of the signal, whose sum is all of it.
+    report : SpectrumReport
+        How the scene was sampled and filtered.
+    """
+    found, count = _composite(path, scene, 1, form), 1
+    full = min(float(found.light.max(initial=0.0)), path.ceiling)
+    allowed = CELLS_SHARE * path.settings.tolerance * full
+    if found.error > allowed:
+        count = min(math.ceil((found.error / allowed) ** 0.5), MOST_CELLS)
+        found = _composite(path, scene, count, form)
+    hidden = add_covariance(path, scene, found.lattice.geometry, found.light, full)
+    error = math.hypot(found.error, hidden.error)
+    depth = DepthReport(count, hidden.order, error / (full or 1.0))
+    layers, report = form(
+        _pixel_path(path), _on_the_sensor(scene, found.light, found.lattice.geometry)
+    )
+    return layers, _joined(report, found.reports, error, depth)
+
+
+def _composite(path: OpticalPath, scene: LayeredScene, count: int, form: FormImage) -> _Composite:
+    """Return layers one before the other, on so many cells along each side of a pixel."""
+    lattice = Lattice.over_array(path.geometry, count)
+    g = lattice.geometry
+    total: NDArray = np.zeros(
+        (len(path.transfer.weights[-1]), g.rows, g.columns), path.settings.dtype
+    )
+    clear, reports, squares = np.ones_like(total), list[SpectrumReport](), 0.0
+    for part, optics in zip(scene.parts, path.layers, strict=True):
+        seen = _layer_path(path, part, optics.effects, lattice)
+        if seen is None:
+            continue
+        window, own = seen
+        light, cover, report = _light_and_cover(own, part, window, scene.white, form)
+        here = slice(None), window.rows, window.columns
+        squares += product_error(clear[here], light)
+        total[here] += clear[here] * light
+        clear[here] *= 1 - cover
+        reports.append(report)
+    # Cells of a pixel err alike along an edge: as few of them have it as there are in a row.
+    error = math.sqrt(squares / (count * g.rows * g.columns))
+    return _Composite(lattice, total, error, reports)
+
+
+def product_error(a: NDArray, b: NDArray) -> float:
+    """Return the error of the mean over a cell of a product, taken as the product of the means.
+
+    Of two edges in one cell, of heights A and B and anywhere in it, it is A B / 9.5 rms; heights
+    are told by the changes from one cell to the next.
+
+    Parameters
+    ----------
+    a, b : NDArray
+        Means (C, h, w) of both factors over the cells.
+
+    Returns
+    -------
+    float
+        Sum of squares over all cells, of the color where it is most.
+    """
+    squares = np.zeros(len(a))
+    for axis in (1, 2):
+        if a.shape[axis] > 1:
+            changes = np.diff(a, axis=axis) * np.diff(b, axis=axis)
+            squares += np.square(changes).sum(axis=(1, 2), dtype=float)
+    return float(squares.max(initial=0.0)) / EDGES**2
+
+
+def _layer_path(
+    path: OpticalPath, part: LayerPart, effects: tuple[Effect, ...], lattice: Lattice
+) -> tuple[Window, OpticalPath] | None:
+    """Return where a layer is seen, and the path of its light; None where it is beside the array.
+
+    The path has twice the colors: those of the light, and of the opacity in white.
+    """
+    g = lattice.geometry
+    cell = PixelAperture(g.pitch_x, g.pitch_y)
+    effects = (*(e for e in effects if _is_of_lens(e)), cell)
+    knobs = replace(path.settings, tolerance=PART * path.settings.tolerance, oversampling=None)
+    band = float(path.transfer.wavelengths[0]), float(path.transfer.wavelengths[-1])
+    beyond = margin(g, effects, band, knobs)
+    pitch = max(g.pitch_x, g.pitch_y)
+    window = lattice.window(
+        part, math.inf if of_kind(effects, FieldTransfer, ImageMotion) else beyond * pitch
+    )
+    if window.rows.start == window.rows.stop or window.columns.start == window.columns.stop:
+        return None
+    transfer = path.transfer.with_half_the_wavelengths()
+    weights, white = transfer.weights[part.components], transfer.weights[-1]
+    colors = len(white)
+    doubled = np.zeros((len(weights) + 1, 2 * colors, weights.shape[2]))
+    doubled[:-1, :colors], doubled[-1, colors:] = weights, white
+    own = replace(
+        path,
+        transfer=Transfer(transfer.wavelengths, doubled, of_kind(effects, Blur)),
+        geometry=window.geometry,
+        settings=knobs,
+        mosaic=_colors(2 * colors),
+        effects=effects,
+        optional=(),
+        layers=(),
+        has_opacity=True,
+    )
+    return window, own
+
+
+def _light_and_cover(
+    path: OpticalPath, part: LayerPart, window: Window, white: Spectrum, form: FormImage
+) -> tuple[NDArray, NDArray, SpectrumReport]:
+    """Return a layer's light [e/s] and opacity (C, rows, columns) in its window."""
+    g, (at_x, at_y) = window.geometry, window.center
+    x, y = part.chart.center
+    chart = replace(part.chart, center=(x - at_x, y - at_y))
+    band = float(path.transfer.wavelengths[0]), float(path.transfer.wavelengths[-1])
+    beyond = margin(g, path.effects, band, path.settings)
+    scene = ChartScene(
+        spectra=(white,) * len(path.transfer.weights),
+        white=white,
+        shape=(g.rows + 2 * beyond, g.columns + 2 * beyond),
+        pitch_x=g.pitch_x,
+        pitch_y=g.pitch_y,
+        samples="averages",
+        dtype=path.settings.dtype,
+        chart=chart,
+    )
+    layers, report = form(path, scene)
+    columns, rows = pixel_centers(g)
+    both: NDArray = np.zeros((len(path.mosaic.colors), g.rows, g.columns), path.settings.dtype)
+    everywhere = slice(0, g.rows)
+    for layer in layers:
+        weight = 1.0 if layer.weight is None else layer.weight(columns + at_x, rows + at_y)
+        for color, plane in enumerate(both):
+            plane += layer.values(color, everywhere) * weight
+    colors = len(both) // 2
+    level = path.transfer.level[-1, colors:, None, None]
+    light, cover = both[:colors], both[colors:]
+    cover /= np.where(level > 0, level, 1.0).astype(cover.dtype)
+    return np.maximum(light, 0, out=light), np.clip(cover, 0, 1, out=cover), report
+
+
+def _on_the_sensor(scene: LayeredScene, light: NDArray, g: Geometry) -> ImageScene:
+    """Return the light (C, rows, columns) on a lattice as a scene of C components [e/s]."""
+    return ImageScene(
+        spectra=(scene.white,) * len(light),
+        white=scene.white,
+        shape=(g.rows, g.columns),
+        pitch_x=g.pitch_x,
+        pitch_y=g.pitch_y,
+        samples="squares",
+        dtype=light.dtype,
+        picture=np.moveaxis(light, 0, -1),
+        black=(0, 0),
+        seen=(1.0, 1.0),
+    )
+
+
+def _pixel_path(path: OpticalPath) -> OpticalPath:
+    """Return what silicon and pixels do to light that lies on the sensor, each color to its own."""
+    white = path.transfer.weights[-1]
+    level = white.sum(axis=1, keepdims=True)
+    weights = np.zeros((len(white), *white.shape))
+    for color, share in enumerate(white / np.where(level > 0, level, 1)):
+        weights[color, color] = share
+    effects = tuple(effect for effect in path.effects if not _is_of_lens(effect))
+    transfer = Transfer(path.transfer.wavelengths, weights, of_kind(effects, Blur))
+    return replace(path, transfer=transfer, effects=effects, layers=())
+
+
+def _is_of_lens(effect: Effect) -> bool:
+    """Return whether an effect blurs or moves light before it is on the sensor."""
+    moves = bool(of_kind([effect], ImageMotion))
+    return moves or (effect.origin == "lens" and bool(of_kind([effect], Blur, FieldTransfer)))
+
+
+def _joined(
+    report: SpectrumReport, parts: list[SpectrumReport], error: float, depth: DepthReport
+) -> SpectrumReport:
+    """Return the report of the pixels, with what is known of the layers.
+
+    `error` is that of putting one before the other [e/s].
+    """
+    changes = dict(report.changes)
+    for name in {name for part in parts for name in part.changes}:
+        if name != PixelAperture.name:
+            changes[name] = math.hypot(*(part.changes.get(name, 0.0) for part in parts))
+    return replace(
+        report,
+        lost_rms=math.hypot(report.lost_rms, error, *(part.lost_rms for part in parts)),
+        changes=changes,
+        peak=math.inf,
+        memory=max([report.memory, *(part.memory for part in parts)]),
+        depth=depth,
+    )
+
+
+def _colors(count: int) -> Mosaic:
+    """Return so many colors without names of their own."""
+    return Mosaic((tuple(str(number) for number in range(count)),))

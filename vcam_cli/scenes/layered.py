@@ -1,0 +1,191 @@
+"""Layers of a scene, each with its light and its opacity, the nearest first.
+
+What a layer sends where it covers a part a of a place is a times its own light, and it lets the
+part 1 - a of the light behind it pass. Behind a lens both are blurred by what the layer's distance
+asks for, which is image formation's business; `flat` is the scene as a pinhole sees it.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vcam_cli.scenes.base import Array, Chart, ChartScene, Frame, Scene, View, chart_scene
+from vcam_cli.scenes.picture_chart import PictureChart
+from vcam_cli.spectra import Spectrum
+
+PARTS = 4
+"""Parts along each side of a cell, in each of which layers are put one before the other."""
+
+
+@dataclass(frozen=True, eq=False)
+class MaskedChart(Chart):
+    """A chart times its opacity, and, as the last component, its opacity."""
+
+    light: Chart
+    """Of K components."""
+    opacity: PictureChart
+    """0 where there is nothing."""
+
+    edge_seconds = property(lambda self: self.light.edge_seconds)
+
+    @property
+    def brightest(self) -> float:
+        """Brightest light, relative to the perfect white."""
+        return self.light.brightest
+
+    def paint(self, x_edges: Array, y_edges: Array, mix: Array, out: Array) -> None:
+        """Write the averages over the cells, as if light and opacity did not both change in one."""
+        self.light.paint(x_edges, y_edges, mix[:, :-1], out)
+        out += mix[:, -1, None, None]
+        out *= self.opacity.averages(x_edges, y_edges, np.ones((1, 1), mix.dtype))
+
+    def values(self, x: Array, y: Array, mix: Array) -> Array:
+        """Return the values at points."""
+        light = self.light.values(x, y, mix[:, :-1]) + mix[:, -1, None, None]
+        return light * self.opacity.values(x, y, np.ones((1, 1), mix.dtype))
+
+
+@dataclass(frozen=True, eq=False)
+class LayerChart(Chart):
+    """A layer's light times its opacity, and, as the last component, its opacity, in its place."""
+
+    layer: Chart
+    """The same around the origin."""
+    center: tuple[float, float] = (0.0, 0.0)
+    """Of the layer, right and down [m]."""
+
+    edge_seconds = property(lambda self: self.layer.edge_seconds)
+
+    @property
+    def brightest(self) -> float:
+        """Brightest light, relative to the perfect white; opacity is as bright as white."""
+        return max(self.layer.brightest, 1.0)
+
+    def paint(self, x_edges: Array, y_edges: Array, mix: Array, out: Array) -> None:
+        """Write the averages over the cells."""
+        self.layer.paint(x_edges - self.center[0], y_edges - self.center[1], mix, out)
+
+    def values(self, x: Array, y: Array, mix: Array) -> Array:
+        """Return the values at points."""
+        return self.layer.values(x - self.center[0], y - self.center[1], mix)
+
+
+@dataclass(frozen=True)
+class LayerPart:
+    """One layer on the sensor plane, enlarged as the lens images it."""
+
+    chart: LayerChart
+    size: Frame | None
+    """Of the rectangle it lies in; None where it fills the frame."""
+    components: slice
+    """Those of the scene's components that are its light."""
+
+
+@dataclass(frozen=True)
+class FlatLayers(Chart):
+    """Layers as a pinhole sees them: nearer ones before those behind, all sharp."""
+
+    parts: tuple[LayerPart, ...]
+
+    @property
+    def brightest(self) -> float:
+        """Brightest light of all layers, relative to the perfect white."""
+        return max(part.chart.brightest for part in self.parts)
+
+    def paint(self, x_edges: Array, y_edges: Array, mix: Array, out: Array) -> None:
+        """Write the averages over the cells, as if two edges never met in a part of one."""
+        x, y = _parts_of(x_edges), _parts_of(y_edges)
+        found = self._compose(mix, lambda chart, m: chart.averages(x, y, m))
+        out[:] = found.reshape(len(mix), len(y_edges) - 1, PARTS, -1, PARTS).mean(axis=(2, 4))
+
+    def values(self, x: Array, y: Array, mix: Array) -> Array:
+        """Return the values at points."""
+        return self._compose(mix, lambda chart, m: chart.values(x, y, m))
+
+    def _compose(self, mix, look):
+        total, clear = 0.0, 1.0
+        for part in self.parts:
+            own = mix[:, part.components]
+            weights = np.zeros((len(mix) + 1, own.shape[1] + 1), mix.dtype)
+            weights[:-1, :-1], weights[-1, -1] = own, 1
+            found = look(part.chart, weights)
+            total = total + clear * found[:-1]
+            clear = clear * (1 - found[-1])
+        return total
+
+
+def _parts_of(edges: Array) -> Array:
+    """Return the edges of cells, and those between their parts."""
+    steps = np.arange(PARTS) / PARTS
+    within = edges[:-1, None] + np.diff(edges)[:, None] * steps
+    return np.append(within.ravel(), edges[-1])
+
+
+@dataclass(frozen=True)
+class LayeredScene:
+    """Layers before the lens.
+
+    Its components are the light of all layers, one after the other, and last white, by which
+    opacity is measured; the picture has none of it.
+    """
+
+    parts: tuple[LayerPart, ...]
+    flat: ChartScene
+    """The layers as a pinhole sees them."""
+
+    @property
+    def spectra(self) -> tuple[Spectrum, ...]:
+        """Spectral radiances of the components [W/(sr m2 m)]."""
+        return self.flat.spectra
+
+    @property
+    def white(self) -> Spectrum:
+        """Spectral radiance of the perfect white [W/(sr m2 m)]."""
+        return self.flat.white
+
+    def values_at(self, x: Array, y: Array, mix: Array) -> Array:
+        """Return sum_k mix[r, k] B_k of the picture at the points (y[i], x[j]): (R, m, n)."""
+        return self.flat.values_at(x, y, mix)
+
+
+AnyScene = Scene | LayeredScene
+"""Whatever stands before the lens, flat or not."""
+
+
+@dataclass(frozen=True)
+class Layer:
+    """What one layer is made of."""
+
+    chart: Chart
+    """Light times opacity, and opacity as the last component, around the origin."""
+    spectra: tuple[Spectrum, ...]
+    """Of the light."""
+    center: tuple[float, float]
+    size: Frame | None
+
+
+def layered_scene(layers: list[Layer], white: Spectrum, view: View) -> LayeredScene:
+    """Return layers as a scene.
+
+    Parameters
+    ----------
+    layers : list of Layer
+        The layers, nearest first.
+    white : Spectrum
+        Spectral radiance of the perfect white [W/(sr m2 m)].
+    view : View
+        Rectangle that the picture of all has to fill.
+
+    Returns
+    -------
+    LayeredScene
+        The scene.
+    """
+    parts, spectra = list[LayerPart](), list[Spectrum]()
+    for layer in layers:
+        chart = LayerChart(layer.chart, layer.center)
+        components = slice(len(spectra), len(spectra) + len(layer.spectra))
+        parts.append(LayerPart(chart, layer.size, components))
+        spectra += layer.spectra
+    flat = chart_scene(FlatLayers(tuple(parts)), (*spectra, white), white, view)
+    return LayeredScene(tuple(parts), flat)

@@ -1,0 +1,74 @@
+"""A picture as a chart: its averages over cells of any size, at any place."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from vcam_cli.scenes.base import Array, Chart, Frame
+
+
+@dataclass(frozen=True, eq=False)
+class PictureChart(Chart):
+    """Samples of a picture as even squares of light in a frame around the origin."""
+
+    picture: Array
+    """Values (h, w, K)."""
+    frame: Frame
+    mirrored: bool
+    """Whether the picture goes on beyond its frame as its mirror image; else all is 0 there."""
+
+    @property
+    def brightest(self) -> float:
+        """Brightest light, relative to the perfect white."""
+        return float(self.picture.max())
+
+    def paint(self, x_edges: Array, y_edges: Array, mix: Array, out: Array) -> None:
+        """Write the exact averages over the cells."""
+        height, width, channels = self.picture.shape
+        down, rows = self._shares(y_edges * (height / self.frame.height) + height / 2, height)
+        across, columns = self._shares(x_edges * (width / self.frame.width) + width / 2, width)
+        seen = self.picture[rows, columns]
+        lines = (down @ seen.reshape(len(seen), -1)).reshape(-1, channels) @ mix.T
+        lines = lines.reshape(len(out[0]), -1, len(mix))
+        for plane, one in zip(out, np.moveaxis(lines, 2, 0), strict=True):
+            plane[:] = (across @ one.T).T
+
+    def values(self, x: Array, y: Array, mix: Array) -> Array:
+        """Return the samples at points."""
+        height, width, _ = self.picture.shape
+        rows, lit_rows = self._index(y * (height / self.frame.height) + height / 2, height)
+        columns, lit_columns = self._index(x * (width / self.frame.width) + width / 2, width)
+        found = self.picture[np.ix_(rows, columns)] * np.outer(lit_rows, lit_columns)[..., None]
+        return np.asarray(np.moveaxis(found @ np.asarray(mix).T, -1, 0), mix.dtype)
+
+    def _shares(self, edges: Array, count: int) -> tuple[Any, slice]:
+        """Return what of each cell is each sample's, a sparse matrix, and the samples that occur.
+
+        Edges are counted in samples.
+        """
+        from scipy.sparse import csr_array
+
+        cells = len(edges) - 1
+        first, last = np.floor(edges[:-1]).astype(int), np.ceil(edges[1:]).astype(int)
+        most = int((last - first).max())
+        sample = first[:, None] + np.arange(most)
+        inside = np.minimum(sample + 1, edges[1:, None]) - np.maximum(sample, edges[:-1, None])
+        share = np.maximum(inside, 0) / np.diff(edges)[:, None]
+        index, lit = self._fold(sample, count)
+        share = np.where(lit, share, 0).astype(self.picture.dtype)
+        low, high = int(index.min()), int(index.max()) + 1
+        starts = np.arange(cells + 1) * most
+        matrix = csr_array((share.ravel(), index.ravel() - low, starts), (cells, high - low))
+        return matrix, slice(low, high)
+
+    def _index(self, place: Array, count: int) -> tuple[Array, Array]:
+        """Return the sample at places, counted in samples, and 1 where there is one, else 0."""
+        return self._fold(np.floor(place).astype(int), count)
+
+    def _fold(self, index: Array, count: int) -> tuple[Array, Array]:
+        """Return the sample that stands at an index, and whether there is one."""
+        if not self.mirrored:
+            return np.clip(index, 0, count - 1), (index >= 0) & (index < count)
+        index = index % (2 * count)
+        return np.minimum(index, 2 * count - 1 - index), np.ones(index.shape, bool)
