@@ -65,6 +65,18 @@ EXAMPLES = {
         (*_chart("eye-chart"), *GRAY, "optics.zernike={4: 0.4 um, 7: 0.3 um}"),
         "0.4 um of defocus and 0.3 um of coma.",
     ),
+    "depth": Example(
+        (
+            *GRAY,
+            "scene.source={kind: layers, layers: ["
+            "{source: {kind: chart, chart: siemens-star}, distance: 0.15 m, width: 30 mm,"
+            " position: [-12 mm, 0 mm]},"
+            " {source: {kind: chart, chart: eye-chart}, distance: 1 m}]}",
+            "optics.focus_distance=1 m",
+            "optics.f_number=1.4",
+        ),
+        "A star at 0.15 m before letters at 1 m, on which the lens is focused.",
+    ),
     "motion": Example(
         (*_chart("eye-chart"), *GRAY, "scene.camera_motion={pan: 60 deg/s}", "exposure.time=5 ms"),
         "A camera that is turned by 0.3 degrees while it exposes.",

@@ -1,5 +1,10 @@
 """Layers at their own distances: each is out of focus by itself, and hides what is behind it.
 
+    E = sum_i T_i[E_i a_i] prod_{j < i} (1 - T_j[a_j]) - covariances over the aperture
+
+E_i and a_i are the light and the opacity of layer i, the nearest first; T_i is the blur of its
+distance d before a lens that is focused at s: a shift of the image plane by v^2 (1/d - 1/s).
+
 The work is done by `image_formation.layered`; without it a scene is a pinhole's picture of all
 layers, seen by a lens that is focused on it.
 """
