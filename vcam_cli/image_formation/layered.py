@@ -63,8 +63,8 @@ class _Composite:
     """Light (C, rows, columns) on the lattice [e/s]."""
     error: float
     """Of light and opacity that both change within a cell, rms [e/s]."""
-    reports: list[SpectrumReport]
-    """Of the layers that are seen."""
+    parts: list[tuple[Geometry, int, SpectrumReport]]
+    """Cells, colors and report of each layer that is seen."""
 
 
 def layered_image(
@@ -100,7 +100,7 @@ def layered_image(
     layers, report = form(
         _pixel_path(path), _on_the_sensor(scene, found.light, found.lattice.geometry)
     )
-    return layers, _joined(report, found.reports, error, depth)
+    return layers, _joined(report, found.parts, error, depth)
 
 
 def _composite(path: OpticalPath, scene: LayeredScene, count: int, form: FormImage) -> _Composite:
@@ -110,7 +110,8 @@ def _composite(path: OpticalPath, scene: LayeredScene, count: int, form: FormIma
     total: NDArray = np.zeros(
         (len(path.transfer.weights[-1]), g.rows, g.columns), path.settings.dtype
     )
-    clear, reports, squares = np.ones_like(total), list[SpectrumReport](), 0.0
+    clear, squares = np.ones_like(total), 0.0
+    parts: list[tuple[Geometry, int, SpectrumReport]] = []
     for part, optics in zip(scene.parts, path.layers, strict=True):
         seen = _layer_path(path, part, optics.effects, lattice)
         if seen is None:
@@ -121,10 +122,10 @@ def _composite(path: OpticalPath, scene: LayeredScene, count: int, form: FormIma
         squares += product_error(clear[here], light)
         total[here] += clear[here] * light
         clear[here] *= 1 - cover
-        reports.append(report)
+        parts.append((own.geometry, len(own.mosaic.colors), report))
     # Cells of a pixel err alike along an edge: as few of them have it as there are in a row.
     error = math.sqrt(squares / (count * g.rows * g.columns))
-    return _Composite(lattice, total, error, reports)
+    return _Composite(lattice, total, error, parts)
 
 
 def product_error(a: NDArray, b: NDArray) -> float:
@@ -258,23 +259,28 @@ def _is_of_lens(effect: Effect) -> bool:
 
 
 def _joined(
-    report: SpectrumReport, parts: list[SpectrumReport], error: float, depth: DepthReport
+    report: SpectrumReport,
+    parts: list[tuple[Geometry, int, SpectrumReport]],
+    error: float,
+    depth: DepthReport,
 ) -> SpectrumReport:
     """Return the report of the pixels, with what is known of the layers.
 
     `error` is that of putting one before the other [e/s].
     """
+    layers = [own for _, _, own in parts]
     changes = dict(report.changes)
-    for name in {name for part in parts for name in part.changes}:
+    for name in {name for own in layers for name in own.changes}:
         if name != PixelAperture.name:
-            changes[name] = math.hypot(*(part.changes.get(name, 0.0) for part in parts))
+            changes[name] = math.hypot(*(own.changes.get(name, 0.0) for own in layers))
     return replace(
         report,
-        lost_rms=math.hypot(report.lost_rms, error, *(part.lost_rms for part in parts)),
+        lost_rms=math.hypot(report.lost_rms, error, *(own.lost_rms for own in layers)),
         changes=changes,
         peak=math.inf,
-        memory=max([report.memory, *(part.memory for part in parts)]),
+        memory=max([report.memory, *(own.memory for own in layers)]),
         depth=depth,
+        parts=tuple(parts),
     )
 
 

@@ -197,3 +197,5 @@ class SpectrumReport:
     """Estimated memory [bytes]."""
     depth: DepthReport | None = None
     """How layers were put one before the other; None of a flat scene."""
+    parts: tuple[tuple[Geometry, int, SpectrumReport], ...] = ()
+    """Of each layer: its cells as if they were pixels, colors of light and opacity, its report."""

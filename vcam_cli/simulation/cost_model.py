@@ -56,6 +56,8 @@ EVALUATE = 5e-9
 FAR = 20e-9
 """The same from the spectrum of a part of the far field, whose cells and pixels have no common grid
 [s]."""
+OCCLUDE = 30e-9
+"""One cell of light or opacity put before what is behind, covariance included [s]."""
 WAVE = 12e-9
 """One pixel of one wave, or of one box [s]."""
 PROCESS = 14e-9
@@ -91,7 +93,15 @@ def threads(workers: int) -> float:
 
 
 def image_seconds(geometry: Geometry, mosaic: Mosaic, report: SpectrumReport) -> float:
-    """Return the core seconds of image formation."""
+    """Return the core seconds of image formation, that of layers included."""
+    return _flat_seconds(geometry, mosaic, report) + sum(
+        _flat_seconds(cells, Mosaic((tuple(map(str, range(colors))),)), own)
+        + OCCLUDE * cells.rows * cells.columns * colors
+        for cells, colors, own in report.parts
+    )
+
+
+def _flat_seconds(geometry: Geometry, mosaic: Mosaic, report: SpectrumReport) -> float:
     pixels, colors = geometry.rows * geometry.columns, len(mosaic.colors)
     if not report.terms:
         return (
