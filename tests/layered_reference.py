@@ -82,8 +82,8 @@ def composed(scene: Scene, x: np.ndarray, y: np.ndarray, u: float, v: float) -> 
     return np.asarray(seen)
 
 
-def ray_sum(scene: Scene, rays: int = RAYS, inside: int = 4) -> np.ndarray:
-    """Light (SIDE, SIDE) of pixels that fill their cells, relative to white."""
+def ray_sum(scene: Scene, rays: int = RAYS, inside: int = 4, side: float = 1.0) -> np.ndarray:
+    """Light (SIDE, SIDE) of square photodetectors, a part `side` of the pitch wide, over white."""
     k = np.arange(rays) + 0.5
     radius, angle = np.sqrt(k / rays), np.pi * (1 + 5**0.5) * k
     # Rays and the points in the pixels are independent: steps that share no factor.
@@ -91,7 +91,16 @@ def ray_sum(scene: Scene, rays: int = RAYS, inside: int = 4) -> np.ndarray:
     jitter = (k[:, None] * steps) % 1
     total = np.zeros((SIDE, SIDE))
     for u, v, (jx, jy) in zip(radius * np.cos(angle), radius * np.sin(angle), jitter, strict=True):
-        x, y = (((np.arange(SIDE * inside) + j) / inside - SIDE / 2) * PITCH for j in (jx, jy))
+        x, y = (
+            (
+                np.arange(SIDE)[:, None]
+                + 0.5
+                + side * ((np.arange(inside) + j) / inside - 0.5)
+                - SIDE / 2
+            ).ravel()
+            * PITCH
+            for j in (jx, jy)
+        )
         seen = composed(scene, x, y, u, v)
         total += seen.reshape(SIDE, inside, SIDE, inside).mean(axis=(1, 3))
     return total / rays

@@ -60,6 +60,12 @@ def test_layers_are_a_sum_over_rays(seed, sharp, tmp_path):
     check(scene, ray_sum(scene, 700, 3), tmp_path, RAYS)
 
 
+def test_photodetectors_that_do_not_fill_their_pixels(tmp_path):
+    scene = random_scene(np.random.default_rng(2), 3, sharp=True)
+    small = {"pixel.photodetector.fill_factor": 0.36}
+    check(scene, ray_sum(scene, 700, 3, 0.6), tmp_path, RAYS, small)
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("seed", range(100, 140))
 def test_forty_scenes_are_sums_over_rays(seed, tmp_path):

@@ -43,10 +43,8 @@ class Hidden:
     """Of what is left out, predicted, rms [e/s]."""
 
 
-def add_covariance(
-    path: OpticalPath, scene: LayeredScene, lattice: Geometry, light: NDArray, full: float
-) -> Hidden:
-    """Add what layers that are out of focus hide of each other to the light on a lattice.
+def add_covariance(path: OpticalPath, scene: LayeredScene, light: NDArray, full: float) -> Hidden:
+    """Add what layers that are out of focus hide of each other to the light of pixels.
 
     Parameters
     ----------
@@ -54,8 +52,6 @@ def add_covariance(
         Lens, pixels and settings, with the optics of each layer.
     scene : LayeredScene
         The scene.
-    lattice : Geometry
-        Cells of the lattice.
     light : NDArray
         Light (C, rows, columns) that is changed [e/s].
     full : float
@@ -70,10 +66,11 @@ def add_covariance(
     pitch = max(path.geometry.pitch_x, path.geometry.pitch_y)
     if len(widest) < 2 or widest[1] < SHARP * pitch:
         return Hidden()
-    rows, columns = _around_edges(scene, lattice, widest[0] + 2 * widest[1])
+    rows, columns = _around_edges(scene, path.geometry, widest[0] + 2 * widest[1])
     if not (rows.stop > rows.start and columns.stop > columns.start):
         return Hidden()
-    centers = pixel_centers(lattice)[0][columns], pixel_centers(lattice)[1][rows]
+    x, y = pixel_centers(path.geometry, detector=True)
+    centers = x[columns], y[rows]
     allowed = SHARE * path.settings.tolerance * full
 
     def sampled(cell: float, order: int) -> _Sampled:
@@ -87,8 +84,10 @@ def add_covariance(
         cell = min(max(asked, widest[1] / SAMPLES, pitch / FINEST), widest[1])
         found = sampled(cell, HIGHEST)
     for plane, own in zip(light, found.light.light, strict=True):
-        across = _interpolated(own.T, found.at_x).T
-        plane[rows, columns] += _interpolated(across, found.at_y)
+        across = _means(own.T, found.at_x, path.geometry.collecting_width / found.cell).T
+        plane[rows, columns] += _means(
+            across, found.at_y, path.geometry.collecting_height / found.cell
+        )
     np.maximum(light, 0, out=light)
     share = math.sqrt(len(centers[0]) * len(centers[1]) / light[0].size)
     coarse = min(SAMPLED * (found.cell / widest[1]) ** 2, 1.0) * found.light.rms
@@ -103,9 +102,9 @@ class _Sampled:
     cell: float
     """Side of a cell [m]."""
     at_x: NDArray
-    """Where the lattice's columns lie, counted in cells."""
+    """Where the pixels' columns lie, counted in cells from the edge of the first."""
     at_y: NDArray
-    """Where its rows lie."""
+    """Where their rows lie."""
 
 
 def _covariance(
@@ -130,7 +129,7 @@ def _covariance(
         mix[:-1, :-1], mix[-1, -1] = level, 1
         planes = part.chart.averages(edges[0], edges[1], mix)
         layers.append(BlurredLayer(planes[:-1], planes[-1], optics.radius / cell))
-    at_x, at_y = ((at - own[0]) / cell - 0.5 for at, own in zip(centers, edges, strict=True))
+    at_x, at_y = ((at - own[0]) / cell for at, own in zip(centers, edges, strict=True))
     return _Sampled(covariance(layers, allowed, order), cell, at_x, at_y)
 
 
@@ -140,6 +139,13 @@ def _around_edges(scene: LayeredScene, g: Geometry, beyond: float) -> tuple[slic
     rows = slice(min(w.rows.start for w in spans), max(w.rows.stop for w in spans))
     columns = slice(min(w.columns.start for w in spans), max(w.columns.stop for w in spans))
     return rows, columns
+
+
+def _means(plane: NDArray, at: NDArray, width: float) -> NDArray:
+    """Return the means of even rows over boxes of a width around places, counted in rows."""
+    sums = np.concatenate([np.zeros_like(plane[:1]), np.cumsum(plane, axis=0)])
+    low, high = (_interpolated(sums, at + side * width / 2) for side in (-1, 1))
+    return (high - low) / plane.dtype.type(width)
 
 
 def _interpolated(plane: NDArray, at: NDArray) -> NDArray:

@@ -17,7 +17,7 @@ class Lattice:
     """Cells on which layers are put one before the other."""
 
     geometry: Geometry
-    """Of the cells, as if they were pixels."""
+    """Of the cells, as if they were pixels; or of the pixels themselves."""
 
     @classmethod
     def over_array(cls, g: Geometry, count: int) -> Lattice:
@@ -54,15 +54,16 @@ class Window:
         """Geometry of its cells, as if they were pixels."""
         g = self.lattice
         rows, columns = self.rows.stop - self.rows.start, self.columns.stop - self.columns.start
-        return _with_cells(g, rows, columns, g.pitch_x, g.pitch_y)
+        size = columns * g.pitch_x, rows * g.pitch_y
+        return replace(g, rows=rows, columns=columns, sensor_width=size[0], sensor_height=size[1])
 
     @property
     def center(self) -> tuple[float, float]:
-        """Its center, right of and below the lattice's [m]."""
+        """Its center, as its cells see it, right of and below the lattice's [m]."""
         g = self.lattice
         x = (self.columns.start + self.columns.stop - g.columns) / 2 * g.pitch_x
         y = (self.rows.start + self.rows.stop - g.rows) / 2 * g.pitch_y
-        return x, y
+        return x * g.sampling_scale, y * g.sampling_scale
 
 
 def _with_cells(g: Geometry, rows: int, columns: int, width: float, height: float) -> Geometry:

@@ -1,6 +1,6 @@
 """The image of layers at their own distances: each through its own blur, then front to back.
 
-On a lattice of cells finer than the pixels, layer i has the light L_i and the opacity C_i that the
+In every pixel, layer i has the light L_i and the opacity C_i that the
 lens makes of its light E_i a_i and its opacity a_i, each with the transfer of its distance T_i:
 
     E = sum_i T_i[E_i a_i] prod_{j < i} (1 - T_j[a_j]).
@@ -9,15 +9,15 @@ That is exact where of two layers that overlap at most one is out of focus: a ra
 of the aperture then meets the sharp one in the same place as all others. What is missing
 where both are is the covariance over the aperture.
 
-Each layer's image is formed as that of any flat scene, with the lattice's cells for pixels and its
-opacity for so many more colors. The light on the lattice is then a scene of its own, on the
-sensor's surface, that silicon and photodetectors average.
+Each layer's image is formed as that of any flat scene, with its opacity for so many more colors.
+Where light and opacity both change within pixels, what that changes is computed on cells finer than
+the pixels (`_correction`).
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -25,13 +25,21 @@ from numpy.typing import NDArray
 
 from vcam_cli.camera.derived.geometry import Geometry, pixel_centers
 from vcam_cli.camera.derived.mosaic import Mosaic
-from vcam_cli.effects.base import Blur, Effect, FieldTransfer, ImageMotion, of_kind
+from vcam_cli.effects.base import (
+    Blur,
+    Effect,
+    FieldTransfer,
+    ImageMotion,
+    SeparableTransfer,
+    of_kind,
+)
 from vcam_cli.effects.pixel_aperture import PixelAperture
 from vcam_cli.image_formation.bandwidth import margin
 from vcam_cli.image_formation.layer_covariance import add_covariance
 from vcam_cli.image_formation.layer_lattice import Lattice, Window
 from vcam_cli.image_formation.optical_path import (
     DepthReport,
+    Layer,
     Layers,
     OpticalPath,
     SpectrumReport,
@@ -55,16 +63,16 @@ PART = 0.5
 
 
 @dataclass(frozen=True)
-class _Composite:
-    """Layers put one before the other."""
+class _Seen:
+    """A layer behind the lens."""
 
-    lattice: Lattice
+    window: Window
     light: NDArray
-    """Light (C, rows, columns) on the lattice [e/s]."""
-    error: float
-    """Of light and opacity that both change within a cell, rms [e/s]."""
-    parts: list[tuple[Geometry, int, SpectrumReport]]
-    """Cells, colors and report of each layer that is seen."""
+    """Light (C, rows, columns) in the window [e/s]."""
+    cover: NDArray
+    """Opacity (C, rows, columns)."""
+    path: OpticalPath
+    report: SpectrumReport
 
 
 def layered_image(
@@ -88,44 +96,100 @@ def layered_image(
     report : SpectrumReport
         How the scene was sampled and filtered.
     """
-    found, count = _composite(path, scene, 1, form), 1
-    full = min(float(found.light.max(initial=0.0)), path.ceiling)
-    allowed = CELLS_SHARE * path.settings.tolerance * full
-    if found.error > allowed:
-        count = min(math.ceil((found.error / allowed) ** 0.5), MOST_CELLS)
-        found = _composite(path, scene, count, form)
-    hidden = add_covariance(path, scene, found.lattice.geometry, found.light, full)
-    error = math.hypot(found.error, hidden.error)
+    layers = list(_layers_seen(path, scene, Lattice(path.geometry), form))
+    light, error = _composed(path, layers, path.geometry)
+    full = min(float(light.max(initial=0.0)), path.ceiling)
+    allowed, count = CELLS_SHARE * path.settings.tolerance * full, 1
+    if error > allowed:
+        count = min(math.ceil((error / allowed) ** 0.5), MOST_CELLS)
+        added, error = _correction(path, scene, count, form)
+        light += added
+    hidden = add_covariance(path, scene, light, full)
+    error = math.hypot(error, hidden.error)
     depth = DepthReport(count, hidden.order, error / (full or 1.0))
-    layers, report = form(
-        _pixel_path(path), _on_the_sensor(scene, found.light, found.lattice.geometry)
-    )
-    return layers, _joined(report, found.parts, error, depth)
+    layer = Layer(lambda color, rows: light[color, rows])
+    return iter([layer]), _report(layers, error, depth)
 
 
-def _composite(path: OpticalPath, scene: LayeredScene, count: int, form: FormImage) -> _Composite:
-    """Return layers one before the other, on so many cells along each side of a pixel."""
-    lattice = Lattice.over_array(path.geometry, count)
+def _layers_seen(
+    path: OpticalPath, scene: LayeredScene, lattice: Lattice, form: FormImage
+) -> Iterator[_Seen]:
+    """Yield the layers that a lattice sees, the nearest first.
+
+    Its cells are the pixels themselves, or average over all of their area.
+    """
     g = lattice.geometry
-    total: NDArray = np.zeros(
-        (len(path.transfer.weights[-1]), g.rows, g.columns), path.settings.dtype
-    )
-    clear, squares = np.ones_like(total), 0.0
-    parts: list[tuple[Geometry, int, SpectrumReport]] = []
+    behind: tuple[Effect, ...] = (PixelAperture(g.pitch_x, g.pitch_y),)
+    if g is path.geometry:
+        kinds = Blur, SeparableTransfer
+        behind = tuple(e for e in of_kind(path.effects, *kinds) if not _is_of_lens(e))
     for part, optics in zip(scene.parts, path.layers, strict=True):
-        seen = _layer_path(path, part, optics.effects, lattice)
-        if seen is None:
-            continue
-        window, own = seen
-        light, cover, report = _light_and_cover(own, part, window, scene.white, form)
-        here = slice(None), window.rows, window.columns
-        squares += product_error(clear[here], light)
-        total[here] += clear[here] * light
-        clear[here] *= 1 - cover
-        parts.append((own.geometry, len(own.mosaic.colors), report))
+        effects = (*(e for e in optics.effects if _is_of_lens(e)), *behind)
+        seen = _layer_path(path, part, effects, lattice)
+        if seen is not None:
+            window, own = seen
+            light, cover, report = _light_and_cover(own, part, window, scene.white, form)
+            yield _Seen(window, light, cover, own, report)
+
+
+def _composed(path: OpticalPath, layers: Iterable[_Seen], g: Geometry) -> tuple[NDArray, float]:
+    """Return the light (C, rows, columns) of layers one before the other, and its error [e/s].
+
+    The error is that of light and opacity that both change within a cell, rms.
+    """
+    colors = len(path.transfer.weights[-1])
+    total: NDArray = np.zeros((colors, g.rows, g.columns), path.settings.dtype)
+    clear, squares = np.ones_like(total), 0.0
+    for layer in layers:
+        here = slice(None), layer.window.rows, layer.window.columns
+        squares += product_error(clear[here], layer.light)
+        total[here] += clear[here] * layer.light
+        clear[here] *= 1 - layer.cover
+    return total, math.sqrt(squares / (g.rows * g.columns))
+
+
+def _correction(
+    path: OpticalPath, scene: LayeredScene, count: int, form: FormImage
+) -> tuple[NDArray, float]:
+    """Return what pixels see more where layers are put one before the other within them [e/s].
+
+    That is done on so many cells along each side of a pixel, and the pixels' means are taken
+    behind; from it, the same with means taken before. The error of the cells is the second value.
+    """
+    lattice = Lattice.over_array(path.geometry, count)
+    g, pixels = lattice.geometry, _pixel_path(path)
+
+    def at_pixels(light: NDArray) -> NDArray:
+        layers, _ = form(pixels, _on_the_sensor(scene, light, g))
+        return _gathered(layers, path.geometry, light)
+
+    layers = list(_layers_seen(path, scene, lattice, form))
+    fine, error = _composed(path, layers, g)
+    coarse, clear = (np.zeros_like(at_pixels(fine)) for _ in range(2))
+    clear += 1
+    for layer in layers:
+        planes = []
+        for values in (layer.light, layer.cover):
+            whole = np.zeros_like(fine)
+            whole[:, layer.window.rows, layer.window.columns] = values
+            planes.append(at_pixels(whole))
+        coarse += clear * planes[0]
+        clear *= 1 - planes[1]
     # Cells of a pixel err alike along an edge: as few of them have it as there are in a row.
-    error = math.sqrt(squares / (count * g.rows * g.columns))
-    return _Composite(lattice, total, error, parts)
+    return at_pixels(fine) - coarse, error / math.sqrt(count)
+
+
+def _gathered(
+    layers: Layers, g: Geometry, like: NDArray, at: tuple[float, float] = (0.0, 0.0)
+) -> NDArray:
+    """Return the sum (C, rows, columns) of parts of an image whose center lies at a place [m]."""
+    out: NDArray = np.zeros((len(like), g.rows, g.columns), like.dtype)
+    columns, rows = pixel_centers(g)
+    for layer in layers:
+        weight = 1.0 if layer.weight is None else layer.weight(columns + at[0], rows + at[1])
+        for color, plane in enumerate(out):
+            plane += layer.values(color, slice(0, g.rows)) * weight
+    return out
 
 
 def product_error(a: NDArray, b: NDArray) -> float:
@@ -160,9 +224,10 @@ def _layer_path(
     The path has twice the colors: those of the light, and of the opacity in white.
     """
     g = lattice.geometry
-    cell = PixelAperture(g.pitch_x, g.pitch_y)
-    effects = (*(e for e in effects if _is_of_lens(e)), cell)
-    knobs = replace(path.settings, tolerance=PART * path.settings.tolerance, oversampling=None)
+    # Opacity counts all of it, however bright: the tolerance is that of white, and no light is cut.
+    brightest = float(path.transfer.level[-1].max())
+    tolerance = PART * path.settings.tolerance * min(1.0, path.ceiling / (brightest or 1.0))
+    knobs = replace(path.settings, tolerance=tolerance, oversampling=None)
     band = float(path.transfer.wavelengths[0]), float(path.transfer.wavelengths[-1])
     beyond = margin(g, effects, band, knobs)
     pitch = max(g.pitch_x, g.pitch_y)
@@ -185,6 +250,7 @@ def _layer_path(
         effects=effects,
         optional=(),
         layers=(),
+        ceiling=math.inf,
         has_opacity=True,
     )
     return window, own
@@ -210,13 +276,8 @@ def _light_and_cover(
         chart=chart,
     )
     layers, report = form(path, scene)
-    columns, rows = pixel_centers(g)
-    both: NDArray = np.zeros((len(path.mosaic.colors), g.rows, g.columns), path.settings.dtype)
-    everywhere = slice(0, g.rows)
-    for layer in layers:
-        weight = 1.0 if layer.weight is None else layer.weight(columns + at_x, rows + at_y)
-        for color, plane in enumerate(both):
-            plane += layer.values(color, everywhere) * weight
+    planes: NDArray = np.empty((len(path.mosaic.colors), 0), path.settings.dtype)
+    both = _gathered(layers, g, planes, window.center)
     colors = len(both) // 2
     level = path.transfer.level[-1, colors:, None, None]
     light, cover = both[:colors], both[colors:]
@@ -258,29 +319,21 @@ def _is_of_lens(effect: Effect) -> bool:
     return moves or (effect.origin == "lens" and bool(of_kind([effect], Blur, FieldTransfer)))
 
 
-def _joined(
-    report: SpectrumReport,
-    parts: list[tuple[Geometry, int, SpectrumReport]],
-    error: float,
-    depth: DepthReport,
-) -> SpectrumReport:
-    """Return the report of the pixels, with what is known of the layers.
-
-    `error` is that of putting one before the other [e/s].
-    """
-    layers = [own for _, _, own in parts]
-    changes = dict(report.changes)
-    for name in {name for own in layers for name in own.changes}:
-        if name != PixelAperture.name:
-            changes[name] = math.hypot(*(own.changes.get(name, 0.0) for own in layers))
-    return replace(
-        report,
-        lost_rms=math.hypot(report.lost_rms, error, *(own.lost_rms for own in layers)),
-        changes=changes,
+def _report(layers: Sequence[_Seen], error: float, depth: DepthReport) -> SpectrumReport:
+    """Return what is known of the image of layers; `error` is that of their order [e/s]."""
+    reports = [layer.report for layer in layers]
+    names = {name for own in reports for name in own.changes}
+    return SpectrumReport(
+        lost_rms=math.hypot(error, *(own.lost_rms for own in reports)),
+        changes={
+            name: math.hypot(*(own.changes.get(name, 0.0) for own in reports)) for name in names
+        },
         peak=math.inf,
-        memory=max([report.memory, *(own.memory for own in layers)]),
+        memory=max((own.memory for own in reports), default=0),
         depth=depth,
-        parts=tuple(parts),
+        parts=tuple(
+            (layer.path.geometry, len(layer.path.mosaic.colors), layer.report) for layer in layers
+        ),
     )
 
 
