@@ -284,6 +284,10 @@ def test_a_frame_that_fails_is_a_row_with_its_error(tmp_path):
         ({"write": ["depth"]}, "write", "the scene has no depth"),
         ({"scenes": {"files": "photos/*.png", "charts": ["csf"]}}, "scenes", "cannot both"),
         ({"camera": "nowhere.yaml"}, "camera", ""),
+        ({"scenes": {"charts": ["no-chart"]}}, "scene.source.chart", "'no-chart'"),
+        ({"scenes": {"charts": [{"kind": "image"}]}}, "charts", "give pictures under files"),
+        ({"vary": {"exposure.time": {"choice": [{"a": 1}]}}}, "exposure.time", ""),
+        ({"vary": {"exposure.captures": {"choice": [["1 ms", "2 ms"]]}}}, "camera", "samples"),
     ],
 )
 def test_what_is_wrong_is_said_with_its_place(tmp_path, changes, place, said):

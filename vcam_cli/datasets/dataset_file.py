@@ -128,6 +128,9 @@ def _check_camera(model: Dataset, camera: Camera) -> None:
     if camera.array.is_scattered:
         message = "its pixels are not on a grid of rows and columns"
         raise BadInput([_problem(model, ("camera",), message, "take another pattern")])
+    if camera.exposure.count > 1:
+        message = "it takes several samples of one integration"
+        raise BadInput([_problem(model, ("camera",), message, "give exposure.time")])
     if "depth" in model.write:
         message = "the scene has no depth"
         raise BadInput([_problem(model, ("write",), message, "leave depth out")])
@@ -157,9 +160,12 @@ def _scenes(model: Dataset) -> Iterator[Scene]:
     """Yield what the frames may show; nothing where that is the camera's own scene."""
     if model.scenes is None:
         return
+    key = ("scenes", "charts") if model.scenes.charts else FILES
+    place = Source(model.locate(key), _tree(model).source.folder, lines=False)
     for chart in model.scenes.charts:
         source = chart if not isinstance(chart, str) else {"kind": "chart", "chart": chart}
-        yield Scene(str(source.get("chart", source.get("kind", ""))), dict(source))
+        name = str(source.get("chart", source.get("kind", "")))
+        yield Scene(name, dict(source), place=place)
     problems: list[Problem] = []
     refuse = partial(_problem, model, FILES)
     folder = _node(model, *FILES).source.folder if model.scenes.files else Path()
@@ -169,7 +175,7 @@ def _scenes(model: Dataset) -> Iterator[Scene]:
             problems.append(refuse(f"no files in {folder} are {pattern}", "correct the pattern"))
         for name in names:
             try:
-                yield _picture(model, Path(name).absolute())
+                yield replace(_picture(model, Path(name).absolute()), place=place)
             except BadInput as error:
                 problems += [refuse(p.message, p.remedy) for p in error.problems]
     if problems:

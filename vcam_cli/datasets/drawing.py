@@ -26,6 +26,8 @@ from vcam_cli.rng import stream
 from vcam_cli.simulation.checks import CHECKS
 
 SOURCE = ("scene", "source")
+NOWHERE = Source("what is drawn", Path(), lines=False)
+"""Where mistakes are said to be that have no place in a file."""
 DIGITS = 9
 """Digits of a value that is drawn."""
 
@@ -40,6 +42,8 @@ class Scene:
     file: Path | None = None
     size: tuple[int, int] = (0, 0)
     """Rows and columns of the picture."""
+    place: Source = NOWHERE
+    """Where mistakes in it are said to be, and relative names start."""
 
 
 @dataclass(frozen=True)
@@ -66,10 +70,10 @@ class Frame:
         tree = tree_at(("seed", "frame"), node_of(self.seed, drawn))
         if self.scene is not None:
             source = self.scene.source | ({"crop": self.crop} if self.crop else {})
-            tree = cameras.merge(tree, tree_at(SOURCE, node_of(source, drawn)))
+            tree = cameras.merge(tree, tree_at(SOURCE, node_of(source, self.scene.place)))
         for path, value in self.values.items():
             place = (places or {}).get(path)
-            node = node_of(value, drawn) if place is None else replace(place, value=value)
+            node = node_of(value, drawn) if place is None else _placed(value, place)
             tree = cameras.merge(tree, tree_at(split(path), node))
         return base.overlay(tree).validate(CHECKS)
 
@@ -77,6 +81,15 @@ class Frame:
     def plain(self) -> dict[str, Any]:
         """All that was drawn, but for the name of the scene."""
         return {"seed": self.seed, "values": self.values, "crop": self.crop}
+
+
+def _placed(value: Any, place: Node) -> Node:
+    """Return a value as a tree of which every part stands at one place."""
+    if isinstance(value, Mapping):
+        value = {key: _placed(item, place) for key, item in value.items()}
+    elif isinstance(value, (list, tuple)):
+        value = [_placed(item, place) for item in value]
+    return replace(place, value=value, keys={})
 
 
 def draw_frame(model: Dataset, scenes: tuple[Scene, ...], number: int) -> Frame:

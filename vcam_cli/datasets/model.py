@@ -93,6 +93,8 @@ def _charts(given: Any) -> tuple[Any, ...]:
         if not isinstance(item, (str, Mapping)):
             message = f"{describe(item)} is no chart"
             raise ValueError(f"{message}; write for example dead-leaves, or a scene.source")
+        if not isinstance(item, str) and item.get("kind", "chart") != "chart":
+            raise ValueError(f"{describe(item['kind'])} is no chart; give pictures under files")
     return tuple(given)
 
 
