@@ -281,7 +281,6 @@ def test_a_frame_that_fails_is_a_row_with_its_error(tmp_path):
         ({"vary": {"seed.frame": {"integers": [1, 9]}}}, "vary.seed.frame", "the key seed"),
         ({"vary": {"exposure.gain": {}}}, "vary.exposure.gain", "is missing"),
         ({"shards": 11}, "shards", "10 frames do not fill 11 shards"),
-        ({"write": ["depth"]}, "write", "the scene has no depth"),
         ({"scenes": {"files": "photos/*.png", "charts": ["csf"]}}, "scenes", "cannot both"),
         ({"camera": "nowhere.yaml"}, "camera", ""),
         ({"scenes": {"charts": ["no-chart"]}}, "scene.source.chart", "'no-chart'"),
@@ -311,6 +310,33 @@ def test_the_command_prints_a_summary(tmp_path):
     assert rows(tmp_path / "out")[0]["seed_frame"] != first[0]["seed_frame"]
     for name, kind in (("sweep", "vcam dataset"), ("run", "vcam dataset")):
         assert kind in CliRunner().invoke(app, [name, str(study)]).output
+
+
+def test_depth_is_that_of_the_nearest_layer(tmp_path):
+    """A mask that covers the left 8 of 24 columns, 0.5 m before a wall 2 m away."""
+    mask = np.zeros((20, 24, 1), np.uint8)
+    mask[:, :8] = 255
+    near = {"kind": "chart", "chart": "uniform", "reflectance": 0.9}
+    layers = [
+        {"source": near, "mask": "mask.png", "distance": "0.5 m"},
+        {"source": near | {"reflectance": 0.1}, "distance": "2 m"},
+    ]
+    camera = {"scene.source": {"kind": "layers", "layers": layers}, "scene.distance": "2 m"}
+    changes = {"write": ["raw", "depth"], "frames": 1, "shards": 1, "vary": {}}
+    study = written(tmp_path, camera=camera, **changes)
+    plain = {key: value for key, value in STUDY.items() if key != "scenes"} | changes
+    study.write_text(yaml.safe_dump(plain, sort_keys=False))
+    write_png(tmp_path / "mask.png", mask[:, :, 0])
+    made(study, tmp_path / "out")
+    known = np.where(np.arange(24) < 8, 0.5, 2.0) * np.ones((20, 1))
+    with np.load(tmp_path / "out" / "shard_0000.npz") as shard:
+        assert np.array_equal(shard["000000.depth"], known)
+        left, right = (part.mean() for part in np.split(shard["000000.raw"], [8], axis=1))
+    assert left > right + 3
+    study.write_text(yaml.safe_dump(plain | {"format": "tiff"}, sort_keys=False))
+    made(study, tmp_path / "tiff")
+    told = tifffile.imread(tmp_path / "tiff" / "shard_0000" / "000000_depth.tif")
+    assert np.array_equal(told, 1000 * known)
 
 
 def test_the_documented_reader_reads(whole, monkeypatch):

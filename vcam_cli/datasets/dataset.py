@@ -18,7 +18,7 @@ from vcam_cli.datasets import manifest
 from vcam_cli.datasets.dataset_file import DatasetFile
 from vcam_cli.datasets.drawing import Frame
 from vcam_cli.datasets.frame_work import NPZ, FrameJob
-from vcam_cli.datasets.shards import Packer, Shard, shards
+from vcam_cli.datasets.shards import Packer, Shard, scale, shards
 from vcam_cli.errors import bad
 from vcam_cli.files.points_store import SweepFolder
 from vcam_cli.files.records import Fingerprint
@@ -225,8 +225,8 @@ def _record(file: DatasetFile, versions: dict[str, str]) -> dict[str, Any]:
         "frames": model.frames,
         "shards": model.shards,
         "layout": whole[model.format],
-        "scale": {"raw": 1, "clean": 1, "ideal": 1}
-        if model.format == "npz"
-        else {"raw": 1, "clean": _scale(file), "ideal": _scale(file)},
+        "scale": {
+            kind: 1 if model.format == "npz" else scale(kind, _scale(file)) for kind in model.write
+        },
         "versions": versions,
     }

@@ -131,8 +131,8 @@ def _check_camera(model: Dataset, camera: Camera) -> None:
     if camera.exposure.count > 1:
         message = "it takes several samples of one integration"
         raise BadInput([_problem(model, ("camera",), message, "give exposure.time")])
-    if "depth" in model.write:
-        message = "the scene has no depth"
+    if "depth" in model.write and camera.scene.moves:
+        message = "the scene moves, so that its depth is not one"
         raise BadInput([_problem(model, ("write",), message, "leave depth out")])
 
 

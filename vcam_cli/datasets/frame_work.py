@@ -27,6 +27,7 @@ NPZ = "npz"
 ARRAYS: dict[str, Callable[[Result], NDArray]] = {
     "raw": lambda result: result.dn,
     "clean": lambda result: result.clean_dn.astype(np.float32),
+    "depth": lambda result: result.frame.depth().astype(np.float32),
     "ideal": lambda result: np.moveaxis(result.frame.ideal_dn(), 0, -1).astype(np.float32),
 }
 """Kind of array -> what it is of a frame."""

@@ -158,7 +158,8 @@ class Dataset(FileModel):
     )
     write: Annotated[tuple[str, ...], words_of(KINDS, 1)] = key(
         "what is written of a frame: raw (codes), clean (the same without noise and rounding),"
-        " ideal (the scene at the pixels' centers, all colors, in codes), depth",
+        " ideal (the scene at the pixels' centers, all colors, in codes), depth (in m along the"
+        " axis; of layers that of the nearest)",
         example=["raw", "clean"],
         default=("raw", "clean"),
     )

@@ -111,7 +111,7 @@ class Packer:
         files = {}
         for name, arrays in frames:
             for kind, values in arrays.items():
-                whole = values if kind == "raw" else whole_numbers(values, self.scale)
+                whole = values if kind == "raw" else whole_numbers(values, scale(kind, self.scale))
                 file = f"shard_{shard.number:04d}/{name}_{kind}.tif"
                 (self.folder.path / file).parent.mkdir(exist_ok=True)
                 put = partial(tiff.write_tiff, samples=whole, description=f"vcam {kind}")
@@ -133,9 +133,21 @@ class Packer:
         return made
 
 
-def whole_numbers(values: NDArray, scale: int) -> NDArray:
-    """Return codes times `scale`, rounded: uint16, or uint32 where that is too small."""
-    whole = np.rint(np.maximum(values.astype(float), 0) * scale)
+MILLIMETERS = 1000
+"""Of depth in TIFF."""
+
+
+def scale(kind: str, codes: int) -> int:
+    """Return what the values of a kind are multiplied by in TIFF, where codes are by so much."""
+    return {"raw": 1, "depth": MILLIMETERS}.get(kind, codes)
+
+
+def whole_numbers(values: NDArray, factor: int) -> NDArray:
+    """Return values times `factor`, rounded: uint16, or uint32 where that is too small.
+
+    What is larger than that holds, as an infinite depth, is its largest number.
+    """
+    whole = np.rint(np.clip(values.astype(float) * factor, 0, 2**32 - 1))
     return whole.astype(np.uint16 if whole.max(initial=0) < 1 << 16 else np.uint32)
 
 

@@ -147,6 +147,16 @@ class LayeredScene:
         """Return sum_k mix[r, k] B_k of the picture at the points (y[i], x[j]): (R, m, n)."""
         return self.flat.values_at(x, y, mix)
 
+    def nearest_at(self, x: Array, y: Array) -> Array:
+        """Return the number of the nearest layer that covers half of a point or more (m, n)."""
+        found = np.full((len(y), len(x)), len(self.parts) - 1)
+        for number in reversed(range(len(self.parts) - 1)):
+            part = self.parts[number]
+            opacity = np.zeros((1, part.components.stop - part.components.start + 1))
+            opacity[0, -1] = 1
+            found[part.chart.values(x, y, opacity)[0] >= 0.5] = number
+        return found
+
 
 AnyScene = Scene | LayeredScene
 """Whatever stands before the lens, flat or not."""

@@ -21,6 +21,7 @@ from vcam_cli.camera.derived.line_times import check_shutter
 from vcam_cli.camera.derived.scene_layers import check_layers
 from vcam_cli.camera.processing import SHOWN
 from vcam_cli.camera.scene_files import Crop
+from vcam_cli.camera.sources import Layers
 from vcam_cli.effects import aberration, point_spread
 from vcam_cli.errors import bad, split
 from vcam_cli.processing import check as check_steps
@@ -103,7 +104,9 @@ def check_picture(camera: Camera) -> None:
 
         check_channels(source.model, color_channels(source.file, path))
         if source.crop is not None:
-            _check_crop(source.crop, picture_size(source.file, path))
+            _check_crop(source.crop, picture_size(source.file, path), SOURCE)
+    if isinstance(source, Layers):
+        _check_crops_of_layers(source)
     if source.kind == "hyperspectral":
         from vcam_cli.files.spectral.hyperspectral import read_bands
 
@@ -112,12 +115,21 @@ def check_picture(camera: Camera) -> None:
         check_bands(camera.scene, bands)
 
 
-def _check_crop(crop: Crop, size: tuple[int, int]) -> None:
+def _check_crops_of_layers(source: Layers) -> None:
+    from vcam_cli.files.images import picture_size
+
+    for number, layer in enumerate(source.layers):
+        shown, place = layer.source, (*SOURCE, "layers", number, "source")
+        if shown.kind == "image" and shown.crop is not None:
+            _check_crop(shown.crop, picture_size(shown.file, (*place, "file")), place)
+
+
+def _check_crop(crop: Crop, size: tuple[int, int], place: tuple[str | int, ...]) -> None:
     """Refuse a crop that goes beyond its picture of so many rows and columns (BadInput)."""
     for name, part, whole in zip(("rows", "columns"), crop.window, size, strict=True):
         if part.stop > whole:
             message = f"the crop ends at {part.stop}, the picture has {whole} {name}"
-            raise bad((*SOURCE, "crop", name), message, "take a smaller crop, or begin it earlier")
+            raise bad((*place, "crop", name), message, "take a smaller crop, or begin it earlier")
 
 
 def check_spectral_file(camera: Camera) -> None:

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.sources import Layers
 from vcam_cli.effects.base import Gain, of_kind
 from vcam_cli.effects.order import quantizer
 from vcam_cli.effects.signal_chain import NoiseSource, Quantizer
@@ -22,6 +23,7 @@ from vcam_cli.image_formation.rate_cache import RateCache
 from vcam_cli.parallel import available_workers
 from vcam_cli.progress import Stages
 from vcam_cli.readout import binned_readout, exposure, nondestructive_samples
+from vcam_cli.scenes.layered import LayeredScene
 from vcam_cli.simulation.preparation import Prepared, prepare
 from vcam_cli.spectra import Spectrum, colorchecker
 
@@ -177,6 +179,17 @@ class Frame(Prepared):
         return np.clip(
             self.to_dn(np.minimum(self.mean_electrons, well)), 0, n * circuit.highest_code
         )
+
+    def depth(self) -> NDArray:
+        """Return how far away is what the pixels' centers see, along the axis (rows, columns) [m].
+
+        Of layers the nearest one counts that covers half of a place or more.
+        """
+        place, source = self.layout, self.camera.scene.source
+        if isinstance(self.scene, LayeredScene) and isinstance(source, Layers):
+            distances = np.array([layer.distance for layer in source.layers])
+            return distances[self.scene.nearest_at(place.picture_x, place.picture_y)]
+        return np.full(place.picture_shape, self.camera.scene.distance)
 
     def ideal_dn(self) -> NDArray:
         """Return the scene point-sampled at the pixels' centers, all colors everywhere [DN].

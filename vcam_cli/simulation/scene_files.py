@@ -63,7 +63,7 @@ def _read_layers(source: Layers) -> tuple[tuple[LayerFiles, ...], tuple[str, ...
         if layer.source.kind == "image":
             image, at = layer.source, (*place, "source", "file")
             read = read_picture(image.file, image.encoding, image.white, at)
-            picture = read.data
+            picture = read.data if image.crop is None else read.data[image.crop.window]
             notes += [note for note in read.notes if layer.mask is None or "alpha" not in note]
         if layer.mask is not None:
             mask = read_opacity(layer.mask, (*place, "mask"))
