@@ -63,6 +63,7 @@ REASONS: dict[str, tuple[str, Callable[[Result], bool]]] = {
     "exposure.auto.max_gain": ("was not reached", lambda r: _limit(r) in ("", "shortest time")),
     "exposure.auto.min": ("was not reached", lambda r: _limit(r) != "shortest time"),
     "exposure.auto.target": ("a limit stopped the exposure", lambda r: _limit(r) != ""),
+    "exposure.auto.follow": ("acts from frame to frame of a sequence", lambda r: True),
     "exposure.compensation": ("a limit stopped the exposure", lambda r: _limit(r) != ""),
     "adc.bits": (
         "codes per electron are given, and no pixel comes near the last code",
@@ -161,7 +162,8 @@ def mistakes(camera: Camera, folder: Path) -> list[str]:
                 result = simulated(changed, folder)
             except (BadInput, CannotDo):
                 continue  # an error says it; or another number is allowed
-            told = key in dict(idle_keys(result.frame.camera))
+            idle = [path for path, _ in idle_keys(result.frame.camera)]
+            told = any(key == path or key.startswith(f"{path}.") for path in idle)
             moved = digest(result) != before
             if moved and told:
                 found.append(f"{key} = {value}: said to change nothing, and does")

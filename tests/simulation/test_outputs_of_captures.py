@@ -116,7 +116,7 @@ def test_what_is_printed():
     assert "hdr_dynamic_range_db" in done.stdout
     assert f"photocurrent {Path('out/hdr.exr')}" in done.stdout
     planned = vcam("plan", "several.yaml").stdout
-    assert "exposure   0.1 s, 3 samples from 0.001 s on" in planned
+    assert "exposure  0.1 s, 3 samples from 0.001 s on" in planned
 
 
 def test_measured_on_the_bench_it_is_one_exposure_of_the_last_time():

@@ -52,7 +52,7 @@ def next_exposure(camera: Camera, taken: Prepared) -> ExposureSettings:
     return replace(wanted, time=chosen, gain=max(product / chosen, circuit.exposure_gain))
 
 
-def exposed(camera: Camera, settings: ExposureSettings) -> Camera:
+def set_exposure(camera: Camera, settings: ExposureSettings) -> Camera:
     """Return the camera with the time and gain that its control has set."""
     return camera.model_copy(
         update={"exposure": camera.exposure.single(settings.time, settings.gain)}

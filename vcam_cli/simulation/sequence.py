@@ -102,7 +102,7 @@ def frames(
     lines = line_times(camera, geometry(camera))
     for each in frame_cameras(camera, count, rate):
         if settings is not None:
-            each = exposure_control.exposed(each, settings)
+            each = exposure_control.set_exposure(each, settings)
             timed = each.exposure.model_copy(update={"reference": reference})
             each = each.model_copy(update={"exposure": timed})
         result = simulate(each, workers, watch, shared)
