@@ -30,18 +30,22 @@ class Depth(Effect):
 
     name = "depth"
     reference = "blur A |1/d - 1/s| v: Ray, Applied Photographic Optics, 3rd ed., 2002"
-    absent = "the scene is flat, or all its layers are in focus; write source: {kind: layers, ...}"
+    absent = (
+        "the scene is flat, or all its layers are in focus and at rest;"
+        " write source: {kind: layers, ...}"
+    )
     origin = "lens"
 
     @classmethod
     def from_camera(cls, camera, geometry):
-        """Return the layers of a scene, or None where it is flat, or all of it is in focus."""
+        """Return the layers of a scene, or None where it is flat, or sharp and at rest."""
         cameras = layer_cameras(camera)
         if not cameras:
             return None
         lens = geometry.focus_distance, geometry.focal_length, geometry.f_number
         blurs = [float(blur_diameter(solve(c).object_distance, *lens)) for c in cameras]
-        return cls(tuple(blurs), geometry.pitch_x) if any(blurs) else None
+        together = not any(blurs) and not camera.scene.moves
+        return None if together else cls(tuple(blurs), geometry.pitch_x)
 
     def describe(self) -> str:
         """Return a short clause with this camera's numbers and units."""
