@@ -227,7 +227,7 @@ def _layer_path(
     # Opacity counts all of it, however bright: the tolerance is that of white, and no light is cut.
     brightest = float(path.transfer.level[-1].max())
     tolerance = PART * path.settings.tolerance * min(1.0, path.ceiling / (brightest or 1.0))
-    knobs = replace(path.settings, tolerance=tolerance, oversampling=None)
+    knobs = replace(path.settings, tolerance=tolerance)
     band = float(path.transfer.wavelengths[0]), float(path.transfer.wavelengths[-1])
     beyond = margin(g, effects, band, knobs)
     pitch = max(g.pitch_x, g.pitch_y)
@@ -324,6 +324,7 @@ def _report(layers: Sequence[_Seen], error: float, depth: DepthReport) -> Spectr
     reports = [layer.report for layer in layers]
     names = {name for own in reports for name in own.changes}
     return SpectrumReport(
+        oversampling=max((own.oversampling for own in reports), default=0.0),
         lost_rms=math.hypot(error, *(own.lost_rms for own in reports)),
         changes={
             name: math.hypot(*(own.changes.get(name, 0.0) for own in reports)) for name in names
