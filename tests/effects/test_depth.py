@@ -162,6 +162,7 @@ def test_without_depth_all_layers_are_sharp(tmp_path):
     assert error(found, truth) <= CLOSE
 
 
+@pytest.mark.long
 def test_light_from_beyond_the_frame_counts(tmp_path):
     """A bright layer beside the array, out of focus, lights its border."""
     white, black = np.ones((8, 8), np.float32), np.zeros((8, 8), np.float32)
