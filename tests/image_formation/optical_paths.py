@@ -41,7 +41,8 @@ def sensor(
     x, y = shift[0] * pitch[0], shift[1] * pitch[1]
     return Geometry(
         focal_length=5e-3, f_number=4.0, aperture_diameter=1.25e-3, object_distance=math.inf,
-        focus_distance=math.inf, magnification=0.0, scene_scale=0.0, rows=rows, columns=columns, pixel_width=pitch[0], pixel_height=pitch[1],
+        focus_distance=math.inf, magnification=0.0, scene_scale=0.0,
+        rows=rows, columns=columns, pixel_width=pitch[0], pixel_height=pitch[1],
         pitch_x=pitch[0], pitch_y=pitch[1], sensor_width=columns * pitch[0],
         sensor_height=rows * pitch[1], detector_width=width, detector_height=height, detector_x=x,
         detector_y=y, collecting_width=width, collecting_height=height, collecting_x=x,
