@@ -163,23 +163,7 @@ class Layers(Model):
         return None
 
 
-Source = (
-    Uniform
-    | Dark
-    | Sinusoid
-    | Csf
-    | SlantedEdge
-    | StepWedge
-    | ColorChecker
-    | SiemensStar
-    | PointGrid
-    | DeadLeaves
-    | EyeChart
-    | HdrPatches
-    | ImageFile
-    | Hyperspectral
-    | Layers
-)
+Source = LayerSource | Hyperspectral | Layers
 KINDS: dict[str, type[Model] | None] = {
     "chart": None,
     "image": ImageFile,
