@@ -9,7 +9,7 @@ import pytest
 import yaml
 from making import QUIET, camera, radiance_for, tree
 
-from vcam_cli import simulate
+from vcam_cli import load, simulate
 from vcam_cli.camera.derived.geometry import geometry
 from vcam_cli.camera.derived.image_motion import trajectory
 from vcam_cli.errors import BadInput
@@ -200,3 +200,9 @@ def test_what_is_not_built_yet_is_refused(wrong, path, tmp_path):
     with pytest.raises(BadInput, match="not built yet") as caught:
         checks.load(str(file))
     assert path in str(caught.value)
+
+
+def test_a_scene_may_overtake_the_shutter():
+    """What moves faster than lines are read is seen reversed, in finite numbers."""
+    sets = ["scene.source.motion.y=1000 km/s", "array.rows=12", "array.columns=16"]
+    assert np.isfinite(simulate(load("street", sets)).mean_electrons).all()

@@ -167,10 +167,23 @@ def mistakes(camera: Camera, folder: Path) -> list[str]:
             moved = digest(result) != before
             if moved and told:
                 found.append(f"{key} = {value}: said to change nothing, and does")
-            if not moved and not told and not is_reasonable(key, base):
+            if (
+                not moved
+                and not told
+                and not (is_reasonable(key, base) or is_out_of_sight(path, written, before, folder))
+            ):
                 found.append(f"{key} = {value}: changes nothing, and nobody says so")
             break
     return found
+
+
+def is_out_of_sight(path: tuple, written: dict[str, Any], before: str, folder: Path) -> bool:
+    """Whether a key is that of a layer which the few pixels of the search do not see."""
+    if path[:3] != ("scene", "source", "layers"):
+        return False
+    without = json.loads(json.dumps(written))
+    del without["scene"]["source"]["layers"][path[3]]
+    return digest(simulated(without, folder)) == before
 
 
 def test_no_number_of_a_camera_is_silently_idle(tmp_path) -> None:

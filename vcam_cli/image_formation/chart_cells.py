@@ -152,7 +152,7 @@ def cells_per_pixel(path: OpticalPath, scene: ChartScene, highest: float) -> Cho
             rows = crops[0].pitch_y / g.pitch_y
             return ChosenCells(max(cells, cell_grid(crops[0], g, cells)[0] / rows), error, trials)
     # It falls with the square of the cells, about: faster than is reckoned here.
-    enough = min(tried * error / budget, most)
+    enough = min(tried * error / budget, most) if budget else most
     return ChosenCells(enough, error * tried / enough, trials)
 
 

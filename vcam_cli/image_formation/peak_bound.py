@@ -192,7 +192,8 @@ def _windows(axis: Axis, reach: float) -> Windows | None:
     What such blurs move by their reach is still on the array, if it is not nearer to its border,
     or mirrored there.
     """
-    aside = 0 if axis.virtual_pixels == axis.pixels else math.ceil(reach / axis.pixel_pitch)
+    pitch = abs(axis.pixel_pitch)  # negative where the scene overtakes the shutter
+    aside = 0 if axis.virtual_pixels == axis.pixels else math.ceil(reach / pitch)
     inside = axis.pixels - 2 * aside
     if inside < 1:
         return None
@@ -206,7 +207,7 @@ def _windows(axis: Axis, reach: float) -> Windows | None:
         terms=terms,
         left=left[terms],
         centers=axis.first + (starts + (pixels - 1) / 2) * axis.pixel_pitch,
-        length=pixels * axis.pixel_pitch,
+        length=pixels * pitch,
         power=(float(power.sum()), float(power[terms].sum())),
         share=_share_of_mean(starts, pixels, axis.pixels),
     )

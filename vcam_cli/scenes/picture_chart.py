@@ -50,8 +50,10 @@ class PictureChart(Chart):
         from scipy.sparse import csr_array
 
         cells = len(edges) - 1
-        first, last = np.floor(edges[:-1]).astype(int), np.ceil(edges[1:]).astype(int)
-        most = int((last - first).max())
+        # Where nothing is beyond the picture, a cell that is wider has no more samples than it.
+        ends = np.clip(edges, 0, count) if not self.mirrored else edges
+        first, last = np.floor(ends[:-1]).astype(int), np.ceil(ends[1:]).astype(int)
+        most = max(int((last - first).max()), 1)
         sample = first[:, None] + np.arange(most)
         inside = np.minimum(sample + 1, edges[1:, None]) - np.maximum(sample, edges[:-1, None])
         share = np.maximum(inside, 0) / np.diff(edges)[:, None]

@@ -20,6 +20,7 @@ from vcam_cli.camera.derived.dark_current import dark_rate
 from vcam_cli.camera.derived.electrical import Electrical, electrical
 from vcam_cli.camera.derived.pixel_layout import detector
 from vcam_cli.camera.photodetector import DarkCurrentDensity
+from vcam_cli.camera.sources import Layers
 from vcam_cli.config.model import Model
 from vcam_cli.errors import BadInput
 from vcam_cli.spectra import Spectrum
@@ -125,6 +126,13 @@ RULES = (
         ("scene.distance",),
         lambda camera: not camera.optics.is_lens,
         "the light falls on the bare sensor",
+    ),
+    Rule(
+        ("scene.distance",),
+        lambda camera: (
+            isinstance(camera.scene.source, Layers) and camera.optics.focus_distance is not None
+        ),
+        "layers have distances of their own, and the lens is focused at optics.focus_distance",
     ),
     Rule(
         ("exposure.shutter", "exposure.start", "exposure.reference"),
