@@ -241,7 +241,7 @@ def _cached(name: str, cameras: Sequence[Any], make: Callable[[Path], None]) -> 
     make: writes it to a file.
     """
     from vcam_cli.files.report import hash_text, to_json
-    from vcam_cli.simulation.provenance import inputs, versions
+    from vcam_cli.simulation.output.provenance import inputs, versions
 
     files = [path for camera in cameras for path in inputs(camera)]
     digests = [hashlib.sha256(path.read_bytes()).hexdigest() for path in files]
@@ -273,7 +273,7 @@ def take(name: str, file: str) -> None:
     import numpy as np
 
     from vcam_cli import load, simulate
-    from vcam_cli.files.png import write_png
+    from vcam_cli.files.images.png import write_png
 
     camera = load(name)
     window = _window(name)

@@ -224,7 +224,7 @@ def draw(name: str, file: Path) -> None:
     import numpy as np
 
     from vcam_cli import simulate
-    from vcam_cli.files.png import write_png
+    from vcam_cli.files.images.png import write_png
 
     images = [np.atleast_3d(simulate(camera).render) for camera in cameras(name)]
     pair = [np.kron(each, np.ones((ENLARGED, ENLARGED, 1), np.uint8)) for each in images]

@@ -13,9 +13,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from vcam_cli.files.png import write_png
+from vcam_cli.files.images.png import write_png
 from vcam_cli.scenes.base import Frame
-from vcam_cli.scenes.eye_chart import eye_chart
+from vcam_cli.scenes.charts.eye_chart import eye_chart
 from vcam_cli.spectra import colorchecker
 
 SCENES = Path(__file__).resolve().parent.parent / "configs" / "scenes"

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from vcam_cli.files.png import write_png
+from vcam_cli.files.images.png import write_png
 
 FILE = Path(__file__).resolve().parent.parent / "configs" / "scenes" / "street.png"
 ROWS, COLUMNS, FINE = 480, 720, 4

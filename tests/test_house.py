@@ -11,6 +11,7 @@ import re
 import subprocess
 import sys
 import tokenize
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -52,6 +53,8 @@ FLOOR[""] = len(FLOORS)  # vcam_cli/__init__.py, the face of it all
 HEAVY = ("colour", "matplotlib", "scipy.signal", "scipy.optimize", "scipy.interpolate")
 LONGEST = 400
 """Lines of a module."""
+FULLEST = 25
+"""Modules of a folder; what outgrows it is two things."""
 UNFINISHED = ("TODO", "FIXME", "XXX", "HACK", "NotImplementedError")
 WRITERS = {
     "write_text", "write_bytes", "touch", "tofile", "savetxt", "savez", "savez_compressed",
@@ -361,6 +364,17 @@ def test_no_rule_forbids_too_much(rule, name, text):
 def test_every_room_has_a_floor():
     rooms = {m.room for m in MODULES} - {"", "data"}
     assert rooms <= set(FLOOR)
+
+
+def full_folders(modules: list[Module]) -> list[str]:
+    """Rooms and folders in them that hold more modules and folders than one looks over."""
+    counts = Counter(m.name.rpartition(".")[0] for m in modules if "." in m.name)
+    return [f"{name}: {count} modules" for name, count in counts.items() if count > FULLEST]
+
+
+def test_no_folder_is_too_full():
+    assert full_folders(MODULES) == []
+    assert full_folders([Module(f"physics.lens{i}", "") for i in range(FULLEST + 1)])
 
 
 def test_configs_and_tests_are_no_part_of_the_sources():

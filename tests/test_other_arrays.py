@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 from tests.test_color import QUIET, expected, lab, patches
 from vcam_cli import load, simulate
 from vcam_cli.commands.main import app
-from vcam_cli.files.exr import read_exr
+from vcam_cli.files.images.exr import read_exr
 
 SMALL = ("quality=[mse]", "accuracy=draft", "scene.source={kind: chart, chart: colorchecker}")
 STACKED = (

@@ -14,7 +14,8 @@ from vcam_cli import memory, parallel
 from vcam_cli.commands import options
 from vcam_cli.errors import CannotDo
 from vcam_cli.files.folder import OutputFolder
-from vcam_cli.simulation import outputs, simulate
+from vcam_cli.simulation import simulate
+from vcam_cli.simulation.output import outputs
 
 
 @pytest.mark.parametrize(

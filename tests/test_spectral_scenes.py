@@ -10,8 +10,9 @@ from spectral_files import envi
 
 from vcam_cli import simulate
 from vcam_cli.errors import BadInput
-from vcam_cli.simulation import provenance, spectral_irradiance
+from vcam_cli.simulation import spectral_irradiance
 from vcam_cli.simulation.checks import load
+from vcam_cli.simulation.output import provenance
 from vcam_cli.simulation.simulate import prepare
 from vcam_cli.spectra import cmf, illuminant
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from vcam_cli import load
 from vcam_cli.camera.camera import Camera
-from vcam_cli.files.png import write_png
+from vcam_cli.files.images.png import write_png
 from vcam_cli.scenes.base import View
 from vcam_cli.scenes.build import build
 

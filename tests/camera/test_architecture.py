@@ -8,11 +8,11 @@ import pytest
 from making import BOLTZMANN, CHARGE, GONE, QUIET, camera, radiance_for
 
 from vcam_cli import simulate
-from vcam_cli.camera.architecture import ARCHITECTURES
 from vcam_cli.camera.derived.geometry import geometry
-from vcam_cli.effects.fpn import FixedPattern
-from vcam_cli.effects.read_noise import ReadNoise
-from vcam_cli.effects.reset_noise import ResetNoise
+from vcam_cli.camera.sensor.architecture import ARCHITECTURES
+from vcam_cli.effects.noise.fpn import FixedPattern
+from vcam_cli.effects.noise.read_noise import ReadNoise
+from vcam_cli.effects.noise.reset_noise import ResetNoise
 from vcam_cli.errors import BadInput
 
 BIT_LINE = 2e-12  # [F]
@@ -211,7 +211,7 @@ def test_impossible_numbers_are_refused(changes, path, message, tmp_path):
 
 
 def test_every_architecture_of_a_file_has_its_line():
-    from vcam_cli.camera.pixel import Pixel
+    from vcam_cli.camera.sensor.pixel import Pixel
 
     words = Pixel.model_fields["architecture"].annotation.__args__
     assert set(words) == set(ARCHITECTURES) == set(NAMES)

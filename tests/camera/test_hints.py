@@ -9,7 +9,7 @@ import pytest
 
 from vcam_cli.camera import hint_tables, hints
 from vcam_cli.camera.load import load
-from vcam_cli.camera.sources import CHARTS
+from vcam_cli.camera.scene.sources import CHARTS
 from vcam_cli.errors import BadInput
 
 BASE = """

@@ -13,13 +13,13 @@ from making import GONE
 from pydantic import TypeAdapter, ValidationError
 
 from vcam_cli.camera.camera import Camera
-from vcam_cli.camera.photodetector import Photodetector
-from vcam_cli.camera.pixel import Readout
 from vcam_cli.camera.processing import Step
 from vcam_cli.camera.quality import METRICS
+from vcam_cli.camera.scene.sources import CHARTS
+from vcam_cli.camera.sensor.photodetector import Photodetector
+from vcam_cli.camera.sensor.pixel import Readout
+from vcam_cli.camera.sensor.technology import Technology
 from vcam_cli.camera.simulation import EFFECTS
-from vcam_cli.camera.sources import CHARTS
-from vcam_cli.camera.technology import Technology
 from vcam_cli.config.model import Model
 from vcam_cli.config.quantities import Quantity
 from vcam_cli.units import DIMENSIONS

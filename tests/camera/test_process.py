@@ -9,7 +9,7 @@ from making import camera
 
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.process import EXPONENTS, process
-from vcam_cli.camera.technology import Technology
+from vcam_cli.camera.sensor.technology import Technology
 from vcam_cli.errors import BadInput
 
 TECHNOLOGY = {

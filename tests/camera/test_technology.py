@@ -10,11 +10,11 @@ from typer.testing import CliRunner
 
 from vcam_cli import load, simulate
 from vcam_cli.camera.derived.process import process
-from vcam_cli.camera.technology import Technology
+from vcam_cli.camera.sensor.technology import Technology
 from vcam_cli.commands.main import app
 from vcam_cli.config import shipped
 from vcam_cli.errors import BadInput
-from vcam_cli.simulation import outputs
+from vcam_cli.simulation.output import outputs
 
 TECHNOLOGY = {
     "pixel.technology": "cmos-0.35um",

@@ -17,9 +17,9 @@ from vcam_cli.capture_schedules.study import schedule
 from vcam_cli.config import shipped
 from vcam_cli.config.validation_messages import problems
 from vcam_cli.errors import BadInput
-from vcam_cli.files.exr import read_exr
 from vcam_cli.files.folder import OutputFolder
-from vcam_cli.files.images import read_picture
+from vcam_cli.files.images.exr import read_exr
+from vcam_cli.files.images.images import read_picture
 from vcam_cli.scheduling.sensor import Sensor
 from vcam_cli.simulation.simulate import prepare
 

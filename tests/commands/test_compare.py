@@ -11,8 +11,8 @@ import pytest
 from typer.testing import CliRunner
 
 from vcam_cli.commands import main
-from vcam_cli.files.exr import read_exr, write_exr
-from vcam_cli.files.png import write_png
+from vcam_cli.files.images.exr import read_exr, write_exr
+from vcam_cli.files.images.png import write_png
 from vcam_cli.processing.tone import codes
 
 WHITE = (95.047, 100.0, 108.883)

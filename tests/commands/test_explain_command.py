@@ -6,8 +6,8 @@ import pytest
 from typer.testing import CliRunner
 
 from vcam_cli.camera import hints
-from vcam_cli.camera.scene_files import ImageFile
-from vcam_cli.camera.sources import CHARTS, PICTURE_MODELS
+from vcam_cli.camera.scene.scene_files import ImageFile
+from vcam_cli.camera.scene.sources import CHARTS, PICTURE_MODELS
 from vcam_cli.commands import explain
 from vcam_cli.commands.main import app
 from vcam_cli.effects.order import ORDER

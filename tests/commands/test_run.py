@@ -607,7 +607,7 @@ class TestFailures:
         def fail(*_):
             raise error
 
-        monkeypatch.setattr("vcam_cli.simulation.outputs.write_metrics", fail)
+        monkeypatch.setattr("vcam_cli.simulation.output.outputs.write_metrics", fail)
         result = vcam("--seed", "2", code=code)
         assert result.stdout == ""
         assert len(result.stderr.splitlines()) == 1

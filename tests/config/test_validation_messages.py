@@ -5,7 +5,7 @@ from camera_trees import changed, mistakes
 from pydantic import BaseModel, ValidationError
 
 from vcam_cli.camera.camera import Camera
-from vcam_cli.camera.pixel import FixedPattern, Pixel
+from vcam_cli.camera.sensor.pixel import FixedPattern, Pixel
 from vcam_cli.config import validation_messages
 from vcam_cli.errors import Problem
 

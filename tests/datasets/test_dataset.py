@@ -23,7 +23,7 @@ from vcam_cli.commands.main import app
 from vcam_cli.datasets import dataset_file
 from vcam_cli.datasets.dataset import dataset
 from vcam_cli.errors import BadInput
-from vcam_cli.files.png import write_png
+from vcam_cli.files.images.png import write_png
 from vcam_cli.sweeps.sweep import Execution, Share
 
 STUDY = {
@@ -118,7 +118,7 @@ def test_a_frame_is_what_a_run_of_its_row_gives(whole):
 
 def test_a_crop_is_that_part_of_the_picture(tmp_path):
     """Beside a file that holds nothing but these samples: the same frame, to the bit."""
-    from vcam_cli.files.images import read_picture
+    from vcam_cli.files.images.images import read_picture
 
     study = written(tmp_path)
     window = {"row": 7, "column": 11, "rows": 20, "columns": 24}

@@ -16,13 +16,13 @@ from making import QUIET, camera, tree
 
 from vcam_cli import simulate
 from vcam_cli.camera.derived.geometry import geometry
-from vcam_cli.effects import aberration
-from vcam_cli.effects.aberration import Aberration
 from vcam_cli.effects.base import SignalLevels
-from vcam_cli.effects.diffraction import Diffraction
-from vcam_cli.effects.field_blur import FieldBlur, ZoneWeight
-from vcam_cli.effects.point_spread import PointSpread
-from vcam_cli.effects.wavefront_blur import DirectedBlur, Lens, SymmetricBlur
+from vcam_cli.effects.optics import aberration
+from vcam_cli.effects.optics.aberration import Aberration
+from vcam_cli.effects.optics.diffraction import Diffraction
+from vcam_cli.effects.optics.field_blur import FieldBlur, ZoneWeight
+from vcam_cli.effects.optics.point_spread import PointSpread
+from vcam_cli.effects.optics.wavefront_blur import DirectedBlur, Lens, SymmetricBlur
 from vcam_cli.errors import BadInput
 from vcam_cli.physics import zernike
 from vcam_cli.simulation.checks import load, read_lens

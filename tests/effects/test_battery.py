@@ -29,7 +29,7 @@ from vcam_cli.effects.base import (
     Transport,
     VeilingGlare,
 )
-from vcam_cli.effects.depth import Depth
+from vcam_cli.effects.optics.depth import Depth
 from vcam_cli.effects.order import ORDER
 from vcam_cli.effects.signal_chain import Limit, NoiseSource, Quantizer, Site
 from vcam_cli.rng import BLOCK_ROWS, stream

@@ -11,9 +11,9 @@ from making import GONE, QUIET, camera
 
 from vcam_cli import simulate
 from vcam_cli.camera.derived.geometry import geometry
-from vcam_cli.effects.charge_diffusion import ChargeDiffusion
+from vcam_cli.effects.pixel.charge_diffusion import ChargeDiffusion
 from vcam_cli.errors import BadInput
-from vcam_cli.files.png import write_png
+from vcam_cli.files.images.png import write_png
 
 LENGTHS = {"diffusion_length": "20 um", "depletion_width": "0.4 um", "substrate_depth": "5 um"}
 HAS = {"pixel.photodetector.charge_diffusion": LENGTHS, "effects": QUIET}

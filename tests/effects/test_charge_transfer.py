@@ -8,7 +8,7 @@ from making import QUIET, camera, radiance_for
 
 from vcam_cli import simulate
 from vcam_cli.effects.base import SignalLevels
-from vcam_cli.effects.charge_transfer import ChargeTransfer
+from vcam_cli.effects.pixel.charge_transfer import ChargeTransfer
 
 RNG = np.random.default_rng(4)
 

@@ -8,8 +8,8 @@ import pytest
 from making import QUIET, camera, radiance_for
 
 from vcam_cli import simulate
-from vcam_cli.camera.array import Binning
-from vcam_cli.effects.correlated_row_noise import CorrelatedRowNoise
+from vcam_cli.camera.sensor.array import Binning
+from vcam_cli.effects.noise.correlated_row_noise import CorrelatedRowNoise
 from vcam_cli.effects.signal_chain import Site
 from vcam_cli.rng import stream
 

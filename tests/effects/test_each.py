@@ -13,13 +13,13 @@ from making import BOLTZMANN, CHARGE, GONE, QUIET, camera, radiance_for
 from vcam_cli import simulate
 from vcam_cli.camera.derived.geometry import geometry
 from vcam_cli.effects.base import SignalLevels
-from vcam_cli.effects.diffraction import Diffraction
-from vcam_cli.effects.fpn import FixedPattern
-from vcam_cli.effects.off_axis import OffAxis
-from vcam_cli.effects.pixel_aperture import PixelAperture
-from vcam_cli.effects.quantization import LogarithmicQuantization, Quantization
-from vcam_cli.effects.reset_noise import ResetNoise
-from vcam_cli.effects.saturation import Saturation
+from vcam_cli.effects.noise.fpn import FixedPattern
+from vcam_cli.effects.noise.quantization import LogarithmicQuantization, Quantization
+from vcam_cli.effects.noise.reset_noise import ResetNoise
+from vcam_cli.effects.optics.diffraction import Diffraction
+from vcam_cli.effects.optics.off_axis import OffAxis
+from vcam_cli.effects.pixel.pixel_aperture import PixelAperture
+from vcam_cli.effects.pixel.saturation import Saturation
 
 QUIETLY = {"effects": QUIET}
 

@@ -8,7 +8,7 @@ from making import QUIET, camera, radiance_for, tree
 from vcam_cli import simulate
 from vcam_cli.camera.derived.geometry import geometry
 from vcam_cli.effects.base import SignalLevels
-from vcam_cli.effects.flicker import Flicker
+from vcam_cli.effects.temporal.flicker import Flicker
 from vcam_cli.errors import BadInput
 from vcam_cli.physics import flicker
 from vcam_cli.simulation import checks

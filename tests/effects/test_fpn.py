@@ -9,7 +9,7 @@ from making import QUIET, camera, radiance_for
 
 from vcam_cli import simulate
 from vcam_cli.camera.derived.geometry import geometry
-from vcam_cli.effects.fpn import FixedPattern
+from vcam_cli.effects.noise.fpn import FixedPattern
 from vcam_cli.effects.signal_chain import Site
 from vcam_cli.rng import stream
 

@@ -9,7 +9,7 @@ from making import QUIET, camera, radiance_for
 from scipy.special import beta
 
 from vcam_cli import simulate
-from vcam_cli.effects.heavy_tailed_noise import HeavyTailedNoise, tukey_lambda
+from vcam_cli.effects.noise.heavy_tailed_noise import HeavyTailedNoise, tukey_lambda
 from vcam_cli.effects.signal_chain import Site
 from vcam_cli.rng import stream
 

@@ -10,7 +10,7 @@ from making import QUIET, camera
 from vcam_cli import simulate
 from vcam_cli.camera.derived.geometry import geometry
 from vcam_cli.effects.base import SignalLevels
-from vcam_cli.effects.off_axis import MeasuredFalloff, OffAxis
+from vcam_cli.effects.optics.off_axis import MeasuredFalloff, OffAxis
 from vcam_cli.errors import BadInput
 
 ROWS = [(0.0, 2.0), (0.05, 1.9), (0.1, 1.2), (0.2, 0.8), (0.3, 0.0)]

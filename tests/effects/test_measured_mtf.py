@@ -9,8 +9,8 @@ from making import QUIET, camera
 
 from vcam_cli import simulate
 from vcam_cli.camera.derived.geometry import geometry
-from vcam_cli.effects.aberration import Aberration
-from vcam_cli.effects.diffraction import Diffraction
+from vcam_cli.effects.optics.aberration import Aberration
+from vcam_cli.effects.optics.diffraction import Diffraction
 from vcam_cli.errors import BadInput
 
 ROWS = [(0, 0.5), (20, 0.45), (50, 0.3), (90, 0.1), (120, 0), (150, 0)]

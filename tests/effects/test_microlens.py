@@ -8,7 +8,7 @@ from making import QUIET, camera
 
 from vcam_cli import simulate
 from vcam_cli.camera.derived.geometry import geometry, pixel_centers
-from vcam_cli.effects.microlens import Microlens
+from vcam_cli.effects.pixel.microlens import Microlens
 
 STACK = {
     "passivation": {"thickness": "1 um", "index": 2.0},

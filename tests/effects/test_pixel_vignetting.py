@@ -9,7 +9,7 @@ from making import QUIET, camera
 from vcam_cli import simulate
 from vcam_cli.camera.derived.geometry import geometry, pixel_centers
 from vcam_cli.effects.base import SignalLevels
-from vcam_cli.effects.pixel_vignetting import PixelVignetting, _series
+from vcam_cli.effects.pixel.pixel_vignetting import PixelVignetting, _series
 
 STACK = {
     "passivation": {"thickness": "0.7 um", "index": 2.0},

@@ -8,7 +8,7 @@ import pytest
 from making import QUIET, camera, radiance_for
 
 from vcam_cli import simulate
-from vcam_cli.effects.read_noise import ReadNoise
+from vcam_cli.effects.noise.read_noise import ReadNoise
 from vcam_cli.effects.signal_chain import Site
 from vcam_cli.rng import stream
 

@@ -9,7 +9,7 @@ from making import QUIET, camera, radiance_for
 from vcam_cli import simulate
 from vcam_cli.camera.derived.geometry import geometry
 from vcam_cli.effects.base import SignalLevels
-from vcam_cli.effects.stray_light import StrayLight
+from vcam_cli.effects.optics.stray_light import StrayLight
 
 EDGE = {
     "scene.source": {"kind": "chart", "chart": "slanted-edge"},

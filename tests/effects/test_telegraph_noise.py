@@ -7,7 +7,7 @@ import pytest
 from making import QUIET, camera, radiance_for
 
 from vcam_cli import simulate
-from vcam_cli.effects.telegraph_noise import TelegraphNoise
+from vcam_cli.effects.noise.telegraph_noise import TelegraphNoise
 
 NOISE = {"fraction": "20 %", "amplitude": "30 e", "occupancy": "25 %"}
 

@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 
 from vcam_cli import BadInput, CannotDo, load, simulate
 from vcam_cli.commands import main
-from vcam_cli.files import camera_raw
+from vcam_cli.files.images import camera_raw
 
 SETS = ("output.dng=true", "array.rows=120", "array.columns=160", "quality=[]")
 

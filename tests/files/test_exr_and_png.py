@@ -11,9 +11,9 @@ import OpenImageIO as oiio
 import pytest
 
 from vcam_cli.errors import BadInput, CannotDo
-from vcam_cli.files import exr, png
-from vcam_cli.files.exr import ExrWriter, read_exr, write_exr
-from vcam_cli.files.png import PngWriter, write_png
+from vcam_cli.files.images import exr, png
+from vcam_cli.files.images.exr import ExrWriter, read_exr, write_exr
+from vcam_cli.files.images.png import PngWriter, write_png
 
 RANDOM = np.random.default_rng(1)
 FRAME = {
@@ -71,8 +71,8 @@ def test_equal_content_gives_equal_bytes_without_time_or_host(tmp_path):
     # another process, as OpenImageIO writes the time of day where it is not told otherwise
     code = """
         import sys, numpy as np
-        from vcam_cli.files.exr import write_exr
-        from vcam_cli.files.png import write_png
+        from vcam_cli.files.images.exr import write_exr
+        from vcam_cli.files.images.png import write_png
         write_exr(sys.argv[1] + "/b.exr", {"dn": np.eye(20, dtype=np.float32)}, {"seed": 1})
         write_png(sys.argv[1] + "/b.png", np.eye(20, dtype=np.uint16))
     """
@@ -157,8 +157,8 @@ FULL_DISK = """
     import os, resource, signal, sys
     import numpy as np
     from vcam_cli.errors import CannotDo
-    from vcam_cli.files.exr import ExrWriter
-    from vcam_cli.files.png import write_png
+    from vcam_cli.files.images.exr import ExrWriter
+    from vcam_cli.files.images.png import write_png
     signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
     signal.alarm(30)
     resource.setrlimit(resource.RLIMIT_FSIZE, (100_000, 100_000))

@@ -9,8 +9,8 @@ import OpenImageIO as oiio
 import pytest
 
 from vcam_cli.errors import BadInput, CannotDo
-from vcam_cli.files import images
-from vcam_cli.files.images import decode_srgb, read_picture
+from vcam_cli.files.images import images
+from vcam_cli.files.images.images import decode_srgb, read_picture
 
 RANDOM = np.random.default_rng(2)
 RGB8 = RANDOM.integers(0, 256, (6, 5, 3)).astype(np.uint8)

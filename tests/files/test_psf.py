@@ -5,7 +5,7 @@ import OpenImageIO as oiio
 import pytest
 
 from vcam_cli.errors import BadInput
-from vcam_cli.files.psf import read_psf
+from vcam_cli.files.images.psf import read_psf
 
 PATH = ("optics", "psf", "file")
 SPOT = np.array([[0, 1, 0], [2, 4, 1], [0, 1, 1]], np.float32)[..., None]

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from vcam_cli.errors import BadInput
-from vcam_cli.files.psf import read_psf
+from vcam_cli.files.images.psf import read_psf
 
 GRID = np.random.default_rng(5).random((5, 7)).round(6)
 EXPECTED = GRID / GRID.sum()

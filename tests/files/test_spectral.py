@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from vcam_cli.errors import CannotDo
-from vcam_cli.files.exr import read_exr
+from vcam_cli.files.images.exr import read_exr
 from vcam_cli.files.spectral import exr as spectral
 from vcam_cli.files.spectral.exr import channel_name, write_spectral
 

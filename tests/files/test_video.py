@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 
 from vcam_cli.commands.main import app
 from vcam_cli.errors import CannotDo
-from vcam_cli.files.video import VideoWriter
+from vcam_cli.files.images.video import VideoWriter
 
 STAND_IN = """#!{python}
 import sys

@@ -7,7 +7,7 @@ import math
 import mpmath as mp
 import numpy as np
 
-from vcam_cli.effects.pixel_aperture import PixelAperture
+from vcam_cli.effects.pixel.pixel_aperture import PixelAperture
 from vcam_cli.physics import aberration, diffraction, radiometry, vignetting, zernike
 from vcam_cli.spectra import Spectrum, integral
 

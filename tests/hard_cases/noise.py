@@ -5,8 +5,8 @@ from __future__ import annotations
 import mpmath as mp
 import numpy as np
 
-from vcam_cli.effects.charge_transfer import ChargeTransfer
-from vcam_cli.effects.fpn import FixedPattern
+from vcam_cli.effects.noise.fpn import FixedPattern
+from vcam_cli.effects.pixel.charge_transfer import ChargeTransfer
 from vcam_cli.physics.noise import poisson_from_normal
 from vcam_cli.quality import nonuniformity, photon_transfer
 

@@ -7,7 +7,7 @@ import math
 import mpmath as mp
 import numpy as np
 
-from vcam_cli.effects.quantization import LogarithmicQuantization, Quantization
+from vcam_cli.effects.noise.quantization import LogarithmicQuantization, Quantization
 from vcam_cli.physics import readout as of_readout
 
 from .hard_case import Case, in_digits

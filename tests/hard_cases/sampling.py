@@ -12,8 +12,8 @@ import scipy.fft
 from vcam_cli.image_formation import box_average
 from vcam_cli.image_formation.cosine_series import Axis
 from vcam_cli.scenes.base import Frame
-from vcam_cli.scenes.csf import Csf
-from vcam_cli.scenes.slanted_edge import SlantedEdge
+from vcam_cli.scenes.charts.csf import Csf
+from vcam_cli.scenes.charts.slanted_edge import SlantedEdge
 
 from .hard_case import Case, in_digits
 from .small_camera import electrons, simulated

@@ -21,8 +21,8 @@ import spectral_files as made
 
 from vcam_cli.camera.derived.lattice import _read as read_positions
 from vcam_cli.errors import BadInput, CannotDo
-from vcam_cli.files.images import color_channels, read_picture
-from vcam_cli.files.psf import read_psf
+from vcam_cli.files.images.images import color_channels, read_picture
+from vcam_cli.files.images.psf import read_psf
 from vcam_cli.files.spectral.hyperspectral import read_bands, read_cube
 from vcam_cli.spectra.measured import read_spectrum
 

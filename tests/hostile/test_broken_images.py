@@ -19,8 +19,8 @@ from typer.testing import CliRunner
 
 from vcam_cli.commands import main
 from vcam_cli.errors import BadInput
-from vcam_cli.files.exr import read_exr
-from vcam_cli.files.images import color_channels
+from vcam_cli.files.images.exr import read_exr
+from vcam_cli.files.images.images import color_channels
 from vcam_cli.files.spectral.hyperspectral import read_cube
 
 RGB = np.random.default_rng(7).uniform(0.1, 0.9, (20, 24, 3)).astype(np.float32)

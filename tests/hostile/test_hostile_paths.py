@@ -14,7 +14,7 @@ from making import GONE, tree
 from typer.testing import CliRunner
 
 from vcam_cli.commands import main
-from vcam_cli.files.exr import read_exr
+from vcam_cli.files.images.exr import read_exr
 
 SMALL = {"array.rows": 8, "array.columns": 9, "accuracy": "draft"}
 

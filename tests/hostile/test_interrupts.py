@@ -18,7 +18,7 @@ import yaml
 from driver import Driver
 from making import tree
 
-from vcam_cli.files.exr import read_exr
+from vcam_cli.files.images.exr import read_exr
 
 SMALL = {
     "array.rows": 16, "array.columns": 24, "accuracy": "draft", "array.pattern": "bayer-rggb",

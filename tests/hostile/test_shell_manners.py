@@ -23,10 +23,10 @@ from vcam_cli import sweep
 from vcam_cli.commands import main
 from vcam_cli.config.file_names import existing_file
 from vcam_cli.errors import BadInput, CannotDo
-from vcam_cli.files import rows
 from vcam_cli.files.atomic import STAGING
-from vcam_cli.files.exr import ExrWriter
-from vcam_cli.files.png import write_png
+from vcam_cli.files.images import rows
+from vcam_cli.files.images.exr import ExrWriter
+from vcam_cli.files.images.png import write_png
 from vcam_cli.sweeps.sweep import Execution
 
 pytestmark = pytest.mark.attack("manners in a shell")

@@ -13,8 +13,9 @@ from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry, geometry
 from vcam_cli.camera.derived.mosaic import Mosaic, mosaic
 from vcam_cli.effects.base import Blur, Effect, PlaneTransfer, RadialTransfer, of_kind
-from vcam_cli.effects.pixel_aperture import PixelAperture
-from vcam_cli.image_formation import bandwidth, photon_rate
+from vcam_cli.effects.pixel.pixel_aperture import PixelAperture
+from vcam_cli.image_formation import photon_rate
+from vcam_cli.image_formation.estimates import bandwidth
 from vcam_cli.image_formation.optical_path import OpticalPath
 from vcam_cli.image_formation.settings import STANDARD, Settings, settings
 from vcam_cli.image_formation.transfer_functions import Transfer

@@ -29,10 +29,11 @@ from optical_paths import (
 from scipy.special import erfc
 
 from vcam_cli.accuracy import ablation
-from vcam_cli.effects.diffraction import Diffraction
-from vcam_cli.effects.wavefront_blur import Lens, SymmetricBlur
-from vcam_cli.image_formation import bandwidth, chart_cells, photon_rate
-from vcam_cli.image_formation.bandwidth import highest_passed, line_spread_tail, margin
+from vcam_cli.effects.optics.diffraction import Diffraction
+from vcam_cli.effects.optics.wavefront_blur import Lens, SymmetricBlur
+from vcam_cli.image_formation import photon_rate
+from vcam_cli.image_formation.estimates import bandwidth, chart_cells
+from vcam_cli.image_formation.estimates.bandwidth import highest_passed, line_spread_tail, margin
 from vcam_cli.image_formation.photon_rate import photo_rate
 from vcam_cli.image_formation.settings import STANDARD, settings
 from vcam_cli.scenes.base import Chart

@@ -7,15 +7,15 @@ from optical_paths import aperture, of_picture, on_chart, path, sensor, signal
 from test_filtering import GRIDS
 
 from vcam_cli.image_formation import box_average
-from vcam_cli.image_formation.bandwidth import axes
 from vcam_cli.image_formation.box_average import box_averages, point_values
+from vcam_cli.image_formation.estimates.bandwidth import axes
 from vcam_cli.image_formation.photon_rate import photo_rate
 from vcam_cli.scenes.base import Frame
-from vcam_cli.scenes.colorchecker import ColorChecker, largest_card
-from vcam_cli.scenes.dead_leaves import dead_leaves
-from vcam_cli.scenes.siemens_star import SiemensStar
-from vcam_cli.scenes.slanted_edge import SlantedEdge
-from vcam_cli.scenes.step_wedge import step_wedge
+from vcam_cli.scenes.charts.colorchecker import ColorChecker, largest_card
+from vcam_cli.scenes.charts.dead_leaves import dead_leaves
+from vcam_cli.scenes.charts.siemens_star import SiemensStar
+from vcam_cli.scenes.charts.slanted_edge import SlantedEdge
+from vcam_cli.scenes.charts.step_wedge import step_wedge
 from vcam_cli.simulation.simulate import prepare
 
 ONE = np.ones((1, 1))

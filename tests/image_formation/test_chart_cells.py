@@ -10,16 +10,16 @@ from optical_paths import PITCH, Gaussian, aperture, on_chart, path, rms, sensor
 from vcam_cli import load
 from vcam_cli.accuracy import ablation
 from vcam_cli.accuracy.knobs import with_accuracy
-from vcam_cli.effects.diffraction import Diffraction
-from vcam_cli.image_formation import chart_cells
-from vcam_cli.image_formation.bandwidth import highest_passed
-from vcam_cli.image_formation.chart_cells import cell_grid, cells_per_pixel
+from vcam_cli.effects.optics.diffraction import Diffraction
+from vcam_cli.image_formation.estimates import chart_cells
+from vcam_cli.image_formation.estimates.bandwidth import highest_passed
+from vcam_cli.image_formation.estimates.chart_cells import cell_grid, cells_per_pixel
 from vcam_cli.image_formation.settings import STANDARD
 from vcam_cli.scenes.base import Chart, ChartScene, Frame
-from vcam_cli.scenes.csf import Csf
-from vcam_cli.scenes.dead_leaves import dead_leaves
-from vcam_cli.scenes.siemens_star import SiemensStar
-from vcam_cli.scenes.slanted_edge import SlantedEdge
+from vcam_cli.scenes.charts.csf import Csf
+from vcam_cli.scenes.charts.dead_leaves import dead_leaves
+from vcam_cli.scenes.charts.siemens_star import SiemensStar
+from vcam_cli.scenes.charts.slanted_edge import SlantedEdge
 from vcam_cli.simulation.simulate import prepare
 
 ROWS, COLUMNS = 60, 80

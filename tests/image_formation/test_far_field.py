@@ -8,17 +8,17 @@ import numpy as np
 import pytest
 from optical_paths import PITCH, Leaning, aperture, on_chart, path, rms, sensor, signal
 
-from vcam_cli.effects.diffraction import Diffraction
-from vcam_cli.effects.wavefront_blur import Lens, SymmetricBlur
+from vcam_cli.effects.optics.diffraction import Diffraction
+from vcam_cli.effects.optics.wavefront_blur import Lens, SymmetricBlur
 from vcam_cli.image_formation import far_field, strategies
 from vcam_cli.image_formation.far_field import far_parts, near_field
 from vcam_cli.image_formation.photon_rate import photo_rate
 from vcam_cli.image_formation.settings import REFERENCE, STANDARD
 from vcam_cli.scenes.base import Chart, Frame
-from vcam_cli.scenes.csf import Csf
-from vcam_cli.scenes.siemens_star import SiemensStar
-from vcam_cli.scenes.slanted_edge import SlantedEdge
-from vcam_cli.scenes.step_wedge import step_wedge
+from vcam_cli.scenes.charts.csf import Csf
+from vcam_cli.scenes.charts.siemens_star import SiemensStar
+from vcam_cli.scenes.charts.slanted_edge import SlantedEdge
+from vcam_cli.scenes.charts.step_wedge import step_wedge
 
 DEFOCUS = SymmetricBlur(Lens(8.0, True), ((4, 0.3e-6),))
 BLURS = {

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from optical_paths import aperture, of_picture, path, sensor
 
-from vcam_cli.effects.diffraction import Diffraction
+from vcam_cli.effects.optics.diffraction import Diffraction
 from vcam_cli.image_formation import filtering
-from vcam_cli.image_formation.bandwidth import axes
 from vcam_cli.image_formation.box_average import box_averages
 from vcam_cli.image_formation.cosine_series import Axis
+from vcam_cli.image_formation.estimates.bandwidth import axes
 from vcam_cli.image_formation.filtering import Filter, chebyshev
 from vcam_cli.image_formation.scene_spectrum import transform_planes
 from vcam_cli.image_formation.strategies import SMOOTH

@@ -20,14 +20,14 @@ from scipy.special import erf
 from test_planes import Changing
 
 from vcam_cli.camera.derived.mosaic import Mosaic
-from vcam_cli.effects.diffraction import Diffraction
-from vcam_cli.effects.wavefront_blur import DirectedBlur, Lens, SymmetricBlur
+from vcam_cli.effects.optics.diffraction import Diffraction
+from vcam_cli.effects.optics.wavefront_blur import DirectedBlur, Lens, SymmetricBlur
 from vcam_cli.image_formation import harmonic_scenes, photon_rate
 from vcam_cli.image_formation.harmonic_scenes import harmonics_count
 from vcam_cli.image_formation.photon_rate import photo_rate
 from vcam_cli.image_formation.settings import REFERENCE
 from vcam_cli.scenes.base import HarmonicScene, chart_scene
-from vcam_cli.scenes.point_grid import PointGrid
+from vcam_cli.scenes.charts.point_grid import PointGrid
 from vcam_cli.scenes.waves import Wave, WaveScene
 
 EXACT = replace(REFERENCE, oversampling=None)

@@ -14,13 +14,14 @@ from reference_cameras import write_picture
 
 from vcam_cli import load, memory
 from vcam_cli.camera.derived.geometry import geometry
-from vcam_cli.effects.diffraction import Diffraction
+from vcam_cli.effects.optics.diffraction import Diffraction
 from vcam_cli.errors import CannotDo
-from vcam_cli.image_formation import memory_model, strategies
-from vcam_cli.image_formation.bandwidth import table_size
+from vcam_cli.image_formation import strategies
+from vcam_cli.image_formation.estimates import memory_model
+from vcam_cli.image_formation.estimates.bandwidth import table_size
 from vcam_cli.image_formation.settings import STANDARD, settings
 from vcam_cli.image_formation.transfer_tables import TableSize
-from vcam_cli.scenes.siemens_star import SiemensStar
+from vcam_cli.scenes.charts.siemens_star import SiemensStar
 from vcam_cli.simulation.simulate import simulate
 
 FEW = ["array.rows=24", "array.columns=32", "quality=[]"]

@@ -16,15 +16,15 @@ from optical_paths import (
     signal,
 )
 
-from vcam_cli.effects.diffraction import Diffraction
-from vcam_cli.image_formation import peak_bound
-from vcam_cli.image_formation.bandwidth import axes, highest_passed
-from vcam_cli.image_formation.chart_cells import cell_grid
-from vcam_cli.image_formation.peak_bound import window, window_spectrum
-from vcam_cli.image_formation.scene_sampling import sampled_image
+from vcam_cli.effects.optics.diffraction import Diffraction
+from vcam_cli.image_formation.estimates import peak_bound
+from vcam_cli.image_formation.estimates.bandwidth import axes, highest_passed
+from vcam_cli.image_formation.estimates.chart_cells import cell_grid
+from vcam_cli.image_formation.estimates.peak_bound import window, window_spectrum
+from vcam_cli.image_formation.estimates.scene_sampling import sampled_image
 from vcam_cli.scenes.base import Chart, Frame
-from vcam_cli.scenes.csf import Csf
-from vcam_cli.scenes.siemens_star import SiemensStar
+from vcam_cli.scenes.charts.csf import Csf
+from vcam_cli.scenes.charts.siemens_star import SiemensStar
 
 SHAPE = 33, 45
 """Pixels of the array, and half the samples of pictures."""

@@ -12,11 +12,11 @@ from vcam_cli.camera.derived.geometry import geometry
 from vcam_cli.effects.base import FieldTransfer, PlaneTransfer, RadialTransfer, Zone
 from vcam_cli.image_formation import strategies
 from vcam_cli.image_formation.cosine_series import Axis
+from vcam_cli.image_formation.estimates.power_spectrum import power_spectrum
 from vcam_cli.image_formation.field_dependence import field_mixtures, tabulate_field
 from vcam_cli.image_formation.filtering import Filter
 from vcam_cli.image_formation.optical_path import OpticalPath
 from vcam_cli.image_formation.photon_rate import photo_rate
-from vcam_cli.image_formation.power_spectrum import power_spectrum
 from vcam_cli.image_formation.scene_spectrum import SampledSpectrum, transform_planes
 from vcam_cli.image_formation.settings import STANDARD
 from vcam_cli.image_formation.transfer_functions import Transfer

@@ -8,13 +8,13 @@ from optical_paths import (
     light,
 )
 
-from vcam_cli.effects.diffraction import Diffraction
-from vcam_cli.effects.pixel_aperture import PixelAperture
-from vcam_cli.effects.wavefront_blur import DirectedBlur, Lens
-from vcam_cli.image_formation import power_spectrum as module
+from vcam_cli.effects.optics.diffraction import Diffraction
+from vcam_cli.effects.optics.wavefront_blur import DirectedBlur, Lens
+from vcam_cli.effects.pixel.pixel_aperture import PixelAperture
 from vcam_cli.image_formation.cosine_series import Axis
+from vcam_cli.image_formation.estimates import power_spectrum as module
+from vcam_cli.image_formation.estimates.power_spectrum import blocks, power_spectrum
 from vcam_cli.image_formation.filtering import Filter
-from vcam_cli.image_formation.power_spectrum import blocks, power_spectrum
 from vcam_cli.image_formation.scene_spectrum import (
     SampledSpectrum,
     rectangle_spectrum,

@@ -5,7 +5,8 @@ import pytest
 from making import QUIET, camera, radiance_for
 
 from vcam_cli import simulate
-from vcam_cli.image_formation import light_plan, photon_rate, scene_detail
+from vcam_cli.image_formation import light_plan, photon_rate
+from vcam_cli.image_formation.estimates import scene_detail
 from vcam_cli.simulation.simulate import prepare
 
 SIZE = {"array.rows": 240, "array.columns": 320}

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from optical_paths import PITCH, aperture, of_picture, on_chart, path, rms, sensor, signal
 
-from vcam_cli.effects.diffraction import Diffraction
-from vcam_cli.image_formation import scene_sampling
-from vcam_cli.image_formation.scene_sampling import with_sufficient_precision
+from vcam_cli.effects.optics.diffraction import Diffraction
+from vcam_cli.image_formation.estimates import scene_sampling
+from vcam_cli.image_formation.estimates.scene_sampling import with_sufficient_precision
 from vcam_cli.image_formation.settings import STANDARD
 from vcam_cli.scenes.base import Frame
-from vcam_cli.scenes.hdr_patches import hdr_patches
+from vcam_cli.scenes.charts.hdr_patches import hdr_patches
 
 SHAPE = 300, 400
 

@@ -19,9 +19,9 @@ from vcam_cli.image_formation.scene_spectrum import (
     transform_planes,
 )
 from vcam_cli.scenes.base import Frame, Framed, Rectangles, View, chart_scene
-from vcam_cli.scenes.colorchecker import ColorChecker, largest_card, reflectances
-from vcam_cli.scenes.slanted_edge import SlantedEdge
-from vcam_cli.scenes.step_wedge import step_wedge
+from vcam_cli.scenes.charts.colorchecker import ColorChecker, largest_card, reflectances
+from vcam_cli.scenes.charts.slanted_edge import SlantedEdge
+from vcam_cli.scenes.charts.step_wedge import step_wedge
 from vcam_cli.simulation.simulate import prepare
 
 MIX = np.random.default_rng(1).uniform(-1, 1, (3, 25))

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from vcam_cli.effects.diffraction import Diffraction
+from vcam_cli.effects.optics.diffraction import Diffraction
 from vcam_cli.image_formation.transfer_functions import Band, transfer
 from vcam_cli.image_formation.transfer_tables import TableSize, mixtures, tabulate
 from vcam_cli.spectra import PLANCK, SPEED_OF_LIGHT, Spectrum, illuminant

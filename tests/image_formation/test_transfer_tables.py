@@ -5,8 +5,8 @@ import pytest
 from optical_paths import Gaussian, Leaning, light
 from scipy.interpolate import CubicSpline
 
-from vcam_cli.effects.diffraction import Diffraction
-from vcam_cli.effects.wavefront_blur import DirectedBlur, Lens, SymmetricBlur
+from vcam_cli.effects.optics.diffraction import Diffraction
+from vcam_cli.effects.optics.wavefront_blur import DirectedBlur, Lens, SymmetricBlur
 from vcam_cli.image_formation.transfer_functions import Transfer
 from vcam_cli.image_formation.transfer_tables import (
     LARGEST_PLANE,

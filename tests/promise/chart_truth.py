@@ -25,8 +25,8 @@ from scipy.special import erfc
 
 from vcam_cli.camera.camera import Camera
 from vcam_cli.scenes.base import Frame
-from vcam_cli.scenes.eye_chart import INK, PAPER, eye_chart
-from vcam_cli.scenes.hdr_patches import hdr_patches
+from vcam_cli.scenes.charts.eye_chart import INK, PAPER, eye_chart
+from vcam_cli.scenes.charts.hdr_patches import hdr_patches
 
 GOAL = 5e-6
 """Of full signal: what may be left, a fortieth of the finest tolerance."""

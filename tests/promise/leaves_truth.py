@@ -16,7 +16,7 @@ from outlines import arcs, series
 from reference import Setup
 from reference_scenes import DATA, column
 
-from vcam_cli.scenes.dead_leaves import GROUND, PERIOD, PIGMENTS, generate_leaves
+from vcam_cli.scenes.charts.dead_leaves import GROUND, PERIOD, PIGMENTS, generate_leaves
 
 CELLS = 4000
 """Of the picture, along a side, on which leaves are looked for that are seen at all."""

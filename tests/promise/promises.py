@@ -21,7 +21,7 @@ from vcam_cli.accuracy.reference import effect_changes, prepare_converged
 from vcam_cli.camera.camera import Camera
 from vcam_cli.effects.order import ORDER
 from vcam_cli.effects.signal_chain import NoiseSource
-from vcam_cli.files.png import write_png
+from vcam_cli.files.images.png import write_png
 from vcam_cli.simulation.preparation import Prepared
 from vcam_cli.simulation.simulate import prepare
 

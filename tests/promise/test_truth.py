@@ -21,7 +21,7 @@ from scipy.special import j1
 
 from vcam_cli.scenes.base import View
 from vcam_cli.scenes.build import build
-from vcam_cli.scenes.dead_leaves import PIGMENTS
+from vcam_cli.scenes.charts.dead_leaves import PIGMENTS
 
 
 def setup_of(folder, name):

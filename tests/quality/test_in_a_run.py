@@ -10,7 +10,7 @@ from making import QUIET, camera
 from vcam_cli.files.folder import OutputFolder
 from vcam_cli.quality.display import Screen, rgb_to_xyz
 from vcam_cli.quality.scielab import cielab_map, s_cielab_map
-from vcam_cli.simulation import outputs
+from vcam_cli.simulation.output import outputs
 from vcam_cli.simulation.simulate import simulate
 
 CHART = {

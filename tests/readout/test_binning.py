@@ -9,16 +9,17 @@ import yaml
 from making import GONE, QUIET, camera, radiance_for, tree
 
 from vcam_cli import simulate
-from vcam_cli.camera.array import Binning
-from vcam_cli.effects.fpn import FixedPattern
-from vcam_cli.effects.quantization import Quantization
-from vcam_cli.effects.read_noise import ReadNoise
-from vcam_cli.effects.saturation import Saturation
+from vcam_cli.camera.sensor.array import Binning
+from vcam_cli.effects.noise.fpn import FixedPattern
+from vcam_cli.effects.noise.quantization import Quantization
+from vcam_cli.effects.noise.read_noise import ReadNoise
+from vcam_cli.effects.pixel.saturation import Saturation
 from vcam_cli.effects.signal_chain import NoiseSource
 from vcam_cli.errors import BadInput
 from vcam_cli.readout import binned_readout, binning, exposure
-from vcam_cli.simulation import checks, raw_file, spectral_irradiance
+from vcam_cli.simulation import checks, spectral_irradiance
 from vcam_cli.simulation.figures import figures
+from vcam_cli.simulation.output import raw_file
 
 KINDS = ("charge", "voltage", "digital")
 BAYER = (("R", "G"), ("G", "B"))

@@ -7,11 +7,11 @@ import pytest
 from making import QUIET, camera, radiance_for
 
 from vcam_cli import simulate
-from vcam_cli.effects.dark_current import DarkCurrent
-from vcam_cli.effects.quantization import Quantization
-from vcam_cli.effects.read_noise import ReadNoise
-from vcam_cli.effects.saturation import Saturation
-from vcam_cli.effects.shot_noise import ShotNoise
+from vcam_cli.effects.noise.quantization import Quantization
+from vcam_cli.effects.noise.read_noise import ReadNoise
+from vcam_cli.effects.noise.shot_noise import ShotNoise
+from vcam_cli.effects.pixel.dark_current import DarkCurrent
+from vcam_cli.effects.pixel.saturation import Saturation
 from vcam_cli.readout import exposure
 from vcam_cli.rng import BLOCK_ROWS
 

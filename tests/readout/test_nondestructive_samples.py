@@ -7,16 +7,16 @@ import pytest
 from making import GONE, QUIET, camera, radiance_for
 
 from vcam_cli import simulate
-from vcam_cli.effects.dark_current import DarkCurrent
-from vcam_cli.effects.fpn import FixedPattern
-from vcam_cli.effects.quantization import Quantization
-from vcam_cli.effects.read_noise import ReadNoise
-from vcam_cli.effects.reset_noise import ResetNoise
-from vcam_cli.effects.saturation import Saturation
-from vcam_cli.effects.shot_noise import ShotNoise
+from vcam_cli.effects.noise.fpn import FixedPattern
+from vcam_cli.effects.noise.quantization import Quantization
+from vcam_cli.effects.noise.read_noise import ReadNoise
+from vcam_cli.effects.noise.reset_noise import ResetNoise
+from vcam_cli.effects.noise.shot_noise import ShotNoise
+from vcam_cli.effects.pixel.dark_current import DarkCurrent
+from vcam_cli.effects.pixel.saturation import Saturation
 from vcam_cli.effects.signal_chain import Quantizer
 from vcam_cli.errors import BadInput
-from vcam_cli.image_formation import memory_model
+from vcam_cli.image_formation.estimates import memory_model
 from vcam_cli.image_formation.settings import settings
 from vcam_cli.readout import exposure, nondestructive_samples
 

@@ -15,7 +15,7 @@ from vcam_cli import load, simulate
 from vcam_cli.commands.main import app
 from vcam_cli.reports import page, pictures
 from vcam_cli.reports.page import Facts, Page, Picture, Scale, Section, Table, Text
-from vcam_cli.simulation import report_plots
+from vcam_cli.simulation.output import report_plots
 
 VOID = {"meta", "img", "br", "link", "input", "hr"}
 SMALL = ["array.rows=24", "array.columns=32"]

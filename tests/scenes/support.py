@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from vcam_cli.camera.scene import Scene
+from vcam_cli.camera.scene.scene import Scene
 from vcam_cli.scenes.base import ChartScene, View
 from vcam_cli.scenes.cells import cell_edges
 

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from support import brute, scene, view
 
-from vcam_cli.camera.sources import CHARTS
-from vcam_cli.scenes import csf
+from vcam_cli.camera.scene.sources import CHARTS
 from vcam_cli.scenes.base import ChartScene, Frame, HarmonicScene
 from vcam_cli.scenes.build import build
 from vcam_cli.scenes.cells import cell_edges
-from vcam_cli.scenes.slanted_edge import half_plane_cover
+from vcam_cli.scenes.charts import csf
+from vcam_cli.scenes.charts.slanted_edge import half_plane_cover
 from vcam_cli.scenes.waves import WaveScene
 from vcam_cli.spectra import illuminant, luminance
 
@@ -214,7 +214,7 @@ def test_csf_keeps_a_reflectance_beyond_its_frame():
 
 def test_csf_of_frequency_zero_is_flat_along_a_row():
     from vcam_cli.scenes.base import Frame
-    from vcam_cli.scenes.csf import Csf
+    from vcam_cli.scenes.charts.csf import Csf
 
     chart = Csf(Frame(1e-3, 1e-3), 0.0, 0.5, 1.0, 0.0)
     edges = np.linspace(-5e-4, 5e-4, 5)
@@ -370,7 +370,8 @@ def test_points_small_and_touching(diameter):
 
 
 def test_letters_are_of_one_stroke():
-    from vcam_cli.scenes import eye_chart, polygons
+    from vcam_cli.scenes import polygons
+    from vcam_cli.scenes.charts import eye_chart
 
     # Areas in strokes by hand; arcs of 720 chords a turn are 1.3e-5 smaller.
     along = (math.sqrt(1188) - 10) / 16  # of a slanting stroke along the bar of Z, the stem of N
@@ -416,7 +417,7 @@ def test_eye_chart_has_rows_of_five_that_fit():
 
 def test_eye_chart_is_upright_and_legible():
     # the middles of 5 x 5 strokes
-    from vcam_cli.scenes.eye_chart import letter
+    from vcam_cli.scenes.charts.eye_chart import letter
     from vcam_cli.scenes.polygons import contains_points
 
     at = (np.arange(5) + 0.5) / 5

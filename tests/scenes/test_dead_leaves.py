@@ -5,10 +5,11 @@ import pytest
 import scipy.ndimage
 from support import scene, view
 
-from vcam_cli.scenes import dead_leaves, discs
+from vcam_cli.scenes import discs
 from vcam_cli.scenes.base import Frame
 from vcam_cli.scenes.build import build
 from vcam_cli.scenes.cells import cell_edges
+from vcam_cli.scenes.charts import dead_leaves
 from vcam_cli.scenes.discs import Discs
 
 LEAVES = {"kind": "chart", "chart": "dead-leaves"}

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vcam_cli.scenes import polygons
-from vcam_cli.scenes.slanted_edge import half_plane_cover
+from vcam_cli.scenes.charts.slanted_edge import half_plane_cover
 
 SQUARE = np.array([(0, 0), (0, 1), (1, 1), (1, 0)], float)  # y down: counterclockwise as seen
 

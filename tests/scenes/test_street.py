@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from vcam_cli import load, simulate
-from vcam_cli.files.images import read_picture
+from vcam_cli.files.images.images import read_picture
 
 ROOT = Path(__file__).parents[2]
 QUIET = {name: "off" for name in ("shot_noise", "read_noise", "fpn", "quantization")}

@@ -7,7 +7,7 @@ from making import camera
 from vcam_cli import load
 from vcam_cli.camera.optics import FocusWindow
 from vcam_cli.errors import BadInput
-from vcam_cli.files.png import write_png
+from vcam_cli.files.images.png import write_png
 from vcam_cli.progress import Silent, Stages
 from vcam_cli.simulation import autofocus, cost_model
 from vcam_cli.simulation.idle_keys import idle_keys

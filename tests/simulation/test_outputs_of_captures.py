@@ -14,7 +14,7 @@ from vcam_cli.accuracy.ablation import with_exposure_time
 from vcam_cli.camera.load import load
 from vcam_cli.characterization.bench import prepare_bench
 from vcam_cli.commands.main import app
-from vcam_cli.files.exr import read_exr
+from vcam_cli.files.images.exr import read_exr
 from vcam_cli.progress import Stages
 from vcam_cli.simulation.simulate import prepare, simulate
 

@@ -24,7 +24,7 @@ from raw_readers import (
 
 from vcam_cli import BadInput, load, simulate
 from vcam_cli.config import shipped
-from vcam_cli.files.dng import CODES
+from vcam_cli.files.images.dng import CODES
 from vcam_cli.processing import color_correction
 from vcam_cli.simulation import checks
 

@@ -8,7 +8,7 @@ from making import QUIET, camera
 from PIL import Image
 
 from vcam_cli import BadInput, simulate
-from vcam_cli.files.exr import read_exr
+from vcam_cli.files.images.exr import read_exr
 from vcam_cli.simulation import checks
 
 tifffile = pytest.importorskip("tifffile", reason="tifffile writes raw.tif")

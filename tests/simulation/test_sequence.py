@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 from vcam_cli import simulate
 from vcam_cli.commands.main import app
 from vcam_cli.errors import BadInput
-from vcam_cli.files.images import read_picture
+from vcam_cli.files.images.images import read_picture
 from vcam_cli.simulation.sequence import frame_cameras
 
 WAVE = {"kind": "chart", "chart": "sinusoid", "frequency": "20 lp/mm"}

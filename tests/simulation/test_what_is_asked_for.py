@@ -6,10 +6,10 @@ from making import camera, radiance_for
 from sweeping import written
 
 from vcam_cli import simulate, sweep
-from vcam_cli.effects.read_noise import ReadNoise
+from vcam_cli.effects.noise.read_noise import ReadNoise
 from vcam_cli.errors import BadInput
-from vcam_cli.simulation import outputs
 from vcam_cli.simulation import simulate as engine
+from vcam_cli.simulation.output import outputs
 
 COLOR = {
     "array.pattern": "bayer-rggb",

@@ -10,7 +10,7 @@ from sweeping import written
 
 from vcam_cli import load, simulate, sweep
 from vcam_cli.errors import BadInput
-from vcam_cli.files.images import read_picture
+from vcam_cli.files.images.images import read_picture
 from vcam_cli.sweeps import error_maps, sweep_points
 
 pytestmark = pytest.mark.long

@@ -6,13 +6,9 @@ from typing import Annotated, Any, Self
 from pydantic import PrivateAttr, model_validator
 from pydantic_core import InitErrorDetails
 
-from vcam_cli.camera.adc import Adc
-from vcam_cli.camera.architecture import ARCHITECTURES, article
-from vcam_cli.camera.array import Array
 from vcam_cli.camera.exposure import Exposure
 from vcam_cli.camera.lens_choice import OPTICS
 from vcam_cli.camera.optics import Optics
-from vcam_cli.camera.pixel import Pixel
 from vcam_cli.camera.processing import (
     STEP_LIST,
     Steps,
@@ -23,7 +19,11 @@ from vcam_cli.camera.processing import (
     picture_mistakes,
 )
 from vcam_cli.camera.quality import METRIC_LIST, Display
-from vcam_cli.camera.scene import Scene
+from vcam_cli.camera.scene.scene import Scene
+from vcam_cli.camera.sensor.adc import Adc
+from vcam_cli.camera.sensor.architecture import ARCHITECTURES, article
+from vcam_cli.camera.sensor.array import Array
+from vcam_cli.camera.sensor.pixel import Pixel
 from vcam_cli.camera.simulation import ACCURACY, Accuracy, Effects, Output, Seed
 from vcam_cli.config.model import FileModel, key
 from vcam_cli.config.validation_messages import failure, fault

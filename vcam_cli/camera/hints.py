@@ -26,7 +26,7 @@ from vcam_cli.camera.hint_tables import (
     SWITCHES,
     VALUES,
 )
-from vcam_cli.camera.sources import CHARTS
+from vcam_cli.camera.scene.sources import CHARTS
 from vcam_cli.config.key_index import Key, keys
 from vcam_cli.config.validation_messages import NO_SUCH_KEY, yaml_text
 from vcam_cli.errors import Path, Problem, dotted_path, nearest

@@ -5,7 +5,6 @@ from typing import Any, get_args
 
 from pydantic_core import InitErrorDetails
 
-from vcam_cli.camera.array import Array
 from vcam_cli.camera.processing_steps import (
     BlackLevel,
     ColorCorrection,
@@ -20,6 +19,7 @@ from vcam_cli.camera.processing_steps import (
     Tone,
     WhiteBalance,
 )
+from vcam_cli.camera.sensor.array import Array
 from vcam_cli.camera.step_plugins import plugin, registered
 from vcam_cli.config.lists import read_items
 from vcam_cli.config.validation_messages import describe, fault, one_of, refusal, yaml_text

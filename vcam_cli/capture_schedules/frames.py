@@ -29,8 +29,8 @@ from vcam_cli.capture_schedules.methods import Task, find_schedules
 from vcam_cli.capture_schedules.model import ScheduleFrames
 from vcam_cli.effects.order import quantizer
 from vcam_cli.errors import bad
-from vcam_cli.files.exr import write_exr
 from vcam_cli.files.folder import OutputFolder
+from vcam_cli.files.images.exr import write_exr
 from vcam_cli.files.plots import in_formats
 from vcam_cli.files.tables import write_table
 from vcam_cli.parallel import available_workers

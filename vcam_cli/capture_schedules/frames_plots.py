@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from vcam_cli.files.images.png import write_png
 from vcam_cli.files.plots import COLORS, plot_figure
-from vcam_cli.files.png import write_png
 
 Square = tuple[slice, slice]
 """Rows and columns of a part of a picture."""

@@ -30,7 +30,8 @@ from vcam_cli.config.yaml_reader import display_path, read_file
 from vcam_cli.config.yaml_tree import Node, Origin
 from vcam_cli.errors import BadInput, Problem
 from vcam_cli.scheduling.pdf import Pdf
-from vcam_cli.simulation import checks, provenance
+from vcam_cli.simulation import checks
+from vcam_cli.simulation.output import provenance
 from vcam_cli.spectra.text import parse_numbers, read_table
 from vcam_cli.sweeps import study_hints
 from vcam_cli.sweeps.sweep_file import refuse_others

@@ -14,7 +14,7 @@ from vcam_cli.capture_schedules.model import ScheduleStudy
 from vcam_cli.files.report import hash_file
 from vcam_cli.files.tables import Cell, write_table
 from vcam_cli.scheduling.objective import expected_snr_noisy_saturation
-from vcam_cli.simulation import provenance
+from vcam_cli.simulation.output import provenance
 
 if TYPE_CHECKING:
     from vcam_cli.capture_schedules.study import ScheduleResult

@@ -31,11 +31,11 @@ from numpy.typing import NDArray
 
 from vcam_cli.accuracy.ablation import with_effects, with_exposure_time
 from vcam_cli.camera.camera import Camera
-from vcam_cli.camera.charts import SlantedEdge, Uniform
 from vcam_cli.camera.derived.geometry import geometry, pixel_centers
 from vcam_cli.camera.derived.mosaic import BLOCKS, NONE, mosaic
-from vcam_cli.camera.illuminant import IlluminantSpec
 from vcam_cli.camera.optics import Wavefront
+from vcam_cli.camera.scene.charts import SlantedEdge, Uniform
+from vcam_cli.camera.scene.illuminant import IlluminantSpec
 from vcam_cli.effects.order import quantizer
 from vcam_cli.effects.signal_chain import noise_sources
 from vcam_cli.errors import bad

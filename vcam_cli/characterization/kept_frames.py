@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from vcam_cli.characterization.bench import Bench
 from vcam_cli.files.atomic import write_text
-from vcam_cli.files.tiff import library, whole_numbers, write_tiff
+from vcam_cli.files.images.tiff import library, whole_numbers, write_tiff
 
 DESCRIPTOR = "emva1288.txt"
 Kind = Literal["pair", "stack", "dark"]

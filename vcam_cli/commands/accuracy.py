@@ -54,8 +54,8 @@ def accuracy(
     from vcam_cli.files import plots, report, tables
     from vcam_cli.files.folder import OutputFolder
     from vcam_cli.reports import study_report
-    from vcam_cli.simulation import provenance
     from vcam_cli.simulation.checks import load
+    from vcam_cli.simulation.output import provenance
 
     model = load(camera, options.overrides(set_, seed, level))
     inputs = provenance.inputs(model)

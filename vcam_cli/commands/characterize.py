@@ -72,8 +72,8 @@ def characterize(
     from vcam_cli.files import curves, plots, report, tables
     from vcam_cli.files.folder import OutputFolder
     from vcam_cli.reports import study_report
-    from vcam_cli.simulation import provenance
     from vcam_cli.simulation.checks import load
+    from vcam_cli.simulation.output import provenance
 
     model = load(camera, options.overrides(set_, seed, accuracy))
     inputs = provenance.inputs(model)

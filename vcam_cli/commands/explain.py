@@ -44,7 +44,7 @@ def explain(
 def names() -> list[str]:
     """Return all that can be explained."""
     from vcam_cli.camera import hint_tables
-    from vcam_cli.camera.sources import CHARTS
+    from vcam_cli.camera.scene.sources import CHARTS
 
     found = [key.dotted for _, key in _all_keys()] + [key.name for _, key in _all_keys()]
     return [*found, *_effects(), *_metrics(), *CHARTS, *hint_tables.KEYS]
@@ -189,7 +189,7 @@ def _of_metric(word: str) -> Iterator[dict[str, Any]]:
 
 
 def _of_chart(word: str) -> Iterator[dict[str, Any]]:
-    from vcam_cli.camera.sources import CHARTS
+    from vcam_cli.camera.scene.sources import CHARTS
     from vcam_cli.config.key_index import keys
 
     chart = CHARTS.get(word.replace("_", "-"))

@@ -48,7 +48,7 @@ def fit(
     from vcam_cli.fitting.parameters import COLUMNS
     from vcam_cli.fitting.plots import plots as plots_of
     from vcam_cli.reports import study_report
-    from vcam_cli.simulation import provenance
+    from vcam_cli.simulation.output import provenance
     from vcam_cli.verification import measurement_file
     from vcam_cli.verification.frames import paths
 

@@ -149,13 +149,13 @@ def _filters() -> list[Item]:
 
 
 def _charts() -> list[Item]:
-    from vcam_cli.camera.sources import CHARTS
+    from vcam_cli.camera.scene.sources import CHARTS
 
     return [Item(name, _first_line(c)) for name, c in CHARTS.items()]
 
 
 def _models() -> list[Item]:
-    from vcam_cli.camera.sources import PICTURE_MODELS
+    from vcam_cli.camera.scene.sources import PICTURE_MODELS
 
     return [Item(name, about) for name, about in PICTURE_MODELS.items()]
 

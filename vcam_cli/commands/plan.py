@@ -125,9 +125,10 @@ def _plan_scenes(
     from vcam_cli.files.folder import OutputFolder
     from vcam_cli.files.plots import in_formats
     from vcam_cli.files.tables import write_table
-    from vcam_cli.simulation import provenance, scene_plans
+    from vcam_cli.simulation import scene_plans
     from vcam_cli.simulation.checks import load
-    from vcam_cli.simulation.scene_plans_plot import plot_scene_plans
+    from vcam_cli.simulation.output import provenance
+    from vcam_cli.simulation.output.scene_plans_plot import plot_scene_plans
 
     model = load(camera, overrides)
     path = out or Path("out") / f"{model.name}-scenes"

@@ -43,7 +43,7 @@ def run(
     model = load(camera, [*options.overrides(set_, seed, accuracy), *asked])
     from vcam_cli.files.folder import OutputFolder
     from vcam_cli.files.report import to_json
-    from vcam_cli.simulation import outputs, provenance
+    from vcam_cli.simulation.output import outputs, provenance
     from vcam_cli.simulation.sequence import write_sequence
     from vcam_cli.simulation.simulate import simulate
 

@@ -5,7 +5,7 @@ arithmetic, is checked there.
 """
 
 from vcam_cli.camera.camera import Camera
-from vcam_cli.camera.technology import Technology
+from vcam_cli.camera.sensor.technology import Technology
 from vcam_cli.capture_schedules.model import ScheduleStudy
 from vcam_cli.config.key_index import Key, keys
 from vcam_cli.config.schema import (

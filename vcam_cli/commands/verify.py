@@ -51,8 +51,8 @@ def verify(
     from vcam_cli.files import plots, report, tables
     from vcam_cli.files.folder import OutputFolder
     from vcam_cli.reports import study_report
-    from vcam_cli.simulation import provenance
     from vcam_cli.simulation.checks import load
+    from vcam_cli.simulation.output import provenance
     from vcam_cli.verification import measurement_file
     from vcam_cli.verification import verify as comparison
     from vcam_cli.verification.frames import paths

@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcam_cli.errors import bad
-from vcam_cli.files.camera_raw import develop, is_raw
-from vcam_cli.files.exr import write_exr
 from vcam_cli.files.folder import OutputFolder
-from vcam_cli.files.images import LinearImage, read_picture
-from vcam_cli.files.maps import write_map
+from vcam_cli.files.images.camera_raw import develop, is_raw
+from vcam_cli.files.images.exr import write_exr
+from vcam_cli.files.images.images import LinearImage, read_picture
+from vcam_cli.files.images.maps import write_map
 from vcam_cli.files.tables import write_metrics
 from vcam_cli.quality.cielab import Formula
 from vcam_cli.quality.display import D65, Screen, rgb_to_xyz

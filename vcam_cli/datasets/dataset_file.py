@@ -18,7 +18,7 @@ from vcam_cli.config.yaml_tree import Node, Source, node_of, tree_at
 from vcam_cli.datasets.drawing import Frame, Scene, crop_size, draw_frame, extremes
 from vcam_cli.datasets.model import Dataset
 from vcam_cli.errors import BadInput, Collector, Problem
-from vcam_cli.files.images import picture_size
+from vcam_cli.files.images.images import picture_size
 from vcam_cli.floats import own_float_errors
 from vcam_cli.simulation.checks import missing_library
 from vcam_cli.sweeps.model import KINDS

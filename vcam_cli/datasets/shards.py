@@ -20,8 +20,9 @@ from numpy.typing import NDArray
 
 from vcam_cli.datasets.frame_work import NPZ
 from vcam_cli.errors import bad
-from vcam_cli.files import frame_archive, tiff
+from vcam_cli.files import frame_archive
 from vcam_cli.files.atomic import write_whole
+from vcam_cli.files.images import tiff
 from vcam_cli.files.points_store import SweepFolder
 from vcam_cli.files.records import Fingerprint, Proofs, file_fingerprint
 from vcam_cli.files.report import hash_text, to_json

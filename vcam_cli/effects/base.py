@@ -34,9 +34,9 @@ from typing import ClassVar, Literal, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from vcam_cli.camera.array import Binning
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry
+from vcam_cli.camera.sensor.array import Binning
 
 Kind = TypeVar("Kind", bound="Effect")
 ENTRIES = 257

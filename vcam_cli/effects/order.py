@@ -32,31 +32,31 @@ from __future__ import annotations
 
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry
-from vcam_cli.effects.aberration import Aberration
 from vcam_cli.effects.base import Effect
-from vcam_cli.effects.charge_diffusion import ChargeDiffusion
-from vcam_cli.effects.charge_transfer import ChargeTransfer
-from vcam_cli.effects.correlated_row_noise import CorrelatedRowNoise
-from vcam_cli.effects.dark_current import DarkCurrent
-from vcam_cli.effects.depth import Depth
-from vcam_cli.effects.diffraction import Diffraction
-from vcam_cli.effects.flicker import Flicker
-from vcam_cli.effects.fpn import FixedPattern
-from vcam_cli.effects.fpn_shading import PatternShading
-from vcam_cli.effects.heavy_tailed_noise import HeavyTailedNoise
-from vcam_cli.effects.microlens import Microlens
-from vcam_cli.effects.motion import Motion
-from vcam_cli.effects.off_axis import OffAxis
-from vcam_cli.effects.pixel_aperture import PixelAperture
-from vcam_cli.effects.pixel_vignetting import PixelVignetting
-from vcam_cli.effects.quantization import Quantization
-from vcam_cli.effects.read_noise import ReadNoise
-from vcam_cli.effects.reset_noise import ResetNoise
-from vcam_cli.effects.saturation import Saturation
-from vcam_cli.effects.shot_noise import ShotNoise
+from vcam_cli.effects.noise.correlated_row_noise import CorrelatedRowNoise
+from vcam_cli.effects.noise.fpn import FixedPattern
+from vcam_cli.effects.noise.fpn_shading import PatternShading
+from vcam_cli.effects.noise.heavy_tailed_noise import HeavyTailedNoise
+from vcam_cli.effects.noise.quantization import Quantization
+from vcam_cli.effects.noise.read_noise import ReadNoise
+from vcam_cli.effects.noise.reset_noise import ResetNoise
+from vcam_cli.effects.noise.shot_noise import ShotNoise
+from vcam_cli.effects.noise.telegraph_noise import TelegraphNoise
+from vcam_cli.effects.optics.aberration import Aberration
+from vcam_cli.effects.optics.depth import Depth
+from vcam_cli.effects.optics.diffraction import Diffraction
+from vcam_cli.effects.optics.off_axis import OffAxis
+from vcam_cli.effects.optics.stray_light import StrayLight
+from vcam_cli.effects.pixel.charge_diffusion import ChargeDiffusion
+from vcam_cli.effects.pixel.charge_transfer import ChargeTransfer
+from vcam_cli.effects.pixel.dark_current import DarkCurrent
+from vcam_cli.effects.pixel.microlens import Microlens
+from vcam_cli.effects.pixel.pixel_aperture import PixelAperture
+from vcam_cli.effects.pixel.pixel_vignetting import PixelVignetting
+from vcam_cli.effects.pixel.saturation import Saturation
 from vcam_cli.effects.signal_chain import Quantizer
-from vcam_cli.effects.stray_light import StrayLight
-from vcam_cli.effects.telegraph_noise import TelegraphNoise
+from vcam_cli.effects.temporal.flicker import Flicker
+from vcam_cli.effects.temporal.motion import Motion
 
 ORDER: tuple[type[Effect], ...] = (
     Diffraction,

@@ -11,7 +11,7 @@ from typing import ClassVar, Literal, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from vcam_cli.camera.array import Binning
+from vcam_cli.camera.sensor.array import Binning
 from vcam_cli.effects.base import Effect, SignalLevels, of_kind
 
 SIGMAS = 6.0

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from vcam_cli.files.atomic import write_whole
-from vcam_cli.files.tiff import SOFTWARE
+from vcam_cli.files.images.tiff import SOFTWARE
 
 LARGEST = 2**31 - 2**16
 """Bytes of a variable that the format holds."""

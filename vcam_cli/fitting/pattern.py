@@ -79,8 +79,8 @@ def pattern(stack: StackStatistics, good: NDArray) -> Pattern:
 def slow_part(average: NDArray) -> tuple[Estimate, NDArray]:
     """Return the variance of what changes slowly over the array, and its surface.
 
-    It is what the cosines of `effects/fpn_shading.py` hold, up to `CYCLES` cycles over the array,
-    less what white noise of pixels, columns and rows has in so few terms.
+    It is what the cosines of `effects/noise/fpn_shading.py` hold, up to `CYCLES` cycles over the
+    array, less what white noise of pixels, columns and rows has in so few terms.
 
     Parameters
     ----------

@@ -3,9 +3,10 @@
 Where the noise of a pixel is normal with variance s^2, the sum of squares of its n values about
 their mean is s^2 times a chi-squared number of n - 1 degrees of freedom. Where a trap of step A was
 filled in k of the n frames it is a noncentral one, of noncentrality A^2 k (n - k) / (n s^2). k is
-binomial, A is distributed exponentially, as `effects/telegraph_noise.py` has them. So the histogram
-of the pixels' variances tells s^2, the share of pixels with traps and their mean step; and whether
-few or most values of a pixel are high, the third moment's sign, tells how often a trap is filled.
+binomial, A is distributed exponentially, as `effects/noise/telegraph_noise.py` has them. So the
+histogram of the pixels' variances tells s^2, the share of pixels with traps and their mean step;
+and whether few or most values of a pixel are high, the third moment's sign, tells how often a trap
+is filled.
 
 Noise with heavy tails makes variances large, too, but not of the same pixels again and again: traps
 are only looked for where the variances of a pixel in two halves of the stack go together.

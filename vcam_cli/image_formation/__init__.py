@@ -11,19 +11,19 @@ Its files in the order in which they are read best:
     box_average           no blur: means over the photodetectors
 
     settings              what the tolerance asks of everything below
-    bandwidth             margin of a chart, and how far up the spectrum anything counts
-    chart_cells           cells on which a chart is painted
-    far_field             coarse cells far from a small array
     scene_spectrum        DCT of samples, or of rectangles in closed form
-    power_spectrum        mean squares by frequency
-    scene_sampling        a scene's spectrum, and where it may end
     transfer_tables       H_kc of few mixtures of components, over |f| or (fx, fy)
     field_dependence      the same for a blur that changes over the field
     cosine_series         one axis: cosines, aliasing, transforms to the pixels
     filtering             spectrum times transfer function, folded onto the pixels
-    effect_changes        what each blur changes in the image
+    far_field             coarse cells far from a small array
 
+    estimates/            numbers beforehand: bandwidth, cells, peaks, memory, changes
+    layers/               scenes of several distances, composited front to back
+    sub_exposures         images that turn or shake while they are exposed
+
+    light_plan            which effects act on which layer of light
+    timed_gains           lamps that flicker
     pixelwise             what each gain, glare, charge and limit changes in it
-    memory_model          memory of an image, beforehand
     rate_cache            light kept for cameras that differ only in what comes after
 """

@@ -18,8 +18,8 @@ import scipy.fft
 from numpy.typing import NDArray
 
 from vcam_cli.camera.derived.geometry import Geometry
-from vcam_cli.image_formation.bandwidth import axes
 from vcam_cli.image_formation.cosine_series import Axis
+from vcam_cli.image_formation.estimates.bandwidth import axes
 from vcam_cli.image_formation.filtering import Filter
 from vcam_cli.image_formation.optical_path import OpticalPath
 from vcam_cli.image_formation.scene_spectrum import (

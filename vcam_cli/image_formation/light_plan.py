@@ -28,14 +28,14 @@ from vcam_cli.effects.base import (
     VeilingGlare,
     of_kind,
 )
-from vcam_cli.effects.sub_exposed_motion import SubExposedMotion
-from vcam_cli.image_formation.optical_path import OpticalPath
-from vcam_cli.image_formation.scene_detail import (
+from vcam_cli.effects.temporal.sub_exposed_motion import SubExposedMotion
+from vcam_cli.image_formation.estimates.scene_detail import (
     SceneDetail,
     change_by_omission,
     scene_detail,
     transfer_functions,
 )
+from vcam_cli.image_formation.optical_path import OpticalPath
 from vcam_cli.scenes.layered import AnyScene, LayeredScene
 
 LIGHT_SHARE = 0.3

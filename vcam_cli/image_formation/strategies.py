@@ -21,11 +21,21 @@ from numpy.typing import NDArray
 
 from vcam_cli import memory
 from vcam_cli.effects.base import Blur, FieldTransfer, SeparableTransfer, of_kind
-from vcam_cli.image_formation import memory_model
-from vcam_cli.image_formation.bandwidth import LOWEST, axes, highest_passed, reach, table_size
 from vcam_cli.image_formation.box_average import box_averages, point_values
-from vcam_cli.image_formation.chart_cells import ChosenCells, cell_grid, cells_per_pixel
-from vcam_cli.image_formation.effect_changes import changes_by_omission, needed_modes
+from vcam_cli.image_formation.estimates import memory_model
+from vcam_cli.image_formation.estimates.bandwidth import (
+    LOWEST,
+    axes,
+    highest_passed,
+    reach,
+    table_size,
+)
+from vcam_cli.image_formation.estimates.chart_cells import ChosenCells, cell_grid, cells_per_pixel
+from vcam_cli.image_formation.estimates.effect_changes import changes_by_omission, needed_modes
+from vcam_cli.image_formation.estimates.scene_sampling import (
+    sampled_image,
+    with_sufficient_precision,
+)
 from vcam_cli.image_formation.far_field import FarPart, far_parts, near_field
 from vcam_cli.image_formation.field_dependence import Mode, field_mixtures, tabulate_field
 from vcam_cli.image_formation.filtering import Filter
@@ -34,9 +44,8 @@ from vcam_cli.image_formation.harmonic_scenes import (
     harmonics_count,
     wave_layers,
 )
-from vcam_cli.image_formation.layered import layered_image
+from vcam_cli.image_formation.layers.layered import layered_image
 from vcam_cli.image_formation.optical_path import Layer, Layers, OpticalPath, SpectrumReport
-from vcam_cli.image_formation.scene_sampling import sampled_image, with_sufficient_precision
 from vcam_cli.image_formation.scene_spectrum import SceneSpectrum
 from vcam_cli.image_formation.sub_exposures import sub_exposed_layers, sub_exposed_motion
 from vcam_cli.image_formation.transfer_tables import Tables, mixtures, tabulate

@@ -26,8 +26,8 @@ from scipy import ndimage
 from vcam_cli import memory
 from vcam_cli.camera.derived.geometry import Geometry, pixel_centers
 from vcam_cli.effects.base import Effect, of_kind
-from vcam_cli.effects.sub_exposed_motion import SubExposedMotion
-from vcam_cli.image_formation import memory_model
+from vcam_cli.effects.temporal.sub_exposed_motion import SubExposedMotion
+from vcam_cli.image_formation.estimates import memory_model
 from vcam_cli.image_formation.optical_path import Layer, Layers, OpticalPath, SpectrumReport
 from vcam_cli.parallel import each
 from vcam_cli.rng import blocks

@@ -27,9 +27,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from vcam_cli.camera.array import Binning
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry
+from vcam_cli.camera.sensor.array import Binning
 from vcam_cli.errors import Collector, bad
 
 Block = tuple[tuple[str, ...], ...]

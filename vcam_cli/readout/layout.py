@@ -15,11 +15,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from vcam_cli.camera.array import Positions
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry, pixel_centers
 from vcam_cli.camera.derived.lattice import Places, places
 from vcam_cli.camera.derived.mosaic import Mosaic, channel_order, mosaic
+from vcam_cli.camera.sensor.array import Positions
 from vcam_cli.errors import CannotDo
 from vcam_cli.image_formation.settings import Settings
 from vcam_cli.readout.binning import ALONE, BinningGroups, binning_groups

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcam_cli.files import atomic, plots
-from vcam_cli.files.png import write_png
+from vcam_cli.files.images.png import write_png
 from vcam_cli.quality import error_map
 from vcam_cli.reports.page import Picture, Scale
 

@@ -1,21 +1,10 @@
 """From what the camera file says about the scene to light on the sensor plane."""
 
-from vcam_cli.camera import charts
-from vcam_cli.camera.scene import Scene as SceneModel
-from vcam_cli.camera.scene_files import Hyperspectral, ImageFile
+from vcam_cli.camera.scene import charts
+from vcam_cli.camera.scene.scene import Scene as SceneModel
+from vcam_cli.camera.scene.scene_files import Hyperspectral, ImageFile
 from vcam_cli.errors import BadInput, bad
-from vcam_cli.scenes import (
-    colorchecker,
-    csf,
-    dead_leaves,
-    eye_chart,
-    hdr_patches,
-    light,
-    siemens_star,
-    sinusoid,
-    step_wedge,
-    uniform,
-)
+from vcam_cli.scenes import light
 from vcam_cli.scenes.base import (
     Array,
     Chart,
@@ -25,13 +14,24 @@ from vcam_cli.scenes.base import (
     View,
     chart_scene,
 )
-from vcam_cli.scenes.csf import Csf
+from vcam_cli.scenes.charts import (
+    colorchecker,
+    csf,
+    dead_leaves,
+    eye_chart,
+    hdr_patches,
+    siemens_star,
+    sinusoid,
+    step_wedge,
+    uniform,
+)
+from vcam_cli.scenes.charts.csf import Csf
+from vcam_cli.scenes.charts.point_grid import PointGrid
+from vcam_cli.scenes.charts.sinusoid import WaveChart
+from vcam_cli.scenes.charts.slanted_edge import SlantedEdge
+from vcam_cli.scenes.charts.still_life import LeavesWithColorChecker
 from vcam_cli.scenes.hyperspectral import Cube, cube_scene
 from vcam_cli.scenes.image import image_scene
-from vcam_cli.scenes.point_grid import PointGrid
-from vcam_cli.scenes.sinusoid import WaveChart
-from vcam_cli.scenes.slanted_edge import SlantedEdge
-from vcam_cli.scenes.still_life import LeavesWithColorChecker
 from vcam_cli.scenes.waves import Wave, WaveScene
 from vcam_cli.spectra import Spectrum, srgb_reflectances
 

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vcam_cli.camera.scene import Scene as SceneModel
-from vcam_cli.camera.scene_files import ImageFile
+from vcam_cli.camera.scene.scene import Scene as SceneModel
+from vcam_cli.camera.scene.scene_files import ImageFile
 from vcam_cli.scenes import light
 from vcam_cli.scenes.base import Array, Chart, Frame, View
 from vcam_cli.scenes.build import chart_and_reflectances, picture_spectra

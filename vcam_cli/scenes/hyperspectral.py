@@ -24,8 +24,8 @@ from typing import Literal
 
 import numpy as np
 
-from vcam_cli.camera.illuminant import IlluminantSpec
-from vcam_cli.camera.scene import Scene
+from vcam_cli.camera.scene.illuminant import IlluminantSpec
+from vcam_cli.camera.scene.scene import Scene
 from vcam_cli.errors import bad
 from vcam_cli.scenes import light
 from vcam_cli.scenes.base import Array, View, paint_by_bands

@@ -15,7 +15,7 @@ References
 
 import math
 
-from vcam_cli.camera.scene import Scene
+from vcam_cli.camera.scene.scene import Scene
 from vcam_cli.errors import bad
 from vcam_cli.spectra import VISIBLE, Spectrum, display_primaries, integral, luminance
 

@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcam_cli.camera import load as files
-from vcam_cli.camera.array import Positions
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import geometry
 from vcam_cli.camera.derived.image_motion import check_motion
@@ -20,16 +19,18 @@ from vcam_cli.camera.derived.lattice import places
 from vcam_cli.camera.derived.line_times import check_shutter
 from vcam_cli.camera.derived.scene_layers import check_layers
 from vcam_cli.camera.processing import SHOWN
-from vcam_cli.camera.scene_files import Crop
-from vcam_cli.camera.sources import Layers
-from vcam_cli.effects import aberration, point_spread
+from vcam_cli.camera.scene.scene_files import Crop
+from vcam_cli.camera.scene.sources import Layers
+from vcam_cli.camera.sensor.array import Positions
+from vcam_cli.effects.optics import aberration, point_spread
 from vcam_cli.errors import bad, split
 from vcam_cli.processing import check as check_steps
 from vcam_cli.quality.display import display_screen
 from vcam_cli.readout.layout import layout
 from vcam_cli.scenes.build import SOURCE, check_channels
 from vcam_cli.scenes.hyperspectral import check_bands, check_coverage, check_place
-from vcam_cli.simulation import isetcam_files, plan, raw_dng, scene_bands, spectral_irradiance
+from vcam_cli.simulation import plan, scene_bands, spectral_irradiance
+from vcam_cli.simulation.output import isetcam_files, raw_dng
 
 
 def load(camera: str | Path, sets: Sequence[str] = ()) -> Camera:
@@ -100,7 +101,7 @@ def check_picture(camera: Camera) -> None:
     """Refuse a picture that is unreadable or contradicts its description (BadInput)."""
     source, path = camera.scene.source, (*SOURCE, "file")
     if source.kind == "image":
-        from vcam_cli.files.images import color_channels, picture_size
+        from vcam_cli.files.images.images import color_channels, picture_size
 
         check_channels(source.model, color_channels(source.file, path))
         if source.crop is not None:
@@ -116,7 +117,7 @@ def check_picture(camera: Camera) -> None:
 
 
 def _check_crops_of_layers(source: Layers) -> None:
-    from vcam_cli.files.images import picture_size
+    from vcam_cli.files.images.images import picture_size
 
     for number, layer in enumerate(source.layers):
         shown, place = layer.source, (*SOURCE, "layers", number, "source")
@@ -154,7 +155,7 @@ def read_lens(camera: Camera) -> dict[str, NDArray]:
     psf = camera.optics.psf
     if psf is None:
         return {}
-    from vcam_cli.files.psf import read_psf
+    from vcam_cli.files.images.psf import read_psf
 
     channels = max(len(psf.wavelengths), 1)
     return {point_spread.PSF: read_psf(psf.file, channels, (*split(point_spread.PSF), "file"))}

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcam_cli.camera.camera import Camera
-from vcam_cli.camera.sources import Layers
+from vcam_cli.camera.scene.sources import Layers
 from vcam_cli.effects.base import Gain, of_kind
 from vcam_cli.effects.order import quantizer
 from vcam_cli.effects.signal_chain import NoiseSource, Quantizer

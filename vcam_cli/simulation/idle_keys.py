@@ -13,14 +13,14 @@ from typing import Any
 
 import numpy as np
 
-from vcam_cli.camera.architecture import ARCHITECTURES
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived import named_spectra, photodiode
 from vcam_cli.camera.derived.dark_current import dark_rate
 from vcam_cli.camera.derived.electrical import Electrical, electrical
 from vcam_cli.camera.derived.pixel_layout import detector
-from vcam_cli.camera.photodetector import DarkCurrentDensity
-from vcam_cli.camera.sources import Layers
+from vcam_cli.camera.scene.sources import Layers
+from vcam_cli.camera.sensor.architecture import ARCHITECTURES
+from vcam_cli.camera.sensor.photodetector import DarkCurrentDensity
 from vcam_cli.config.model import Model
 from vcam_cli.errors import BadInput
 from vcam_cli.spectra import Spectrum

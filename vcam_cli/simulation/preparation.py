@@ -17,7 +17,8 @@ from vcam_cli.camera.derived.geometry import Geometry, geometry
 from vcam_cli.camera.derived.mosaic import Mosaic
 from vcam_cli.effects.base import Effect, ImageMotion, of_kind
 from vcam_cli.errors import bad
-from vcam_cli.image_formation import bandwidth, memory_model, photon_rate
+from vcam_cli.image_formation import photon_rate
+from vcam_cli.image_formation.estimates import bandwidth, memory_model
 from vcam_cli.image_formation.optical_path import OpticalPath, SpectrumReport
 from vcam_cli.image_formation.rate_cache import RateCache
 from vcam_cli.image_formation.settings import Settings, settings

@@ -4,12 +4,12 @@ from pathlib import Path
 
 import numpy as np
 
-from vcam_cli.camera.architecture import ARCHITECTURES
 from vcam_cli.camera.derived import photodiode
 from vcam_cli.camera.derived.camera_angles import camera_angles
 from vcam_cli.camera.derived.dark_noise import SIGMAS, dark_noise
 from vcam_cli.camera.processing import SHOWN
-from vcam_cli.camera.scene_files import ImageFile
+from vcam_cli.camera.scene.scene_files import ImageFile
+from vcam_cli.camera.sensor.architecture import ARCHITECTURES
 from vcam_cli.effects.base import ImageMotion, of_kind
 from vcam_cli.effects.order import quantizer
 from vcam_cli.scenes.build import picture_model

@@ -14,7 +14,7 @@ import numpy as np
 
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import geometry
-from vcam_cli.camera.illuminant import IlluminantSpec
+from vcam_cli.camera.scene.illuminant import IlluminantSpec
 from vcam_cli.image_formation.photon_rate import responses
 from vcam_cli.readout.layout import layout
 from vcam_cli.scenes.hyperspectral import DEFAULT_ILLUMINANT, Bands, Cube, covers

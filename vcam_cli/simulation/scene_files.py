@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import geometry
 from vcam_cli.camera.derived.scene_layers import PATH, layer_cameras
-from vcam_cli.camera.sources import Layers
+from vcam_cli.camera.scene.sources import Layers
 from vcam_cli.effects.base import Effect, of_kind
-from vcam_cli.effects.depth import Depth
+from vcam_cli.effects.optics.depth import Depth
 from vcam_cli.image_formation.optical_path import LayerOptics
 from vcam_cli.progress import Stages
 from vcam_cli.scenes.base import View
@@ -34,7 +34,7 @@ def read_scene(camera: Camera, stages: Stages) -> tuple[Any, tuple[str, ...]]:
     """
     source, path = camera.scene.source, (*SOURCE, "file")
     if source.kind == "image":
-        from vcam_cli.files.images import read_picture
+        from vcam_cli.files.images.images import read_picture
 
         with stages("read"):
             read = read_picture(source.file, source.encoding, source.white, path)
@@ -54,8 +54,8 @@ def read_scene(camera: Camera, stages: Stages) -> tuple[Any, tuple[str, ...]]:
 
 
 def _read_layers(source: Layers) -> tuple[tuple[LayerFiles, ...], tuple[str, ...]]:
-    from vcam_cli.files.images import read_picture
-    from vcam_cli.files.scene_maps import read_opacity
+    from vcam_cli.files.images.images import read_picture
+    from vcam_cli.files.images.scene_maps import read_opacity
 
     found, notes = list[LayerFiles](), list[str]()
     for number, layer in enumerate(source.layers):

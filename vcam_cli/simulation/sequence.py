@@ -19,11 +19,12 @@ from vcam_cli.camera.derived.geometry import geometry
 from vcam_cli.camera.derived.line_times import line_times
 from vcam_cli.errors import bad
 from vcam_cli.files.folder import OutputFolder
-from vcam_cli.files.png import write_png
+from vcam_cli.files.images.png import write_png
+from vcam_cli.files.images.video import VideoWriter, ffmpeg
 from vcam_cli.files.tables import write_table
-from vcam_cli.files.video import VideoWriter, ffmpeg
 from vcam_cli.progress import Observer
-from vcam_cli.simulation import exposure_control, outputs
+from vcam_cli.simulation import exposure_control
+from vcam_cli.simulation.output import outputs
 from vcam_cli.simulation.shared import Shared
 from vcam_cli.simulation.simulate import Result, simulate
 from vcam_cli.units import render

@@ -12,12 +12,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcam_cli.arguments import brief, require_folder, require_whole
-from vcam_cli.camera.array import Positions
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.electrical import no_volts
 from vcam_cli.camera.derived.geometry import geometry
 from vcam_cli.camera.derived.scene_layers import with_flat_scene
 from vcam_cli.camera.processing_steps import Step
+from vcam_cli.camera.sensor.array import Positions
 from vcam_cli.errors import BadInput
 from vcam_cli.floats import own_float_errors
 from vcam_cli.parallel import suitable_workers
@@ -248,7 +248,7 @@ class Result:
 
     def save(self, folder: str | Path) -> Path:
         """Write what `vcam run` writes, and return the folder. Raises BadInput, CannotDo."""
-        from vcam_cli.simulation.outputs import save
+        from vcam_cli.simulation.output.outputs import save
 
         return save(self, require_folder(folder))
 

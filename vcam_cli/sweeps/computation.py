@@ -15,7 +15,7 @@ from vcam_cli.files.points_store import SweepFolder
 from vcam_cli.files.report import hash_file
 from vcam_cli.image_formation.rate_cache import light_key
 from vcam_cli.progress import Observer
-from vcam_cli.simulation import provenance
+from vcam_cli.simulation.output import provenance
 from vcam_cli.sweeps import (
     expectations,
     figures,

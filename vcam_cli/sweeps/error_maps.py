@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcam_cli.camera.camera import Camera
-from vcam_cli.camera.charts import Csf
 from vcam_cli.camera.derived.geometry import geometry
+from vcam_cli.camera.scene.charts import Csf
 from vcam_cli.processing.tone import codes
 from vcam_cli.quality import error_map, iso_lines
 from vcam_cli.quality.modes import density, density_modes

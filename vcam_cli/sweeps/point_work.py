@@ -10,12 +10,12 @@ from typing import Protocol
 from vcam_cli.camera.camera import Camera
 from vcam_cli.errors import BadInput, CannotDo, one_line
 from vcam_cli.files.atomic import written_bytes
-from vcam_cli.files.png import write_png
+from vcam_cli.files.images.png import write_png
 from vcam_cli.floats import own_float_errors
 from vcam_cli.interrupts import restore_interrupt
 from vcam_cli.parallel import available_workers
-from vcam_cli.simulation import outputs
-from vcam_cli.simulation.provenance import versions
+from vcam_cli.simulation.output import outputs
+from vcam_cli.simulation.output.provenance import versions
 from vcam_cli.simulation.shared import Shared
 from vcam_cli.simulation.simulate import Result, simulate
 from vcam_cli.sweeps.point_effects import with_every_effect

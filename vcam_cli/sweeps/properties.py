@@ -24,8 +24,8 @@ from vcam_cli.camera.derived.pixel_layout import detector
 from vcam_cli.camera.derived.process import process
 from vcam_cli.characterization.closed_form import directional_mtf
 from vcam_cli.effects.base import Effect, Gain, of_kind
-from vcam_cli.effects.off_axis import OffAxis
-from vcam_cli.effects.pixel_vignetting import PixelVignetting
+from vcam_cli.effects.optics.off_axis import OffAxis
+from vcam_cli.effects.pixel.pixel_vignetting import PixelVignetting
 from vcam_cli.errors import bad
 from vcam_cli.image_formation import photon_rate
 from vcam_cli.image_formation.settings import settings

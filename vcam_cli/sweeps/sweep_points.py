@@ -31,8 +31,8 @@ from vcam_cli.config.validation_messages import NO_SUCH_KEY
 from vcam_cli.config.yaml_tree import Node, Source, tree_at
 from vcam_cli.errors import BadInput, Problem, split
 from vcam_cli.files.report import hash_file, hash_text, to_json
-from vcam_cli.simulation import provenance
 from vcam_cli.simulation.checks import CHECKS
+from vcam_cli.simulation.output import provenance
 from vcam_cli.sweeps.model import Sweep, overlap
 from vcam_cli.sweeps.sweep_file import Cell, Parameter, StudyCase, StudyFile
 

@@ -25,7 +25,7 @@ from vcam_cli.files.records import Proofs, read_record
 from vcam_cli.files.report import hash_file, hash_text, to_json
 from vcam_cli.files.spectral.hyperspectral import companions
 from vcam_cli.files.tables import Cell
-from vcam_cli.simulation import provenance
+from vcam_cli.simulation.output import provenance
 from vcam_cli.sweeps.model import Basis
 from vcam_cli.sweeps.sweep_file import StudyFile
 

@@ -2,7 +2,7 @@
 
 from typing import Annotated, Literal
 
-from vcam_cli.camera.illuminant import IlluminantSpec
+from vcam_cli.camera.scene.illuminant import IlluminantSpec
 from vcam_cli.config.model import Model, at_most_one, key
 from vcam_cli.config.quantities import Number, Quantity, Whole
 from vcam_cli.config.values import TIME, MaybePositive, MaybeSiliconTemperature, Text

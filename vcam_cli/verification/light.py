@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from vcam_cli.camera.illuminant import Illuminant, IlluminantSpec
+from vcam_cli.camera.scene.illuminant import Illuminant, IlluminantSpec
 
 
 class Light(Illuminant):

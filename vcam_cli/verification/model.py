@@ -8,7 +8,7 @@ from pydantic import model_validator
 from pydantic_core import InitErrorDetails
 
 from vcam_cli import units
-from vcam_cli.camera.illuminant import IlluminantSpec
+from vcam_cli.camera.scene.illuminant import IlluminantSpec
 from vcam_cli.config.lists import check_list, read_items
 from vcam_cli.config.model import FileModel, Model, at_most_one, key
 from vcam_cli.config.quantities import Number, Percentage, Quantity

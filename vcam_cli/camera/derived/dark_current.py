@@ -19,7 +19,7 @@ from vcam_cli.camera.derived.charge_storage import TRANSFERRED
 from vcam_cli.camera.derived.junction import depletion_width
 from vcam_cli.camera.derived.pixel_layout import detector
 from vcam_cli.camera.derived.process import Need, Process, process
-from vcam_cli.camera.photodetector import DarkCurrentDensity
+from vcam_cli.camera.sensor.photodetector import DarkCurrentDensity
 from vcam_cli.errors import bad
 from vcam_cli.physics import junction as physics
 from vcam_cli.physics import readout, silicon

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import math
 
-from vcam_cli.camera.architecture import ARCHITECTURES
 from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.sensor.architecture import ARCHITECTURES
 from vcam_cli.physics import readout
 
 SIGMAS = 4.0

@@ -7,15 +7,15 @@ from dataclasses import dataclass
 
 from numpy.typing import NDArray
 
-from vcam_cli.camera.adc import Adc
-from vcam_cli.camera.architecture import ARCHITECTURES
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived import sense_node
 from vcam_cli.camera.derived.charge_storage import capacity
 from vcam_cli.camera.derived.dark_noise import SIGMAS, dark_noise
 from vcam_cli.camera.derived.transfer_curve import PATH as CURVE
 from vcam_cli.camera.derived.transfer_curve import Curve, transfer_curve
-from vcam_cli.camera.pixel import AGREE
+from vcam_cli.camera.sensor.adc import Adc
+from vcam_cli.camera.sensor.architecture import ARCHITECTURES
+from vcam_cli.camera.sensor.pixel import AGREE
 from vcam_cli.errors import BadInput, bad
 from vcam_cli.physics import readout
 

@@ -20,10 +20,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from vcam_cli.camera.architecture import ARCHITECTURES, article
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.lattice import lattice
-from vcam_cli.camera.pixel import ChargeTransfer, Timing
+from vcam_cli.camera.sensor.architecture import ARCHITECTURES, article
+from vcam_cli.camera.sensor.pixel import ChargeTransfer, Timing
 from vcam_cli.errors import bad
 from vcam_cli.physics.transfer_time import transfer_time
 

@@ -23,7 +23,7 @@ from vcam_cli.camera.derived.pixel_layout import (
     detector_area,
     sampling_scale,
 )
-from vcam_cli.camera.scene import Extent
+from vcam_cli.camera.scene.scene import Extent
 from vcam_cli.errors import Collector, bad
 from vcam_cli.physics import depth_of_field, diffraction, radiometry
 

@@ -17,8 +17,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from vcam_cli.camera.array import CLEAR, Positions
 from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.sensor.array import CLEAR, Positions
 from vcam_cli.errors import bad, data_file_problems
 from vcam_cli.spectra.text import parse_numbers, read_table
 

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.lattice import lattice
 from vcam_cli.camera.optics import LEAST_F_NUMBER, MOST_F_NUMBER
-from vcam_cli.camera.pixel import AGREE
-from vcam_cli.camera.sources import Layers
+from vcam_cli.camera.scene.sources import Layers
+from vcam_cli.camera.sensor.pixel import AGREE
 from vcam_cli.errors import bad
 from vcam_cli.physics import radiometry
 

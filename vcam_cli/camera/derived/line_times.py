@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from vcam_cli.camera.array import Positions
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry
+from vcam_cli.camera.sensor.array import Positions
 from vcam_cli.errors import bad
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
-from vcam_cli.camera.array import Block
 from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.sensor.array import Block
 
 NONE = "."
 """A place of a block where there is no pixel."""

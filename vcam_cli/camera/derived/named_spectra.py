@@ -1,7 +1,7 @@
 """The spectra that a camera names or gives, each with its place in the file."""
 
 from vcam_cli.camera.camera import Camera
-from vcam_cli.camera.illuminant import IlluminantSpec
+from vcam_cli.camera.scene.illuminant import IlluminantSpec
 from vcam_cli.camera.spectrum import SpectrumSpec
 from vcam_cli.errors import Collector, Path, bad
 from vcam_cli.physics.silicon import ABSORPTION_RANGE

@@ -20,7 +20,7 @@ from vcam_cli.camera.derived.dark_current import dark_rate
 from vcam_cli.camera.derived.junction import depletion_width, depths
 from vcam_cli.camera.derived.process import Need, process
 from vcam_cli.camera.derived.sense_node import capacitance
-from vcam_cli.camera.photodetector import ChargeDiffusion
+from vcam_cli.camera.sensor.photodetector import ChargeDiffusion
 from vcam_cli.errors import Collector, split
 from vcam_cli.physics import photodiode as physics
 from vcam_cli.physics import silicon

@@ -9,7 +9,7 @@ import numpy as np
 
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.process import Process, process
-from vcam_cli.camera.pixel import Microlens
+from vcam_cli.camera.sensor.pixel import Microlens
 from vcam_cli.errors import BadInput, bad
 from vcam_cli.physics import photodiode, vignetting
 

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from typing import Any, TypeVar, get_args
 
 from vcam_cli.camera.camera import Camera
-from vcam_cli.camera.technology import (
+from vcam_cli.camera.sensor.technology import (
     Gate,
     Junction,
     JunctionCapacitance,

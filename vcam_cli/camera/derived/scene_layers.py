@@ -6,8 +6,8 @@ import math
 
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.lens import focus_distance, lens
-from vcam_cli.camera.scene import Extent
-from vcam_cli.camera.sources import Layers
+from vcam_cli.camera.scene.scene import Extent
+from vcam_cli.camera.scene.sources import Layers
 from vcam_cli.errors import Collector, bad
 
 PATH = ("scene", "source", "layers")

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived import sense_node
 from vcam_cli.camera.derived.process import Need, process
-from vcam_cli.camera.transfer_curve import Follower, Points
+from vcam_cli.camera.sensor.transfer_curve import Follower, Points
 from vcam_cli.errors import bad, data_file_problems
 from vcam_cli.physics import follower as physics
 from vcam_cli.spectra.text import read_rows

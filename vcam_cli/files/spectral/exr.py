@@ -19,10 +19,15 @@ from typing import BinaryIO
 import numpy as np
 
 from vcam_cli.files.atomic import cannot_write
-from vcam_cli.files.exr import ExrWriter
 from vcam_cli.files.file_checks import UnusableFile
-from vcam_cli.files.images import check_size, extract_display_window, open_image, read_samples
-from vcam_cli.files.rows import Attribute
+from vcam_cli.files.images.exr import ExrWriter
+from vcam_cli.files.images.images import (
+    check_size,
+    extract_display_window,
+    open_image,
+    read_samples,
+)
+from vcam_cli.files.images.rows import Attribute
 from vcam_cli.files.spectral.data import GAINS, SpectralData
 from vcam_cli.scenes.hyperspectral import Quantity
 from vcam_cli.spectra import SPEED_OF_LIGHT

@@ -18,8 +18,8 @@ from typing import Any, Literal
 import numpy as np
 
 from vcam_cli.files.file_checks import UnusableFile
-from vcam_cli.files.images import check_size, open_image, read_samples
-from vcam_cli.files.rows import pending_error
+from vcam_cli.files.images.images import check_size, open_image, read_samples
+from vcam_cli.files.images.rows import pending_error
 from vcam_cli.files.spectral.data import PER_NM, SpectralData, check_length, finite_numbers
 
 LONGEST = 1 << 20  # bytes of a table

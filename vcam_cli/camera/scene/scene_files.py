@@ -1,0 +1,118 @@
+"""Scenes that are files: pictures, and spectra at every place."""
+
+from collections.abc import Mapping
+from pathlib import PurePath
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import model_validator
+
+from vcam_cli.camera.scene.motion import MOTION, MaybeMotion, MovingSource
+from vcam_cli.config.model import Model, key
+from vcam_cli.config.quantities import Quantity, Whole
+from vcam_cli.config.validation_messages import describe, refusal
+from vcam_cli.config.values import Choice, Either, File, FileName, Positive, Wavelength, mapping
+
+DEPTH = key(
+    "distance along the axis [m] at every sample: not built yet", example="depth.exr", default=None
+)
+"""The key of scenes that are files."""
+
+
+def refuse_depth(source: Any) -> None:
+    """Refuse the depth of a scene that is a file: only flat scenes are built."""
+    if source.depth is not None:
+        raise refusal(("depth",), "scenes with depth are not built yet", "leave it out")
+
+
+_SAMPLE = Whole(least=0, most=10**9, example="0")
+_COUNT = Whole(least=1, most=10**9, example="512")
+
+
+class Crop(Model):
+    """A rectangle of a picture, upright, in its samples."""
+
+    row: Annotated[int, _SAMPLE] = key("the first row, from 0 at the top", example=0, default=0)
+    column: Annotated[int, _SAMPLE] = key("the first column, from 0 left", example=0, default=0)
+    rows: Annotated[int, _COUNT] = key("number of rows", example=512)
+    columns: Annotated[int, _COUNT] = key("number of columns", example=512)
+
+    @property
+    def window(self) -> tuple[slice, slice]:
+        """Return its rows and columns."""
+        rows = slice(self.row, self.row + self.rows)
+        return rows, slice(self.column, self.column + self.columns)
+
+
+class ImageFile(MovingSource):
+    """A picture, read as the reflectance or the radiance of a flat scene."""
+
+    kind: Literal["image"] = key("what kind of source this is", example="image")
+    motion: MaybeMotion = MOTION
+    file: File = key("any image file that OpenImageIO reads", example="photo.png")
+    encoding: Annotated[str, Choice("srgb", "linear")] = key(
+        "how the file codes light; default srgb, for .exr, .hdr and .pfm linear",
+        example="srgb",
+        default=None,
+    )
+    white: Positive = key("value in the file that has the stated luminance", default=1.0)
+    model: Literal["auto", "reflectance", "laser", "rgb-display", "mallett"] = key(
+        "what channels mean: auto (one is reflectance, three are mallett), reflectance (one), "
+        "laser (450, 550 and 650 nm, equal planes = equal radiance in W), rgb-display (the "
+        "primaries of the camera file's display), mallett (the smooth reflectances that "
+        "have these sRGB colors under D65)",
+        default="auto",
+    )
+    crop: Annotated[Crop | None, mapping(Crop)] = key(
+        "the part of the picture that is the scene; default all of it",
+        example={"row": 100, "column": 200, "rows": 512, "columns": 512},
+        default=None,
+    )
+
+    depth: Annotated[str | None, FileName()] = DEPTH
+
+    @model_validator(mode="after")
+    def _encoding(self) -> Self:
+        refuse_depth(self)
+        if "encoding" not in self.model_fields_set:
+            linear = PurePath(self.file).suffix.lower() in (".exr", ".hdr", ".pfm")
+            self._fill(encoding="linear" if linear else "srgb")
+        return self
+
+
+_CHANNEL = Quantity("length", above=0, least=1e-9, most=1e-3)
+
+
+def _channels(given: Any) -> Mapping[str, float]:
+    if not isinstance(given, Mapping) or len(given) < 2:
+        raise ValueError(
+            f"{describe(given)} names no channels; write for example {{w400: 400 nm, w450: 450 nm}}"
+        )
+    return {str(name): _CHANNEL.read(value) for name, value in given.items()}
+
+
+class Hyperspectral(MovingSource):
+    """A file of spectra: spectral EXR, ENVI, ISETCam scene, npz, multichannel TIFF."""
+
+    kind: Literal["hyperspectral"] = key("what kind of source this is", example="hyperspectral")
+    motion: MaybeMotion = MOTION
+    file: File = key(
+        "radiances or reflectances: a spectral .exr, an ENVI .hdr, an ISETCam .mat, a .npz with "
+        "wavelength_nm and radiance or reflectance, a .tif with a table of its wavelengths",
+        example="scene.exr",
+    )
+    channels: Annotated[Mapping[str, float] | None, Either(_channels, dict[str, Wavelength])] = key(
+        "of an .exr that names its channels in its own way, as renderers do: the wavelength of"
+        " each, radiances in W/(sr m2 nm)",
+        example={"w400": "400 nm", "w450": "450 nm"},
+        default=None,
+    )
+
+    depth: Annotated[str | None, FileName()] = DEPTH
+
+    @model_validator(mode="after")
+    def _named(self) -> Self:
+        refuse_depth(self)
+        if self.channels is not None and PurePath(self.file).suffix.lower() != ".exr":
+            message = "only the channels of an .exr have names of their own"
+            raise refusal(("channels",), message, "remove it, or give an .exr")
+        return self

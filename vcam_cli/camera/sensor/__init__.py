@@ -1,0 +1,1 @@
+"""What a camera file may say of the sensor: pixel, photodetector, technology, array."""

@@ -1,0 +1,342 @@
+"""The pixel: photodetector, readout, fixed-pattern noise, and what lies above it."""
+
+from collections.abc import Iterator, Mapping
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import AliasChoices, model_validator
+from pydantic_core import InitErrorDetails
+
+from vcam_cli.camera.sensor.architecture import ARCHITECTURES, article
+from vcam_cli.camera.sensor.noise import (
+    CorrelatedRowNoise,
+    HeavyTailedNoise,
+    PatternShading,
+    TelegraphNoise,
+)
+from vcam_cli.camera.sensor.photodetector import Photodetector
+from vcam_cli.camera.sensor.technology import CHOICE, TechnologyChoice
+from vcam_cli.camera.sensor.transfer_curve import TransferCurve
+from vcam_cli.config.model import Model, at_most_one, exactly_one, key
+from vcam_cli.config.quantities import Number, Quantity, Whole
+from vcam_cli.config.validation_messages import fault, refusal
+from vcam_cli.config.values import (
+    MOST_ELECTRONS,
+    Electrons,
+    Fraction,
+    MaybeFraction,
+    MaybeTime,
+    Percent,
+    Positive,
+    SiliconTemperature,
+    mapping,
+    word_or,
+)
+
+Size = Annotated[float, Quantity("length", above=0, least=1e-9, most=1e-2)]
+"""Of a pixel, up to that of a detector of X-rays."""
+Gap = Annotated[float, Quantity("length", least=0, most=1e-3)]
+"""Between pixels."""
+Thickness = Annotated[float, Quantity("length", least=0, most=1e-2)]
+"""Of a layer on a pixel."""
+AGREE = 1e-3
+"""Relative difference up to which redundant numbers of a file count as equal."""
+
+
+class ChargeTransfer(Model):
+    """Transfer of charge in a CCD."""
+
+    inefficiency: Annotated[float, Number(least=0, below=1, example="3e-5")] = key(
+        "charge left behind at a stage", example=3e-5, default=3e-5
+    )
+    phases: Annotated[int, Whole(least=1, most=8, example="3")] = key("stages per pixel", default=3)
+
+
+class Timing(Model):
+    """Clocks of the readout, from which `vcam plan` has the frame rate."""
+
+    pixel_time: MaybeTime = key(
+        "of one pixel at an output; default of a ccd: as fast as its charge transfer allows, of"
+        " others none, where columns have an ADC each",
+        example="25 ns",
+        default=None,
+    )
+    row_time: MaybeTime = key(
+        "to bring a row to the foot of its columns", example="10 us", default=None
+    )
+    conversion_time: Annotated[float, Quantity("time", least=0, most=1e9)] = key(
+        "of the ADCs in all pixels of a dps", example="1 ms", unit="ms", default=0.0
+    )
+    outputs: Annotated[int, Whole(least=1, most=10_000, example="1")] = key(
+        "pixels that leave the array at a time", default=1
+    )
+
+
+class Readout(Model):
+    """From electrons to volts: two of conversion_gain, voltage_swing and full_well.
+
+    Or full_well alone, as data sheets count: then there are no volts, and the ADC is full with it.
+    """
+
+    conversion_gain: Annotated[float | None, Quantity("conversion_gain", above=0)] = key(
+        "volts per electron; default q / capacitance", example="20 uV/e", default=None
+    )
+    voltage_swing: Annotated[float | None, Quantity("voltage", above=0)] = key(
+        "at the full well", example="1.38 V", default=None
+    )
+    full_well: Annotated[float | None, Quantity("charge", above=0)] = key(
+        "electrons a pixel can hold; enough by itself",
+        example="69 ke",
+        default=None,
+    )
+    transfer_curve: Annotated[TransferCurve | None, word_or(TransferCurve, {"linear": None})] = key(
+        "from charge to the output of the pixel: linear, or its capacitance and source follower",
+        example="linear",
+        default=None,
+    )
+    gain: Positive = key(
+        "analog gain of the fixed readout chain; the photographer's is exposure.gain", default=1.0
+    )
+    read_noise: Electrons = key("temporal noise of a readout", example="5 e", default=0.0)
+    column_noise: Electrons = key(
+        "temporal, one draw a column and frame; none in dps and ccd", example="0 e", default=0.0
+    )
+    row_noise: Electrons = key("temporal, one draw a row and frame", example="0 e", default=0.0)
+    heavy_tailed_noise: Annotated[
+        HeavyTailedNoise | None, word_or(HeavyTailedNoise, {"none": None})
+    ] = key(
+        "temporal noise of a readout with large values more often than normal noise has",
+        example={"rms": "3 e", "shape": -0.1},
+        default=None,
+    )
+    correlated_row_noise: Annotated[
+        CorrelatedRowNoise | None, word_or(CorrelatedRowNoise, {"none": None})
+    ] = key(
+        "temporal, of rows that resemble their neighbors",
+        example={"rms": "1 e", "correlation": 0.9},
+        default=None,
+    )
+    telegraph_noise: Annotated[TelegraphNoise | None, word_or(TelegraphNoise, {"none": None})] = (
+        key(
+            "random telegraph noise of the pixels that have a trap",
+            example={"fraction": "2 %", "amplitude": "10 e"},
+            default=None,
+        )
+    )
+    reset_noise: Annotated[
+        float | Literal["ktc", "none"],
+        Quantity("charge", least=0, most=MOST_ELECTRONS, words={"ktc": "ktc", "none": "none"}),
+    ] = key(
+        "ktc (from the capacitance that is reset), none, or electrons; correlated double sampling "
+        "removes it in aps-4t and ccd",
+        unit="e",
+        example="ktc",
+        default="none",
+    )
+    bit_line_capacitance: Annotated[float | None, Quantity("capacitance", above=0)] = key(
+        "of a column's bit line; its kTC is the reset noise of a pps",
+        example="2000 fF",
+        default=None,
+    )
+    charge_transfer: Annotated[ChargeTransfer | None, mapping(ChargeTransfer)] = key(
+        "of a ccd; default the example's", example={"inefficiency": 3e-5, "phases": 3}, default=None
+    )
+
+    timing: Annotated[Timing | None, mapping(Timing)] = key(
+        "clocks, for the frame rate of vcam plan alone", example={"row_time": "10 us"}, default=None
+    )
+
+    @model_validator(mode="after")
+    def _check_agreement(self) -> Self:
+        g, v, well = self.conversion_gain, self.voltage_swing, self.full_well
+        if g is not None and v is not None and well is not None and abs(v / g / well - 1) > AGREE:
+            message = f"voltage_swing / conversion_gain is {v / g:.6g} e, not {well:.6g} e"
+            raise refusal(("full_well",), message, "give two of the three")
+        return self
+
+
+class FixedPattern(Model):
+    """What differs from pixel to pixel and column to column, the same in every frame."""
+
+    offset_pixel: Electrons = key(
+        "spread of the pixels' offsets (also: dsnu)",
+        example="2 e",
+        default=0.0,
+        validation_alias=AliasChoices("offset_pixel", "dsnu"),
+    )
+    offset_column: Electrons = key(
+        "spread of the columns' offsets; none in dps and ccd", example="1 e", default=0.0
+    )
+    gain_pixel: Percent = key(
+        "spread of the pixels' gains (also: prnu)",
+        example="0.5 %",
+        default=0.0,
+        validation_alias=AliasChoices("gain_pixel", "prnu"),
+    )
+    gain_column: Percent = key(
+        "spread of the columns' gains; none in dps and ccd", example="0 %", default=0.0
+    )
+    dark: Percent = key("spread of the pixels' dark currents", example="0 %", default=0.0)
+    shading: Annotated[PatternShading | None, word_or(PatternShading, {"none": None})] = key(
+        "slow differences over the array", example={"offset": "2 e", "gain": "0.5 %"}, default=None
+    )
+
+    rules = (at_most_one("offset_pixel", "dsnu"), at_most_one("gain_pixel", "prnu"))
+
+
+class Defects(Model):
+    """Pixels that do not work."""
+
+    hot: Fraction = key(
+        "fraction of pixels that read the full well whatever the light", example=1e-4, default=0.0
+    )
+    dead: Fraction = key("fraction of pixels that collect nothing", example=1e-4, default=0.0)
+
+    @model_validator(mode="after")
+    def _check_fractions(self) -> Self:
+        if self.hot + self.dead > 1:
+            message = f"hot and dead pixels are {self.hot + self.dead:g} of all"
+            raise refusal((), message, "give fractions that add up to at most 1")
+        return self
+
+
+class Layer(Model):
+    """A dielectric layer."""
+
+    thickness: Thickness = key("thickness", example="0.7 um")
+    index: Annotated[float, Number(least=1, most=10, example="1.46")] = key(
+        "refractive index", example=1.46
+    )
+
+
+class Stack(Model):
+    """The layers above the photodetector: a tunnel that shades it."""
+
+    passivation: Layer = key("the upper layer", example={"thickness": "0.7 um", "index": 2.0})
+    oxide: Layer = key("the lower layer", example={"thickness": "6 um", "index": 1.46})
+
+
+class Microlens(Model):
+    """A lens on every pixel; effective fill factor = min(gain x fill factor, 0.95)."""
+
+    gain: Annotated[float | None, Number(least=1, example="1.8")] = key(
+        "factor on the fill factor", example=1.8, default=None
+    )
+    efficiency: MaybeFraction = key(
+        "effective fill factor, in place of a gain", example=0.9, default=None
+    )
+    shift: Literal["optimal", "centered"] = key(
+        "optimal: shifted toward the axis to follow the chief ray", default="optimal"
+    )
+
+    rules = (
+        exactly_one("gain", "efficiency", of="its strength", remedy="write for example gain: 1.8"),
+    )
+
+
+def _is_determined(given: Mapping[str, Any]) -> Iterator[InitErrorDetails]:
+    """Require what a technology could have filled in, where there is none."""
+    if "technology" in given:
+        return
+    detector, readout = given.get("photodetector"), given.get("readout", {})
+    if not isinstance(detector, Mapping) or not isinstance(readout, Mapping):
+        return
+    here = ("photodetector",)
+    if not {"fill_factor", "width", "height"} & set(detector):
+        message = "the photodetector's size is missing"
+        remedy = "add fill_factor: 0.3 (1 for a data sheet's QE of the whole pixel)"
+        yield fault(here, message, f"{remedy}, or width and height")
+    if "quantum_efficiency" not in detector:
+        example = "add it, for example quantum_efficiency: 0.5"
+        yield fault((*here, "quantum_efficiency"), "is missing", example)
+    known = [name for name in ("voltage_swing", "full_well") if name in readout]
+    if "conversion_gain" in readout or "capacitance" in detector:
+        known.append("conversion_gain")
+    if len(known) >= 2 or known == ["full_well"]:  # then the ADC is full with it
+        return
+    message = (
+        "the readout is not determined: two of conversion_gain, voltage_swing and full_well are "
+        "needed (photodetector.capacitance may stand for conversion_gain)"
+    )
+    remedy = "add conversion_gain: 20 uV/e" if known else "add two of them"
+    if "conversion_gain" in known:
+        remedy = "add voltage_swing: 1.38 V or full_well: 69 ke"
+    yield fault(("readout",), message, remedy)
+
+
+class Pixel(Model):
+    """One pixel of the array."""
+
+    architecture: Literal["aps-3t", "aps-4t", "pps", "dps", "ccd"] = key(
+        "readout architecture", default="aps-3t"
+    )
+    technology: Annotated[TechnologyChoice | None, CHOICE] = key(
+        "fills in what is not given: a name, or {from: name, ...} with changes",
+        example="cmos-0.35um",
+        default=None,
+    )
+    width: Size = key("width of the pixel", example="6.5 um")
+    height: Size = key("height of the pixel; default its width", example="6.5 um", default=None)
+    gap_x: Gap = key("between pixels of a row; pitch = width + gap", example="0 um", default=0.0)
+    gap_y: Gap = key("between pixels of a column", example="0 um", default=0.0)
+    photodetector: Photodetector = key(
+        "what collects light", example={"fill_factor": 0.3, "quantum_efficiency": 0.5}
+    )
+    readout: Readout = key(
+        "from electrons to volts",
+        example={"conversion_gain": "20 uV/e", "full_well": "69 ke"},
+        default=Readout,
+    )
+    fpn: FixedPattern = key(
+        "fixed-pattern noise", example={"offset_pixel": "2 e"}, default=FixedPattern
+    )
+    defects: Defects = key("pixels that do not work", example={"hot": 0}, default=Defects)
+    stack: Annotated[Stack | None, word_or(Stack, {"none": None})] = key(
+        "layers above the photodetector, which shade it", example="none", default=None
+    )
+    microlens: Annotated[Microlens | None, word_or(Microlens, {"none": None})] = key(
+        "a lens on every pixel", example="none", default=None
+    )
+    temperature: SiliconTemperature = key("of the sensor", example="300 K", default=300.0)
+
+    rules = (_is_determined,)
+
+    @model_validator(mode="after")
+    def _defaults(self) -> Self:
+        if "height" not in self.model_fields_set:
+            self._fill(height=self.width)
+        return self
+
+    @model_validator(mode="after")
+    def _sizes_agree(self) -> Self:
+        pd = self.photodetector
+        if pd.fill_factor is None or pd.width is None or pd.height is None:
+            return self
+        actual = pd.width * pd.height / (self.width * self.height)
+        if abs(actual / pd.fill_factor - 1) > AGREE:
+            message = f"is {pd.fill_factor:g}, but width and height make it {actual:.6g}"
+            where = ("photodetector", "fill_factor")
+            raise refusal(where, message, "give the fill factor or the size")
+        return self
+
+    @model_validator(mode="after")
+    def _readout_suits(self) -> Self:
+        name, readout = self.architecture, self.readout
+        kind = ARCHITECTURES[name]
+        if readout.charge_transfer is not None and not kind.transfers:
+            where = ("readout", "charge_transfer")
+            message = f"{article(name)} {name} pixel transfers no charge"
+            raise refusal(where, message, "remove it, or write architecture: ccd")
+        curve = readout.transfer_curve
+        if curve is not None and curve.follower is not None and name == "pps":
+            path = ("readout", "transfer_curve", "follower")
+            raise refusal(path, "a passive pixel has no follower", "remove it")
+        of_bit_line = kind.reset_noise == "bit line" and readout.reset_noise == "ktc"
+        if of_bit_line and readout.bit_line_capacitance is None:
+            where = ("readout", "bit_line_capacitance")
+            message = f"is missing: the reset noise of {article(name)} {name} is its bit line's"
+            remedy = "add bit_line_capacitance: 2000 fF, or give reset_noise in electrons"
+            raise refusal(where, message, remedy)
+        if kind.transfers and readout.charge_transfer is None:
+            usual = {"charge_transfer": ChargeTransfer()}
+            self._fill(readout=readout.model_copy(update=usual))
+        return self

@@ -1,0 +1,159 @@
+"""Fixed-pattern noise: no two pixels, and no two columns, are alike; and some do not work.
+
+    electrons = signal (1 + g_pixel z_1 + g_column z_2) + o_pixel z_3 + o_column z_4
+
+z are normal numbers of pixels (1, 3) and columns (2, 4), the same in every frame.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcam_cli.camera.derived.electrical import electrical
+from vcam_cli.camera.sensor.architecture import ARCHITECTURES
+from vcam_cli.effects.signal_chain import NoiseSource
+
+OVERFULL = 100
+"""Full wells of charge in a hot pixel: more than the noise of any readout brings below one."""
+
+
+@dataclass(frozen=True)
+class FixedPattern(NoiseSource):
+    """Offsets [electrons] and gains [1], per pixel and per column, drawn from the sensor seed.
+
+    With them dark currents: a pixel's is the mean one times 1 + `dark` z, and never below zero; it
+    makes shot noise of its own. And pixels that do not work: a hot one leaks so much that it reads
+    the full well whatever the light is (the clip comes last, and takes the readout noise with it);
+    a dead one collects nothing, and reads offset and readout noise. Which pixels these are does
+    not depend on the float type, and a larger fraction has the pixels of a smaller one.
+
+    A ccd's defects and dark currents stay in their pixels: charge transfer moves mean signals.
+    """
+
+    offset_pixel: float
+    offset_column: float
+    gain_pixel: float
+    gain_column: float
+    dark: float = 0.0
+    """Relative spread of the pixels' dark currents."""
+    hot: float = 0.0
+    dead: float = 0.0
+    """Fractions of the pixels."""
+    full_well: float = math.inf
+    """Of a pixel [electrons]."""
+    no_columns: str = ""
+    """The architecture, where it has no column terms though the file gives them."""
+
+    name = "fpn"
+    reference = "Chen 2003, eq 2.26 (Q_f); El Gamal et al., Proc. SPIE 3301, 1998"
+    absent = "the file gives no pixel.fpn or pixel.defects that its architecture has"
+    seconds_per_pixel = 20e-9
+    scope = "sensor"
+    sample_draws = "common"
+
+    def __post_init__(self):
+        # Where all pixels are defective they do not differ: the plan would see no noise in it.
+        object.__setattr__(self, "removable", not (self.hot or self.dead))
+
+    @classmethod
+    def from_camera(cls, camera, geometry):
+        """Return the fixed pattern that the pixel's architecture has, or None where it has none."""
+        fpn, defects, name = camera.pixel.fpn, camera.pixel.defects, camera.pixel.architecture
+        columns = fpn.offset_column, fpn.gain_column
+        missing = any(columns) and not ARCHITECTURES[name].column_terms
+        offset, gain = (0.0, 0.0) if missing else columns
+        strengths = (fpn.offset_pixel, offset, fpn.gain_pixel, gain, fpn.dark)
+        if not any((*strengths, defects.hot, defects.dead)):
+            return None
+        well = electrical(camera).full_well
+        return cls(*strengths, defects.hot, defects.dead, well, name if missing else "")
+
+    def describe(self) -> str:
+        """Return a short clause with this camera's numbers and units."""
+        said = (
+            f"offsets of {self.offset_pixel:.4g} e a pixel and {self.offset_column:.4g} e a column,"
+            f" gains of {self.gain_pixel:.3%} a pixel and {self.gain_column:.3%} a column"
+        )
+        if self.no_columns:
+            said = (
+                f"offsets of {self.offset_pixel:.4g} e and gains of {self.gain_pixel:.3%} a pixel"
+                f" (columns do not differ in a {self.no_columns})"
+            )
+        if self.dark:
+            said += f", dark currents of {self.dark:.3%}"
+        if self.hot or self.dead:
+            said += f", {self.hot:.4%} of the pixels hot and {self.dead:.4%} dead"
+        return said
+
+    def split(self):
+        """Return the pixels' own pattern, the columns' and None: rows are alike."""
+        own = replace(self, offset_column=0.0, gain_column=0.0)
+        if not (self.offset_column or self.gain_column):
+            return own, None, None
+        return own, FixedPattern(0.0, self.offset_column, 0.0, self.gain_column), None
+
+    def before_shot(self, mean, site):
+        """Return the mean signal with dark currents and defects in it; it reuses the array."""
+        if self.dark and site.dark:
+            z = site.normal("fpn dark")
+            z *= self.dark
+            np.maximum(z, -1, out=z)
+            z *= site.dark
+            mean += z
+        if self.hot or self.dead:
+            # 64 bits whatever the rest is computed in: the same pixels in both.
+            chance = site.stream("fpn defects").random((site.rows, site.columns))
+            mean[chance < self.hot] = OVERFULL * self.full_well
+            mean[chance >= 1 - self.dead] = 0
+        return mean
+
+    def apply(self, electrons, site):
+        """Return the block with gains and offsets in it; it reuses the array [electrons]."""
+        if self.gain_pixel or self.gain_column:
+            gain: NDArray = 1 + self.gain_column * site.normal_columns("fpn gain column")
+            if self.gain_pixel:
+                g = site.normal("fpn gain pixel")
+                g *= self.gain_pixel
+                g += gain
+                gain = g
+            electrons *= gain
+        if self.offset_pixel:
+            z = site.normal("fpn offset pixel")
+            z *= self.offset_pixel
+            electrons += z
+        if self.offset_column:
+            electrons += self.offset_column * site.normal_columns("fpn offset column")
+        return electrons
+
+    @property
+    def fills_wells(self) -> bool:
+        """Whether there are hot pixels."""
+        return self.hot > 0
+
+    def variance(self, mean, dark=0.0):
+        """Return the variance that it adds to a pixel [electrons squared]."""
+        offsets = self.offset_pixel**2 + self.offset_column**2
+        gains = (self.gain_pixel**2 + self.gain_column**2) * mean**2
+        working = 1 - self.hot - self.dead
+        # Of a mixture: the mean variance of its parts, and the variance of their means.
+        within = offsets * (1 - self.hot) + (gains + self._dark_variance(dark)) * working
+        if not self.hot:
+            return within + self.dead * (1 - self.dead) * mean**2
+        center = self.hot * self.full_well + working * mean
+        between = self.hot * (self.full_well - center) ** 2 + working * (mean - center) ** 2
+        return within + between + self.dead * center**2
+
+    def _dark_variance(self, dark: float) -> float:
+        """Variance of the dark signals [electrons squared]: of a normal number, 0 if below 0."""
+        if not self.dark or not dark:
+            return 0.0
+        top = 1 / self.dark
+        below = math.erfc(top / math.sqrt(2)) / 2
+        density = math.exp(-(top**2) / 2) / math.sqrt(2 * math.pi)
+        # Mean square less squared mean with the ones taken out: a small spread would drown in them.
+        spread = self.dark**2 * (1 - below - density**2)
+        return (below * (1 - below) + spread - self.dark * density * (1 - 2 * below)) * dark**2

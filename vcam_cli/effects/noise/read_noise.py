@@ -1,0 +1,76 @@
+"""Noise of the readout chain: of every pixel, of every column, of every row.
+
+    variance = r_pixel^2 + r_column^2 + r_row^2   [electrons squared]
+
+A column and a row have one draw each in a frame.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from vcam_cli.camera.sensor.architecture import ARCHITECTURES
+from vcam_cli.effects.signal_chain import NoiseSource
+
+
+@dataclass(frozen=True)
+class ReadNoise(NoiseSource):
+    """Input-referred noise of one readout [electrons rms], new in every frame.
+
+    A pixel has its own, that of its column and that of its row; the three are independent.
+    """
+
+    electrons: float
+    column: float = 0.0
+    row: float = 0.0
+    no_columns: str = ""
+    """The architecture, where its columns have no noise though the file gives it."""
+
+    name = "read_noise"
+    reference = "Chen 2003, eq 2.26 (Q_r); column and row parts: EMVA 1288 release 4.0, section 8"
+    absent = "the file gives no read, column or row noise that its architecture has, or 0"
+    seconds_per_pixel = 9e-9
+    origin = "readout"
+
+    @classmethod
+    def from_camera(cls, camera, geometry):
+        """Return the noise of the readout, or None where pixel, column and row have none."""
+        given, name = camera.pixel.readout, camera.pixel.architecture
+        missing = given.column_noise > 0 and not ARCHITECTURES[name].column_terms
+        column = 0.0 if missing else given.column_noise
+        if not any((given.read_noise, column, given.row_noise)):
+            return None
+        return cls(given.read_noise, column, given.row_noise, name if missing else "")
+
+    def describe(self) -> str:
+        """Return a short clause with this camera's numbers and units."""
+        said = f"{self.electrons:.4g} electrons rms"
+        if self.column:
+            said += f", {self.column:.4g} of every column"
+        if self.row:
+            said += f", {self.row:.4g} of every row"
+        if self.no_columns:
+            said += f" (columns have no noise in a {self.no_columns})"
+        return said
+
+    def split(self):
+        """Return the pixels' own noise, the columns' and the rows'."""
+        column = ReadNoise(0.0, column=self.column) if self.column else None
+        row = ReadNoise(0.0, row=self.row) if self.row else None
+        return ReadNoise(self.electrons), column, row
+
+    def apply(self, electrons, site):
+        """Return the block with the noise of one readout in it; it reuses the array [electrons]."""
+        if self.electrons:
+            z = site.normal(self.name)
+            z *= self.electrons
+            electrons += z
+        if self.column:
+            electrons += self.column * site.normal_columns("read_noise column")
+        if self.row:
+            electrons += self.row * site.normal_rows("read_noise row")
+        return electrons
+
+    def variance(self, mean, dark=0.0):
+        """Return the variance that it adds to a pixel [electrons squared]."""
+        return self.electrons**2 + self.column**2 + self.row**2

@@ -1,0 +1,90 @@
+"""Random telegraph noise: traps in the transistors of some pixels, now filled, now empty.
+
+    noise = A (b - p)   or, double sampled,   A (b_1 - b_2)
+
+b is 1 with the probability p that the trap is filled, else 0; steps A are exponentially
+distributed.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcam_cli.camera.sensor.architecture import ARCHITECTURES
+from vcam_cli.effects.signal_chain import NoiseSource
+
+
+@dataclass(frozen=True)
+class TelegraphNoise(NoiseSource):
+    """Pixels with a trap, which shifts their signal by a step while it is filled.
+
+    Which pixels have one, and how large its step A is, stays with the sensor; whether it is filled
+    is new in every readout, since traps change faster than frames follow each other. Where
+    correlated double sampling takes the difference of two readouts a pixel has three levels, -A, 0
+    and A; elsewhere it has two. Their mean is taken as part of the pixel's offset.
+    """
+
+    fraction: float
+    """Of the pixels that have a trap."""
+    amplitude: float
+    """Mean of the steps, which are distributed exponentially [electrons]."""
+    occupancy: float
+    """Share of the time that a trap is filled."""
+    double_sampled: bool = False
+
+    name = "telegraph_noise"
+    reference = (
+        "Wang, Rao, Mierop and Theuwissen, Random telegraph signal in CMOS image sensor pixels,"
+        " IEDM 2006, doi:10.1109/IEDM.2006.346973"
+    )
+    absent = "the file gives no pixel.readout.telegraph_noise, or 0"
+    seconds_per_pixel = 20e-9
+
+    @classmethod
+    def from_camera(cls, camera, geometry):
+        """Return the noise that the file gives, or None where it gives none."""
+        given = camera.pixel.readout.telegraph_noise
+        if given is None or not given.fraction * given.amplitude:
+            return None
+        if given.occupancy in (0, 1):
+            return None
+        double = ARCHITECTURES[camera.pixel.architecture].reset_noise == "none"
+        return cls(given.fraction, given.amplitude, given.occupancy, double)
+
+    def describe(self) -> str:
+        """Return a short clause with this camera's numbers and units."""
+        levels = "three levels" if self.double_sampled else "two levels"
+        return (
+            f"{self.fraction:.4%} of the pixels with {levels}, {self.amplitude:.4g} electrons"
+            f" apart in the mean, filled {self.occupancy:.3g} of the time"
+        )
+
+    def apply(self, electrons, site):
+        """Return the block with the state of its traps in it; it reuses the array [electrons]."""
+        shape = (site.rows, site.columns)
+        # 64 bits whatever the rest is computed in: the same pixels in both.
+        chance = site.sensor_stream(f"{self.name} trap").random(shape)
+        level = self._filled(site, self.name, shape)
+        level -= (
+            self._filled(site, f"{self.name} reset", shape)
+            if self.double_sampled
+            else (self.occupancy)
+        )
+        trapped = chance < self.fraction
+        # Of pixels with a trap, chance / fraction is even from 0 to 1, whatever the fraction is.
+        step = -self.amplitude * np.log1p(-chance[trapped] / self.fraction)
+        electrons[trapped] += (step * level[trapped]).astype(electrons.dtype)
+        return electrons
+
+    def _filled(self, site, name: str, shape: tuple[int, int]) -> NDArray[np.float64]:
+        """Return 1 where a trap would be filled at this readout, 0 where empty."""
+        return (site.stream(name).random(shape) < self.occupancy).astype(np.float64)
+
+    def variance(self, mean, dark=0.0):
+        """Return the variance that it adds, in the mean over the pixels [electrons squared]."""
+        readouts = 2 if self.double_sampled else 1
+        square = 2 * self.amplitude**2  # mean square of exponential steps
+        return readouts * self.fraction * square * self.occupancy * (1 - self.occupancy)

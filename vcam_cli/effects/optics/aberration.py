@@ -1,0 +1,79 @@
+"""Blur by the lens's aberrations: defocus, Zernike wavefronts, or what was measured.
+
+    H(f) = mean of exp(2 pi i (W(p + s / 2) - W(p - s / 2)) / lambda)
+
+over the points p that two pupils share which lie s = lambda N (1 - m) f diameters apart, W the
+wavefront. A measured PSF has its Fourier transform for H, a measured MTF its own value.
+
+`Diffraction` says what diffraction leaves of contrast; an aberration is the factor that makes it
+less. Which kind of blur a camera has depends on its file:
+
+    point_spread.py     a point spread function, measured or from a lens program
+    measured_mtf.py     a measured modulation transfer, the same everywhere or over the field
+    field_blur.py       a wavefront that changes over the field, or turns with the azimuth
+    wavefront_blur.py   a wavefront that is the same everywhere, symmetric about the axis or not
+"""
+
+from __future__ import annotations
+
+from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.derived.geometry import Geometry
+from vcam_cli.effects.optics.field_blur import FieldBlur
+from vcam_cli.effects.optics.measured_mtf import FieldMtf, MeasuredMtf
+from vcam_cli.effects.optics.point_spread import PointSpread
+from vcam_cli.effects.optics.wavefront_blur import (
+    AberrationBlur,
+    DirectedBlur,
+    Lens,
+    SymmetricBlur,
+    wavefronts,
+)
+from vcam_cli.errors import bad
+from vcam_cli.physics import aberration
+
+KINDS = (PointSpread, MeasuredMtf, FieldMtf, SymmetricBlur, DirectedBlur, FieldBlur)
+"""Kinds of blur; a camera has at most one of them."""
+
+
+class Aberration(AberrationBlur):
+    """What makes the lens worse than a perfect one."""
+
+    @classmethod
+    def from_camera(cls, camera: Camera, geometry: Geometry) -> AberrationBlur | None:
+        """Return the kind of blur that the camera's lens has, or None for a perfect lens."""
+        blurs = (kind.from_camera(camera, geometry) for kind in KINDS)
+        return next((blur for blur in blurs if blur is not None), None)
+
+
+def check(camera: Camera, geometry: Geometry) -> None:
+    """Refuse a wavefront too steep to be followed as a wave.
+
+    It is refused switched off or not: the plan says of what is left out how much it would do.
+
+    Raises
+    ------
+    BadInput
+        For a wavefront that rises by too many wavelengths over a pupil radius.
+    """
+    if camera.optics.measured_blur and geometry.focus_shift:
+        raise bad(
+            ("optics", "focus_distance"),
+            "a measured blur is that of what is in focus, and not known at other distances",
+            "write psf: none and mtf: none, or put the scene in focus",
+        )
+    if camera.optics.measured_blur or not Lens.from_camera(camera, geometry).diffracts:
+        return
+    shortest = camera.scene.wavelengths.start
+    slopes = [
+        aberration.slope_in_waves(terms, shortest) for _, terms in wavefronts(camera, geometry)
+    ]
+    if max(slopes) > aberration.MAX_SLOPE:
+        key = "zernike" if camera.optics.zernike.terms else "defocus"
+        key = "focus_distance" if geometry.focus_shift else key
+        raise bad(
+            ("optics", key),
+            f"gives a wavefront that rises by {max(slopes):.4g} wavelengths of"
+            f" {shortest * 1e9:.4g} nm over a pupil radius; at most {aberration.MAX_SLOPE:g} can be"
+            " followed",
+            "check the unit, or write diffraction: false for the blur of rays",
+        )

@@ -1,0 +1,184 @@
+"""Blur by a wavefront error that changes over the field.
+
+The file says what the wavefront is on the half-axis from the center to the right; the lens is
+symmetric about its axis, so that elsewhere the wavefront is turned about it.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.derived.geometry import Geometry
+from vcam_cli.effects.base import FieldTransfer, Zone
+from vcam_cli.effects.optics.wavefront_blur import (
+    GREEN,
+    AberrationBlur,
+    DirectedBlur,
+    Lens,
+    SymmetricBlur,
+    uniform_wavefront,
+    wavefronts,
+)
+from vcam_cli.physics import zernike
+from vcam_cli.physics.zernike import Terms
+
+PLACES_PER_WAVE = 6.0
+"""Further places for each wave (rms) that the wavefront changes by from center to corner: the
+transfer function turns by some radians then, and a polynomial needs a degree for each."""
+MAX_PLACES = 13
+"""Number of places at which that ends: of a wavefront of more waves what lies between two zones is
+known less well."""
+
+
+@dataclass(frozen=True)
+class FieldBlur(AberrationBlur, FieldTransfer):
+    """Wavefronts at places of the field, straight in between, turned with the azimuth."""
+
+    lens: Lens
+    places: tuple[tuple[float, Terms], ...]
+    """((place from 0 center to 1 corner, terms), ...), rising"""
+    half_diagonal: float
+    """Half the diagonal of the sensor [m]."""
+
+    @classmethod
+    def from_camera(cls, camera: Camera, geometry: Geometry) -> FieldBlur | None:
+        """Return the blur of a wavefront that changes over the field, else None."""
+        if uniform_wavefront(camera, geometry) is not None:
+            return None
+        places = wavefronts(camera, geometry)
+        listed = tuple((place or 0.0, terms) for place, terms in places)
+        half_diagonal = math.hypot(geometry.sensor_width, geometry.sensor_height) / 2
+        return cls(Lens.from_camera(camera, geometry), listed, half_diagonal)
+
+    def describe(self) -> str:
+        """Return a short clause with this camera's numbers and units."""
+        center, corner = (self.lens.describe(self.wavefront(place)) for place in (0.0, 1.0))
+        return f"center: {center}; corner: {corner}"
+
+    @property
+    def reach(self) -> float:
+        """How far from its place the blur throws almost all of the light, diffraction aside [m]."""
+        return max(self.lens.reach(self.wavefront(place)) for place, _ in self.places)
+
+    def wavefront(self, place: float) -> Terms:
+        """Return the wavefront on the half-axis to the right, at a place from 0 to 1."""
+        every = sorted({index for _, terms in self.places for index, _ in terms})
+        where = [p for p, _ in self.places]
+        listed = [dict(terms) for _, terms in self.places]
+        return zernike.combine(
+            tuple(
+                (i, float(np.interp(place, where, [t.get(i, 0.0) for t in listed]))) for i in every
+            )
+        )
+
+    def zones(self, count):
+        """Return zones at `count` places from center to corner, or more, whose weights sum to 1.
+
+        Places are added for every wave by which the wavefront changes, up to `MAX_PLACES`.
+        """
+        waves = sum(change for _, _, change in self._changes) / GREEN
+        count = max(count, min(count + math.ceil(PLACES_PER_WAVE * waves), MAX_PLACES))
+        stretches = self._stretches(count)
+        rings = sorted({place for nodes in stretches for place in nodes})
+        orders = {zernike.noll_orders(index)[1] for _, terms in self.places for index, _ in terms}
+        most = max((abs(m) for m in orders), default=0)
+        found = []
+        for place in rings:
+            terms = self.wavefront(place)
+            if not most:
+                weight = ZoneWeight(stretches, place, 0, 0, self.half_diagonal)
+                found.append(Zone(SymmetricBlur(self.lens, terms), weight))
+                continue
+            # As many harmonics around as powers outwards; a multiple of 4 has its quarter turns.
+            around = 4 * math.ceil((2 * most * (count - 1) + 1) / 4)
+            for sector in range(around):
+                angle = 2 * math.pi * sector / around
+                weight = ZoneWeight(stretches, place, sector, around, self.half_diagonal)
+                found.append(Zone(DirectedBlur(self.lens, terms, angle), weight))
+        return tuple(found)
+
+    @property
+    def _changes(self) -> list[tuple[float, float, float]]:
+        """Ends of the stretches on which the wavefront changes evenly, and the change [m rms]."""
+        edges = [0.0, *(place for place, _ in self.places if 0 < place < 1), 1.0]
+        minus = [tuple((i, -c) for i, c in self.wavefront(place)) for place in edges[:-1]]
+        changes = [
+            zernike.combine(a, self.wavefront(b)) for a, b in zip(minus, edges[1:], strict=True)
+        ]
+        return [(*ends, zernike.rms(c)) for ends, c in zip(pairwise(edges), changes, strict=True)]
+
+    def _stretches(self, count: int) -> tuple[tuple[float, ...], ...]:
+        """Return places in each stretch on which the wavefront changes evenly, with its ends.
+
+        They are Chebyshev points, between which polynomials err least; there are most of them
+        where the wavefront changes most.
+        """
+        total = sum(change for _, _, change in self._changes) or 1.0
+        found = []
+        for low, high, change in self._changes:
+            steps = 1 + math.ceil((max(count, 2) - 2) * change / total - 1e-9)
+            at = (1 - np.cos(np.pi * np.arange(steps + 1) / steps)) / 2
+            inner = (low + (high - low) * at[1:-1]).tolist()
+            found.append((low, *inner, high))
+        return tuple(found)
+
+    def mean_error(self, signal) -> float:
+        """Return a bound of the rms change of the mean signal by leaving it out [electrons]."""
+        # Wavefronts change evenly in between: none is worse than that of one of its ends.
+        places = {0.0, 1.0, *(place for place, _ in self.places if 0 < place < 1)}
+        return max(DirectedBlur(self.lens, self.wavefront(p)).mean_error(signal) for p in places)
+
+
+@dataclass(frozen=True)
+class ZoneWeight:
+    """Weight of a zone: 1 in its place, 0 in those of all others.
+
+    Between them a polynomial of the distance, on every stretch where the wavefront changes evenly,
+    and a sum of waves of the azimuth. Beyond the corner that of the corner holds.
+    """
+
+    stretches: tuple[tuple[float, ...], ...]
+    """Places of the rings on each stretch from center 0 to corner 1."""
+    place: float
+    """Place of this ring, from center 0 to corner 1."""
+    sector: int
+    """Index of the sector of the ring."""
+    around: int
+    """Number of sectors of a ring; 0 for a whole ring."""
+    half_diagonal: float
+    """Half the diagonal of the sensor [m]."""
+
+    def __call__(self, x: NDArray, y: NDArray) -> NDArray:
+        """Return the weight at x (columns,), y (rows,) [m]: (rows, columns), in the type of x."""
+        radius = np.minimum(np.hypot(x[None, :], y[:, None]) / self.half_diagonal, 1.0)
+        weight = np.zeros(radius.shape)
+        for nodes in self.stretches:
+            if self.place in nodes:
+                here = (radius >= nodes[0]) & (radius <= nodes[-1])
+                weight[here] = _polynomial(radius[here], nodes, self.place)
+        if self.around and weight.any():
+            angle = np.arctan2(y[:, None], x[None, :]) - 2 * np.pi * self.sector / self.around
+            weight *= _waves(angle, self.around)
+        return weight.astype(x.dtype)
+
+
+def _polynomial(place: NDArray, nodes: tuple[float, ...], own: float) -> NDArray:
+    """Return Lagrange's polynomial, which is 1 at its own node and 0 at the others."""
+    out = np.ones_like(place)
+    for node in nodes:
+        if node != own:
+            out *= (place - node) / (own - node)
+    return out
+
+
+def _waves(angle: NDArray, count: int) -> NDArray:
+    """Return the sum of waves that is 1 at angle 0 and 0 at the others of `count` (even)."""
+    half = angle / 2
+    near = np.abs(np.sin(half)) < 1e-6
+    return np.where(near, 1.0, np.sin(count * half) / (count * np.tan(np.where(near, 1.0, half))))

@@ -1,0 +1,116 @@
+"""Blur by a point spread function that was measured or comes from a lens program.
+
+It has both aberrations and diffraction in it, so the effect `diffraction` goes.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.derived.geometry import Geometry
+from vcam_cli.effects.base import PlaneTransfer
+from vcam_cli.effects.optics.wavefront_blur import AberrationBlur, largest_loss
+from vcam_cli.physics.cache import ByteCache
+
+PSF = "optics.psf"
+"""Key under which the camera carries the samples of its point spread function."""
+
+
+@dataclass(frozen=True)
+class PointSpread(AberrationBlur, PlaneTransfer):
+    """A point spread function from a file: points of light, one on every sample.
+
+    Its origin, where a perfect lens would put the light, is the middle of the file's grid, between
+    two samples where their number is even.
+    """
+
+    file: str
+    pitch: float
+    """Distance of the samples [m]."""
+    wavelengths: tuple[float, ...]
+    """Wavelengths of the channels [m]; empty where there is one for all wavelengths."""
+    samples: NDArray | None = field(compare=False, repr=False)
+    """Samples (channels, rows, columns), each of sum 1; None before the file was read."""
+
+    @classmethod
+    def from_camera(cls, camera: Camera, geometry: Geometry) -> PointSpread | None:
+        """Return the blur of the file's point spread function, or None where it gives none."""
+        psf = camera.optics.psf
+        if psf is None:
+            return None
+        return cls(psf.file, psf.pitch, psf.wavelengths, camera.samples(PSF))
+
+    def describe(self) -> str:
+        """Return a short clause with this camera's numbers and units."""
+        text = f"point spread function sampled every {self.pitch * 1e6:.4g} um"
+        if self.samples is None:
+            return text
+        return f"{text}: 90% of the light within {2e6 * self._radius(0.9):.3g} um"
+
+    @property
+    def reach(self) -> float:
+        """How far from its place the blur throws almost all of the light, diffraction aside [m]."""
+        return self._radius(0.99)
+
+    def _loaded_samples(self) -> NDArray:
+        if self.samples is None:
+            raise RuntimeError(f"{self.file} has not been read")
+        return self.samples
+
+    def _radius(self, share: float) -> float:
+        """Return the radius around the origin that holds a share of the light [m]."""
+        x, y = self._coordinates
+        radius = np.hypot(x[None, :], y[:, None]).ravel()
+        order = np.argsort(radius)
+        light = np.cumsum(self._loaded_samples().mean(axis=0).ravel()[order])
+        return float(radius[order][np.searchsorted(light, share * light[-1])])
+
+    @property
+    def _coordinates(self) -> tuple[NDArray, NDArray]:
+        _, rows, columns = self._loaded_samples().shape
+        x = (np.arange(columns) - (columns - 1) / 2) * self.pitch
+        y = (np.arange(rows) - (rows - 1) / 2) * self.pitch
+        return x, y
+
+    def otf_plane(self, fx, fy, wavelength):
+        """Return the transfer at all pairs of fx (n,) and fy (m,) [cycles/m]: complex (m, n)."""
+        key = (fx.tobytes(), fy.tobytes())
+        channels = self._transfer_cache.get(key, lambda: self._channel_transfers(fx, fy))
+        if len(self.wavelengths) < 2:
+            return channels[0].copy()
+        order = np.argsort(self.wavelengths)
+        at = np.interp(wavelength, np.array(self.wavelengths)[order], np.arange(len(order)))
+        low = min(int(at), len(order) - 2)
+        part = at - low
+        return (1 - part) * channels[order[low]] + part * channels[order[low + 1]]
+
+    @cached_property
+    def _transfer_cache(self) -> ByteCache:
+        """The last transfer of the channels, which the wavelengths share."""
+        return ByteCache(0)
+
+    def _channel_transfers(self, fx: NDArray, fy: NDArray) -> NDArray:
+        """Return the Fourier sums of the samples: (channels, m, n).
+
+        They are 0 beyond the Nyquist frequency of the samples.
+        """
+        x, y = self._coordinates
+        along = np.exp(-2j * np.pi * np.outer(x, fx)) * (np.abs(fx) < 0.5 / self.pitch)
+        down = np.exp(-2j * np.pi * np.outer(fy, y)) * (np.abs(fy) < 0.5 / self.pitch)[:, None]
+        return np.array([down @ plane @ along for plane in self._loaded_samples()])
+
+    def cutoff(self, wavelength):
+        """Return the frequency from which the transfer is zero, or inf [cycles/m]."""
+        return math.sqrt(0.5) / self.pitch
+
+    def mean_error(self, signal) -> float:
+        """Return a bound of the rms change of the mean signal by leaving it out [electrons]."""
+        if self.samples is None:
+            return signal.full_signal
+        return largest_loss(self, 0.5 / self.pitch) * signal.full_signal

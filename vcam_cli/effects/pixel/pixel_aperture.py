@@ -1,0 +1,54 @@
+"""Blur by the pixel, which averages over the area whose light it collects.
+
+    H(f) = sinc(f_x w) sinc(f_y h),   sinc(u) = sin(pi u) / (pi u)
+
+w and h are width and height of the area that collects the pixel's light: the photodetector, or
+that of its microlens. What a pixel's pitch samples too coarsely then comes back as aliasing.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vcam_cli.effects.base import SeparableTransfer
+from vcam_cli.effects.optics.turned_transfer import TurnedTransfer
+
+
+@dataclass(frozen=True)
+class PixelAperture(SeparableTransfer):
+    """Rectangular sampling aperture [m]: sinc(f w) along each axis."""
+
+    width: float
+    height: float
+
+    name = "pixel_aperture"
+    reference = "Chen 2003, eq 2.23 (integral over the photodetector) and section 2.2.2"
+    absent = "every pixel has one"
+
+    @classmethod
+    def from_camera(cls, camera, geometry):
+        """Return the aperture that collects the pixel's light."""
+        return cls(geometry.collecting_width, geometry.collecting_height)
+
+    def describe(self) -> str:
+        """Return a short clause with this camera's numbers and units."""
+        return f"averages over {self.width * 1e6:.4g} x {self.height * 1e6:.4g} um"
+
+    def seen_by_turned(self, angle):
+        """Return the aperture as a scene meets it that is turned clockwise by an angle [rad]."""
+        return TurnedTransfer(self, angle)
+
+    @property
+    def box(self) -> tuple[float, float]:
+        """Width and height of the area that it averages over evenly [m]."""
+        return self.width, self.height
+
+    def along_x(self, frequency):
+        """Return the transfer along x at `frequency` [cycles/m]."""
+        return np.sinc(frequency * self.width)
+
+    def along_y(self, frequency):
+        """Return the transfer along y at `frequency` [cycles/m]."""
+        return np.sinc(frequency * self.height)

@@ -1,0 +1,1 @@
+"""Effects of the exposure's time: what moves during it, and lamps that flicker."""

@@ -1,0 +1,1 @@
+"""Files of pictures: EXR, PNG, TIFF, DNG, camera raw, maps and video."""

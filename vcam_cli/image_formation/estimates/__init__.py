@@ -1,0 +1,1 @@
+"""What is estimated before an image is formed: bandwidth, sampling, peaks, memory, changes."""

@@ -1,0 +1,271 @@
+"""The cells on which a chart is painted: their error is measured, not guessed.
+
+Cells far finer than what the lens passes fold nothing that counts. Where the whole chart on such
+cells is cheap they are taken. Elsewhere its center, its busiest parts and some others are seen
+through the lens on finer and finer cells, against a reference whose cells share no factor with any
+of them, and the coarsest that keep their share of the tolerance are taken for the whole.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
+from typing import NamedTuple
+
+import numpy as np
+import scipy.fft
+from numpy.typing import NDArray
+
+from vcam_cli.camera.derived.geometry import Geometry
+from vcam_cli.image_formation.cosine_series import Axis
+from vcam_cli.image_formation.estimates.bandwidth import axes
+from vcam_cli.image_formation.optical_path import OpticalPath
+from vcam_cli.parallel import product
+from vcam_cli.scenes.base import ChartScene
+
+CELLS_SHARE = 0.25
+"""Part of the tolerance that cells may use."""
+BEYOND_CUTOFF = 1.1
+"""Cells per pixel pitch over the highest frequency passed [pixel Nyquist], at least."""
+FOLDED = 0.04
+"""Means over cells fold what edges have beyond the cells' Nyquist frequency: what is left of it is
+this part of full signal over the squared ratio of that frequency to the cut-off, about."""
+SAFE = 3.0
+"""Factor on the cells that this asks for where none are measured: a chart of patches smaller than
+the lens resolves leaves twice as much, relative to its own weak signal."""
+CHEAP = 1 << 20
+"""Cells that are painted without asking whether fewer would do."""
+MOST = 1 << 26
+"""Cells at most."""
+LADDER = (1.1, 1.6, 2.2, 2.7, 3.3, 4.2, 5.3, 6.6, 8.3, 10.4, 13.1, 16.4, 24.2, 32.3, 48.1)
+"""Cells per pixel pitch that are tried on crops. Whole numbers of them would lie in a crop as its
+photodetectors do, and err less there than on the whole."""
+FASTEST_FALL = 4.0
+"""Power of the cells with which their error falls, at most: numbers of cells that would need a
+faster fall from those tried before are not tried."""
+OVEREXPOSED = 2.0
+"""Cells of charts that fill pixels, at least: fewer end the spectrum within that of the pixels, and
+bright light rings into dark pixels that are on none of the crops."""
+OVEREXPOSED_SHARE = 0.3
+"""Part of that share where light fills pixels: the error of the whole is then that of few pixels,
+which hardly any crop shows."""
+COPRIME = 1.37
+"""Cells of a crop's reference over those that reach the cut-off."""
+CROP, SMALLEST_CROP = 24, 12
+"""Pixels along a side of a crop, and of the smallest: fewer show too little of a chart."""
+CROP_CELLS, MOST_CROP_CELLS = 320, 480
+"""Cells along a side of a crop's reference, and of that of the smallest crops at most."""
+BLOCKS, POINTS = 16, 12
+"""Parts of a chart along each axis that are compared by contrast, and points along each."""
+FEW = 3
+"""Crops of the busiest parts, and crops of parts taken evenly."""
+EVEN = (0.7548776662466927, 0.5698402909980532)
+"""Steps of a sequence that fills a square evenly: powers of the inverse plastic number."""
+FREQUENCIES = 1025
+"""Entries of the crops' table over |f|."""
+
+
+class ChosenCells(NamedTuple):
+    """How finely a chart is painted."""
+
+    per_pixel: float
+    """Cells per pixel pitch."""
+    error: float = 0.0
+    """Rms of the signal on crops of the chart [e/s]; 0 where none were measured."""
+    trials: int = 0
+    """Times that the crops were painted for it, that of the reference among them."""
+
+
+def cell_grid(scene: ChartScene, geometry: Geometry, per_pixel: float) -> tuple[int, int]:
+    """Return the cells of a chart on which transforms are fast.
+
+    Parameters
+    ----------
+    scene : ChartScene
+        The chart.
+    geometry : Geometry
+        Geometry of the array.
+    per_pixel : float
+        Cells per pixel pitch, at least.
+
+    Returns
+    -------
+    ny, nx : int
+        Cells along y and x.
+    """
+    ny = scene.shape[0] * scene.pitch_y / geometry.pitch_y * per_pixel
+    nx = scene.shape[1] * scene.pitch_x / geometry.pitch_x * per_pixel
+    fast = [scipy.fft.next_fast_len(max(1, math.ceil(n - 1e-9)), real=True) for n in (ny, nx)]
+    return fast[0], fast[1]
+
+
+def cells_per_pixel(path: OpticalPath, scene: ChartScene, highest: float) -> ChosenCells:
+    """Return how finely a chart is painted, and the error that this leaves.
+
+    Parameters
+    ----------
+    path : OpticalPath
+        Lens, pixels and settings.
+    scene : ChartScene
+        The chart.
+    highest : float
+        Frequency beyond which lens and pixels pass nothing [pixel Nyquist].
+
+    Returns
+    -------
+    ChosenCells
+        Cells per pixel pitch, their error, and the trials that it took.
+    """
+    if path.settings.oversampling is not None:
+        return ChosenCells(path.settings.oversampling)
+    asked = highest * max(BEYOND_CUTOFF, math.sqrt(FOLDED / path.settings.tolerance))
+    finest = SAFE * asked
+    reference = min(COPRIME * max(asked, LADDER[1]), MOST_CROP_CELLS / SMALLEST_CROP)
+    if math.prod(cell_grid(scene, path.geometry, finest)) <= CHEAP:
+        return ChosenCells(finest)
+    level = path.judged_weights.sum(axis=1)
+    otf = _mean_otf(path, finest)
+    crops = _crops(path, scene, reference, level)
+    converged = _signals(path, crops, reference, level, otf)
+    g = path.geometry
+    within = partial(_within, g)
+    full = min(float(within(converged).max()), path.ceiling)
+    budget = CELLS_SHARE * path.settings.tolerance * full
+    whole = math.prod(cell_grid(scene, path.geometry, 1.0))
+    most = min(finest, max(1.0, math.sqrt(MOST / whole)))
+    least = 0.0
+    if converged.max() > path.ceiling:
+        least, budget = OVEREXPOSED, OVEREXPOSED_SHARE * budget
+    tried, error, trials = most, budget, 1
+    for cells in [c for c in LADDER if least <= c <= min(most, reference / COPRIME)]:
+        if trials > 1 and error * (tried / cells) ** FASTEST_FALL > budget:
+            continue
+        tried, trials = cells, trials + 1
+        found = _signals(path, crops, cells, level, otf)
+        # Few pixels may have no error by chance; many around them may hide theirs.
+        error = _error_that_counts(found, converged, path.ceiling)
+        if within(found).size < found.size:
+            error = max(error, _error_that_counts(within(found), within(converged), path.ceiling))
+        if error <= budget:
+            rows = crops[0].pitch_y / g.pitch_y
+            return ChosenCells(max(cells, cell_grid(crops[0], g, cells)[0] / rows), error, trials)
+    # It falls with the square of the cells, about: faster than is reckoned here.
+    enough = min(tried * error / budget, most) if budget else most
+    return ChosenCells(enough, error * tried / enough, trials)
+
+
+def _error_that_counts(found: NDArray, converged: NDArray, ceiling: float) -> float:
+    """Return the rms of the error of crops (crops, rows, columns) that full pixels do not hide.
+
+    Where light is far brighter than what fills a pixel, hardly any error counts; but the few that
+    do, below it, are as large as full signal, and a crop has too few pixels to show them. So the
+    errors of a crop are also given to its darkest pixels first, from either end.
+    """
+    full = np.minimum(converged, ceiling)
+    squares = np.square(np.minimum(found, ceiling) - full).mean()
+    if converged.max() > ceiling:
+        crops = len(found), -1
+        light = np.sort(converged.reshape(crops), axis=1)
+        errors = np.sort((found - converged).reshape(crops), axis=1)
+        for moved in (errors, errors[:, ::-1]):
+            changed = np.clip(light + moved, 0, ceiling) - np.minimum(light, ceiling)
+            squares = max(squares, np.square(changed).mean())
+    return math.sqrt(float(squares))
+
+
+Table = tuple[NDArray, NDArray]
+"""Frequencies (n,) [cycles/m], and an OTF there (n,), without unit."""
+
+
+def _mean_otf(path: OpticalPath, highest: float) -> Table:
+    """Return the OTF of the color with most light, its aberrations aside.
+
+    They only weaken detail.
+    """
+    g = path.geometry
+    corner = highest * math.hypot(0.5 / g.pitch_x, 0.5 / g.pitch_y)
+    f = np.linspace(0, min(path.transfer.cutoff, corner), FREQUENCIES)
+    weights = path.judged_weights.sum(axis=0)
+    otf = (weights / (weights.sum() or 1.0)) @ path.transfer.otf_radial(f)
+    return f, otf
+
+
+def _crops(path: OpticalPath, scene: ChartScene, cells: float, level: NDArray) -> list[ChartScene]:
+    """Return places of a chart on which cells are tried.
+
+    `cells` are those of the reference, per pixel pitch.
+    """
+    g = path.geometry
+    side = int(np.clip(CROP_CELLS / cells, SMALLEST_CROP, CROP))
+    size = side * g.pitch_x, side * g.pitch_y
+    sensor = g.sensor_width, g.sensor_height
+    half = np.maximum(np.subtract(sensor, size) / 2, 0)  # a small array is amid each
+    even = 2 * (np.arange(1, FEW + 1)[:, None] * EVEN % 1) - 1
+    busy = _busiest(path, scene, level)
+    places = np.clip(np.concatenate([[(0, 0)], even * half, busy]), -half, half)
+    return [scene.crop((float(x), float(y)), *size) for x, y in places]
+
+
+def _within(g: Geometry, signals: NDArray) -> NDArray:
+    """Return the pixels of crops (crops, rows, columns) that are those of the array."""
+    rows, columns = (
+        slice((side - n) // 2, (side + n + 1) // 2)
+        for side, n in zip(
+            signals.shape[1:], np.minimum(signals.shape[1:], (g.rows, g.columns)), strict=True
+        )
+    )
+    return signals[:, rows, columns]
+
+
+def _busiest(path: OpticalPath, scene: ChartScene, level: NDArray) -> NDArray:
+    """Return the centers (n, 2) of the parts of most contrast, with and without a ceiling [m].
+
+    They come from values at points with uneven steps, which share no factor with what repeats in a
+    chart.
+    """
+    g = path.geometry
+    k = np.arange(BLOCKS * POINTS)
+    x, y = (
+        ((k + k * step % 1) / len(k) - 0.5) * length
+        for length, step in zip((g.sensor_width, g.sensor_height), EVEN, strict=True)
+    )
+    light = scene.values_at(x, y, level[None])[0].reshape(BLOCKS, POINTS, BLOCKS, POINTS)
+    contrasts = [light.var(axis=(1, 3)).ravel()]
+    if float(light.max()) > path.ceiling:
+        contrasts.append(np.minimum(light, path.ceiling).var(axis=(1, 3)).ravel())
+    order = np.concatenate([np.argsort(contrast)[::-1][:FEW] for contrast in contrasts])
+    centers = (np.stack([order % BLOCKS, order // BLOCKS], axis=1) + 0.5) / BLOCKS - 0.5
+    return np.asarray(centers * (g.sensor_width, g.sensor_height))
+
+
+def _signals(
+    path: OpticalPath, crops: Sequence[ChartScene], cells: float, level: NDArray, otf: Table
+) -> NDArray:
+    """Return the signals (crops, rows, columns) of crops of one size [e/s].
+
+    They are mirrored at their borders. `level` (K,) is the signal of the scene's components.
+    """
+    g, first = path.geometry, crops[0]
+    rows, columns = round(first.pitch_y / g.pitch_y), round(first.pitch_x / g.pitch_x)
+    small = replace(path, geometry=replace(g, rows=rows, columns=columns))
+    grid = cell_grid(first, g, cells)
+    x, y = axes(small, first.with_cells(grid), cells)
+    transfer = np.interp(np.hypot(x.frequencies, y.frequencies[:, None]), *otf, right=0.0)
+    for effect in path.separable:
+        transfer *= np.outer(effect.along_y(y.frequencies), effect.along_x(x.frequencies))
+    along_y, along_x = _waves(y), _waves(x).T
+    signals = []
+    for crop in crops:
+        light = crop.with_cells(grid).planes(level[None])[0].astype(np.float64)
+        light = scipy.fft.dctn(light, type=2)[: y.terms, : x.terms] * transfer
+        signals.append(product(product(along_y, light), along_x))
+    return np.array(signals)
+
+
+def _waves(axis: Axis) -> NDArray:
+    """Return every term of an axis at every photodetector: (pixels, terms)."""
+    k = np.arange(axis.terms)
+    place = (axis.first + np.arange(axis.pixels) * axis.pixel_pitch) / axis.length
+    return np.cos(np.pi * np.outer(place, k)) * (axis.weights * np.where(k > 0, 2, 1))

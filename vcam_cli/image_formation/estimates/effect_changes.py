@@ -1,0 +1,114 @@
+"""What each transfer function does to a picture, by Parseval's theorem.
+
+The plan shows it. What the plan leaves out it decides before, by bounds that know no picture.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcam_cli.effects.base import Effect, FieldTransfer, PlaneTransfer, RadialTransfer, of_kind
+from vcam_cli.image_formation.estimates.scene_sampling import SampledImage
+from vcam_cli.image_formation.field_dependence import Mode
+from vcam_cli.image_formation.optical_path import OpticalPath
+from vcam_cli.image_formation.transfer_tables import Tables, TableSize, radial_table
+
+MODES_SHARE = 0.1
+"""Part of the tolerance for modes of the field that this picture does not need."""
+
+
+def changes_by_omission(
+    path: OpticalPath, image: SampledImage, tables: Tables, field_change: float
+) -> dict[str, float]:
+    """Return the rms change of the signal by leaving out each transfer function.
+
+    Parameters
+    ----------
+    path : OpticalPath
+        Lens, pixels and settings.
+    image : SampledImage
+        The scene's spectrum.
+    tables : Tables
+        Tables of the whole lens.
+    field_change : float
+        Rms of all that changes over the field [e/s].
+
+    Returns
+    -------
+    dict
+        Name of an effect -> rms change [e/s].
+    """
+    squares: dict[Effect, NDArray] = {
+        effect: image.power.omission_power(image.lens_power, effect) for effect in path.separable
+    }
+    for effect in of_kind(path.effects, RadialTransfer):
+        rest = _omission_tables(
+            path, image, [e for e in path.transfer.radial_blurs if e is not effect]
+        )
+        squares[effect] = image.power.filtered_power(rest)
+    if directed := of_kind(path.effects, PlaneTransfer, FieldTransfer):
+        squares |= dict.fromkeys(
+            directed, image.power.filtered_power(_directional_tables(path, tables))
+        )
+    changes = {effect.name: image.rms(square) for effect, square in squares.items()}
+    if path.field is not None:
+        changes[path.field.name] = math.hypot(changes[path.field.name], field_change)
+    return changes
+
+
+def _omission_tables(
+    path: OpticalPath, image: SampledImage, radial: list[RadialTransfer]
+) -> Tables:
+    """Return the radial part with fewer transfer functions, less the whole of it."""
+    whole = image.tables.radial
+    assert whole is not None
+    others = path.transfer.with_effects(radial).with_mixtures(image.tables.mix)
+    size = TableSize(image.tables.top, whole.shape[-1], 0.0, 0.0)
+    return replace(image.tables, radial=radial_table(others, size) - whole)
+
+
+def _directional_tables(path: OpticalPath, tables: Tables) -> Tables:
+    """Return what a blur with a direction, or the mean of one that changes over the field, adds."""
+    if any(plane is not None for plane in tables.planes) or tables.radial is None:
+        return replace(tables, radial=None)
+    uniform_transfer = path.transfer.with_mixtures(tables.mix)
+    size = TableSize(tables.top, tables.radial.shape[-1], 0.0, 0.0)
+    return replace(tables, radial=tables.radial - radial_table(uniform_transfer, size))
+
+
+def needed_modes(
+    path: OpticalPath, image: SampledImage, modes: tuple[Mode, ...]
+) -> tuple[tuple[Mode, ...], float]:
+    """Return the modes of the field that a picture needs.
+
+    Parameters
+    ----------
+    path : OpticalPath
+        Lens, pixels and settings.
+    image : SampledImage
+        The scene's spectrum.
+    modes : tuple of Mode
+        All modes of the field.
+
+    Returns
+    -------
+    kept : tuple of Mode
+        The needed modes, in their order.
+    change : float
+        Rms that all modes add [e/s].
+    """
+    squares = np.array(
+        [
+            mode.map.mean_square * image.rms(image.power.filtered_power(mode.tables())) ** 2
+            for mode in modes
+        ]
+    )
+    allowed = MODES_SHARE * path.settings.tolerance * image.full_signal
+    weakest = np.argsort(squares)
+    dropped = set(weakest[np.cumsum(squares[weakest]) <= allowed**2].tolist())
+    kept = tuple(mode for i, mode in enumerate(modes) if i not in dropped)
+    return kept, math.sqrt(float(squares.sum()))

@@ -1,0 +1,186 @@
+"""How much memory an image takes, estimated conservatively before it is formed.
+
+One sum of what is held at once at the worst moment; a test compares it with measured peaks.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from vcam_cli.camera.derived.geometry import Geometry
+from vcam_cli.effects.base import PlaneTransfer, of_kind
+from vcam_cli.image_formation.estimates.bandwidth import axes
+from vcam_cli.image_formation.far_field import FarPart
+from vcam_cli.image_formation.optical_path import OpticalPath
+from vcam_cli.image_formation.settings import Settings
+from vcam_cli.image_formation.transfer_tables import (
+    LARGEST_OF_FIELD,
+    LARGEST_PLANE,
+    PARITIES,
+    TableSize,
+)
+from vcam_cli.scenes.base import ChartScene, SampledScene
+
+BASE = 170_000_000
+"""Interpreter and libraries [bytes]."""
+SLACK = 1.1
+"""Memory of the process over what is in use: freed memory is not given back at once."""
+PUPIL_GRIDS = 300_000_000
+"""Grids of the pupil that are kept for lenses with aberrations, at most [bytes]."""
+WORK = 24_000_000
+"""Temporary arrays of one thread [bytes]."""
+SCATTERED = 120
+"""Pixel at a place of its own: positions, samples by color, the tree in which its neighbors are
+found [bytes]."""
+
+
+def image_bytes(
+    path: OpticalPath,
+    scene: SampledScene,
+    highest: float,
+    planes: int,
+    size: TableSize,
+    rings: Sequence[FarPart] = (),
+) -> int:
+    """Return the memory of an image through the cosine spectrum.
+
+    The scene and the rings around it are computed one after the other.
+
+    Parameters
+    ----------
+    path : OpticalPath
+        Lens, pixels and settings.
+    scene : SampledScene
+        The scene on its grid.
+    highest : float
+        Frequency beyond which nothing counts [pixel Nyquist].
+    planes : int
+        Number of mixtures of the scene's components.
+    size : TableSize
+        Size of the tables.
+    rings : sequence of FarPart
+        Rings around a near field.
+
+    Returns
+    -------
+    int
+        Bytes, at least those measured.
+    """
+    g, width, colors = path.geometry, path.settings.float_width // 8, len(path.mosaic.colors)
+    waves = (2 if g.collecting_x else 1) * (2 if g.collecting_y else 1)
+    tables = 0
+    directed = (*path.transfer.plane_blurs, *of_kind([z.blur for z in path.zones], PlaneTransfer))
+    if directed:
+        waves = 4
+        zones = len({blur.model[0] for blur in directed})
+        entries = size.plane_entries(directed, LARGEST_OF_FIELD if path.zones else LARGEST_PLANE)
+        per_table = entries**2 * planes * colors * len(PARITIES)
+        count = len(path.transfer.with_half_the_wavelengths().wavelengths)
+        tables = 8 * per_table * (3 + zones) + count * 2 * entries**2 * 24 + PUPIL_GRIDS
+    series = colors * (waves + (2 if path.zones else 0))
+    near = width * _values(path, scene, highest, planes, series)
+    far = [8 * _values(path, part.scene, highest, planes, series) for part in rings]
+    held = max([near, *far]) + g.rows * g.columns * width + tables
+    return BASE + round(SLACK * held) + WORK * path.workers
+
+
+def _values(
+    path: OpticalPath, scene: SampledScene, highest: float, planes: int, series: int
+) -> int:
+    """Numbers that a scene's spectrum takes, and so many series for the pixels.
+
+    Where folding is exact a series has as many terms as the scene has pixels, its margin included.
+    """
+    g, (x, y) = path.geometry, axes(path, scene, highest)
+    rectangles = isinstance(scene, ChartScene) and scene.chart.edges() is not None
+    samples = 4 * g.rows * g.columns if rectangles else math.prod(scene.shape) * planes
+    evaluated = g.rows * x.folded_terms if y.virtual_pixels is None else 0
+    return samples + series * (y.folded_terms * x.folded_terms + evaluated)
+
+
+def sub_exposure_bytes(geometry: Geometry, knobs: Settings, colors: int) -> int:
+    """Return the memory of a still image at places finer than the pixels, beside its spectrum.
+
+    Parameters
+    ----------
+    geometry : Geometry
+        Geometry of the places, as if they were pixels.
+    knobs : Settings
+        Settings of image formation.
+    colors : int
+        Number of colors.
+
+    Returns
+    -------
+    int
+        Bytes, at least those measured: the image, and copies of a plane while it is filtered.
+    """
+    width = knobs.float_width // 8
+    return round(SLACK * geometry.rows * geometry.columns * (colors * width + 2 * 8))
+
+
+def box_average_bytes(samples: int, planes: int, geometry: Geometry, knobs: Settings) -> int:
+    """Return the memory of means over boxes.
+
+    Parameters
+    ----------
+    samples : int
+        Samples of one plane of a picture; 0 of a chart.
+    planes : int
+        Number of planes.
+    geometry : Geometry
+        Geometry of the array.
+    knobs : Settings
+        Settings of image formation.
+
+    Returns
+    -------
+    int
+        Bytes, at least those measured.
+    """
+    pixels = geometry.rows * geometry.columns
+    width = knobs.float_width // 8
+    held = planes * (samples * width + 2 * pixels * (width + 8)) + 5 * 8 * max(samples, pixels)
+    return BASE + round(SLACK * held)
+
+
+def frame_bytes(
+    geometry: Geometry,
+    knobs: Settings,
+    colors: int,
+    judged: bool,
+    samples: int = 0,
+    scattered: int = 0,
+) -> int:
+    """Return the memory of a frame without its scene: signal, raw, render.
+
+    Parameters
+    ----------
+    geometry : Geometry
+        Geometry of the array.
+    knobs : Settings
+        Settings of image formation.
+    colors : int
+        Number of colors.
+    judged : bool
+        Whether an ideal image is made and compared.
+    samples : int, optional
+        Samples of one integration, of each color that a pixel has; 0 for a single exposure.
+    scattered : int, optional
+        Pixels that fill no rows and columns, of which a picture on a grid is made.
+
+    Returns
+    -------
+    int
+        Bytes, at least those measured.
+    """
+    pixels = geometry.rows * geometry.columns
+    width = knobs.float_width // 8
+    frame = pixels * (2 * width + 2 + colors)
+    if samples:  # their electrons and codes, the photocurrent and what is made into a picture
+        frame += pixels * (samples * (width + 4) + 8)
+    frame += SCATTERED * scattered
+    return (
+        BASE + max(pixels * width * (colors + 1), frame) + (16 * pixels * colors if judged else 0)
+    )

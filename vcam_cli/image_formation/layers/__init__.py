@@ -1,0 +1,1 @@
+"""Scenes of several distances: layers composited front to back, each with its own defocus."""

@@ -1,0 +1,1 @@
+"""The charts, one file each: exact averages over cells, or waves."""

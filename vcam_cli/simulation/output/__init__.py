@@ -1,0 +1,1 @@
+"""What a run writes: raw files, pictures, metrics, provenance, its report."""

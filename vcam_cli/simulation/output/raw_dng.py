@@ -1,0 +1,199 @@
+"""raw.dng: the raw frame for raw converters, with what they need to develop it.
+
+The color matrices of the DNG specification map XYZ to the camera's colors, under illuminants A and
+D65. Each is the inverse of what color correction is here, fitted to a ColorChecker as the camera's
+own lens, filters and silicon see it (`processing.color_correction`): a converter that takes the
+light's matrix and adapts white as Bradford has it comes to the same colors. Converters interpolate
+between the two for other lights; LibRaw takes that of D65 for all.
+
+What lens and pixels keep from the light toward the corners is written as gain maps: converters that
+know them (Adobe's, darktable's) make even light even again, LibRaw leaves it as it is.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.derived.geometry import geometry
+from vcam_cli.camera.derived.mosaic import BLOCKS
+from vcam_cli.effects.base import Gain, of_kind
+from vcam_cli.effects.signal_chain import noise_sources
+from vcam_cli.errors import bad
+from vcam_cli.files.images.dng import (
+    LEAST_SIZE,
+    LIGHT_SOURCES,
+    MOST_BITS,
+    Colors,
+    RawImage,
+    write_dng,
+)
+from vcam_cli.processing.base import Patches
+from vcam_cli.processing.color_correction import BRADFORD, RGB_TO_XYZ, Fit, fit_matrix
+from vcam_cli.processing.white_balance import illuminant_gains
+from vcam_cli.readout.layout import layout
+from vcam_cli.simulation.frame import Frame
+from vcam_cli.spectra import Spectrum, cmf, colorchecker, illuminant, pair_weights
+
+RANGE = (360e-9, 830e-9)
+"""Wavelengths at which color is known [m]."""
+BAYER = tuple(BLOCKS[f"bayer-{name}"] for name in ("rggb", "grbg", "gbrg", "bggr"))
+MAP_POINTS = 65
+"""Rows and columns of a gain map."""
+LARGEST_GAIN = 64.0
+"""Of a gain map: what is darker than that is left dark."""
+TOP = (1 << MOST_BITS) - 1
+"""Level of the highest code of a curve made straight."""
+_PATH = ("output", "dng")
+_REMEDY = "write dng: false; tiff: true writes them as they are"
+
+
+def check(camera: Camera) -> None:
+    """Raise BadInput for a raw frame that raw converters would read wrong, or not at all."""
+    if not camera.output.dng:
+        return
+    if camera.array.is_scattered:
+        message = "raw converters read pixels in rows and columns alone"
+        raise bad(_PATH, message, "write dng: false")
+    place = layout(camera, geometry(camera))
+    rows, columns = place.geometry.rows, place.geometry.columns
+    mosaic = place.raw_mosaic
+    if camera.array.mosaic and mosaic.block not in BAYER:
+        size = f"{len(mosaic.block)} x {len(mosaic.block[0])}"
+        message = (
+            f"{', '.join(mosaic.colors)} in blocks of {size} pixels are no Bayer mosaic, and"
+            " raw converters read others wrong: LibRaw all of more than 2 x 2, and some of 2 x 2"
+        )
+        raise bad(_PATH, message, _REMEDY)
+    bits = _highest_code(camera, place.binning_groups.summed_codes).bit_length()
+    if bits > MOST_BITS:
+        message = f"its codes have {bits} bits, and raw converters read at most {MOST_BITS}"
+        raise bad(_PATH, message, _REMEDY)
+    if min(rows, columns) < LEAST_SIZE:
+        message = f"LibRaw reads no raw frame of less than {LEAST_SIZE} rows and columns"
+        raise bad(_PATH, f"{message}, and this one has {rows} x {columns}", _REMEDY)
+
+
+def _highest_code(camera: Camera, added: int) -> int:
+    return int((2**camera.adc.bits - 1) * added)
+
+
+def write_raw_dng(path: Path, frame: Frame, description: str) -> None:
+    """Write raw.dng."""
+    codes = np.moveaxis(frame.dn, 0, -1) if frame.layout.full_color else frame.dn
+    levels = np.array([frame.black_dn, frame.saturated_dn, frame.white_dn.max()])
+    linear = frame.linear(levels)
+    table, (black, white) = None, levels[:2]
+    if frame.electrical.linearized:
+        curve = frame.linear(np.arange(_highest_code(frame.camera, frame.summed_codes) + 1.0))
+        scale = TOP / (curve[-1] - curve[0])
+        table = np.rint((curve - curve[0]) * scale).astype(np.uint16)
+        black, white = (linear[:2] - curve[0]) * scale
+    span, light = linear[1:] - linear[0]
+    image = RawImage(
+        codes=codes,
+        block=frame.mosaic.block if frame.camera.array.mosaic else (),
+        colors=_colors(frame) if len(frame.mosaic.colors) > 1 else None,
+        black=max(float(black), 0.0),
+        white=round(white),
+        table=table,
+        baseline_exposure=float(np.log2(span / light)) if light > 0 < span else 0.0,
+        shading=_shading(frame),
+        noise=_noise(frame, span),
+        name=frame.camera.name,
+        exposure_time=frame.exposure_time,
+        f_number=frame.geometry.f_number,
+        focal_length=frame.geometry.focal_length,
+        iso=frame.base_iso * frame.camera.exposure_gain,
+        description=description,
+    )
+    write_dng(path, image)
+
+
+def _shading(frame: Frame) -> NDArray | None:
+    """Return how much brighter the axis is than places from edge to edge; None where it is not."""
+    gains, g = of_kind(frame.plan.active, Gain), frame.layout.grid
+    half_width, half_height = g.columns * g.pitch_x / 2, g.rows * g.pitch_y / 2
+    x, y = (np.linspace(-half, half, MAP_POINTS) for half in (half_width, half_height))
+    share, axis = np.ones((MAP_POINTS, MAP_POINTS)), np.zeros(1)
+    for effect in gains:
+        share *= effect.gain(x, y) / effect.gain(axis, axis)
+    return None if np.ptp(share) == 0 else 1 / np.maximum(share, 1 / LARGEST_GAIN)
+
+
+def _noise(frame: Frame, span: float) -> tuple[float, float]:
+    """Return by how much the temporal variance of a level grows from black to white, and in black.
+
+    Levels are from 0 (black) to 1 (white).
+
+    `span` is from black to white, of codes of a linear ADC [DN].
+    """
+    electrons = span * frame.electrical.electrons_per_dn / frame.summed_codes
+    dark = frame.dark_rate * frame.exposure_time
+    sources, binning = noise_sources(frame.plan.active, "frame"), frame.camera.array.binning
+    floor, full = (
+        sum(source.binned_variance(mean, dark, binning) for source in sources)
+        for mean in (dark, dark + electrons)
+    )
+    rounding = frame.code.rounding(dark, floor * frame.summed_codes) / frame.summed_codes
+    return (full - floor) / electrons**2, (floor + rounding) / electrons**2
+
+
+def _colors(frame: Frame) -> Colors:
+    """Return the camera's colors of the scene's white, and its color matrices."""
+    white = frame.linear(frame.white_dn) - float(frame.linear(np.array([frame.black_dn]))[0])
+    neutral = 1 / illuminant_gains(white)
+    matrices = {name: color_matrix(frame, illuminant(name)) for name in LIGHT_SOURCES}
+    return Colors(matrices, neutral / neutral.max())
+
+
+def color_matrix(frame: Frame, light: Spectrum) -> NDArray:
+    """Return the matrix from XYZ to the camera's colors that suits a light best.
+
+    Parameters
+    ----------
+    frame : Frame
+        A frame of a camera with the colors R, G and B.
+    light : Spectrum
+        Spectral radiance of the light, in any scale.
+
+    Returns
+    -------
+    ndarray
+        Coefficients (3, 3). The light's own XYZ, with Y = 1, gives the camera's colors of it, the
+        largest of which is 1.
+
+    References
+    ----------
+    Adobe Systems, Digital Negative specification 1.7.1.0, 2023, chapter 6.
+    """
+    fit, white = _fit(frame, light)
+    observer = [Spectrum(tables=(table,)) for table in cmf()]
+    xyz = pair_weights([light], observer, list(_band(frame))).sum(axis=-1)[0]
+    display_white = RGB_TO_XYZ.sum(axis=1)
+    adapted = BRADFORD @ (xyz / xyz[1]) / (BRADFORD @ display_white)
+    to_xyz = np.linalg.solve(BRADFORD, adapted[:, np.newaxis] * BRADFORD) @ RGB_TO_XYZ
+    return np.asarray(np.linalg.inv(to_xyz @ fit.matrix @ np.diag(white.max() / white)))
+
+
+def _fit(frame: Frame, light: Spectrum) -> tuple[Fit, NDArray]:
+    """Return the color correction of a light, and the camera's colors of its white."""
+    start, stop = _band(frame)
+    lit = [light, *(light.multiply(reflectance) for _, reflectance in colorchecker())]
+    band = frame.camera.scene.wavelengths.model_copy(update={"start": start, "stop": stop})
+    scene = frame.camera.scene.model_copy(update={"wavelengths": band})
+    camera = frame.camera.model_copy(update={"scene": scene})
+    white, *patches = replace(frame, camera=camera).axis_rate(lit).T
+    signals = np.transpose(patches)
+    fit = fit_matrix(signals, white, True, Patches(signals, light, start, stop))
+    return fit, white
+
+
+def _band(frame: Frame) -> tuple[float, float]:
+    """Return the wavelengths that are simulated and have a color [m]."""
+    band = frame.camera.scene.wavelengths
+    return max(band.start, RANGE[0]), min(band.stop, RANGE[1])
