@@ -161,7 +161,7 @@ def test_headers_as_instruments_write_them(header, tmp_path):
     at = np.array([0.0, 0.2501, 0.4])
     expected = [0.01 * np.sin(9 * at), 0.004 * (1 - np.cos(7 * at)), 0 * at]
     # The trapezoidal rule and straight pieces between the rows err by 1e-6 of the path.
-    np.testing.assert_allclose(found.at(at), expected, atol=2e-8)
+    np.testing.assert_allclose(found.angles_at(at), expected, atol=2e-8)
 
 
 @pytest.mark.parametrize(

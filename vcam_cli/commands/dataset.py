@@ -7,7 +7,7 @@ import typer
 
 from vcam_cli.commands import options
 from vcam_cli.commands.progress import Progress
-from vcam_cli.commands.sweep import Fresh, Processes, Scheduler, Shard, Study
+from vcam_cli.commands.sweep import Fresh, Processes, Scheduler, Shard, Study, share_numbers
 from vcam_cli.interrupts import INTERRUPTED, restore_interrupt
 
 if TYPE_CHECKING:
@@ -43,8 +43,8 @@ def dataset(
     from vcam_cli.files.report import to_json
     from vcam_cli.sweeps.sweep import Execution, Share
 
-    number, count = (int(part) for part in (shard or "1/1").split("/"))
-    share = Share(number, count) if shard else None
+    numbers = share_numbers(shard)
+    share = Share(*numbers) if numbers else None
     execution = Execution(share, workers, scheduler, fresh)
     file = dataset_file.read(study, set_ or (), seed, accuracy)
     path = out or Path("out") / file.model.name

@@ -72,16 +72,16 @@ def _study_schema() -> Schema:
         "$defs": definitions,
         "type": "object",
         "properties": {"kind": {"enum": [*KINDS, "dataset"]}},
-        **_choice("schedule", ScheduleStudy, _choice("dataset", Dataset, _of(Sweep))),
+        **_choice("schedule", ScheduleStudy, _choice("dataset", Dataset, _schema_reference(Sweep))),
     }
     return file_schema(either, "a study file")
 
 
-def _of(model: type) -> Schema:
+def _schema_reference(model: type) -> Schema:
     return {"$ref": reference(model.__name__)}
 
 
 def _choice(kind: str, model: type, other: Schema) -> Schema:
     """Return the schema of a model where a file says that it is of a kind, else another one."""
     says_so = {"properties": {"kind": {"const": kind}}, "required": ["kind"]}
-    return {"if": says_so, "then": _of(model), "else": other}
+    return {"if": says_so, "then": _schema_reference(model), "else": other}

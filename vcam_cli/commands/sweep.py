@@ -28,6 +28,14 @@ def _shard(value: str | None) -> str | None:
     return value
 
 
+def share_numbers(shard: str | None) -> tuple[int, int] | None:
+    """Return the share's number and how many there are, of a word that `_shard` has checked."""
+    if shard is None:
+        return None
+    number, count = shard.split("/")
+    return int(number), int(count)
+
+
 Study = Annotated[
     str,
     typer.Argument(
@@ -97,7 +105,6 @@ def sweep(
         if len(messages) <= MOST_MESSAGES:
             options.say(message, quiet)
 
-    number, count = (int(part) for part in (shard or "1/1").split("/"))
     with Progress(quiet, log="sweep") as progress:
         try:
             with restore_interrupt():
@@ -107,7 +114,7 @@ def sweep(
                     options.overrides(set_, seed, accuracy),
                     workers,
                     scheduler,
-                    (number, count) if shard else None,
+                    share_numbers(shard),
                     fresh,
                     progress,
                     tell,

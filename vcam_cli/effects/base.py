@@ -165,7 +165,7 @@ class Effect(ABC):
         """
         return None
 
-    def during(self, start: float, stop: float) -> Effect:
+    def part_of_exposure(self, start: float, stop: float) -> Effect:
         """Return what of it acts from `start` to `stop` after a line's exposure begins [s]."""
         return self
 

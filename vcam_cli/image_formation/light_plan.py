@@ -79,7 +79,7 @@ class LightPlan:
         """Return the path without the omitted effects."""
         kept = tuple(effect for effect in path.effects if effect not in self.omitted)
         gone = {effect.name for effect in self.omitted}
-        layers = tuple(layer.without(gone) for layer in path.layers)
+        layers = tuple(layer.without_effects(gone) for layer in path.layers)
         transfer = path.transfer.with_effects(kept)
         transfer = replace(transfer, weights=transfer.weights / (self.on_axis or 1.0))
         return replace(path, transfer=transfer, effects=kept, optional=(), layers=layers)

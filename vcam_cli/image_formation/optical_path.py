@@ -31,13 +31,13 @@ class LayerOptics:
     radius: float
     """Of a point's blur by defocus; positive where the layer is nearer than what is in focus [m]"""
 
-    def without(self, names: Collection[str]) -> LayerOptics:
+    def without_effects(self, names: Collection[str]) -> LayerOptics:
         """Return the same without some effects."""
         return replace(self, effects=tuple(e for e in self.effects if e.name not in names))
 
-    def during(self, start: float, stop: float) -> LayerOptics:
+    def part_of_exposure(self, start: float, stop: float) -> LayerOptics:
         """Return the same from `start` to `stop` after a line's exposure begins [s]."""
-        return replace(self, effects=tuple(e.during(start, stop) for e in self.effects))
+        return replace(self, effects=tuple(e.part_of_exposure(start, stop) for e in self.effects))
 
 
 @dataclass(frozen=True)

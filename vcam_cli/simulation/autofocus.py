@@ -25,7 +25,7 @@ from vcam_cli.camera.derived.geometry import geometry
 from vcam_cli.camera.optics import FocusWindow
 from vcam_cli.errors import BadInput, bad
 from vcam_cli.progress import Stages
-from vcam_cli.simulation.cost_model import trial_seconds
+from vcam_cli.simulation.cost_model import light_seconds
 from vcam_cli.simulation.preparation import Prepared, prepare, standing_still
 
 CIRCLE = 8.0
@@ -105,9 +105,7 @@ class _Trials:
             ready = prepare(moved, self._picture, self._workers, Stages())
         except BadInput:  # a wavefront too steep to be followed: far from sharp
             return 0.0
-        self.seconds += trial_seconds(
-            ready.layout.lattice, ready.layout.mosaic, ready.spectrum, self._workers
-        )
+        self.seconds += light_seconds(ready.layout, ready.spectrum, self._workers)
         return _contrast_of_pixels(ready, self._window)
 
 

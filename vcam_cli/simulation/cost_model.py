@@ -92,24 +92,21 @@ def threads(workers: int) -> float:
     return workers**0.75
 
 
-def image_seconds(geometry: Geometry, mosaic: Mosaic, report: SpectrumReport) -> float:
+def image_seconds(geometry: Geometry, colors: int, report: SpectrumReport) -> float:
     """Return the core seconds of image formation, that of layers included."""
-    return _flat_seconds(geometry, mosaic, report) + sum(
-        _flat_seconds(cells, Mosaic((tuple(map(str, range(colors))),)), own)
-        + OCCLUDE * cells.rows * cells.columns * colors
-        for cells, colors, own in report.parts
+    return _flat_seconds(geometry, colors, report) + sum(
+        _flat_seconds(cells, planes, own) + OCCLUDE * cells.rows * cells.columns * planes
+        for cells, planes, own in report.parts
     )
 
 
-def _flat_seconds(geometry: Geometry, mosaic: Mosaic, report: SpectrumReport) -> float:
-    pixels, colors = geometry.rows * geometry.columns, len(mosaic.colors)
+def _flat_seconds(geometry: Geometry, colors: int, report: SpectrumReport) -> float:
+    pixels = geometry.rows * geometry.columns
+    always = FIXED + _sub_exposure_seconds(pixels * colors, colors, report)
     if not report.terms:
-        return (
-            FIXED + WAVE * pixels * colors + _sub_exposure_seconds(pixels * colors, colors, report)
-        )
+        return always + WAVE * pixels * colors
     return (
-        FIXED
-        + _sub_exposure_seconds(pixels * colors, colors, report)
+        always
         + (SAMPLE + PAINT * report.is_painted) * report.cells * report.planes
         + report.edge_seconds * (1 + TRIAL_EDGES * report.trials)
         + TRIAL * report.trials
@@ -178,8 +175,7 @@ def irradiance_seconds(
     files = bool(camera.output.irradiance) + camera.output.isetcam
     band = camera.scene.wavelengths
     count = len(Band(band.start, band.stop, knobs.wavelength_step).nodes())
-    bands = Mosaic((tuple(str(i) for i in range(BANDS_AT_ONCE)),))
-    together = image_seconds(geometry, bands, report) / BANDS_AT_ONCE
+    together = image_seconds(geometry, BANDS_AT_ONCE, report) / BANDS_AT_ONCE
     return files * count * (together + EXR * geometry.rows * geometry.columns)
 
 
@@ -191,22 +187,16 @@ def usual_spectrum(geometry: Geometry) -> SpectrumReport:
 
 def light_seconds(place: Layout, report: SpectrumReport, workers: int) -> float:
     """Return the seconds of image formation alone, on this machine."""
-    return image_seconds(place.lattice, place.mosaic, report) * slowness() / threads(workers)
+    core = image_seconds(place.lattice, len(place.mosaic.colors), report)
+    return core * slowness() / threads(workers)
 
 
 def first_estimate(camera: Camera, place: Layout, workers: int) -> float:
     """Return the seconds of a whole run, before anything is known of its scene."""
     guess = usual_spectrum(place.lattice)
-    core = image_seconds(place.lattice, place.mosaic, guess)
+    core = image_seconds(place.lattice, len(place.mosaic.colors), guess)
     core += output_seconds(camera, place.geometry, place.mosaic)
     return core * slowness() / threads(workers)
-
-
-def trial_seconds(
-    geometry: Geometry, mosaic: Mosaic, report: SpectrumReport, workers: int
-) -> float:
-    """Return the seconds of the light alone, as the autofocus tries it."""
-    return image_seconds(geometry, mosaic, report) * slowness() / threads(workers)
 
 
 def frame_seconds(
@@ -242,7 +232,7 @@ def frame_seconds(
     float
         Seconds on this machine.
     """
-    core = decided.seconds + image_seconds(place.lattice, place.mosaic, report)
+    core = decided.seconds + image_seconds(place.lattice, len(place.mosaic.colors), report)
     core += output_seconds(camera, place.geometry, place.mosaic)
     core += sample_seconds(camera, place.geometry, decided.active)
     core += irradiance_seconds(camera, geometry, knobs, report)

@@ -245,8 +245,8 @@ def _light_during(
         of_kind(layer.effects, ImageMotion) for layer in whole.layers
     ):
         return light.values
-    effects = tuple(effect.during(start, stop) for effect in whole.effects)
-    layers = tuple(layer.during(start, stop) for layer in whole.layers)
+    effects = tuple(effect.part_of_exposure(start, stop) for effect in whole.effects)
+    layers = tuple(layer.part_of_exposure(start, stop) for layer in whole.layers)
     part = replace(
         whole, effects=effects, transfer=whole.transfer.with_effects(effects), layers=layers
     )

@@ -102,7 +102,7 @@ def _bands(
     effects = (*in_lens, PixelAperture(g.pitch_x, g.pitch_y))
     omitted = {d.name for d in ready.plan.decisions if d.state == "off"}
     optics = layer_optics(ready.camera, effects)
-    kept = tuple(layer.without(omitted) for layer in optics)
+    kept = tuple(layer.without_effects(omitted) for layer in optics)
     light = OpticalPath(transfer, g, ready.settings, bands, effects, workers, layers=kept)
     dtype = ready.settings.dtype
     x, y = pixel_centers(g)

@@ -64,7 +64,7 @@ class CameraAngles:
         """Whether the camera turns about its axis."""
         return bool(np.ptp(self.angles[2]))
 
-    def at(self, times: NDArray) -> tuple[NDArray, NDArray, NDArray]:
+    def angles_at(self, times: NDArray) -> tuple[NDArray, NDArray, NDArray]:
         """Return pan, tilt and roll at times of any shape [rad]."""
         pan, tilt, roll = (np.interp(times, self.times, angle) for angle in self.angles)
         return pan, tilt, roll

@@ -69,8 +69,8 @@ class Trajectory:
         late = np.asarray(times, dtype=float) - self.reference
         if self.recorded is None:
             return self.pan * late, self.tilt * late, self.roll * late
-        first = self.recorded.at(np.array(self.reference))
-        now = self.recorded.at(np.asarray(times, dtype=float))
+        first = self.recorded.angles_at(np.array(self.reference))
+        now = self.recorded.angles_at(np.asarray(times, dtype=float))
         pan, tilt, roll = (after - before for after, before in zip(now, first, strict=True))
         return pan, tilt, roll
 
@@ -125,7 +125,7 @@ class ExposedMotion:
     time: float
     """How long a line is exposed [s]."""
 
-    def during(self, start: float, stop: float) -> ExposedMotion:
+    def part_of_exposure(self, start: float, stop: float) -> ExposedMotion:
         """Return that from `start` to `stop` after a line's exposure begins [s]."""
         return replace(self, begin=self.begin + start, time=stop - start)
 

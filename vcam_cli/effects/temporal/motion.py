@@ -117,9 +117,9 @@ class EvenMotion(ImageMotion, Motion):
         path, drift = np.hypot(*self.path), np.hypot(*self.drift)
         return float(np.hypot(*self.displacement) + 0.5 * (path + drift * self.height))
 
-    def during(self, start: float, stop: float) -> EvenMotion:
+    def part_of_exposure(self, start: float, stop: float) -> EvenMotion:
         """Return the motion from `start` to `stop` after a line's exposure begins [s]."""
-        exposed = self.exposed.during(start, stop)
+        exposed = self.exposed.part_of_exposure(start, stop)
         return type(self)(exposed, self.width, self.height, self.pitch)
 
     def mean_transfer(self, fx: NDArray, fy: NDArray, spectrum) -> NDArray:
@@ -224,9 +224,9 @@ class RecordedMotion(ImageMotion, PlaneTransfer, Motion):
         """How far from its place light comes to lie [m]."""
         return self.reach + float(np.hypot(*self.displacement))
 
-    def during(self, start: float, stop: float) -> RecordedMotion:
+    def part_of_exposure(self, start: float, stop: float) -> RecordedMotion:
         """Return the motion from `start` to `stop` after the exposure begins [s]."""
-        exposed = self.exposed.during(start, stop)
+        exposed = self.exposed.part_of_exposure(start, stop)
         return RecordedMotion(exposed, self.width, self.height, self.pitch)
 
     def cutoff(self, wavelength):

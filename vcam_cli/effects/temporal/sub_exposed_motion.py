@@ -133,9 +133,9 @@ class SubExposedMotion(ImageMotion):
         dy = [np.broadcast_to(y[:, None] - at_y, (len(y), len(x))).ravel() for _, at_y in found]
         return np.array(dx), np.array(dy)
 
-    def during(self, start: float, stop: float) -> SubExposedMotion:
+    def part_of_exposure(self, start: float, stop: float) -> SubExposedMotion:
         """Return the motion from `start` to `stop` after a line's exposure begins [s]."""
-        return replace(self, exposed=self.exposed.during(start, stop))
+        return replace(self, exposed=self.exposed.part_of_exposure(start, stop))
 
     def mean_transfer(self, fx: NDArray, fy: NDArray, spectrum) -> NDArray:
         """Return a transfer that loses as much, rms over some places: (m, n)."""
