@@ -61,7 +61,7 @@ LINEAR_CODES = Case(
     "codes beyond either end wrap around; halves go to the even code",
     "exactly clip(round(x))",
     lambda: in_digits(_code_exact, SIGNALS),
-    lambda: of_readout.adc_code(SIGNALS, 1.0, 16),
+    lambda: Quantization(0.0, 1.0, 16).apply(SIGNALS.copy()),
     lambda: (SIGNALS + 0.5).astype(np.int64).astype(np.uint16),
     "(x + 0.5) as a 16-bit whole number",
     0.0,

@@ -108,7 +108,7 @@ def test_a_scene_inside_the_focal_length_is_refused(distance: float) -> None:
 @given(f_numbers, magnifications)
 def test_cone_and_irradiance_agree(f_number: float, m: float) -> None:
     sine2 = r.numerical_aperture(f_number, m) ** 2
-    tangent2 = r.cone_tangent_squared(f_number, m)
+    tangent2 = 1 / (2 * f_number * (1 - m)) ** 2
     assert tangent2 / (1 + tangent2) == pytest.approx(sine2, rel=1e-14)
     assert r.irradiance_per_radiance(f_number, m) == pytest.approx(np.pi * sine2, rel=1e-14)
     printed = np.pi / (1 + 4 * (f_number * (1 - m)) ** 2)
@@ -143,11 +143,5 @@ def test_no_field_of_view_of_half_the_world(angle: float) -> None:
         r.focal_length_of_field_of_view(angle, 0.01)
 
 
-def test_photon_energy_at_one_micrometer() -> None:
-    """1 eV is 1.239841984 um (CODATA 2018)."""
-    assert r.photon_energy(1.239841984332e-6) == pytest.approx(1.602176634e-19, rel=1e-12)
-
-
 def test_arrays_keep_their_shape() -> None:
     assert r.relative_illumination_exact(np.ones((3, 1)), np.ones(4)).shape == (3, 4)
-    assert r.off_axis_tangent_squared(np.array([0.0, 1e-3]), 1e-3).tolist() == [0, 1]

@@ -143,32 +143,6 @@ def otf_ratio(
     return ratio[()]
 
 
-def grid_memory(terms: Terms, wavelengths: Floats) -> dict[tuple[Terms, float], int]:
-    """Return the memory that `otf_ratio` keeps for a wavefront.
-
-    Parameters
-    ----------
-    terms : Terms
-        Noll indices and coefficients [m] of the wavefront.
-    wavelengths : ndarray
-        Wavelengths (n,) [m].
-
-    Returns
-    -------
-    dict
-        Size of every grid [bytes] by its key in the cache. The cache never takes more than
-        `GRID_CACHE_BYTES` in all.
-    """
-    rest, _ = zernike.split_tilt(terms)
-    if zernike.is_symmetric(rest):
-        return {}
-    order = max(zernike.noll_orders(index)[0] for index, _ in rest)
-    return {
-        (rest, w): pupil_grid.grid_bytes(slope_in_waves(rest, w), order)
-        for w in wavelengths.tolist()
-    }
-
-
 def _checked_slope(terms: Terms, wavelength: float) -> float:
     """Return the largest slope [wavelengths per pupil radius]; ValueError above `MAX_SLOPE`."""
     slope = slope_in_waves(terms, wavelength)

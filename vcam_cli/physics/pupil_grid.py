@@ -166,25 +166,6 @@ def samples_across(slope: float, order: int) -> int:
     )
 
 
-def grid_bytes(slope: float, order: int) -> int:
-    """Return the memory that the grid of a wavefront takes.
-
-    Parameters
-    ----------
-    slope : float
-        Largest slope of the wavefront [wavelengths per pupil radius].
-    order : int
-        Highest radial order of its polynomials.
-
-    Returns
-    -------
-    int
-        Memory [bytes].
-    """
-    samples = samples_across(slope, order)
-    return 2 * samples * (samples + MIRRORED_LAGS) * 8
-
-
 def _step(samples: int) -> float:
     """Return the distance of the samples [pupil radii]; two samples lie around the pupil."""
     return 2 / (samples - 4)

@@ -14,8 +14,6 @@ References
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vcam_cli.spectra import PLANCK, SPEED_OF_LIGHT
-
 Floats = NDArray[np.float64]
 
 
@@ -149,24 +147,6 @@ def f_number_of_numerical_aperture(
     return (np.sqrt((1 - sine) * (1 + sine)) / (2 * sine * (1 - _float(magnification))))[()]
 
 
-def cone_tangent_squared(f_number: ArrayLike, magnification: ArrayLike = 0.0) -> Floats:
-    """Return tan^2(theta) of the image-side cone's half-angle, 1 / (2 N (1 - m))^2.
-
-    Parameters
-    ----------
-    f_number : array_like
-        F-number N [dimensionless], positive.
-    magnification : array_like
-        Magnification m [dimensionless], zero or negative.
-
-    Returns
-    -------
-    ndarray
-        Squared tangent [dimensionless].
-    """
-    return ((1 / (2 * effective_f_number(f_number, magnification))) ** 2)[()]
-
-
 def irradiance_per_radiance(f_number: ArrayLike, magnification: ArrayLike = 0.0) -> Floats:
     """Return the on-axis irradiance on the sensor per radiance of the scene, eq 2.18 of [1].
 
@@ -187,24 +167,6 @@ def irradiance_per_radiance(f_number: ArrayLike, magnification: ArrayLike = 0.0)
     return (np.pi * numerical_aperture(f_number, magnification) ** 2)[()]
 
 
-def off_axis_tangent_squared(image_height: ArrayLike, image_distance: ArrayLike) -> Floats:
-    """Return tan^2(phi) of the off-axis angle of a place on the sensor.
-
-    Parameters
-    ----------
-    image_height : array_like
-        Distance from the optical axis on the sensor [m].
-    image_distance : array_like
-        Distance from the lens to the sensor [m].
-
-    Returns
-    -------
-    ndarray
-        Squared tangent [dimensionless].
-    """
-    return ((_float(image_height) / _float(image_distance)) ** 2)[()]
-
-
 def relative_illumination_exact(tan2_theta: ArrayLike, tan2_phi: ArrayLike) -> Floats:
     """Return the irradiance off the axis over that on it, for a uniform Lambertian disk [1], [2].
 
@@ -215,10 +177,9 @@ def relative_illumination_exact(tan2_theta: ArrayLike, tan2_phi: ArrayLike) -> F
     Parameters
     ----------
     tan2_theta : array_like
-        a, of the image-side cone's half-angle [dimensionless], positive (`cone_tangent_squared`).
+        a, of the image-side cone's half-angle [dimensionless], positive.
     tan2_phi : array_like
-        b, of the off-axis angle [dimensionless], zero or more (`off_axis_tangent_squared`). Both
-        broadcast.
+        b, of the off-axis angle [dimensionless], zero or more. Both broadcast.
 
     Returns
     -------
@@ -240,7 +201,7 @@ def relative_illumination_cos4(tan2_phi: ArrayLike) -> Floats:
     Parameters
     ----------
     tan2_phi : array_like
-        Squared tangent of the off-axis angle [dimensionless] (`off_axis_tangent_squared`).
+        Squared tangent of the off-axis angle [dimensionless].
 
     Returns
     -------
@@ -299,19 +260,3 @@ def focal_length_of_field_of_view(
         raise ValueError("a field of view lies between 0 and 180 degrees")
     image = _float(extent) / (2 * np.tan(angle / 2))
     return (image / (1 + image / _float(object_distance)))[()]
-
-
-def photon_energy(wavelength: ArrayLike) -> Floats:
-    """Return the energy of a photon, h c / wavelength.
-
-    Parameters
-    ----------
-    wavelength : array_like
-        Wavelength [m], positive.
-
-    Returns
-    -------
-    ndarray
-        Energy [J].
-    """
-    return (PLANCK * SPEED_OF_LIGHT / _float(wavelength))[()]

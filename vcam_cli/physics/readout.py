@@ -204,48 +204,6 @@ def adc_full_scale(
     return (_float(conversion_gain) * _float(gain) / _float(codes_per_electron) * span)[()]
 
 
-def adc_code(
-    electrons: ArrayLike, codes_per_electron: ArrayLike, bits: int, offset: ArrayLike = 0.0
-) -> Floats:
-    """Return the output of a linear ADC, clip(round(offset + electrons x slope), 0, 2^bits - 1).
-
-    Parameters
-    ----------
-    electrons : array_like
-        Charge [e], of any shape.
-    codes_per_electron : array_like
-        Overall system gain [DN/e].
-    bits : int
-        Resolution of the ADC [bits].
-    offset : array_like
-        Code of black [DN].
-
-    Returns
-    -------
-    ndarray
-        Codes [DN], whole numbers as floats, in the shape of `electrons`. Halves are rounded to the
-        even code.
-    """
-    level = _float(offset) + _float(electrons) * _float(codes_per_electron)
-    return np.clip(np.rint(level), 0.0, 2.0**bits - 1)[()]
-
-
-def quantization_variance(codes_per_electron: ArrayLike) -> Floats:
-    """Return the variance of rounding to codes: a twelfth of a code squared, in electrons.
-
-    Parameters
-    ----------
-    codes_per_electron : array_like
-        Overall system gain [DN/e], positive.
-
-    Returns
-    -------
-    ndarray
-        Variance of quantization [e^2].
-    """
-    return (1 / (12 * _float(codes_per_electron) ** 2))[()]
-
-
 def saturation_speed(saturation_exposure: ArrayLike) -> Floats:
     """Return the saturation-based ISO speed, 78 / H_sat [3].
 

@@ -150,13 +150,9 @@ def stack_transmission(cosine: ArrayLike, layers: Layers) -> Floats:
     above, n1 = np.asarray(cosine, np.float64), 1.0
     total = np.ones_like(above)
     for _, n2 in layers:
-        inside = refracted_cosine(above, n1, n2)
-        s, p = (
-            _power_transmission(n1 * above, n2 * inside),
-            _power_transmission(n2 * above, n1 * inside),
-        )
-        total = total * ((s + p) / 2)
-        above, n1 = inside, n2
+        both = transmission_s(above, n1, n2) + transmission_p(above, n1, n2)
+        total = total * (both / 2)
+        above, n1 = refracted_cosine(above, n1, n2), n2
     return total[()]
 
 

@@ -26,8 +26,6 @@ WINDOW = 5
 """Pixels along a side of the window of the adaptive filter."""
 REACH = 4.0
 """Standard deviations after which the Gaussian of an unsharp mask ends."""
-SECOND_DIFFERENCE = np.array([1.0, -2.0, 1.0])
-"""Twice along rows and columns: the mask of [2], whose response to noise of variance 1 is 36."""
 
 Planes = np.ndarray
 

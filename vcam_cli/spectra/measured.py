@@ -17,7 +17,6 @@ from vcam_cli.spectra.spectrum import Floats, Outside, Table
 from vcam_cli.spectra.text import MAX_ROWS, parse_numbers, read_lines
 
 NANOMETERS, MICROMETERS = "nm", "um"
-_SIZES = {NANOMETERS: 1e-9, MICROMETERS: 1e-6}
 _NM_RANGE, _UM_RANGE = (100.0, 1e5), (0.1, 30.0)
 """Wavelengths of light in either unit; where they overlap, in nothing."""
 _UNIT = re.compile(
