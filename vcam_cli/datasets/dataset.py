@@ -24,7 +24,6 @@ from vcam_cli.files.points_store import SweepFolder
 from vcam_cli.files.records import Fingerprint
 from vcam_cli.files.report import hash_file, hash_text, to_json
 from vcam_cli.progress import Observer, Silent
-from vcam_cli.simulation.checks import CHECKS
 from vcam_cli.simulation.output import provenance
 from vcam_cli.sweeps.point_execution import claim_point, compute, keep_outcome
 from vcam_cli.sweeps.point_work import Task
@@ -111,12 +110,11 @@ def dataset(
 
 def frame_ids(file: DatasetFile) -> list[str]:
     """Return the hash of every frame: of all that its arrays depend on, wherever files lie."""
-    base = file.base.validate(CHECKS)
-    form = base.model_dump(mode="json")
+    form = file.camera.model_dump(mode="json")
     for name in ("name", "quality", "output", "seed"):
         form.pop(name, None)
-    form["sensor"] = base.seed.sensor
-    content = hash_of(base, form, {"write": sorted(file.model.write)})
+    form["sensor"] = file.camera.seed.sensor
+    content = hash_of(file.camera, form, {"write": sorted(file.model.write)})
     hashes = {s.file: hash_file(s.file) for s in file.scenes if s.file is not None}
 
     def plain(frame: Frame) -> dict[str, Any]:
@@ -132,8 +130,7 @@ def frame_ids(file: DatasetFile) -> list[str]:
 
 def _scale(file: DatasetFile) -> int:
     """Return what codes are multiplied by in TIFF: what 16 bits leave of the ADC's."""
-    bits = file.base.validate(CHECKS).adc.bits
-    return 2 ** max(0, 16 - bits)
+    return 2 ** max(0, 16 - file.camera.adc.bits)
 
 
 def _of_share(whole: list[Shard], execution: Execution) -> list[Shard]:
@@ -221,7 +218,7 @@ def _record(file: DatasetFile, versions: dict[str, str]) -> dict[str, Any]:
     return {
         "name": model.name,
         "dataset": model.model_dump(mode="json"),
-        "camera": file.base.validate(CHECKS).model_dump(mode="json"),
+        "camera": file.camera.model_dump(mode="json"),
         "frames": model.frames,
         "shards": model.shards,
         "layout": whole[model.format],

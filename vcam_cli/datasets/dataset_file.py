@@ -5,7 +5,7 @@ from __future__ import annotations
 import glob
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 from pathlib import Path
 
 from vcam_cli.camera import load as cameras
@@ -20,7 +20,7 @@ from vcam_cli.datasets.model import Dataset
 from vcam_cli.errors import BadInput, Collector, Problem
 from vcam_cli.files.images.images import picture_size
 from vcam_cli.floats import own_float_errors
-from vcam_cli.simulation.checks import missing_library
+from vcam_cli.simulation.checks import CHECKS, missing_library
 from vcam_cli.sweeps.model import KINDS
 
 FILES = ("scenes", "files")
@@ -50,6 +50,11 @@ class DatasetFile:
     scenes: tuple[Scene, ...]
     inputs: tuple[Path, ...]
     """Every file that was read, or will be."""
+
+    @cached_property
+    def camera(self) -> Camera:
+        """The camera before anything is drawn."""
+        return self.base.validate(CHECKS)
 
     def frame(self, number: int) -> Frame:
         """Return a frame, by its number from 0."""

@@ -13,7 +13,7 @@ from vcam_cli.fitting.traps import PixelMoments, pixel_moments
 from vcam_cli.progress import Observer
 from vcam_cli.spectra import integral, photons
 from vcam_cli.verification.frame_sets import FrameSet
-from vcam_cli.verification.frames import color_block, stacks
+from vcam_cli.verification.frames import color_planes, stacks
 from vcam_cli.verification.model import Measurement
 from vcam_cli.verification.stack_statistics import (
     Estimate,
@@ -115,8 +115,9 @@ def measure(measurement: Measurement, watch: Observer) -> Conditions:
             condition = _condition(stack.entry, stack.label, stack.frames, good, measurement)
             is_usual = stack.entry.temperature in (None, usual)
             if stack.entry.is_dark and is_usual and stack.entry.exposure == shortest:
-                planes = _planes(stack.frames, good, measurement)
-                condition = replace(condition, moments=tuple(map(pixel_moments, *planes)))
+                places = [p for each in color_planes(measurement).values() for p in each]
+                moments = (pixel_moments(stack.frames[:, *p], good[p]) for p in places)
+                condition = replace(condition, moments=tuple(moments))
             found.append(condition)
     dark = sorted((c for c in found if c.entry.is_dark), key=lambda c: c.entry.exposure)
     return Conditions(
@@ -157,22 +158,18 @@ def _defects(
 def _condition(
     entry: FrameSet, label: str, frames: NDArray, good: NDArray, measurement: Measurement
 ) -> Condition:
-    block = color_block(measurement)
-    size = len(block), len(block[0])
-    planes: dict[str, list[StackStatistics]] = {}
-    patterns: dict[str, list[Pattern]] = {}
-    for r, line in enumerate(block):
-        for c, color in enumerate(line):
-            here = good[r :: size[0], c :: size[1]]
-            told = stack_statistics(frames[:, r :: size[0], c :: size[1]], here)
-            planes.setdefault(color, []).append(told)
-            patterns.setdefault(color, []).append(pattern(told, here))
+    planes: dict[str, tuple[StackStatistics, ...]] = {}
+    patterns: dict[str, Pattern] = {}
+    for color, places in color_planes(measurement).items():
+        planes[color] = tuple(stack_statistics(frames[:, *place], good[place]) for place in places)
+        told = zip(planes[color], places, strict=True)
+        patterns[color] = _mean_pattern([pattern(plane, good[place]) for plane, place in told])
     assert measurement.levels is not None
     return Condition(
         entry,
         label,
-        {color: tuple(each) for color, each in planes.items()},
-        {color: _mean_pattern(each) for color, each in patterns.items()},
+        planes,
+        patterns,
         float(np.mean(frames[:, good] == 0)),
         float(np.mean(frames[:, good] == 2**measurement.levels.bits - 1)),
     )
@@ -195,14 +192,3 @@ def photons_per_pixel(entry: FrameSet, measurement: Measurement) -> float | None
     lamp = entry.light.resolve()
     per_joule = integral(photons(lamp), *BAND) / integral(lamp, *BAND)
     return entry.irradiance * area * entry.exposure * per_joule
-
-
-def _planes(
-    frames: NDArray, good: NDArray, measurement: Measurement
-) -> tuple[list[NDArray], list[NDArray]]:
-    """Return the planes of the places of the color filter array, and which pixels count there."""
-    block = color_block(measurement)
-    places = [(r, c) for r in range(len(block)) for c in range(len(block[0]))]
-    down, across = len(block), len(block[0])
-    cut = [(slice(r, None, down), slice(c, None, across)) for r, c in places]
-    return [frames[:, rows, columns] for rows, columns in cut], [good[place] for place in cut]

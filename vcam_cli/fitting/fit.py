@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from vcam_cli.errors import BadInput, Collector
+from vcam_cli.errors import Collector, bad
 from vcam_cli.fitting import camera_file, edge, sensor
 from vcam_cli.fitting.conditions import (
     CLIPPED,
@@ -27,7 +27,7 @@ from vcam_cli.fitting.pattern import CYCLES
 from vcam_cli.fitting.traps import LEAST_FRAMES, Traps, find_traps
 from vcam_cli.progress import Observer, Silent
 from vcam_cli.verification.frame_sets import FrameSet
-from vcam_cli.verification.frames import color_block, paths, stacks
+from vcam_cli.verification.frames import color_block, paths, raise_if_any, stacks
 from vcam_cli.verification.model import Measurement
 from vcam_cli.verification.stack_statistics import Estimate, combine
 
@@ -96,9 +96,11 @@ def fit(measurement: Measurement, watch: Observer | None = None) -> Fit:
     curves, against = sensor.transfers(found, measurement, line)
     out.notes += against
     if not curves:
-        raise _refusal(measurement, ("frames",), "; ".join(against) or "there are no flat frames",
-                       "add flat frames at five levels or more, dark frames of their exposure"
-                       " time beside them")  # fmt: skip
+        message = "; ".join(against) or "there are no flat frames"
+        remedy = (
+            "add flat frames at five levels or more, dark frames of their exposure time beside them"
+        )
+        raise bad("frames", message, remedy).with_places(measurement.locate)
     gain = sensor.pooled_gain(curves)
     _of_dark(out, found, line, gain)
     _of_gain(out, curves, gain)
@@ -131,17 +133,8 @@ def _check(measurement: Measurement) -> None:
     if not any(e.is_dark and e.temperature in (None, usual) for e in measurement.frame_sets):
         remedy = "add {files: dark_*.tif, exposure: 10 ms, light: none}"
         problems.add("frames", "there are no dark frames", remedy)
-    try:
-        problems.raise_if_any()
-    except BadInput as error:
-        raise error.with_places(measurement.locate) from None
+    raise_if_any(problems, measurement)
     paths(measurement)
-
-
-def _refusal(measurement: Measurement, path: tuple, message: str, remedy: str) -> BadInput:
-    problems = Collector()
-    problems.add(path, message, remedy)
-    return BadInput(problems.problems).with_places(measurement.locate)
 
 
 def _of_dark(out: Fit, found: Conditions, line: sensor.Dark, gain: Estimate) -> None:

@@ -23,7 +23,7 @@ from vcam_cli.quality.mtf import EdgeResponse, Lattice, slanted_edge_sfr
 from vcam_cli.simulation.preparation import Prepared
 from vcam_cli.simulation.simulate import prepare
 from vcam_cli.sweeps.point_effects import with_every_effect
-from vcam_cli.verification.frames import Stack, color_block
+from vcam_cli.verification.frames import Stack, color_planes
 from vcam_cli.verification.model import Measurement
 from vcam_cli.verification.stack_prediction import STACKS, Judged, compare, take_stack
 from vcam_cli.verification.stack_quantities import Quantity
@@ -51,23 +51,18 @@ def edge_responses(frames: NDArray, measurement: Measurement) -> dict[str, list[
     ValueError
         No edge is found.
     """
-    pixel, block = measurement.pixel, color_block(measurement)
+    pixel = measurement.pixel
     assert pixel is not None
     assert pixel.width is not None
     pitch_x, pitch_y = pixel.width, pixel.height or pixel.width
-    pitch, down, across = min(pitch_x, pitch_y), len(block), len(block[0])
+    pitch = min(pitch_x, pitch_y)
+    y, x = (np.arange(n) * p for n, p in zip(frames.shape[1:], (pitch_y, pitch_x), strict=True))
     found: dict[str, list[EdgeResponse]] = {}
-    for color in dict.fromkeys(name for line in block for name in line):
-        places = [(r, c) for r in range(down) for c in range(across) if block[r][c] == color]
+    for color, places in color_planes(measurement).items():
         found[color] = []
         for frame in frames.astype(np.float64):
             lattices = [
-                Lattice(
-                    plane := frame[r::down, c::across],
-                    (c + across * np.arange(plane.shape[1])) * pitch_x,
-                    (r + down * np.arange(plane.shape[0])) * pitch_y,
-                )
-                for r, c in places
+                Lattice(frame[rows, columns], x[columns], y[rows]) for rows, columns in places
             ]
             found[color].append(slanted_edge_sfr(lattices, pitch, REACH * pitch))
     return found

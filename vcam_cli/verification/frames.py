@@ -20,6 +20,7 @@ from vcam_cli.files.images.exr import read_exr
 from vcam_cli.files.images.images import open_image, read_samples
 from vcam_cli.verification.frame_sets import FrameSet
 from vcam_cli.verification.model import Measurement
+from vcam_cli.verification.stack_statistics import robust_deviation
 
 OUTLIER = 10.0
 """Deviations of a frame's mean from the others' (scaled median deviation) that make it bad."""
@@ -47,14 +48,20 @@ class Stack:
         """What the user is told of frames that are left out."""
         return [f"{self.label}: {name} is unlike the others and left out" for name in self.dropped]
 
-    def plane(self, row: int, column: int, block: tuple[int, int]) -> NDArray:
-        """Return the frames' pixels of one place of the color filter array (n, rows, columns)."""
-        return self.frames[:, row :: block[0], column :: block[1]]
-
 
 def color_block(measurement: Measurement) -> tuple[tuple[str, ...], ...]:
     """Return the colors of the smallest block that repeats; Y where there are no filters."""
     return BLOCKS[measurement.pattern]
+
+
+def color_planes(measurement: Measurement) -> dict[str, list[tuple[slice, slice]]]:
+    """Return where the pixels of each color are: rows and columns of its places in the block."""
+    block = color_block(measurement)
+    planes: dict[str, list[tuple[slice, slice]]] = {}
+    for row, column in np.ndindex(len(block), len(block[0])):
+        place = slice(row, None, len(block)), slice(column, None, len(block[0]))
+        planes.setdefault(block[row][column], []).append(place)
+    return planes
 
 
 def paths(
@@ -127,7 +134,7 @@ def numbered_stacks(
 def _without_outliers(entry: FrameSet, label: str, files: list[Path], frames: NDArray) -> Stack:
     means = frames.mean(axis=(1, 2))
     center = np.median(means)
-    limit = max(OUTLIER * 1.4826 * float(np.median(abs(means - center))), LEAST_OUTLIER * center)
+    limit = max(OUTLIER * robust_deviation(means), LEAST_OUTLIER * center)
     good = abs(means - center) <= limit
     if good.sum() < 2 <= len(files) or len(files) < 3:
         good[:] = True

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,7 +12,14 @@ from vcam_cli.camera.derived.lattice import places
 from vcam_cli.errors import Collector
 from vcam_cli.verification import stack_quantities
 from vcam_cli.verification.frame_sets import FrameSet
-from vcam_cli.verification.frames import Stack, color_block, numbered_stacks, paths, raise_if_any
+from vcam_cli.verification.frames import (
+    Stack,
+    color_block,
+    color_planes,
+    numbered_stacks,
+    paths,
+    raise_if_any,
+)
 from vcam_cli.verification.model import Measurement, Point, Signal
 
 WINDOW = 256
@@ -97,13 +103,15 @@ def quantities_of_colors(
     """Return what the middle of a stack is judged by, color by color; "" of the only one."""
     assert measurement.levels is not None
     frames = middle(frames, measurement)
-    block, highest = color_block(measurement), 2**measurement.levels.bits - 1
-    planes: dict[str, list[list[stack_quantities.Quantity]]] = {}
-    for row, column in np.ndindex(len(block), len(block[0])):
-        plane = frames[:, row :: len(block), column :: len(block[0])]
-        color = block[row][column] if len(block) * len(block[0]) > 1 else ""
-        planes.setdefault(color, []).append(stack_quantities.quantities(plane, highest))
-    return {color: stack_quantities.mean_of_planes(each) for color, each in planes.items()}
+    highest, planes = 2**measurement.levels.bits - 1, color_planes(measurement)
+    found = {
+        color: [stack_quantities.quantities(frames[:, *place], highest) for place in places]
+        for color, places in planes.items()
+    }
+    return {
+        color if len(planes) > 1 else "": stack_quantities.mean_of_planes(each)
+        for color, each in found.items()
+    }
 
 
 def _check(camera: Camera, measurement: Measurement) -> None:
@@ -130,19 +138,19 @@ def _check(camera: Camera, measurement: Measurement) -> None:
 
 def colors(measurement: Measurement) -> set[str]:
     """Return the colors of the frames."""
-    return set(itertools.chain(*color_block(measurement)))
+    return set(color_planes(measurement))
 
 
 def _points(stack: Stack, measurement: Measurement) -> list[Point]:
-    entry, block = stack.entry, color_block(measurement)
-    size = len(block), len(block[0])
-    codes: dict[str, list[np.ndarray]] = {}
-    for row, column in np.ndindex(size):
-        codes.setdefault(block[row][column], []).append(stack.plane(row, column, size).ravel())
+    entry = stack.entry
+    codes = {
+        color: np.concatenate([stack.frames[:, *place].ravel() for place in places])
+        for color, places in color_planes(measurement).items()
+    }
     return [
         Point.model_construct(
             name=entry.name,
-            signal=Signal(float(np.concatenate(each).mean()), "dn"),
+            signal=Signal(float(each.mean()), "dn"),
             channel=color if len(codes) > 1 else "",
             exposure=entry.exposure,
             light=entry.light,

@@ -15,7 +15,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from vcam_cli.verification.stack_statistics import stack_statistics
+from vcam_cli.verification.stack_statistics import robust_deviation, stack_statistics
 
 BANDS = 0.0, 0.125, 0.25, 0.5
 """Ends of the bands of spectra [cycles/pixel]."""
@@ -62,7 +62,7 @@ def quantities(frames: NDArray, highest: int) -> list[Quantity]:
     """
     average = frames.mean(axis=0)
     median = float(np.median(average))
-    spread = max(1.4826 * float(np.median(abs(average - median))), 0.5)
+    spread = max(robust_deviation(average), 0.5)
     good = abs(average - median) <= OUTLIER * spread
     mean = float(average[good].mean())
     shares = {

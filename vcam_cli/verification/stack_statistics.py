@@ -46,6 +46,11 @@ def combine(estimates: list[Estimate]) -> Estimate:
     return total * (1 / len(estimates))
 
 
+def robust_deviation(values: NDArray) -> float:
+    """Return the standard deviation of normal numbers by their median absolute deviation."""
+    return 1.4826 * float(np.median(abs(values - np.median(values))))
+
+
 @dataclass(frozen=True)
 class StackStatistics:
     """A plane of one color of a stack: means, and variances with their errors [DN, DN^2]."""
