@@ -118,11 +118,13 @@ def test_entries_follow_the_reach_within_limits():
 
 
 def test_a_reader_of_fewer_columns_is_the_same():
+    """To the rounding of a matrix product, whose sums run in another order for another width."""
     exact = spectral(Diffraction(2.8, 0.0), DirectedBlur(Lens(2.8, True), MIXED))
     tables = tables_of(exact)
     for parity in range(4):
         whole = reader(tables, parity, F)
-        np.testing.assert_array_equal(whole.values(G[3:5], 9), whole.values(G)[:, :, 3:5, :9])
+        few, all_columns = whole.values(G[3:5], 9), whole.values(G)
+        np.testing.assert_allclose(few, all_columns[:, :, 3:5, :9], rtol=1e-14)
 
 
 def test_a_spline_by_weights_is_the_spline():
