@@ -175,8 +175,8 @@ def _readouts(draw: st.DrawFn) -> Tree:
     )
     noises = {name: _ELECTRONS for name in ("read_noise", "column_noise", "row_noise")}
     resets = {"reset_noise": st.one_of(st.sampled_from(["ktc", "none"]), _ELECTRONS)}
-    tails = mappings({"rms": _ELECTRONS}, {"shape": st.floats(-0.4, 0.14)})
-    bands = mappings({"rms": _ELECTRONS}, {"correlation": st.floats(0, 0.99)})
+    tails = mappings({"rms": _ELECTRONS}, {"shape": fractions(-0.4, 0.14)})
+    bands = mappings({"rms": _ELECTRONS}, {"correlation": fractions(0, 0.99)})
     traps = mappings(
         {"fraction": between(0.01, 100, "%"), "amplitude": _ELECTRONS},
         {"occupancy": between(1, 99, "%")},

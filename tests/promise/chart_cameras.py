@@ -56,7 +56,8 @@ CHARTS: dict[str, tuple[dict[str, Any], ...]] = {
         {"checks": 2.0}, {"checks": None}, {"checks": None}, {"checks": 0.5}, {"checks": 1 / 3},
     ),
 }  # fmt: skip
-"""What each chart is asked for; of an image the side of its checks over the pitch, None: leaves."""
+"""What each chart is asked for; of an image the side of its checks over the pitch, None: leaves. A
+new chart comes last: its place is part of the seed of its cameras."""
 
 
 @dataclass(frozen=True)

@@ -168,9 +168,9 @@ def _of_effect(word: str) -> Iterator[dict[str, Any]]:
 
 def equation(effect: Any) -> str:
     """Return the equation of an effect: what is indented first in its module's docstring."""
-    import inspect
+    import sys
 
-    paragraphs = (inspect.getdoc(inspect.getmodule(effect)) or "").split("\n\n")
+    paragraphs = (sys.modules[effect.__module__].__doc__ or "").split("\n\n")
     return next(" ".join(text.split()) for text in paragraphs if text.startswith("    "))
 
 

@@ -4,7 +4,7 @@
     ---------------------  -----------------  -----------------------------  -----------------------
     radiance of the scene  (always there)     camera equation, eq 2.18       photons / (s m2 m)
     spectrum of the image  Blur               diffraction, aberration,       electrons / s, blurred
-                                              charge_diffusion
+                                              depth, charge_diffusion
     spectrum of the image  ImageMotion        motion                         electrons / s, blurred
     spectrum of the image  SeparableTransfer  pixel_aperture                 electrons / s, blurred
     electrons / s          Gain               off_axis                       electrons / s

@@ -4,7 +4,8 @@ Spectral radiance on the sensor plane: L(x, y, wavelength) = sum_k B_k(x, y) S_k
 [W/(sr m2 m)], with x to the right, y down, in meters on the sensor from the array's center, and
 upright: magnification's two reversals are left out, the top of the scene is row 0.
 
-Why two kinds of scene: a sinusoid is known in closed form and stays exact, all else is samples.
+Why three kinds of scene: sinusoids (`waves.py`) and charts that repeat (`HarmonicScene`) are known
+in closed form and stay exact, all else is samples.
 `SampledScene.planes(mix)` paints as many mixtures of 25 spectra as the camera asks for.
 """
 
