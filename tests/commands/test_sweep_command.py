@@ -1,5 +1,6 @@
 """`vcam sweep`: what it says, how it ends; the shipped study; studies in the other commands."""
 
+import csv
 import json
 import os
 import signal
@@ -13,7 +14,7 @@ import yaml
 from making import tree
 from typer.testing import CliRunner
 
-from vcam_cli.commands import progress
+from vcam_cli.commands import options, progress
 from vcam_cli.commands.main import app
 from vcam_cli.files import atomic
 from vcam_cli.sweeps import sweep as module
@@ -36,13 +37,19 @@ def folder(tmp_path, monkeypatch):
 def write(changes=None, **study):
     small = {"array.rows": 8, "array.columns": 12, "accuracy": "draft"}
     Path("camera.yaml").write_text(yaml.safe_dump(tree({**small, **(changes or {})})))
-    Path("study.yaml").write_text(yaml.safe_dump(STUDY | study, sort_keys=False))
+    given = {key: value for key, value in (STUDY | study).items() if value is not None}
+    Path("study.yaml").write_text(yaml.safe_dump(given, sort_keys=False))
 
 
 def vcam(*args, code=0):
     done = CliRunner().invoke(app, list(args), prog_name="vcam")
     assert done.exit_code == code, done.output
     return done
+
+
+def points():
+    with open("out/study/points.csv", newline="") as file:
+        return list(csv.DictReader(file))
 
 
 def one(*args, code=0):
@@ -52,12 +59,66 @@ def one(*args, code=0):
 def test_a_person_reads_the_optimum_and_where_it_all_is():
     write()
     text = one().stdout
-    assert "nominal: best pixel.width 6.0 (5.0 to 6.0) um, mean_electrons" in text
+    lines = [line.split() for line in text.splitlines()]
+    assert lines[0] == ["pixel.width", "[um]", "mean_electrons"]
+    assert [line[0] for line in lines[1:4]] == ["4", "5", "6"]
+    shown = [f"{float(row['mean_electrons']):.6g}" for row in points()]
+    assert [line[1] for line in lines[1:4]] == shown
+    assert lines[5][:6] == ["case", "parameter", "unit", "best", "low", "high"]
+    best = ["nominal", "pixel.width", "um", "6", "5", "6", "mean_electrons", shown[2]]
+    assert lines[6][:8] == best
     assert "at the high end of its range" in text
     assert "3 of 3 points, 3 computed in" in text
     assert text.endswith("study: out/study/\n")
     assert "3 of 3 points, 0 computed in" in one().stdout
     assert one("-q").output == ""
+
+
+def test_results_are_means_over_seeds_and_repeats():
+    """Of what is varied alone is there a row; words stand left, numbers right."""
+    phases = {"scene.source.phase": ["0 deg", "90 deg"]}
+    chart = {"kind": "chart", "chart": "csf", "max_frequency": "20 lp/mm"}
+    write(
+        {"scene.source": chart},
+        vary={"pixel.architecture": {"values": ["aps-3t", "aps-4t"]}},
+        seeds=2,
+        repeat=phases,
+        optimize=None,
+    )
+    head, *rows, said = one().stdout.partition("\n\n")[0].splitlines()
+    assert head.split() == ["pixel.architecture", "mean_electrons"]
+    assert said == "means over seeds and repeats"
+    assert [row.split()[0] for row in rows] == ["aps-3t", "aps-4t"]
+    for row in rows:
+        name, shown = row.split()
+        every = [float(p["mean_electrons"]) for p in points() if p["pixel.architecture"] == name]
+        assert len(every) == 4
+        assert shown == f"{sum(every) / 4:.6g}"
+
+
+def test_a_long_table_is_cut_where_no_optimum_stands_for_it():
+    widths = {"pixel.width": {"start": "4 um", "stop": "6 um", "count": 26}}
+    write(vary=widths, optimize=None)
+    assert "and 2 rows more: points.csv" in one().stdout
+    write(vary=widths)
+    assert one().stdout.startswith("case")
+
+
+def test_a_point_that_failed_leaves_its_cell_empty():
+    write(vary={"optics.f_number": {"values": [4, -1]}}, optimize=None)
+    assert [line.split() for line in one(code=4).stdout.splitlines()[1:3]][1] == ["-1"]
+
+
+def test_a_narrow_terminal_gets_plain_columns(monkeypatch, capsys):
+    """No number is cut, and brackets are no markup."""
+    monkeypatch.setattr(sys.stdout, "isatty", lambda: True, raising=False)
+    head, row = ["case", ">exposure.time [ms]"], ["nominal", "10"]
+    monkeypatch.setattr(options, "line_width", lambda most: 20)
+    options.print_table(head, [row])
+    assert capsys.readouterr().out == "case     exposure.time [ms]\nnominal                  10\n"
+    monkeypatch.setattr(options, "line_width", lambda most: 80)
+    options.print_table(head, [row])
+    assert "exposure.time [ms]" in capsys.readouterr().out
 
 
 def test_json_is_all_there_is_on_stdout():
@@ -133,7 +194,8 @@ def test_ctrl_c_says_that_points_are_kept():
     process.send_signal(signal.SIGINT)
     out, err = process.communicate(timeout=60)
     assert (process.returncode, out) == (130, "")
-    assert err == "interrupted; finished points are kept, the same command goes on with them\n"
+    last = err.splitlines()[-1]  # on a busy machine, stages are told before it
+    assert last == "interrupted; finished points are kept, the same command goes on with them"
     assert not list(Path("out/study/points").glob("*.part"))
 
 

@@ -63,7 +63,6 @@ REASONS: dict[str, tuple[str, Callable[[Result], bool]]] = {
     "exposure.auto.max_gain": ("was not reached", lambda r: _limit(r) in ("", "shortest time")),
     "exposure.auto.min": ("was not reached", lambda r: _limit(r) != "shortest time"),
     "exposure.auto.target": ("a limit stopped the exposure", lambda r: _limit(r) != ""),
-    "exposure.auto.follow": ("acts from frame to frame of a sequence", lambda r: True),
     "exposure.compensation": ("a limit stopped the exposure", lambda r: _limit(r) != ""),
     "adc.bits": (
         "codes per electron are given, and no pixel comes near the last code",

@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 from making import QUIET, camera, radiance_for
 
+from vcam_cli.files.folder import OutputFolder
 from vcam_cli.progress import Silent
-from vcam_cli.simulation.sequence import frames
+from vcam_cli.simulation.sequence import frames, write_sequence
+from vcam_cli.simulation.simulate import simulate
 
 RATE = 40.0
 LAMP = {
@@ -89,3 +91,15 @@ def test_an_overexposed_frame_tells_no_more_than_that_it_was(tmp_path):
 def test_a_white_that_stays_leaves_the_exposure_as_it_is(tmp_path):
     found = exposures(tmp_path, 4, {}, method="white")
     assert len({(time, gain) for time, gain, _ in found}) == 1
+
+
+def test_following_is_said_to_change_nothing_in_a_single_frame(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    small = {"array.rows": 8, "array.columns": 8, "effects": QUIET}
+    made = camera(tmp_path, small | {"exposure": {"auto": {"max": "20 ms", "follow": 0.2}}})
+    said = [note for note in simulate(made).notes if "exposure.auto.follow" in note]
+    assert len(said) == 1
+    assert "in sequences alone" in said[0]
+    with OutputFolder(tmp_path / "out") as folder:
+        first = write_sequence(made, 2, RATE, folder, None, Silent())
+    assert not [note for note in first.notes if "exposure.auto.follow" in note]

@@ -7,7 +7,7 @@ import pytest
 from sweeping import written
 
 from vcam_cli import sweep
-from vcam_cli.commands.sweep import report
+from vcam_cli.commands.sweep import closing_lines
 from vcam_cli.errors import BadInput
 
 VARY = {"pixel.width": {"start": "4 um", "stop": "6 um", "count": 5}}
@@ -71,7 +71,7 @@ def test_every_kind_of_quantity(tmp_path):
     assert found["most"]["most"] == ""
     means = {r["pixel.width [um]"]: r["mean_electrons"] for r in result.points[:5]}
     assert float(found["ratio"]["found"]) == pytest.approx(means[4.0] / means[6.0], rel=1e-5)
-    said = report(result)
+    said = "\n".join(closing_lines(result))
     shares = "4 of 5 predicted, 1 of 1 chosen, 1 of 1 calibrated"
     assert f"expected.csv: 6 of 7 expectations are met: {shares}" in said
     assert "  missed: step: -" in said
@@ -86,7 +86,7 @@ def test_a_point_that_failed_leaves_it_unknown(tmp_path):
     result = sweep(path, tmp_path / "out", workers=1)
     (row,) = rows(tmp_path / "out").values()
     assert (row["found"], row["verdict"]) == ("", "unknown")
-    assert "unknown: x" in report(result)
+    assert "unknown: x" in "\n".join(closing_lines(result))
 
 
 @pytest.mark.parametrize(

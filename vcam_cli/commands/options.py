@@ -236,13 +236,34 @@ def print_rows(columns: Sequence[str], rows: Sequence[Sequence[str]], plain: str
     for i, name in enumerate(columns):
         right = name.startswith(">")
         table.add_column(
-            name.lstrip(">"),
+            Text(name.lstrip(">")),
             justify="right" if right else "left",
             no_wrap=right or i == 0,
         )
     for row in rows:
         table.add_row(*map(Text, row))  # names may hold brackets, which are no markup
     console.print(table, soft_wrap=False)
+
+
+def print_table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
+    """Print rows as a table, in columns of plain text where a terminal is none or too narrow.
+
+    columns: headings, those of numbers beginning with ">".
+    """
+    every = [[name.lstrip(">") for name in columns], *rows]
+    widths = [max(map(len, cells)) for cells in zip(*every, strict=True)]
+    sides = [">" if name.startswith(">") else "<" for name in columns]
+    lines = [
+        "  ".join(
+            f"{cell:{side}{width}}" for cell, side, width in zip(row, sides, widths, strict=True)
+        )
+        for row in every
+    ]
+    plain = "\n".join(line.rstrip() for line in lines)
+    if sys.stdout.isatty() and sum(widths) + 2 * len(widths) > line_width(sys.maxsize):
+        print(plain)
+    else:
+        print_rows(columns, rows, plain)
 
 
 def write_json(value: object) -> None:

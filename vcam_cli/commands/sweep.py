@@ -1,6 +1,6 @@
 """`vcam sweep`: metrics of a camera over varied parameters."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -10,10 +10,12 @@ from vcam_cli.commands.progress import Progress
 from vcam_cli.interrupts import INTERRUPTED, restore_interrupt
 
 if TYPE_CHECKING:
-    from vcam_cli.sweeps.sweep_result import ExpectationResult, SweepResult
+    from vcam_cli.sweeps.sweep_result import CaseOptimum, ExpectationResult, SweepResult
 
 MOST_MESSAGES = 12
 """The number of messages about points that are shown at most."""
+MOST_ROWS = 24
+"""The number of rows of results that are shown at most."""
 
 
 def _shard(value: str | None) -> str | None:
@@ -86,7 +88,7 @@ def sweep(
     wants_report: options.Report = False,
     formats: options.Formats = None,
 ) -> None:
-    """Run a sweep study and write points.csv, optimum.csv and a plot of every metric.
+    """Run a sweep study; print its results, write points.csv, optimum.csv and plots.
 
     Finished points are kept: a sweep that was stopped goes on when it is started again.
 
@@ -129,26 +131,68 @@ def sweep(
     if as_json:
         print(to_json(result.summary()), end="")
     elif not quiet:
-        print(report(result))
+        print_report(result)
     raise typer.Exit(result.exit_code)
 
 
-def report(result: "SweepResult") -> str:
-    """Return the report of a sweep: optima, number of points, expectations and folder."""
-    lines = []
-    for f in result.optima:
-        case, parameter, unit, best, low, high, metric, value = f.row
-        interval = f" ({low} to {high})" if low != "" else ""
-        lines.append(f"{case}: best {parameter} {best}{interval} {unit}".rstrip())
-        lines[-1] += f", {metric} {value}"
-        if f.is_beyond_points:
-            lines.append(f"  of the best point; between the points the fit reaches {f.fitted:.6g}")
-        if f.edge:
-            end = "low" if f.edge == "low" else "high"
-            lines.append(f"  at the {end} end of its range: the optimum may lie beyond")
+def print_report(result: "SweepResult") -> None:
+    """Print the table of results where it is short, the optima, and `closing_lines`."""
+    means = [] if result.missing else result.mean_rows
+    if 0 < len(means) <= MOST_ROWS or not result.optima:
+        options.print_table(*results_table(means[:MOST_ROWS]))
+        if len(means) > MOST_ROWS:
+            print(f"and {len(means) - MOST_ROWS} rows more: points.csv")
+        if len(result.points) > len(means):
+            print("means over seeds and repeats")
+        print()
+    if result.optima:
+        options.print_table(*optimum_table(result.optima))
+        print()
+    print("\n".join(closing_lines(result)))
+
+
+Table = tuple[list[str], list[list[str]]]
+"""Headings, those of numbers with ">", and rows."""
+
+
+def results_table(means: "Sequence[Mapping[str, object]]") -> Table:
+    """Return the metrics at what is varied; the case where there are several."""
+    names = list(means[0]) if means else []
+    if len({row["case"] for row in means}) == 1:
+        names.remove("case")
+    words = {name for name in names if any(isinstance(row[name], str) for row in means)}
+    heads = [name if name in words else f">{name}" for name in names]
+    return heads, [[_cell(row[name]) for name in names] for row in means]
+
+
+def optimum_table(optima: "Sequence[CaseOptimum]") -> Table:
+    """Return the best value of each parameter in each case, with what there is to say of it."""
+    rows = []
+    for best in optima:
+        said = EDGES.get(best.edge, "")
+        if best.is_beyond_points:
+            said = f"{said}; the fit reaches {best.fitted:.6g} between points".removeprefix("; ")
+        rows.append([*map(_cell, best.row), said])
+    heads = ["case", "parameter", "unit", ">best", ">low", ">high", "metric", ">value", ""]
+    return heads, rows
+
+
+EDGES = {
+    "low": "at the low end of its range: the optimum may lie beyond",
+    "high": "at the high end of its range: the optimum may lie beyond",
+}
+"""End of a range -> what is said of an optimum there."""
+
+
+def _cell(value: object) -> str:
+    return "" if value is None else f"{value:.6g}" if isinstance(value, float) else str(value)
+
+
+def closing_lines(result: "SweepResult") -> list[str]:
+    """Return the number of points, what failed or is missing, the expectations and the folder."""
     total = len(result.ids)
     there = total - result.missing
-    lines.append(f"{there} of {total} points, {result.computed} computed in {result.seconds:.1f} s")
+    lines = [f"{there} of {total} points, {result.computed} computed in {result.seconds:.1f} s"]
     if result.failed:
         lines.append(f"{result.failed} failed: see the column error of points.csv")
     if result.missing:
@@ -156,7 +200,7 @@ def report(result: "SweepResult") -> str:
     else:
         lines += _expectations_text(result.expectations)
     lines.append(f"{result.name}: {result.out}/")
-    return "\n".join(lines)
+    return lines
 
 
 def _expectations_text(verdicts: Sequence["ExpectationResult"]) -> Iterator[str]:

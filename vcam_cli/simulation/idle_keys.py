@@ -7,7 +7,7 @@ not reached, is no matter of the file and not told here.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -88,6 +88,12 @@ def _is_lit_by_flicker(camera: Camera) -> bool:
     return lamp is not None and lamp.flicker is not None and lamp.flicker.depth > 0
 
 
+FOLLOW = Rule(
+    ("exposure.auto.follow",),
+    lambda camera: True,
+    "it acts from frame to frame, in sequences alone; take one with --frames 30 --fps 30",
+)
+"""The rule of single frames: a sequence does not say it."""
 _DETECTOR = "pixel.photodetector"
 _CURVE = "pixel.readout.transfer_curve"
 RULES = (
@@ -107,6 +113,7 @@ RULES = (
         lambda camera: camera.exposure.auto is None or camera.exposure.auto.method != "percentile",
         "the automatic exposure goes by another level; write method: percentile",
     ),
+    FOLLOW,
     Rule(
         ("optics.defocus",),
         lambda camera: camera.optics.focus == "auto",
@@ -207,7 +214,17 @@ def idle_keys(camera: Camera) -> Iterator[tuple[str, str]]:
 
 def notes(camera: Camera) -> tuple[str, ...]:
     """Return a note for every idle key."""
-    return tuple(f"{path} changes nothing here: {why}" for path, why in idle_keys(camera))
+    return tuple(_note(path, why) for path, why in idle_keys(camera))
+
+
+def sequence_notes(remarks: Iterable[str]) -> tuple[str, ...]:
+    """Return the notes on a sequence's first frame without what holds of single frames alone."""
+    single = {_note(path, FOLLOW.why) for path in FOLLOW.paths}
+    return tuple(remark for remark in remarks if remark not in single)
+
+
+def _note(path: str, why: str) -> str:
+    return f"{path} changes nothing here: {why}"
 
 
 def _is_given(camera: Camera, path: str) -> bool:

@@ -24,6 +24,7 @@ from vcam_cli.files.images.video import VideoWriter, ffmpeg
 from vcam_cli.files.tables import write_table
 from vcam_cli.progress import Observer
 from vcam_cli.simulation import exposure_control
+from vcam_cli.simulation.idle_keys import sequence_notes
 from vcam_cli.simulation.output import outputs
 from vcam_cli.simulation.shared import Shared
 from vcam_cli.simulation.simulate import Result, simulate
@@ -155,7 +156,7 @@ def write_sequence(
         for number, (each, result) in enumerate(frames(camera, count, rate, workers, watch)):
             if first is None:
                 missing = bool(camera.output.render) and program is None
-                told = result.remarks + ((NO_VIDEO,) if missing else ())
+                told = sequence_notes(result.remarks) + ((NO_VIDEO,) if missing else ())
                 result = first = replace(result, remarks=told)
             name = f"{number + 1:04d}"
             outputs.write_raw(result, folder.new(f"frames/raw_{name}.exr"))

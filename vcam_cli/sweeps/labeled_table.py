@@ -1,8 +1,9 @@
-"""The points of a sweep as labeled arrays of xarray: metrics over case, parameters and seed."""
+"""The points of a sweep by what is varied: means over seeds, and labeled arrays of xarray."""
 
 from __future__ import annotations
 
 import math
+from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
@@ -41,6 +42,42 @@ def sweep_dataset(points: Sequence[Mapping[str, Cell]]) -> Any:
         for axis, (path, unit) in ((axis, _path_and_unit(axis)) for axis in axes)
     }
     return xarray.Dataset({name: (dims, array) for name, array in arrays.items()}, coordinates)
+
+
+def mean_rows(
+    points: Sequence[Mapping[str, Cell]], averaged: Sequence[str]
+) -> list[dict[str, Any]]:
+    """Return a row for each case and value of what is varied: those, and the metrics.
+
+    Parameters
+    ----------
+    points : sequence of mappings
+        The rows of points.csv.
+    averaged : sequence of str
+        Columns of repeats, which are averaged over as seeds are.
+
+    Returns
+    -------
+    list of dict
+        Metrics as means, None where one of the points averaged has failed.
+    """
+    if not points:
+        return []
+    names = list(points[0])
+    seed = names.index("seed")
+    varied = [name for name in names[:seed] if name not in averaged]
+    groups = defaultdict[tuple[Cell, ...], list[Mapping[str, Cell]]](list)
+    for row in points:
+        groups[tuple(row[name] for name in varied)].append(row)
+    return [
+        dict(zip(varied, place, strict=True))
+        | {name: _mean([row[name] for row in rows]) for name in names[seed + 1 : -1]}
+        for place, rows in groups.items()
+    ]
+
+
+def _mean(cells: Sequence[Cell]) -> float | None:
+    return None if "" in cells else float(np.mean(np.array(cells, float)))
 
 
 def _labels(cells: Iterable[Cell]) -> list[Cell]:

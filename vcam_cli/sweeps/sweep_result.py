@@ -164,6 +164,8 @@ class SweepResult:
     """Whether every point was, before it ran or then."""
     optima: tuple[CaseOptimum, ...]
     expectations: tuple[ExpectationResult, ...]
+    averaged: tuple[str, ...] = ()
+    """Columns of what is averaged over beside the seed: repeats."""
     computed: int = 0
     """Number of points computed now; the others were there."""
     seconds: float = 0.0
@@ -174,6 +176,13 @@ class SweepResult:
     def rows(self) -> list[Row]:
         """The rows of points.csv, None where a cell is empty: what pandas and polars read."""
         return [{k: None if v == "" else v for k, v in row.items()} for row in self.points]
+
+    @property
+    def mean_rows(self) -> list[Row]:
+        """Metrics for each case and value of what is varied, means over repeats and seeds."""
+        from vcam_cli.sweeps.labeled_table import mean_rows
+
+        return mean_rows(self.points, self.averaged)
 
     @property
     def optimum_rows(self) -> list[Row]:
@@ -289,6 +298,7 @@ def _read_record(record: dict[str, Any], out: Path, study: StudyFile) -> SweepRe
         out=out,
         ids=tuple(record["points"]),
         points=list(_rows(out / "points.csv", _column_types(study))),
+        averaged=tuple(p.column for p in study.averaged_parameters().values()),
         missing=0,
         refused=tuple(record["refused"]),
         all_refused=record["all_refused"],

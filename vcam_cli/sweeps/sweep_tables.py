@@ -159,6 +159,7 @@ def result(
         out=out,
         ids=tuple(point.id for point in grid.points),
         points=[dict(zip(names, row, strict=True)) for row in _point_rows(findings)],
+        averaged=tuple(parameter.column for parameter in grid.averaged_parameters),
         missing=sum(1 for p in grid.points if p.id and p.id not in outcomes),
         refused=tuple(map(str, grid.problems)),
         all_refused=all(refused),
