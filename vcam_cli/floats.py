@@ -1,9 +1,10 @@
-"""How floating-point errors are treated while vcam computes, whatever the caller has set."""
+"""How floating-point errors are treated whatever the caller has set, and the root mean square."""
 
 from collections.abc import Callable
 from typing import ParamSpec, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -15,3 +16,8 @@ def own_float_errors(function: Callable[P, T]) -> Callable[P, T]:
     What underflows is 0, as the computations take it; all else is a warning of NumPy.
     """
     return np.errstate(all="warn", under="ignore")(function)
+
+
+def rms(values: NDArray) -> float:
+    """Return the root of the mean square of values of any shape, in their unit."""
+    return float(np.sqrt(np.square(values, dtype=np.float64).mean()))

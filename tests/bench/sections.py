@@ -18,6 +18,7 @@ from vcam_cli.accuracy.study import without_effect
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import geometry
 from vcam_cli.config import shipped
+from vcam_cli.floats import rms
 from vcam_cli.scheduling.pdf import Pdf
 from vcam_cli.scheduling.shot_noise import optimal_schedules
 
@@ -142,7 +143,7 @@ def against_plain(
         given, ours = plain.setup(camera, count)
         theirs = median_cost(lambda given=given: plain.frame(given), repeats, warm=False)
         rows[scene] = theirs.ratio(frames(camera, repeats).cost)
-        apart = ablation.rms(plain.rate(given) - ours) / float(ours.max())
+        apart = rms(plain.rate(given) - ours) / float(ours.max())
     rows["mean signals differ by, rms"] = {"share": apart}
     return {f"plain NumPy, {count} wavelengths, over the frame": rows}
 

@@ -467,4 +467,4 @@ def test_the_margin_is_wide_enough_for_light_beyond_the_well(chart, time, tmp_pa
     allowed = (
         bandwidth.MARGIN_SHARE * made.accuracy.tolerance * ablation.full_signal_of(wide, truth)
     )
-    assert ablation.rms(raw - truth) <= allowed
+    assert rms(raw - truth) <= allowed

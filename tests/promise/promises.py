@@ -22,6 +22,7 @@ from vcam_cli.camera.camera import Camera
 from vcam_cli.effects.order import ORDER
 from vcam_cli.effects.signal_chain import NoiseSource
 from vcam_cli.files.images.png import write_png
+from vcam_cli.floats import rms
 from vcam_cli.simulation.preparation import Prepared
 from vcam_cli.simulation.simulate import prepare
 
@@ -359,7 +360,7 @@ def truth(camera: Camera) -> Truth:
 def kept(true: Truth) -> Iterator[Kept]:
     """Both promises, at every preset."""
     for preset, auto in true.auto.items():
-        mean = ablation.rms(ablation.mean_raw(auto) - true.mean) / true.full
+        mean = rms(ablation.mean_raw(auto) - true.mean) / true.full
         lost = variance_lost_of(auto, true.found)
         yield Kept(preset, auto.settings.tolerance, mean, lost)
 

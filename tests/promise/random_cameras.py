@@ -18,6 +18,7 @@ from vcam_cli.accuracy import ablation
 from vcam_cli.accuracy.knobs import with_accuracy
 from vcam_cli.accuracy.reference import prepare_converged
 from vcam_cli.camera.camera import Camera
+from vcam_cli.floats import rms
 from vcam_cli.simulation.simulate import prepare
 
 COUNT = 40
@@ -158,5 +159,5 @@ def held(camera: Camera, workers: int = 1) -> Iterator[Held]:
         out = [d for d in auto.plan.decisions if d.state == "off" and d.by == "plan"]
         expected = auto.spectrum.lost_rms * auto.exposure_time / full
         expected += sum(d.contribution or 0 for d in out if d.unit == "of full signal")
-        mean = ablation.rms(ablation.mean_raw(auto) - truth) / full
+        mean = rms(ablation.mean_raw(auto) - truth) / full
         yield Held(tolerance, expected, mean, variance_lost_of(auto, found))

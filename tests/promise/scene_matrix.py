@@ -26,6 +26,7 @@ from vcam_cli.accuracy.reference import effect_changes, prepare_converged
 from vcam_cli.camera.camera import Camera
 from vcam_cli.effects.base import Charge, of_kind
 from vcam_cli.effects.signal_chain import NoiseSource
+from vcam_cli.floats import rms
 from vcam_cli.simulation.preparation import Prepared
 from vcam_cli.simulation.simulate import prepare
 
@@ -163,7 +164,7 @@ def cell(name: str, scene: str, folder: Path) -> Cell:
         name,
         scene,
         states,
-        ablation.rms(ablation.mean_raw(auto) - true) / full / tolerance,
+        rms(ablation.mean_raw(auto) - true) / full / tolerance,
         promises.variance_lost_of(auto, found) / (2 * tolerance),
         shares,
     )

@@ -83,9 +83,9 @@ def test_what_acts_on_the_mean_does_so_before_shot_noise():
 
     The draw stands behind shot noise in the order, and its noise is added there: 0 here.
     """
-    code = Quantization(0.0, 1.0, 16)
+    adc = Quantization(0.0, 1.0, 16)
     effects = (DarkCurrent(60.0), ShotNoise(), Halved(0.0))
-    taken, _ = exposure.capture(np.full((64, 400), 1940.0), 0.5, effects, code, SEEDS, 1)
+    taken, _ = exposure.capture(np.full((64, 400), 1940.0), 0.5, effects, adc, SEEDS, 1)
     mean, n = (1940 * 0.5 + 30) / 2 + 30, taken.size
     assert taken.mean() == pytest.approx(mean, abs=5 * np.sqrt(mean / n))
     assert taken.var() == pytest.approx(mean, rel=5 * np.sqrt(2 / n))
@@ -94,17 +94,17 @@ def test_what_acts_on_the_mean_does_so_before_shot_noise():
 
 def test_a_longer_array_begins_like_a_shorter_one():
     """The draws of a block do not depend on how many blocks follow."""
-    code = Quantization(0.0, 1.0, 12)
+    adc = Quantization(0.0, 1.0, 12)
     effects = (ShotNoise(), ReadNoise(3.0))
-    long, _ = exposure.capture(np.full((200, 30), 5e4), 0.01, effects, code, SEEDS, 1)
-    short, _ = exposure.capture(np.full((128, 30), 5e4), 0.01, effects, code, SEEDS, 1)
+    long, _ = exposure.capture(np.full((200, 30), 5e4), 0.01, effects, adc, SEEDS, 1)
+    short, _ = exposure.capture(np.full((128, 30), 5e4), 0.01, effects, adc, SEEDS, 1)
     assert np.array_equal(long[:128], short)
 
 
 def test_every_block_is_reported_once():
-    code = Quantization(0.0, 1.0, 12)
+    adc = Quantization(0.0, 1.0, 12)
     seen = []
-    exposure.capture(np.ones((150, 8)), 1.0, (), code, SEEDS, 3, done=seen.append)
+    exposure.capture(np.ones((150, 8)), 1.0, (), adc, SEEDS, 3, done=seen.append)
     assert sorted((s.start, s.stop) for s in seen) == [(0, 64), (64, 128), (128, 150)]
     assert BLOCK_ROWS == 64
 

@@ -27,10 +27,10 @@ FINE = Quantization(0.0, 1.0, 24)
 """An ADC whose steps are electrons."""
 
 
-def taken(rate, effects, times=TIMES, code=FINE, shape=(300, 500), workers=2):
+def taken(rate, effects, times=TIMES, adc=FINE, shape=(300, 500), workers=2):
     """Samples of even light [e/s], in 64 bits."""
     return nondestructive_samples.samples(
-        np.full(shape, float(rate)), times, effects, code, SEEDS, workers
+        np.full(shape, float(rate)), times, effects, adc, SEEDS, workers
     )
 
 
@@ -136,15 +136,15 @@ def test_a_sample_does_not_depend_on_those_that_follow(dtype, tmp_path):
     frame = simulate(camera(tmp_path, NOISY | several(*TEXTS))).frame
     effects = tuple(e for e in frame.plan.active if not isinstance(e, Quantizer))
     rate = frame.rate.astype(dtype)
-    long, codes = nondestructive_samples.samples(rate, TIMES, effects, frame.code, SEEDS, 1)
+    long, codes = nondestructive_samples.samples(rate, TIMES, effects, frame.adc, SEEDS, 1)
     assert long.dtype == dtype
     for count in (1, 2, 3):
         short, dn = nondestructive_samples.samples(
-            rate, TIMES[:count], effects, frame.code, SEEDS, 1
+            rate, TIMES[:count], effects, frame.adc, SEEDS, 1
         )
         assert short.tobytes() == long[:count].tobytes()
         assert dn.tobytes() == codes[:count].tobytes()
-    single, dn = exposure.capture(rate, TIMES[0], effects, frame.code, SEEDS, 1)
+    single, dn = exposure.capture(rate, TIMES[0], effects, frame.adc, SEEDS, 1)
     assert single.tobytes() == long[0].tobytes()
     assert dn.tobytes() == codes[0].tobytes()
 

@@ -102,11 +102,6 @@ def full_signal_of(ready: Prepared, mean: NDArray) -> float:
     return max(1.0, min(ready.electrical.full_well, float(mean.max())))
 
 
-def rms(values: NDArray) -> float:
-    """Root of the mean square."""
-    return float(np.sqrt(np.mean(np.square(values))))
-
-
 def variance_shares(ready: Prepared, full: float, workers: int) -> dict[str, float]:
     """Of every draw, and of the ADC's rounding: its largest share of the variance of its scope.
 
@@ -130,18 +125,18 @@ def variance_shares(ready: Prepared, full: float, workers: int) -> dict[str, flo
                 for charge, field in zip(everything, fields, strict=True)
             )
         if scope == "frame":
-            for code in of_kind(active, Quantizer):
-                shares[code.name] = max(
-                    _rounding_share(code, charge, group.conversions) for charge in everything
+            for adc in of_kind(active, Quantizer):
+                shares[adc.name] = max(
+                    _rounding_share(adc, charge, group.conversions) for charge in everything
                 )
     return {name: float(share) for name, share in shares.items()}
 
 
-def _rounding_share(code: Quantizer, electrons: NDArray, times: int) -> float:
+def _rounding_share(adc: Quantizer, electrons: NDArray, times: int) -> float:
     """Mean square of the rounding error, a mean of so many, over the variance with it."""
-    line = code.response(electrons.copy())
+    line = adc.response(electrons.copy())
     ends = electrons.mean() * np.array([1.0, 1.001]) + np.array([0.0, 1.0])
-    per_code = float(np.diff(ends)[0] / np.diff(code.response(ends.copy()))[0])
+    per_code = float(np.diff(ends)[0] / np.diff(adc.response(ends.copy()))[0])
     error = float(np.mean((np.rint(line) - line) ** 2)) * per_code**2 / times
     return error / max(error + float(np.var(electrons)), 1e-300)
 
@@ -158,11 +153,11 @@ def _draw_field(
     Of pixels that are read as one, their mean.
     """
     seeds = {"sensor": ready.camera.seed.sensor, "frame": ready.camera.seed.frame}
-    code = quantizer(ready.camera, ready.geometry)
+    adc = quantizer(ready.camera, ready.geometry)
     charges = of_kind(ready.plan.active, Charge)
     rate = field / ready.exposure_time - sum(e.rate() for e in charges)
     effects = (*charges, *draws)
-    take = partial(exposure.capture, code=code, seeds=seeds, workers=workers)
+    take = partial(exposure.capture, adc=adc, seeds=seeds, workers=workers)
     joins = replace(ready.layout.binning_groups, step=(1, 1))  # all of its pixels are alike
     time = ready.exposure_time
-    return binned_readout.read(joins, rate, time, effects, take, code.bits)[0] / joins.summed_codes
+    return binned_readout.read(joins, rate, time, effects, take, adc.bits)[0] / joins.summed_codes

@@ -20,6 +20,7 @@ from vcam_cli.accuracy.knobs import CONVERGED, FINEST, with_accuracy
 from vcam_cli.camera.camera import Camera
 from vcam_cli.effects.base import of_kind
 from vcam_cli.effects.signal_chain import NoiseSource, Quantizer
+from vcam_cli.floats import rms
 from vcam_cli.scenes.base import ChartScene
 from vcam_cli.simulation.preparation import Prepared
 from vcam_cli.simulation.simulate import prepare
@@ -131,7 +132,7 @@ def sampling(ready: Prepared) -> float:
 
 def rms_and_largest(difference: NDArray) -> NDArray:
     """(rms, largest) of a difference of signals [electrons]."""
-    return np.array([ablation.rms(difference), float(np.abs(difference).max())])
+    return np.array([rms(difference), float(np.abs(difference).max())])
 
 
 def _is_rectangles(ready: Prepared) -> bool:

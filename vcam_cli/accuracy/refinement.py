@@ -11,6 +11,7 @@ from vcam_cli.accuracy.knobs import Knob
 from vcam_cli.accuracy.measurements import Shot
 from vcam_cli.accuracy.setting_errors import FLOOR
 from vcam_cli.camera.camera import Camera
+from vcam_cli.floats import rms
 from vcam_cli.image_formation.settings import settings
 from vcam_cli.simulation.preparation import Prepared
 from vcam_cli.simulation.simulate import prepare
@@ -40,9 +41,9 @@ def refine_reference(
     others = [shot.mean for shot in shown if shot is not base]
     for camera in finer if others else ():
         mean = ablation.mean_raw(prepare(camera, workers)[0])
-        change = ablation.rms(mean - best) / full
+        change = rms(mean - best) / full
         best = mean
-        least = min(ablation.rms(other - best) for other in others) / full
+        least = min(rms(other - best) for other in others) / full
         if change <= max(PART * least, FLOOR):
             break
     return Refined(replace(base, mean=best), change)

@@ -43,7 +43,7 @@ from vcam_cli.accuracy.refinement import Refined, is_same_camera, refine_referen
 from vcam_cli.accuracy.setting_errors import COLUMNS, Point
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.simulation import PRESETS
-from vcam_cli.floats import own_float_errors
+from vcam_cli.floats import own_float_errors, rms
 from vcam_cli.parallel import available_workers
 from vcam_cli.progress import Observer, Silent
 from vcam_cli.simulation.shared import Shared
@@ -123,7 +123,7 @@ class _Measurement:
         coarse = self.clock.timed_shot(with_accuracy(self.camera, preset="reference"))
         truth = self.clock.shot(finest_camera(self.camera, coarse.ready))
         self.full = ablation.full_signal_of(truth.ready, truth.mean)
-        change = ablation.rms(truth.mean - coarse.mean)
+        change = rms(truth.mean - coarse.mean)
         reference = describe_reference(truth.ready, coarse.ready, self.full, change)
         self.watch.begin("errors of presets and tolerances")
         own = self.clock.timed_shot(self.camera)

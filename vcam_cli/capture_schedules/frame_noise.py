@@ -56,7 +56,7 @@ class NoiseMeasurement:
         The camera with the mean rate of its pixels.
     sensor : Sensor
         Its pixel.
-    code : Quantizer
+    adc : Quantizer
         Its ADC.
     times : tuple of float
         (N,) rising capture times [s].
@@ -68,11 +68,11 @@ class NoiseMeasurement:
         self,
         ready: Prepared,
         sensor: Sensor,
-        code: Quantizer,
+        adc: Quantizer,
         times: tuple[float, ...],
         workers: int,
     ) -> None:
-        self.ready, self.sensor, self.code, self.times = ready, sensor, code, times
+        self.ready, self.sensor, self.adc, self.times = ready, sensor, adc, times
         self.workers = workers
         self.rate = ready.rate.astype(np.float64)
         self.effects: tuple[Effect, ...] = tuple(
@@ -112,10 +112,10 @@ class NoiseMeasurement:
         seeds = {"sensor": seed.sensor, "frame": seed.frame + 1 + number}
         e = self.ready.electrical
         electrons, _ = nondestructive_samples.samples(
-            self.rate, self.times, self.effects, self.code, seeds, self.workers
+            self.rate, self.times, self.effects, self.adc, seeds, self.workers
         )
-        dn = np.rint(self.code.response(electrons))
-        return (self.code.linear(dn) - e.offset) * e.electrons_per_dn
+        dn = np.rint(self.adc.response(electrons))
+        return (self.adc.linear(dn) - e.offset) * e.electrons_per_dn
 
     def _estimate(self, charge: Floats, full: Flags, method: str) -> Floats:
         s = self.sensor

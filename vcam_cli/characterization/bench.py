@@ -178,14 +178,14 @@ class Bench:
         (rows, columns) array
             Codes [DN].
         """
-        code = quantizer(self.ready.camera, self.ready.geometry)
+        adc = quantizer(self.ready.camera, self.ready.geometry)
         seed = self.camera.seed
         # No frame of another frame seed has the same noise.
         seeds = {"sensor": seed.sensor, "frame": seed.frame + (number << 64)}
         active = self.ready.plan.active
-        electrons, _ = exposure.capture(rate, time, active, code, seeds, self.workers)
-        dn = np.rint(code.response(electrons)) + self.pedestal
-        return np.clip(dn, 0, 2**code.bits - 1 + self.pedestal)
+        electrons, _ = exposure.capture(rate, time, active, adc, seeds, self.workers)
+        dn = np.rint(adc.response(electrons)) + self.pedestal
+        return np.clip(dn, 0, 2**adc.bits - 1 + self.pedestal)
 
     def color_pixels(self, frame: NDArray, color: str) -> NDArray:
         """Return the pixels of one color as lattices of equal size, (lattices, rows, columns)."""

@@ -144,11 +144,11 @@ def _expected_linearity(bench: Bench, channel: Channel) -> tuple[float, float, f
     """Return the linearity error of the readout's curve, its least and its largest deviation."""
     if bench.ready.electrical.curve is None:
         return 0.0, 0.0, 0.0
-    code = quantizer(bench.ready.camera, bench.ready.geometry)
+    adc = quantizer(bench.ready.camera, bench.ready.geometry)
     series = channel.transfer.series
     electrons = series.photons * bench.efficiency(channel.color) + bench.dark
-    black = float(code.response(np.array([bench.dark]))[0])
-    without_noise = replace(series, mean=code.response(electrons), dark_mean=black)
+    black = float(adc.response(np.array([bench.dark]))[0])
+    without_noise = replace(series, mean=adc.response(electrons), dark_mean=black)
     straight = linearity(without_noise)
     return straight.error, straight.min_deviation, straight.max_deviation
 

@@ -7,7 +7,7 @@ import typer
 
 from vcam_cli.commands import options
 from vcam_cli.commands.progress import Progress
-from vcam_cli.commands.sweep import Fresh, Processes, Scheduler, Shard, Study, share_numbers
+from vcam_cli.commands.sweep import Fresh, Processes, Scheduler, Shard, share_numbers
 from vcam_cli.interrupts import INTERRUPTED, restore_interrupt
 
 if TYPE_CHECKING:
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def dataset(
-    study: Study,
+    study: options.Study,
     out: options.Out = None,
     set_: options.Set = None,
     seed: options.Seed = None,

@@ -86,6 +86,15 @@ Camera = Annotated[
         show_default=False,
     ),
 ]
+Study = Annotated[
+    str,
+    typer.Argument(
+        metavar="STUDY",
+        help="A study file, or the name of a shipped study (see `vcam list studies`).",
+        autocompletion=complete_study,
+        show_default=False,
+    ),
+]
 Out = Annotated[
     Path | None,
     typer.Option("-o", "--out", metavar="DIR", help="Folder to write into; default out/NAME."),

@@ -18,15 +18,6 @@ if TYPE_CHECKING:
 MOST_TIMES = 10
 """The number of captures whose times are shown."""
 
-Study = Annotated[
-    str,
-    typer.Argument(
-        metavar="STUDY",
-        help="A study file, or the name of a shipped study (see `vcam list studies`).",
-        autocompletion=options.complete_study,
-        show_default=False,
-    ),
-]
 Set = Annotated[
     list[str] | None,
     typer.Option(
@@ -45,7 +36,7 @@ Seed = Annotated[
 
 
 def schedule(
-    study: Study,
+    study: options.Study,
     out: options.Out = None,
     set_: Set = None,
     seed: Seed = None,

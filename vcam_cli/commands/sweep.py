@@ -38,15 +38,6 @@ def share_numbers(shard: str | None) -> tuple[int, int] | None:
     return int(number), int(count)
 
 
-Study = Annotated[
-    str,
-    typer.Argument(
-        metavar="STUDY",
-        help="A study file, or the name of a shipped study (see `vcam list studies`).",
-        autocompletion=options.complete_study,
-        show_default=False,
-    ),
-]
 Processes = Annotated[
     int | None,
     typer.Option(
@@ -74,7 +65,7 @@ Fresh = Annotated[bool, typer.Option("--fresh", help="Compute finished points ag
 
 
 def sweep(
-    study: Study,
+    study: options.Study,
     out: options.Out = None,
     set_: options.Set = None,
     seed: options.Seed = None,

@@ -33,6 +33,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from vcam_cli.floats import rms
+
 Floats = NDArray[np.floating]
 
 BINS_PER_PIXEL = 4
@@ -194,7 +196,7 @@ def _polyfit_without_outliers(y: Floats, x: Floats, degree: int) -> Floats:
     powers = scale ** -np.arange(degree, -1, -1.0)
     curve = np.polyfit(y / scale, x, degree) * powers
     off = np.abs(x - np.polyval(curve, y))
-    near = off <= 3 * max(float(np.sqrt(np.mean(off**2))), 1e-15)
+    near = off <= 3 * max(rms(off), 1e-15)
     if near.sum() > 2 * degree + 2:
         curve = np.polyfit(y[near] / scale, x[near], degree) * powers
     return np.asarray(curve, dtype=np.float64)

@@ -143,7 +143,7 @@ def capture(
     rate: NDArray,
     time: float,
     effects: tuple[Effect, ...],
-    code: Quantizer,
+    adc: Quantizer,
     seeds: dict[str, int],
     workers: int,
     done: Callable[[slice], None] | None = None,
@@ -160,7 +160,7 @@ def capture(
         Exposure time [s].
     effects : tuple of Effect
         Effects that run, in the order of action.
-    code : Quantizer
+    adc : Quantizer
         The ADC.
     seeds : dict
         Seeds of 'sensor' and 'frame'.
@@ -184,13 +184,13 @@ def capture(
     """
     if rate.ndim == 3:
         layers = [
-            capture(plane, time, effects, code, seeds, workers, layer=number)
+            capture(plane, time, effects, adc, seeds, workers, layer=number)
             for number, plane in enumerate(rate)
         ]
         return np.array([e for e, _ in layers]), np.array([dn for _, dn in layers])
     dark = mean_dark(time, effects)
     electrons = np.empty_like(rate)
-    dn = np.empty(rate.shape, codes_type(code.bits))
+    dn = np.empty(rate.shape, codes_type(adc.bits))
 
     def shoot(block: slice) -> None:
         opened = sites(rate, dark, seeds, layer, block)
@@ -203,7 +203,7 @@ def capture(
             for effect in of_kind(effects, ElectronEffect):
                 tile = effect.apply(tile, here[effect.scope])
             electrons[rows] = tile
-            dn[rows] = code.apply(tile)
+            dn[rows] = adc.apply(tile)
         if done is not None:
             done(block)
 

@@ -45,7 +45,7 @@ def samples(
     rate: NDArray,
     times: Sequence[float],
     effects: tuple[Effect, ...],
-    code: Quantizer,
+    adc: Quantizer,
     seeds: dict[str, int],
     workers: int,
     layer: int = 0,
@@ -61,7 +61,7 @@ def samples(
         Times of the N samples, rising [s].
     effects : tuple of Effect
         Effects that run, in the order of action.
-    code : Quantizer
+    adc : Quantizer
         The ADC.
     seeds : dict
         Seeds of 'sensor' and 'frame'.
@@ -87,14 +87,14 @@ def samples(
     if rate.ndim == 3:
         layers = [
             samples(
-                *(plane, times, effects, code, seeds, workers, number),
+                *(plane, times, effects, adc, seeds, workers, number),
                 [of_step[number] for of_step in step_rates],
             )
             for number, plane in enumerate(rate)
         ]
         return np.stack([e for e, _ in layers], 1), np.stack([dn for _, dn in layers], 1)
     electrons = np.empty((len(times), *rate.shape), rate.dtype)
-    dn = np.empty(electrons.shape, codes_type(code.bits))
+    dn = np.empty(electrons.shape, codes_type(adc.bits))
     well = full_well(effects)
 
     def shoot(block: slice) -> None:
@@ -114,7 +114,7 @@ def samples(
             read[full] = well
             full = read >= well
             electrons[number, block] = read
-            dn[number, block] = code.apply(read)
+            dn[number, block] = adc.apply(read)
             before = time
 
     each(shoot, blocks(len(rate)), workers)
@@ -156,7 +156,7 @@ def photocurrent(
     times: Sequence[float],
     estimator: str,
     effects: tuple[Effect, ...],
-    code: Quantizer,
+    adc: Quantizer,
     electrical: Electrical,
     saturated_dn: float,
     workers: int,
@@ -177,7 +177,7 @@ def photocurrent(
         samples before saturation).
     effects : tuple of Effect
         Effects that run, of which the mean dark current and the variances are known.
-    code : Quantizer
+    adc : Quantizer
         The ADC.
     electrical : Electrical
         Conversion between electrons, volts and codes.
@@ -197,13 +197,13 @@ def photocurrent(
     X. Liu and A. El Gamal, IEEE Trans. Circuits Syst. I 50(4), 2003, doi:10.1109/TCSI.2003.809815.
     """
     dark = mean_dark(1.0, effects)
-    read, reset = variances(effects, code)
+    read, reset = variances(effects, adc)
     out = np.empty(dn.shape[1:], np.float32)
 
     def estimate(block: slice) -> None:
         here = dn[..., block, :]
         full = here >= saturated_dn
-        linear = code.linear(here.astype(np.float64))
+        linear = adc.linear(here.astype(np.float64))
         charge = (linear - electrical.offset) * electrical.electrons_per_dn
         if estimator == "weighted":
             found = estimators.weighted_estimate(charge, times, full, dark, read, reset)
@@ -215,14 +215,14 @@ def photocurrent(
     return out
 
 
-def variances(effects: tuple[Effect, ...], code: Quantizer) -> tuple[float, float]:
+def variances(effects: tuple[Effect, ...], adc: Quantizer) -> tuple[float, float]:
     """Return the variances of one readout and of what all samples have in common.
 
     Parameters
     ----------
     effects : tuple of Effect
         Effects that run, of which the temporal noise counts.
-    code : Quantizer
+    adc : Quantizer
         The ADC.
 
     Returns
@@ -235,5 +235,5 @@ def variances(effects: tuple[Effect, ...], code: Quantizer) -> tuple[float, floa
     sources = noise_sources(effects, "frame")
     sample_sites = sum(e.variance(0.0) for e in sources if e.sample_draws == "independent")
     common = sum(e.variance(0.0) for e in sources if e.sample_draws == "common")
-    below, above = code.response(np.array([0.0, 1.0]))
+    below, above = adc.response(np.array([0.0, 1.0]))
     return float(sample_sites + (1 / (above - below)) ** 2 / 12), float(common)

@@ -26,7 +26,7 @@ from vcam_cli.scheduling.sensor import Sensor
 
 
 def sensor(
-    electrical: Electrical, effects: Sequence[Effect], code: Quantizer, longest: float
+    electrical: Electrical, effects: Sequence[Effect], adc: Quantizer, longest: float
 ) -> Sensor:
     """Return the pixel as its schedule models it.
 
@@ -38,7 +38,7 @@ def sensor(
         Full well and end of the ADC.
     effects : sequence of Effect
         Effects that the camera's file describes.
-    code : Quantizer
+    adc : Quantizer
         The ADC.
     longest : float
         Longest exposure time [s].
@@ -48,7 +48,7 @@ def sensor(
     Sensor
         Model of the pixel.
     """
-    read, reset = variances(tuple(effects), code)
+    read, reset = variances(tuple(effects), adc)
     return Sensor(
         well=electrical.saturation,
         dark=mean_dark(1.0, tuple(effects)),
@@ -63,7 +63,7 @@ def choose_sample_times(
     rate: NDArray,
     electrical: Electrical,
     effects: Sequence[Effect],
-    code: Quantizer,
+    adc: Quantizer,
 ) -> tuple[float, ...]:
     """Return the times of the samples of one integration.
 
@@ -77,7 +77,7 @@ def choose_sample_times(
         Full well and end of the ADC.
     effects : sequence of Effect
         Effects that the camera has.
-    code : Quantizer
+    adc : Quantizer
         The ADC.
 
     Returns
@@ -89,7 +89,7 @@ def choose_sample_times(
     asked = camera.exposure.schedule
     if asked is None:
         return camera.exposure.samples
-    return optimal_times(rate, asked.count, sensor(electrical, effects, code, asked.max))
+    return optimal_times(rate, asked.count, sensor(electrical, effects, adc, asked.max))
 
 
 def optimal_times(rate: NDArray, count: int, pixel: Sensor) -> tuple[float, ...]:

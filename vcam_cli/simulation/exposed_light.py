@@ -25,6 +25,7 @@ from vcam_cli.effects.base import (
 from vcam_cli.effects.order import quantizer
 from vcam_cli.effects.signal_chain import Limit, NoiseSource, extreme_signal
 from vcam_cli.errors import bad
+from vcam_cli.floats import rms
 from vcam_cli.image_formation import photon_rate, pixelwise, timed_gains
 from vcam_cli.image_formation.light_plan import PERCENTILES, LightPlan
 from vcam_cli.image_formation.settings import Settings
@@ -104,11 +105,11 @@ def expose(
     for effect in timed:
         others = tuple(e for e in timed if e is not effect)
         without = timed_gains.apply(light.values, others, place.lattice, 0.0, time)
-        changes[effect.name] = _rms(np.subtract(lit, without))
+        changes[effect.name] = rms(np.subtract(lit, without))
     if transports := [transport.name for transport in of_kind(enabled, Transport)]:
         well = min(circuit.full_well / time - dark, MOST_ELECTRONS)
         deferred = np.minimum(rate, well) - np.minimum(groups.collect(collected), well)
-        changes |= dict.fromkeys(transports, _rms(deferred))
+        changes |= dict.fromkeys(transports, rms(deferred))
     full = max(1.0, min(circuit.full_well, peak))
     alone = not times and camera.array.binning is None
     signal = SignalLevels(
@@ -161,10 +162,6 @@ def _pixel_changes(
         changes = pixelwise.changes_by_omission(plane, geometry, colors, present, running, time)
         largest = {name: max(change, largest.get(name, 0.0)) for name, change in changes.items()}
     return largest
-
-
-def _rms(values: NDArray) -> float:
-    return float(np.sqrt(np.square(values, dtype=np.float64).mean()))
 
 
 def _transport(

@@ -97,7 +97,7 @@ def picture_snr_db(frame: Frame) -> float:
         return -math.inf
     sources = noise_sources(frame.plan.active, "frame")
     noise = sum(source.binned_variance(light + dark, dark, binning) for source in sources)
-    rounding = frame.code.rounding(light + dark, summed * noise) / summed
+    rounding = frame.adc.rounding(light + dark, summed * noise) / summed
     return 20 * math.log10(light / math.sqrt(noise + rounding))
 
 
@@ -161,7 +161,7 @@ def _raw_peak(frame: Frame) -> float:
     brightest = (float(joins.join(frame.rate).max()) / summed + frame.dark_rate) * (
         frame.exposure_time
     )
-    level = float(frame.code.response(np.array([min(brightest, e.full_well)]))[0])
+    level = float(frame.adc.response(np.array([min(brightest, e.full_well)]))[0])
     return min((level - e.offset) / (e.highest_code - e.offset), 1.0)
 
 

@@ -77,7 +77,7 @@ class Frame(Prepared):
         """From which on a pixel of `picture_dn` is saturated: in all its samples [DN]."""
         if not self.times:
             return self.saturated_dn
-        linear = float(self.code.linear(np.array([self.saturated_dn]))[0])
+        linear = float(self.adc.linear(np.array([self.saturated_dn]))[0])
         charge = (linear - self.electrical.offset) * self.electrical.electrons_per_dn
         # Not all of it: the photocurrent is rounded to 32 bits, and so is its code.
         least = charge / self.times[0] * (1 - 1e-6) - self.dark_rate
@@ -94,7 +94,7 @@ class Frame(Prepared):
         return self.layout.binning_groups.join(mean)
 
     @property
-    def code(self) -> Quantizer:
+    def adc(self) -> Quantizer:
         """The ADC."""
         return quantizer(self.camera, self.geometry)
 
@@ -112,12 +112,12 @@ class Frame(Prepared):
     def to_dn(self, electrons: NDArray) -> NDArray:
         """Return the ADC's curve before rounding and clipping; added codes are equal [DN]."""
         n = self.summed_codes
-        return self.code.response(electrons) if n == 1 else n * self.code.response(electrons / n)
+        return self.adc.response(electrons) if n == 1 else n * self.adc.response(electrons / n)
 
     def linear(self, dn: NDArray) -> NDArray:
         """Return what a linear ADC has for these codes, added where `to_dn` adds them [DN]."""
         n = self.summed_codes
-        return self.code.linear(dn) if n == 1 else n * self.code.linear(dn / n)
+        return self.adc.linear(dn) if n == 1 else n * self.adc.linear(dn / n)
 
     @property
     def white_dn(self) -> NDArray:
@@ -135,7 +135,7 @@ class Frame(Prepared):
         if self.layout.binning_groups.binning.kind == "voltage":
             well -= binned_readout.SURE * self._noise_of_full
         # In both float types: where the well lies half way between two codes they round apart.
-        codes = [self.code.apply(np.full(1, well, kind))[0] for kind in (np.float32, np.float64)]
+        codes = [self.adc.apply(np.full(1, well, kind))[0] for kind in (np.float32, np.float64)]
         return self.summed_codes * float(min(*codes, highest))
 
     @property
@@ -248,17 +248,17 @@ def take_frame(ready: Prepared, workers: int, stages: Stages | None = None) -> F
     """Return one frame of a camera that is ready for it."""
     stages, camera = stages or Stages(), ready.camera
     with stages("capture"):
-        active, code = ready.plan.active, quantizer(camera, ready.geometry)
+        active, adc = ready.plan.active, quantizer(camera, ready.geometry)
         seeds = {"sensor": camera.seed.sensor, "frame": camera.seed.frame}
         known = {field.name: getattr(ready, field.name) for field in fields(ready)}
         times = ready.times
         if not times:
-            take = partial(exposure.capture, code=code, seeds=seeds, workers=workers)
+            take = partial(exposure.capture, adc=adc, seeds=seeds, workers=workers)
             joins, time = ready.layout.binning_groups, ready.exposure_time
-            electrons, dn = binned_readout.read(joins, ready.rate, time, active, take, code.bits)
+            electrons, dn = binned_readout.read(joins, ready.rate, time, active, take, adc.bits)
             return Frame(**known, electrons=electrons, dn=dn)
         electrons, dn = nondestructive_samples.samples(
-            ready.rate, times, active, code, seeds, workers, step_rates=ready.step_rates
+            ready.rate, times, active, adc, seeds, workers, step_rates=ready.step_rates
         )
     last = Frame(**known, electrons=electrons[-1], dn=dn[-1])
     with stages("reconstruction"):
@@ -267,7 +267,7 @@ def take_frame(ready: Prepared, workers: int, stages: Stages | None = None) -> F
             times,
             camera.exposure.estimator,
             active,
-            code,
+            adc,
             ready.electrical,
             last.saturated_dn,
             workers,

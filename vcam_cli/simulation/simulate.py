@@ -317,13 +317,10 @@ def prepare(
 ) -> tuple[Prepared, tuple[str, ...]]:
     """Return the camera ready to take its frame, and notes: what `vcam plan` shows."""
     try:
-        stages = Stages(watch=observer(watch))
-        camera = _load_lens(camera, stages)
-        picture, notes = _completed(camera, *read_scene(camera, stages))
-        workers = workers or threads(camera)
-        camera, told, seconds = focused(camera, picture, workers, stages)
+        stages, workers = Stages(watch=observer(watch)), workers or threads(camera)
+        camera, picture, notes, seconds = _in_focus(camera, workers, stages, Shared())
         ready = bring_light(camera, picture, workers, stages, earlier=seconds)
-        return ready, notes + told + remarks.remarks(ready)
+        return ready, notes + remarks.remarks(ready)
     except BadInput as error:
         raise error.with_places(camera.locate) from None
 
@@ -348,10 +345,21 @@ def _completed(camera: Camera, picture: Any, notes: tuple[str, ...]) -> tuple[An
     return cube, (*notes, *more)
 
 
-def _simulate(camera: Camera, workers: int, stages: Stages, shared: Shared) -> Result:
+def _in_focus(
+    camera: Camera, workers: int, stages: Stages, shared: Shared
+) -> tuple[Camera, Any, tuple[str, ...], float]:
+    """Return the camera in focus, its picture file's samples, notes, and the focusing's time [s].
+
+    The time is estimated; the plan counts it.
+    """
     camera = _load_lens(camera, stages)
     picture, notes = _completed(camera, *shared.picture(camera, lambda: read_scene(camera, stages)))
     camera, told, seconds = focused(camera, picture, workers, stages)
+    return camera, picture, notes + told, seconds
+
+
+def _simulate(camera: Camera, workers: int, stages: Stages, shared: Shared) -> Result:
+    camera, picture, notes, seconds = _in_focus(camera, workers, stages, shared)
     frame = expose(camera, picture, workers, stages, shared.rate_cache, seconds)
     context = Context(
         pattern=frame.mosaic.block,
@@ -366,7 +374,7 @@ def _simulate(camera: Camera, workers: int, stages: Stages, shared: Shared) -> R
         layout=frame.layout if frame.layout.is_scattered else None,
     )
     steps = partial(process, frame.picture_dn, context, workers=workers)
-    result = Result(frame, stages, workers, steps, notes + told + remarks.remarks(frame))
+    result = Result(frame, stages, workers, steps, notes + remarks.remarks(frame))
     if needs_picture(camera):  # what is wrong with its steps is said before anything is written
         _ = result.processed
     return result

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from vcam_cli.camera.camera import Camera
 from vcam_cli.errors import BadInput, Collector
+from vcam_cli.floats import rms
 from vcam_cli.progress import Observer, Silent
 from vcam_cli.verification.edges import judge_edge
 from vcam_cli.verification.frames import numbered_stacks, paths, raise_if_any
@@ -111,7 +112,7 @@ class Verification:
         return {
             "count": len(self.rows),
             "mean_error_percent": float(percent.mean()),
-            "rms_error_percent": float(np.sqrt(np.mean(percent**2))),
+            "rms_error_percent": rms(percent),
             "largest_error_percent": float(np.abs(percent).max()),
             "missed": len(self.missed),
             "judged": sum(row.deviation is not None for row in self.rows),

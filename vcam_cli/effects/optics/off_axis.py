@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from vcam_cli.camera.derived.falloff import falloff
 from vcam_cli.effects.base import Gain
+from vcam_cli.floats import rms
 from vcam_cli.physics import radiometry
 
 ENTRIES = 1 << 17
@@ -100,7 +101,7 @@ class OffAxis(Gain):
         """Return a bound of the rms change of the mean signal by leaving it out [electrons]."""
         radius2 = _quadrant(self.half_width, self.half_height)
         loss = 1 - self._relative_illumination(radius2 / self.image_distance**2)
-        return 1.002 * float(np.sqrt(np.mean(loss**2))) * signal.full_signal
+        return 1.002 * rms(loss) * signal.full_signal
 
 
 @dataclass(frozen=True)
@@ -166,7 +167,7 @@ class MeasuredFalloff(Gain):
         change = 1 - self._relative_illumination(
             np.sqrt(_quadrant(self.half_width, self.half_height))
         )
-        return 1.002 * float(np.sqrt(np.mean(change**2))) * signal.full_signal
+        return 1.002 * rms(change) * signal.full_signal
 
 
 def _quadrant(half_width: float, half_height: float) -> NDArray:

@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 
 from vcam_cli.camera.derived import pixel_layout
 from vcam_cli.effects.base import Gain
+from vcam_cli.floats import rms
 from vcam_cli.physics import vignetting
 
 POINTS = (17, 33, 65)
@@ -127,8 +128,7 @@ class PixelVignetting(Gain):
         at = (np.arange(64) + 0.5) / 64
         gain = self.gain(at * self.half_width, at * self.half_height)
         brightest = max(float(gain.max()), LEAST)
-        rms = float(np.sqrt(np.mean((1 - gain) ** 2)))
-        return 1.002 * rms / brightest * signal.full_signal
+        return 1.002 * rms(1 - gain) / brightest * signal.full_signal
 
 
 @lru_cache(maxsize=16)

@@ -8,8 +8,6 @@ electrons are there. Float32 holds codes of up to 24 bits exactly.
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from types import TracebackType
-from typing import Self
 
 import numpy as np
 
@@ -28,7 +26,7 @@ oiio.attribute("limits:resolution", 1 << 28)  # a million by default; scattered 
 _NOT_OURS = ("oiio:", "openexr:", "screenWindow", "compression", "PixelAspectRatio", "DateTime")
 
 
-class ExrWriter:
+class ExrWriter(RowWriter):
     """Context that writes an EXR progressively, so that later rows can be computed meanwhile.
 
         with ExrWriter(path, (rows, columns), ["dn", "electrons"], {"name": "x"}) as raw:
@@ -52,35 +50,22 @@ class ExrWriter:
         if len(set(channels)) != len(channels):
             raise ValueError(f"channel names must differ: {channels}")
         self._channels = tuple(channels)
-        self._width = shape[1]
         spec = image_spec(*shape, len(channels), "float")
         spec.channelnames = self._channels
         set_attributes(spec, {**(attributes or {}), "compression": compression})
-        self._writer = RowWriter(path, "openexr", spec, _is_whole)
-
-    def __enter__(self) -> Self:
-        self._writer.__enter__()
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self._writer.__exit__(kind, error, trace)
+        super().__init__(path, "openexr", spec, _is_whole)
 
     def write_rows(self, first_row: int, blocks: Mapping[str, np.ndarray]) -> None:
         """Write a block (n, width) of every channel, rows first_row .. first_row + n - 1."""
         if set(blocks) != set(self._channels):
             raise ValueError(f"channels {sorted(blocks)} given, {self._channels} expected")
         rows = len(blocks[self._channels[0]])
-        together = np.empty((rows, self._width, len(self._channels)), np.float32)
+        together = np.empty((rows, self._spec.width, len(self._channels)), np.float32)
         for index, name in enumerate(self._channels):
             if blocks[name].shape != together.shape[:2]:
                 raise ValueError(f"channel {name}: shape {blocks[name].shape}")
             together[:, :, index] = blocks[name]
-        self._writer.write(first_row, together)
+        self.write(first_row, together)
 
 
 def write_exr(

@@ -6,8 +6,6 @@ OpenImageIO's defaults for 1.05 times the bytes.
 
 from collections.abc import Sequence
 from pathlib import Path
-from types import TracebackType
-from typing import Self
 
 import numpy as np
 
@@ -18,7 +16,7 @@ _END = b"\0\0\0\0IEND\xaeB`\x82"
 _SAMPLES = {np.dtype(np.uint8): "uint8", np.dtype(np.uint16): "uint16"}
 
 
-class PngWriter:
+class PngWriter(RowWriter):
     """Context that writes a PNG progressively; `shape` is (h, w), (h, w, 1) or (h, w, 3).
 
     `description` is a text in the file. `dtype` is uint8 or uint16. Every row must be written,
@@ -48,25 +46,13 @@ class PngWriter:
                 **({"ImageDescription": description} if description else {}),
             },
         )
-        self._writer = RowWriter(path, "png", spec, _is_whole)
-
-    def __enter__(self) -> Self:
-        self._writer.__enter__()
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self._writer.__exit__(kind, error, trace)
+        super().__init__(path, "png", spec, _is_whole)
 
     def write_rows(self, first_row: int, block: np.ndarray) -> None:
         """Write rows first_row .. first_row + n - 1 from a block (n, w) or (n, w, channels)."""
         if block.dtype != self._dtype:
             raise ValueError(f"a block of {block.dtype} in a PNG of {self._dtype}")
-        self._writer.write(first_row, block[:, :, None] if block.ndim == 2 else block)
+        self.write(first_row, block[:, :, None] if block.ndim == 2 else block)
 
 
 def write_png(path: Path | str, image: np.ndarray, description: str = "") -> None:

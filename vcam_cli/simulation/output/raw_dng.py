@@ -139,7 +139,7 @@ def _noise(frame: Frame, span: float) -> tuple[float, float]:
         sum(source.binned_variance(mean, dark, binning) for source in sources)
         for mean in (dark, dark + electrons)
     )
-    rounding = frame.code.rounding(dark, floor * frame.summed_codes) / frame.summed_codes
+    rounding = frame.adc.rounding(dark, floor * frame.summed_codes) / frame.summed_codes
     return (full - floor) / electrons**2, (floor + rounding) / electrons**2
 
 

@@ -55,7 +55,7 @@ def noise_parts(frame: Frame) -> tuple[NDArray, dict[str, NDArray]]:
     temporal = sum(parts[s.name] for s in noise_sources(frame.plan.active, "frame"))
     noise = np.broadcast_to(temporal, signal.shape)
     rounding = [
-        frame.code.rounding(level + dark, joins * float(n)) / joins
+        frame.adc.rounding(level + dark, joins * float(n)) / joins
         for level, n in zip(signal, noise, strict=True)
     ]
     return signal, parts | {"quantization": np.array(rounding)}
