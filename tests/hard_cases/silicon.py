@@ -195,10 +195,10 @@ def _dark_exact(donors: mp.mpf) -> mp.mpf:
 
 
 def _dark(x_n: np.ndarray, x_p: np.ndarray) -> np.ndarray:
-    return junction.dark_current_density(
+    return sum(junction.dark_current_parts(
         CARRIERS, HOLES, ELECTRONS, DONORS, ACCEPTORS, SURFACE, NEUTRAL, x_n, x_p,
         _lifetime(DONORS), LIVES,
-    )  # fmt: skip
+    ))  # fmt: skip
 
 
 DARK_CURRENT = Case(

@@ -104,14 +104,10 @@ def plot_binning(
 
     Parameters
     ----------
-    path : Path or str
-        The PNG.
-    title : str
-        Title of the figure.
+    path, title, units
+        As those of `plot_pdf_and_captures`.
     steps : sequence of (str, Pdf)
         Name and pdf of each step, the original first.
-    units : Units
-        Units of the axes.
 
     Raises
     ------

@@ -103,12 +103,8 @@ def system_mtf(
     ----------
     ready : Prepared
         The camera.
-    color : int
-        Index of the color.
-    frequency : (n,) array
-        Spatial frequencies along `direction` [cycles/m].
-    direction : tuple of float
-        Unit vector (x, y).
+    color, frequency, direction
+        As those of `directional_mtf`.
 
     Returns
     -------

@@ -46,14 +46,8 @@ def pulse_mean(
 
     Parameters
     ----------
-    start : array_like
-        Starts of exposures, of any shape [s].
-    time : float
-        Exposure time, above 0 [s].
-    frequency : float
-        Frequency of the light [Hz].
-    depth : float
-        Modulation (brightest - darkest) / (brightest + darkest).
+    start, time, frequency, depth
+        As those of `sinusoid_mean`.
     duty : float
         Bright part of a period, above 0.
     phase : float, optional

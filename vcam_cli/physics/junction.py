@@ -30,7 +30,7 @@ def _float(value: ArrayLike) -> Floats:
     return np.asarray(value, dtype=np.float64)
 
 
-def dark_current_density(
+def dark_current_parts(
     intrinsic: ArrayLike,
     hole_diffusivity: ArrayLike,
     electron_diffusivity: ArrayLike,
@@ -42,13 +42,13 @@ def dark_current_density(
     x_p: ArrayLike,
     hole_lifetime: ArrayLike,
     electron_lifetime: ArrayLike,
-) -> Floats:
-    """Return the dark current density of a junction, eq 2.31 of [1].
+) -> tuple[Floats, Floats, Floats]:
+    """Return the three terms of the dark current density of a junction, eq 2.31 of [1].
 
-    Diffusion from the two neutral regions, and generation in the depletion region:
+    Diffusion from the n region, generation in the depletion region, diffusion from the p region:
 
-        j = q D_p n_i^2 / (N_d x1) + q D_n n_i^2 / (N_a (x3 - x2))
-            + (q n_i / 2) (x_n / tau_p + x_p / tau_n)
+        j = q D_p n_i^2 / (N_d x1) + (q n_i / 2) (x_n / tau_p + x_p / tau_n)
+            + q D_n n_i^2 / (N_a (x3 - x2))
 
     Parameters
     ----------
@@ -64,54 +64,6 @@ def dark_current_density(
         Widths of the depletion region on either side of the junction [m].
     hole_lifetime, electron_lifetime : array_like
         Lifetimes tau_p, tau_n [s], positive. All broadcast.
-
-    Returns
-    -------
-    ndarray
-        Current density j [A/m2].
-
-    Raises
-    ------
-    ValueError
-        A width, concentration or lifetime that is not positive.
-    """
-    parts = dark_current_parts(
-        intrinsic,
-        hole_diffusivity,
-        electron_diffusivity,
-        donors,
-        acceptors,
-        surface_width,
-        neutral_width,
-        x_n,
-        x_p,
-        hole_lifetime,
-        electron_lifetime,
-    )
-    return (parts[0] + parts[1] + parts[2])[()]
-
-
-def dark_current_parts(
-    intrinsic: ArrayLike,
-    hole_diffusivity: ArrayLike,
-    electron_diffusivity: ArrayLike,
-    donors: ArrayLike,
-    acceptors: ArrayLike,
-    surface_width: ArrayLike,
-    neutral_width: ArrayLike,
-    x_n: ArrayLike,
-    x_p: ArrayLike,
-    hole_lifetime: ArrayLike,
-    electron_lifetime: ArrayLike,
-) -> tuple[Floats, Floats, Floats]:
-    """Return the three terms of eq 2.31 of [1], by the region where they come from.
-
-    Parameters
-    ----------
-    intrinsic, hole_diffusivity, electron_diffusivity, donors, acceptors : array_like
-        As of `dark_current_density`.
-    surface_width, neutral_width, x_n, x_p, hole_lifetime, electron_lifetime : array_like
-        Likewise.
 
     Returns
     -------

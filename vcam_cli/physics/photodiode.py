@@ -67,10 +67,8 @@ def collected_parts(
 
     Parameters
     ----------
-    absorption : array_like
-        Absorption coefficient a [1/m], not negative.
-    x1, x2, x3 : array_like
-        Depths [m], 0 <= x1 <= x2 <= x3. All four broadcast.
+    absorption, x1, x2, x3
+        As those of `quantum_efficiency`.
 
     Returns
     -------
@@ -100,10 +98,8 @@ def quantum_efficiency_pinned(
 
     Parameters
     ----------
-    absorption : array_like
-        Absorption coefficient a [1/m], not negative.
-    x1, x2, x3 : array_like
-        Depths [m], 0 <= x1 <= x2 <= x3. All four broadcast.
+    absorption, x1, x2, x3
+        As those of `quantum_efficiency`.
 
     Returns
     -------

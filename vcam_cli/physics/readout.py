@@ -176,32 +176,27 @@ def codes_per_electron(
 def adc_full_scale(
     conversion_gain: ArrayLike,
     gain: ArrayLike,
-    codes_per_electron: ArrayLike,
+    slope: ArrayLike,
     bits: ArrayLike,
     offset: ArrayLike,
 ) -> Floats:
     """Return the full scale of a linear ADC with a wanted slope: `codes_per_electron` inverted.
 
+    Slope and full scale change places in it.
+
     Parameters
     ----------
-    conversion_gain : array_like
-        Conversion gain g [V/e].
-    gain : array_like
-        Analog gain between pixel and ADC [dimensionless].
-    codes_per_electron : array_like
+    conversion_gain, gain, bits, offset
+        As those of `codes_per_electron`.
+    slope : array_like
         Overall system gain [DN/e], positive.
-    bits : array_like
-        Resolution of the ADC [bits].
-    offset : array_like
-        Code of black [DN].
 
     Returns
     -------
     ndarray
         Volts above black that give the highest code [V].
     """
-    span = 2.0 ** _float(bits) - 1 - _float(offset)
-    return (_float(conversion_gain) * _float(gain) / _float(codes_per_electron) * span)[()]
+    return codes_per_electron(conversion_gain, gain, slope, bits, offset)
 
 
 def saturation_speed(saturation_exposure: ArrayLike) -> Floats:

@@ -193,16 +193,8 @@ def diffusion_mtf(
 
     Parameters
     ----------
-    frequency : array_like
-        Spatial frequency f [cycles/m], of either sign.
-    absorption : array_like
-        Absorption coefficient a [1/m], positive.
-    diffusion_length : array_like
-        Diffusion length of electrons in the neutral region L_n [m], positive; may be infinite.
-    depletion_width : array_like
-        Depth L of the depletion region [m], not negative.
-    neutral_depth : array_like
-        Depth L_d of the neutral region [m], not negative. All five broadcast.
+    frequency, absorption, diffusion_length, depletion_width, neutral_depth
+        As those of `collection_efficiency`; the absorption is positive.
 
     Returns
     -------

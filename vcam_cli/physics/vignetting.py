@@ -102,12 +102,8 @@ def transmission_p(cosine: ArrayLike, index: ArrayLike, below: ArrayLike) -> Flo
 
     Parameters
     ----------
-    cosine : array_like
-        Cosine of the angle of incidence [dimensionless], in 0..1.
-    index : array_like
-        Refractive index n1 of the medium that the light leaves.
-    below : array_like
-        Refractive index n2 of the medium that it enters. All three broadcast.
+    cosine, index, below
+        As those of `transmission_s`.
 
     Returns
     -------

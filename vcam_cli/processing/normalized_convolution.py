@@ -132,14 +132,8 @@ class Sites:
 
         Parameters
         ----------
-        color : str or None
-            Name of the color; None for all pixels.
-        width : int
-            Half the width of the tent [pixels].
-        rows : ndarray of int
-            The frame's rows.
-        axes : tuple of int
-            Axes along which the tent extends.
+        color, width, rows, axes
+            As those of `mean`.
 
         Returns
         -------

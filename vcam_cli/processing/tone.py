@@ -96,10 +96,8 @@ def encode(linear: np.ndarray, curve: Curve, bits: int) -> np.ndarray:
     ----------
     linear : ndarray
         Linear light of any shape, white = 1, float32.
-    curve : float or "srgb"
-        Exponent of a power law, or sRGB.
-    bits : int
-        Resolution of the codes [bits].
+    curve, bits
+        As those of `codes`.
 
     Returns
     -------

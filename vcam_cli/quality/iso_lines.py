@@ -173,12 +173,8 @@ def map_lines(values: NDArray, x: NDArray, y: NDArray, level: float) -> list[NDA
 
     Parameters
     ----------
-    values : ndarray
-        Map (rows, columns).
-    x, y : ndarray
-        Places of the columns (columns,) and of the rows (rows,).
-    level : float
-        Level in the unit of the map.
+    values, x, y, level
+        As those of `contours`.
 
     Returns
     -------

@@ -107,16 +107,10 @@ def s_cielab_map(
 
     Parameters
     ----------
-    image, reference : ndarray
-        Linear display values, white = 1, (rows, columns, 3), or (rows, columns, 1) for gray.
-    screen : Screen
-        Display on which they are seen.
+    image, reference, screen, formula, workers
+        As those of `cielab_map`.
     filters : {"zhang-wandell-1996", "isetcam", "continuous"}
         Filters of the eye.
-    formula : {"1976", "1994", "2000"}
-        Formula of Delta E.
-    workers : int, optional
-        Number of threads; all processors unless given.
 
     Returns
     -------

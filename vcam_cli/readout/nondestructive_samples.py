@@ -55,20 +55,10 @@ def samples(
 
     Parameters
     ----------
-    rate : NDArray
-        Rate (rows, columns), or (C, rows, columns) of stacked pixels [e/s].
+    rate, effects, adc, seeds, workers, layer
+        As those of `exposure.capture`.
     times : sequence of float
         Times of the N samples, rising [s].
-    effects : tuple of Effect
-        Effects that run, in the order of action.
-    adc : Quantizer
-        The ADC.
-    seeds : dict
-        Seeds of 'sensor' and 'frame'.
-    workers : int
-        Number of threads; results do not depend on it.
-    layer : int, optional
-        Index of the layer of stacked pixels.
     step_rates : sequence of NDArray, optional
         Mean rate between each sample and the one before, where it is not the same all the time:
         N times the shape of `rate` [e/s].

@@ -57,14 +57,10 @@ def upper_bounds(
 
     Parameters
     ----------
-    pdf : Pdf
-        Photocurrents of the scene [e/s].
+    pdf, sensor, constraints
+        As those of `full_noise.optimal_schedules`.
     most : int
         The largest number of captures, at least 1.
-    sensor : Sensor
-        The pixel.
-    constraints : Constraints
-        What the readout demands.
 
     Returns
     -------

@@ -92,14 +92,8 @@ def weighted_estimate(
 
     Parameters
     ----------
-    samples : (N, ...) array_like
-        Charge at each of the times [e].
-    times : (N,) array_like
-        Rising sample times [s].
-    saturated : (N, ...) array
-        Whether a sample has reached the well or the ADC's end.
-    dark_rate : float
-        Mean dark current of a pixel, i_dc [e/s].
+    samples, times, saturated, dark_rate
+        As those of `last_sample_before_saturation`.
     read_variance : float
         Variance of one readout [e^2].
     reset_variance : float

@@ -64,14 +64,8 @@ def least_bounds(
 
     Parameters
     ----------
-    pdf : Pdf
-        Photocurrents of the scene [e/s].
-    counts : tuple of int
-        Numbers of captures, each at least 1.
-    sensor : Sensor
-        The pixel.
-    constraints : Constraints
-        What the readout demands.
+    pdf, counts, sensor, constraints
+        As those of `full_noise.optimal_schedules`.
 
     Returns
     -------
@@ -90,14 +84,8 @@ def flow_bounds(
 
     Parameters
     ----------
-    pdf : Pdf
-        Photocurrents of the scene [e/s].
-    counts : sequence of int
-        Numbers of captures, each at least 1.
-    sensor : Sensor
-        The pixel, with a longest exposure.
-    constraints : Constraints
-        What the readout demands.
+    pdf, counts, sensor, constraints
+        As those of `full_noise.optimal_schedules`; the pixel has a longest exposure.
 
     Returns
     -------

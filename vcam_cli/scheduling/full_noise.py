@@ -100,16 +100,12 @@ def refine_times(
 
     Parameters
     ----------
-    pdf : Pdf
-        Photocurrents of the scene [e/s].
+    pdf, sensor, constraints
+        As those of `optimal_schedules`; of the constraints the least gap counts.
     schedules : dict
         Best times on the candidates by number of captures [s].
     times : (G,) array
         The candidates, rising [s].
-    sensor : Sensor
-        The pixel.
-    constraints : Constraints
-        What the readout demands; of these the least gap counts here.
 
     Returns
     -------

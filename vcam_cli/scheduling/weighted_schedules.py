@@ -57,14 +57,8 @@ def optimal_schedules(
 
     Parameters
     ----------
-    pdf : Pdf
-        Photocurrents of the scene [e/s].
-    counts : sequence of int
-        Numbers of captures, each at least 1.
-    sensor : Sensor
-        The pixel.
-    constraints : Constraints
-        What the readout demands.
+    pdf, counts, sensor, constraints
+        As those of `full_noise.optimal_schedules`.
 
     Returns
     -------

@@ -89,12 +89,8 @@ def frames(
 
     Parameters
     ----------
-    camera : Camera
-        The camera of the first frame.
-    count : int
-        Number of frames.
-    rate : float
-        Frames per second [Hz].
+    camera, count, rate
+        As those of `frame_cameras`.
     workers : int or None
         Number of threads; results do not depend on it.
     watch : Observer
@@ -129,12 +125,8 @@ def write_sequence(
 
     Parameters
     ----------
-    camera : Camera
-        The camera of the first frame.
-    count : int
-        Number of frames.
-    rate : float
-        Frames per second [Hz].
+    camera, count, rate
+        As those of `frame_cameras`.
     folder : OutputFolder
         Folder that they go to.
     workers : int or None
