@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
@@ -60,6 +61,27 @@ class Condition:
         """Return a statistic in the mean over all planes."""
         listed = [plane for planes in self.planes.values() for plane in planes]
         return combine([getattr(plane, name) for plane in listed])
+
+    def lines(self, name: str) -> Estimate:
+        """Return the temporal variance of rows or columns in the mean over all planes."""
+        first = next(iter(self.planes.values()))[0]
+        lines = first.average.shape[0 if name == "row" else 1] * self.planes_in_line
+        return shared(self.every(name), self.planes_in_line, (first.frames - 1) * (lines - 1))
+
+    @property
+    def planes_in_line(self) -> int:
+        """Number of planes that have pixels in one row, or column, of the array."""
+        return math.isqrt(sum(map(len, self.planes.values())))
+
+
+def shared(found: Estimate, planes: int, freedom: int) -> Estimate:
+    """Return the variance of lines in the mean over planes, of which so many share each line.
+
+    What a line has of its own is the same in all of these: its error is that of the array's lines,
+    however many planes there are. What the pixels add is independent.
+    """
+    own = max(found.value, 0.0) * math.sqrt(2 / max(freedom, 1))
+    return replace(found, error=math.hypot(found.error, own * math.sqrt(1 - 1 / planes)))
 
 
 @dataclass(frozen=True)
@@ -163,7 +185,8 @@ def _condition(
     for color, places in color_planes(measurement).items():
         planes[color] = tuple(stack_statistics(frames[:, *place], good[place]) for place in places)
         told = zip(planes[color], places, strict=True)
-        patterns[color] = _mean_pattern([pattern(plane, good[place]) for plane, place in told])
+        found = [pattern(plane, good[place]) for plane, place in told]
+        patterns[color] = _mean_pattern(found, [columns for _, columns in places])
     assert measurement.levels is not None
     return Condition(
         entry,
@@ -175,9 +198,44 @@ def _condition(
     )
 
 
-def _mean_pattern(patterns: list[Pattern]) -> Pattern:
+def alien_columns(listed: list[tuple[Condition, str]]) -> list[str]:
+    """Return what is said of columns unlike all others, stack by stack: (stack, color), ..."""
+    notes = []
+    for stack in {id(stack): stack for stack, _ in listed}.values():
+        seen = [stack.patterns[color] for each, color in listed if each is stack]
+        numbers = sorted({number for pattern in seen for number in pattern.alien})
+        if numbers:
+            largest = max((pattern.largest for pattern in seen), key=abs)
+            notes.append(
+                f"{stack.label}: columns {_ranges(numbers)} are unlike the others, by up to"
+                f" {largest:+.3g} DN; they count in no spread of columns, and the camera file has"
+                " no place for them"
+            )
+    return notes
+
+
+def _ranges(numbers: list[int]) -> str:
+    """Return rising numbers in words: 0 to 9, 312."""
+    parts: list[list[int]] = []
+    for number in numbers:
+        if parts and number == parts[-1][-1] + 1:
+            parts[-1].append(number)
+        else:
+            parts.append([number])
+    return ", ".join(f"{p[0]}" if len(p) == 1 else f"{p[0]} to {p[-1]}" for p in parts)
+
+
+def _mean_pattern(patterns: list[Pattern], columns: list[slice]) -> Pattern:
+    """Return the mean over planes, which have these columns of the array."""
     names = ("total", "pixel", "column", "row", "slow")
-    return Pattern(*(combine([getattr(p, name) for p in patterns]) for name in names))
+    alien = {
+        (place.start or 0) + column * (place.step or 1)
+        for each, place in zip(patterns, columns, strict=True)
+        for column in each.alien
+    }
+    every = {name: combine([getattr(p, name) for p in patterns]) for name in names}
+    largest = max((p.largest for p in patterns), key=abs)
+    return Pattern(**every, alien=tuple(sorted(alien)), largest=largest)
 
 
 def photons_per_pixel(entry: FrameSet, measurement: Measurement) -> float | None:

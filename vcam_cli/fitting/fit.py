@@ -18,7 +18,9 @@ from vcam_cli.fitting.conditions import (
     CLIPPED,
     Condition,
     Conditions,
+    alien_columns,
     measure,
+    shared,
     usual_temperature,
 )
 from vcam_cli.fitting.noise_shape import is_significant, neighbor_correlation, tail_shape
@@ -161,11 +163,11 @@ def _of_dark(out: Fit, found: Conditions, line: sensor.Dark, gain: Estimate) -> 
     add(deviation("read_noise", read, gain, "e", "EMVA 1288 R4 eq 53, without rounding and shot"
                   " noise of the dark current, of pixels by themselves"))  # fmt: skip
     rows_apart = len(color_block(out.measurement))
-    lag_one, excess = first.every("row_correlation"), first.every("excess")
+    lag_one, excess = first.every("row_correlation"), sensor.readout_excess(first, line, gain)
     r = lag_one.value if is_significant(lag_one) else 0.0
     bands = ((1 + r**2) / (1 - min(r, 0.999) ** 2)) ** 0.5  # Bartlett: rows that tell the same
     for name, wider in (("row", bands), ("column", 1.0)):
-        variance = first.every(name)
+        variance = first.lines(name)
         method = f"temporal variance of {name} means less the pixels' share"
         told = replace(variance, error=variance.error * wider)
         add(deviation(f"{name}_noise", told, gain, "e", method))
@@ -233,16 +235,27 @@ def _of_patterns(
     out: Fit, found: Conditions, curves: list[sensor.Transfer], line: sensor.Dark, gain: Estimate
 ) -> None:
     add = out.parameters.append
-    dark = list(found.dark[0].patterns.values())
+    first = found.dark[0]
+    dark = list(first.patterns.values())
+    lines = (first.planes_in_line, found.shape[1] - 1)
     for name in ("pixel", "column", "total"):
         variance = combine([getattr(pattern, name) for pattern in dark])
+        variance = shared(variance, *lines) if name == "column" else variance
         key = "dsnu" if name == "total" else f"offset_{name}"
         add(deviation(key, variance, gain, "e", "EMVA 1288 R4 eq 66, of dark frames"))
-    gains = [_gain_variances(curve, found, line) for curve in curves]
+    chosen = [_near_half(curve, found, line) for curve in curves]
+    gains = [
+        _gain_variances(curve, i, found, line) for curve, i in zip(curves, chosen, strict=True)
+    ]
+    lights = len({curve.light for curve in curves})  # all of them show the same gains
     for number, name in enumerate(("gain_pixel", "gain_column")):
         variance = combine([each[number] for each in gains])
+        variance = replace(variance, error=variance.error * lights**0.5)
+        variance = shared(variance, *lines) if name == "gain_column" else variance
         one = Estimate(1.0, 0.0)
         add(deviation(name, variance, one, "1", "EMVA 1288 R4 eq 67, near half of saturation"))
+    lit = [(curve.conditions[i], curve.color) for curve, i in zip(curves, chosen, strict=True)]
+    out.notes += alien_columns([*((first, color) for color in first.patterns), *lit])
     slow = {
         "shading_offset": (combine([pattern.slow for pattern in dark]), gain, "e"),
         "shading_gain": (combine([each[2] for each in gains]), Estimate(1.0, 0.0), "1"),
@@ -270,19 +283,19 @@ def _of_patterns(
 
 
 def _gain_variances(
-    curve: sensor.Transfer, found: Conditions, line: sensor.Dark
+    curve: sensor.Transfer, i: int, found: Conditions, line: sensor.Dark
 ) -> tuple[Estimate, Estimate, Estimate]:
-    """Return the variances of gains from the stack near half of saturation that tells most."""
+    """Return the variances of gains from a stack of a photon transfer."""
+    signal = float(curve.result.series.signal[i])
+    return sensor.gain_variances(curve.conditions[i], found.dark[0], curve.color, signal, line)
+
+
+def _near_half(curve: sensor.Transfer, found: Conditions, line: sensor.Dark) -> int:
+    """Return the number of the stack near half of saturation that tells most of gains."""
     signal = curve.result.series.signal
     part = signal / signal[curve.result.series.saturation_index]
-    near = np.flatnonzero(abs(part - 0.5) <= max(NEAR, float(abs(part - 0.5).min())))
-    each = [
-        sensor.gain_variances(
-            curve.conditions[i], found.dark[0], curve.color, float(signal[i]), line
-        )
-        for i in near
-    ]
-    return min(each, key=lambda variances: variances[0].error)
+    near = np.flatnonzero(abs(part - 0.5) <= max(NEAR, float(abs(part - 0.5).min()))).tolist()
+    return int(min(near, key=lambda i: _gain_variances(curve, i, found, line)[0].error))
 
 
 def _of_range(out: Fit, curves: list[sensor.Transfer], line: sensor.Dark, gain: Estimate) -> None:

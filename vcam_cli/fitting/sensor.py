@@ -49,6 +49,7 @@ def dark_line(dark: tuple[Condition, ...]) -> Dark:
     means = [c.every("mean") for c in dark]
     shortest = dark[0].patterns.values()
     rows, columns = next(iter(dark[0].planes.values()))[0].average.shape
+    rows, columns = rows * dark[0].planes_in_line, columns * dark[0].planes_in_line
     patterns = [p.pixel.value / (rows * columns) + max(p.column.value, 0) / columns
                 for p in shortest]  # fmt: skip
     fixed = math.sqrt(max(float(np.mean(patterns)), 0.0))
@@ -256,3 +257,13 @@ def read_variance(
     )
     without = replace(found, value=found.value - ROUNDING - shot)
     return replace(without, error=math.hypot(without.error, shot_error))
+
+
+def readout_excess(dark: Condition, line: Dark, gain: Estimate) -> Estimate:
+    """Return the excess kurtosis of a dark stack without that of the dark current's shot noise.
+
+    The fourth cumulant of a Poisson number is its mean, K^4 times that in codes.
+    """
+    fourth = gain.value**3 * max(line.mean(dark.entry.exposure), 0.0)
+    square = dark.every("pixel").value ** 2
+    return dark.every("excess") - Estimate(fourth / square if square else 0.0, 0.0)

@@ -70,10 +70,16 @@ class PixelMoments:
     """Of each half of the stack [DN^2]."""
     third: NDArray
     """Sum of cubes [DN^3]."""
+    lines: float
+    """What the means of rows and columns that are taken out add to each variance [DN^2]."""
 
 
 def pixel_moments(frames: NDArray, good: NDArray) -> PixelMoments:
     """Return the moments of the good pixels, noise of frames, rows and columns taken out.
+
+    A mean over a row has a share of the pixel itself in it, which would go with it: what is left is
+    scaled up, as if each mean were that of the row's other pixels. A trap's step keeps its size so,
+    and the noise of these means is that of all pixels, which is known.
 
     Parameters
     ----------
@@ -85,11 +91,14 @@ def pixel_moments(frames: NDArray, good: NDArray) -> PixelMoments:
     residual = np.where(good, frames - frames.mean(axis=0), 0.0)
     residual -= residual.mean(axis=(1, 2), keepdims=True)
     residual -= residual.mean(axis=2, keepdims=True) + residual.mean(axis=1, keepdims=True)
-    each = residual[:, good]
+    own = math.prod(1 - 1 / length for length in good.shape)
+    each = residual[:, good] / own
     each -= each.mean(axis=0)
     half = len(frames) // 2
     halves = _variance(each[:half]), _variance(each[half:])
-    return PixelMoments(len(frames), _variance(each), halves, (each**3).sum(axis=0))
+    variance = _variance(each)
+    lines = float(variance.mean()) * (1 - own)
+    return PixelMoments(len(frames), variance, halves, (each**3).sum(axis=0), lines)
 
 
 def _variance(values: NDArray) -> NDArray:
@@ -133,7 +142,8 @@ def find_traps(moments: list[PixelMoments]) -> Traps | None:
         Estimate(value * scale, error * slope * scale)
         for value, error, slope, scale in zip(values, errors, _slopes(found.x), scales, strict=True)
     )
-    return Traps(fraction, amplitude, occupancy, core)
+    lines = Estimate(float(np.mean([m.lines for m in moments])), 0.0)
+    return Traps(fraction, amplitude, occupancy, core - lines)
 
 
 def _go_together(moments: list[PixelMoments]) -> bool:
