@@ -15,7 +15,7 @@ from strategies import Tree, between, cameras, fractions
 from vcam_cli.accuracy.ablation import with_effects
 from vcam_cli.camera.derived.electrical import electrical
 from vcam_cli.camera.derived.geometry import geometry
-from vcam_cli.readout.layout import layout
+from vcam_cli.readout.layout import camera_layout
 from vcam_cli.simulation import checks
 from vcam_cli.simulation.pixel_figures import pixel_figures
 from vcam_cli.simulation.simulate import Result, simulate
@@ -183,7 +183,7 @@ def test_the_signal_to_noise_ratio_falls_with_each_noise(tree, name, level, fact
 def figures(camera):
     """SNR and dynamic range by their closed forms."""
     solved = geometry(camera)
-    joins = layout(camera, solved).binning_groups
+    joins = camera_layout(camera, solved).binning_groups
     return pixel_figures(camera, solved, electrical(camera), joins, camera.exposure.time)
 
 

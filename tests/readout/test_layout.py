@@ -10,14 +10,14 @@ from vcam_cli.camera.derived.geometry import geometry
 from vcam_cli.errors import CannotDo
 from vcam_cli.image_formation.settings import settings
 from vcam_cli.readout import layout as module
-from vcam_cli.readout.layout import FINER, FINEST, interpolate, layout
+from vcam_cli.readout.layout import FINER, FINEST, camera_layout, interpolate
 
 SIZE = {"array.rows": 6, "array.columns": 4, "output.render": "none"}
 
 
 def made(folder, pattern, **changes):
     found = camera(folder, SIZE | {"array.pattern": pattern} | changes)
-    return layout(found, geometry(found))
+    return camera_layout(found, geometry(found))
 
 
 def scattered(folder, rows, **changes):

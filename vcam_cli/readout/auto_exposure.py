@@ -25,7 +25,7 @@ class ExposureSettings:
     "" where it reached its target, or where the file gives the time."""
 
 
-def expose(
+def exposure_settings(
     camera: Camera, rate: NDArray, white_rate: float, dark_rate: float, circuit: Electrical
 ) -> ExposureSettings:
     """Return time and gain of a camera's exposure, given or chosen for the scene.

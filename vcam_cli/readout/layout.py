@@ -236,7 +236,7 @@ class Layout:
         return np.maximum(out, 0, out=out)
 
 
-def layout(camera: Camera, geometry: Geometry) -> Layout:
+def camera_layout(camera: Camera, geometry: Geometry) -> Layout:
     """Return the layout of a camera's pixels.
 
     Parameters

@@ -26,7 +26,7 @@ from vcam_cli.effects.optics import aberration, point_spread
 from vcam_cli.errors import bad, split
 from vcam_cli.processing import check as check_steps
 from vcam_cli.quality.display import display_screen
-from vcam_cli.readout.layout import layout
+from vcam_cli.readout.layout import camera_layout
 from vcam_cli.scenes.build import SOURCE, check_channels
 from vcam_cli.scenes.hyperspectral import check_bands, check_coverage, check_place
 from vcam_cli.simulation import plan, scene_bands, spectral_irradiance
@@ -59,7 +59,7 @@ def check_size(camera: Camera) -> None:
     if camera.array.is_scattered:
         _check_every_color(camera)
         return
-    solved = layout(camera, geometry(camera)).geometry
+    solved = camera_layout(camera, geometry(camera)).geometry
     if any(step.name == "demosaic" for step in camera.processing):
         for name, count in (("rows", solved.rows), ("columns", solved.columns)):
             if count < 2:
@@ -70,9 +70,9 @@ def check_size(camera: Camera) -> None:
 
 def _check_every_color(camera: Camera) -> None:
     """Refuse scattered pixels of which a color has none to be demosaiced from (BadInput)."""
-    place = layout(camera, geometry(camera))
-    there = {place.mosaic.colors[index] for index in np.unique(place.color)}
-    missing = [color for color in place.mosaic.colors if color not in there]
+    layout = camera_layout(camera, geometry(camera))
+    there = {layout.mosaic.colors[index] for index in np.unique(layout.color)}
+    missing = [color for color in layout.mosaic.colors if color not in there]
     if missing and any(step.name == "demosaic" for step in camera.processing):
         message = f"so few pixels have none of {', '.join(missing)}, and cannot be demosaiced"
         raise bad("array", message, "use a larger array")
@@ -81,7 +81,7 @@ def _check_every_color(camera: Camera) -> None:
 def check_binning(camera: Camera) -> None:
     """Refuse an array that is no whole number of binning groups (BadInput)."""
     if not camera.array.is_scattered:
-        layout(camera, geometry(camera))
+        camera_layout(camera, geometry(camera))
 
 
 def check_positions(camera: Camera) -> None:
@@ -164,7 +164,7 @@ def read_lens(camera: Camera) -> dict[str, NDArray]:
 def check_display(camera: Camera) -> None:
     """Refuse a display too fine to be judged, where a metric looks at it (BadInput)."""
     if {"cielab", "s-cielab"} & set(camera.quality):
-        display_screen(camera.display, layout(camera, geometry(camera)).picture_shape[1])
+        display_screen(camera.display, camera_layout(camera, geometry(camera)).picture_shape[1])
 
 
 LIBRARIES = {"dng": ("tifffile", "imagecodecs"), "tiff": ("tifffile",)}

@@ -185,24 +185,24 @@ def usual_spectrum(geometry: Geometry) -> SpectrumReport:
     return SpectrumReport(cells=samples, terms=samples, planes=3, filters=1)
 
 
-def light_seconds(place: Layout, report: SpectrumReport, workers: int) -> float:
+def light_seconds(layout: Layout, report: SpectrumReport, workers: int) -> float:
     """Return the seconds of image formation alone, on this machine."""
-    core = image_seconds(place.lattice, len(place.mosaic.colors), report)
+    core = image_seconds(layout.lattice, len(layout.mosaic.colors), report)
     return core * slowness() / threads(workers)
 
 
-def first_estimate(camera: Camera, place: Layout, workers: int) -> float:
+def first_estimate(camera: Camera, layout: Layout, workers: int) -> float:
     """Return the seconds of a whole run, before anything is known of its scene."""
-    guess = usual_spectrum(place.lattice)
-    core = image_seconds(place.lattice, len(place.mosaic.colors), guess)
-    core += output_seconds(camera, place.geometry, place.mosaic)
+    guess = usual_spectrum(layout.lattice)
+    core = image_seconds(layout.lattice, len(layout.mosaic.colors), guess)
+    core += output_seconds(camera, layout.geometry, layout.mosaic)
     return core * slowness() / threads(workers)
 
 
 def frame_seconds(
     camera: Camera,
     geometry: Geometry,
-    place: Layout,
+    layout: Layout,
     knobs: Settings,
     report: SpectrumReport,
     decided: Plan,
@@ -216,7 +216,7 @@ def frame_seconds(
         The camera.
     geometry : Geometry
         Geometry of its array.
-    place : Layout
+    layout : Layout
         Layout of its pixels.
     knobs : Settings
         Settings of image formation.
@@ -232,8 +232,8 @@ def frame_seconds(
     float
         Seconds on this machine.
     """
-    core = decided.seconds + image_seconds(place.lattice, len(place.mosaic.colors), report)
-    core += output_seconds(camera, place.geometry, place.mosaic)
-    core += sample_seconds(camera, place.geometry, decided.active)
+    core = decided.seconds + image_seconds(layout.lattice, len(layout.mosaic.colors), report)
+    core += output_seconds(camera, layout.geometry, layout.mosaic)
+    core += sample_seconds(camera, layout.geometry, decided.active)
     core += irradiance_seconds(camera, geometry, knobs, report)
     return core * slowness() / threads(workers)

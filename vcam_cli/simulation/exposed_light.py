@@ -59,7 +59,7 @@ def expose(
     camera: Camera,
     solved: Geometry,
     circuit: Electrical,
-    place: Layout,
+    layout: Layout,
     light: photon_rate.Rate,
     white_rate: NDArray,
     effects: Sequence[Effect],
@@ -72,14 +72,14 @@ def expose(
     `light_during` gives the light between two times after a line's exposure begins [s], in the
     shape of `light`, which is that of the whole exposure.
     """
-    groups, white = place.binning_groups, float(white_rate.max())
+    groups, white = layout.binning_groups, float(white_rate.max())
     enabled = plan.enabled_effects(camera, solved)
     dark = exposure.mean_dark(1.0, enabled)
-    collected = place.select_pixels(light.values)
+    collected = layout.select_pixels(light.values)
     rate = groups.collect(_transport(collected, dark / groups.summed_charges, effects))
     adc = quantizer(camera, solved)
     times = sample_times.choose_sample_times(camera, rate, circuit, enabled, adc)
-    chosen = auto_exposure.expose(camera, rate, white, dark, circuit)
+    chosen = auto_exposure.exposure_settings(camera, rate, white, dark, circuit)
     if times:
         chosen = replace(chosen, time=times[-1])
     time = chosen.time
@@ -89,9 +89,11 @@ def expose(
     timed = tuple(e for e in of_kind(effects, TemporalGain) if e not in light_plan.omitted)
 
     def collect(values: NDArray, start: float, stop: float) -> NDArray:
-        lit = collected if values is light.values else place.select_pixels(values)
+        lit = collected if values is light.values else layout.select_pixels(values)
         if timed:
-            lit = place.select_pixels(timed_gains.apply(values, timed, place.lattice, start, stop))
+            lit = layout.select_pixels(
+                timed_gains.apply(values, timed, layout.lattice, start, stop)
+            )
         return groups.collect(_transport(lit, dark / groups.summed_charges, effects, held))
 
     rate = collect(light.values, 0.0, time)
@@ -100,11 +102,11 @@ def expose(
     step_rates = tuple(collect(light_during(start, stop), start, stop) for start, stop in steps)
     peak = (float(rate.max()) + dark) * time
     refuse_too_much(max(peak, white * time, dark))
-    lit = timed_gains.apply(light.values, timed, place.lattice, 0.0, time)
-    changes = _pixel_changes(place, groups.collect(lit), enabled, effects, time)
+    lit = timed_gains.apply(light.values, timed, layout.lattice, 0.0, time)
+    changes = _pixel_changes(layout, groups.collect(lit), enabled, effects, time)
     for effect in timed:
         others = tuple(e for e in timed if e is not effect)
-        without = timed_gains.apply(light.values, others, place.lattice, 0.0, time)
+        without = timed_gains.apply(light.values, others, layout.lattice, 0.0, time)
         changes[effect.name] = rms(np.subtract(lit, without))
     if transports := [transport.name for transport in of_kind(enabled, Transport)]:
         well = min(circuit.full_well / time - dark, MOST_ELECTRONS)
@@ -117,7 +119,7 @@ def expose(
         time,
         dark * time,
         camera.array.binning,
-        _levels(place, rate, dark, time, circuit.full_well),
+        _levels(layout, rate, dark, time, circuit.full_well),
         extreme_signal(of_kind(enabled, NoiseSource), peak, dark * time) if alone else math.inf,
     )
     return ExposedLight(rate, times, signal, chosen, changes, light_plan, step_rates)
@@ -134,10 +136,10 @@ def refuse_too_much(electrons: float) -> None:
 
 
 def _levels(
-    place: Layout, rate: NDArray, dark: float, time: float, well: float
+    layout: Layout, rate: NDArray, dark: float, time: float, well: float
 ) -> tuple[float, ...]:
     """Return the signals of the scene at which noise is promised, with the dark [electrons]."""
-    mosaic, planes = place.charge_pixels[1], rate.ndim == 3
+    mosaic, planes = layout.charge_pixels[1], rate.ndim == 3
     mosaics = [Mosaic(((color,),)) for color in mosaic.colors] if planes else [mosaic]
     levels = [
         pixelwise.percentiles(plane, colors, PERCENTILES)
@@ -148,15 +150,19 @@ def _levels(
 
 
 def _pixel_changes(
-    place: Layout, light: NDArray, present: Sequence[Effect], running: Sequence[Effect], time: float
+    layout: Layout,
+    light: NDArray,
+    present: Sequence[Effect],
+    running: Sequence[Effect],
+    time: float,
 ) -> dict[str, float]:
     """Return the rms change of the mean raw by leaving out each effect on pixels [e/s].
 
     It is that of the color where it is most.
     """
-    geometry, mosaic = place.charge_pixels
+    geometry, mosaic = layout.charge_pixels
     mosaics = [Mosaic(((color,),)) for color in mosaic.colors]
-    parts = zip(light, mosaics, strict=True) if place.planes else [(light, mosaic)]
+    parts = zip(light, mosaics, strict=True) if layout.planes else [(light, mosaic)]
     largest: dict[str, float] = {}
     for plane, colors in parts:
         changes = pixelwise.changes_by_omission(plane, geometry, colors, present, running, time)

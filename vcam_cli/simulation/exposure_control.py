@@ -45,7 +45,7 @@ def next_exposure(camera: Camera, taken: Prepared) -> ExposureSettings:
     full = min(circuit.full_well, circuit.adc_full_scale * circuit.exposure_gain / gain)
     held = np.minimum(taken.rate, max(full / time - taken.dark_rate, 0.0))
     white = float(taken.white_rate.max())
-    wanted = auto_exposure.expose(base, held, white, taken.dark_rate, circuit)
+    wanted = auto_exposure.exposure_settings(base, held, white, taken.dark_rate, circuit)
     now = time * gain
     product = now * (wanted.time * wanted.gain / now) ** auto.follow
     chosen = min(max(product / circuit.exposure_gain, auto.min), auto.max)

@@ -185,11 +185,11 @@ class Frame(Prepared):
 
         Of layers the nearest one counts that covers half of a place or more.
         """
-        place, source = self.layout, self.camera.scene.source
+        layout, source = self.layout, self.camera.scene.source
         if isinstance(self.scene, LayeredScene) and isinstance(source, Layers):
             distances = np.array([layer.distance for layer in source.layers])
-            return distances[self.scene.nearest_at(place.picture_x, place.picture_y)]
-        return np.full(place.picture_shape, self.camera.scene.distance)
+            return distances[self.scene.nearest_at(layout.picture_x, layout.picture_y)]
+        return np.full(layout.picture_shape, self.camera.scene.distance)
 
     def ideal_dn(self) -> NDArray:
         """Return the scene point-sampled at the pixels' centers, all colors everywhere [DN].
@@ -197,9 +197,9 @@ class Frame(Prepared):
         It is (C, rows, columns) of the picture, without blur, falloff and noise; black is included.
         Where the processing leaves the readout's curve in, it is straight from black to white.
         """
-        place = self.layout
-        level = self.transfer.level.T * self.exposure_time * place.binning_groups.signal_ratio
-        photo = self.scene.values_at(place.picture_x, place.picture_y, level)
+        layout = self.layout
+        level = self.transfer.level.T * self.exposure_time * layout.binning_groups.signal_ratio
+        photo = self.scene.values_at(layout.picture_x, layout.picture_y, level)
         if self.electrical.curve is not None and not self.electrical.curve.corrected:
             white = self.white_rate * self.exposure_time * self.summed_codes
             span = np.where(white > 0, self.white_dn - self.black_dn, 0.0)

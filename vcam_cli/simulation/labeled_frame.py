@@ -42,11 +42,11 @@ def frame_dataset(result: Result) -> Any:
 
 def _dimensions(result: Result) -> tuple[str, ...]:
     """Return the names of the dimensions of `dn`."""
-    place = result.frame.layout
+    layout = result.frame.layout
     if result.dn.ndim == 1:
         return ("pixel",)
-    rows = ("row", "column") if place.is_scattered else ("y", "x")
-    return (*rows, "plane") if place.full_color else rows
+    rows = ("row", "column") if layout.is_scattered else ("y", "x")
+    return (*rows, "plane") if layout.full_color else rows
 
 
 def _coordinates(result: Result, dims: tuple[str, ...]) -> Iterator[tuple[str, Labeled]]:

@@ -27,7 +27,7 @@ from vcam_cli.progress import Stages
 from vcam_cli.quality import scielab
 from vcam_cli.quality.display import display_screen
 from vcam_cli.readout import auto_exposure, exposure, iso_speed
-from vcam_cli.readout.layout import Layout, layout
+from vcam_cli.readout.layout import Layout, camera_layout
 from vcam_cli.scenes.base import ChartScene
 from vcam_cli.scenes.layered import AnyScene, LayeredScene
 from vcam_cli.simulation import cost_model, exposed_light, plan
@@ -155,27 +155,27 @@ def _prepare(
 ) -> Prepared:
     """Return the same where times are given, or nothing moves."""
     solved = geometry(camera)
-    place = layout(camera, solved)
-    base_iso = iso_speed.base_iso(camera, solved, place)
+    layout = camera_layout(camera, solved)
+    base_iso = iso_speed.base_iso(camera, solved, layout)
     camera = iso_speed.set_gain(camera, base_iso)
     circuit = electrical(camera)
-    knobs = place.settings(settings(camera))
-    frame_bytes = _require_memory(camera, place, knobs, solved)
-    stages.watch.expect(cost_model.first_estimate(camera, place, workers))
+    knobs = layout.settings(settings(camera))
+    frame_bytes = _require_memory(camera, layout, knobs, solved)
+    stages.watch.expect(cost_model.first_estimate(camera, layout, workers))
 
     effects = plan.mean_signal_effects(camera, solved)
     with stages("scene"):
         band = camera.scene.wavelengths
-        margin = partial(bandwidth.margin, place.lattice, effects, (band.start, band.stop), knobs)
+        margin = partial(bandwidth.margin, layout.lattice, effects, (band.start, band.stop), knobs)
 
         def scene_within(pixels: int) -> AnyScene:
-            view = photon_rate.view(place.lattice, knobs, pixels)
+            view = photon_rate.view(layout.lattice, knobs, pixels)
             return build_scene(camera, view, picture)
 
         scene = scene_within(margin())
     with stages("optics"):
-        transfer, white_rate = _transfer(camera, solved, place, scene, effects, knobs, rate_cache)
-        summed = place.binning_groups.summed_charges
+        transfer, white_rate = _transfer(camera, solved, layout, scene, effects, knobs, rate_cache)
+        summed = layout.binning_groups.summed_charges
         ceiling = auto_exposure.ceiling(
             camera, float(white_rate.max()), circuit.saturation / summed
         )
@@ -184,17 +184,17 @@ def _prepare(
             scene = scene_within(margin(overexposure))
         optional = plan.optional_effects(camera, effects)
         path = OpticalPath(
-            *(transfer, place.lattice, knobs, place.mosaic, effects, workers, ceiling, optional),
+            *(transfer, layout.lattice, knobs, layout.mosaic, effects, workers, ceiling, optional),
             layer_optics(camera, effects),
         )
-        photo_rate = partial(photon_rate.photo_rate, path, scene, place.planes)
+        photo_rate = partial(photon_rate.photo_rate, path, scene, layout.planes)
         light = photo_rate() if rate_cache is None else rate_cache.rate(camera, ceiling, photo_rate)
         effects = tuple(effect for effect in effects if effect not in light.plan.omitted)
         white_rate = white_rate * summed / (light.plan.on_axis or 1.0)
     with stages("exposure"):
-        during = partial(_light_during, path, scene, place, light)
+        during = partial(_light_during, path, scene, layout, light)
         exposed = exposed_light.expose(
-            *(camera, solved, circuit, place, light, white_rate, effects, optional, knobs, during)
+            *(camera, solved, circuit, layout, light, white_rate, effects, optional, knobs, during)
         )
         camera = camera.with_exposure_gain(exposed.settings.gain)
         needed = max(frame_bytes, light.spectrum.memory) + scene_bytes(picture)
@@ -203,17 +203,17 @@ def _prepare(
             camera, solved, knobs, exposed.light_plan, exposed.signal, needed, changes
         )
         if of_kind(effects, ImageMotion):  # every sample of an integration has light of its own
-            once = cost_model.light_seconds(place, light.spectrum, workers)
+            once = cost_model.light_seconds(layout, light.spectrum, workers)
             earlier += len(exposed.times) * once
-        decided = _with_seconds(camera, solved, place, knobs, light, decided, workers, earlier)
+        decided = _with_seconds(camera, solved, layout, knobs, light, decided, workers, earlier)
         stages.watch.expect(decided.seconds)
     return Prepared(
         camera=camera,
         geometry=solved,
         electrical=electrical(camera),
         settings=knobs,
-        mosaic=place.raw_mosaic,
-        layout=place,
+        mosaic=layout.raw_mosaic,
+        layout=layout,
         scene=scene,
         transfer=transfer,
         white_rate=white_rate,
@@ -231,7 +231,7 @@ def _prepare(
 def _light_during(
     path: OpticalPath,
     scene: AnyScene,
-    place: Layout,
+    layout: Layout,
     light: photon_rate.Rate,
     start: float,
     stop: float,
@@ -250,7 +250,7 @@ def _light_during(
     part = replace(
         whole, effects=effects, transfer=whole.transfer.with_effects(effects), layers=layers
     )
-    return photon_rate.photo_rate(part, scene, place.planes).values
+    return photon_rate.photo_rate(part, scene, layout.planes).values
 
 
 def _brightest(scene: AnyScene) -> float:
@@ -263,7 +263,7 @@ def _brightest(scene: AnyScene) -> float:
 def _with_seconds(
     camera: Camera,
     solved: Geometry,
-    place: Layout,
+    layout: Layout,
     knobs: Settings,
     light: photon_rate.Rate,
     decided: plan.Plan,
@@ -272,29 +272,29 @@ def _with_seconds(
 ) -> plan.Plan:
     """Return the plan with the seconds of the frame, and of one with everything on."""
     spectrum = light.spectrum
-    seconds = cost_model.frame_seconds(camera, solved, place, knobs, spectrum, decided, workers)
+    seconds = cost_model.frame_seconds(camera, solved, layout, knobs, spectrum, decided, workers)
     if light.plan.omitted and not spectrum.terms:
-        spectrum = cost_model.usual_spectrum(place.lattice)
+        spectrum = cost_model.usual_spectrum(layout.lattice)
     whole = replace(decided, seconds=decided.seconds + sum(d.saved for d in decided.decisions))
-    every = cost_model.frame_seconds(camera, solved, place, knobs, spectrum, whole, workers)
+    every = cost_model.frame_seconds(camera, solved, layout, knobs, spectrum, whole, workers)
     return replace(decided, seconds=earlier + seconds, seconds_of_all=earlier + every)
 
 
-def _require_memory(camera: Camera, place: Layout, knobs: Settings, solved: Geometry) -> int:
+def _require_memory(camera: Camera, layout: Layout, knobs: Settings, solved: Geometry) -> int:
     """Return the bytes of a frame without its scene, and refuse one that does not fit.
 
     What was read of the scene is in memory already.
     """
-    colors = len(place.mosaic.colors)
-    samples = camera.exposure.count * (colors if place.full_color else 1)
+    colors = len(layout.mosaic.colors)
+    samples = camera.exposure.count * (colors if layout.full_color else 1)
     lamp = camera.scene.illuminant
     if camera.scene.moves or (lamp is not None and lamp.flicker is not None):
         samples *= 2  # each has a rate of its own
-    scattered = solved.rows * solved.columns if place.is_scattered else 0
+    scattered = solved.rows * solved.columns if layout.is_scattered else 0
     judged = bool(camera.quality)
-    needed = memory_model.frame_bytes(place.lattice, knobs, colors, judged, samples, scattered)
+    needed = memory_model.frame_bytes(layout.lattice, knobs, colors, judged, samples, scattered)
     if "s-cielab" in camera.quality:
-        shape = place.picture_shape
+        shape = layout.picture_shape
         screen = display_screen(camera.display, shape[1])
         # By one thread, which is all there are where memory is little.
         needed += scielab.needed_bytes(shape, screen, camera.display.filters, 1)
@@ -305,7 +305,7 @@ def _require_memory(camera: Camera, place: Layout, knobs: Settings, solved: Geom
 def _transfer(
     camera: Camera,
     solved: Geometry,
-    place: Layout,
+    layout: Layout,
     scene: AnyScene,
     effects: tuple[Effect, ...],
     knobs: Settings,
@@ -321,7 +321,7 @@ def _transfer(
         solved,
         knobs,
         (*scene.spectra, scene.white),
-        place.mosaic,
+        layout.mosaic,
         effects,
     )
     try:

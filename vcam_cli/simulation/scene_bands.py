@@ -16,7 +16,7 @@ from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import geometry
 from vcam_cli.camera.scene.illuminant import IlluminantSpec
 from vcam_cli.image_formation.photon_rate import responses
-from vcam_cli.readout.layout import layout
+from vcam_cli.readout.layout import camera_layout
 from vcam_cli.scenes.hyperspectral import DEFAULT_ILLUMINANT, Bands, Cube, covers
 from vcam_cli.spectra import Spectrum, pair_weights, photons
 
@@ -53,7 +53,7 @@ def unseen_share(camera: Camera, bands: Bands) -> float:
     if not low < high:
         return 1.0
     inside = Spectrum.from_samples([low, high], [1.0, 1.0], "zero")
-    seen = responses(camera, layout(camera, geometry(camera)).mosaic)
+    seen = responses(camera, camera_layout(camera, geometry(camera)).mosaic)
     lit = [photons(spectrum) for spectrum in (light, light.multiply(inside))]
     whole, known = pair_weights(lit, seen, [start, stop]).sum(axis=2)
     visible = whole > 0

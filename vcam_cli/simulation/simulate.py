@@ -145,10 +145,10 @@ class Result:
     @property
     def color(self) -> NDArray:
         """Index of each raw pixel's color, in the shape of `dn`."""
-        place = self.frame.layout
-        if place.full_color:
+        layout = self.frame.layout
+        if layout.full_color:
             return np.broadcast_to(np.arange(len(self.colors)), self.dn.shape)
-        return self._displayed(place.color)
+        return self._displayed(layout.color)
 
     @property
     def x(self) -> NDArray:
@@ -156,14 +156,14 @@ class Result:
 
         Of a honeycomb and of pixels at places of their own: of every pixel, in the shape of `dn`.
         """
-        place = self.frame.layout
-        return self._displayed(place.x) if place.is_scattered else place.centers[0]
+        layout = self.frame.layout
+        return self._displayed(layout.x) if layout.is_scattered else layout.centers[0]
 
     @property
     def y(self) -> NDArray:
         """Centers of the raw frame's rows, below the array's center, (rows,) [m]; as `x`."""
-        place = self.frame.layout
-        return self._displayed(place.y) if place.is_scattered else place.centers[1]
+        layout = self.frame.layout
+        return self._displayed(layout.y) if layout.is_scattered else layout.centers[1]
 
     def _displayed(self, values: NDArray) -> NDArray:
         """Values of the raw frame in the shape that a user sees."""

@@ -30,7 +30,7 @@ from vcam_cli.errors import bad
 from vcam_cli.image_formation import photon_rate
 from vcam_cli.image_formation.settings import settings
 from vcam_cli.physics import readout, vignetting
-from vcam_cli.readout.layout import layout
+from vcam_cli.readout.layout import camera_layout
 from vcam_cli.scenes import light
 from vcam_cli.simulation import plan
 from vcam_cli.simulation.pixel_figures import pixel_figures
@@ -83,7 +83,7 @@ def _pixel_figure(name: str) -> Callable[[Camera, Geometry], float]:
         if time is None:
             message = f"{name} depends on the exposure time, which this camera chooses itself"
             raise bad("exposure", message, "add set: {exposure.time: 30 ms}")
-        groups = layout(camera, g).binning_groups
+        groups = camera_layout(camera, g).binning_groups
         return float(getattr(pixel_figures(camera, g, electrical(camera), groups, time), name))
 
     return value
@@ -99,7 +99,7 @@ _VALUES: dict[str, Callable[[Camera, Geometry], float]] = {
     "voltage_swing": lambda camera, _: _voltage(camera, "voltage_swing", 1.0),
     "full_well": lambda camera, _: electrical(camera).full_well,
     "well_capacity": lambda camera, g: (
-        electrical(camera).full_well * layout(camera, g).binning_groups.summed_codes
+        electrical(camera).full_well * camera_layout(camera, g).binning_groups.summed_codes
     ),
     "dark_current": lambda camera, _: dark_rate(camera),
     "dark_current_density": lambda camera, g: (
@@ -147,7 +147,7 @@ def _mtf(camera: Camera, nyquist: float) -> list[Curves]:
         message = "the light of this scene is known only by its file"
         raise bad("scene.source", message, "set a chart and an illuminant for this figure")
     g, frequency = geometry(camera), np.linspace(0, nyquist * 1e3, FREQUENCIES)
-    mosaic, white = layout(camera, g).mosaic, (light.white_radiance(camera.scene),)
+    mosaic, white = camera_layout(camera, g).mosaic, (light.white_radiance(camera.scene),)
 
     def transfer(effects: tuple[Effect, ...]) -> list[NDArray]:
         found = photon_rate.scene_transfer(camera, g, settings(camera), white, mosaic, effects)
@@ -173,7 +173,7 @@ def _quantum_efficiency(camera: Camera) -> list[Curves]:
     wavelength = np.linspace(band.start, band.stop, max(count, 2))
     silicon = photodiode.quantum_efficiency(camera)
     found = []
-    for color in layout(camera, geometry(camera)).mosaic.colors:
+    for color in camera_layout(camera, geometry(camera)).mosaic.colors:
         spec = camera.array.filters.get(color)
         response = silicon if spec is None else silicon.multiply(spec.resolve())
         values = {"quantum_efficiency": np.asarray(response.evaluate(wavelength))}

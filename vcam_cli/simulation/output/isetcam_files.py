@@ -73,13 +73,13 @@ def write_isetcam(
 
 
 def _scene(frame: Frame, wavelengths: NDArray) -> dict[str, Any]:
-    g, place = frame.geometry, frame.layout
+    g, layout = frame.geometry, frame.layout
     levels = spectral_irradiance.spectral_levels(frame.camera, frame.scene.spectra, wavelengths)
     planes = (
-        frame.scene.values_at(place.picture_x, place.picture_y, level[np.newaxis])[0]
+        frame.scene.values_at(layout.picture_x, layout.picture_y, level[np.newaxis])[0]
         for level in levels.T
     )
-    shape = len(place.picture_y), len(place.picture_x)
+    shape = len(layout.picture_y), len(layout.picture_x)
     white = spectral_irradiance.spectral_levels(frame.camera, (frame.scene.white,), wavelengths)[0]
     return {
         "type": "scene",

@@ -40,15 +40,15 @@ from vcam_cli.simulation.output.raw_file import ROWS_AT_ONCE
 from vcam_cli.simulation.simulate import Result
 
 
-def save(result: Result, place: Path) -> Path:
+def save(result: Result, out: Path) -> Path:
     """Write all files of one run, the record too, into a folder; return it."""
     inputs = provenance.inputs(result.frame.camera)
     start = time.perf_counter()
     computed = sum(result.stages.seconds.values())
-    with OutputFolder(place, inputs=inputs) as folder:
+    with OutputFolder(out, inputs=inputs) as folder:
         write(result, folder)
         finish(result, folder, inputs, lambda: computed + time.perf_counter() - start)
-    return place
+    return out
 
 
 def finish(

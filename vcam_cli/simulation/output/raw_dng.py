@@ -35,7 +35,7 @@ from vcam_cli.files.images.dng import (
 from vcam_cli.processing.base import Patches
 from vcam_cli.processing.color_correction import BRADFORD, RGB_TO_XYZ, Fit, fit_matrix
 from vcam_cli.processing.white_balance import illuminant_gains
-from vcam_cli.readout.layout import layout
+from vcam_cli.readout.layout import camera_layout
 from vcam_cli.simulation.frame import Frame
 from vcam_cli.spectra import Spectrum, cmf, colorchecker, illuminant, pair_weights
 
@@ -59,9 +59,9 @@ def check(camera: Camera) -> None:
     if camera.array.is_scattered:
         message = "raw converters read pixels in rows and columns alone"
         raise bad(_PATH, message, "write dng: false")
-    place = layout(camera, geometry(camera))
-    rows, columns = place.geometry.rows, place.geometry.columns
-    mosaic = place.raw_mosaic
+    layout = camera_layout(camera, geometry(camera))
+    rows, columns = layout.geometry.rows, layout.geometry.columns
+    mosaic = layout.raw_mosaic
     if camera.array.mosaic and mosaic.block not in BAYER:
         size = f"{len(mosaic.block)} x {len(mosaic.block[0])}"
         message = (
@@ -69,7 +69,7 @@ def check(camera: Camera) -> None:
             " raw converters read others wrong: LibRaw all of more than 2 x 2, and some of 2 x 2"
         )
         raise bad(_PATH, message, _REMEDY)
-    bits = _highest_code(camera, place.binning_groups.summed_codes).bit_length()
+    bits = _highest_code(camera, layout.binning_groups.summed_codes).bit_length()
     if bits > MOST_BITS:
         message = f"its codes have {bits} bits, and raw converters read at most {MOST_BITS}"
         raise bad(_PATH, message, _REMEDY)

@@ -102,18 +102,18 @@ def _write(path: Path, frame: Frame, values: Values, said: dict[str, Attribute])
 
 def _channels(frame: Frame, values: Values) -> Iterator[tuple[str, Channel]]:
     """Names and rows of the channels, in the order of the file."""
-    place = frame.layout
+    layout = frame.layout
     for name, (array, conversion) in values.items():
-        if place.full_color:
+        if layout.full_color:
             for color, plane in zip(frame.mosaic.colors, array, strict=True):
                 yield f"{name}.{color}", _rows_of(plane, conversion)
         else:
-            one_row = array.reshape(1, -1) if place.is_scattered else array
+            one_row = array.reshape(1, -1) if layout.is_scattered else array
             yield name, _rows_of(one_row, conversion)
-    if place.is_scattered:
-        yield "x", _rows_of(place.x.reshape(1, -1), _micrometers)
-        yield "y", _rows_of(place.y.reshape(1, -1), _micrometers)
-        yield "color", _rows_of(place.color.reshape(1, -1), None)
+    if layout.is_scattered:
+        yield "x", _rows_of(layout.x.reshape(1, -1), _micrometers)
+        yield "y", _rows_of(layout.y.reshape(1, -1), _micrometers)
+        yield "color", _rows_of(layout.color.reshape(1, -1), None)
 
 
 def _rows_of(array: NDArray, conversion: Conversion | None) -> Channel:
