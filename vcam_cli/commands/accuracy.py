@@ -51,11 +51,11 @@ def accuracy(
     """
     from vcam_cli.accuracy import study
     from vcam_cli.accuracy.plots import pareto
-    from vcam_cli.files import plots, report, tables
+    from vcam_cli.files import tables
     from vcam_cli.files.folder import OutputFolder
-    from vcam_cli.reports import study_report
     from vcam_cli.simulation.checks import load
     from vcam_cli.simulation.output import provenance
+    from vcam_cli.simulation.output.study_files import write_study
 
     model = load(camera, options.overrides(set_, seed, level))
     inputs = provenance.inputs(model)
@@ -66,16 +66,10 @@ def accuracy(
         rows = (point.row for point in found.points)
         tables.write_table(folder.new("accuracy.csv"), study.COLUMNS, rows)
         drawn = {"accuracy.png": lambda path: pareto(path, *pareto_arguments(found))}
-        for name, draw in plots.in_formats(drawn, formats or ()).items():
-            draw(folder.new(name))
-        if wants_report:
-            study_report.write(folder, **report_arguments(found))
+        page = report_arguments(found) if wants_report else None
         record = found.report() | {"camera": model.model_dump(mode="json")}
-        folder.finish(record | {"versions": provenance.versions()})
-    if as_json:
-        print(report.to_json({"out": str(path), **found.report()}), end="")
-    elif not quiet:
-        print_report(found, path)
+        write_study(folder, drawn, formats, page, record)
+    options.print_found(found, path, as_json, quiet, print_report)
 
 
 def pareto_arguments(found: "Study"):

@@ -69,11 +69,11 @@ def characterize(
     from vcam_cli.characterization import characterize as study
     from vcam_cli.characterization.kept_frames import DESCRIPTOR, FrameFiles
     from vcam_cli.characterization.plots import characterization_panels
-    from vcam_cli.files import curves, plots, report, tables
+    from vcam_cli.files import curves, tables
     from vcam_cli.files.folder import OutputFolder
-    from vcam_cli.reports import study_report
     from vcam_cli.simulation.checks import load
     from vcam_cli.simulation.output import provenance
+    from vcam_cli.simulation.output.study_files import write_study
 
     model = load(camera, options.overrides(set_, seed, accuracy))
     inputs = provenance.inputs(model)
@@ -88,20 +88,14 @@ def characterize(
             name: partial(curves.draw, title=title, panels=panels)
             for name, (title, panels) in characterization_panels(found).items()
         }
-        for name, draw in plots.in_formats(drawn, formats or ()).items():
-            draw(folder.new(name))
-        if wants_report:
-            study_report.write(folder, **report_arguments(found))
+        page = report_arguments(found) if wants_report else None
         record = found.report() | {"camera": model.model_dump(mode="json")}
-        folder.finish(record | {"versions": provenance.versions()})
+        write_study(folder, drawn, formats, page, record)
     for note in found.notes:
         options.say(note, quiet)
-    if as_json:
-        print(report.to_json({"out": str(path), **found.report()}), end="")
-    elif not quiet:
-        print_report(found, path)
-        if keep_frames:
-            print(f"{path}/frames: TIFF files of each color, and {DESCRIPTOR}, which lists them")
+    options.print_found(found, path, as_json, quiet, print_report)
+    if keep_frames and not (as_json or quiet):
+        print(f"{path}/frames: TIFF files of each color, and {DESCRIPTOR}, which lists them")
 
 
 def report_arguments(found: "Characterization") -> dict[str, Any]:

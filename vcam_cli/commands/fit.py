@@ -41,14 +41,13 @@ def fit(
     """
     import yaml
 
-    from vcam_cli.files import plots, report, tables
+    from vcam_cli.files import tables
     from vcam_cli.files.atomic import write_text
     from vcam_cli.files.folder import OutputFolder
     from vcam_cli.fitting import fit as fitting
     from vcam_cli.fitting.parameters import COLUMNS
-    from vcam_cli.fitting.plots import plots as plots_of
-    from vcam_cli.reports import study_report
-    from vcam_cli.simulation.output import provenance
+    from vcam_cli.fitting.plots import plots
+    from vcam_cli.simulation.output.study_files import write_study
     from vcam_cli.verification import measurement_file
     from vcam_cli.verification.frames import paths
 
@@ -63,20 +62,14 @@ def fit(
         tables.write_table(
             folder.new("parameters.csv"), COLUMNS, (p.cells for p in found.parameters)
         )
-        for name, draw in plots.in_formats(plots_of(found), formats or ()).items():
-            draw(folder.new(name))
-        if wants_report:
-            study_report.write(folder, **report_arguments(found))
+        page = report_arguments(found) if wants_report else None
         form = {"measurement": measured.model_dump(mode="json")}
-        folder.finish(found.report() | form | {"versions": provenance.versions()})
+        write_study(folder, plots(found), formats, page, found.report() | form)
     for note in found.notes:
         options.say(note, quiet)
     for name in found.unknown:
         options.say(f"not told by the frames: {name}", quiet)
-    if as_json:
-        print(report.to_json({"out": str(path), **found.report()}), end="")
-    elif not quiet:
-        print_fit(found, path)
+    options.print_found(found, path, as_json, quiet, print_fit)
 
 
 def report_arguments(found: "Fit") -> dict[str, Any]:

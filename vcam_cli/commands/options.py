@@ -6,7 +6,7 @@ Results go to stdout, everything else to stderr; with `--json` stdout carries on
 import json
 import shutil
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -278,3 +278,15 @@ def print_table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
 def write_json(value: object) -> None:
     """Print one JSON document on stdout."""
     print(json.dumps(value, indent=2, allow_nan=False, ensure_ascii=False))
+
+
+def print_found(
+    found: Any, path: Path, as_json: bool, quiet: bool, print_report: Callable[[Any, Path], None]
+) -> None:
+    """Print what a study found: its report as JSON, or for a reader unless it is to be quiet."""
+    if as_json:
+        from vcam_cli.files.report import to_json
+
+        print(to_json({"out": str(path), **found.report()}), end="")
+    elif not quiet:
+        print_report(found, path)

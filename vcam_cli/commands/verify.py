@@ -48,11 +48,11 @@ def verify(
       vcam verify test-pixel-0.18um test-pixel-simulated
       vcam verify camera.yaml bench.yaml --set pixel.temperature="310 K"
     """
-    from vcam_cli.files import plots, report, tables
+    from vcam_cli.files import tables
     from vcam_cli.files.folder import OutputFolder
-    from vcam_cli.reports import study_report
     from vcam_cli.simulation.checks import load
     from vcam_cli.simulation.output import provenance
+    from vcam_cli.simulation.output.study_files import write_study
     from vcam_cli.verification import measurement_file
     from vcam_cli.verification import verify as comparison
     from vcam_cli.verification.frames import paths
@@ -68,21 +68,15 @@ def verify(
         rows = (row.cells for row in found.rows)
         tables.write_table(folder.new("verify.csv"), comparison.COLUMNS, rows)
         drawn = {"errors.png": partial(draw_errors, result=found)}
-        for name, draw in plots.in_formats(drawn, formats or ()).items():
-            draw(folder.new(name))
-        if wants_report:
-            study_report.write(folder, **report_arguments(found))
+        page = report_arguments(found) if wants_report else None
         forms = {
             "camera": model.model_dump(mode="json"),
             "measurement": measured.model_dump(mode="json"),
         }
-        folder.finish(found.report() | forms | {"versions": provenance.versions()})
+        write_study(folder, drawn, formats, page, found.report() | forms)
     for note in found.notes:
         options.say(note, quiet)
-    if as_json:
-        print(report.to_json({"out": str(path), **found.report()}), end="")
-    elif not quiet:
-        print_report(found, path)
+    options.print_found(found, path, as_json, quiet, print_report)
     if found.missed:
         options.say(f"{len(found.missed)} of {len(found.rows)} predictions miss their tolerance")
         raise typer.Exit(MISSED)
