@@ -88,6 +88,13 @@ def on_page_markdown(markdown: str, page: Page, config: MkDocsConfig, files: Fil
     return re.sub(outside, lambda link: f"`{link[1].strip('`')}`", markdown)
 
 
+def on_post_build(config: MkDocsConfig) -> None:
+    """Write the index of the search as a script, too, which pages opened from the disk can read."""
+    folder = Path(config.site_dir) / "search"
+    index = (folder / "search_index.json").read_text("utf-8")
+    (folder / "search_index.js").write_text(f"var __index = {index}", "utf-8")
+
+
 # Effects and commands
 
 

@@ -114,7 +114,12 @@ def test_the_documentation_builds_without_a_warning_and_loads_nothing(tmp_path):
     loads = r'<(?:script|img|link|iframe)[^>]+(?:src|href)="(https?:)?//'
     for page in pages:
         assert not re.search(loads, page.read_text("utf-8")), page
-    found = json.loads((tmp_path / "site" / "search" / "search_index.json").read_text("utf-8"))
+    index = (tmp_path / "site" / "search" / "search_index.json").read_text("utf-8")
+    script = (tmp_path / "site" / "search" / "search_index.js").read_text("utf-8")
+    assert script == f"var __index = {index}"  # the search of pages opened from the disk
+    for page in ("index.html", "reference/camera.html"):
+        assert "javascripts/search_from_disk.js" in (tmp_path / "site" / page).read_text("utf-8")
+    found = json.loads(index)
     places = {each["location"] for each in found["docs"]}
     assert {place.removeprefix("reference/") for place in places} >= FACTS
     keys = (tmp_path / "site" / "reference" / "camera.html").read_text("utf-8")
