@@ -184,9 +184,13 @@ def _not_simulated() -> Iterator[str]:
 
     yield "# What is not simulated\n"
     yield "What cameras have and a camera file cannot say, and what is simulated in its place.\n"
+    words: dict[str, list[str]] = {}
     for name, about in NOT_SIMULATED.items():
-        title = name.replace("_", " ")
-        yield f"## {title} {{ #{name} }}\n\n{sentence(escaped(about))}\n"
+        words.setdefault(about, []).append(name)
+    for about, (name, *others) in words.items():
+        yield f"## {name.replace('_', ' ')} {{ #{name} }}\n\n{sentence(escaped(about))}\n"
+        if others:
+            yield f"Also called {', '.join(other.replace('_', ' ') for other in others)}.\n"
 
 
 def _cite() -> str:

@@ -59,7 +59,12 @@ def test_the_camera_files_of_a_page_are_valid(page, tmp_path, monkeypatch):
 
 
 @pytest.mark.parametrize(
-    "name", [pytest.param("python.md", marks=pytest.mark.long), "howto/noise-model.md"]
+    "name",
+    [
+        pytest.param("python.md", marks=pytest.mark.long),
+        "howto/noise-model.md",
+        "howto/raw-files.md",
+    ],
 )
 def test_the_python_of_a_page_runs(name, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)

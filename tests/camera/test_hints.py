@@ -129,6 +129,16 @@ GUESSES = {
     "output=dng": "output: {dng: true}",
     "output.bits=16": "output.render: 16",
     "quality=all": "quality: [mse, psnr, cielab, s-cielab]",
+    # words of EMVA 1288 and of lens makers
+    "pixel.system_gain=0.37 DN/e": "adc.gain: 0.37 DN/e",
+    "adc.black_level=240": "adc.offset: 240 DN",
+    "exposure.black_level=240": "adc.offset: 240 DN",
+    "pixel.pedestal=64 DN": "adc.offset: 64 DN",
+    "exposure.gain=6 dB": "exposure.gain: 1.995",
+    "exposure.gain=-6 dB": "exposure.gain: 0.5012",
+    "optics.cra=30 deg": "optics.exit_pupil_distance: 5 mm",
+    "optics.flare=2 %": "optics.stray_light: 2 %",
+    "optics.cos4=true": "optics.off_axis: cos4",
     # parts of a camera by names of their own
     "sensor.width=3 um": "pixel.width: 3 um",
     "sensor.rows=48": "array.rows: 48",
@@ -276,6 +286,21 @@ def test_what_is_not_simulated_is_said(word):
     assert word not in {key.name for key in hints.index()}
     remedy, _ = remedy_of(f"pixel.{word}=1")
     assert "is not simulated" in remedy
+
+
+@pytest.mark.parametrize(
+    "guess",
+    [
+        "pixel.readout.gains=[1, 8]", "exposure.gains=[1, 8]", "adc.gains=[1, 8]",
+        "optics.distortion={k1: -0.1}", "optics.k1=-0.1", "lens.distortion=-0.1",
+        "optics.lateral_color={table: {450: -0.02 %}}", "optics.tca=1 um",
+        "pixel.readout.blooming=5 %", "array.crosstalk=1 %", "effects.crosstalk=on",
+        "pixel.photodetector.optical_crosstalk=1 %", "adc.companding={knees: [[1, 1]]}",
+        "adc.kind=companding",
+    ],
+)  # fmt: skip
+def test_what_is_not_simulated_is_said_wherever_it_is_looked_for(guess):
+    assert "not simulated" in remedy_of(guess)[0]
 
 
 def test_no_word_of_the_table_is_a_key_of_that_place():

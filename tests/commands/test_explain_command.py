@@ -42,6 +42,12 @@ def test_an_effect_is_told_with_its_source_and_switch(effect):
     assert f"effects: {{{effect.name}: off}}" in said
 
 
+def test_a_key_leads_to_no_effect_that_only_speaks_of_its_section():
+    """`pixel` and `scene` are words of sentences, and no keys that an effect needs."""
+    for name in ("pixel.temperature", "scene.luminance", "pixel.width"):
+        assert "effect:" not in vcam(name).stdout
+
+
 def test_a_key_leads_to_its_effect():
     assert "vcam explain read_noise" in vcam("pixel.readout.read_noise").stdout
     assert "vcam explain fpn" in vcam("prnu").stdout

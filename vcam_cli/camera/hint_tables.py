@@ -35,6 +35,14 @@ KEYS: Mapping[str, str] = {
     "autofocus": "optics.focus: auto",
     "auto_focus": "optics.focus: auto",
     "contrast_detection": "optics.focus: auto",
+    **dict.fromkeys(
+        ("cra", "chief_ray_angle", "chief_ray", "exit_pupil"), "optics.exit_pupil_distance: 5 mm"
+    ),
+    **dict.fromkeys(
+        ("flare", "veiling_glare", "glare", "ghosting", "ghost"), "optics.stray_light: 2 %"
+    ),
+    "cos4": "optics.off_axis: cos4",
+    "wavefront": "optics.zernike: {4: 0.05 um}",
     "aberrations": "optics.zernike: {4: 0.05 um}",
     "size": "pixel.width: 3 um",
     "pixel_size": "pixel.width: 3 um",
@@ -52,6 +60,10 @@ KEYS: Mapping[str, str] = {
     "cti": "pixel.readout.charge_transfer: {inefficiency: 3e-5, phases: 3}",
     "hot_pixels": "pixel.defects.hot: 0.0001",
     "dead_pixels": "pixel.defects.dead: 0.0001",
+    **dict.fromkeys(
+        ("system_gain", "overall_system_gain", "conversion_factor", "k"), "adc.gain: 0.25 DN/e"
+    ),
+    **dict.fromkeys(("black_level", "pedestal", "blacklevel"), "adc.offset: 64 DN"),
     "bit_depth": "adc.bits: 12",
     "bitdepth": "adc.bits: 12",
     **dict.fromkeys(
@@ -209,6 +221,12 @@ FORMS: Mapping[str, tuple[tuple[str, str], ...]] = {
         (_NUMBER, r"write {gain: \1}"),
         ("(?i)true|on|yes", "write {gain: 1.8}"),
     ),
+    "adc.kind": (
+        (
+            "(?i)compand.*|pwl|piecewise.*|knees?",
+            "write logarithmic, or linear, as an ADC with knees is not simulated",
+        ),
+    ),
     "pixel.fpn": (
         (rf"{_NUMBER} ?%", r"write {prnu: \1 %}"),
         (rf"{_NUMBER} ?e-?", r"write {dsnu: \1 e}"),
@@ -268,13 +286,36 @@ SWITCHES = {
 }
 """A word for a switch -> what it means."""
 NOT_SIMULATED: Mapping[str, str] = {
-    "blooming": "charge beyond the full well is drained, and spills to no neighbor",
+    **dict.fromkeys(
+        ("blooming", "anti_blooming", "antiblooming"),
+        "charge beyond the full well is drained, and spills to no neighbor",
+    ),
     "smear": "charge is transferred in no time, and collects no light meanwhile",
-    "crosstalk": "pixels share light and charge by pixel.photodetector.charge_diffusion alone",
-    "distortion": "the lens images straight lines as straight lines",
-    "lateral_color": "the lens images all wavelengths in one size",
-    "chromatic_aberration": "wavefronts in optics.zernike are the same length at all wavelengths",
-    "dual_conversion_gain": "every pixel is read with one gain, pixel.readout.gain",
+    **dict.fromkeys(
+        ("crosstalk", "optical_crosstalk", "electrical_crosstalk"),
+        "pixels share light and charge by pixel.photodetector.charge_diffusion alone",
+    ),
+    **dict.fromkeys(
+        ("distortion", "lens_distortion", "radial_distortion", "k1", "k2", "k3"),
+        "the lens images straight lines as straight lines",
+    ),
+    **dict.fromkeys(
+        ("lateral_color", "lateral_chromatic_aberration", "transverse_color", "tca"),
+        "the lens images all wavelengths in one size",
+    ),
+    **dict.fromkeys(
+        ("chromatic_aberration", "longitudinal_color", "axial_color", "focus_shift"),
+        "wavefronts in optics.zernike are the same length at all wavelengths",
+    ),
+    **dict.fromkeys(
+        ("prescription", "zemax"),
+        "a lens is given by what it does, in optics.zernike, optics.psf or optics.mtf",
+    ),
+    **dict.fromkeys(
+        ("dual_conversion_gain", "gains", "dual_gain", "conversion_gains", "dcg"),
+        "every pixel is read with one gain, pixel.readout.gain",
+    ),
+    **dict.fromkeys(("companding", "knees", "pwl"), "adc.kind is linear or logarithmic"),
     "flash": "the light of the scene is scene.illuminant at one level",
     **dict.fromkeys(
         ("phase_detection", "pdaf", "dual_pixel"),

@@ -41,6 +41,7 @@ _FILM_DIAGONAL = math.hypot(36, 24)
 """Of the frame that focal lengths are equivalent to [mm]."""
 _NUMBER = re.compile(r"[A-Za-z/ .=-]*?(\d+(?:\.\d+)?)[ -]*([kM]?)[A-Za-z ]*")
 """A number among letters: ISO800, 10 bit, 3024 px."""
+_DECIBELS = re.compile(r"([+-]?\d{1,2}(?:\.\d+)?) ?dB")
 _SIZE = re.compile(r"(\d+) *[xX*×] *(\d+)|(\d{1,3}(?:\.\d+)?) *(?:MP|Mpx|megapixels?)?")
 """Columns and rows, or millions of pixels."""
 
@@ -201,6 +202,8 @@ def _meant_value(problem: Problem, given: object) -> str:
         return ""
     if meant := VALUES.get(path, {}).get(_plain(word)):
         return f"write {meant}"
+    if " unit 'dB'" in problem.message and (decibels := _DECIBELS.fullmatch(word)):
+        return f"write {10 ** (float(decibels[1]) / 20):.4g}, as {word} are 20 log10 of it"
     for form, remedy in FORMS.get(path, ()):
         if match := re.fullmatch(form, word.strip()):
             return match.expand(remedy)

@@ -258,7 +258,8 @@ class Optics(Model):
     exit_pupil_distance: Annotated[
         float | None, Quantity("length", above=0, words={"auto": None})
     ] = key(
-        "from the sensor; auto = the image distance (1 - m) f; sets the angles at the pixel",
+        "from the sensor; auto = the image distance (1 - m) f; sets the chief ray angles (CRA) at"
+        " the pixels",
         unit="mm",
         example="auto",
         default=None,

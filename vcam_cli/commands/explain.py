@@ -121,9 +121,9 @@ def concerns(effect: Any, key: Any) -> bool:
     Or needs the mapping that the key is in.
     """
     named = any(str(part).startswith(effect.name) for part in key.path)
-    parent = re.escape(key.dotted.rpartition(".")[0])
-    of_mapping = re.search(rf"{parent}(?![.\w])", effect.absent) if parent else None
-    return named or key.dotted in effect.absent or of_mapping is not None
+    places = (key.dotted, key.dotted.rpartition(".")[0])
+    needed = (p for p in places if "." in p)  # a section's name is a word of its sentences, too
+    return named or any(re.search(rf"{re.escape(p)}(?![.\w])", effect.absent) for p in needed)
 
 
 def _effects() -> dict[str, Any]:

@@ -196,15 +196,19 @@ def _first_line(item: object) -> str:
 def _metrics() -> list[Item]:
     always = {
         "exposure_time": "exposure time [s]",
-        "mean_electrons": "mean of the raw signal [e]",
+        "mean_electrons": "mean of the raw signal, dark signal included [e]",
         "saturated_fraction": "fraction of pixels at the full well",
-        "snr_db": "SNR at 20 % of the well [dB] (eq 3.2)",
-        "dynamic_range_db": "dynamic range [dB] (eq 3.1)",
-        "well_capacity": "full well [e]",
-        "quantized_dynamic_range_db": "dynamic range up to the ADC's end, with its rounding [dB]",
+        "snr_db": "signal over temporal noise of a pixel at 20 % of the well, 20 log10(S / sqrt(S +"
+        " D + r^2)), with dark charge D and read and reset noise r [dB] (Chen 2003, eq 3.2)",
+        "dynamic_range_db": "dynamic range of a pixel, 20 log10((full well - D) / sqrt(D + r^2)),"
+        " before the ADC [dB] (Chen 2003, eq 3.1)",
+        "well_capacity": "full well of what one raw value counts [e]",
+        "quantized_dynamic_range_db": "the same up to the ADC's end, with its rounding: what a data"
+        " sheet's range is to be compared with [dB]",
         "picture_snr_db": "mean signal of this picture over its temporal noise [dB]",
         "digital_gain": "what the render multiplies the raw by, raw saturation = white = 1",
-        "base_iso": "ISO speed at gain 1 (ISO 12232, saturation-based)",
+        "base_iso": "ISO speed at exposure.gain 1: 78 lx s / H, with the exposure H of the sensor"
+        " by daylight D55 that fills the brightest color (ISO 12232, saturation-based)",
     }
     asked = {
         "mse": "mean squared error against the ideal image; ask for it in `quality`",

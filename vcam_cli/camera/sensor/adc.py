@@ -34,8 +34,8 @@ class Adc(Model):
     bits: Annotated[int, Whole(least=1, most=24, example="10")] = key("resolution", default=10)
     kind: Literal["linear", "logarithmic"] = key("its curve", default="linear")
     offset: Annotated[float | None, Quantity("dn", least=0, words={"auto": None})] = key(
-        "the number for no signal; auto = the fewest codes that keep four standard deviations of"
-        " the dark noise above 0",
+        "the code for no signal, the black level (pedestal); auto = the fewest codes that keep four"
+        " standard deviations of the dark noise above 0",
         unit="DN",
         example="auto",
         default=None,

@@ -145,7 +145,9 @@ class Photodetector(Model):
         default=None,
     )
     dark_current: Annotated[float | None, Quantity("rate", least=0)] = key(
-        "of the whole pixel, in place of a density", example="12 e/s", default=None
+        "of the whole pixel at its temperature, in place of a density",
+        example="12 e/s",
+        default=None,
     )
     dark_current_scale: Annotated[float, Number(least=0, example="1")] = key(
         "multiplies the dark current", default=1.0

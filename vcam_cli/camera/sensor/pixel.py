@@ -81,10 +81,12 @@ class Readout(Model):
         "volts per electron; default q / capacitance", example="20 uV/e", default=None
     )
     voltage_swing: Annotated[float | None, Quantity("voltage", above=0)] = key(
-        "at the full well", example="1.38 V", default=None
+        "volts at the full well", example="1.38 V", default=None
     )
     full_well: Annotated[float | None, Quantity("charge", above=0)] = key(
-        "electrons a pixel can hold; enough by itself",
+        "electrons at which a pixel is full: signal and noise are cut off there; voltage_swing /"
+        " conversion_gain, or enough by itself; the saturation capacity of EMVA 1288, where its"
+        " noise begins to fall, lies just below",
         example="69 ke",
         default=None,
     )
@@ -96,7 +98,12 @@ class Readout(Model):
     gain: Positive = key(
         "analog gain of the fixed readout chain; the photographer's is exposure.gain", default=1.0
     )
-    read_noise: Electrons = key("temporal noise of a readout", example="5 e", default=0.0)
+    read_noise: Electrons = key(
+        "temporal noise of one readout of a pixel, rms, in electrons of the pixel; reset noise,"
+        " that of columns and rows, and the ADC's rounding come on top",
+        example="5 e",
+        default=0.0,
+    )
     column_noise: Electrons = key(
         "temporal, one draw a column and frame; none in dps and ccd", example="0 e", default=0.0
     )
@@ -296,7 +303,12 @@ class Pixel(Model):
     microlens: Annotated[Microlens | None, word_or(Microlens, {"none": None})] = key(
         "a lens on every pixel", example="none", default=None
     )
-    temperature: SiliconTemperature = key("of the sensor", example="300 K", default=300.0)
+    temperature: SiliconTemperature = key(
+        "of the sensor: kTC noise follows it, and dark current that is given as a density at a"
+        " temperature",
+        example="300 K",
+        default=300.0,
+    )
 
     rules = (_is_determined,)
 
