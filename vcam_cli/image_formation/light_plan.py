@@ -40,8 +40,6 @@ from vcam_cli.scenes.layered import AnyScene, LayeredScene
 
 LIGHT_SHARE = 0.3
 """Part of the tolerance that all omitted effects on the light may use together."""
-CLEAR = 2.0
-"""Times its budget that each blur changes where no more of the scene need be looked at."""
 LEVEL_SHARE = 0.5
 """Part of the tolerance by which they may shift a percentile of the light, relative to it: shot
 noise has the variance of the signal."""
@@ -108,9 +106,7 @@ def light_plan(path: OpticalPath, scene: AnyScene) -> LightPlan:
         if not functions:
             functions.update(transfer_functions(path, found))
         blurs = of_kind(candidates, *BLURS)
-        return not displacing and all(
-            _share(found, functions, blur) > CLEAR * budget for blur in blurs
-        )
+        return not displacing and all(_share(found, functions, blur) > budget for blur in blurs)
 
     surveyed = scene.flat if isinstance(scene, LayeredScene) else scene
     detail = scene_detail(path, surveyed, every_blur_counts)

@@ -23,6 +23,8 @@ from numpy.typing import NDArray
 
 CORNISH_FISHER_MEAN = 8.0
 """Mean from which the expansion is used [electrons]; below, the distribution is inverted."""
+FEW = 0.25
+"""Share of the numbers from which on those that are not inverted yet go on by themselves."""
 
 
 def poisson_from_normal(mean: NDArray[np.floating], z: NDArray[np.floating]) -> NDArray:
@@ -72,18 +74,22 @@ def _invert(mean: NDArray, z: NDArray) -> NDArray:
     m = np.maximum(mean.astype(np.float64), 0.0)
     # The upper tail in its own right, since 1 - Phi(z) rounds to 0 from z = 8 on.
     upper = ndtr(-z.astype(np.float64))
-    term = np.exp(-m)
     tail = -np.expm1(-m)  # P(X > k)
-    count = np.zeros_like(m)
-    active = np.flatnonzero(tail > upper)
+    count = np.zeros_like(mean)
+    place: NDArray = np.flatnonzero(tail > upper)
+    m, tail, upper = m[place], tail[place], np.maximum(upper[place], 1e-15)
+    term, above = np.exp(-m), np.full(m.shape, True)
     k = 0
-    while active.size:
+    while left := np.count_nonzero(above):
+        if left < FEW * above.size:  # picking them takes as long as some steps of all
+            place, m, term = place[above], m[above], term[above]
+            tail, upper, above = tail[above], upper[above], above[above]
         k += 1
-        count[active] = k
-        term[active] *= m[active] / k
-        tail[active] -= term[active]
-        active = active[tail[active] > np.maximum(upper[active], 1e-15)]
-    return count.astype(mean.dtype)
+        count[place] += above
+        term *= m / k
+        tail -= term
+        above = tail > upper
+    return count
 
 
 def gaussian_shot_noise(mean: NDArray[np.floating], z: NDArray[np.floating]) -> NDArray:

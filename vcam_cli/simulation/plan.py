@@ -143,7 +143,10 @@ def check(camera: Camera) -> None:
 
 def enabled_effects(camera: Camera, geometry: Geometry) -> tuple[Effect, ...]:
     """Return the effects that the camera has and the user has not switched off."""
-    found = camera_effects(camera, geometry).values()
+    return _enabled(camera, camera_effects(camera, geometry).values())
+
+
+def _enabled(camera: Camera, found: Iterable[Effect | None]) -> tuple[Effect, ...]:
     return tuple(e for e in found if e is not None and _wish(camera, e) != "off")
 
 
@@ -188,7 +191,7 @@ def make(
         Name of an effect -> rms change of the signal by leaving it out, where known [e/s].
     """
     effects = camera_effects(camera, geometry)
-    present = enabled_effects(camera, geometry)
+    present = _enabled(camera, effects.values())
     shares = {name: min(c * signal.time / signal.full_signal, 1.0) for name, c in changes.items()}
     shares |= light.shares
     omitted = {*light.omitted, *_negligible(camera, present, light, signal, shares)}

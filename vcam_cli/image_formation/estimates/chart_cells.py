@@ -42,6 +42,8 @@ MOST = 1 << 26
 LADDER = (1.1, 1.6, 2.2, 2.7, 3.3, 4.2, 5.3, 6.6, 8.3, 10.4, 13.1, 16.4, 24.2, 32.3, 48.1)
 """Cells per pixel pitch that are tried on crops. Whole numbers of them would lie in a crop as its
 photodetectors do, and err less there than on the whole."""
+LIKELY = 2.0
+"""Cells per pixel pitch from which on they are tried; fewer, where it seems that they would do."""
 FASTEST_FALL = 4.0
 """Power of the cells with which their error falls, at most: numbers of cells that would need a
 faster fall from those tried before are not tried."""
@@ -138,19 +140,34 @@ def cells_per_pixel(path: OpticalPath, scene: ChartScene, highest: float) -> Cho
     least = 0.0
     if converged.max() > path.ceiling:
         least, budget = OVEREXPOSED, OVEREXPOSED_SHARE * budget
-    tried, error, trials = most, budget, 1
-    for cells in [c for c in LADDER if least <= c <= min(most, reference / COPRIME)]:
-        if trials > 1 and error * (tried / cells) ** FASTEST_FALL > budget:
-            continue
-        tried, trials = cells, trials + 1
+
+    def measured(cells: float) -> float:
         found = _signals(path, crops, cells, level, otf)
-        # Few pixels may have no error by chance; many around them may hide theirs.
         error = _error_that_counts(found, converged, path.ceiling)
+        # Few pixels may have no error by chance; many around them may hide theirs.
         if within(found).size < found.size:
             error = max(error, _error_that_counts(within(found), within(converged), path.ceiling))
+        return error
+
+    ladder = [c for c in LADDER if least <= c <= min(most, reference / COPRIME)]
+    first = next((i for i, c in enumerate(ladder) if c >= LIKELY), len(ladder) - 1)
+    tried, error, trials = most, budget, 1
+    for cells in ladder[first:]:
+        if trials > 1 and error * (tried / cells) ** FASTEST_FALL > budget:
+            continue
+        tried, error, trials = cells, measured(cells), trials + 1
         if error <= budget:
-            rows = crops[0].pitch_y / g.pitch_y
-            return ChosenCells(max(cells, cell_grid(crops[0], g, cells)[0] / rows), error, trials)
+            break
+    if trials == 2 and error <= budget:
+        for cells in ladder[:first][::-1]:
+            fewer = measured(cells) if error * (tried / cells) ** 2 <= budget else math.inf
+            trials += fewer < math.inf
+            if fewer > budget:
+                break
+            tried, error = cells, fewer
+    if trials > 1 and error <= budget:
+        rows = crops[0].pitch_y / g.pitch_y
+        return ChosenCells(max(tried, cell_grid(crops[0], g, tried)[0] / rows), error, trials)
     # It falls with the square of the cells, about: faster than is reckoned here.
     enough = min(tried * error / budget, most) if budget else most
     return ChosenCells(enough, error * tried / enough, trials)

@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 import scipy.fft
@@ -186,36 +187,45 @@ def _tile_detail(path: OpticalPath, scene: Scene, level: NDArray, settled: Settl
     even = _surveyed(path, scene, level, counts.tolist())
     parts = even.light.reshape(counts[0], SURVEY, counts[1], SURVEY)
     places, shares = _tile_places(_contrast(parts), rng)
-    brightest = float(parts.mean(axis=(1, 3)).max())
-    squares: list[NDArray] = []
-    for place, share in zip(places, shares, strict=True):
-        index = np.array(divmod(int(place), counts[1]))
+
+    def light_of_tile(place: int) -> NDArray:
+        index = np.array(divmod(place, counts[1]))
         place_in_part = 0.5 if covers else rng.random(2)
         start = ((index + place_in_part) / counts - 0.5) * size * pitch - length / 2
         y, x = (
             first + (np.arange(n) + rng.random(n)) * (whole / n)
             for first, whole, n in zip(start, length, points, strict=True)
         )
-        values = _light_at(scene, x, y, level)
+        return _light_at(scene, x, y, level)
+
+    brightest = float(parts.mean(axis=(1, 3)).max())
+    power, sums = np.zeros(points), np.zeros(0)
+    for first, last in pairwise((0, *(n for n in ASKED if n < len(places)), len(places))):
+        values = np.array([light_of_tile(int(place)) for place in places[first:last]])
         brightest = max(brightest, _brightest_block(values))
-        tile = np.square(scipy.fft.dctn(values, type=2, norm="ortho")) * (share / values.size)
-        tile[0, 0] = 0
-        squares.append(tile)
-        found = replace(even, brightest=min(brightest, path.ceiling))
-        if len(squares) in ASKED and settled(_with_tiles(found, squares, length)):
+        squares = np.square(scipy.fft.dctn(values, type=2, norm="ortho", axes=(1, 2)))
+        squares *= shares[first:last, None, None] / points.prod()
+        squares[:, 0, 0] = 0
+        power += squares.sum(axis=0)
+        sums = np.append(sums, squares.sum(axis=(1, 2)))
+        detail = replace(
+            _with_tiles(even, power, sums, length), brightest=min(brightest, path.ceiling)
+        )
+        if last < len(places) and settled(detail):
             break
-    return _with_tiles(found, squares, length)
+    return detail
 
 
-def _with_tiles(even: SceneDetail, squares: Sequence[NDArray], length: NDArray) -> SceneDetail:
-    """Return a scene's detail with the mean squares of its tiles, of so much length [m]."""
-    power, points = np.sum(squares, axis=0), squares[0].shape
-    sums = np.sum(squares, axis=(1, 2))
+def _with_tiles(even: SceneDetail, power: NDArray, sums: NDArray, length: NDArray) -> SceneDetail:
+    """Return a scene's detail with the mean squares of its tiles, of so much length [m].
+
+    `power` are those of every frequency in all tiles, `sums` of all frequencies in every tile.
+    """
     whole = float(sums.sum())
     error = float(sums.std()) * math.sqrt(len(sums)) / whole if whole else 0.0
-    top = [math.floor(UNRESOLVED * n) for n in points]
+    top = [math.floor(UNRESOLVED * n) for n in power.shape]
     noise = float(power[top[0] :, top[1] :].mean())
-    fy, fx = (np.arange(n) / (2 * side) for n, side in zip(points, length, strict=True))
+    fy, fx = (np.arange(n) / (2 * side) for n, side in zip(power.shape, length, strict=True))
     return replace(
         even,
         fx=fx,
@@ -254,11 +264,14 @@ def _tile_places(contrast: NDArray, rng: np.random.Generator) -> tuple[NDArray, 
 
 
 def _brightest_block(values: NDArray) -> float:
-    """Return the largest mean over blocks of points: light that no blur takes away."""
-    n = min(BLOCK, *values.shape)
-    rows, columns = (size // n for size in values.shape)
-    blocks = values[: rows * n, : columns * n].reshape(rows, n, columns, n)
-    return float(blocks.mean(axis=(1, 3)).max())
+    """Return the largest mean over blocks of points: light that no blur takes away.
+
+    Of tiles (tiles, rows, columns).
+    """
+    n = min(BLOCK, *values.shape[1:])
+    rows, columns = (size // n for size in values.shape[1:])
+    blocks = values[:, : rows * n, : columns * n].reshape(-1, rows, n, columns, n)
+    return float(blocks.mean(axis=(2, 4)).max())
 
 
 def transfer_functions(path: OpticalPath, detail: SceneDetail) -> dict[Effect, NDArray]:
@@ -305,12 +318,12 @@ def change_by_omission(
     float
         Rms change in the color of most light [electrons / s].
     """
-    kept, lost = np.ones(detail.power.shape), np.ones(detail.power.shape, complex)
+    kept = lost = np.ones(detail.power.shape)
     for effect, function in functions.items():
         if effect in omitted:
-            lost *= function
+            lost = lost * function
         else:
-            kept *= np.abs(function)
+            kept = kept * np.abs(function)
     changed = np.square(kept * np.abs(1 - lost))
     squares = float((detail.power * changed).sum()) + detail.unresolved * float(changed.max())
     return math.sqrt(squares * (1 + CONFIDENCE * detail.error))

@@ -43,9 +43,10 @@ class SlantedEdge(Chart):
         stop = np.searchsorted(along, -offset + reach, side="right")
         row, column = expand_ranges(start, stop)
         part = half_plane_cover(offset[row] + along[column], widths[0][column], widths[1][row])
-        plain = self._mix_levels((np.arange(len(x)) >= start[:, None]), mix)
-        for plane, edge, field in zip(out, self._mix_levels(part, mix), plain, strict=True):
-            plane[:] = field
+        is_bright = np.arange(len(x)) >= start[:, None]
+        levels = self._mix_levels(np.arange(2.0), mix)
+        for plane, edge, level in zip(out, self._mix_levels(part, mix), levels, strict=True):
+            plane[:] = np.where(is_bright, level[1], level[0])
             plane[row, column] = edge
 
     def values(self, x: Array, y: Array, mix: Array) -> Array:
