@@ -32,7 +32,7 @@ def fit(
 
     Write camera.yaml, which runs as it is, parameters.csv with 90 % intervals and methods (EMVA
     1288 release 4.0 where it defines one), plots of photon transfer, dark signal and intervals,
-    and fit.json. What the frames cannot tell is listed.
+    mtf.csv where there are edges, and fit.json. What the frames cannot tell is listed.
 
     \b
     Example:
@@ -45,6 +45,8 @@ def fit(
     from vcam_cli.files.atomic import write_text
     from vcam_cli.files.folder import OutputFolder
     from vcam_cli.fitting import fit as fitting
+    from vcam_cli.fitting.camera_file import MTF
+    from vcam_cli.fitting.edge import COLUMNS as LENS_COLUMNS
     from vcam_cli.fitting.parameters import COLUMNS
     from vcam_cli.fitting.plots import plots
     from vcam_cli.simulation.output.study_files import write_study
@@ -62,6 +64,8 @@ def fit(
         tables.write_table(
             folder.new("parameters.csv"), COLUMNS, (p.cells for p in found.parameters)
         )
+        if found.lens is not None:
+            tables.write_table(folder.new(MTF), LENS_COLUMNS, found.lens.rows())
         page = report_arguments(found) if wants_report else None
         form = {"measurement": measured.model_dump(mode="json")}
         write_study(folder, plots(found), formats, page, found.report() | form)
@@ -82,6 +86,7 @@ def report_arguments(found: "Fit") -> dict[str, Any]:
         "photon_transfer.png": "Temporal variance over signal, from which the gain follows",
         "dark_signal.png": "Dark frames: black level and dark current",
         "intervals.png": "How sure each number is",
+        "mtf.csv": "Modulation transfer of the lens, the pixel's own taken out.",
     }
     return {
         "title": f"{found.measurement.name}: a camera from its frames",

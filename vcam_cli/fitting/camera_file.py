@@ -1,18 +1,26 @@
-"""The camera file of a fitted sensor: a bare sensor under the light of its flat frames."""
+"""The camera file of a fitted sensor under the light of its flat frames: bare, or behind a lens.
+
+With a lens the scene is as bright as gives the sensor that light. The lens keeps none of it back
+and falls off nowhere, since flat frames are taken without it.
+"""
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, Any
 
 from vcam_cli import units
 from vcam_cli.fitting.conditions import Conditions, usual_temperature
 from vcam_cli.fitting.pattern import CYCLES
 from vcam_cli.fitting.sensor import Transfer
+from vcam_cli.physics.radiometry import irradiance_per_radiance
 from vcam_cli.physics.readout import ELEMENTARY_CHARGE
 
 if TYPE_CHECKING:
     from vcam_cli.fitting.fit import Fit
 
+MTF = "mtf.csv"
+"""The file of the lens's transfer, beside the camera file."""
 BLACK = 1.0
 """Quantum efficiency that stands for one that is not known."""
 
@@ -42,6 +50,19 @@ def tree(found: Fit, conditions: Conditions, curves: list[Transfer]) -> dict[str
         "illuminant": entry.light.to_yaml() if entry.light else "equal-energy",
         "irradiance": units.render(entry.irradiance or 0.01, "irradiance"),
     }
+    optics: str | dict[str, Any] = "none"
+    if measurement.optics is not None and found.lens is not None:
+        lens = measurement.optics
+        optics = {
+            "f_number": lens.f_number,
+            "focal_length": units.render(lens.focal_length, "length"),
+            "transmittance": 1,
+            "off_axis": "none",
+            "mtf": {"file": MTF},
+        }
+        solid_angle = float(irradiance_per_radiance(lens.f_number))
+        before = (entry.irradiance or 0.01) * math.pi / solid_angle
+        scene |= {"irradiance": units.render(before, "irradiance"), "distance": "infinity"}
     if entry.irradiance is None:
         found.unknown.append("irradiance of the flat frames: 0.01 W/m2 stands in the camera file")
     usual = usual_temperature(measurement)
@@ -63,7 +84,7 @@ def tree(found: Fit, conditions: Conditions, curves: list[Transfer]) -> dict[str
     return {
         "name": measurement.name,
         "scene": scene,
-        "optics": "none",
+        "optics": optics,
         "pixel": {
             "width": units.render(pixel.width, "length"),
             **height,

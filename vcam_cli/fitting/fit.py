@@ -1,7 +1,7 @@
 """`vcam fit`: a camera file from raw frames, every number with its interval.
 
 measurement file -> frames (`frames`) -> statistics of each stack (`conditions`, `statistics`)
--> gain, noise, pattern, range (`sensor`) and MTF50 (`edge`) -> parameters and camera (here)
+-> gain, noise, pattern, range (`sensor`) sharpness (`edge`) -> parameters and camera (here)
 """
 
 from __future__ import annotations
@@ -28,6 +28,8 @@ from vcam_cli.fitting.parameters import COLUMNS, SIGMAS, Parameter, deviation, p
 from vcam_cli.fitting.pattern import CYCLES
 from vcam_cli.fitting.traps import LEAST_FRAMES, Traps, find_traps
 from vcam_cli.progress import Observer, Silent
+from vcam_cli.quality.mtf import EdgeResponse
+from vcam_cli.verification.edges import edge_responses
 from vcam_cli.verification.frame_sets import FrameSet
 from vcam_cli.verification.frames import color_block, paths, raise_if_any, stacks
 from vcam_cli.verification.model import Measurement
@@ -54,6 +56,8 @@ class Fit:
     """The line of their means over time."""
     curves: list[sensor.Transfer] = field(default_factory=list)
     """The photon transfer of every color in every light."""
+    lens: edge.LensTransfer | None = None
+    """What an edge tells of the lens."""
 
     def value(self, name: str) -> float | None:
         """Return an estimate, None where there is none."""
@@ -265,8 +269,9 @@ def _of_patterns(
         if is_significant(variance):
             add(deviation(key, variance, scale, unit, method))
     if is_significant(slow["shading_gain"][0]):
-        out.notes.append("flat frames are not even: what is slow over the array is written as"
-                         " shading of gains, and may be that of the light")  # fmt: skip
+        out.notes.append("flat frames are not even: shading by the lamp, by a lens and by the"
+                         " pixels look alike in them and are not told apart; all of it is written"
+                         " as shading of the pixels' gains")  # fmt: skip
     fractions = {"hot": found.hot, "dead": found.dead}
     for name, share in fractions.items():
         if share is None:
@@ -321,15 +326,23 @@ def _of_edge(out: Fit, measurement: Measurement) -> None:
     edges = [stack for stack in stacks(measurement) if stack.entry.target == "slanted-edge"]
     if not edges:
         tell("sharpness: there are no frames of an edge")
+    seen: list[EdgeResponse] = []
     for stack in edges:
         try:
-            found = edge.mtf50(stack, measurement)
+            found = edge_responses(stack.frames, measurement)
         except ValueError as error:
             tell(f"sharpness, {stack.label}: {error}")
             continue
-        for color, value in found.items():
+        for color, responses in found.items():
+            seen += responses
+            value = edge.mtf50(responses)
             if value is None:
                 tell(f"MTF50 of {color}: two frames of an edge at least, sharp enough, are needed")
                 continue
             method = "ISO 12233 e-SFR, mean over the frames"
             out.parameters.append(parameter(f"mtf50.{color}", value * 1e-3, "lp/mm", method))
+    if seen:
+        out.lens = edge.lens_transfer(seen, measurement)
+        if measurement.optics is None:
+            tell("the lens of the edge: the measurement gives no optics (f_number, focal_length),"
+                 " the camera is a bare sensor; mtf.csv is for its optics.mtf")  # fmt: skip

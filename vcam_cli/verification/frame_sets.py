@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 from vcam_cli.camera.scene.illuminant import IlluminantSpec
 from vcam_cli.config.model import Model, at_most_one, key
 from vcam_cli.config.quantities import Number, Quantity, Whole
-from vcam_cli.config.values import TIME, MaybePositive, MaybeSiliconTemperature, Text
+from vcam_cli.config.values import TIME, Length, MaybePositive, MaybeSiliconTemperature, Text
 from vcam_cli.verification.light import Light
 
 PixelSize = Annotated[float | None, Quantity("length", above=0, least=1e-9, most=1e-2)]
@@ -62,3 +62,12 @@ class MeasuredPixel(Model):
 
     width: PixelSize = key("pitch of the pixels", example="3.45 um")
     height: PixelSize = key("default the width", example="3.45 um", default=None)
+
+
+class MeasuredLens(Model):
+    """The lens through which the edges were taken."""
+
+    f_number: Annotated[float, Number(above=0, least=0.5, most=1e4, example="2.8")] = key(
+        "focal length over diameter of the aperture", example=2.8
+    )
+    focal_length: Length = key("focal length", example="16 mm")

@@ -15,7 +15,7 @@ from vcam_cli.config.quantities import Number, Percentage, Quantity
 from vcam_cli.config.validation_messages import describe, fault, refusal
 from vcam_cli.config.values import TIME, Either, MaybeSiliconTemperature, Text, Word, mapping
 from vcam_cli.config.yaml_type import YamlType, to_yaml
-from vcam_cli.verification.frame_sets import PATTERNS, FrameSet, Levels, MeasuredPixel
+from vcam_cli.verification.frame_sets import PATTERNS, FrameSet, Levels, MeasuredLens, MeasuredPixel
 from vcam_cli.verification.light import Light
 
 DIMENSIONS = {"volts": "voltage", "dn": "dn", "electrons": "charge"}
@@ -150,6 +150,11 @@ class Measurement(FileModel):
     )
     pixel: Annotated[MeasuredPixel | None, mapping(MeasuredPixel)] = key(
         "pixels of the frames; needed for files", example={"width": "3.45 um"}, default=None
+    )
+    optics: Annotated[MeasuredLens | None, mapping(MeasuredLens)] = key(
+        "the lens before the sensor in frames of an edge; fit then writes a camera with that lens",
+        example={"f_number": 2.8, "focal_length": "16 mm"},
+        default=None,
     )
     pattern: PATTERNS = key("color filter array of the frames", default="monochrome")
     hold_out: Annotated[float, Percentage(least=0, below=1)] = key(
