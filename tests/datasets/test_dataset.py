@@ -15,7 +15,7 @@ import pytest
 import tifffile
 import yaml
 from making import tree
-from sweeping import ROOT, VCAM, environment
+from sweeping import ROOT, VCAM, Cluster, environment
 from typer.testing import CliRunner
 
 from vcam_cli import load, simulate
@@ -184,6 +184,35 @@ def test_workers_kills_and_order_change_no_byte(whole, tmp_path):
     assert contents(tmp_path / "out") == contents(out)
     assert not list(points.glob("*.npz"))
     assert made(study, tmp_path / "out").computed == 0
+
+
+@pytest.mark.long
+def test_a_cluster_changes_no_byte(whole, tmp_path):
+    """Two workers of a Dask scheduler, one of which is killed as soon as three frames are there."""
+    pytest.importorskip("distributed")
+    study, out = whole
+    cluster = Cluster(tmp_path)
+    try:
+        cluster.add_worker()
+        cluster.add_worker()
+        command = [*VCAM, "dataset", str(study), "--scheduler", cluster.address, "--json"]
+        process = subprocess.Popen(
+            [*command, "-o", str(tmp_path / "out")],
+            env=environment(), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
+        )  # fmt: skip
+        points = tmp_path / "out" / "points"
+        deadline = time.monotonic() + 60
+        while len(list(points.glob("*.json"))) < 3 and process.poll() is None:
+            assert time.monotonic() < deadline
+            time.sleep(0.002)
+        cluster.workers[0].kill()
+        told, said = process.communicate(timeout=120)
+        assert process.returncode == 0, said
+        assert json.loads(told)["computed"] == 10
+        assert contents(tmp_path / "out") == contents(out)
+        assert not list(points.glob("*.npz"))
+    finally:
+        cluster.close()
 
 
 def test_shares_add_up(whole, tmp_path):

@@ -1,13 +1,12 @@
 """A sweep on a Dask scheduler and two workers in processes of their own, one of them killed."""
 
 import json
-import re
 import subprocess
 import sys
 import time
 
 import pytest
-from sweeping import VCAM, environment, written
+from sweeping import VCAM, Cluster, environment, written
 
 from vcam_cli import sweep
 from vcam_cli.errors import BadInput, CannotDo
@@ -59,39 +58,6 @@ def test_what_becomes_of_a_task():
         workers._outcome(job, FakeFuture(cancelled=True), "lost")
     with pytest.raises(CannotDo, match="install vcam"):
         workers._outcome(job, FakeFuture(ModuleNotFoundError("vcam_cli")), "lost")
-
-
-class Cluster:
-    """A scheduler and workers, each a process."""
-
-    def __init__(self, folder):
-        self.folder, self.address = folder, ""
-        self.workers = []
-        self.scheduler = self._start(
-            "scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard"
-        )
-        log = folder / "scheduler.log"
-        until = time.monotonic() + 30
-        while not self.address and time.monotonic() < until:
-            found = re.search(r"tcp://127\.0\.0\.1:\d+", log.read_text())
-            self.address = found[0] if found else ""
-            time.sleep(0.02)
-
-    def add_worker(self):
-        name = f"worker{len(self.workers)}"
-        options = ("--nthreads", "1", "--no-nanny", "--no-dashboard", "--name", name)
-        local = ("--local-directory", str(self.folder))
-        self.workers.append(self._start("worker", self.address, *options, *local, name=name))
-
-    def _start(self, what, *arguments, name=""):
-        command = [sys.executable, "-m", f"distributed.cli.dask_{what}", *arguments]
-        with open(self.folder / f"{name or what}.log", "wb") as log:
-            return subprocess.Popen(command, stdout=log, stderr=log, env=environment())
-
-    def close(self):
-        for process in (*self.workers, self.scheduler):
-            process.kill()
-            process.wait()
 
 
 @pytest.mark.long
