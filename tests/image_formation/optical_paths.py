@@ -17,7 +17,7 @@ from vcam_cli.effects.pixel.pixel_aperture import PixelAperture
 from vcam_cli.image_formation import photon_rate
 from vcam_cli.image_formation.estimates import bandwidth
 from vcam_cli.image_formation.optical_path import OpticalPath
-from vcam_cli.image_formation.settings import STANDARD, Settings, settings
+from vcam_cli.image_formation.settings import STANDARD, Settings, camera_settings
 from vcam_cli.image_formation.transfer_functions import Transfer
 from vcam_cli.scenes.base import Chart, ChartScene, Scene, chart_scene
 from vcam_cli.scenes.build import build
@@ -105,7 +105,7 @@ def of_camera(made: Camera, picture: Any = None) -> tuple[OpticalPath, Scene]:
     """The path and the scene of a camera, as the simulation makes them."""
     g, knobs, effects = (
         geometry(made),
-        settings(made),
+        camera_settings(made),
         plan.mean_signal_effects(made, geometry(made)),
     )
     band, colors = made.scene.wavelengths, mosaic(made)

@@ -35,7 +35,7 @@ from vcam_cli.image_formation import photon_rate
 from vcam_cli.image_formation.estimates import bandwidth, chart_cells
 from vcam_cli.image_formation.estimates.bandwidth import highest_passed, line_spread_tail, margin
 from vcam_cli.image_formation.photon_rate import photo_rate
-from vcam_cli.image_formation.settings import STANDARD, settings
+from vcam_cli.image_formation.settings import STANDARD, camera_settings
 from vcam_cli.scenes.base import Chart
 from vcam_cli.simulation import preparation
 from vcam_cli.simulation.simulate import prepare
@@ -460,7 +460,9 @@ def test_the_margin_is_wide_enough_for_light_beyond_the_well(chart, time, tmp_pa
     made = camera(tmp_path, changes)
     usual = prepare(made, 1)[0]
     monkeypatch.setattr(
-        preparation, "settings", lambda camera: replace(settings(camera), margin_scale=6.0)
+        preparation,
+        "camera_settings",
+        lambda camera: replace(camera_settings(camera), margin_scale=6.0),
     )
     wide = prepare(made, 1)[0]
     raw, truth = (ablation.mean_raw(ready) for ready in (usual, wide))

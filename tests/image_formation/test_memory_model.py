@@ -19,7 +19,7 @@ from vcam_cli.errors import CannotDo
 from vcam_cli.image_formation import strategies
 from vcam_cli.image_formation.estimates import memory_model
 from vcam_cli.image_formation.estimates.bandwidth import table_size
-from vcam_cli.image_formation.settings import STANDARD, settings
+from vcam_cli.image_formation.settings import STANDARD, camera_settings
 from vcam_cli.image_formation.transfer_tables import TableSize
 from vcam_cli.scenes.charts.siemens_star import SiemensStar
 from vcam_cli.simulation.simulate import simulate
@@ -182,7 +182,9 @@ def test_memory_is_asked_for_once_with_the_largest_part(monkeypatch):
 def test_more_pixels_need_more():
     camera = load("colorchecker-d65", SMALL)
     few, many = (
-        memory_model.frame_bytes(replace(geometry(camera), rows=n), settings(camera), 3, False)
+        memory_model.frame_bytes(
+            replace(geometry(camera), rows=n), camera_settings(camera), 3, False
+        )
         for n in (1000, 2000)
     )
     assert few < many

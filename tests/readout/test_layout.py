@@ -8,7 +8,7 @@ from making import GONE, camera
 
 from vcam_cli.camera.derived.geometry import geometry
 from vcam_cli.errors import CannotDo
-from vcam_cli.image_formation.settings import settings
+from vcam_cli.image_formation.settings import camera_settings
 from vcam_cli.readout import layout as module
 from vcam_cli.readout.layout import FINER, FINEST, camera_layout, interpolate
 
@@ -137,7 +137,7 @@ def test_light_is_never_below_zero(tmp_path):
 
 def test_a_fine_lattice_is_not_sampled_finer_still(tmp_path):
     found = camera(tmp_path, SIZE)
-    knobs = settings(found)
+    knobs = camera_settings(found)
     fine = scattered(tmp_path, PLACES).settings(knobs)
     assert fine.oversampling == 1
     assert fine.wavelength_step == knobs.wavelength_step

@@ -17,7 +17,7 @@ from vcam_cli.effects.pixel.saturation import Saturation
 from vcam_cli.effects.signal_chain import Quantizer
 from vcam_cli.errors import BadInput
 from vcam_cli.image_formation.estimates import memory_model
-from vcam_cli.image_formation.settings import settings
+from vcam_cli.image_formation.settings import camera_settings
 from vcam_cli.readout import exposure, nondestructive_samples
 
 SEEDS = {"sensor": 1, "frame": 1}
@@ -376,7 +376,7 @@ def test_nothing_is_drawn_where_noise_is_switched_off(tmp_path):
 def test_memory_counts_the_samples(tmp_path):
     made = camera(tmp_path, FLAT | several(*TEXTS))
     frame = simulate(made).frame
-    knobs = settings(made)
+    knobs = camera_settings(made)
     more, less = (memory_model.frame_bytes(frame.geometry, knobs, 1, False, n) for n in (1000, 500))
     assert more - less == PIXELS * 500 * (knobs.float_width // 8 + 4)
     assert memory_model.frame_bytes(frame.geometry, knobs, 1, False, 4) >= memory_model.frame_bytes(

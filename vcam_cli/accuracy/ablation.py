@@ -70,7 +70,7 @@ def with_effects(camera: Camera, every: str, *left_out: str) -> Camera:
 
 
 def wanted_effects(camera: Camera) -> list[str]:
-    """Names of the effects that the file describes and does not switch off, in their order."""
+    """Return the names of effects that the file has and does not switch off, in their order."""
     names = {e.name for e in plan.enabled_effects(camera, geometry(camera))}
     return [kind.name for kind in ORDER if kind.name in names]
 
@@ -84,7 +84,7 @@ def with_exposure_time(camera: Camera, time: float, gain: float | None = None) -
 
 
 def mean_raw(ready: Prepared) -> NDArray:
-    """Noise-free raw signal of every pixel, clipped where the well is full, float64 [electrons]."""
+    """Return every pixel's noise-free signal, clipped at the full well, float64 [electrons]."""
     mean = exposure.mean_electrons(ready.rate, ready.exposure_time, ready.plan.active)
     mean = mean.astype(np.float64)
     for limit in of_kind(ready.plan.active, Limit):
@@ -93,7 +93,7 @@ def mean_raw(ready: Prepared) -> NDArray:
 
 
 def full_signal(ready: Prepared) -> float:
-    """Largest noise-free mean signal on the array, at most the full well, at least 1 electron."""
+    """Return the largest noise-free mean signal, at most the full well, at least 1 [electrons]."""
     return full_signal_of(ready, mean_raw(ready))
 
 
@@ -103,9 +103,23 @@ def full_signal_of(ready: Prepared, mean: NDArray) -> float:
 
 
 def variance_shares(ready: Prepared, full: float, workers: int) -> dict[str, float]:
-    """Of every draw, and of the ADC's rounding: its largest share of the variance of its scope.
+    """Return the largest share that each draw, and the ADC's rounding, has of a variance.
 
-    ready: the camera with everything on; full: its full signal [electrons].
+    It is the variance of what is new in every frame, or of what stays with the sensor, as the draw.
+
+    Parameters
+    ----------
+    ready : Prepared
+        The camera with everything on.
+    full : float
+        Its full signal [electrons].
+    workers : int
+        Number of threads; results do not depend on it.
+
+    Returns
+    -------
+    dict
+        Name of an effect -> its share [dimensionless].
     """
     active, group = ready.plan.active, ready.layout.binning_groups.binning
     row_noise = [source.split()[2] for source in of_kind(active, NoiseSource)]

@@ -122,7 +122,7 @@ FINEST: dict[str, Any] = {k.name: k.finest for k in KNOBS if k.finest is not Non
 
 
 def applicable_knobs(ready: Prepared) -> tuple[list[Knob], dict[str, str]]:
-    """Knobs that a camera has; and of the others why it has not: name -> reason.
+    """Return the knobs that a camera has, and of the others why it has not: name -> reason.
 
     ready: the camera with everything on.
     """
@@ -131,7 +131,7 @@ def applicable_knobs(ready: Prepared) -> tuple[list[Knob], dict[str, str]]:
 
 
 def settings_to_try(knob: Knob, ready: Prepared) -> dict[str, Any]:
-    """Its settings that differ for this camera, and that its size allows."""
+    """Return the settings of a knob that differ for this camera, and that its size allows."""
     if knob.name == "oversampling":
         most = math.sqrt(MOST_SAMPLES / (ready.geometry.rows * ready.geometry.columns))
         return {s: v for s, v in knob.settings.items() if v <= max(2, most)}

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from vcam_cli.accuracy import ablation
 from vcam_cli.camera.camera import Camera
-from vcam_cli.image_formation.settings import settings
+from vcam_cli.image_formation.settings import camera_settings
 from vcam_cli.processing import process
 from vcam_cli.progress import Observer
 from vcam_cli.quality import display
@@ -65,7 +65,7 @@ class Shot:
         return max(by_scope.values(), default=0.0)
 
     def color_difference(self, other: Shot, workers: int, noisy: bool = False) -> float | None:
-        """Mean S-CIELAB between two renders, on the camera's display; None without renders.
+        """Return the mean S-CIELAB between two renders, on the camera's display; None without renders.
 
         noisy: with their noise, which is alike only where both have as many bits.
         """
@@ -149,7 +149,7 @@ class Clock:
 def settings_key(camera: Camera) -> str:
     """Return the camera as a text, with the settings that its accuracy comes to."""
     rest = camera.model_copy(update={"accuracy": None})
-    return f"{rest!r} {settings(camera)!r}"
+    return f"{rest!r} {camera_settings(camera)!r}"
 
 
 def _computation(result: Result) -> tuple:
@@ -163,7 +163,7 @@ def _computation(result: Result) -> tuple:
 
 
 def is_median_known(runs: list[float]) -> bool:
-    """Whether the median of so many runs [s] is known to a tenth, or has taken long enough."""
+    """Return whether the median of runs [s] is known to a tenth, or has taken long enough."""
     if len(runs) < 2:
         return False
     if (max(runs) - min(runs)) / 2 <= KNOWN * statistics.median(runs):

@@ -42,7 +42,7 @@ def pareto(
     panels: Sequence[tuple[str, Sequence[Pair]]],
     everything: Sequence[tuple[float, float, str]] = (),
 ) -> None:
-    """Error over time, and beside it what each effect contributes, expected and found.
+    """Plot error over time, and beside it what each effect contributes, expected and found.
 
     presets: (seconds, error, name); tolerance: drawn as a line; panels: (label of the axis, pairs),
     one below the other; everything: presets with every effect on. Errors relative to full signal.

@@ -30,7 +30,7 @@ class Recommendation:
 
 
 def coarser_knobs(camera: Camera, points: tuple[Point, ...]) -> dict[str, Any]:
-    """Knobs that may be coarser than the file's accuracy has them, and save time: name -> value."""
+    """Return knobs that save time where they are coarser than the file's: name -> value."""
     own = next(p for p in points if p.knob == "file")
     out: dict[str, Any] = {}
     for knob in KNOBS:

@@ -79,7 +79,7 @@ def finest_camera(camera: Camera, coarse: Prepared, most_bytes: float = 0) -> Ca
 def prepare_converged(
     camera: Camera, coarse: Prepared, workers: int, most_bytes: float = 0
 ) -> Prepared:
-    """`finest`, with its light on the pixels."""
+    """Return the camera of `finest_camera` with its light on the pixels."""
     return prepare(finest_camera(camera, coarse, most_bytes), workers)[0]
 
 
@@ -131,12 +131,12 @@ def sampling(ready: Prepared) -> float:
 
 
 def rms_and_largest(difference: NDArray) -> NDArray:
-    """(rms, largest) of a difference of signals [electrons]."""
+    """Return the rms and the largest of a difference of signals, (2,) [electrons]."""
     return np.array([rms(difference), float(np.abs(difference).max())])
 
 
 def _is_rectangles(ready: Prepared) -> bool:
-    """Whether the scene is a chart of even rectangles, whose spectrum is known in closed form."""
+    """Return whether the scene is a chart of even rectangles, whose spectrum is known in closed form."""
     return isinstance(ready.scene, ChartScene) and ready.scene.chart.edges() is not None
 
 

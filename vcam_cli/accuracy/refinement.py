@@ -12,7 +12,7 @@ from vcam_cli.accuracy.measurements import Shot
 from vcam_cli.accuracy.setting_errors import FLOOR
 from vcam_cli.camera.camera import Camera
 from vcam_cli.floats import rms
-from vcam_cli.image_formation.settings import settings
+from vcam_cli.image_formation.settings import camera_settings
 from vcam_cli.simulation.preparation import Prepared
 from vcam_cli.simulation.simulate import prepare
 
@@ -50,7 +50,7 @@ def refine_reference(
 
 
 def is_same_camera(knob: Knob, value: Any, case: Camera, base: Prepared) -> bool:
-    """Whether a knob at this value is the camera that `base` is: nothing to be computed again."""
+    """Return whether a knob at this value is the camera that `base` is: nothing to be computed again."""
     if knob.name == "spectral_rank" and value >= base.spectrum.planes:
         return True  # it takes no more of them by itself
-    return settings(case) == settings(base.camera)
+    return camera_settings(case) == camera_settings(base.camera)

@@ -62,7 +62,7 @@ class Point:
 
     @property
     def row(self) -> tuple[str | float, ...]:
-        """As in accuracy.csv."""
+        """The row of accuracy.csv."""
         values = (getattr(self, name) for name in COLUMNS)
         return tuple("" if value is None else value for value in values)
 

@@ -70,7 +70,7 @@ class Study:
     recommendation: Recommendation
 
     def report(self) -> dict[str, Any]:
-        """As accuracy.json shows it."""
+        """Return what accuracy.json holds."""
         return {
             "name": self.camera.name,
             "tolerance": self.camera.accuracy.tolerance,
@@ -94,7 +94,7 @@ class Study:
 
 @own_float_errors
 def accuracy(camera: Camera, workers: int | None = None, watch: Observer | None = None) -> Study:
-    """Measures `camera` along every knob, with every preset, without every effect.
+    """Measure a camera along every knob, with every preset, without every effect.
 
     workers: threads, default all processors, and for what is timed those that a frame takes.
     watch: told of stages. Raises BadInput, CannotDo.
@@ -118,7 +118,7 @@ class _Measurement:
     """Knob -> what its last refinement changed, relative to full signal."""
 
     def study(self) -> Study:
-        """All of it; the reference first, then what is compared with it."""
+        """Return all of it; the reference is made first, then what is compared with it."""
         self.watch.begin("converged reference")
         coarse = self.clock.timed_shot(with_accuracy(self.camera, preset="reference"))
         truth = self.clock.shot(finest_camera(self.camera, coarse.ready))

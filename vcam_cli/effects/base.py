@@ -81,7 +81,7 @@ class SignalLevels:
 
 
 def switched_off(camera: Camera, name: str) -> bool:
-    """Whether the file leaves this effect out, whatever else it says."""
+    """Return whether the file leaves this effect out, whatever else it says."""
     return isinstance(camera.effects, dict) and camera.effects.get(name) == "off"
 
 

@@ -68,7 +68,7 @@ LADDER = ((0.02, DRAFT), (0.005, STANDARD), (0.001, FINE), (0.0, REFERENCE))
 """Settings for tolerances from the first number of each pair upward."""
 
 
-def settings(camera: Camera) -> Settings:
+def camera_settings(camera: Camera) -> Settings:
     """Return the settings for the camera's tolerance, with those that its file states itself."""
     accuracy = camera.accuracy
     chosen = next(s for least, s in LADDER if accuracy.tolerance >= least)

@@ -292,7 +292,7 @@ def _chords(
     near, far = np.maximum(0, np.abs(cy) - cone) ** 2, (np.abs(cy) + cone) ** 2
 
     def darkness(side: int) -> Floats:
-        """Where the last light vanishes on this side, on whichever chord that is."""
+        """Return the tangent at which the last light vanishes on a side, on whichever chord."""
         shift = ox + side * width
         return _tangent(shift, np.where(side * shift > 0, far, near), layers)
 

@@ -15,7 +15,7 @@ from vcam_cli.effects.base import Gain, of_kind, switched_off
 from vcam_cli.effects.order import ORDER
 from vcam_cli.errors import bad
 from vcam_cli.image_formation import photon_rate
-from vcam_cli.image_formation.settings import settings
+from vcam_cli.image_formation.settings import camera_settings
 from vcam_cli.physics import readout
 from vcam_cli.readout.layout import Layout
 from vcam_cli.spectra import VISIBLE, illuminant, luminance
@@ -50,7 +50,7 @@ def base_iso(camera: Camera, geometry: Geometry, layout: Layout) -> float:
     wanted = [k.from_camera(camera, geometry) for k in kinds if not switched_off(camera, k.name)]
     gains = of_kind((gain for gain in wanted if gain is not None), Gain)
     levels = photon_rate.axis_levels(
-        camera, geometry, settings(camera), [daylight], layout.mosaic, gains
+        camera, geometry, camera_settings(camera), [daylight], layout.mosaic, gains
     )
     rate = float(levels.max()) * layout.binning_groups.summed_charges
     if rate <= 0:

@@ -93,12 +93,12 @@ class Layout:
         finer = self.geometry.pitch_x / self.lattice.pitch_x
         return self.geometry.report(oversampling * finer)
 
-    def settings(self, knobs: Settings) -> Settings:
+    def settings(self, settings: Settings) -> Settings:
         """Return the settings for the lattice; a fine one is sampled finely enough.
 
         Parameters
         ----------
-        knobs : Settings
+        settings : Settings
             Settings for an array of pixels.
 
         Returns
@@ -107,8 +107,8 @@ class Layout:
             Settings for the lattice.
         """
         if self.places is None:
-            return knobs
-        return replace(knobs, oversampling=1.0)
+            return settings
+        return replace(settings, oversampling=1.0)
 
     def select_pixels(self, light: NDArray) -> NDArray:
         """Return the raw frame's pixels from the lattice's light.

@@ -166,7 +166,7 @@ def sample_seconds(camera: Camera, geometry: Geometry, effects: Sequence[Effect]
 
 
 def irradiance_seconds(
-    camera: Camera, geometry: Geometry, knobs: Settings, report: SpectrumReport
+    camera: Camera, geometry: Geometry, settings: Settings, report: SpectrumReport
 ) -> float:
     """Return the core seconds of the spectral irradiance, 0 where no file asks for it.
 
@@ -174,7 +174,7 @@ def irradiance_seconds(
     """
     files = bool(camera.output.irradiance) + camera.output.isetcam
     band = camera.scene.wavelengths
-    count = len(Band(band.start, band.stop, knobs.wavelength_step).nodes())
+    count = len(Band(band.start, band.stop, settings.wavelength_step).nodes())
     together = image_seconds(geometry, BANDS_AT_ONCE, report) / BANDS_AT_ONCE
     return files * count * (together + EXR * geometry.rows * geometry.columns)
 
@@ -203,7 +203,7 @@ def frame_seconds(
     camera: Camera,
     geometry: Geometry,
     layout: Layout,
-    knobs: Settings,
+    settings: Settings,
     report: SpectrumReport,
     decided: Plan,
     workers: int,
@@ -218,7 +218,7 @@ def frame_seconds(
         Geometry of its array.
     layout : Layout
         Layout of its pixels.
-    knobs : Settings
+    settings : Settings
         Settings of image formation.
     report : SpectrumReport
         How its scene was sampled and filtered.
@@ -235,5 +235,5 @@ def frame_seconds(
     core = decided.seconds + image_seconds(layout.lattice, len(layout.mosaic.colors), report)
     core += output_seconds(camera, layout.geometry, layout.mosaic)
     core += sample_seconds(camera, layout.geometry, decided.active)
-    core += irradiance_seconds(camera, geometry, knobs, report)
+    core += irradiance_seconds(camera, geometry, settings, report)
     return core * slowness() / threads(workers)

@@ -64,7 +64,7 @@ def expose(
     white_rate: NDArray,
     effects: Sequence[Effect],
     optional: Sequence[Effect],
-    knobs: Settings,
+    settings: Settings,
     light_during: Callable[[float, float], NDArray],
 ) -> ExposedLight:
     """Return the light of an exposure whose time is given or chosen for the scene.
@@ -85,7 +85,7 @@ def expose(
     time = chosen.time
     # A full well holds no more, whatever falls on it.
     held = circuit.full_well / time if of_kind(enabled, Limit) else math.inf
-    light_plan = timed_gains.light_plan(light.plan, effects, optional, time, knobs.tolerance)
+    light_plan = timed_gains.light_plan(light.plan, effects, optional, time, settings.tolerance)
     timed = tuple(e for e in of_kind(effects, TemporalGain) if e not in light_plan.omitted)
 
     def collect(values: NDArray, start: float, stop: float) -> NDArray:

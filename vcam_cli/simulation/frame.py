@@ -74,7 +74,7 @@ class Frame(Prepared):
 
     @property
     def picture_saturated_dn(self) -> float:
-        """From which on a pixel of `picture_dn` is saturated: in all its samples [DN]."""
+        """The value of `picture_dn` from which on a pixel is saturated in all its samples [DN]."""
         if not self.times:
             return self.saturated_dn
         linear = float(self.adc.linear(np.array([self.saturated_dn]))[0])

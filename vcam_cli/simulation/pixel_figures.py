@@ -48,7 +48,7 @@ class PixelFigures:
 def pixel_figures(
     camera: Camera, geometry: Geometry, electrical: Electrical, joins: BinningGroups, time: float
 ) -> PixelFigures:
-    """Signal over noise of a pixel that is exposed for a time [s]."""
+    """Return signal over noise of a pixel that is exposed for a time [s]."""
     wanted = plan.enabled_effects(camera, geometry)
     draws = noise_sources(wanted, "frame")
     # In electrons of all wells together, in which shot noise is Poisson's.

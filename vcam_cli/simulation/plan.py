@@ -151,14 +151,14 @@ def _enabled(camera: Camera, found: Iterable[Effect | None]) -> tuple[Effect, ..
 
 
 def mean_signal_effects(camera: Camera, geometry: Geometry) -> tuple[Effect, ...]:
-    """Effects that are wanted and act before electrons are counted, in the order of action."""
+    """Return the wanted effects that act before electrons are counted, in the order of action."""
     present = enabled_effects(camera, geometry)
     later = of_kind(present, Charge, NoiseSource)
     return tuple(effect for effect in present if effect not in later)
 
 
 def optional_effects(camera: Camera, effects: Iterable[Effect]) -> tuple[Effect, ...]:
-    """Those of the effects that the plan may leave out."""
+    """Return those of the effects that the plan may leave out."""
     return tuple(e for e in effects if e.removable and _wish(camera, e) == "auto")
 
 
@@ -288,7 +288,7 @@ class _Weighing:
         return self.pixels // binning.count
 
     def contribution(self, effect: Effect) -> tuple[float | None, str]:
-        """How much leaving it out would change, and of what."""
+        """Return how much leaving it out would change, and of what."""
         if effect.name in self.shares:
             return self.shares[effect.name], "of full signal"
         return effect.contribution(self.signal, self.present)

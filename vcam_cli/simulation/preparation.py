@@ -21,7 +21,7 @@ from vcam_cli.image_formation import photon_rate
 from vcam_cli.image_formation.estimates import bandwidth, memory_model
 from vcam_cli.image_formation.optical_path import OpticalPath, SpectrumReport
 from vcam_cli.image_formation.rate_cache import RateCache
-from vcam_cli.image_formation.settings import Settings, settings
+from vcam_cli.image_formation.settings import Settings, camera_settings
 from vcam_cli.image_formation.transfer_functions import Transfer
 from vcam_cli.progress import Stages
 from vcam_cli.quality import scielab
@@ -159,22 +159,26 @@ def _prepare(
     base_iso = iso_speed.base_iso(camera, solved, layout)
     camera = iso_speed.set_gain(camera, base_iso)
     circuit = electrical(camera)
-    knobs = layout.settings(settings(camera))
-    frame_bytes = _require_memory(camera, layout, knobs, solved)
+    settings = layout.settings(camera_settings(camera))
+    frame_bytes = _require_memory(camera, layout, settings, solved)
     stages.watch.expect(cost_model.first_estimate(camera, layout, workers))
 
     effects = plan.mean_signal_effects(camera, solved)
     with stages("scene"):
         band = camera.scene.wavelengths
-        margin = partial(bandwidth.margin, layout.lattice, effects, (band.start, band.stop), knobs)
+        margin = partial(
+            bandwidth.margin, layout.lattice, effects, (band.start, band.stop), settings
+        )
 
         def scene_within(pixels: int) -> AnyScene:
-            view = photon_rate.view(layout.lattice, knobs, pixels)
+            view = photon_rate.view(layout.lattice, settings, pixels)
             return build_scene(camera, view, picture)
 
         scene = scene_within(margin())
     with stages("optics"):
-        transfer, white_rate = _transfer(camera, solved, layout, scene, effects, knobs, rate_cache)
+        transfer, white_rate = _transfer(
+            camera, solved, layout, scene, effects, settings, rate_cache
+        )
         summed = layout.binning_groups.summed_charges
         ceiling = auto_exposure.ceiling(
             camera, float(white_rate.max()), circuit.saturation / summed
@@ -184,8 +188,15 @@ def _prepare(
             scene = scene_within(margin(overexposure))
         optional = plan.optional_effects(camera, effects)
         path = OpticalPath(
-            *(transfer, layout.lattice, knobs, layout.mosaic, effects, workers, ceiling, optional),
-            layer_optics(camera, effects),
+            transfer=transfer,
+            geometry=layout.lattice,
+            settings=settings,
+            mosaic=layout.mosaic,
+            effects=effects,
+            workers=workers,
+            ceiling=ceiling,
+            optional=optional,
+            layers=layer_optics(camera, effects),
         )
         photo_rate = partial(photon_rate.photo_rate, path, scene, layout.planes)
         light = photo_rate() if rate_cache is None else rate_cache.rate(camera, ceiling, photo_rate)
@@ -194,24 +205,33 @@ def _prepare(
     with stages("exposure"):
         during = partial(_light_during, path, scene, layout, light)
         exposed = exposed_light.expose(
-            *(camera, solved, circuit, layout, light, white_rate, effects, optional, knobs, during)
+            camera,
+            solved,
+            circuit,
+            layout,
+            light,
+            white_rate,
+            effects,
+            optional,
+            settings,
+            during,
         )
         camera = camera.with_exposure_gain(exposed.settings.gain)
         needed = max(frame_bytes, light.spectrum.memory) + scene_bytes(picture)
         changes = light.spectrum.changes | exposed.changes
         decided = plan.make(
-            camera, solved, knobs, exposed.light_plan, exposed.signal, needed, changes
+            camera, solved, settings, exposed.light_plan, exposed.signal, needed, changes
         )
         if of_kind(effects, ImageMotion):  # every sample of an integration has light of its own
             once = cost_model.light_seconds(layout, light.spectrum, workers)
             earlier += len(exposed.times) * once
-        decided = _with_seconds(camera, solved, layout, knobs, light, decided, workers, earlier)
+        decided = _with_seconds(camera, solved, layout, settings, light, decided, workers, earlier)
         stages.watch.expect(decided.seconds)
     return Prepared(
         camera=camera,
         geometry=solved,
         electrical=electrical(camera),
-        settings=knobs,
+        settings=settings,
         mosaic=layout.raw_mosaic,
         layout=layout,
         scene=scene,
@@ -264,7 +284,7 @@ def _with_seconds(
     camera: Camera,
     solved: Geometry,
     layout: Layout,
-    knobs: Settings,
+    settings: Settings,
     light: photon_rate.Rate,
     decided: plan.Plan,
     workers: int,
@@ -272,15 +292,15 @@ def _with_seconds(
 ) -> plan.Plan:
     """Return the plan with the seconds of the frame, and of one with everything on."""
     spectrum = light.spectrum
-    seconds = cost_model.frame_seconds(camera, solved, layout, knobs, spectrum, decided, workers)
+    seconds = cost_model.frame_seconds(camera, solved, layout, settings, spectrum, decided, workers)
     if light.plan.omitted and not spectrum.terms:
         spectrum = cost_model.usual_spectrum(layout.lattice)
     whole = replace(decided, seconds=decided.seconds + sum(d.saved for d in decided.decisions))
-    every = cost_model.frame_seconds(camera, solved, layout, knobs, spectrum, whole, workers)
+    every = cost_model.frame_seconds(camera, solved, layout, settings, spectrum, whole, workers)
     return replace(decided, seconds=earlier + seconds, seconds_of_all=earlier + every)
 
 
-def _require_memory(camera: Camera, layout: Layout, knobs: Settings, solved: Geometry) -> int:
+def _require_memory(camera: Camera, layout: Layout, settings: Settings, solved: Geometry) -> int:
     """Return the bytes of a frame without its scene, and refuse one that does not fit.
 
     What was read of the scene is in memory already.
@@ -292,7 +312,7 @@ def _require_memory(camera: Camera, layout: Layout, knobs: Settings, solved: Geo
         samples *= 2  # each has a rate of its own
     scattered = solved.rows * solved.columns if layout.is_scattered else 0
     judged = bool(camera.quality)
-    needed = memory_model.frame_bytes(layout.lattice, knobs, colors, judged, samples, scattered)
+    needed = memory_model.frame_bytes(layout.lattice, settings, colors, judged, samples, scattered)
     if "s-cielab" in camera.quality:
         shape = layout.picture_shape
         screen = display_screen(camera.display, shape[1])
@@ -308,7 +328,7 @@ def _transfer(
     layout: Layout,
     scene: AnyScene,
     effects: tuple[Effect, ...],
-    knobs: Settings,
+    settings: Settings,
     rate_cache: RateCache | None,
 ) -> tuple[Transfer, NDArray]:
     """Return the transfer of the scene's components, and the rate (C,) of perfect white [e/s].
@@ -319,7 +339,7 @@ def _transfer(
         photon_rate.scene_transfer,
         camera,
         solved,
-        knobs,
+        settings,
         (*scene.spectra, scene.white),
         layout.mosaic,
         effects,

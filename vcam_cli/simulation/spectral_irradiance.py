@@ -68,7 +68,7 @@ def nodes(ready: Prepared) -> NDArray:
 
 
 def planes(ready: Prepared, workers: int) -> Iterator[NDArray]:
-    """Spectral irradiance at each of the `nodes`, one by one: (rows, columns) [W/(m2 m)].
+    """Yield the spectral irradiance at each of the `nodes`, one by one: (rows, columns) [W/(m2 m)].
 
     Raises CannotDo where memory does not suffice.
     """
@@ -138,7 +138,7 @@ def _scene(ready: Prepared) -> AnyScene:
 
 
 def levels(ready: Prepared, wavelengths: NDArray) -> NDArray:
-    """Of each of the scene's components on the axis, without blur: (K, J) [W/(m2 m)]."""
+    """Return the irradiance of the K components on the axis, without blur: (K, J) [W/(m2 m)]."""
     per_radiance = ready.geometry.irradiance_per_radiance
     transmittance = ready.camera.optics.transmittance.resolve()
     spectra = [s.multiply(transmittance) for s in ready.scene.spectra]

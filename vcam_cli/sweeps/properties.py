@@ -28,7 +28,7 @@ from vcam_cli.effects.optics.off_axis import OffAxis
 from vcam_cli.effects.pixel.pixel_vignetting import PixelVignetting
 from vcam_cli.errors import bad
 from vcam_cli.image_formation import photon_rate
-from vcam_cli.image_formation.settings import settings
+from vcam_cli.image_formation.settings import camera_settings
 from vcam_cli.physics import readout, vignetting
 from vcam_cli.readout.layout import camera_layout
 from vcam_cli.scenes import light
@@ -150,7 +150,9 @@ def _mtf(camera: Camera, nyquist: float) -> list[Curves]:
     mosaic, white = camera_layout(camera, g).mosaic, (light.white_radiance(camera.scene),)
 
     def transfer(effects: tuple[Effect, ...]) -> list[NDArray]:
-        found = photon_rate.scene_transfer(camera, g, settings(camera), white, mosaic, effects)
+        found = photon_rate.scene_transfer(
+            camera, g, camera_settings(camera), white, mosaic, effects
+        )
         colors = range(len(mosaic.colors))
         return [directional_mtf(found, effects, color, frequency, (1.0, 0.0)) for color in colors]
 

@@ -54,7 +54,7 @@ class Parameter:
 
     @property
     def column(self) -> str:
-        """As points.csv names it: "pixel.width [um]"."""
+        """The name of its column in points.csv: "pixel.width [um]"."""
         return f"{self.path} [{self.unit}]" if self.unit else self.path
 
     def text(self, cell: Cell) -> str:

@@ -28,7 +28,7 @@ class TurnedTransfer(PlaneTransfer):
 
     @property
     def reference(self) -> str:  # type: ignore[override]
-        """Where that comes from."""
+        """Equation and paper of the effect that is turned."""
         return self.still.reference
 
     @classmethod

@@ -215,7 +215,7 @@ def _ideal_attributes(frame: Frame) -> dict[str, Attribute]:
 
 
 def config_hash(camera: Camera) -> str:
-    """SHA-256 of the resolved camera."""
+    """Return the SHA-256 of the resolved camera."""
     return hash_text(to_json(camera.model_dump(mode="json")))
 
 
@@ -245,6 +245,6 @@ def record(result: Result, inputs: tuple[Path, ...], seconds: float) -> dict[str
 
 
 def peak_memory() -> int:
-    """Largest memory of this process so far [bytes]."""
+    """Return the largest memory of this process so far [bytes]."""
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     return peak if sys.platform == "darwin" else peak * 1024

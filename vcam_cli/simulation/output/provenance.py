@@ -21,7 +21,7 @@ from vcam_cli.source_code import code_hash
 
 
 def inputs(camera: Camera) -> tuple[Path, ...]:
-    """Every file that a run reads: YAML files, and what they name."""
+    """Return every file that a run reads: YAML files, and what they name."""
     return tuple(sorted({*camera.files, *data_files(camera)}, key=str))
 
 
@@ -68,6 +68,6 @@ def versions() -> dict[str, str]:
 
 
 def _version(name: str) -> str:
-    """Of a library; from its files, which takes longer, where it is not loaded."""
+    """Return the version of a library; where it is not loaded from its files, which takes longer."""
     known = None if name == "OpenImageIO" else getattr(sys.modules.get(name), "__version__", None)
     return known or version(name)  # OpenImageIO numbers itself in its own way
