@@ -65,7 +65,7 @@ class Shot:
         return max(by_scope.values(), default=0.0)
 
     def color_difference(self, other: Shot, workers: int, noisy: bool = False) -> float | None:
-        """Return the mean S-CIELAB between two renders, on the camera's display; None without renders.
+        """Return the mean S-CIELAB between two renders on the display; None without renders.
 
         noisy: with their noise, which is alike only where both have as many bits.
         """

@@ -136,7 +136,7 @@ def rms_and_largest(difference: NDArray) -> NDArray:
 
 
 def _is_rectangles(ready: Prepared) -> bool:
-    """Return whether the scene is a chart of even rectangles, whose spectrum is known in closed form."""
+    """Return whether the scene is a chart of even rectangles: its spectrum is a closed form."""
     return isinstance(ready.scene, ChartScene) and ready.scene.chart.edges() is not None
 
 

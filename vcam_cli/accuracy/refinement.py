@@ -50,7 +50,7 @@ def refine_reference(
 
 
 def is_same_camera(knob: Knob, value: Any, case: Camera, base: Prepared) -> bool:
-    """Return whether a knob at this value is the camera that `base` is: nothing to be computed again."""
+    """Return whether a knob at this value makes the camera of `base`, computed already."""
     if knob.name == "spectral_rank" and value >= base.spectrum.planes:
         return True  # it takes no more of them by itself
     return camera_settings(case) == camera_settings(base.camera)

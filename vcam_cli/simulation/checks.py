@@ -34,7 +34,7 @@ from vcam_cli.simulation.output import isetcam_files, raw_dng
 
 
 def load(camera: str | Path, sets: Sequence[str] = ()) -> Camera:
-    """Return a camera as `camera.load.load` does, all that is wrong told at once. Raises the same."""
+    """Return what `camera.load.load` does, with all that is wrong told at once. Raises the same."""
     return files.load(camera, sets, checks=CHECKS)
 
 

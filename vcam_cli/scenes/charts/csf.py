@@ -72,7 +72,7 @@ class Csf(Chart):
     """Phase of the chirp at the left edge [rad]."""
 
     def highest_frequency(self, half_width: float) -> float:
-        """Return twice that of the chirp at the edge, which leaves room for what its window adds."""
+        """Return twice that of the chirp at the edge: room for what its window adds [cycles/m]."""
         at_edge = self.max_frequency * (0.5 + half_width / self.frame.width)
         return 2 * at_edge + 8 / min(self.frame.width, self.frame.height)
 

@@ -68,6 +68,6 @@ def versions() -> dict[str, str]:
 
 
 def _version(name: str) -> str:
-    """Return the version of a library; where it is not loaded from its files, which takes longer."""
+    """Return the version of a library; of one that is not loaded from its files, slower."""
     known = None if name == "OpenImageIO" else getattr(sys.modules.get(name), "__version__", None)
     return known or version(name)  # OpenImageIO numbers itself in its own way
