@@ -38,7 +38,7 @@ stability: $(VENV)/.dev  ## hard cases: our error beside that of the textbook fo
 
 fuzz: $(VENV)/.dev  ## twenty thousand camera and study files with something broken in them
 	$(BIN)/python -m tests.hostile
-	VCAM_FUZZ=20 $(BIN)/python -m pytest -q -n auto tests/hostile/test_random_cameras.py
+	VCAM_FUZZ=40 $(BIN)/python -m pytest -q -n auto tests/hostile/test_random_cameras.py
 
 attacks: $(VENV)/.dev  ## all attacks of tests/hostile, counted in docs/attacks.md
 	$(BIN)/python tests/hostile/attacks.py

@@ -2,9 +2,11 @@
 
 import copy
 import math
+from collections.abc import Collection, Iterable
 from pathlib import Path
 from typing import Any
 
+import pytest
 import yaml
 
 from vcam_cli import load
@@ -47,6 +49,13 @@ QUIET = {
     )
 }
 """`effects` of a camera without any randomness."""
+
+
+def long_except(quick: Collection[Any], values: Iterable[Any]) -> list[Any]:
+    """Parameters of a test of which only some are tried by `make test`, all by `make test-all`."""
+    return [
+        value if value in quick else pytest.param(value, marks=pytest.mark.long) for value in values
+    ]
 
 
 def tree(changes: dict[str, Any]) -> dict[str, Any]:

@@ -7,6 +7,7 @@ import sys
 import textwrap
 
 import pytest
+from making import long_except
 from sweeping import ROOT, environment, written
 
 from vcam_cli.errors import BadInput, CannotDo
@@ -131,9 +132,14 @@ def test_two_studies_in_one_folder_at_once(tmp_path, first):
 
 @pytest.mark.parametrize(
     ("changes", "same"),
-    [({}, True), ({"name": "other"}, False), ({"metrics": ["snr_db"]}, False),
-     ({"seeds": 2}, False), ({"vary": {"adc.bits": {"values": [8]}}}, False)],
-)  # fmt: skip
+    [
+        ({}, True),
+        ({"name": "other"}, False),
+        pytest.param({"metrics": ["snr_db"]}, False, marks=pytest.mark.long),
+        pytest.param({"seeds": 2}, False, marks=pytest.mark.long),
+        pytest.param({"vary": {"adc.bits": {"values": [8]}}}, False, marks=pytest.mark.long),
+    ],
+)
 def test_whole_sweeps_at_once(tmp_path, changes, same):
     """A sweep of a study that another process has in hand, or of another one."""
     first = written(tmp_path / "a")
@@ -169,7 +175,9 @@ WRITING = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize("command", WRITING, ids=[command[0] for command in WRITING])
+@pytest.mark.parametrize(
+    "command", long_except(WRITING[:3], WRITING), ids=[command[0] for command in WRITING]
+)
 def test_every_other_command_in_the_folder_of_a_sweep_at_work(command, tmp_path):
     """It is refused before it computes, and the folder stays what it is."""
     oiio = pytest.importorskip("OpenImageIO")

@@ -5,12 +5,14 @@ import pickle
 
 import numpy as np
 import pytest
+from making import long_except
 
 from vcam_cli import load, simulate
 from vcam_cli.config import shipped
 
 pytestmark = pytest.mark.attack("manners in Python")
 CAMERAS = [name for name in shipped.names("cameras") if name not in ("12mp-bayer", "low-light")]
+QUICK = ("starter", "cfa-rgbw", "x3-stacked", "table-top", "hdr-captures")
 SETS = ["array.rows=16", "array.columns=18", "accuracy=draft", "quality=[mse]"]
 
 
@@ -19,7 +21,7 @@ def arrays(result) -> list:
     return [np.asarray(each) for each in found] + [list(result.metrics.values())]
 
 
-@pytest.fixture(scope="module", params=CAMERAS)
+@pytest.fixture(scope="module", params=long_except(QUICK, CAMERAS))
 def camera(request):
     return load(request.param, SETS)
 

@@ -24,8 +24,8 @@ SINGLE = np.finfo(np.float32).eps
 SLOW = [HealthCheck.too_slow, HealthCheck.data_too_large, HealthCheck.function_scoped_fixture]
 TIMES = int(os.environ.get("VCAM_FUZZ", "1"))
 """As many examples; `make fuzz` sets it."""
-few = settings(max_examples=8 * TIMES, suppress_health_check=SLOW)
-many = settings(max_examples=20 * TIMES, suppress_health_check=SLOW)
+few = settings(max_examples=4 * TIMES, suppress_health_check=SLOW)
+many = settings(max_examples=10 * TIMES, suppress_health_check=SLOW)
 
 
 def camera_of(tree: Tree, folder, sets=()):

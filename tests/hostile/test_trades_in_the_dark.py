@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
+from making import long_except
 
 from vcam_cli import load, schedule, sweep
 from vcam_cli.accuracy.study import accuracy
@@ -77,7 +78,7 @@ def timeless(rows) -> list[dict]:
 
 
 @pytest.mark.parametrize("base", BASES)
-@pytest.mark.parametrize("sees", SEES)
+@pytest.mark.parametrize("sees", long_except(["silicon"], SEES))
 def test_sweeps(base, sees, tmp_path):
     camera_file(tmp_path, base, SEES[sees])
     study = sweep_file(tmp_path)
@@ -93,7 +94,7 @@ def test_sweeps(base, sees, tmp_path):
     assert not any(np.isnan(row["mse"]) for row in found[0])
 
 
-@pytest.mark.parametrize("base", BASES)
+@pytest.mark.parametrize("base", long_except(["starter"], BASES))
 def test_schedules(base, tmp_path):
     camera_file(tmp_path, base, {})
     study = schedule_file(tmp_path)
@@ -146,7 +147,7 @@ def test_a_bench_with_nothing_to_measure_says_so(sees, tmp_path):
 
 @pytest.mark.parametrize(
     "sees",
-    ["silicon", *(pytest.param(s, marks=pytest.mark.long) for s in SEES if s != "silicon")],
+    long_except(["silicon"], SEES),
 )
 def test_accuracy(sees, tmp_path):
     """A dark camera has an error, too: none, but for that of its dark current left out."""

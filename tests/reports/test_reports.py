@@ -89,7 +89,7 @@ def test_a_page_of_every_part_is_valid_and_escapes_what_it_shows():
     ("name", "sets"),
     [
         ("still-life", []),
-        ("x3-stacked", []),
+        pytest.param("x3-stacked", [], marks=pytest.mark.long),
         ("starter", ["optics=none"]),
         ("starter", ["adc={bits: 10, kind: logarithmic}", "output.render=none", "quality=[]"]),
         (
