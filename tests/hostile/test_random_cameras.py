@@ -183,8 +183,8 @@ def test_the_signal_to_noise_ratio_falls_with_each_noise(tree, name, level, fact
 def figures(camera):
     """SNR and dynamic range by their closed forms."""
     solved = geometry(camera)
-    joins = camera_layout(camera, solved).binning_groups
-    return pixel_figures(camera, solved, electrical(camera), joins, camera.exposure.time)
+    groups = camera_layout(camera, solved).binning_groups
+    return pixel_figures(camera, solved, electrical(camera), groups, camera.exposure.time)
 
 
 SETS = {

@@ -176,11 +176,11 @@ def test_the_plan_knows_the_variance(kind, flats):
     frame = flats[kind]
     draws = [e for e in frame.plan.active if isinstance(e, NoiseSource)]
     dark = frame.dark_rate * frame.exposure_time
-    joins = frame.layout.binning_groups
-    node = LIGHT * joins.summed_charges + dark
-    told = sum(e.binned_variance(node, dark, joins.binning) for e in draws)
+    groups = frame.layout.binning_groups
+    node = LIGHT * groups.summed_charges + dark
+    told = sum(e.binned_variance(node, dark, groups.binning) for e in draws)
     in_electrons = told * (N**2 if kind == "digital" else 1)
-    signal = node / joins.summed_charges
+    signal = node / groups.summed_charges
     assert in_electrons == pytest.approx(of_flat(kind, signal)[1])
 
 
@@ -256,12 +256,12 @@ CODE = Quantization(10.0, 4.0, 8)  # 245 steps of 4 electrons: full at 980
 
 def read(kind, rate):
     """A frame of 2 x 2 joined pixels of a rate in 1 s, each with a well of 1000 electrons."""
-    joins = binning.BinningGroups(Binning(rows=2, columns=2, kind=kind), (1, 1))
+    groups = binning.BinningGroups(Binning(rows=2, columns=2, kind=kind), (1, 1))
 
     def take(rate, time, effects):
         return exposure.capture(rate, time, effects, CODE, {"sensor": 1, "frame": 1}, 1)
 
-    electrons, dn = binned_readout.read(joins, joins.collect(rate), 1.0, CLIP, take, 8)
+    electrons, dn = binned_readout.read(groups, groups.collect(rate), 1.0, CLIP, take, 8)
     return electrons[0, 0], dn[0, 0]
 
 

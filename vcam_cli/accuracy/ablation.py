@@ -172,6 +172,6 @@ def _draw_field(
     rate = field / ready.exposure_time - sum(e.rate() for e in charges)
     effects = (*charges, *draws)
     take = partial(exposure.capture, adc=adc, seeds=seeds, workers=workers)
-    joins = replace(ready.layout.binning_groups, step=(1, 1))  # all of its pixels are alike
+    groups = replace(ready.layout.binning_groups, step=(1, 1))  # all of its pixels are alike
     time = ready.exposure_time
-    return binned_readout.read(joins, rate, time, effects, take, adc.bits)[0] / joins.summed_codes
+    return binned_readout.read(groups, rate, time, effects, take, adc.bits)[0] / groups.summed_codes

@@ -67,24 +67,9 @@ def read(
         return binning_groups.join(electrons), binning_groups.sums(
             dn, codes_type(bits, binning_groups.count)
         )
-    held, _ = take(rate, time, effects_in_pixels(effects))
-    return take(binning_groups.join(held), 1.0, effects_in_readout(effects))
-
-
-def effects_in_pixels(effects: Sequence[Effect]) -> tuple[Effect, ...]:
-    """Return the effects that act in the pixels, before their voltages are joined.
-
-    Parameters
-    ----------
-    effects : sequence of Effect
-        Effects in the order of action.
-
-    Returns
-    -------
-    tuple of Effect
-        Effects in the same order; of noise the part that every pixel has to itself.
-    """
-    return tuple(part for effect in effects for part in effect.parts_in_pixels())
+    in_pixels = tuple(part for effect in effects for part in effect.parts_in_pixels())
+    electrons, _ = take(rate, time, in_pixels)
+    return take(binning_groups.join(electrons), 1.0, effects_in_readout(effects))
 
 
 def effects_in_readout(effects: Sequence[Effect]) -> tuple[Effect, ...]:

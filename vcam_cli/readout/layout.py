@@ -261,9 +261,9 @@ def camera_layout(camera: Camera, geometry: Geometry) -> Layout:
     pattern = camera.array.pattern
     if pattern == "stacked":
         colors = channel_order(camera.array.colors)
-        joins = binning_groups(camera, (("all",),), geometry)
-        raw = joins.geometry(geometry)
-        return Layout(raw, Mosaic((colors,)), geometry, planes=True, binning_groups=joins)
+        groups = binning_groups(camera, (("all",),), geometry)
+        raw = groups.geometry(geometry)
+        return Layout(raw, Mosaic((colors,)), geometry, planes=True, binning_groups=groups)
     if pattern == "honeycomb":
         twice = replace(geometry, columns=2 * geometry.columns, pitch_x=geometry.pitch_x / 2)
         return Layout(geometry, mosaic(camera), twice)
@@ -273,8 +273,8 @@ def camera_layout(camera: Camera, geometry: Geometry) -> Layout:
         fine = _fine_lattice(geometry, FINEST if camera.accuracy.tolerance < FINE else FINER)
         return Layout(geometry, Mosaic((colors,)), fine, planes=True, places=found)
     colors_of_lattice = mosaic(camera)
-    joins = binning_groups(camera, colors_of_lattice.block, geometry)
-    return Layout(joins.geometry(geometry), colors_of_lattice, geometry, binning_groups=joins)
+    groups = binning_groups(camera, colors_of_lattice.block, geometry)
+    return Layout(groups.geometry(geometry), colors_of_lattice, geometry, binning_groups=groups)
 
 
 def _fine_lattice(g: Geometry, finer: int) -> Geometry:

@@ -205,7 +205,7 @@ def frame_seconds(
     layout: Layout,
     settings: Settings,
     report: SpectrumReport,
-    decided: Plan,
+    plan: Plan,
     workers: int,
 ) -> float:
     """Return the seconds of a whole frame.
@@ -222,7 +222,7 @@ def frame_seconds(
         Settings of image formation.
     report : SpectrumReport
         How its scene was sampled and filtered.
-    decided : Plan
+    plan : Plan
         Its plan, with the core seconds of the effects that run.
     workers : int
         Number of threads.
@@ -232,8 +232,8 @@ def frame_seconds(
     float
         Seconds on this machine.
     """
-    core = decided.seconds + image_seconds(layout.lattice, len(layout.mosaic.colors), report)
+    core = plan.seconds + image_seconds(layout.lattice, len(layout.mosaic.colors), report)
     core += output_seconds(camera, layout.geometry, layout.mosaic)
-    core += sample_seconds(camera, layout.geometry, decided.active)
+    core += sample_seconds(camera, layout.geometry, plan.active)
     core += irradiance_seconds(camera, geometry, settings, report)
     return core * slowness() / threads(workers)

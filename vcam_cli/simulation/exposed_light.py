@@ -84,7 +84,7 @@ def expose(
         chosen = replace(chosen, time=times[-1])
     time = chosen.time
     # A full well holds no more, whatever falls on it.
-    held = circuit.full_well / time if of_kind(enabled, Limit) else math.inf
+    full_rate = circuit.full_well / time if of_kind(enabled, Limit) else math.inf
     light_plan = timed_gains.light_plan(light.plan, effects, optional, time, settings.tolerance)
     timed = tuple(e for e in of_kind(effects, TemporalGain) if e not in light_plan.omitted)
 
@@ -94,7 +94,7 @@ def expose(
             lit = layout.select_pixels(
                 timed_gains.apply(values, timed, layout.lattice, start, stop)
             )
-        return groups.collect(_transport(lit, dark / groups.summed_charges, effects, held))
+        return groups.collect(_transport(lit, dark / groups.summed_charges, effects, full_rate))
 
     rate = collect(light.values, 0.0, time)
     moving = of_kind(effects, ImageMotion)
@@ -171,17 +171,17 @@ def _pixel_changes(
 
 
 def _transport(
-    rate: NDArray, dark: float, effects: Sequence[Effect], held: float = math.inf
+    rate: NDArray, dark: float, effects: Sequence[Effect], full_rate: float = math.inf
 ) -> NDArray:
     """Return the photo-electrons per second that arrive where charge is transported [e/s].
 
     With the dark rate [e/s] they are what arrives of both. What a packet does not hold, beyond
-    `held` [e/s] for the time of the exposure, stays where it is and is clipped there. Below that
-    transport is linear, so that an exposure can be timed by the picture as it is read.
+    `full_rate` [e/s] for the time of the exposure, stays where it is and is clipped there. Below
+    that transport is linear, so that an exposure can be timed by the picture as it is read.
     """
     for transport in of_kind(effects, Transport):
         signal = rate + rate.dtype.type(dark)
-        beyond = signal - np.minimum(signal, signal.dtype.type(min(held, MOST_ELECTRONS)))
+        beyond = signal - np.minimum(signal, signal.dtype.type(min(full_rate, MOST_ELECTRONS)))
         signal -= beyond
         planes = signal.reshape(-1, *signal.shape[-2:])
         signal = np.array([transport.transport(plane) for plane in planes]).reshape(rate.shape)

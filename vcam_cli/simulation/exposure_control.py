@@ -22,14 +22,14 @@ from vcam_cli.readout.auto_exposure import ExposureSettings
 from vcam_cli.simulation.preparation import Prepared
 
 
-def next_exposure(camera: Camera, taken: Prepared) -> ExposureSettings:
+def next_exposure(camera: Camera, last: Prepared) -> ExposureSettings:
     """Return time and gain of the frame after one that was taken.
 
     Parameters
     ----------
     camera : Camera
         The camera, with its automatic exposure.
-    taken : Prepared
+    last : Prepared
         The frame before.
 
     Returns
@@ -39,13 +39,13 @@ def next_exposure(camera: Camera, taken: Prepared) -> ExposureSettings:
     """
     auto = camera.exposure.auto
     assert auto is not None
-    base = iso_speed.set_gain(camera, taken.base_iso)
-    circuit, time = electrical(base), taken.exposure_time
-    gain = taken.camera.exposure_gain
+    base = iso_speed.set_gain(camera, last.base_iso)
+    circuit, time = electrical(base), last.exposure_time
+    gain = last.camera.exposure_gain
     full = min(circuit.full_well, circuit.adc_full_scale * circuit.exposure_gain / gain)
-    held = np.minimum(taken.rate, max(full / time - taken.dark_rate, 0.0))
-    white = float(taken.white_rate.max())
-    wanted = auto_exposure.exposure_settings(base, held, white, taken.dark_rate, circuit)
+    metered = np.minimum(last.rate, max(full / time - last.dark_rate, 0.0))
+    white = float(last.white_rate.max())
+    wanted = auto_exposure.exposure_settings(base, metered, white, last.dark_rate, circuit)
     now = time * gain
     product = now * (wanted.time * wanted.gain / now) ** auto.follow
     chosen = min(max(product / circuit.exposure_gain, auto.min), auto.max)

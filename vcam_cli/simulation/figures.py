@@ -30,8 +30,8 @@ def figures(frame: Frame) -> list[tuple[str, float, str]]:
     `pixel_figures` computes dynamic ranges (eq 3.1), SNR (eq 3.2) and well capacity. Of several
     samples of one integration, all but the last two are of the last sample.
     """
-    e, joins = frame.electrical, frame.layout.binning_groups
-    known = pixel_figures(frame.camera, frame.geometry, e, joins, frame.exposure_time)
+    e, groups = frame.electrical, frame.layout.binning_groups
+    known = pixel_figures(frame.camera, frame.geometry, e, groups, frame.exposure_time)
     listed = [
         ("exposure_time", frame.exposure_time, "s"),
         ("mean_electrons", float(frame.electrons.mean(dtype=np.float64)), "e"),
@@ -72,8 +72,8 @@ def _sample_figures(
 
 def saturated_pixels(frame: Frame) -> NDArray:
     """Return which pixels of the raw frame are saturated, in the shape of `dn`."""
-    e, joins = frame.electrical, frame.layout.binning_groups
-    if joins.count == joins.summed_charges:
+    e, groups = frame.electrical, frame.layout.binning_groups
+    if groups.count == groups.summed_charges:
         return np.asarray((frame.electrons >= e.full_well) | (frame.dn >= e.highest_code))
     return np.asarray(frame.dn >= frame.saturated_dn)
 
@@ -86,9 +86,9 @@ def picture_snr_db(frame: Frame) -> float:
     are straight lines of the signal, so that the mean variance is that of the mean signal. It is
     -inf without light, or where all pixels saturate.
     """
-    joins, binning = frame.layout.binning_groups, frame.camera.array.binning
-    summed = joins.summed_codes
-    signal = joins.join(frame.rate) * frame.exposure_time / summed
+    groups, binning = frame.layout.binning_groups, frame.camera.array.binning
+    summed = groups.summed_codes
+    signal = groups.join(frame.rate) * frame.exposure_time / summed
     dark = frame.dark_rate * frame.exposure_time
     usable = signal + dark < frame.electrical.saturation
     count = int(usable.sum())
@@ -156,9 +156,9 @@ def exposure_report(frame: Frame) -> ExposureReport:
 
 def _raw_peak(frame: Frame) -> float:
     """Return the brightest pixel's mean code above the offset, as a fraction of full scale."""
-    joins, e = frame.layout.binning_groups, frame.electrical
-    summed = joins.summed_codes
-    brightest = (float(joins.join(frame.rate).max()) / summed + frame.dark_rate) * (
+    groups, e = frame.layout.binning_groups, frame.electrical
+    summed = groups.summed_codes
+    brightest = (float(groups.join(frame.rate).max()) / summed + frame.dark_rate) * (
         frame.exposure_time
     )
     level = float(frame.adc.response(np.array([min(brightest, e.full_well)]))[0])

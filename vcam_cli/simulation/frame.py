@@ -254,8 +254,8 @@ def take_frame(ready: Prepared, workers: int, stages: Stages | None = None) -> F
         times = ready.times
         if not times:
             take = partial(exposure.capture, adc=adc, seeds=seeds, workers=workers)
-            joins, time = ready.layout.binning_groups, ready.exposure_time
-            electrons, dn = binned_readout.read(joins, ready.rate, time, active, take, adc.bits)
+            groups, time = ready.layout.binning_groups, ready.exposure_time
+            electrons, dn = binned_readout.read(groups, ready.rate, time, active, take, adc.bits)
             return Frame(**known, electrons=electrons, dn=dn)
         electrons, dn = nondestructive_samples.samples(
             ready.rate, times, active, adc, seeds, workers, step_rates=ready.step_rates

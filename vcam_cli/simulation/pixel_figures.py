@@ -46,18 +46,18 @@ class PixelFigures:
 
 
 def pixel_figures(
-    camera: Camera, geometry: Geometry, electrical: Electrical, joins: BinningGroups, time: float
+    camera: Camera, geometry: Geometry, electrical: Electrical, groups: BinningGroups, time: float
 ) -> PixelFigures:
     """Return signal over noise of a pixel that is exposed for a time [s]."""
     wanted = plan.enabled_effects(camera, geometry)
     draws = noise_sources(wanted, "frame")
     # In electrons of all wells together, in which shot noise is Poisson's.
-    wells = joins.count // joins.summed_charges
-    floor = sum(x.binned_variance(0.0, 0.0, joins.binning) for x in draws) * wells**2
+    wells = groups.count // groups.summed_charges
+    floor = sum(x.binned_variance(0.0, 0.0, groups.binning) for x in draws) * wells**2
     dark = mean_dark(time, wanted)
     well, all_dark = electrical.full_well * wells, dark * wells
     most = electrical.saturation * wells
-    conversions = joins.binning.conversions
+    conversions = groups.binning.conversions
     one = quantizer(camera, geometry).rounding(dark, conversions * floor / wells**2)
     rounding = wells**2 * one / conversions
     return PixelFigures(
@@ -66,7 +66,7 @@ def pixel_figures(
         quantized_dynamic_range_db=float(
             readout.dynamic_range_db(most, all_dark, floor + rounding)
         ),
-        well_capacity=electrical.full_well * joins.summed_codes,
+        well_capacity=electrical.full_well * groups.summed_codes,
         dark=dark,
         draws=draws,
     )

@@ -232,10 +232,10 @@ def _pattern(frame: Frame) -> dict[str, Attribute]:
 
 def _binning(frame: Frame) -> dict[str, Attribute]:
     """Which pixels are read as one: offset and highest code of `digital` are sums as well."""
-    joins = frame.layout.binning_groups
-    if joins.count == 1:
+    groups = frame.layout.binning_groups
+    if groups.count == 1:
         return {}
-    given = joins.binning
+    given = groups.binning
     return {"vcam:binning": f"{given.rows}x{given.columns} {given.kind}"}
 
 

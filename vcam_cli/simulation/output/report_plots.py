@@ -51,11 +51,11 @@ def noise_parts(frame: Frame) -> tuple[NDArray, dict[str, NDArray]]:
         for source in noise_sources(frame.plan.active, scope):
             each = [source.binned_variance(level + dark, dark, binning) for level in signal]
             parts[source.name] = np.array(each)
-    joins = binning.conversions
+    conversions = binning.conversions
     temporal = sum(parts[s.name] for s in noise_sources(frame.plan.active, "frame"))
     noise = np.broadcast_to(temporal, signal.shape)
     rounding = [
-        frame.adc.rounding(level + dark, joins * float(n)) / joins
+        frame.adc.rounding(level + dark, conversions * float(n)) / conversions
         for level, n in zip(signal, noise, strict=True)
     ]
     return signal, parts | {"quantization": np.array(rounding)}
