@@ -7,13 +7,14 @@ import re
 from html.parser import HTMLParser
 
 import numpy as np
+import OpenImageIO
 import pytest
 from typer.testing import CliRunner
 
 from tests.making import camera as made
 from vcam_cli import load, simulate
 from vcam_cli.commands.main import app
-from vcam_cli.reports import page, pictures
+from vcam_cli.reports import page, pictures, study_report
 from vcam_cli.reports.page import Facts, Page, Picture, Scale, Section, Table, Text
 from vcam_cli.simulation.output import report_plots
 
@@ -275,3 +276,33 @@ def test_measured_cameras_have_a_report(command, tmp_path):
     found = check((tmp_path / "out" / "report.html").read_text("utf-8"))
     assert found.images
     assert f"{command}.csv" in "".join(found.texts)
+
+
+def decoded(source, folder):
+    """The gray codes of a picture that a page holds."""
+    file = folder / "picture.png"
+    file.write_bytes(base64.b64decode(source.partition(",")[2]))
+    return OpenImageIO.ImageBuf(str(file)).get_pixels(OpenImageIO.UINT8)[:, :, 0]
+
+
+def test_cells_of_a_mosaic_stand_for_it_until_it_is_zoomed(tmp_path):
+    """Shown smaller, pixels that alternate would beat with the screen's; zoomed, each is seen."""
+    mosaic = np.zeros((100, 400), np.uint8)
+    mosaic[::2, ::2] = 200
+    far = decoded(pictures.without_mosaic(mosaic), tmp_path)
+    assert np.array_equal(far, np.full((50, 200), 50))
+    assert not pictures.without_mosaic(mosaic[:, :200])
+    wide = np.tile(mosaic, (1, 6))  # 2400 columns: squares of 3 x 3 would not have all colors alike
+    source, note = pictures.codes(wide, is_mosaic=True)
+    assert "1/4" in note
+    assert np.unique(decoded(source, tmp_path)).tolist() == [50]
+    shown = Picture("raw", "data:b", "alt", group="a", far="data:a")
+    text = page.html(Page("t", "a", [Section("s", [shown])]))
+    assert text.index('class="far" src="data:a"') < text.index('src="data:b"')
+
+
+def test_a_table_leaves_out_columns_in_which_nothing_stands():
+    csv = b"frame,channel,error\none,,1.5\ntwo,,2.5\n"
+    text = study_report.study_html("t", "a", [], {"verify.csv": csv}).decode()
+    assert "channel" not in text
+    assert "error" in text

@@ -18,6 +18,7 @@ CAPTIONS = {
     "segments.csv": "What schedules are worth that are found on coarser pdfs.",
     "targets.csv": "The fewest captures that reach each gain.",
     "online.csv": "What planning capture by capture loses.",
+    "charge.png": "Charge over time of a bright and a dark pixel, and the samples that count",
     "captures.png": "The capture times of every method",
     "pdf.png": "The probability of photocurrents, and its approximation",
     "gain.png": "Gain over the number of captures for every method",

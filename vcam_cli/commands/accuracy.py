@@ -102,7 +102,10 @@ def report_arguments(found: "Study") -> dict[str, Any]:
     """Return title, text, facts and captions of the report."""
     from vcam_cli.reports.page import Facts
 
-    facts = [("recommended", found.recommendation.sentence), ("reference", convergence(found))]
+    facts = [
+        ("recommended", found.recommendation.sentence.replace("`", "")),
+        ("reference", convergence(found)),
+    ]
     facts += [(f"{knob} does not apply", why) for knob, why in found.absent.items()]
     captions = {
         "accuracy.csv": "Errors are relative to full signal, of the mean raw frame against the"

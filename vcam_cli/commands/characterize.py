@@ -1,6 +1,5 @@
 """`vcam characterize`: a camera measured by EMVA 1288 and ISO 12233."""
 
-from collections.abc import Iterator
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -100,15 +99,19 @@ def characterize(
 
 def report_arguments(found: "Characterization") -> dict[str, Any]:
     """Return title, text, facts and captions of the report."""
-    from vcam_cli.reports.page import Facts, note_facts
+    from vcam_cli.reports.page import Table, note_facts, number_columns
 
-    def measured(color: str) -> Iterator[tuple[str, str]]:
-        for name in SHOWN:
-            q = found.get(name, color)
-            yield name, f"{q.measured:.4g} (expected {q.expected:.4g}) {q.unit}".rstrip()
-
-    cards = [Facts(channel.color, list(measured(channel.color))) for channel in found.channels]
-    cards += note_facts(found.notes)
+    head, rows = quantities_table(found)
+    parts = [
+        Table(
+            "In short",
+            head,
+            rows,
+            "Measured, and expected of the file.",
+            numbers=number_columns(rows),
+        ),
+        *note_facts(found.notes),
+    ]
     captions = {
         "characterize.csv": "What the bench measured beside what the camera file says.",
         "photon_transfer.png": "Temporal variance over the mean, whose slope is the system gain K",
@@ -118,22 +121,35 @@ def report_arguments(found: "Characterization") -> dict[str, Any]:
     }
     about = "Measured on simulated raw frames as EMVA 1288 and ISO 12233 have it."
     title = f"{found.bench.camera.name}: a camera on the bench"
-    return {"title": title, "about": about, "facts": cards, "captions": captions}
+    return {"title": title, "about": about, "facts": parts, "captions": captions}
 
 
 def print_report(found: "Characterization", path: Path) -> None:
     """Print the table: measured and expected values of every color side by side."""
     console, table = options.open_table()
-    colors = [channel.color for channel in found.channels]
-    table.add_column("quantity", no_wrap=True)
-    for color in colors:
-        measured = "measured" if len(colors) == 1 else color
-        table.add_column(measured, justify="right", no_wrap=True)
-        table.add_column("expected", justify="right", no_wrap=True)
-    table.add_column("unit", no_wrap=True)
-    for name in SHOWN:
-        quantities = [found.get(name, color) for color in colors]
-        cells = (f"{value:.4g}" for q in quantities for value in (q.measured, q.expected))
-        table.add_row(name, *cells, quantities[0].unit)
+    head, rows = quantities_table(found)
+    for name in head:
+        side = "left" if name in ("quantity", "unit") else "right"
+        table.add_column(name, justify=side, no_wrap=True)
+    for row in rows:
+        table.add_row(*row)
     console.print(table)
     console.print(f"{path}/characterize.csv, photon_transfer.png, snr.png, linearity.png, mtf.png")
+
+
+def quantities_table(found: "Characterization") -> tuple[list[str], list[list[str]]]:
+    """Return headings and rows of the quantities: measured and expected values of every color."""
+    colors = [channel.color for channel in found.channels]
+    measured = ["measured"] if len(colors) == 1 else colors
+    head = ["quantity", *(name for color in measured for name in (color, "expected")), "unit"]
+    rows = []
+    for name in SHOWN:
+        every = [found.get(name, color) for color in colors]
+        cells = [_number(value) for q in every for value in (q.measured, q.expected)]
+        rows.append([name, *cells, every[0].unit])
+    return head, rows
+
+
+def _number(value: float) -> str:
+    """Return four digits of a number, those of electrons without an exponent."""
+    return f"{float(f'{value:.4g}'):.8g}"

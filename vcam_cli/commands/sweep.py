@@ -148,22 +148,26 @@ Table = tuple[list[str], list[list[str]]]
 
 def results_table(means: "Sequence[Mapping[str, object]]") -> Table:
     """Return the metrics at what is varied; the case where there are several."""
+    from vcam_cli.sweeps.labeled_table import cell_text
+
     names = list(means[0]) if means else []
     if len({row["case"] for row in means}) == 1:
         names.remove("case")
     words = {name for name in names if any(isinstance(row[name], str) for row in means)}
     heads = [name if name in words else f">{name}" for name in names]
-    return heads, [[_cell(row[name]) for name in names] for row in means]
+    return heads, [[cell_text(row[name]) for name in names] for row in means]
 
 
 def optimum_table(optima: "Sequence[CaseOptimum]") -> Table:
     """Return the best value of each parameter in each case, with what there is to say of it."""
+    from vcam_cli.sweeps.labeled_table import cell_text
+
     rows = []
     for best in optima:
         said = EDGES.get(best.edge, "")
         if best.is_beyond_points:
             said = f"{said}; the fit reaches {best.fitted:.6g} between points".removeprefix("; ")
-        rows.append([*map(_cell, best.row), said])
+        rows.append([*map(cell_text, best.row), said])
     heads = ["case", "parameter", "unit", ">best", ">low", ">high", "metric", ">value", ""]
     return heads, rows
 
@@ -173,10 +177,6 @@ EDGES = {
     "high": "at the high end of its range: the optimum may lie beyond",
 }
 """End of a range -> what is said of an optimum there."""
-
-
-def _cell(value: object) -> str:
-    return "" if value is None else f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
 def closing_lines(result: "SweepResult") -> list[str]:

@@ -42,6 +42,9 @@ class Picture:
     scale: Scale | None = None
     group: str = ""
     """Pictures of one group show the same place and are zoomed together; "" for no zoom."""
+    far: str = ""
+    """What stands for it until it is zoomed: cells of a mosaic averaged, which would beat with the
+    screen's pixels; "" for the picture itself."""
 
 
 @dataclass(frozen=True)

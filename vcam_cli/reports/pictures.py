@@ -17,11 +17,29 @@ from vcam_cli.reports.page import Picture, Scale
 
 WIDEST = 1024
 """Columns of a picture from which on it is shown smaller: a page of six such has some 10 MB."""
+SMALL = 320
+"""Columns of a picture up to which a page shows it as large as it is, or larger."""
 
 
 def png(data: bytes) -> str:
     """Return the bytes of a PNG file as a URL that holds them."""
     return "data:image/png;base64," + base64.b64encode(data).decode("ascii")
+
+
+def without_mosaic(image: NDArray) -> str:
+    """Return codes with squares of 2 x 2 pixels averaged as a URL; "" of a picture that is small.
+
+    Pixels behind a mosaic alternate: shown smaller, they would beat with those of the screen.
+
+    Parameters
+    ----------
+    image : ndarray of uint8 or uint16
+        Codes (rows, columns) or (rows, columns, 1 or 3).
+    """
+    if not SMALL <= image.shape[1] <= WIDEST:
+        return ""  # it is shown larger than it is, or averaged anyway
+    small = _averaged(image, 2)
+    return png(atomic.written_bytes("picture.png", lambda path: write_png(path, small)))
 
 
 def drawing(draw: Callable[[Any], None], size: tuple[float, float]) -> str:
@@ -30,15 +48,19 @@ def drawing(draw: Callable[[Any], None], size: tuple[float, float]) -> str:
     return "data:image/svg+xml;base64," + base64.b64encode(svg).decode("ascii")
 
 
-def codes(image: NDArray) -> tuple[str, str]:
+def codes(image: NDArray, is_mosaic: bool = False) -> tuple[str, str]:
     """Return a picture of sRGB codes as a URL, and how far it was shrunk, in words.
 
     Parameters
     ----------
     image : ndarray of uint8 or uint16
         Codes (rows, columns) or (rows, columns, 1 or 3).
+    is_mosaic : bool
+        Whether neighbors lie behind filters of different colors: squares that are averaged then
+        have as many of each.
     """
     step = math.ceil(image.shape[1] / WIDEST)
+    step += is_mosaic and step > 1 and step % 2
     small = _averaged(image, step)
     data = atomic.written_bytes("picture.png", lambda path: write_png(path, small))
     shrunk = f"Shown at 1/{step} of its size, {step} x {step} pixels averaged." if step > 1 else ""
@@ -60,7 +82,14 @@ def shades(values: NDArray, white: float) -> NDArray[np.uint8]:
 
 
 def map_picture(
-    title: str, values: NDArray, upper: float, unit: str, alt: str, note: str, group: str = ""
+    title: str,
+    values: NDArray,
+    upper: float,
+    unit: str,
+    alt: str,
+    note: str,
+    group: str = "",
+    is_mosaic: bool = False,
 ) -> Picture:
     """Return a map in false colors with the bar of its scale.
 
@@ -74,11 +103,15 @@ def map_picture(
         Value of the lightest color; the darkest is 0.
     unit : str
         Unit of the values.
+    is_mosaic : bool
+        Whether neighbors lie behind filters of different colors.
     """
-    source, shrunk = codes(error_map.false_color(values, upper))
+    colors = error_map.false_color(values, upper)
+    source, shrunk = codes(colors, is_mosaic)
+    far = without_mosaic(colors) if is_mosaic else ""
     most = f"{upper:.5g} {unit}".rstrip()
     scale = Scale("0", f"{most} or more", error_map.INFERNO)
-    return Picture(title, source, alt, f"{note} {shrunk}".strip(), scale, group)
+    return Picture(title, source, alt, f"{note} {shrunk}".strip(), scale, group, far)
 
 
 def _averaged(image: NDArray, step: int) -> NDArray:

@@ -10,7 +10,7 @@ from pathlib import PurePath
 from vcam_cli.files import atomic
 from vcam_cli.files.folder import OutputFolder
 from vcam_cli.reports import page, pictures
-from vcam_cli.reports.page import Facts, Page, Picture, Section, Table
+from vcam_cli.reports.page import Page, Part, Picture, Section, Table
 
 REPORT = "report.html"
 MOST_ROWS = 400
@@ -23,7 +23,7 @@ def write(
     folder: OutputFolder,
     title: str,
     about: str,
-    facts: Sequence[Facts],
+    facts: Sequence[Part],
     captions: Mapping[str, str],
 ) -> None:
     """Write report.html of the tables and plots that are new in a folder; see `study_html`."""
@@ -34,7 +34,7 @@ def write(
 def study_html(
     title: str,
     about: str,
-    facts: Sequence[Facts],
+    facts: Sequence[Part],
     contents: Mapping[str, bytes],
     captions: Mapping[str, str] | None = None,
 ) -> bytes:
@@ -44,7 +44,7 @@ def study_html(
     ----------
     title, about : str
         Title, and a sentence below it.
-    facts : sequence of Facts
+    facts : sequence of parts
         What the study came to.
     contents : mapping
         Name of a file -> its bytes. CSV files are shown as tables, PNG files as pictures.
@@ -73,8 +73,11 @@ def study_html(
 
 
 def _table(name: str, data: bytes, note: str) -> Table:
+    """Return the table of a CSV file, without the columns in which nothing stands."""
     head, *rows = csv.reader(io.StringIO(data.decode("utf-8")))
-    shown = [[_short(cell) for cell in row] for row in rows[:MOST_ROWS]]
+    used = [i for i in range(len(head)) if any(row[i] for row in rows)] or range(len(head))
+    head = [head[i] for i in used]
+    shown = [[_short(row[i]) for i in used] for row in rows[:MOST_ROWS]]
     if len(rows) > MOST_ROWS:
         note = f"{note} The first {MOST_ROWS} of {len(rows)} rows; the file has all.".strip()
     return Table(name, head, shown, note, len(rows) > FOLDED_ROWS, page.number_columns(shown))

@@ -76,6 +76,11 @@ def mean_rows(
     ]
 
 
+def cell_text(value: object) -> str:
+    """Return a cell of a table of results as a person reads it: numbers of six digits."""
+    return "" if value is None else f"{value:.6g}" if isinstance(value, float) else str(value)
+
+
 def _mean(cells: Sequence[Cell]) -> float | None:
     return None if "" in cells else float(np.mean(np.array(cells, float)))
 

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 
-from vcam_cli.reports.page import Facts
-from vcam_cli.reports.study_report import REPORT, study_html
+from vcam_cli.reports.page import Facts, Part, Table, number_columns
+from vcam_cli.reports.study_report import FOLDED_ROWS, REPORT, study_html
+from vcam_cli.sweeps.labeled_table import cell_text
 from vcam_cli.sweeps.sweep_result import SweepResult
 
 CAPTIONS = {
@@ -30,8 +31,18 @@ def report_file(result: SweepResult, contents: Mapping[str, bytes]) -> dict[str,
     facts += [(f"no figure {name}", why) for name, why in result.unmade.items()]
     captions = {name: _caption(name) for name in contents}
     about = "A sweep: metrics of a camera over its parameters."
-    shown = [Facts("In short", facts)]
+    shown: list[Part] = [Facts("In short", facts), *_results(result)]
     return {REPORT: study_html(f"{result.name}: a sweep", about, shown, contents, captions)}
+
+
+def _results(result: SweepResult) -> Iterator[Part]:
+    """Yield the table of means over seeds and repeats, where it is short and says more."""
+    means = result.mean_rows
+    if not 0 < len(means) <= FOLDED_ROWS or len(means) == len(result.points):
+        return
+    rows = [[cell_text(cell) for cell in row.values()] for row in means]
+    note = "Means over seeds and repeats."
+    yield Table("Results", list(means[0]), rows, note, numbers=number_columns(rows))
 
 
 def _caption(name: str) -> str:

@@ -13,8 +13,9 @@
       x = clamp(x, rest);
       y = clamp(y, rest);
       for (const frame of frames) {
-        const image = frame.firstElementChild;
-        image.style.transform = `scale(${scale}) translate(${-100 * x}%, ${-100 * y}%)`;
+        for (const image of frame.children) {
+          image.style.transform = `scale(${scale}) translate(${-100 * x}%, ${-100 * y}%)`;
+        }
         frame.classList.toggle("near", scale > 1);
       }
     };

@@ -74,6 +74,7 @@ def _pictures(result: Result) -> Iterator[Part]:
         yield pictures.map_picture(
             "Light collected", joined, upper, "e", f"Map of the mean electrons of {name}",
             "Mean electrons of every pixel behind its filter, before noise and saturation.", GROUP,
+            len(frame.mosaic.colors) > 1,
         )  # fmt: skip
     yield from _raw(result)
     if needs_picture(frame.camera):
@@ -97,10 +98,12 @@ def _raw(result: Result) -> Iterator[Part]:
     frame = result.frame
     low = min(frame.black_dn, frame.saturated_dn - 1)
     shown = pictures.shades(dn - dn.dtype.type(low), frame.saturated_dn - low)
-    raw, note = pictures.codes(shown)
+    is_mosaic = len(frame.mosaic.colors) > 1 and shown.ndim == 2
+    raw, note = pictures.codes(shown, is_mosaic)
     about = "Codes from the black level to saturation, brightened by a square root."
     yield Picture("Raw frame", raw, f"Raw codes of {frame.camera.name} as shades of gray",
-                  f"{about} {note}".strip(), group=GROUP)  # fmt: skip
+                  f"{about} {note}".strip(), group=GROUP,
+                  far=pictures.without_mosaic(shown) if is_mosaic else "")  # fmt: skip
 
 
 def _steps(frame: Frame) -> str:
