@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from vcam_cli.rng import BLOCK_ROWS, blocks, stream
+from vcam_cli.rng import BLOCK_ROWS, blocks, coarse_normals, stream
 
 
 def test_equal_keys_give_equal_numbers():
@@ -40,3 +40,38 @@ def test_neighboring_blocks_do_not_overlap():
 def test_blocks_cover_every_row_once(rows):
     covered = np.concatenate([np.arange(rows)[b] for b in blocks(rows)])
     assert np.array_equal(covered, np.arange(rows))
+
+
+@pytest.mark.parametrize("dtype", [np.float32, np.float64])
+def test_coarse_normals_have_the_moments_of_a_normal_number(dtype):
+    """Over all of their values: the variance is 1 by construction, and tails end at 4.3 sigma."""
+    drawn = coarse_normals(_EveryValue(), 64, 1024, dtype).astype(float)
+    assert len(np.unique(drawn)) == 1 << 16
+    mean, variance, third, fourth = (np.mean(drawn**power) for power in (1, 2, 3, 4))
+    # Rounding to 32 bits, of values that are symmetric about 0.
+    assert abs(mean) < 1e-7
+    assert abs(third) < 1e-6
+    assert abs(variance - 1) < 1e-7
+    assert abs(fourth / 3 - 1) < 1e-3  # what lies beyond the last value adds 6e-4 to it
+    assert 4.2 < drawn.max() < 4.4
+
+
+class _EveryValue:
+    """A generator whose bits are each number of 16 bits once."""
+
+    bit_generator = property(lambda self: self)
+
+    def random_raw(self, count):
+        return np.arange(1 << 16, dtype="<u2").view("<u8")[:count]
+
+
+def test_rows_of_coarse_normals_do_not_depend_on_how_many_are_drawn():
+    """A single exposure draws some rows at a time, and samples of an integration all."""
+    one, other = stream(3, "shot_noise"), stream(3, "shot_noise")
+    whole = coarse_normals(one, 5, 7, np.float32)  # rows that end within a word of 64 bits
+    parts = [coarse_normals(other, rows, 7, np.float32) for rows in (2, 3)]
+    assert np.array_equal(whole, np.concatenate(parts))
+    flat = coarse_normals(one, 500, 400, np.float32).ravel()
+    # Neighbors, which share words: 5 standard errors of a correlation of independent numbers.
+    lags = [np.mean(flat[lag:] * flat[:-lag]) for lag in range(1, 9)]
+    assert np.abs(lags).max() < 5 / np.sqrt(flat.size)

@@ -12,8 +12,10 @@ Why blocks and not rows: opening a stream costs 30 us, as much as 3000 normals.
 from __future__ import annotations
 
 import hashlib
+from functools import lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 BLOCK_ROWS = 64
 """Rows of the array that share one stream, and that flow together through the engine."""
@@ -39,6 +41,44 @@ def stream(seed: int, effect: str, capture: int = 0, block: int = 0) -> np.rando
     digest = hashlib.blake2b(f"vcam {seed} {effect} {capture}".encode(), digest_size=16).digest()
     key = int.from_bytes(digest, "little")
     return np.random.Generator(np.random.Philox(key=key, counter=[0, 0, 0, block]))
+
+
+def coarse_normals(generator: np.random.Generator, rows: int, columns: int, dtype: type) -> NDArray:
+    """Return standard normal numbers of 16 random bits each, in a fifth of the time.
+
+    Each is one of 65536 equally probable values, of at most 4.3 standard deviations. Their mean is
+    0 and their variance 1. Rows that are drawn one after the other are those drawn together.
+
+    Parameters
+    ----------
+    generator : np.random.Generator
+        Stream of random bits.
+    rows, columns : int
+        How many there are.
+    dtype : type
+        Floating-point type.
+
+    Returns
+    -------
+    NDArray
+        Normal numbers (rows, columns).
+    """
+    words = -(-columns // 4)
+    raw = generator.bit_generator.random_raw(rows * words).astype("<u8", copy=False)
+    bits = raw.view("<u2").reshape(rows, 4 * words)[:, :columns]
+    return _normal_quantiles(dtype).take(bits)
+
+
+@lru_cache(maxsize=2)
+def _normal_quantiles(dtype: type) -> NDArray:
+    """Return the standard normal numbers in the middle of 65536 equal parts, with variance 1."""
+    from scipy.special import ndtri
+
+    count = 1 << 16
+    middle = ndtri((np.arange(count) + 0.5) / count)
+    quantiles = (middle / np.sqrt(np.mean(np.square(middle)))).astype(dtype)
+    quantiles.setflags(write=False)
+    return quantiles
 
 
 def blocks(rows: int) -> list[slice]:

@@ -7,6 +7,7 @@ import pytest
 from making import QUIET, camera, radiance_for
 
 from vcam_cli import simulate
+from vcam_cli.effects.noise.fpn import FixedPattern
 from vcam_cli.effects.noise.quantization import Quantization
 from vcam_cli.effects.noise.read_noise import ReadNoise
 from vcam_cli.effects.noise.shot_noise import ShotNoise
@@ -68,7 +69,9 @@ class Halved(ReadNoise):
         return mean
 
 
-@pytest.mark.parametrize("more", [{}, LINES], ids=["plain", "lines and defects"])
+@pytest.mark.parametrize(
+    "more", [{}, LINES, {"accuracy": "draft"}], ids=["plain", "lines and defects", "draft"]
+)
 def test_same_bytes_however_few_pixels_flow_together(more, tmp_path, monkeypatch):
     made = camera(tmp_path, NOISY | more)
     whole = simulate(made, workers=1)
@@ -90,6 +93,20 @@ def test_what_acts_on_the_mean_does_so_before_shot_noise():
     assert taken.mean() == pytest.approx(mean, abs=5 * np.sqrt(mean / n))
     assert taken.var() == pytest.approx(mean, rel=5 * np.sqrt(2 / n))
     assert np.array_equal(taken, np.rint(taken))
+
+
+def test_noise_of_few_bits_has_the_variance_that_each_source_states():
+    """At draft: of a few electrons, of many, and of what stays with the sensor."""
+    adc, n = Quantization(0.0, 1.0, 16), 128 * 400
+    effects = (ShotNoise(), FixedPattern(4.0, 0.0, 0.01, 0.0), ReadNoise(3.0))
+    for mean in (3.0, 2000.0):
+        rate = np.full((128, 400), mean, np.float32)
+        taken = exposure.capture(rate, 1.0, effects, adc, SEEDS, 1, coarse_normals=True)[0]
+        fine = exposure.capture(rate, 1.0, effects, adc, SEEDS, 1)[0]
+        variance = sum(effect.variance(mean) for effect in effects)
+        assert taken.mean() == pytest.approx(mean, abs=5 * np.sqrt(variance / n))
+        assert taken.var() == pytest.approx(variance, rel=5 * np.sqrt(2 / n))
+        assert not np.array_equal(taken, fine)
 
 
 def test_a_longer_array_begins_like_a_shorter_one():

@@ -173,12 +173,15 @@ def test_the_raw_frame_is_the_last_sample(tmp_path):
     assert second.black_dn < result.frame.black_dn
 
 
-def test_stacked_pixels_are_sampled_layer_by_layer():
+@pytest.mark.parametrize("coarse", [False, True])
+def test_stacked_pixels_are_sampled_layer_by_layer(coarse):
     rate = np.stack([np.full((70, 40), level) for level in (1e4, 2e4, 3e4)])
     effects = (ShotNoise(), ResetNoise(5.0), ReadNoise(3.0), FixedPattern(4.0, 1.0, 0.01, 0.01))
-    electrons, dn = nondestructive_samples.samples(rate, TIMES, effects, FINE, SEEDS, 2)
+    electrons, dn = nondestructive_samples.samples(
+        rate, TIMES, effects, FINE, SEEDS, 2, coarse_normals=coarse
+    )
     assert electrons.shape == dn.shape == (4, 3, 70, 40)
-    alone, codes = exposure.capture(rate, TIMES[0], effects, FINE, SEEDS, 1)
+    alone, codes = exposure.capture(rate, TIMES[0], effects, FINE, SEEDS, 1, coarse_normals=coarse)
     assert np.array_equal(electrons[0], alone)
     assert np.array_equal(dn[0], codes)
     noise = (electrons - electrons.mean(axis=(2, 3), keepdims=True)).reshape(4, 3, -1)

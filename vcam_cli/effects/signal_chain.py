@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from vcam_cli.camera.sensor.array import Binning
 from vcam_cli.effects.base import Effect, SignalLevels, of_kind
+from vcam_cli.rng import coarse_normals
 
 SIGMAS = 6.0
 """Standard deviations of the noise that count as its extremes."""
@@ -39,6 +40,8 @@ class Site:
     sensor: Callable[[str], np.random.Generator] | None = None
     """Generator of a named stream for this block of what stays with the sensor, where that is
     another one than `stream`."""
+    coarse_normals: bool = False
+    """Whether the normal numbers of pixels are `rng.coarse_normals`."""
     lines_drawn: dict[str, NDArray] = field(default_factory=dict)
     """Draws per column and per row of the array that are at hand."""
 
@@ -53,6 +56,8 @@ class Site:
 
     def normal(self, name: str) -> NDArray:
         """Return one standard normal number a pixel, (rows, columns)."""
+        if self.coarse_normals:
+            return coarse_normals(self.stream(name), self.rows, self.columns, self.dtype)
         return self.stream(name).standard_normal((self.rows, self.columns), dtype=self.dtype)
 
     def normal_columns(self, name: str) -> NDArray:

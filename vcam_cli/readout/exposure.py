@@ -64,7 +64,13 @@ def mean_dark(time: float, effects: tuple[Effect, ...]) -> float:
 
 
 def sites(
-    rate: NDArray, dark: float, seeds: dict[str, int], layer: int, block: slice, sample: int = 0
+    rate: NDArray,
+    dark: float,
+    seeds: dict[str, int],
+    layer: int,
+    block: slice,
+    sample: int = 0,
+    coarse_normals: bool = False,
 ) -> dict[str, Site]:
     """Return the sites at which the noise of a block of rows is drawn, by scope.
 
@@ -84,6 +90,8 @@ def sites(
         Rows of the block.
     sample : int, optional
         Index of the sample within one integration.
+    coarse_normals : bool, optional
+        Whether the normal numbers of pixels are `rng.coarse_normals`.
 
     Returns
     -------
@@ -103,6 +111,7 @@ def sites(
             first_row=block.start,
             array_rows=len(rate),
             sensor=sensor,
+            coarse_normals=coarse_normals,
         )
         for scope, seed in seeds.items()
     }
@@ -148,6 +157,7 @@ def capture(
     workers: int,
     done: Callable[[slice], None] | None = None,
     layer: int = 0,
+    coarse_normals: bool = False,
 ) -> tuple[NDArray, NDArray]:
     """Return one frame of an array whose rate of electrons is known.
 
@@ -170,6 +180,8 @@ def capture(
         Function that is called with every block of rows that is finished.
     layer : int, optional
         Index of the layer of stacked pixels.
+    coarse_normals : bool, optional
+        Whether the normal numbers of pixels are `rng.coarse_normals`.
 
     Returns
     -------
@@ -184,7 +196,7 @@ def capture(
     """
     if rate.ndim == 3:
         layers = [
-            capture(plane, time, effects, adc, seeds, workers, layer=number)
+            capture(plane, time, effects, adc, seeds, workers, None, number, coarse_normals)
             for number, plane in enumerate(rate)
         ]
         return np.array([e for e, _ in layers]), np.array([dn for _, dn in layers])
@@ -193,7 +205,7 @@ def capture(
     dn = np.empty(rate.shape, codes_type(adc.bits))
 
     def shoot(block: slice) -> None:
-        opened = sites(rate, dark, seeds, layer, block)
+        opened = sites(rate, dark, seeds, layer, block, coarse_normals=coarse_normals)
         for rows in slices_within(block, max(1, AT_ONCE // rate.shape[1])):
             tile = mean_electrons(rate[rows], time, effects)
             place = {"rows": len(tile), "first_row": rows.start}

@@ -50,12 +50,13 @@ def samples(
     workers: int,
     layer: int = 0,
     step_rates: Sequence[NDArray] = (),
+    coarse_normals: bool = False,
 ) -> tuple[NDArray, NDArray]:
     """Return all samples of one integration.
 
     Parameters
     ----------
-    rate, effects, adc, seeds, workers, layer
+    rate, effects, adc, seeds, workers, layer, coarse_normals
         As those of `exposure.capture`.
     times : sequence of float
         Times of the N samples, rising [s].
@@ -79,6 +80,7 @@ def samples(
             samples(
                 *(plane, times, effects, adc, seeds, workers, number),
                 [of_step[number] for of_step in step_rates],
+                coarse_normals,
             )
             for number, plane in enumerate(rate)
         ]
@@ -94,8 +96,8 @@ def samples(
         for number, time in enumerate(times):
             step = time - before
             dark = mean_dark(step, effects)
-            sample_sites = sites(rate, dark, seeds, layer, block, number)
-            common_sites = sites(rate, dark, seeds, layer, block)
+            sample_sites = sites(rate, dark, seeds, layer, block, number, coarse_normals)
+            common_sites = sites(rate, dark, seeds, layer, block, 0, coarse_normals)
             lit = step_rates[number] if step_rates else rate
             charge += _collect_charge(
                 mean_electrons(lit[block], step, effects), effects, sample_sites, common_sites

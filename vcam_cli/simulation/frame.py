@@ -251,14 +251,18 @@ def take_frame(ready: Prepared, workers: int, stages: Stages | None = None) -> F
         active, adc = ready.plan.active, quantizer(camera, ready.geometry)
         seeds = {"sensor": camera.seed.sensor, "frame": camera.seed.frame}
         known = {field.name: getattr(ready, field.name) for field in fields(ready)}
-        times = ready.times
+        times, coarse = ready.times, ready.settings.coarse_normals
         if not times:
-            take = partial(exposure.capture, adc=adc, seeds=seeds, workers=workers)
+            take = partial(
+                exposure.capture, adc=adc, seeds=seeds, workers=workers, coarse_normals=coarse
+            )
             groups, time = ready.layout.binning_groups, ready.exposure_time
             electrons, dn = binned_readout.read(groups, ready.rate, time, active, take, adc.bits)
             return Frame(**known, electrons=electrons, dn=dn)
         electrons, dn = nondestructive_samples.samples(
-            ready.rate, times, active, adc, seeds, workers, step_rates=ready.step_rates
+            *(ready.rate, times, active, adc, seeds, workers),
+            step_rates=ready.step_rates,
+            coarse_normals=coarse,
         )
     last = Frame(**known, electrons=electrons[-1], dn=dn[-1])
     with stages("reconstruction"):
