@@ -37,7 +37,7 @@ from vcam_cli.image_formation.estimates.bandwidth import highest_passed, line_sp
 from vcam_cli.image_formation.photon_rate import photo_rate
 from vcam_cli.image_formation.settings import STANDARD, camera_settings
 from vcam_cli.scenes.base import Chart
-from vcam_cli.simulation import preparation
+from vcam_cli.simulation import setup
 from vcam_cli.simulation.simulate import prepare
 
 BAND = 550e-9, 550e-9
@@ -460,7 +460,7 @@ def test_the_margin_is_wide_enough_for_light_beyond_the_well(chart, time, tmp_pa
     made = camera(tmp_path, changes)
     usual = prepare(made, 1)[0]
     monkeypatch.setattr(
-        preparation,
+        setup,
         "camera_settings",
         lambda camera: replace(camera_settings(camera), margin_scale=6.0),
     )

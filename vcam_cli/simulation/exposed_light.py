@@ -10,9 +10,6 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from vcam_cli.camera.camera import Camera
-from vcam_cli.camera.derived.electrical import Electrical
-from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.camera.derived.mosaic import Mosaic
 from vcam_cli.effects.base import (
     Effect,
@@ -28,10 +25,10 @@ from vcam_cli.errors import bad
 from vcam_cli.floats import rms
 from vcam_cli.image_formation import photon_rate, pixelwise, timed_gains
 from vcam_cli.image_formation.light_plan import PERCENTILES, LightPlan
-from vcam_cli.image_formation.settings import Settings
 from vcam_cli.readout import auto_exposure, exposure, sample_times
 from vcam_cli.readout.layout import Layout
 from vcam_cli.simulation import plan
+from vcam_cli.simulation.setup import CameraSetup
 
 MOST_ELECTRONS = 1e25
 """More than any pixel ever meets, and far from where 32-bit numbers end."""
@@ -56,28 +53,43 @@ class ExposedLight:
 
 
 def expose(
-    camera: Camera,
-    solved: Geometry,
-    circuit: Electrical,
-    layout: Layout,
+    setup: CameraSetup,
     light: photon_rate.Rate,
     white_rate: NDArray,
     effects: Sequence[Effect],
     optional: Sequence[Effect],
-    settings: Settings,
     light_during: Callable[[float, float], NDArray],
 ) -> ExposedLight:
     """Return the light of an exposure whose time is given or chosen for the scene.
 
-    `light_during` gives the light between two times after a line's exposure begins [s], in the
-    shape of `light`, which is that of the whole exposure.
+    Parameters
+    ----------
+    setup : CameraSetup
+        The camera, at the gain that its file gives.
+    light : Rate
+        Light of the whole exposure.
+    white_rate : NDArray
+        Rate of the scene's perfect white on the axis in every color (C,) [e/s].
+    effects : sequence of Effect
+        Effects that act before electrons are counted.
+    optional : sequence of Effect
+        Those of them that may be left out.
+    light_during : callable
+        Function from two times after a line's exposure begins [s] to the light between them, in
+        the shape of that of the whole exposure.
+
+    Raises
+    ------
+    BadInput
+        For more light than any unit could have meant.
     """
+    camera, layout, circuit = setup.camera, setup.layout, setup.electrical
     groups, white = layout.binning_groups, float(white_rate.max())
-    enabled = plan.enabled_effects(camera, solved)
+    enabled = plan.enabled_effects(camera, setup.geometry)
     dark = exposure.mean_dark(1.0, enabled)
     collected = layout.select_pixels(light.values)
     rate = groups.collect(_transport(collected, dark / groups.summed_charges, effects))
-    adc = quantizer(camera, solved)
+    adc = quantizer(camera, setup.geometry)
     times = sample_times.choose_sample_times(camera, rate, circuit, enabled, adc)
     chosen = auto_exposure.exposure_settings(camera, rate, white, dark, circuit)
     if times:
@@ -85,7 +97,9 @@ def expose(
     time = chosen.time
     # A full well holds no more, whatever falls on it.
     full_rate = circuit.full_well / time if of_kind(enabled, Limit) else math.inf
-    light_plan = timed_gains.light_plan(light.plan, effects, optional, time, settings.tolerance)
+    light_plan = timed_gains.light_plan(
+        light.plan, effects, optional, time, setup.settings.tolerance
+    )
     timed = tuple(e for e in of_kind(effects, TemporalGain) if e not in light_plan.omitted)
 
     def collect(values: NDArray, start: float, stop: float) -> NDArray:

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from vcam_cli import memory
 from vcam_cli.camera.camera import Camera
-from vcam_cli.camera.derived.electrical import Electrical, electrical
-from vcam_cli.camera.derived.geometry import Geometry, geometry
+from vcam_cli.camera.derived.electrical import Electrical
+from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.camera.derived.mosaic import Mosaic
 from vcam_cli.effects.base import Effect, ImageMotion, of_kind
 from vcam_cli.errors import bad
@@ -21,17 +21,18 @@ from vcam_cli.image_formation import photon_rate
 from vcam_cli.image_formation.estimates import bandwidth, memory_model
 from vcam_cli.image_formation.optical_path import OpticalPath, SpectrumReport
 from vcam_cli.image_formation.rate_cache import RateCache
-from vcam_cli.image_formation.settings import Settings, camera_settings
+from vcam_cli.image_formation.settings import Settings
 from vcam_cli.image_formation.transfer_functions import Transfer
 from vcam_cli.progress import Stages
 from vcam_cli.quality import scielab
 from vcam_cli.quality.display import display_screen
-from vcam_cli.readout import auto_exposure, exposure, iso_speed
-from vcam_cli.readout.layout import Layout, camera_layout
+from vcam_cli.readout import auto_exposure, exposure
+from vcam_cli.readout.layout import Layout
 from vcam_cli.scenes.base import ChartScene
 from vcam_cli.scenes.layered import AnyScene, LayeredScene
 from vcam_cli.simulation import cost_model, exposed_light, plan
 from vcam_cli.simulation.scene_files import ScenePicture, build_scene, layer_optics, scene_bytes
+from vcam_cli.simulation.setup import CameraSetup, camera_setup
 
 
 @dataclass(frozen=True)
@@ -154,43 +155,27 @@ def _prepare(
     earlier: float = 0.0,
 ) -> Prepared:
     """Return the same where times are given, or nothing moves."""
-    solved = geometry(camera)
-    layout = camera_layout(camera, solved)
-    base_iso = iso_speed.base_iso(camera, solved, layout)
-    camera = iso_speed.set_gain(camera, base_iso)
-    circuit = electrical(camera)
-    settings = layout.settings(camera_settings(camera))
-    frame_bytes = _require_memory(camera, layout, settings, solved)
+    setup = camera_setup(camera)
+    camera, layout = setup.camera, setup.layout
+    frame_bytes = _require_memory(setup)
     stages.watch.expect(cost_model.first_estimate(camera, layout, workers))
 
-    effects = plan.mean_signal_effects(camera, solved)
+    effects = plan.mean_signal_effects(camera, setup.geometry)
     with stages("scene"):
-        band = camera.scene.wavelengths
-        margin = partial(
-            bandwidth.margin, layout.lattice, effects, (band.start, band.stop), settings
-        )
-
-        def scene_within(pixels: int) -> AnyScene:
-            view = photon_rate.view(layout.lattice, settings, pixels)
-            return build_scene(camera, view, picture)
-
-        scene = scene_within(margin())
+        scene = _scene(setup, picture, effects)
     with stages("optics"):
-        transfer, white_rate = _transfer(
-            camera, solved, layout, scene, effects, settings, rate_cache
-        )
-        summed = layout.binning_groups.summed_charges
-        ceiling = auto_exposure.ceiling(
-            camera, float(white_rate.max()), circuit.saturation / summed
-        )
-        overexposure = _brightest(scene) * float(white_rate.max()) / ceiling
+        transfer, white_rate = _transfer(setup, scene, effects, rate_cache)
+        brightest, summed = float(white_rate.max()), layout.binning_groups.summed_charges
+        saturation = setup.electrical.saturation / summed
+        ceiling = auto_exposure.ceiling(camera, brightest, saturation)
+        overexposure = _brightest(scene) * brightest / ceiling
         if overexposure > 1:  # of what lies beside the array, too
-            scene = scene_within(margin(overexposure))
+            scene = _scene(setup, picture, effects, overexposure)
         optional = plan.optional_effects(camera, effects)
         path = OpticalPath(
             transfer=transfer,
             geometry=layout.lattice,
-            settings=settings,
+            settings=setup.settings,
             mosaic=layout.mosaic,
             effects=effects,
             workers=workers,
@@ -204,34 +189,29 @@ def _prepare(
         white_rate = white_rate * summed / (light.plan.on_axis or 1.0)
     with stages("exposure"):
         during = partial(_light_during, path, scene, layout, light)
-        exposed = exposed_light.expose(
-            camera,
-            solved,
-            circuit,
-            layout,
-            light,
-            white_rate,
-            effects,
-            optional,
-            settings,
-            during,
-        )
-        camera = camera.with_exposure_gain(exposed.settings.gain)
+        exposed = exposed_light.expose(setup, light, white_rate, effects, optional, during)
+        setup = setup.at_gain(exposed.settings.gain)
         needed = max(frame_bytes, light.spectrum.memory) + scene_bytes(picture)
         changes = light.spectrum.changes | exposed.changes
         decided = plan.make(
-            camera, solved, settings, exposed.light_plan, exposed.signal, needed, changes
+            setup.camera,
+            setup.geometry,
+            setup.settings,
+            exposed.light_plan,
+            exposed.signal,
+            needed,
+            changes,
         )
         if of_kind(effects, ImageMotion):  # every sample of an integration has light of its own
             once = cost_model.light_seconds(layout, light.spectrum, workers)
             earlier += len(exposed.times) * once
-        decided = _with_seconds(camera, solved, layout, settings, light, decided, workers, earlier)
+        decided = _with_seconds(setup, light, decided, workers, earlier)
         stages.watch.expect(decided.seconds)
     return Prepared(
-        camera=camera,
-        geometry=solved,
-        electrical=electrical(camera),
-        settings=settings,
+        camera=setup.camera,
+        geometry=setup.geometry,
+        electrical=setup.electrical,
+        settings=setup.settings,
         mosaic=layout.raw_mosaic,
         layout=layout,
         scene=scene,
@@ -241,7 +221,7 @@ def _prepare(
         spectrum=light.spectrum,
         exposure_time=exposed.signal.time,
         exposure_limit=exposed.settings.limit,
-        base_iso=base_iso,
+        base_iso=setup.base_iso,
         times=exposed.times,
         plan=decided,
         step_rates=exposed.step_rates,
@@ -281,54 +261,66 @@ def _brightest(scene: AnyScene) -> float:
 
 
 def _with_seconds(
-    camera: Camera,
-    solved: Geometry,
-    layout: Layout,
-    settings: Settings,
+    setup: CameraSetup,
     light: photon_rate.Rate,
     decided: plan.Plan,
     workers: int,
     earlier: float,
 ) -> plan.Plan:
     """Return the plan with the seconds of the frame, and of one with everything on."""
-    spectrum = light.spectrum
-    seconds = cost_model.frame_seconds(camera, solved, layout, settings, spectrum, decided, workers)
+    spectrum, layout = light.spectrum, setup.layout
+    known = (setup.camera, setup.geometry, layout, setup.settings)
+    seconds = cost_model.frame_seconds(*known, spectrum, decided, workers)
     if light.plan.omitted and not spectrum.terms:
         spectrum = cost_model.usual_spectrum(layout.lattice)
     whole = replace(decided, seconds=decided.seconds + sum(d.saved for d in decided.decisions))
-    every = cost_model.frame_seconds(camera, solved, layout, settings, spectrum, whole, workers)
+    every = cost_model.frame_seconds(*known, spectrum, whole, workers)
     return replace(decided, seconds=earlier + seconds, seconds_of_all=earlier + every)
 
 
-def _require_memory(camera: Camera, layout: Layout, settings: Settings, solved: Geometry) -> int:
+def _require_memory(setup: CameraSetup) -> int:
     """Return the bytes of a frame without its scene, and refuse one that does not fit.
 
     What was read of the scene is in memory already.
     """
+    camera, layout, array = setup.camera, setup.layout, setup.geometry
     colors = len(layout.mosaic.colors)
     samples = camera.exposure.count * (colors if layout.full_color else 1)
     lamp = camera.scene.illuminant
     if camera.scene.moves or (lamp is not None and lamp.flicker is not None):
         samples *= 2  # each has a rate of its own
-    scattered = solved.rows * solved.columns if layout.is_scattered else 0
+    scattered = array.rows * array.columns if layout.is_scattered else 0
     judged = bool(camera.quality)
-    needed = memory_model.frame_bytes(layout.lattice, settings, colors, judged, samples, scattered)
+    needed = memory_model.frame_bytes(
+        layout.lattice, setup.settings, colors, judged, samples, scattered
+    )
     if "s-cielab" in camera.quality:
         shape = layout.picture_shape
         screen = display_screen(camera.display, shape[1])
         # By one thread, which is all there are where memory is little.
         needed += scielab.needed_bytes(shape, screen, camera.display.filters, 1)
-    memory.require(needed, solved.rows, solved.columns)
+    memory.require(needed, array.rows, array.columns)
     return needed
 
 
+def _scene(
+    setup: CameraSetup,
+    picture: ScenePicture,
+    effects: tuple[Effect, ...],
+    overexposure: float = 1.0,
+) -> AnyScene:
+    """Return the scene, a chart with its margin: wider where what lies beside it is overexposed."""
+    band, lattice = setup.camera.scene.wavelengths, setup.layout.lattice
+    pixels = bandwidth.margin(
+        lattice, effects, (band.start, band.stop), setup.settings, overexposure
+    )
+    return build_scene(setup.camera, photon_rate.view(lattice, setup.settings, pixels), picture)
+
+
 def _transfer(
-    camera: Camera,
-    solved: Geometry,
-    layout: Layout,
+    setup: CameraSetup,
     scene: AnyScene,
     effects: tuple[Effect, ...],
-    settings: Settings,
     rate_cache: RateCache | None,
 ) -> tuple[Transfer, NDArray]:
     """Return the transfer of the scene's components, and the rate (C,) of perfect white [e/s].
@@ -337,15 +329,15 @@ def _transfer(
     """
     compute = partial(
         photon_rate.scene_transfer,
-        camera,
-        solved,
-        settings,
+        setup.camera,
+        setup.geometry,
+        setup.settings,
         (*scene.spectra, scene.white),
-        layout.mosaic,
+        setup.layout.mosaic,
         effects,
     )
     try:
-        whole = compute() if rate_cache is None else rate_cache.transfer(camera, compute)
+        whole = compute() if rate_cache is None else rate_cache.transfer(setup.camera, compute)
     except ValueError as error:
         raise bad(
             "scene.wavelengths", str(error), "narrow the wavelengths, or extend the spectrum"
