@@ -11,9 +11,12 @@ before a file names the step. A name that vcam has itself stays vcam's.
 
 import hashlib
 import inspect
+import os
+import sys
 from abc import abstractmethod
 from collections.abc import Iterable
-from functools import cache
+from contextlib import suppress
+from functools import cache, lru_cache
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
 from typing import Any, ClassVar
@@ -54,7 +57,21 @@ class PluginStep(Step):
 
 
 def registered() -> dict[str, EntryPoint]:
-    """Return the entry points of installed packages, by the name of their step."""
+    """Return the entry points of installed packages, by the name of their step.
+
+    Every frame of a sweep asks for them; they are read again where a folder that Python looks into
+    has changed, as it has when a package was installed.
+    """
+    folders = []
+    for folder in sys.path:
+        with suppress(OSError):
+            folders.append((folder, os.stat(folder or ".").st_mtime_ns))
+    return dict(_entry_points(tuple(folders)))
+
+
+@lru_cache(1)
+def _entry_points(folders: tuple[tuple[str, int], ...]) -> dict[str, EntryPoint]:
+    """Return the entry points in folders, of which each comes with the time of its last change."""
     return {point.name: point for point in entry_points(group=GROUP)}
 
 

@@ -171,6 +171,10 @@ class _Frames:
             return False
         return bool(outcome.error) or self._folder.read(point, (NPZ,)) is not None
 
+    def is_there(self, point: str) -> bool:
+        """Return whether a frame can be packed; one computed now is not read for that."""
+        return point in self.computed - self.unfinished or self.is_finished(point)
+
     def keep(self, outcome: Outcome) -> None:
         """Keep the outcome of a frame."""
         found = keep_outcome(self._folder, outcome, self._code)
@@ -204,7 +208,7 @@ def _pack_all(
     for shard in whole:
         is_new = not points.computed.isdisjoint(shard.ids)
         files = None if is_new else packer.files(shard)
-        if files is None and all(map(points.is_finished, shard.ids)):
+        if files is None and all(map(points.is_there, shard.ids)):
             files = packer.pack(shard)
         if files is not None:
             found.append(shard)

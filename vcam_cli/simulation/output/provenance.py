@@ -5,6 +5,7 @@ from __future__ import annotations
 import platform
 import sys
 from collections.abc import Iterator
+from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -67,6 +68,7 @@ def versions() -> dict[str, str]:
     return {**own, "python": platform.python_version(), **found}
 
 
+@cache
 def _version(name: str) -> str:
     """Return the version of a library; of one that is not loaded from its files, slower."""
     known = None if name == "OpenImageIO" else getattr(sys.modules.get(name), "__version__", None)
