@@ -144,19 +144,22 @@ def shapes(rng: np.random.Generator, n: int) -> np.ndarray:
     return out.astype(np.float32)
 
 
+def write_exr(path: Path, picture: np.ndarray) -> str:
+    """An .exr of one channel; its name."""
+    out = oiio.ImageOutput.create(str(path))
+    out.open(str(path), oiio.ImageSpec(picture.shape[1], picture.shape[0], 1, "float"))
+    out.write_image(picture.astype(np.float32)[..., None])
+    out.close()
+    return str(path)
+
+
 def source(scene: Scene, folder: Path) -> dict:
     """The scene's `source` of a camera file, its pictures written into a folder."""
     listed = []
     for number, layer in enumerate(scene.layers):
         names = []
         for kind, picture in (("light", layer.light), ("mask", layer.opacity)):
-            name = str(folder / f"{kind}{number}.exr")
-            spec = oiio.ImageSpec(picture.shape[1], picture.shape[0], 1, "float")
-            out = oiio.ImageOutput.create(name)
-            out.open(name, spec)
-            out.write_image(picture.astype(np.float32)[..., None])
-            out.close()
-            names.append(name)
+            names.append(write_exr(folder / f"{kind}{number}.exr", picture))
         own = {"source": {"kind": "image", "file": names[0]}, "distance": f"{layer.distance!r} m"}
         if layer.width is not None:
             own |= {"mask": names[1], "width": f"{layer.width!r} m"}
@@ -180,6 +183,50 @@ def changes(scene: Scene, folder: Path) -> dict:
         "array.rows": SIDE,
         "array.columns": SIDE,
     }
+
+
+def filling(scene_focus: float, distance: float) -> float:
+    """Width of a layer that just fills the frame [m]."""
+    return SIDE * PITCH * distance * (1 / FOCAL - 1 / scene_focus)
+
+
+def pictured(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
+    """Light and distance of what a pinhole sees of layers that all fill the frame."""
+    light, depth = scene.layers[-1].light, np.full(scene.layers[-1].light.shape, np.nan)
+    depth[:] = scene.layers[-1].distance
+    for layer in reversed(scene.layers[:-1]):
+        light = np.where(layer.opacity > 0, layer.light, light)
+        depth = np.where(layer.opacity > 0, layer.distance, depth)
+    return light, depth
+
+
+def slope_sum(light: np.ndarray, ends: tuple[float, float], focus: float) -> np.ndarray:
+    """The picture (SIDE, SIDE) of a plane whose 1 / distance goes evenly from top to bottom.
+
+    Where a ray meets it is found by iteration: each place tells how far the next one is displaced.
+    """
+    middle, rise = (ends[0] + ends[1]) / 2, ends[1] - ends[0]
+    blur = FOCAL / F_NUMBER / 2 / (1 / FOCAL - 1 / focus)
+    k, inside = np.arange(700) + 0.5, 4
+    radius, angle = np.sqrt(k / len(k)), np.pi * (1 + 5**0.5) * k
+    jitter = (k[:, None] * np.array([0.8191725133961645, 0.6710436067037893])) % 1
+    n, total = len(light), np.zeros((SIDE, SIDE))
+    for u, v, (jx, jy) in zip(radius * np.cos(angle), radius * np.sin(angle), jitter, strict=True):
+        x, y = (((np.arange(SIDE * inside) + j) / inside - SIDE / 2) * PITCH for j in (jx, jy))
+        met = y
+        for _ in range(12):
+            inverse = middle + rise * np.clip(met / (SIDE * PITCH), -0.5, 0.5)
+            moved = blur * (inverse - 1 / focus)
+            met = y + moved * v
+        places = (
+            x[None, :] + (moved * u)[:, None],
+            np.broadcast_to(met[:, None], (len(y), len(x))),
+        )
+        columns, rows = (np.floor(at / (SIDE * PITCH) * n + n / 2).astype(int) for at in places)
+        columns, rows = (np.where(i % (2 * n) < n, i % n, n - 1 - i % n) for i in (columns, rows))
+        seen = light[rows, columns]
+        total += seen.reshape(SIDE, inside, SIDE, inside).mean(axis=(1, 3))
+    return total / len(k)
 
 
 def pupil_sum(scene: Scene, wavelength: float, points: int = 600, fine: int = 5) -> np.ndarray:

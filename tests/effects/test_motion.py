@@ -184,24 +184,6 @@ def test_meters_a_second_need_a_distance(tmp_path):
         checks.load(str(file))
 
 
-@pytest.mark.parametrize(
-    ("wrong", "path"),
-    [
-        (
-            {"scene.source": {"kind": "image", "file": "imu.csv", "depth": "imu.csv"}},
-            "scene.source.depth",
-        ),
-    ],
-)
-def test_what_is_not_built_yet_is_refused(wrong, path, tmp_path):
-    (tmp_path / "imu.csv").write_text("", encoding="utf-8")
-    file = tmp_path / "wrong.yaml"
-    file.write_text(yaml.safe_dump(tree(wrong), sort_keys=False), encoding="utf-8")
-    with pytest.raises(BadInput, match="not built yet") as caught:
-        checks.load(str(file))
-    assert path in str(caught.value)
-
-
 def test_a_scene_may_overtake_the_shutter():
     """What moves faster than lines are read is seen reversed, in finite numbers."""
     sets = ["scene.source.motion.y=1000 km/s", "array.rows=12", "array.columns=16"]

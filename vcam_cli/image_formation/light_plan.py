@@ -36,6 +36,7 @@ from vcam_cli.image_formation.estimates.scene_detail import (
     transfer_functions,
 )
 from vcam_cli.image_formation.optical_path import OpticalPath
+from vcam_cli.scenes.depth_scene import DepthScene
 from vcam_cli.scenes.layered import AnyScene, LayeredScene
 
 LIGHT_SHARE = 0.3
@@ -108,7 +109,7 @@ def light_plan(path: OpticalPath, scene: AnyScene) -> LightPlan:
         blurs = of_kind(candidates, *BLURS)
         return not displacing and all(_share(found, functions, blur) > budget for blur in blurs)
 
-    surveyed = scene.flat if isinstance(scene, LayeredScene) else scene
+    surveyed = scene.flat if isinstance(scene, LayeredScene | DepthScene) else scene
     detail = scene_detail(path, surveyed, every_blur_counts)
     if detail is not None and not functions:
         functions.update(transfer_functions(path, detail))

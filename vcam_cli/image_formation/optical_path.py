@@ -150,6 +150,23 @@ class DepthReport:
 
 
 @dataclass(frozen=True)
+class CutReport:
+    """How a picture with depth was cut into layers, and what it hides."""
+
+    layers: int
+    error: float
+    """Predicted rms error of the cuts and of the cells of rays, relative to full signal."""
+    cell: float
+    """Side of the cells on which layers were composed ray by ray [m]; 0 where that changes none."""
+    hidden_rms: float
+    """Estimated rms error of what was guessed of the hidden background, relative to full signal."""
+    hidden_most: float
+    """Estimate of the largest error in a pixel, likewise."""
+    ray_values: int = 0
+    """Values that were moved to where a ray sees them."""
+
+
+@dataclass(frozen=True)
 class SpectrumReport:
     """How a scene was sampled and filtered, and what each transfer function does to it."""
 
@@ -197,5 +214,7 @@ class SpectrumReport:
     """Estimated memory [bytes]."""
     depth: DepthReport | None = None
     """How layers were put one before the other; None of a flat scene."""
+    cut: CutReport | None = None
+    """How a picture with depth was cut into layers; None of other scenes."""
     parts: tuple[tuple[Geometry, int, SpectrumReport], ...] = ()
     """Of each layer: its cells as if they were pixels, colors of light and opacity, its report."""

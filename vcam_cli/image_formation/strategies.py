@@ -1,6 +1,7 @@
 """From a scene to the signal of its pixels: each scene by the plainest computation that suits it.
 
-- Layers at their own distances: each by one of these ways, then front to back (`layered.py`).
+- Layers at their own distances: each by one of these ways, then front to back (`layered.py`); so
+  is a picture with depth, cut into layers (`cut_image.py`).
 - Sinusoids, and patterns that repeat whose harmonics up to the cut-off are few enough to be summed:
   each has its transfer. Exact (`harmonic_scenes.py`).
 - No blur in the lens or in the silicon: means over the photodetectors. Exact (`box_average.py`).
@@ -44,12 +45,14 @@ from vcam_cli.image_formation.harmonic_scenes import (
     harmonics_count,
     wave_layers,
 )
+from vcam_cli.image_formation.layers.cut_image import cut_image
 from vcam_cli.image_formation.layers.layered import layered_image
 from vcam_cli.image_formation.optical_path import Layer, Layers, OpticalPath, SpectrumReport
 from vcam_cli.image_formation.scene_spectrum import SceneSpectrum
 from vcam_cli.image_formation.sub_exposures import sub_exposed_layers, sub_exposed_motion
 from vcam_cli.image_formation.transfer_tables import Tables, mixtures, tabulate
 from vcam_cli.scenes.base import ChartScene, HarmonicScene, SampledScene
+from vcam_cli.scenes.depth_scene import DepthScene
 from vcam_cli.scenes.layered import AnyScene, LayeredScene
 from vcam_cli.scenes.waves import WaveScene
 
@@ -86,6 +89,10 @@ def image_layers(path: OpticalPath, scene: AnyScene) -> tuple[Layers, SpectrumRe
     if isinstance(scene, LayeredScene):
         if path.layers:
             return layered_image(path, scene, image_layers)
+        scene = scene.flat
+    if isinstance(scene, DepthScene):
+        if path.layers:
+            return cut_image(path, scene, image_layers)
         scene = scene.flat
     if motion := sub_exposed_motion(path):
         return sub_exposed_layers(path, scene, motion, image_layers)

@@ -115,6 +115,11 @@ class ImageScene(SampledScene):
         mixed = np.asarray(mix, self.dtype) @ light.reshape(-1, light.shape[2]).T
         return np.asarray(mixed.reshape(len(mix), len(rows), len(columns)))
 
+    def samples_under(self, x: Array, y: Array) -> tuple[Array, Array]:
+        """Return the rows and columns of the samples under points, of a picture without border."""
+        rows, _ = self._samples_at(y, self.pitch_y, 0)
+        return rows, self._samples_at(x, self.pitch_x, 1)[0]
+
     def mean_and_rms(self, mix: Array, size: tuple[float, float]) -> tuple[Array, Array]:
         """Return the mean over a centered rectangle and an rms over the grid, of all samples.
 

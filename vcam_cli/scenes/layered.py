@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vcam_cli.scenes.base import Array, Chart, ChartScene, Frame, Scene, View, chart_scene
+from vcam_cli.scenes.depth_scene import DepthScene
 from vcam_cli.scenes.picture_chart import PictureChart
 from vcam_cli.spectra import Spectrum
 
@@ -158,7 +159,7 @@ class LayeredScene:
         return found
 
 
-AnyScene = Scene | LayeredScene
+AnyScene = Scene | LayeredScene | DepthScene
 """Whatever stands before the lens, flat or not."""
 
 

@@ -31,6 +31,7 @@ from vcam_cli.scenes.build import SOURCE, check_channels
 from vcam_cli.scenes.hyperspectral import check_bands, check_coverage, check_place
 from vcam_cli.simulation import plan, scene_bands, spectral_irradiance
 from vcam_cli.simulation.output import isetcam_files, raw_dng
+from vcam_cli.simulation.scene_files import read_map
 
 
 def load(camera: str | Path, sets: Sequence[str] = ()) -> Camera:
@@ -116,6 +117,21 @@ def check_picture(camera: Camera) -> None:
         check_bands(camera.scene, bands)
 
 
+def check_depth(camera: Camera) -> None:
+    """Refuse a map of depth that does not go with its picture, or with the lens (BadInput)."""
+    source, path = camera.scene.source, (*SOURCE, "file")
+    if not camera.scene.has_depth or not camera.optics.is_lens:
+        return
+    if source.kind == "image":
+        from vcam_cli.files.images.images import picture_size
+
+        read_map(camera, picture_size(source.file, path))
+    if source.kind == "hyperspectral":
+        from vcam_cli.files.spectral.hyperspectral import spectra_size
+
+        read_map(camera, spectra_size(source.file, path, source.channels))
+
+
 def _check_crops_of_layers(source: Layers) -> None:
     from vcam_cli.files.images.images import picture_size
 
@@ -197,6 +213,7 @@ CHECKS: tuple[files.CameraCheck, ...] = (
     (check_size, "pixel array processing"),
     (check_positions, "pixel array processing"),
     (check_picture, "scene"),
+    (check_depth, "scene optics pixel array"),
     (check_spectral_file, "scene optics pixel array exposure adc accuracy"),
     (check_lens, "optics scene pixel array effects"),
     (check_formats, "output"),

@@ -23,6 +23,7 @@ from vcam_cli.image_formation.rate_cache import RateCache
 from vcam_cli.parallel import available_workers
 from vcam_cli.progress import Stages
 from vcam_cli.readout import binned_readout, exposure, nondestructive_samples
+from vcam_cli.scenes.depth_scene import DepthScene
 from vcam_cli.scenes.layered import LayeredScene
 from vcam_cli.simulation.preparation import Prepared, prepare
 from vcam_cli.spectra import Spectrum, colorchecker
@@ -189,6 +190,8 @@ class Frame(Prepared):
         if isinstance(self.scene, LayeredScene) and isinstance(source, Layers):
             distances = np.array([layer.distance for layer in source.layers])
             return distances[self.scene.nearest_at(layout.picture_x, layout.picture_y)]
+        if isinstance(self.scene, DepthScene):
+            return self.scene.depth_at(layout.picture_x, layout.picture_y)
         return np.full(layout.picture_shape, self.camera.scene.distance)
 
     def ideal_dn(self) -> NDArray:

@@ -18,7 +18,6 @@ from vcam_cli.camera.derived import named_spectra, photodiode
 from vcam_cli.camera.derived.dark_current import dark_rate
 from vcam_cli.camera.derived.electrical import Electrical, electrical
 from vcam_cli.camera.derived.pixel_layout import detector
-from vcam_cli.camera.scene.sources import Layers
 from vcam_cli.camera.sensor.architecture import ARCHITECTURES
 from vcam_cli.camera.sensor.photodetector import DarkCurrentDensity
 from vcam_cli.config.model import Model
@@ -136,10 +135,8 @@ RULES = (
     ),
     Rule(
         ("scene.distance",),
-        lambda camera: (
-            isinstance(camera.scene.source, Layers) and camera.optics.focus_distance is not None
-        ),
-        "layers have distances of their own, and the lens is focused at optics.focus_distance",
+        lambda camera: camera.scene.has_distances and camera.optics.focus_distance is not None,
+        "the source has distances of its own, and the lens is focused at optics.focus_distance",
     ),
     Rule(
         ("exposure.shutter", "exposure.start", "exposure.reference"),

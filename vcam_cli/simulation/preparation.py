@@ -181,7 +181,7 @@ def _prepare(
             workers=workers,
             ceiling=ceiling,
             optional=optional,
-            layers=layer_optics(camera, effects),
+            layers=layer_optics(camera, effects, scene),
         )
         photo_rate = partial(photon_rate.photo_rate, path, scene, layout.planes)
         light = photo_rate() if rate_cache is None else rate_cache.rate(camera, ceiling, photo_rate)

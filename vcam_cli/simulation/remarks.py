@@ -13,9 +13,10 @@ from vcam_cli.camera.sensor.architecture import ARCHITECTURES
 from vcam_cli.effects.base import ImageMotion, of_kind
 from vcam_cli.effects.order import quantizer
 from vcam_cli.scenes.build import picture_model
+from vcam_cli.scenes.depth_scene import DepthScene
 from vcam_cli.scenes.hyperspectral import CubeScene
 from vcam_cli.scenes.image import ImageScene
-from vcam_cli.scenes.layered import LayeredScene
+from vcam_cli.scenes.layered import AnyScene, LayeredScene
 from vcam_cli.scenes.light import visible_range
 from vcam_cli.simulation import idle_keys
 from vcam_cli.simulation.preparation import Prepared
@@ -36,7 +37,7 @@ VISIBLE_CROP = 5e-4
 
 def remarks(ready: Prepared) -> tuple[str, ...]:
     """Return notes on the silicon, on times that the camera chose, and on a scene of spectra."""
-    scene, band = ready.scene, ready.camera.scene.wavelengths
+    scene, band = _picture(ready), ready.camera.scene.wavelengths
     before = (
         *idle_keys.notes(ready.camera),
         *photodiode.remarks(ready.camera),
@@ -65,6 +66,11 @@ def remarks(ready: Prepared) -> tuple[str, ...]:
     return before + tuple(notes)
 
 
+def _picture(ready: Prepared) -> AnyScene:
+    """Return the scene; of a picture with depth the picture."""
+    return ready.scene.flat if isinstance(ready.scene, DepthScene) else ready.scene
+
+
 def _blind_colors(ready: Prepared) -> tuple[str, ...]:
     """Return which colors see nothing of a perfect white, which may be a mistake of a spectrum."""
     white = zip(ready.mosaic.colors, ready.white_rate, strict=True)
@@ -79,7 +85,7 @@ def _motion(ready: Prepared) -> tuple[str, ...]:
     g, turn = ready.geometry, ready.camera.scene.camera_motion
     notes = []
     pixels = sum((e.travel for e in of_kind(ready.plan.active, ImageMotion)), 0.0) / g.pitch_x
-    if pixels >= 1 and isinstance(ready.scene, ImageScene | CubeScene):
+    if pixels >= 1 and isinstance(_picture(ready), ImageScene):
         notes.append(
             f"the scene's file ends at the border: what moves in, up to {pixels:.0f} pixels, is its"
             " mirror image"
@@ -117,7 +123,7 @@ def _sub_exposures(ready: Prepared) -> str:
 def _depth(ready: Prepared) -> tuple[str, ...]:
     """Return how layers were put one before the other, and where the lens was focused unasked."""
     found, camera, notes = ready.spectrum.depth, ready.camera, []
-    if not isinstance(ready.scene, LayeredScene):
+    if not isinstance(ready.scene, LayeredScene | DepthScene):
         return ()
     if camera.optics.focus_distance is None and "distance" not in camera.scene.model_fields_set:
         notes.append(
@@ -131,6 +137,30 @@ def _depth(ready: Prepared) -> tuple[str, ...]:
             f"layers are put one before the other on {found.cells} x {found.cells} cells a"
             f" pixel{how}: predicted error {100 * found.error:.2g} % of full signal"
             + (", more than accuracy asks for" if more else "")
+        )
+    return (*notes, *_cut(ready))
+
+
+def _cut(ready: Prepared) -> tuple[str, ...]:
+    """Return how a picture with depth was cut into layers, and what is unknown of it."""
+    found, scene = ready.spectrum.cut, ready.scene
+    if found is None or not isinstance(scene, DepthScene):
+        return ()
+    near, far = (f"{d:.3g} m" for d in (scene.depth.min(), scene.depth.max()))
+    pixels = [2 * abs(r) / ready.geometry.pitch_x for r in scene.cut.radii]
+    how = ""
+    if found.cell:
+        how = f", put one before the other by rays on cells of {found.cell * 1e6:.3g} um"
+    more = ", more than accuracy asks for" if found.error > ready.settings.tolerance else ""
+    notes = [
+        f"depth from {near} to {far} is cut into {found.layers} layers, points of which become"
+        f" {min(pixels):.3g} to {max(pixels):.3g} pixels wide by defocus{how}: predicted error"
+        f" {100 * found.error:.2g} % of full signal{more}"
+    ]
+    if found.hidden_most:
+        notes.append(
+            f"hidden background unknown: up to {100 * found.hidden_most:.2g} % of full signal, rms"
+            f" {100 * found.hidden_rms:.2g} %; behind edges it goes on as what is beside them"
         )
     return tuple(notes)
 
@@ -213,7 +243,7 @@ def _scheduled_times(ready: Prepared) -> tuple[str, ...]:
 
 def _colors_of_picture(ready: Prepared) -> tuple[str, ...]:
     """Return what three channels are taken for, where the file does not say."""
-    source, scene = ready.camera.scene.source, ready.scene
+    source, scene = ready.camera.scene.source, _picture(ready)
     if not isinstance(source, ImageFile) or source.model != "auto":
         return ()
     if not isinstance(scene, ImageScene):
@@ -242,9 +272,10 @@ def _steps_not_shown(ready: Prepared) -> tuple[str, ...]:
 
 def _cropped(ready: Prepared) -> tuple[str, ...]:
     """Return how much of a picture lies beyond the array."""
-    if not isinstance(ready.scene, ImageScene):
+    scene = _picture(ready)
+    if not isinstance(scene, ImageScene):
         return ()
-    parts = zip(("height", "width"), ready.scene.seen, strict=True)
+    parts = zip(("height", "width"), scene.seen, strict=True)
     lost = [f"{1 - part:.1%} of its {side}" for side, part in parts if part < 1 - VISIBLE_CROP]
     if not lost:
         return ()

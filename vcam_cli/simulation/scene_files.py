@@ -4,26 +4,41 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 from numpy.typing import NDArray
 
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import geometry
-from vcam_cli.camera.derived.scene_layers import PATH, layer_cameras
+from vcam_cli.camera.derived.scene_layers import DEPTH, PATH, camera_at, layer_cameras
+from vcam_cli.camera.scene.scene_files import DepthMap, Hyperspectral, ImageFile
 from vcam_cli.camera.scene.sources import Layers
 from vcam_cli.effects.base import Effect, of_kind
 from vcam_cli.effects.optics.depth import Depth
+from vcam_cli.errors import bad
+from vcam_cli.image_formation import photon_rate
 from vcam_cli.image_formation.optical_path import LayerOptics
+from vcam_cli.image_formation.settings import camera_settings
+from vcam_cli.physics.diffraction import otf_circular
 from vcam_cli.progress import Stages
+from vcam_cli.readout.layout import camera_layout
 from vcam_cli.scenes.base import View
 from vcam_cli.scenes.build import build
 from vcam_cli.scenes.build_layers import LayerFiles, PlacedLayer, build_layers
+from vcam_cli.scenes.depth_scene import (
+    DepthPicture,
+    DepthScene,
+    LensBlur,
+    depth_scene,
+    flat_distance,
+)
 from vcam_cli.scenes.hyperspectral import Cube
+from vcam_cli.scenes.image import ImageScene
 from vcam_cli.scenes.layered import AnyScene
 from vcam_cli.simulation import plan
 
-ScenePicture = NDArray | Cube | tuple[LayerFiles, ...] | None
-"""Samples of an image file (h, w, channels) in linear light, the cube of a hyperspectral file, the
-files of each layer; None for charts."""
+ScenePicture = NDArray | Cube | DepthPicture | tuple[LayerFiles, ...] | None
+"""Samples of an image file (h, w, channels) in linear light, the cube of a hyperspectral file, one
+of both with its map of depth, the files of each layer; None for charts."""
 SOURCE = ("scene", "source")
 
 
@@ -38,19 +53,98 @@ def read_scene(camera: Camera, stages: Stages) -> tuple[Any, tuple[str, ...]]:
 
         with stages("read"):
             read = read_picture(source.file, source.encoding, source.white, path)
-        return read.data, read.notes
+            return _with_depth(camera, read.data, read.notes)
     if source.kind == "hyperspectral":
         from vcam_cli.files.spectral.hyperspectral import read_cube
         from vcam_cli.scenes.hyperspectral import check_place
 
         with stages("read"):
             cube, notes = read_cube(source.file, path, source.channels)
-        check_place(cube.bands, camera.optics.is_lens)
-        return cube, notes
+            check_place(cube.bands, camera.optics.is_lens)
+            return _with_depth(camera, cube, notes)
     if isinstance(source, Layers):
         with stages("read"):
             return _read_layers(source)
     return None, ()
+
+
+def _with_depth(
+    camera: Camera, picture: NDArray | Cube, notes: tuple[str, ...]
+) -> tuple[ScenePicture, tuple[str, ...]]:
+    """Return a picture with its map of depth, where it has one."""
+    if not camera.scene.has_depth:
+        return picture, notes
+    data = picture.data if isinstance(picture, Cube) else picture
+    depth, more = read_map(camera, (data.shape[0], data.shape[1]))
+    return DepthPicture(picture, depth), (*notes, *more)
+
+
+def read_map(camera: Camera, size: tuple[int, int]) -> tuple[NDArray, tuple[str, ...]]:
+    """Return the map of depth (h, w) [m] beside a scene's file of so many samples, and notes.
+
+    Raises BadInput for a map that does not go with it, or with what the lens cannot image.
+    """
+    from vcam_cli.files.images.scene_maps import read_depth
+
+    source, focal = camera.scene.source, geometry(camera).focal_length
+    assert isinstance(source, ImageFile | Hyperspectral)
+    if isinstance(source.depth, DepthMap):
+        name = source.depth.file
+        depth, notes = read_depth(name, source.depth.unit, DEPTH, size)
+    else:
+        name = source.file
+        depth, notes = read_depth(name, 1.0, DEPTH, size, source.depth)
+    nearest = float(depth.min())
+    if nearest <= focal:
+        row, column = np.argwhere(depth == depth.min())[0]
+        message = (
+            f"{name}: {nearest:.6g} m at row {row}, column {column} lies within the focal length of"
+            f" {focal:.6g} m"
+        )
+        raise bad(DEPTH, message, "check the unit of the map, or use a shorter focal length")
+    return depth, notes
+
+
+def flattened(camera: Camera, picture: ScenePicture) -> tuple[Camera, Any, tuple[str, ...]]:
+    """Return the camera without a map of depth that is one distance within the tolerance, and why.
+
+    Then the scene is flat, at that distance. An autofocus may yet tell distances apart.
+    """
+    if not isinstance(picture, DepthPicture):
+        return camera, picture, ()
+    layout = camera_layout(camera, geometry(camera))
+    settings = layout.settings(camera_settings(camera))
+    view = photon_rate.view(layout.lattice, settings, 0)
+    flat = _flat(camera, view, picture)
+    tolerance = 0.0 if camera.optics.focus == "auto" else camera.accuracy.tolerance
+    distance = flat_distance(flat, picture, view, _blur(camera), tolerance)
+    if distance is None:
+        return camera, picture, ()
+    note = f"the map of depth is flat within the tolerance: the scene lies at {distance:.6g} m"
+    return camera_at(camera, distance), picture.picture, (note,)
+
+
+def _flat(camera: Camera, view: View, picture: DepthPicture) -> ImageScene:
+    """Return a picture with depth as a pinhole sees it."""
+    found = build(camera.scene, view, picture.picture, camera.display.primaries)
+    assert isinstance(found, ImageScene)
+    return found
+
+
+def _blur(camera: Camera) -> LensBlur:
+    """Return how a camera's lens blurs points by their distance."""
+    solved = geometry(camera)
+    slope = solved.image_distance**2 / (2 * solved.working_f_number)
+    shift = camera.optics.defocus / (2 * solved.working_f_number)
+    off = isinstance(camera.effects, dict) and camera.effects.get("diffraction") == "off"
+    wavelength = camera.scene.wavelengths.start
+
+    def sharp(frequency: NDArray) -> NDArray:
+        if off or not camera.optics.diffraction:
+            return np.ones_like(frequency)
+        return otf_circular(frequency, wavelength, solved.f_number, solved.magnification)
+
+    return LensBlur(slope, shift - slope / solved.focus_distance, sharp)
 
 
 def _read_layers(source: Layers) -> tuple[tuple[LayerFiles, ...], tuple[str, ...]]:
@@ -81,6 +175,9 @@ def scene_bytes(picture: ScenePicture) -> int:
 def build_scene(camera: Camera, view: View, picture: ScenePicture) -> AnyScene:
     """Return the scene of a camera on a view, from what its files hold; raises as `build` does."""
     source = camera.scene.source
+    if isinstance(picture, DepthPicture):
+        flat = _flat(camera, view, picture)
+        return depth_scene(flat, picture, view, _blur(camera), camera.accuracy.tolerance)
     if not isinstance(source, Layers):
         if isinstance(picture, tuple):
             raise ValueError("a flat source has no layers")
@@ -96,12 +193,17 @@ def build_scene(camera: Camera, view: View, picture: ScenePicture) -> AnyScene:
     return build_layers(placed, view)
 
 
-def layer_optics(camera: Camera, effects: tuple[Effect, ...]) -> tuple[LayerOptics, ...]:
+def layer_optics(
+    camera: Camera, effects: tuple[Effect, ...], scene: AnyScene
+) -> tuple[LayerOptics, ...]:
     """Return what acts on the light of each layer; () of a scene that is seen flat."""
     if not of_kind(effects, Depth):
         return ()
+    cameras = layer_cameras(camera)
+    if isinstance(scene, DepthScene):
+        cameras = tuple(camera_at(camera, distance) for distance in scene.distances)
     found = []
-    for alone in layer_cameras(camera):
+    for alone in cameras:
         solved = geometry(alone)
         shift = alone.optics.defocus + solved.focus_shift
         radius = shift / (2 * solved.working_f_number)

@@ -27,6 +27,7 @@ from vcam_cli.quality import display
 from vcam_cli.quality.metrics import Metrics
 from vcam_cli.quality.mse import mse, psnr_db
 from vcam_cli.quality.scielab import cielab_map, s_cielab_map
+from vcam_cli.scenes.depth_scene import DepthPicture
 from vcam_cli.scenes.hyperspectral import Cube
 from vcam_cli.simulation import remarks, scene_bands
 from vcam_cli.simulation.autofocus import focused
@@ -35,7 +36,7 @@ from vcam_cli.simulation.figures import figures
 from vcam_cli.simulation.frame import Frame, expose
 from vcam_cli.simulation.preparation import Prepared
 from vcam_cli.simulation.preparation import prepare as bring_light
-from vcam_cli.simulation.scene_files import read_scene
+from vcam_cli.simulation.scene_files import flattened, read_scene
 from vcam_cli.simulation.shared import Shared
 
 
@@ -338,6 +339,11 @@ def _completed(camera: Camera, picture: Any, notes: tuple[str, ...]) -> tuple[An
 
     Spectra are dark where their file ends and the camera hardly sees.
     """
+    if isinstance(picture, DepthPicture):
+        own, more = _completed(camera, picture.picture, notes)
+        crop = getattr(camera.scene.source, "crop", None)
+        depth = picture.depth if crop is None else picture.depth[crop.window]
+        return DepthPicture(own, depth), more
     if not isinstance(picture, Cube):
         crop = getattr(camera.scene.source, "crop", None)
         return picture if crop is None else picture[crop.window], notes
@@ -354,8 +360,9 @@ def _in_focus(
     """
     camera = _load_lens(camera, stages)
     picture, notes = _completed(camera, *shared.picture(camera, lambda: read_scene(camera, stages)))
+    camera, picture, flat = flattened(camera, picture)
     camera, told, seconds = focused(camera, picture, workers, stages)
-    return camera, picture, notes + told, seconds
+    return camera, picture, notes + flat + told, seconds
 
 
 def _simulate(camera: Camera, workers: int, stages: Stages, shared: Shared) -> Result:

@@ -37,6 +37,7 @@ from vcam_cli.parallel import each
 from vcam_cli.rng import blocks
 from vcam_cli.scenes.base import SampledScene
 from vcam_cli.scenes.build import build
+from vcam_cli.scenes.depth_scene import DepthScene
 from vcam_cli.scenes.layered import AnyScene, LayeredScene
 from vcam_cli.scenes.waves import WaveScene
 from vcam_cli.simulation.cost_model import BANDS_AT_ONCE
@@ -101,7 +102,7 @@ def _bands(
     bands = Mosaic((tuple(f"{w * 1e9:.6f}" for w in wavelengths),))
     effects = (*in_lens, PixelAperture(g.pitch_x, g.pitch_y))
     omitted = {d.name for d in ready.plan.decisions if d.state == "off"}
-    optics = layer_optics(ready.camera, effects)
+    optics = layer_optics(ready.camera, effects, ready.scene)
     kept = tuple(layer.without_effects(omitted) for layer in optics)
     light = OpticalPath(transfer, g, ready.settings, bands, effects, workers, layers=kept)
     dtype = ready.settings.dtype
@@ -129,7 +130,9 @@ def _bands(
 def _scene(ready: Prepared) -> AnyScene:
     """Return the frame's scene, on the picture's grid where the raw frame has another."""
     grid = ready.layout.grid
-    if grid is ready.layout.lattice or isinstance(ready.scene, WaveScene | LayeredScene):
+    if grid is ready.layout.lattice or isinstance(
+        ready.scene, WaveScene | LayeredScene | DepthScene
+    ):
         return ready.scene
     if isinstance(ready.scene, SampledScene) and ready.scene.samples == "squares":
         return ready.scene

@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.lattice import lattice
 from vcam_cli.camera.optics import LEAST_F_NUMBER, MOST_F_NUMBER
-from vcam_cli.camera.scene.sources import Layers
 from vcam_cli.camera.sensor.pixel import AGREE
 from vcam_cli.errors import bad
 from vcam_cli.physics import radiometry
@@ -41,9 +40,9 @@ class Lens:
 
 
 def scene_distance(camera: Camera) -> float:
-    """Return the distance from the lens to the scene [m]; layers as a whole are in focus."""
-    layered = isinstance(camera.scene.source, Layers)
-    return focus_distance(camera) if layered else camera.scene.distance
+    """Return the distance from the lens to the scene [m]; of many distances that in focus."""
+    own = camera.scene.has_distances
+    return focus_distance(camera) if own else camera.scene.distance
 
 
 def focus_distance(camera: Camera) -> float:

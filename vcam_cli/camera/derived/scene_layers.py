@@ -11,6 +11,7 @@ from vcam_cli.camera.scene.sources import Layers
 from vcam_cli.errors import Collector, bad
 
 PATH = ("scene", "source", "layers")
+DEPTH = ("scene", "source", "depth")
 
 
 def layer_cameras(camera: Camera) -> tuple[Camera, ...]:
@@ -39,6 +40,17 @@ def layer_cameras(camera: Camera) -> tuple[Camera, ...]:
     return tuple(found)
 
 
+def camera_at(camera: Camera, distance: float) -> Camera:
+    """Return the camera, focused as before, with a flat scene at a distance [m] as its source.
+
+    It is that of a file with a map of depth, which is left out.
+    """
+    optics = camera.optics.model_copy(update={"focus_distance": focus_distance(camera)})
+    source = camera.scene.source.model_copy(update={"depth": None})
+    scene = camera.scene.model_copy(update={"source": source, "distance": distance})
+    return camera.model_copy(update={"scene": scene, "optics": optics})
+
+
 def with_flat_scene(camera: Camera) -> Camera:
     """Return the camera; with a flat scene where a single layer that hides nothing is all of it."""
     layers = camera.scene.source.layers if isinstance(camera.scene.source, Layers) else ()
@@ -49,13 +61,19 @@ def with_flat_scene(camera: Camera) -> Camera:
 
 
 def check_layers(camera: Camera) -> None:
-    """Refuse layers that no lens images, and sizes that are not known (BadInput)."""
+    """Refuse distances that no lens images, and sizes that are not known (BadInput)."""
     source = camera.scene.source
-    if not isinstance(source, Layers):
+    if not camera.scene.has_distances:
         return
     if not camera.optics.is_lens:
         message = "without a lens all light falls on the sensor at once, whatever its distance"
-        raise bad(PATH, message, "use a flat source, or give a lens")
+        place = PATH if isinstance(source, Layers) else DEPTH
+        raise bad(place, message, "use a flat source, or give a lens")
+    if not isinstance(source, Layers):
+        if isinstance(camera.scene.extent, Extent):
+            message = "a picture with depth covers the array, whatever lies how far away"
+            raise bad(("scene", "extent"), message, "remove it")
+        return
     if isinstance(camera.scene.extent, Extent):
         message = "every layer has a width of its own"
         raise bad(("scene", "extent"), message, "remove it, and give the layers' widths")

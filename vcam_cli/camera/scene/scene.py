@@ -97,6 +97,16 @@ class Scene(Model):
         return bool(moving or (turn and turn.moves))
 
     @property
+    def has_depth(self) -> bool:
+        """Whether its source is a file with a map of distances."""
+        return isinstance(self.source, ImageFile | Hyperspectral) and self.source.depth is not None
+
+    @property
+    def has_distances(self) -> bool:
+        """Whether its source has distances of its own, in layers or a map."""
+        return isinstance(self.source, Layers) or self.has_depth
+
+    @property
     def emits(self) -> bool:
         """Whether the source shines by itself and needs no lamp."""
         source = self.source

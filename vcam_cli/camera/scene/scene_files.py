@@ -10,18 +10,37 @@ from vcam_cli.camera.scene.motion import MOTION, MaybeMotion, MovingSource
 from vcam_cli.config.model import Model, key
 from vcam_cli.config.quantities import Quantity, Whole
 from vcam_cli.config.validation_messages import describe, refusal
-from vcam_cli.config.values import Choice, Either, File, FileName, Positive, Wavelength, mapping
-
-DEPTH = key(
-    "distance along the axis [m] at every sample: not built yet", example="depth.exr", default=None
+from vcam_cli.config.values import (
+    Choice,
+    Either,
+    File,
+    FileName,
+    Length,
+    Positive,
+    Wavelength,
+    mapping,
 )
-"""The key of scenes that are files."""
 
 
-def refuse_depth(source: Any) -> None:
-    """Refuse the depth of a scene that is a file: only flat scenes are built."""
-    if source.depth is not None:
-        raise refusal(("depth",), "scenes with depth are not built yet", "leave it out")
+class DepthMap(Model):
+    """A file of distances beside a picture."""
+
+    file: File = key(
+        "distances along the axis, one for every sample of the picture: one channel, or the channel"
+        " Z, of an .exr, .png, .tif, .pfm; a .npy of rows x columns; inf is the sky",
+        example="depth.exr",
+    )
+    unit: Length = key("the length that a value of 1 stands for", example="1 mm", default=1.0)
+
+
+def _depth_map(given: Any) -> Any:
+    if isinstance(given, Mapping | DepthMap):
+        return DepthMap.model_validate(given)
+    return DepthMap(file=FileName().read(given))
+
+
+def _channel_or_map(given: Any) -> Any:
+    return _depth_map(given) if isinstance(given, Mapping | DepthMap) else FileName().read(given)
 
 
 _SAMPLE = Whole(least=0, most=10**9, example="0")
@@ -68,11 +87,15 @@ class ImageFile(MovingSource):
         default=None,
     )
 
-    depth: Annotated[str | None, FileName()] = DEPTH
+    depth: Annotated[DepthMap | None, Either(_depth_map, str | DepthMap)] = key(
+        "a file of the distance along the axis at every sample [m], or {file: z.png, unit: 1 mm}:"
+        " the picture is cut into layers by it, each with its own sharpness",
+        example="depth.exr",
+        default=None,
+    )
 
     @model_validator(mode="after")
     def _encoding(self) -> Self:
-        refuse_depth(self)
         if "encoding" not in self.model_fields_set:
             linear = PurePath(self.file).suffix.lower() in (".exr", ".hdr", ".pfm")
             self._fill(encoding="linear" if linear else "srgb")
@@ -107,12 +130,19 @@ class Hyperspectral(MovingSource):
         default=None,
     )
 
-    depth: Annotated[str | None, FileName()] = DEPTH
+    depth: Annotated[str | DepthMap | None, Either(_channel_or_map, str | DepthMap)] = key(
+        "of an .exr: the name of its channel of distances along the axis [m]; or {file: depth.exr}:"
+        " the scene is cut into layers by it, each with its own sharpness",
+        example="dd.y.T",
+        default=None,
+    )
 
     @model_validator(mode="after")
     def _named(self) -> Self:
-        refuse_depth(self)
         if self.channels is not None and PurePath(self.file).suffix.lower() != ".exr":
             message = "only the channels of an .exr have names of their own"
             raise refusal(("channels",), message, "remove it, or give an .exr")
+        if isinstance(self.depth, str) and PurePath(self.file).suffix.lower() != ".exr":
+            message = "only an .exr has its distances in a channel of its own"
+            raise refusal(("depth",), message, "write depth: {file: depth.exr}")
         return self

@@ -24,7 +24,7 @@ class Depth(Effect):
     """Layers and how far the lens throws a point of each by defocus alone."""
 
     blurs: tuple[float, ...]
-    """Diameters on the sensor, the nearest layer's first [m]."""
+    """Diameters on the sensor, the nearest layer's first [m]; () where a map has the distances."""
     pitch: float
     """Of the pixels [m]."""
 
@@ -32,13 +32,15 @@ class Depth(Effect):
     reference = "blur A |1/d - 1/s| v: Ray, Applied Photographic Optics, 3rd ed., 2002"
     absent = (
         "the scene is flat, or all its layers are in focus and at rest;"
-        " write source: {kind: layers, ...}"
+        " write source: {kind: layers, ...}, or depth: beside an image"
     )
     origin = "lens"
 
     @classmethod
     def from_camera(cls, camera, geometry):
         """Return the layers of a scene, or None where it is flat, or sharp and at rest."""
+        if camera.scene.has_depth:
+            return cls((), geometry.pitch_x)
         cameras = layer_cameras(camera)
         if not cameras:
             return None
@@ -49,5 +51,7 @@ class Depth(Effect):
 
     def describe(self) -> str:
         """Return a short clause with this camera's numbers and units."""
+        if not self.blurs:
+            return "a picture cut into layers by its map of depth, each out of focus by itself"
         pixels = ", ".join(f"{blur / self.pitch:.3g}" for blur in self.blurs)
         return f"{len(self.blurs)} layers, points of which become {pixels} pixels wide by defocus"

@@ -150,7 +150,7 @@ def _read(
     if source.format_name() == "openexr":
         data = extract_display_window(data, spec, more)
     light = _linear(data, srgb, white, signed)
-    light = np.ascontiguousarray(_upright(light, spec, more))
+    light = np.ascontiguousarray(upright(light, spec, more))
     names = tuple(spec.channelnames[index] for index in chosen)
     return LinearImage(light, names, (*notes, *more, *_remarks(spec)))
 
@@ -352,7 +352,7 @@ def _check_values(block: np.ndarray, row: int, signed: bool) -> None:
         )
 
 
-def _upright(data: np.ndarray, spec: Any, notes: list[str]) -> np.ndarray:
+def upright(data: np.ndarray, spec: Any, notes: list[str]) -> np.ndarray:
     """Return the image turned upright, by the EXIF / TIFF orientation 1 to 8."""
     orientation = spec.get_int_attribute("Orientation", 1)
     if not 2 <= orientation <= 8:

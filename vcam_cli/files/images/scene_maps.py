@@ -6,8 +6,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcam_cli.errors import bad
-from vcam_cli.files.file_checks import check_file, convert_errors
-from vcam_cli.files.images.images import open_image, read_picture
+from vcam_cli.files.file_checks import UnusableFile, check_file, convert_errors
+from vcam_cli.files.images.images import (
+    check_size,
+    extract_display_window,
+    open_image,
+    read_picture,
+    read_samples,
+    upright,
+)
 
 YamlPath = tuple[str | int, ...]
 
@@ -36,3 +43,105 @@ def read_opacity(path: Path | str, yaml_path: YamlPath) -> NDArray:
         message = f"the mask has an opacity of {data.max():.4g}, more than 1"
         raise bad(yaml_path, message, "scale it to 0 to 1")
     return np.ascontiguousarray(data[:, :, 0])
+
+
+def read_depth(
+    path: Path | str,
+    unit: float,
+    yaml_path: YamlPath,
+    size: tuple[int, int],
+    channel: str | None = None,
+) -> tuple[NDArray, tuple[str, ...]]:
+    """Return the distances (h, w) that a file has for every sample of a picture, and notes.
+
+    Parameters
+    ----------
+    path : Path or str
+        An image with one channel, or with a channel Z; or a .npy of rows x columns.
+    unit : float
+        Length that a value of 1 stands for [m]; codes of whole numbers are values, too.
+    yaml_path : tuple
+        Key that names the file.
+    size : tuple of int
+        Rows and columns of the picture.
+    channel : str, optional
+        Name of the channel; by default the only one, or that named Z or depth.
+
+    Returns
+    -------
+    depth : NDArray
+        Distances [m], above 0; infinite for the sky.
+    notes : tuple of str
+        What was taken for granted, for the user.
+
+    Raises
+    ------
+    BadInput
+        For a file that is no such map, of another size than the picture, or with a distance that is
+        none.
+    """
+    path, notes = Path(path), list[str]()
+    remedy = "save it as an .exr with one channel of distances in m"
+    with convert_errors(path, yaml_path, remedy):
+        check_file(path)
+        stored = _numpy_map(path) if path.suffix.lower() == ".npy" else _image_map(path, channel)
+        if stored.shape != size:
+            raise UnusableFile(
+                f"has {stored.shape[0]} x {stored.shape[1]} distances for a picture of {size[0]} x"
+                f" {size[1]} samples",
+                "give one distance for every sample of the picture",
+            )
+        if stored.dtype.kind in "ui" and unit == 1.0:
+            notes.append(
+                f"{path.name} holds whole numbers, which are taken as meters; for millimeters write"
+                f" depth: {{file: {path.name}, unit: 1 mm}}"
+            )
+        depth = np.asarray(stored * unit, np.float32)
+        wrong = ~(depth > 0)
+        if wrong.any():
+            row, column = np.argwhere(wrong)[0]
+            raise UnusableFile(
+                f"holds {stored[row, column]:g} at row {row}, column {column}, one of {wrong.sum()}"
+                " values that are no distance above 0",
+                "fill them in; write inf for the sky",
+            )
+    return depth, tuple(notes)
+
+
+def _numpy_map(path: Path) -> NDArray:
+    found = np.load(path, mmap_mode="r", allow_pickle=False)
+    if not isinstance(found, np.ndarray) or found.ndim != 2 or found.dtype.kind not in "fui":
+        raise UnusableFile("is no array of rows x columns of numbers")
+    return found
+
+
+def _image_map(path: Path, channel: str | None) -> NDArray:
+    with open_image(path) as source:
+        spec = source.spec()
+        if spec.deep or spec.depth > 1:
+            raise UnusableFile("is a deep image or a volume")
+        index = _depth_channel(tuple(spec.channelnames), channel)
+        check_size(spec, 1)
+        bits = spec.get_int_attribute("oiio:BitsPerSample", 8)
+        if bits not in (8, 16, 32, 64):
+            raise UnusableFile(f"has codes of {bits} bits, which would be read as others")
+        notes: list[str] = []
+        data, _ = read_samples(source, spec, (index,))
+        if source.format_name() == "openexr":
+            data = extract_display_window(data, spec, notes)
+        return np.asarray(upright(data, spec, notes)[:, :, 0])
+
+
+def _depth_channel(names: tuple[str, ...], wanted: str | None) -> int:
+    """Return the index of the channel of distances."""
+    if wanted is None and len(names) == 1:
+        return 0
+    ends = [name.rpartition(".")[2].upper() for name in names]
+    found = [i for i, end in enumerate(ends) if end in ("Z", "DEPTH")]
+    if wanted is not None:
+        found = [i for i, name in enumerate(names) if name == wanted]
+    if len(found) != 1:
+        shown = ", ".join(names[:20]) + (" ..." if len(names) > 20 else "")
+        what = f"has no channel {wanted}" if wanted else "has no single channel Z"
+        raise UnusableFile(f"{what}; it has {shown}", "name the one that holds the distances")
+    return found[0]

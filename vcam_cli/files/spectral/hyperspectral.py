@@ -79,6 +79,14 @@ def read_bands(path: Path | str, yaml_path: YamlPath, channels: Channels = None)
         return _bands(stored, order)
 
 
+def spectra_size(
+    path: Path | str, yaml_path: YamlPath, channels: Channels = None
+) -> tuple[int, int]:
+    """Return rows and columns of a file of spectra, by its header. Raise as `read_cube` does."""
+    with _open_bands(Path(path), yaml_path, channels) as (stored, _):
+        return stored.shape
+
+
 def read_cube(
     path: Path | str, yaml_path: YamlPath, channels: Channels = None
 ) -> tuple[Cube, tuple[str, ...]]:

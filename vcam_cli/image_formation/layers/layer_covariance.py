@@ -84,8 +84,8 @@ def add_covariance(path: OpticalPath, scene: LayeredScene, light: NDArray, full:
         cell = min(max(asked, widest[1] / SAMPLES, pitch / FINEST), widest[1])
         found = sampled(cell, HIGHEST)
     for plane, own in zip(light, found.light.light, strict=True):
-        across = _means(own.T, found.at_x, path.geometry.collecting_width / found.cell).T
-        plane[rows, columns] += _means(
+        across = box_means(own.T, found.at_x, path.geometry.collecting_width / found.cell).T
+        plane[rows, columns] += box_means(
             across, found.at_y, path.geometry.collecting_height / found.cell
         )
     np.maximum(light, 0, out=light)
@@ -141,7 +141,7 @@ def _around_edges(scene: LayeredScene, g: Geometry, beyond: float) -> tuple[slic
     return rows, columns
 
 
-def _means(plane: NDArray, at: NDArray, width: float) -> NDArray:
+def box_means(plane: NDArray, at: NDArray, width: float) -> NDArray:
     """Return the means of even rows over boxes of a width around places, counted in rows."""
     sums = np.concatenate([np.zeros_like(plane[:1]), np.cumsum(plane, axis=0)])
     low, high = (_interpolated(sums, at + side * width / 2) for side in (-1, 1))

@@ -122,9 +122,9 @@ def _layers_seen(
     behind: tuple[Effect, ...] = (PixelAperture(g.pitch_x, g.pitch_y),)
     if g is path.geometry:
         kinds = Blur, SeparableTransfer
-        behind = tuple(e for e in of_kind(path.effects, *kinds) if not _is_of_lens(e))
+        behind = tuple(e for e in of_kind(path.effects, *kinds) if not is_of_lens(e))
     for part, optics in zip(scene.parts, path.layers, strict=True):
-        effects = (*(e for e in optics.effects if _is_of_lens(e)), *behind)
+        effects = (*(e for e in optics.effects if is_of_lens(e)), *behind)
         seen = _layer_path(path, part, effects, lattice)
         if seen is not None:
             window, own = seen
@@ -161,7 +161,7 @@ def _correction(
 
     def at_pixels(light: NDArray) -> NDArray:
         layers, _ = form(pixels, _on_the_sensor(scene, light, g))
-        return _gathered(layers, path.geometry, light)
+        return gathered(layers, path.geometry, light)
 
     layers = list(_layers_seen(path, scene, lattice, form))
     fine, error = _composed(path, layers, g)
@@ -179,7 +179,7 @@ def _correction(
     return at_pixels(fine) - coarse, error / math.sqrt(count)
 
 
-def _gathered(
+def gathered(
     layers: Layers, g: Geometry, like: NDArray, at: tuple[float, float] = (0.0, 0.0)
 ) -> NDArray:
     """Return the sum (C, rows, columns) of parts of an image whose center lies at a place [m]."""
@@ -277,7 +277,7 @@ def _light_and_cover(
     )
     layers, report = form(path, scene)
     planes: NDArray = np.empty((len(path.mosaic.colors), 0), path.settings.dtype)
-    both = _gathered(layers, g, planes, window.center)
+    both = gathered(layers, g, planes, window.center)
     colors = len(both) // 2
     level = path.transfer.level[-1, colors:, None, None]
     light, cover = both[:colors], both[colors:]
@@ -308,12 +308,12 @@ def _pixel_path(path: OpticalPath) -> OpticalPath:
     weights = np.zeros((len(white), *white.shape))
     for color, share in enumerate(white / np.where(level > 0, level, 1)):
         weights[color, color] = share
-    effects = tuple(effect for effect in path.effects if not _is_of_lens(effect))
+    effects = tuple(effect for effect in path.effects if not is_of_lens(effect))
     transfer = Transfer(path.transfer.wavelengths, weights, of_kind(effects, Blur))
     return replace(path, transfer=transfer, effects=effects, layers=())
 
 
-def _is_of_lens(effect: Effect) -> bool:
+def is_of_lens(effect: Effect) -> bool:
     """Return whether an effect blurs or moves light before it is on the sensor."""
     moves = bool(of_kind([effect], ImageMotion))
     return moves or (effect.origin == "lens" and bool(of_kind([effect], Blur, FieldTransfer)))

@@ -1,0 +1,137 @@
+"""The image of a picture with depth: its layers add up, and stay behind what is nearer.
+
+Layer i shows the light L_i = T_i[E p_i] and covers A_i = T_i[p_i], with the transfer T_i of its
+distance and its shares p_i of the samples, which add up to 1. Where depth is smooth the A_i add up
+to 1, too, and the image is the sum of all L_i. At an edge they do not: beside it, what blurs over
+it covers more, on it less. So layers are added from the nearest on until all is covered,
+
+    V_i = min(A_i, 1 - V_1 - ... - V_i-1),    E = sum_i L_i V_i / A_i,
+
+which is exact for a straight edge before an even background, and what is then left open shows what
+the picture hides, as it is guessed (`scenes.depth_cut`). That light and cover of two layers that
+are both out of focus vary together over the aperture is summed up over rays (`ray_composition`).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcam_cli.camera.derived.mosaic import Mosaic
+from vcam_cli.effects.base import Blur, SeparableTransfer, of_kind
+from vcam_cli.image_formation.layers.layered import PART, gathered, is_of_lens
+from vcam_cli.image_formation.layers.ray_composition import composed, ray_correction
+from vcam_cli.image_formation.optical_path import (
+    CutReport,
+    Layer,
+    LayerOptics,
+    Layers,
+    OpticalPath,
+    SpectrumReport,
+)
+from vcam_cli.image_formation.transfer_functions import Transfer
+from vcam_cli.scenes.depth_scene import CutLayer, DepthScene
+
+FormImage = Callable[[OpticalPath, CutLayer], tuple[Layers, SpectrumReport]]
+"""What forms the image of a flat scene."""
+
+
+def cut_image(
+    path: OpticalPath, scene: DepthScene, form: FormImage
+) -> tuple[Layers, SpectrumReport]:
+    """Return the light at the photodetectors of a picture with depth, and how it was computed.
+
+    Parameters
+    ----------
+    path : OpticalPath
+        Lens, pixels and settings, with the optics of each layer.
+    scene : DepthScene
+        The scene.
+    form : callable
+        What forms the image of a flat scene.
+
+    Returns
+    -------
+    layers : Layers
+        Shares of the signal, whose sum is all of it.
+    report : SpectrumReport
+        How the scene was sampled and filtered.
+    """
+    reports: list[SpectrumReport] = []
+    used = [int(number) for number in np.flatnonzero(scene.cut.is_used())]
+
+    def formed(layer: CutLayer, optics: LayerOptics) -> tuple[NDArray, NDArray]:
+        own = _layer_path(path, optics)
+        parts, report = form(own, layer)
+        reports.append(report)
+        both = gathered(parts, path.geometry, np.empty((len(own.mosaic.colors), 0), own_type))
+        colors = len(both) // 2
+        level = own.transfer.level[-1, colors:, None, None]
+        cover = both[colors:] / np.where(level > 0, level, 1.0).astype(own_type)
+        return both[:colors], np.clip(cover, 0, 1, out=cover)
+
+    own_type = path.settings.dtype
+    shown = (formed(scene.shown(number), path.layers[number]) for number in used)
+    hidden_layers = ((scene.hidden(number), path.layers[number]) for number in used)
+    hidden = (formed(layer, optics) for layer, optics in hidden_layers if layer is not None)
+    light, opened = composed(shown, hidden)
+    full = min(float(light.max(initial=0.0)), path.ceiling)
+    rays = ray_correction(path, scene, full)
+    light = np.maximum(light + rays.light, 0)
+    opened = np.clip(opened + rays.opened, 0, 1)
+    behind = scene.cut.hidden
+    cut = CutReport(
+        layers=len(used),
+        error=math.hypot(scene.cut.error, rays.error / (full or 1.0)),
+        cell=rays.cell,
+        hidden_rms=behind.unknown * float(np.sqrt(np.square(opened, dtype=float).mean())),
+        hidden_most=behind.most_unknown * float(opened.max(initial=0.0)),
+        ray_values=rays.values,
+    )
+    return iter([Layer(lambda color, rows: light[color, rows])]), _report(path, reports, cut)
+
+
+def _layer_path(path: OpticalPath, optics: LayerOptics) -> OpticalPath:
+    """Return the path of a layer's light, with twice the colors: those of its cover come last.
+
+    Cover is seen in the light of all the picture's parts together.
+    """
+    behind = (e for e in of_kind(path.effects, Blur, SeparableTransfer) if not is_of_lens(e))
+    effects = (*(e for e in optics.effects if is_of_lens(e)), *behind)
+    transfer = path.transfer.with_half_the_wavelengths()
+    weights, white = transfer.weights, transfer.weights.sum(axis=0)
+    colors = len(white)
+    doubled = np.zeros((len(weights) + 1, 2 * colors, weights.shape[2]))
+    doubled[:-1, :colors], doubled[-1, colors:] = weights, white
+    brightest = float(path.transfer.level.sum(axis=0).max())
+    tolerance = PART * path.settings.tolerance * min(1.0, path.ceiling / (brightest or 1.0))
+    return replace(
+        path,
+        transfer=Transfer(transfer.wavelengths, doubled, of_kind(effects, Blur)),
+        settings=replace(path.settings, tolerance=tolerance),
+        mosaic=Mosaic((tuple(str(number) for number in range(2 * colors)),)),
+        effects=effects,
+        optional=(),
+        layers=(),
+        ceiling=math.inf,
+        has_opacity=True,
+    )
+
+
+def _report(path: OpticalPath, reports: list[SpectrumReport], cut: CutReport) -> SpectrumReport:
+    names = {name for own in reports for name in own.changes}
+    return SpectrumReport(
+        oversampling=max((own.oversampling for own in reports), default=0.0),
+        lost_rms=math.hypot(*(own.lost_rms for own in reports)),
+        changes={
+            name: math.hypot(*(own.changes.get(name, 0.0) for own in reports)) for name in names
+        },
+        peak=math.inf,
+        memory=max((own.memory for own in reports), default=0),
+        cut=cut,
+        parts=tuple((path.geometry, 2 * len(path.mosaic.colors), own) for own in reports),
+    )

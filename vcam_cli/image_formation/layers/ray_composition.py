@@ -1,0 +1,296 @@
+"""Layers of a picture with depth, composed ray by ray: what their means over the aperture lack.
+
+The rays through one point u of the aperture see each layer sharp, displaced by its blur's radius
+times u. Composed so and averaged over u, layers hide each other exactly; composed of their means
+they do not. The difference is as smooth as the layers out of focus are blurred, so it is summed up
+on cells about as coarse as that, and only near samples that hide something.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcam_cli.camera.derived.geometry import pixel_centers
+from vcam_cli.image_formation.layers.layer_covariance import box_means
+from vcam_cli.image_formation.optical_path import OpticalPath
+from vcam_cli.parallel import each
+from vcam_cli.scenes.depth_scene import DepthScene
+
+SHARP = 0.1
+"""Radius of a blur below which a layer counts as sharp [pixels]."""
+RAYS = 37
+"""Points of the aperture: of 91, the sum is the same to a tenth of the error by the cells."""
+SHARE = 0.3
+"""Part of the tolerance that the cells may use."""
+SAMPLED = 1.4
+"""Error of the difference by its cells, relative to it, times the square of the blur's radius over
+the cell: as measured on slopes and discs."""
+FINEST = 3
+"""Cells along a pixel's side, at most."""
+TILE = 64
+"""Cells along the side of what is composed at once."""
+LEAST_COVER = 0.05
+"""Cover below which nothing is known to be seen."""
+
+Planes = tuple[NDArray, NDArray]
+"""Light (C, h, w), and cover in the same shape or (h, w)."""
+
+
+@dataclass(frozen=True)
+class RayCorrection:
+    """What the composition of means lacks."""
+
+    light: NDArray | float = 0.0
+    """(C, rows, columns) at the pixels [e/s]; 0 where it is nothing."""
+    opened: NDArray | float = 0.0
+    """Share (rows, columns) of what is hidden in it, likewise."""
+    error: float = 0.0
+    """Predicted rms error that its cells leave [e/s]."""
+    cell: float = 0.0
+    """Side of a cell [m]; 0 where there are none."""
+    values: int = 0
+    """Values that were moved to where a ray sees them."""
+
+
+def composed(shown: Iterable[Planes], hidden: Iterable[Planes]) -> Planes:
+    """Return the light of layers, the nearest first, and how much of it shows what is hidden.
+
+    Parameters
+    ----------
+    shown, hidden : iterable
+        Light times cover, and cover, of what the picture shows of each layer, and of what goes on
+        behind nearer ones.
+
+    Returns
+    -------
+    light : NDArray
+        Light, in the shape of the layers'.
+    opened : NDArray
+        Share of the hidden layers in it, in the shape of the covers.
+    """
+    total: NDArray | float = 0.0
+    clear: NDArray | float = 1.0
+    for shone, covered in shown:
+        total = total + shone * _visible(covered, clear)
+        clear = np.maximum(clear - covered, 0)
+    behind: list[NDArray | float] = [0.0, 0.0]
+    for layer in hidden:
+        behind = [own + plane for own, plane in zip(behind, layer, strict=True)]
+    light, cover = np.asarray(behind[0]), np.asarray(behind[1])
+    visible = _visible(cover, clear)
+    opened = np.broadcast_to(cover * visible, np.shape(clear))
+    known = np.maximum(1 - clear + opened, LEAST_COVER)
+    return np.asarray((total + light * visible) / known), np.asarray(opened)
+
+
+def _visible(cover: NDArray, clear: NDArray | float) -> NDArray:
+    """Return the part of a layer that is seen where so much is not covered yet."""
+    return np.where(cover > clear, clear / np.where(cover > 0, cover, 1), 1).astype(cover.dtype)
+
+
+def ray_correction(path: OpticalPath, scene: DepthScene, full: float) -> RayCorrection:
+    """Return what the means of layers over the aperture lack at the pixels.
+
+    Parameters
+    ----------
+    path : OpticalPath
+        Lens, pixels and settings.
+    scene : DepthScene
+        The scene.
+    full : float
+        Full signal, to which the tolerance is relative [e/s].
+
+    Returns
+    -------
+    RayCorrection
+        The light that is missing.
+    """
+    behind, radii = scene.cut.hidden, scene.cut.radii
+    pitch = max(path.geometry.pitch_x, path.geometry.pitch_y)
+    if not len(behind.samples):
+        return RayCorrection()
+    near, far = (
+        np.abs(radii[scene.cut.first.ravel()[at]]) for at in (behind.samples, behind.sources)
+    )
+    blur = float(np.sqrt(np.square(np.minimum(near, far)).mean()))
+    if blur < SHARP * pitch:
+        return RayCorrection()
+    allowed = SHARE * path.settings.tolerance * full
+    light = scene.flat.planes(path.transfer.level.T, path.workers)
+
+    def on_cells(width: float) -> _Cells:
+        together = max(round(width / scene.flat.pitch_x), 1)
+        return _Cells(scene, light, together, path.workers)
+
+    cells = on_cells(blur)
+    found = cells.missing()
+    rms = _rms(found)
+    width = blur * math.sqrt(allowed / (SAMPLED * rms)) if rms > 0 else blur
+    if width < blur:
+        cells = on_cells(max(width, pitch / FINEST))
+        found = cells.missing()
+    error = min(SAMPLED * (cells.width / blur) ** 2, 1.0) * _rms(found)
+    planes = [_at_pixels(plane, path, scene, cells.width) for plane in found]
+    return RayCorrection(np.stack(planes[:-1]), planes[-1], error, cells.width, cells.values)
+
+
+def _rms(missing: NDArray) -> float:
+    """Return the rms of the light of planes (C + 1, h, w) in the color where it is most."""
+    return float(np.sqrt(np.square(missing[:-1], dtype=float).mean(axis=(1, 2)).max()))
+
+
+def _at_pixels(plane: NDArray, path: OpticalPath, scene: DepthScene, cell: float) -> NDArray:
+    """Return the means over the collecting areas of a plane (h, w) of cells."""
+    g, (width, height) = path.geometry, scene.flat.extent
+    x, y = pixel_centers(g, detector=True)
+    down = box_means(plane, (y + height / 2) / cell, g.collecting_height / cell)
+    return box_means(down.T, (x + width / 2) / cell, g.collecting_width / cell).T
+
+
+@dataclass
+class _Cells:
+    """Samples taken together, composed ray by ray."""
+
+    scene: DepthScene
+    light: NDArray
+    """Light (C, h, w) of the samples [e/s]."""
+    together: int
+    """Samples along the side of a cell."""
+    workers: int
+    values: int = 0
+
+    @property
+    def width(self) -> float:
+        """Side of a cell [m]."""
+        return self.together * self.scene.flat.pitch_x
+
+    def missing(self) -> NDArray:
+        """Return what the composition of means lacks in every cell (C + 1, rows, columns).
+
+        It is light [e/s], and the share of what is hidden in it.
+        """
+        shape = [math.ceil(count / self.together) for count in self.light.shape[1:]]
+        out = np.zeros((len(self.light) + 1, *shape), self.light.dtype)
+        reach = math.ceil(float(np.abs(self.scene.cut.radii).max()) / self.width) + 1
+        hides = np.zeros(self.light.shape[1:], bool)
+        hides.ravel()[self.scene.cut.hidden.samples] = True
+        y, x = (index // self.together for index in np.nonzero(hides))
+        near = np.zeros(shape, bool)
+        near[y, x] = True
+        tiles: list[tuple[slice, slice]] = []
+        for top, left in product(*(range(0, count, TILE) for count in shape)):
+            rows, columns = slice(top, top + TILE), slice(left, left + TILE)
+            around = tuple(slice(max(s.start - reach, 0), s.stop + reach) for s in (rows, columns))
+            if near[around].any():
+                tiles.append((rows, columns))
+
+        counts = [0] * len(tiles)
+
+        def fill(number: int) -> None:
+            tile = tiles[number]
+            here = out[:, tile[0], tile[1]]
+            found, counts[number] = self._tile(tile, reach)
+            here[:] = found[:, : here.shape[1], : here.shape[2]]
+
+        each(fill, range(len(tiles)), self.workers)
+        self.values = sum(counts)
+        return out
+
+    def _tile(self, tile: tuple[slice, slice], reach: int) -> tuple[NDArray, int]:
+        """Return the same in one tile, and how many values were moved for it."""
+        layers = list(self._layers(tile, reach))
+        means = [np.zeros((len(p), TILE, TILE), p.dtype) for _, p, _ in layers]
+        total: NDArray | float = 0.0
+        for u, v in aperture_points(RAYS):
+            moved = [_moved(p, radius * u, radius * v, reach) for radius, p, _ in layers]
+            total = total + self._composed(layers, moved)
+            for mean, one in zip(means, moved, strict=True):
+                mean += one / RAYS
+        lacking = np.asarray(total / RAYS - self._composed(layers, means))
+        return lacking, RAYS * sum(mean.size for mean in means)
+
+    def _composed(
+        self, layers: list[tuple[float, NDArray, bool]], planes: list[NDArray]
+    ) -> NDArray:
+        """Return light and the share of what is hidden in it (C + 1, h, w)."""
+        parts: tuple[list[Planes], list[Planes]] = ([], [])
+        for (_, _, hidden), own in zip(layers, planes, strict=True):
+            parts[hidden].append((own[:-1], own[-1]))
+        light, opened = composed(*parts)
+        return np.concatenate([light, opened[None]])
+
+    def _layers(
+        self, tile: tuple[slice, slice], reach: int
+    ) -> Iterator[tuple[float, NDArray, bool]]:
+        """Yield radius [cells], light and cover (C + 1, h, w) and whether it is hidden.
+
+        They are those of layers in a tile and as far around it as they blur.
+        """
+        cut, n = self.scene.cut, self.together
+        rows, columns = (
+            _mirrored(np.arange((s.start - reach) * n, (s.start + TILE + reach) * n), count)
+            for s, count in zip(tile, self.light.shape[1:], strict=True)
+        )
+        light = self.light[:, rows[:, None], columns]
+        flat = np.ravel_multi_index(np.ix_(rows, columns), self.light.shape[1:])
+        first, share = cut.first.ravel()[flat].astype(int), cut.share.ravel()[flat]
+        yield from self._present(light, first, share, False)
+        place = np.full(cut.first.size, -1)
+        place[cut.hidden.samples] = np.arange(len(cut.hidden.samples))
+        index = place[flat]
+        there = index >= 0
+        if there.any():
+            source = cut.hidden.sources[index]
+            first = np.where(there, cut.first.ravel()[source].astype(int), -2)
+            light = self.light.reshape(len(self.light), -1)[:, source]
+            yield from self._present(light, first, cut.share.ravel()[source], True)
+
+    def _present(
+        self, light: NDArray, first: NDArray, share: NDArray, hidden: bool
+    ) -> Iterator[tuple[float, NDArray, bool]]:
+        n, radii = self.together, self.scene.cut.radii
+        known = np.unique(first[first >= 0])
+        for layer in np.union1d(known, known + 1):
+            cover = np.where(first == layer, 1 - share, np.where(first == layer - 1, share, 0))
+            if layer < len(radii) and cover.any():
+                both = np.concatenate([light * cover, cover[None]])
+                c, h, w = both.shape
+                means = both.reshape(c, h // n, n, w // n, n).mean(axis=(2, 4))
+                yield radii[layer] / self.width, means.astype(light.dtype), hidden
+
+
+def aperture_points(count: int) -> Iterator[tuple[float, float]]:
+    """Yield points of equal shares of a disc's area, in its radii: a spiral of golden angles.
+
+    References
+    ----------
+    .. [1] H. Vogel, "A better way to construct the sunflower head", Math. Biosciences 44, 179-189,
+       1979, doi:10.1016/0025-5564(79)90080-4.
+    """
+    for k in range(count):
+        radius, angle = math.sqrt((k + 0.5) / count), math.pi * (1 + math.sqrt(5)) * (k + 0.5)
+        yield radius * math.cos(angle), radius * math.sin(angle)
+
+
+def _mirrored(index: NDArray, count: int) -> NDArray:
+    index = index % (2 * count)
+    return np.minimum(index, 2 * count - 1 - index)
+
+
+def _moved(planes: NDArray, x: float, y: float, reach: int) -> NDArray:
+    """Return the inner part of planes, displaced to the right and down by so many cells."""
+    out = planes
+    for axis, by in ((1, y), (2, x)):
+        start = math.floor(reach - by)
+        part = planes.dtype.type(reach - by - start)
+        low, high = (
+            out[(slice(None),) * axis + (slice(at, at + TILE),)] for at in (start, start + 1)
+        )
+        out = low * (1 - part) + high * part
+    return out

@@ -1,0 +1,352 @@
+"""A map of depth, cut into layers as finely as a tolerance asks, and what lies hidden behind.
+
+A point at the distance d blurs to a disc whose radius is a line of 1 / d, signed: positive before
+what is in focus. So the cuts are made in that radius. A sample between two layers belongs to both,
+in the shares by which its radius lies between theirs: their blurs, so mixed, are its own up to the
+second order of the layers' spacing,
+
+    T(r) = (1 - w) T(r_i) + w T(r_i+1) + O((r_i - r_i+1)^2).
+
+How wide the spacing may be, the picture's own power spectrum tells: a picture without detail looks
+the same at any distance.
+
+Behind a sample with farther ones beside it, so near that rays through the aperture pass it, what
+the picture does not show goes on as the nearest of these: its light and its distance. What that
+guess is worth is told by another one, the picture's mirror image at the edge.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.fft
+from numpy.typing import NDArray
+
+MOST_LAYERS = 256
+"""Layers of a picture, at most."""
+BETWEEN = 0.73
+"""Rms over all places between two layers of an error that is largest in the middle: of
+4 t (1 - t), sqrt(8 / 15)."""
+LEAST_JUMP = 0.5
+"""Difference of blur radii from which on one sample hides another [pixels]."""
+STEPS = 24
+"""Groups of radii, each of which is searched at once for what lies behind it."""
+EDGE = 1.5
+"""Samples by which neighbors are apart, at most."""
+BINS = 256
+"""Frequencies of a power spectrum."""
+DIRECTIONS = 16
+FEW = 10_000
+"""Samples that tell whether a map has few values."""
+
+
+@dataclass(frozen=True)
+class Detail:
+    """What the pixels of a lens see of a picture's detail by length of the spatial frequency."""
+
+    frequency: NDArray
+    """(n,) [cycles/m]."""
+    power: NDArray
+    """Mean squares (n,) of the picture without its mean, relative to the square of full signal."""
+
+    def blur_change(self, *parts: tuple[float, float]) -> float:
+        """Return the rms, over full signal, of a sum of blurs: pairs of a factor and radius [m]."""
+        total = sum(factor * disc_transfer(self.frequency, radius) for factor, radius in parts)
+        return float(np.sqrt((self.power * np.square(total)).sum()))
+
+    def slope_change(self, radius: float) -> float:
+        """Return what a slope changes, rms over full signal, for every unit of it.
+
+        Rays through the point u of the aperture see a surface whose blur's radius rises by g a
+        length as if it were 1 + g u times as dense: mean of u exp(-2 pi i f r u) = 2 J2(z) / z.
+        """
+        from scipy.special import jv
+
+        z = 2 * np.pi * self.frequency * abs(radius)
+        tilt = np.where(z > 1e-6, 2 * jv(2, z) / np.where(z > 1e-6, z, 1.0), 0.0)
+        return float(np.sqrt((self.power * np.square(tilt)).sum() / 2))
+
+
+@dataclass(frozen=True)
+class Hidden:
+    """What lies behind samples that other samples beside them are far behind of."""
+
+    samples: NDArray
+    """Index (n,) of the samples that hide it, in the flattened map."""
+    sources: NDArray
+    """Index (n,) of the samples as which it goes on."""
+    unknown: float
+    """Rms difference of two guesses of its light, relative to full signal."""
+    most_unknown: float
+    """The largest difference of both."""
+
+
+@dataclass(frozen=True)
+class DepthCut:
+    """A map of depth in layers."""
+
+    radii: NDArray
+    """Radius (N,) of the blur at each layer's distance, falling: the nearest first [m]."""
+    first: NDArray
+    """Layer (h, w) that a sample belongs to, or the nearer one of both."""
+    share: NDArray
+    """Share (h, w) of each sample that belongs to the layer behind it."""
+    hidden: Hidden
+    error: float
+    """Predicted rms error by the layers' spacing, and by taking slopes as steps, relative to full
+    signal."""
+
+    def coverage(self, layer: int, rows: NDArray, columns: NDArray) -> NDArray:
+        """Return what of samples (rows x columns) belongs to a layer, 0 to 1."""
+        here = np.ix_(rows, columns)
+        first, share = self.first[here], self.share[here]
+        return np.where(first == layer, 1 - share, np.where(first == layer - 1, share, 0))
+
+    def is_used(self) -> NDArray:
+        """Return which layers (N,) anything lies in."""
+        count = len(self.radii)
+        near = np.bincount(self.first.ravel(), minlength=count)
+        behind = np.bincount(self.first[self.share > 0].ravel() + 1, minlength=count)
+        return np.asarray(near[:count] + behind[:count] > 0)
+
+
+def disc_transfer(frequency: NDArray, radius: float) -> NDArray:
+    """Return the transfer 2 J1(z) / z, z = 2 pi f r, of an even disc.
+
+    Parameters
+    ----------
+    frequency : NDArray
+        Spatial frequencies (n,) [cycles/m].
+    radius : float
+        Radius of the disc; its sign does not matter [m].
+
+    Returns
+    -------
+    NDArray
+        Transfer (n,) without unit.
+
+    References
+    ----------
+    .. [1] H. H. Hopkins, "The frequency response of a defocused optical system", Proc. R. Soc.
+       London A 231, 91-103, 1955, doi:10.1098/rspa.1955.0158 (its limit by rays).
+    """
+    from scipy.special import j1
+
+    z = 2 * np.pi * np.asarray(frequency, float) * abs(radius)
+    return np.where(z > 1e-6, 2 * j1(z) / np.where(z > 1e-6, z, 1.0), 1.0)
+
+
+def picture_detail(
+    picture: NDArray, pitch: float, pixel: float, lens: Callable[[NDArray], NDArray]
+) -> Detail:
+    """Return the detail of a picture in the color of all its channels together.
+
+    Parameters
+    ----------
+    picture : NDArray
+        Light (h, w) of its samples, relative to white.
+    pitch : float
+        Pitch of the samples on the sensor [m].
+    pixel : float
+        Side of the pixels [m].
+    lens : callable
+        What the lens passes at frequencies (n,) [cycles/m] where it is in focus.
+
+    Returns
+    -------
+    Detail
+        The detail.
+    """
+    together = max(int(pixel / pitch), 1)  # finer than the pixels nothing is seen
+    blocks = _block_means(picture, together)
+    full = min(float(blocks.max(initial=0.0)), 1.0)
+    if together > 1:
+        picture, pitch = _block_means(picture, max(together // 2, 1)), pitch * (together // 2)
+    squares = np.square(scipy.fft.dctn(picture.astype(np.float32), type=2, norm="ortho"))
+    squares[0, 0] = 0
+    fy, fx = (np.arange(count) / (2 * count * pitch) for count in picture.shape)
+    length = np.hypot(fx[None, :], fy[:, None])
+    top = float(np.hypot(0.5, 0.5) / pitch)
+    bins = np.minimum((np.sqrt(length / top) * BINS).astype(int), BINS - 1).ravel()
+    power = np.bincount(bins, squares.ravel(), BINS) / picture.size
+    weighted = np.bincount(bins, (squares * length).ravel(), BINS) / picture.size
+    seen = power > 0
+    frequency = weighted[seen] / power[seen]
+    angle = (np.arange(DIRECTIONS) + 0.5) * (np.pi / 2 / DIRECTIONS)
+    across = np.outer(frequency * pixel, np.cos(angle)), np.outer(frequency * pixel, np.sin(angle))
+    aperture = np.square(np.sinc(across[0]) * np.sinc(across[1])).mean(axis=1)
+    passed = np.square(lens(frequency)) * aperture
+    return Detail(frequency, power[seen] * passed / (full**2 or 1.0))
+
+
+def _block_means(picture: NDArray, side: int) -> NDArray:
+    """Return the means over whole blocks of samples; of a smaller picture over all of it."""
+    down, across = (min(side, count) for count in picture.shape)
+    rows, columns = picture.shape[0] // down, picture.shape[1] // across
+    whole = picture[: rows * down, : columns * across]
+    return np.asarray(whole.reshape(rows, down, columns, across).mean(axis=(1, 3)))
+
+
+def is_flat(radius: NDArray, detail: Detail, allowed: float) -> bool:
+    """Return whether a map of blur radii may be taken as one distance, in the middle of all."""
+    low, high = float(radius.min()), float(radius.max())
+    middle = (low + high) / 2
+    return max(detail.blur_change((1, middle), (-1, end)) for end in (low, high)) <= allowed
+
+
+def cut_depth(
+    radius: NDArray, picture: NDArray, pitch: float, pixel: float, detail: Detail, allowed: float
+) -> DepthCut:
+    """Cut a picture into layers.
+
+    Parameters
+    ----------
+    radius : NDArray
+        Radius (h, w) of the blur at every sample's distance, with its sign [m].
+    picture : NDArray
+        Light (h, w), relative to white, by which the guesses of what is hidden are judged.
+    pitch : float
+        Pitch of the samples on the sensor [m].
+    pixel : float
+        Side of the pixels [m].
+    detail : Detail
+        Detail of the picture.
+    allowed : float
+        Error that the cut may leave, rms, relative to full signal.
+
+    Returns
+    -------
+    DepthCut
+        The layers.
+    """
+    radii, error = _layer_radii(radius, detail, allowed)
+    values = _few_values(radius, len(radii))
+    if values is not None:
+        radii, error = values, 0.0
+    if len(radii) == 1:
+        first, share = np.zeros(radius.shape, np.uint16), np.zeros(radius.shape, np.float32)
+    else:
+        place = np.interp(-radius, -radii, np.arange(len(radii)))
+        first = np.minimum(place, len(radii) - 2).astype(np.uint16)
+        share = (place - first).astype(np.float32)
+    hidden = _hidden(radius / pitch, picture, LEAST_JUMP * pixel / pitch)
+    slope = _slope(radius / pitch, max(int(pixel / pitch), 1))
+    tilt = slope * detail.slope_change(float(np.sqrt(np.square(radius).mean())))
+    return DepthCut(radii, first, share, hidden, math.hypot(error, tilt))
+
+
+def _slope(radius: NDArray, side: int) -> float:
+    """Return by how much the radius rises from pixel to pixel, rms, where nothing is hidden.
+
+    Radii are counted in samples, of which so many are a pixel's side.
+    """
+    means = _block_means(radius, side)
+    rises = [np.diff(means, axis=axis) / side for axis in (0, 1) if means.shape[axis] > 1]
+    squares = [np.square(rise[np.abs(rise) < 1]) for rise in rises]
+    return math.sqrt(sum(float(own.mean()) for own in squares if own.size))
+
+
+def _layer_radii(radius: NDArray, detail: Detail, allowed: float) -> tuple[NDArray, float]:
+    """Return the layers' radii, from the largest to the smallest, and the error between them."""
+    high, low = float(radius.max()), float(radius.min())
+    if is_flat(radius, detail, allowed):
+        return np.array([(high + low) / 2]), allowed
+    while True:
+        radii = [high]
+        while radii[-1] > low and len(radii) <= MOST_LAYERS:
+            radii.append(_next_radius(radii[-1], low, detail, allowed))
+        if len(radii) <= MOST_LAYERS:
+            return np.array(radii), allowed
+        allowed *= 1.5
+
+
+def _next_radius(start: float, low: float, detail: Detail, allowed: float) -> float:
+    """Return the smallest radius down to which the blurs between are mixtures of the ends'."""
+
+    def error(end: float) -> float:
+        middle = (start + end) / 2
+        return BETWEEN * detail.blur_change((1, middle), (-0.5, start), (-0.5, end))
+
+    near, far = start, low
+    if error(low) <= allowed and error((start + low) / 2) <= allowed:
+        return low
+    for _ in range(30):
+        middle = (near + far) / 2
+        near, far = (middle, far) if error(middle) <= allowed else (near, middle)
+    return near if near < start - 1e-9 * abs(start - low) else (start + far) / 2
+
+
+def _few_values(radius: NDArray, most: int) -> NDArray | None:
+    """Return the values of a map, falling, where they are few; else None."""
+    flat = radius.ravel()
+    for part in (flat[:: max(len(flat) // FEW, 1)], flat):
+        values = np.unique(part)[::-1]
+        if len(values) > most:
+            return None
+    return np.asarray(values)
+
+
+def _hidden(radius: NDArray, picture: NDArray, jump: float) -> Hidden:
+    """Return what lies hidden; radii and the least jump are counted in samples."""
+    samples, sources = [], []
+    for behind, source in _sources(radius, jump):
+        samples.append(behind)
+        sources.append(source)
+    if not sum(map(len, samples)):
+        none = np.zeros(0, int)
+        return Hidden(none, none, 0.0, 0.0)
+    behind, source = np.concatenate(samples), np.concatenate(sources)
+    difference = picture.ravel()[source] - picture.ravel()[_mirrored(radius, behind, source, jump)]
+    full = min(float(picture.max()), 1.0) or 1.0
+    rms = float(np.sqrt(np.square(difference, dtype=float).mean())) / full
+    return Hidden(behind, source, rms, float(np.abs(difference).max()) / full)
+
+
+def _sources(radius: NDArray, jump: float) -> Iterator[tuple[NDArray, NDArray]]:
+    """Yield samples behind which something lies hidden, and the farther ones as which it goes on.
+
+    Rays see as far behind a sample as both radii differ.
+    """
+    from scipy.ndimage import distance_transform_edt, minimum_filter
+
+    low, high = float(radius.min()), float(radius.max())
+    if high - low < jump:
+        return
+    reach = min(int(np.ceil(high - low + EDGE)), max(radius.shape))
+    over = radius - minimum_filter(radius, 2 * reach + 1, mode="nearest") >= jump
+    group = max((high - low) / STEPS, jump)
+    number = np.where(over, ((radius - low) / group).astype(int), -1)
+    for step in np.unique(number[over]):
+        rows, columns = (np.flatnonzero((number == step).any(axis=axis)) for axis in (1, 0))
+        window = tuple(
+            slice(max(at[0] - reach, 0), min(at[-1] + reach + 1, count))
+            for at, count in zip((rows, columns), radius.shape, strict=True)
+        )
+        near, own = number[window] == step, radius[window]
+        far = own <= low + step * group - jump
+        if not far.any():
+            continue
+        apart, index = distance_transform_edt(~far, return_indices=True)
+        seen = near & (apart <= own - own[tuple(index)] + EDGE)
+        y, x = np.nonzero(seen)
+        top, left, width = window[0].start, window[1].start, radius.shape[1]
+        yield (
+            (y + top) * width + x + left,
+            (index[0][seen] + top) * width + index[1][seen] + left,
+        )
+
+
+def _mirrored(radius: NDArray, behind: NDArray, source: NDArray, jump: float) -> NDArray:
+    """Return the samples as which what is hidden goes on mirrored at its edge, where they may be.
+
+    Elsewhere they are the sources themselves.
+    """
+    shape, flat = radius.shape, radius.ravel()
+    own, other = np.unravel_index(behind, shape), np.unravel_index(source, shape)
+    places = [2 * b - a for a, b in zip(own, other, strict=True)]
+    inside = [np.clip(p, 0, count - 1) for p, count in zip(places, shape, strict=True)]
+    found = np.ravel_multi_index(tuple(inside), shape)
+    return np.where(flat[found] <= flat[behind] - jump, found, source)

@@ -1,0 +1,233 @@
+"""A picture with depth on the sensor plane, in layers: those that it shows, and what they hide."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from vcam_cli.scenes.base import Array, SampledScene, View
+from vcam_cli.scenes.cells import uneven_points
+from vcam_cli.scenes.depth_cut import DepthCut, Detail, cut_depth, is_flat, picture_detail
+from vcam_cli.scenes.hyperspectral import Cube
+from vcam_cli.scenes.image import ImageScene, image_scene
+from vcam_cli.spectra import Spectrum
+
+SHARE = 0.3
+"""Part of the tolerance that the cuts between layers may use."""
+
+
+@dataclass(frozen=True)
+class DepthPicture:
+    """What the files of a picture with depth hold."""
+
+    picture: Array | Cube
+    """Samples (h, w, channels), or spectra."""
+    depth: Array
+    """Distance (h, w) along the axis [m]."""
+
+    @property
+    def nbytes(self) -> int:
+        """Memory of both [bytes]."""
+        picture = self.picture.data if isinstance(self.picture, Cube) else self.picture
+        return int(picture.nbytes + self.depth.nbytes)
+
+
+@dataclass(frozen=True)
+class LensBlur:
+    """How a lens blurs a point, by its distance."""
+
+    slope: float
+    """Of the blur's radius over the inverse distance [m2]."""
+    offset: float
+    """Radius of a point infinitely far, with its sign [m]."""
+    sharp: Callable[[Array], Array]
+    """Transfer of what is in focus, at frequencies (n,) [cycles/m]."""
+
+    def radius(self, depth: Array) -> Array:
+        """Return the radius of the blur at distances, positive when nearer than the focus [m]."""
+        return np.asarray(self.slope / np.asarray(depth, float) + self.offset)
+
+    def distance(self, radius: float) -> float:
+        """Return the distance of a blur's radius [m]."""
+        inverse = (radius - self.offset) / self.slope
+        return 1 / inverse if inverse > 0 else math.inf
+
+
+@dataclass(frozen=True)
+class CutLayer(SampledScene):
+    """One layer: the picture's light times what of it lies there, and, as the last part, that."""
+
+    flat: ImageScene
+    coverage: Array
+    """What of every sample (h, w) lies in the layer, 0 to 1."""
+    sources: Array | None = None
+    """Index (h, w) of the samples whose light it is, in the flattened picture; None: their own."""
+
+    def planes(self, mix: Array, workers: int = 1) -> Array:
+        """Return the linear combinations of the picture's parts and of the coverage (R, h, w)."""
+        mix = np.asarray(mix, self.dtype)
+        out = self.flat.planes(mix[:, :-1], workers)
+        if self.sources is not None:
+            out = out.reshape(len(mix), -1)[:, self.sources.ravel()].reshape(out.shape)
+        out += mix[:, -1, None, None]
+        out *= self.coverage
+        return out
+
+    def values_at(self, x: Array, y: Array, mix: Array) -> Array:
+        """Return the sample under each point."""
+        rows, columns = self.flat.samples_under(x, y)
+        mix = np.asarray(mix, self.dtype)
+        if self.sources is None:
+            light = self.flat.values_at(x, y, mix[:, :-1])
+        else:
+            planes = self.flat.planes(mix[:, :-1]).reshape(len(mix), -1)
+            light = planes[:, self.sources[np.ix_(rows, columns)]]
+        return (light + mix[:, -1, None, None]) * self.coverage[np.ix_(rows, columns)]
+
+    def mean_and_rms(self, mix: Array, size: tuple[float, float]) -> tuple[Array, Array]:
+        """Return the mean over a centered rectangle and the rms over the grid, from points."""
+        inside, everywhere = (
+            self.values_at(uneven_points(width), uneven_points(height), mix).astype(np.float64)
+            for width, height in (size, self.extent)
+        )
+        return inside.mean(axis=(1, 2)), np.sqrt(np.square(everywhere).mean(axis=(1, 2)))
+
+
+@dataclass(frozen=True)
+class DepthScene:
+    """A picture, and how far away each of its samples is."""
+
+    flat: ImageScene
+    """The picture as a pinhole sees it."""
+    depth: Array
+    """Distance (h, w) along the axis [m]."""
+    cut: DepthCut
+    distances: tuple[float, ...]
+    """Of the layers [m]."""
+
+    @property
+    def spectra(self) -> tuple[Spectrum, ...]:
+        """Spectral radiances of the picture's parts [W/(sr m2 m)]."""
+        return self.flat.spectra
+
+    @property
+    def white(self) -> Spectrum:
+        """Spectral radiance of the perfect white [W/(sr m2 m)]."""
+        return self.flat.white
+
+    def values_at(self, x: Array, y: Array, mix: Array) -> Array:
+        """Return sum_k mix[r, k] B_k of the picture at the points (y[i], x[j]): (R, m, n)."""
+        return self.flat.values_at(x, y, mix)
+
+    def depth_at(self, x: Array, y: Array) -> Array:
+        """Return the distance of the samples under points (m, n) [m]."""
+        return np.asarray(self.depth[np.ix_(*self.flat.samples_under(x, y))])
+
+    def shown(self, number: int) -> CutLayer:
+        """Return what the picture shows of a layer."""
+        rows, columns = (np.arange(count) for count in self.depth.shape)
+        return self._layer(self.cut.coverage(number, rows, columns), None)
+
+    def hidden(self, number: int) -> CutLayer | None:
+        """Return what of a layer goes on behind nearer samples; None where nothing does."""
+        cut, found = self.cut, self.cut.hidden
+        first, share = cut.first.ravel()[found.sources], cut.share.ravel()[found.sources]
+        own = np.where(first == number, 1 - share, np.where(first + 1 == number, share, 0))
+        if not own.any():
+            return None
+        coverage = np.zeros(self.depth.size, np.float32)
+        coverage[found.samples] = own
+        sources = np.arange(self.depth.size)
+        sources[found.samples] = found.sources
+        shape = self.depth.shape
+        return self._layer(coverage.reshape(shape), sources.reshape(shape))
+
+    def _layer(self, coverage: Array, sources: Array | None) -> CutLayer:
+        flat = self.flat
+        return CutLayer(
+            spectra=(*flat.spectra, flat.white),
+            white=flat.white,
+            shape=flat.shape,
+            pitch_x=flat.pitch_x,
+            pitch_y=flat.pitch_y,
+            samples="squares",
+            dtype=flat.dtype,
+            flat=flat,
+            coverage=coverage.astype(flat.dtype),
+            sources=sources,
+        )
+
+
+def flat_distance(
+    flat: ImageScene, given: DepthPicture, view: View, blur: LensBlur, tolerance: float
+) -> float | None:
+    """Return the one distance that all of a picture may be taken to have [m]; None where none.
+
+    Parameters
+    ----------
+    flat : ImageScene
+        The picture on the sensor.
+    given : DepthPicture
+        The picture and its map.
+    view : View
+        Rectangle that the picture fills.
+    blur : LensBlur
+        What the lens does to points.
+    tolerance : float
+        Error that the whole image may have, relative to full signal; 0: none.
+
+    Returns
+    -------
+    float or None
+        The distance.
+    """
+    depth = _on_sensor(flat, given, view)
+    low, high = float(str(depth.min())), float(str(depth.max()))  # 0.8, and not what a float has
+    if low == high:
+        return low
+    if not tolerance:
+        return None
+    radius = blur.radius(depth)
+    if not is_flat(radius, _detail(flat, view, blur), SHARE * tolerance):
+        return None
+    return blur.distance(float(radius.min() + radius.max()) / 2)
+
+
+def depth_scene(
+    flat: ImageScene, given: DepthPicture, view: View, blur: LensBlur, tolerance: float
+) -> DepthScene:
+    """Return a picture with depth, cut into layers as finely as the tolerance asks.
+
+    Parameters are those of `flat_distance`.
+    """
+    depth = _on_sensor(flat, given, view)
+    pixel = max(view.pitch_x, view.pitch_y)
+    cut = cut_depth(
+        blur.radius(depth),
+        _brightness(flat),
+        flat.pitch_x,
+        pixel,
+        _detail(flat, view, blur),
+        SHARE * tolerance,
+    )
+    return DepthScene(flat, depth, cut, tuple(blur.distance(float(r)) for r in cut.radii))
+
+
+def _on_sensor(flat: ImageScene, given: DepthPicture, view: View) -> Array:
+    """Return the distances of the samples that are kept."""
+    placed = image_scene(given.depth[..., None], flat.spectra, flat.white, view)
+    return np.asarray(placed.picture[..., 0])
+
+
+def _brightness(flat: ImageScene) -> Array:
+    """Return the light (h, w) of all parts of a picture together, white = 1."""
+    count = len(flat.spectra)
+    return np.asarray(flat.planes(np.full((1, count), 1 / count))[0])
+
+
+def _detail(flat: ImageScene, view: View, blur: LensBlur) -> Detail:
+    pixel = min(view.pitch_x, view.pitch_y)
+    return picture_detail(_brightness(flat), flat.pitch_x, pixel, blur.sharp)
