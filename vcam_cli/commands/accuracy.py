@@ -60,9 +60,11 @@ def accuracy(
     model = load(camera, options.overrides(set_, seed, level))
     inputs = provenance.inputs(model)
     path = out or Path("out") / model.name
-    place = OutputFolder(path, record="accuracy.json", inputs=inputs)
-    with place as folder, Progress(quiet) as progress:
-        found = study.accuracy(model, workers, progress)
+    with (
+        OutputFolder(path, record="accuracy.json", inputs=inputs) as folder,
+        Progress(quiet) as bar,
+    ):
+        found = study.accuracy(model, workers, bar)
         rows = (point.row for point in found.points)
         tables.write_table(folder.new("accuracy.csv"), study.COLUMNS, rows)
         drawn = {"accuracy.png": lambda path: pareto(path, *pareto_arguments(found))}

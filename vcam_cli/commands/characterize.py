@@ -77,10 +77,12 @@ def characterize(
     model = load(camera, options.overrides(set_, seed, accuracy))
     inputs = provenance.inputs(model)
     path = out or Path("out") / model.name
-    place = OutputFolder(path, record="characterize.json", inputs=inputs)
-    with place as folder, Progress(quiet) as progress:
+    with (
+        OutputFolder(path, record="characterize.json", inputs=inputs) as folder,
+        Progress(quiet) as bar,
+    ):
         keeper = FrameFiles(folder.new) if keep_frames else None
-        found = study.characterize(model, workers, progress, keeper)
+        found = study.characterize(model, workers, bar, keeper)
         rows = (quantity.row for quantity in found.quantities)
         tables.write_table(folder.new("characterize.csv"), study.COLUMNS, rows)
         drawn = {
