@@ -130,6 +130,7 @@ def column(folder: Path) -> list[float]:
         return [float(row["mse"]) for row in csv.DictReader(file)]
 
 
+@pytest.mark.long
 def test_shares_of_one_folder_by_two_programs(tmp_path):
     """The same version, another mse: no table has both, and each run says so."""
     study = written(tmp_path, {"quality": ["mse"]}, metrics=["mse"])

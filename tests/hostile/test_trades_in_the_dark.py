@@ -115,7 +115,12 @@ def test_a_schedule_for_no_light_is_refused_with_its_place(sees, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("sees", "treatment"), [("luminance", "raise"), ("cap", "warn"), ("light", "ignore")]
+    ("sees", "treatment"),
+    [
+        ("luminance", "raise"),
+        pytest.param("cap", "warn", marks=pytest.mark.long),
+        pytest.param("light", "ignore", marks=pytest.mark.long),
+    ],
 )
 def test_benches(sees, treatment, tmp_path, monkeypatch):
     """The bench has a lamp of its own: what the scene is makes no difference.

@@ -246,7 +246,11 @@ def test_crops_of_small_arrays(shape, measured):
 
 @pytest.mark.parametrize(
     ("chart", "rows", "columns"),
-    [("hdr-patches", 48, 64), ("hdr-patches", 72, 96), ("dead-leaves", 48, 64)],
+    [
+        ("hdr-patches", 48, 64),
+        ("hdr-patches", 72, 96),
+        pytest.param("dead-leaves", 48, 64, marks=pytest.mark.long),
+    ],
 )
 def test_light_far_beyond_the_well_does_not_ring_into_dark_pixels(chart, rows, columns):
     """White fills a pixel thousands of times over; where it does not, no light of it may show."""

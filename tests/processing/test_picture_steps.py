@@ -7,7 +7,7 @@ import pytest
 from PIL import Image
 from scipy import ndimage
 
-from tests.making import tree
+from tests.making import long_except, tree
 from vcam_cli.camera.camera import Camera
 from vcam_cli.processing import jpeg, picture_steps
 from vcam_cli.processing.base import Block
@@ -93,7 +93,9 @@ def camera(*steps, pattern="bayer-rggb", **changes):
     return Camera.model_validate(tree(SMALL | {"scene.illuminant": "D65"} | more | changes))
 
 
-@pytest.mark.parametrize("pattern", ["bayer-rggb", "quad-bayer", "honeycomb"])
+@pytest.mark.parametrize(
+    "pattern", long_except(["honeycomb"], ["bayer-rggb", "quad-bayer", "honeycomb"])
+)
 @pytest.mark.parametrize("step", [{"denoise": {}}, {"sharpen": {"radius": "3 px"}}], ids=str)
 def test_steps_are_those_of_the_whole_picture_for_any_workers(pattern, step):
     before = simulate(camera(pattern=pattern)).linear.transpose(2, 0, 1)

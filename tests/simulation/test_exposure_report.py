@@ -215,7 +215,8 @@ def test_a_run_says_how_it_was_exposed(tmp_path) -> None:
 def test_every_shipped_mosaic_tells_its_colors() -> None:
     """Of a honeycomb and of stacked pixels, too: shares of the color's own pixels."""
     for name in ("cfa-honeycomb", "x3-stacked", "cfa-rgbw"):
-        sets = ["exposure={time: 400 ms}", "array.rows=40", "array.columns=60"]
+        chart = "scene.source={kind: chart, chart: colorchecker}"
+        sets = [chart, "exposure={time: 400 ms}", "array.rows=40", "array.columns=60"]
         frame = simulate(load(name, sets)).frame
         report = exposure_report(frame)
         assert set(report.clipped) == set(frame.mosaic.colors)
