@@ -95,7 +95,9 @@ def setup_of(
     if filters is None:
         filters = (np.ones_like,) if array.pattern == "monochrome" else RGB
     density = detector.dark_current_density
-    dark = detector.dark_current or 0  # that of a junction is told by its process
+    dark = (
+        detector.dark_current.value if detector.dark_current else 0
+    )  # that of a junction is told by its process
     if density is not None and density != "junction":
         dark = density.value * width * height / ref.CHARGE
     return ref.Setup(

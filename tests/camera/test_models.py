@@ -13,6 +13,7 @@ from making import GONE
 from pydantic import TypeAdapter, ValidationError
 
 from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.derived.dark_current import dark_rate
 from vcam_cli.camera.processing import Step
 from vcam_cli.camera.quality import METRICS
 from vcam_cli.camera.scene.sources import CHARTS
@@ -239,6 +240,20 @@ class TestValues:
             pixel__photodetector__dark_current_density=given
         ).pixel.photodetector.dark_current_density
         assert (density.value, density.temperature, density.doubling) == (1e-5, 300.0, 8.0)
+
+    def test_a_dark_current_at_a_temperature(self):
+        """As data sheets print it; its YAML reads back, and a bare rate stays bare."""
+        given = {"value": "12 e/s", "temperature": "300 K", "doubling": "6 K"}
+        for changes, factor, written in (
+            (given, 2.0, given),  # one doubling warmer
+            ("12 e/s", 1.0, "12 e/s"),
+        ):
+            c = camera(
+                pixel__photodetector__dark_current=changes,
+                pixel__temperature="306 K",
+            )
+            assert dark_rate(c) == pytest.approx(12 * factor, rel=1e-12)
+            assert c.model_dump(mode="json")["pixel"]["photodetector"]["dark_current"] == written
 
     def test_quantum_efficiency_of_a_pixel(self):
         of_detector = camera().pixel.photodetector.quantum_efficiency

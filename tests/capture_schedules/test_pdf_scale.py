@@ -62,6 +62,15 @@ def test_what_is_written_in_the_study_is_believed(study, pdf):
     assert schedule_file.read(study(pdf, MAX)).known.max == 250
 
 
+def test_relative_photocurrents_in_the_study_are_wondered_at(study, tmp_path):
+    """A well of 20 ke takes five hours of 1 e/s: said, as the stars may be meant."""
+    uniform = "{uniform: {min: 0, max: 1}%s}"
+    (said,) = schedule(study(uniform % ""), tmp_path / "out").notes
+    assert "fills the well in 2e+04 s" in said
+    remedy = said.partition("add to the pdf ")[2]
+    assert not schedule(study(uniform % f", {remedy}"), tmp_path / "two").notes
+
+
 def test_what_numbers_were_taken_for_is_said(study, tmp_path):
     found = schedule(study(TABLE % ", brightest: 4 fA", ""), tmp_path / "out")
     assert any("as the study scales them: the brightest, 2.497e+04 e/s" in n for n in found.notes)

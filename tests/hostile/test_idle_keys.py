@@ -201,6 +201,7 @@ STACK = {
 }
 EDGE = {"kind": "chart", "chart": "slanted-edge"}
 DENSITY = "pixel.photodetector.dark_current_density"
+CURRENT = "pixel.photodetector.dark_current"
 
 
 @pytest.mark.parametrize(
@@ -211,6 +212,11 @@ DENSITY = "pixel.photodetector.dark_current_density"
             "pixel.temperature",
             {"pixel.temperature": "310 K", DENSITY: "1 nA/cm2"},
             {DENSITY: {"value": "1 nA/cm2", "temperature": "300 K"}},
+        ),
+        (
+            "pixel.photodetector.dark_current.doubling",
+            {CURRENT: {"value": "12 e/s", "temperature": "300 K", "doubling": "6 K"}},
+            {"pixel.temperature": "310 K"},
         ),
         (
             "pixel.fpn.offset_column",

@@ -47,8 +47,11 @@ def mistake(pdf: Pdf, study: ScheduleStudy) -> tuple[str, str] | None:
 
 
 def notes(pdf: Pdf, study: ScheduleStudy) -> Iterator[str]:
-    """Yield what a table's numbers were taken for."""
-    if study.sensor is None or study.pdf.kind not in TABLES:
+    """Yield what a table's numbers were taken for, and numbers of a study that no camera has."""
+    if study.sensor is None:
+        return
+    if study.pdf.kind not in TABLES:
+        yield from _unusual(pdf, study.sensor.well_capacity)
         return
     how = "as the study scales them" if study.pdf.brightest is not None else "taken as e/s"
     seconds = study.sensor.well_capacity / pdf.max
@@ -56,3 +59,14 @@ def notes(pdf: Pdf, study: ScheduleStudy) -> Iterator[str]:
         f"photocurrents of the table are {how}: the brightest, {pdf.max:.4g} e/s, fills the well in"
         f" {1000 * seconds:.4g} ms"
     )
+
+
+def _unusual(pdf: Pdf, well: float) -> Iterator[str]:
+    """Yield that photocurrents fill a well [e] in a time that is not a camera's."""
+    seconds = well / pdf.max
+    if not USUAL_TIMES[0] <= seconds <= USUAL_TIMES[1]:
+        yield (
+            f"with a sensor, photocurrents of the pdf are e/s: the brightest, {pdf.max:.4g} e/s,"
+            f" fills the well in {seconds:.3g} s; if they are relative, add to the pdf"
+            " brightest: 1000 ke/s"
+        )

@@ -14,7 +14,6 @@ from vcam_cli.fitting.conditions import Conditions, usual_temperature
 from vcam_cli.fitting.pattern import CYCLES
 from vcam_cli.fitting.sensor import Transfer
 from vcam_cli.physics.radiometry import irradiance_per_radiance
-from vcam_cli.physics.readout import ELEMENTARY_CHARGE
 
 if TYPE_CHECKING:
     from vcam_cli.fitting.fit import Fit
@@ -106,20 +105,13 @@ def tree(found: Fit, conditions: Conditions, curves: list[Transfer]) -> dict[str
 
 
 def _dark_current(found: Fit) -> dict[str, Any]:
-    """Return the dark current: of the pixel, or where it is known over temperature its density."""
+    """Return the dark current of the pixel, with its temperature where its rise is known."""
     current, rise = max(found.value("dark_current") or 0, 0), found.value("dark_current_doubling")
-    pixel, usual = found.measurement.pixel, usual_temperature(found.measurement)
+    value, usual = f"{current:.6g} e/s", usual_temperature(found.measurement)
     if rise is None or usual is None:
-        return {"dark_current": f"{current:.6g} e/s"}
-    assert pixel is not None
-    assert pixel.width is not None
-    area = pixel.width * (pixel.height or pixel.width)
-    density = {
-        "value": units.render(current * ELEMENTARY_CHARGE / area, "current_density"),
-        "temperature": units.render(usual, "temperature"),
-        "doubling": f"{rise:.6g} K",
-    }
-    return {"dark_current_density": density}
+        return {"dark_current": value}
+    known = {"temperature": units.render(usual, "temperature"), "doubling": f"{rise:.6g} K"}
+    return {"dark_current": {"value": value, **known}}
 
 
 def _noise(found: Fit) -> dict[str, Any]:

@@ -19,7 +19,7 @@ from vcam_cli.camera.derived.dark_current import dark_rate
 from vcam_cli.camera.derived.electrical import Electrical, electrical
 from vcam_cli.camera.derived.pixel_layout import detector
 from vcam_cli.camera.sensor.architecture import ARCHITECTURES
-from vcam_cli.camera.sensor.photodetector import DarkCurrentDensity
+from vcam_cli.camera.sensor.photodetector import AtTemperature
 from vcam_cli.config.model import Model
 from vcam_cli.errors import BadInput
 from vcam_cli.spectra import Spectrum
@@ -58,8 +58,9 @@ def _needs_no_temperature(camera: Camera) -> bool:
 
 
 def _doubling_is_idle(camera: Camera) -> bool:
-    given = camera.pixel.photodetector.dark_current_density
-    return isinstance(given, DarkCurrentDensity) and given.temperature in (
+    own = camera.pixel.photodetector
+    given = own.dark_current or own.dark_current_density
+    return isinstance(given, AtTemperature) and given.temperature in (
         None,
         camera.pixel.temperature,
     )
@@ -155,7 +156,7 @@ RULES = (
         f"there is no dark current; give {_DETECTOR}.dark_current",
     ),
     Rule(
-        (f"{_DETECTOR}.dark_current_density.doubling",),
+        (f"{_DETECTOR}.dark_current_density.doubling", f"{_DETECTOR}.dark_current.doubling"),
         _doubling_is_idle,
         "the dark current is given at the pixel's own temperature",
     ),
@@ -163,7 +164,7 @@ RULES = (
         ("pixel.temperature",),
         _needs_no_temperature,
         "neither dark current nor noise follows from it; give the dark current's temperature,"
-        f" as {_DETECTOR}.dark_current_density: {{value: 1 nA/cm2, temperature: 300 K}}",
+        f" as {_DETECTOR}.dark_current: {{value: 12 e/s, temperature: 300 K}}",
     ),
     Rule(
         ("pixel.fpn.offset_column", "pixel.fpn.gain_column", "pixel.readout.column_noise"),

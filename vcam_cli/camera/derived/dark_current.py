@@ -44,8 +44,10 @@ def dark_rate(camera: Camera) -> float:
     Raises BadInput for numbers of the process that are missing, and temperatures too far apart.
     """
     own = camera.pixel.photodetector
-    if own.dark_current is not None:
-        return own.dark_current * own.dark_current_scale
+    if (pixel := own.dark_current) is not None:
+        path = "pixel.photodetector.dark_current"
+        growth = _growth(camera, pixel.temperature, pixel.doubling, path)
+        return pixel.value * growth * own.dark_current_scale
     given, made = own.dark_current_density, process(camera)
     per_length = 0.0
     if isinstance(given, DarkCurrentDensity):

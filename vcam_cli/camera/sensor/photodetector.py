@@ -62,12 +62,9 @@ def _efficiency(given: Any) -> QuantumEfficiency:
 _EFFICIENCY_FORMS = Annotated[SpectrumSpec, _EFFICIENCY] | PixelEfficiency | Literal["junction"]
 
 
-class DarkCurrentDensity(Model):
-    """Dark current density of the photodetector, at a temperature."""
+class AtTemperature(Model):
+    """Where the value of a dark current, or of its density, holds."""
 
-    value: Annotated[float, Quantity("current_density", least=0)] = key(
-        "dark current density", example="1 nA/cm2"
-    )
     temperature: MaybeSiliconTemperature = key(
         "at which it holds; default the pixel's", example="300 K", default=None
     )
@@ -78,11 +75,28 @@ class DarkCurrentDensity(Model):
     rules = (needs("doubling", "temperature", "a doubling needs the temperature it starts from"),)
 
     def to_yaml(self) -> Any:
-        """Return the YAML form: a bare density where no temperature is given."""
+        """Return the YAML form: the bare value where no temperature is given."""
         form = self.model_dump(mode="json")
         return form if self.temperature is not None else form["value"]
 
 
+class DarkCurrentDensity(AtTemperature):
+    """Dark current density of the photodetector, at a temperature."""
+
+    value: Annotated[float, Quantity("current_density", least=0)] = key(
+        "dark current density", example="1 nA/cm2"
+    )
+
+
+class DarkCurrent(AtTemperature):
+    """Dark current of the whole pixel, at a temperature, as data sheets print it."""
+
+    value: Annotated[float, Quantity("rate", least=0)] = key(
+        "dark current of the pixel", example="12 e/s"
+    )
+
+
+_RATE = Quantity("rate", least=0)
 _DENSITY = Quantity("current_density", least=0, words={"junction": "junction"})
 
 
@@ -91,6 +105,12 @@ def _dark_density(given: Any) -> Any:
         return DarkCurrentDensity.model_validate(given)
     value = _DENSITY.read(given)
     return value if value == "junction" else DarkCurrentDensity(value=_DENSITY.text(value))
+
+
+def _dark_current(given: Any) -> DarkCurrent:
+    if isinstance(given, (Mapping, DarkCurrent)):
+        return DarkCurrent.model_validate(given)
+    return DarkCurrent(value=_RATE.text(_RATE.read(given)))
 
 
 class ChargeDiffusion(Model):
@@ -144,8 +164,16 @@ class Photodetector(Model):
         example="1 nA/cm2",
         default=None,
     )
-    dark_current: Annotated[float | None, Quantity("rate", least=0)] = key(
-        "of the whole pixel at its temperature, in place of a density",
+    dark_current: Annotated[
+        DarkCurrent | None,
+        Either(
+            _dark_current,
+            Annotated[float, _RATE] | DarkCurrent,
+            yaml_form=lambda v: v if v is None else v.to_yaml(),
+        ),
+    ] = key(
+        "of the whole pixel, at its temperature, in place of a density; or {value, temperature,"
+        " doubling}",
         example="12 e/s",
         default=None,
     )

@@ -304,8 +304,8 @@ class Pixel(Model):
         "a lens on every pixel", example="none", default=None
     )
     temperature: SiliconTemperature = key(
-        "of the sensor: kTC noise follows it, and dark current that is given as a density at a"
-        " temperature",
+        "of the sensor: kTC noise follows it, and dark current that is given at a temperature of"
+        " its own",
         example="300 K",
         default=300.0,
     )
