@@ -37,6 +37,7 @@ BOOST = {
     "reference/camera.md": 1.5,
     "reference/metrics.md": 1.5,
     "reference/not-simulated.md": 1.5,
+    "reference/words.md": 1.5,
     "reference/effects.md": 1.2,
     "gallery.md": 0.3,
     "attacks.md": 0.5,
@@ -64,6 +65,7 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
         "reference/commands.md": "\n".join(_commands()),
         "reference/metrics.md": "\n".join(_metrics()),
         "reference/not-simulated.md": "\n".join(_not_simulated()),
+        "reference/words.md": "\n".join(_words()),
         "cite.md": _cite(),
     }
     if "thesis.md" not in files.src_uris:
@@ -191,6 +193,21 @@ def _not_simulated() -> Iterator[str]:
         yield f"## {name.replace('_', ' ')} {{ #{name} }}\n\n{sentence(escaped(about))}\n"
         if others:
             yield f"Also called {', '.join(other.replace('_', ' ') for other in others)}.\n"
+
+
+def _words() -> Iterator[str]:
+    from vcam_cli.camera.hint_tables import KEYS
+    from vcam_cli.camera.hints import index
+
+    keys = {key.dotted: key for key in index()}
+    yield "# Words and their keys\n"
+    yield "What data sheets, photographers and EMVA 1288 call it, and the key that means it.\n"
+    for word, entry in sorted(KEYS.items()):
+        path = entry.partition(": ")[0]
+        if len(word) > 2:
+            about = sentence(escaped(keys[path].description))
+            yield f"## {word.replace('_', ' ')} {{ #{word} }}\n"
+            yield f"[`{path}`](camera.md#{path}), as in `{entry}`. {about}\n"
 
 
 def _cite() -> str:

@@ -31,6 +31,8 @@ FACTS = {
     "effects.html#dark_current",
     "metrics.html#snr_db",
     "not-simulated.html#crosstalk",
+    "words.html#system_gain",
+    "words.html#saturation_capacity",
 }
 """Places of the reference that the search must know."""
 
