@@ -70,7 +70,7 @@ class ChartCamera:
 
     @property
     def chart(self) -> str:
-        return self.name.rpartition("-")[0]
+        return str(self.changes["scene.source"]["chart"])
 
     def load(self, folder: Path, accuracy: str) -> Camera:
         """The camera as a user's file gives it, every effect on `auto`."""
@@ -105,9 +105,12 @@ class ChartCamera:
         return (np.indices(tuple(counts)).sum(axis=0) % 2).astype(float)
 
 
-def random_camera(chart: str, number: int) -> ChartCamera:
-    """A camera drawn at random; every number gives another, always the same."""
-    kind = tuple(CHARTS).index(chart)
+def random_camera(chart: str, number: int, draw: int | None = None) -> ChartCamera:
+    """A camera drawn at random; every number gives another, always the same.
+
+    `draw` begins other draws than those of CAMERAS.
+    """
+    kind = tuple(CHARTS).index(chart) if draw is None else draw
     rng = np.random.default_rng((29, kind, number))
 
     def between(low: float, high: float) -> float:
@@ -134,15 +137,22 @@ def random_camera(chart: str, number: int) -> ChartCamera:
         "array.columns": size[1],
         "array.pattern": PATTERNS[(number + kind) % len(PATTERNS)],
     }
-    return ChartCamera(f"{chart}-{number}", changes, checks)
+    name = f"{chart}-{number}" if draw is None else f"{chart}-{number}-{draw}"
+    return ChartCamera(name, changes, checks)
 
+
+HARD = ((3, 7), (3, 15), (3, 25), (3, 43), (3, 37), (2, 43), (4, 51), (4, 42), (4, 33))
+"""Numbers and draws of arrays of few pixels before hdr-patches: a pixel that sees all of a chart,
+or lies beside a lamp. Cells chosen from crops broke the promise on them, by up to 8.8 T."""
 
 CAMERAS = {
     each.name: each
     for chart in CHARTS
     for each in (random_camera(chart, number) for number in range(len(CHARTS[chart])))
-}
+} | {each.name: each for each in (random_camera("hdr-patches", *hard) for hard in HARD)}
 QUICK = tuple(
-    name for name, each in CAMERAS.items() if name[-1] in "123" and each.chart != "dead-leaves"
+    name
+    for name, each in CAMERAS.items()
+    if name.split("-")[-1] in ("1", "2", "3", "7", "51") and each.chart != "dead-leaves"
 )
 """Names of those that every run of the tests judges."""

@@ -37,8 +37,8 @@ SAFE = 3.0
 the lens resolves leaves twice as much, relative to its own weak signal."""
 CHEAP = 1 << 20
 """Cells that are painted without asking whether fewer would do."""
-MOST = 1 << 26
-"""Cells at most."""
+MOST_OF_SMALL, MOST = 1 << 22, 1 << 26
+"""Cells at most, of arrays with fewer pixels than a crop and of others."""
 LADDER = (1.1, 1.6, 2.2, 2.7, 3.3, 4.2, 5.3, 6.6, 8.3, 10.4, 13.1, 16.4, 24.2, 32.3, 48.1)
 """Cells per pixel pitch that are tried on crops. Whole numbers of them would lie in a crop as its
 photodetectors do, and err less there than on the whole."""
@@ -123,19 +123,22 @@ def cells_per_pixel(path: OpticalPath, scene: ChartScene, highest: float) -> Cho
     if path.settings.oversampling is not None:
         return ChosenCells(path.settings.oversampling)
     asked = highest * max(BEYOND_CUTOFF, math.sqrt(FOLDED / path.settings.tolerance))
+    asked *= math.sqrt(_brightest_over_full(path, scene))
     finest = SAFE * asked
     reference = min(COPRIME * max(asked, LADDER[1]), MOST_CROP_CELLS / SMALLEST_CROP)
-    if math.prod(cell_grid(scene, path.geometry, finest)) <= CHEAP:
+    g = path.geometry
+    if math.prod(cell_grid(scene, g, finest)) <= CHEAP:
         return ChosenCells(finest)
+    whole = math.prod(cell_grid(scene, g, 1.0))
+    if g.rows * g.columns <= CROP**2:  # too few to tell an error from chance
+        return ChosenCells(min(finest, math.sqrt(MOST_OF_SMALL / whole)))
     level = path.judged_weights.sum(axis=1)
     otf = _mean_otf(path, finest)
     crops = _crops(path, scene, reference, level)
     converged = _signals(path, crops, reference, level, otf)
-    g = path.geometry
     within = partial(_within, g)
     full = min(float(within(converged).max()), path.ceiling)
     budget = CELLS_SHARE * path.settings.tolerance * full
-    whole = math.prod(cell_grid(scene, path.geometry, 1.0))
     most = min(finest, max(1.0, math.sqrt(MOST / whole)))
     least = 0.0
     if converged.max() > path.ceiling:
@@ -143,11 +146,7 @@ def cells_per_pixel(path: OpticalPath, scene: ChartScene, highest: float) -> Cho
 
     def measured(cells: float) -> float:
         found = _signals(path, crops, cells, level, otf)
-        error = _error_that_counts(found, converged, path.ceiling)
-        # Few pixels may have no error by chance; many around them may hide theirs.
-        if within(found).size < found.size:
-            error = max(error, _error_that_counts(within(found), within(converged), path.ceiling))
-        return error
+        return _error_that_counts(found, converged, path.ceiling, within(found).size)
 
     ladder = [c for c in LADDER if least <= c <= min(most, reference / COPRIME)]
     first = next((i for i, c in enumerate(ladder) if c >= LIKELY), len(ladder) - 1)
@@ -173,15 +172,53 @@ def cells_per_pixel(path: OpticalPath, scene: ChartScene, highest: float) -> Cho
     return ChosenCells(enough, error * tried / enough, trials)
 
 
-def _error_that_counts(found: NDArray, converged: NDArray, ceiling: float) -> float:
+def _brightest_over_full(path: OpticalPath, scene: ChartScene) -> float:
+    """Return the brightest light before a small array over that of its brightest pixel, at least 1.
+
+    What cells fold of an edge is relative to the light there, the tolerance to that of a pixel,
+    which may see all of a chart or lie beside a lamp. Of larger arrays crops tell.
+    """
+    g = path.geometry
+    sensor = g.sensor_width, g.sensor_height
+    if 2 * math.prod(sensor) > math.prod(scene.extent):
+        return 1.0
+    level = path.judged_weights.sum(axis=1)[None]
+    on_it, around = (
+        scene.values_at(*_uneven_points(size), level)[0] for size in (sensor, scene.extent)
+    )
+    rows, columns = (np.arange(0, 1, 1 / min(n, len(on_it))) for n in (g.rows, g.columns))
+    rows, columns = ((starts * len(on_it)).astype(int) for starts in (rows, columns))
+    sums = np.add.reduceat(np.add.reduceat(on_it, rows, 0), columns, 1)
+    full = float(sums.max()) / on_it.size * len(rows) * len(columns)
+    brightest = float(max(on_it.max(), around.max()))
+    return max(1.0, brightest / full) if full > 0 else 1.0
+
+
+def _uneven_points(size: tuple[float, float]) -> tuple[NDArray, NDArray]:
+    """Return points (n,) along x and y over a centered rectangle [m], with uneven steps.
+
+    They share no factor with what repeats in a chart.
+    """
+    k = np.arange(BLOCKS * POINTS)
+    x, y = (
+        ((k + k * step % 1) / len(k) - 0.5) * length
+        for length, step in zip(size, EVEN, strict=True)
+    )
+    return x, y
+
+
+def _error_that_counts(found: NDArray, converged: NDArray, ceiling: float, pixels: int) -> float:
     """Return the rms of the error of crops (crops, rows, columns) that full pixels do not hide.
 
     Where light is far brighter than what fills a pixel, hardly any error counts; but the few that
     do, below it, are as large as full signal, and a crop has too few pixels to show them. So the
-    errors of a crop are also given to its darkest pixels first, from either end.
+    errors of a crop are also given to its darkest pixels first, from either end. Of an array that
+    is smaller than its crops, with fewer `pixels`, the error is that of as many that err most: its
+    own may have none by chance, and the many around them would hide theirs.
     """
     full = np.minimum(converged, ceiling)
-    squares = np.square(np.minimum(found, ceiling) - full).mean()
+    errors = np.square(np.minimum(found, ceiling) - full).ravel()
+    squares = np.sort(errors)[-pixels:].mean()
     if converged.max() > ceiling:
         crops = len(found), -1
         light = np.sort(converged.reshape(crops), axis=1)
@@ -222,7 +259,8 @@ def _crops(path: OpticalPath, scene: ChartScene, cells: float, level: NDArray) -
     even = 2 * (np.arange(1, FEW + 1)[:, None] * EVEN % 1) - 1
     busy = _busiest(path, scene, level)
     places = np.clip(np.concatenate([[(0, 0)], even * half, busy]), -half, half)
-    return [scene.crop((float(x), float(y)), *size) for x, y in places]
+    different = dict.fromkeys((float(x), float(y)) for x, y in places)
+    return [scene.crop(place, *size) for place in different]
 
 
 def _within(g: Geometry, signals: NDArray) -> NDArray:
@@ -239,15 +277,10 @@ def _within(g: Geometry, signals: NDArray) -> NDArray:
 def _busiest(path: OpticalPath, scene: ChartScene, level: NDArray) -> NDArray:
     """Return the centers (n, 2) of the parts of most contrast, with and without a ceiling [m].
 
-    They come from values at points with uneven steps, which share no factor with what repeats in a
-    chart.
+    They come from values at points.
     """
     g = path.geometry
-    k = np.arange(BLOCKS * POINTS)
-    x, y = (
-        ((k + k * step % 1) / len(k) - 0.5) * length
-        for length, step in zip((g.sensor_width, g.sensor_height), EVEN, strict=True)
-    )
+    x, y = _uneven_points((g.sensor_width, g.sensor_height))
     light = scene.values_at(x, y, level[None])[0].reshape(BLOCKS, POINTS, BLOCKS, POINTS)
     contrasts = [light.var(axis=(1, 3)).ravel()]
     if float(light.max()) > path.ceiling:
