@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import OpenImageIO as oiio
+import scipy.fft
 
 FOCAL, F_NUMBER, PITCH = 5e-3, 2.0, 5e-6
 SIDE = 32
@@ -229,35 +230,34 @@ def slope_sum(light: np.ndarray, ends: tuple[float, float], focus: float) -> np.
     return total / len(k)
 
 
-def pupil_sum(scene: Scene, wavelength: float, points: int = 600, fine: int = 5) -> np.ndarray:
+def pupil_sum(scene: Scene, wavelength: float, points: int = 800, fine: int = 11) -> np.ndarray:
     """The same with diffraction: a sum over points of the pupil, for incoherent light.
 
     The transfer of a frequency f is the overlap of the pupil with itself, 2 wavelength N f apart.
     Of each point amid two that overlap, a defocused layer has the phase of its shift; so the
     layers' picture through that point counts in all frequencies for which both lie in the pupil
     (H. H. Hopkins, Proc. R. Soc. A 231, 91, 1955, with layers that hide each other by rays).
+    It takes 2 pitch / (wavelength N) samples to a pixel, `fine`, to have all frequencies there are.
     """
-    beyond = 12
+    beyond = 8
     n = (SIDE + 2 * beyond) * fine
-    frequency = np.fft.fftfreq(n, PITCH / fine)
-    fx, fy = frequency[None, :], frequency[:, None]
+    fx, fy = np.fft.rfftfreq(n, PITCH / fine)[None, :], np.fft.fftfreq(n, PITCH / fine)[:, None]
+    # Half of the distance of the two points of the pupil, in its radii.
     number = F_NUMBER * scene.image_distance / FOCAL
-    apart = wavelength * number * frequency  # half of the pupils' distance, in their radii
+    apart_x, apart_y = (np.float32(wavelength * number) * f.astype(np.float32) for f in (fx, fy))
     k = np.arange(points) + 0.5
     radius, angle = np.sqrt(k / points), np.pi * (1 + 5**0.5) * k
     steps = (k[:, None] * np.array([0.8191725133961645, 0.6710436067037893])) % 1 - 0.5
-    total, count = np.zeros((n, n), complex), np.zeros((n, n))
+    total = np.zeros((n, fx.size), np.complex64)
     for u, v, (jx, jy) in zip(radius * np.cos(angle), radius * np.sin(angle), steps, strict=True):
         x, y = (((np.arange(n) + 0.5 + j) / fine - SIDE / 2 - beyond) * PITCH for j in (jx, jy))
-        seen = composed(scene, x, y, u, v)
-        moved = np.exp(-2j * np.pi * (fx * jx + fy * jy) * PITCH / fine)
-        both = [
-            np.hypot(u + sign * apart[None, :], v + sign * apart[:, None]) <= 1 for sign in (1, -1)
-        ]
-        inside = both[0] & both[1]
-        total += np.where(inside, np.fft.fft2(seen) * moved, 0)
-        count += inside
-    count0 = count[0, 0]
-    picture = np.fft.ifft2(total / count0).real
+        seen = scipy.fft.rfft2(composed(scene, x, y, u, v).astype(np.float32))
+        for f, jitter in ((fx, jx), (fy, jy)):
+            seen *= np.exp(-2j * np.pi * f * jitter * PITCH / fine).astype(np.complex64)
+        # Both u + apart and u - apart lie within the radius 1.
+        between = 2 * np.abs(np.float32(u) * apart_x + np.float32(v) * apart_y)
+        length = apart_x**2 + apart_y**2 + between
+        total += np.where(length <= 1 - u**2 - v**2, seen, 0)
+    picture = scipy.fft.irfft2(total / points, (n, n))
     inner = slice(beyond * fine, -beyond * fine)
     return picture[inner, inner].reshape(SIDE, fine, SIDE, fine).mean(axis=(1, 3))

@@ -142,9 +142,9 @@ class DepthReport:
 
     cells: int
     """Cells along each side of a pixel on which that was done."""
-    order: int
-    """Radial order of the polynomials over the aperture, up to which it was followed what layers
-    out of focus hide of each other; 0 where there was no need to."""
+    rings: int
+    """Rings of points of the aperture, through which it was followed what layers out of focus hide
+    of each other; 0 where there was no need to."""
     error: float
     """Predicted rms error of both, relative to full signal."""
 

@@ -131,7 +131,8 @@ def _depth(ready: Prepared) -> tuple[str, ...]:
             " scene.distance; give optics.focus_distance"
         )
     if found is not None:
-        how = f", covariance over the aperture to order {found.order}" if found.order else ""
+        points = f"{found.rings} rings of points of the aperture"
+        how = f", covariance over {points}" if found.rings else ""
         more = found.error > ready.settings.tolerance
         notes.append(
             f"layers are put one before the other on {found.cells} x {found.cells} cells a"

@@ -7,6 +7,7 @@ those that do not fill the frame: what is opaque all over hides all alike.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,20 +15,22 @@ import scipy.fft
 from numpy.typing import NDArray
 
 from vcam_cli.camera.derived.geometry import Geometry, pixel_centers
+from vcam_cli.effects.base import of_kind
+from vcam_cli.effects.optics.diffraction import Diffraction
 from vcam_cli.image_formation.layers.layer_lattice import Lattice
-from vcam_cli.image_formation.layers.occlusion import HIGHEST, BlurredLayer, Covariance, covariance
+from vcam_cli.image_formation.layers.occlusion import RINGS, BlurredLayer, Covariance, covariance
 from vcam_cli.image_formation.optical_path import OpticalPath
 from vcam_cli.scenes.cells import cell_edges
 from vcam_cli.scenes.layered import LayeredScene
 
 SHARP = 0.1
 """Radius of a blur below which a layer counts as sharp [pixels]."""
-SAMPLES = 4.0
-"""Samples over the radius of the second widest blur, at most."""
-FINEST = 4
+COARSEST = 1.0
+"""Side of a cell for layers that are nearly sharp, at most [pixels]."""
+FINEST = 8
 """Samples per pixel pitch, at most."""
-SHARE = 0.3
-"""Part of the tolerance that the covariance of higher orders may use."""
+SHARE = 0.2
+"""Part of the tolerance that the covariance may miss by a sum over few points of the aperture."""
 SAMPLED = 0.6
 """Error of the covariance by its samples, relative to it, times the square of the samples over the
 radius: as measured on layers of discs and bars."""
@@ -37,10 +40,10 @@ radius: as measured on layers of discs and bars."""
 class Hidden:
     """What is known of the covariance."""
 
-    order: int = 0
-    """Radial order of the polynomials up to which it was summed; 0 where there was no need to."""
+    rings: int = 0
+    """Rings of points of the aperture over which it was summed; 0 where there was no need to."""
     error: float = 0.0
-    """Of what is left out, predicted, rms [e/s]."""
+    """Predicted, rms [e/s]."""
 
 
 def add_covariance(path: OpticalPath, scene: LayeredScene, light: NDArray, full: float) -> Hidden:
@@ -60,12 +63,14 @@ def add_covariance(path: OpticalPath, scene: LayeredScene, light: NDArray, full:
     Returns
     -------
     Hidden
-        How far it was followed, and what is left.
+        By how many rings it was summed, and its error.
     """
     widest = sorted((abs(optics.radius) for optics in path.layers), reverse=True)
     pitch = max(path.geometry.pitch_x, path.geometry.pitch_y)
-    if len(widest) < 2 or widest[1] < SHARP * pitch:
+    period = _period(path)
+    if len(widest) < 2 or widest[0] < SHARP * pitch or widest[1] + period < SHARP * pitch:
         return Hidden()
+    scale = max(widest[1], COARSEST * pitch)
     rows, columns = _around_edges(scene, path.geometry, widest[0] + 2 * widest[1])
     if not (rows.stop > rows.start and columns.stop > columns.start):
         return Hidden()
@@ -73,16 +78,16 @@ def add_covariance(path: OpticalPath, scene: LayeredScene, light: NDArray, full:
     centers = x[columns], y[rows]
     allowed = SHARE * path.settings.tolerance * full
 
-    def sampled(cell: float, order: int) -> _Sampled:
-        return _covariance(path, scene, centers, cell, widest[0], allowed, order)
+    def sampled(cell: float, rings: Sequence[int]) -> _Sampled:
+        return _covariance(path, scene, centers, cell, widest[0], allowed, rings)
 
-    found = sampled(widest[1], 1)
+    found = sampled(scale, RINGS[:1])
     if found.light.rms <= 0.0:
         return Hidden()
-    asked = widest[1] * math.sqrt(allowed / (SAMPLED * found.light.rms))
-    if asked < widest[1] or found.light.error > allowed:
-        cell = min(max(asked, widest[1] / SAMPLES, pitch / FINEST), widest[1])
-        found = sampled(cell, HIGHEST)
+    asked = scale * math.sqrt(allowed / (SAMPLED * found.light.rms))
+    if asked < scale or found.light.error > allowed:
+        cell = min(max(asked, pitch / FINEST), scale)
+        found = sampled(cell, RINGS)
     for plane, own in zip(light, found.light.light, strict=True):
         across = box_means(own.T, found.at_x, path.geometry.collecting_width / found.cell).T
         plane[rows, columns] += box_means(
@@ -90,8 +95,8 @@ def add_covariance(path: OpticalPath, scene: LayeredScene, light: NDArray, full:
         )
     np.maximum(light, 0, out=light)
     share = math.sqrt(len(centers[0]) * len(centers[1]) / light[0].size)
-    coarse = min(SAMPLED * (found.cell / widest[1]) ** 2, 1.0) * found.light.rms
-    return Hidden(found.light.order, share * math.hypot(found.light.error, coarse))
+    coarse = min(SAMPLED * (found.cell / scale) ** 2, 1.0) * found.light.rms
+    return Hidden(found.light.rings, share * math.hypot(found.light.error, coarse))
 
 
 @dataclass(frozen=True)
@@ -114,7 +119,7 @@ def _covariance(
     cell: float,
     widest: float,
     allowed: float,
-    order: int,
+    rings: Sequence[int],
 ) -> _Sampled:
     """Return the covariance around columns and rows of a lattice, and what blurs into them [m]."""
     edges = []
@@ -130,7 +135,16 @@ def _covariance(
         planes = part.chart.averages(edges[0], edges[1], mix)
         layers.append(BlurredLayer(planes[:-1], planes[-1], optics.radius / cell))
     at_x, at_y = ((at - own[0]) / cell for at, own in zip(centers, edges, strict=True))
-    return _Sampled(covariance(layers, allowed, order), cell, at_x, at_y)
+    light = covariance(layers, allowed, _period(path) / cell, rings)
+    return _Sampled(light, cell, at_x, at_y)
+
+
+def _period(path: OpticalPath) -> float:
+    """Return the period of the lens's cut-off in the scene's mean light; 0 without diffraction."""
+    white = path.transfer.weights[-1].sum(axis=0)
+    mean = float(np.average(path.transfer.wavelengths, weights=white))
+    lens = of_kind(path.layers[0].effects, Diffraction)
+    return max((1 / effect.cutoff(mean) for effect in lens), default=0.0)
 
 
 def _around_edges(scene: LayeredScene, g: Geometry, beyond: float) -> tuple[slice, slice]:

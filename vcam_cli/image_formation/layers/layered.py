@@ -106,7 +106,7 @@ def layered_image(
         light += added
     hidden = add_covariance(path, scene, light, full)
     error = math.hypot(error, hidden.error)
-    depth = DepthReport(count, hidden.order, error / (full or 1.0))
+    depth = DepthReport(count, hidden.rings, error / (full or 1.0))
     layer = Layer(lambda color, rows: light[color, rows])
     return iter([layer]), _report(layers, error, depth)
 

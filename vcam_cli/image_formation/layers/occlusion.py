@@ -3,30 +3,29 @@
 A ray through the point u of the aperture (in its radii) meets a layer whose points blur to the
 radius r in x - r u. In the mean over all rays, light behind an edge is not the mean light times the
 mean of what the edge lets pass: both depend on u, and their covariance over the aperture is
-missing. In Zernike's polynomials Z_n, orthonormal over the aperture, a layer's opacity is
-sum_n A_n Z_n(u) in every place, the light behind it sum_n S_n Z_n(u), and the covariance is
+missing. It is the mean over u of the layers put one before the other, as the rays through u see
+them, less the layers' means put one before the other:
 
-    sum of A_n S_n over n >= 2,   A_n = a filtered by c_n(r f),
-    c_n(f) = mean of Z_n(u) exp(-2 pi i f u) = (-i)^m (-1)^((n-m)/2) 2 sqrt(n+1) J_{n+1}(z) / z
-             times 1, sqrt(2) cos(m theta) or sqrt(2) sin(m theta),   z = 2 pi |f|.
+    <L_1 + (1 - a_1) (L_2 + (1 - a_2) (...))> - (<L_1> + (1 - <a_1>) (<L_2> + (1 - <a_2>) (...))).
 
-A_1 and S_1 are the means. From the last layer to the first the light seen over a layer is
+The mean is a sum over points of the aperture: Gauss's in the squared radius, evenly spaced along
+each ring. More rings are taken until they change the picture by no more than the error that is
+allowed.
 
-    S_1' = L_1 + (1 - A_1) S_1 - sum_n A_n S_n,   S_n' = L_n + (1 - A_1) S_n - A_n S_1.
-
-What this leaves out is of third order: three layers that all vary together. Orders of polynomials
-are added until the last changed the picture by no more than the error that is allowed.
+In waves, a frequency f of incoherent light is transferred by the points of the pupil that are
+lambda N f / 2 away from two others, one each way (in the pupil's diameters) [1]_. So the picture
+through u has those frequencies alone for which both of them lie in the pupil.
 
 References
 ----------
-.. [1] A. J. E. M. Janssen, "Extended Nijboer-Zernike approach for the computation of optical
-   point-spread functions", J. Opt. Soc. Am. A 19, 849-857, 2002, doi:10.1364/JOSAA.19.000849
-   (the transform of a polynomial: Noll 1976, eq 8).
+.. [1] H. H. Hopkins, "The frequency response of a defocused optical system", Proc. R. Soc. A 231,
+   91-103, 1955, doi:10.1098/rspa.1955.0158.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -34,14 +33,14 @@ import numpy as np
 import scipy.fft
 from numpy.typing import NDArray
 
-from vcam_cli.physics.zernike import noll_orders
+from vcam_cli.physics.diffraction import otf_circular
 
-HIGHEST = 8
-"""Highest radial order of polynomials that is tried."""
-FURTHER = 1.2
-"""Rms of all further orders over that of the last one, at most, on layers of discs and bars."""
-STEP = 0.01
-"""Between the entries of a table of Bessel functions, straight in between to 2e-5 [rad]."""
+RINGS = (2, 4, 6, 8)
+"""Rings of points in the aperture that are tried."""
+FURTHER = 0.2
+"""Rms error of a number of rings over what it changed, at most, on layers of discs and bars."""
+SPOKES = 4
+"""Points along the aperture's edge, over the number of rings."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,13 +60,17 @@ class BlurredLayer:
         planes = np.concatenate([self.light, self.opacity[None]])
         return np.asarray(scipy.fft.rfft2(planes, axes=(1, 2)))
 
-    def coefficient(self, index: int) -> tuple[NDArray, NDArray]:
-        """Return light (C, h, w) and opacity (h, w) in the polynomial of a Noll index."""
+    def shift(self, u: float, v: float) -> NDArray:
+        """Return the transfer (h, w // 2 + 1) to what rays through a point of the aperture see."""
+        rows, columns = self.opacity.shape
+        down = np.exp(-2j * np.pi * self.radius * v * scipy.fft.fftfreq(rows))
+        right = np.exp(-2j * np.pi * self.radius * u * scipy.fft.rfftfreq(columns))
+        return np.outer(down, right).astype(self.spectrum.dtype)
+
+    def filtered(self, transfer: NDArray) -> NDArray:
+        """Return light and opacity (C + 1, h, w) behind a transfer."""
         shape = self.opacity.shape
-        fx, fy = scipy.fft.rfftfreq(shape[1]), scipy.fft.fftfreq(shape[0])
-        factor = polynomial_transfer(index, self.radius * fx, self.radius * fy)
-        found = scipy.fft.irfft2(self.spectrum * factor.astype(self.spectrum.dtype), shape)
-        return found[:-1], found[-1]
+        return np.asarray(scipy.fft.irfft2(self.spectrum * transfer, shape, axes=(1, 2)))
 
 
 @dataclass(frozen=True)
@@ -76,45 +79,19 @@ class Covariance:
 
     light: NDArray
     """What is to be added to it (C, h, w), in the light's unit."""
-    order: int
-    """Highest radial order of the polynomials that were summed; 0 where none was."""
+    rings: int
+    """Rings of points over which the mean was taken."""
     error: float
-    """Predicted rms of all further orders, by what the last one added; in the light's unit."""
+    """Predicted rms error, by what the last rings changed; in the light's unit."""
     rms: float
     """Of the light."""
 
 
-def polynomial_transfer(index: int, fx: NDArray, fy: NDArray) -> NDArray:
-    """Return c_n, the mean over the aperture of Z_n(u) exp(-2 pi i f u) [1].
-
-    Parameters
-    ----------
-    index : int
-        Noll's index of the polynomial, from 1.
-    fx, fy : NDArray
-        Frequencies (n,) and (m,) [cycles per radius of the blur].
-
-    Returns
-    -------
-    NDArray
-        Transfer (m, n) without unit, complex.
-    """
-    from scipy.special import jv
-
-    n, m = noll_orders(index)
-    order = abs(m)
-    length = np.hypot(fx[None, :], fy[:, None])
-    z = np.arange(0.0, 2 * np.pi * float(length.max()) + 2 * STEP, STEP)
-    table = np.concatenate([[0.5 * (n == 0)], jv(n + 1, z[1:]) / z[1:]])
-    radial = np.interp(2 * np.pi * length, z, table)
-    direction = (fx[None, :] + 1j * fy[:, None]) / np.where(length > 0, length, 1.0)
-    turned = direction**order
-    around = 1.0 if m == 0 else np.sqrt(2) * (turned.real if m > 0 else turned.imag)
-    return 2 * np.sqrt(n + 1) * (-1) ** ((n - order) // 2) * (-1j) ** order * radial * around
-
-
 def covariance(
-    layers: Sequence[BlurredLayer], allowed: float, highest: int = HIGHEST
+    layers: Sequence[BlurredLayer],
+    allowed: float,
+    period: float = 0.0,
+    rings: Sequence[int] = RINGS,
 ) -> Covariance:
     """Return the covariance over the aperture that the product of means lacks.
 
@@ -123,48 +100,71 @@ def covariance(
     layers : sequence of BlurredLayer
         Layers of one shape, the nearest first. Their border is taken to repeat.
     allowed : float
-        Rms that further polynomials may add, in the light's unit.
-    highest : int, optional
-        Highest order of polynomials that is tried.
+        Rms error to be reached, in the light's unit.
+    period : float, optional
+        Of the frequency from which the lens transfers nothing, lambda N [samples]; 0 without
+        diffraction.
+    rings : sequence of int, optional
+        Rings of points in the aperture that are tried, one after the other.
 
     Returns
     -------
     Covariance
         The covariance.
     """
-    means = [layer.coefficient(1) for layer in layers]
-    behind = [np.zeros_like(layers[0].light)]
-    for light, cover in reversed(means):
-        behind.insert(0, light + (1 - cover) * behind[0])
-    total, error = np.zeros_like(behind[0]), np.inf
-    for order in range(1, highest + 1):
-        first = order * (order + 1) // 2 + 1
-        indices = range(first, first + order + 1)
-        added = np.sum([_of_polynomial(layers, means, behind, i) for i in indices], axis=0)
-        total += added
-        error = _rms(added)
-        if FURTHER * error <= allowed:
+    light: NDArray = np.zeros_like(layers[0].light)
+    for count in rings:
+        before, light = light, _covariance(layers, count, period)
+        error = FURTHER * _rms(light - before)
+        if error <= allowed:
             break
-    return Covariance(total, order, FURTHER * error, _rms(total))
+    return Covariance(light, count, error, _rms(light))
+
+
+def aperture_points(rings: int) -> Iterator[tuple[float, float, float]]:
+    """Yield points (u, v) of a disc of radius 1 and their weights, whose sum is 1."""
+    nodes, weights = np.polynomial.legendre.leggauss(rings)
+    for ring, (node, weight) in enumerate(zip(nodes, weights, strict=True)):
+        radius = math.sqrt((1 + node) / 2)
+        count = math.ceil(SPOKES * rings * radius)
+        for angle in 2 * np.pi / count * (np.arange(count) + ring / 2):
+            yield radius * math.cos(angle), radius * math.sin(angle), weight / 2 / count
+
+
+def _covariance(layers: Sequence[BlurredLayer], rings: int, period: float) -> NDArray:
+    """Return the covariance (C, h, w) by so many rings of points."""
+    shape = layers[0].opacity.shape
+    fx, fy = scipy.fft.rfftfreq(shape[1])[None, :], scipy.fft.fftfreq(shape[0])[:, None]
+    apart_x, apart_y = period * fx, period * fy
+    spectrum = np.zeros_like(layers[0].spectrum[:-1])
+    transfers = [np.zeros_like(spectrum[0]) for _ in layers]
+    counted = np.zeros(spectrum.shape[1:], spectrum.real.dtype)
+    for u, v, weight in aperture_points(rings):
+        # Both u + apart and u - apart lie within the radius 1.
+        between = 2 * np.abs(u * apart_x + v * apart_y)
+        inside = weight * (u**2 + v**2 + apart_x**2 + apart_y**2 + between <= 1)
+        inside = inside.astype(counted.dtype)
+        shifts = [layer.shift(u, v) for layer in layers]
+        seen = _composed([a.filtered(b) for a, b in zip(layers, shifts, strict=True)])
+        spectrum += inside * scipy.fft.rfft2(seen, axes=(1, 2))
+        counted += inside
+        for transfer, shift in zip(transfers, shifts, strict=True):
+            transfer += inside * shift
+    share = otf_circular(np.hypot(fx, fy), period, 1.0) / np.where(counted > 0, counted, 1)
+    share = share.astype(counted.dtype)
+    means = [a.filtered(share * b) for a, b in zip(layers, transfers, strict=True)]
+    together = scipy.fft.irfft2(share * spectrum, shape, axes=(1, 2))
+    return np.asarray(together - _composed(means))
+
+
+def _composed(layers: Sequence[NDArray]) -> NDArray:
+    """Return the light (C, h, w) of layers (C + 1, h, w) one before the other."""
+    total = np.zeros_like(layers[0][:-1])
+    for layer in reversed(layers):
+        total = layer[:-1] + (1 - layer[-1]) * total
+    return total
 
 
 def _rms(light: NDArray) -> float:
     """Return the rms of light (C, h, w) in the color where it is most."""
     return float(np.sqrt(np.square(light).mean(axis=(1, 2)).max()))
-
-
-def _of_polynomial(
-    layers: Sequence[BlurredLayer],
-    means: Sequence[tuple[NDArray, NDArray]],
-    behind: Sequence[NDArray],
-    index: int,
-) -> NDArray:
-    """Return what one polynomial adds to the picture (C, h, w)."""
-    varying, added = np.zeros_like(behind[0]), np.zeros_like(behind[0])
-    ordered = list(zip(layers, means, behind[1:], strict=True))
-    for layer, (_, cover), seen in reversed(ordered):
-        light, opacity = layer.coefficient(index)
-        clear = 1 - cover
-        added = clear * added - opacity * varying
-        varying = light + clear * varying - opacity * seen
-    return added
