@@ -1,6 +1,8 @@
 """Cameras drawn at random, and frames of them on a bench: what a fit sees, and what it does not.
 
-`python tests/fitting/blind.py N` fits N of them and prints how often the intervals hold the truth.
+`python tests/fitting/blind.py N ROWS FRAMES` fits N of them and prints how often the intervals hold
+the truth; with `all` behind it their pixels have traps, their pattern has shading, and every second
+one is read as a mosaic.
 """
 
 import sys
@@ -12,6 +14,7 @@ import numpy as np
 import yaml
 
 from vcam_cli import load, simulate
+from vcam_cli.camera.camera import Camera
 from vcam_cli.fitting.fit import Fit, fit
 from vcam_cli.verification import measurement_file
 
@@ -44,6 +47,19 @@ def truth(number: int) -> dict[str, float]:
         "gain_pixel": spread(0.005, 0.015),
         "gain_column": spread(0.002, 0.006),
         "quantum_efficiency.Y": float(rng.uniform(0.3, 0.8)),
+    }
+
+
+def traps_and_shading(number: int, known: dict[str, float]) -> dict[str, float]:
+    """The numbers of these, drawn likewise: steps that stand out, shading of 1 to 3 %."""
+    rng = np.random.default_rng([1289, number])
+    noise = (known["read_noise"] ** 2 + 1 / 12 / known["system_gain"] ** 2) ** 0.5
+    return {
+        "telegraph_fraction": float(rng.uniform(0.01, 0.05)),
+        "telegraph_amplitude": float(rng.uniform(4, 10)) * noise,
+        "telegraph_occupancy": float(rng.uniform(0.15, 0.85)),
+        "shading_offset": float(rng.uniform(1, 2)) * known["offset_column"],
+        "shading_gain": float(rng.uniform(0.01, 0.03)),
     }
 
 
@@ -95,7 +111,18 @@ def bench(
         "effects": "all",
     }  # fmt: skip
     (folder / "camera.yaml").write_text(yaml.safe_dump(made))
-    camera = load(folder / "camera.yaml").with_({"seed.sensor": sensor, **(changes or {})})
+    camera = load(folder / "camera.yaml").with_(changes or {})
+    return frames_on_a_bench(camera, folder, watts, frames, sensor)
+
+
+def frames_on_a_bench(
+    camera: Camera, folder: Path, watts: float, frames: int, sensor: int, line: Any = LINE
+) -> dict[str, Any]:
+    """Write dark and flat frames of a bare sensor as npy files; return the measurement's YAML.
+
+    watts: irradiance that fills a pixel in `FLAT_TIME` [W/m2].
+    """
+    camera = camera.with_({"seed.sensor": sensor})
     seed, entries = 1000 * sensor, []
 
     def take(name: str, count: int, settings: dict[str, Any], entry: dict[str, Any]) -> None:
@@ -114,32 +141,51 @@ def bench(
         light = f"{level * watts!r} W/m2"
         count = frames if level == 0.5 else max(2, frames // 4)
         take(f"flat{level:g}", count, {"scene.irradiance": light},
-             {"exposure": "10 ms", "light": LINE, "irradiance": light})  # fmt: skip
+             {"exposure": "10 ms", "light": line, "irradiance": light})  # fmt: skip
+    width = f"{camera.pixel.width * 1e6!r} um"
     return {
         "kind": "measurement",
         "name": "blind",
         "frames": entries,
-        "levels": {"bits": 12, "black": "auto"},
-        "pixel": {"width": "4 um"},
+        "levels": {"bits": camera.adc.bits, "black": "auto"},
+        "pixel": {"width": width},
     }
 
 
-def blind_fit(number: int, folder: Path, rows: int, frames: int) -> tuple[dict[str, float], Fit]:
+def blind_fit(
+    number: int, folder: Path, rows: int, frames: int, everything: bool = False
+) -> tuple[dict[str, float], Fit]:
     """One drawn camera and what the fit makes of its frames."""
-    known = truth(number)
-    (folder / "bench.yaml").write_text(
-        yaml.safe_dump(bench(known, folder, rows, frames, number + 1))
-    )
+    known, changes = truth(number), {}
+    if everything:
+        known |= traps_and_shading(number, known)
+        changes = {
+            "pixel.readout.telegraph_noise": {
+                "fraction": f"{100 * known['telegraph_fraction']!r} %",
+                "amplitude": f"{known['telegraph_amplitude']!r} e",
+                "occupancy": f"{100 * known['telegraph_occupancy']!r} %",
+            },
+            "pixel.fpn.shading": {
+                "offset": f"{known['shading_offset']!r} e",
+                "gain": f"{100 * known['shading_gain']!r} %",
+            },
+        }
+    form = bench(known, folder, rows, frames, number + 1, changes)
+    if everything and number % 2:
+        form["pattern"] = "bayer-rggb"
+        efficiency = known.pop("quantum_efficiency.Y")
+        known |= {f"quantum_efficiency.{color}": efficiency for color in "RGB"}
+    (folder / "bench.yaml").write_text(yaml.safe_dump(form))
     return known, fit(measurement_file.read(folder / "bench.yaml"))
 
 
-def main(count: int, rows: int = 256, frames: int = 16) -> None:
+def main(count: int, rows: int = 256, frames: int = 16, everything: bool = False) -> None:
     """Print the mean and rms error of every parameter, and the share of intervals that hold it."""
     held: dict[str, list[bool]] = {}
     errors: dict[str, list[float]] = {}
     for number in range(count):
         with tempfile.TemporaryDirectory() as folder:
-            known, found = blind_fit(number, Path(folder), rows, frames)
+            known, found = blind_fit(number, Path(folder), rows, frames, everything)
         for p in found.parameters:
             if p.name in known:
                 held.setdefault(p.name, []).append(p.low <= known[p.name] <= p.high)
@@ -153,4 +199,5 @@ def main(count: int, rows: int = 256, frames: int = 16) -> None:
 
 
 if __name__ == "__main__":
-    main(*(int(a) for a in sys.argv[1:]))
+    given = sys.argv[1:]
+    main(*(int(a) for a in given if a != "all"), everything="all" in given)

@@ -26,6 +26,8 @@ from vcam_cli.verification.stack_statistics import (
 DEAD, HOT = 0.1, 0.5
 """Signal of a dead pixel, over the others' in light, is less; that of a hot one, over saturation in
 the dark, is more."""
+LEAST_LIGHT = 0.1
+"""Signal of a color, over saturation, in which its dead pixels are told."""
 CLIPPED = 0.005
 """Share of pixels at the ends of the codes above which a stack counts as clipped (EMVA 1288)."""
 DRIFT = 0.01
@@ -44,8 +46,9 @@ class Condition:
     """Color -> statistics of each of its places in the block."""
     patterns: dict[str, Pattern]
     at_zero: float
-    at_most: float
-    """Shares of the codes that are 0, and the highest."""
+    """Share of the codes that are 0."""
+    at_most: dict[str, float]
+    """Color -> share of its codes that are the highest."""
     moments: tuple[PixelMoments, ...] = ()
     """Of the pixels of each plane, of the dark frames of the shortest exposure time."""
 
@@ -85,6 +88,21 @@ def shared(found: Estimate, planes: int, freedom: int) -> Estimate:
 
 
 @dataclass(frozen=True)
+class Defects:
+    """Pixels that do not work, each (rows, columns)."""
+
+    hot: NDArray
+    dead: NDArray
+    judged: NDArray
+    """Pixels that some light is bright enough for to tell whether they are dead."""
+
+    @property
+    def good(self) -> NDArray:
+        """The pixels that work."""
+        return ~(self.hot | self.dead)
+
+
+@dataclass(frozen=True)
 class Conditions:
     """All stacks of a measurement."""
 
@@ -93,9 +111,7 @@ class Conditions:
     warm: tuple[Condition, ...]
     """Dark frames at other temperatures than that of the flat frames."""
     flat: tuple[Condition, ...]
-    hot: float
-    dead: float | None
-    """Fractions of the pixels; None where no frame has light enough to tell."""
+    defects: Defects
     shape: tuple[int, int]
     notes: tuple[str, ...]
 
@@ -126,8 +142,8 @@ def measure(measurement: Measurement, watch: Observer) -> Conditions:
             )
     usual = usual_temperature(measurement)
     here = [(entry, mean) for entry, mean in averages if entry.temperature in (None, usual)]
-    hot, dead = _defects(here, highest)
-    good = ~hot if dead is None else ~(hot | dead)
+    defects = _defects(here, highest, measurement)
+    good = defects.good
     found: list[Condition] = []
     flats = len(averages)
     shortest = min(entry.exposure for entry, _ in here if entry.is_dark)
@@ -146,8 +162,7 @@ def measure(measurement: Measurement, watch: Observer) -> Conditions:
         tuple(c for c in dark if c.entry.temperature in (None, usual)),
         tuple(c for c in dark if c.entry.temperature not in (None, usual)),
         tuple(c for c in found if not c.entry.is_dark),
-        float(hot.mean()),
-        None if dead is None else float(dead.mean()),
+        defects,
         good.shape,
         tuple(notes),
     )
@@ -160,41 +175,51 @@ def usual_temperature(measurement: Measurement) -> float | None:
 
 
 def _defects(
-    averages: Iterable[tuple[FrameSet, NDArray]], highest: int
-) -> tuple[NDArray, NDArray | None]:
-    """Return which pixels are hot, and which dead; None where no light is bright enough."""
+    averages: Iterable[tuple[FrameSet, NDArray]], highest: int, measurement: Measurement
+) -> Defects:
+    """Return which pixels do not work, each beside the others of its color."""
     listed = list(averages)
     dark = [(entry.exposure, mean) for entry, mean in listed if entry.is_dark]
     unlit = min(dark, key=lambda each: each[0])[1]
     black = float(np.median(unlit))
-    full = max((float(np.median(mean)) for _, mean in listed), default=float(highest))
-    hot = unlit > black + HOT * (full - black)
-    half = black + 0.3 * (full - black)
-    lit = [mean for entry, mean in listed if not entry.is_dark and np.median(mean) > half]
-    if not lit or full - black < 0.05 * highest:
-        return hot, None
-    light = lit[0] - black
-    return hot, light < DEAD * np.median(light)
+    places = [place for each in color_planes(measurement).values() for place in each]
+    full = max(float(np.median(mean[place])) for _, mean in listed for place in places) - black
+    hot = unlit > black + HOT * full
+    dead, judged = np.zeros(unlit.shape, bool), np.zeros(unlit.shape, bool)
+    lit = [mean - black for entry, mean in listed if not entry.is_dark]
+    if not lit or full < 0.05 * highest:
+        return Defects(hot, dead, judged)
+    for place in places:
+        light = max((mean[place] for mean in lit), key=np.median)
+        usual = float(np.median(light))
+        if usual > LEAST_LIGHT * full:
+            judged[place] = True
+            dead[place] = light < DEAD * usual
+    return Defects(hot, dead, judged)
 
 
 def _condition(
     entry: FrameSet, label: str, frames: NDArray, good: NDArray, measurement: Measurement
 ) -> Condition:
+    assert measurement.levels is not None
+    highest = 2**measurement.levels.bits - 1
     planes: dict[str, tuple[StackStatistics, ...]] = {}
     patterns: dict[str, Pattern] = {}
+    at_most: dict[str, float] = {}
     for color, places in color_planes(measurement).items():
         planes[color] = tuple(stack_statistics(frames[:, *place], good[place]) for place in places)
         told = zip(planes[color], places, strict=True)
         found = [pattern(plane, good[place]) for plane, place in told]
         patterns[color] = _mean_pattern(found, [columns for _, columns in places])
-    assert measurement.levels is not None
+        full = [float(np.mean(frames[:, *p][:, good[p]] == highest)) for p in places]
+        at_most[color] = float(np.mean(full))
     return Condition(
         entry,
         label,
         planes,
         patterns,
         float(np.mean(frames[:, good] == 0)),
-        float(np.mean(frames[:, good] == 2**measurement.levels.bits - 1)),
+        at_most,
     )
 
 

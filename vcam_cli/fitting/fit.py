@@ -252,8 +252,12 @@ def _of_patterns(
         _gain_variances(curve, i, found, line) for curve, i in zip(curves, chosen, strict=True)
     ]
     lights = len({curve.light for curve in curves})  # all of them show the same gains
+    # What noise is left in a mean frame counts less, relative to gains, the brighter it is.
+    weights = [
+        float(curve.result.series.signal[i]) ** 2 for curve, i in zip(curves, chosen, strict=True)
+    ]
     for number, name in enumerate(("gain_pixel", "gain_column")):
-        variance = combine([each[number] for each in gains])
+        variance = combine([each[number] for each in gains], weights)
         variance = replace(variance, error=variance.error * lights**0.5)
         variance = shared(variance, *lines) if name == "gain_column" else variance
         one = Estimate(1.0, 0.0)
@@ -262,7 +266,7 @@ def _of_patterns(
     out.notes += alien_columns([*((first, color) for color in first.patterns), *lit])
     slow = {
         "shading_offset": (combine([pattern.slow for pattern in dark]), gain, "e"),
-        "shading_gain": (combine([each[2] for each in gains]), Estimate(1.0, 0.0), "1"),
+        "shading_gain": (combine([each[2] for each in gains], weights), Estimate(1.0, 0.0), "1"),
     }
     method = f"of cosines up to {CYCLES} cycles over the array"
     for key, (variance, scale, unit) in slow.items():
@@ -272,12 +276,15 @@ def _of_patterns(
         out.notes.append("flat frames are not even: shading by the lamp, by a lens and by the"
                          " pixels look alike in them and are not told apart; all of it is written"
                          " as shading of the pixels' gains")  # fmt: skip
-    fractions = {"hot": found.hot, "dead": found.dead}
-    for name, share in fractions.items():
-        if share is None:
+    defects, whole = found.defects, found.shape[0] * found.shape[1]
+    for name, mask, n in (
+        ("hot", defects.hot, whole),
+        ("dead", defects.dead, int(defects.judged.sum())),
+    ):
+        if not n:
             out.unknown.append(f"{name} pixels: no flat frames are bright enough")
             continue
-        n = found.shape[0] * found.shape[1]
+        share = float(mask.sum()) / n
         center = (share + SIGMAS**2 / (2 * n)) / (1 + SIGMAS**2 / n)
         reach = (
             SIGMAS / (1 + SIGMAS**2 / n) * ((share * (1 - share) + SIGMAS**2 / (4 * n)) / n) ** 0.5
@@ -313,7 +320,7 @@ def _of_range(out: Fit, curves: list[sensor.Transfer], line: sensor.Dark, gain: 
     for curve in full:
         assert curve.saturated is not None
         mean = curve.saturated.mean(curve.color)
-        if curve.saturated.at_most > 0.5:
+        if curve.saturated.at_most[curve.color] > 0.5:
             out.unknown.append("full well: the ADC is full before the pixel is")
             return
         levels.append(replace(mean, error=max(mean.error, 12**-0.5)))  # rounding of one code

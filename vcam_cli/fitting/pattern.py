@@ -77,8 +77,11 @@ def pattern(stack: StackStatistics, good: NDArray) -> Pattern:
     row = _of_lines(found.row, seen / kept, rows, freedom["row"])
     column -= max(stack.column.value, 0.0) / n
     row -= max(stack.row.value, 0.0) / n
+    # Pixels that are noisier than others leave more of it: the square of their variances has the
+    # excess kurtosis of all noise in it, three times its relative variance.
+    noisier = stack.pixel.value / n * math.sqrt(max(stack.excess.value, 0.0) / 3)
     errors = {
-        "pixel": _chi(pixel_seen, (rows - 1) * (kept - 1)),
+        "pixel": _chi(math.hypot(pixel_seen, noisier), (rows - 1) * (kept - 1)),
         "column": _chi(found.column + pixel_seen / rows, freedom["column"]),
         "row": _chi(found.row + pixel_seen / kept, freedom["row"]),
     }

@@ -174,12 +174,14 @@ def _transfer(
     errors = np.array([c.variance(color).error for c in ordered])[used]
     square = float(s @ s)
     error = math.hypot(float(np.linalg.norm(s * errors)), float(s.sum()) * first[1].error) / square
-    spread = _mean_gain_error(ordered, signal, color, found, line)
-    gain = Estimate(result.gain, math.hypot(error, result.gain * spread))
+    spread, uneven = _gain_spread(ordered, signal, color, found, line)
+    # Gains g of a mean of 1 leave the mean signal as it is, and multiply its variance by g^2.
+    mean_gain, error = result.gain / (1 + uneven), error / (1 + uneven)
+    gain = Estimate(mean_gain, math.hypot(error, mean_gain * spread))
     efficiency = None
     if known:
         responsivity = Estimate(result.responsivity, result.responsivity * spread)
-        alone = Estimate(result.gain, error)  # the pattern's mean gain is in both
+        alone = Estimate(mean_gain, error)  # the pattern's mean gain is in both
         efficiency = responsivity / alone
     try:
         deviation = linearity(series).error if known else None
@@ -188,22 +190,24 @@ def _transfer(
     return Transfer(color, light, result, gain, efficiency, deviation, ordered)
 
 
-def _mean_gain_error(
+def _gain_spread(
     ordered: tuple[Condition, ...],
     signal: np.ndarray,
     color: str,
     found: Conditions,
     line: Dark,
-) -> float:
-    """Return how far the mean gain of so many pixels and columns is from that of all sensors."""
+) -> tuple[float, float]:
+    """Return how far the mean gain of so many pixels and columns is from that of all sensors.
+
+    Beside it the relative variance of the gains of these pixels.
+    """
     half = int(np.argmin(abs(signal - 0.5 * signal.max())))
-    pixel, column, _ = gain_variances(
-        ordered[half], found.dark[0], color, float(signal[half]), line
-    )
+    parts = gain_variances(ordered[half], found.dark[0], color, float(signal[half]), line)
+    pixel, column, slow = (max(part.value, 0.0) for part in parts)
     rows, columns = ordered[half].planes[color][0].average.shape
     planes = len(ordered[half].planes[color])
-    variance = max(pixel.value, 0) / (rows * columns * planes) + max(column.value, 0) / columns
-    return math.sqrt(variance)
+    variance = pixel / (rows * columns * planes) + column / columns
+    return math.sqrt(variance), pixel + column + (slow if is_significant(parts[2]) else 0.0)
 
 
 def gain_variances(

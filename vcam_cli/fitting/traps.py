@@ -20,7 +20,9 @@ References
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,8 +39,14 @@ CLEAR = 12.0
 """Variance over that of the median pixel from which the third moment's sign tells the state."""
 EDGES = np.concatenate([[0.0], np.linspace(0.2, 3, 29), np.geomspace(3.3, 1000, 30), [np.inf]])
 """Edges of the histogram, over the median pixel's variance."""
-NODES = 110
-"""Steps over which the exponential distribution is summed."""
+Cost = Callable[..., Any]
+"""From logarithms of core variance, fraction and step, and the logit of the occupancy."""
+UNKNOWN = 1e3
+"""Standard error of a logit that is not known."""
+LITTLE_KNOWN = 0.3
+"""Standard error of an occupancy that is not known: 12^-1/2."""
+NODES, ROUGH = 110, 40
+"""Steps over which the exponential distribution is summed, at last and before."""
 
 
 @dataclass(frozen=True)
@@ -120,8 +128,6 @@ def find_traps(moments: list[PixelMoments]) -> Traps | None:
         Share, mean step, occupancy, each with its standard error by the curvature of the
         likelihood.
     """
-    from scipy.optimize import minimize
-
     frames = moments[0].frames
     if frames < LEAST_FRAMES or not _go_together(moments):
         return None
@@ -130,20 +136,47 @@ def find_traps(moments: list[PixelMoments]) -> Traps | None:
     unit = float(np.median(variance))
     counts = _histogram(variance / unit, third)
 
-    def cost(place: NDArray) -> float:
-        expected = _probabilities(place, frames)
+    def cost(place: NDArray, nodes: int = NODES) -> float:
+        expected = _probabilities(place, frames, nodes)
         return -float((counts * np.log(np.maximum(expected, 1e-300))).sum())
 
-    begin = np.array([0.0, math.log(0.02), math.log(5.0), 0.0])
-    found = minimize(cost, begin, method="Nelder-Mead", options={"xatol": 1e-4, "fatol": 1e-4})
-    values, errors = _values(found.x), _errors(cost, found.x)
+    found = _most_likely(cost)
+    if found is None:
+        return None
+    place, errors = found
+    values = _values(place, frames)
     scales = unit, 1.0, math.sqrt(unit), 1.0
     core, fraction, amplitude, occupancy = (
         Estimate(value * scale, error * slope * scale)
-        for value, error, slope, scale in zip(values, errors, _slopes(found.x), scales, strict=True)
+        for value, error, slope, scale in zip(
+            values, errors, _slopes(place, frames), scales, strict=True
+        )
     )
+    rarer = min(occupancy.value, 1 - occupancy.value)
+    if rarer * frames < 1.05:  # at the end of its range
+        occupancy = replace(occupancy, error=LITTLE_KNOWN)
     lines = Estimate(float(np.mean([m.lines for m in moments])), 0.0)
     return Traps(fraction, amplitude, occupancy, core - lines)
+
+
+def _most_likely(cost: Cost) -> tuple[NDArray, NDArray] | None:
+    """Return where the cost is least, and the standard errors there; None where it is nowhere.
+
+    Rare and frequent steps may each be a minimum by itself.
+    """
+    from scipy.optimize import minimize
+
+    found = []
+    for occupancy in (-1.0, 0.0, 1.0):
+        begin = np.array([0.0, math.log(0.02), math.log(5.0), occupancy])
+        rough = minimize(
+            cost, begin, (ROUGH,), method="Nelder-Mead", options={"xatol": 1e-3, "fatol": 1e-3}
+        )
+        found.append(rough)
+    best = min(found, key=lambda each: each.fun)
+    place = minimize(cost, best.x, method="Nelder-Mead", options={"xatol": 1e-4, "fatol": 1e-4}).x
+    errors = _errors(cost, place)
+    return (place, errors) if np.isfinite(errors).all() else None
 
 
 def _go_together(moments: list[PixelMoments]) -> bool:
@@ -163,36 +196,41 @@ def _histogram(variance: NDArray, third: NDArray) -> NDArray:
     return counts
 
 
-def _values(place: NDArray) -> tuple[float, float, float, float]:
-    """Return core variance, fraction, mean step and occupancy, in units of the median pixel."""
+def _values(place: NDArray, frames: int) -> tuple[float, float, float, float]:
+    """Return core variance, fraction, mean step and occupancy, in units of the median pixel.
+
+    A trap that is filled, or empty, in less than one of so many frames is none that is seen again
+    and again: a few rare steps in all pixels would look like it.
+    """
     core, fraction, amplitude, occupancy = map(float, place)
+    share = 1 / (1 + math.exp(-occupancy))
     return (
         math.exp(core),
         min(math.exp(fraction), 1.0),
         math.exp(amplitude),
-        1 / (1 + math.exp(-occupancy)),
+        min(max(share, 1 / frames), 1 - 1 / frames),
     )
 
 
-def _slopes(place: NDArray) -> tuple[float, float, float, float]:
+def _slopes(place: NDArray, frames: int) -> tuple[float, float, float, float]:
     """Return how fast the values change with the place."""
-    core, fraction, amplitude, occupancy = _values(place)
+    core, fraction, amplitude, occupancy = _values(place, frames)
     return core, fraction, amplitude, occupancy * (1 - occupancy)
 
 
-def _probabilities(place: NDArray, frames: int) -> NDArray:
+def _probabilities(place: NDArray, frames: int, nodes: int = NODES) -> NDArray:
     """Return the probability of every bin of the histogram (2, bins)."""
     from scipy.special import chdtr, chndtr
     from scipy.stats import binom
 
-    core, fraction, amplitude, occupancy = _values(place)
+    core, fraction, amplitude, occupancy = _values(place, frames)
     freedom = frames - 1
     scaled = EDGES[1:-1] * freedom / core
     plain = np.diff(np.concatenate([[0.0], chdtr(freedom, scaled), [1.0]]))
     filled = np.arange(frames + 1)
     share = binom.pmf(filled, frames, occupancy)
     # Few noncentralities stand for all: between them the distribution is smooth.
-    centers = np.concatenate([[0.0], np.geomspace(0.05, 4e4, NODES)])
+    centers = np.concatenate([[0.0], np.geomspace(0.05, 4e4, nodes)])
     table = chndtr(scaled, freedom, centers[:, None])
     table = np.diff(np.concatenate([np.zeros((len(centers), 1)), table,
                                     np.ones((len(centers), 1))], axis=1))  # fmt: skip
@@ -214,8 +252,12 @@ def _probabilities(place: NDArray, frames: int) -> NDArray:
     return (1 - fraction) * plain_part + fraction * out
 
 
-def _errors(cost, place: NDArray) -> NDArray:
-    """Return standard errors from the curvature of the negative logarithm of the likelihood."""
+def _errors(cost: Cost, place: NDArray) -> NDArray:
+    """Return standard errors from the curvature of the negative logarithm of the likelihood.
+
+    Where it has none along the occupancy, which then ends its range, that is not known, and the
+    others are; infinite where it is no minimum along these.
+    """
     size, step = len(place), 0.02
     hessian = np.empty((size, size))
     moved = np.eye(size) * step
@@ -225,4 +267,9 @@ def _errors(cost, place: NDArray) -> NDArray:
                        ((1, 1), (1, -1), (-1, 1), (-1, -1))]  # fmt: skip
             value = (corners[0] - corners[1] - corners[2] + corners[3]) / (4 * step**2)
             hessian[i, j] = hessian[j, i] = value
-    return np.sqrt(np.maximum(np.diag(np.linalg.pinv(hessian)), 0))
+    for known in (size, size - 1):
+        part = hessian[:known, :known]
+        if np.linalg.eigvalsh(part).min() > 0:
+            errors = np.sqrt(np.diag(np.linalg.inv(part)))
+            return np.append(errors, np.full(size - known, UNKNOWN))
+    return np.full(size, np.inf)

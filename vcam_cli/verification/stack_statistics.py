@@ -40,10 +40,11 @@ class Estimate:
         return Estimate(ratio, math.hypot(self.error, ratio * other.error) / abs(other.value))
 
 
-def combine(estimates: list[Estimate]) -> Estimate:
-    """Return the mean of independent estimates of one number."""
-    total = sum(estimates[1:], estimates[0])
-    return total * (1 / len(estimates))
+def combine(estimates: list[Estimate], weights: list[float] | None = None) -> Estimate:
+    """Return the mean of independent estimates of one number, by weight where there are any."""
+    weights = weights or [1.0] * len(estimates)
+    scaled = [each * weight for each, weight in zip(estimates, weights, strict=True)]
+    return sum(scaled[1:], scaled[0]) * (1 / sum(weights))
 
 
 def robust_deviation(values: NDArray) -> float:
