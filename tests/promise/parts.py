@@ -180,7 +180,7 @@ class Part:
 BEFORE_SCENES = tuple(itertools.product(scene_matrix.CAMERAS, scene_matrix.SCENES))
 PARTS = {
     "named": Part(
-        "twenty-two cameras with little in common",
+        "twenty-four cameras with little in common",
         tuple((name,) for name in promises.CAMERAS),
         named,
         named_figures,

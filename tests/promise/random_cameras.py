@@ -1,7 +1,8 @@
 """Cameras drawn at random, every effect that their kind has, and what a tolerance makes of them.
 
 Sizes and strengths are spread over what cameras have, evenly in their logarithm where they span
-more than a factor of three. The arrays are small: nothing here depends on their size but time.
+more than a factor of three. Every fifth scene moves, by some pixels in 10 ms; before some hangs a
+card, out of focus. The arrays are small: nothing here depends on their size but time.
 """
 
 from __future__ import annotations
@@ -71,7 +72,7 @@ def tree(number: int) -> dict:
     noise: dict = {"reset_noise": spread(0.3, 30, "e")}
     if ccd:
         noise = {"charge_transfer": {"inefficiency": spread(1e-6, 1e-3), "phases": 3}}
-    return {
+    drawn = {
         "name": f"random-{number}",
         "scene": scene,
         "optics": {
@@ -125,6 +126,19 @@ def tree(number: int) -> dict:
         },
         "adc": {"bits": int(rng.integers(8, 15))},
     }
+    lengths = drawn["pixel"]["width"], drawn["optics"]["focal_length"]
+    width, focal_length = (float(length.split()[0]) for length in lengths)
+    in_scene = 1e-3 * width / focal_length  # a pixel's width, at 1 m [m]
+    if number % 5 == 2:  # it moves, so many pixels in 10 ms
+        pixels = {axis: share(-1, 1) * spread(0.5, 20) for axis in ("x", "y")}
+        source["motion"] = {axis: f"{n * in_scene / 10e-3:.4g} m/s" for axis, n in pixels.items()}
+    if number % 10 == 8 and source.get("model") != "laser":  # a card hangs before its middle
+        near = share(0.6, 0.95)
+        card = {"kind": "chart", "chart": "slanted-edge"}
+        size = {"distance": f"{near} m", "width": f"{16 * near * in_scene:.4g} m"}
+        behind = {"source": source, "distance": scene.pop("distance")}
+        scene["source"] = {"kind": "layers", "layers": [{"source": card, **size}, behind]}
+    return drawn
 
 
 def made(number: int, folder: Path) -> Camera:
