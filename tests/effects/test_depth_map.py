@@ -297,6 +297,24 @@ def test_cameras_that_see_no_depth_are_refused(given, said, tmp_path):
         checks.check_layers(made)
 
 
+@pytest.mark.parametrize("kind", ["map", "layers"])
+def test_a_blur_of_too_many_waves_is_refused(kind, tmp_path):
+    """By rays it is simulated."""
+    wide = {"optics": OPTICS | {"f_number": 1.4, "focal_length": "35 mm", "focus_distance": "1 m"}}
+    depth = np.where(np.eye(64), 0.4, 1.0)
+    given = STILL | {"scene.source": picture(tmp_path), "effects": QUIET} | wide
+    if kind == "map":
+        given["scene.source"] |= {"depth": write_exr(tmp_path / "z.exr", depth)}
+    else:
+        plain = {"source": {"kind": "chart", "chart": "uniform"}}
+        layers = [plain | {"distance": f"{distance} m"} for distance in (0.4, 1)]
+        given["scene.source"] = {"kind": "layers", "layers": layers}
+    with pytest.raises(BadInput, match=r"0\.4 m gives .* at most 200 .* diffraction: off"):
+        simulate(camera(tmp_path, given))
+    rays = {"effects": STILL["effects"], "array.rows": 8, "array.columns": 8}
+    assert np.isfinite(seen(tmp_path, given, rays)[0]).all()
+
+
 def test_only_an_exr_has_its_depth_in_a_channel(tmp_path):
     source = {"kind": "hyperspectral", "file": "cube.hdr", "depth": "dd.y.T"}
     with pytest.raises(BadInput, match=r"depth: \{file: depth.exr\}"):

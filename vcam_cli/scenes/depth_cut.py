@@ -27,6 +27,8 @@ from numpy.typing import NDArray
 
 MOST_LAYERS = 256
 """Layers of a picture, at most."""
+FINEST = 2e-5
+"""Error of the cuts below which no more layers are made, rms, relative to full signal."""
 BETWEEN = 0.73
 """Rms over all places between two layers of an error that is largest in the middle: of
 4 t (1 - t), sqrt(8 / 15)."""
@@ -222,7 +224,7 @@ def cut_depth(
     DepthCut
         The layers.
     """
-    radii, error = _layer_radii(radius, detail, allowed)
+    radii, error = _layer_radii(radius, detail, max(allowed, FINEST))
     values = _few_values(radius, len(radii))
     if values is not None:
         radii, error = values, 0.0
@@ -239,14 +241,17 @@ def cut_depth(
 
 
 def _slope(radius: NDArray, side: int) -> float:
-    """Return by how much the radius rises from pixel to pixel, rms, where nothing is hidden.
+    """Return by how much the radius rises over a length, rms, where nothing is hidden.
 
-    Radii are counted in samples, of which so many are a pixel's side.
+    Radii are counted in samples, of which so many are a pixel's side: noise within it is none.
     """
-    means = _block_means(radius, side)
-    rises = [np.diff(means, axis=axis) / side for axis in (0, 1) if means.shape[axis] > 1]
-    squares = [np.square(rise[np.abs(rise) < 1]) for rise in rises]
-    return math.sqrt(sum(float(own.mean()) for own in squares if own.size))
+    squares = 0.0
+    for axis in (0, 1):
+        rise = np.diff(radius, axis=axis)
+        if rise.size:
+            means = _block_means(np.where(np.abs(rise) < 1, rise, 0), side)
+            squares += float(np.square(means).mean())
+    return math.sqrt(squares)
 
 
 def _layer_radii(radius: NDArray, detail: Detail, allowed: float) -> tuple[NDArray, float]:

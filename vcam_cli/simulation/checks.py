@@ -17,7 +17,7 @@ from vcam_cli.camera.derived.geometry import geometry
 from vcam_cli.camera.derived.image_motion import check_motion
 from vcam_cli.camera.derived.lattice import places
 from vcam_cli.camera.derived.line_times import check_shutter
-from vcam_cli.camera.derived.scene_layers import check_layers
+from vcam_cli.camera.derived.scene_layers import PATH, check_layers, layer_cameras
 from vcam_cli.camera.processing import SHOWN
 from vcam_cli.camera.scene.scene_files import Crop
 from vcam_cli.camera.scene.sources import Layers
@@ -31,7 +31,7 @@ from vcam_cli.scenes.build import SOURCE, check_channels
 from vcam_cli.scenes.hyperspectral import check_bands, check_coverage, check_place
 from vcam_cli.simulation import plan, scene_bands, spectral_irradiance
 from vcam_cli.simulation.output import isetcam_files, raw_dng
-from vcam_cli.simulation.scene_files import read_map
+from vcam_cli.simulation.scene_files import check_blur, read_map
 
 
 def load(camera: str | Path, sets: Sequence[str] = ()) -> Camera:
@@ -168,6 +168,8 @@ def check_lens(camera: Camera) -> None:
 def read_lens(camera: Camera) -> dict[str, NDArray]:
     """Return what the files of the camera's optics hold, for `Camera.with_samples`."""
     aberration.check(camera, geometry(camera))
+    for number, alone in enumerate(layer_cameras(camera)):
+        check_blur(alone, (*PATH, number, "distance"))
     psf = camera.optics.psf
     if psf is None:
         return {}

@@ -9,12 +9,19 @@ from numpy.typing import NDArray
 
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import geometry
-from vcam_cli.camera.derived.scene_layers import DEPTH, PATH, camera_at, layer_cameras
+from vcam_cli.camera.derived.scene_layers import (
+    DEPTH,
+    PATH,
+    camera_at,
+    flat_camera,
+    layer_cameras,
+)
 from vcam_cli.camera.scene.scene_files import DepthMap, Hyperspectral, ImageFile
 from vcam_cli.camera.scene.sources import Layers
 from vcam_cli.effects.base import Effect, of_kind
+from vcam_cli.effects.optics import aberration
 from vcam_cli.effects.optics.depth import Depth
-from vcam_cli.errors import bad
+from vcam_cli.errors import BadInput, bad
 from vcam_cli.image_formation import photon_rate
 from vcam_cli.image_formation.optical_path import LayerOptics
 from vcam_cli.image_formation.settings import camera_settings
@@ -102,7 +109,28 @@ def read_map(camera: Camera, size: tuple[int, int]) -> tuple[NDArray, tuple[str,
             f" {focal:.6g} m"
         )
         raise bad(DEPTH, message, "check the unit of the map, or use a shorter focal length")
+    for distance in (nearest, float(depth.max())):
+        check_blur(camera_at(camera, distance), DEPTH)
     return depth, notes
+
+
+def check_blur(alone: Camera, path: tuple[str | int, ...]) -> None:
+    """Refuse a distance at which a camera's blur cannot be followed (BadInput).
+
+    `alone` looks at that distance only, `path` is the key that tells it.
+    """
+    try:
+        aberration.check(alone, geometry(alone))
+    except BadInput as error:
+        [problem] = error.problems
+        message = f"what lies at {alone.scene.distance:.6g} m {problem.message}"
+        remedy = "stop down, focus closer to it, or write effects: {diffraction: off} for rays"
+        if alone.optics.measured_blur:
+            message, remedy = (
+                problem.message,
+                "use a flat scene, or another description of the lens",
+            )
+        raise bad(path, message, remedy) from None
 
 
 def flattened(camera: Camera, picture: ScenePicture) -> tuple[Camera, Any, tuple[str, ...]]:
@@ -121,7 +149,7 @@ def flattened(camera: Camera, picture: ScenePicture) -> tuple[Camera, Any, tuple
     if distance is None:
         return camera, picture, ()
     note = f"the map of depth is flat within the tolerance: the scene lies at {distance:.6g} m"
-    return camera_at(camera, distance), picture.picture, (note,)
+    return flat_camera(camera, camera_at(camera, distance)), picture.picture, (note,)
 
 
 def _flat(camera: Camera, view: View, picture: DepthPicture) -> ImageScene:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.lens import focus_distance, lens
@@ -23,32 +24,39 @@ def layer_cameras(camera: Camera) -> tuple[Camera, ...]:
     source = camera.scene.source
     if not isinstance(source, Layers):
         return ()
-    optics = camera.optics.model_copy(update={"focus_distance": focus_distance(camera)})
-    effects = camera.effects
-    if isinstance(effects, dict):  # what is wanted of the whole need not be in each layer
-        effects = {name: state for name, state in effects.items() if state != "on"}
     found = []
     for layer in source.layers:
         alone = layer.source.model_copy(update={"motion": layer.motion})
         extent = "sensor" if layer.width is None else Extent.model_construct(width=layer.width)
-        scene = camera.scene.model_copy(
-            update={"source": alone, "distance": layer.distance, "extent": extent}
-        )
-        found.append(
-            camera.model_copy(update={"scene": scene, "optics": optics, "effects": effects})
-        )
+        found.append(_looking_at(camera, source=alone, distance=layer.distance, extent=extent))
     return tuple(found)
 
 
 def camera_at(camera: Camera, distance: float) -> Camera:
-    """Return the camera, focused as before, with a flat scene at a distance [m] as its source.
+    """Return a camera that sees all of a picture with depth at one distance [m], as a layer of it.
 
-    It is that of a file with a map of depth, which is left out.
+    It has the same lens, focused as before; the map of depth is left out.
     """
-    optics = camera.optics.model_copy(update={"focus_distance": focus_distance(camera)})
     source = camera.scene.source.model_copy(update={"depth": None})
-    scene = camera.scene.model_copy(update={"source": source, "distance": distance})
-    return camera.model_copy(update={"scene": scene, "optics": optics})
+    return _looking_at(camera, source=source, distance=distance)
+
+
+def flat_camera(camera: Camera, alone: Camera) -> Camera:
+    """Return a camera of one layer that is all of its scene, with the effects of the whole."""
+    effects = camera.effects
+    if isinstance(effects, dict):  # no depth is left to be simulated
+        effects = {name: state for name, state in effects.items() if name != "depth"}
+    return alone.model_copy(update={"effects": effects})
+
+
+def _looking_at(camera: Camera, **changes: Any) -> Camera:
+    """Return the camera, focused as before, with another scene."""
+    optics = camera.optics.model_copy(update={"focus_distance": focus_distance(camera)})
+    effects = camera.effects
+    if isinstance(effects, dict):  # what is wanted of the whole need not be in each layer
+        effects = {name: state for name, state in effects.items() if state != "on"}
+    scene = camera.scene.model_copy(update=changes)
+    return camera.model_copy(update={"scene": scene, "optics": optics, "effects": effects})
 
 
 def with_flat_scene(camera: Camera) -> Camera:
@@ -57,7 +65,7 @@ def with_flat_scene(camera: Camera) -> Camera:
     if len(layers) != 1 or layers[0].width is not None or layers[0].mask is not None:
         return camera
     [alone] = layer_cameras(camera)
-    return alone.model_copy(update={"effects": camera.effects})
+    return flat_camera(camera, alone)
 
 
 def check_layers(camera: Camera) -> None:

@@ -1,0 +1,139 @@
+"""Cutting a map of depth: shares of layers, their number, what lies hidden and where."""
+
+import numpy as np
+import pytest
+from scipy.signal import fftconvolve
+
+from vcam_cli.scenes.depth_cut import (
+    LEAST_JUMP,
+    Detail,
+    cut_depth,
+    disc_transfer,
+    picture_detail,
+)
+
+PITCH = 1e-6
+PIXEL = 4e-6
+ALL = np.arange(48)
+
+
+def passes(frequency: np.ndarray) -> np.ndarray:
+    return np.ones_like(frequency)
+
+
+def noise(seed: int = 0) -> np.ndarray:
+    return np.random.default_rng(seed).uniform(0, 1, (48, 48))
+
+
+def cut(radius: np.ndarray, allowed: float = 1e-3, picture: np.ndarray | None = None):
+    picture = noise() if picture is None else picture
+    detail = picture_detail(picture, PITCH, PIXEL, passes)
+    return cut_depth(radius, picture, PITCH, PIXEL, detail, allowed)
+
+
+def test_a_disc_passes_nothing_at_the_first_zero_of_its_transfer():
+    """Airy's constant: J1 is 0 at 3.8317 = 2 pi 0.6098."""
+    radius = 10e-6
+    found = disc_transfer(np.array([0.0, 1.0, 0.60983 / radius]), radius)
+    assert found == pytest.approx([1, 1, 0], abs=1e-5)
+
+
+def test_the_power_of_a_wave_is_half_its_squared_amplitude():
+    """Of a wave much longer than a pixel, whose full signal is 1."""
+    x = (np.arange(256) + 0.5) / 256
+    wave = 0.5 + 0.5 * np.cos(2 * np.pi * x) * np.ones((256, 1))
+    detail = picture_detail(wave, PITCH, PIXEL, passes)
+    assert detail.power.sum() == pytest.approx(0.5 * 0.5**2, rel=2e-2)
+    at = float((detail.power * detail.frequency).sum() / detail.power.sum())
+    assert at == pytest.approx(1 / 256e-6, rel=2e-2)
+
+
+def test_shares_of_a_sample_add_up_and_have_its_radius():
+    radius = np.linspace(30e-6, -10e-6, 48)[:, None] + np.zeros((48, 48))
+    found = cut(radius)
+    layers = np.array([found.coverage(number, ALL, ALL) for number in range(len(found.radii))])
+    assert layers.sum(axis=0) == pytest.approx(1)
+    assert np.tensordot(found.radii, layers, 1) == pytest.approx(radius, abs=1e-12)
+    assert (np.diff(found.radii) < 0).all()
+    assert found.is_used().all()
+
+
+@pytest.mark.parametrize("allowed", [1e-2, 1e-3, 1e-4])
+def test_the_blur_between_layers_is_as_exact_as_predicted(allowed):
+    """Of the whole picture at a radius midway between two layers, blurred by sums over discs."""
+    radius = np.linspace(24e-6, 8e-6, 48)[:, None] + np.zeros((48, 48))
+    picture = np.kron(noise(1)[::4, ::4], np.ones((4, 4)))
+    found = cut(radius, allowed, picture)
+    fine, wide = 6, 200
+    large = np.kron(np.tile(picture, (3, 3)), np.ones((fine, fine)))
+    y, x = np.mgrid[-wide : wide + 1, -wide : wide + 1]
+    seen = []
+    first, second = found.radii[:2]
+    for own in ((first + second) / 2, first, second):
+        disc = (np.hypot(x, y) * PITCH / fine <= abs(own)).astype(float)
+        blurred = fftconvolve(large, disc / disc.sum(), mode="same")
+        inner = blurred[48 * fine : 96 * fine, 48 * fine : 96 * fine]
+        side = round(PIXEL / PITCH) * fine
+        seen.append(inner.reshape(48 * fine // side, side, -1, side).mean(axis=(1, 3)))
+    error = float(np.sqrt(np.square(seen[0] - (seen[1] + seen[2]) / 2).mean()))
+    # In the middle it is the largest; discs of squares and the picture's border leave the rest.
+    assert error <= 1.6 * max(found.error, 2e-5) + 2e-4
+
+
+def test_few_values_are_layers_themselves():
+    radius = np.where(noise() > 0.5, 20e-6, np.where(noise(1) > 0.5, 5e-6, -8e-6))
+    found = cut(radius)
+    assert found.radii == pytest.approx([20e-6, 5e-6, -8e-6])
+    assert found.error < 1e-3
+    assert not found.share[found.first < 1].any()
+
+
+@pytest.mark.parametrize("why", ["no detail", "no blur", "one distance"])
+def test_one_layer_is_enough(why):
+    radius = np.linspace(30e-6, -10e-6, 48)[:, None] + np.zeros((48, 48))
+    picture = noise()
+    if why == "no detail":
+        picture = np.full((48, 48), 0.5)
+    else:
+        radius = 1e-3 * radius if why == "no blur" else np.full((48, 48), 7e-6)
+    assert len(cut(radius, picture=picture).radii) == 1
+
+
+def test_what_rays_pass_by_is_hidden_and_no_more():
+    """A step of 12 samples: so far behind the edge, and there the samples at the edge go on."""
+    radius = np.where(np.arange(48) < 24, 10e-6, -2e-6) * np.ones((48, 1))
+    hidden = cut(radius).hidden
+    rows, columns = np.unravel_index(hidden.samples, radius.shape)
+    assert columns.max() == 23
+    assert 11 <= 24 - columns.min() <= 14
+    assert np.bincount(rows).min() == np.bincount(rows).max()
+    assert (hidden.sources == rows * 48 + 24).all()
+    assert hidden.unknown > 0.1
+
+
+@pytest.mark.parametrize("kind", ["slope", "small step"])
+def test_smooth_surfaces_hide_nothing(kind):
+    columns = np.arange(48) * np.ones((48, 1))
+    step = 0.9 * LEAST_JUMP * PIXEL
+    radius = 0.6 * PITCH * columns if kind == "slope" else np.where(columns < 24, step, 0)
+    assert not len(cut(radius).hidden.samples)
+
+
+def test_even_backgrounds_are_known():
+    radius = np.where(np.arange(48) < 24, 10e-6, -2e-6) * np.ones((48, 1))
+    picture = np.where(np.arange(48) < 24, noise(), 0.3)
+    hidden = cut(radius, picture=picture).hidden
+    assert (hidden.unknown, hidden.most_unknown) == (0, 0)
+
+
+def test_a_slope_changes_what_a_sum_over_rays_says():
+    """Of one frequency: the mean of u cos over points of the aperture."""
+    radius, frequency = 5e-6, 70e3
+    k = np.arange(4000) + 0.5
+    rho, angle = np.sqrt(k / len(k)), np.pi * (1 + 5**0.5) * k
+    u, v = rho * np.cos(angle), rho * np.sin(angle)
+    mean = (u * np.exp(-2j * np.pi * frequency * radius * u)).mean()
+    detail = Detail(np.array([frequency]), np.array([0.5]))
+    # A wave of power 1/2, along the slope and across it in equal parts.
+    assert detail.slope_change(radius) == pytest.approx(abs(mean) / 2, rel=1e-3)
+    assert abs((v * np.exp(-2j * np.pi * frequency * radius * u)).mean()) < 1e-3
