@@ -67,6 +67,19 @@ def test_few_frames_do_not_tell():
     assert find_traps([pixel_moments(drawn(2, frames=4), GOOD)]) is None
 
 
+def test_a_trap_is_filled_in_one_frame_at_least():
+    """Else a few rare steps would be traps in all pixels; an occupancy at its end is not known."""
+    for logit, share in ((-20.0, 1 / 16), (20.0, 15 / 16), (0.0, 0.5)):
+        assert traps._values(np.array([0.0, -4.0, 1.5, logit]), 16)[3] == pytest.approx(share)
+
+    def flat(place):
+        return 0.5 * float(np.sum((place[:3] / 0.1) ** 2))
+
+    errors = traps._errors(flat, np.zeros(4))
+    assert errors == pytest.approx([0.1, 0.1, 0.1, traps.UNKNOWN])
+    assert np.isinf(traps._errors(lambda place: -flat(place), np.zeros(4))).all()
+
+
 def test_lines_that_are_taken_out_leave_steps_their_size():
     """A step of 20 in half of 10 frames of 16 x 12 pixels, noise of 1.5: in the mean of 400 arrays.
 

@@ -216,7 +216,8 @@ def _of_traps(out: Fit, traps: Traps, gain: Estimate) -> None:
     method = "maximum likelihood of the pixels' variances, shortest dark frames"
     add(parameter("telegraph_fraction", traps.fraction, "1", method))
     add(parameter("telegraph_amplitude", traps.amplitude / gain, "e", f"mean step, {method}"))
-    add(parameter("telegraph_occupancy", traps.occupancy, "1", method))
+    told = parameter("telegraph_occupancy", traps.occupancy, "1", method)
+    add(replace(told, low=max(told.low, 0.0), high=min(told.high, 1.0)))
 
 
 def _of_gain(out: Fit, curves: list[sensor.Transfer], gain: Estimate) -> None:
@@ -264,9 +265,15 @@ def _of_patterns(
         add(deviation(name, variance, one, "1", "EMVA 1288 R4 eq 67, near half of saturation"))
     lit = [(curve.conditions[i], curve.color) for curve, i in zip(curves, chosen, strict=True)]
     out.notes += alien_columns([*((first, color) for color in first.patterns), *lit])
+    # Columns are most of what makes the slow part uncertain, and planes of a mosaic share them.
+    alike = first.planes_in_line**0.5
+    slow_dark = combine([pattern.slow for pattern in dark])
+    slow_dark = replace(slow_dark, error=slow_dark.error * alike)
+    slow_gain = combine([each[2] for each in gains], weights)
+    slow_gain = replace(slow_gain, error=slow_gain.error * alike * lights**0.5)
     slow = {
-        "shading_offset": (combine([pattern.slow for pattern in dark]), gain, "e"),
-        "shading_gain": (combine([each[2] for each in gains], weights), Estimate(1.0, 0.0), "1"),
+        "shading_offset": (slow_dark, gain, "e"),
+        "shading_gain": (slow_gain, Estimate(1.0, 0.0), "1"),
     }
     method = f"of cosines up to {CYCLES} cycles over the array"
     for key, (variance, scale, unit) in slow.items():

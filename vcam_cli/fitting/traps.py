@@ -44,7 +44,8 @@ Cost = Callable[..., Any]
 UNKNOWN = 1e3
 """Standard error of a logit that is not known."""
 LITTLE_KNOWN = 0.3
-"""Standard error of an occupancy that is not known: 12^-1/2."""
+"""Standard error of an occupancy that is not known, 12^-1/2; relative, what that leaves of
+fraction and step."""
 NODES, ROUGH = 110, 40
 """Steps over which the exponential distribution is summed, at last and before."""
 
@@ -153,8 +154,12 @@ def find_traps(moments: list[PixelMoments]) -> Traps | None:
         )
     )
     rarer = min(occupancy.value, 1 - occupancy.value)
-    if rarer * frames < 1.05:  # at the end of its range
+    if rarer * frames < 1.05:  # at the end of its range: fraction and step rest on it
         occupancy = replace(occupancy, error=LITTLE_KNOWN)
+        fraction, amplitude = (
+            replace(each, error=math.hypot(each.error, LITTLE_KNOWN * each.value))
+            for each in (fraction, amplitude)
+        )
     lines = Estimate(float(np.mean([m.lines for m in moments])), 0.0)
     return Traps(fraction, amplitude, occupancy, core - lines)
 
