@@ -76,6 +76,8 @@ class LightPlan:
 
     def reduced(self, path: OpticalPath) -> OpticalPath:
         """Return the path without the omitted effects."""
+        if not self.omitted:
+            return replace(path, optional=())
         kept = tuple(effect for effect in path.effects if effect not in self.omitted)
         gone = {effect.name for effect in self.omitted}
         layers = tuple(layer.without_effects(gone) for layer in path.layers)
@@ -183,7 +185,7 @@ def _rms(values: NDArray) -> float:
 
 def _levels_stay(path: OpticalPath, detail: SceneDetail | None, effect: Effect) -> bool:
     """Return whether the percentiles of the light stay where they are without a gain or glare."""
-    if detail is None:
+    if detail is None or not of_kind([effect], Gain, VeilingGlare):
         return True
     before, after = np.percentile(_light_behind(detail, effect), PERCENTILES, axis=(1, 2)).T
     return bool(np.all(np.abs(after - before) <= LEVEL_SHARE * path.settings.tolerance * before))
