@@ -106,4 +106,5 @@ def print_fit(found: "Fit", path: Path) -> None:
         f"{n:<24} {v:>11}  {low:>11} .. {high:<11} {u}" for n, v, low, high, u in rows
     )
     options.print_rows(("parameter", ">value", ">from", ">to", "unit"), rows, plain)
-    print(f"{path}/camera.yaml, parameters.csv, photon_transfer.png, fit.json")
+    transfer = "" if found.lens is None else ", mtf.csv"
+    print(f"{path}/camera.yaml, parameters.csv{transfer}, photon_transfer.png, fit.json")
