@@ -309,7 +309,7 @@ def test_a_blur_of_too_many_waves_is_refused(kind, tmp_path):
         plain = {"source": {"kind": "chart", "chart": "uniform"}}
         layers = [plain | {"distance": f"{distance} m"} for distance in (0.4, 1)]
         given["scene.source"] = {"kind": "layers", "layers": layers}
-    with pytest.raises(BadInput, match=r"0\.4 m gives .* at most 200 .* diffraction: off"):
+    with pytest.raises(BadInput, match=r"0\.4 m gives .* at most 200 .*diffraction: off"):
         simulate(camera(tmp_path, given))
     rays = {"effects": STILL["effects"], "array.rows": 8, "array.columns": 8}
     assert np.isfinite(seen(tmp_path, given, rays)[0]).all()

@@ -107,6 +107,12 @@ class DepthCut:
         first, share = self.first[here], self.share[here]
         return np.where(first == layer, 1 - share, np.where(first == layer - 1, share, 0))
 
+    def radius(self, samples: NDArray) -> NDArray:
+        """Return the blur's radius of samples (n,), given by their index in the flattened map."""
+        first, share = self.first.ravel()[samples].astype(int), self.share.ravel()[samples]
+        behind = np.minimum(first + 1, len(self.radii) - 1)
+        return np.asarray(self.radii[first] * (1 - share) + self.radii[behind] * share)
+
     def is_used(self) -> NDArray:
         """Return which layers (N,) anything lies in."""
         count = len(self.radii)

@@ -33,6 +33,8 @@ SAMPLED = 1.4
 the cell: as measured on slopes and discs."""
 FINEST = 3
 """Cells along a pixel's side, at most."""
+FARTHEST = 64
+"""Cells over which a point is blurred to one side, at most."""
 TILE = 64
 """Cells along the side of what is composed at once."""
 LEAST_COVER = 0.05
@@ -115,9 +117,7 @@ def ray_correction(path: OpticalPath, scene: DepthScene, full: float) -> RayCorr
     pitch = max(path.geometry.pitch_x, path.geometry.pitch_y)
     if not len(behind.samples):
         return RayCorrection()
-    near, far = (
-        np.abs(radii[scene.cut.first.ravel()[at]]) for at in (behind.samples, behind.sources)
-    )
+    near, far = (np.abs(scene.cut.radius(at)) for at in (behind.samples, behind.sources))
     blur = float(np.sqrt(np.square(np.minimum(near, far)).mean()))
     if blur < SHARP * pitch:
         return RayCorrection()
@@ -128,12 +128,13 @@ def ray_correction(path: OpticalPath, scene: DepthScene, full: float) -> RayCorr
         together = max(round(width / scene.flat.pitch_x), 1)
         return _Cells(scene, light, together, path.workers)
 
-    cells = on_cells(blur)
+    finest = max(pitch / FINEST, float(np.abs(radii).max()) / FARTHEST)
+    cells = on_cells(max(blur, finest))
     found = cells.missing()
     rms = _rms(found)
     width = blur * math.sqrt(allowed / (SAMPLED * rms)) if rms > 0 else blur
-    if width < blur:
-        cells = on_cells(max(width, pitch / FINEST))
+    if max(width, finest) < cells.width:
+        cells = on_cells(max(width, finest))
         found = cells.missing()
     error = min(SAMPLED * (cells.width / blur) ** 2, 1.0) * _rms(found)
     planes = [_at_pixels(plane, path, scene, cells.width) for plane in found]
