@@ -83,6 +83,21 @@ def test_two_planes_are_two_layers(focus, tmp_path):
     assert frame.spectrum.cut.hidden_most == 0.0
 
 
+@pytest.mark.long
+@pytest.mark.parametrize("seed", range(300, 330))
+def test_thirty_scenes_are_sums_over_rays(seed, tmp_path):
+    """Two to four planes at any distance, the lens focused anywhere.
+
+    Half of what is promised: explicit layers are off by up to 0.12 %, these rays by 0.05 %.
+    """
+    rng = np.random.default_rng(seed)
+    distances = sorted(float(d) for d in 1 / rng.uniform(0.3, 3, 2 + seed % 3))
+    focus = float(1 / rng.uniform(0.8, 3))
+    scene = planes(rng, distances, focus, even=True)
+    found, _ = seen(tmp_path, with_depth(tmp_path, *pictured(scene), focus))
+    assert error(found, ray_sum(scene, 700, 4)) <= 0.5 * STANDARD
+
+
 def test_three_planes_are_three_layers(tmp_path):
     scene = planes(np.random.default_rng(4), [0.4, 0.8, 3.0], 0.8, even=True)
     found, frame = seen(tmp_path, with_depth(tmp_path, *pictured(scene), 0.8))

@@ -32,12 +32,12 @@ FINEST = 2e-5
 BETWEEN = 0.73
 """Rms over all places between two layers of an error that is largest in the middle: of
 4 t (1 - t), sqrt(8 / 15)."""
-LEAST_JUMP = 0.5
+LEAST_JUMP = 0.1
 """Difference of blur radii from which on one sample hides another [pixels]."""
 STEPS = 24
 """Groups of radii, each of which is searched at once for what lies behind it."""
-EDGE = 1.5
-"""Samples by which neighbors are apart, at most."""
+EDGE = 1.0
+"""Samples by which the middles of those at an edge are apart."""
 BINS = 256
 """Frequencies of a power spectrum."""
 DIRECTIONS = 16
@@ -337,7 +337,7 @@ def _sources(radius: NDArray, jump: float) -> Iterator[tuple[NDArray, NDArray]]:
             for at, count in zip((rows, columns), radius.shape, strict=True)
         )
         near, own = number[window] == step, radius[window]
-        far = own <= low + step * group - jump
+        far = own <= own[near].min() - jump
         if not far.any():
             continue
         apart, index = distance_transform_edt(~far, return_indices=True)

@@ -21,6 +21,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from vcam_cli import memory
 from vcam_cli.camera.derived.mosaic import Mosaic
 from vcam_cli.effects.base import Blur, SeparableTransfer, of_kind
 from vcam_cli.image_formation.layers.layered import PART, gathered, is_of_lens
@@ -36,6 +37,8 @@ from vcam_cli.image_formation.optical_path import (
 from vcam_cli.image_formation.transfer_functions import Transfer
 from vcam_cli.scenes.depth_scene import CutLayer, DepthScene
 
+PLANES = 10
+"""Values of every pixel and color that are kept at once."""
 FormImage = Callable[[OpticalPath, CutLayer], tuple[Layers, SpectrumReport]]
 """What forms the image of a flat scene."""
 
@@ -62,6 +65,8 @@ def cut_image(
         How the scene was sampled and filtered.
     """
     reports: list[SpectrumReport] = []
+    held = _held_bytes(path, scene)
+    memory.require(held, path.geometry.rows, path.geometry.columns)
     used = [int(number) for number in np.flatnonzero(scene.cut.is_used())]
 
     def formed(layer: CutLayer, optics: LayerOptics) -> tuple[NDArray, NDArray]:
@@ -92,7 +97,7 @@ def cut_image(
         hidden_most=behind.most_unknown * float(opened.max(initial=0.0)),
         ray_values=rays.values,
     )
-    return iter([Layer(lambda color, rows: light[color, rows])]), _report(path, reports, cut)
+    return iter([Layer(lambda color, rows: light[color, rows])]), _report(path, reports, cut, held)
 
 
 def _layer_path(path: OpticalPath, optics: LayerOptics) -> OpticalPath:
@@ -122,7 +127,22 @@ def _layer_path(path: OpticalPath, optics: LayerOptics) -> OpticalPath:
     )
 
 
-def _report(path: OpticalPath, reports: list[SpectrumReport], cut: CutReport) -> SpectrumReport:
+def _held_bytes(path: OpticalPath, scene: DepthScene) -> int:
+    """Return the memory of what is kept while layers are formed, one by one [bytes].
+
+    Of pixels: light, cover and what is still clear, and the same of what is hidden. Of samples:
+    light for the rays, and of a layer its shares and sources.
+    """
+    size, pixels = path.settings.float_width // 8, path.geometry.rows * path.geometry.columns
+    colors = len(path.mosaic.colors)
+    samples = (colors * size + 40) * scene.depth.size
+    return PLANES * colors * pixels * size + samples
+
+
+def _report(
+    path: OpticalPath, reports: list[SpectrumReport], cut: CutReport, held: int
+) -> SpectrumReport:
+    """Return what is known of the image of layers."""
     names = {name for own in reports for name in own.changes}
     return SpectrumReport(
         oversampling=max((own.oversampling for own in reports), default=0.0),
@@ -131,7 +151,7 @@ def _report(path: OpticalPath, reports: list[SpectrumReport], cut: CutReport) ->
             name: math.hypot(*(own.changes.get(name, 0.0) for own in reports)) for name in names
         },
         peak=math.inf,
-        memory=max((own.memory for own in reports), default=0),
+        memory=held + max((own.memory for own in reports), default=0),
         cut=cut,
         parts=tuple((path.geometry, 2 * len(path.mosaic.colors), own) for own in reports),
     )
