@@ -271,7 +271,7 @@ def _with_seconds(
     spectrum, layout = light.spectrum, setup.layout
     known = (setup.camera, setup.geometry, layout, setup.settings)
     seconds = cost_model.frame_seconds(*known, spectrum, decided, workers)
-    if light.plan.omitted and not spectrum.terms:
+    if light.plan.omitted and not (spectrum.terms or spectrum.parts):
         spectrum = cost_model.usual_spectrum(layout.lattice)
     whole = replace(decided, seconds=decided.seconds + sum(d.saved for d in decided.decisions))
     every = cost_model.frame_seconds(*known, spectrum, whole, workers)
