@@ -386,6 +386,10 @@ class TestInit:
         assert json.loads(result.stdout) == {"files": [f"new/{name}" for name in names]}
         assert result.stderr == ""
 
+    def test_the_name_of_a_file_is_no_folder(self):
+        assert "write vcam init mine" in vcam("init", "mine.yaml", code=2).stderr
+        assert not Path("mine.yaml").exists()
+
     def test_nothing_is_overwritten(self):
         Path("camera.yaml").write_text("mine")
         assert "exists already" in vcam("init", code=2).stderr

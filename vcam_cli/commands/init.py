@@ -38,6 +38,9 @@ def init(
     from vcam_cli.errors import bad
     from vcam_cli.files import atomic
 
+    if folder.suffix in (".yaml", ".yml"):
+        other = folder.with_suffix("")
+        raise bad((), f"{folder} would be a folder", f"write vcam init {other}")
     camera, study = folder / FILE, folder / STUDY
     for target in (camera, study):
         if target.exists() or target.is_symlink():
