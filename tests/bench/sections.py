@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import sys
 import tempfile
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
@@ -18,6 +19,7 @@ from vcam_cli.accuracy.study import without_effect
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import geometry
 from vcam_cli.config import shipped
+from vcam_cli.errors import CannotDo
 from vcam_cli.floats import rms
 from vcam_cli.scheduling.pdf import Pdf
 from vcam_cli.scheduling.shot_noise import optimal_schedules
@@ -160,7 +162,12 @@ def per_effect(
     chosen = names or ablation.wanted_effects(camera)
     camera = ablation.with_effects(camera, "all")
     whole = Frames(camera).take(0, warm=True)
-    others = {name: Frames(without_effect(camera, name)).take(0, warm=True) for name in chosen}
+    others = {}
+    for name in chosen:
+        try:
+            others[name] = Frames(without_effect(camera, name)).take(0, warm=True)
+        except CannotDo as refused:  # aberrations without diffraction have no end in frequency
+            print(f"without {name}: {refused}", file=sys.stderr)
     for _ in range(repeats):
         whole.take()
         for other in others.values():
