@@ -244,6 +244,31 @@ def test_noise_is_weighed_against_the_noise_that_runs(tmp_path):
     assert np.std(result.electrons - result.mean_electrons) == pytest.approx(3, rel=0.1)
 
 
+@pytest.mark.parametrize(
+    ("electrons", "drawn", "idle"),
+    [
+        (20_000, {"gain_pixel": "0.5 %"}, "offset_pixel"),
+        (20, {"offset_pixel": "5 e"}, "gain_pixel"),
+        (1000, {"offset_pixel": "5 e", "gain_pixel": "0.5 %"}, ""),
+    ],
+)
+def test_draws_that_hardly_add_to_the_pattern_are_not_drawn(electrons, drawn, idle, tmp_path):
+    """Offsets of 5 e and gains of 0.5 % of a wall: 25 beside 1e4, 0.01 and 25 e^2; 1 % may go."""
+    wall = {
+        "effects": "auto",
+        "accuracy": "standard",
+        "scene.source": {"kind": "chart", "chart": "uniform"},
+        "scene.radiance": radiance_for(electrons),
+        "pixel.fpn": {"offset_pixel": "5 e", "gain_pixel": "0.5 %"},
+    }
+    lean = simulate(camera(tmp_path, wall))
+    assert decisions(lean)["fpn"].reason.partition("not called for here: ")[2] == idle
+    alone = simulate(camera(tmp_path, wall | {"pixel.fpn": drawn}))
+    assert lean.electrons.tobytes() == alone.electrons.tobytes()
+    whole = simulate(camera(tmp_path, wall | {"effects": {"fpn": "on"}}))
+    assert (lean.electrons.tobytes() == whole.electrons.tobytes()) == (not idle)
+
+
 # --- on, off, all --------------------------------------------------------------------------------
 
 EVERYTHING = NOISE | {DARK: "100 e/s", "optics.off_axis": "exact"}

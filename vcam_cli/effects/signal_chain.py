@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from abc import abstractmethod
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import ClassVar, Literal, Self
 
@@ -100,6 +100,14 @@ class ElectronEffect(Effect):
 
 class NoiseSource(ElectronEffect):
     """A random contribution; whoever adds it also states its variance."""
+
+    parts: ClassVar[tuple[str, ...]] = ()
+    """Names of its strengths, where it has several that each take a draw of their own from every
+    pixel; one at 0 is not drawn."""
+
+    def without_parts(self, names: Collection[str]) -> Self:
+        """Return it with some of its parts at 0."""
+        return self
 
     def split(self) -> tuple[Self | None, Self | None, Self | None]:
         """Return the parts of each pixel by itself, of each column, and of each row."""

@@ -58,11 +58,12 @@ class LightPlan:
 
     omitted: tuple[Effect, ...] = ()
     """Effects that are left out."""
-    free: tuple[Effect, ...] = ()
-    """Effects that could be left out, but would save nothing."""
+    bounding: tuple[Effect, ...] = ()
+    """Blurs that seemed to count for little, but stay: without them the spectrum of others would
+    reach further."""
     shares: dict[str, float] = field(default_factory=dict)
-    """Estimated rms change by leaving out each of both, and motion, which is more than its blur;
-    relative to full signal."""
+    """Estimated rms change by leaving out each omitted effect, and motion, which is more than its
+    blur; relative to full signal."""
 
     @property
     def share(self) -> float:
@@ -105,11 +106,15 @@ def light_plan(path: OpticalPath, scene: AnyScene) -> LightPlan:
     functions: dict[Effect, NDArray] = {}
     displacing = tuple(e for e in of_kind(candidates, ImageMotion) if e.needs_survey)
 
+    # Beside a lens that counts, the pixel's average stays whatever the scene has for it.
+    decisive = blurs = of_kind(candidates, *BLURS)
+    if of_kind(blurs, Blur, FieldTransfer):
+        decisive = of_kind(blurs, Blur, FieldTransfer, SubExposedMotion)
+
     def every_blur_counts(found: SceneDetail) -> bool:
         if not functions:
             functions.update(transfer_functions(path, found))
-        blurs = of_kind(candidates, *BLURS)
-        return not displacing and all(_share(found, functions, blur) > budget for blur in blurs)
+        return not displacing and all(_share(found, functions, b) > budget for b in decisive)
 
     surveyed = scene.flat if isinstance(scene, LayeredScene | DepthScene) else scene
     detail = scene_detail(path, surveyed, every_blur_counts)
@@ -123,10 +128,10 @@ def light_plan(path: OpticalPath, scene: AnyScene) -> LightPlan:
             break
         if _levels_stay(path, detail, effect):
             chosen = together
-    free = _bounding_blurs(path, chosen)
-    omitted = tuple(effect for effect in chosen if effect not in free)
-    told = (*chosen, *displacing)
-    return LightPlan(omitted, free, {effect.name: shares[effect] for effect in told})
+    bounding = _bounding_blurs(path, chosen)
+    omitted = tuple(effect for effect in chosen if effect not in bounding)
+    told = (*omitted, *displacing)
+    return LightPlan(omitted, bounding, {effect.name: shares[effect] for effect in told})
 
 
 Functions = Mapping[Effect, NDArray]

@@ -20,6 +20,7 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,7 +39,7 @@ from vcam_cli.effects.signal_chain import (
     total_variance,
 )
 from vcam_cli.errors import BadInput, Collector
-from vcam_cli.image_formation.light_plan import LightPlan
+from vcam_cli.image_formation.light_plan import LIGHT_SHARE, LightPlan
 from vcam_cli.image_formation.settings import Settings
 
 OMITTED_SHARE = 0.5
@@ -194,13 +195,12 @@ def make(
     present = _enabled(camera, effects.values())
     shares = {name: min(c * signal.time / signal.full_signal, 1.0) for name, c in changes.items()}
     shares |= light.shares
-    omitted = {*light.omitted, *_negligible(camera, present, light, signal, shares)}
-    weigh = _Weighing(present, signal, shares, geometry.rows * geometry.columns)
+    variances = _SceneVariances(present, signal, camera.accuracy.tolerance)
+    omitted = {*light.omitted, *_negligible(camera, variances, light, shares)}
+    on = tuple(effect for effect in present if effect not in omitted)
+    active, idle = _without_idle_draws(camera, on, variances)
+    weigh = _Weighing(present, signal, shares, geometry.rows * geometry.columns, idle)
     decisions = [_decide(kind, effects[kind.name], camera, light, omitted, weigh) for kind in ORDER]
-    on = {decision.name for decision in decisions if decision.state == "on"}
-    active = tuple(
-        effect for effect in effects.values() if effect is not None and effect.name in on
-    )
     seconds = sum(decision.seconds for decision in decisions)
     return Plan(tuple(decisions), active, settings, seconds, memory_bytes, levels=signal.levels)
 
@@ -215,16 +215,11 @@ def _wish(camera: Camera, effect: Effect) -> str:
 
 
 def _negligible(
-    camera: Camera,
-    present: Sequence[Effect],
-    light: LightPlan,
-    signal: SignalLevels,
-    shares: Mapping[str, float],
+    camera: Camera, variances: _SceneVariances, light: LightPlan, shares: Mapping[str, float]
 ) -> tuple[Effect, ...]:
     """Effects on electrons that may all be left out together, those that change least first."""
-    tolerance = camera.accuracy.tolerance
-    budget = OMITTED_SHARE * tolerance - light.share
-    whole = _variances(present, present, signal)
+    present, signal = variances.present, variances.signal
+    budget = OMITTED_SHARE * camera.accuracy.tolerance - light.share
     out: tuple[Effect, ...] = ()
     # Late charge is some of the dark signal's: with transport, the two stay together.
     moved = any(transport not in light.omitted for transport in of_kind(present, Transport))
@@ -238,36 +233,83 @@ def _negligible(
         return math.inf if error is None else error / signal.full_signal
 
     def variance_share(effects: Sequence[Effect]) -> float:
-        kept = tuple(effect for effect in present if effect not in effects)
-        lost = np.abs(_variances(present, kept, signal) - whole)
-        return float((lost / np.maximum(whole, 1e-300)).max())
+        return variances.share_lost([effect for effect in present if effect not in effects])
 
     def use(effect: Effect) -> float:
-        return max(
-            mean_share(effect) / OMITTED_SHARE, variance_share([effect]) / (2 * VARIANCE_SHARE)
-        )
+        of_mean = mean_share(effect) / (OMITTED_SHARE * camera.accuracy.tolerance)
+        return max(of_mean, variance_share([effect]))
 
     for effect in sorted(rest, key=use):
         together = (*out, effect)
-        if sum(map(mean_share, together)) > budget:
-            continue
-        if variance_share(together) <= 2 * VARIANCE_SHARE * tolerance:
+        if sum(map(mean_share, together)) <= budget and variance_share(together) <= 1:
             out = together
     return out
 
 
-def _variances(present: Sequence[Effect], kept: Sequence[Effect], signal: SignalLevels) -> NDArray:
-    """Temporal and fixed-pattern variances at the scene's levels: (2, levels) [electrons squared].
+@dataclass(frozen=True)
+class _SceneVariances:
+    """Temporal and fixed-pattern variances at the scene's levels."""
 
-    Without a charge, both the dark signal and the level are lower.
+    present: Sequence[Effect]
+    """All effects that are wanted."""
+    signal: SignalLevels
+    tolerance: float
+
+    @cached_property
+    def whole(self) -> NDArray:
+        """With all effects: (2, levels) [electrons squared]."""
+        return self.of_effects(self.present)
+
+    def of_effects(self, kept: Sequence[Effect]) -> NDArray:
+        """Return them with some effects alone: (2, levels) [electrons squared].
+
+        Without a charge, both the dark signal and the level are lower.
+        """
+        gone = [charge for charge in of_kind(self.present, Charge) if charge not in kept]
+        missing = sum(charge.rate() for charge in gone) * self.signal.time
+        levels = tuple(max(level - missing, 0.0) for level in self.signal.weighed)
+        dark = max(self.signal.dark - missing, 0.0)
+        here = replace(self.signal, dark=dark, levels=levels)
+        return np.array(
+            [total_variance(noise_sources(kept, scope), here) for scope in ("frame", "sensor")]
+        )
+
+    def share_lost(self, kept: Sequence[Effect]) -> float:
+        """Return the largest relative change with some effects alone, over what is allowed."""
+        lost = np.abs(self.of_effects(kept) - self.whole) / np.maximum(self.whole, 1e-300)
+        return float(lost.max()) / (2 * VARIANCE_SHARE * self.tolerance)
+
+
+def _without_idle_draws(
+    camera: Camera, on: Sequence[Effect], variances: _SceneVariances
+) -> tuple[tuple[Effect, ...], dict[str, tuple[str, ...]]]:
+    """Return the effects that run less draws that hardly add to a variance, and those, by effect.
+
+    They share a tolerance with the whole effects that are left out.
     """
-    gone = [charge for charge in of_kind(present, Charge) if charge not in kept]
-    missing = sum(charge.rate() for charge in gone) * signal.time
-    levels = tuple(max(level - missing, 0.0) for level in signal.weighed)
-    here = replace(signal, dark=max(signal.dark - missing, 0.0), levels=levels)
-    return np.array(
-        [total_variance(noise_sources(kept, scope), here) for scope in ("frame", "sensor")]
-    )
+    lean, idle = dict[Effect, Effect](), dict[str, tuple[str, ...]]()
+    for source in of_kind(on, NoiseSource):
+        if source.parts and _wish(camera, source) == "auto":
+            others = [lean.get(effect, effect) for effect in on if effect is not source]
+            if names := _idle_parts(source, others, variances):
+                lean[source], idle[source.name] = source.without_parts(names), names
+    return tuple(lean.get(effect, effect) for effect in on), idle
+
+
+def _idle_parts(
+    source: NoiseSource, others: Sequence[Effect], variances: _SceneVariances
+) -> tuple[str, ...]:
+    """Return the parts of a source that may go together, those that add least first."""
+
+    def share_lost(names: Sequence[str]) -> float:
+        return variances.share_lost((*others, source.without_parts(names)))
+
+    out: tuple[str, ...] = ()
+    drawn = [name for name in source.parts if getattr(source, name)]
+    for name in sorted(drawn, key=lambda name: share_lost([name])):
+        if share_lost([*out, name]) <= 1:
+            out = (*out, name)
+    return out
 
 
 @dataclass(frozen=True)
@@ -278,6 +320,8 @@ class _Weighing:
     signal: SignalLevels
     shares: Mapping[str, float]
     pixels: int
+    idle: Mapping[str, tuple[str, ...]]
+    """Name of an effect -> its draws that are not called for."""
 
     def places(self, kind: type[Effect]) -> int:
         """Return how many pixels an effect acts on: those whose charge is joined count as one."""
@@ -316,8 +360,14 @@ def _decide(
     if effect in omitted:
         reason = f"{what}; not called for here"
         return Decision(kind.name, "off", "plan", reason, *weighed, 0.0, saved=seconds)
-    free = effect in light.free
+    free = (
+        effect in light.bounding
+        and contribution is not None
+        and light.share + contribution <= LIGHT_SHARE * camera.accuracy.tolerance
+    )
     if free:
         what += f"; free: {contribution:.2%} (could go; costs nothing)"
+    if idle := weigh.idle.get(kind.name):
+        what += f"; not drawn, since not called for here: {', '.join(idle)}"
     by = "user" if wish == "on" else "plan"
     return Decision(kind.name, "on", by, what, *weighed, seconds, free=free)

@@ -1,5 +1,6 @@
 """Notes of a run: what it chose, left out or took for granted where the file left that open."""
 
+import math
 from pathlib import Path
 
 import numpy as np
@@ -175,7 +176,10 @@ def _clipped_dark(ready: Prepared) -> tuple[str, ...]:
     missing = margin - e.offset * step
     if ready.camera.adc.offset is None or missing <= 0:
         return ()
-    share = float((ready.rate * time + ready.dark_rate * time < missing).mean())
+    threshold = missing / time - ready.dark_rate
+    if float(ready.rate.min(initial=math.inf)) >= threshold:
+        return ()
+    share = float((ready.rate < threshold).mean())
     if share < VISIBLE_CLIPPING:
         return ()
     what = "their mean comes out wrong"
@@ -206,6 +210,8 @@ def _overflow(ready: Prepared) -> tuple[str, ...]:
     """Return where charge goes that wells do not hold; no blooming or smear is simulated."""
     well, rate = ready.electrical.full_well, ready.rate.reshape(-1)
     dark, time = ready.dark_rate * ready.exposure_time, ready.exposure_time
+    if float(rate.max(initial=0.0)) * time + dark <= well:
+        return ()
     blocks = (rate[i : i + PIXELS_AT_ONCE] for i in range(0, rate.size, PIXELS_AT_ONCE))
     beyond = sum(float(np.maximum(block * time + (dark - well), 0).sum()) for block in blocks)
     share = beyond / (well * rate.size)

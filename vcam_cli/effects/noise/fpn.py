@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -54,6 +55,7 @@ class FixedPattern(NoiseSource):
     seconds_per_pixel = 20e-9
     scope = "sensor"
     sample_draws = "common"
+    parts = ("offset_pixel", "gain_pixel", "dark")
 
     def __post_init__(self):
         # Where all pixels are defective they do not differ: the plan would see no noise in it.
@@ -88,6 +90,11 @@ class FixedPattern(NoiseSource):
         if self.hot or self.dead:
             said += f", {self.hot:.4%} of the pixels hot and {self.dead:.4%} dead"
         return said
+
+    def without_parts(self, names):
+        """Return it with some of its parts at 0."""
+        gone: dict[str, Any] = dict.fromkeys(names, 0.0)
+        return replace(self, **gone)
 
     def split(self):
         """Return the pixels' own pattern, the columns' and None: rows are alike."""
