@@ -117,6 +117,16 @@ def test_planes_are_linear_in_the_mix_and_in_the_dtype_of_the_view():
     )
 
 
+@pytest.mark.parametrize("source", [COLORED, LEAVES, BOTH, CHECKER, STAR, LETTERS, PATCHES])
+def test_planes_of_mixtures_may_be_negative(source):
+    # Mixtures that replace many spectra by few have components of either sign.
+    chart = sampled(source)
+    mix = mix_of(chart)
+    both = chart.planes(mix[:1] - 2 * mix[1:])
+    one, other = chart.planes(mix)
+    np.testing.assert_allclose(both[0], one - 2 * other, atol=1e-12 * mix.sum())
+
+
 @pytest.mark.long
 def test_bands_of_rows_join_seamlessly(monkeypatch):
     chart = sampled(BOTH, margin=1)

@@ -51,7 +51,7 @@ class LeavesWithColorChecker(Chart):
             (x, cover_x), (y, cover_y) = across.part(columns), down.part(rows)
             if len(cover_x) and len(cover_y):
                 under = self.leaves.averages(x, y, of_leaves) * np.outer(cover_y, cover_x)
-                out[:, rows, columns] = np.maximum(out[:, rows, columns] - under, 0.0)
+                out[:, rows, columns] -= under  # a mixture's light may be negative
         cover = self.card.cell_cover(across.edges, down.edges)
         self.card.add_light(cover, mix, out[:, down.cells, across.cells])
 
