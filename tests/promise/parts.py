@@ -15,8 +15,10 @@ import periodic_cameras
 import promises
 import random_cameras
 import scene_matrix
+import spent
 
 from vcam_cli.accuracy import ablation
+from vcam_cli.config import shipped
 
 Figure = tuple[str, str, bool]
 """What is promised, what was found, whether it holds."""
@@ -208,5 +210,11 @@ PARTS = {
         (*BEFORE_SCENES, *itertools.product(scene_matrix.CAMERAS, scene_matrix.EMPTY)),
         scene_matrix.times,
         scene_matrix.time_figures,
+    ),
+    "spent": Part(
+        "shipped cameras: how much of the tolerance they spend, and what presets cost",
+        tuple((name,) for name in shipped.names("cameras")),
+        spent.spent,
+        spent.figures,
     ),
 }
