@@ -38,14 +38,6 @@ SPENT = (0.2, 0.9)
 """Parts of the tolerance between which an error lies that is neither wasted nor risked."""
 DRAFT, REFERENCE = 0.5, 10.0
 """Time of a frame at draft and at reference over that at standard, at most."""
-SMOOTH = "its chart has no detail that cells of a pixel do not show; coarser ones save nothing"
-BRIGHT = "detail of light that fills pixels counts as it is before, and hardly any of it is seen"
-EXEMPT = {
-    **dict.fromkeys(("csf-0.18um", "csf-0.25um", "csf-0.35um", "csf-color-0.35um"), SMOOTH),
-    "csf-monochrome": SMOOTH,
-    **dict.fromkeys(("hdr-patches", "hdr-captures", "hdr-scene"), BRIGHT),
-}
-"""Cameras whose least error is not judged, and why."""
 
 
 @dataclass(frozen=True)
@@ -144,17 +136,14 @@ def figures(found: Sequence[Spent]) -> Iterator[tuple[str, str, bool]]:
     text = f"error over the tolerance, largest; at most {SPENT[1]}"
     yield text, f"{every[worst]:.2f} ({' at '.join(worst)})", every[worst] <= SPENT[1]
     exact = {(each.name, preset) for each in found for preset in each.exact}
-    judged = {at: e for at, e in every.items() if at not in exact and at[0] not in EXEMPT}
+    judged = {at: e for at, e in every.items() if at not in exact}
     idle = [f"{' at '.join(at)} {error:.2f}" for at, error in judged.items() if error < SPENT[0]]
-    text = f"errors below {SPENT[0]} of the tolerance, but for those exempt; none"
+    text = f"errors below {SPENT[0]} of the tolerance, but for exact ones; none"
     yield text, f"{len(idle)} of {len(judged)}: {', '.join(idle) or 'none'}", not idle
     if judged:
         yield "the same, median; for information", f"{statistics.median(judged.values()):.2f}", True
     names = [" at ".join(at) for at in sorted(exact)]
-    yield "exact by a closed form, exempt", ", ".join(names) or "none", True
-    for why in dict.fromkeys(EXEMPT[each.name] for each in found if each.name in EXEMPT):
-        names = [each.name for each in found if EXEMPT.get(each.name) == why]
-        yield f"exempt: {why}", ", ".join(names), True
+    yield "exact by a closed form", ", ".join(names) or "none", True
     for text, ratios, most in (
         ("time at draft over standard", {each.name: each.draft for each in found}, DRAFT),
         ("time at reference over standard", {e.name: e.reference for e in found}, REFERENCE),
