@@ -118,6 +118,7 @@ def test_a_slope_is_a_sum_over_rays(focus, tmp_path):
     found, frame = seen(tmp_path, given)
     flat, _ = seen(tmp_path, given, {"effects": STILL["effects"] | {"depth": "off"}})
     assert error(found, truth) <= 1.5 * frame.spectrum.cut.error
+    assert error(found, truth) <= 0.5 * STANDARD
     assert error(flat, truth) > 10 * error(found, truth)
 
 

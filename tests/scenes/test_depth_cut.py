@@ -9,8 +9,10 @@ from vcam_cli.scenes.depth_cut import (
     Detail,
     cut_depth,
     disc_transfer,
+    full_signal,
     picture_detail,
 )
+from vcam_cli.scenes.depth_slopes import MARGIN, SlopeBlur, displaced
 
 PITCH = 1e-6
 PIXEL = 4e-6
@@ -27,7 +29,8 @@ def noise(seed: int = 0) -> np.ndarray:
 
 def cut(radius: np.ndarray, allowed: float = 1e-3, picture: np.ndarray | None = None):
     picture = noise() if picture is None else picture
-    detail = picture_detail(picture, PITCH, PIXEL, passes)
+    full = full_signal(picture, PITCH, PIXEL)
+    detail = picture_detail(picture, PITCH, PIXEL, passes, full)
     return cut_depth(radius, picture, PITCH, PIXEL, detail, allowed)
 
 
@@ -42,7 +45,7 @@ def test_the_power_of_a_wave_is_half_its_squared_amplitude():
     """Of a wave much longer than a pixel, whose full signal is 1."""
     x = (np.arange(256) + 0.5) / 256
     wave = 0.5 + 0.5 * np.cos(2 * np.pi * x) * np.ones((256, 1))
-    detail = picture_detail(wave, PITCH, PIXEL, passes)
+    detail = picture_detail(wave, PITCH, PIXEL, passes, full_signal(wave, PITCH, PIXEL))
     assert detail.power.sum() == pytest.approx(0.5 * 0.5**2, rel=2e-2)
     at = float((detail.power * detail.frequency).sum() / detail.power.sum())
     assert at == pytest.approx(1 / 256e-6, rel=2e-2)
@@ -133,7 +136,23 @@ def test_a_slope_changes_what_a_sum_over_rays_says():
     rho, angle = np.sqrt(k / len(k)), np.pi * (1 + 5**0.5) * k
     u, v = rho * np.cos(angle), rho * np.sin(angle)
     mean = (u * np.exp(-2j * np.pi * frequency * radius * u)).mean()
-    detail = Detail(np.array([frequency]), np.array([0.5]))
-    # A wave of power 1/2, along the slope and across it in equal parts.
-    assert detail.slope_change(radius) == pytest.approx(abs(mean) / 2, rel=1e-3)
+    # The light of a wave of amplitude 1 on a slope of 1, displaced by r / 4, has this power.
+    power = (2 * np.pi * frequency * radius / 4) ** 2 / 2
+    detail = Detail(np.array([frequency]), np.array([power]))
+    slopes = SlopeBlur(np.array([radius]), np.ones(1), 1e-9)
+    told = slopes.change(detail) / MARGIN
+    assert told == pytest.approx(abs(mean) / np.sqrt(2), rel=1e-3)
+    assert slopes.error(detail) < 0.5 * slopes.change(detail)
     assert abs((v * np.exp(-2j * np.pi * frequency * radius * u)).mean()) < 1e-3
+
+
+def test_light_of_a_slope_is_displaced_by_a_quarter_of_radius_times_slope():
+    """A ramp of light goes by r g / 4 toward larger blur; steps and even radii move none."""
+    light = np.add.outer(0.02 * np.arange(32), 0.01 * np.arange(48))
+    radius = 0.1 * np.arange(48) * np.ones((32, 1))
+    moved = displaced(light, radius)
+    inner = (slice(1, -1), slice(1, -1))
+    assert moved[inner] == pytest.approx((light - radius * 0.1 / 4 * 0.01)[inner], rel=1e-12)
+    for high, jump in ((5.0, 1.0), (0.4, 0.3)):
+        step = np.where(np.arange(48) < 24, high, 0.0) * np.ones((32, 1))
+        assert displaced(light, step, jump) == pytest.approx(light, abs=0)

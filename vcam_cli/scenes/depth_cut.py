@@ -17,7 +17,6 @@ guess is worth is told by another one, the picture's mirror image at the edge.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
@@ -54,22 +53,14 @@ class Detail:
     power: NDArray
     """Mean squares (n,) of the picture without its mean, relative to the square of full signal."""
 
+    def rms(self, transfer: NDArray) -> float:
+        """Return the rms, over full signal, of the detail behind a transfer (n,)."""
+        return float(np.sqrt((self.power * np.square(transfer)).sum()))
+
     def blur_change(self, *parts: tuple[float, float]) -> float:
         """Return the rms, over full signal, of a sum of blurs: pairs of a factor and radius [m]."""
-        total = sum(factor * disc_transfer(self.frequency, radius) for factor, radius in parts)
-        return float(np.sqrt((self.power * np.square(total)).sum()))
-
-    def slope_change(self, radius: float) -> float:
-        """Return what a slope changes, rms over full signal, for every unit of it.
-
-        Rays through the point u of the aperture see a surface whose blur's radius rises by g a
-        length as if it were 1 + g u times as dense: mean of u exp(-2 pi i f r u) = 2 J2(z) / z.
-        """
-        from scipy.special import jv
-
-        z = 2 * np.pi * self.frequency * abs(radius)
-        tilt = np.where(z > 1e-6, 2 * jv(2, z) / np.where(z > 1e-6, z, 1.0), 0.0)
-        return float(np.sqrt((self.power * np.square(tilt)).sum() / 2))
+        blurs = [factor * disc_transfer(self.frequency, radius) for factor, radius in parts]
+        return self.rms(np.sum(blurs, axis=0))
 
 
 @dataclass(frozen=True)
@@ -98,8 +89,7 @@ class DepthCut:
     """Share (h, w) of each sample that belongs to the layer behind it."""
     hidden: Hidden
     error: float
-    """Predicted rms error by the layers' spacing, and by taking slopes as steps, relative to full
-    signal."""
+    """Predicted rms error by the layers' spacing, relative to full signal."""
 
     def coverage(self, layer: int, rows: NDArray, columns: NDArray) -> NDArray:
         """Return what of samples (rows x columns) belongs to a layer, 0 to 1."""
@@ -147,8 +137,18 @@ def disc_transfer(frequency: NDArray, radius: float) -> NDArray:
     return np.where(z > 1e-6, 2 * j1(z) / np.where(z > 1e-6, z, 1.0), 1.0)
 
 
+def full_signal(picture: NDArray, pitch: float, pixel: float) -> float:
+    """Return the brightest light (h, w) of a picture in the means over pixels, at most white."""
+    together = max(int(pixel / pitch), 1)
+    return min(float(_block_means(picture, together).max(initial=0.0)), 1.0)
+
+
 def picture_detail(
-    picture: NDArray, pitch: float, pixel: float, lens: Callable[[NDArray], NDArray]
+    picture: NDArray,
+    pitch: float,
+    pixel: float,
+    lens: Callable[[NDArray], NDArray],
+    full: float,
 ) -> Detail:
     """Return the detail of a picture in the color of all its channels together.
 
@@ -162,17 +162,16 @@ def picture_detail(
         Side of the pixels [m].
     lens : callable
         What the lens passes at frequencies (n,) [cycles/m] where it is in focus.
+    full : float
+        Full signal, relative to white.
 
     Returns
     -------
     Detail
         The detail.
     """
-    together = max(int(pixel / pitch), 1)  # finer than the pixels nothing is seen
-    blocks = _block_means(picture, together)
-    full = min(float(blocks.max(initial=0.0)), 1.0)
-    if together > 1:
-        picture, pitch = _block_means(picture, max(together // 2, 1)), pitch * (together // 2)
+    together = max(int(pixel / pitch) // 2, 1)  # finer than the pixels nothing is seen
+    picture, pitch = _block_means(picture, together), pitch * together
     squares = np.square(scipy.fft.dctn(picture.astype(np.float32), type=2, norm="ortho"))
     squares[0, 0] = 0
     fy, fx = (np.arange(count) / (2 * count * pitch) for count in picture.shape)
@@ -241,23 +240,7 @@ def cut_depth(
         first = np.minimum(place, len(radii) - 2).astype(np.uint16)
         share = (place - first).astype(np.float32)
     hidden = _hidden(radius / pitch, picture, LEAST_JUMP * pixel / pitch)
-    slope = _slope(radius / pitch, max(int(pixel / pitch), 1))
-    tilt = slope * detail.slope_change(float(np.sqrt(np.square(radius).mean())))
-    return DepthCut(radii, first, share, hidden, math.hypot(error, tilt))
-
-
-def _slope(radius: NDArray, side: int) -> float:
-    """Return by how much the radius rises over a length, rms, where nothing is hidden.
-
-    Radii are counted in samples, of which so many are a pixel's side: noise within it is none.
-    """
-    squares = 0.0
-    for axis in (0, 1):
-        rise = np.diff(radius, axis=axis)
-        if rise.size:
-            means = _block_means(np.where(np.abs(rise) < 1, rise, 0), side)
-            squares += float(np.square(means).mean())
-    return math.sqrt(squares)
+    return DepthCut(radii, first, share, hidden, error)
 
 
 def _layer_radii(radius: NDArray, detail: Detail, allowed: float) -> tuple[NDArray, float]:

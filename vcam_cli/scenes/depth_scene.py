@@ -4,19 +4,30 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from vcam_cli.scenes.base import Array, SampledScene, View
 from vcam_cli.scenes.cells import uneven_points
-from vcam_cli.scenes.depth_cut import DepthCut, Detail, cut_depth, is_flat, picture_detail
+from vcam_cli.scenes.depth_cut import (
+    LEAST_JUMP,
+    DepthCut,
+    Detail,
+    cut_depth,
+    full_signal,
+    is_flat,
+    picture_detail,
+)
+from vcam_cli.scenes.depth_slopes import SlopeBlur, displaced, slope_light
 from vcam_cli.scenes.hyperspectral import Cube
 from vcam_cli.scenes.image import ImageScene, image_scene
 from vcam_cli.spectra import Spectrum
 
 SHARE = 0.3
 """Part of the tolerance that the cuts between layers may use."""
+SLOPE_SHARE = 0.1
+"""Part of the tolerance within which slopes count as steps."""
 
 
 @dataclass(frozen=True)
@@ -61,6 +72,7 @@ class CutLayer(SampledScene):
     """One layer: the picture's light times what of it lies there, and, as the last part, that."""
 
     flat: ImageScene
+    """The picture."""
     coverage: Array
     """What of every sample (h, w) lies in the layer, 0 to 1."""
     sources: Array | None = None
@@ -107,6 +119,10 @@ class DepthScene:
     cut: DepthCut
     distances: tuple[float, ...]
     """Of the layers [m]."""
+    sloped: ImageScene
+    """The picture with its light where rays see slopes in the mean; `flat` where none counts."""
+    slope_error: float
+    """Predicted rms error by slopes, relative to full signal."""
 
     @property
     def spectra(self) -> tuple[Spectrum, ...]:
@@ -146,7 +162,7 @@ class DepthScene:
         return self._layer(coverage.reshape(shape), sources.reshape(shape))
 
     def _layer(self, coverage: Array, sources: Array | None) -> CutLayer:
-        flat = self.flat
+        flat = self.sloped
         return CutLayer(
             spectra=(*flat.spectra, flat.white),
             white=flat.white,
@@ -204,16 +220,34 @@ def depth_scene(
     Parameters are those of `flat_distance`.
     """
     depth = _on_sensor(flat, given, view)
+    radius, light = blur.radius(depth), _brightness(flat)
     pixel = max(view.pitch_x, view.pitch_y)
-    cut = cut_depth(
-        blur.radius(depth),
-        _brightness(flat),
-        flat.pitch_x,
-        pixel,
-        _detail(flat, view, blur),
-        SHARE * tolerance,
-    )
-    return DepthScene(flat, depth, cut, tuple(blur.distance(float(r)) for r in cut.radii))
+    detail = _detail(flat, view, blur)
+    cut = cut_depth(radius, light, flat.pitch_x, pixel, detail, SHARE * tolerance)
+    sloped, error = _sloped(flat, radius, light, view, blur, SLOPE_SHARE * tolerance)
+    distances = tuple(blur.distance(float(r)) for r in cut.radii)
+    return DepthScene(flat, depth, cut, distances, sloped, error)
+
+
+def _sloped(
+    flat: ImageScene, radius: Array, light: Array, view: View, blur: LensBlur, allowed: float
+) -> tuple[ImageScene, float]:
+    """Return the picture with the light of slopes, and the error that they leave."""
+    pitch = flat.pitch_x
+    jump = LEAST_JUMP * max(view.pitch_x, view.pitch_y) / pitch
+    change = slope_light(light, radius / pitch, jump)
+    if not change.any():
+        return flat, 0.0
+    full = full_signal(light, pitch, max(view.pitch_x, view.pitch_y))
+    detail = picture_detail(change, pitch, min(view.pitch_x, view.pitch_y), blur.sharp, full)
+    slopes = SlopeBlur.of(change, radius, pitch)
+    changed = slopes.change(detail)
+    if changed <= allowed:
+        return flat, changed
+    picture = flat.picture.astype(flat.dtype)
+    for channel in np.moveaxis(picture, 2, 0):
+        channel[:] = displaced(channel, radius / pitch, jump)
+    return replace(flat, picture=picture), slopes.error(detail)
 
 
 def _on_sensor(flat: ImageScene, given: DepthPicture, view: View) -> Array:
@@ -229,5 +263,6 @@ def _brightness(flat: ImageScene) -> Array:
 
 
 def _detail(flat: ImageScene, view: View, blur: LensBlur) -> Detail:
-    pixel = min(view.pitch_x, view.pitch_y)
-    return picture_detail(_brightness(flat), flat.pitch_x, pixel, blur.sharp)
+    light, pixel = _brightness(flat), min(view.pitch_x, view.pitch_y)
+    full = full_signal(light, flat.pitch_x, pixel)
+    return picture_detail(light, flat.pitch_x, pixel, blur.sharp, full)

@@ -91,7 +91,7 @@ def cut_image(
     behind = scene.cut.hidden
     cut = CutReport(
         layers=len(used),
-        error=math.hypot(scene.cut.error, rays.error / (full or 1.0)),
+        error=math.hypot(scene.cut.error, scene.slope_error, rays.error / (full or 1.0)),
         cell=rays.cell,
         hidden_rms=behind.unknown * float(np.sqrt(np.square(opened, dtype=float).mean())),
         hidden_most=behind.most_unknown * float(opened.max(initial=0.0)),
@@ -131,11 +131,12 @@ def _held_bytes(path: OpticalPath, scene: DepthScene) -> int:
     """Return the memory of what is kept while layers are formed, one by one [bytes].
 
     Of pixels: light, cover and what is still clear, and the same of what is hidden. Of samples:
-    light for the rays, and of a layer its shares and sources.
+    light for the rays, that of slopes displaced too, and of a layer its shares and sources.
     """
     size, pixels = path.settings.float_width // 8, path.geometry.rows * path.geometry.columns
     colors = len(path.mosaic.colors)
-    samples = (colors * size + 40) * scene.depth.size
+    pictures = 2 if scene.sloped is not scene.flat else 1
+    samples = (pictures * colors * size + 40) * scene.depth.size
     return PLANES * colors * pixels * size + samples
 
 

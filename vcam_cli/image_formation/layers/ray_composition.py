@@ -123,10 +123,13 @@ def ray_correction(path: OpticalPath, scene: DepthScene, full: float) -> RayCorr
         return RayCorrection()
     allowed = SHARE * path.settings.tolerance * full
     light = scene.flat.planes(path.transfer.level.T, path.workers)
+    sloped = light
+    if scene.sloped is not scene.flat:  # rays see slopes as they are, means have them displaced
+        sloped = scene.sloped.planes(path.transfer.level.T, path.workers)
 
     def on_cells(width: float) -> _Cells:
         together = max(round(width / scene.flat.pitch_x), 1)
-        return _Cells(scene, light, together, path.workers)
+        return _Cells(scene, light, sloped, together, path.workers)
 
     finest = max(pitch / FINEST, float(np.abs(radii).max()) / FARTHEST)
     cells = on_cells(max(blur, finest))
@@ -161,6 +164,8 @@ class _Cells:
     scene: DepthScene
     light: NDArray
     """Light (C, h, w) of the samples [e/s]."""
+    sloped: NDArray
+    """The same as the layers' means have it; `light` itself where no slope counts."""
     together: int
     """Samples along the side of a cell."""
     workers: int
@@ -205,16 +210,21 @@ class _Cells:
 
     def _tile(self, tile: tuple[slice, slice], reach: int) -> tuple[NDArray, int]:
         """Return the same in one tile, and how many values were moved for it."""
-        layers = list(self._layers(tile, reach))
+        layers = list(self._layers(self.light, tile, reach))
+        taken = layers
+        if self.sloped is not self.light:
+            taken = list(self._layers(self.sloped, tile, reach))
         means = [np.zeros((len(p), TILE, TILE), p.dtype) for _, p, _ in layers]
         total: NDArray | float = 0.0
         for u, v in aperture_points(RAYS):
-            moved = [_moved(p, radius * u, radius * v, reach) for radius, p, _ in layers]
-            total = total + self._composed(layers, moved)
-            for mean, one in zip(means, moved, strict=True):
+            seen = [_moved(p, radius * u, radius * v, reach) for radius, p, _ in layers]
+            total = total + self._composed(layers, seen)
+            if taken is not layers:
+                seen = [_moved(p, radius * u, radius * v, reach) for radius, p, _ in taken]
+            for mean, one in zip(means, seen, strict=True):
                 mean += one / RAYS
         lacking = np.asarray(total / RAYS - self._composed(layers, means))
-        return lacking, RAYS * sum(mean.size for mean in means)
+        return lacking, RAYS * sum(mean.size for mean in means) * (1 + (taken is not layers))
 
     def _composed(
         self, layers: list[tuple[float, NDArray, bool]], planes: list[NDArray]
@@ -227,7 +237,7 @@ class _Cells:
         return np.concatenate([light, opened[None]])
 
     def _layers(
-        self, tile: tuple[slice, slice], reach: int
+        self, samples: NDArray, tile: tuple[slice, slice], reach: int
     ) -> Iterator[tuple[float, NDArray, bool]]:
         """Yield radius [cells], light and cover (C + 1, h, w) and whether it is hidden.
 
@@ -236,10 +246,10 @@ class _Cells:
         cut, n = self.scene.cut, self.together
         rows, columns = (
             _mirrored(np.arange((s.start - reach) * n, (s.start + TILE + reach) * n), count)
-            for s, count in zip(tile, self.light.shape[1:], strict=True)
+            for s, count in zip(tile, samples.shape[1:], strict=True)
         )
-        light = self.light[:, rows[:, None], columns]
-        flat = np.ravel_multi_index(np.ix_(rows, columns), self.light.shape[1:])
+        light = samples[:, rows[:, None], columns]
+        flat = np.ravel_multi_index(np.ix_(rows, columns), samples.shape[1:])
         first, share = cut.first.ravel()[flat].astype(int), cut.share.ravel()[flat]
         yield from self._present(light, first, share, False)
         place = np.full(cut.first.size, -1)
@@ -249,7 +259,7 @@ class _Cells:
         if there.any():
             source = cut.hidden.sources[index]
             first = np.where(there, cut.first.ravel()[source].astype(int), -2)
-            light = self.light.reshape(len(self.light), -1)[:, source]
+            light = samples.reshape(len(samples), -1)[:, source]
             yield from self._present(light, first, cut.share.ravel()[source], True)
 
     def _present(
