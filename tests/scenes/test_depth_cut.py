@@ -12,7 +12,7 @@ from vcam_cli.scenes.depth_cut import (
     full_signal,
     picture_detail,
 )
-from vcam_cli.scenes.depth_slopes import MARGIN, SlopeBlur, displaced
+from vcam_cli.scenes.depth_slopes import MARGIN, SlopeBlur, displaced, mean_slope, undisplaced_error
 
 PITCH = 1e-6
 PIXEL = 4e-6
@@ -156,3 +156,17 @@ def test_light_of_a_slope_is_displaced_by_a_quarter_of_radius_times_slope():
     for high, jump in ((5.0, 1.0), (0.4, 0.3)):
         step = np.where(np.arange(48) < 24, high, 0.0) * np.ones((32, 1))
         assert displaced(light, step, jump) == pytest.approx(light, abs=0)
+
+
+def test_a_map_in_steps_rises_as_a_smooth_one_and_its_error_is_predicted():
+    """Of 0.1 a sample, in steps of four, which are a pixel: no sample moves, as the minmod asks."""
+    smooth = 0.1 * np.arange(48.0) + np.zeros((48, 48))
+    steps = 0.4 * (np.arange(48) // 4) + np.zeros((48, 48))
+    assert mean_slope(steps, 4) == pytest.approx(mean_slope(smooth, 4), rel=0.05)
+    assert mean_slope(smooth, 4) == pytest.approx(0.1, rel=1e-12)
+    assert np.array_equal(displaced(noise(), steps), noise())
+    picture = noise()
+    detail = picture_detail(picture, PITCH, PIXEL, passes, full_signal(picture, PITCH, PIXEL))
+    found = [undisplaced_error(detail, PITCH * r, PITCH, 4) for r in (steps, smooth)]
+    assert found[0] == pytest.approx(found[1], rel=0.1)
+    assert found[0] > 0

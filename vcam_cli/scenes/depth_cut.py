@@ -140,7 +140,7 @@ def disc_transfer(frequency: NDArray, radius: float) -> NDArray:
 def full_signal(picture: NDArray, pitch: float, pixel: float) -> float:
     """Return the brightest light (h, w) of a picture in the means over pixels, at most white."""
     together = max(int(pixel / pitch), 1)
-    return min(float(_block_means(picture, together).max(initial=0.0)), 1.0)
+    return min(float(block_means(picture, together).max(initial=0.0)), 1.0)
 
 
 def picture_detail(
@@ -171,7 +171,7 @@ def picture_detail(
         The detail.
     """
     together = max(int(pixel / pitch) // 2, 1)  # finer than the pixels nothing is seen
-    picture, pitch = _block_means(picture, together), pitch * together
+    picture, pitch = block_means(picture, together), pitch * together
     squares = np.square(scipy.fft.dctn(picture.astype(np.float32), type=2, norm="ortho"))
     squares[0, 0] = 0
     fy, fx = (np.arange(count) / (2 * count * pitch) for count in picture.shape)
@@ -189,7 +189,7 @@ def picture_detail(
     return Detail(frequency, power[seen] * passed / (full**2 or 1.0))
 
 
-def _block_means(picture: NDArray, side: int) -> NDArray:
+def block_means(picture: NDArray, side: int) -> NDArray:
     """Return the means over whole blocks of samples; of a smaller picture over all of it."""
     down, across = (min(side, count) for count in picture.shape)
     rows, columns = picture.shape[0] // down, picture.shape[1] // across

@@ -19,7 +19,7 @@ from vcam_cli.scenes.depth_cut import (
     is_flat,
     picture_detail,
 )
-from vcam_cli.scenes.depth_slopes import SlopeBlur, displaced, slope_light
+from vcam_cli.scenes.depth_slopes import SlopeBlur, displaced, slope_light, undisplaced_error
 from vcam_cli.scenes.hyperspectral import Cube
 from vcam_cli.scenes.image import ImageScene, image_scene
 from vcam_cli.spectra import Spectrum
@@ -236,14 +236,16 @@ def _sloped(
     pitch = flat.pitch_x
     jump = LEAST_JUMP * max(view.pitch_x, view.pitch_y) / pitch
     change = slope_light(light, radius / pitch, jump)
+    side = max(int(min(view.pitch_x, view.pitch_y) / pitch), 1)
+    as_it_is = undisplaced_error(_detail(flat, view, blur), radius, pitch, side)
     if not change.any():
-        return flat, 0.0
+        return flat, as_it_is
     full = full_signal(light, pitch, max(view.pitch_x, view.pitch_y))
     detail = picture_detail(change, pitch, min(view.pitch_x, view.pitch_y), blur.sharp, full)
     slopes = SlopeBlur.of(change, radius, pitch)
     changed = slopes.change(detail)
     if changed <= allowed:
-        return flat, changed
+        return flat, max(changed, as_it_is)
     picture = flat.picture.astype(flat.dtype)
     for channel in np.moveaxis(picture, 2, 0):
         channel[:] = displaced(channel, radius / pitch, jump)

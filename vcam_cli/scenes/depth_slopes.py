@@ -22,7 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from vcam_cli.scenes.depth_cut import Detail, disc_transfer
+from vcam_cli.scenes.depth_cut import Detail, block_means, disc_transfer
 
 STEEPEST = 1.0
 """Difference of the radii of samples side by side from which on they are no slope, whatever else
@@ -91,6 +91,58 @@ def _sides(rises: NDArray, axis: int) -> tuple[NDArray, NDArray]:
     ends = [(1, 1) if along == axis else (0, 0) for along in (0, 1)]
     padded = np.pad(rises, ends)
     return np.split(padded, [-1], axis)[0], np.split(padded, [1], axis)[1]
+
+
+def mean_slope(radius: NDArray, side: int) -> float:
+    """Return by how much the radius rises over a length, rms, where nothing is hidden.
+
+    Parameters
+    ----------
+    radius : NDArray
+        Radius (h, w) of the blur at every sample's distance, with its sign [samples].
+    side : int
+        Side of a pixel, within which steps of a map are taken together [samples].
+
+    Returns
+    -------
+    float
+        Slope without unit.
+    """
+    squares = 0.0
+    for axis in (0, 1):
+        rise = np.diff(radius, axis=axis)
+        if rise.size:
+            means = block_means(np.where(np.abs(rise) < STEEPEST, rise, 0), side)
+            squares += float(np.square(means).mean())
+    return math.sqrt(squares)
+
+
+def undisplaced_error(detail: Detail, radius: NDArray, pitch: float, side: int) -> float:
+    """Return the rms error, over full signal, of a picture whose samples stay where they are.
+
+    It counts what slopes change as 2 J2(z) / z of all detail, and so the steps of a coarse map,
+    over which no sample is displaced.
+
+    Parameters
+    ----------
+    detail : Detail
+        Detail of the picture.
+    radius : NDArray
+        Radius (h, w) of the blur at every sample's distance, with its sign [m].
+    pitch : float
+        Pitch of the samples [m].
+    side : int
+        Side of a pixel [samples].
+
+    Returns
+    -------
+    float
+        Error without unit.
+    """
+    middle = float(np.sqrt(np.square(radius).mean()))
+    z = 2 * np.pi * detail.frequency * middle
+    tilt = detail.rms(z / 4 * _paraboloid(detail, middle)) / math.sqrt(2)
+    return mean_slope(radius / pitch, side) * tilt
 
 
 @dataclass(frozen=True)
