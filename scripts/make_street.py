@@ -1,8 +1,9 @@
-"""Write the street in configs/scenes: street.png, houses behind a road on which a car stands.
+"""Write the street in configs/scenes: houses behind a road, with a car on it, without, and it.
 
-Run `.venv/bin/python scripts/make_street.py`. It is drawn by the formulas below, each pixel the
-mean of 4 x 4 samples; nobody photographed it. Lengths are in meters, x to the right from the
-middle, y up from the road; colors are sRGB codes from 0 to 1, of reflectances.
+Run `.venv/bin/python scripts/make_street.py`. They are drawn by the formulas below, each pixel the
+mean of 4 x 4 samples; nobody photographed them. Lengths are in meters, x to the right from the
+middle, y up from the road; colors are sRGB codes from 0 to 1, of reflectances. The car by itself
+has a file of its opacity.
 """
 
 import sys
@@ -14,10 +15,12 @@ from numpy.typing import NDArray
 
 from vcam_cli.files.images.png import write_png
 
-FILE = Path(__file__).resolve().parent.parent / "configs" / "scenes" / "street.png"
+SCENES = Path(__file__).resolve().parent.parent / "configs" / "scenes"
 ROWS, COLUMNS, FINE = 480, 720, 4
 WIDTH, BELOW = 14.4, 2.4
 """Width that the picture shows, and how much of the road in front [m]."""
+CAR_ROWS, CAR_COLUMNS = slice(350, 425), slice(265, 475)
+"""Where the car lies in it [pixels]."""
 Floats = NDArray[np.float64]
 Color = tuple[float, float, float]
 PLASTER: tuple[Color, ...] = (
@@ -106,21 +109,67 @@ def car(x: Floats, y: Floats, picture: Floats) -> None:
             fill(picture, disc(at_x, at_y, place, 0.05), TIRE)
 
 
-def street() -> NDArray[np.uint8]:
-    """Return codes (ROWS, COLUMNS, 3)."""
+def street(with_car: bool) -> Floats:
+    """Return sRGB codes of the samples, from 0 to 1."""
     x, y = grid()
     picture = np.empty((ROWS * FINE, COLUMNS * FINE, 3))
     picture[:] = SKY
     houses(picture, x, y)
     road(picture, x, y)
-    car(x, y, picture)
-    linear = np.where(picture > 0.04045, ((picture + 0.055) / 1.055) ** 2.4, picture / 12.92)
-    mean = linear.reshape(ROWS, FINE, COLUMNS, FINE, 3).mean(axis=(1, 3))
-    codes = np.where(mean > 0.0031308, 1.055 * mean ** (1 / 2.4) - 0.055, 12.92 * mean)
-    return np.rint(codes * 255).astype(np.uint8)
+    if with_car:
+        car(x, y, picture)
+    return picture
+
+
+def car_alone() -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
+    """Return codes (rows, columns, 3) of the car, those of its color where it is, and opacity."""
+    picture = np.full((ROWS * FINE, COLUMNS * FINE, 3), np.nan)
+    car(*grid(), picture)
+    there = ~np.isnan(picture[..., :1])
+    light = pixel_means(np.where(there, linear(picture), 0.0))[CAR_ROWS, CAR_COLUMNS]
+    opacity = pixel_means(there.astype(float))[CAR_ROWS, CAR_COLUMNS]
+    color = codes(light / np.maximum(opacity, 1e-9))
+    return eight_bits(color), eight_bits(opacity[..., 0])
+
+
+def linear(picture: Floats) -> Floats:
+    """Return the light of sRGB codes."""
+    return np.where(picture > 0.04045, ((picture + 0.055) / 1.055) ** 2.4, picture / 12.92)
+
+
+def codes(light: Floats) -> Floats:
+    """Return the sRGB codes of light."""
+    return np.where(light > 0.0031308, 1.055 * light ** (1 / 2.4) - 0.055, 12.92 * light)
+
+
+def pixel_means(samples: Floats) -> Floats:
+    """Return the means over the samples of every pixel."""
+    return samples.reshape(ROWS, FINE, COLUMNS, FINE, -1).mean(axis=(1, 3))
+
+
+def eight_bits(values: Floats) -> NDArray[np.uint8]:
+    """Return values from 0 to 1 as codes."""
+    return np.rint(values * 255).astype(np.uint8)
+
+
+def picture(with_car: bool) -> NDArray[np.uint8]:
+    """Return codes (ROWS, COLUMNS, 3)."""
+    return eight_bits(codes(pixel_means(linear(street(with_car)))))
+
+
+def pictures() -> dict[str, NDArray[np.uint8]]:
+    """Return the codes of every file, by its name."""
+    color, opacity = car_alone()
+    return {
+        "street.png": picture(with_car=True),
+        "street-empty.png": picture(with_car=False),
+        "street-car.png": color,
+        "street-car-opacity.png": opacity,
+    }
 
 
 if __name__ == "__main__":
-    write_png(FILE, street())
-    print(FILE)
+    for name, image in pictures().items():
+        write_png(SCENES / name, image)
+        print(SCENES / name)
     sys.exit()
