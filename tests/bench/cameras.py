@@ -70,6 +70,22 @@ BUSY: dict[str, Any] = {
 """Fifteen of the sixteen effects: charge transfer is a ccd's, which has no reset noise."""
 
 
+LAYERED: dict[str, list[dict[str, Any]]] = {
+    "dead leaves": [
+        {"kind": "chart", "chart": "dead-leaves", "seed": seed} for seed in range(1, 9)
+    ],
+    "charts of rectangles": [
+        {"kind": "chart", "chart": chart} for chart in ("colorchecker", "slanted-edge") * 4
+    ],
+    "photographs": [SOURCES["color"]] * 8,
+}
+"""Sources of eight layers, the nearest first."""
+NEAREST, FURTHEST = 0.6, 3.0
+"""Distance of the first and of the last layer [m]; the focus is amid them."""
+FOCAL_LENGTH, PITCH = 8e-3, 2e-6
+"""Of the bench's lens and pixels [m]."""
+
+
 @dataclass(frozen=True)
 class Studio:
     """A folder with the picture, of one size."""
@@ -95,6 +111,43 @@ class Studio:
     def camera(self, scene: str = "gray", base: dict[str, Any] = PLAIN, **changes: Any) -> Camera:
         """The camera looking at the picture (gray, color, laser) or at a chart."""
         return load(self.write(self.tree(scene, base, **changes)))
+
+    def layered(self, kind: str) -> tuple[Camera, Camera]:
+        """The camera before the last of eight layers alone, and before all of them.
+
+        Seven lie on a ring, each two fifths as wide as the frame, before the last, so that some of
+        each is seen. Their distances are even in 1 / distance.
+        """
+        sources = LAYERED[kind]
+        inverse = np.linspace(1 / NEAREST, 1 / FURTHEST, len(sources))
+        focus = 1 / float(inverse.mean())
+        layers: list[dict[str, Any]] = []
+        for number, (source, distance) in enumerate(zip(sources, 1 / inverse, strict=True)):
+            width = self.columns * PITCH * distance * (1 / FOCAL_LENGTH - 1 / focus)
+            angle = 2 * np.pi * number / (len(sources) - 1)
+            x, y = 0.3 * width * np.cos(angle), 0.3 * width * np.sin(angle)
+            layers.append(
+                {
+                    "source": source,
+                    "distance": f"{distance} m",
+                    "width": f"{0.4 * width} m",
+                    "position": [f"{x} m", f"{y} m"],
+                }
+            )
+        del layers[-1]["width"], layers[-1]["position"]
+        optics = {**PLAIN["optics"], "focus_distance": f"{focus} m"}
+        cameras = []
+        for name, source in (
+            ("flat", sources[-1]),
+            ("layers", {"kind": "layers", "layers": layers}),
+        ):
+            tree = self.tree("gray", PLAIN, optics=optics, effects="auto")
+            lit = {"source": source, "luminance": "200 cd/m2", "distance": f"{focus} m"}
+            if name == "layers":
+                del lit["distance"]
+            tree["scene"] = lit
+            cameras.append(load(self.write(tree, f"{name}.yaml")))
+        return cameras[0], cameras[1]
 
 
 @lru_cache(maxsize=4)

@@ -25,7 +25,7 @@ from vcam_cli.scheduling.pdf import Pdf
 from vcam_cli.scheduling.shot_noise import optimal_schedules
 
 from . import plain
-from .cameras import BUSY, PLAIN, Studio, studio
+from .cameras import BUSY, LAYERED, PLAIN, Studio, studio
 from .measure import (
     Cost,
     Frames,
@@ -52,6 +52,8 @@ PAINTED_OVER_PHOTOGRAPH = 2.0
 """What a painted chart may cost over a photograph of its size."""
 PAINTED_MEMORY = 1.3
 """What a painted chart of 12 megapixels may take of memory [GB]."""
+LAYERS_OVER_FLAT = 4.0
+"""What a scene of eight layers may cost over a flat frame."""
 START_UP = 0.3
 """What `vcam run` may take beyond the bare imports [s]."""
 IMPORTS = ("numpy", "scipy.fft", "pydantic", "OpenImageIO", "typer")
@@ -127,6 +129,18 @@ def painted_chart(place: Studio, repeats: int) -> dict[str, Section]:
         "photograph, peak memory [GB]": {"gigabytes": peak_memory(str(photograph_file)) / 1e9},
     }
     return {"a painted chart beside a photograph": {"chart over photograph": ratio, **memory}}
+
+
+def layers(place: Studio, repeats: int, kinds: Sequence[str] = ()) -> dict[str, Section]:
+    """A scene of eight layers over a flat frame of one of them; frames take turns."""
+    rows = {}
+    for kind in kinds or LAYERED:
+        flat, deep = (Frames(camera).take(0, warm=True) for camera in place.layered(kind))
+        for _ in range(repeats):
+            flat.take()
+            deep.take()
+        rows[kind] = {**deep.cost.ratio(flat.cost), "at_most": LAYERS_OVER_FLAT}
+    return {"eight layers over a flat frame": rows}
 
 
 def against_plain(

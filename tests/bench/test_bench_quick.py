@@ -27,6 +27,8 @@ TINY = Size(
     levels=64,
     effects=("shot_noise", "off_axis"),
     scenes=(),
+    layers=(36, 48),
+    layered=("charts of rectangles",),
     shipped=("csf-monochrome",),
     busy=PLAIN,
     always={"processing": [{"demosaic": "bilinear"}]},  # a fit takes longest of a frame so small
@@ -61,8 +63,8 @@ def figures(found):
 def test_every_part_is_there(found):
     titles = " ".join(found["sections"])
     for word in (
-        "frame over R_compute", "shares", "shipped", "photograph", "plain NumPy", "wavelengths",
-        "without", "sweep", "growth", "schedules", "command",
+        "frame over R_compute", "shares", "shipped", "photograph", "eight layers",
+        "plain NumPy", "wavelengths", "without", "sweep", "growth", "schedules", "command",
     ):  # fmt: skip
         assert word in titles
     assert len(PARTS) == len(found["sections"]) - 1  # frames have their shares besides

@@ -42,6 +42,10 @@ class Size:
     """Some of the sweeps; () for all."""
     scenes: tuple[str, ...] = ("color", "laser", "chart")
     """Scenes beside the gray picture."""
+    layers: tuple[int, int] = (1000, 1000)
+    """Rows and columns of the frames with layers."""
+    layered: tuple[str, ...] = ()
+    """Some of the layered scenes; () for all."""
     shipped: tuple[str, ...] = ()
     """Some of the shipped cameras; () for all."""
     busy: dict[str, Any] = field(default_factory=lambda: BUSY)
@@ -66,6 +70,7 @@ QUICK = Size(
     plain_scenes=("color",),
     effects=("aberration", "stray_light", "pixel_vignetting", "microlens", "shot_noise", "fpn"),
     varied=("exposure time",),
+    layers=(216, 288),
     shipped=("starter", "csf-monochrome", "eye-chart"),
 )
 
@@ -111,6 +116,11 @@ def _painted(bench: Bench) -> dict[str, Section]:
     return sections.painted_chart(bench.studio(bench.size.frame), bench.size.few)
 
 
+def _layers(bench: Bench) -> dict[str, Section]:
+    size = bench.size
+    return sections.layers(bench.studio(size.layers), size.few, size.layered)
+
+
 def _plain(bench: Bench) -> dict[str, Section]:
     size = bench.size
     place = bench.studio(size.frame)
@@ -147,6 +157,7 @@ PARTS: dict[str, Callable[[Bench], dict[str, Section]]] = {
     "frames": _frames,
     "shipped": _shipped,
     "painted": _painted,
+    "layers": _layers,
     "plain": _plain,
     "wavelengths": _wavelengths,
     "effects": _effects,

@@ -5,7 +5,7 @@ part 1 - a of the light behind it pass. Behind a lens both are blurred by what t
 asks for, which is image formation's business; `flat` is the scene as a pinhole sees it.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -36,14 +36,27 @@ class MaskedChart(Chart):
 
     def paint(self, x_edges: Array, y_edges: Array, mix: Array, out: Array) -> None:
         """Write the averages over the cells, as if light and opacity did not both change in one."""
-        self.light.paint(x_edges, y_edges, mix[:, :-1], out)
-        out += mix[:, -1, None, None]
-        out *= self.opacity.averages(x_edges, y_edges, np.ones((1, 1), mix.dtype))
+        out[:] = 0
+        columns, rows = self.opacity.cells(x_edges, y_edges)
+        if columns.stop > columns.start and rows.stop > rows.start:
+            x, y = _edges(x_edges, columns), _edges(y_edges, rows)
+            seen = self.light.averages(x, y, mix[:, :-1])
+            seen += mix[:, -1, None, None]
+            seen *= self.opacity.averages(x, y, np.ones((1, 1), mix.dtype))
+            out[:, rows, columns] = seen
 
     def values(self, x: Array, y: Array, mix: Array) -> Array:
         """Return the values at points."""
         light = self.light.values(x, y, mix[:, :-1]) + mix[:, -1, None, None]
         return light * self.opacity.values(x, y, np.ones((1, 1), mix.dtype))
+
+    def crop_to_cells(self, x_edges: Array, y_edges: Array) -> "MaskedChart":
+        """Return the same with light that may be faster on these cells."""
+        columns, rows = self.opacity.cells(x_edges, y_edges)
+        if columns.stop > columns.start and rows.stop > rows.start:
+            x, y = _edges(x_edges, columns), _edges(y_edges, rows)
+            return replace(self, light=self.light.crop_to_cells(x, y))
+        return self
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,6 +78,11 @@ class LayerChart(Chart):
     def paint(self, x_edges: Array, y_edges: Array, mix: Array, out: Array) -> None:
         """Write the averages over the cells."""
         self.layer.paint(x_edges - self.center[0], y_edges - self.center[1], mix, out)
+
+    def crop_to_cells(self, x_edges: Array, y_edges: Array) -> "LayerChart":
+        """Return the same layer as a chart that may be faster on these cells."""
+        x, y = x_edges - self.center[0], y_edges - self.center[1]
+        return replace(self, layer=self.layer.crop_to_cells(x, y))
 
     def values(self, x: Array, y: Array, mix: Array) -> Array:
         """Return the values at points."""
@@ -113,6 +131,11 @@ class FlatLayers(Chart):
             total = total + clear * found[:-1]
             clear = clear * (1 - found[-1])
         return total
+
+
+def _edges(edges: Array, cells: slice) -> Array:
+    """Return the edges of some of the cells."""
+    return edges[cells.start : cells.stop + 1]
 
 
 def _parts_of(edges: Array) -> Array:

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from vcam_cli.scenes.base import Array, Chart, Frame
+from vcam_cli.scenes.cells import clip_cells
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,6 +42,14 @@ class PictureChart(Chart):
         columns, lit_columns = self._index(x * (width / self.frame.width) + width / 2, width)
         found = self.picture[np.ix_(rows, columns)] * np.outer(lit_rows, lit_columns)[..., None]
         return np.asarray(np.moveaxis(found @ np.asarray(mix).T, -1, 0), mix.dtype)
+
+    def cells(self, x_edges: Array, y_edges: Array) -> tuple[slice, slice]:
+        """Return the columns and rows of cells that the picture reaches."""
+        if self.mirrored:
+            return slice(0, len(x_edges) - 1), slice(0, len(y_edges) - 1)
+        columns, _, _ = clip_cells(x_edges, self.frame.width / 2)
+        rows, _, _ = clip_cells(y_edges, self.frame.height / 2)
+        return columns, rows
 
     def _shares(self, edges: Array, count: int) -> tuple[Any, slice]:
         """Return what of each cell is each sample's, a sparse matrix, and the samples that occur.
