@@ -60,7 +60,7 @@ OCCLUDE = 30e-9
 """One cell of light or opacity put before what is behind, covariance included [s]."""
 RAY = 12e-9
 """One value of a cell's light or cover moved to where a ray sees it, and composed [s]."""
-MOVE = 10e-9
+MOVE = 5.5e-9
 """One value of a layer transformed to where a ray sees it, and composed [s]."""
 WAVE = 12e-9
 """One pixel of one wave, or of one box [s]."""
