@@ -26,7 +26,7 @@ from vcam_cli.errors import BadInput
 from vcam_cli.simulation import checks
 from vcam_cli.simulation.simulate import prepare
 
-STILL = {"scene.radiance": radiance_for(5000), "effects": QUIET, "accuracy": "0.2 %"}
+STILL = {"scene.radiance": radiance_for(40000), "effects": QUIET, "accuracy": "0.2 %"}
 RAYS = {"effects": QUIET | {"diffraction": "off"}}
 WAVELENGTH = 550e-9
 CLOSE = 2e-3

@@ -20,24 +20,20 @@ from vcam_cli.effects.optics.diffraction import Diffraction
 from vcam_cli.image_formation.layers.layer_lattice import Lattice
 from vcam_cli.image_formation.layers.occlusion import RINGS, BlurredLayer, Covariance, covariance
 from vcam_cli.image_formation.optical_path import OpticalPath
+from vcam_cli.scenes.cells import cell_edges
 from vcam_cli.scenes.layered import LayeredScene
 
 SHARP = 0.1
 """Radius of a blur below which a layer counts as sharp [pixels]."""
+COARSEST = 1.0
+"""Side of a cell for layers that are nearly sharp, at most [pixels]."""
 FINEST = 8
 """Samples per pixel pitch, at most."""
 SHARE = 0.2
-"""Part of the tolerance that the sum over few points of the aperture may miss, and as much the
-cells."""
-SAMPLED = 0.5
-"""Error of the covariance by its cells, relative to it, as measured on layers of discs and bars,
-over the square of their side. That is counted in the geometric mean of a pixel and the radius of
-the sharpest layer, at least a pixel: its light has its detail in the covariance of those before
-it, however wide they are."""
-NARROWEST = 0.25
-"""Width of the strips along edges that have a covariance, at least [pixels]. Where they are
-narrower than pixels, they have less of it on coarse cells: that error grows with the inverse root
-of their width."""
+"""Part of the tolerance that the covariance may miss by a sum over few points of the aperture."""
+SAMPLED = 0.6
+"""Error of the covariance by its samples, relative to it, times the square of the samples over the
+radius: as measured on layers of discs and bars."""
 
 
 @dataclass(frozen=True)
@@ -48,8 +44,6 @@ class Hidden:
     """Rings of points of the aperture over which it was summed; 0 where there was no need to."""
     error: float = 0.0
     """Predicted, rms [e/s]."""
-    values: int = 0
-    """Values that were moved to where rays see them."""
 
 
 def add_covariance(path: OpticalPath, scene: LayeredScene, light: NDArray, full: float) -> Hidden:
@@ -76,9 +70,7 @@ def add_covariance(path: OpticalPath, scene: LayeredScene, light: NDArray, full:
     period = _period(path)
     if len(widest) < 2 or widest[0] < SHARP * pitch or widest[1] + period < SHARP * pitch:
         return Hidden()
-    coarsest, detail = (max(radius, pitch) for radius in (widest[1], widest[-1]))
-    strip = min(max(widest[1] + period, NARROWEST * pitch), pitch)
-    squared = SAMPLED / (detail * math.sqrt(pitch * strip))
+    scale = max(widest[1], COARSEST * pitch)
     rows, columns = _around_edges(scene, path.geometry, widest[0] + 2 * widest[1])
     if not (rows.stop > rows.start and columns.stop > columns.start):
         return Hidden()
@@ -89,17 +81,13 @@ def add_covariance(path: OpticalPath, scene: LayeredScene, light: NDArray, full:
     def sampled(cell: float, rings: Sequence[int]) -> _Sampled:
         return _covariance(path, scene, centers, cell, widest[0], allowed, rings)
 
-    def cell_error() -> float:
-        return squared * found.cell**2 * found.light.rms
-
-    found = sampled(_aligned(coarsest, pitch), RINGS[:1])
-    values = found.light.values
+    found = sampled(scale, RINGS[:1])
     if found.light.rms <= 0.0:
         return Hidden()
-    if cell_error() > allowed or found.light.error > allowed:
-        asked = found.cell * math.sqrt(min(allowed / cell_error(), 1))
-        found = sampled(_aligned(max(asked, pitch / FINEST), pitch), RINGS)
-        values += found.light.values
+    asked = scale * math.sqrt(allowed / (SAMPLED * found.light.rms))
+    if asked < scale or found.light.error > allowed:
+        cell = min(max(asked, pitch / FINEST), scale)
+        found = sampled(cell, RINGS)
     for plane, own in zip(light, found.light.light, strict=True):
         across = box_means(own.T, found.at_x, path.geometry.collecting_width / found.cell).T
         plane[rows, columns] += box_means(
@@ -107,15 +95,8 @@ def add_covariance(path: OpticalPath, scene: LayeredScene, light: NDArray, full:
         )
     np.maximum(light, 0, out=light)
     share = math.sqrt(len(centers[0]) * len(centers[1]) / light[0].size)
-    return Hidden(found.light.rings, share * math.hypot(found.light.error, cell_error()), values)
-
-
-def _aligned(cell: float, pitch: float) -> float:
-    """Return the side of cells, at most as large, that divides the pixels or is whole pixels [m].
-
-    What is sharp behind what is not then loses nothing between the two.
-    """
-    return pitch * math.floor(cell / pitch) if cell >= pitch else pitch / math.ceil(pitch / cell)
+    coarse = min(SAMPLED * (found.cell / scale) ** 2, 1.0) * found.light.rms
+    return Hidden(found.light.rings, share * math.hypot(found.light.error, coarse))
 
 
 @dataclass(frozen=True)
@@ -140,17 +121,12 @@ def _covariance(
     allowed: float,
     rings: Sequence[int],
 ) -> _Sampled:
-    """Return the covariance around columns and rows of a lattice, and what blurs into them [m].
-
-    Cells begin at the first pixel's border.
-    """
-    pitches = path.geometry.pitch_x, path.geometry.pitch_y
-    beyond = math.ceil(widest / cell) + 1
+    """Return the covariance around columns and rows of a lattice, and what blurs into them [m]."""
     edges = []
-    for at, pitch in zip(centers, pitches, strict=True):
-        count = math.ceil((at[-1] - at[0] + pitch) / cell) + 2 * beyond
+    for at in centers:
+        count = math.ceil((at[-1] - at[0] + 2 * widest) / cell) + 2
         count = scipy.fft.next_fast_len(count, real=True)
-        edges.append(at[0] - pitch / 2 + (np.arange(count + 1) - beyond) * cell)
+        edges.append((at[0] + at[-1]) / 2 + cell_edges(count, cell))
     layers = []
     for part, optics in zip(scene.parts, path.layers, strict=True):
         level = path.transfer.level[part.components].T

@@ -60,8 +60,6 @@ EDGES = 9.5
 """Heights of two edges in a cell over the rms covariance of both within it: sqrt(90)."""
 PART = 0.5
 """Part of the tolerance that the image of each layer may use."""
-SURE = 1.7
-"""Predicted error over the rms that is expected: of 140 scenes of discs and bars none errs more."""
 
 
 @dataclass(frozen=True)
@@ -75,11 +73,6 @@ class _Seen:
     """Opacity (C, rows, columns)."""
     path: OpticalPath
     report: SpectrumReport
-
-    def lost_rms(self, g: Geometry) -> float:
-        """Return the rms over all of an array of what the layer's own image lacks [e/s]."""
-        cells = self.window.geometry
-        return self.report.lost_rms * math.sqrt(cells.rows * cells.columns / (g.rows * g.columns))
 
 
 def layered_image(
@@ -112,9 +105,8 @@ def layered_image(
         added, error = _correction(path, scene, count, form)
         light += added
     hidden = add_covariance(path, scene, light, full)
-    lost = [layer.lost_rms(path.geometry) for layer in layers]
-    error = SURE * math.hypot(error, hidden.error, *lost)
-    depth = DepthReport(count, hidden.rings, error / (full or 1.0), hidden.values)
+    error = math.hypot(error, hidden.error)
+    depth = DepthReport(count, hidden.rings, error / (full or 1.0))
     layer = Layer(lambda color, rows: light[color, rows])
     return iter([layer]), _report(layers, error, depth)
 
@@ -328,12 +320,12 @@ def is_of_lens(effect: Effect) -> bool:
 
 
 def _report(layers: Sequence[_Seen], error: float, depth: DepthReport) -> SpectrumReport:
-    """Return what is known of the image of layers, and its error [e/s]."""
+    """Return what is known of the image of layers; `error` is that of their order [e/s]."""
     reports = [layer.report for layer in layers]
     names = {name for own in reports for name in own.changes}
     return SpectrumReport(
         oversampling=max((own.oversampling for own in reports), default=0.0),
-        lost_rms=error,
+        lost_rms=math.hypot(error, *(own.lost_rms for own in reports)),
         changes={
             name: math.hypot(*(own.changes.get(name, 0.0) for own in reports)) for name in names
         },

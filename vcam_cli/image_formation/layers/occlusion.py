@@ -14,9 +14,7 @@ allowed.
 
 In waves, a frequency f of incoherent light is transferred by the points of the pupil that are
 lambda N f / 2 away from two others, one each way (in the pupil's diameters) [1]_. So the picture
-through u has those frequencies alone for which both of them lie in the pupil. A point stands for a
-patch around it, and counts by how much of that lies in their overlap: whole points, in or out,
-would take twice as many rings.
+through u has those frequencies alone for which both of them lie in the pupil.
 
 References
 ----------
@@ -37,11 +35,10 @@ from numpy.typing import NDArray
 
 from vcam_cli.physics.diffraction import otf_circular
 
-RINGS = (2, 4, 8)
+RINGS = (2, 4, 6, 8)
 """Rings of points in the aperture that are tried."""
-FURTHER = 2.4
-"""Rms error of a number of rings over what it changed from half as many, at most, times the number:
-as measured on layers of discs and bars, in waves; it is no larger than the change."""
+FURTHER = 0.2
+"""Rms error of a number of rings over what it changed, at most, on layers of discs and bars."""
 SPOKES = 4
 """Points along the aperture's edge, over the number of rings."""
 
@@ -88,8 +85,6 @@ class Covariance:
     """Predicted rms error, by what the last rings changed; in the light's unit."""
     rms: float
     """Of the light."""
-    values: int
-    """Values of layers that were moved to where rays through a point of the aperture see them."""
 
 
 def covariance(
@@ -118,14 +113,12 @@ def covariance(
         The covariance.
     """
     light: NDArray = np.zeros_like(layers[0].light)
-    values, size = 0, sum(layer.light.size + layer.opacity.size for layer in layers)
     for count in rings:
-        values += size * len(list(aperture_points(count)))
         before, light = light, _covariance(layers, count, period)
-        error = min(FURTHER / count, 1.0) * _rms(light - before)
+        error = FURTHER * _rms(light - before)
         if error <= allowed:
             break
-    return Covariance(light, count, error, _rms(light), values)
+    return Covariance(light, count, error, _rms(light))
 
 
 def aperture_points(rings: int) -> Iterator[tuple[float, float, float]]:
@@ -146,14 +139,10 @@ def _covariance(layers: Sequence[BlurredLayer], rings: int, period: float) -> ND
     spectrum = np.zeros_like(layers[0].spectrum[:-1])
     transfers = [np.zeros_like(spectrum[0]) for _ in layers]
     counted = np.zeros(spectrum.shape[1:], spectrum.real.dtype)
-    points = list(aperture_points(rings))
-    half = math.sqrt(math.pi / len(points)) / 2
-    for u, v, weight in points:
-        # The further of u + apart and u - apart from the middle.
+    for u, v, weight in aperture_points(rings):
+        # Both u + apart and u - apart lie within the radius 1.
         between = 2 * np.abs(u * apart_x + v * apart_y)
-        furthest = np.sqrt(u**2 + v**2 + apart_x**2 + apart_y**2 + between)
-        steep = 2 * min(half, 1 - math.hypot(u, v))
-        inside = weight * np.clip(0.5 + (1 - furthest) / steep, 0, 1)
+        inside = weight * (u**2 + v**2 + apart_x**2 + apart_y**2 + between <= 1)
         inside = inside.astype(counted.dtype)
         shifts = [layer.shift(u, v) for layer in layers]
         seen = _composed([a.filtered(b) for a, b in zip(layers, shifts, strict=True)])
