@@ -26,11 +26,13 @@ from vcam_cli.errors import BadInput
 from vcam_cli.simulation import checks
 from vcam_cli.simulation.simulate import prepare
 
-STILL = {"scene.radiance": radiance_for(40000), "effects": QUIET, "accuracy": "0.2 %"}
+STILL = {"scene.radiance": radiance_for(5000), "effects": QUIET, "accuracy": "0.2 %"}
 RAYS = {"effects": QUIET | {"diffraction": "off"}}
 WAVELENGTH = 550e-9
 CLOSE = 2e-3
 """Of full signal, rms: what a picture may differ from the sum over rays."""
+FEW = 1e-3
+"""Of full signal, rms: what sums over few points err."""
 LENS = {"f_number": 2, "focal_length": "5 mm", "transmittance": 1, "off_axis": "none"}
 
 
@@ -47,23 +49,24 @@ def error(found: np.ndarray, truth: np.ndarray) -> float:
     return float(np.sqrt(np.mean(np.square(found - truth))) / truth.max())
 
 
-def check(scene: Scene, truth: np.ndarray, folder, *more: dict) -> None:
+def check(scene: Scene, truth: np.ndarray, folder, *more: dict, unsure: float = 0.0) -> None:
+    """`unsure` is what the truth errs itself, of full signal."""
     found, frame = seen(folder, changes(scene, folder), *more)
-    assert error(found, truth) <= CLOSE
-    assert frame.spectrum.depth.error < 5 * CLOSE
+    assert frame.spectrum.depth.error <= CLOSE
+    assert error(found, truth) <= frame.spectrum.depth.error + unsure
 
 
 @pytest.mark.parametrize(("seed", "sharp"), [(1, True), (3, False)])
 def test_layers_are_a_sum_over_rays(seed, sharp, tmp_path):
     """One of two in focus, or none."""
     scene = random_scene(np.random.default_rng(seed), 2, sharp)
-    check(scene, ray_sum(scene, 700, 3), tmp_path, RAYS)
+    check(scene, ray_sum(scene, 700, 3), tmp_path, RAYS, unsure=FEW)
 
 
 def test_photodetectors_that_do_not_fill_their_pixels(tmp_path):
     scene = random_scene(np.random.default_rng(2), 3, sharp=True)
     small = {"pixel.photodetector.fill_factor": 0.36}
-    check(scene, ray_sum(scene, 700, 3, 0.6), tmp_path, RAYS, small)
+    check(scene, ray_sum(scene, 700, 3, 0.6), tmp_path, RAYS, small, unsure=FEW)
 
 
 @pytest.mark.long
@@ -76,7 +79,7 @@ def test_forty_scenes_are_sums_over_rays(seed, tmp_path):
 
 def test_layers_are_a_sum_over_points_of_the_pupil(tmp_path):
     scene = random_scene(np.random.default_rng(5), 2)
-    check(scene, pupil_sum(scene, WAVELENGTH, 350, 5), tmp_path)
+    check(scene, pupil_sum(scene, WAVELENGTH, 350, 5), tmp_path, unsure=FEW)
 
 
 @pytest.mark.long
@@ -95,7 +98,7 @@ def test_the_error_is_no_more_than_was_promised(tmp_path):
     for name, tolerance in (("draft", 0.02), ("standard", 0.005)):
         found, frame = seen(tmp_path, changes(scene, tmp_path), RAYS, {"accuracy": name})
         predicted = frame.spectrum.depth.error
-        assert error(found, truth) <= min(tolerance, predicted + 0.25 * tolerance)
+        assert error(found, truth) <= predicted <= tolerance
 
 
 @pytest.mark.parametrize("distance", [0.3, 0.5, 3.0])

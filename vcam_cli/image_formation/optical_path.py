@@ -146,7 +146,9 @@ class DepthReport:
     """Rings of points of the aperture, through which it was followed what layers out of focus hide
     of each other; 0 where there was no need to."""
     error: float
-    """Predicted rms error of both, relative to full signal."""
+    """Predicted rms error of both and of the layers' own images, relative to full signal."""
+    ray_values: int = 0
+    """Values of layers that were moved to where rays see them."""
 
 
 @dataclass(frozen=True)

@@ -60,6 +60,8 @@ OCCLUDE = 30e-9
 """One cell of light or opacity put before what is behind, covariance included [s]."""
 RAY = 12e-9
 """One value of a cell's light or cover moved to where a ray sees it, and composed [s]."""
+MOVE = 10e-9
+"""One value of a layer transformed to where a ray sees it, and composed [s]."""
 WAVE = 12e-9
 """One pixel of one wave, or of one box [s]."""
 PROCESS = 14e-9
@@ -97,6 +99,7 @@ def threads(workers: int) -> float:
 def image_seconds(geometry: Geometry, colors: int, report: SpectrumReport) -> float:
     """Return the core seconds of image formation, that of layers included."""
     rays = RAY * report.cut.ray_values if report.cut else 0.0
+    rays += MOVE * report.depth.ray_values if report.depth else 0.0
     return (
         rays
         + _flat_seconds(geometry, colors, report)

@@ -9,31 +9,37 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from operator import methodcaller
 
 import numpy as np
-import scipy.fft
 from numpy.typing import NDArray
 
-from vcam_cli.camera.derived.geometry import Geometry, pixel_centers
 from vcam_cli.effects.base import of_kind
 from vcam_cli.effects.optics.diffraction import Diffraction
-from vcam_cli.image_formation.layers.layer_lattice import Lattice
-from vcam_cli.image_formation.layers.occlusion import RINGS, BlurredLayer, Covariance, covariance
+from vcam_cli.image_formation.layers.edge_tiles import Cells, Tile, TileBatch, painted, tiles_with
+from vcam_cli.image_formation.layers.occlusion import aperture_points
 from vcam_cli.image_formation.optical_path import OpticalPath
-from vcam_cli.scenes.cells import cell_edges
+from vcam_cli.parallel import results
 from vcam_cli.scenes.layered import LayeredScene
 
 SHARP = 0.1
 """Radius of a blur below which a layer counts as sharp [pixels]."""
-COARSEST = 1.0
-"""Side of a cell for layers that are nearly sharp, at most [pixels]."""
 FINEST = 8
 """Samples per pixel pitch, at most."""
-SHARE = 0.2
-"""Part of the tolerance that the covariance may miss by a sum over few points of the aperture."""
-SAMPLED = 0.6
-"""Error of the covariance by its samples, relative to it, times the square of the samples over the
-radius: as measured on layers of discs and bars."""
+RINGS = (2, 4, 8)
+"""Rings of points in the aperture that are tried."""
+FURTHER_RAYS, FURTHER_WAVES = 0.2, 0.6
+"""Rms error of a number of rings over what it changed from half as many, as measured on layers of
+discs and bars: of rays, and of waves, of which points near the pupil's edge count in part."""
+SAMPLED = 0.5
+"""Error of the covariance by its cells, relative to it, as measured on layers of discs and bars,
+over the square of their side. That is counted in the geometric mean of a pixel and the radius of
+the sharpest layer, at least a pixel: its light has its detail in the covariance of those before
+it, however wide they are."""
+NARROWEST = 0.25
+"""Width of the strips along edges that have a covariance, at least [pixels]. Where they are
+narrower than pixels, they have less of it on coarse cells: that error grows with the inverse root
+of their width."""
 
 
 @dataclass(frozen=True)
@@ -44,9 +50,13 @@ class Hidden:
     """Rings of points of the aperture over which it was summed; 0 where there was no need to."""
     error: float = 0.0
     """Predicted, rms [e/s]."""
+    values: int = 0
+    """Values that were moved to where rays see them."""
 
 
-def add_covariance(path: OpticalPath, scene: LayeredScene, light: NDArray, full: float) -> Hidden:
+def add_covariance(
+    path: OpticalPath, scene: LayeredScene, light: NDArray, edges: NDArray, allowed: float
+) -> Hidden:
     """Add what layers that are out of focus hide of each other to the light of pixels.
 
     Parameters
@@ -57,86 +67,118 @@ def add_covariance(path: OpticalPath, scene: LayeredScene, light: NDArray, full:
         The scene.
     light : NDArray
         Light (C, rows, columns) that is changed [e/s].
-    full : float
-        Full signal, to which the tolerance is relative [e/s].
+    edges : NDArray
+        Pixels (rows, columns) that some rays reach past a layer and others do not.
+    allowed : float
+        Error to be reached, rms [e/s].
 
     Returns
     -------
     Hidden
         By how many rings it was summed, and its error.
     """
+    if not may_hide(path):
+        return Hidden()
+    g = path.geometry
+    pitch = max(g.pitch_x, g.pitch_y)
     widest = sorted((abs(optics.radius) for optics in path.layers), reverse=True)
-    pitch = max(path.geometry.pitch_x, path.geometry.pitch_y)
-    period = _period(path)
-    if len(widest) < 2 or widest[0] < SHARP * pitch or widest[1] + period < SHARP * pitch:
+    # Of cells that are powers of two of pixels wide, the coarse ones are means of the fine.
+    count = 2 ** math.floor(math.log2(max(widest[1] / pitch, 1)))
+    tiles, size = tiles_with(edges, widest[0] / pitch, count)
+    if not tiles:
         return Hidden()
-    scale = max(widest[1], COARSEST * pitch)
-    rows, columns = _around_edges(scene, path.geometry, widest[0] + 2 * widest[1])
-    if not (rows.stop > rows.start and columns.stop > columns.start):
-        return Hidden()
-    x, y = pixel_centers(path.geometry, detector=True)
-    centers = x[columns], y[rows]
-    allowed = SHARE * path.settings.tolerance * full
+    share = math.sqrt(sum(edges[tile].size for tile in tiles) / edges.size)
+    allowed, squared = allowed / share / math.sqrt(2), _squared_error(path)
 
-    def sampled(cell: float, rings: Sequence[int]) -> _Sampled:
-        return _covariance(path, scene, centers, cell, widest[0], allowed, rings)
-
-    found = sampled(scale, RINGS[:1])
-    if found.light.rms <= 0.0:
+    cells = Cells.around(g, size, pitch, widest[0], count)
+    batches = painted(path, scene, tiles, cells)
+    found = _summed(path, batches, cells, count, allowed, RINGS[:1])
+    values = found.values
+    while True:
+        coarse = squared * found.side**2 * _rms(found.light)
+        finer = coarse > allowed and found.side > pitch / FINEST * 1.001
+        if not finer and (found.error <= allowed or found.rings == RINGS[-1]):
+            break
+        asked = found.side * min(math.sqrt(allowed / coarse), 1.0) / pitch if coarse > 0 else count
+        if asked < 1:
+            side = pitch / min(math.ceil(1 / asked), FINEST)
+            cells = Cells.around(g, size, side, widest[0])
+            batches = painted(path, scene, tiles, cells)
+        count = 2 ** math.floor(math.log2(max(asked, 1)))
+        found = _summed(path, batches, cells, count, allowed, RINGS)
+        values += found.values
+    if found.error == coarse == 0.0:
         return Hidden()
-    asked = scale * math.sqrt(allowed / (SAMPLED * found.light.rms))
-    if asked < scale or found.light.error > allowed:
-        cell = min(max(asked, pitch / FINEST), scale)
-        found = sampled(cell, RINGS)
-    for plane, own in zip(light, found.light.light, strict=True):
-        across = box_means(own.T, found.at_x, path.geometry.collecting_width / found.cell).T
-        plane[rows, columns] += box_means(
-            across, found.at_y, path.geometry.collecting_height / found.cell
-        )
+    for tile, part in zip(found.tiles, found.light, strict=True):
+        light[:, *tile] += part
     np.maximum(light, 0, out=light)
-    share = math.sqrt(len(centers[0]) * len(centers[1]) / light[0].size)
-    coarse = min(SAMPLED * (found.cell / scale) ** 2, 1.0) * found.light.rms
-    return Hidden(found.light.rings, share * math.hypot(found.light.error, coarse))
+    return Hidden(found.rings, share * math.hypot(found.error, coarse), values)
+
+
+def _squared_error(path: OpticalPath) -> float:
+    """Return the error of the covariance by its cells, over it and their squared side [1/m2]."""
+    pitch = max(path.geometry.pitch_x, path.geometry.pitch_y)
+    widest = sorted((abs(optics.radius) for optics in path.layers), reverse=True)
+    strip = min(max(widest[1] + _period(path), NARROWEST * pitch), pitch)
+    return SAMPLED / (max(widest[-1], pitch) * math.sqrt(pitch * strip))
+
+
+def may_hide(path: OpticalPath) -> bool:
+    """Return whether more than one layer is so far out of focus that rays through it differ."""
+    least = SHARP * max(path.geometry.pitch_x, path.geometry.pitch_y)
+    widest = sorted((abs(optics.radius) for optics in path.layers), reverse=True)
+    return len(widest) > 1 and widest[0] >= least and widest[1] + _period(path) >= least
+
+
+def _rms(light: Sequence[NDArray]) -> float:
+    """Return the rms of parts of a frame (C, h, w) in the color where it is most."""
+    squares = sum(np.square(part).sum(axis=(1, 2), dtype=float) for part in light)
+    return math.sqrt(float(np.max(squares)) / sum(part[0].size for part in light))
 
 
 @dataclass(frozen=True)
-class _Sampled:
-    """Covariance on cells of its own."""
+class _Sum:
+    """Covariance at the pixels, summed over points of the aperture."""
 
-    light: Covariance
-    cell: float
-    """Side of a cell [m]."""
-    at_x: NDArray
-    """Where the pixels' columns lie, counted in cells from the edge of the first."""
-    at_y: NDArray
-    """Where their rows lie."""
+    tiles: list[Tile]
+    light: list[NDArray]
+    """(C, rows, columns) of every tile [e/s]."""
+    side: float
+    """Of a cell [m]."""
+    rings: int
+    error: float
+    """Predicted rms error, by what the last rings changed [e/s]."""
+    values: int
+    """Values of layers that were moved to where rays see them."""
 
 
-def _covariance(
+def _summed(
     path: OpticalPath,
-    scene: LayeredScene,
-    centers: tuple[NDArray, NDArray],
-    cell: float,
-    widest: float,
+    batches: Sequence[TileBatch],
+    cells: Cells,
+    count: int,
     allowed: float,
-    rings: Sequence[int],
-) -> _Sampled:
-    """Return the covariance around columns and rows of a lattice, and what blurs into them [m]."""
-    edges = []
-    for at in centers:
-        count = math.ceil((at[-1] - at[0] + 2 * widest) / cell) + 2
-        count = scipy.fft.next_fast_len(count, real=True)
-        edges.append((at[0] + at[-1]) / 2 + cell_edges(count, cell))
-    layers = []
-    for part, optics in zip(scene.parts, path.layers, strict=True):
-        level = path.transfer.level[part.components].T
-        mix = np.zeros((len(level) + 1, level.shape[1] + 1), path.settings.dtype)
-        mix[:-1, :-1], mix[-1, -1] = level, 1
-        planes = part.chart.averages(edges[0], edges[1], mix)
-        layers.append(BlurredLayer(planes[:-1], planes[-1], optics.radius / cell))
-    at_x, at_y = ((at - own[0]) / cell for at, own in zip(centers, edges, strict=True))
-    light = covariance(layers, allowed, _period(path) / cell, rings)
-    return _Sampled(light, cell, at_x, at_y)
+    numbers: Sequence[int],
+) -> _Sum:
+    """Return the covariance at the pixels by as many rings as it takes, of those given.
+
+    It is that on cells of so many of those that were painted, along either side.
+    """
+    period = _period(path)
+    further = FURTHER_WAVES if period > 0 else FURTHER_RAYS
+    batches = [batch.together(count) for batch in batches]
+    cells = cells.together(count)
+    tiles = [tile for batch in batches for tile in batch.tiles]
+    values, light = 0, [np.zeros(())] * len(tiles)
+    for rings in numbers:
+        each = results(methodcaller("lacking", cells, rings, period), batches, path.workers)
+        found = [part for parts in each for part in parts]
+        error = further * _rms([own - before for own, before in zip(found, light, strict=True)])
+        values += sum(batch.values for batch in batches) * len(list(aperture_points(rings)))
+        light = found
+        if error <= allowed:
+            break
+    return _Sum(tiles, light, cells.side, rings, error, values)
 
 
 def _period(path: OpticalPath) -> float:
@@ -145,25 +187,3 @@ def _period(path: OpticalPath) -> float:
     mean = float(np.average(path.transfer.wavelengths, weights=white))
     lens = of_kind(path.layers[0].effects, Diffraction)
     return max((1 / effect.cutoff(mean) for effect in lens), default=0.0)
-
-
-def _around_edges(scene: LayeredScene, g: Geometry, beyond: float) -> tuple[slice, slice]:
-    """Return the rows and columns of a lattice within reach of an edge of a layer [m]."""
-    spans = [Lattice(g).window(part, beyond) for part in scene.parts[:-1]]
-    rows = slice(min(w.rows.start for w in spans), max(w.rows.stop for w in spans))
-    columns = slice(min(w.columns.start for w in spans), max(w.columns.stop for w in spans))
-    return rows, columns
-
-
-def box_means(plane: NDArray, at: NDArray, width: float) -> NDArray:
-    """Return the means of even rows over boxes of a width around places, counted in rows."""
-    sums = np.concatenate([np.zeros_like(plane[:1]), np.cumsum(plane, axis=0)])
-    low, high = (_interpolated(sums, at + side * width / 2) for side in (-1, 1))
-    return (high - low) / plane.dtype.type(width)
-
-
-def _interpolated(plane: NDArray, at: NDArray) -> NDArray:
-    """Return a plane straight between its rows, at places counted in rows."""
-    index = np.clip(at.astype(int), 0, len(plane) - 2)
-    part = (at - index).astype(plane.dtype)[:, None]
-    return np.asarray(plane[index] * (1 - part) + plane[index + 1] * part)

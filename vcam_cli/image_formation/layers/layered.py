@@ -54,12 +54,16 @@ FormImage = Callable[[OpticalPath, ChartScene | ImageScene], tuple[Layers, Spect
 """What forms the image of a flat scene."""
 CELLS_SHARE = 0.2
 """Part of the tolerance that edges within the cells of the lattice may use."""
+HIDDEN_SHARE = 0.3
+"""The same of the covariance, where the rest leaves it no more."""
 MOST_CELLS = 6
 """Cells along each side of a pixel, at most."""
 EDGES = 9.5
 """Heights of two edges in a cell over the rms covariance of both within it: sqrt(90)."""
 PART = 0.5
 """Part of the tolerance that the image of each layer may use."""
+SURE = 1.8
+"""Predicted error over the rms that is expected: of 140 scenes of discs and bars none errs more."""
 
 
 @dataclass(frozen=True)
@@ -73,6 +77,11 @@ class _Seen:
     """Opacity (C, rows, columns)."""
     path: OpticalPath
     report: SpectrumReport
+
+    def lost_rms(self, g: Geometry) -> float:
+        """Return the rms over all of an array of what the layer's own image lacks [e/s]."""
+        cells = self.window.geometry
+        return self.report.lost_rms * math.sqrt(cells.rows * cells.columns / (g.rows * g.columns))
 
 
 def layered_image(
@@ -104,11 +113,31 @@ def layered_image(
         count = min(math.ceil((error / allowed) ** 0.5), MOST_CELLS)
         added, error = _correction(path, scene, count, form)
         light += added
-    hidden = add_covariance(path, scene, light, full)
-    error = math.hypot(error, hidden.error)
-    depth = DepthReport(count, hidden.rings, error / (full or 1.0))
+    error = math.hypot(error, *(layer.lost_rms(path.geometry) for layer in layers))
+    left = _allowed(path.settings.tolerance * full, error)
+    hidden = add_covariance(path, scene, light, _edges(path, layers), left)
+    error = SURE * math.hypot(error, hidden.error)
+    depth = DepthReport(count, hidden.rings, error / (full or 1.0), hidden.values)
     layer = Layer(lambda color, rows: light[color, rows])
     return iter([layer]), _report(layers, error, depth)
+
+
+def _edges(path: OpticalPath, layers: Iterable[_Seen]) -> NDArray:
+    """Return the pixels (rows, columns) that some rays reach past a layer and others do not."""
+    g, least = path.geometry, path.settings.tolerance / 2
+    edges, hidden = np.zeros((g.rows, g.columns), bool), np.zeros((g.rows, g.columns), bool)
+    for layer in layers:
+        here = layer.window.rows, layer.window.columns
+        full = layer.cover.min(axis=0) >= 1 - least
+        edges[here] |= (layer.cover.max(axis=0) > least) & ~full & ~hidden[here]
+        hidden[here] |= full
+    return edges
+
+
+def _allowed(tolerance: float, error: float) -> float:
+    """Return what the covariance may err where all else errs so much, rms [e/s]."""
+    left = (tolerance / SURE) ** 2 - error**2
+    return math.sqrt(max(left, (HIDDEN_SHARE * tolerance) ** 2))
 
 
 def _layers_seen(
@@ -320,12 +349,12 @@ def is_of_lens(effect: Effect) -> bool:
 
 
 def _report(layers: Sequence[_Seen], error: float, depth: DepthReport) -> SpectrumReport:
-    """Return what is known of the image of layers; `error` is that of their order [e/s]."""
+    """Return what is known of the image of layers, and its error [e/s]."""
     reports = [layer.report for layer in layers]
     names = {name for own in reports for name in own.changes}
     return SpectrumReport(
         oversampling=max((own.oversampling for own in reports), default=0.0),
-        lost_rms=math.hypot(error, *(own.lost_rms for own in reports)),
+        lost_rms=error,
         changes={
             name: math.hypot(*(own.changes.get(name, 0.0) for own in reports)) for name in names
         },

@@ -9,12 +9,13 @@ them, less the layers' means put one before the other:
     <L_1 + (1 - a_1) (L_2 + (1 - a_2) (...))> - (<L_1> + (1 - <a_1>) (<L_2> + (1 - <a_2>) (...))).
 
 The mean is a sum over points of the aperture: Gauss's in the squared radius, evenly spaced along
-each ring. More rings are taken until they change the picture by no more than the error that is
-allowed.
+each ring.
 
 In waves, a frequency f of incoherent light is transferred by the points of the pupil that are
 lambda N f / 2 away from two others, one each way (in the pupil's diameters) [1]_. So the picture
-through u has those frequencies alone for which both of them lie in the pupil.
+through u has those frequencies alone for which both of them lie in the pupil. A point stands for a
+patch around it, and counts by how much of that lies in their overlap: whole points, in or out,
+would take twice as many rings.
 
 References
 ----------
@@ -35,10 +36,6 @@ from numpy.typing import NDArray
 
 from vcam_cli.physics.diffraction import otf_circular
 
-RINGS = (2, 4, 6, 8)
-"""Rings of points in the aperture that are tried."""
-FURTHER = 0.2
-"""Rms error of a number of rings over what it changed, at most, on layers of discs and bars."""
 SPOKES = 4
 """Points along the aperture's edge, over the number of rings."""
 
@@ -47,78 +44,27 @@ SPOKES = 4
 class BlurredLayer:
     """A layer's light and opacity before the lens, and how widely a point of it blurs."""
 
-    light: NDArray
-    """Light times opacity of every color (C, h, w), in any unit."""
-    opacity: NDArray
-    """(h, w) from 0 to 1."""
+    planes: NDArray
+    """Light times opacity of every color, in any unit, and opacity from 0 to 1 (..., C + 1, h, w).
+    What comes first are places that do not see each other."""
     radius: float
     """Radius of a point's blur [samples]; its sign is that of the distance before the focus."""
 
     @cached_property
     def spectrum(self) -> NDArray:
-        """Transform (C + 1, h, w // 2 + 1) of light and opacity."""
-        planes = np.concatenate([self.light, self.opacity[None]])
-        return np.asarray(scipy.fft.rfft2(planes, axes=(1, 2)))
+        """Transform (..., C + 1, h, w // 2 + 1) of light and opacity."""
+        return np.asarray(scipy.fft.rfft2(self.planes))
 
     def shift(self, u: float, v: float) -> NDArray:
         """Return the transfer (h, w // 2 + 1) to what rays through a point of the aperture see."""
-        rows, columns = self.opacity.shape
+        rows, columns = self.planes.shape[-2:]
         down = np.exp(-2j * np.pi * self.radius * v * scipy.fft.fftfreq(rows))
         right = np.exp(-2j * np.pi * self.radius * u * scipy.fft.rfftfreq(columns))
         return np.outer(down, right).astype(self.spectrum.dtype)
 
     def filtered(self, transfer: NDArray) -> NDArray:
-        """Return light and opacity (C + 1, h, w) behind a transfer."""
-        shape = self.opacity.shape
-        return np.asarray(scipy.fft.irfft2(self.spectrum * transfer, shape, axes=(1, 2)))
-
-
-@dataclass(frozen=True)
-class Covariance:
-    """What the product of means lacks."""
-
-    light: NDArray
-    """What is to be added to it (C, h, w), in the light's unit."""
-    rings: int
-    """Rings of points over which the mean was taken."""
-    error: float
-    """Predicted rms error, by what the last rings changed; in the light's unit."""
-    rms: float
-    """Of the light."""
-
-
-def covariance(
-    layers: Sequence[BlurredLayer],
-    allowed: float,
-    period: float = 0.0,
-    rings: Sequence[int] = RINGS,
-) -> Covariance:
-    """Return the covariance over the aperture that the product of means lacks.
-
-    Parameters
-    ----------
-    layers : sequence of BlurredLayer
-        Layers of one shape, the nearest first. Their border is taken to repeat.
-    allowed : float
-        Rms error to be reached, in the light's unit.
-    period : float, optional
-        Of the frequency from which the lens transfers nothing, lambda N [samples]; 0 without
-        diffraction.
-    rings : sequence of int, optional
-        Rings of points in the aperture that are tried, one after the other.
-
-    Returns
-    -------
-    Covariance
-        The covariance.
-    """
-    light: NDArray = np.zeros_like(layers[0].light)
-    for count in rings:
-        before, light = light, _covariance(layers, count, period)
-        error = FURTHER * _rms(light - before)
-        if error <= allowed:
-            break
-    return Covariance(light, count, error, _rms(light))
+        """Return light and opacity (..., C + 1, h, w) behind a transfer."""
+        return np.asarray(scipy.fft.irfft2(self.spectrum * transfer, self.planes.shape[-2:]))
 
 
 def aperture_points(rings: int) -> Iterator[tuple[float, float, float]]:
@@ -131,40 +77,55 @@ def aperture_points(rings: int) -> Iterator[tuple[float, float, float]]:
             yield radius * math.cos(angle), radius * math.sin(angle), weight / 2 / count
 
 
-def _covariance(layers: Sequence[BlurredLayer], rings: int, period: float) -> NDArray:
-    """Return the covariance (C, h, w) by so many rings of points."""
-    shape = layers[0].opacity.shape
+def covariance(layers: Sequence[BlurredLayer], rings: int, period: float = 0.0) -> NDArray:
+    """Return the covariance over the aperture that the product of means lacks.
+
+    Parameters
+    ----------
+    layers : sequence of BlurredLayer
+        Layers of one shape, the nearest first. Their border is taken to repeat.
+    rings : int
+        Rings of points in the aperture.
+    period : float, optional
+        Of the frequency from which the lens transfers nothing, lambda N [samples]; 0 without
+        diffraction.
+
+    Returns
+    -------
+    NDArray
+        What is to be added to the product of means (..., C, h, w), in the light's unit.
+    """
+    shape = layers[0].planes.shape[-2:]
     fx, fy = scipy.fft.rfftfreq(shape[1])[None, :], scipy.fft.fftfreq(shape[0])[:, None]
     apart_x, apart_y = period * fx, period * fy
-    spectrum = np.zeros_like(layers[0].spectrum[:-1])
-    transfers = [np.zeros_like(spectrum[0]) for _ in layers]
-    counted = np.zeros(spectrum.shape[1:], spectrum.real.dtype)
-    for u, v, weight in aperture_points(rings):
-        # Both u + apart and u - apart lie within the radius 1.
+    spectrum = np.zeros_like(layers[0].spectrum[..., :-1, :, :])
+    transfers = [np.zeros(spectrum.shape[-2:], spectrum.dtype) for _ in layers]
+    counted = np.zeros(spectrum.shape[-2:], spectrum.real.dtype)
+    points = list(aperture_points(rings))
+    half = math.sqrt(math.pi / len(points)) / 2
+    for u, v, weight in points:
+        # The further of u + apart and u - apart from the middle.
         between = 2 * np.abs(u * apart_x + v * apart_y)
-        inside = weight * (u**2 + v**2 + apart_x**2 + apart_y**2 + between <= 1)
+        furthest = np.sqrt(u**2 + v**2 + apart_x**2 + apart_y**2 + between)
+        steep = 2 * min(half, 1 - math.hypot(u, v))
+        inside = weight * np.clip(0.5 + (1 - furthest) / steep, 0, 1)
         inside = inside.astype(counted.dtype)
         shifts = [layer.shift(u, v) for layer in layers]
         seen = _composed([a.filtered(b) for a, b in zip(layers, shifts, strict=True)])
-        spectrum += inside * scipy.fft.rfft2(seen, axes=(1, 2))
+        spectrum += inside * scipy.fft.rfft2(seen)
         counted += inside
         for transfer, shift in zip(transfers, shifts, strict=True):
             transfer += inside * shift
     share = otf_circular(np.hypot(fx, fy), period, 1.0) / np.where(counted > 0, counted, 1)
     share = share.astype(counted.dtype)
     means = [a.filtered(share * b) for a, b in zip(layers, transfers, strict=True)]
-    together = scipy.fft.irfft2(share * spectrum, shape, axes=(1, 2))
+    together = scipy.fft.irfft2(share * spectrum, shape)
     return np.asarray(together - _composed(means))
 
 
 def _composed(layers: Sequence[NDArray]) -> NDArray:
-    """Return the light (C, h, w) of layers (C + 1, h, w) one before the other."""
-    total = np.zeros_like(layers[0][:-1])
+    """Return the light (..., C, h, w) of layers (..., C + 1, h, w) one before the other."""
+    total = np.zeros_like(layers[0][..., :-1, :, :])
     for layer in reversed(layers):
-        total = layer[:-1] + (1 - layer[-1]) * total
+        total = layer[..., :-1, :, :] + (1 - layer[..., -1:, :, :]) * total
     return total
-
-
-def _rms(light: NDArray) -> float:
-    """Return the rms of light (C, h, w) in the color where it is most."""
-    return float(np.sqrt(np.square(light).mean(axis=(1, 2)).max()))
