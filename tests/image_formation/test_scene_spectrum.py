@@ -16,8 +16,10 @@ from vcam_cli.image_formation.scene_spectrum import (
     pairs,
     rectangle_spectrum,
     terms_of_runs,
+    transform_painted,
     transform_planes,
 )
+from vcam_cli.scenes import base
 from vcam_cli.scenes.base import Frame, Framed, Rectangles, View, chart_scene
 from vcam_cli.scenes.charts.colorchecker import ColorChecker, largest_card, reflectances
 from vcam_cli.scenes.charts.slanted_edge import SlantedEdge
@@ -126,6 +128,21 @@ def test_samples_are_transformed_along_both_axes(shape, dtype):
         np.testing.assert_allclose(
             found.coefficients, expected, atol=tolerance * abs(expected).max()
         )
+
+
+@pytest.mark.parametrize("workers", [1, 3])
+def test_charts_are_transformed_band_by_band(workers, monkeypatch):
+    """As their whole planes are, of which the first terms are kept."""
+    painted = scene("slanted edge")
+    whole = transform_planes(painted.planes(MIX), 1).coefficients
+    monkeypatch.setattr(base, "CELLS_A_BAND", 5 * painted.shape[1] + 1)
+    assert len(base.bands_of_rows(*painted.shape)) > 5
+    terms = painted.shape[0] - 31, painted.shape[1] - 50
+    found, brightest = transform_painted(painted, MIX, terms, np.float64, workers)
+    np.testing.assert_allclose(
+        found.coefficients, whole[:, : terms[0], : terms[1]], atol=1e-12 * abs(whole).max()
+    )
+    np.testing.assert_array_equal(brightest, abs(painted.planes(MIX)).max(axis=(1, 2)))
 
 
 INDICES = (slice(None), slice(30, 8, -1), slice(4, None, 3), np.array([3, 0, 30]))

@@ -25,7 +25,7 @@ from vcam_cli.image_formation.optical_path import OpticalPath
 from vcam_cli.image_formation.scene_spectrum import (
     SceneSpectrum,
     rectangle_spectrum,
-    transform_planes,
+    transform_painted,
 )
 from vcam_cli.scenes.base import ChartScene
 
@@ -80,11 +80,12 @@ class FarPart:
             Spectrum of R planes.
         """
         rectangles = self.scene.rectangles(mix)
+        x, y = axes(path, self.scene, highest)
         if rectangles is not None:
-            x, y = axes(path, self.scene, highest)
             return rectangle_spectrum(rectangles, self.scene.shape, (y, x), np.float64)
-        planes = self.scene.planes(mix, path.workers).astype(np.float64, copy=False)
-        return transform_planes(planes, path.workers)
+        terms = y.terms, x.terms
+        spectrum, _ = transform_painted(self.scene, mix, terms, np.float64, path.workers)
+        return spectrum
 
     def image_filter(self, near: Filter, path: OpticalPath, highest: float) -> Filter:
         """Return the filter for this part, with the ring's low-pass and the sign.

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from vcam_cli.image_formation.cosine_series import Axis
 from vcam_cli.parallel import each, pieces, product, rows_at_once, slices_within
-from vcam_cli.scenes.base import Rectangles
+from vcam_cli.scenes.base import ChartScene, Rectangles, bands_of_rows
 
 Index = NDArray | slice
 
@@ -162,6 +162,66 @@ def transform_planes(planes: NDArray, workers: int) -> SampledSpectrum:
         each(along_rows, pieces(rows, rows_at_once(columns)), workers)
         each(along_columns, pieces(columns, rows_at_once(rows)), workers)
     return SampledSpectrum(planes)
+
+
+def transform_painted(
+    scene: ChartScene, mix: NDArray, terms: tuple[int, int], dtype: type, workers: int
+) -> tuple[SampledSpectrum, NDArray]:
+    """Return the first terms of the DCT-II of a chart's planes, and how bright they are.
+
+    Rows are painted and transformed band by band, and of each only the terms are kept: all cells of
+    a plane are never held at once.
+
+    Parameters
+    ----------
+    scene : ChartScene
+        The chart on its cells.
+    mix : NDArray
+        Mixtures (R, K) of the scene's components.
+    terms : tuple of int
+        Number of terms along y and x.
+    dtype : type
+        Floating-point type of the coefficients.
+    workers : int
+        Number of threads; the result does not depend on it.
+
+    Returns
+    -------
+    spectrum : SampledSpectrum
+        Coefficients, unnormalized.
+    brightest : NDArray
+        Largest absolute value of every plane (R,).
+    """
+    rows, columns = scene.shape
+    bands = bands_of_rows(rows, columns)
+    half: NDArray = np.empty((len(mix), rows, terms[1]), dtype)
+    brightest = np.zeros((len(bands), len(mix)))
+    paint = scene.painter(mix)
+    spare: list[
+        NDArray
+    ] = []  # memory that is new to the process costs more than what is done in it
+
+    def along_rows(number: int) -> None:
+        band = bands[number]
+        shape = len(mix), bands[0].stop, columns
+        whole = spare.pop() if spare else np.empty(shape, scene.dtype)
+        light = whole[:, : band.stop - band.start]
+        paint(band, light)
+        brightest[number] = np.maximum(light.max(axis=(1, 2)), -light.min(axis=(1, 2)))
+        for plane, own in zip(light.astype(dtype, copy=False), half[:, band], strict=True):
+            for some in pieces(len(plane), rows_at_once(columns)):
+                found = scipy.fft.dct(plane[some], axis=1, overwrite_x=True)
+                own[some] = found[:, : terms[1]]
+        spare.append(whole)
+
+    def along_columns(s: slice) -> None:
+        for plane in half:
+            some = scipy.fft.dct(np.ascontiguousarray(plane[:, s]), axis=0, overwrite_x=True)
+            plane[: terms[0], s] = some[: terms[0]]
+
+    each(along_rows, range(len(bands)), workers)
+    each(along_columns, pieces(terms[1], rows_at_once(rows)), workers)
+    return SampledSpectrum(half[:, : terms[0]]), brightest.max(axis=0)
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,7 +18,7 @@ from typing import Any, ClassVar, Literal, Protocol
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from vcam_cli.parallel import each
+from vcam_cli.parallel import each, pieces
 from vcam_cli.scenes.cells import cell_edges, clip_cells, edges_within, uneven_points
 from vcam_cli.scenes.waves import WaveScene
 from vcam_cli.spectra import Spectrum
@@ -280,18 +280,23 @@ class ChartScene(SampledScene):
 
     def planes(self, mix: Array, workers: int = 1) -> Array:
         """Return the averages over the cells, painted in bands of rows."""
+        out = np.empty((len(mix), *self.shape), self.dtype)
+        paint = self.painter(mix)
+        paint_by_bands(lambda rows: paint(rows, out[:, rows]), *self.shape, workers)
+        return out
+
+    def painter(self, mix: Array) -> Callable[[slice, Array], None]:
+        """Return what writes the averages over the cells of rows into an array (R, rows, nx)."""
         ny, nx = self.shape
         x_edges = self.center[0] + cell_edges(nx, self.pitch_x)
         y_edges = self.center[1] + cell_edges(ny, self.pitch_y)
-        out = np.empty((len(mix), ny, nx), self.dtype)
         mix = np.asarray(mix, self.dtype)
         chart = self.chart.crop_to_cells(x_edges, y_edges)
 
-        def paint(rows: slice) -> None:
-            chart.paint(x_edges, y_edges[rows.start : rows.stop + 1], mix, out[:, rows])
+        def paint(rows: slice, out: Array) -> None:
+            chart.paint(x_edges, y_edges[rows.start : rows.stop + 1], mix, out)
 
-        paint_by_bands(paint, ny, nx, workers)
-        return out
+        return paint
 
     def mean_and_rms(self, mix: Array, size: tuple[float, float]) -> tuple[Array, Array]:
         """Return the mean over a centered rectangle and the rms over the grid, from points."""
@@ -323,9 +328,12 @@ class ChartScene(SampledScene):
 
 def paint_by_bands(paint: Callable[[slice], None], rows: int, columns: int, workers: int) -> None:
     """Call `paint` on bands of rows, which do not depend on the number of workers."""
-    band = max(1, CELLS_A_BAND // columns)
-    bands = [slice(top, min(top + band, rows)) for top in range(0, rows, band)]
-    each(paint, bands, workers)
+    each(paint, bands_of_rows(rows, columns), workers)
+
+
+def bands_of_rows(rows: int, columns: int) -> list[slice]:
+    """Return bands of rows of cells that are painted at once."""
+    return pieces(rows, max(1, CELLS_A_BAND // columns))
 
 
 def chart_scene(

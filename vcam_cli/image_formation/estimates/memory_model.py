@@ -20,7 +20,7 @@ from vcam_cli.image_formation.transfer_tables import (
     PARITIES,
     TableSize,
 )
-from vcam_cli.scenes.base import ChartScene, SampledScene
+from vcam_cli.scenes.base import ChartScene, SampledScene, bands_of_rows
 
 BASE = 170_000_000
 """Interpreter and libraries [bytes]."""
@@ -93,8 +93,13 @@ def _values(
     Where folding is exact a series has as many terms as the scene has pixels, its margin included.
     """
     g, (x, y) = path.geometry, axes(path, scene, highest)
-    rectangles = isinstance(scene, ChartScene) and scene.chart.edges() is not None
-    samples = 4 * g.rows * g.columns if rectangles else math.prod(scene.shape) * planes
+    samples = planes * math.prod(scene.shape)
+    if isinstance(scene, ChartScene):  # painted in bands, of which the terms along x are kept
+        rows, columns = scene.shape
+        bands = columns * bands_of_rows(rows, columns)[0].stop * path.workers
+        samples = planes * (rows * x.terms + bands)
+        if scene.chart.edges() is not None:
+            samples = 4 * g.rows * g.columns
     evaluated = g.rows * x.folded_terms if y.virtual_pixels is None else 0
     return samples + series * (y.folded_terms * x.folded_terms + evaluated)
 

@@ -16,6 +16,7 @@ from vcam_cli.image_formation.optical_path import OpticalPath
 from vcam_cli.image_formation.scene_spectrum import (
     SceneSpectrum,
     rectangle_spectrum,
+    transform_painted,
     transform_planes,
 )
 from vcam_cli.image_formation.transfer_tables import Mixing, Tables, bounding_tables, tabulate
@@ -165,6 +166,11 @@ def _scene_spectrum(
         brightest = np.abs(rectangles.values).max(axis=(1, 2))
         known = rectangle_spectrum(rectangles, scene.shape, (y, x), dtype)
         return scene, known, float((level.T @ brightest).max())
+    if isinstance(scene, ChartScene):
+        x, y = axes(path, scene, highest)
+        terms = y.terms, x.terms
+        painted, brightest = transform_painted(scene, mix, terms, dtype, path.workers)
+        return scene, painted, float((level.T @ brightest).max())
     planes: NDArray = scene.planes(mix, path.workers).astype(dtype, copy=False)
     brightest = np.array([max(float(p.max()), -float(p.min())) for p in planes])
     return scene, transform_planes(planes, path.workers), float((level.T @ brightest).max())
