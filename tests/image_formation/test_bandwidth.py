@@ -38,6 +38,7 @@ from vcam_cli.image_formation.photon_rate import photo_rate
 from vcam_cli.image_formation.settings import STANDARD, camera_settings
 from vcam_cli.scenes.base import Chart
 from vcam_cli.simulation import setup
+from vcam_cli.simulation.plan import OMITTED_SHARE
 from vcam_cli.simulation.simulate import prepare
 
 BAND = 550e-9, 550e-9
@@ -297,6 +298,7 @@ def test_pixels_need_not_be_square(size, tmp_path):
     """Each axis is followed in Nyquist frequencies of its own."""
     changes, values = write_picture(tmp_path, "noise")
     changes |= {"optics.f_number": 1.4, "pixel.width": size[0], "pixel.height": size[1]}
+    changes |= {"array.rows": 48, "array.columns": 64}  # of fewer pixels the loss is by chance
     some = rate(camera(tmp_path, changes | {"accuracy": "standard"}), values)
     exact = {"preset": "reference", "oversampling": 64}
     lost = rms(some.values, rate(camera(tmp_path, changes | {"accuracy": exact}), values).values)
@@ -417,10 +419,10 @@ def test_a_grating_that_pixels_fold_is_not_missed(frequency, across, tmp_path):
 # --- limits --------------------------------------------------------------------------------------
 
 
-def test_the_shares_of_the_settings_stay_within_half_of_the_tolerance():
-    """Their errors are independent; the other half is for effects that are left out."""
+def test_the_shares_of_settings_and_omitted_effects_stay_within_the_tolerance():
+    """Their errors are independent: what a blur changes lies below the highest frequency."""
     shares = bandwidth.MARGIN_SHARE, bandwidth.FREQUENCY_SHARE, chart_cells.CELLS_SHARE
-    assert math.hypot(*shares) <= 0.5
+    assert math.hypot(*shares, OMITTED_SHARE) <= 0.95
 
 
 @pytest.mark.parametrize("fill", [0.3, 1.0])

@@ -6,10 +6,10 @@ from making import camera
 from optical_paths import aperture, of_picture, on_chart, path, sensor, signal
 from test_filtering import GRIDS
 
-from vcam_cli.image_formation import box_average
 from vcam_cli.image_formation.box_average import box_averages, point_values
 from vcam_cli.image_formation.estimates.bandwidth import axes
 from vcam_cli.image_formation.photon_rate import photo_rate
+from vcam_cli.scenes import bands
 from vcam_cli.scenes.base import Frame
 from vcam_cli.scenes.charts.colorchecker import ColorChecker, largest_card
 from vcam_cli.scenes.charts.dead_leaves import dead_leaves
@@ -148,7 +148,7 @@ def test_bands_of_rows_are_those_of_all(monkeypatch):
     optical_path = path(g, aperture(g))
     scene = on_chart(optical_path, POINTS["star"])
     whole = box_averages(scene, ONE, g, axes(optical_path, scene, 1.0), 1)
-    monkeypatch.setattr(box_average, "CELLS_A_BAND", 90)  # three rows at once
+    monkeypatch.setattr(bands, "CELLS", 90)  # three rows at once
     banded = box_averages(scene, ONE, g, axes(optical_path, scene, 1.0), 1)
     np.testing.assert_allclose(banded, whole, atol=1e-12)
 

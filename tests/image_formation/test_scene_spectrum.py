@@ -19,7 +19,7 @@ from vcam_cli.image_formation.scene_spectrum import (
     transform_painted,
     transform_planes,
 )
-from vcam_cli.scenes import base
+from vcam_cli.scenes import bands
 from vcam_cli.scenes.base import Frame, Framed, Rectangles, View, chart_scene
 from vcam_cli.scenes.charts.colorchecker import ColorChecker, largest_card, reflectances
 from vcam_cli.scenes.charts.slanted_edge import SlantedEdge
@@ -135,8 +135,8 @@ def test_charts_are_transformed_band_by_band(workers, monkeypatch):
     """As their whole planes are, of which the first terms are kept."""
     painted = scene("slanted edge")
     whole = transform_planes(painted.planes(MIX), 1).coefficients
-    monkeypatch.setattr(base, "CELLS_A_BAND", 5 * painted.shape[1] + 1)
-    assert len(base.bands_of_rows(*painted.shape)) > 5
+    monkeypatch.setattr(bands, "CELLS", 5 * painted.shape[1] + 1)
+    assert len(bands.bands_of_rows(*painted.shape)) > 5
     terms = painted.shape[0] - 31, painted.shape[1] - 50
     found, brightest = transform_painted(painted, MIX, terms, np.float64, workers)
     np.testing.assert_allclose(

@@ -132,7 +132,7 @@ def test_bands_of_rows_join_seamlessly(monkeypatch):
     chart = sampled(BOTH, margin=1)
     mix = mix_of(chart)
     whole, points = chart.planes(mix), brute(chart, mix, 2)
-    monkeypatch.setattr("vcam_cli.scenes.base.CELLS_A_BAND", 40)
+    monkeypatch.setattr("vcam_cli.scenes.bands.CELLS", 40)
     np.testing.assert_allclose(chart.planes(mix), whole, rtol=1e-12, atol=1e-14)
     np.testing.assert_allclose(brute(chart, mix, 2), points, rtol=1e-12)
 
@@ -141,7 +141,7 @@ def test_bands_of_rows_join_seamlessly(monkeypatch):
     "source", [CSF, EDGE, CHECKER, pytest.param(BOTH, marks=pytest.mark.long), *SHARP]
 )
 def test_workers_do_not_change_a_byte(source, monkeypatch):
-    monkeypatch.setattr("vcam_cli.scenes.base.CELLS_A_BAND", 100)
+    monkeypatch.setattr("vcam_cli.scenes.bands.CELLS", 100)
     chart = sampled(source, margin=1, oversampling=2, dtype=np.float32)
     mix = mix_of(chart)
     assert chart.planes(mix, workers=3).tobytes() == chart.planes(mix).tobytes()

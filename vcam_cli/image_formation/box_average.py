@@ -7,7 +7,8 @@ from numpy.typing import NDArray
 
 from vcam_cli.camera.derived.geometry import Geometry, pixel_centers
 from vcam_cli.image_formation.cosine_series import Axis
-from vcam_cli.scenes.base import CELLS_A_BAND, ChartScene, SampledScene
+from vcam_cli.scenes.bands import bands_of_rows
+from vcam_cli.scenes.base import ChartScene, SampledScene
 
 SLIVER = 1e-9
 """Gaps between photodetectors below this part of the pitch are rounding errors."""
@@ -76,9 +77,7 @@ def _chart_averages(
     )
     mix = np.asarray(mix, scene.dtype)
     out = np.empty((len(mix), geometry.rows, geometry.columns), scene.dtype)
-    band = max(1, CELLS_A_BAND // len(x_edges))
-    for top in range(0, geometry.rows, band):
-        rows = slice(top, min(top + band, geometry.rows))
+    for rows in bands_of_rows(geometry.rows, len(x_edges)):
         cells = y_edges[rows.start * step_y : (rows.stop - 1) * step_y + 2]
         painted = scene.chart.crop_to_cells(x_edges, cells).averages(x_edges, cells, mix)
         out[:, rows] = painted[:, ::step_y, ::step_x]

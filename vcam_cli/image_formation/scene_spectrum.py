@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 from vcam_cli.image_formation.cosine_series import Axis
 from vcam_cli.parallel import each, pieces, product, rows_at_once, slices_within
-from vcam_cli.scenes.base import ChartScene, Rectangles, bands_of_rows
+from vcam_cli.scenes.bands import bands_of_rows
+from vcam_cli.scenes.base import ChartScene, Rectangles
 
 Index = NDArray | slice
 

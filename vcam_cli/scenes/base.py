@@ -18,14 +18,12 @@ from typing import Any, ClassVar, Literal, Protocol
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
-from vcam_cli.parallel import each, pieces
+from vcam_cli.scenes.bands import bands_of_rows, paint_by_bands
 from vcam_cli.scenes.cells import cell_edges, clip_cells, edges_within, uneven_points
 from vcam_cli.scenes.waves import WaveScene
 from vcam_cli.spectra import Spectrum
 
 Array = NDArray[Any]
-
-CELLS_A_BAND = 1 << 19  # cells painted at once: bounds the memory of temporaries
 
 
 @dataclass(frozen=True)
@@ -319,21 +317,10 @@ class ChartScene(SampledScene):
         """Return the chart's values at points: (R, m, n)."""
         x, y = np.asarray(x, float), np.asarray(y, float)
         out = np.empty((len(mix), len(y), len(x)), self.dtype)
-        band = max(1, CELLS_A_BAND // len(x))
         mix = np.asarray(mix, self.dtype)
-        for top in range(0, len(y), band):
-            out[:, top : top + band] = self.chart.values(x, y[top : top + band], mix)
+        for rows in bands_of_rows(len(y), len(x)):
+            out[:, rows] = self.chart.values(x, y[rows], mix)
         return out
-
-
-def paint_by_bands(paint: Callable[[slice], None], rows: int, columns: int, workers: int) -> None:
-    """Call `paint` on bands of rows, which do not depend on the number of workers."""
-    each(paint, bands_of_rows(rows, columns), workers)
-
-
-def bands_of_rows(rows: int, columns: int) -> list[slice]:
-    """Return bands of rows of cells that are painted at once."""
-    return pieces(rows, max(1, CELLS_A_BAND // columns))
 
 
 def chart_scene(

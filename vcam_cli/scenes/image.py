@@ -10,7 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vcam_cli.scenes.base import Array, SampledScene, View, paint_by_bands
+from vcam_cli.scenes.bands import paint_by_bands
+from vcam_cli.scenes.base import Array, SampledScene, View
 from vcam_cli.spectra import Spectrum
 
 ROWS = 64

@@ -4,7 +4,7 @@ The section keys of a camera file say what exists; `effects` says what the user 
 what is left to the plan is decided by two promises, with tolerance T:
 
 - mean: all that is left out changes the mean raw by at most T / 2 of full signal, rms over the
-  array; the other half is for the settings;
+  array; with what the settings err, the squares of which add to it, it stays within T;
 - variance: at the 1st, 10th, 50th, 90th and 99th percentile of the scene's own signal, temporal and
   fixed-pattern variance each stay within 2 T of everything on.
 

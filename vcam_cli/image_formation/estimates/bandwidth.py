@@ -28,7 +28,7 @@ from vcam_cli.image_formation.transfer_tables import TableSize
 from vcam_cli.scenes.base import ChartScene, SampledScene, Scene
 
 MARGIN_SHARE = 0.15
-FREQUENCY_SHARE = 0.35
+FREQUENCY_SHARE = 0.65
 """Parts of the tolerance that margin and highest frequency may use."""
 FIELD_SHARE = 0.2
 """The same for modes of a field that are left out before the picture is known: as if it had full

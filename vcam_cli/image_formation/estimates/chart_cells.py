@@ -25,7 +25,7 @@ from vcam_cli.image_formation.optical_path import OpticalPath
 from vcam_cli.parallel import product
 from vcam_cli.scenes.base import ChartScene
 
-CELLS_SHARE = 0.25
+CELLS_SHARE = 0.4
 """Part of the tolerance that cells may use."""
 BEYOND_CUTOFF = 1.1
 """Cells per pixel pitch over the highest frequency passed [pixel Nyquist], at least."""

@@ -20,7 +20,8 @@ from vcam_cli.image_formation.transfer_tables import (
     PARITIES,
     TableSize,
 )
-from vcam_cli.scenes.base import ChartScene, SampledScene, bands_of_rows
+from vcam_cli.scenes.bands import bands_of_rows
+from vcam_cli.scenes.base import ChartScene, SampledScene
 
 BASE = 170_000_000
 """Interpreter and libraries [bytes]."""

@@ -60,8 +60,8 @@ MOST_CELLS = 6
 """Cells along each side of a pixel, at most."""
 EDGES = 9.5
 """Heights of two edges in a cell over the rms covariance of both within it: sqrt(90)."""
-PART = 0.5
-"""Part of the tolerance that the image of each layer may use."""
+PART = 0.27
+"""Part of the tolerance that the image of each layer may use: there are some of them."""
 SURE = 1.8
 """Predicted error over the rms that is expected: of 140 scenes of discs and bars none errs more."""
 
