@@ -32,7 +32,7 @@ from vcam_cli.scenes.base import ChartScene
 NEAR = 12.0
 """Distance from the array to the border of the near field, beyond the reach of the lens's blurs, in
 inverse cut-off frequencies: there the tail is smooth but for 0.2 % of itself."""
-LEAST_PIXELS, LEAST_PART = 4, 1 / 64
+LEAST_PIXELS, LEAST_PART = 8, 1 / 64
 """That distance in pixels, and in shorter sides of the array, at least."""
 CELLS = 16
 """Cells of a ring over the distance from the array to its inner border, at least."""

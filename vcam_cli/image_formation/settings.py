@@ -64,7 +64,7 @@ class Settings:
 DRAFT = Settings(20e-9, 2049, 2e-3, 3, 4, 32, coarse_normals=True)
 STANDARD = Settings(10e-9, 2049, 5e-4, 4, 8, 32)
 FINE = Settings(10e-9, 4097, 2e-4, 5, 10, 32)
-REFERENCE = Settings(2.5e-9, 32769, 1e-5, 6, 16, 64)
+REFERENCE = Settings(2.5e-9, 32769, 2e-5, 6, 16, 64)
 
 LADDER = ((0.02, DRAFT), (0.005, STANDARD), (0.001, FINE), (0.0, REFERENCE))
 """Settings for tolerances from the first number of each pair upward."""
