@@ -24,6 +24,8 @@ from vcam_cli.scenes.base import Frame, Framed, Rectangles, View, chart_scene
 from vcam_cli.scenes.charts.colorchecker import ColorChecker, largest_card, reflectances
 from vcam_cli.scenes.charts.slanted_edge import SlantedEdge
 from vcam_cli.scenes.charts.step_wedge import step_wedge
+from vcam_cli.scenes.layered import LayerChart, MaskedChart
+from vcam_cli.scenes.picture_chart import PictureChart
 from vcam_cli.simulation.simulate import prepare
 
 MIX = np.random.default_rng(1).uniform(-1, 1, (3, 25))
@@ -53,6 +55,34 @@ def test_rectangles_have_the_light_of_the_cells(chart, scene_width):
     )
     averages = np.einsum("yd,rde,xe->ryx", down, found.values, across)
     np.testing.assert_allclose(averages, painted.planes(MIX), atol=2e-13)
+
+
+@pytest.mark.parametrize("mirrored", [False, True])
+def test_opaque_layers_of_rectangles_are_rectangles(mirrored):
+    """A card on a layer beside the middle, with its opacity: as if it were painted."""
+    view = View(31, 40, 4e-6, 3e-6, 12, 5, None, np.float64)
+    card = ColorChecker(largest_card(view.frame))
+    whole = PictureChart(np.ones((1, 1, 1)), Frame(61.3e-6, 47.7e-6), mirrored)
+    layer = LayerChart(MaskedChart(card, whole), (9.1e-6, -5.3e-6))
+    spectra = (*reflectances(), reflectances()[0])
+    layered = chart_scene(layer, spectra, spectra[0], view)
+    mix = np.random.default_rng(2).uniform(0, 1, (2, 26))
+    found = layered.rectangles(mix)
+    ny, nx = layered.shape
+    down, across = (
+        covers(edges, (np.arange(n + 1) - n / 2) * pitch)
+        for edges, n, pitch in ((found.y, ny, layered.pitch_y), (found.x, nx, layered.pitch_x))
+    )
+    averages = np.einsum("yd,rde,xe->ryx", down, found.values, across)
+    painted = layered.planes(mix)
+    # Painted, the two are averaged before they are multiplied: cells on the border err, and no more
+    # than by what lies in them.
+    wrong = np.abs(averages - painted).max(axis=0) > 1e-12
+    assert np.count_nonzero(wrong) <= 2 * (nx + ny)
+    assert np.abs(averages - painted).max() <= 0.25 * painted.max()
+    assert painted.max() > 0.5
+    other = PictureChart(np.ones((2, 2, 1)), Frame(61.3e-6, 47.7e-6), mirrored)
+    assert MaskedChart(card, other).edges() is None
 
 
 def covers(edges, cells):

@@ -50,6 +50,14 @@ class MaskedChart(Chart):
         light = self.light.values(x, y, mix[:, :-1]) + mix[:, -1, None, None]
         return light * self.opacity.values(x, y, np.ones((1, 1), mix.dtype))
 
+    def edges(self) -> tuple[Array, Array] | None:
+        """Return where light or opacity may change, if both are made of even rectangles."""
+        light, opacity = self.light.edges(), self.opacity.edges()
+        if light is None or opacity is None:
+            return None
+        x, y = (np.union1d(*both) for both in zip(light, opacity, strict=True))
+        return x, y
+
     def crop_to_cells(self, x_edges: Array, y_edges: Array) -> "MaskedChart":
         """Return the same with light that may be faster on these cells."""
         columns, rows = self.opacity.cells(x_edges, y_edges)
@@ -78,6 +86,13 @@ class LayerChart(Chart):
     def paint(self, x_edges: Array, y_edges: Array, mix: Array, out: Array) -> None:
         """Write the averages over the cells."""
         self.layer.paint(x_edges - self.center[0], y_edges - self.center[1], mix, out)
+
+    def edges(self) -> tuple[Array, Array] | None:
+        """Return where the light of a layer of even rectangles may change."""
+        inner = self.layer.edges()
+        if inner is None:
+            return None
+        return inner[0] + self.center[0], inner[1] + self.center[1]
 
     def crop_to_cells(self, x_edges: Array, y_edges: Array) -> "LayerChart":
         """Return the same layer as a chart that may be faster on these cells."""

@@ -43,6 +43,14 @@ class PictureChart(Chart):
         found = self.picture[np.ix_(rows, columns)] * np.outer(lit_rows, lit_columns)[..., None]
         return np.asarray(np.moveaxis(found @ np.asarray(mix).T, -1, 0), mix.dtype)
 
+    def edges(self) -> tuple[Array, Array] | None:
+        """Return the border of a picture that is a single sample, if it has one."""
+        if self.picture.shape[:2] != (1, 1):
+            return None
+        half = self.frame.width / 2, self.frame.height / 2
+        x, y = (np.empty(0) if self.mirrored else np.array([-end, end]) for end in half)
+        return x, y
+
     def cells(self, x_edges: Array, y_edges: Array) -> tuple[slice, slice]:
         """Return the columns and rows of cells that the picture reaches."""
         if self.mirrored:

@@ -88,24 +88,30 @@ def add_covariance(
     if not tiles:
         return Hidden()
     share = math.sqrt(sum(edges[tile].size for tile in tiles) / edges.size)
-    allowed, squared = allowed / share / math.sqrt(2), _squared_error(path)
+    allowed, squared = allowed / share, _squared_error(path)
+    half = allowed / math.sqrt(2)  # of independent errors
 
     cells = Cells.around(g, size, pitch, widest[0], count)
     batches = painted(path, scene, tiles, cells)
-    found = _summed(path, batches, cells, count, allowed, RINGS[:1])
+    found = _summed(path, batches, cells, count, half, RINGS[:1])
     values = found.values
     while True:
         coarse = squared * found.side**2 * _rms(found.light)
-        finer = coarse > allowed and found.side > pitch / FINEST * 1.001
-        if not finer and (found.error <= allowed or found.rings == RINGS[-1]):
+        if math.hypot(found.error, coarse) <= allowed:
             break
-        asked = found.side * min(math.sqrt(allowed / coarse), 1.0) / pitch if coarse > 0 else count
-        if asked < 1:
-            side = pitch / min(math.ceil(1 / asked), FINEST)
-            cells = Cells.around(g, size, side, widest[0])
-            batches = painted(path, scene, tiles, cells)
-        count = 2 ** math.floor(math.log2(max(asked, 1)))
-        found = _summed(path, batches, cells, count, allowed, RINGS)
+        room = math.sqrt(max(allowed**2 - found.error**2, half**2))  # what the rings leave
+        is_coarse = coarse > room and found.side > pitch / FINEST * 1.001
+        if not is_coarse and (found.error <= half or found.rings == RINGS[-1]):
+            break
+        if is_coarse:
+            asked = found.side * math.sqrt(room / coarse) / pitch
+            if asked < 1:
+                per_pixel = max(math.ceil(1 / asked), round(pitch / found.side) + 1)
+                side = pitch / min(per_pixel, FINEST)
+                cells = Cells.around(g, size, side, widest[0])
+                batches = painted(path, scene, tiles, cells)
+            count = 2 ** math.floor(math.log2(max(asked, 1)))
+        found = _summed(path, batches, cells, count, half, RINGS)
         values += found.values
     if found.error == coarse == 0.0:
         return Hidden()
