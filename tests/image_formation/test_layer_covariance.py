@@ -1,8 +1,10 @@
 """What layers hide of each other beyond the product of their means, tile by tile."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from layered_reference import changes, random_scene
+from layered_reference import FOCAL, PITCH, Flat, Scene, changes, random_scene, ray_sum, write_exr
 from making import QUIET, camera, radiance_for
 
 from vcam_cli import simulate
@@ -57,9 +59,97 @@ def test_covariance_of_stripes_is_that_of_their_waves():
     n, r, s = 64, 5.0, -3.0
     k = 2 * np.pi * 4 / n
     wave = np.broadcast_to((1 + np.cos(k * np.arange(n))) / 2, (n, n))
-    front = BlurredLayer(np.stack([np.zeros((n, n)), wave]), r)
-    back = BlurredLayer(np.stack([wave, np.ones((n, n))]), s)
+    front = BlurredLayer(np.stack([np.zeros((n, n)), wave]), (r, 0.0))
+    back = BlurredLayer(np.stack([wave, np.ones((n, n))]), (s, 0.0))
     found = covariance([front, back], 8)[0].mean()
     u, _, weights = np.array(list(aperture_points(60))).T
     mean = [np.sum(weights * np.cos(k * radius * u)) for radius in (r - s, r, s)]
     assert found == pytest.approx(-(mean[0] - mean[1] * mean[2]) / 8, rel=1e-6)
+
+
+def mesh_before_mesh(period: float, front: float, back: float) -> Scene:
+    """Stripes of a period and with blurs of these radii [pixels], and the same behind them."""
+    samples, pixels = 1360, 136
+    place = (np.arange(samples) + 0.5) * pixels / samples
+    stripes = np.broadcast_to(np.floor(place / (period / 2)) % 2, (samples, samples))
+    stripes, none = stripes.astype(np.float32), np.zeros((samples, samples), np.float32)
+
+    def layer(radius: float, light: np.ndarray, opacity: np.ndarray) -> Flat:
+        distance = 1 / (1 + radius / 1.25)
+        return Flat(distance, light, opacity, pixels * PITCH * distance * (1 / FOCAL - 1))
+
+    return Scene((layer(front, none, stripes), layer(back, stripes, none + 1)), 1.0)
+
+
+@pytest.mark.parametrize(
+    ("period", "front", "back"),
+    [(4, 14, 12), pytest.param(4, 20, 19, marks=pytest.mark.long)],
+)
+def test_detail_within_cells_is_not_missed(period, front, back, tmp_path):
+    """Much finer than the blur, and hidden by the same: in their means there is nothing of it.
+
+    The product of the means is 0.25; cells as coarse as the blur would find nothing missing.
+    """
+    scene = mesh_before_mesh(period, front, back)
+    given = {"scene.radiance": radiance_for(5000), "effects": QUIET | {"diffraction": "off"}}
+    frame = simulate(camera(tmp_path, given | changes(scene, tmp_path))).frame
+    found = frame.mean_electrons / (frame.white_rate[0] * frame.exposure_time)
+    truth = ray_sum(scene, 3000, 2)
+    assert truth.mean() < 0.22
+    assert found.mean() == pytest.approx(truth.mean(), rel=0.04)
+    error = np.sqrt(np.mean(np.square(found - truth))) / truth.max()
+    assert error <= frame.spectrum.depth.error
+
+
+def test_dim_layers_err_as_bright_ones(tmp_path):
+    """Relative to their own full signal: opacity does not count as if white lay behind it."""
+    scene = random_scene(np.random.default_rng(11), 3)
+    dim = replace(scene, layers=tuple(replace(x, light=x.light * 0.02) for x in scene.layers))
+    given = {"scene.radiance": radiance_for(5000), "effects": QUIET}
+    found = []
+    for made in (scene, dim):
+        frame = simulate(camera(tmp_path, given | changes(made, tmp_path))).frame
+        found.append((frame.mean_electrons, frame.spectrum.depth.error))
+    np.testing.assert_allclose(found[1][0], 0.02 * found[0][0], rtol=2e-4, atol=1e-3)
+    assert found[1][1] == pytest.approx(found[0][1], rel=0.01)
+
+
+def test_layers_in_a_corner_and_nothing_behind(tmp_path):
+    """Light that diffraction throws far makes an edge where a tile sees no layer."""
+    white = write_exr(tmp_path / "white.exr", np.ones((8, 8), np.float32))
+    layers = []
+    for distance in (0.5, 0.6):
+        pixel = PITCH * distance * (1 / FOCAL - 1)
+        layers.append(
+            {
+                "source": {"kind": "image", "file": white},
+                "distance": f"{distance} m",
+                "width": f"{20 * pixel} m",
+                "position": [f"{-90 * pixel} m", f"{-90 * pixel} m"],
+            }
+        )
+    given = {
+        "scene.source": {"kind": "layers", "layers": layers},
+        "scene.radiance": radiance_for(5000),
+        "effects": QUIET,
+        "accuracy": "reference",
+        "array.rows": 200,
+        "array.columns": 200,
+        "optics": {"f_number": 8, "focal_length": "5 mm", "focus_distance": "1 m"},
+    }
+    frame = simulate(camera(tmp_path, given)).frame
+    assert frame.mean_electrons[10, 10] > 100 * frame.mean_electrons[-10, -10]
+    assert frame.spectrum.depth.rings > 0
+
+
+def test_of_layers_that_move_nothing_is_added(tmp_path):
+    """At rest they would hide other light of each other: what they do counts as an error."""
+    scene = random_scene(np.random.default_rng(3), 2, sharp=False)
+    given = {"scene.radiance": radiance_for(5000), "effects": QUIET} | changes(scene, tmp_path)
+    still = simulate(camera(tmp_path, given)).frame.spectrum.depth
+    for layer in given["scene.source"]["layers"][:1]:
+        layer["motion"] = {"x": "0.1 m/s"}
+    moved = simulate(camera(tmp_path, given | {"exposure.time": "20 ms"})).frame.spectrum.depth
+    assert still.rings > 0
+    assert moved.rings == 0
+    assert moved.error > 2 * still.error

@@ -78,7 +78,8 @@ def _layer(placed: PlacedLayer, view: View) -> Layer:
         if mask.shape == picture.shape[:2]:
             whole = np.concatenate([picture * mask[..., None], mask[..., None]], axis=2)
             masked = PictureChart(whole, frame, mirrored=fills)
-            return Layer(masked, spectra, placed.center, None if fills else frame)
+            brightest = float(picture.max(initial=0.0))
+            return Layer(masked, spectra, placed.center, None if fills else frame, brightest)
         chart: Chart = PictureChart(picture, frame, mirrored=True)
     else:
         mask = np.ones((1, 1), np.float32) if files.mask is None else files.mask
@@ -87,7 +88,7 @@ def _layer(placed: PlacedLayer, view: View) -> Layer:
         spectra = tuple(white.multiply(reflectance) for reflectance in reflectances)
     opacity = PictureChart(mask[..., None], frame, mirrored=fills)
     size = None if fills else frame
-    return Layer(MaskedChart(chart, opacity), spectra, placed.center, size)
+    return Layer(MaskedChart(chart, opacity), spectra, placed.center, size, chart.brightest)
 
 
 def _picture_frame(picture: Array, view: View) -> Frame:

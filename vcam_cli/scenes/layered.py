@@ -113,6 +113,8 @@ class LayerPart:
     """Of the rectangle it lies in; None where it fills the frame."""
     components: slice
     """Those of the scene's components that are its light."""
+    brightest: float
+    """Its brightest light, relative to the perfect white."""
 
 
 @dataclass(frozen=True)
@@ -173,6 +175,11 @@ class LayeredScene:
     """The layers as a pinhole sees them."""
 
     @property
+    def brightest(self) -> float:
+        """Brightest light of all layers, relative to the perfect white; 1 where there is none."""
+        return max(part.brightest for part in self.parts) or 1.0
+
+    @property
     def spectra(self) -> tuple[Spectrum, ...]:
         """Spectral radiances of the components [W/(sr m2 m)]."""
         return self.flat.spectra
@@ -211,6 +218,8 @@ class Layer:
     """Of the light."""
     center: tuple[float, float]
     size: Frame | None
+    brightest: float
+    """Brightest light, relative to the perfect white."""
 
 
 def layered_scene(layers: list[Layer], white: Spectrum, view: View) -> LayeredScene:
@@ -234,7 +243,7 @@ def layered_scene(layers: list[Layer], white: Spectrum, view: View) -> LayeredSc
     for layer in layers:
         chart = LayerChart(layer.chart, layer.center)
         components = slice(len(spectra), len(spectra) + len(layer.spectra))
-        parts.append(LayerPart(chart, layer.size, components))
+        parts.append(LayerPart(chart, layer.size, components, layer.brightest))
         spectra += layer.spectra
     flat = chart_scene(FlatLayers(tuple(parts)), (*spectra, white), white, view)
     return LayeredScene(tuple(parts), flat)

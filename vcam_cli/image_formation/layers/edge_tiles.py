@@ -20,14 +20,17 @@ from vcam_cli.camera.derived.geometry import Geometry, pixel_centers
 from vcam_cli.image_formation.layers.occlusion import BlurredLayer, covariance
 from vcam_cli.image_formation.optical_path import OpticalPath
 from vcam_cli.parallel import results
+from vcam_cli.scenes.cells import GOLDEN
 from vcam_cli.scenes.layered import LayeredScene
 
 SIDE = 48
 """Side of a tile, at least [pixels]."""
-AROUND = 4
-"""The same, in radii of the widest blur: so much does a tile see around it."""
+SIDE_IN_RADII = 4
+"""The same, in radii of the widest blur: what lies around a tile is then no more than twice it."""
 TOGETHER = 1 << 18
 """Values of one layer that are worked on at once."""
+POINTS, JUDGED = 16, 12
+"""Points along each side of a tile at which its detail is judged, and tiles in which it is."""
 Tile = tuple[slice, slice]
 """Rows and columns of pixels."""
 
@@ -51,7 +54,7 @@ def tiles_with(edges: NDArray, radius: float, whole: int) -> tuple[list[Tile], t
     size : tuple of int
         Rows and columns [pixels].
     """
-    least = max(math.ceil(AROUND * radius), SIDE)
+    least = max(math.ceil(SIDE_IN_RADII * radius), SIDE)
     size = [math.ceil(count / max(count // least, 1) / whole) * whole for count in edges.shape]
     rows, columns = (
         [slice(start, min(start + step, count)) for start in range(0, count, step)]
@@ -63,13 +66,16 @@ def tiles_with(edges: NDArray, radius: float, whole: int) -> tuple[list[Tile], t
 
 @dataclass(frozen=True)
 class Cells:
-    """The cells of a tile, which begin at its first pixel's border, and those around it."""
+    """The cells of a tile, which begin at its first pixel's border, and those around it.
+
+    They are as long along x and y as the pixels, times a number or divided by one.
+    """
 
     geometry: Geometry
-    side: float
-    """Of a cell [m]."""
-    before: int
-    """Cells before the first pixel, in either direction."""
+    per_pixel: float
+    """Cells along either side of a pixel: a whole number, or the inverse of one."""
+    before: tuple[int, int]
+    """Rows and columns of cells before the first pixel."""
     shape: tuple[int, int]
     """Rows and columns of cells."""
     pixels: tuple[int, int]
@@ -77,50 +83,51 @@ class Cells:
 
     @classmethod
     def around(
-        cls, geometry: Geometry, pixels: tuple[int, int], side: float, radius: float, whole: int = 1
+        cls, geometry: Geometry, pixels: tuple[int, int], per_pixel: int, radius: float, whole: int
     ) -> Cells:
-        """Return the cells of a side, as far around tiles of so many pixels as a radius [m].
+        """Return cells as far around tiles of so many pixels as a radius [m].
 
-        `whole` of them and more can be taken together.
+        `whole` of them along either side can be taken together.
         """
-        before = math.ceil(radius / side / whole) + 1
-        shape = [
-            scipy.fft.next_fast_len(math.ceil(n * pitch / side / whole) + 2 * before, real=True)
-            for n, pitch in zip(pixels, (geometry.pitch_y, geometry.pitch_x), strict=True)
-        ]
-        cells = shape[0] * whole, shape[1] * whole
-        return cls(geometry, side, before * whole, cells, pixels)
+        before, shape = [], []
+        for count, pitch in zip(pixels, (geometry.pitch_y, geometry.pitch_x), strict=True):
+            around = math.ceil(radius / pitch * per_pixel / whole) + 1
+            cells = math.ceil(count * per_pixel / whole) + 2 * around
+            before.append(around * whole)
+            shape.append(scipy.fft.next_fast_len(cells, real=True) * whole)
+        return cls(geometry, per_pixel, (before[0], before[1]), (shape[0], shape[1]), pixels)
+
+    @property
+    def sides(self) -> tuple[float, float]:
+        """Of a cell along x and y [m]."""
+        return self.geometry.pitch_x / self.per_pixel, self.geometry.pitch_y / self.per_pixel
 
     def edges(self, tile: Tile) -> tuple[NDArray, NDArray]:
         """Return the edges of columns and of rows of cells around a tile [m]."""
-        g, (rows, columns) = self.geometry, self.shape
+        g, (side_x, side_y) = self.geometry, self.sides
         x, y = pixel_centers(g, detector=True)
         left, top = x[tile[1].start] - g.pitch_x / 2, y[tile[0].start] - g.pitch_y / 2
         return (
-            left + (np.arange(columns + 1) - self.before) * self.side,
-            top + (np.arange(rows + 1) - self.before) * self.side,
+            left + (np.arange(self.shape[1] + 1) - self.before[1]) * side_x,
+            top + (np.arange(self.shape[0] + 1) - self.before[0]) * side_y,
         )
 
     def together(self, count: int) -> Cells:
         """Return cells that are each so many of these along either side."""
-        rows, columns = self.shape
-        return replace(
-            self,
-            side=self.side * count,
-            before=self.before // count,
-            shape=(rows // count, columns // count),
+        before, shape = (
+            (rows // count, columns // count) for rows, columns in (self.before, self.shape)
         )
+        return replace(self, per_pixel=self.per_pixel / count, before=before, shape=shape)
 
     def at_pixels(self, planes: NDArray) -> NDArray:
         """Return the means over the collecting areas of a tile's pixels (..., rows, columns)."""
         g, weights = self.geometry, []
-        for count, pitch, width, cells in (
-            (self.pixels[0], g.pitch_y, g.collecting_height, self.shape[0]),
-            (self.pixels[1], g.pitch_x, g.collecting_width, self.shape[1]),
+        for axis, width in enumerate(
+            (g.collecting_height / g.pitch_y, g.collecting_width / g.pitch_x)
         ):
-            at = self.before + (np.arange(count) + 0.5) * pitch / self.side
-            one = np.eye(cells, dtype=planes.dtype)
-            weights.append(box_means(one, at, width / self.side))
+            at = self.before[axis] + (np.arange(self.pixels[axis]) + 0.5) * self.per_pixel
+            one = np.eye(self.shape[axis], dtype=planes.dtype)
+            weights.append(box_means(one, at, width * self.per_pixel))
         return np.asarray(weights[0] @ planes @ weights[1].T)
 
 
@@ -129,8 +136,10 @@ class TileBatch:
     """Tiles that see the same layers."""
 
     tiles: list[Tile]
+    numbers: list[int]
+    """Of the layers in the scene, the nearest first."""
     radii: list[float]
-    """Of the layers' blurs [m], the nearest first."""
+    """Of their blurs [m]."""
     planes: list[NDArray]
     """Light of every color and opacity (tiles, C + 1, rows, columns) of each layer's cells."""
 
@@ -141,35 +150,36 @@ class TileBatch:
 
     def together(self, count: int) -> TileBatch:
         """Return the means over so many cells along either side."""
-        if count == 1:
-            return self
-        planes = []
-        for fine in self.planes:
-            *other, rows, columns = fine.shape
-            apart = fine.reshape(*other, rows // count, count, columns // count, count)
-            planes.append(apart.mean(axis=(-3, -1), dtype=fine.dtype))
-        return replace(self, planes=planes)
+        return replace(self, planes=[_means(planes, count) for planes in self.planes])
 
     def lacking(self, cells: Cells, rings: int, period: float) -> list[NDArray]:
         """Return the covariance (C, rows, columns) at the pixels of every tile.
 
         It is that by so many rings of points, with the period of the lens's cut-off [m].
         """
+        side_x, side_y = cells.sides
         layers = [
-            BlurredLayer(planes, radius / cells.side)
+            BlurredLayer(planes, (radius / side_x, radius / side_y))
             for radius, planes in zip(self.radii, self.planes, strict=True)
         ]
-        light = cells.at_pixels(covariance(layers, rings, period / cells.side))
+        light = cells.at_pixels(covariance(layers, rings, (period / side_x, period / side_y)))
         return [
             own[:, : rows.stop - rows.start, : columns.stop - columns.start]
             for own, (rows, columns) in zip(light, self.tiles, strict=True)
         ]
 
 
-def painted(
-    path: OpticalPath, scene: LayeredScene, tiles: Sequence[Tile], cells: Cells
-) -> list[TileBatch]:
-    """Return tiles with the layers that are seen in each.
+def _means(planes: NDArray, count: int) -> NDArray:
+    """Return the means over so many cells along either side."""
+    if count == 1:
+        return planes
+    *other, rows, columns = planes.shape
+    apart = planes.reshape(*other, rows // count, count, columns // count, count)
+    return np.asarray(apart.mean(axis=(-3, -1), dtype=planes.dtype))
+
+
+class Painting:
+    """Tiles with the layers that are seen in each, of those that see more than one.
 
     Parameters
     ----------
@@ -181,44 +191,79 @@ def painted(
         The tiles.
     cells : Cells
         Their cells.
-
-    Returns
-    -------
-    list of TileBatch
-        The tiles, those that see the same layers together.
     """
-    mixes = []
-    for part in scene.parts:
-        level = path.transfer.level[part.components].T
-        mix = np.zeros((len(level) + 1, level.shape[1] + 1), path.settings.dtype)
-        mix[:-1, :-1], mix[-1, -1] = level, 1
-        mixes.append(mix)
 
-    def seen(tile: Tile) -> list[tuple[int, NDArray]]:
-        edges, layers = cells.edges(tile), []
-        for number, (part, mix) in enumerate(zip(scene.parts, mixes, strict=True)):
+    def __init__(
+        self, path: OpticalPath, scene: LayeredScene, tiles: Sequence[Tile], cells: Cells
+    ) -> None:
+        self.cells = cells
+        self._scene, self._mixes = scene, []
+        for part in scene.parts:
+            level = path.transfer.level[part.components].T
+            mix = np.zeros((len(level) + 1, level.shape[1] + 1), path.settings.dtype)
+            mix[:-1, :-1], mix[-1, -1] = level, 1
+            self._mixes.append(mix)
+        seen = results(self._seen, tiles, path.workers)
+        found = [(tile, own) for tile, own in zip(tiles, seen, strict=True) if len(own) > 1]
+        found.sort(key=lambda each: list(each[1]))
+        at_once = max(TOGETHER // (len(self._mixes[0]) * math.prod(cells.shape)), 1)
+        self.batches: list[TileBatch] = []
+        """The tiles, those that see the same layers together."""
+        for same, members in groupby(found, lambda each: list(each[1])):
+            radii = [path.layers[number].radius for number in same]
+            for some in _parts(list(members), at_once):
+                planes = [np.stack([own[number] for _, own in some]) for number in same]
+                self.batches.append(TileBatch([tile for tile, _ in some], same, radii, planes))
+
+    def _seen(self, tile: Tile) -> dict[int, NDArray]:
+        """Return the layers of a tile that are seen, by their number."""
+        edges, layers = self.cells.edges(tile), {}
+        for number, (part, mix) in enumerate(zip(self._scene.parts, self._mixes, strict=True)):
             planes = part.chart.averages(*edges, mix)
             if planes[-1].any():
-                layers.append((number, planes))
+                layers[number] = planes
             if planes[-1].min() >= 1:
                 break
         return layers
 
-    def numbers(number: int) -> list[int]:
-        return [layer for layer, _ in found[number]]
+    def unresolved(self, count: int) -> float:
+        """Return what detail of two layers that lies within cells could hide of each other, rms.
 
-    found = results(seen, tiles, path.workers)
-    batches = []
-    for same, members in groupby(sorted(range(len(tiles)), key=numbers), numbers):
-        radii = [path.layers[layer].radius for layer in same]
-        size = len(mixes[0]) * math.prod(cells.shape)
-        for some in _parts(list(members), max(TOGETHER // size, 1)):
-            planes = [np.stack([found[k][n][1] for k in some]) for n in range(len(same))]
-            batches.append(TileBatch([tiles[k] for k in some], radii, planes))
-    return batches
+        It is the product of mean deviations from the means over two cells of so many of these along
+        either side, as if all of it lay behind each other: [e/s] in the color where it is most.
+        """
+        every = [(batch, k) for batch in self.batches for k in range(len(batch.tiles))]
+        chosen = every[:: max(len(every) // JUDGED, 1)]
+        squares = [np.square(self._hidden_detail(batch, k, count)) for batch, k in chosen]
+        return math.sqrt(float(np.mean(squares, axis=0).max())) if squares else 0.0
+
+    def _hidden_detail(self, batch: TileBatch, k: int, count: int) -> NDArray:
+        """Return the same of a tile (C,) [e/s]."""
+        edges, indices = self.cells.edges(batch.tiles[k]), []
+        for n in self.cells.shape[::-1]:
+            indices.append(np.unique(np.linspace(0, n - 1, POINTS).astype(int)))
+        jitter = (
+            (np.arange(POINTS) * GOLDEN % 1)[: len(indices[0])],
+            (np.arange(POINTS) * GOLDEN**2 % 1)[: len(indices[1])],
+        )
+        x, y = (e[i] + (e[1] - e[0]) * j for e, i, j in zip(edges, indices, jitter, strict=True))
+        columns, rows = (index // (2 * count) for index in indices)
+        deviations, means = [], []
+        for number, planes in zip(batch.numbers, batch.planes, strict=True):
+            blocks = _means(planes[k], 2 * count)[:, rows[:, None], columns]
+            points = self._scene.parts[number].chart.values(x, y, self._mixes[number])
+            deviations.append(np.abs(points - blocks).mean(axis=(1, 2)))
+            means.append(planes[k, :-1].mean(axis=(1, 2)))
+        total = np.zeros(len(means[0]))
+        for front in range(len(means) - 1):
+            for back in range(front + 1, len(means)):
+                behind = np.max(means[back + 1 :], axis=0) if back + 1 < len(means) else 0.0
+                seen = deviations[back][:-1] + deviations[back][-1] * behind
+                total += deviations[front][-1] * seen
+        return total
 
 
-def _parts(items: list[int], count: int) -> Iterator[list[int]]:
+def _parts(items: list, count: int) -> Iterator[list]:
     for start in range(0, len(items), count):
         yield items[start : start + count]
 

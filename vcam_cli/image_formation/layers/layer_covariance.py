@@ -14,9 +14,9 @@ from operator import methodcaller
 import numpy as np
 from numpy.typing import NDArray
 
-from vcam_cli.effects.base import of_kind
+from vcam_cli.effects.base import ImageMotion, of_kind
 from vcam_cli.effects.optics.diffraction import Diffraction
-from vcam_cli.image_formation.layers.edge_tiles import Cells, Tile, TileBatch, painted, tiles_with
+from vcam_cli.image_formation.layers.edge_tiles import Cells, Painting, Tile, tiles_with
 from vcam_cli.image_formation.layers.occlusion import aperture_points
 from vcam_cli.image_formation.optical_path import OpticalPath
 from vcam_cli.parallel import results
@@ -30,12 +30,16 @@ RINGS = (2, 4, 8)
 """Rings of points in the aperture that are tried."""
 FURTHER_RAYS, FURTHER_WAVES = 0.2, 0.6
 """Rms error of a number of rings over what it changed from half as many, as measured on layers of
-discs and bars: of rays, and of waves, of which points near the pupil's edge count in part."""
+discs and bars: of rays, and of waves, of which points near the pupil's edge count in part. It is no
+less than by what part changes fall from one number of rings to the next."""
 SAMPLED = 0.5
 """Error of the covariance by its cells, relative to it, as measured on layers of discs and bars,
 over the square of their side. That is counted in the geometric mean of a pixel and the radius of
 the sharpest layer, at least a pixel: its light has its detail in the covariance of those before
 it, however wide they are."""
+DETAIL = 0.1
+"""Part of what detail within cells could hide that is taken to be lost: of layers whose detail has
+nothing in common hardly any is, of the same mesh twice most."""
 NARROWEST = 0.25
 """Width of the strips along edges that have a covariance, at least [pixels]. Where they are
 narrower than pixels, they have less of it on coarse cells: that error grows with the inverse root
@@ -84,41 +88,52 @@ def add_covariance(
     widest = sorted((abs(optics.radius) for optics in path.layers), reverse=True)
     # Of cells that are powers of two of pixels wide, the coarse ones are means of the fine.
     count = 2 ** math.floor(math.log2(max(widest[1] / pitch, 1)))
-    tiles, size = tiles_with(edges, widest[0] / pitch, count)
+    tiles, size = tiles_with(edges, widest[0] / pitch, 2 * count)
+    cells = Cells.around(g, size, 1, widest[0], 2 * count)
+    painting = Painting(path, scene, tiles, cells)
+    tiles = [tile for batch in painting.batches for tile in batch.tiles]
     if not tiles:
         return Hidden()
     share = math.sqrt(sum(edges[tile].size for tile in tiles) / edges.size)
     allowed, squared = allowed / share, _squared_error(path)
     half = allowed / math.sqrt(2)  # of independent errors
-
-    cells = Cells.around(g, size, pitch, widest[0], count)
-    batches = painted(path, scene, tiles, cells)
-    found = _summed(path, batches, cells, count, half, RINGS[:1])
+    found = _summed(path, painting, count, half, RINGS[:1])
     values = found.values
+    if _moves(path):  # at rest they would hide other light of each other
+        return Hidden(0, share * _rms(found.light), values)
     while True:
-        coarse = squared * found.side**2 * _rms(found.light)
-        if math.hypot(found.error, coarse) <= allowed:
-            break
+        side = count * pitch / painting.cells.per_pixel
+        by_side = squared * side**2 * _rms(found.light)
+        by_detail = DETAIL * painting.unresolved(count)
+        lost = math.hypot(by_side, by_detail)
+        error = math.hypot(found.error, lost)
         room = math.sqrt(max(allowed**2 - found.error**2, half**2))  # what the rings leave
-        is_coarse = coarse > room and found.side > pitch / FINEST * 1.001
-        if not is_coarse and (found.error <= half or found.rings == RINGS[-1]):
+        is_coarse = lost > room and painting.cells.per_pixel < FINEST * count
+        is_settled = found.error <= half or found.rings == RINGS[-1]
+        if error <= allowed or (is_settled and not is_coarse):
             break
         if is_coarse:
-            asked = found.side * math.sqrt(room / coarse) / pitch
+            asked = side / pitch * (0.5 if by_detail > by_side else math.sqrt(room / lost))
             if asked < 1:
-                per_pixel = max(math.ceil(1 / asked), round(pitch / found.side) + 1)
-                side = pitch / min(per_pixel, FINEST)
-                cells = Cells.around(g, size, side, widest[0])
-                batches = painted(path, scene, tiles, cells)
+                per_pixel = max(math.ceil(1 / asked), round(pitch / side) + 1)
+                cells = Cells.around(g, size, min(per_pixel, FINEST), widest[0], 2)
+                painting = Painting(path, scene, tiles, cells)
             count = 2 ** math.floor(math.log2(max(asked, 1)))
-        found = _summed(path, batches, cells, count, half, RINGS)
+        found = _summed(path, painting, count, half, RINGS)
         values += found.values
-    if found.error == coarse == 0.0:
+    if error == 0.0:
         return Hidden()
     for tile, part in zip(found.tiles, found.light, strict=True):
         light[:, *tile] += part
     np.maximum(light, 0, out=light)
-    return Hidden(found.rings, share * math.hypot(found.error, coarse), values)
+    return Hidden(found.rings, share * error, values)
+
+
+def _moves(path: OpticalPath) -> bool:
+    """Return whether layers move while they are exposed."""
+    least = SHARP * min(path.geometry.pitch_x, path.geometry.pitch_y)
+    every = (motion for optics in path.layers for motion in of_kind(optics.effects, ImageMotion))
+    return any(motion.travel > least for motion in every)
 
 
 def _squared_error(path: OpticalPath) -> float:
@@ -149,8 +164,6 @@ class _Sum:
     tiles: list[Tile]
     light: list[NDArray]
     """(C, rows, columns) of every tile [e/s]."""
-    side: float
-    """Of a cell [m]."""
     rings: int
     error: float
     """Predicted rms error, by what the last rings changed [e/s]."""
@@ -159,12 +172,7 @@ class _Sum:
 
 
 def _summed(
-    path: OpticalPath,
-    batches: Sequence[TileBatch],
-    cells: Cells,
-    count: int,
-    allowed: float,
-    numbers: Sequence[int],
+    path: OpticalPath, painting: Painting, count: int, allowed: float, numbers: Sequence[int]
 ) -> _Sum:
     """Return the covariance at the pixels by as many rings as it takes, of those given.
 
@@ -172,19 +180,21 @@ def _summed(
     """
     period = _period(path)
     further = FURTHER_WAVES if period > 0 else FURTHER_RAYS
-    batches = [batch.together(count) for batch in batches]
-    cells = cells.together(count)
+    batches = [batch.together(count) for batch in painting.batches]
+    cells = painting.cells.together(count)
     tiles = [tile for batch in batches for tile in batch.tiles]
-    values, light = 0, [np.zeros(())] * len(tiles)
+    values, light, last = 0, [np.zeros(())] * len(tiles), math.inf
     for rings in numbers:
-        each = results(methodcaller("lacking", cells, rings, period), batches, path.workers)
-        found = [part for parts in each for part in parts]
-        error = further * _rms([own - before for own, before in zip(found, light, strict=True)])
+        found = results(methodcaller("lacking", cells, rings, period), batches, path.workers)
+        more = [part for parts in found for part in parts]
+        change = _rms([own - before for own, before in zip(more, light, strict=True)])
+        error = change * max(further, min(change / last, 1.0) if last > 0 else 0.0)
+        last = change
         values += sum(batch.values for batch in batches) * len(list(aperture_points(rings)))
-        light = found
+        light = more
         if error <= allowed:
             break
-    return _Sum(tiles, light, cells.side, rings, error, values)
+    return _Sum(tiles, light, rings, error, values)
 
 
 def _period(path: OpticalPath) -> float:

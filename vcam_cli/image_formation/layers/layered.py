@@ -119,7 +119,8 @@ def layered_image(
     left = _allowed(path.settings.tolerance * full, error)
     hidden = add_covariance(path, scene, light, _edges(path, layers), left)
     error = math.hypot(error, SURE * hidden.error)
-    depth = DepthReport(count, hidden.rings, error / (full or 1.0), hidden.values)
+    full = min(float(light.max(initial=0.0)), path.ceiling)
+    depth = DepthReport(count, hidden.rings, error / full if full else 0.0, hidden.values)
     layer = Layer(lambda color, rows: light[color, rows])
     return iter([layer]), _report(layers, error, depth)
 
@@ -127,13 +128,14 @@ def layered_image(
 def _edges(path: OpticalPath, layers: Iterable[_Seen]) -> NDArray:
     """Return the pixels (rows, columns) that some rays reach past a layer and others do not."""
     g, least = path.geometry, path.settings.tolerance / 2
-    edges, hidden = np.zeros((g.rows, g.columns), bool), np.zeros((g.rows, g.columns), bool)
+    between: NDArray = np.zeros((g.rows, g.columns), path.settings.dtype)  # neither 0 nor 1
+    hidden = np.zeros((g.rows, g.columns), bool)
     for layer in layers:
         here = layer.window.rows, layer.window.columns
-        full = layer.cover.min(axis=0) >= 1 - least
-        edges[here] |= (layer.cover.max(axis=0) > least) & ~full & ~hidden[here]
-        hidden[here] |= full
-    return edges
+        low, high = layer.cover.min(axis=0), layer.cover.max(axis=0)
+        between[here] += np.where(hidden[here], 0, np.minimum(high, 1 - low))
+        hidden[here] |= low >= 1 - least
+    return between > least
 
 
 def _allowed(tolerance: float, error: float) -> float:
@@ -156,7 +158,7 @@ def _layers_seen(
         behind = tuple(e for e in of_kind(path.effects, *kinds) if not is_of_lens(e))
     for part, optics in zip(scene.parts, path.layers, strict=True):
         effects = (*(e for e in optics.effects if is_of_lens(e)), *behind)
-        seen = _layer_path(path, part, effects, lattice)
+        seen = _layer_path(path, part, effects, lattice, scene.brightest)
         if seen is not None:
             window, own = seen
             light, cover, report = _light_and_cover(own, part, window, scene.white, form)
@@ -248,16 +250,21 @@ def product_error(a: NDArray, b: NDArray) -> float:
 
 
 def _layer_path(
-    path: OpticalPath, part: LayerPart, effects: tuple[Effect, ...], lattice: Lattice
+    path: OpticalPath,
+    part: LayerPart,
+    effects: tuple[Effect, ...],
+    lattice: Lattice,
+    brightest: float,
 ) -> tuple[Window, OpticalPath] | None:
     """Return where a layer is seen, and the path of its light; None where it is beside the array.
 
-    The path has twice the colors: those of the light, and of the opacity in white.
+    The path has twice the colors: those of the light, and of the opacity in light as bright as the
+    scene's brightest, relative to white.
     """
     g = lattice.geometry
-    # Opacity counts all of it, however bright: the tolerance is that of white, and no light is cut.
-    brightest = float(path.transfer.level[-1].max())
-    tolerance = PART * path.settings.tolerance * min(1.0, path.ceiling / (brightest or 1.0))
+    # Opacity counts as the scene's brightest light, which may lie behind it; no light is cut.
+    level = brightest * float(path.transfer.level[-1].max())
+    tolerance = PART * path.settings.tolerance * min(1.0, path.ceiling / (level or 1.0))
     knobs = replace(path.settings, tolerance=tolerance)
     band = float(path.transfer.wavelengths[0]), float(path.transfer.wavelengths[-1])
     beyond = margin(g, effects, band, knobs)
@@ -271,7 +278,7 @@ def _layer_path(
     weights, white = transfer.weights[part.components], transfer.weights[-1]
     colors = len(white)
     doubled = np.zeros((len(weights) + 1, 2 * colors, weights.shape[2]))
-    doubled[:-1, :colors], doubled[-1, colors:] = weights, white
+    doubled[:-1, :colors], doubled[-1, colors:] = weights, brightest * white
     own = replace(
         path,
         transfer=Transfer(transfer.wavelengths, doubled, of_kind(effects, Blur)),

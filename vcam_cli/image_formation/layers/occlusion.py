@@ -47,8 +47,9 @@ class BlurredLayer:
     planes: NDArray
     """Light times opacity of every color, in any unit, and opacity from 0 to 1 (..., C + 1, h, w).
     What comes first are places that do not see each other."""
-    radius: float
-    """Radius of a point's blur [samples]; its sign is that of the distance before the focus."""
+    radius: tuple[float, float]
+    """Radius of a point's blur along x and y [samples]; its sign is that of the distance before the
+    focus."""
 
     @cached_property
     def spectrum(self) -> NDArray:
@@ -58,8 +59,8 @@ class BlurredLayer:
     def shift(self, u: float, v: float) -> NDArray:
         """Return the transfer (h, w // 2 + 1) to what rays through a point of the aperture see."""
         rows, columns = self.planes.shape[-2:]
-        down = np.exp(-2j * np.pi * self.radius * v * scipy.fft.fftfreq(rows))
-        right = np.exp(-2j * np.pi * self.radius * u * scipy.fft.rfftfreq(columns))
+        down = np.exp(-2j * np.pi * self.radius[1] * v * scipy.fft.fftfreq(rows))
+        right = np.exp(-2j * np.pi * self.radius[0] * u * scipy.fft.rfftfreq(columns))
         return np.outer(down, right).astype(self.spectrum.dtype)
 
     def filtered(self, transfer: NDArray) -> NDArray:
@@ -77,7 +78,9 @@ def aperture_points(rings: int) -> Iterator[tuple[float, float, float]]:
             yield radius * math.cos(angle), radius * math.sin(angle), weight / 2 / count
 
 
-def covariance(layers: Sequence[BlurredLayer], rings: int, period: float = 0.0) -> NDArray:
+def covariance(
+    layers: Sequence[BlurredLayer], rings: int, period: tuple[float, float] = (0.0, 0.0)
+) -> NDArray:
     """Return the covariance over the aperture that the product of means lacks.
 
     Parameters
@@ -86,9 +89,9 @@ def covariance(layers: Sequence[BlurredLayer], rings: int, period: float = 0.0) 
         Layers of one shape, the nearest first. Their border is taken to repeat.
     rings : int
         Rings of points in the aperture.
-    period : float, optional
-        Of the frequency from which the lens transfers nothing, lambda N [samples]; 0 without
-        diffraction.
+    period : tuple of float, optional
+        Along x and y, of the frequency from which the lens transfers nothing, lambda N [samples]; 0
+        without diffraction.
 
     Returns
     -------
@@ -97,7 +100,7 @@ def covariance(layers: Sequence[BlurredLayer], rings: int, period: float = 0.0) 
     """
     shape = layers[0].planes.shape[-2:]
     fx, fy = scipy.fft.rfftfreq(shape[1])[None, :], scipy.fft.fftfreq(shape[0])[:, None]
-    apart_x, apart_y = period * fx, period * fy
+    apart_x, apart_y = period[0] * fx, period[1] * fy
     spectrum = np.zeros_like(layers[0].spectrum[..., :-1, :, :])
     transfers = [np.zeros(spectrum.shape[-2:], spectrum.dtype) for _ in layers]
     counted = np.zeros(spectrum.shape[-2:], spectrum.real.dtype)
@@ -116,7 +119,7 @@ def covariance(layers: Sequence[BlurredLayer], rings: int, period: float = 0.0) 
         counted += inside
         for transfer, shift in zip(transfers, shifts, strict=True):
             transfer += inside * shift
-    share = otf_circular(np.hypot(fx, fy), period, 1.0) / np.where(counted > 0, counted, 1)
+    share = otf_circular(np.hypot(apart_x, apart_y), 1.0, 1.0) / np.where(counted > 0, counted, 1)
     share = share.astype(counted.dtype)
     means = [a.filtered(share * b) for a, b in zip(layers, transfers, strict=True)]
     together = scipy.fft.irfft2(share * spectrum, shape)
