@@ -48,13 +48,17 @@ def test_rectangles_have_the_light_of_the_cells(chart, scene_width):
     """Averaged over the cells, by overlaps worked out here."""
     painted = scene(chart, scene_width=scene_width)
     found = painted.rectangles(MIX)
-    ny, nx = painted.shape
+    np.testing.assert_allclose(overlaps(found, painted), painted.planes(MIX), atol=2e-13)
+
+
+def overlaps(found, on):
+    """Averages of rectangles over the cells of a scene."""
+    ny, nx = on.shape
     down, across = (
         covers(edges, (np.arange(n + 1) - n / 2) * pitch)
-        for edges, n, pitch in ((found.y, ny, painted.pitch_y), (found.x, nx, painted.pitch_x))
+        for edges, n, pitch in ((found.y, ny, on.pitch_y), (found.x, nx, on.pitch_x))
     )
-    averages = np.einsum("yd,rde,xe->ryx", down, found.values, across)
-    np.testing.assert_allclose(averages, painted.planes(MIX), atol=2e-13)
+    return np.einsum("yd,rde,xe->ryx", down, found.values, across)
 
 
 @pytest.mark.parametrize("mirrored", [False, True])
@@ -67,18 +71,12 @@ def test_opaque_layers_of_rectangles_are_rectangles(mirrored):
     spectra = (*reflectances(), reflectances()[0])
     layered = chart_scene(layer, spectra, spectra[0], view)
     mix = np.random.default_rng(2).uniform(0, 1, (2, 26))
-    found = layered.rectangles(mix)
-    ny, nx = layered.shape
-    down, across = (
-        covers(edges, (np.arange(n + 1) - n / 2) * pitch)
-        for edges, n, pitch in ((found.y, ny, layered.pitch_y), (found.x, nx, layered.pitch_x))
-    )
-    averages = np.einsum("yd,rde,xe->ryx", down, found.values, across)
+    averages = overlaps(layered.rectangles(mix), layered)
     painted = layered.planes(mix)
     # Painted, the two are averaged before they are multiplied: cells on the border err, and no more
     # than by what lies in them.
     wrong = np.abs(averages - painted).max(axis=0) > 1e-12
-    assert np.count_nonzero(wrong) <= 2 * (nx + ny)
+    assert np.count_nonzero(wrong) <= 2 * sum(layered.shape)
     assert np.abs(averages - painted).max() <= 0.25 * painted.max()
     assert painted.max() > 0.5
     other = PictureChart(np.ones((2, 2, 1)), Frame(61.3e-6, 47.7e-6), mirrored)

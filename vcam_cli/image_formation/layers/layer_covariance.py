@@ -24,8 +24,8 @@ from vcam_cli.scenes.layered import LayeredScene
 
 SHARP = 0.1
 """Radius of a blur below which a layer counts as sharp [pixels]."""
-FINEST = 8
-"""Samples per pixel pitch, at most."""
+FINEST, MOST_VALUES = 8, 1 << 27
+"""Cells along each side of a pixel, and values that are held on all of them, at most."""
 RINGS = (2, 4, 8)
 """Rings of points in the aperture that are tried."""
 FURTHER_RAYS, FURTHER_WAVES = 0.2, 0.6
@@ -99,6 +99,8 @@ def add_covariance(
     half = allowed / math.sqrt(2)  # of independent errors
     found = _summed(path, painting, count, half, RINGS[:1])
     values = found.values
+    held = sum(batch.values for batch in painting.batches)
+    finest = min(FINEST, max(math.isqrt(MOST_VALUES // held), 1))
     if _moves(path):  # at rest they would hide other light of each other
         return Hidden(0, share * _rms(found.light), values)
     while True:
@@ -108,7 +110,7 @@ def add_covariance(
         lost = math.hypot(by_side, by_detail)
         error = math.hypot(found.error, lost)
         room = math.sqrt(max(allowed**2 - found.error**2, half**2))  # what the rings leave
-        is_coarse = lost > room and painting.cells.per_pixel < FINEST * count
+        is_coarse = lost > room and painting.cells.per_pixel < finest * count
         is_settled = found.error <= half or found.rings == RINGS[-1]
         if error <= allowed or (is_settled and not is_coarse):
             break
@@ -116,7 +118,7 @@ def add_covariance(
             asked = side / pitch * (0.5 if by_detail > by_side else math.sqrt(room / lost))
             if asked < 1:
                 per_pixel = max(math.ceil(1 / asked), round(pitch / side) + 1)
-                cells = Cells.around(g, size, min(per_pixel, FINEST), widest[0], 2)
+                cells = Cells.around(g, size, min(per_pixel, finest), widest[0], 2)
                 painting = Painting(path, scene, tiles, cells)
             count = 2 ** math.floor(math.log2(max(asked, 1)))
         found = _summed(path, painting, count, half, RINGS)
