@@ -155,14 +155,21 @@ def transform_planes(planes: NDArray, workers: int) -> SampledSpectrum:
         def along_rows(s: slice, plane: NDArray = plane) -> None:
             plane[s] = scipy.fft.dct(plane[s], type=2, axis=1, overwrite_x=True)
 
-        def along_columns(s: slice, plane: NDArray = plane) -> None:
-            columns = np.ascontiguousarray(plane[:, s])
-            plane[:, s] = scipy.fft.dct(columns, type=2, axis=0, overwrite_x=True)
-
         rows, columns = plane.shape
         each(along_rows, pieces(rows, rows_at_once(columns)), workers)
-        each(along_columns, pieces(columns, rows_at_once(rows)), workers)
+        _transform_columns(plane, rows, workers)
     return SampledSpectrum(planes)
+
+
+def _transform_columns(plane: NDArray, terms: int, workers: int) -> None:
+    """Put the first terms of the DCT-II of its columns in the first rows of a plane."""
+
+    def along_columns(s: slice) -> None:
+        columns = np.ascontiguousarray(plane[:, s])
+        plane[:terms, s] = scipy.fft.dct(columns, type=2, axis=0, overwrite_x=True)[:terms]
+
+    rows, columns = plane.shape
+    each(along_columns, pieces(columns, rows_at_once(rows)), workers)
 
 
 def transform_painted(
@@ -198,9 +205,8 @@ def transform_painted(
     half: NDArray = np.empty((len(mix), rows, terms[1]), dtype)
     brightest = np.zeros((len(bands), len(mix)))
     paint = scene.painter(mix)
-    spare: list[
-        NDArray
-    ] = []  # memory that is new to the process costs more than what is done in it
+    # Memory that is new to the process costs more than what is done in it.
+    spare: list[NDArray] = []
 
     def along_rows(number: int) -> None:
         band = bands[number]
@@ -215,13 +221,9 @@ def transform_painted(
                 own[some] = found[:, : terms[1]]
         spare.append(whole)
 
-    def along_columns(s: slice) -> None:
-        for plane in half:
-            some = scipy.fft.dct(np.ascontiguousarray(plane[:, s]), axis=0, overwrite_x=True)
-            plane[: terms[0], s] = some[: terms[0]]
-
     each(along_rows, range(len(bands)), workers)
-    each(along_columns, pieces(terms[1], rows_at_once(rows)), workers)
+    for plane in half:
+        _transform_columns(plane, terms[0], workers)
     return SampledSpectrum(half[:, : terms[0]]), brightest.max(axis=0)
 
 

@@ -5,7 +5,6 @@ One sum of what is held at once at the worst moment; a test compares it with mea
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 from vcam_cli.camera.derived.geometry import Geometry
@@ -94,13 +93,14 @@ def _values(
     Where folding is exact a series has as many terms as the scene has pixels, its margin included.
     """
     g, (x, y) = path.geometry, axes(path, scene, highest)
-    samples = planes * math.prod(scene.shape)
-    if isinstance(scene, ChartScene):  # painted in bands, of which the terms along x are kept
-        rows, columns = scene.shape
+    rows, columns = scene.shape
+    if not isinstance(scene, ChartScene):
+        samples = planes * rows * columns
+    elif scene.chart.edges() is not None:
+        samples = 4 * g.rows * g.columns
+    else:  # painted in bands, of which the terms along x are kept
         bands = columns * bands_of_rows(rows, columns)[0].stop * path.workers
         samples = planes * (rows * x.terms + bands)
-        if scene.chart.edges() is not None:
-            samples = 4 * g.rows * g.columns
     evaluated = g.rows * x.folded_terms if y.virtual_pixels is None else 0
     return samples + series * (y.folded_terms * x.folded_terms + evaluated)
 

@@ -8,7 +8,7 @@ layers are worked on together, as many as fit the cache.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby, product
 
@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from vcam_cli.camera.derived.geometry import Geometry, pixel_centers
 from vcam_cli.image_formation.layers.occlusion import BlurredLayer, covariance
 from vcam_cli.image_formation.optical_path import OpticalPath
-from vcam_cli.parallel import results
+from vcam_cli.parallel import pieces, results
 from vcam_cli.scenes.cells import GOLDEN
 from vcam_cli.scenes.layered import LayeredScene
 
@@ -56,10 +56,7 @@ def tiles_with(edges: NDArray, radius: float, whole: int) -> tuple[list[Tile], t
     """
     least = max(math.ceil(SIDE_IN_RADII * radius), SIDE)
     size = [math.ceil(count / max(count // least, 1) / whole) * whole for count in edges.shape]
-    rows, columns = (
-        [slice(start, min(start + step, count)) for start in range(0, count, step)]
-        for count, step in zip(edges.shape, size, strict=True)
-    )
+    rows, columns = (pieces(count, step) for count, step in zip(edges.shape, size, strict=True))
     tiles = [tile for tile in product(rows, columns) if edges[tile].any()]
     return tiles, (size[0], size[1])
 
@@ -150,7 +147,7 @@ class TileBatch:
 
     def together(self, count: int) -> TileBatch:
         """Return the means over so many cells along either side."""
-        return replace(self, planes=[_means(planes, count) for planes in self.planes])
+        return replace(self, planes=[cell_means(planes, count) for planes in self.planes])
 
     def lacking(self, cells: Cells, rings: int, period: float) -> list[NDArray]:
         """Return the covariance (C, rows, columns) at the pixels of every tile.
@@ -169,7 +166,7 @@ class TileBatch:
         ]
 
 
-def _means(planes: NDArray, count: int) -> NDArray:
+def cell_means(planes: NDArray, count: int) -> NDArray:
     """Return the means over so many cells along either side."""
     if count == 1:
         return planes
@@ -203,7 +200,7 @@ class Painting:
             mix = np.zeros((len(level) + 1, level.shape[1] + 1), path.settings.dtype)
             mix[:-1, :-1], mix[-1, -1] = level, 1
             self._mixes.append(mix)
-        seen = results(self._seen, tiles, path.workers)
+        seen = results(self._visible_layers, tiles, path.workers)
         found = [(tile, own) for tile, own in zip(tiles, seen, strict=True) if len(own) > 1]
         found.sort(key=lambda each: list(each[1]))
         at_once = max(TOGETHER // (len(self._mixes[0]) * math.prod(cells.shape)), 1)
@@ -211,11 +208,22 @@ class Painting:
         """The tiles, those that see the same layers together."""
         for same, members in groupby(found, lambda each: list(each[1])):
             radii = [path.layers[number].radius for number in same]
-            for some in _parts(list(members), at_once):
+            alike = list(members)
+            for some in (alike[few] for few in pieces(len(alike), at_once)):
                 planes = [np.stack([own[number] for _, own in some]) for number in same]
                 self.batches.append(TileBatch([tile for tile, _ in some], same, radii, planes))
 
-    def _seen(self, tile: Tile) -> dict[int, NDArray]:
+    @property
+    def tiles(self) -> list[Tile]:
+        """All tiles, in the order of the batches."""
+        return [tile for batch in self.batches for tile in batch.tiles]
+
+    @property
+    def values(self) -> int:
+        """Values of all layers on all tiles."""
+        return sum(batch.values for batch in self.batches)
+
+    def _visible_layers(self, tile: Tile) -> dict[int, NDArray]:
         """Return the layers of a tile that are seen, by their number."""
         edges, layers = self.cells.edges(tile), {}
         for number, (part, mix) in enumerate(zip(self._scene.parts, self._mixes, strict=True)):
@@ -242,15 +250,14 @@ class Painting:
         edges, indices = self.cells.edges(batch.tiles[k]), []
         for n in self.cells.shape[::-1]:
             indices.append(np.unique(np.linspace(0, n - 1, POINTS).astype(int)))
-        jitter = (
-            (np.arange(POINTS) * GOLDEN % 1)[: len(indices[0])],
-            (np.arange(POINTS) * GOLDEN**2 % 1)[: len(indices[1])],
+        x, y = (
+            cells[index] + (cells[1] - cells[0]) * (np.arange(len(index)) * step % 1)
+            for cells, index, step in zip(edges, indices, (GOLDEN, GOLDEN**2), strict=True)
         )
-        x, y = (e[i] + (e[1] - e[0]) * j for e, i, j in zip(edges, indices, jitter, strict=True))
         columns, rows = (index // (2 * count) for index in indices)
         deviations, means = [], []
         for number, planes in zip(batch.numbers, batch.planes, strict=True):
-            blocks = _means(planes[k], 2 * count)[:, rows[:, None], columns]
+            blocks = cell_means(planes[k], 2 * count)[:, rows[:, None], columns]
             points = self._scene.parts[number].chart.values(x, y, self._mixes[number])
             deviations.append(np.abs(points - blocks).mean(axis=(1, 2)))
             means.append(planes[k, :-1].mean(axis=(1, 2)))
@@ -261,11 +268,6 @@ class Painting:
                 seen = deviations[back][:-1] + deviations[back][-1] * behind
                 total += deviations[front][-1] * seen
         return total
-
-
-def _parts(items: list, count: int) -> Iterator[list]:
-    for start in range(0, len(items), count):
-        yield items[start : start + count]
 
 
 def box_means(plane: NDArray, at: NDArray, width: float) -> NDArray:

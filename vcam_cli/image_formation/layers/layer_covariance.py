@@ -1,7 +1,7 @@
 """Covariance over the aperture of the layers of a scene, sampled as coarsely as their blur allows.
 
-`occlusion.py` has the mathematics. Only layers that are out of focus take part, and only around
-those that do not fill the frame: what is opaque all over hides all alike.
+`occlusion.py` has the mathematics, `edge_tiles.py` the parts of the frame that are looked at: what
+is opaque all over hides all alike.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from vcam_cli.effects.base import ImageMotion, of_kind
 from vcam_cli.effects.optics.diffraction import Diffraction
-from vcam_cli.image_formation.layers.edge_tiles import Cells, Painting, Tile, tiles_with
+from vcam_cli.image_formation.layers.edge_tiles import Cells, Painting, tiles_with
 from vcam_cli.image_formation.layers.occlusion import aperture_points
 from vcam_cli.image_formation.optical_path import OpticalPath
 from vcam_cli.parallel import results
@@ -81,26 +81,24 @@ def add_covariance(
     Hidden
         By how many rings it was summed, and its error.
     """
-    if not may_hide(path):
+    if not _may_hide(path):
         return Hidden()
     g = path.geometry
     pitch = max(g.pitch_x, g.pitch_y)
-    widest = sorted((abs(optics.radius) for optics in path.layers), reverse=True)
+    widest = _radii(path)
     # Of cells that are powers of two of pixels wide, the coarse ones are means of the fine.
     count = 2 ** math.floor(math.log2(max(widest[1] / pitch, 1)))
     tiles, size = tiles_with(edges, widest[0] / pitch, 2 * count)
     cells = Cells.around(g, size, 1, widest[0], 2 * count)
     painting = Painting(path, scene, tiles, cells)
-    tiles = [tile for batch in painting.batches for tile in batch.tiles]
-    if not tiles:
+    if not painting.batches:
         return Hidden()
-    share = math.sqrt(sum(edges[tile].size for tile in tiles) / edges.size)
+    share = math.sqrt(sum(edges[tile].size for tile in painting.tiles) / edges.size)
     allowed, squared = allowed / share, _squared_error(path)
     half = allowed / math.sqrt(2)  # of independent errors
     found = _summed(path, painting, count, half, RINGS[:1])
     values = found.values
-    held = sum(batch.values for batch in painting.batches)
-    finest = min(FINEST, max(math.isqrt(MOST_VALUES // held), 1))
+    finest = min(FINEST, max(math.isqrt(MOST_VALUES // painting.values), 1))
     if _moves(path):  # at rest they would hide other light of each other
         return Hidden(0, share * _rms(found.light), values)
     while True:
@@ -125,7 +123,7 @@ def add_covariance(
         values += found.values
     if error == 0.0:
         return Hidden()
-    for tile, part in zip(found.tiles, found.light, strict=True):
+    for tile, part in zip(painting.tiles, found.light, strict=True):
         light[:, *tile] += part
     np.maximum(light, 0, out=light)
     return Hidden(found.rings, share * error, values)
@@ -141,16 +139,21 @@ def _moves(path: OpticalPath) -> bool:
 def _squared_error(path: OpticalPath) -> float:
     """Return the error of the covariance by its cells, over it and their squared side [1/m2]."""
     pitch = max(path.geometry.pitch_x, path.geometry.pitch_y)
-    widest = sorted((abs(optics.radius) for optics in path.layers), reverse=True)
+    widest = _radii(path)
     strip = min(max(widest[1] + _period(path), NARROWEST * pitch), pitch)
     return SAMPLED / (max(widest[-1], pitch) * math.sqrt(pitch * strip))
 
 
-def may_hide(path: OpticalPath) -> bool:
+def _may_hide(path: OpticalPath) -> bool:
     """Return whether more than one layer is so far out of focus that rays through it differ."""
     least = SHARP * max(path.geometry.pitch_x, path.geometry.pitch_y)
-    widest = sorted((abs(optics.radius) for optics in path.layers), reverse=True)
+    widest = _radii(path)
     return len(widest) > 1 and widest[0] >= least and widest[1] + _period(path) >= least
+
+
+def _radii(path: OpticalPath) -> list[float]:
+    """Return the radii of the layers' blurs, the widest first [m]."""
+    return sorted((abs(optics.radius) for optics in path.layers), reverse=True)
 
 
 def _rms(light: Sequence[NDArray]) -> float:
@@ -163,7 +166,6 @@ def _rms(light: Sequence[NDArray]) -> float:
 class _Sum:
     """Covariance at the pixels, summed over points of the aperture."""
 
-    tiles: list[Tile]
     light: list[NDArray]
     """(C, rows, columns) of every tile [e/s]."""
     rings: int
@@ -184,8 +186,7 @@ def _summed(
     further = FURTHER_WAVES if period > 0 else FURTHER_RAYS
     batches = [batch.together(count) for batch in painting.batches]
     cells = painting.cells.together(count)
-    tiles = [tile for batch in batches for tile in batch.tiles]
-    values, light, last = 0, [np.zeros(())] * len(tiles), math.inf
+    values, light, last = 0, [np.zeros(())] * len(painting.tiles), math.inf
     for rings in numbers:
         found = results(methodcaller("lacking", cells, rings, period), batches, path.workers)
         more = [part for parts in found for part in parts]
@@ -196,7 +197,7 @@ def _summed(
         light = more
         if error <= allowed:
             break
-    return _Sum(tiles, light, rings, error, values)
+    return _Sum(light, rings, error, values)
 
 
 def _period(path: OpticalPath) -> float:

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcam_cli.camera.derived.geometry import pixel_centers
-from vcam_cli.image_formation.layers.edge_tiles import box_means
+from vcam_cli.image_formation.layers.edge_tiles import box_means, cell_means
 from vcam_cli.image_formation.optical_path import OpticalPath
 from vcam_cli.parallel import each
 from vcam_cli.scenes.depth_scene import DepthScene
@@ -271,9 +271,8 @@ class _Cells:
             cover = np.where(first == layer, 1 - share, np.where(first == layer - 1, share, 0))
             if layer < len(radii) and cover.any():
                 both = np.concatenate([light * cover, cover[None]])
-                c, h, w = both.shape
-                means = both.reshape(c, h // n, n, w // n, n).mean(axis=(2, 4))
-                yield radii[layer] / self.width, means.astype(light.dtype), hidden
+                means = cell_means(both, n).astype(light.dtype)
+                yield radii[layer] / self.width, means, hidden
 
 
 def aperture_points(count: int) -> Iterator[tuple[float, float]]:
