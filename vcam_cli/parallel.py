@@ -122,6 +122,10 @@ def slices_within(whole: slice, size: int) -> list[slice]:
 def product(left: NDArray, right: NDArray) -> NDArray:
     """Return the product of two matrices of the same float type, computed in one thread."""
     out = np.empty((len(left), right.shape[1]), right.dtype)
+    if left.size > PRODUCT >= right.size:
+        for rows in pieces(len(out), max(1, PRODUCT // max(1, right.size))):
+            np.matmul(left[rows], right, out=out[rows])
+        return out
     for columns in pieces(out.shape[1], max(1, PRODUCT // max(1, left.size))):
         np.matmul(left, right[:, columns], out=out[:, columns])
     return out

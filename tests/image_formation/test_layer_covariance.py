@@ -8,16 +8,16 @@ from layered_reference import FOCAL, PITCH, Flat, Scene, changes, random_scene, 
 from making import QUIET, camera, radiance_for
 
 from vcam_cli import simulate
-from vcam_cli.image_formation.layers import edge_tiles, layer_covariance
+from vcam_cli.image_formation.layers import edge_tiles, layer_covariance, tile_sample
 from vcam_cli.image_formation.layers.occlusion import BlurredLayer, aperture_points, covariance
 
 LARGE = {"array.rows": 150, "array.columns": 190}
 """So that there are some tiles, the last ones smaller than the others."""
 
 
-def light(folder, more=LARGE) -> np.ndarray:
+def light(folder, more=LARGE, seed=11) -> np.ndarray:
     """Mean electrons over white of three layers, two of them far out of focus."""
-    scene = random_scene(np.random.default_rng(11), 3)
+    scene = random_scene(np.random.default_rng(seed), 3)
     given = {"scene.radiance": radiance_for(5000), "effects": QUIET, "accuracy": "0.2 %"}
     frame = simulate(camera(folder, given | changes(scene, folder) | more)).frame
     return frame.mean_electrons / (frame.white_rate[0] * frame.exposure_time)
@@ -153,3 +153,61 @@ def test_of_layers_that_move_nothing_is_added(tmp_path):
     assert still.rings > 0
     assert moved.rings == 0
     assert moved.error > 2 * still.error
+
+
+def test_covariance_that_does_not_count_is_left_out_and_said(tmp_path, monkeypatch):
+    """Of more tiles than are looked at: what is missing is within what is told of it."""
+    scene = random_scene(np.random.default_rng(2), 3)
+    more = {"array.rows": 300, "array.columns": 380, "scene.radiance": radiance_for(5000)}
+    given = more | {"effects": QUIET, "accuracy": "standard"}
+    made = camera(tmp_path, changes(scene, tmp_path) | given)
+    every = simulate(made).frame
+    monkeypatch.setattr(tile_sample, "MOST", 3)
+    found = simulate(made).frame
+    full = float(every.mean_electrons.max())
+    missing = float(np.sqrt(np.mean(np.square(found.mean_electrons - every.mean_electrons)))) / full
+    depth = found.spectrum.depth
+    assert depth.rings == 0 < every.spectrum.depth.rings
+    assert 0.1 * depth.left_out < missing <= depth.left_out <= depth.error <= 0.005
+    assert every.spectrum.depth.left_out == 0
+
+
+def test_covariance_that_counts_is_added_on_all_tiles(tmp_path, monkeypatch):
+    """Some tiles tell that it does: the frame is that of which all tiles were looked at."""
+    more = {"array.rows": 300, "array.columns": 380, "accuracy": "0.1 %"}
+    by_all = light(tmp_path, more, 2)
+    monkeypatch.setattr(tile_sample, "MOST", 3)
+    by_some = light(tmp_path, more, 2)
+    # Cells and rings may differ, both within the tolerance.
+    assert np.sqrt(np.mean(np.square(by_some - by_all))) <= 0.001 * by_all.max()
+    monkeypatch.setattr(layer_covariance, "SHARP", 1e9)
+    assert np.abs(by_some - light(tmp_path, more, 2)).max() > 0.02 * by_all.max()
+
+
+def test_sample_of_tiles_tells_of_all_of_them():
+    """Light of which a few tiles have most: its mean square and its error over many samples."""
+    rng = np.random.default_rng(5)
+    strength = rng.pareto(1.5, (12, 15))
+    plane = np.kron(strength, np.ones((8, 8))) * rng.standard_normal((96, 120))
+    tiles, _ = edge_tiles.tiles_with(np.ones(plane.shape, bool), 0.0, 8)
+    small = [
+        (slice(row, row + 8), slice(column, column + 8))
+        for row in range(0, 96, 8)
+        for column in range(0, 120, 8)
+    ]
+    assert len(tiles) < tile_sample.MOST < len(small)
+    truth = float(np.sqrt(np.square(plane).mean()))
+    whole = tile_sample.telling_tiles(tiles, np.abs(plane))
+    of_all = whole.rms([plane[None][:, *tile] for tile in whole.tiles])
+    assert of_all == pytest.approx(truth, rel=1e-12)
+    assert whole.drawn == 0 == whole.chance_error([plane[None][:, *tile] for tile in tiles])
+    squares, within = [], 0
+    for seed in range(200):
+        seen = np.abs(plane) * np.random.default_rng(seed).uniform(0.2, 1.0, plane.shape)
+        sample = tile_sample.telling_tiles(small, seen)
+        light = [plane[None][:, *tile] for tile in sample.tiles]
+        squares.append(sample.rms(light) ** 2)
+        within += truth**2 <= squares[-1] * (1 + 2 * sample.chance_error(light))
+    # Means of 200 samples of 16 tiles, of which each tells to some tenths.
+    assert np.mean(squares) == pytest.approx(truth**2, rel=0.05)
+    assert within >= 180

@@ -147,6 +147,8 @@ class DepthReport:
     of each other; 0 where there was no need to."""
     error: float
     """Predicted rms error of both and of the layers' own images, relative to full signal."""
+    left_out: float = 0.0
+    """What of it is that the layers hide of each other and that was not added, likewise."""
     ray_values: int = 0
     """Values of layers that were moved to where rays see them."""
 

@@ -32,6 +32,8 @@ from vcam_cli.physics.zernike import Floats, Terms
 MAX_SLOPE = 200.0
 """Largest slope of a wavefront that is computed [wavelengths per pupil radius]."""
 
+NEGLIGIBLE = 1e-11
+"""Sum of the last terms of a series that are left out."""
 _SERIES_CACHE: ByteCache[Floats] = ByteCache(20_000_000)
 GRID_CACHE_BYTES = 500_000_000
 """Memory that grids of wavefronts are kept in [bytes]."""
@@ -178,7 +180,8 @@ def _chebyshev_series(waves: Floats, slope: float) -> Floats:
     )
     coefficients = dct(np.array(values), type=2) / count
     coefficients[0] /= 2
-    return coefficients
+    beyond = np.cumsum(np.abs(coefficients[::-1]))[::-1]
+    return coefficients[: max(np.count_nonzero(beyond > NEGLIGIBLE), 1)]
 
 
 def _means_of_defocus(waves: float, half_shifts: Floats) -> Floats:

@@ -74,9 +74,12 @@ def _layer(placed: PlacedLayer, view: View) -> Layer:
         assert files.picture is not None
         picture, frame = files.picture, _picture_frame(files.picture, own)
         spectra = picture_spectra(placed.scene, source.model, picture)
-        mask = np.ones(picture.shape[:2], np.float32) if files.mask is None else files.mask
-        if mask.shape == picture.shape[:2]:
-            whole = np.concatenate([picture * mask[..., None], mask[..., None]], axis=2)
+        mask = files.mask
+        if mask is None or mask.shape == picture.shape[:2]:
+            whole = np.ones((*picture.shape[:2], picture.shape[2] + 1), picture.dtype)
+            whole[..., :-1] = picture
+            if mask is not None:
+                whole *= mask[..., None]
             masked = PictureChart(whole, frame, mirrored=fills)
             brightest = float(picture.max(initial=0.0))
             return Layer(masked, spectra, placed.center, None if fills else frame, brightest)

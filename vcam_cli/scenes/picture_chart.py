@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from vcam_cli.parallel import product
 from vcam_cli.scenes.base import Array, Chart, Frame
 from vcam_cli.scenes.cells import clip_cells
 
@@ -30,7 +31,7 @@ class PictureChart(Chart):
         down, rows = self._shares(y_edges * (height / self.frame.height) + height / 2, height)
         across, columns = self._shares(x_edges * (width / self.frame.width) + width / 2, width)
         seen = self.picture[rows, columns]
-        lines = (down @ seen.reshape(len(seen), -1)).reshape(-1, channels) @ mix.T
+        lines = product((down @ seen.reshape(len(seen), -1)).reshape(-1, channels), mix.T)
         lines = lines.reshape(len(out[0]), -1, len(mix))
         for plane, one in zip(out, np.moveaxis(lines, 2, 0), strict=True):
             plane[:] = (across @ one.T).T

@@ -134,6 +134,8 @@ def _depth(ready: Prepared) -> tuple[str, ...]:
     if found is not None:
         points = f"{found.rings} rings of points of the aperture"
         how = f", covariance over {points}" if found.rings else ""
+        if found.left_out:
+            how = f", without their covariance of {100 * found.left_out:.2g} %"
         more = found.error > ready.settings.tolerance
         notes.append(
             f"layers are put one before the other on {found.cells} x {found.cells} cells a"

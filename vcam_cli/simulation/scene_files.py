@@ -176,15 +176,19 @@ def _blur(camera: Camera) -> LensBlur:
 
 
 def _read_layers(source: Layers) -> tuple[tuple[LayerFiles, ...], tuple[str, ...]]:
-    from vcam_cli.files.images.images import read_picture
+    from vcam_cli.files.images.images import LinearImage, read_picture
     from vcam_cli.files.images.scene_maps import read_opacity
 
     found, notes = list[LayerFiles](), list[str]()
+    pictures: dict[tuple[str, str, float], LinearImage] = {}  # layers may share a file
     for number, layer in enumerate(source.layers):
         place, picture, mask = (*PATH, number), None, None
         if layer.source.kind == "image":
             image, at = layer.source, (*place, "source", "file")
-            read = read_picture(image.file, image.encoding, image.white, at)
+            kept = image.file, image.encoding, image.white
+            if kept not in pictures:
+                pictures[kept] = read_picture(*kept, at)
+            read = pictures[kept]
             picture = read.data if image.crop is None else read.data[image.crop.window]
             notes += [note for note in read.notes if layer.mask is None or "alpha" not in note]
         if layer.mask is not None:

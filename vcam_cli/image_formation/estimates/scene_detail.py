@@ -3,9 +3,9 @@
 A scene without detail needs no lens and no transform, and one with little of it shows little of
 what blurs it. A wave's power is known. Of other scenes a survey of points tells where the light
 changes; there, and by chance elsewhere, tiles of points are transformed. How probable a tile was is
-allowed for, so that the mean over the tiles is that over the array (D. G. Horvitz and D. J.
-Thompson, J. Am. Stat. Assoc. 47, 1952). Points lie at random places of their cells: detail finer
-than the cells counts as noise, which never hides (R. L. Cook, ACM Trans. Graphics 5, 1986).
+allowed for, so that the mean over the tiles is that over the array (`chosen_places.py`). Points lie
+at random places of their cells: detail finer than the cells counts as noise, which never hides
+(R. L. Cook, ACM Trans. Graphics 5, 1986).
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ import scipy.fft
 from numpy.typing import NDArray
 
 from vcam_cli.effects.base import Effect
+from vcam_cli.image_formation.estimates.chosen_places import chosen_places
 from vcam_cli.image_formation.optical_path import OpticalPath
 from vcam_cli.scenes.base import ChartScene, Scene, WaveScene
 
@@ -254,13 +255,7 @@ def _tile_places(contrast: NDArray, rng: np.random.Generator) -> tuple[NDArray, 
     flat = contrast.ravel()
     if flat.size <= TILES:
         return np.argsort(-flat), np.full(flat.size, 1 / flat.size)
-    chance = np.full(flat.size, 1 / flat.size)
-    if flat.any():
-        chance = ANYWHERE * chance + (1 - ANYWHERE) * flat / flat.sum()
-    ticks = (np.arange(TILES) + rng.random()) / TILES
-    places = np.minimum(np.searchsorted(np.cumsum(chance), ticks), flat.size - 1)
-    places = places[np.argsort(-chance[places])]
-    return places, 1 / (TILES * flat.size * chance[places])
+    return chosen_places(flat, TILES, ANYWHERE, rng)
 
 
 def _brightest_block(values: NDArray) -> float:

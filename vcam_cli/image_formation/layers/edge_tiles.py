@@ -201,8 +201,10 @@ class Painting:
             mix[:-1, :-1], mix[-1, -1] = level, 1
             self._mixes.append(mix)
         seen = results(self._visible_layers, tiles, path.workers)
-        found = [(tile, own) for tile, own in zip(tiles, seen, strict=True) if len(own) > 1]
+        found = [(place, own) for place, own in enumerate(seen) if len(own) > 1]
         found.sort(key=lambda each: list(each[1]))
+        self.places = [place for place, _ in found]
+        """Numbers of the given tiles, in the order of the batches."""
         at_once = max(TOGETHER // (len(self._mixes[0]) * math.prod(cells.shape)), 1)
         self.batches: list[TileBatch] = []
         """The tiles, those that see the same layers together."""
@@ -210,8 +212,9 @@ class Painting:
             radii = [path.layers[number].radius for number in same]
             alike = list(members)
             for some in (alike[few] for few in pieces(len(alike), at_once)):
-                planes = [np.stack([own[number] for _, own in some]) for number in same]
-                self.batches.append(TileBatch([tile for tile, _ in some], same, radii, planes))
+                planes = [np.stack([layer[number] for _, layer in some]) for number in same]
+                own = [tiles[place] for place, _ in some]
+                self.batches.append(TileBatch(own, same, radii, planes))
 
     @property
     def tiles(self) -> list[Tile]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from operator import methodcaller
 
 import numpy as np
@@ -18,6 +18,7 @@ from vcam_cli.effects.base import ImageMotion, of_kind
 from vcam_cli.effects.optics.diffraction import Diffraction
 from vcam_cli.image_formation.layers.edge_tiles import Cells, Painting, tiles_with
 from vcam_cli.image_formation.layers.occlusion import aperture_points
+from vcam_cli.image_formation.layers.tile_sample import TileSample, all_tiles, telling_tiles
 from vcam_cli.image_formation.optical_path import OpticalPath
 from vcam_cli.parallel import results
 from vcam_cli.scenes.layered import LayeredScene
@@ -46,6 +47,10 @@ narrower than pixels, they have less of it on coarse cells: that error grows wit
 of their width."""
 
 
+CONFIDENCE = 2.0
+"""Standard errors that are added to what some tiles tell of all."""
+
+
 @dataclass(frozen=True)
 class Hidden:
     """What is known of the covariance."""
@@ -54,6 +59,8 @@ class Hidden:
     """Rings of points of the aperture over which it was summed; 0 where there was no need to."""
     error: float = 0.0
     """Predicted, rms [e/s]."""
+    left_out: float = 0.0
+    """What of it is covariance that was not added, rms [e/s]."""
     values: int = 0
     """Values that were moved to where rays see them."""
 
@@ -61,7 +68,9 @@ class Hidden:
 def add_covariance(
     path: OpticalPath, scene: LayeredScene, light: NDArray, edges: NDArray, allowed: float
 ) -> Hidden:
-    """Add what layers that are out of focus hide of each other to the light of pixels.
+    """Add what layers out of focus hide of each other to the light of pixels, where it counts.
+
+    Some tiles tell whether it does, and how finely it is to be summed.
 
     Parameters
     ----------
@@ -72,7 +81,8 @@ def add_covariance(
     light : NDArray
         Light (C, rows, columns) that is changed [e/s].
     edges : NDArray
-        Pixels (rows, columns) that some rays reach past a layer and others do not.
+        Part of the rays (rows, columns) that layers stop, or let pass if that is less; 0 where all
+        rays see the same.
     allowed : float
         Error to be reached, rms [e/s].
 
@@ -88,45 +98,105 @@ def add_covariance(
     widest = _radii(path)
     # Of cells that are powers of two of pixels wide, the coarse ones are means of the fine.
     count = 2 ** math.floor(math.log2(max(widest[1] / pitch, 1)))
-    tiles, size = tiles_with(edges, widest[0] / pitch, 2 * count)
-    cells = Cells.around(g, size, 1, widest[0], 2 * count)
-    painting = Painting(path, scene, tiles, cells)
-    if not painting.batches:
+    tiles, size = tiles_with(edges > 0, widest[0] / pitch, 2 * count)
+    if not tiles:
         return Hidden()
-    share = math.sqrt(sum(edges[tile].size for tile in painting.tiles) / edges.size)
-    allowed, squared = allowed / share, _squared_error(path)
-    half = allowed / math.sqrt(2)  # of independent errors
-    found = _summed(path, painting, count, half, RINGS[:1])
+    sample = telling_tiles(tiles, edges * light.max(axis=0))
+    cells = Cells.around(g, size, 1, widest[0], 2 * count)
+    found = _converged(path, scene, sample, (cells, count), allowed, RINGS[:1])
     values = found.values
-    finest = min(FINEST, max(math.isqrt(MOST_VALUES // painting.values), 1))
     if _moves(path):  # at rest they would hide other light of each other
-        return Hidden(0, share * _rms(found.light), values)
+        return Hidden(0, found.likely_rms, found.likely_rms, values)
+    if sample.drawn:
+        grid = found.cells, found.count
+        room = math.sqrt(max(allowed**2 - found.likely_square, 0.0))
+        if 0 < room < found.error:  # it counts only if its error does
+            found = _converged(path, scene, sample, grid, room, RINGS)
+            values += found.values
+        if found.likely_rms <= allowed:
+            return Hidden(0, found.likely_rms, found.likely_rms, values)
+        found = _converged(path, scene, all_tiles(tiles, edges.size), grid, allowed, RINGS)
+        values += found.values
+    for tile, part in zip(found.sample.tiles, found.light, strict=True):
+        light[:, *tile] += part
+    np.maximum(light, 0, out=light)
+    return Hidden(found.rings, found.error, values=values)
+
+
+@dataclass(frozen=True)
+class _Sum:
+    """Covariance at the pixels, summed over points of the aperture."""
+
+    sample: TileSample
+    """The tiles that have some."""
+    light: list[NDArray]
+    """(C, rows, columns) of every tile [e/s]."""
+    rings: int
+    cells: Cells
+    """Those that were painted."""
+    count: int
+    """Painted cells along either side of one of the sum."""
+    error: float
+    """Predicted rms over the frame [e/s]."""
+    values: int
+    """Values of layers that were moved to where rays see them."""
+
+    @property
+    def likely_square(self) -> float:
+        """The most that its mean square over the frame is likely to be [(e/s)^2]."""
+        by_chance = CONFIDENCE * self.sample.chance_error(self.light)
+        return (1 + by_chance) * self.sample.rms(self.light) ** 2
+
+    @property
+    def likely_rms(self) -> float:
+        """The most that it is likely to be with its error, rms [e/s]."""
+        return math.hypot(math.sqrt(self.likely_square), self.error)
+
+
+def _converged(
+    path: OpticalPath,
+    scene: LayeredScene,
+    sample: TileSample,
+    grid: tuple[Cells, int],
+    allowed: float,
+    numbers: Sequence[int],
+) -> _Sum:
+    """Return the covariance of some tiles, on as fine cells and by as many rings as it takes.
+
+    It begins with given cells, so many of which along either side are taken together, and with
+    some numbers of rings.
+    """
+    cells, count = grid
+    pitch = max(path.geometry.pitch_x, path.geometry.pitch_y)
+    half = allowed / math.sqrt(2)  # of independent errors
+    painting = Painting(path, scene, sample.tiles, cells)
+    sample = sample.part(painting.places)
+    if not painting.batches:
+        return _Sum(sample, [], 0, cells, count, 0.0, 0)
+    finest = min(FINEST, max(math.isqrt(MOST_VALUES // painting.values), 1))
+    found, values = _summed(path, painting, sample, count, half, numbers), 0
     while True:
-        side = count * pitch / painting.cells.per_pixel
-        by_side = squared * side**2 * _rms(found.light)
-        by_detail = DETAIL * painting.unresolved(count)
+        values += found.values
+        side = count * pitch / cells.per_pixel
+        by_side = _squared_error(path) * side**2 * sample.rms(found.light)
+        by_detail = DETAIL * math.sqrt(sample.share) * painting.unresolved(count)
         lost = math.hypot(by_side, by_detail)
         error = math.hypot(found.error, lost)
         room = math.sqrt(max(allowed**2 - found.error**2, half**2))  # what the rings leave
-        is_coarse = lost > room and painting.cells.per_pixel < finest * count
+        is_coarse = lost > room and cells.per_pixel < finest * count
         is_settled = found.error <= half or found.rings == RINGS[-1]
         if error <= allowed or (is_settled and not is_coarse):
-            break
+            return replace(found, cells=cells, error=error, values=values)
         if is_coarse:
             asked = side / pitch * (0.5 if by_detail > by_side else math.sqrt(room / lost))
             if asked < 1:
                 per_pixel = max(math.ceil(1 / asked), round(pitch / side) + 1)
-                cells = Cells.around(g, size, min(per_pixel, finest), widest[0], 2)
-                painting = Painting(path, scene, tiles, cells)
+                per_pixel = min(per_pixel, finest)
+                cells = Cells.around(path.geometry, cells.pixels, per_pixel, _radii(path)[0], 2)
+                painting = Painting(path, scene, sample.tiles, cells)
+                sample = sample.part(painting.places)
             count = 2 ** math.floor(math.log2(max(asked, 1)))
-        found = _summed(path, painting, count, half, RINGS)
-        values += found.values
-    if error == 0.0:
-        return Hidden()
-    for tile, part in zip(painting.tiles, found.light, strict=True):
-        light[:, *tile] += part
-    np.maximum(light, 0, out=light)
-    return Hidden(found.rings, share * error, values)
+        found = _summed(path, painting, sample, count, half, RINGS)
 
 
 def _moves(path: OpticalPath) -> bool:
@@ -156,27 +226,13 @@ def _radii(path: OpticalPath) -> list[float]:
     return sorted((abs(optics.radius) for optics in path.layers), reverse=True)
 
 
-def _rms(light: Sequence[NDArray]) -> float:
-    """Return the rms of parts of a frame (C, h, w) in the color where it is most."""
-    squares = sum(np.square(part).sum(axis=(1, 2), dtype=float) for part in light)
-    return math.sqrt(float(np.max(squares)) / sum(part[0].size for part in light))
-
-
-@dataclass(frozen=True)
-class _Sum:
-    """Covariance at the pixels, summed over points of the aperture."""
-
-    light: list[NDArray]
-    """(C, rows, columns) of every tile [e/s]."""
-    rings: int
-    error: float
-    """Predicted rms error, by what the last rings changed [e/s]."""
-    values: int
-    """Values of layers that were moved to where rays see them."""
-
-
 def _summed(
-    path: OpticalPath, painting: Painting, count: int, allowed: float, numbers: Sequence[int]
+    path: OpticalPath,
+    painting: Painting,
+    sample: TileSample,
+    count: int,
+    allowed: float,
+    numbers: Sequence[int],
 ) -> _Sum:
     """Return the covariance at the pixels by as many rings as it takes, of those given.
 
@@ -186,18 +242,18 @@ def _summed(
     further = FURTHER_WAVES if period > 0 else FURTHER_RAYS
     batches = [batch.together(count) for batch in painting.batches]
     cells = painting.cells.together(count)
-    values, light, last = 0, [np.zeros(())] * len(painting.tiles), math.inf
+    values, light, last = 0, [np.zeros((1, 1, 1))] * len(painting.tiles), math.inf
     for rings in numbers:
         found = results(methodcaller("lacking", cells, rings, period), batches, path.workers)
         more = [part for parts in found for part in parts]
-        change = _rms([own - before for own, before in zip(more, light, strict=True)])
+        change = sample.rms([own - before for own, before in zip(more, light, strict=True)])
         error = change * max(further, min(change / last, 1.0) if last > 0 else 0.0)
         last = change
         values += sum(batch.values for batch in batches) * len(list(aperture_points(rings)))
         light = more
         if error <= allowed:
             break
-    return _Sum(light, rings, error, values)
+    return _Sum(sample, light, rings, painting.cells, count, error, values)
 
 
 def _period(path: OpticalPath) -> float:

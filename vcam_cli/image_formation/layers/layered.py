@@ -120,13 +120,18 @@ def layered_image(
     hidden = add_covariance(path, scene, light, _edges(path, layers), left)
     error = math.hypot(error, SURE * hidden.error)
     full = min(float(light.max(initial=0.0)), path.ceiling)
-    depth = DepthReport(count, hidden.rings, error / full if full else 0.0, hidden.values)
+    over_full = 1 / full if full else 0.0
+    left_out = SURE * hidden.left_out * over_full
+    depth = DepthReport(count, hidden.rings, error * over_full, left_out, hidden.values)
     layer = Layer(lambda color, rows: light[color, rows])
     return iter([layer]), _report(layers, error, depth)
 
 
 def _edges(path: OpticalPath, layers: Iterable[_Seen]) -> NDArray:
-    """Return the pixels (rows, columns) that some rays reach past a layer and others do not."""
+    """Return the part of rays (rows, columns) that layers stop, or let pass if that is less.
+
+    It is 0 where they are as good as all.
+    """
     g, least = path.geometry, path.settings.tolerance / 2
     between: NDArray = np.zeros((g.rows, g.columns), path.settings.dtype)  # neither 0 nor 1
     hidden = np.zeros((g.rows, g.columns), bool)
@@ -135,7 +140,7 @@ def _edges(path: OpticalPath, layers: Iterable[_Seen]) -> NDArray:
         low, high = layer.cover.min(axis=0), layer.cover.max(axis=0)
         between[here] += np.where(hidden[here], 0, np.minimum(high, 1 - low))
         hidden[here] |= low >= 1 - least
-    return between > least
+    return np.where(between > least, between, 0)
 
 
 def _allowed(tolerance: float, error: float) -> float:
@@ -158,10 +163,11 @@ def _layers_seen(
         behind = tuple(e for e in of_kind(path.effects, *kinds) if not is_of_lens(e))
     for part, optics in zip(scene.parts, path.layers, strict=True):
         effects = (*(e for e in optics.effects if is_of_lens(e)), *behind)
-        seen = _layer_path(path, part, effects, lattice, scene.brightest)
+        hides = part is not scene.parts[-1]
+        seen = _layer_path(path, part, effects, lattice, scene.brightest, hides)
         if seen is not None:
-            window, own = seen
-            light, cover, report = _light_and_cover(own, part, window, scene.white, form)
+            window, own, beyond = seen
+            light, cover, report = _light_and_cover(own, part, window, beyond, scene.white, form)
             yield _Seen(window, light, cover, own, report)
 
 
@@ -255,11 +261,13 @@ def _layer_path(
     effects: tuple[Effect, ...],
     lattice: Lattice,
     brightest: float,
-) -> tuple[Window, OpticalPath] | None:
+    hides: bool,
+) -> tuple[Window, OpticalPath, int] | None:
     """Return where a layer is seen, and the path of its light; None where it is beside the array.
 
-    The path has twice the colors: those of the light, and of the opacity in light as bright as the
-    scene's brightest, relative to white.
+    Of a layer that hides others the path has twice the colors: those of the light, and of the
+    opacity in light as bright as the scene's brightest, relative to white. The third value are the
+    pixels by which its chart is to go on beyond the window.
     """
     g = lattice.geometry
     # Opacity counts as the scene's brightest light, which may lie behind it; no light is cut.
@@ -277,32 +285,40 @@ def _layer_path(
     transfer = path.transfer.with_half_the_wavelengths()
     weights, white = transfer.weights[part.components], transfer.weights[-1]
     colors = len(white)
-    doubled = np.zeros((len(weights) + 1, 2 * colors, weights.shape[2]))
-    doubled[:-1, :colors], doubled[-1, colors:] = weights, brightest * white
+    every = np.zeros((len(weights) + 1, (1 + hides) * colors, weights.shape[2]))
+    every[:-1, :colors] = weights
+    if hides:
+        every[-1, colors:] = brightest * white
     own = replace(
         path,
-        transfer=Transfer(transfer.wavelengths, doubled, of_kind(effects, Blur)),
+        transfer=Transfer(transfer.wavelengths, every, of_kind(effects, Blur)),
         geometry=window.geometry,
         settings=knobs,
-        mosaic=_colors(2 * colors),
+        mosaic=_colors(every.shape[1]),
         effects=effects,
         optional=(),
         layers=(),
         ceiling=math.inf,
-        has_opacity=True,
+        has_opacity=hides,
     )
-    return window, own
+    return window, own, beyond
 
 
 def _light_and_cover(
-    path: OpticalPath, part: LayerPart, window: Window, white: Spectrum, form: FormImage
+    path: OpticalPath,
+    part: LayerPart,
+    window: Window,
+    beyond: int,
+    white: Spectrum,
+    form: FormImage,
 ) -> tuple[NDArray, NDArray, SpectrumReport]:
-    """Return a layer's light [e/s] and opacity (C, rows, columns) in its window."""
+    """Return a layer's light [e/s] and opacity (C, rows, columns) in its window.
+
+    The opacity of one that hides nothing is 1.
+    """
     g, (at_x, at_y) = window.geometry, window.center
     x, y = part.chart.center
     chart = replace(part.chart, center=(x - at_x, y - at_y))
-    band = float(path.transfer.wavelengths[0]), float(path.transfer.wavelengths[-1])
-    beyond = margin(g, path.effects, band, path.settings)
     scene = ChartScene(
         spectra=(white,) * len(path.transfer.weights),
         white=white,
@@ -316,6 +332,12 @@ def _light_and_cover(
     layers, report = form(path, scene)
     planes: NDArray = np.empty((len(path.mosaic.colors), 0), path.settings.dtype)
     both = gathered(layers, g, planes, window.center)
+    if not path.has_opacity:
+        return (
+            np.maximum(both, 0, out=both),
+            np.broadcast_to(both.dtype.type(1), both.shape),
+            report,
+        )
     colors = len(both) // 2
     level = path.transfer.level[-1, colors:, None, None]
     light, cover = both[:colors], both[colors:]

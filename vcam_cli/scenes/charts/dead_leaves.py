@@ -95,7 +95,7 @@ class Leaves:
         return np.concatenate([ground, mix[:, self.pigment] * self.factor], axis=1)
 
 
-@lru_cache(maxsize=4)
+@lru_cache(maxsize=16)
 def generate_leaves(seed: int) -> Leaves:
     """Return the leaves of a seed, about 60 000; a later one lies in front.
 
