@@ -9,7 +9,7 @@ standard normal per pixel for each of five noise sources. The parts, by default 
     frames       a camera before four scenes, over R_compute; the shares of its stages
     shipped      every shipped camera, over R_compute of its own size
     painted      a painted chart beside a photograph of its size; its peak memory
-    layers       a scene of eight layers over a flat frame of one of them
+    layers       eight layers over the same seen flat, and over one of them alone
     plain        a plain NumPy pipeline, wavelength by wavelength, over the frame
     wavelengths  301 wavelengths over 31
     effects      a frame over the same without one effect

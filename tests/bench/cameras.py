@@ -112,7 +112,7 @@ class Studio:
         """The camera looking at the picture (gray, color, laser) or at a chart."""
         return load(self.write(self.tree(scene, base, **changes)))
 
-    def layered(self, kind: str) -> tuple[Camera, Camera]:
+    def layered(self, kind: str, accuracy: str = "standard") -> tuple[Camera, Camera]:
         """The camera before the last of eight layers alone, and before all of them.
 
         Seven lie on a ring, each two fifths as wide as the frame, before the last, so that some of
@@ -141,7 +141,7 @@ class Studio:
             ("flat", sources[-1]),
             ("layers", {"kind": "layers", "layers": layers}),
         ):
-            tree = self.tree("gray", PLAIN, optics=optics, effects="auto")
+            tree = self.tree("gray", PLAIN, optics=optics, effects="auto", accuracy=accuracy)
             lit = {"source": source, "luminance": "200 cd/m2", "distance": f"{focus} m"}
             if name == "layers":
                 del lit["distance"]

@@ -7,7 +7,7 @@ import sys
 import tempfile
 from collections.abc import Callable, Sequence
 from contextlib import ExitStack
-from itertools import pairwise
+from itertools import pairwise, product
 from pathlib import Path
 from typing import Any
 
@@ -53,7 +53,7 @@ PAINTED_OVER_PHOTOGRAPH = 2.0
 PAINTED_MEMORY = 1.3
 """What a painted chart of 12 megapixels may take of memory [GB]."""
 LAYERS_OVER_FLAT = 4.0
-"""What a scene of eight layers may cost over a flat frame."""
+"""What a scene of eight layers may cost over a flat frame of them."""
 START_UP = 0.3
 """What `vcam run` may take beyond the bare imports [s]."""
 IMPORTS = ("numpy", "scipy.fft", "pydantic", "OpenImageIO", "typer")
@@ -132,15 +132,23 @@ def painted_chart(place: Studio, repeats: int) -> dict[str, Section]:
 
 
 def layers(place: Studio, repeats: int, kinds: Sequence[str] = ()) -> dict[str, Section]:
-    """A scene of eight layers over a flat frame of one of them; frames take turns."""
-    rows = {}
-    for kind in kinds or LAYERED:
-        flat, deep = (Frames(camera).take(0, warm=True) for camera in place.layered(kind))
+    """Eight layers over the same seen flat, and over the last of them alone; frames take turns."""
+    same: Section = {}
+    alone: Section = {}
+    for kind, accuracy in product(kinds or LAYERED, ("standard", "0.2 %")):
+        cameras = place.layered(kind, accuracy)
+        one, deep = (Frames(camera).take(0, warm=True) for camera in cameras)
+        flat = Frames(ablation.with_effects(deep.camera, "auto", "depth")).take(0, warm=True)
         for _ in range(repeats):
-            flat.take()
-            deep.take()
-        rows[kind] = {**deep.cost.ratio(flat.cost), "at_most": LAYERS_OVER_FLAT}
-    return {"eight layers over a flat frame": rows}
+            for taken in (one, flat, deep):
+                taken.take()
+        name = f"{kind}, {accuracy}"
+        same[name] = {**deep.cost.ratio(flat.cost), "at_most": LAYERS_OVER_FLAT}
+        alone[name] = deep.cost.ratio(one.cost)
+    return {
+        "eight layers over the same without depth": same,
+        "eight layers over the last of them alone": alone,
+    }
 
 
 def against_plain(

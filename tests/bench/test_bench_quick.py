@@ -67,7 +67,8 @@ def test_every_part_is_there(found):
         "plain NumPy", "wavelengths", "without", "sweep", "growth", "schedules", "command",
     ):  # fmt: skip
         assert word in titles
-    assert len(PARTS) == len(found["sections"]) - 1  # frames have their shares besides
+    # Frames have their shares besides, and layers another denominator.
+    assert len(PARTS) == len(found["sections"]) - 2
     assert set(found["sections"]["frame over the same without"]) == set(TINY.effects)
     (camera,) = found["sections"]["frame time over R_compute, shipped cameras"]
     assert camera.startswith("csf-monochrome, ")

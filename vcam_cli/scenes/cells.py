@@ -62,3 +62,12 @@ def overlap(edges: Array, low: float, high: float) -> Array:
     """Return the part of every cell between `edges` that lies within [low, high]: (n,)."""
     inside = np.minimum(edges[1:], high) - np.maximum(edges[:-1], low)
     return np.maximum(inside, 0.0) / np.diff(edges)
+
+
+def cell_means(planes: Array, count: int) -> Array:
+    """Return the means over so many cells along either side of planes (..., rows, columns)."""
+    if count == 1:
+        return planes
+    *other, rows, columns = planes.shape
+    apart = planes.reshape(*other, rows // count, count, columns // count, count)
+    return np.asarray(apart.mean(axis=(-3, -1), dtype=planes.dtype))

@@ -10,12 +10,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from vcam_cli.scenes.base import Array, Chart, ChartScene, Frame, Scene, View, chart_scene
+from vcam_cli.scenes.cells import cell_means
 from vcam_cli.scenes.depth_scene import DepthScene
 from vcam_cli.scenes.picture_chart import PictureChart
 from vcam_cli.spectra import Spectrum
 
 PARTS = 4
-"""Parts along each side of a cell, in each of which layers are put one before the other."""
+"""Parts along each side of a pixel or of a larger cell, in each of which layers are put one before
+the other. How fine cells within pixels are to be is chosen by what they err, with this in it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,6 +124,8 @@ class FlatLayers(Chart):
     """Layers as a pinhole sees them: nearer ones before those behind, all sharp."""
 
     parts: tuple[LayerPart, ...]
+    pitch: float
+    """Of the pixels, along the shorter of their sides [m]."""
 
     @property
     def brightest(self) -> float:
@@ -130,9 +134,11 @@ class FlatLayers(Chart):
 
     def paint(self, x_edges: Array, y_edges: Array, mix: Array, out: Array) -> None:
         """Write the averages over the cells, as if two edges never met in a part of one."""
-        x, y = _parts_of(x_edges), _parts_of(y_edges)
+        largest = max(float(np.diff(edges).max()) for edges in (x_edges, y_edges))
+        count = PARTS if largest > self.pitch * (1 - 1e-9) else 1
+        x, y = _parts_of(x_edges, count), _parts_of(y_edges, count)
         found = self._compose(mix, lambda chart, m: chart.averages(x, y, m))
-        out[:] = found.reshape(len(mix), len(y_edges) - 1, PARTS, -1, PARTS).mean(axis=(2, 4))
+        out[:] = cell_means(found, count)
 
     def values(self, x: Array, y: Array, mix: Array) -> Array:
         """Return the values at points."""
@@ -155,9 +161,9 @@ def _edges(edges: Array, cells: slice) -> Array:
     return edges[cells.start : cells.stop + 1]
 
 
-def _parts_of(edges: Array) -> Array:
-    """Return the edges of cells, and those between their parts."""
-    steps = np.arange(PARTS) / PARTS
+def _parts_of(edges: Array, count: int) -> Array:
+    """Return the edges of cells, and those between so many parts of each."""
+    steps = np.arange(count) / count
     within = edges[:-1, None] + np.diff(edges)[:, None] * steps
     return np.append(within.ravel(), edges[-1])
 
@@ -245,5 +251,6 @@ def layered_scene(layers: list[Layer], white: Spectrum, view: View) -> LayeredSc
         components = slice(len(spectra), len(spectra) + len(layer.spectra))
         parts.append(LayerPart(chart, layer.size, components, layer.brightest))
         spectra += layer.spectra
-    flat = chart_scene(FlatLayers(tuple(parts)), (*spectra, white), white, view)
+    pitch = min(view.pitch_x, view.pitch_y)
+    flat = chart_scene(FlatLayers(tuple(parts), pitch), (*spectra, white), white, view)
     return LayeredScene(tuple(parts), flat)

@@ -20,7 +20,7 @@ from vcam_cli.camera.derived.geometry import Geometry, pixel_centers
 from vcam_cli.image_formation.layers.occlusion import BlurredLayer, covariance
 from vcam_cli.image_formation.optical_path import OpticalPath
 from vcam_cli.parallel import pieces, results
-from vcam_cli.scenes.cells import GOLDEN
+from vcam_cli.scenes.cells import GOLDEN, cell_means
 from vcam_cli.scenes.layered import LayeredScene
 
 SIDE = 48
@@ -164,15 +164,6 @@ class TileBatch:
             own[:, : rows.stop - rows.start, : columns.stop - columns.start]
             for own, (rows, columns) in zip(light, self.tiles, strict=True)
         ]
-
-
-def cell_means(planes: NDArray, count: int) -> NDArray:
-    """Return the means over so many cells along either side."""
-    if count == 1:
-        return planes
-    *other, rows, columns = planes.shape
-    apart = planes.reshape(*other, rows // count, count, columns // count, count)
-    return np.asarray(apart.mean(axis=(-3, -1), dtype=planes.dtype))
 
 
 class Painting:

@@ -17,9 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcam_cli.camera.derived.geometry import pixel_centers
-from vcam_cli.image_formation.layers.edge_tiles import box_means, cell_means
+from vcam_cli.image_formation.layers.edge_tiles import box_means
 from vcam_cli.image_formation.optical_path import OpticalPath
 from vcam_cli.parallel import each
+from vcam_cli.scenes.cells import cell_means
 from vcam_cli.scenes.depth_scene import DepthScene
 
 SHARP = 0.1
