@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -254,6 +254,8 @@ class _SceneVariances:
     """All effects that are wanted."""
     signal: SignalLevels
     tolerance: float
+    _known: dict[tuple[Effect, float], NDArray] = field(default_factory=dict)
+    """Variances of one source at the levels, without so much dark signal."""
 
     @cached_property
     def whole(self) -> NDArray:
@@ -265,14 +267,24 @@ class _SceneVariances:
 
         Without a charge, both the dark signal and the level are lower.
         """
-        gone = [charge for charge in of_kind(self.present, Charge) if charge not in kept]
+        gone = [charge for charge in self._charges if charge not in kept]
         missing = sum(charge.rate() for charge in gone) * self.signal.time
+        total = np.zeros((2, len(self.signal.weighed)))
+        for scope, sums in zip(("frame", "sensor"), total, strict=True):
+            for source in noise_sources(kept, scope):
+                if (source, missing) not in self._known:
+                    found = total_variance([source], self._signal_without(missing))
+                    self._known[source, missing] = found
+                sums += self._known[source, missing]
+        return total
+
+    @cached_property
+    def _charges(self) -> tuple[Charge, ...]:
+        return of_kind(self.present, Charge)
+
+    def _signal_without(self, missing: float) -> SignalLevels:
         levels = tuple(max(level - missing, 0.0) for level in self.signal.weighed)
-        dark = max(self.signal.dark - missing, 0.0)
-        here = replace(self.signal, dark=dark, levels=levels)
-        return np.array(
-            [total_variance(noise_sources(kept, scope), here) for scope in ("frame", "sensor")]
-        )
+        return replace(self.signal, dark=max(self.signal.dark - missing, 0.0), levels=levels)
 
     def share_lost(self, kept: Sequence[Effect]) -> float:
         """Return the largest relative change with some effects alone, over what is allowed."""
