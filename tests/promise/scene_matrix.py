@@ -206,7 +206,7 @@ class Times:
         )
 
 
-ENOUGH = 3.0
+ENOUGH = 12.0
 """Seconds after which no frame is repeated."""
 
 
