@@ -81,8 +81,8 @@ def add_covariance(
     light : NDArray
         Light (C, rows, columns) that is changed [e/s].
     edges : NDArray
-        Part of the rays (rows, columns) that layers stop, or let pass if that is less; 0 where all
-        rays see the same.
+        What layers may hide of those behind them for some rays alone (rows, columns); 0 where all
+        rays see the same [e/s].
     allowed : float
         Error to be reached, rms [e/s].
 
@@ -101,7 +101,7 @@ def add_covariance(
     tiles, size = tiles_with(edges > 0, widest[0] / pitch, 2 * count)
     if not tiles:
         return Hidden()
-    sample = telling_tiles(tiles, edges * light.max(axis=0))
+    sample = telling_tiles(tiles, edges)
     cells = Cells.around(g, size, 1, widest[0], 2 * count)
     found = _converged(path, scene, sample, (cells, count), allowed, RINGS[:1])
     values = found.values
@@ -113,7 +113,7 @@ def add_covariance(
         if 0 < room < found.error:  # it counts only if its error does
             found = _converged(path, scene, sample, grid, room, RINGS)
             values += found.values
-        if found.likely_rms <= allowed:
+        if found.light and found.likely_rms <= allowed:
             return Hidden(0, found.likely_rms, found.likely_rms, values)
         found = _converged(path, scene, all_tiles(tiles, edges.size), grid, allowed, RINGS)
         values += found.values

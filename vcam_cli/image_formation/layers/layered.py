@@ -18,7 +18,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,6 +37,7 @@ from vcam_cli.effects.pixel.pixel_aperture import PixelAperture
 from vcam_cli.image_formation.estimates.bandwidth import margin
 from vcam_cli.image_formation.layers.layer_covariance import add_covariance
 from vcam_cli.image_formation.layers.layer_lattice import Lattice, Window
+from vcam_cli.image_formation.layers.seen_layers import SeenLayer, partly_hidden
 from vcam_cli.image_formation.optical_path import (
     DepthReport,
     Layer,
@@ -65,24 +66,6 @@ PART = 0.5
 SURE_OF_LAYERS, SURE = 1.4, 1.8
 """Predicted error over the rms that is expected, of the layers' own images and of their order: of
 134 scenes of discs and bars none errs more, nor is any predicted to err more than the tolerance."""
-
-
-@dataclass(frozen=True)
-class _Seen:
-    """A layer behind the lens."""
-
-    window: Window
-    light: NDArray
-    """Light (C, rows, columns) in the window [e/s]."""
-    cover: NDArray
-    """Opacity (C, rows, columns)."""
-    path: OpticalPath
-    report: SpectrumReport
-
-    def lost_rms(self, g: Geometry) -> float:
-        """Return the rms over all of an array of what the layer's own image lacks [e/s]."""
-        cells = self.window.geometry
-        return self.report.lost_rms * math.sqrt(cells.rows * cells.columns / (g.rows * g.columns))
 
 
 def layered_image(
@@ -117,7 +100,7 @@ def layered_image(
     own = math.hypot(*(layer.lost_rms(path.geometry) for layer in layers))
     error = math.hypot(SURE_OF_LAYERS * own, SURE * error)
     left = _allowed(path.settings.tolerance * full, error)
-    hidden = add_covariance(path, scene, light, _edges(path, layers), left)
+    hidden = add_covariance(path, scene, light, partly_hidden(layers, path), left)
     error = math.hypot(error, SURE * hidden.error)
     full = min(float(light.max(initial=0.0)), path.ceiling)
     over_full = 1 / full if full else 0.0
@@ -125,22 +108,6 @@ def layered_image(
     depth = DepthReport(count, hidden.rings, error * over_full, left_out, hidden.values)
     layer = Layer(lambda color, rows: light[color, rows])
     return iter([layer]), _report(layers, error, depth)
-
-
-def _edges(path: OpticalPath, layers: Iterable[_Seen]) -> NDArray:
-    """Return the part of rays (rows, columns) that layers stop, or let pass if that is less.
-
-    It is 0 where they are as good as all.
-    """
-    g, least = path.geometry, path.settings.tolerance / 2
-    between: NDArray = np.zeros((g.rows, g.columns), path.settings.dtype)  # neither 0 nor 1
-    hidden = np.zeros((g.rows, g.columns), bool)
-    for layer in layers:
-        here = layer.window.rows, layer.window.columns
-        low, high = layer.cover.min(axis=0), layer.cover.max(axis=0)
-        between[here] += np.where(hidden[here], 0, np.minimum(high, 1 - low))
-        hidden[here] |= low >= 1 - least
-    return np.where(between > least, between, 0)
 
 
 def _allowed(tolerance: float, error: float) -> float:
@@ -151,7 +118,7 @@ def _allowed(tolerance: float, error: float) -> float:
 
 def _layers_seen(
     path: OpticalPath, scene: LayeredScene, lattice: Lattice, form: FormImage
-) -> Iterator[_Seen]:
+) -> Iterator[SeenLayer]:
     """Yield the layers that a lattice sees, the nearest first.
 
     Its cells are the pixels themselves, or average over all of their area.
@@ -168,10 +135,10 @@ def _layers_seen(
         if seen is not None:
             window, own, beyond = seen
             light, cover, report = _light_and_cover(own, part, window, beyond, scene.white, form)
-            yield _Seen(window, light, cover, own, report)
+            yield SeenLayer(window, light, cover, own, report)
 
 
-def _composed(path: OpticalPath, layers: Iterable[_Seen], g: Geometry) -> tuple[NDArray, float]:
+def _composed(path: OpticalPath, layers: Iterable[SeenLayer], g: Geometry) -> tuple[NDArray, float]:
     """Return the light (C, rows, columns) of layers one before the other, and its error [e/s].
 
     The error is that of light and opacity that both change within a cell, rms.
@@ -379,7 +346,7 @@ def is_of_lens(effect: Effect) -> bool:
     return moves or (effect.origin == "lens" and bool(of_kind([effect], Blur, FieldTransfer)))
 
 
-def _report(layers: Sequence[_Seen], error: float, depth: DepthReport) -> SpectrumReport:
+def _report(layers: Sequence[SeenLayer], error: float, depth: DepthReport) -> SpectrumReport:
     """Return what is known of the image of layers, and its error [e/s]."""
     reports = [layer.report for layer in layers]
     names = {name for own in reports for name in own.changes}
