@@ -53,7 +53,7 @@ PAINTED_OVER_PHOTOGRAPH = 2.0
 PAINTED_MEMORY = 1.3
 """What a painted chart of 12 megapixels may take of memory [GB]."""
 LAYERS_OVER_FLAT = 4.0
-"""What a scene of eight layers may cost over a flat frame of them."""
+"""What a scene of eight layers may cost over a flat frame, of them or of one of them."""
 START_UP = 0.3
 """What `vcam run` may take beyond the bare imports [s]."""
 IMPORTS = ("numpy", "scipy.fft", "pydantic", "OpenImageIO", "typer")
@@ -144,7 +144,7 @@ def layers(place: Studio, repeats: int, kinds: Sequence[str] = ()) -> dict[str, 
                 taken.take()
         name = f"{kind}, {accuracy}"
         same[name] = {**deep.cost.ratio(flat.cost), "at_most": LAYERS_OVER_FLAT}
-        alone[name] = deep.cost.ratio(one.cost)
+        alone[name] = {**deep.cost.ratio(one.cost), "at_most": LAYERS_OVER_FLAT}
     return {
         "eight layers over the same without depth": same,
         "eight layers over the last of them alone": alone,

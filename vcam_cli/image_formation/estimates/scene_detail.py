@@ -219,7 +219,7 @@ def _tile_detail(path: OpticalPath, scene: Scene, level: NDArray, settled: Settl
     side = np.minimum(TILE, size)
     covers = counts.prod() <= TILES
     if not covers:
-        counts = np.clip(np.round(size / TILE).astype(int), 1, MOST_PLACES)
+        counts = np.array(_places(path))
         side = np.minimum(TILE, size // counts)
     points, length = POINTS_PER_PIXEL * side, side * pitch
     even = _surveyed(path, scene, level, counts.tolist())

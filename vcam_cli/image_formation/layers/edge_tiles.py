@@ -208,11 +208,6 @@ class Painting:
                 self.batches.append(TileBatch(own, same, radii, planes))
 
     @property
-    def tiles(self) -> list[Tile]:
-        """All tiles, in the order of the batches."""
-        return [tile for batch in self.batches for tile in batch.tiles]
-
-    @property
     def values(self) -> int:
         """Values of all layers on all tiles."""
         return sum(batch.values for batch in self.batches)

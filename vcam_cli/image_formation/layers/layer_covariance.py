@@ -59,10 +59,13 @@ class Hidden:
     """Rings of points of the aperture over which it was summed; 0 where there was no need to."""
     error: float = 0.0
     """Predicted, rms [e/s]."""
-    left_out: float = 0.0
-    """What of it is covariance that was not added, rms [e/s]."""
     values: int = 0
     """Values that were moved to where rays see them."""
+
+    @property
+    def left_out(self) -> float:
+        """What of the error is covariance that was not added, rms [e/s]."""
+        return 0.0 if self.rings else self.error
 
 
 def add_covariance(
@@ -106,7 +109,7 @@ def add_covariance(
     found = _converged(path, scene, sample, (cells, count), allowed, RINGS[:1])
     values = found.values
     if _moves(path):  # at rest they would hide other light of each other
-        return Hidden(0, found.likely_rms, found.likely_rms, values)
+        return Hidden(0, found.likely_rms, values)
     if sample.drawn:
         grid = found.cells, found.count
         room = math.sqrt(max(allowed**2 - found.likely_square, 0.0))
@@ -114,13 +117,13 @@ def add_covariance(
             found = _converged(path, scene, sample, grid, room, RINGS)
             values += found.values
         if found.light and found.likely_rms <= allowed:
-            return Hidden(0, found.likely_rms, found.likely_rms, values)
+            return Hidden(0, found.likely_rms, values)
         found = _converged(path, scene, all_tiles(tiles, edges.size), grid, allowed, RINGS)
         values += found.values
     for tile, part in zip(found.sample.tiles, found.light, strict=True):
         light[:, *tile] += part
     np.maximum(light, 0, out=light)
-    return Hidden(found.rings, found.error, values=values)
+    return Hidden(found.rings, found.error, values)
 
 
 @dataclass(frozen=True)
@@ -242,7 +245,7 @@ def _summed(
     further = FURTHER_WAVES if period > 0 else FURTHER_RAYS
     batches = [batch.together(count) for batch in painting.batches]
     cells = painting.cells.together(count)
-    values, light, last = 0, [np.zeros((1, 1, 1))] * len(painting.tiles), math.inf
+    values, light, last = 0, [np.zeros((1, 1, 1))] * len(sample.tiles), math.inf
     for rings in numbers:
         found = results(methodcaller("lacking", cells, rings, period), batches, path.workers)
         more = [part for parts in found for part in parts]
