@@ -34,7 +34,7 @@ NAMES = {"raw.exr", "ideal.exr", "render.png", "metrics.csv", "run.json"}
 SIGNALS = pytest.mark.parametrize(
     "number", [signal.SIGINT, signal.SIGKILL], ids=["SIGINT", "SIGKILL"]
 )
-MOMENTS = pytest.mark.parametrize("moments", [4, pytest.param(150, marks=pytest.mark.long)])
+MOMENTS = pytest.mark.parametrize("moments", [2, pytest.param(150, marks=pytest.mark.long)])
 
 
 @pytest.fixture

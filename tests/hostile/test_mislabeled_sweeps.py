@@ -134,7 +134,7 @@ def test_two_studies_in_one_folder_at_once(tmp_path, first):
     ("changes", "same"),
     [
         ({}, True),
-        ({"name": "other"}, False),
+        pytest.param({"name": "other"}, False, marks=pytest.mark.long),
         pytest.param({"metrics": ["snr_db"]}, False, marks=pytest.mark.long),
         pytest.param({"seeds": 2}, False, marks=pytest.mark.long),
         pytest.param({"vary": {"adc.bits": {"values": [8]}}}, False, marks=pytest.mark.long),
@@ -176,7 +176,7 @@ WRITING = [
 
 
 @pytest.mark.parametrize(
-    "command", long_except(WRITING[:3], WRITING), ids=[command[0] for command in WRITING]
+    "command", long_except(WRITING[:2], WRITING), ids=[command[0] for command in WRITING]
 )
 def test_every_other_command_in_the_folder_of_a_sweep_at_work(command, tmp_path):
     """It is refused before it computes, and the folder stays what it is."""

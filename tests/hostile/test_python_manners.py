@@ -12,7 +12,7 @@ from vcam_cli.config import shipped
 
 pytestmark = pytest.mark.attack("manners in Python")
 CAMERAS = [name for name in shipped.names("cameras") if name not in ("12mp-bayer", "low-light")]
-QUICK = ("starter", "cfa-rgbw", "x3-stacked", "table-top", "hdr-captures")
+QUICK = ("starter", "cfa-rgbw", "table-top", "hdr-captures")
 SETS = ["array.rows=16", "array.columns=18", "accuracy=draft", "quality=[mse]"]
 
 

@@ -82,16 +82,21 @@ def mesh_before_mesh(period: float, front: float, back: float) -> Scene:
 
 
 @pytest.mark.parametrize(
-    ("period", "front", "back"),
-    [(4, 14, 12), pytest.param(4, 20, 19, marks=pytest.mark.long)],
+    ("period", "front", "back", "accuracy"),
+    [
+        (4, 14, 12, "draft"),
+        pytest.param(4, 14, 12, "standard", marks=pytest.mark.long),
+        pytest.param(4, 20, 19, "standard", marks=pytest.mark.long),
+    ],
 )
-def test_detail_within_cells_is_not_missed(period, front, back, tmp_path):
+def test_detail_within_cells_is_not_missed(period, front, back, accuracy, tmp_path):
     """Much finer than the blur, and hidden by the same: in their means there is nothing of it.
 
     The product of the means is 0.25; cells as coarse as the blur would find nothing missing.
     """
     scene = mesh_before_mesh(period, front, back)
     given = {"scene.radiance": radiance_for(5000), "effects": QUIET | {"diffraction": "off"}}
+    given["accuracy"] = accuracy
     frame = simulate(camera(tmp_path, given | changes(scene, tmp_path))).frame
     found = frame.mean_electrons / (frame.white_rate[0] * frame.exposure_time)
     truth = ray_sum(scene, 3000, 2)

@@ -218,7 +218,7 @@ def test_the_cone_agrees_with_rays(x, y, f_number, width, height, chief_centered
 
 
 @pytest.mark.parametrize("chief_centered", [False, True])
-@pytest.mark.parametrize("f_number", long_except([1.2, 64], [1.2, 2.8, 16, 64]))
+@pytest.mark.parametrize("f_number", long_except([1.2], [1.2, 2.8, 16, 64]))
 def test_the_stated_error_of_the_quadrature(f_number, chief_centered, monkeypatch):
     """Against four times as many points each way, all over a field in which the light ends."""
     at = np.linspace(0, 0.6, 25)

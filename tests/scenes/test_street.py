@@ -13,6 +13,7 @@ ROOT = Path(__file__).parents[2]
 QUIET = {name: "off" for name in ("shot_noise", "read_noise", "fpn", "quantization")}
 
 
+@pytest.mark.long
 def test_the_shipped_files_are_what_their_script_draws():
     spec = importlib.util.spec_from_file_location("make_street", ROOT / "scripts/make_street.py")
     script = importlib.util.module_from_spec(spec)
