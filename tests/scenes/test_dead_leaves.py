@@ -5,7 +5,7 @@ import pytest
 import scipy.ndimage
 from support import scene, view
 
-from vcam_cli.scenes import discs
+from vcam_cli.scenes import disc_edges, discs
 from vcam_cli.scenes.base import Frame
 from vcam_cli.scenes.build import build
 from vcam_cli.scenes.cells import cell_edges
@@ -54,6 +54,28 @@ def test_discs_in_cells_against_points():
     # points: about n^-1.5 = 2e-3 an edge; cells: a fraction of 4^-5 where edges meet
     assert np.sqrt(((cells - fine) ** 2).mean()) < 1.5e-3
     assert abs(cells - fine).max() < 1.5e-2
+
+
+@pytest.mark.parametrize("part", [0.2, 0.4, 0.6])
+@pytest.mark.parametrize("error", [0.005, 0.0025, 0.001, 0.0003])
+def test_cells_err_no_more_than_asked_for(error, part):
+    """Against nine times as many cells, each of them divided as often as can be.
+
+    Cells are a part of the smallest leaf's radius wide, the last of them divided before.
+    """
+    mix, frame = np.ones((1, len(dead_leaves.PIGMENTS))), Frame(1.0, 0.7)
+    edges = cell_edges(400, part * dead_leaves.SMALLEST)
+    found = dead_leaves.dead_leaves(3, frame, error).averages(edges, edges, mix)
+    thirds = edges[:-1, None] + np.diff(edges)[:, None] * np.array([0, 1 / 3, 2 / 3])
+    inner = np.append(thirds.ravel(), edges[-1])
+    fine = dead_leaves.dead_leaves(3, frame).averages(inner, inner, mix)
+    truth = fine.reshape(1, 400, 3, 400, 3).mean((2, 4))
+    assert np.sqrt(np.square(found - truth).mean()) <= error
+
+
+def test_asking_for_less_divides_less():
+    asked = (0.0, 1e-6, 1e-4, 1e-3, 0.01, 1.0)
+    assert [disc_edges.divisions(error) for error in asked] == [5, 5, 4, 2, 0, 0]
 
 
 def test_points_see_the_frontmost_disc():

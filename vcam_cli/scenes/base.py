@@ -33,7 +33,7 @@ class View:
     rows, columns: pixels; pitch_x, pitch_y: [m]; oversampling: chart samples per pixel pitch;
     margin: pixels that a chart goes on beyond the array on every side;
     scene_width: [m] on the sensor when the scene's extent has a width, None when the scene covers
-    the array; dtype of planes.
+    the array; dtype of planes; cell_error: what means over a chart's cells may err, rms of white.
     """
 
     rows: int
@@ -44,6 +44,7 @@ class View:
     margin: int = 0
     scene_width: float | None = None
     dtype: DTypeLike = np.float64
+    cell_error: float = 0.0
 
     @property
     def width(self) -> float:

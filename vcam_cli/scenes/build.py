@@ -126,7 +126,7 @@ def _chart(source: object, view: View) -> tuple[Chart, tuple[Spectrum, ...]]:
             card = colorchecker.largest_card(frame)
             return colorchecker.ColorChecker(card), colorchecker.reflectances()
         case charts.DeadLeaves():
-            leaves = dead_leaves.dead_leaves(source.seed, frame)
+            leaves = dead_leaves.dead_leaves(source.seed, frame, view.cell_error)
             if source.colorchecker == 0.0:
                 return leaves, dead_leaves.reflectances()
             card = colorchecker.card_of_height(source.colorchecker, frame)

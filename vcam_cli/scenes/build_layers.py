@@ -1,7 +1,7 @@
 """From layers as the camera file has them to layers on the sensor plane."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -68,7 +68,7 @@ def build_layers(layers: Sequence[PlacedLayer], view: View) -> LayeredScene:
 
 def _layer(placed: PlacedLayer, view: View) -> Layer:
     source, files = placed.scene.source, placed.files
-    own = View(view.rows, view.columns, view.pitch_x, view.pitch_y, scene_width=placed.width)
+    own = replace(view, oversampling=1, margin=0, scene_width=placed.width)
     fills, frame = placed.width is None, own.frame
     if isinstance(source, ImageFile):
         assert files.picture is not None

@@ -27,6 +27,7 @@ def paint(
     y_edges: Array,
     out: Array,
     hidden: Cells | None = None,
+    divided: int = disc_edges.MOST,
 ) -> None:
     """Write the cell averages of discs on a ground into `out` (R, ny, nx).
 
@@ -42,6 +43,8 @@ def paint(
         Averages (R, ny, nx).
     hidden : Cells, optional
         Cells of which nothing is seen; they become 0.
+    divided : int, optional
+        How often cells are divided in which edges meet, see `disc_edges.divisions`.
     """
     near = discs.find_near(x_edges[0], x_edges[-1], y_edges[0], y_edges[-1])
     discs = discs.select(near)
@@ -59,7 +62,8 @@ def paint(
         row, column = np.divmod(cell[starts], label.shape[1])
         box = np.stack([x_edges[column], x_edges[column + 1], y_edges[row], y_edges[row + 1]])
         crossed = CrossedCells(box, label[row, column], count, front)
-        for plane, light in zip(out, disc_edges.average_colors(discs, crossed, color), strict=True):
+        lights = disc_edges.average_colors(discs, crossed, color, divided)
+        for plane, light in zip(out, lights, strict=True):
             plane[row, column] = light
 
 

@@ -21,14 +21,13 @@ References
 import math
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import ClassVar
 
 import numpy as np
 
 from vcam_cli.scenes import discs
 from vcam_cli.scenes.base import Array, Chart, Frame
-from vcam_cli.scenes.cells import cell_edges
-from vcam_cli.scenes.disc_edges import Discs
+from vcam_cli.scenes.cells import cell_edges, cell_means
+from vcam_cli.scenes.disc_edges import MOST, Discs, divisions
 from vcam_cli.scenes.discs import Cells
 from vcam_cli.spectra import Spectrum, colorchecker
 
@@ -47,6 +46,9 @@ SUMMED, SUMMED_FAR = 32, 4
 """Parts along each side of a cell from which on its average is read from sums over one period, of
 cells within and beyond one. Their edges then fall between those of the parts: of white, an rms of
 6e-5 in single cells, and of 1e-3 in those beyond, which lenses blur by the hundred."""
+EDGE_SECONDS = 0.047, 0.0166
+"""Core seconds to find the edges that a frame sees, and more for each division of cells,
+calibrated."""
 DARKEST = 0.25
 """Lower bound of a leaf's own factor, which is uniform between this and 1."""
 
@@ -122,6 +124,8 @@ class PlacedLeaves(Chart):
     leaves: Leaves
     unit: float
     """Unit of the leaves' places [m]."""
+    divided: int = MOST
+    """How often cells are divided in which edges meet."""
 
     def paint(
         self,
@@ -134,7 +138,7 @@ class PlacedLeaves(Chart):
         """Write the averages over the cells into `out`; 0 in the cells that are hidden."""
         color = self.leaves.color(mix).astype(mix.dtype, copy=False)
         x, y = x_edges / self.unit, y_edges / self.unit
-        discs.paint(self.leaves.discs, color, x, y, out, hidden)
+        discs.paint(self.leaves.discs, color, x, y, out, hidden, self.divided)
 
     def values(self, x: Array, y: Array, mix: Array) -> Array:
         """Return the values at points."""
@@ -150,7 +154,9 @@ class DeadLeaves(Chart):
     """Whole number, 0 or more."""
     unit: float
     """Longer side of the frame [m]."""
-    edge_seconds: ClassVar[float] = 0.13
+    divided: int = MOST
+    """How often cells are divided in which edges meet."""
+    edge_seconds = property(lambda self: EDGE_SECONDS[0] + EDGE_SECONDS[1] * self.divided)
 
     def crop_to_cells(
         self, x_edges: Array, y_edges: Array, hidden: Cells | None = None
@@ -231,13 +237,13 @@ class DeadLeaves(Chart):
             cells = out[:, top : top + band]
             y = _divided(y_edges[top : top + band + 1], parts)
             fine = self.crop_to_cells(x, y).averages(x, y, mix)
-            shape = len(mix), cells.shape[1], parts, columns, parts
-            cells[:] = fine.reshape(shape).mean(axis=(2, 4))
+            cells[:] = cell_means(fine, parts)
 
     def _placed_leaves(self, x: Array, y: Array) -> PlacedLeaves:
         left, right, top, bottom = (end / self.unit for end in (x[0], x[-1], y[0], y[-1]))
         leaves = generate_leaves(self.seed)
-        return PlacedLeaves(_periodic_copies(leaves, left, right, top, bottom), self.unit)
+        copies = _periodic_copies(leaves, left, right, top, bottom)
+        return PlacedLeaves(copies, self.unit, self.divided)
 
 
 def _divided(edges: Array, parts: int) -> Array:
@@ -278,9 +284,9 @@ def _periodic_averages(plane: Array, edges: Array, axis: int) -> Array:
     return np.diff(at_edges, axis=axis) / (np.diff(edges) * FINEST).reshape(shape)
 
 
-def dead_leaves(seed: int, frame: Frame) -> DeadLeaves:
-    """Return the leaves of a seed, spread over a frame."""
-    return DeadLeaves(seed, max(frame.width, frame.height))
+def dead_leaves(seed: int, frame: Frame, cell_error: float = 0.0) -> DeadLeaves:
+    """Return the leaves of a seed, spread over a frame; cells may err so much, rms of white."""
+    return DeadLeaves(seed, max(frame.width, frame.height), divisions(cell_error))
 
 
 def _every_nth_edge(step: int, edges: Array) -> Array:

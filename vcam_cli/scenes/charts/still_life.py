@@ -5,7 +5,6 @@ lies under it is painted by itself and taken away.
 """
 
 from dataclasses import dataclass, replace
-from typing import ClassVar
 
 import numpy as np
 
@@ -22,7 +21,7 @@ class LeavesWithColorChecker(Chart):
 
     leaves: DeadLeaves | PlacedLeaves
     card: Card
-    edge_seconds: ClassVar[float] = DeadLeaves.edge_seconds
+    edge_seconds = property(lambda self: self.leaves.edge_seconds)
 
     def crop_to_cells(self, x_edges: Array, y_edges: Array) -> "LeavesWithColorChecker":
         """Return the chart with only those leaves that may be seen beside the card."""
