@@ -85,8 +85,8 @@ def mesh_before_mesh(period: float, front: float, back: float) -> Scene:
     ("period", "front", "back", "accuracy"),
     [
         (4, 14, 12, "draft"),
-        pytest.param(4, 14, 12, "standard", marks=pytest.mark.long),
-        pytest.param(4, 20, 19, "standard", marks=pytest.mark.long),
+        pytest.param(4, 14, 12, "reference", marks=pytest.mark.long),
+        pytest.param(4, 20, 19, "reference", marks=pytest.mark.long),
     ],
 )
 def test_detail_within_cells_is_not_missed(period, front, back, accuracy, tmp_path):

@@ -7,7 +7,6 @@ is opaque all over hides all alike.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from operator import methodcaller
 
@@ -106,7 +105,7 @@ def add_covariance(
         return Hidden()
     sample = telling_tiles(tiles, edges)
     cells = Cells.around(g, size, 1, widest[0], 2 * count)
-    found = _converged(path, scene, sample, (cells, count), allowed, RINGS[:1])
+    found = _converged(path, scene, sample, (cells, count), allowed, _Rings(RINGS[:1]))
     values = found.values
     if _moves(path):  # at rest they would hide other light of each other
         return Hidden(0, found.likely_rms, values)
@@ -114,16 +113,28 @@ def add_covariance(
         grid = found.cells, found.count
         room = math.sqrt(max(allowed**2 - found.likely_square, 0.0))
         if 0 < room < found.error:  # it counts only if its error does
-            found = _converged(path, scene, sample, grid, room, RINGS)
+            found = _converged(path, scene, sample, grid, room, _Rings())
             values += found.values
         if found.light and found.likely_rms <= allowed:
             return Hidden(0, found.likely_rms, values)
-        found = _converged(path, scene, all_tiles(tiles, edges.size), grid, allowed, RINGS)
-        values += found.values
+        grid, rings = (found.cells, found.count), found.sufficient_rings(allowed)
+        every = _converged(path, scene, all_tiles(tiles, edges.size), grid, allowed, rings)
+        values += found.values + every.values
+        found = every
     for tile, part in zip(found.sample.tiles, found.light, strict=True):
         light[:, *tile] += part
     np.maximum(light, 0, out=light)
     return Hidden(found.rings, found.error, values)
+
+
+@dataclass(frozen=True)
+class _Rings:
+    """Numbers of rings of points of the aperture that are tried."""
+
+    numbers: tuple[int, ...] = RINGS
+    error: float = 0.0
+    """Error of the last of them, relative to the covariance; 0 where what it changes has to tell
+    it."""
 
 
 @dataclass(frozen=True)
@@ -143,6 +154,19 @@ class _Sum:
     """Predicted rms over the frame [e/s]."""
     values: int
     """Values of layers that were moved to where rays see them."""
+    tried: tuple[tuple[int, float], ...] = ()
+    """Numbers of rings that were tried, and the error of each [e/s]."""
+
+    def sufficient_rings(self, allowed: float) -> _Rings:
+        """Return the rings that suffice for an error [e/s], and what they are likely to err."""
+        rms = self.sample.rms(self.light)
+        if not rms:
+            return _Rings()
+        by_chance = math.sqrt(1 + CONFIDENCE * self.sample.chance_error(self.light))
+        half = allowed / math.sqrt(2) / by_chance
+        enough = [(number, error) for number, error in self.tried if error <= half]
+        number, error = min(enough, default=max(self.tried))
+        return _Rings() if number == RINGS[0] else _Rings((number,), by_chance * error / rms)
 
     @property
     def likely_square(self) -> float:
@@ -162,7 +186,7 @@ def _converged(
     sample: TileSample,
     grid: tuple[Cells, int],
     allowed: float,
-    numbers: Sequence[int],
+    rings: _Rings,
 ) -> _Sum:
     """Return the covariance of some tiles, on as fine cells and by as many rings as it takes.
 
@@ -177,7 +201,7 @@ def _converged(
     if not painting.batches:
         return _Sum(sample, [], 0, cells, count, 0.0, 0)
     finest = min(FINEST, max(math.isqrt(MOST_VALUES // painting.values), 1))
-    found, values = _summed(path, painting, sample, count, half, numbers), 0
+    found, values = _summed(path, painting, sample, count, half, rings), 0
     while True:
         values += found.values
         side = count * pitch / cells.per_pixel
@@ -199,7 +223,7 @@ def _converged(
                 painting = Painting(path, scene, sample.tiles, cells)
                 sample = sample.part(painting.places)
             count = 2 ** math.floor(math.log2(max(asked, 1)))
-        found = _summed(path, painting, sample, count, half, RINGS)
+        found = _summed(path, painting, sample, count, half, _Rings())
 
 
 def _moves(path: OpticalPath) -> bool:
@@ -235,28 +259,40 @@ def _summed(
     sample: TileSample,
     count: int,
     allowed: float,
-    numbers: Sequence[int],
+    rings: _Rings,
 ) -> _Sum:
     """Return the covariance at the pixels by as many rings as it takes, of those given.
 
-    It is that on cells of so many of those that were painted, along either side.
+    It is that on cells of so many of those that were painted, along either side. Of a sample that
+    takes more than the fewest rings it is also told what three quarters of them err.
     """
     period = _period(path)
     further = FURTHER_WAVES if period > 0 else FURTHER_RAYS
     batches = [batch.together(count) for batch in painting.batches]
     cells = painting.cells.together(count)
-    values, light, last = 0, [np.zeros((1, 1, 1))] * len(sample.tiles), math.inf
-    for rings in numbers:
-        found = results(methodcaller("lacking", cells, rings, period), batches, path.workers)
-        more = [part for parts in found for part in parts]
-        change = sample.rms([own - before for own, before in zip(more, light, strict=True)])
-        error = change * max(further, min(change / last, 1.0) if last > 0 else 0.0)
-        last = change
-        values += sum(batch.values for batch in batches) * len(list(aperture_points(rings)))
-        light = more
+    light, last, tried, points = [np.zeros((1, 1, 1))] * len(sample.tiles), math.inf, [], 0
+
+    def change(number: int) -> tuple[list[NDArray], float]:
+        found = results(methodcaller("lacking", cells, number, period), batches, path.workers)
+        every = [part for parts in found for part in parts]
+        return every, sample.rms([own - one for own, one in zip(every, light, strict=True)])
+
+    for number in rings.numbers:
+        light, moved = change(number)
+        error = moved * max(further, min(moved / last, 1.0) if last > 0 else 0.0)
+        last = moved
+        if rings.error:
+            error = rings.error * sample.rms(light)
+        tried.append((number, error))
+        points += len(list(aperture_points(number)))
         if error <= allowed:
             break
-    return _Sum(sample, light, rings, painting.cells, count, error, values)
+    if sample.drawn and number > RINGS[0]:
+        between = 3 * number // 4
+        tried.append((between, math.hypot(change(between)[1], error)))
+        points += len(list(aperture_points(between)))
+    values = points * sum(batch.values for batch in batches)
+    return _Sum(sample, light, number, painting.cells, count, error, values, tuple(tried))
 
 
 def _period(path: OpticalPath) -> float:
