@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from vcam_cli import memory
 from vcam_cli.effects.base import Blur, FieldTransfer, SeparableTransfer, of_kind
-from vcam_cli.image_formation.box_average import box_averages, point_values
+from vcam_cli.image_formation.box_average import box_averages, judged_rows, point_values
 from vcam_cli.image_formation.estimates import memory_model
 from vcam_cli.image_formation.estimates.bandwidth import (
     LOWEST,
@@ -122,13 +122,15 @@ def _mean_layers(path: OpticalPath, scene: SampledScene) -> tuple[Layers, Spectr
     samples = 0 if isinstance(scene, ChartScene) else math.prod(scene.shape)
     needed = memory_model.box_average_bytes(samples, len(level), g, path.settings)
     memory.require(needed, g.rows, g.columns)
-    signal = points = point_values(scene, level, g)
     changes = {}
     if path.separable:
         signal = box_averages(scene, level, g, axes(path, scene, 1.0), path.workers)
-        both = zip(signal, points, strict=True)
+        rows = judged_rows(g.rows)
+        both = zip(signal[:, rows], point_values(scene, level, g, rows), strict=True)
         change = max(float(np.square(a - b, dtype=np.float64).mean()) for a, b in both)
         changes = {effect.name: math.sqrt(change) for effect in path.separable}
+    else:
+        signal = point_values(scene, level, g)
     report = SpectrumReport(changes=changes, memory=needed)
     return iter([Layer(lambda color, rows: signal[color, rows])]), report
 

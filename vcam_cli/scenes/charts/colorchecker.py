@@ -11,6 +11,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from vcam_cli.parallel import product
 from vcam_cli.scenes.base import Array, Chart, Frame
 from vcam_cli.scenes.cells import overlap
 from vcam_cli.spectra import Spectrum, colorchecker
@@ -74,7 +75,7 @@ class Card:
         block[:, ROWS, COLUMNS] = card
         down = np.concatenate([cover.rows, cover.down[None]]).astype(mix.dtype)
         across = np.concatenate([cover.columns, cover.across[None]]).astype(mix.dtype)
-        return np.asarray((down.T @ block) @ across)
+        return np.stack([product(product(down.T, plane), across) for plane in block])
 
     def add_light(self, cover: "Cover", mix: Array, out: Array) -> None:
         """Add the light of card and patches to `out`."""

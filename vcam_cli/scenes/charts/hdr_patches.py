@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vcam_cli.parallel import product
 from vcam_cli.scenes import discs
 from vcam_cli.scenes.base import Array, Chart, Frame
 from vcam_cli.scenes.cells import clip_cells, overlap
@@ -92,7 +93,7 @@ class HdrPatches(Chart):
     def _patches(self, columns: Array, rows: Array) -> Array:
         """Return the light of cloth and patches from the parts they cover: (c, nx) and (r, ny)."""
         above = np.where(self.levels > 0, self.levels - self.cloth, 0.0)
-        return rows.T @ (above @ columns) + self.cloth
+        return product(rows.T, above @ columns) + self.cloth
 
     def _disc(self) -> Discs:
         return Discs(np.zeros(1), np.array([self.lamp_y]), np.array([self.radius]))
