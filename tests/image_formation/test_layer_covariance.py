@@ -189,6 +189,23 @@ def test_covariance_that_counts_is_added_on_all_tiles(tmp_path, monkeypatch):
     assert np.abs(by_some - light(tmp_path, more, 2)).max() > 0.02 * by_all.max()
 
 
+@pytest.mark.long
+@pytest.mark.parametrize(("seed", "accuracy"), [(2, "0.1 %"), (5, "0.05 %"), (8, "0.05 %")])
+def test_rings_that_a_sample_finds_sufficient(seed, accuracy, tmp_path, monkeypatch):
+    """Fewer than a doubling asks for: the error is still what is told, against many more."""
+    scene = random_scene(np.random.default_rng(seed), 3)
+    more = {"array.rows": 300, "array.columns": 380, "scene.radiance": radiance_for(5000)}
+    given = more | {"effects": QUIET, "accuracy": "0.01 %"}
+    made = camera(tmp_path, changes(scene, tmp_path) | given)
+    truth = simulate(made).frame
+    monkeypatch.setattr(tile_sample, "MOST", 3)
+    found = simulate(made.with_({"accuracy": accuracy})).frame
+    assert found.spectrum.depth.rings == 3 < truth.spectrum.depth.rings
+    error = np.sqrt(np.mean(np.square(found.mean_electrons - truth.mean_electrons)))
+    told = found.spectrum.depth.error + truth.spectrum.depth.error
+    assert error <= told * truth.mean_electrons.max()
+
+
 def test_sample_of_tiles_tells_of_all_of_them():
     """Light of which a few tiles have most: its mean square and its error over many samples."""
     rng = np.random.default_rng(5)
