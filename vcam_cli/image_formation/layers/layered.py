@@ -141,16 +141,14 @@ def _layers_seen(
 def _composed(path: OpticalPath, layers: Iterable[SeenLayer], g: Geometry) -> tuple[NDArray, float]:
     """Return the light (C, rows, columns) of layers one before the other, and its error [e/s].
 
-    The error is that of light and opacity that both change within a cell, rms, in the color of
-    which the layer has most.
+    The error is that of light and opacity that both change within a cell, rms.
     """
     colors = len(path.transfer.weights[-1])
     total: NDArray = np.zeros((colors, g.rows, g.columns), path.settings.dtype)
     clear, squares = np.ones_like(total), 0.0
     for layer in layers:
         here = slice(None), layer.window.rows, layer.window.columns
-        most = int(layer.light.mean(axis=(1, 2)).argmax())
-        squares += product_error(clear[here][most], layer.light[most])
+        squares += product_error(clear[here], layer.light)
         total[here] += clear[here] * layer.light
         clear[here] *= 1 - layer.cover
     return total, math.sqrt(squares / (g.rows * g.columns))
@@ -209,18 +207,19 @@ def product_error(a: NDArray, b: NDArray) -> float:
     Parameters
     ----------
     a, b : NDArray
-        Means (h, w) of both factors over the cells.
+        Means (C, h, w) of both factors over the cells.
 
     Returns
     -------
     float
-        Sum of squares over all cells.
+        Sum of squares over all cells, of the color where it is most.
     """
-    squares = 0.0
-    for axis in (0, 1):
-        changes = np.diff(a, axis=axis) * np.diff(b, axis=axis)
-        squares += float(np.square(changes).sum(dtype=float))
-    return squares / EDGES**2
+    squares = np.zeros(len(a))
+    for axis in (1, 2):
+        if a.shape[axis] > 1:
+            changes = np.diff(a, axis=axis) * np.diff(b, axis=axis)
+            squares += np.square(changes).sum(axis=(1, 2), dtype=float)
+    return float(squares.max(initial=0.0)) / EDGES**2
 
 
 def _layer_path(
