@@ -118,9 +118,8 @@ def add_covariance(
         if found.light and found.likely_rms <= allowed:
             return Hidden(0, found.likely_rms, values)
         grid, rings = (found.cells, found.count), found.sufficient_rings(allowed)
-        every = _converged(path, scene, all_tiles(tiles, edges.size), grid, allowed, rings)
-        values += found.values + every.values
-        found = every
+        found = _converged(path, scene, all_tiles(tiles, edges.size), grid, allowed, rings)
+        values += found.values
     for tile, part in zip(found.sample.tiles, found.light, strict=True):
         light[:, *tile] += part
     np.maximum(light, 0, out=light)
@@ -162,11 +161,11 @@ class _Sum:
         rms = self.sample.rms(self.light)
         if not rms:
             return _Rings()
-        by_chance = math.sqrt(1 + CONFIDENCE * self.sample.chance_error(self.light))
-        half = allowed / math.sqrt(2) / by_chance
-        enough = [(number, error) for number, error in self.tried if error <= half]
+        likely = math.sqrt(self.likely_square) / rms
+        half = allowed / math.sqrt(2)
+        enough = [each for each in self.tried if likely * each[1] <= half]
         number, error = min(enough, default=max(self.tried))
-        return _Rings() if number == RINGS[0] else _Rings((number,), by_chance * error / rms)
+        return _Rings() if number == RINGS[0] else _Rings((number,), likely * error / rms)
 
     @property
     def likely_square(self) -> float:
@@ -272,15 +271,18 @@ def _summed(
     cells = painting.cells.together(count)
     light, last, tried, points = [np.zeros((1, 1, 1))] * len(sample.tiles), math.inf, [], 0
 
-    def change(number: int) -> tuple[list[NDArray], float]:
+    def lacking(number: int) -> list[NDArray]:
         found = results(methodcaller("lacking", cells, number, period), batches, path.workers)
-        every = [part for parts in found for part in parts]
-        return every, sample.rms([own - one for own, one in zip(every, light, strict=True)])
+        return [part for parts in found for part in parts]
+
+    def apart(one: list[NDArray], other: list[NDArray]) -> float:
+        return sample.rms([a - b for a, b in zip(one, other, strict=True)])
 
     for number in rings.numbers:
-        light, moved = change(number)
-        error = moved * max(further, min(moved / last, 1.0) if last > 0 else 0.0)
-        last = moved
+        before, light = light, lacking(number)
+        change = apart(light, before)
+        error = change * max(further, min(change / last, 1.0) if last > 0 else 0.0)
+        last = change
         if rings.error:
             error = rings.error * sample.rms(light)
         tried.append((number, error))
@@ -289,7 +291,7 @@ def _summed(
             break
     if sample.drawn and number > RINGS[0]:
         between = 3 * number // 4
-        tried.append((between, math.hypot(change(between)[1], error)))
+        tried.append((between, math.hypot(apart(lacking(between), light), error)))
         points += len(list(aperture_points(between)))
     values = points * sum(batch.values for batch in batches)
     return _Sum(sample, light, number, painting.cells, count, error, values, tuple(tried))
