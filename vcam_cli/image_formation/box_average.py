@@ -9,7 +9,7 @@ from vcam_cli.camera.derived.geometry import Geometry, pixel_centers
 from vcam_cli.image_formation.cosine_series import Axis
 from vcam_cli.scenes.bands import bands_of_rows
 from vcam_cli.scenes.base import ChartScene, SampledScene
-from vcam_cli.scenes.cells import GOLDEN
+from vcam_cli.scenes.cells import uneven_points
 
 JUDGED_ROWS = 256
 """Rows of an array, at most, that tell what the area of its photodetectors changes."""
@@ -54,8 +54,7 @@ def judged_rows(rows: int) -> NDArray:
     """Return rows of an array at uneven distances, or all where they are few."""
     if rows <= JUDGED_ROWS:
         return np.arange(rows)
-    k = np.arange(JUDGED_ROWS)
-    return ((k + k * GOLDEN % 1) * (rows / JUDGED_ROWS)).astype(int)
+    return (uneven_points(rows, JUDGED_ROWS) + rows / 2).astype(int)
 
 
 def point_values(

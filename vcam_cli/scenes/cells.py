@@ -11,6 +11,8 @@ POINTS = 96
 """Points along each side of a chart that is looked at."""
 GOLDEN = 0.6180339887498949
 """Inverse golden ratio, which no fraction of small numbers comes near."""
+EVEN = (0.7548776662466927, 0.5698402909980532)
+"""Steps of a sequence that fills a square evenly: powers of the inverse plastic number."""
 
 
 def cell_edges(count: int, pitch: float) -> Array:
@@ -18,10 +20,13 @@ def cell_edges(count: int, pitch: float) -> Array:
     return (np.arange(count + 1) - count / 2) * pitch
 
 
-def uneven_points(length: float) -> Array:
-    """Return points over a centered length, rising, whose steps share no factor with it [m]."""
-    k = np.arange(POINTS)
-    return ((k + k * GOLDEN % 1) / POINTS - 0.5) * length
+def uneven_points(length: float, count: int = POINTS, step: float = GOLDEN) -> Array:
+    """Return points over a centered length, rising, whose steps share no factor with it.
+
+    There is one in each of so many parts of it, whose place within the part goes on by `step`.
+    """
+    k = np.arange(count)
+    return ((k + k * step % 1) / count - 0.5) * length
 
 
 def clip_cells(edges: Array, half: float) -> tuple[slice, Array, Array]:

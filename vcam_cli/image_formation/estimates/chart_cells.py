@@ -24,6 +24,7 @@ from vcam_cli.image_formation.estimates.bandwidth import axes
 from vcam_cli.image_formation.optical_path import OpticalPath
 from vcam_cli.parallel import product
 from vcam_cli.scenes.base import ChartScene
+from vcam_cli.scenes.cells import EVEN, uneven_points
 
 CELLS_SHARE = 0.4
 """Part of the tolerance that cells may use."""
@@ -63,8 +64,6 @@ BLOCKS, POINTS = 16, 12
 """Parts of a chart along each axis that are compared by contrast, and points along each."""
 FEW = 3
 """Crops of the busiest parts, and crops of parts taken evenly."""
-EVEN = (0.7548776662466927, 0.5698402909980532)
-"""Steps of a sequence that fills a square evenly: powers of the inverse plastic number."""
 FREQUENCIES = 1025
 """Entries of the crops' table over |f|."""
 
@@ -195,13 +194,9 @@ def _brightest_over_full(path: OpticalPath, scene: ChartScene) -> float:
 
 
 def _uneven_points(size: tuple[float, float]) -> tuple[NDArray, NDArray]:
-    """Return points (n,) along x and y over a centered rectangle [m], with uneven steps.
-
-    They share no factor with what repeats in a chart.
-    """
-    k = np.arange(BLOCKS * POINTS)
+    """Return points (n,) along x and y over a centered rectangle [m]."""
     x, y = (
-        ((k + k * step % 1) / len(k) - 0.5) * length
+        uneven_points(length, BLOCKS * POINTS, step)
         for length, step in zip(size, EVEN, strict=True)
     )
     return x, y

@@ -24,6 +24,7 @@ from vcam_cli.image_formation.estimates.chosen_places import chosen_places
 from vcam_cli.image_formation.estimates.edge_detail import edge_power, isolated_edges
 from vcam_cli.image_formation.optical_path import OpticalPath
 from vcam_cli.scenes.base import ChartScene, Rectangles, Scene, WaveScene
+from vcam_cli.scenes.cells import EVEN, uneven_points
 
 TILE = 32
 """Pixels along a side of a tile, at most."""
@@ -40,8 +41,6 @@ MOST_PLACES = 24
 """Parts of the array along each axis, at most, each of which may be a tile's place."""
 SURVEY = 4
 """Points along each axis of such a part."""
-UNEVEN = (0.7548776662466927, 0.5698402909980532)
-"""Steps within the cells of the survey, which share no factor with what repeats in a chart."""
 ANYWHERE = 0.1
 """Share of the tiles whose places do not depend on the survey."""
 BLOCK = 8
@@ -144,14 +143,10 @@ def _surveyed(
 ) -> SceneDetail:
     """Return the light at a few points, as if it were even."""
     g = path.geometry
+    sides = g.sensor_height, g.sensor_width
     y, x = (
-        ((k + k * step % 1) / len(k) - 0.5) * length
-        for k, length, step in zip(
-            (np.arange(count * SURVEY) for count in places),
-            (g.sensor_height, g.sensor_width),
-            UNEVEN,
-            strict=True,
-        )
+        uneven_points(length, count * SURVEY, step)
+        for length, count, step in zip(sides, places, EVEN, strict=True)
     )
     light = _light_at(scene, x, y, level)
     none, nothing = np.zeros(1), np.zeros((1, 1))
