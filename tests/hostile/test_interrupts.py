@@ -62,6 +62,14 @@ def _numbers(data: bytes) -> bytes:
     return json.dumps({name: point[name] for name in point if name != "seconds"}).encode()
 
 
+def moments_over(longest: float, count: int, number: int) -> list[float]:
+    """Random moments in seconds, one in every equal part of the time, in random order."""
+    chance = random.Random(int(number))
+    moments = [longest * (part + chance.random()) / count for part in range(count)]
+    chance.shuffle(moments)
+    return moments
+
+
 def whole(folder: Path) -> None:
     """Every file under a final name can be read to its end, every record's files are there."""
     for path in (p for p in folder.rglob("*") if p.is_file() and not hidden(folder, p)):
@@ -101,19 +109,19 @@ def ended(done: dict[str, Any], number: int, vcam: Driver, out: Path) -> bool:
 @SIGNALS
 def test_a_run_that_replaces_another(number, moments, vcam, folder):
     """The former results or the new ones, never some of each; and the next run succeeds."""
-    expected = {}
+    expected, seconds = {}, []
     for seed in ("1", "2"):
         done = vcam(folder, *RUN, seed, "--seed", seed)
         assert done["code"] == 0, done
         expected[seed] = results(folder / seed)
+        seconds.append(done["seconds"])
     assert expected["1"] != expected["2"]
     assert set(contents(folder / "1")) == NAMES
-    longest, out, chance, stops = done["seconds"], folder / "out", random.Random(int(number)), 0
+    out, stops = folder / "out", 0
     assert vcam(folder, *RUN, "out", "--seed", "1")["code"] == 0
     now = "1"
-    for _ in range(moments):
+    for after in moments_over(min(seconds), moments, number):
         other = "2" if now == "1" else "1"
-        after = chance.uniform(0, longest)
         done = vcam(folder, *RUN, "out", "--seed", other, signal=number, after=after)
         stops += ended(done, number, vcam, out)
         whole(out)
@@ -136,9 +144,8 @@ def test_a_run_that_replaces_another(number, moments, vcam, folder):
 def test_a_first_run(number, vcam, folder):
     """There was nothing before: after an interrupt not even the folder is there."""
     longest = vcam(folder, *RUN, "expected")["seconds"]
-    chance, out, stops = random.Random(int(number)), folder / "deep" / "out", 0
-    for _ in range(5):
-        after = chance.uniform(0, longest)
+    out, stops = folder / "deep" / "out", 0
+    for after in moments_over(longest, 5, number):
         done = vcam(folder, *RUN, "deep/out", signal=number, after=after)
         stops += ended(done, number, vcam, out)
         whole(out)
@@ -155,11 +162,11 @@ def test_a_sweep_goes_on_where_it_was(number, moments, vcam, folder):
     assert done["code"] == 0, done
     longest, expected = done["seconds"], results(folder / "whole")
     assert sum(name.endswith(".json") for name in expected) >= 6
-    out, chance, stops = folder / "out", random.Random(int(number)), 0
-    for _ in range(moments):
+    out, stops = folder / "out", 0
+    for moment in moments_over(longest, moments, number):
         before = kept(out)
         # The rest of a sweep takes less time than all of it.
-        after = chance.uniform(0, longest * (0.8 if len(before) < 12 else 0.5))
+        after = moment * (0.8 if len(before) < 12 else 0.5)
         done = vcam(folder, *SWEEP, "out", signal=number, after=after)
         stops += ended(done, number, vcam, out)
         whole(out)
