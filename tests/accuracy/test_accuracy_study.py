@@ -174,6 +174,19 @@ def test_variance_shares_are_what_frames_have(tmp_path):
     assert shares["shot_noise"] == pytest.approx(0.5, rel=0.03)
 
 
+def test_hot_pixels_are_full_in_variance_shares(tmp_path):
+    """What they add is the variance of some full pixels, not of charge that no pixel holds."""
+    pattern = {"defects": {"hot": 0.01}, "fpn": {"gain_pixel": "1 %", "shading": {"gain": "5 %"}}}
+    changes = {f"pixel.{name}": value for name, value in pattern.items()}
+    made = camera(tmp_path, changes | {"scene.radiance": radiance_for(20000), "effects": "all"})
+    ready = prepare(made)[0]
+    shares = ablation.variance_shares(ready, 20000.0, 1)
+    well = made.pixel.readout.full_well
+    hot, slow, own = 0.01 * 0.99 * (well - 20000) ** 2, (0.05 * 20000) ** 2, (0.01 * 20000) ** 2
+    assert well > 40000
+    assert shares["fpn_shading"] == pytest.approx(slow / (hot + slow + own), rel=0.05)
+
+
 def point(knob: str, setting: str, error: float, seconds: float, variance: float = 0.0) -> Point:
     return Point(knob, setting, error, error, error, seconds, 0.0, variance_lost=variance)
 

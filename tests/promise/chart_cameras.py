@@ -154,5 +154,5 @@ QUICK = tuple(
     name
     for name, each in CAMERAS.items()
     if name.split("-")[-1] in ("1", "2", "3", "7", "51") and each.chart != "dead-leaves"
-)
+) + ("colorchecker-5",)
 """Names of those that every run of the tests judges."""

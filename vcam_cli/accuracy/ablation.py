@@ -19,7 +19,13 @@ from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import geometry
 from vcam_cli.effects.base import Charge, of_kind
 from vcam_cli.effects.order import ORDER, quantizer
-from vcam_cli.effects.signal_chain import Limit, NoiseSource, Quantizer, noise_sources
+from vcam_cli.effects.signal_chain import (
+    Limit,
+    NoiseSource,
+    Quantizer,
+    full_well,
+    noise_sources,
+)
 from vcam_cli.readout import binned_readout, exposure
 from vcam_cli.simulation import plan
 from vcam_cli.simulation.preparation import Prepared
@@ -29,6 +35,8 @@ FLAT = (4, 1 << 16)
 same along a whole column. A variance is good to sqrt(2 / columns) = 0.6 % then."""
 SQUARE = (1 << 10, 1 << 10)
 """The same where some of it is the same along a whole row too: good to 4 %."""
+HOT = 2.0
+"""Full wells beyond which the charge of a pixel is that of a hot one."""
 
 
 @dataclass(frozen=True)
@@ -164,7 +172,7 @@ def _draw_field(
 ) -> NDArray:
     """Return a flat field [electrons], dark signal included, with these draws in it, never clipped.
 
-    Of pixels that are read as one, their mean.
+    Hot pixels are full, as they are read. Of pixels that are read as one, their mean.
     """
     seeds = {"sensor": ready.camera.seed.sensor, "frame": ready.camera.seed.frame}
     adc = quantizer(ready.camera, ready.geometry)
@@ -174,4 +182,9 @@ def _draw_field(
     take = partial(exposure.capture, adc=adc, seeds=seeds, workers=workers)
     groups = replace(ready.layout.binning_groups, step=(1, 1))  # all of its pixels are alike
     time = ready.exposure_time
-    return binned_readout.read(groups, rate, time, effects, take, adc.bits)[0] / groups.summed_codes
+    found = binned_readout.read(groups, rate, time, effects, take, adc.bits)[0]
+    found = found / groups.summed_codes
+    if any(draw.fills_wells for draw in draws):
+        full = full_well(ready.plan.active)
+        found[found > HOT * full] = full
+    return found

@@ -31,6 +31,10 @@ FINEST_CELLS = 64
 """Largest oversampling that a camera file may ask for."""
 ORDER = 2.5
 """Power of the oversampling with which the error of a painted edge falls."""
+CHANGES_PART = 0.2
+"""Part of the tolerance to which it is measured what effects change,"""
+LEAST_OF_CHANGES = 0.001
+"""and the least that it takes: at that of the reference some effects take minutes."""
 MOST_BYTES = 4e9
 """Memory beyond which a chart is not sampled more finely for the reference."""
 
@@ -107,11 +111,11 @@ def effect_changes(
 ) -> dict[str, NDArray]:
     """Return the change of the mean raw by leaving out each effect: (rms, largest) [e].
 
-    In 64 bits, and as fine as most tolerances ask; what the settings still miss is missed with and
-    without the effect.
+    In 64 bits, to a part of the camera's tolerance: without an effect other cells and frequencies
+    are chosen, so that what they miss differs.
     """
     fixed = ablation.with_exposure_time(camera, exposure_time)
-    tolerance = min(max(camera.accuracy.tolerance, 0.001), 0.005)
+    tolerance = max(camera.accuracy.tolerance * CHANGES_PART, LEAST_OF_CHANGES)
     fixed = with_accuracy(fixed, tolerance=tolerance, float_width=64)
     whole = prepare(ablation.with_effects(fixed, "all"), workers)[0]
     noise = {e.name for e in of_kind(whole.plan.active, NoiseSource, Quantizer)}

@@ -134,7 +134,8 @@ def sampled_image(
     density = math.prod(scene.extent) / (g.sensor_width * g.sensor_height)
     pitch = g.pitch_y, g.pitch_x
     if knobs.oversampling is None:
-        budget = FREQUENCY_SHARE * knobs.tolerance * full / np.sqrt(density)
+        allowed = FREQUENCY_SHARE * knobs.tolerance * full
+        budget = allowed / math.sqrt(density * _more_than_mean(g.rows * g.columns))
         needed = power.needed_frequency(squares, budget, pitch) * (1 + 1e-9)
         highest = min(max(needed, least), highest)
     else:
@@ -151,6 +152,15 @@ def sampled_image(
         peak=peak,
         density=density,
     )
+
+
+def _more_than_mean(pixels: int) -> float:
+    """Return how many times the mean square of all places that of some pixels may be.
+
+    It is two standard errors of the mean of so many squares of normal numbers: the middle of a
+    picture, where its waves meet in phase, is all that a single pixel sees.
+    """
+    return 1 + 2 * math.sqrt(2 / pixels)
 
 
 def _scene_spectrum(
