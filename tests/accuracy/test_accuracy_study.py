@@ -14,7 +14,6 @@ from vcam_cli.accuracy.setting_errors import COLUMNS, Point
 from vcam_cli.effects.order import ORDER
 from vcam_cli.simulation.simulate import prepare
 
-pytestmark = pytest.mark.long
 
 OWN_ERROR = {knob.name for knob in KNOBS} | {f"effect:{kind.name}" for kind in ORDER}
 """Knobs of which no promise is made."""
@@ -40,7 +39,7 @@ def measured(tmp_path_factory):
     made = camera(tmp_path_factory.mktemp("study"), NOISY)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(measurements, "TURNS", 1)
-        patch.setattr(reference, "MOST_BYTES", 5e7)
+        patch.setattr(reference, "MOST_BYTES", 2e8)
         return study.accuracy(made, workers=1)
 
 

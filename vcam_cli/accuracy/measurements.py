@@ -147,8 +147,8 @@ class Clock:
 
 
 def settings_key(camera: Camera) -> str:
-    """Return the camera as a text, with the settings that its accuracy comes to."""
-    rest = camera.model_copy(update={"accuracy": None})
+    """Return all keys of a camera as a text, with the settings that its accuracy comes to."""
+    rest = dict(camera) | {"accuracy": None}
     return f"{rest!r} {camera_settings(camera)!r}"
 
 

@@ -27,8 +27,10 @@ from vcam_cli.simulation.simulate import prepare
 
 FURTHER = 2.5
 """How much further than `accuracy: reference` a spectrum is followed: its error falls tenfold."""
-FINEST_CELLS = 64
+FINEST_CELLS = 256
 """Largest oversampling that a camera file may ask for."""
+FINEST_OF_RECTANGLES = 64
+"""How far a chart is followed whose spectrum is known [pixel Nyquist]."""
 ORDER = 2.5
 """Power of the oversampling with which the error of a painted edge falls."""
 CHANGES_PART = 0.2
@@ -61,8 +63,8 @@ def finest_camera(camera: Camera, coarse: Prepared, most_bytes: float = 0) -> Ca
 
     coarse: the camera at `accuracy: reference`. Where its scene has a spectrum, it is followed
     two and a half times as far as there, or painted on so many times its cells, an odd number, as
-    long as so many bytes suffice; 0: `MOST_BYTES`. A chart whose spectrum is known is followed as
-    far as the key goes.
+    long as so many bytes suffice; 0: `MOST_BYTES`. A chart whose spectrum is known is followed to
+    `FINEST_OF_RECTANGLES`.
     """
     knobs: dict[str, Any] = dict(FINEST)
     reached = sampling(coarse)
@@ -75,7 +77,7 @@ def finest_camera(camera: Camera, coarse: Prepared, most_bytes: float = 0) -> Ca
         most = int(math.sqrt(samples / _pixels(coarse)))
         wanted = min(math.ceil(FURTHER * reached) | 1, FINEST_CELLS - 1)
         if _is_rectangles(coarse):
-            wanted = most = FINEST_CELLS
+            wanted = most = FINEST_OF_RECTANGLES
         knobs["oversampling"] = min(max(math.ceil(reached), min(wanted, most)), FINEST_CELLS)
     return with_accuracy(ablation.with_effects(camera, "all"), tolerance=CONVERGED, **knobs)
 

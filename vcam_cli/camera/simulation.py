@@ -84,7 +84,7 @@ class Accuracy(Model):
     wavelength_step: Annotated[float | None, Quantity("length", least=1e-10)] = key(
         "spacing of wavelengths", example="5 nm", default=None
     )
-    oversampling: Annotated[int | None, Whole(least=1, most=64, example="4")] = key(
+    oversampling: Annotated[int | None, Whole(least=1, most=256, example="4")] = key(
         "samples of a chart per pixel", example=4, default=None
     )
     table_size: Annotated[int | None, Whole(least=16, most=2**20, example="4096")] = key(
