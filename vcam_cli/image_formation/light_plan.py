@@ -46,6 +46,8 @@ LEVEL_SHARE = 0.5
 noise has the variance of the signal."""
 PERCENTILES = (1, 10, 50, 90, 99)
 """Percentiles of the scene's own light at which noise is promised."""
+PLACES = 33
+"""Places along each side of the array at which the least gain is sought."""
 BLURS = (Blur, SeparableTransfer, FieldTransfer, SubExposedMotion)
 """Kinds of effects that blur the light."""
 KINDS = (*BLURS, Gain, VeilingGlare, Transport)
@@ -100,7 +102,7 @@ def light_plan(path: OpticalPath, scene: AnyScene) -> LightPlan:
     candidates = of_kind(path.optional, *KINDS)
     if not candidates:
         return LightPlan()
-    if path.transfer.is_dark:
+    if path.transfer.is_dark or path.fullness * _least_gain(path) >= 1:
         return LightPlan(candidates, shares=dict.fromkeys((e.name for e in candidates), 0.0))
     budget = LIGHT_SHARE * path.settings.tolerance
     functions: dict[Effect, NDArray] = {}
@@ -132,6 +134,15 @@ def light_plan(path: OpticalPath, scene: AnyScene) -> LightPlan:
     omitted = tuple(effect for effect in chosen if effect not in bounding)
     told = (*omitted, *displacing)
     return LightPlan(omitted, bounding, {effect.name: shares[effect] for effect in told})
+
+
+def _least_gain(path: OpticalPath) -> float:
+    """Return the least product of all gains over the array, relative to that on the axis."""
+    g, least = path.geometry, 1.0
+    x, y = (np.linspace(-size / 2, size / 2, PLACES) for size in (g.sensor_width, g.sensor_height))
+    for gain in of_kind(path.effects, Gain):
+        least *= float(gain.gain(x, y).min()) / (gain.on_axis or 1.0)
+    return least
 
 
 Functions = Mapping[Effect, NDArray]

@@ -54,6 +54,9 @@ class OpticalPath:
     ceiling: float = np.inf
     """Rate that fills a pixel by the end of the exposure, as far as it is known; brighter ones all
     look alike [e/s]."""
+    fullness: float = 0.0
+    """Light of the darkest place of the scene over that which fills a pixel whatever its noise, by
+    white on the axis; 0 where it is not known."""
     optional: tuple[Effect, ...] = ()
     """Effects that may be left out where the scene does not call for them."""
     layers: tuple[LayerOptics, ...] = ()

@@ -206,6 +206,11 @@ class Chart(ABC):
         """Brightest light, relative to the perfect white."""
         return 1.0
 
+    @property
+    def darkest(self) -> float:
+        """Bound below its light at all wavelengths, over white; 0 where none is known."""
+        return 0.0
+
     def highest_frequency(self, half_width: float) -> float:
         """Return the frequency beyond which a chart has no detail; inf where edges are sharp.
 

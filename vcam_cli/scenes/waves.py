@@ -30,6 +30,15 @@ class WaveScene:
     waves: tuple[Wave, ...]
     white: Spectrum
 
+    @property
+    def darkest(self) -> float:
+        """Bound below its light at all wavelengths, over the perfect white's."""
+        if self.spectra != (self.white,):
+            return 0.0
+        steady = [wave for wave in self.waves if not (wave.fx or wave.fy)]
+        level = sum(wave.weights[0] * math.cos(wave.phase) for wave in steady)
+        return level - sum(abs(wave.weights[0]) for wave in self.waves if wave not in steady)
+
     def values_at(self, x: Array, y: Array, mix: Array) -> Array:
         """Return sum_k mix[r, k] B_k at the points (y[i], x[j]): (R, m, n)."""
         return wave_values(self.waves, x, y, mix)

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -15,7 +16,8 @@ from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.electrical import Electrical
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.camera.derived.mosaic import Mosaic
-from vcam_cli.effects.base import Effect, ImageMotion, of_kind
+from vcam_cli.effects.base import Effect, ImageMotion, TemporalGain, of_kind
+from vcam_cli.effects.signal_chain import SIGMAS, NoiseSource, full_well
 from vcam_cli.errors import bad
 from vcam_cli.image_formation import photon_rate
 from vcam_cli.image_formation.estimates import bandwidth, memory_model
@@ -30,9 +32,14 @@ from vcam_cli.readout import auto_exposure, exposure
 from vcam_cli.readout.layout import Layout
 from vcam_cli.scenes.base import ChartScene
 from vcam_cli.scenes.layered import AnyScene, LayeredScene
+from vcam_cli.scenes.waves import WaveScene
 from vcam_cli.simulation import cost_model, exposed_light, plan
 from vcam_cli.simulation.scene_files import ScenePicture, build_scene, layer_optics, scene_bytes
 from vcam_cli.simulation.setup import CameraSetup, camera_setup
+
+OVERFULL = 2.0
+"""Full wells of light from which on a pixel counts as full, if six standard deviations of its noise
+leave it so."""
 
 
 @dataclass(frozen=True)
@@ -180,6 +187,7 @@ def _prepare(
             effects=effects,
             workers=workers,
             ceiling=ceiling,
+            fullness=_fullness(setup, scene, float(white_rate.min())),
             optional=optional,
             layers=layer_optics(camera, effects, scene),
         )
@@ -258,6 +266,27 @@ def _brightest(scene: AnyScene) -> float:
     if isinstance(scene, LayeredScene):
         scene = scene.flat
     return scene.chart.brightest if isinstance(scene, ChartScene) else 0.0
+
+
+def _fullness(setup: CameraSetup, scene: AnyScene, white_rate: float) -> float:
+    """Return the darkest light of a scene over that which fills a pixel whatever its noise.
+
+    `white_rate` is that of the perfect white in the color with least light [e/s]. It is 0 where
+    the darkest light is not known, or more than one charge, sample or time decides what is full.
+    """
+    camera, time = setup.camera, setup.camera.exposure.time
+    enabled = plan.enabled_effects(camera, setup.geometry)
+    well = full_well(enabled)
+    joined = camera.array.binning is not None or of_kind(enabled, TemporalGain)
+    if time is None or joined or math.isinf(well) or not isinstance(scene, ChartScene | WaveScene):
+        return 0.0
+    darkest = scene.chart.darkest if isinstance(scene, ChartScene) else scene.darkest
+    full = OVERFULL * well
+    dark = exposure.mean_dark(1.0, enabled) * time
+    variance = sum(s.variance(full + dark, dark) for s in of_kind(enabled, NoiseSource))
+    if full - SIGMAS * math.sqrt(variance) < well:
+        return 0.0
+    return darkest * white_rate * time / full
 
 
 def _with_seconds(

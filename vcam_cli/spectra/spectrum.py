@@ -4,6 +4,7 @@ Wavelengths are in meters. What the values mean (a radiance per meter, a transmi
 efficiency) is the caller's: a product of spectra has the product of their units.
 """
 
+import math
 from dataclasses import dataclass, field, replace
 from typing import Literal, Self
 
@@ -237,6 +238,11 @@ class Spectrum:
         wavelength = np.geomspace(100e-9, 10e-6, 4607)
         log = _log_planck(wavelength, temperature) - _log_planck(np.array(560e-9), temperature)
         return cls.from_samples(wavelength, np.exp(log))
+
+    @property
+    def least(self) -> float:
+        """Bound below the values of a spectrum without lines and negative ones, in its tables."""
+        return self.scale * math.prod(float(table.value.min()) for table in self.tables)
 
     @property
     def degree(self) -> int:

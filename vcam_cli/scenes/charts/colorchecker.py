@@ -62,6 +62,11 @@ class Card:
         """Half the height on the sensor [m]."""
         return self.scale * HEIGHT / 2
 
+    @property
+    def darkest(self) -> float:
+        """Least reflectance of patches and card at any wavelength."""
+        return min(CARD, *(spectrum.least for _, spectrum in colorchecker()))
+
     def light(self, cover: "Cover", mix: Array) -> Array:
         """Return the light of card and patches times their cover, 0 around them.
 
@@ -145,6 +150,11 @@ class ColorChecker(Chart):
     """The chart: the card before its surround."""
 
     card: Card
+
+    @property
+    def darkest(self) -> float:
+        """Least reflectance of card and surround at any wavelength."""
+        return min(self.card.darkest, SURROUND)
 
     def paint(self, x_edges: Array, y_edges: Array, mix: Array, out: Array) -> None:
         """Write the exact averages over the cells into `out`."""

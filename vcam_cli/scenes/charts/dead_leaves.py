@@ -158,6 +158,11 @@ class DeadLeaves(Chart):
     """How often cells are divided in which edges meet."""
     edge_seconds = property(lambda self: EDGE_SECONDS[0] + EDGE_SECONDS[1] * self.divided)
 
+    @property
+    def darkest(self) -> float:
+        """Least reflectance that a leaf or the ground may have at any wavelength."""
+        return min(DARKEST, GROUND) * min(spectrum.least for spectrum in reflectances())
+
     def crop_to_cells(
         self, x_edges: Array, y_edges: Array, hidden: Cells | None = None
     ) -> "DeadLeaves | PlacedLeaves":

@@ -27,6 +27,11 @@ class SlantedEdge(Chart):
     contrast: float
     """Michelson contrast, 0..1."""
 
+    @property
+    def darkest(self) -> float:
+        """Reflectance of the dark side."""
+        return MEAN * (1 - self.contrast)
+
     def paint(self, x_edges: Array, y_edges: Array, mix: Array, out: Array) -> None:
         """Write the averages over the cells into `out`.
 

@@ -20,6 +20,11 @@ class StepWedge(Chart):
     borders: Array
     """Borders between the bars (n - 1,) [m]."""
 
+    @property
+    def darkest(self) -> float:
+        """Least reflectance of a bar."""
+        return float(self.levels.min())
+
     def paint(self, x_edges: Array, y_edges: Array, mix: Array, out: Array) -> None:
         """Write the exact averages over the cells into `out`."""
         out[:] = _times_mix(mix, step_averages(self.levels, self.borders, x_edges))

@@ -23,6 +23,11 @@ class LeavesWithColorChecker(Chart):
     card: Card
     edge_seconds = property(lambda self: self.leaves.edge_seconds)
 
+    @property
+    def darkest(self) -> float:
+        """Least reflectance of leaves and card at any wavelength."""
+        return min(self.leaves.darkest, self.card.darkest)
+
     def crop_to_cells(self, x_edges: Array, y_edges: Array) -> "LeavesWithColorChecker":
         """Return the chart with only those leaves that may be seen beside the card."""
         if isinstance(self.leaves, PlacedLeaves):
