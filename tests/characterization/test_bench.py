@@ -117,7 +117,7 @@ def test_unequal_dark_currents_and_lost_charge(small, tmp_path):
 
 def test_codes_are_moved_up_where_the_dark_would_be_cut_off(small, tmp_path):
     """Half of the noise would be lost below code 0, and with it 0.4 of the dark's variance."""
-    adc = {"bits": 12, "gain": "0.124 DN/e"}
+    adc = {"bits": 12, "gain": "0.124 DN/e", "offset": "0 DN"}
     found = characterize(camera(tmp_path, {**SHEET, "adc": adc}))
     assert found.bench.pedestal > 5 * NOISE * 0.124
     assert "moved up" in found.notes[0]

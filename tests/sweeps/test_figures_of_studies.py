@@ -104,7 +104,7 @@ def test_finished_figures_are_not_computed_again_and_stay_the_same(swept, monkey
         (out / "iso.csv").unlink()
         with pytest.raises(AssertionError, match="a frame is computed"):
             sweep(study, out, workers=1)
-    (out / "best.png").write_bytes(b"")
+    (out / "best.png").unlink()
     assert sweep(study, out, workers=1).computed == 0
     assert made(out) == before
 
@@ -286,7 +286,7 @@ def test_figures_of_a_former_study_go(tmp_path):
         (MTF | {"cases": ["cold"]}, "cases", "write one of: plain, hot"),
         (MTF | {"at": ["5 um", "-5 um"]}, "at", "is negative"),
         (MTF | {"at": "5 s"}, "at", "is a time, not a length"),
-        ({"show": "pictures", "at": "2 m"}, "at", "die"),
+        ({"show": "pictures", "at": "5 mm"}, "at", "die"),
         (MTF | {"over": "adc.bit"}, "over", "pixel.width"),
         (MTF | {"set": {"optics.f_numbr": 2}}, "set", "f_number"),
         (MTF | {"set": {"pixel.width": "6 um"}}, "set", "is varied by"),

@@ -181,7 +181,8 @@ def _clipped_dark(ready: Prepared) -> tuple[str, ...]:
     threshold = missing / time - ready.dark_rate
     if float(ready.rate.min(initial=math.inf)) >= threshold:
         return ()
-    share = float((ready.rate < threshold).mean())
+    largest = float(np.finfo(ready.rate.dtype).max)
+    share = float((ready.rate < min(threshold, largest)).mean())
     if share < VISIBLE_CLIPPING:
         return ()
     what = "their mean comes out wrong"
