@@ -14,7 +14,6 @@ from vcam_cli.accuracy.setting_errors import COLUMNS, Point
 from vcam_cli.effects.order import ORDER
 from vcam_cli.simulation.simulate import prepare
 
-
 OWN_ERROR = {knob.name for knob in KNOBS} | {f"effect:{kind.name}" for kind in ORDER}
 """Knobs of which no promise is made."""
 DARK = "pixel.photodetector.dark_current"

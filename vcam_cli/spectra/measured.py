@@ -26,6 +26,8 @@ _WAVELENGTH = re.compile(
     r"(?<![a-z])(wave ?-?_?length|wavelen|wl|lambda|λ)(?![a-z])|^ *\(?(nm|um)\)? *$"
 )
 _PERCENT = re.compile(r"%|percent")
+MAX_NUMBERS = 1 << 22
+"""Numbers of a file of many columns: a thousand spectra at a thousand wavelengths, and more."""
 PREAMBLE = 1000
 """Most lines that an instrument may write above its numbers."""
 
@@ -135,6 +137,8 @@ def _read_sheet(file: Path) -> _Sheet:
         rows.append(parse_numbers(file, n, cells))
         if len(rows) > MAX_ROWS:
             raise ValueError(f"{file}: has more than {MAX_ROWS} rows; no more are read")
+        if len(rows) * len(cells) > MAX_NUMBERS:
+            raise ValueError(f"{file}: has more than {MAX_NUMBERS} numbers; no more are read")
     if not rows:
         raise _without_numbers(file, above)
     if len(rows[0]) < 2:
