@@ -283,7 +283,7 @@ def _fullness(setup: CameraSetup, scene: AnyScene, white_rate: float) -> float:
     darkest = scene.chart.darkest if isinstance(scene, ChartScene) else scene.darkest
     full = OVERFULL * well
     dark = exposure.mean_dark(1.0, enabled) * time
-    variance = sum(s.variance(full + dark, dark) for s in of_kind(enabled, NoiseSource))
+    variance = math.fsum(s.variance(full + dark, dark) for s in of_kind(enabled, NoiseSource))
     if full - SIGMAS * math.sqrt(variance) < well:
         return 0.0
     return darkest * white_rate * time / full
