@@ -8,6 +8,8 @@ import numpy as np
 import pytest
 from optical_paths import PITCH, Leaning, aperture, on_chart, path, rms, sensor, signal
 
+from vcam_cli import load
+from vcam_cli.accuracy import ablation
 from vcam_cli.effects.optics.diffraction import Diffraction
 from vcam_cli.effects.optics.wavefront_blur import Lens, SymmetricBlur
 from vcam_cli.image_formation import far_field, strategies
@@ -19,6 +21,7 @@ from vcam_cli.scenes.charts.csf import Csf
 from vcam_cli.scenes.charts.siemens_star import SiemensStar
 from vcam_cli.scenes.charts.slanted_edge import SlantedEdge
 from vcam_cli.scenes.charts.step_wedge import step_wedge
+from vcam_cli.simulation.simulate import prepare
 
 DEFOCUS = SymmetricBlur(Lens(8.0, True), ((4, 0.3e-6),))
 BLURS = {
@@ -131,3 +134,32 @@ def test_filters_go_as_far_as_the_low_pass_of_rings(monkeypatch):
     monkeypatch.setattr(strategies, "near_field", lambda path, scene, widest: scene)
     exact = signal(optical_path, scene.crop((0.0, 0.0), *parts[-2].scene.extent))
     assert rms(found.values, exact) < 0.05 * STANDARD.tolerance * exact.max()
+
+
+@pytest.mark.parametrize(("rows", "followed"), [(100, 10), (240, 0)])
+def test_modes_are_left_out_of_far_light_that_hardly_counts(rows, followed, monkeypatch):
+    """Bright patches around a small array count, and around a larger one little.
+
+    A tenth of the tolerance is what that light may be; what the modes change of it is less.
+    """
+    source, lens = "{kind: chart, chart: hdr-patches}", "[{field: 0}, {field: 1, 4: 150 nm}]"
+    sets = [f"scene.source={source}", f"optics.zernike={lens}", "scene.luminance=100 cd/m2"]
+    made = load("starter", [*sets, f"array.rows={rows}", f"array.columns={4 * rows // 3}"])
+    found = []
+
+    def spy(self, full_signal):
+        found.append(own(self, full_signal))
+        return found[-1]
+
+    own = far_field.FarField.parts_with_modes
+    monkeypatch.setattr(far_field.FarField, "parts_with_modes", spy)
+    few = prepare(made, 1)[0]
+    assert few.spectrum.far_parts == 10
+    assert few.spectrum.far_filters == 10 + followed * (few.spectrum.filters - 1)
+    monkeypatch.setattr(far_field, "MODES_SHARE", 0.0)
+    all_of_them = prepare(made, 1)[0]
+    assert found == [followed, 10]
+    error = rms(few.rate, all_of_them.rate) * few.exposure_time
+    allowed = 0.1 * made.accuracy.tolerance * ablation.full_signal(few)
+    assert error < allowed / 10
+    assert (error > 0) == (followed < 10)

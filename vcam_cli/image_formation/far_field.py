@@ -11,6 +11,7 @@ two are the same; beyond it, the low-pass changes the tail by less than 1e-4 of 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,8 +21,9 @@ from numpy.typing import NDArray
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.image_formation.cosine_series import Axis
 from vcam_cli.image_formation.estimates.bandwidth import axes
+from vcam_cli.image_formation.field_dependence import Mode, filtered_layers
 from vcam_cli.image_formation.filtering import Filter
-from vcam_cli.image_formation.optical_path import OpticalPath
+from vcam_cli.image_formation.optical_path import Layer, OpticalPath
 from vcam_cli.image_formation.scene_spectrum import (
     SceneSpectrum,
     rectangle_spectrum,
@@ -44,6 +46,11 @@ LOW_PASS = 1.84
 """Nyquist frequency of a ring's cells over that at which its low-pass is 1 / e. Of exp(-f^4) little
 is left at the former, 1e-5; its kernel falls fast and has no second moment, so that it leaves all
 that changes slowly as it is."""
+
+PLACES = 4096
+"""Places of the array at which far light is judged, about,"""
+MODES_SHARE = 0.1
+"""and part of the tolerance that it may be where the modes of the field are left out."""
 
 
 @dataclass(frozen=True)
@@ -110,6 +117,77 @@ class FarPart:
             along_x *= effect.along_x(x.frequencies)
             along_y *= effect.along_y(y.frequencies)
         return replace(near, x=x, y=y, along_x=along_x, along_y=along_y)
+
+
+@dataclass(frozen=True, eq=False)
+class FarField:
+    """The rings around a near field, behind the filter of that."""
+
+    path: OpticalPath
+    parts: Sequence[FarPart]
+    """An outer and an inner rectangle for each ring, the innermost first."""
+    near: Filter
+    """Filter of the near field."""
+    highest: float
+    """Frequency at which it ends [pixel Nyquist]."""
+
+    def parts_with_modes(self, full_signal: float) -> int:
+        """Return through how many of the parts the modes of the field are to be followed.
+
+        Modes change far light by less than all of it: those of rings that are together no more than
+        their share of the tolerance are left out. That is judged at some places of the array.
+
+        Parameters
+        ----------
+        full_signal : float
+            Full signal [e/s].
+
+        Returns
+        -------
+        int
+            Parts, the innermost first.
+        """
+        g = self.path.geometry
+        step = max(1, math.isqrt(g.rows * g.columns // PLACES))
+        some = replace(
+            g,
+            rows=max(1, g.rows // step),
+            columns=max(1, g.columns // step),
+            pitch_x=g.pitch_x * step,
+            pitch_y=g.pitch_y * step,
+        )
+        judged = replace(self, path=replace(self.path, geometry=some), highest=self.highest * step)
+        allowed = MODES_SHARE * self.path.settings.tolerance * full_signal
+        light: NDArray = np.zeros((self.near.tables.colors, some.rows, some.columns))
+        for count in range(len(self.parts), 0, -2):
+            ring = replace(judged, parts=self.parts[count - 2 : count])
+            for layer in ring.layers():
+                for color, total in enumerate(light):
+                    total += layer.values(color, slice(None))
+            if math.sqrt(np.square(light).mean(axis=(1, 2)).max()) > allowed:
+                return count
+        return 0
+
+    def layers(self, modes: Sequence[Mode] = (), followed: int = 0) -> Iterator[Layer]:
+        """Yield the light of the parts.
+
+        Parameters
+        ----------
+        modes : sequence of Mode, optional
+            Modes of the field, by which the transfer differs from its mean.
+        followed : int, optional
+            Parts, the innermost first, whose light is followed through them.
+
+        Yields
+        ------
+        Layer
+            Share of the signal [e/s].
+        """
+        for number, part in enumerate(self.parts):
+            spectrum = part.spectrum(self.path, self.highest, self.near.tables.mix)
+            image_filter = part.image_filter(self.near, self.path, self.highest)
+            own = modes if number < followed else ()
+            yield from filtered_layers(image_filter, own, spectrum, self.path.workers)
 
 
 def _low_pass(axis: Axis) -> NDArray:

@@ -9,7 +9,7 @@ them within a known error (as eigen-images of point spread functions do: Lauer, 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -19,6 +19,9 @@ from numpy.typing import NDArray
 
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.effects.base import Blur, PlaneTransfer, Zone, of_kind
+from vcam_cli.image_formation.filtering import Filter
+from vcam_cli.image_formation.optical_path import Layer
+from vcam_cli.image_formation.scene_spectrum import SceneSpectrum
 from vcam_cli.image_formation.transfer_functions import Transfer
 from vcam_cli.image_formation.transfer_tables import (
     LARGEST_OF_FIELD,
@@ -288,3 +291,30 @@ def zone_maps(zones: Sequence[Zone], geometry: Geometry) -> list[Map]:
     half = geometry.sensor_width / 2, geometry.sensor_height / 2
     at = np.linspace(-1, 1, PLACES)
     return [Map(zone.weight(at * half[0], at * half[1]), *half) for zone in zones]
+
+
+def filtered_layers(
+    image_filter: Filter, modes: Sequence[Mode], spectrum: SceneSpectrum, workers: int
+) -> Iterator[Layer]:
+    """Yield the light through a filter, and through one more for each mode of the field.
+
+    Parameters
+    ----------
+    image_filter : Filter
+        Filter with the mean transfer function of all zones.
+    modes : sequence of Mode
+        Modes that are added to it.
+    spectrum : SceneSpectrum
+        Spectrum of the mixtures that the tables are for.
+    workers : int
+        Number of threads; the result does not depend on it.
+
+    Yields
+    ------
+    Layer
+        Share of the signal [e/s].
+    """
+    for mode in (None, *modes):
+        chosen = image_filter if mode is None else replace(image_filter, tables=mode.tables())
+        series = chosen.apply(spectrum, workers)
+        yield Layer(series.signal, None if mode is None else mode.map)

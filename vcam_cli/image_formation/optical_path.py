@@ -196,6 +196,8 @@ class SpectrumReport:
     """Rectangles of the far field, each with a spectrum of its own."""
     far_cells: int = 0
     """Samples of one plane in all of them."""
+    far_filters: int = 0
+    """Times that one of their spectra was filtered."""
     terms: int = 0
     """Terms of one plane's spectrum that were filtered; 0 where there was no need to."""
     planes: int = 0

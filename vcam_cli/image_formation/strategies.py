@@ -13,8 +13,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from collections.abc import Sequence
 from itertools import chain
 
 import numpy as np
@@ -37,8 +36,13 @@ from vcam_cli.image_formation.estimates.scene_sampling import (
     sampled_image,
     with_sufficient_precision,
 )
-from vcam_cli.image_formation.far_field import FarPart, far_parts, near_field
-from vcam_cli.image_formation.field_dependence import Mode, field_mixtures, tabulate_field
+from vcam_cli.image_formation.far_field import FarField, FarPart, far_parts, near_field
+from vcam_cli.image_formation.field_dependence import (
+    Mode,
+    field_mixtures,
+    filtered_layers,
+    tabulate_field,
+)
 from vcam_cli.image_formation.filtering import Filter
 from vcam_cli.image_formation.harmonic_scenes import (
     harmonic_layers,
@@ -48,7 +52,6 @@ from vcam_cli.image_formation.harmonic_scenes import (
 from vcam_cli.image_formation.layers.cut_image import cut_image
 from vcam_cli.image_formation.layers.layered import layered_image
 from vcam_cli.image_formation.optical_path import Layer, Layers, OpticalPath, SpectrumReport
-from vcam_cli.image_formation.scene_spectrum import SceneSpectrum
 from vcam_cli.image_formation.sub_exposures import sub_exposed_layers, sub_exposed_motion
 from vcam_cli.image_formation.transfer_tables import Tables, mixtures, tabulate
 from vcam_cli.scenes.base import ChartScene, HarmonicScene, SampledScene
@@ -182,6 +185,8 @@ def _spectral_layers(
         tables = tabulate(exact, size, mixing)
     modes, field_change = needed_modes(path, image, modes)
     image_filter = _filter(path, image.scene, tables, image.highest)
+    far = FarField(path, rings, image_filter, image.highest)
+    followed = far.parts_with_modes(image.full_signal) if modes else 0
     planes = [plane for plane in tables.planes if plane is not None]
     report = SpectrumReport(
         oversampling=image.highest,
@@ -193,6 +198,7 @@ def _spectral_layers(
         trials=chosen.trials if chosen else 0,
         far_parts=len(rings),
         far_cells=sum(math.prod(part.scene.shape) for part in rings),
+        far_filters=len(tables.parities) * len(rings) + len(modes) * followed,
         terms=image_filter.terms,
         planes=len(tables.mix),
         changes=changes_by_omission(path, image, tables, field_change),
@@ -201,8 +207,8 @@ def _spectral_layers(
         peak=image.peak,
         memory=needed,
     )
-    layers = _layers(image_filter, modes, image.spectrum, path.workers)
-    return chain(layers, _far_layers(path, rings, image_filter, modes, image.highest)), report
+    layers = filtered_layers(image_filter, modes, image.spectrum, path.workers)
+    return chain(layers, far.layers(modes, followed)), report
 
 
 def _filter(path: OpticalPath, scene: SampledScene, tables: Tables, highest: float) -> Filter:
@@ -219,29 +225,3 @@ def _filter(path: OpticalPath, scene: SampledScene, tables: Tables, highest: flo
     if widest > 0:
         smooth = min(smooth, 1 / (PERIODS * widest))
     return Filter(x, y, tables, along_x, along_y, smooth)
-
-
-def _layers(
-    image_filter: Filter, modes: Sequence[Mode], spectrum: SceneSpectrum, workers: int
-) -> Iterator[Layer]:
-    """Yield the light through the filter, and through one more for each mode of the field."""
-    for mode in (None, *modes):
-        chosen = image_filter if mode is None else replace(image_filter, tables=mode.tables())
-        series = chosen.apply(spectrum, workers)
-        yield Layer(series.signal, None if mode is None else mode.map)
-
-
-def _far_layers(
-    path: OpticalPath,
-    rings: Sequence[FarPart],
-    near: Filter,
-    modes: Sequence[Mode],
-    highest: float,
-) -> Iterator[Layer]:
-    """Yield the light of the rings around a near field, through its filter and modes.
-
-    `highest` is the frequency at which the filter ends [pixel Nyquist].
-    """
-    for part in rings:
-        spectrum = part.spectrum(path, highest, near.tables.mix)
-        yield from _layers(part.image_filter(near, path, highest), modes, spectrum, path.workers)

@@ -121,10 +121,16 @@ def _flat_seconds(geometry: Geometry, colors: int, report: SpectrumReport) -> fl
         + report.edge_seconds * (1 + TRIAL_EDGES * report.trials)
         + TRIAL * report.trials
         + TERM * report.terms * report.planes * colors * report.filters
-        + (EVALUATE + FAR * report.far_parts) * pixels * colors * report.filters
-        + (SAMPLE + PAINT + TERM * colors * report.filters) * report.far_cells * report.planes
+        + (EVALUATE * report.filters + FAR * report.far_filters) * pixels * colors
+        + (SAMPLE + PAINT) * report.far_cells * report.planes
+        + TERM * colors * report.far_filters * report.planes * _cells_of_a_part(report)
         + TABLE * report.table_values
     )
+
+
+def _cells_of_a_part(report: SpectrumReport) -> float:
+    """Return the samples of one plane of a part of the far field, in the mean."""
+    return report.far_cells / max(1, report.far_parts)
 
 
 def _sub_exposure_seconds(values: int, colors: int, report: SpectrumReport) -> float:
