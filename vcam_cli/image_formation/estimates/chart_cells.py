@@ -41,13 +41,17 @@ CHEAP = 1 << 20
 MOST_OF_SMALL, MOST = 1 << 22, 1 << 26
 """Cells at most, of arrays with fewer pixels than a crop and of others."""
 LADDER = (1.1, 1.6, 2.2, 2.7, 3.3, 4.2, 5.3, 6.6, 8.3, 10.4, 13.1, 16.4, 24.2, 32.3, 48.1)
-"""Cells per pixel pitch that are tried on crops. Whole numbers of them would lie in a crop as its
-photodetectors do, and err less there than on the whole."""
+"""Cells per pixel pitch that are tried on crops."""
 LIKELY = 2.0
 """Cells per pixel pitch from which on they are tried; fewer, where it seems that they would do."""
 FASTEST_FALL = 4.0
 """Power of the cells with which their error falls, at most: numbers of cells that would need a
 faster fall from those tried before are not tried."""
+SLOWEST_FALL = 2.0
+"""That power, at least: numbers that would need a slower one are not tried either."""
+BETWEEN = 1.04
+"""Of two numbers tried, of which one errs too much, cells between them are tried so many times what
+the law of powers asks for."""
 OVEREXPOSED = 2.0
 """Cells of charts that fill pixels, at least: fewer end the spectrum within that of the pixels, and
 bright light rings into dark pixels that are on none of the crops."""
@@ -143,32 +147,75 @@ def cells_per_pixel(path: OpticalPath, scene: ChartScene, highest: float) -> Cho
     if converged.max() > path.ceiling:
         least, budget = OVEREXPOSED, OVEREXPOSED_SHARE * budget
 
-    def measured(cells: float) -> float:
-        found = _signals(path, crops, cells, level, otf)
-        return _error_that_counts(found, converged, path.ceiling, within(found).size)
+    trials = 1
+
+    def measured(asked: float) -> _Trial:
+        nonlocal trials
+        trials += 1
+        found = _signals(path, crops, asked, level, otf)
+        error = _error_that_counts(found, converged, path.ceiling, within(found).size)
+        return _Trial(_crop_grid(crops[0], g, asked)[0] * g.pitch_y / crops[0].pitch_y, error)
 
     ladder = [c for c in LADDER if least <= c <= min(most, reference / COPRIME)]
     first = next((i for i, c in enumerate(ladder) if c >= LIKELY), len(ladder) - 1)
-    tried, error, trials = most, budget, 1
+    kept: _Trial | None = None
+    failed: _Trial | None = None
     for cells in ladder[first:]:
-        if trials > 1 and error * (tried / cells) ** FASTEST_FALL > budget:
+        if failed and failed.error_of(cells, FASTEST_FALL) > budget:
             continue
-        tried, error, trials = cells, measured(cells), trials + 1
-        if error <= budget:
+        kept = measured(cells)
+        if kept.error <= budget:
             break
-    if trials == 2 and error <= budget:
+        kept, failed = None, kept
+    if kept and not failed:
         for cells in ladder[:first][::-1]:
-            fewer = measured(cells) if error * (tried / cells) ** 2 <= budget else math.inf
-            trials += fewer < math.inf
-            if fewer > budget:
+            if kept.error_of(cells, SLOWEST_FALL) > budget:
                 break
-            tried, error = cells, fewer
-    if trials > 1 and error <= budget:
-        rows = crops[0].pitch_y / g.pitch_y
-        return ChosenCells(max(tried, cell_grid(crops[0], g, tried)[0] / rows), error, trials)
+            fewer = measured(cells)
+            if fewer.error > budget:
+                failed = fewer
+                break
+            kept = fewer
+    for _ in range(2):
+        if not kept or not failed:
+            break
+        between = BETWEEN * failed.enough_beside(kept, budget)
+        if (kept.cells**2 - between**2) * whole < CHEAP:
+            break
+        fewer = measured(between)
+        if fewer.error <= budget:
+            kept = fewer
+            break
+        failed = fewer
+    if kept:
+        return ChosenCells(*kept, trials)
+    last = failed or _Trial(most, budget)
     # It falls with the square of the cells, about: faster than is reckoned here.
-    enough = min(tried * error / budget, most) if budget else most
-    return ChosenCells(enough, error * tried / enough, trials)
+    enough = min(last.cells * last.error / budget, most) if budget else most
+    return ChosenCells(enough, last.error_of(enough, 1.0), trials)
+
+
+class _Trial(NamedTuple):
+    """What cells err on crops of a chart."""
+
+    cells: float
+    """Cells per pixel pitch."""
+    error: float
+    """Rms of the signal [e/s]."""
+
+    def error_of(self, cells: float, power: float) -> float:
+        """Return the error of other cells, where it falls with a power of them [e/s]."""
+        return self.error * (self.cells / cells) ** power
+
+    def enough_beside(self, finer: _Trial, budget: float) -> float:
+        """Return the cells with which the error falls to a budget that a finer trial keeps.
+
+        It is a power of the cells between the two.
+        """
+        if finer.error <= 0:
+            return self.cells
+        power = math.log(self.error / finer.error) / math.log(finer.cells / self.cells)
+        return float(self.cells * (self.error / budget) ** (1 / power))
 
 
 def _brightest_over_full(path: OpticalPath, scene: ChartScene) -> float:
@@ -222,6 +269,17 @@ def _error_that_counts(found: NDArray, converged: NDArray, ceiling: float, pixel
             changed = np.clip(light + moved, 0, ceiling) - np.minimum(light, ceiling)
             squares = max(squares, np.square(changed).mean())
     return math.sqrt(float(squares))
+
+
+def _crop_grid(crop: ChartScene, geometry: Geometry, per_pixel: float) -> tuple[int, int]:
+    """Return the cells (ny, nx) of a crop, no whole number of them a pixel.
+
+    Those would lie in it as its photodetectors do, and err less there than on the whole.
+    """
+    pixels = round(crop.pitch_y / geometry.pitch_y), round(crop.pitch_x / geometry.pitch_x)
+    counts = (math.ceil(per_pixel * n - 1e-9) for n in pixels)
+    ny, nx = (count + (count % n == 0) for count, n in zip(counts, pixels, strict=True))
+    return ny, nx
 
 
 Table = tuple[NDArray, NDArray]
@@ -295,7 +353,7 @@ def _signals(
     g, first = path.geometry, crops[0]
     rows, columns = round(first.pitch_y / g.pitch_y), round(first.pitch_x / g.pitch_x)
     small = replace(path, geometry=replace(g, rows=rows, columns=columns))
-    grid = cell_grid(first, g, cells)
+    grid = _crop_grid(first, g, cells)
     x, y = axes(small, first.with_cells(grid), cells)
     transfer = np.interp(np.hypot(x.frequencies, y.frequencies[:, None]), *otf, right=0.0)
     for effect in path.separable:
