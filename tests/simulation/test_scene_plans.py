@@ -5,9 +5,11 @@ import csv
 import pytest
 from typer.testing import CliRunner
 
+from vcam_cli import load
 from vcam_cli.commands.main import app
 from vcam_cli.errors import BadInput
 from vcam_cli.simulation import scene_plans
+from vcam_cli.simulation.simulate import prepare
 
 SMALL = ("array.rows=64", "array.columns=80")
 
@@ -55,3 +57,21 @@ def test_the_command_writes_a_table_and_a_picture(tmp_path, monkeypatch):
 def test_a_scene_that_is_not_there_is_told(tmp_path):
     with pytest.raises(BadInput):
         list(scene_plans.plan_scenes("starter", SMALL, ["no-such-scene"], 1))
+
+
+def planned(chart, *sets):
+    source = f"scene.source={{kind: chart, chart: {chart}}}"
+    return prepare(load("starter", [*SMALL, source, *sets]), 1)[0]
+
+
+def test_blurs_left_out_save_transforms_where_there_would_be_some():
+    """Before a wall there are none, with every effect on either; a lens that is fine enough for its
+    pixels saves those of an edge."""
+    wall = planned("uniform")
+    edge = planned("slanted-edge", "array.rows=400", "array.columns=500", "pixel.width=60 um")
+    for ready in (wall, edge):
+        states = {d.name: d.state for d in ready.plan.decisions}
+        assert states["diffraction"] == "off"
+        assert not ready.spectrum.terms
+    assert wall.plan.seconds <= wall.plan.seconds_of_all < 1.1 * wall.plan.seconds
+    assert edge.plan.seconds_of_all - edge.plan.seconds > 1e-3  # [s]

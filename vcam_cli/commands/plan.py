@@ -148,15 +148,20 @@ def _plan_scenes(
 
 
 def print_scenes(plans: "Sequence[ScenePlan]") -> None:
-    """Print effects by scenes: on, off, or free; a line a scene, in a terminal a line an effect."""
+    """Print effects by scenes: on, off, or free; a line a scene, in a terminal a line an effect.
+
+    Beside them are the estimated time of a frame and what the plan saves of it.
+    """
     from vcam_cli.simulation.scene_plans import effect_names
 
-    names = effect_names(plans)
+    effects = effect_names(plans)
+    names = [*effects, "seconds", "saved"]
     width = max(len(each.scene) for each in plans)
     lines, columns = [f"{'':<{width}}  " + " ".join(names)], []
     for each in plans:
         states = {d.name: "free" if d.free else d.state for d in each.decisions}
-        columns.append([states.get(name, "-") for name in names])
+        times = [f"{seconds:.2g}" for seconds in (each.plan.seconds, each.saved)]
+        columns.append([states.get(name, "-") for name in effects] + times)
         cells = (f"{state:<{len(name)}}" for name, state in zip(names, columns[-1], strict=True))
         lines.append(f"{each.scene:<{width}}  " + " ".join(cells).rstrip())
     rows = [(name, *states) for name, *states in zip(names, *columns, strict=True)]

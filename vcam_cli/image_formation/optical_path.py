@@ -186,6 +186,9 @@ class SpectrumReport:
     """Samples of one plane of the scene that were transformed; 0 where its spectrum is known."""
     cells_per_pixel: float = 0.0
     """Cells of a painted chart per pixel pitch; 0 where there are none."""
+    is_averaged: bool = False
+    """Whether it was averaged over the photodetectors, no blur being there that asks for its
+    spectrum."""
     is_painted: bool = False
     """Whether they had to be painted, as those of a chart."""
     edge_seconds: float = 0.0

@@ -134,7 +134,7 @@ def _mean_layers(path: OpticalPath, scene: SampledScene) -> tuple[Layers, Spectr
         changes = {effect.name: math.sqrt(change) for effect in path.separable}
     else:
         signal = point_values(scene, level, g)
-    report = SpectrumReport(changes=changes, memory=needed)
+    report = SpectrumReport(is_averaged=True, changes=changes, memory=needed)
     return iter([Layer(lambda color, rows: signal[color, rows])]), report
 
 

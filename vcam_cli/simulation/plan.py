@@ -239,7 +239,8 @@ def _negligible(
         of_mean = mean_share(effect) / (OMITTED_SHARE * camera.accuracy.tolerance)
         return max(of_mean, variance_share([effect]))
 
-    for effect in sorted(rest, key=use):
+    uses = {effect: use(effect) for effect in rest}
+    for effect in sorted((e for e in rest if uses[e] <= 1), key=uses.__getitem__):
         together = (*out, effect)
         if sum(map(mean_share, together)) <= budget and variance_share(together) <= 1:
             out = together
@@ -317,9 +318,9 @@ def _idle_parts(
         return variances.share_lost((*others, source.without_parts(names)))
 
     out: tuple[str, ...] = ()
-    drawn = [name for name in source.parts if getattr(source, name)]
-    for name in sorted(drawn, key=lambda name: share_lost([name])):
-        if share_lost([*out, name]) <= 1:
+    lost = {name: share_lost([name]) for name in source.parts if getattr(source, name)}
+    for name in sorted((n for n in lost if lost[n] <= 1), key=lost.__getitem__):
+        if not out or share_lost([*out, name]) <= 1:
             out = (*out, name)
     return out
 

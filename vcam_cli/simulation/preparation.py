@@ -16,7 +16,14 @@ from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.electrical import Electrical
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.camera.derived.mosaic import Mosaic
-from vcam_cli.effects.base import Effect, ImageMotion, TemporalGain, of_kind
+from vcam_cli.effects.base import (
+    Blur,
+    Effect,
+    FieldTransfer,
+    ImageMotion,
+    TemporalGain,
+    of_kind,
+)
 from vcam_cli.effects.signal_chain import SIGMAS, NoiseSource, full_well
 from vcam_cli.errors import bad
 from vcam_cli.image_formation import photon_rate
@@ -300,7 +307,7 @@ def _with_seconds(
     spectrum, layout = light.spectrum, setup.layout
     known = (setup.camera, setup.geometry, layout, setup.settings)
     seconds = cost_model.frame_seconds(*known, spectrum, decided, workers)
-    if light.plan.omitted and not (spectrum.terms or spectrum.parts):
+    if spectrum.is_averaged and of_kind(light.plan.omitted, Blur, FieldTransfer):
         spectrum = cost_model.usual_spectrum(layout.lattice)
     whole = replace(decided, seconds=decided.seconds + sum(d.saved for d in decided.decisions))
     every = cost_model.frame_seconds(*known, spectrum, whole, workers)

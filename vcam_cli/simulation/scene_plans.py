@@ -36,6 +36,11 @@ class ScenePlan:
         """Decisions on the effects that the camera has, in their order."""
         return tuple(d for d in self.plan.decisions if d.by != "camera")
 
+    @property
+    def saved(self) -> float:
+        """Estimated time that the plan saves of a frame with every effect [s]."""
+        return max(0.0, self.plan.seconds_of_all - self.plan.seconds)
+
 
 def scene_settings(names: Sequence[str]) -> dict[str, tuple[str, ...]]:
     """Return scenes and the overrides that put each before a camera.

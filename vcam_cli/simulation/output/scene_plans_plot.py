@@ -1,4 +1,7 @@
-"""The picture of scenes.csv: effects by scenes, contribution against what is allowed, on or off."""
+"""The picture of scenes.csv: effects by scenes, contribution against what is allowed, on or off.
+
+An effect that is left out has what that saves in its place.
+"""
 
 from __future__ import annotations
 
@@ -10,10 +13,13 @@ from typing import Any
 import numpy as np
 
 from vcam_cli.files.plots import STYLE, load, save
+from vcam_cli.simulation.plan import Decision
 from vcam_cli.simulation.scene_plans import ScenePlan, effect_names
 
 DECADES = 3.0
 """Powers of ten of contribution over what is allowed that the colors show, up and down."""
+LEAST_SAVED = 5e-5
+"""Time that is worth a number [s]."""
 
 
 def plot_scene_plans(path: Path | str, title: str, plans: Sequence[ScenePlan]) -> None:
@@ -43,7 +49,7 @@ def plot_scene_plans(path: Path | str, title: str, plans: Sequence[ScenePlan]) -
     for column, each in enumerate(plans):
         for d in each.decisions:
             at = names.index(d.name), column
-            marks[at] = "" if d.state == "off" else "free" if d.free else "on"
+            marks[at] = _mark(d)
             if d.contribution is not None and d.allowed:
                 ratio = d.contribution / d.allowed
                 ratios[at] = math.log10(max(ratio, 10**-DECADES))
@@ -67,4 +73,13 @@ def plot_scene_plans(path: Path | str, title: str, plans: Sequence[ScenePlan]) -
         exponents = np.arange(-DECADES, DECADES + 1, 1.0)
         bar.set_ticks(list(exponents), labels=[f"{10.0**e:g}" for e in exponents])
         bar.set_label("contribution over what may be left out together")
+        figure.supxlabel('an effect without "on" is left out; a time is what that saves', size=8)
         save(figure, path)
+
+
+def _mark(decision: Decision) -> str:
+    """Return what is written of an effect before a scene."""
+    if decision.state == "on":
+        return "free" if decision.free else "on"
+    saved = decision.saved if decision.by == "plan" else 0.0
+    return f"{1000 * saved:.1g} ms" if saved >= LEAST_SAVED else ""
