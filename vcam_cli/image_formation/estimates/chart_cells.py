@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.image_formation.cosine_series import Axis
 from vcam_cli.image_formation.estimates.bandwidth import axes
+from vcam_cli.image_formation.estimates.cell_search import CHEAP, CellSearch, CellTrial
 from vcam_cli.image_formation.optical_path import OpticalPath
 from vcam_cli.parallel import product
 from vcam_cli.scenes.base import ChartScene
@@ -36,22 +37,12 @@ this part of full signal over the squared ratio of that frequency to the cut-off
 SAFE = 3.0
 """Factor on the cells that this asks for where none are measured: a chart of patches smaller than
 the lens resolves leaves twice as much, relative to its own weak signal."""
-CHEAP = 1 << 20
-"""Cells that are painted without asking whether fewer would do."""
 MOST_OF_SMALL, MOST = 1 << 22, 1 << 26
 """Cells at most, of arrays with fewer pixels than a crop and of others."""
 LADDER = (1.1, 1.6, 2.2, 2.7, 3.3, 4.2, 5.3, 6.6, 8.3, 10.4, 13.1, 16.4, 24.2, 32.3, 48.1)
 """Cells per pixel pitch that are tried on crops."""
 LIKELY = 2.0
 """Cells per pixel pitch from which on they are tried; fewer, where it seems that they would do."""
-FASTEST_FALL = 4.0
-"""Power of the cells with which their error falls, at most: numbers of cells that would need a
-faster fall from those tried before are not tried."""
-SLOWEST_FALL = 2.0
-"""That power, at least: numbers that would need a slower one are not tried either."""
-BETWEEN = 1.04
-"""Of two numbers tried, of which one errs too much, cells between them are tried so many times what
-the law of powers asks for."""
 OVEREXPOSED = 2.0
 """Cells of charts that fill pixels, at least: fewer end the spectrum within that of the pixels, and
 bright light rings into dark pixels that are on none of the crops."""
@@ -147,75 +138,23 @@ def cells_per_pixel(path: OpticalPath, scene: ChartScene, highest: float) -> Cho
     if converged.max() > path.ceiling:
         least, budget = OVEREXPOSED, OVEREXPOSED_SHARE * budget
 
-    trials = 1
-
-    def measured(asked: float) -> _Trial:
-        nonlocal trials
-        trials += 1
-        found = _signals(path, crops, asked, level, otf)
+    def measure(cells: float) -> CellTrial:
+        found = _signals(path, crops, cells, level, otf)
         error = _error_that_counts(found, converged, path.ceiling, within(found).size)
-        return _Trial(_crop_grid(crops[0], g, asked)[0] * g.pitch_y / crops[0].pitch_y, error)
+        return CellTrial(_crop_grid(crops[0], g, cells)[0] * g.pitch_y / crops[0].pitch_y, error)
 
     ladder = [c for c in LADDER if least <= c <= min(most, reference / COPRIME)]
     first = next((i for i, c in enumerate(ladder) if c >= LIKELY), len(ladder) - 1)
-    kept: _Trial | None = None
-    failed: _Trial | None = None
-    for cells in ladder[first:]:
-        if failed and failed.error_of(cells, FASTEST_FALL) > budget:
-            continue
-        kept = measured(cells)
-        if kept.error <= budget:
-            break
-        kept, failed = None, kept
-    if kept and not failed:
-        for cells in ladder[:first][::-1]:
-            if kept.error_of(cells, SLOWEST_FALL) > budget:
-                break
-            fewer = measured(cells)
-            if fewer.error > budget:
-                failed = fewer
-                break
-            kept = fewer
-    for _ in range(2):
-        if not kept or not failed:
-            break
-        between = BETWEEN * failed.enough_beside(kept, budget)
-        if (kept.cells**2 - between**2) * whole < CHEAP:
-            break
-        fewer = measured(between)
-        if fewer.error <= budget:
-            kept = fewer
-            break
-        failed = fewer
-    if kept:
-        return ChosenCells(*kept, trials)
-    last = failed or _Trial(most, budget)
+    search = CellSearch(measure, budget)
+    search.try_upward(ladder[first:])
+    search.try_downward(ladder[:first])
+    search.try_between(whole, max(least, LADDER[0]))
+    if search.kept:
+        return ChosenCells(*search.kept, search.trials)
+    last = search.failed or CellTrial(most, budget)
     # It falls with the square of the cells, about: faster than is reckoned here.
     enough = min(last.cells * last.error / budget, most) if budget else most
-    return ChosenCells(enough, last.error_of(enough, 1.0), trials)
-
-
-class _Trial(NamedTuple):
-    """What cells err on crops of a chart."""
-
-    cells: float
-    """Cells per pixel pitch."""
-    error: float
-    """Rms of the signal [e/s]."""
-
-    def error_of(self, cells: float, power: float) -> float:
-        """Return the error of other cells, where it falls with a power of them [e/s]."""
-        return self.error * (self.cells / cells) ** power
-
-    def enough_beside(self, finer: _Trial, budget: float) -> float:
-        """Return the cells with which the error falls to a budget that a finer trial keeps.
-
-        It is a power of the cells between the two.
-        """
-        if finer.error <= 0:
-            return self.cells
-        power = math.log(self.error / finer.error) / math.log(finer.cells / self.cells)
-        return float(self.cells * (self.error / budget) ** (1 / power))
+    return ChosenCells(enough, last.error_of(enough, 1.0), search.trials)
 
 
 def _brightest_over_full(path: OpticalPath, scene: ChartScene) -> float:
