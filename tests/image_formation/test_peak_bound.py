@@ -1,5 +1,6 @@
 """The bound from below on full signal: never above the array's own brightest pixel."""
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -40,7 +41,8 @@ def full_signal(optical_path, scene) -> float:
 
 def brightest(optical_path, scene) -> float:
     """The brightest pixel, of all frequencies that the lens passes, and a chart on fine cells."""
-    knobs = replace(optical_path.settings, oversampling=16.0, float_width=64)
+    last = 16.0 if math.isfinite(optical_path.transfer.cutoff) else 64.0
+    knobs = replace(optical_path.settings, oversampling=last, float_width=64)
     return float(signal(replace(optical_path, settings=knobs), scene).max())
 
 
@@ -68,6 +70,7 @@ LENSES = {
     "beside its place": (Diffraction(2.0, 0.0), Leaning(8e-6, 3e-6, 1e-6, 2e-6)),
     "narrow": (Diffraction(2.0, 0.0), Leaning(0.3e-6, -0.2e-6, 0.2e-6, 0.3e-6)),
     "wide": (Diffraction(2.0, 0.0), Leaning(0.0, 0.0, 12e-6, 12e-6)),
+    "no end": (Leaning(0.3e-6, -0.2e-6, 0.05e-6, 0.05e-6),),
 }
 
 
@@ -177,8 +180,34 @@ def test_detail_that_repeats_with_the_pixels_is_their_constant_light():
     optical_path = path(g, Diffraction(1.0, 0.0), aperture(g))
     scene = of_picture(np.ones((200, 300)), PITCH)
     x, _ = axes(optical_path, scene, 6.5)
-    windows = peak_bound._windows(x, 0.0)
+    windows = peak_bound._windows(x, 0.0, 0.25)
     assert {0, 600, 1200, 1800} <= set(windows.terms.tolist())
     assert len(windows.terms) < 0.15 * x.terms
-    every, kept = windows.power
+    every, below, kept = windows.power
+    assert every == below
     assert 0 <= every - kept < 1e-5 * every
+
+
+def test_terms_up_to_a_part_of_the_highest_frequency_are_told_apart():
+    """What lies beyond counts in the power of all, and in neither of the others."""
+    g = sensor(200, 300)
+    optical_path = path(g, Diffraction(1.0, 0.0), aperture(g))
+    x, _ = axes(optical_path, of_picture(np.ones((200, 300)), PITCH), 6.5)
+    windows = peak_bound._windows(x, 0.0, 0.25)
+    some = windows.below(0.5)
+    assert some.terms.max() < 0.5 * x.terms <= windows.terms.max()
+    every, below, kept = some.power
+    assert every == windows.power[0]
+    assert kept <= below < 0.8 * every
+    assert below - kept < 1e-5 * every
+
+
+def test_a_spectrum_without_an_end_has_a_bound():
+    """A mosaic of detail that no lens ends: waves alike in every second pixel are many."""
+    rng = np.random.default_rng(7)
+    g = sensor(60, 80, fill=(0.5, 0.5))
+    lens = Leaning(0.3e-6, -0.2e-6, 0.05e-6, 0.05e-6)
+    optical_path = path(g, lens, aperture(g))
+    scene = of_picture(rng.random((75, 100)), 0.8 * PITCH)
+    found, exact = full_signal(optical_path, scene), brightest(optical_path, scene)
+    assert 0.1 * exact < found <= exact * (1 + ROUNDING)

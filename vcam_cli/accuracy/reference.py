@@ -37,6 +37,8 @@ CHANGES_PART = 0.2
 """Part of the tolerance to which it is measured what effects change,"""
 LEAST_OF_CHANGES = 0.001
 """and the least that it takes: at that of the reference some effects take minutes."""
+MOST_TERMS = 1e8
+"""Terms that are filtered for it to the tolerance itself, at most: beyond, it is done with that."""
 MOST_BYTES = 4e9
 """Memory beyond which a chart is not sampled more finely for the reference."""
 
@@ -114,20 +116,33 @@ def effect_changes(
     """Return the change of the mean raw by leaving out each effect: (rms, largest) [e].
 
     In 64 bits, to a part of the camera's tolerance: without an effect other cells and frequencies
-    are chosen, so that what they miss differs.
+    are chosen, so that what they miss differs. Where that would take too long it is measured to
+    the tolerance itself.
     """
     fixed = ablation.with_exposure_time(camera, exposure_time)
-    tolerance = max(camera.accuracy.tolerance * CHANGES_PART, LEAST_OF_CHANGES)
-    fixed = with_accuracy(fixed, tolerance=tolerance, float_width=64)
-    whole = prepare(ablation.with_effects(fixed, "all"), workers)[0]
-    noise = {e.name for e in of_kind(whole.plan.active, NoiseSource, Quantizer)}
-    truth, out = ablation.mean_raw(whole), {}
+    coarse = camera.accuracy.tolerance
+    fine = min(coarse, max(coarse * CHANGES_PART, LEAST_OF_CHANGES))
+
+    def light(tolerance: float, *without: str) -> Prepared:
+        exact = with_accuracy(fixed, tolerance=tolerance, float_width=64)
+        return prepare(ablation.with_effects(exact, "all", *without), workers)[0]
+
+    def is_quick(ready: Prepared) -> bool:
+        spectrum = ready.spectrum
+        return spectrum.terms * spectrum.planes * spectrum.filters <= MOST_TERMS
+
+    whole = {coarse: light(coarse)}
+    noise = {e.name for e in of_kind(whole[coarse].plan.active, NoiseSource, Quantizer)}
+    out = {name: np.zeros(2) for name in names}
     for name in names:
         if name in noise:  # drawn after the mean is known
-            out[name] = np.zeros(2)
-        else:
-            without = prepare(ablation.with_effects(fixed, "all", name), workers)[0]
-            out[name] = rms_and_largest(ablation.mean_raw(without) - truth)
+            continue
+        tolerance, found = coarse, light(coarse, name)
+        if is_quick(found):
+            tolerance, found = fine, light(fine, name)
+            whole[fine] = whole.get(fine) or light(fine)
+        change = ablation.mean_raw(found) - ablation.mean_raw(whole[tolerance])
+        out[name] = rms_and_largest(change)
     return out
 
 

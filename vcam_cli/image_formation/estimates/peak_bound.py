@@ -9,7 +9,7 @@ that the pixels make of it.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -26,8 +26,9 @@ WINDOW = 0.35875, 0.48829, 0.14128, 0.01168
 """Amplitudes of the cosines of the Blackman-Harris window, which is nowhere negative and passes
 less than 3e-5 of what is off its four lowest frequencies (F. J. Harris, Proc. IEEE 66, 1978,
 doi:10.1109/PROC.1978.10837)."""
-PART = 1 / 4
-"""Length of a window over that of the array."""
+LENGTHS = 1 / 4, 1.0
+"""Lengths of windows over that of the array; the longer tell where the shorter tell nothing: fewer
+terms are as constant in them."""
 PLACES = 16
 """Windows along each axis."""
 MOST, MOST_PART = 1 << 18, 1 / 8
@@ -50,11 +51,13 @@ def brightest_pixel(
     separable: Sequence[SeparableTransfer],
     rms: float,
     reach: float = 0.0,
+    rms_beyond: Callable[[float], float] | None = None,
 ) -> float:
     """Return a signal that the brightest pixel of the array has at least [electrons / s].
 
     It is that of one color, as if all pixels had it. The terms that are not summed can
-    bring no more than their part of the mean square, by Cauchy's inequality. A blur that the tables
+    bring no more than their part of the mean square, by Cauchy's inequality; where too many would
+    have to be, those of high frequencies are not summed either. A blur that the tables
     leave out makes of the mean over a window one of means over that window moved, by its reach at
     most: the darkest of them counts. Where the reach is no small part of a window, what the mean
     over the array keeps of the light that is further from its border counts.
@@ -73,26 +76,50 @@ def brightest_pixel(
         Root mean square of the signal over the scene, at least [electrons / s].
     reach : float, optional
         Reach of blurs that are not in the tables; by default there is none [m].
+    rms_beyond : callable, optional
+        From a part of the highest frequency along both axes to the root mean square of what lies
+        beyond, at least [electrons / s]; by default nothing is known of it.
 
     Returns
     -------
     float
         The bound; 0 where none is known, or none would be found soon.
     """
+    bounds = (
+        _bound(spectrum, axes, tables, separable, rms, reach, rms_beyond, length)
+        for length in LENGTHS
+    )
+    return next((bound for bound in bounds if bound > 0), 0.0)
+
+
+def _bound(
+    spectrum: SceneSpectrum,
+    axes: tuple[Axis, Axis],
+    tables: Tables,
+    separable: Sequence[SeparableTransfer],
+    rms: float,
+    reach: float,
+    rms_beyond: Callable[[float], float] | None,
+    length: float,
+) -> float:
+    """Return the bound from windows of one length, relative to that of the array."""
     x, y = axes
-    along_x, along_y = _windows(x, reach), _windows(y, reach)
+    along_x, along_y = _windows(x, reach, length), _windows(y, reach, length)
     if along_x is None or along_y is None:
         return 0.0
-    if len(along_x.terms) * len(along_y.terms) > max(MOST, x.terms * y.terms * MOST_PART):
+    count, most = len(along_x.terms) * len(along_y.terms), max(MOST, x.terms * y.terms * MOST_PART)
+    part = math.sqrt(most / count) if count > most else 1.0
+    if part < 1 and rms_beyond is None:
         return 0.0  # to find it would take as long as to filter the whole spectrum
+    along_x, along_y = along_x.below(part), along_y.below(part)
     fx, fy = x.frequencies[along_x.terms], y.frequencies[along_y.terms]
     (index_x, factor_x), (index_y, factor_y) = along_x.coefficients, along_y.coefficients
     for effect in separable:
         factor_x = factor_x * effect.along_x(fx)
         factor_y = factor_y * effect.along_y(fy)
-    length = min(along_x.length, along_y.length)
-    is_wide = reach > length * LARGEST_REACH
-    steps = 0 if is_wide else math.ceil(reach / (length * STEP))
+    shorter = min(along_x.length, along_y.length)
+    is_wide = reach > shorter * LARGEST_REACH
+    steps = 0 if is_wide else math.ceil(reach / (shorter * STEP))
     moved = np.linspace(-reach, reach, 2 * steps + 1) if steps else np.zeros(1)
     signal = np.zeros((len(along_y.centers) * len(moved), len(along_x.centers) * len(moved)))
     for parity in tables.parities:
@@ -105,8 +132,11 @@ def brightest_pixel(
             for plane, of_plane in enumerate(table.values(fy[rows])[:, 0]):
                 light = light + of_plane * spectrum.terms(plane, index_y[rows], index_x)
             signal += over_y[:, rows] @ product(light, over_x)
-    every, summed = along_x.power[0] * along_y.power[0], along_x.power[1] * along_y.power[1]
-    left_out = math.sqrt(max(every - summed, 0.0) * len(tables.parities)) * rms
+    every, below, summed = np.multiply(along_x.power, along_y.power)
+    left_out = math.sqrt(max(below - summed, 0.0) * len(tables.parities)) * rms
+    if rms_beyond is not None and part < 1:
+        beyond = max(every - below, 0.0) * len(tables.parities)
+        left_out += math.sqrt(beyond) * rms_beyond(part)
     if is_wide:
         return max(0.0, along_x.share * along_y.share * (float(signal.mean()) - left_out))
     darkest = signal.reshape(len(along_y.centers), len(moved), -1, len(moved)).min(axis=(1, 3))
@@ -121,6 +151,7 @@ def brightest_of_mosaic(
     separable: Sequence[SeparableTransfer],
     rms: float,
     reach: float = 0.0,
+    rms_beyond: Callable[[float], float] | None = None,
 ) -> float:
     """Return the same for an array whose pixels have the colors of a mosaic [electrons / s].
 
@@ -135,7 +166,8 @@ def brightest_of_mosaic(
     y = _every_nth(axes[1], row, len(mosaic.block))
     if not (x.pixels and y.pixels):
         return 0.0
-    return brightest_pixel(spectrum, (x, y), tables.of_color(index), separable, rms, reach)
+    known = spectrum, (x, y), tables.of_color(index), separable
+    return brightest_pixel(*known, rms, reach, rms_beyond)
 
 
 def _every_nth(axis: Axis, first: int, step: int) -> Axis:
@@ -159,14 +191,30 @@ class Windows:
     """(m,) Part of each of them that is left in the mean over a window."""
     centers: NDArray
     """(p,) Centers of the windows, from the scene's edge [m]."""
+    pixels: int
+    """Pixels of a window."""
     length: float
-    """Length of a window [m]."""
-    power: tuple[float, float]
-    """Sum of the squares of these parts over all terms, each over the mean square of its wave, and
-    over those that count."""
+    """Their length [m]."""
+    power: tuple[float, float, float]
+    """Sum of the squares of these parts over all terms, each over the mean square of its wave; over
+    those up to the highest frequency that is summed; and over those that count."""
     share: float
     """Weight of a pixel in the mean over the array over that in the mean of all windows, at
     least."""
+
+    def below(self, part: float) -> Windows:
+        """Return them with the terms up to a part of the axis's highest frequency alone."""
+        if part >= 1:
+            return self
+        count = max(1, int(part * self.axis.terms))
+        some = self.terms < count
+        terms, left = self.terms[some], self.left[some]
+        kept = float((np.square(left) * _twice(terms)).sum())
+        low = window_spectrum(
+            2 * np.pi * self.axis.frequencies[:count] * self.axis.pixel_pitch, self.pixels
+        )
+        every = float((np.square(low) * _twice(np.arange(count))).sum())
+        return replace(self, terms=terms, left=left, power=(self.power[0], every, kept))
 
     @property
     def coefficients(self) -> tuple[NDArray, NDArray]:
@@ -186,9 +234,10 @@ def _twice(terms: NDArray) -> NDArray:
     return np.where(terms > 0, 2, 1)
 
 
-def _windows(axis: Axis, reach: float) -> Windows | None:
+def _windows(axis: Axis, reach: float, length: float) -> Windows | None:
     """Return windows all over the array's side; None where blurs left out are wider than it.
 
+    Their length is relative to that side.
     What such blurs move by their reach is still on the array, if it is not nearer to its border,
     or mirrored there.
     """
@@ -197,7 +246,7 @@ def _windows(axis: Axis, reach: float) -> Windows | None:
     inside = axis.pixels - 2 * aside
     if inside < 1:
         return None
-    pixels = max(math.floor(PART * inside), 1)
+    pixels = max(math.floor(length * inside), 1)
     left = window_spectrum(2 * np.pi * axis.frequencies * axis.pixel_pitch, pixels)
     terms = np.flatnonzero(np.abs(left) > KEPT)
     starts = np.unique(np.rint(np.linspace(aside, aside + inside - pixels, PLACES))).astype(int)
@@ -207,8 +256,9 @@ def _windows(axis: Axis, reach: float) -> Windows | None:
         terms=terms,
         left=left[terms],
         centers=axis.first + (starts + (pixels - 1) / 2) * axis.pixel_pitch,
+        pixels=pixels,
         length=pixels * pitch,
-        power=(float(power.sum()), float(power[terms].sum())),
+        power=(float(power.sum()), float(power.sum()), float(power[terms].sum())),
         share=_share_of_mean(starts, pixels, axis.pixels),
     )
 

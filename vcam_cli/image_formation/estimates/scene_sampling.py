@@ -127,12 +127,17 @@ def sampled_image(
     )
     rms = float(np.sqrt(squares.reshape(len(squares), -1).sum(axis=1).max()))
     aside = max((blur.reach for blur in directed), default=0.0)
+    pitch = g.pitch_y, g.pitch_x
+    top = 2 * min(pitch[0] * y.bandwidth, pitch[1] * x.bandwidth)
+
+    def rms_beyond(part: float) -> float:
+        return power.tail_rms(squares, part * top, pitch)
+
     brightest = brightest_of_mosaic(
-        path.mosaic, spectrum, (x, y), tables, path.separable, rms, aside
+        path.mosaic, spectrum, (x, y), tables, path.separable, rms, aside, rms_beyond
     )
     full = min(brightest, path.ceiling)
     density = math.prod(scene.extent) / (g.sensor_width * g.sensor_height)
-    pitch = g.pitch_y, g.pitch_x
     if knobs.oversampling is None:
         allowed = FREQUENCY_SHARE * knobs.tolerance * full
         budget = allowed / math.sqrt(density * _more_than_mean(g.rows * g.columns))
