@@ -136,9 +136,9 @@ def test_filters_go_as_far_as_the_low_pass_of_rings(monkeypatch):
     assert rms(found.values, exact) < 0.05 * STANDARD.tolerance * exact.max()
 
 
-@pytest.mark.parametrize(("rows", "followed"), [(100, 10), (240, 0)])
+@pytest.mark.parametrize(("rows", "followed"), [(100, 2), (240, 0)])
 def test_modes_are_left_out_of_far_light_that_hardly_counts(rows, followed, monkeypatch):
-    """Bright patches around a small array count, and around a larger one little.
+    """Of bright patches around a small array those next to it count, around a larger one none.
 
     A tenth of the tolerance is what that light may be; what the modes change of it is less.
     """
@@ -162,4 +162,4 @@ def test_modes_are_left_out_of_far_light_that_hardly_counts(rows, followed, monk
     error = rms(few.rate, all_of_them.rate) * few.exposure_time
     allowed = 0.1 * made.accuracy.tolerance * ablation.full_signal(few)
     assert error < allowed / 10
-    assert (error > 0) == (followed < 10)
+    assert error > 0
