@@ -38,7 +38,7 @@ CHANGES_PART = 0.2
 LEAST_OF_CHANGES = 0.001
 """and the least that it takes: at that of the reference some effects take minutes."""
 MOST_TERMS = 1e8
-"""Terms that are filtered for it to the tolerance itself, at most: beyond, it is done with that."""
+"""Terms that measuring to the tolerance itself filters: where they are more, that is enough."""
 MOST_BYTES = 4e9
 """Memory beyond which a chart is not sampled more finely for the reference."""
 
@@ -138,7 +138,7 @@ def effect_changes(
         if name in noise:  # drawn after the mean is known
             continue
         tolerance, found = coarse, light(coarse, name)
-        if is_quick(found):
+        if fine < coarse and is_quick(found):
             tolerance, found = fine, light(fine, name)
             whole[fine] = whole.get(fine) or light(fine)
         change = ablation.mean_raw(found) - ablation.mean_raw(whole[tolerance])

@@ -11,6 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -50,8 +51,9 @@ def brightest_pixel(
     tables: Tables,
     separable: Sequence[SeparableTransfer],
     rms: float,
-    reach: float = 0.0,
-    rms_beyond: Callable[[float], float] | None = None,
+    rms_beyond: Callable[[float], float],
+    reach: float,
+    length: float,
 ) -> float:
     """Return a signal that the brightest pixel of the array has at least [electrons / s].
 
@@ -74,43 +76,25 @@ def brightest_pixel(
         Transfer functions along the axes.
     rms : float
         Root mean square of the signal over the scene, at least [electrons / s].
-    reach : float, optional
-        Reach of blurs that are not in the tables; by default there is none [m].
-    rms_beyond : callable, optional
+    rms_beyond : callable
         From a part of the highest frequency along both axes to the root mean square of what lies
-        beyond, at least [electrons / s]; by default nothing is known of it.
+        beyond, at least [electrons / s].
+    reach : float
+        Reach of blurs that are not in the tables [m].
+    length : float
+        Length of the windows over that of the array.
 
     Returns
     -------
     float
-        The bound; 0 where none is known, or none would be found soon.
+        The bound; 0 where none is known.
     """
-    bounds = (
-        _bound(spectrum, axes, tables, separable, rms, reach, rms_beyond, length)
-        for length in LENGTHS
-    )
-    return next((bound for bound in bounds if bound > 0), 0.0)
-
-
-def _bound(
-    spectrum: SceneSpectrum,
-    axes: tuple[Axis, Axis],
-    tables: Tables,
-    separable: Sequence[SeparableTransfer],
-    rms: float,
-    reach: float,
-    rms_beyond: Callable[[float], float] | None,
-    length: float,
-) -> float:
-    """Return the bound from windows of one length, relative to that of the array."""
     x, y = axes
     along_x, along_y = _windows(x, reach, length), _windows(y, reach, length)
     if along_x is None or along_y is None:
         return 0.0
     count, most = len(along_x.terms) * len(along_y.terms), max(MOST, x.terms * y.terms * MOST_PART)
     part = math.sqrt(most / count) if count > most else 1.0
-    if part < 1 and rms_beyond is None:
-        return 0.0  # to find it would take as long as to filter the whole spectrum
     along_x, along_y = along_x.below(part), along_y.below(part)
     fx, fy = x.frequencies[along_x.terms], y.frequencies[along_y.terms]
     (index_x, factor_x), (index_y, factor_y) = along_x.coefficients, along_y.coefficients
@@ -134,7 +118,7 @@ def _bound(
             signal += over_y[:, rows] @ product(light, over_x)
     every, below, summed = np.multiply(along_x.power, along_y.power)
     left_out = math.sqrt(max(below - summed, 0.0) * len(tables.parities)) * rms
-    if rms_beyond is not None and part < 1:
+    if part < 1:
         beyond = max(every - below, 0.0) * len(tables.parities)
         left_out += math.sqrt(beyond) * rms_beyond(part)
     if is_wide:
@@ -150,8 +134,8 @@ def brightest_of_mosaic(
     tables: Tables,
     separable: Sequence[SeparableTransfer],
     rms: float,
-    reach: float = 0.0,
-    rms_beyond: Callable[[float], float] | None = None,
+    rms_beyond: Callable[[float], float],
+    reach: float,
 ) -> float:
     """Return the same for an array whose pixels have the colors of a mosaic [electrons / s].
 
@@ -166,8 +150,9 @@ def brightest_of_mosaic(
     y = _every_nth(axes[1], row, len(mosaic.block))
     if not (x.pixels and y.pixels):
         return 0.0
-    known = spectrum, (x, y), tables.of_color(index), separable
-    return brightest_pixel(*known, rms, reach, rms_beyond)
+    known = spectrum, (x, y), tables.of_color(index), separable, rms, rms_beyond, reach
+    bounds = (brightest_pixel(*known, length) for length in LENGTHS)
+    return next((bound for bound in bounds if bound > 0), 0.0)
 
 
 def _every_nth(axis: Axis, first: int, step: int) -> Axis:
@@ -180,47 +165,49 @@ def _every_nth(axis: Axis, first: int, step: int) -> Axis:
     )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Windows:
     """Windows of pixels along an axis, and the terms of the series that count in them."""
 
     axis: Axis
-    terms: NDArray
-    """(m,) rising"""
     left: NDArray
-    """(m,) Part of each of them that is left in the mean over a window."""
+    """(terms of the axis,) Part of each of them that is left in the mean over a window."""
+    count: int
+    """Terms up to the highest frequency that is summed."""
     centers: NDArray
     """(p,) Centers of the windows, from the scene's edge [m]."""
-    pixels: int
-    """Pixels of a window."""
     length: float
-    """Their length [m]."""
-    power: tuple[float, float, float]
-    """Sum of the squares of these parts over all terms, each over the mean square of its wave; over
-    those up to the highest frequency that is summed; and over those that count."""
+    """Length of a window [m]."""
     share: float
     """Weight of a pixel in the mean over the array over that in the mean of all windows, at
     least."""
 
     def below(self, part: float) -> Windows:
         """Return them with the terms up to a part of the axis's highest frequency alone."""
-        if part >= 1:
-            return self
-        count = max(1, int(part * self.axis.terms))
-        some = self.terms < count
-        terms, left = self.terms[some], self.left[some]
-        kept = float((np.square(left) * _twice(terms)).sum())
-        low = window_spectrum(
-            2 * np.pi * self.axis.frequencies[:count] * self.axis.pixel_pitch, self.pixels
-        )
-        every = float((np.square(low) * _twice(np.arange(count))).sum())
-        return replace(self, terms=terms, left=left, power=(self.power[0], every, kept))
+        return replace(self, count=max(1, int(part * self.axis.terms)))
+
+    @cached_property
+    def terms(self) -> NDArray:
+        """The terms that count (m,), rising."""
+        return np.flatnonzero(np.abs(self.left[: self.count]) > KEPT)
+
+    @property
+    def power(self) -> tuple[float, float, float]:
+        """Sum of the squares of what is left, each over the mean square of its wave.
+
+        That of all terms, of those up to the highest frequency that is summed, and of those that
+        count.
+        """
+        power = np.square(self.left) * _twice(np.arange(self.axis.terms))
+        every, below, kept = power, power[: self.count], power[self.terms]
+        return float(every.sum()), float(below.sum()), float(kept.sum())
 
     @property
     def coefficients(self) -> tuple[NDArray, NDArray]:
         """The coefficients behind the terms, and what the mean over a window has of them: (m,)."""
         index, sign = self.axis.coefficient_index(self.terms)
-        return index, sign * self.left * self.axis.weights[self.terms] * _twice(self.terms)
+        left = self.left[self.terms]
+        return index, sign * left * self.axis.weights[self.terms] * _twice(self.terms)
 
     def waves(self, odd: bool, moved: NDArray) -> NDArray:
         """Return every term, as cosine or sine, at every center, moved by so much [m]: (p, m)."""
@@ -247,18 +234,13 @@ def _windows(axis: Axis, reach: float, length: float) -> Windows | None:
     if inside < 1:
         return None
     pixels = max(math.floor(length * inside), 1)
-    left = window_spectrum(2 * np.pi * axis.frequencies * axis.pixel_pitch, pixels)
-    terms = np.flatnonzero(np.abs(left) > KEPT)
     starts = np.unique(np.rint(np.linspace(aside, aside + inside - pixels, PLACES))).astype(int)
-    power = np.square(left) * _twice(np.arange(axis.terms))
     return Windows(
         axis=axis,
-        terms=terms,
-        left=left[terms],
+        left=window_spectrum(2 * np.pi * axis.frequencies * axis.pixel_pitch, pixels),
+        count=axis.terms,
         centers=axis.first + (starts + (pixels - 1) / 2) * axis.pixel_pitch,
-        pixels=pixels,
         length=pixels * pitch,
-        power=(float(power.sum()), float(power.sum()), float(power[terms].sum())),
         share=_share_of_mean(starts, pixels, axis.pixels),
     )
 

@@ -134,7 +134,7 @@ def sampled_image(
         return power.tail_rms(squares, part * top, pitch)
 
     brightest = brightest_of_mosaic(
-        path.mosaic, spectrum, (x, y), tables, path.separable, rms, aside, rms_beyond
+        path.mosaic, spectrum, (x, y), tables, path.separable, rms, rms_beyond, aside
     )
     full = min(brightest, path.ceiling)
     density = math.prod(scene.extent) / (g.sensor_width * g.sensor_height)

@@ -73,7 +73,8 @@ def plot_scene_plans(path: Path | str, title: str, plans: Sequence[ScenePlan]) -
         exponents = np.arange(-DECADES, DECADES + 1, 1.0)
         bar.set_ticks(list(exponents), labels=[f"{10.0**e:g}" for e in exponents])
         bar.set_label("contribution over what may be left out together")
-        figure.supxlabel('an effect without "on" is left out; a time is what that saves', size=8)
+        said = 'an effect without "on" or "free" is left out; a time is what that saves'
+        figure.supxlabel(said, size=8)
         save(figure, path)
 
 
