@@ -49,6 +49,18 @@ def test_tiles_without_an_edge_are_left_out():
     assert (seen == 1).all()
 
 
+def test_a_strip_ends_where_a_tile_is_missing_and_with_its_row():
+    edges = np.ones((150, 390), bool)
+    every, _ = edge_tiles.tiles_with(edges, 3.0, 4)
+    across = len({columns.start for _, columns in every})
+    edges[every[2]] = False
+    tiles, _ = edge_tiles.tiles_with(edges, 3.0, 4)
+    strips = edge_tiles.adjacent(tiles)
+    assert [tile for strip in strips for tile in strip] == tiles
+    lengths = [len(strip) for strip in strips]
+    assert lengths == [2, across - 3] + [across] * (len(every) // across - 1)
+
+
 def test_covariance_of_stripes_is_that_of_their_waves():
     """A wave of cover before a wave of light: the mean over the aperture in closed form.
 

@@ -61,6 +61,18 @@ def tiles_with(edges: NDArray, radius: float, whole: int) -> tuple[list[Tile], t
     return tiles, (size[0], size[1])
 
 
+def adjacent(tiles: Sequence[Tile]) -> list[list[Tile]]:
+    """Return strips of tiles, each of which begins where the one to its left ends."""
+    strips: list[list[Tile]] = []
+    for tile in tiles:
+        last = strips[-1][-1] if strips else None
+        if last and last[0] == tile[0] and last[1].stop == tile[1].start:
+            strips[-1].append(tile)
+        else:
+            strips.append([tile])
+    return strips
+
+
 @dataclass(frozen=True)
 class Cells:
     """The cells of a tile, which begin at its first pixel's border, and those around it.
@@ -99,13 +111,16 @@ class Cells:
         """Of a cell along x and y [m]."""
         return self.geometry.pitch_x / self.per_pixel, self.geometry.pitch_y / self.per_pixel
 
-    def edges(self, tile: Tile) -> tuple[NDArray, NDArray]:
-        """Return the edges of columns and of rows of cells around a tile [m]."""
+    def edges(self, tile: Tile, further: int = 0) -> tuple[NDArray, NDArray]:
+        """Return the edges of columns and of rows of cells around a tile [m].
+
+        They go on for some further columns to its right.
+        """
         g, (side_x, side_y) = self.geometry, self.sides
         x, y = pixel_centers(g, detector=True)
         left, top = x[tile[1].start] - g.pitch_x / 2, y[tile[0].start] - g.pitch_y / 2
         return (
-            left + (np.arange(self.shape[1] + 1) - self.before[1]) * side_x,
+            left + (np.arange(self.shape[1] + further + 1) - self.before[1]) * side_x,
             top + (np.arange(self.shape[0] + 1) - self.before[0]) * side_y,
         )
 
@@ -191,8 +206,9 @@ class Painting:
             mix = np.zeros((len(level) + 1, level.shape[1] + 1), path.settings.dtype)
             mix[:-1, :-1], mix[-1, -1] = level, 1
             self._mixes.append(mix)
-        seen = results(self._visible_layers, tiles, path.workers)
-        found = [(place, own) for place, own in enumerate(seen) if len(own) > 1]
+        seen = results(self._visible_layers, adjacent(tiles), path.workers)
+        every = [own for strip in seen for own in strip]
+        found = [(place, own) for place, own in enumerate(every) if len(own) > 1]
         found.sort(key=lambda each: list(each[1]))
         self.places = [place for place, _ in found]
         """Numbers of the given tiles, in the order of the batches."""
@@ -212,14 +228,23 @@ class Painting:
         """Values of all layers on all tiles."""
         return sum(batch.values for batch in self.batches)
 
-    def _visible_layers(self, tile: Tile) -> dict[int, NDArray]:
-        """Return the layers of a tile that are seen, by their number."""
-        edges, layers = self.cells.edges(tile), {}
+    def _visible_layers(self, strip: list[Tile]) -> list[dict[int, NDArray]]:
+        """Return the layers that are seen of each tile of a strip, by their number."""
+        cells, first = self.cells, strip[0]
+        starts = [round((tile[1].start - first[1].start) * cells.per_pixel) for tile in strip]
+        edges = cells.edges(first, starts[-1])
+        layers: list[dict[int, NDArray]] = [{} for _ in strip]
+        open_tiles = list(zip(starts, layers, strict=True))
         for number, (part, mix) in enumerate(zip(self._scene.parts, self._mixes, strict=True)):
             planes = part.chart.averages(*edges, mix)
-            if planes[-1].any():
-                layers[number] = planes
-            if planes[-1].min() >= 1:
+            hidden = []
+            for start, seen in open_tiles:
+                own = planes[..., start : start + cells.shape[1]]
+                if own[-1].any():
+                    seen[number] = own
+                hidden.append(own[-1].min() >= 1)
+            open_tiles = [tile for tile, gone in zip(open_tiles, hidden, strict=True) if not gone]
+            if not open_tiles:
                 break
         return layers
 

@@ -117,7 +117,9 @@ def add_covariance(
             values += found.values
         if found.light and found.likely_rms <= allowed:
             return Hidden(0, found.likely_rms, values)
-        grid, rings = (found.cells, found.count), found.sufficient_rings(allowed)
+        per_pixel = round(found.cells.per_pixel)
+        closest = Cells.around(g, size, per_pixel, widest[0], 2 * found.count)
+        grid, rings = (closest, found.count), found.sufficient_rings(allowed)
         found = _converged(path, scene, all_tiles(tiles, edges.size), grid, allowed, rings)
         values += found.values
     for tile, part in zip(found.sample.tiles, found.light, strict=True):
