@@ -102,7 +102,8 @@ def light_plan(path: OpticalPath, scene: AnyScene) -> LightPlan:
     candidates = of_kind(path.optional, *KINDS)
     if not candidates:
         return LightPlan()
-    if path.transfer.is_dark or path.fullness * _least_gain(path) >= 1:
+    # The least gain is at most that of the axis.
+    if path.transfer.is_dark or (path.fullness >= 1 and path.fullness * _least_gain(path) >= 1):
         return LightPlan(candidates, shares=dict.fromkeys((e.name for e in candidates), 0.0))
     budget = LIGHT_SHARE * path.settings.tolerance
     functions: dict[Effect, NDArray] = {}

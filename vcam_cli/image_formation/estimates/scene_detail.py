@@ -37,8 +37,9 @@ TILES = 16
 """Tiles that are transformed, at most."""
 ASKED = (1, 2, 4, 8)
 """Numbers of tiles after which it is asked whether they tell enough."""
-MOST_PLACES = 24
-"""Parts of the array along each axis, at most, each of which may be a tile's place."""
+MOST_PLACES, FEW_PLACES = 24, 8
+"""Parts of the array along each axis, at most, each of which may be a tile's place; and those where
+the detail is known, and the survey serves gains alone, which change slowly."""
 SURVEY = 4
 """Points along each axis of such a part."""
 ANYWHERE = 0.1
@@ -160,10 +161,10 @@ def _light_at(scene: Scene, x: NDArray, y: NDArray, level: NDArray) -> NDArray:
     return scene.values_at(x, y, level[None] / largest)[0].astype(np.float64) * largest
 
 
-def _places(path: OpticalPath) -> list[int]:
+def _places(path: OpticalPath, most: int) -> list[int]:
     """Return the parts of the array along y and x of which each is surveyed."""
     g = path.geometry
-    return [min(max(1, round(n / TILE)), MOST_PLACES) for n in (g.rows, g.columns)]
+    return [min(max(1, round(n / TILE)), most) for n in (g.rows, g.columns)]
 
 
 def _edge_detail(
@@ -175,7 +176,7 @@ def _edge_detail(
     widest = max(g.pitch_x, g.pitch_y, *(e.reach for e in path.effects))
     frequency, power, beyond = edge_power(rectangles, min(cutoff, 1 / widest), cutoff)
     brightest = min(float(rectangles.values.max()), path.ceiling)
-    even = _surveyed(path, scene, level, _places(path))
+    even = _surveyed(path, scene, level, _places(path, FEW_PLACES))
     return replace(
         even,
         fx=frequency,
@@ -191,7 +192,8 @@ def _wave_detail(path: OpticalPath, scene: WaveScene, level: NDArray) -> SceneDe
     """Return waves at their pairs of frequencies, with half of their squared amplitudes."""
     g = path.geometry
     shortest = min(g.columns, g.rows)
-    even = _surveyed(path, scene, level, _places(path) if shortest > 1 else (1, 1))
+    places = _places(path, FEW_PLACES) if shortest > 1 else (1, 1)
+    even = _surveyed(path, scene, level, places)
     waves = [wave for wave in scene.waves if wave.fx or wave.fy]
     amplitudes = np.array([level @ np.asarray(wave.weights) for wave in waves])
     return replace(
@@ -214,7 +216,7 @@ def _tile_detail(path: OpticalPath, scene: Scene, level: NDArray, settled: Settl
     side = np.minimum(TILE, size)
     covers = counts.prod() <= TILES
     if not covers:
-        counts = np.array(_places(path))
+        counts = np.array(_places(path, MOST_PLACES))
         side = np.minimum(TILE, size // counts)
     points, length = POINTS_PER_PIXEL * side, side * pitch
     even = _surveyed(path, scene, level, counts.tolist())
@@ -360,11 +362,8 @@ def _spectrum(path: OpticalPath) -> list[tuple[float, float]]:
     """Return some wavelengths [m], and their shares of the light."""
     transfer = path.transfer
     light = np.abs(transfer.weights).sum(axis=(0, 1)) + np.finfo(float).tiny
-    parts = np.array_split(np.arange(len(light)), min(WAVELENGTHS, len(light)))
-    return [
-        (
-            float(np.average(transfer.wavelengths[part], weights=light[part])),
-            float(light[part].sum() / light.sum()),
-        )
-        for part in parts
-    ]
+    count = min(WAVELENGTHS, len(light))
+    starts = np.arange(count) * len(light) // count
+    each = np.add.reduceat(light, starts)
+    means = np.add.reduceat(light * transfer.wavelengths, starts) / each
+    return list(zip(means.tolist(), (each / each.sum()).tolist(), strict=True))
