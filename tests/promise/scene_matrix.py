@@ -206,27 +206,30 @@ class Times:
         )
 
 
-ENOUGH = 12.0
-"""Seconds after which no frame is repeated."""
+SURE, ENOUGH = 4.0, 12.0
+"""Seconds for which frames are repeated at least, a few turns; and after which no more are."""
+TURNS = 5
+"""Turns at least, where they take no longer."""
 
 
-def times(name: str, scene: str, folder: Path, repeats: int = 5) -> Times:
+def times(name: str, scene: str, folder: Path) -> Times:
     """Time a frame as planned, and with everything on, in turns; the first of each is not counted.
 
-    Frames that take long are taken once more, and no more.
+    What comes first changes from turn to turn. Of so many short frames that scatter says little;
+    frames that take long are taken once more, and no more.
     """
     auto = camera(name, scene, LARGE, folder)
-    everything = ablation.with_effects(auto, "all")
+    both = [auto, ablation.with_effects(auto, "all")]
     best, spent = [math.inf, math.inf], 0.0
-    for turn in range(repeats + 1):
-        for index, made in enumerate((auto, everything)):
+    for turn in itertools.count():
+        for index in (0, 1) if turn % 2 else (1, 0):
             start = time.process_time()
-            _ = simulate(made, 1).render
+            _ = simulate(both[index], 1).render
             took = time.process_time() - start
             spent += took
             if turn:
                 best[index] = min(best[index], took)
-        if turn and spent > ENOUGH:
+        if turn and (spent > ENOUGH or (spent > SURE and turn >= TURNS)):
             break
     return Times(name, scene, *best)
 
