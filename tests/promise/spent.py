@@ -32,8 +32,9 @@ MOST_BYTES = 5e8
 those at standard that does not count [bytes]."""
 TIMED = (1_000_000, 2_000_000)
 """Pixels of an array that is timed, at least and at most."""
-TURNS = 3
-"""Frames of every preset that are timed, in turns; the fastest counts."""
+TURNS, LONG_TURNS, LONG = 9, 3, 2.0
+"""Frames of every preset that are timed, in turns, of which the fastest counts; and of those that
+take longer than so many seconds."""
 SPENT = (0.2, 0.9)
 """Parts of the tolerance between which an error lies that is neither wasted nor risked."""
 DRAFT, REFERENCE = 0.5, 10.0
@@ -121,7 +122,7 @@ def seconds(camera: Camera) -> dict[str, float]:
     taken = dict.fromkeys(presets, math.inf)
     for turn in range(TURNS):
         for preset, made in presets.items():
-            if turn and preset == "reference" and taken[preset] > 10:
+            if turn >= LONG_TURNS and taken[preset] > LONG:
                 continue
             start = time.process_time()
             _ = simulate(made, 1).render
