@@ -7,7 +7,7 @@ are known in closed form, and few numbers along each axis make all of them.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations_with_replacement, pairwise
 from typing import Protocol
 
@@ -200,6 +200,8 @@ def transform_painted(
     brightest : NDArray
         Largest absolute value of every plane (R,).
     """
+    if np.dtype(dtype).itemsize < np.dtype(scene.dtype).itemsize:
+        scene = replace(scene, dtype=dtype)
     rows, columns = scene.shape
     bands = bands_of_rows(rows, columns)
     half: NDArray = np.empty((len(mix), rows, terms[1]), dtype)

@@ -3,7 +3,7 @@
 The tolerance T bounds rms(mean raw - converged mean raw) / full signal (camera file key
 `accuracy`). Full signal is the largest mean signal on the array, at most the full well: it depends
 on the scene and its exposure. The settings below were chosen by measuring each alone on charts and
-pictures; `reference` also computes in 64 bits, and `draft` draws noise from few bits.
+pictures; `reference` also computes in 64 bits, but for charts, and `draft` draws noise from few.
 """
 
 from __future__ import annotations
@@ -32,6 +32,9 @@ class Settings:
     """Steps of tables over fx and fy in one period of the phase of the widest blur."""
     float_width: int
     """32 or 64 bits."""
+    chart_width: int = 32
+    """The same of a chart's spectrum, where the light does not call for more: it ends where the
+    tolerance lets it, far above the error of 32 bits, while that of a picture may be whole."""
     oversampling: float | None = None
     """Cells per pixel pitch of a chart, and highest frequency of any spectrum in pixel Nyquist
     frequencies; None: what the tolerance asks for."""
@@ -78,4 +81,6 @@ def camera_settings(camera: Camera) -> Settings:
     chosen = replace(chosen, tolerance=accuracy.tolerance, mixing_tolerance=mixing)
     if camera.scene.wavelengths.step is not None:
         chosen = replace(chosen, wavelength_step=camera.scene.wavelengths.step)
+    if "float_width" in accuracy.knobs:
+        chosen = replace(chosen, chart_width=accuracy.knobs["float_width"])
     return replace(chosen, **accuracy.knobs)

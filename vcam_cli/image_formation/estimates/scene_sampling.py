@@ -70,16 +70,17 @@ class SampledImage:
 
 
 def with_sufficient_precision(path: OpticalPath, scene: SampledScene) -> OpticalPath:
-    """Return the path, in 64 bits where 32 would take more than their share of the tolerance.
+    """Return the path with as many bits as its spectrum calls for.
 
-    Full signal is at least the mean over the array, or the ceiling.
+    They are 64 where 32 would take more than their share of the tolerance; else what the settings
+    say of charts and of pictures. Full signal is at least the mean over the array, or the ceiling.
     """
     g, knobs = path.geometry, path.settings
     mean, rms = scene.mean_and_rms(path.transfer.level.T, (g.sensor_width, g.sensor_height))
     full = min(float(mean.max()), path.ceiling)
-    if float(rms.max()) * SINGLE <= SINGLE_SHARE * knobs.tolerance * full:
-        return path
-    return replace(path, settings=replace(knobs, float_width=64))
+    suffices = float(rms.max()) * SINGLE <= SINGLE_SHARE * knobs.tolerance * full
+    least = knobs.chart_width if isinstance(scene, ChartScene) else knobs.float_width
+    return replace(path, settings=replace(knobs, float_width=least if suffices else 64))
 
 
 def sampled_image(
