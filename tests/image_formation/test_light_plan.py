@@ -5,6 +5,7 @@ import pytest
 from making import camera, radiance_for
 
 from vcam_cli import simulate
+from vcam_cli.image_formation.light_plan import LIGHT_SHARE
 from vcam_cli.simulation.simulate import prepare
 
 SIZE = {"array.rows": 96, "array.columns": 128}
@@ -39,6 +40,24 @@ def test_without_a_blur_that_counts_there_is_no_spectrum(tmp_path):
     ready = prepare(camera(tmp_path, SIZE | large | WEDGE | {"effects": "auto"}), 1)[0]
     assert {d.name: d.state for d in ready.plan.decisions}["diffraction"] == "off"
     assert ready.spectrum.terms == 0
+
+
+def test_the_lens_goes_before_the_average_of_the_photodetector(tmp_path):
+    """Of the two, which change too much together, only without the lens is there no spectrum."""
+    changes = {"array.rows": 300, "array.columns": 800, "pixel.width": "8 um", "effects": "auto"}
+    changes |= {"optics.f_number": 5.6, "accuracy": "standard"}
+    changes |= {"scene.source": WEDGE["scene.source"] | {"steps": 20}}
+    ready = prepare(camera(tmp_path, changes), 1)[0]
+    shares = ready.plan.decisions
+    lens, average = (
+        next(d for d in shares if d.name == n) for n in ("diffraction", "pixel_aperture")
+    )
+    assert (lens.state, average.state, ready.spectrum.terms) == ("off", "on", 0)
+    budget = LIGHT_SHARE * ready.settings.tolerance
+    without = changes | {"effects": {"diffraction": "on", "pixel_aperture": "auto"}}
+    free = prepare(camera(tmp_path, without), 1)[0].plan.decisions
+    own = next(d.contribution for d in free if d.name == "pixel_aperture")
+    assert own < lens.contribution < budget < own + lens.contribution
 
 
 def test_what_ends_the_spectrum_of_others_stays_and_is_free(tmp_path):

@@ -28,6 +28,7 @@ from vcam_cli.effects.base import (
     VeilingGlare,
     of_kind,
 )
+from vcam_cli.effects.pixel.pixel_aperture import PixelAperture
 from vcam_cli.effects.temporal.sub_exposed_motion import SubExposedMotion
 from vcam_cli.image_formation.estimates.scene_detail import (
     SceneDetail,
@@ -39,7 +40,7 @@ from vcam_cli.image_formation.optical_path import OpticalPath
 from vcam_cli.scenes.depth_scene import DepthScene
 from vcam_cli.scenes.layered import AnyScene, LayeredScene
 
-LIGHT_SHARE = 0.3
+LIGHT_SHARE = 0.4
 """Part of the tolerance that all omitted effects on the light may use together."""
 LEVEL_SHARE = 0.5
 """Part of the tolerance by which they may shift a percentile of the light, relative to it: shot
@@ -125,12 +126,15 @@ def light_plan(path: OpticalPath, scene: AnyScene) -> LightPlan:
         functions.update(transfer_functions(path, detail))
     shares = {effect: _share(detail, functions, effect) for effect in candidates}
     chosen: list[Effect] = []
-    for effect in sorted(shares, key=shares.__getitem__):
-        together = [*chosen, effect]
-        if _joint_share(detail, functions, together, shares) > budget:
-            break
-        if _levels_stay(path, detail, effect):
-            chosen = together
+    # Without the pixel's average alone nothing is saved: it goes if the others leave room.
+    averages = of_kind(candidates, PixelAperture)
+    for group in ([e for e in candidates if e not in averages], averages):
+        for effect in sorted(group, key=shares.__getitem__):
+            together = [*chosen, effect]
+            if _joint_share(detail, functions, together, shares) > budget:
+                break
+            if _levels_stay(path, detail, effect):
+                chosen = together
     bounding = _bounding_blurs(path, chosen)
     omitted = tuple(effect for effect in chosen if effect not in bounding)
     told = (*omitted, *displacing)
