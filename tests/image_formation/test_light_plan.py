@@ -83,6 +83,18 @@ def test_the_photodetector_stays_and_is_free_where_the_lens_counts(tmp_path):
     assert kept.spectrum.terms < prepare(camera(tmp_path, changes | without), 1)[0].spectrum.terms
 
 
+def test_diffusion_of_little_weight_stays_and_is_free_where_the_lens_counts(tmp_path):
+    """It costs nothing there, and without it the spectrum would be longer than of all."""
+    changes = SILICON | WEDGE | {"optics.f_number": 11, "accuracy": "draft"}
+    changes |= {"pixel.photodetector.charge_diffusion.substrate_depth": "0.7 um"}
+    assert states(tmp_path, changes | {"effects": "auto"})["charge_diffusion"] == "free"
+    kept, whole = (
+        prepare(camera(tmp_path, SIZE | changes | {"effects": effects}), 1)[0].spectrum.terms
+        for effects in ("auto", "all")
+    )
+    assert 0 < kept == whole
+
+
 @pytest.mark.parametrize(("fraction", "state"), [(1e-4, "off"), (0.03, "on")])
 def test_glare_is_left_out_where_it_shifts_nothing(fraction, state, tmp_path):
     edge = {"scene.source": {"kind": "chart", "chart": "slanted-edge", "contrast": 0.2}}

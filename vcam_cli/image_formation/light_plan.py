@@ -22,6 +22,7 @@ from vcam_cli.effects.base import (
     FieldTransfer,
     Gain,
     ImageMotion,
+    RadialTransfer,
     SeparableTransfer,
     SignalLevels,
     Transport,
@@ -215,16 +216,15 @@ def _levels_stay(path: OpticalPath, detail: SceneDetail | None, effect: Effect) 
 def _bounding_blurs(path: OpticalPath, chosen: Collection[Effect]) -> tuple[Effect, ...]:
     """Return blurs that could go, but without which the spectrum of others would reach further.
 
-    Where it is followed for another blur, the transfer of the pixel costs nothing and ends it
-    earlier. Where no other blur has a last frequency, those that have one stay.
+    Where it is followed for another blur, transfers along the axes or of |f| alone cost nothing and
+    end it earlier. Where no other blur has a last frequency, those that have one stay.
     """
     wavelength = float(path.transfer.wavelengths[-1])
     kept = [blur for blur in of_kind(path.effects, Blur) if blur not in chosen]
     if not (kept or path.field not in (None, *chosen)):
         return ()
-    bounded = any(math.isfinite(blur.cutoff(wavelength)) for blur in kept)
-    bounds = [] if bounded else of_kind(chosen, Blur)
-    return (
-        *of_kind(chosen, SeparableTransfer),
-        *(blur for blur in bounds if math.isfinite(blur.cutoff(wavelength))),
-    )
+    costless = of_kind(chosen, SeparableTransfer, RadialTransfer)
+    if any(math.isfinite(blur.cutoff(wavelength)) for blur in kept):
+        return costless
+    others = [blur for blur in of_kind(chosen, Blur) if blur not in costless]
+    return (*costless, *(blur for blur in others if math.isfinite(blur.cutoff(wavelength))))
