@@ -59,6 +59,10 @@ def test_a_strip_ends_where_a_tile_is_missing_and_with_its_row():
     assert [tile for strip in strips for tile in strip] == tiles
     lengths = [len(strip) for strip in strips]
     assert lengths == [2, across - 3] + [across] * (len(every) // across - 1)
+    assert max(lengths) < edge_tiles.IN_A_STRIP
+    wide, _ = edge_tiles.tiles_with(np.ones((60, 2000), bool), 3.0, 4)
+    lengths = [len(strip) for strip in edge_tiles.adjacent(wide)]
+    assert sum(lengths) == len(wide) > max(lengths) == edge_tiles.IN_A_STRIP
 
 
 def test_covariance_of_stripes_is_that_of_their_waves():

@@ -27,6 +27,8 @@ SIDE = 48
 """Side of a tile, at least [pixels]."""
 SIDE_IN_RADII = 4
 """The same, in radii of the widest blur: what lies around a tile is then no more than twice it."""
+IN_A_STRIP = 16
+"""Tiles that are painted at once, at most."""
 TOGETHER = 1 << 18
 """Values of one layer that are worked on at once."""
 POINTS, JUDGED = 16, 12
@@ -62,11 +64,12 @@ def tiles_with(edges: NDArray, radius: float, whole: int) -> tuple[list[Tile], t
 
 
 def adjacent(tiles: Sequence[Tile]) -> list[list[Tile]]:
-    """Return strips of tiles, each of which begins where the one to its left ends."""
+    """Return strips of some tiles, each of which begins where the one to its left ends."""
     strips: list[list[Tile]] = []
     for tile in tiles:
         last = strips[-1][-1] if strips else None
-        if last and last[0] == tile[0] and last[1].stop == tile[1].start:
+        follows = last and last[0] == tile[0] and last[1].stop == tile[1].start
+        if follows and len(strips[-1]) < IN_A_STRIP:
             strips[-1].append(tile)
         else:
             strips.append([tile])
@@ -241,7 +244,7 @@ class Painting:
             for start, seen in open_tiles:
                 own = planes[..., start : start + cells.shape[1]]
                 if own[-1].any():
-                    seen[number] = own
+                    seen[number] = own.copy()  # lets go of the strip
                 hidden.append(own[-1].min() >= 1)
             open_tiles = [tile for tile, gone in zip(open_tiles, hidden, strict=True) if not gone]
             if not open_tiles:
