@@ -71,6 +71,16 @@ def test_inversion_is_the_quantile(mean, z):
     assert k == expected or near
 
 
+@pytest.mark.parametrize("mean", [0.0, 1e-6, 0.03, 1.0, 7.99])
+def test_even_light_draws_what_any_light_does(mean):
+    z = np.append(np.random.default_rng(3).standard_normal(100_000), [-9, 7.9, 9, 40])
+    even = np.full(z.shape, mean)
+    uneven = np.append(even, 5.0)
+    assert (
+        poisson_from_normal(even, z) == poisson_from_normal(uneven, np.append(z, 0.0))[:-1]
+    ).all()
+
+
 def test_no_light_no_electrons():
     z = np.linspace(-6, 6, 101)
     assert not poisson_from_normal(np.zeros(101), z).any()

@@ -369,12 +369,15 @@ def test_decisions_are_complete_and_have_reasons(name, run):
 @pytest.mark.parametrize("tolerance", [0.5, 0.02])
 @EVERY
 def test_saturation_is_left_out_only_far_below_the_well(name, tolerance, run):
-    """Six standard deviations of all noise below it; quantization is never left out."""
+    """Six standard deviations of all noise below it; quantization is never left out.
+
+    It is the light that is simulated: without a lens it may be brighter.
+    """
     result = run(name, accuracy=tolerance)
     found = decisions(result)
     assert found["quantization"].state == "on"
     everything = run(name, effects="all", accuracy=tolerance)
-    brightest = float(everything.mean_electrons.max())
+    brightest = float(result.mean_electrons.max())
     variance = sum(variances(everything, scope, brightest, 0.0) for scope in ("frame", "sensor"))
     reached = brightest + 6 * math.sqrt(variance) >= result.frame.electrical.full_well
     defective = result.frame.camera.pixel.defects.hot > 0

@@ -25,6 +25,8 @@ CORNISH_FISHER_MEAN = 8.0
 """Mean from which the expansion is used [electrons]; below, the distribution is inverted."""
 FEW = 0.25
 """Share of the numbers from which on those that are not inverted yet go on by themselves."""
+LEAST_TAIL = 1e-15
+"""Probability of larger numbers below which they do not occur."""
 
 
 def poisson_from_normal(mean: NDArray[np.floating], z: NDArray[np.floating]) -> NDArray:
@@ -63,7 +65,9 @@ def poisson_from_normal(mean: NDArray[np.floating], z: NDArray[np.floating]) -> 
     np.maximum(out, 0, out=out)  # the expansion turns negative 5 standard deviations below 8
     low = mean < CORNISH_FISHER_MEAN
     if low.any():
-        out[low] = _invert(mean[low], z[low])
+        is_even = mean.min() == mean.max()  # as in dark frames, half of whose time that saves
+        invert = _invert_even if is_even else _invert
+        out[low] = invert(mean[low], z[low])
     return out
 
 
@@ -77,7 +81,7 @@ def _invert(mean: NDArray, z: NDArray) -> NDArray:
     tail = -np.expm1(-m)  # P(X > k)
     count = np.zeros_like(mean)
     place: NDArray = np.flatnonzero(tail > upper)
-    m, tail, upper = m[place], tail[place], np.maximum(upper[place], 1e-15)
+    m, tail, upper = m[place], tail[place], np.maximum(upper[place], LEAST_TAIL)
     term, above = np.exp(-m), np.full(m.shape, True)
     k = 0
     while left := np.count_nonzero(above):
@@ -90,6 +94,20 @@ def _invert(mean: NDArray, z: NDArray) -> NDArray:
         tail -= term
         above = tail > upper
     return count
+
+
+def _invert_even(mean: NDArray, z: NDArray) -> NDArray:
+    """Return the same where all means are one: how many of the distribution's steps lie below z."""
+    from scipy.special import ndtri
+
+    m, k = max(float(mean[0]), 0.0), 0
+    term, tail, tails = np.exp(-m), -np.expm1(-m), []
+    while tail > LEAST_TAIL:
+        tails.append(tail)
+        k += 1
+        term *= m / k
+        tail -= term
+    return np.searchsorted(-ndtri(tails), z).astype(mean.dtype)
 
 
 def gaussian_shot_noise(mean: NDArray[np.floating], z: NDArray[np.floating]) -> NDArray:
