@@ -178,7 +178,7 @@ def transform_painted(
     """Return the first terms of the DCT-II of a chart's planes, and how bright they are.
 
     Rows are painted and transformed band by band, and of each only the terms are kept: all cells of
-    a plane are never held at once.
+    a plane are never held at once. They are painted in no more bits than they are transformed in.
 
     Parameters
     ----------
