@@ -19,8 +19,9 @@ from vcam_cli.image_formation.estimates import bandwidth
 from vcam_cli.image_formation.optical_path import OpticalPath
 from vcam_cli.image_formation.settings import STANDARD, Settings, camera_settings
 from vcam_cli.image_formation.transfer_functions import Transfer
-from vcam_cli.scenes.base import Chart, ChartScene, Scene, chart_scene
+from vcam_cli.scenes.base import Chart, ChartScene, Scene
 from vcam_cli.scenes.build import build
+from vcam_cli.scenes.framed import chart_scene
 from vcam_cli.scenes.image import ImageScene
 from vcam_cli.simulation import plan
 from vcam_cli.spectra import Spectrum

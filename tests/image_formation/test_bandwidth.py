@@ -34,11 +34,11 @@ from vcam_cli.effects.optics.wavefront_blur import Lens, SymmetricBlur
 from vcam_cli.image_formation import photon_rate
 from vcam_cli.image_formation.estimates import bandwidth, chart_cells
 from vcam_cli.image_formation.estimates.bandwidth import highest_passed, line_spread_tail, margin
+from vcam_cli.image_formation.light_plan import OMITTED_SHARE
 from vcam_cli.image_formation.photon_rate import photo_rate
 from vcam_cli.image_formation.settings import STANDARD, camera_settings
 from vcam_cli.scenes.base import Chart
 from vcam_cli.simulation import setup
-from vcam_cli.simulation.plan import OMITTED_SHARE
 from vcam_cli.simulation.simulate import prepare
 
 BAND = 550e-9, 550e-9

@@ -26,8 +26,9 @@ from vcam_cli.image_formation import harmonic_scenes, photon_rate
 from vcam_cli.image_formation.harmonic_scenes import harmonics_count
 from vcam_cli.image_formation.photon_rate import photo_rate
 from vcam_cli.image_formation.settings import REFERENCE
-from vcam_cli.scenes.base import HarmonicScene, chart_scene
+from vcam_cli.scenes.base import HarmonicScene
 from vcam_cli.scenes.charts.point_grid import PointGrid
+from vcam_cli.scenes.framed import chart_scene
 from vcam_cli.scenes.waves import Wave, WaveScene
 
 EXACT = replace(REFERENCE, oversampling=None)

@@ -5,7 +5,7 @@ import pytest
 from making import camera, radiance_for
 
 from vcam_cli import simulate
-from vcam_cli.image_formation.light_plan import LIGHT_SHARE
+from vcam_cli.image_formation.light_plan import OMITTED_SHARE
 from vcam_cli.simulation.simulate import prepare
 
 SIZE = {"array.rows": 96, "array.columns": 128}
@@ -53,7 +53,7 @@ def test_the_lens_goes_before_the_average_of_the_photodetector(tmp_path):
         next(d for d in shares if d.name == n) for n in ("diffraction", "pixel_aperture")
     )
     assert (lens.state, average.state, ready.spectrum.terms) == ("off", "on", 0)
-    budget = LIGHT_SHARE * ready.settings.tolerance
+    budget = OMITTED_SHARE * ready.settings.tolerance
     without = changes | {"effects": {"diffraction": "on", "pixel_aperture": "auto"}}
     free = prepare(camera(tmp_path, without), 1)[0].plan.decisions
     own = next(d.contribution for d in free if d.name == "pixel_aperture")

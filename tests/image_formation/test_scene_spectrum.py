@@ -20,10 +20,11 @@ from vcam_cli.image_formation.scene_spectrum import (
     transform_planes,
 )
 from vcam_cli.scenes import bands
-from vcam_cli.scenes.base import Frame, Framed, Rectangles, View, chart_scene
+from vcam_cli.scenes.base import Frame, Rectangles, View
 from vcam_cli.scenes.charts.colorchecker import ColorChecker, largest_card, reflectances
 from vcam_cli.scenes.charts.slanted_edge import SlantedEdge
 from vcam_cli.scenes.charts.step_wedge import step_wedge
+from vcam_cli.scenes.framed import Framed, chart_scene
 from vcam_cli.scenes.layered import LayerChart, MaskedChart
 from vcam_cli.scenes.picture_chart import PictureChart
 from vcam_cli.simulation.simulate import prepare

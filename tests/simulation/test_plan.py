@@ -14,6 +14,7 @@ from vcam_cli.effects.order import ORDER
 from vcam_cli.effects.signal_chain import NoiseSource
 from vcam_cli.errors import BadInput
 from vcam_cli.simulation import plan
+from vcam_cli.simulation.simulate import prepare
 
 NAMES = [kind.name for kind in ORDER]
 NOISE = {
@@ -470,3 +471,14 @@ def test_a_plan_is_frozen(tmp_path):
     with pytest.raises(AttributeError):
         made.seconds = 0
     assert replace(made, seconds=1.0).seconds == 1
+
+
+def test_an_edge_says_that_it_lacks_the_lens(tmp_path):
+    """The array as a whole hardly shows it, an MTF that is measured from it would."""
+    edge = EDGE | {"accuracy": "draft", "array.rows": 240, "array.columns": 320}
+    _, notes = prepare(camera(tmp_path, edge | {"effects": "auto"}))
+    [note] = [note for note in notes if "MTF" in note]
+    assert "lacks diffraction," in note
+    assert note.endswith("write effects: {diffraction: on}")
+    _, notes = prepare(camera(tmp_path, edge | {"effects": {"diffraction": "on"}}))
+    assert not any("MTF" in note for note in notes)

@@ -41,8 +41,9 @@ from vcam_cli.image_formation.optical_path import OpticalPath
 from vcam_cli.scenes.depth_scene import DepthScene
 from vcam_cli.scenes.layered import AnyScene, LayeredScene
 
-LIGHT_SHARE = 0.4
-"""Part of the tolerance that all omitted effects on the light may use together."""
+OMITTED_SHARE = 0.5
+"""Part of the mean's tolerance for all effects that are left out; those on electrons may use what
+those on the light leave of it."""
 LEVEL_SHARE = 0.5
 """Part of the tolerance by which they may shift a percentile of the light, relative to it: shot
 noise has the variance of the signal."""
@@ -107,7 +108,7 @@ def light_plan(path: OpticalPath, scene: AnyScene) -> LightPlan:
     # The least gain is at most that of the axis.
     if path.transfer.is_dark or (path.fullness >= 1 and path.fullness * _least_gain(path) >= 1):
         return LightPlan(candidates, shares=dict.fromkeys((e.name for e in candidates), 0.0))
-    budget = LIGHT_SHARE * path.settings.tolerance
+    budget = OMITTED_SHARE * path.settings.tolerance
     functions: dict[Effect, NDArray] = {}
     displacing = tuple(e for e in of_kind(candidates, ImageMotion) if e.needs_survey)
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from vcam_cli.camera.derived.geometry import Geometry, pixel_centers
 from vcam_cli.effects.base import Effect, SignalLevels, TemporalGain, of_kind
-from vcam_cli.image_formation.light_plan import LIGHT_SHARE, LightPlan
+from vcam_cli.image_formation.light_plan import OMITTED_SHARE, LightPlan
 
 
 def light_plan(
@@ -44,7 +44,7 @@ def light_plan(
         change = effect.mean_error(SignalLevels(full_signal=1.0, time=time))
         if effect not in optional or change is None:
             continue
-        if plan.share + change <= LIGHT_SHARE * tolerance:
+        if plan.share + change <= OMITTED_SHARE * tolerance:
             shares = {**plan.shares, effect.name: change}
             plan = replace(plan, omitted=(*plan.omitted, effect), shares=shares)
     return plan

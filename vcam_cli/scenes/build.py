@@ -5,15 +5,7 @@ from vcam_cli.camera.scene.scene import Scene as SceneModel
 from vcam_cli.camera.scene.scene_files import Hyperspectral, ImageFile
 from vcam_cli.errors import BadInput, bad
 from vcam_cli.scenes import light
-from vcam_cli.scenes.base import (
-    Array,
-    Chart,
-    HarmonicScene,
-    SampledScene,
-    Scene,
-    View,
-    chart_scene,
-)
+from vcam_cli.scenes.base import Array, Chart, HarmonicScene, SampledScene, Scene, View
 from vcam_cli.scenes.charts import (
     colorchecker,
     csf,
@@ -30,6 +22,7 @@ from vcam_cli.scenes.charts.point_grid import PointGrid
 from vcam_cli.scenes.charts.sinusoid import WaveChart
 from vcam_cli.scenes.charts.slanted_edge import SlantedEdge
 from vcam_cli.scenes.charts.still_life import LeavesWithColorChecker
+from vcam_cli.scenes.framed import chart_scene
 from vcam_cli.scenes.hyperspectral import Cube, cube_scene
 from vcam_cli.scenes.image import image_scene
 from vcam_cli.scenes.waves import Wave, WaveScene

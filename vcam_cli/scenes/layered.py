@@ -9,9 +9,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from vcam_cli.scenes.base import Array, Chart, ChartScene, Frame, Scene, View, chart_scene
+from vcam_cli.scenes.base import Array, Chart, ChartScene, Frame, Scene, View
 from vcam_cli.scenes.cells import cell_means
 from vcam_cli.scenes.depth_scene import DepthScene
+from vcam_cli.scenes.framed import chart_scene
 from vcam_cli.scenes.picture_chart import PictureChart
 from vcam_cli.spectra import Spectrum
 

@@ -39,11 +39,9 @@ from vcam_cli.effects.signal_chain import (
     total_variance,
 )
 from vcam_cli.errors import BadInput, Collector
-from vcam_cli.image_formation.light_plan import LIGHT_SHARE, LightPlan
+from vcam_cli.image_formation.light_plan import OMITTED_SHARE, LightPlan
 from vcam_cli.image_formation.settings import Settings
 
-OMITTED_SHARE = 0.5
-"""Part of the mean's tolerance for all effects that are left out."""
 VARIANCE_SHARE = 0.8
 """Part of the variance's tolerance for them; the rest is for percentiles that are estimated."""
 
@@ -376,7 +374,7 @@ def _decide(
     free = (
         effect in light.bounding
         and contribution is not None
-        and light.share + contribution <= LIGHT_SHARE * camera.accuracy.tolerance
+        and light.share + contribution <= OMITTED_SHARE * camera.accuracy.tolerance
     )
     if free:
         what += f"; free: {contribution:.2%} (could go; costs nothing)"

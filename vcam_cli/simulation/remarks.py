@@ -13,13 +13,15 @@ from vcam_cli.camera.scene.scene_files import ImageFile
 from vcam_cli.camera.sensor.architecture import ARCHITECTURES
 from vcam_cli.effects.base import ImageMotion, of_kind
 from vcam_cli.effects.order import quantizer
+from vcam_cli.image_formation.light_plan import BLURS
+from vcam_cli.scenes.base import ChartScene
 from vcam_cli.scenes.build import picture_model
 from vcam_cli.scenes.depth_scene import DepthScene
 from vcam_cli.scenes.hyperspectral import CubeScene
 from vcam_cli.scenes.image import ImageScene
 from vcam_cli.scenes.layered import AnyScene, LayeredScene
 from vcam_cli.scenes.light import visible_range
-from vcam_cli.simulation import idle_keys
+from vcam_cli.simulation import idle_keys, plan
 from vcam_cli.simulation.preparation import Prepared
 from vcam_cli.spectra import luminance
 
@@ -52,6 +54,7 @@ def remarks(ready: Prepared) -> tuple[str, ...]:
         *_cropped(ready),
         *_motion(ready),
         *_depth(ready),
+        *_edge_without_blur(ready),
         *_steps_not_shown(ready),
     )
     if not isinstance(scene, CubeScene):
@@ -118,6 +121,23 @@ def _sub_exposures(ready: Prepared) -> str:
         f"motion is computed as {many} of the still image, known at {found.places_per_pixel} places"
         " along each side of a pixel; they leave an error of"
         f" {100 * found.sub_exposure_error:.2g} % of full signal"
+    )
+
+
+def _edge_without_blur(ready: Prepared) -> tuple[str, ...]:
+    """Return that a straight edge, from which an MTF is measured, lacks a blur."""
+    scene = ready.scene
+    if not isinstance(scene, ChartScene) or scene.chart.across_edge() is None:
+        return ()
+    omitted = {d.name for d in ready.plan.decisions if d.state == "off" and d.by == "plan"}
+    wanted = plan.enabled_effects(ready.camera, ready.geometry)
+    names = [blur.name for blur in of_kind(wanted, *BLURS) if blur.name in omitted]
+    if not names:
+        return ()
+    wish = ", ".join(f"{name}: on" for name in names)
+    return (
+        f"an MTF measured from this edge lacks {' and '.join(names)}, which this array hardly"
+        f" shows; to measure one, write effects: {{{wish}}}",
     )
 
 

@@ -21,9 +21,15 @@ from numpy.typing import NDArray
 
 from vcam_cli.effects.base import Effect
 from vcam_cli.image_formation.estimates.chosen_places import chosen_places
-from vcam_cli.image_formation.estimates.edge_detail import edge_power, isolated_edges
+from vcam_cli.image_formation.estimates.edge_detail import (
+    EdgePower,
+    PixelLattice,
+    isolated_edges,
+    rectangles_power,
+    straight_edge_power,
+)
 from vcam_cli.image_formation.optical_path import OpticalPath
-from vcam_cli.scenes.base import ChartScene, Rectangles, Scene, WaveScene
+from vcam_cli.scenes.base import ChartScene, Scene, WaveScene
 from vcam_cli.scenes.cells import EVEN, uneven_points
 
 TILE = 32
@@ -52,9 +58,6 @@ REACH = 12.0
 """Reach of a lens in inverse cut-off frequencies, beyond which little light goes."""
 APART = 4.0
 """Distance of edges in inverse cut-off frequencies, from which on each has a blur of its own."""
-IN_STEP = 0.7
-"""Error of the power of edges that all lie alike to the pixels, relative to it: the mean square of
-what a blur changes at the pixels' centers was up to 2.4 times that of all places."""
 ENOUGH = 4.0
 """Shorter side of an array over the reach of its lens, from which on its own light tells what the
 lens does to it."""
@@ -127,10 +130,9 @@ def scene_detail(
     if min(g.sensor_width, g.sensor_height) < ENOUGH * (REACH / path.transfer.cutoff + reach):
         return None
     if isinstance(scene, ChartScene):
-        size, apart = (g.sensor_width, g.sensor_height), APART / path.transfer.cutoff + 2 * reach
-        rectangles = isolated_edges(scene, level, size, max(apart, g.pitch_x, g.pitch_y))
-        if rectangles is not None:
-            return _edge_detail(path, scene, level, rectangles)
+        edges = _edge_power(path, scene, level)
+        if edges is not None:
+            return _edge_detail(path, scene, level, edges)
     return _tile_detail(path, scene, level, settled)
 
 
@@ -167,24 +169,34 @@ def _places(path: OpticalPath, most: int) -> list[int]:
     return [min(max(1, round(n / TILE)), most) for n in (g.rows, g.columns)]
 
 
-def _edge_detail(
-    path: OpticalPath, scene: ChartScene, level: NDArray, rectangles: Rectangles
-) -> SceneDetail:
-    """Return the detail of rectangles that are wider than what blurs them."""
-    g = path.geometry
+def _edge_power(path: OpticalPath, scene: ChartScene, level: NDArray) -> EdgePower | None:
+    """Return the waves of edges that lie further apart than what blurs them; else None."""
+    g, widest = path.geometry, max((e.reach for e in path.effects), default=0.0)
+    apart = max(APART / path.transfer.cutoff + 2 * widest, g.pitch_x, g.pitch_y)
     cutoff = min(path.transfer.cutoff, 1 / min(g.pitch_x, g.pitch_y))
-    widest = max(g.pitch_x, g.pitch_y, *(e.reach for e in path.effects))
-    frequency, power, beyond = edge_power(rectangles, min(cutoff, 1 / widest), cutoff)
-    brightest = min(float(rectangles.values.max()), path.ceiling)
-    even = _surveyed(path, scene, level, _places(path, FEW_PLACES))
+    ends = min(cutoff, 1 / max(g.pitch_x, g.pitch_y, widest)), cutoff
+    size = g.sensor_width, g.sensor_height
+    pixels = PixelLattice((g.pitch_x, g.pitch_y), size, path.transfer.cutoff)
+    across = scene.chart.across_edge()
+    if across is not None:
+        x, y = (np.array([-part, part]) * apart for part in across)
+        signals = np.diag(_light_at(scene, x, y, level))
+        return straight_edge_power(across, signals, pixels, *ends)
+    rectangles = isolated_edges(scene, level, size, apart)
+    return None if rectangles is None else rectangles_power(rectangles, pixels, *ends)
+
+
+def _edge_detail(
+    path: OpticalPath, scene: ChartScene, level: NDArray, edges: EdgePower
+) -> SceneDetail:
+    """Return the detail of even light between edges."""
     return replace(
-        even,
-        fx=frequency,
-        fy=frequency,
-        power=power,
-        unresolved=beyond,
-        error=IN_STEP,
-        brightest=brightest,
+        _surveyed(path, scene, level, _places(path, FEW_PLACES)),
+        fx=edges.fx,
+        fy=edges.fy,
+        power=edges.power,
+        unresolved=edges.beyond,
+        brightest=min(edges.brightest, path.ceiling),
     )
 
 

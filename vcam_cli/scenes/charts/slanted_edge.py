@@ -38,7 +38,7 @@ class SlantedEdge(Chart):
         Exact: the bright half plane's area in every cell.
         """
         x, y = (x_edges[1:] + x_edges[:-1]) / 2, (y_edges[1:] + y_edges[:-1]) / 2
-        across, down = self._normal()
+        across, down = self.across_edge()
         widths = abs(across) * np.diff(x_edges), abs(down) * np.diff(y_edges)
         if across < 0.0:  # so that every row grows brighter from left to right
             x, widths, out = x[::-1], (widths[0][::-1], widths[1]), out[:, :, ::-1]
@@ -56,11 +56,11 @@ class SlantedEdge(Chart):
 
     def values(self, x: Array, y: Array, mix: Array) -> Array:
         """Return the values at points."""
-        across, down = self._normal()
+        across, down = self.across_edge()
         distance = np.add.outer(down * np.asarray(y), across * np.asarray(x))
         return self._mix_levels(np.heaviside(distance, 0.5), mix)
 
-    def _normal(self) -> tuple[float, float]:
+    def across_edge(self) -> tuple[float, float]:
         """Return the unit vector (x, y down) toward the bright side."""
         return math.cos(self.angle), math.sin(self.angle)
 

@@ -1,0 +1,76 @@
+"""Charts on a view's cells, whole or as a picture in a frame."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from vcam_cli.scenes.base import Array, Chart, ChartScene, Frame, View
+from vcam_cli.scenes.cells import clip_cells, edges_within
+from vcam_cli.spectra import Spectrum
+
+
+def chart_scene(
+    chart: Chart, spectra: tuple[Spectrum, ...], white: Spectrum, view: View
+) -> ChartScene:
+    """Return the chart on the view's cells, black outside the frame where it has a width.
+
+    Its parts have the spectral radiances `spectra`, and perfect white has `white` [W/(sr m2 m)].
+    """
+    if view.scene_width is not None:
+        chart = Framed(chart, view.frame)
+    return ChartScene(
+        spectra=spectra,
+        white=white,
+        shape=view.shape,
+        pitch_x=view.pitch_x / view.oversampling,
+        pitch_y=view.pitch_y / view.oversampling,
+        samples="averages",
+        dtype=view.dtype,
+        chart=chart,
+    )
+
+
+@dataclass(frozen=True)
+class Framed(Chart):
+    """A chart seen through a frame: black outside, cells on the frame's edge area-sampled."""
+
+    chart: Chart
+    frame: Frame
+    edge_seconds = property(lambda self: self.chart.edge_seconds)
+
+    @property
+    def brightest(self) -> float:
+        """Brightest light of the chart, in the frame or not."""
+        return self.chart.brightest
+
+    def paint(self, x_edges: Array, y_edges: Array, mix: Array, out: Array) -> None:
+        """Write the averages over the cells, those on the frame's edge by area."""
+        out[:] = 0
+        columns, cover_x, inside_x = clip_cells(x_edges, self.frame.width / 2)
+        rows, cover_y, inside_y = clip_cells(y_edges, self.frame.height / 2)
+        if len(cover_x) and len(cover_y):
+            picture = self.chart.averages(inside_x, inside_y, mix)
+            picture *= np.outer(cover_y, cover_x).astype(mix.dtype)
+            out[:, rows, columns] = picture
+
+    def edges(self) -> tuple[Array, Array] | None:
+        """Return where the light may change, the frame's own edges included."""
+        inner = self.chart.edges()
+        if inner is None:
+            return None
+        sides = (self.frame.width / 2, self.frame.height / 2)
+        x, y = (edges_within(e, half) for e, half in zip(inner, sides, strict=True))
+        return x, y
+
+    def crop_to_cells(self, x_edges: Array, y_edges: Array) -> "Framed":
+        """Return the same frame around a chart that may be faster on these cells."""
+        _, _, inside_x = clip_cells(x_edges, self.frame.width / 2)
+        _, _, inside_y = clip_cells(y_edges, self.frame.height / 2)
+        if len(inside_x) and len(inside_y):
+            return replace(self, chart=self.chart.crop_to_cells(inside_x, inside_y))
+        return self
+
+    def values(self, x: Array, y: Array, mix: Array) -> Array:
+        """Return the values at points: 0 outside the frame."""
+        inside = np.outer(abs(y) <= self.frame.height / 2, abs(x) <= self.frame.width / 2)
+        return self.chart.values(x, y, mix) * inside
