@@ -119,3 +119,11 @@ def test_a_hundred_thousand_workers_are_as_many_as_help(capsys):
     assert options.few_workers(most) == most
     assert options.few_workers(None) is None
     assert capsys.readouterr().err == ""
+
+
+def test_a_blas_starts_no_threads_unless_asked(monkeypatch):
+    """vcam has threads of its own; what the user says of a BLAS stands."""
+    found = {"OMP_NUM_THREADS": "3"}
+    monkeypatch.setattr(memory.os, "environ", found)
+    memory.limit_blas_threads()
+    assert [found[name] for name in memory.BLAS_VARIABLES] == ["3", "1", "1"]

@@ -10,6 +10,8 @@ from vcam_cli.errors import CannotDo
 
 LEAST_ADDRESS_SPACE = 400_000_000
 """Of a process that simulates a few pixels: interpreter, libraries, what they reserve [bytes]."""
+BLAS_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+"""Variables of the environment that tell a BLAS how many threads it may start."""
 
 
 def available() -> int:
@@ -38,18 +40,23 @@ def available() -> int:
     return min(found)
 
 
+def limit_blas_threads() -> None:
+    """Let a BLAS start no threads, unless the environment says how many.
+
+    To be called before it is loaded. vcam has threads of its own; those of a BLAS spin beside them,
+    which takes half of the processors' time again and gains nothing, and reserve address space.
+    """
+    for name in BLAS_VARIABLES:
+        os.environ.setdefault(name, "1")
+
+
 def require_address_space() -> None:
     """Raise CannotDo where the process's address space does not hold the libraries it needs.
 
-    To be asked before they are loaded: OpenBLAS waits forever for what it cannot have. It reserves
-    space for each of its threads, so where space is limited it gets one: vcam has threads of its
-    own.
+    To be asked before they are loaded: OpenBLAS waits forever for what it cannot have.
     """
     limit = _address_space()
-    if limit is None:
-        return
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    if limit < LEAST_ADDRESS_SPACE:
+    if limit is not None and limit < LEAST_ADDRESS_SPACE:
         raise CannotDo(
             f"the process may have {limit / 1e6:.0f} MB of address space;"
             f" {LEAST_ADDRESS_SPACE / 1e6:.0f} MB are needed at least",

@@ -31,11 +31,14 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from .report import lines
-from .whole import PARTS, QUICK, WHOLE, measure
+from vcam_cli.memory import limit_blas_threads
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
+    limit_blas_threads()  # as `vcam` does, before NumPy is loaded
+    from .report import lines
+    from .whole import PARTS, QUICK, WHOLE, measure
+
     parser = argparse.ArgumentParser(prog="python -m tests.bench")
     parser.add_argument("parts", nargs="*", metavar="PART", help=f"some of {', '.join(PARTS)}")
     parser.add_argument("--json", help="also write the figures to this file")

@@ -7,7 +7,12 @@ from hypothesis import strategies as st
 
 from vcam_cli.processing.base import padded_block
 from vcam_cli.processing.demosaic import bilinear
-from vcam_cli.processing.normalized_convolution import NormalizedConvolution, Sites, half_width
+from vcam_cli.processing.normalized_convolution import (
+    NormalizedConvolution,
+    Sites,
+    half_width,
+    tent,
+)
 
 PATTERNS = {
     "bayer": (("R", "G"), ("G", "B")),
@@ -105,3 +110,20 @@ def test_half_widths():
     assert [half_width(PATTERNS["quad"], c) for c in "RGB"] == [3, 3, 3]
     with pytest.raises(ValueError, match="no W"):
         half_width(PATTERNS["bayer"], "W")
+
+
+@pytest.mark.parametrize("width", [1, 2, 3, 7])
+@pytest.mark.parametrize("axes", [(0,), (1,), (0, 1)])
+def test_a_tent_is_what_its_definition_says(width, axes):
+    """Of arrays that are smaller than the tent, too; sums of whole numbers are exact."""
+    rng, weights = np.random.default_rng(3), [*range(1, width + 1), *range(width - 1, 0, -1)]
+    for shape in ((9, 14), (2, 3), (1, 1)):
+        values = rng.integers(0, 9, shape).astype(np.float32)
+        expected = values
+        for axis in axes:
+
+            def along(line):
+                return np.convolve(line, weights)[width - 1 : width - 1 + len(line)]
+
+            expected = np.apply_along_axis(along, axis, expected)
+        assert np.array_equal(tent(values, width, axes), expected)

@@ -31,6 +31,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 
 from parts import PARTS, Figure, Part
 
+from vcam_cli.memory import limit_blas_threads
 from vcam_cli.parallel import available_workers
 
 
@@ -42,6 +43,7 @@ def main() -> int:
     parser.add_argument("--workers", type=int, default=available_workers(), help="processes")
     parser.add_argument("--json", help="also write what was found to this file")
     options = parser.parse_args()
+    limit_blas_threads()  # of the processes that are started, as `vcam` does
     names = [name for name in PARTS if getattr(options, name)] or list(PARTS)
     found: dict[str, list] = {}
     figures: dict[str, list[Figure]] = {}

@@ -188,6 +188,7 @@ def _main() -> None:
     _replace_closed_streams()
     for name in ("stdout", "stderr"):
         _outlive_reader(name)
+    memory.limit_blas_threads()
     try:
         memory.require_address_space()
     except CannotDo as error:

@@ -28,6 +28,7 @@ from threading import Lock
 from typing import Any, Literal
 
 from vcam_cli.errors import CannotDo
+from vcam_cli.memory import BLAS_VARIABLES
 from vcam_cli.parallel import ThreadPool, available_workers
 from vcam_cli.simulation.shared import Shared
 from vcam_cli.sweeps.point_work import Task, compute_on_cluster, compute_point
@@ -42,7 +43,6 @@ Submit = Callable[[int, Task], "Future[Outcome]"]
 
 SERVE = "import sys; sys.path[:] = {}; from vcam_cli.sweeps.workers import serve; serve({}, {})"
 """The program of a worker process: its path, the number of its connection, and of its threads."""
-THREAD_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 TRIES = 3
 """Number of worker processes that may die of the same point."""
 DEATH_TIMEOUT = 5.0
@@ -229,7 +229,7 @@ class WorkerProcess:
                     pass_fds=[theirs.fileno()],
                     stdin=subprocess.DEVNULL,
                     stdout=subprocess.DEVNULL,
-                    env=os.environ | dict.fromkeys(THREAD_VARIABLES, str(self._threads)),
+                    env=os.environ | dict.fromkeys(BLAS_VARIABLES, "1"),
                     process_group=0,  # an interrupt is for this process alone
                 )
 
