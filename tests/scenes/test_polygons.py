@@ -65,3 +65,21 @@ def test_triangles_have_their_area_and_cells_their_points(corners):
     mean = polygons.contains_points(triangle, x, y).reshape(6, points, 6, points).mean((1, 3))
     # each of three sides crosses at most 2 x 64 of 64^2 parts of a cell, half of each in error
     np.testing.assert_allclose(cover, mean, atol=3 / points)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_a_part_of_the_grid_is_that_of_the_whole(seed):
+    """Corners lie on the grid, as often as not."""
+    rng = np.random.default_rng(seed)
+    letters = polygons.sides(rng.integers(0, 9, (20, 3, 2)) / rng.choice([1, 1.5]))
+    grid = np.arange(10.0)
+    whole, points = (
+        each(letters, grid, grid) for each in (polygons.cover, polygons.contains_points)
+    )
+    for _ in range(12):
+        (top, bottom), (left, right) = np.sort(rng.choice(10, (2, 2), replace=False), axis=1)
+        x, y = grid[left : right + 1], grid[top : bottom + 1]
+        part = polygons.cover(letters, x, y)
+        np.testing.assert_allclose(part, whole[top:bottom, left:right], atol=1e-12)
+        seen = polygons.contains_points(letters, x[1:], y[1:])
+        assert np.array_equal(seen, points[top + 1 : bottom + 1, left + 1 : right + 1])
