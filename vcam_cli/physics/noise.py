@@ -52,6 +52,9 @@ def poisson_from_normal(mean: NDArray[np.floating], z: NDArray[np.floating]) -> 
     ndarray
         Whole numbers, 0 or more [electrons], in the shape and float type of `mean`.
     """
+    low = mean < CORNISH_FISHER_MEAN
+    if low.any() and mean.min() == mean.max():  # as in dark frames
+        return _invert_even(mean, z)
     root = np.sqrt(np.maximum(mean, CORNISH_FISHER_MEAN))
     z2 = z * z
     out = (z2 * (-1 / 72) - 1 / 36) * z
@@ -63,11 +66,8 @@ def poisson_from_normal(mean: NDArray[np.floating], z: NDArray[np.floating]) -> 
     out += 1 / 3
     np.floor(out, out=out)
     np.maximum(out, 0, out=out)  # the expansion turns negative 5 standard deviations below 8
-    low = mean < CORNISH_FISHER_MEAN
     if low.any():
-        is_even = mean.min() == mean.max()  # as in dark frames, half of whose time that saves
-        invert = _invert_even if is_even else _invert
-        out[low] = invert(mean[low], z[low])
+        out[low] = _invert(mean[low], z[low])
     return out
 
 
@@ -97,17 +97,27 @@ def _invert(mean: NDArray, z: NDArray) -> NDArray:
 
 
 def _invert_even(mean: NDArray, z: NDArray) -> NDArray:
-    """Return the same where all means are one: how many of the distribution's steps lie below z."""
+    """Return the same where all means are one: how many of the distribution's steps lie below z.
+
+    Each is compared with all numbers, of their own float type: that takes a fifth of the time of
+    searching for each.
+    """
     from scipy.special import ndtri
 
-    m, k = max(float(mean[0]), 0.0), 0
+    m, k = max(float(mean.flat[0]), 0.0), 0
     term, tail, tails = np.exp(-m), -np.expm1(-m), []
     while tail > LEAST_TAIL:
         tails.append(tail)
         k += 1
         term *= m / k
         tail -= term
-    return np.searchsorted(-ndtri(tails), z).astype(mean.dtype)
+    steps = -ndtri(tails)
+    rounded = steps.astype(z.dtype)
+    below = np.nextafter(rounded, z.dtype.type(-np.inf))
+    count = np.zeros(z.shape, np.uint8)
+    for step in np.where(rounded > steps, below, rounded):
+        count += z > step
+    return count.astype(mean.dtype)
 
 
 def gaussian_shot_noise(mean: NDArray[np.floating], z: NDArray[np.floating]) -> NDArray:
