@@ -23,6 +23,8 @@ from vcam_cli.image_formation.transfer_functions import Band
 from vcam_cli.quality.display import display_screen
 from vcam_cli.quality.scielab import places_per_pixel
 from vcam_cli.readout.layout import Layout
+from vcam_cli.scenes.base import ChartScene
+from vcam_cli.scenes.layered import AnyScene
 from vcam_cli.scheduling.estimators import PASSES
 from vcam_cli.simulation.plan import Plan
 
@@ -72,6 +74,8 @@ EXR = 28e-9
 """One noisy value into an EXR file [s]."""
 ESTIMATE = 25e-9
 """One sample of a pixel into its photocurrent, once [s]."""
+PAINTED = 9
+"""Cells a pixel on which charts are painted, as often as not."""
 BANDS_AT_ONCE = 4
 """Bands of the spectral irradiance that are computed together, as the colors of a frame are."""
 PNG = 14e-9
@@ -195,10 +199,30 @@ def irradiance_seconds(
     return files * count * (together + EXR * geometry.rows * geometry.columns)
 
 
-def usual_spectrum(geometry: Geometry) -> SpectrumReport:
-    """Return the spectrum that a scene in color with much detail would have."""
+def usual_spectrum(geometry: Geometry, is_painted: bool = False) -> SpectrumReport:
+    """Return the spectrum that a scene in color with much detail would have.
+
+    `is_painted` says that it is a chart of which no closed form is known.
+    """
     samples = 2 * geometry.rows * geometry.columns
+    if is_painted:
+        cells = PAINTED * geometry.rows * geometry.columns
+        return SpectrumReport(cells=cells, terms=samples, planes=1, filters=1, is_painted=True)
     return SpectrumReport(cells=samples, terms=samples, planes=3, filters=1)
+
+
+def blur_seconds(layout: Layout, report: SpectrumReport, scene: AnyScene) -> float:
+    """Return the core seconds that a first blur would add to the light, 0 where one is there."""
+    if not report.is_averaged:
+        return 0.0
+    is_painted = isinstance(scene, ChartScene) and scene.chart.edges() is None
+    blurred = usual_spectrum(layout.lattice, is_painted)
+    colors = len(layout.mosaic.colors)
+    return max(
+        0.0,
+        image_seconds(layout.lattice, colors, blurred)
+        - image_seconds(layout.lattice, colors, report),
+    )
 
 
 def light_seconds(layout: Layout, report: SpectrumReport, workers: int) -> float:

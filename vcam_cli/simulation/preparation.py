@@ -220,7 +220,7 @@ def _prepare(
         if of_kind(effects, ImageMotion):  # every sample of an integration has light of its own
             once = cost_model.light_seconds(layout, light.spectrum, workers)
             earlier += len(exposed.times) * once
-        decided = _with_seconds(setup, light, decided, workers, earlier)
+        decided = _with_seconds(setup, light, scene, decided, workers, earlier)
         stages.watch.expect(decided.seconds)
     return Prepared(
         camera=setup.camera,
@@ -299,19 +299,27 @@ def _fullness(setup: CameraSetup, scene: AnyScene, white_rate: float) -> float:
 def _with_seconds(
     setup: CameraSetup,
     light: photon_rate.Rate,
+    scene: AnyScene,
     decided: plan.Plan,
     workers: int,
     earlier: float,
 ) -> plan.Plan:
-    """Return the plan with the seconds of the frame, and of one with everything on."""
-    spectrum, layout = light.spectrum, setup.layout
-    known = (setup.camera, setup.geometry, layout, setup.settings)
-    seconds = cost_model.frame_seconds(*known, spectrum, decided, workers)
-    if spectrum.is_averaged and of_kind(light.plan.omitted, Blur, FieldTransfer):
-        spectrum = cost_model.usual_spectrum(layout.lattice)
-    whole = replace(decided, seconds=decided.seconds + sum(d.saved for d in decided.decisions))
-    every = cost_model.frame_seconds(*known, spectrum, whole, workers)
-    return replace(decided, seconds=earlier + seconds, seconds_of_all=earlier + every)
+    """Return the plan with the seconds of the frame, and of one with everything on.
+
+    Blurs that are left out save what a first one would take, each an equal part.
+    """
+    known = (setup.camera, setup.geometry, setup.layout, setup.settings, light.spectrum)
+    blurs = {blur.name for blur in of_kind(light.plan.omitted, Blur, FieldTransfer)}
+    of_blurs = cost_model.blur_seconds(setup.layout, light.spectrum, scene)
+    decisions = tuple(
+        replace(d, saved=d.saved + of_blurs / len(blurs)) if d.name in blurs else d
+        for d in decided.decisions
+    )
+    whole = replace(decided, seconds=decided.seconds + sum(d.saved for d in decisions))
+    seconds, every = (
+        earlier + cost_model.frame_seconds(*known, each, workers) for each in (decided, whole)
+    )
+    return replace(decided, decisions=decisions, seconds=seconds, seconds_of_all=every)
 
 
 def _require_memory(setup: CameraSetup) -> int:

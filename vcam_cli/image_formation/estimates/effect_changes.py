@@ -42,8 +42,11 @@ def changes_by_omission(
     dict
         Name of an effect -> rms change [e/s].
     """
+    behind_lens = image.lens_power  # that of its radial part, which bounds what it passes
+    if path.field is None and of_kind(path.effects, PlaneTransfer):
+        behind_lens = image.power.lens_power(tables)
     squares: dict[Effect, NDArray] = {
-        effect: image.power.omission_power(image.lens_power, effect) for effect in path.separable
+        effect: image.power.omission_power(behind_lens, effect) for effect in path.separable
     }
     for effect in of_kind(path.effects, RadialTransfer):
         rest = _omission_tables(
