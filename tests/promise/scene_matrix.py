@@ -207,16 +207,16 @@ class Times:
 
 
 SURE, ENOUGH = 4.0, 12.0
-"""Seconds for which frames are repeated at least, a few turns; and after which no more are."""
-TURNS = 5
-"""Turns at least, where they take no longer."""
+"""Seconds for which frames are repeated at least, some turns; and after which few turns do."""
+FEW_TURNS, TURNS = 2, 5
+"""Turns of frames that take long, at least, and of others."""
 
 
 def times(name: str, scene: str, folder: Path) -> Times:
     """Time a frame as planned, and with everything on, in turns; the first of each is not counted.
 
     What comes first changes from turn to turn. Of so many short frames that scatter says little;
-    frames that take long are taken once more, and no more.
+    frames that take long are taken twice more, and no more.
     """
     auto = camera(name, scene, LARGE, folder)
     both = [auto, ablation.with_effects(auto, "all")]
@@ -229,7 +229,7 @@ def times(name: str, scene: str, folder: Path) -> Times:
             spent += took
             if turn:
                 best[index] = min(best[index], took)
-        if turn and (spent > ENOUGH or (spent > SURE and turn >= TURNS)):
+        if turn >= (FEW_TURNS if spent > ENOUGH else TURNS) and spent > SURE:
             break
     return Times(name, scene, *best)
 
