@@ -137,8 +137,11 @@ def otf_ratio_grid(terms: Terms, wavelength: float, slope: float) -> OtfRatioGri
 
 def _phasors(paths: Floats, wavelength: float) -> NDArray[np.complex64]:
     """Return exp(2 pi i path / wavelength), in 32 bits once whole turns are gone."""
-    turns = (paths / wavelength) % 1.0
-    return np.exp((2j * np.pi * turns).astype(np.complex64))
+    phase = (2 * np.pi * ((paths / wavelength) % 1.0)).astype(np.float32)
+    out = np.empty(phase.shape, np.complex64)
+    np.cos(phase, out=out.real)  # a complex exponential takes five times as long
+    np.sin(phase, out=out.imag)
+    return out
 
 
 def samples_across(slope: float, order: int) -> int:
