@@ -117,13 +117,20 @@ def light_plan(path: OpticalPath, scene: AnyScene) -> LightPlan:
     if of_kind(blurs, Blur, FieldTransfer):
         decisive = of_kind(blurs, Blur, FieldTransfer, SubExposedMotion)
 
-    def every_blur_counts(found: SceneDetail) -> bool:
+    # Transfers of |f| alone save nothing by themselves, where the spectrum is followed for others.
+    costly = [blur for blur in decisive if not of_kind([blur], RadialTransfer)]
+
+    def nothing_is_saved(found: SceneDetail) -> bool:
+        if displacing or not found.brightest:
+            return False
         if not functions:
             functions.update(transfer_functions(path, found))
-        return not displacing and all(_share(found, functions, b) > budget for b in decisive)
+        alone = (_share(found, functions, blur) for blur in costly)
+        together = _joint_share(found, functions, decisive, {})
+        return together > budget and all(share > budget for share in alone)
 
     surveyed = scene.flat if isinstance(scene, LayeredScene | DepthScene) else scene
-    detail = scene_detail(path, surveyed, every_blur_counts)
+    detail = scene_detail(path, surveyed, nothing_is_saved)
     if detail is not None and not functions:
         functions.update(transfer_functions(path, detail))
     shares = {effect: _share(detail, functions, effect) for effect in candidates}

@@ -110,8 +110,8 @@ def encode(linear: np.ndarray, curve: Curve, bits: int) -> np.ndarray:
     linear = np.ascontiguousarray(linear, dtype=np.float32)
     # Below 0 a float32 is a negative integer. Left to `take`, that takes four times as long where
     # signs change by chance, as in dark frames.
-    bits = np.clip(linear.view(np.int32), 0, _ONE)
-    index = np.right_shift(bits, table.shift, dtype=np.int32).astype(np.intp)
+    inside = np.clip(linear.view(np.int32), 0, _ONE)
+    index = np.right_shift(inside, table.shift, dtype=np.int32).astype(np.intp)
     code = table.code.take(index, mode="wrap")
     code += (linear >= table.level.take(index, mode="wrap")).view(np.uint8)
     return code
