@@ -1,11 +1,9 @@
 """The cells on which a chart is painted: their error is measured, not guessed.
 
 Cells far finer than what the lens passes fold nothing that counts. Where the whole chart on such
-cells is cheap they are taken. Elsewhere its busiest parts and some others, the more likely the more
-contrast they have, are seen through the lens on finer and finer cells, against a reference whose
-cells share no factor with any of them. Each part stands for so much of the array as it was unlikely
-(`chosen_places.py`), and the coarsest cells that keep their share of the tolerance are taken for
-the whole.
+cells is cheap they are taken. Elsewhere its center, its busiest parts and some others are seen
+through the lens on finer and finer cells, against a reference whose cells share no factor with any
+of them, and the coarsest that keep their share of the tolerance are taken for the whole.
 """
 
 from __future__ import annotations
@@ -24,7 +22,6 @@ from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.image_formation.cosine_series import Axis
 from vcam_cli.image_formation.estimates.bandwidth import axes
 from vcam_cli.image_formation.estimates.cell_search import CHEAP, CellSearch, CellTrial
-from vcam_cli.image_formation.estimates.chosen_places import chosen_places
 from vcam_cli.image_formation.optical_path import OpticalPath
 from vcam_cli.parallel import product
 from vcam_cli.scenes.base import ChartScene
@@ -61,11 +58,7 @@ CROP_CELLS, MOST_CROP_CELLS = 320, 480
 BLOCKS, POINTS = 16, 12
 """Parts of a chart along each axis that are compared by contrast, and points along each."""
 FEW = 3
-"""Crops of the busiest parts, and where light fills pixels of parts taken evenly."""
-OTHERS = 6
-"""Crops of other parts."""
-ANYWHERE = 0.2
-"""Share of these for which all parts are alike."""
+"""Crops of the busiest parts, and crops of parts taken evenly."""
 FREQUENCIES = 1025
 """Entries of the crops' table over |f|."""
 
@@ -135,7 +128,7 @@ def cells_per_pixel(path: OpticalPath, scene: ChartScene, highest: float) -> Cho
         return ChosenCells(min(finest, math.sqrt(MOST_OF_SMALL / whole)))
     level = path.judged_weights.sum(axis=1)
     otf = _mean_otf(path, finest)
-    crops, shares = _crops(path, scene, reference, level)
+    crops = _crops(path, scene, reference, level)
     converged = _signals(path, crops, reference, level, otf)
     within = partial(_within, g)
     full = min(float(within(converged).max()), path.ceiling)
@@ -147,7 +140,7 @@ def cells_per_pixel(path: OpticalPath, scene: ChartScene, highest: float) -> Cho
 
     def measure(cells: float) -> CellTrial:
         found = _signals(path, crops, cells, level, otf)
-        error = _error_that_counts(found, converged, path.ceiling, within(found).size, shares)
+        error = _error_that_counts(found, converged, path.ceiling, within(found).size)
         return CellTrial(_crop_grid(crops[0], g, cells)[0] * g.pitch_y / crops[0].pitch_y, error)
 
     ladder = [c for c in LADDER if least <= c <= min(most, reference / COPRIME)]
@@ -195,12 +188,8 @@ def _uneven_points(size: tuple[float, float]) -> tuple[NDArray, NDArray]:
     return x, y
 
 
-def _error_that_counts(
-    found: NDArray, converged: NDArray, ceiling: float, pixels: int, shares: NDArray
-) -> float:
+def _error_that_counts(found: NDArray, converged: NDArray, ceiling: float, pixels: int) -> float:
     """Return the rms of the error of crops (crops, rows, columns) that full pixels do not hide.
-
-    Each stands for a share of the array, and the standard error of their sum is added.
 
     Where light is far brighter than what fills a pixel, hardly any error counts; but the few that
     do, below it, are as large as full signal, and a crop has too few pixels to show them. So the
@@ -209,11 +198,8 @@ def _error_that_counts(
     own may have none by chance, and the many around them would hide theirs.
     """
     full = np.minimum(converged, ceiling)
-    errors = np.square(np.minimum(found, ceiling) - full)
-    if pixels == errors.size and converged.max() <= ceiling:
-        parts = shares * errors.mean(axis=(1, 2))
-        return math.sqrt(float(parts.sum() + parts.std() * math.sqrt(len(parts))))
-    squares = np.sort(errors.ravel())[-pixels:].mean()
+    errors = np.square(np.minimum(found, ceiling) - full).ravel()
+    squares = np.sort(errors)[-pixels:].mean()
     if converged.max() > ceiling:
         crops = len(found), -1
         light = np.sort(converged.reshape(crops), axis=1)
@@ -252,10 +238,8 @@ def _mean_otf(path: OpticalPath, highest: float) -> Table:
     return f, otf
 
 
-def _crops(
-    path: OpticalPath, scene: ChartScene, cells: float, level: NDArray
-) -> tuple[list[ChartScene], NDArray]:
-    """Return places of a chart on which cells are tried, and the share that each stands for.
+def _crops(path: OpticalPath, scene: ChartScene, cells: float, level: NDArray) -> list[ChartScene]:
+    """Return places of a chart on which cells are tried.
 
     `cells` are those of the reference, per pixel pitch.
     """
@@ -264,24 +248,11 @@ def _crops(
     size = side * g.pitch_x, side * g.pitch_y
     sensor = g.sensor_width, g.sensor_height
     half = np.maximum(np.subtract(sensor, size) / 2, 0)  # a small array is amid each
-    contrasts = _contrasts(path, scene, level)
-    busiest = [np.argsort(contrast)[::-1][:FEW] for contrast in contrasts]
-    if len(busiest) > 1:  # some pixels are full: how many do not count is not known
-        even = 2 * (np.arange(1, FEW + 1)[:, None] * EVEN % 1) - 1
-        busy = _in_blocks(np.concatenate(busiest), 0.5) * sensor
-        places = np.concatenate([[(0, 0)], even * half, busy])
-        shares = np.full(len(places), 1 / len(places))
-    else:
-        rng = np.random.default_rng(0)
-        rest = np.setdiff1d(np.arange(BLOCKS**2), busiest[0])
-        others, of_rest = chosen_places(contrasts[0][rest], OTHERS, ANYWHERE, rng)
-        blocks = np.concatenate([busiest[0], rest[others]])
-        places = _in_blocks(blocks, rng.random((len(blocks), 2))) * sensor
-        shares = np.append(np.ones(FEW), of_rest * len(rest)) / BLOCKS**2
-    found: dict[tuple[float, float], float] = {}
-    for (x, y), share in zip(np.clip(places, -half, half), shares, strict=True):
-        found[float(x), float(y)] = found.get((float(x), float(y)), 0.0) + float(share)
-    return [scene.crop(place, *size) for place in found], np.array(list(found.values()))
+    even = 2 * (np.arange(1, FEW + 1)[:, None] * EVEN % 1) - 1
+    busy = _busiest(path, scene, level)
+    places = np.clip(np.concatenate([[(0, 0)], even * half, busy]), -half, half)
+    different = dict.fromkeys((float(x), float(y)) for x, y in places)
+    return [scene.crop(place, *size) for place in different]
 
 
 def _within(g: Geometry, signals: NDArray) -> NDArray:
@@ -295,10 +266,10 @@ def _within(g: Geometry, signals: NDArray) -> NDArray:
     return signals[:, rows, columns]
 
 
-def _contrasts(path: OpticalPath, scene: ChartScene, level: NDArray) -> list[NDArray]:
-    """Return the contrast of the blocks of an array, without and, where it counts, with a ceiling.
+def _busiest(path: OpticalPath, scene: ChartScene, level: NDArray) -> NDArray:
+    """Return the centers (n, 2) of the parts of most contrast, with and without a ceiling [m].
 
-    It comes from values at points.
+    They come from values at points.
     """
     g = path.geometry
     x, y = _uneven_points((g.sensor_width, g.sensor_height))
@@ -306,16 +277,9 @@ def _contrasts(path: OpticalPath, scene: ChartScene, level: NDArray) -> list[NDA
     contrasts = [light.var(axis=(1, 3)).ravel()]
     if float(light.max()) > path.ceiling:
         contrasts.append(np.minimum(light, path.ceiling).var(axis=(1, 3)).ravel())
-    return contrasts
-
-
-def _in_blocks(blocks: NDArray, place: NDArray | float) -> NDArray:
-    """Return places (n, 2) in blocks, from the array's center over its width and height.
-
-    `place` is that in a block, 0 to 1.
-    """
-    corners = np.stack([blocks % BLOCKS, blocks // BLOCKS], axis=1)
-    return np.asarray((corners + place) / BLOCKS - 0.5)
+    order = np.concatenate([np.argsort(contrast)[::-1][:FEW] for contrast in contrasts])
+    centers = (np.stack([order % BLOCKS, order // BLOCKS], axis=1) + 0.5) / BLOCKS - 0.5
+    return np.asarray(centers * (g.sensor_width, g.sensor_height))
 
 
 def _signals(
