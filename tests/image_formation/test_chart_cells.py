@@ -176,7 +176,7 @@ def test_whole_numbers_of_cells_are_kept():
 
 
 def crops(scene: ChartScene, g, cells: float = 4.0) -> list[ChartScene]:
-    return chart_cells._crops(path(g), scene, cells, np.ones(len(scene.spectra)))
+    return chart_cells._crops(path(g), scene, cells, np.ones(len(scene.spectra)))[0]
 
 
 def test_crops_have_the_center_and_lie_within_the_array():
@@ -231,7 +231,7 @@ def test_what_repeats_is_not_mistaken_for_even(period):
             bright = np.where(left, (x / (period * PITCH)) % 1 < 0.5, 0.5)
             return np.multiply.outer(mix[:, 0], np.broadcast_to(bright, (len(y), len(x))))
 
-    found = chart_cells._busiest(path(g), on_chart(path(g), Stripes(), margin=20), np.ones(1))
+    found, _ = chart_cells._busiest(path(g), on_chart(path(g), Stripes(), margin=20), np.ones(1))
     assert (found[:, 0] < 0).all()
 
 

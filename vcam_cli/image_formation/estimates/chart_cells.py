@@ -128,7 +128,7 @@ def cells_per_pixel(path: OpticalPath, scene: ChartScene, highest: float) -> Cho
         return ChosenCells(min(finest, math.sqrt(MOST_OF_SMALL / whole)))
     level = path.judged_weights.sum(axis=1)
     otf = _mean_otf(path, finest)
-    crops = _crops(path, scene, reference, level)
+    crops, edges = _crops(path, scene, reference, level)
     converged = _signals(path, crops, reference, level, otf)
     within = partial(_within, g)
     full = min(float(within(converged).max()), path.ceiling)
@@ -140,7 +140,7 @@ def cells_per_pixel(path: OpticalPath, scene: ChartScene, highest: float) -> Cho
 
     def measure(cells: float) -> CellTrial:
         found = _signals(path, crops, cells, level, otf)
-        error = _error_that_counts(found, converged, path.ceiling, within(found).size)
+        error = _error_that_counts(found, converged, path.ceiling, within(found).size, edges)
         return CellTrial(_crop_grid(crops[0], g, cells)[0] * g.pitch_y / crops[0].pitch_y, error)
 
     ladder = [c for c in LADDER if least <= c <= min(most, reference / COPRIME)]
@@ -188,8 +188,13 @@ def _uneven_points(size: tuple[float, float]) -> tuple[NDArray, NDArray]:
     return x, y
 
 
-def _error_that_counts(found: NDArray, converged: NDArray, ceiling: float, pixels: int) -> float:
+def _error_that_counts(
+    found: NDArray, converged: NDArray, ceiling: float, pixels: int, edges: float
+) -> float:
     """Return the rms of the error of crops (crops, rows, columns) that full pixels do not hide.
+
+    What cells err on is edges, of which the array has so many times as much as the crops, in the
+    mean over each.
 
     Where light is far brighter than what fills a pixel, hardly any error counts; but the few that
     do, below it, are as large as full signal, and a crop has too few pixels to show them. So the
@@ -199,6 +204,8 @@ def _error_that_counts(found: NDArray, converged: NDArray, ceiling: float, pixel
     """
     full = np.minimum(converged, ceiling)
     errors = np.square(np.minimum(found, ceiling) - full).ravel()
+    if pixels == errors.size and converged.max() <= ceiling:
+        return math.sqrt(float(errors.mean()) * edges)
     squares = np.sort(errors)[-pixels:].mean()
     if converged.max() > ceiling:
         crops = len(found), -1
@@ -238,10 +245,13 @@ def _mean_otf(path: OpticalPath, highest: float) -> Table:
     return f, otf
 
 
-def _crops(path: OpticalPath, scene: ChartScene, cells: float, level: NDArray) -> list[ChartScene]:
-    """Return places of a chart on which cells are tried.
+def _crops(
+    path: OpticalPath, scene: ChartScene, cells: float, level: NDArray
+) -> tuple[list[ChartScene], float]:
+    """Return places of a chart on which cells are tried, and the array's edges over theirs.
 
-    `cells` are those of the reference, per pixel pitch.
+    `cells` are those of the reference, per pixel pitch. Edges are told by the mean square of the
+    steps between points: an edge has as much of it as its length.
     """
     g = path.geometry
     side = int(np.clip(CROP_CELLS / cells, SMALLEST_CROP, CROP))
@@ -249,10 +259,26 @@ def _crops(path: OpticalPath, scene: ChartScene, cells: float, level: NDArray) -
     sensor = g.sensor_width, g.sensor_height
     half = np.maximum(np.subtract(sensor, size) / 2, 0)  # a small array is amid each
     even = 2 * (np.arange(1, FEW + 1)[:, None] * EVEN % 1) - 1
-    busy = _busiest(path, scene, level)
+    busy, steps = _busiest(path, scene, level)
     places = np.clip(np.concatenate([[(0, 0)], even * half, busy]), -half, half)
     different = dict.fromkeys((float(x), float(y)) for x, y in places)
-    return [scene.crop(place, *size) for place in different]
+    on_crops = np.mean([_steps_on(steps, place, size, sensor) for place in different])
+    edges = float(steps.mean() / on_crops) if on_crops else 1.0
+    return [scene.crop(place, *size) for place in different], edges
+
+
+def _steps_on(
+    steps: NDArray, place: tuple[float, float], size: tuple[float, float], sensor: tuple
+) -> float:
+    """Return the mean of what blocks (rows, columns) have, over those that a crop meets."""
+    columns, rows = (
+        slice(
+            max(0, math.floor(((at - length / 2) / whole + 0.5) * BLOCKS + 1e-9)),
+            max(1, math.ceil(((at + length / 2) / whole + 0.5) * BLOCKS - 1e-9)),
+        )
+        for at, length, whole in zip(place, size, sensor, strict=True)
+    )
+    return float(steps[rows, columns].mean())
 
 
 def _within(g: Geometry, signals: NDArray) -> NDArray:
@@ -266,10 +292,11 @@ def _within(g: Geometry, signals: NDArray) -> NDArray:
     return signals[:, rows, columns]
 
 
-def _busiest(path: OpticalPath, scene: ChartScene, level: NDArray) -> NDArray:
+def _busiest(path: OpticalPath, scene: ChartScene, level: NDArray) -> tuple[NDArray, NDArray]:
     """Return the centers (n, 2) of the parts of most contrast, with and without a ceiling [m].
 
-    They come from values at points.
+    They come from values at points. With them come the mean squares of the steps between these, in
+    every block (BLOCKS, BLOCKS).
     """
     g = path.geometry
     x, y = _uneven_points((g.sensor_width, g.sensor_height))
@@ -279,7 +306,8 @@ def _busiest(path: OpticalPath, scene: ChartScene, level: NDArray) -> NDArray:
         contrasts.append(np.minimum(light, path.ceiling).var(axis=(1, 3)).ravel())
     order = np.concatenate([np.argsort(contrast)[::-1][:FEW] for contrast in contrasts])
     centers = (np.stack([order % BLOCKS, order // BLOCKS], axis=1) + 0.5) / BLOCKS - 0.5
-    return np.asarray(centers * (g.sensor_width, g.sensor_height))
+    steps = [np.square(np.diff(light, axis=axis)).mean(axis=(1, 3)) for axis in (1, 3)]
+    return np.asarray(centers * (g.sensor_width, g.sensor_height)), steps[0] + steps[1]
 
 
 def _signals(
