@@ -262,3 +262,16 @@ def test_light_far_beyond_the_well_does_not_ring_into_dark_pixels(chart, rows, c
         ablation.mean_raw(prepare(each, 1)[0]) for each in (with_accuracy(camera, **fine), camera)
     )
     assert rms(found - truth) <= 0.005 * truth.max()
+
+
+def test_cells_that_a_chart_would_paint_in_parts_are_finer():
+    """Where in parts they would take longer than as many as are painted as they are."""
+    optical_path = before("f/2")
+    leaves = dead_leaves(4, FRAME)
+    scene = on_chart(optical_path, leaves)
+    finer = PITCH / leaves.undivided
+    for part, is_finer in ((0.26, False), (0.49, True), (0.6, False), (0.9, True), (1.1, False)):
+        found = chart_cells._with_undivided(optical_path, scene, part * finer)
+        assert found == pytest.approx(finer if is_finer else part * finer)
+    edge = on_chart(optical_path, CHARTS["slanted edge"])
+    assert chart_cells._with_undivided(optical_path, edge, 1.3) == 1.3

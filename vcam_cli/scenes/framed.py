@@ -37,6 +37,7 @@ class Framed(Chart):
     chart: Chart
     frame: Frame
     edge_seconds = property(lambda self: self.chart.edge_seconds)
+    undivided = property(lambda self: self.chart.undivided)
 
     @property
     def brightest(self) -> float:

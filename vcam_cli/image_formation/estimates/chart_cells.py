@@ -51,8 +51,15 @@ OVEREXPOSED_SHARE = 0.3
 which hardly any crop shows."""
 COPRIME = 1.37
 """Cells of a crop's reference over those that reach the cut-off."""
-CROP, SMALLEST_CROP = 24, 12
+NEAR = 6.0
+"""Cells of a first reference, a third of a pixel and more from those that it judges, which are
+enough for most charts; only where they are not is a far finer one painted."""
+CROP, SMALLEST_CROP = 48, 12
 """Pixels along a side of a crop, and of the smallest: fewer show too little of a chart."""
+CROPPED = 0.07
+"""Part of an array's pixels that crops have together, at most, but for the smallest ones."""
+FEW_PIXELS = 24**2
+"""Pixels of an array up to which none of it is a crop."""
 CROP_CELLS, MOST_CROP_CELLS = 320, 480
 """Cells along a side of a crop's reference, and of that of the smallest crops at most."""
 BLOCKS, POINTS = 16, 12
@@ -61,6 +68,10 @@ FEW = 3
 """Crops of the busiest parts, and crops of parts taken evenly."""
 FREQUENCIES = 1025
 """Entries of the crops' table over |f|."""
+
+
+Table = tuple[NDArray, NDArray]
+"""Frequencies (n,) [cycles/m], and an OTF there (n,), without unit."""
 
 
 class ChosenCells(NamedTuple):
@@ -119,24 +130,61 @@ def cells_per_pixel(path: OpticalPath, scene: ChartScene, highest: float) -> Cho
     asked = highest * max(BEYOND_CUTOFF, math.sqrt(FOLDED / path.settings.tolerance))
     asked *= math.sqrt(_brightest_over_full(path, scene))
     finest = SAFE * asked
-    reference = min(COPRIME * max(asked, LADDER[1]), MOST_CROP_CELLS / SMALLEST_CROP)
     g = path.geometry
     if math.prod(cell_grid(scene, g, finest)) <= CHEAP:
         return ChosenCells(finest)
     whole = math.prod(cell_grid(scene, g, 1.0))
-    if g.rows * g.columns <= CROP**2:  # too few to tell an error from chance
+    if g.rows * g.columns <= FEW_PIXELS:  # too few to tell an error from chance
         return ChosenCells(min(finest, math.sqrt(MOST_OF_SMALL / whole)))
-    level = path.judged_weights.sum(axis=1)
     otf = _mean_otf(path, finest)
+    most = min(finest, max(1.0, math.sqrt(MOST / whole)))
+    far = min(COPRIME * max(asked, LADDER[1]), MOST_CROP_CELLS / SMALLEST_CROP)
+    search = None
+    for reference in sorted({min(NEAR, far), far}):
+        search = _search(path, scene, otf, reference, most, search)
+        search.try_between(whole, LADDER[0])
+        if search.kept:
+            cells, error = search.kept
+            return ChosenCells(_with_undivided(path, scene, cells), error, search.trials)
+    assert search is not None
+    budget, last = search.budget, search.failed or CellTrial(most, search.budget)
+    # It falls with the square of the cells, about: faster than is reckoned here.
+    enough = min(last.cells * last.error / budget, most) if budget else most
+    return ChosenCells(enough, last.error_of(enough, 1.0), search.trials)
+
+
+def _with_undivided(path: OpticalPath, scene: ChartScene, cells: float) -> float:
+    """Return more cells where the chart would paint such wide ones in parts, and gain by more.
+
+    Painting a cell takes as long as transforming it, about.
+    """
+    finer = max(path.geometry.pitch_x, path.geometry.pitch_y) / scene.chart.undivided
+    painted = math.ceil(finer / cells) * cells
+    return finer if painted**2 - finer**2 > finer**2 - cells**2 > 0 else cells
+
+
+def _search(
+    path: OpticalPath,
+    scene: ChartScene,
+    otf: Table,
+    reference: float,
+    most: float,
+    before: CellSearch | None,
+) -> CellSearch:
+    """Return the search among the cells that a reference of so many judges, and `most` at most.
+
+    One before it found none among fewer cells.
+    """
+    g, level = path.geometry, path.judged_weights.sum(axis=1)
     crops, edges = _crops(path, scene, reference, level)
     converged = _signals(path, crops, reference, level, otf)
     within = partial(_within, g)
     full = min(float(within(converged).max()), path.ceiling)
     budget = CELLS_SHARE * path.settings.tolerance * full
-    most = min(finest, max(1.0, math.sqrt(MOST / whole)))
-    least = 0.0
+    failed = before.failed if before else None
+    least = failed.cells if failed else 0.0
     if converged.max() > path.ceiling:
-        least, budget = OVEREXPOSED, OVEREXPOSED_SHARE * budget
+        least, budget = max(least, OVEREXPOSED), OVEREXPOSED_SHARE * budget
 
     def measure(cells: float) -> CellTrial:
         found = _signals(path, crops, cells, level, otf)
@@ -145,16 +193,10 @@ def cells_per_pixel(path: OpticalPath, scene: ChartScene, highest: float) -> Cho
 
     ladder = [c for c in LADDER if least <= c <= min(most, reference / COPRIME)]
     first = next((i for i, c in enumerate(ladder) if c >= LIKELY), len(ladder) - 1)
-    search = CellSearch(measure, budget)
+    search = CellSearch(measure, budget, failed=failed, trials=1 + (before.trials if before else 0))
     search.try_upward(ladder[first:])
     search.try_downward(ladder[:first])
-    search.try_between(whole, max(least, LADDER[0]))
-    if search.kept:
-        return ChosenCells(*search.kept, search.trials)
-    last = search.failed or CellTrial(most, budget)
-    # It falls with the square of the cells, about: faster than is reckoned here.
-    enough = min(last.cells * last.error / budget, most) if budget else most
-    return ChosenCells(enough, last.error_of(enough, 1.0), search.trials)
+    return search
 
 
 def _brightest_over_full(path: OpticalPath, scene: ChartScene) -> float:
@@ -228,10 +270,6 @@ def _crop_grid(crop: ChartScene, geometry: Geometry, per_pixel: float) -> tuple[
     return ny, nx
 
 
-Table = tuple[NDArray, NDArray]
-"""Frequencies (n,) [cycles/m], and an OTF there (n,), without unit."""
-
-
 def _mean_otf(path: OpticalPath, highest: float) -> Table:
     """Return the OTF of the color with most light, its aberrations aside.
 
@@ -254,7 +292,8 @@ def _crops(
     steps between points: an edge has as much of it as its length.
     """
     g = path.geometry
-    side = int(np.clip(CROP_CELLS / cells, SMALLEST_CROP, CROP))
+    most = math.sqrt(CROPPED / (1 + 2 * FEW) * g.rows * g.columns)
+    side = int(np.clip(min(CROP_CELLS / cells, most), SMALLEST_CROP, CROP))
     size = side * g.pitch_x, side * g.pitch_y
     sensor = g.sensor_width, g.sensor_height
     half = np.maximum(np.subtract(sensor, size) / 2, 0)  # a small array is amid each

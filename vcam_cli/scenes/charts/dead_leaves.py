@@ -157,6 +157,7 @@ class DeadLeaves(Chart):
     divided: int = MOST
     """How often cells are divided in which edges meet."""
     edge_seconds = property(lambda self: EDGE_SECONDS[0] + EDGE_SECONDS[1] * self.divided)
+    undivided = property(lambda self: self.unit / FINEST)
 
     @property
     def darkest(self) -> float:

@@ -22,6 +22,7 @@ class LeavesWithColorChecker(Chart):
     leaves: DeadLeaves | PlacedLeaves
     card: Card
     edge_seconds = property(lambda self: self.leaves.edge_seconds)
+    undivided = property(lambda self: self.leaves.undivided)
 
     @property
     def darkest(self) -> float:
