@@ -117,17 +117,17 @@ def light_plan(path: OpticalPath, scene: AnyScene) -> LightPlan:
     if of_kind(blurs, Blur, FieldTransfer):
         decisive = of_kind(blurs, Blur, FieldTransfer, SubExposedMotion)
 
-    # Transfers of |f| alone save nothing by themselves, where the spectrum is followed for others.
-    costly = [blur for blur in decisive if not of_kind([blur], RadialTransfer)]
+    # Of transfers of |f| some save nothing as long as others stay.
+    radial = of_kind(decisive, RadialTransfer)
+    groups: list[Sequence[Effect]] = [(blur,) for blur in decisive if blur not in radial]
+    groups += [radial] if radial else []
 
     def nothing_is_saved(found: SceneDetail) -> bool:
-        if displacing or not found.brightest:
+        if displacing or found.even or not found.brightest:
             return False
         if not functions:
             functions.update(transfer_functions(path, found))
-        alone = (_share(found, functions, blur) for blur in costly)
-        together = _joint_share(found, functions, decisive, {})
-        return together > budget and all(share > budget for share in alone)
+        return all(_joint_share(found, functions, group, {}) > budget for group in groups)
 
     surveyed = scene.flat if isinstance(scene, LayeredScene | DepthScene) else scene
     detail = scene_detail(path, surveyed, nothing_is_saved)
