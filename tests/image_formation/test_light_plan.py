@@ -5,6 +5,8 @@ import pytest
 from making import camera, radiance_for
 
 from vcam_cli import simulate
+from vcam_cli.image_formation import light_plan, photon_rate
+from vcam_cli.image_formation.estimates import scene_detail
 from vcam_cli.image_formation.light_plan import OMITTED_SHARE
 from vcam_cli.simulation.simulate import prepare
 
@@ -129,3 +131,43 @@ def test_all_that_is_on_is_not_surveyed(tmp_path, monkeypatch):
 
     monkeypatch.setattr(light_plan, "scene_detail", None)
     assert set(states(tmp_path, WEDGE | {"effects": "all"}).values()) <= {"on", "off"}
+
+
+COMA = {"optics.zernike": {8: "60 nm"}}
+SPINNING = {"motion": {"rotate": "400 deg/s"}}
+
+
+@pytest.mark.parametrize("accuracy", ["draft", "standard"])
+@pytest.mark.parametrize("chart", ["eye-chart", "dead-leaves", "siemens-star"])
+@pytest.mark.parametrize(
+    ("camera_keys", "source_keys"),
+    [({}, {}), (SILICON, {}), (COMA, {}), (SILICON | COMA, {}), ({}, SPINNING)],
+    ids=["lens", "silicon", "coma", "silicon and coma", "turning"],
+)
+def test_few_tiles_leave_out_what_all_do(
+    camera_keys, source_keys, chart, accuracy, tmp_path, monkeypatch
+):
+    """Where it is not asked whether some tell enough, all are."""
+    changes = camera_keys | {"accuracy": accuracy, "effects": "auto"}
+    changes |= {"array.rows": 240, "array.columns": 320}
+    changes |= {"scene.source": {"kind": "chart", "chart": chart, **source_keys}}
+    planned = []
+    whole = light_plan.light_plan
+
+    def plan_light(path, scene):
+        with monkeypatch.context() as patched:
+            survey = scene_detail.scene_detail
+            patched.setattr(light_plan, "scene_detail", lambda path, scene, _: survey(path, scene))
+            planned.append(whole(path, scene).omitted)
+        planned.append(whole(path, scene).omitted)
+        raise Planned
+
+    monkeypatch.setattr(photon_rate, "light_plan", plan_light)
+    with pytest.raises(Planned):
+        prepare(camera(tmp_path, changes), 1)
+    all_tiles, few_tiles = planned
+    assert few_tiles == all_tiles
+
+
+class Planned(Exception):
+    """Raised as soon as the light is planned."""
