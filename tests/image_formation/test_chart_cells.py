@@ -11,7 +11,7 @@ from vcam_cli import load
 from vcam_cli.accuracy import ablation
 from vcam_cli.accuracy.knobs import with_accuracy
 from vcam_cli.effects.optics.diffraction import Diffraction
-from vcam_cli.image_formation.estimates import chart_cells
+from vcam_cli.image_formation.estimates import cell_search, chart_cells
 from vcam_cli.image_formation.estimates.bandwidth import highest_passed
 from vcam_cli.image_formation.estimates.chart_cells import cell_grid, cells_per_pixel
 from vcam_cli.image_formation.settings import STANDARD
@@ -148,6 +148,15 @@ def test_detail_beyond_saturation_does_not_count(measured):
     cells, error, _ = cells_per_pixel(optical_path, scene, highest_passed(optical_path, scene))
     assert chart_cells.OVEREXPOSED <= cells < chart_cells.OVEREXPOSED + 0.5
     assert error == 0
+
+
+def test_overexposed_charts_keep_the_cells_that_they_need(measured, monkeypatch):
+    """Also where fewer would spare a large image."""
+    monkeypatch.setattr(cell_search, "CHEAP", 0)
+    optical_path = replace(before("f/2"), ceiling=1e-3)
+    scene = on_chart(optical_path, SlantedEdge(0.1, 0.5), margin=10)
+    cells = cells_per_pixel(optical_path, scene, highest_passed(optical_path, scene))[0]
+    assert cells >= chart_cells.OVEREXPOSED
 
 
 @pytest.mark.parametrize("per_pixel", [1.0, 1.37, 2.5, 7.3])

@@ -57,7 +57,7 @@ def join_sides(parts: Iterable[Sides]) -> Sides:
 
 def cover(polygons: Sides, x_edges: Array, y_edges: Array) -> Array:
     """Return the part of every cell that polygons cover: (len(y_edges) - 1, len(x_edges) - 1)."""
-    row, xa, xb, ya, yb = _cut_at_rows(_seen(polygons, x_edges, y_edges), y_edges)
+    row, xa, xb, ya, yb = _cut_at_rows(_sides_that_count(polygons, x_edges, y_edges), y_edges)
     rise = (yb - ya) / np.diff(y_edges)[row]
     low, high = np.minimum(xa, xb), np.maximum(xa, xb)
     # one column more on either side, for what lies beyond the grid
@@ -83,7 +83,7 @@ def cover(polygons: Sides, x_edges: Array, y_edges: Array) -> Array:
 
 def contains_points(polygons: Sides, x: Array, y: Array) -> Array:
     """Return 1 where the points (y[i], x[j]), both rising, lie in a polygon: (len(y), len(x))."""
-    polygons = _seen(polygons, x, y)
+    polygons = _sides_that_count(polygons, x, y)
     low, high = np.minimum(polygons.y0, polygons.y1), np.maximum(polygons.y0, polygons.y1)
     side, row = expand_ranges(y.searchsorted(low), y.searchsorted(high))
     x0, y0, x1, y1 = (each[side] for each in _fields(polygons))
@@ -93,7 +93,7 @@ def contains_points(polygons: Sides, x: Array, y: Array) -> Array:
     return np.cumsum(turns.reshape(len(y), len(x) + 1), axis=1)[:, :-1]
 
 
-def _seen(polygons: Sides, x: Array, y: Array) -> Sides:
+def _sides_that_count(polygons: Sides, x: Array, y: Array) -> Sides:
     """Return the sides that count between the first and the last place along x and y.
 
     Those that lie left of them do.

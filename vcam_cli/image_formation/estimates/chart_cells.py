@@ -142,7 +142,6 @@ def cells_per_pixel(path: OpticalPath, scene: ChartScene, highest: float) -> Cho
     search = None
     for reference in sorted({min(NEAR, far), far}):
         search = _search(path, scene, otf, reference, most, search)
-        search.try_between(whole, LADDER[0])
         if search.kept:
             cells, error = search.kept
             return ChosenCells(_with_undivided(path, scene, cells), error, search.trials)
@@ -196,6 +195,7 @@ def _search(
     search = CellSearch(measure, budget, failed=failed, trials=1 + (before.trials if before else 0))
     search.try_upward(ladder[first:])
     search.try_downward(ladder[:first])
+    search.try_between(math.prod(cell_grid(scene, g, 1.0)), max(least, LADDER[0]))
     return search
 
 
