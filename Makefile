@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 SOURCES := vcam_cli tests scripts
 CAMERA ?= still-life
 
-.PHONY: run test test-all lint check bench interchange promise stability docs fuzz attacks schemas tables thesis lock clean
+.PHONY: run test test-all lint check bench interchange promise stability docs figures fuzz attacks schemas tables thesis lock clean
 
 run: $(VENV)/.runtime  ## simulate the shipped still life: out/still-life/
 	$(BIN)/vcam run $(CAMERA)
@@ -35,6 +35,9 @@ promise: $(VENV)/.dev  ## the plan's promises: cameras named, random, exactly kn
 
 stability: $(VENV)/.dev  ## hard cases: our error beside that of the textbook form, as a table
 	$(BIN)/python -m tests.hard_cases
+
+figures: $(VENV)/.dev  ## figures and tables of README.md and docs/ that change with the engine; an idle machine
+	$(BIN)/python scripts/doc_figures.py
 
 fuzz: $(VENV)/.dev  ## twenty thousand camera and study files with something broken in them
 	$(BIN)/python -m tests.hostile

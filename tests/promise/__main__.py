@@ -1,15 +1,18 @@
 """The promises of the plan, measured: prints every figure, and exits with 1 where one is missed.
 
-    python -m tests.promise [--named] [--random] [--exact] [--matrix] [--times] [--spent]
-                            [CAMERA...]
+    python -m tests.promise [--named] [--random] [--exact] [--frames] [--matrix] [--times] [--spent]
+                            [--count N] [--first-seed N] [CAMERA...]
+    python -m tests.promise --only KIND SEED
 
-Without options: all of it, in half an hour on two processors. Named cameras have little in common;
+Without options: all of it, in an hour on two processors. Named cameras have little in common;
 of each, what the mean signal and the variances lose beside what may be lost, what the plan expected
 of every effect beside its ablation, and what is not worth its cost. Forty more are drawn at random
-with every effect. The mean signal of others is known exactly. Ten cameras stand before eighteen
-scenes: what is left out there is held against true ablations, and the time that it saves is
-measured, in processor seconds on one thread. Shipped cameras spend the tolerance: their errors are
-no small part of it, and their presets no more expensive than that explains.
+with every effect. The mean signal of others is known exactly. Thousands of frames of all kinds are
+drawn at random, each with a truth of its own (`frames.py`); `--only` prints one of them. Ten
+cameras stand before eighteen scenes: what is left out there is held against true ablations, and the
+time that it saves is measured, in processor seconds on one thread. Shipped cameras spend the
+tolerance: their errors are no small part of it, and their presets no more expensive than that
+explains.
 """
 
 from __future__ import annotations
@@ -21,7 +24,7 @@ import tempfile
 import time
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from multiprocessing import get_context
 from pathlib import Path
 
@@ -29,6 +32,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).parent.parent))
 sys.path.insert(0, str(Path(__file__).parent))
 
+import frames
 from parts import PARTS, Figure, Part
 
 from vcam_cli.memory import limit_blas_threads
@@ -42,7 +46,15 @@ def main() -> int:
         parser.add_argument(f"--{name}", action="store_true", help=f"only {part.text}")
     parser.add_argument("--workers", type=int, default=available_workers(), help="processes")
     parser.add_argument("--json", help="also write what was found to this file")
+    parser.add_argument("--count", type=int, default=frames.COUNT, help="random frames")
+    parser.add_argument("--first-seed", type=int, default=0, help="of every kind of them")
+    parser.add_argument("--only", nargs=2, metavar=("KIND", "SEED"), help="print one of them")
     options = parser.parse_args()
+    if options.only:
+        print(frames.show(*options.only, Path(tempfile.mkdtemp())))
+        return 0
+    drawn = frames.cases(options.count, options.first_seed)
+    PARTS["frames"] = replace(PARTS["frames"], cases=drawn)
     limit_blas_threads()  # of the processes that are started, as `vcam` does
     names = [name for name in PARTS if getattr(options, name)] or list(PARTS)
     found: dict[str, list] = {}
@@ -79,7 +91,8 @@ def _measured(part: Part, cases: list[tuple], workers: int) -> Iterator:
             jobs = [pool.submit(part.measure, *c, p) for c, p in zip(cases, places, strict=True)]
             for job in jobs:
                 found = job.result()
-                print(found.line, flush=True)
+                if found.line:
+                    print(found.line, flush=True)
                 yield found
 
 

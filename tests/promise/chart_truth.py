@@ -17,9 +17,10 @@ from typing import Any
 import edge_truth
 import leaves_truth
 import numpy as np
-from fourier import Series, cutoff, mean_electrons, working_f_number
+from fourier import Series, cutoff, mean_electrons, picture, working_f_number
 from outlines import arcs, circle, merge, rectangles, series, sides
 from reference import Setup
+from reference_collect import Squares
 from reference_scenes import color_chart
 from scipy.special import erfc
 
@@ -59,17 +60,9 @@ def truth(camera: Camera, setup: Setup) -> Truth:
 
 def image_truth(setup: Setup, samples: np.ndarray) -> Truth:
     """A gray image (h, w) that just covers the array: squares of light, mirrored at its borders."""
-    mirrored = np.block([[samples, samples[:, ::-1]], [samples[::-1], samples[::-1, ::-1]]])
-    waves = []
-    for count, size in zip(mirrored.shape, setup.size[::-1], strict=True):
-        side = 2 * size / count
-        center = (np.arange(count) + 0.5) * side - size / 2
-        most = math.floor(2 * size * cutoff(setup))
-        f = np.arange(-most, most + 1) / (2 * size)
-        wave = np.exp(-2j * math.pi * np.outer(f, center)) * np.sinc(f * side)[:, None] / count
-        waves.append((f, wave))
-    (fy, down), (fx, across) = waves
-    return Truth(mean_electrons(setup, Series(fx, fy, down @ mirrored @ across.T)), 0.0)
+    rows, columns = samples.shape
+    squares = Squares(samples[None], setup.size[0] / columns, setup.size[1] / rows)
+    return Truth(mean_electrons(setup, *picture(setup, squares)), 0.0)
 
 
 def converge(mean: Callable[[float], np.ndarray], setup: Setup) -> Truth:

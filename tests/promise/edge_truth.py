@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from fourier import cutoff, transfer
+from fourier import cutoff, places, transfer
 from reference import Setup
 
 
@@ -21,25 +21,35 @@ def mean_signal(setup: Setup, angle: float, borders: np.ndarray, levels: np.ndar
 
     levels (n + 1,): light between borders (n,) [m], which rise along (cos angle, sin angle).
     """
-    x, y = setup.centers
-    x, y = x + setup.aperture[0], y + setup.aperture[1]
+    x, y, gather = places(setup)
     along = math.cos(angle), math.sin(angle)
-    distance = along[0] * x + along[1] * y
-    farthest = abs(distance).max() + abs(borders).max()
-    f, weight = _rule(cutoff(setup), 4 + math.ceil(farthest * cutoff(setup)))
+    farthest = abs(along[0] * x).max() + abs(along[1] * y).max() + abs(borders).max()
+    end = cutoff(setup, along)
+    f, weight = _rule(end, 4 + math.ceil(farthest * end))
     passed = transfer(setup, f * along[0], f * along[1])  # (C, F)
     waves = np.exp(-2j * math.pi * np.outer(f, borders)) @ np.diff(levels)
-    turn = np.exp(2j * math.pi * np.multiply.outer(distance, f))
-    light = (turn * (waves * weight / f / math.pi)).imag @ passed.T  # (rows, columns, C)
-    even = (levels[0] + levels[-1]) / 2 * transfer(setup, np.zeros(1), np.zeros(1))[:, 0]
-    return np.take_along_axis(light + even, setup.color[..., None], axis=-1)[..., 0]
+    down = np.exp(2j * math.pi * np.outer(y * along[1], f))
+    across = np.exp(2j * math.pi * np.outer(x * along[0], f))
+    amount = waves * weight / f / math.pi
+    light = np.array([((down * (amount * one)) @ across.T).imag for one in passed])
+    even = (levels[0] + levels[-1]) / 2 * transfer(setup, np.zeros(1), np.zeros(1)).real
+    return gather(light + even[..., None])
 
 
 def step_wedge(setup: Setup, steps: int, density_range: float) -> np.ndarray:
-    """Bars of equal width over the array, 10^(-D i / (n - 1)), the first and last without end."""
-    levels = 10.0 ** (-density_range * np.arange(steps) / (steps - 1))
-    borders = (np.arange(1, steps) / steps - 0.5) * setup.size[0]
-    return mean_signal(setup, 0.0, borders, levels)
+    """Mean photo-electrons of every pixel before a step wedge."""
+    return mean_signal(setup, 0.0, *bars(setup, steps, density_range))
+
+
+def bars(setup: Setup, steps: int, density_range: float) -> tuple[np.ndarray, np.ndarray]:
+    """Borders [m] and levels of bars of equal width over the array, 10^(-D i / (n - 1)), the first
+    and last without end."""
+    return (np.arange(1, steps) / steps - 0.5) * setup.size[0], levels(steps, density_range)
+
+
+def levels(steps: int, density_range: float) -> np.ndarray:
+    """Levels of the bars, from the left."""
+    return 10.0 ** (-density_range * np.arange(steps) / (steps - 1))
 
 
 def slanted_edge(setup: Setup, angle: float, contrast: float) -> np.ndarray:

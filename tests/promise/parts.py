@@ -11,6 +11,7 @@ from typing import Any
 
 import chart_cameras
 import exact_errors
+import frames
 import periodic_cameras
 import promises
 import random_cameras
@@ -198,6 +199,12 @@ PARTS = {
         tuple((name,) for name in (*periodic_cameras.CAMERAS, *chart_cameras.CAMERAS)),
         exact,
         exact_figures,
+    ),
+    "frames": Part(
+        "random frames of all kinds, and those that once broke the promise",
+        frames.cases(frames.COUNT, 0),
+        frames.measure,
+        frames.figures,
     ),
     "matrix": Part(
         "ten cameras before eighteen scenes: what is left out, against true ablations",

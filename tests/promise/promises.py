@@ -369,12 +369,13 @@ def at_preset(camera: Camera, preset: str) -> Camera:
     return camera.model_copy(update={"accuracy": type(camera.accuracy)(preset=preset)})
 
 
-def variance_lost_of(auto: Prepared, found: Prepared) -> float:
+def variance_lost_of(auto: Prepared, found: Prepared, levels: np.ndarray | None = None) -> float:
     """Largest relative change of a variance, as the effects state it, with what is left out.
 
-    found: the camera with everything on.
+    found: the camera with everything on; levels: signals [electrons], by default its own.
     """
-    return max(_variance_lost(auto, found, scope) for scope in ("frame", "sensor"))
+    at = scene_levels(found) if levels is None else levels
+    return max(_variance_lost(auto, found, scope, at) for scope in ("frame", "sensor"))
 
 
 PERCENTILES = (1, 10, 50, 90, 99)
@@ -394,12 +395,12 @@ def scene_levels(found: Prepared) -> np.ndarray:
     ).ravel()
 
 
-def _variance_lost(auto: Prepared, found: Prepared, scope: str) -> float:
+def _variance_lost(auto: Prepared, found: Prepared, scope: str, levels: np.ndarray) -> float:
     """At the percentiles of the scene's own signal, with the dark signal that each has."""
     worst = 0.0
     time = auto.exposure_time
     missing = (found.dark_rate - auto.dark_rate) * time
-    for level in scene_levels(found):
+    for level in levels:
         everything = _variance(found, scope, level, found.dark_rate * time)
         own = _variance(auto, scope, max(0.0, level - missing), auto.dark_rate * time)
         if everything:
