@@ -5,18 +5,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from vcam_cli.commands import options
+from vcam_cli.commands.plan_story import TABLE_UNITS
 from vcam_cli.commands.progress import Progress
 
 if TYPE_CHECKING:
     from vcam_cli.accuracy.setting_errors import Point
     from vcam_cli.accuracy.study import Study
 
-SHARE_OF = {
-    "of full signal": "full signal",
-    "of the temporal variance": "temporal var.",
-    "of the fixed-pattern variance": "fixed var.",
-}
-"""The plan's units, short enough for a table."""
 SETTINGS = (
     "knob", "setting", "rms %", "of T", "largest %", "electrons", "S-CIELAB", "seconds", "spread",
 )  # fmt: skip
@@ -106,6 +101,7 @@ def report_arguments(found: "Study") -> dict[str, Any]:
 
     facts = [
         ("recommended", found.recommendation.sentence.replace("`", "")),
+        *(("tolerance missed", text.replace("`", "")) for text in found.recommendation.missed),
         ("reference", convergence(found)),
     ]
     facts += [(f"{knob} does not apply", why) for knob, why in found.absent.items()]
@@ -131,13 +127,15 @@ def print_report(found: "Study", path: Path) -> None:
 
     width = None if sys.stdout.isatty() else 120
     console = Console(width=width, soft_wrap=True, highlight=False)
-    title = "error against the converged reference, and the share of the tolerance T that it takes"
-    _table(console, f"{title}; a knob's is its own", SETTINGS, settings(found))  # fmt: skip
-    _table(console, "each effect left out: expected by the plan, and measured", EFFECTS,
+    title = "error against the converged reference, and its ratio to the tolerance T of the setting"
+    _table(console, f"{title}; of a knob: its own error", SETTINGS, settings(found))  # fmt: skip
+    _table(console, "each effect skipped: change expected by the plan, and measured", EFFECTS,
            effects(found))  # fmt: skip
     for knob, why in found.absent.items():
         console.print(f"{knob} does not apply: {why}")
     console.print(convergence(found))
+    for sentence in found.recommendation.missed:
+        console.print(f"{sentence}.")
     console.print(f"recommended: {found.recommendation.sentence}")
     console.print(f"{path}/accuracy.csv, accuracy.png, accuracy.json")
 
@@ -150,14 +148,17 @@ def convergence(found: "Study") -> str:
     shown = [p for p in found.points if not p.effect]
     unsure = sorted({p.knob for p in shown if not p.is_certain})
     text = (
-        f"full signal: {reference.full_signal:.6g} electrons; the reference itself is good to"
+        f"full signal: {reference.full_signal:.6g} electrons; estimated error of the reference:"
         f" {100 * reference.lost:.1g} % of it"
     )
     if unsure:
-        return f"{text}; <: at most so much, since of {', '.join(unsure)} it is not a tenth as much"
+        return (
+            f"{text}; <: upper bound, since the reference is not ten times better"
+            f" ({', '.join(unsure)})"
+        )
     return (
-        f"{text}; each knob was refined until that changed a tenth of its least error, or less than"
-        f" {100 * FLOOR:.0e} %, which is rounding"
+        f"{text}; each knob was refined until the change was a tenth of its least error, or below"
+        f" {100 * FLOOR:.0e} % (rounding)"
     )
 
 
@@ -211,7 +212,7 @@ def effects(found: "Study") -> list[tuple[str, ...]]:
             "-" if e.predicted is None else f"{100 * e.predicted:.2g}",
             f"{100 * e.measured:.2g}",
             "-" if e.ratio is None else f"{e.ratio:.2f}",
-            SHARE_OF.get(e.unit, e.unit),
+            TABLE_UNITS.get(e.unit, e.unit),
             _delta_e(delta_e[e.name]),
             f"{1000 * e.seconds_saved:.0f}",
         )

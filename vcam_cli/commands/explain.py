@@ -135,10 +135,13 @@ def _effects() -> dict[str, Any]:
 def _of_effect(word: str) -> Iterator[dict[str, Any]]:
     import inspect
 
+    from vcam_cli.effects.base import Blur, FieldTransfer, ImageMotion, SeparableTransfer
+
     effect = _effects().get(word.removeprefix("effects.").replace("-", "_"))
     if effect is None:
         return
-    cost = "a transform or two; the plan says how long they take" if effect.costly else "little"
+    filters = issubclass(effect, Blur | FieldTransfer | SeparableTransfer | ImageMotion)
+    cost = "a transform or two; the plan says how long they take" if filters else "little"
     if effect.seconds_per_pixel:
         cost = f"about {effect.seconds_per_pixel * 1e9:.2g} ns a pixel on one core"
     keys = [

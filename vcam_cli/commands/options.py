@@ -216,6 +216,13 @@ def line_width(most: int = 96) -> int:
     return min(most, shutil.get_terminal_size().columns)
 
 
+def wrap(text: str) -> list[str]:
+    """Return lines of at most 100 characters, and no wider than a terminal."""
+    import textwrap
+
+    return textwrap.wrap(text, line_width(100), break_long_words=False)
+
+
 def open_table(plain_width: int = 120) -> tuple[Any, Any]:
     """Return a console on stdout and an empty table for it, plain where it is no terminal.
 

@@ -1,18 +1,12 @@
 """`vcam plan`: what a run would simulate, what not, why, and at what cost."""
 
-from collections.abc import Sequence
-from functools import partial
-from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from vcam_cli.commands import options
+from vcam_cli.commands.plan_story import LEGEND
 from vcam_cli.commands.progress import Progress
-
-if TYPE_CHECKING:
-    from vcam_cli.simulation.scene_plans import ScenePlan
-
 
 Scenes = Annotated[
     list[str] | None,
@@ -21,6 +15,23 @@ Scenes = Annotated[
         metavar="all|FILE",
         help="Plan before other scenes: `all` for six charts in three lights, or a scene file or"
         " shipped scene. Repeatable. Writes scenes.csv and scenes.png.",
+    ),
+]
+Measure = Annotated[
+    bool,
+    typer.Option(
+        "--measure",
+        help="With --scenes: also take frames before every scene, with the effects of the plan"
+        " and with all, and write the measured seconds.",
+    ),
+]
+Turns = Annotated[
+    int | None,
+    typer.Option(
+        "--turns",
+        metavar="N",
+        min=1,
+        help="With --measure: frames of each kind that count, after a warm-up; default 5.",
     ),
 ]
 Geometry = Annotated[
@@ -49,6 +60,8 @@ def plan(
     quiet: options.Quiet = False,
     workers: options.Workers = None,
     scenes: Scenes = None,
+    measure: Measure = False,
+    turns: Turns = None,
     out: options.Out = None,
     geometry: Geometry = False,
     details: Details = False,
@@ -56,8 +69,8 @@ def plan(
 ) -> None:
     """Show which effects a run simulates, which not and why, and what it costs.
 
-    The irradiance on the pixels is computed, since the scene decides what each effect contributes;
-    no frame is exposed, and nothing is written but the table of several scenes.
+    The irradiance on the pixels is computed, since the contribution of an effect depends on the
+    scene. No frame is exposed, except with --measure, and nothing is written, except with --scenes.
 
     \b
     Example:
@@ -67,13 +80,19 @@ def plan(
       vcam plan starter --geometry
       vcam plan starter --scenes all
       vcam plan starter --scenes still-life --scenes my-scene.yaml
+      vcam plan everything --scenes all --measure --turns 3
     """
     if scenes and geometry:
         raise typer.BadParameter("--geometry is of one scene; leave out --scenes")
+    if (measure and not scenes) or (turns and not measure):
+        raise typer.BadParameter("--turns needs --measure, and --measure needs --scenes")
     if scenes:
-        _plan_scenes(
-            camera, scenes, out, options.overrides(set_, accuracy=accuracy), quiet, workers, formats
-        )
+        from vcam_cli.commands.plan_scenes import plan_scenes
+        from vcam_cli.simulation.scene_times import TURNS
+
+        asked = options.overrides(set_, accuracy=accuracy)
+        count = (turns or TURNS) if measure else 0
+        plan_scenes(camera, scenes, out, asked, quiet, workers, formats, count)
         return
     from vcam_cli.camera.derived.frame_rate import frame_rate
     from vcam_cli.commands.plan_story import print_story
@@ -106,66 +125,11 @@ def plan(
     else:
         told = facts(report, solved, ready.exposure_time, ready.times, rate_of_frames)
         if details:
-            print("\n".join((table(report), "", settings_line(report))))
+            legend = options.wrap(LEGEND)
+            print("\n".join((table(report), "", *legend, "", settings_line(report))))
             print("\n".join(f"{heading:<10} {text}" for heading, text in told))
         else:
             print_story(camera, report, told)
-
-
-def _plan_scenes(
-    camera: str,
-    scenes: list[str],
-    out: Path | None,
-    overrides: list[str],
-    quiet: bool,
-    workers: int | None,
-    formats: Sequence[str] | None,
-) -> None:
-    """Write and print the table of effects by scenes."""
-    from vcam_cli.files.folder import OutputFolder
-    from vcam_cli.files.plots import in_formats
-    from vcam_cli.files.tables import write_table
-    from vcam_cli.simulation import scene_plans
-    from vcam_cli.simulation.checks import load
-    from vcam_cli.simulation.output import provenance
-    from vcam_cli.simulation.output.scene_plans_plot import plot_scene_plans
-
-    model = load(camera, overrides)
-    path = out or Path("out") / f"{model.name}-scenes"
-    place = OutputFolder(path, record="scenes.json", inputs=provenance.inputs(model))
-    with place as folder:
-        plans = list(scene_plans.plan_scenes(camera, overrides, scenes, workers))
-        rows = list(scene_plans.rows(plans))
-        write_table(folder.new("scenes.csv"), scene_plans.COLUMNS, rows)
-        title = f"{model.name}: what scenes call for"
-        drawn = {"scenes.png": partial(plot_scene_plans, title=title, plans=plans)}
-        for name, draw in in_formats(drawn, formats or ()).items():
-            draw(folder.new(name))
-        folder.finish({"name": model.name, "scenes": [each.scene for each in plans]})
-    if not quiet:
-        print_scenes(plans)
-        print(f"{model.name}: {folder.path / 'scenes.csv'}, {folder.path / 'scenes.png'}")
-
-
-def print_scenes(plans: "Sequence[ScenePlan]") -> None:
-    """Print effects by scenes: on, off, or free; a line a scene, in a terminal a line an effect.
-
-    Beside them are the estimated time of a frame and what the plan saves of it.
-    """
-    from vcam_cli.simulation.scene_plans import effect_names
-
-    effects = effect_names(plans)
-    names = [*effects, "seconds", "saved"]
-    width = max(len(each.scene) for each in plans)
-    lines, columns = [f"{'':<{width}}  " + " ".join(names)], []
-    for each in plans:
-        states = {d.name: "free" if d.free else d.state for d in each.decisions}
-        times = [f"{seconds:.2g}" for seconds in (each.plan.seconds, each.saved)]
-        columns.append([states.get(name, "-") for name in effects] + times)
-        cells = (f"{state:<{len(name)}}" for name, state in zip(names, columns[-1], strict=True))
-        lines.append(f"{each.scene:<{width}}  " + " ".join(cells).rstrip())
-    rows = [(name, *states) for name, *states in zip(names, *columns, strict=True)]
-    options.print_rows(("effect", *(each.scene for each in plans)), rows, "\n".join(lines))
 
 
 def table(report: dict) -> str:

@@ -87,7 +87,7 @@ def print_summary(
     )
     lines += [f"{about:<12} {path / name}" for name, about in FILES.items() if name in files]
     lines.append(f"{record['name']}: {path}/")
-    lines += ["", *wrap(simulated_effects(record["plan"], measured))]
+    lines += ["", *options.wrap(simulated_effects(record["plan"], measured))]
     print("\n".join(lines))
 
 
@@ -144,14 +144,14 @@ FILES = {
 
 
 def simulated_effects(plan: dict, measured: float) -> str:
-    """Return what was simulated, what the scene does not call for, and the time of both."""
+    """Return how many effects were simulated, which were skipped, and the time of both."""
     effects = plan["effects"]
     on = [e for e in effects if e["state"] == "on"]
     omitted = [e for e in effects if e["state"] == "off" and e["by"] == "plan"]
     off = [e for e in effects if e["state"] == "off" and e["by"] == "user"]
     parts = [f"simulated {len(on)} of {len(on) + len(omitted)} effects"]
     if omitted:
-        parts.append("not called for here: " + ", ".join(map(_share, omitted)))
+        parts.append("skipped: " + ", ".join(map(_share, omitted)))
     if off:
         parts.append("switched off: " + ", ".join(spoken(e["name"]) for e in off))
     time = f"{measured:.2f} s"
@@ -163,10 +163,3 @@ def simulated_effects(plan: dict, measured: float) -> str:
 def _share(effect: dict) -> str:
     """Return an effect and how much it would change."""
     return f"{spoken(effect['name'])} ({100 * effect['contribution']:.2g} % {effect['unit']})"
-
-
-def wrap(text: str) -> list[str]:
-    """Return lines of at most 100 characters, and no wider than a terminal."""
-    import textwrap
-
-    return textwrap.wrap(text, options.line_width(100), break_long_words=False)

@@ -152,19 +152,15 @@ def _integral(spectrum: Spectrum, wavelengths: NDArray) -> float:
 def mtf_parts(frame: Frame) -> tuple[NDArray, dict[str, NDArray]]:
     """Return frequencies along a row (n,) [cycles/m], and what each effect leaves of waves.
 
-    They are the means over the light of the scene; see `Effect.mean_transfer`.
+    They are those at the wavelength in the middle of the scene's light.
     """
     frequency = np.linspace(0, 1 / frame.geometry.pitch_x, FREQUENCIES)
     transfer = frame.transfer
     shares = np.abs(transfer.weights).sum(axis=(0, 1))
-    shares = shares / max(float(shares.sum()), 1e-300)
-    spectrum = list(zip(transfer.wavelengths.tolist(), shares.tolist(), strict=True))
-    parts = {}
-    for effect in frame.plan.active:
-        found = effect.mean_transfer(frequency, np.zeros(1), spectrum)
-        if found is not None:
-            parts[effect.name] = np.abs(np.asarray(found)[0])
-    return frequency, parts
+    middle = int(np.searchsorted(np.cumsum(shares), shares.sum() / 2))
+    wavelength = float(transfer.wavelengths[min(middle, len(shares) - 1)])
+    found = ((e.name, e.row_transfer(frequency, wavelength)) for e in frame.plan.active)
+    return frequency, {name: contrast for name, contrast in found if contrast is not None}
 
 
 def draw_mtf(figure: Any, frame: Frame, names: Sequence[str]) -> None:

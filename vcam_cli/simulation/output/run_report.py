@@ -137,7 +137,7 @@ def _plan_text(record: Mapping[str, Any]) -> str:
     on = sum(effect["state"] == "on" for effect in plan["effects"])
     left = sum(e["state"] == "off" and e["by"] == "plan" for e in plan["effects"])
     return (
-        f"Simulated: {on} effects. Left out because this scene does not call for them: {left}."
+        f"Simulated: {on} effects. Skipped, since the change is within the tolerance: {left}."
         f" Estimated: {plan['seconds']:.2g} s and {plan['memory_bytes'] / 1e6:.3g} MB;"
         f" taken: {sum(record['stages'].values()):.2g} s and"
         f" {record['peak_memory_bytes'] / 1e6:.3g} MB of the whole process."
