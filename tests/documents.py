@@ -10,7 +10,12 @@ from typer.testing import CliRunner
 from vcam_cli.commands.main import app
 
 ROOT = Path(__file__).parent.parent
-MINUTES = (["accuracy"], ["sweep", "pixel-size"], ["sweep", "cfa-against-x3"])
+MINUTES = (
+    ["accuracy"],
+    ["plan", "everything"],
+    ["sweep", "pixel-size"],
+    ["sweep", "cfa-against-x3"],
+)
 """Beginnings of commands that take minutes and have tests of their own."""
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
+from scripts import doc_figures
 from tests import documents
 from tests.documents import ROOT
 from vcam_cli.commands.list_ import KINDS
@@ -16,6 +17,8 @@ from vcam_cli.commands.main import COMMANDS, app
 README = documents.read(ROOT / "README.md")
 BLOCKS = [(block.language, block.text) for block in documents.blocks(README)]
 PAGES = [documents.read(page) for page in documents.pages()]
+CASE = re.compile(r"^\| (.+?) \| ([\d.e-]+)(?: \(absolute\))? \| ([\d.e-]+) \|$", re.MULTILINE)
+"""A line of the table of hard cases: name, error of vcam, error of the textbook form."""
 TARGETS = re.findall(r"^(\w+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE)
 
 
@@ -89,3 +92,24 @@ def test_every_option_that_is_told_exists():
         help_text = CliRunner().invoke(app, [words[1], "--help"]).stdout
         for option in (word for word in words if word.startswith("-")):
             assert re.search(rf"(^|[\s,]){re.escape(option)}\b", help_text), (command, option)
+
+
+def test_the_hard_cases_err_as_the_table_says():
+    """The same names; errors, which differ between processors, within a factor of 10."""
+    shown = {name: errors for name, *errors in CASE.findall(README)}
+    found = {name: errors for name, *errors in CASE.findall(doc_figures.table())}
+    assert list(shown) == list(found) == list(doc_figures.SHOWN.values())
+    for name in shown:
+        for said, true in zip(map(float, shown[name]), map(float, found[name]), strict=True):
+            assert said == true or 0.1 <= said / max(true, 1e-99) <= 10, name
+
+
+def test_the_table_of_hard_cases_is_renewed_between_its_marks(tmp_path):
+    copy = tmp_path / "README.md"
+    copy.write_text(CASE.sub("| a | 1 | 1 |", README), encoding="utf-8")
+    doc_figures.hard_cases(1, copy)
+    renewed = copy.read_text(encoding="utf-8")
+    assert [name for name, *_ in CASE.findall(renewed)] == list(doc_figures.SHOWN.values())
+    ends = [text.split(mark)[side] for text in (README, renewed)
+            for mark, side in zip(doc_figures.MARKS, (0, 1), strict=True)]  # fmt: skip
+    assert ends[:2] == ends[2:]

@@ -20,6 +20,8 @@ from vcam_cli.commands.list_ import first_comment
 from vcam_cli.commands.main import app
 from vcam_cli.config import shipped
 from vcam_cli.datasets import dataset_file
+from vcam_cli.simulation.plan import camera_effects
+from vcam_cli.simulation.scene_plans import scene_settings
 from vcam_cli.sweeps import expectations, figures, sweep_file, sweep_points
 from vcam_cli.sweeps.study_cameras import StudyCameras
 
@@ -124,6 +126,28 @@ def test_the_benchmark_camera():
     states = {d.name: d.state for d in small("12mp-bayer").frame.plan.decisions}
     noises = ("shot_noise", "fpn", "reset_noise", "read_noise", "dark_current")
     assert [states[noise] for noise in noises] == ["on"] * 5
+
+
+def test_everything_has_every_effect_of_its_architecture():
+    """But for the transfer of a CCD, the reset noise that it cancels, and depth, which is a
+    scene's."""
+    camera = load("everything")
+    described = camera_effects(camera, geometry(camera))
+    missing = {name for name, effect in described.items() if effect is None}
+    assert missing == {"charge_transfer", "reset_noise", "depth"}
+    assert camera.effects == "auto"
+
+
+@pytest.mark.long
+def test_everything_stands_before_every_scene_of_the_plan():
+    """The sets of effects differ: what each scene needs."""
+    small = ("array.rows=48", "array.columns=64", "accuracy=draft")
+    sets = set()
+    for scene, changes in scene_settings(["all"]).items():
+        result = simulate(load("everything", (*small, *changes)), 1)
+        assert np.isfinite(result.electrons).all(), scene
+        sets.add(tuple(d.state for d in result.frame.plan.decisions))
+    assert len(sets) >= 5
 
 
 def test_the_starter_is_complete_by_itself():

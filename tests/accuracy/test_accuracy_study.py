@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 import pytest
+import yaml
 from making import camera, radiance_for
 
 from vcam_cli import simulate
@@ -12,6 +13,8 @@ from vcam_cli.accuracy.knobs import KNOBS
 from vcam_cli.accuracy.recommendation import coarser_knobs, recommend
 from vcam_cli.accuracy.setting_errors import COLUMNS, Point
 from vcam_cli.effects.order import ORDER
+from vcam_cli.files.images.png import write_png
+from vcam_cli.floats import rms
 from vcam_cli.simulation.simulate import prepare
 
 OWN_ERROR = {knob.name for knob in KNOBS} | {f"effect:{kind.name}" for kind in ORDER}
@@ -19,7 +22,7 @@ OWN_ERROR = {knob.name for knob in KNOBS} | {f"effect:{kind.name}" for kind in O
 DARK = "pixel.photodetector.dark_current"
 NOISY = {
     "scene.radiance": radiance_for(2000),
-    "scene.source": {"kind": "chart", "chart": "slanted-edge"},
+    "scene.source": {"kind": "chart", "chart": "siemens-star"},
     "optics.off_axis": "exact",
     "optics.focal_length": "0.6 mm",
     DARK: "3 ke/s",
@@ -230,6 +233,115 @@ def test_recommended_is_the_fastest_that_keeps_the_tolerance(points, line, tmp_p
     assert pasted.accuracy.tolerance in (0.02, 0.01, 0.005, 0.0002)
 
 
+def judged(
+    knob: str, setting: str, error: float, own: float, seconds: float = 1.0, **more
+) -> Point:
+    """A row with a tolerance of its own."""
+    return Point(knob, setting, error, error, error, seconds, 0.0, tolerance=own, **more)
+
+
+FILE = judged("file", "as it is", 0.009, 0.005)
+"""A file at `standard` whose plan misses it."""
+
+
+@pytest.mark.parametrize(
+    ("points", "line"),
+    [
+        # `reference` is good enough for the file, but not for what it promises itself.
+        ([FILE, judged("preset", "reference", 0.003, 0.0002)], ""),
+        ([FILE, judged("preset", "reference", 0.0001, 0.0002)], "accuracy: reference"),
+        # Its plan skips more noise than it may.
+        ([FILE, judged("preset", "reference", 1e-4, 2e-4, variance_lost=0.002)], ""),
+        # The reference may be wrong by more than what is left of the tolerance.
+        ([FILE, judged("preset", "reference", 1.5e-4, 2e-4, unsure=1e-4)], ""),
+        # Where every plan misses, all effects are a way out: the fastest that meets both.
+        (
+            [
+                FILE,
+                judged("preset", "reference", 0.003, 0.0002),
+                judged("all", "draft", 0.004, 0.02, seconds=2.0),
+                judged("all", "standard", 1e-4, 0.005, seconds=3.0),
+            ],
+            "accuracy: draft\neffects: all",
+        ),
+        # A plan that meets both goes first, also where all effects are faster.
+        (
+            [
+                FILE,
+                judged("tolerance", "0.1 %", 1e-4, 0.001, seconds=9.0),
+                judged("all", "standard", 1e-4, 0.005),
+            ],
+            "accuracy: 0.1 %",
+        ),
+    ],
+)
+def test_no_setting_is_recommended_that_misses_its_own_tolerance(points, line, tmp_path):
+    found = recommend(camera(tmp_path, {"accuracy": "standard"}), tuple(points))
+    assert found.line == line
+    if line:
+        assert " with ".join(f"`{part}`" for part in line.splitlines()) in found.sentence
+        assert "within the tolerance of 0.5 %" in found.sentence
+    else:
+        assert found.sentence.startswith("none: no setting is known to meet the 0.5 %")
+
+
+def test_settings_that_miss_their_own_tolerance_are_named_once_each(tmp_path):
+    points = (
+        FILE,
+        judged("preset", "standard", 0.009, 0.005),  # the same as the file's
+        judged("preset", "draft", 0.009, 0.02),
+        judged("preset", "reference", 0.00834, 0.0002),
+        judged("tolerance", "0.1 %", 0.0005, 0.001, variance_lost=0.01),
+        judged("all", "reference", 0.0003, 0.0002, unsure=0.0002),  # that may be the reference's
+        judged("wavelength_step", "80 nm", 0.9, None),
+    )
+    found = recommend(camera(tmp_path, {"accuracy": "standard"}), points)
+    of_standard, of_reference, of_variance = found.missed
+    assert of_standard.startswith("`accuracy: standard` misses its own tolerance")
+    assert "0.83 % of full signal, 41.7 times the tolerance of 0.02 %" in of_reference
+    assert "1 % of a variance, 5 times the tolerance of 0.2 %" in of_variance
+
+
+def test_a_line_with_all_effects_keeps_those_off_that_the_file_switches_off(tmp_path):
+    made = camera(tmp_path, NOISY | {"effects": {"off_axis": "off"}})
+    found = recommend(made, (FILE, judged("all", "standard", 1e-4, 0.005)))
+    pasted = camera(tmp_path, NOISY | yaml.load(found.line, yaml.BaseLoader))
+    assert pasted.effects["off_axis"] == "off"
+    assert pasted.effects["read_noise"] == "on"
+
+
+def test_the_recommendation_before_one_white_column_meets_its_tolerances(tmp_path):
+    """A survey of some places may miss such a line, and all presets with it."""
+    picture = np.zeros((64, 96), np.uint8)
+    picture[:, 47] = 255
+    write_png(tmp_path / "column.png", picture)
+    lone = {
+        "scene.radiance": radiance_for(2000),
+        "scene.source": {"kind": "image", "file": "column.png"},
+        "array.rows": 16,
+        "array.columns": 24,
+        "effects": "auto",
+        "accuracy": "standard",
+    }
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(measurements, "TURNS", 1)
+        found = study.accuracy(camera(tmp_path, lone), workers=1)
+    presets = [p for p in found.points if p.knob in ("preset", "all")]
+    assert len(presets) == 6
+    for p in presets:
+        setting = f"`accuracy: {p.setting}`{' with `effects: all`' if p.knob == 'all' else ''}"
+        missed = any(text.startswith(f"{setting} misses") for text in found.recommendation.missed)
+        assert missed == (p.tolerance_spent > 1), setting
+    line = yaml.load(found.recommendation.line, yaml.BaseLoader)  # on and off are words
+    if isinstance(line["accuracy"], dict):
+        line["accuracy"] = yaml.safe_load(found.recommendation.line)["accuracy"]
+    pasted = camera(tmp_path, lone | line)
+    exact = {"effects": "all", "accuracy": {"tolerance": 1e-6, "float_width": 64}}
+    truth = ablation.mean_raw(prepare(camera(tmp_path, lone | exact), 1)[0])
+    error = rms(ablation.mean_raw(prepare(pasted, 1)[0]) - truth) / truth.max()
+    assert error <= min(0.005, pasted.accuracy.tolerance)
+
+
 def test_knobs_are_made_coarser_where_they_save_time_and_lose_little(tmp_path):
     made = camera(tmp_path, {"accuracy": "standard"})
     points = (
@@ -251,6 +363,4 @@ def test_a_saving_within_the_spread_is_none(tmp_path):
 
 
 def _read(line: str):
-    import yaml
-
     return yaml.safe_load(line)["accuracy"]

@@ -122,13 +122,11 @@ def test_says_what_it_does():
     def text(lens, *terms):
         return DirectedBlur(lens, terms).describe()
 
-    assert text(WAVES, (8, 0.055e-6)) == (
-        "wavefront error of 0.1 waves rms at 550 nm: Strehl ratio 0.67"
-    )
+    assert text(WAVES, (8, 0.055e-6)) == "0.1 waves rms at 550 nm, Strehl ratio 0.67"
     # 2 x 2 N_w x 4 sqrt(3) c
     width = 16 * 4 * math.sqrt(3)
-    assert f"{width:.4g} um wide" in text(WAVES, (4, 1e-6))
-    assert f"{width:.4g} um wide" in text(RAYS, (4, 1e-6), (2, 1e-6))
+    assert f"blurs points to {width:.4g} um" in text(WAVES, (4, 1e-6))
+    assert f"blurs points to {width:.4g} um" in text(RAYS, (4, 1e-6), (2, 1e-6))
     assert "Strehl" not in text(RAYS, (4, 1e-9))
     assert text(WAVES, (2, 1e-6)) == "moves the image by 16 um to the right and 0 um down"
 
@@ -269,7 +267,7 @@ def test_a_gaussian_spread_has_a_gaussian_transfer(tmp_path):
     np.testing.assert_allclose(blur.otf_plane(f, f, GREEN), expected, atol=1e-6)
     # a disk of sqrt(2 ln 100) sigma holds 99 %; known to the samples' distance
     assert blur.reach == pytest.approx(math.sqrt(2 * math.log(100)) * sigma, rel=0.03)
-    assert re.search(r"90% of the light within 8\.[3-9]\d* um", blur.describe())
+    assert re.search(r"90 % of the light within 8\.[3-9]\d* um", blur.describe())
 
 
 def test_a_spread_beside_the_middle_moves_the_image(tmp_path):

@@ -182,7 +182,7 @@ def test_the_plan_says_how_far_layers_are_out_of_focus(tmp_path):
     [depth] = [d for d in ready.plan.decisions if d.name == "depth"]
     widths = [2 * abs(scene.blur_radius(layer)) / PITCH for layer in scene.layers]
     assert depth.state == "on"
-    assert ", ".join(f"{width:.3g}" for width in widths) in depth.reason
+    assert " and ".join(f"{width:.3g}" for width in widths) in depth.reason
     assert any("layers" in note and "full signal" in note for note in notes)
 
 

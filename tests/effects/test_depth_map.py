@@ -263,7 +263,7 @@ def test_the_plan_tells_layers_and_what_is_hidden(tmp_path):
     [depth] = [d for d in ready.plan.decisions if d.name == "depth"]
     assert depth.state == "on"
     assert any("cut into 2 layers" in note for note in notes)
-    assert any("hidden background unknown: up to" in note for note in notes)
+    assert any("occluded background is extrapolated" in note for note in notes)
     flat = prepare(camera(tmp_path, STILL | given | {"effects": {"depth": "off"}}))[0]
     assert ready.plan.seconds > 1.5 * flat.plan.seconds
 

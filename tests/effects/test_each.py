@@ -461,4 +461,4 @@ def test_which_adc_the_camera_has(tmp_path):
     assert found.full == pytest.approx(1 / 20e-6, rel=1e-12)
     assert found.bend == pytest.approx(4e-3 / 20e-6, rel=1e-12)
     assert "4096 codes" in found.describe()
-    assert "electrons a step" in found.describe()
+    assert "e per step" in found.describe()

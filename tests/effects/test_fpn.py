@@ -196,7 +196,7 @@ def test_defects_alone_are_a_fixed_pattern(tmp_path):
     made = camera(tmp_path, {"pixel.defects": {"hot": 1e-4}})
     effect = FixedPattern.from_camera(made, geometry(made))
     assert (effect.hot, effect.dead, effect.full_well) == (1e-4, 0, pytest.approx(WELL))
-    assert "0.0100% of the pixels hot" in effect.describe()
+    assert "0.01 % hot" in effect.describe()
 
 
 def test_pictures_survive_defects(tmp_path):

@@ -78,7 +78,7 @@ def test_a_camera_has_it(tmp_path):
 def test_a_value_above_the_axis_is_a_gain_above_one(tmp_path):
     effect = effect_of(tmp_path, [(0, 0.5), (0.3, 0.6)])
     assert effect.gain(np.array([0.15e-3]), np.zeros(1))[0, 0] == pytest.approx(1.1, rel=1e-12)
-    assert "13.33% more" in effect.describe()
+    assert "13.3 % brighter" in effect.describe()
 
 
 def test_bound_of_its_change(tmp_path):

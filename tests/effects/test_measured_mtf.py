@@ -70,7 +70,7 @@ def test_goes_on_like_diffraction_where_it_ends_above_zero(wavelength, tmp_path)
         assert blur.otf(np.array(f * 1e3), wavelength) == pytest.approx(expected, rel=1e-4)
     cutoff = (1 - 5e-3) / (4 * wavelength)
     assert blur.cutoff(wavelength) == pytest.approx(cutoff)
-    assert "beyond 100 lp/mm like diffraction" in blur.describe()
+    assert "beyond 100 lp/mm as diffraction" in blur.describe()
 
 
 def test_is_straight_between_wavelengths_and_holds_beyond(tmp_path):

@@ -147,6 +147,6 @@ def test_the_plan_leaves_out_one_that_gains_next_to_nothing(gain, state, tmp_pat
 def test_what_it_says(tmp_path):
     made = camera(tmp_path, {"pixel.microlens": {"gain": 1.8}})
     found = Microlens.from_camera(made, geometry(made))
-    assert found.describe() == "collects 1.8 times the light, that of 90.000% of the pixel"
+    assert found.describe() == "1.8 times the light; effective fill factor 90 %"
     assert found.on_axis == pytest.approx(1.8)
     assert math.isclose(found.share, 0.9)

@@ -157,14 +157,14 @@ def test_the_plan_leaves_motion_out_where_nothing_is_seen_to_move(tmp_path):
 
 
 def test_what_is_not_in_the_file_is_said(tmp_path):
-    """Of a picture that ends, its mirror image; of a pan, how much faster corners move."""
+    """A picture that ends is mirrored; of a pan, corner motion is underestimated."""
     source = picture(tmp_path / "moving.exr")
     source["scene.source"]["motion"] = motion((4.0, 0.0))
     notes = simulate(camera(tmp_path, STILL | source)).notes
-    assert any("up to 2 pixels, is its mirror image" in note for note in notes)
+    assert any("up to 2 pixels move in and are mirrored" in note for note in notes)
     edge = {"scene.source": {"kind": "chart", "chart": "slanted-edge"}}
     turn = {"scene.camera_motion": {"pan": "20 deg/s"}}
-    [note] = [n for n in simulate(camera(tmp_path, STILL | edge | turn)).notes if "corners" in n]
+    [note] = [n for n in simulate(camera(tmp_path, STILL | edge | turn)).notes if "corner" in n]
     corner = math.hypot(ROWS, COLUMNS) / 2 * PITCH / (SCALE * 1.0)
     assert f"{100 * corner**2:.2g} %" in note
 

@@ -70,7 +70,7 @@ def test_an_automatic_exposure_meters_the_scene_where_its_file_says(tmp_path):
     assert (
         found.mean_electrons.tobytes() == result(tmp_path, moving, fixed).mean_electrons.tobytes()
     )
-    assert any("metered on the scene as it stands" in note for note in found.notes)
+    assert any("meters the scene without motion" in note for note in found.notes)
     assert found.frame.camera.exposure.auto is not None
     longer = {"exposure": {"auto": {"max": "2 ms"}}}
     assert result(tmp_path, moving, longer).frame.exposure_limit == "longest time"

@@ -167,5 +167,5 @@ def test_it_says_what_is_lost_where(tmp_path):
     }
     said = effect(tmp_path, **study).describe()
     # 1 - 0.63861 / 0.86724, from the oracle's table of the first case
-    assert said.startswith("takes 26.36% of the light in the center, 30.0")
-    assert said.endswith("% in the corners")
+    assert said.startswith("blocks 26.4 % of the light in the center, 30")
+    assert said.endswith(" % in the corners")

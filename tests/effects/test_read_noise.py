@@ -74,9 +74,9 @@ def test_noise_of_pixels_has_the_stream_it_always_had(dtype):
 @pytest.mark.parametrize(
     ("readout", "said"),
     [
-        ({"read_noise": "6 e"}, "6 electrons rms"),
-        ({"read_noise": "6 e", "row_noise": "2 e"}, "6 electrons rms, 2 of every row"),
-        ({"column_noise": "2 e"}, "0 electrons rms, 2 of every column"),
+        ({"read_noise": "6 e"}, "6 e rms per pixel"),
+        ({"read_noise": "6 e", "row_noise": "2 e"}, "6 e rms per pixel, 2 e per row"),
+        ({"column_noise": "2 e"}, "0 e rms per pixel, 2 e per column"),
     ],
 )
 def test_says_what_there_is(readout, said, tmp_path):

@@ -205,4 +205,4 @@ def test_what_was_read_of_a_file_is_said(tmp_path):
     source = {"scene.source": {"kind": "chart", "chart": "slanted-edge"}}
     notes = simulate(camera(tmp_path, STILL | source | recorded(file))).notes
     [note] = [note for note in notes if note.startswith("imu.csv")]
-    assert note.endswith("is that of time_s, pan_deg; acc_x are left aside")
+    assert note.endswith("moves by time_s, pan_deg; acc_x are ignored")

@@ -157,7 +157,7 @@ def test_a_turn_in_a_sequence_turns_the_photodetectors_with_the_camera(tmp_path)
 
 
 def test_the_plan_weighs_a_turn(tmp_path):
-    """Left out before an even field and where it is tiny; on before a picture, and priced."""
+    """Left out before an even field; on, and priced, before a picture without a bound."""
     states = []
     chart = {"kind": "chart", "chart": "siemens-star"}
     for source, speed in (
@@ -169,7 +169,7 @@ def test_the_plan_weighs_a_turn(tmp_path):
         moving = {"scene.source": source | {"motion": {"rotate": degrees(speed)}}}
         found = result(tmp_path, changes, moving)
         states += [d.state for d in found.frame.plan.decisions if d.name == "motion"]
-    assert states == ["off", "off", "on"]
+    assert states == ["off", "on", "on"]
     assert any("sub-exposures of the still image" in note for note in found.notes)
 
 

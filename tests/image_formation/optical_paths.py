@@ -75,7 +75,8 @@ def path(
     ceiling: float = np.inf,
 ) -> OpticalPath:
     """A path through the effects to the pixels of a sensor."""
-    return OpticalPath(transfer or light(*effects), g, knobs, colors, effects, 1, ceiling)
+    full = min(1.0, ceiling)
+    return OpticalPath(transfer or light(*effects), g, knobs, colors, effects, 1, ceiling, full)
 
 
 def on_chart(path: OpticalPath, chart: Chart, margin: int | None = None) -> ChartScene:

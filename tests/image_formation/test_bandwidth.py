@@ -302,8 +302,8 @@ def test_pixels_need_not_be_square(size, tmp_path):
     some = rate(camera(tmp_path, changes | {"accuracy": "standard"}), values)
     exact = {"preset": "reference", "oversampling": 64}
     lost = rms(some.values, rate(camera(tmp_path, changes | {"accuracy": exact}), values).values)
-    assert lost < bandwidth.FREQUENCY_SHARE * 5e-3 * some.values.max()
-    assert lost / 1.5 < some.spectrum.lost_rms < lost * 1.5
+    assert lost < some.spectrum.lost_rms
+    assert some.spectrum.lost_rms < bandwidth.FREQUENCY_SHARE * 5e-3 * some.values.max()
 
 
 @pytest.mark.parametrize("rows", [201, 480])
@@ -324,9 +324,10 @@ def test_the_mean_signal_is_kept(rows, tmp_path):
 @pytest.mark.parametrize("f_number", [1, 2])
 @pytest.mark.parametrize("kind", ["noise", "blocks"])
 def test_loss_of_a_picture_is_known(kind, f_number, tmp_path):
-    """Its spectrum is at hand as far as anything is followed: by Parseval, within a factor of 1.5.
+    """Its spectrum is at hand as far as anything is followed: by Parseval, never less than is lost.
 
-    What is lost is folded by the pixels, so terms that fall on one frequency add with their signs.
+    What is lost is folded by the pixels, so terms that fall on one frequency add with their signs:
+    told as if all were alike, of noise up to four times too much.
     """
     changes, values = write_picture(tmp_path, kind)
     changes |= {"optics.f_number": f_number}
@@ -335,7 +336,7 @@ def test_loss_of_a_picture_is_known(kind, f_number, tmp_path):
     fine = rate(camera(tmp_path, changes | {"accuracy": exact}), values)
     lost = rms(rough.values, fine.values)
     assert lost > 1e-4 * fine.values.max()
-    assert lost / 1.5 < rough.spectrum.lost_rms < lost * 1.5
+    assert lost < rough.spectrum.lost_rms < lost * 4
 
 
 @pytest.mark.parametrize("preset", ["draft", "standard", "reference"])
@@ -372,7 +373,7 @@ def test_no_further_than_the_lens(tmp_path):
 
 
 def test_no_further_than_the_tolerance_asks(tmp_path):
-    """A coarser tolerance ends lower; what is lost is what it allows at most, and is known."""
+    """A coarser tolerance ends lower; what is lost is at most what is told, and that is allowed."""
     changes, values = write_picture(tmp_path, "noise")
     reached = []
     for preset, tolerance in (("reference", 2e-4), ("standard", 5e-3), ("draft", 2e-2)):
@@ -383,11 +384,9 @@ def test_no_further_than_the_tolerance_asks(tmp_path):
         )
         reached.append(some.spectrum.oversampling)
         lost = rms(some.values, whole.values)
-        assert lost < 1.2 * bandwidth.FREQUENCY_SHARE * tolerance * whole.values.max(), preset
-        # At `reference` what is left is next to nothing.
-        assert lost == pytest.approx(
-            some.spectrum.lost_rms, rel=2 if preset == "reference" else 0.2
-        )
+        told = some.spectrum.lost_rms
+        assert lost < told + 1e-6 * whole.values.max(), preset
+        assert told < bandwidth.FREQUENCY_SHARE * tolerance * whole.values.max(), preset
     assert reached == sorted(reached, reverse=True)
     assert reached[0] > reached[-1] >= 1
 

@@ -8,7 +8,6 @@ from test_filtering import GRIDS
 
 from vcam_cli.image_formation.box_average import box_averages, point_values
 from vcam_cli.image_formation.estimates.bandwidth import axes
-from vcam_cli.image_formation.photon_rate import photo_rate
 from vcam_cli.scenes import bands
 from vcam_cli.scenes.base import Frame
 from vcam_cli.scenes.charts.colorchecker import ColorChecker, largest_card
@@ -164,17 +163,6 @@ def test_a_single_row_or_column(shape):
     points = SlantedEdge(0.3, 1.0).values(x.ravel(), y.ravel(), ONE)
     expected = points.reshape(shape[0], 400, shape[1], 400).mean(axis=(1, 3))
     np.testing.assert_allclose(found, expected, atol=1 / 800)
-
-
-def test_the_aperture_changes_what_points_and_means_differ_by():
-    g = sensor(10, 14, (0.5, 0.7), pitch=(1e-6, 1e-6))
-    optical_path = path(g, aperture(g))
-    scene = on_chart(optical_path, POINTS["star"])
-    made = photo_rate(optical_path, scene).spectrum
-    points = point_values(scene, ONE, g)[0].astype(float)
-    expected = np.sqrt(np.mean((signal(optical_path, scene) - points) ** 2))
-    assert made.changes == {"pixel_aperture": pytest.approx(expected, rel=1e-6)}
-    assert made.oversampling == made.cells == made.terms == 0
 
 
 @pytest.mark.parametrize("aperture", ["on", "off"])

@@ -20,7 +20,7 @@ from vcam_cli.scenes.base import Chart, Frame
 from vcam_cli.scenes.charts.csf import Csf
 from vcam_cli.scenes.charts.siemens_star import SiemensStar
 from vcam_cli.scenes.charts.slanted_edge import SlantedEdge
-from vcam_cli.scenes.charts.step_wedge import step_wedge
+from vcam_cli.scenes.charts.step_wedge import StepWedge, step_wedge
 from vcam_cli.simulation.simulate import prepare
 
 DEFOCUS = SymmetricBlur(Lens(8.0, True), ((4, 0.3e-6),))
@@ -109,6 +109,8 @@ def test_the_light_of_rings_is_that_of_fine_cells(name, blurs, monkeypatch):
     A fortieth of the tolerance of `reference`; of a lamp beside a dark array, a thousandth of its
     light: the rings of its diffraction pattern.
     """
+    for kind in (SlantedEdge, StepWedge):  # as if they had no closed form
+        monkeypatch.setattr(kind, "profile", lambda _: None)
     knobs = replace(REFERENCE, oversampling=5)
     optical_path = before(*BLURS[blurs], knobs=knobs)
     scene = on_chart(optical_path, CHARTS[name], margin=250)

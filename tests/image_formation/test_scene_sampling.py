@@ -66,7 +66,7 @@ def test_rounding_of_32_bits_is_in_proportion_to_the_rms_of_the_light(name, monk
     ],
 )
 def test_numbers_have_as_many_bits_as_rounding_asks_for(lamp, tolerance, ceiling, bits):
-    seen = before(tolerance, ceiling)
+    seen = replace(before(tolerance, ceiling), full=min(max(lamp, 1.0), ceiling))
     assert with_sufficient_precision(seen, of_picture(picture(lamp), PITCH)).settings == replace(
         seen.settings, float_width=bits
     )

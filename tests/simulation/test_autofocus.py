@@ -8,6 +8,7 @@ from vcam_cli import load
 from vcam_cli.camera.optics import FocusWindow
 from vcam_cli.errors import BadInput
 from vcam_cli.files.images.png import write_png
+from vcam_cli.image_formation.estimates import light_cost
 from vcam_cli.progress import Silent, Stages
 from vcam_cli.simulation import autofocus, cost_model
 from vcam_cli.simulation.idle_keys import idle_keys
@@ -151,7 +152,7 @@ def test_the_plan_counts_the_seconds_of_the_search(tmp_path):
         prepare(camera(tmp_path, EDGE | {"optics.focus": focus}), workers=1)[0].plan
         for focus in ("auto", "fixed")
     )
-    least = (autofocus.TRIALS - 1) * cost_model.FIXED * cost_model.slowness()
+    least = (autofocus.TRIALS - 1) * light_cost.FIXED * cost_model.slowness()
     assert auto.seconds - fixed.seconds > least
     assert auto.seconds_of_all - fixed.seconds_of_all > least
 

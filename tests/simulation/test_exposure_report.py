@@ -250,11 +250,11 @@ def test_where_charge_beyond_the_well_goes_is_told(architecture: str, tmp_path) 
     """In closed form: light of 3.5 wells leaves 2.5 of them; of one well nothing."""
     kind = {"pixel.architecture": architecture}
     bright = kind | {"scene.radiance": radiance_for(3.5 * WELL)}
-    [note] = notes(tmp_path, bright, "beyond the full well")
-    assert "2.5 times what all wells hold, is drained" in note
+    [note] = notes(tmp_path, bright, "excess charge")
+    assert "2.5 times the capacity of all wells, is discarded" in note
     assert "blooming" in note
     assert ("smear" in note) == (architecture == "ccd")
-    assert not notes(tmp_path, kind | {"scene.radiance": radiance_for(WELL)}, "full well")
+    assert not notes(tmp_path, kind | {"scene.radiance": radiance_for(WELL)}, "excess charge")
 
 
 @pytest.mark.parametrize("wells", [2.0, 9.9e4, 1.02e5, 3e6])

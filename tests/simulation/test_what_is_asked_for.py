@@ -1,5 +1,7 @@
 """What neither raw nor metrics need is not computed."""
 
+import json
+
 import numpy as np
 import pytest
 from making import camera, radiance_for
@@ -8,6 +10,7 @@ from sweeping import written
 from vcam_cli import simulate, sweep
 from vcam_cli.effects.noise.read_noise import ReadNoise
 from vcam_cli.errors import BadInput
+from vcam_cli.simulation import idle_keys
 from vcam_cli.simulation import simulate as engine
 from vcam_cli.simulation.output import outputs
 
@@ -92,3 +95,28 @@ def test_noise_that_is_left_out_is_not_drawn(tmp_path, monkeypatch):
     simulate(camera(tmp_path, quiet | {"effects": "auto"}), 1)
     with pytest.raises(AssertionError, match="drawn"):
         simulate(camera(tmp_path, quiet | {"effects": "all"}), 1)
+
+
+def test_notes_are_looked_for_when_they_are_read(tmp_path, monkeypatch):
+    """To find the keys that cannot act, the camera is solved again and again."""
+    looked = []
+    original = idle_keys.notes
+    monkeypatch.setattr(idle_keys, "notes", lambda one: looked.append(one) or original(one))
+    idle = {"pixel.readout.gain": 2, "exposure.time": "5 ms"}
+    made = camera(tmp_path, COLOR | RAW | idle)
+    result, (ready, notes) = simulate(made, 1), engine.prepare(made, 1)
+    assert result.metrics
+    assert not looked
+    assert ready.plan.decisions
+    expected = "pixel.readout.gain changes nothing here"
+    for found in (result.notes, result.notes, notes, list(notes)):
+        assert [n for n in found if n.startswith(expected)]
+    assert len(looked) == 2, "once for the frame, once for what is ready to take it"
+    assert notes[:] == (*notes,) == result.notes
+
+
+def test_run_json_has_the_notes(tmp_path):
+    made = camera(tmp_path, COLOR | RAW | {"pixel.readout.gain": 2})
+    simulate(made, 1).save(tmp_path / "out")
+    [note] = json.loads((tmp_path / "out" / "run.json").read_text())["notes"]
+    assert note.startswith("pixel.readout.gain changes nothing here")

@@ -22,6 +22,7 @@ from vcam_cli.progress import Observer
 from vcam_cli.quality import display
 from vcam_cli.quality.scielab import s_cielab_map
 from vcam_cli.simulation.preparation import Prepared
+from vcam_cli.simulation.scene_times import compute_frame
 from vcam_cli.simulation.shared import Shared
 from vcam_cli.simulation.simulate import Result, simulate
 
@@ -137,7 +138,7 @@ class Clock:
 
     def _run(self, key: str) -> Result:
         start = time.perf_counter()
-        result = _compute_frame(self._cameras[key], self.workers)
+        result = compute_frame(self._cameras[key], self.workers)
         self.runs[key].append(time.perf_counter() - start)
         first = self._found.setdefault(_computation(result), key)
         if self.runs[first] is not self.runs[key]:
@@ -170,15 +171,6 @@ def is_median_known(runs: list[float]) -> bool:
         return True
     spent = sum(runs)
     return len(runs) >= (2 if spent > TWICE else 3 if spent > THRICE else TURNS)
-
-
-def _compute_frame(camera: Camera, workers: int) -> Result:
-    """Compute a frame from the scene to its render and metrics."""
-    result = simulate(camera, workers)
-    if camera.output.render:
-        _ = result.render
-    _ = result.metrics
-    return result
 
 
 def _shot(result: Result) -> Shot:

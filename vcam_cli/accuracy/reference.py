@@ -78,7 +78,7 @@ def finest_camera(camera: Camera, coarse: Prepared, most_bytes: float = 0) -> Ca
         )
         most = int(math.sqrt(samples / _pixels(coarse)))
         wanted = min(math.ceil(FURTHER * reached) | 1, FINEST_CELLS - 1)
-        if _is_rectangles(coarse):
+        if _is_closed(coarse):
             wanted = most = FINEST_OF_RECTANGLES
         knobs["oversampling"] = min(max(math.ceil(reached), min(wanted, most)), FINEST_CELLS)
     return with_accuracy(ablation.with_effects(camera, "all"), tolerance=CONVERGED, **knobs)
@@ -98,7 +98,7 @@ def describe_reference(found: Prepared, coarse: Prepared, full: float, change: f
     of the difference of their signals [electrons].
     """
     left = found.spectrum.lost_rms * found.exposure_time
-    chart = isinstance(found.scene, ChartScene) and not _is_rectangles(found)
+    chart = isinstance(found.scene, ChartScene) and not _is_closed(found)
     if chart and sampling(found) > sampling(coarse):
         left = change / ((sampling(found) / sampling(coarse)) ** ORDER - 1)
     return Reference(
@@ -156,9 +156,9 @@ def rms_and_largest(difference: NDArray) -> NDArray:
     return np.array([rms(difference), float(np.abs(difference).max())])
 
 
-def _is_rectangles(ready: Prepared) -> bool:
+def _is_closed(ready: Prepared) -> bool:
     """Return whether the scene is a chart of even rectangles: its spectrum is a closed form."""
-    return isinstance(ready.scene, ChartScene) and ready.scene.chart.edges() is not None
+    return isinstance(ready.scene, ChartScene) and not ready.scene.is_painted
 
 
 def _pixels(ready: Prepared) -> float:

@@ -82,12 +82,12 @@ class Study:
             "notes": [
                 "Errors are of the mean raw signal against the reference, relative to full signal.",
                 "A knob's error is its own, with all others converged.",
-                "tolerance_spent is the error over what may be lost, for all rows that promise it.",
-                "mean_s_cielab is between renders without noise; of an effect left out and of"
-                " shot_noise, with it.",
+                "tolerance_spent is the error over the tolerance, where a setting promises one.",
+                "mean_s_cielab is between renders without noise; with noise for skipped effects and"
+                " for shot_noise.",
                 "Noise and rounding change no mean: their contribution is a share of the variance"
                 " at the 1st to 99th percentile of the scene's own signal, the largest of them.",
-                "An effect left out is measured with everything else on.",
+                "An effect is skipped with everything else on.",
             ],
         }
 

@@ -29,6 +29,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import ClassVar, Literal, TypeVar
 
 import numpy as np
@@ -39,10 +40,11 @@ from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.camera.sensor.array import Binning
 
 Kind = TypeVar("Kind", bound="Effect")
-ENTRIES = 257
-"""Frequencies at which a mean over wavelengths is computed."""
 PLACES = 3
-"""Places of the field at which a blur that changes over it is averaged."""
+"""Places of the field over which the contrast of a blur that changes over it is averaged."""
+SPREAD_RANGE, SPREAD_STEPS = (1e2, 1e8), 96
+"""Frequencies at which the spread of a blur is sought [cycles/m]: no blur of a camera is wider than
+a sensor or counts when it is narrower than a wave of light."""
 
 
 def of_kind(effects: Iterable[Effect], *kinds: type[Kind]) -> tuple[Kind, ...]:
@@ -98,8 +100,6 @@ class Effect(ABC):
     """Cost on one core of 2020s hardware, for the plan's estimate."""
     removable: ClassVar[bool] = True
     """Whether the plan may leave it out (a user always may)."""
-    costly: ClassVar[bool] = False
-    """Whether image formation takes longer with it: the plan leaves it out where it may."""
     origin: ClassVar[Literal["lens", "pixel", "readout"]] = "pixel"
     """The part of the camera that it comes from."""
 
@@ -146,22 +146,49 @@ class Effect(ABC):
         error = self.mean_error(signal)
         return (None, "") if error is None else (error / signal.full_signal, "of full signal")
 
-    def mean_transfer(
-        self, fx: NDArray, fy: NDArray, spectrum: Sequence[tuple[float, float]]
-    ) -> NDArray | None:
-        """Return what it leaves of waves, in the mean over the light and the field.
+    largest_loss: ClassVar[float] = 2.0
+    """Bound on |1 - H(f)|: 1 where its transfer is never negative."""
+    is_even: ClassVar[bool] = False
+    """Whether its blur is symmetric along x and along y."""
+
+    @property
+    def is_uniform(self) -> bool:
+        """Whether it blurs all places alike."""
+        return True
+
+    def spread(self, wavelengths: NDArray) -> NDArray | None:
+        """Return how far it displaces light in the mean, at most.
+
+        A point of light that comes to lie at distances r with the weights h takes from a wave
+        |1 - H(f)| <= integral h |1 - exp(-2 pi i f r)| <= 2 pi |f| (mean of r).
 
         Parameters
         ----------
-        fx, fy : NDArray
-            Spatial frequencies along x (n,) and y (m,) [cycles/m].
-        spectrum : sequence of (float, float)
-            Wavelengths [m] and their shares of the light.
+        wavelengths : NDArray
+            Wavelengths (J,) [m].
 
         Returns
         -------
         NDArray or None
-            Transfer at all pairs (m, n), without unit; None where it blurs nothing.
+            Bound (J,) on |1 - H(f)| / (2 pi |f|) at every frequency and place of the field [m];
+            None where it blurs nothing.
+        """
+        return None
+
+    def row_transfer(self, frequency: NDArray, wavelength: float) -> NDArray | None:
+        """Return the contrast that it leaves of waves along a row, in the mean over the field.
+
+        Parameters
+        ----------
+        frequency : NDArray
+            Spatial frequencies (n,) [cycles/m].
+        wavelength : float
+            Wavelength [m].
+
+        Returns
+        -------
+        NDArray or None
+            Contrast (n,) without unit; None where it blurs nothing.
         """
         return None
 
@@ -200,11 +227,37 @@ class Blur(Effect):
         It is 1 at frequency 0.
         """
 
-    def mean_transfer(
-        self, fx: NDArray, fy: NDArray, spectrum: Sequence[tuple[float, float]]
-    ) -> NDArray:
-        """Return its transfer at the wavelength in the middle of the light: (m, n)."""
-        return self.otf_plane(fx, fy, spectrum[len(spectrum) // 2][0])
+    def spread(self, wavelengths: NDArray) -> NDArray:
+        """Return a bound (J,) on |1 - H(f)| / (2 pi |f|) at wavelengths (J,) [m]; inf: none known.
+
+        A blur without one is never left out.
+        """
+        return np.full(len(wavelengths), np.inf)
+
+    def otf_along(
+        self, frequency: NDArray, across: tuple[float, float], wavelength: float
+    ) -> NDArray | None:
+        """Return the transfer of waves in one direction, or None where it is not known by itself.
+
+        Parameters
+        ----------
+        frequency : NDArray
+            Spatial frequencies (n,) [cycles/m].
+        across : tuple of float
+            Unit vector (x, y) along which the waves change.
+        wavelength : float
+            Wavelength [m].
+
+        Returns
+        -------
+        NDArray or None
+            Transfer (n,), complex where the blur is not symmetric.
+        """
+        return None
+
+    def row_transfer(self, frequency: NDArray, wavelength: float) -> NDArray:
+        """Return the contrast (n,) that it leaves of waves along a row."""
+        return np.abs(self.otf_plane(frequency, np.zeros(1), wavelength)[0])
 
     @property
     def model(self) -> tuple[Blur, int, bool]:
@@ -219,6 +272,8 @@ class Blur(Effect):
 class RadialTransfer(Blur):
     """A transfer function that depends on the length of the spatial frequency only."""
 
+    is_even = True
+
     @abstractmethod
     def otf(self, frequency: NDArray, wavelength: float) -> NDArray:
         """Return the transfer at `frequency` [cycles/m] and `wavelength` [m]; 1 at frequency 0."""
@@ -231,14 +286,27 @@ class RadialTransfer(Blur):
         """Return the transfer at all pairs of fx (n,) and fy (m,) [cycles/m]: (m, n)."""
         return self.otf(np.hypot(fx[None, :], fy[:, None]), wavelength)
 
-    def mean_transfer(
-        self, fx: NDArray, fy: NDArray, spectrum: Sequence[tuple[float, float]]
+    def spread(self, wavelengths: NDArray) -> NDArray:
+        """Return a bound (J,) on |1 - H(f)| / (2 pi |f|) at wavelengths (J,) [m]."""
+        return np.array(_radial_spread(self, tuple(wavelengths.tolist())))
+
+    def otf_along(
+        self, frequency: NDArray, across: tuple[float, float], wavelength: float
     ) -> NDArray:
-        """Return its transfer in the mean over the light, from a table over |f|: (m, n)."""
-        radius = np.hypot(fx[None, :], fy[:, None])
-        table = np.linspace(0, float(radius.max()), ENTRIES)
-        mean = sum(share * self.otf(table, wavelength) for wavelength, share in spectrum)
-        return np.interp(radius, table, mean)
+        """Return the transfer (n,) of waves in one direction, which is that of all."""
+        return self.otf(np.abs(frequency), wavelength)
+
+
+@lru_cache(maxsize=64)
+def _radial_spread(blur: RadialTransfer, wavelengths: tuple[float, ...]) -> tuple[float, ...]:
+    """Return the largest loss over 2 pi f, at frequencies apart by a factor.
+
+    That factor bounds it between them, as losses grow until nothing is left.
+    """
+    frequency = np.geomspace(*SPREAD_RANGE, SPREAD_STEPS)
+    factor = frequency[1] / frequency[0]
+    otf = blur.spectral_otf(frequency, np.array(wavelengths))
+    return tuple((factor * np.abs(1 - otf) / (2 * np.pi * frequency)).max(axis=1).tolist())
 
 
 class PlaneTransfer(Blur):
@@ -247,8 +315,6 @@ class PlaneTransfer(Blur):
     Complex where it is not symmetric about a point: H(-f) = conj(H(f)), with the sign of
     integral h(x, y) exp(-2 pi i (fx x + fy y)) dx dy, x to the right and y down.
     """
-
-    costly = True
 
 
 @dataclass(frozen=True)
@@ -266,8 +332,6 @@ class FieldTransfer(Effect):
     A camera has at most one of the kind.
     """
 
-    costly = True
-
     @abstractmethod
     def zones(self, count: int) -> tuple[Zone, ...]:
         """Return blurs whose weights sum to 1 in every place.
@@ -276,15 +340,16 @@ class FieldTransfer(Effect):
         not to be enough.
         """
 
-    def mean_transfer(
-        self, fx: NDArray, fy: NDArray, spectrum: Sequence[tuple[float, float]]
-    ) -> NDArray:
-        """Return one that loses as much as the blurs of some places do, rms: (m, n)."""
+    @property
+    def is_uniform(self) -> bool:
+        """No: it blurs places of the field each by itself."""
+        return False
+
+    def row_transfer(self, frequency: NDArray, wavelength: float) -> NDArray:
+        """Return the contrast (n,) that it leaves of waves along a row, rms over some zones."""
         zones = self.zones(PLACES)
         some = [zone.blur for zone in zones[:: max(1, len(zones) // PLACES)]]
-        wavelength = spectrum[len(spectrum) // 2][0]
-        lost = [np.square(np.abs(1 - blur.otf_plane(fx, fy, wavelength))) for blur in some]
-        return np.asarray(1 - np.sqrt(np.mean(lost, axis=0)))
+        return np.sqrt(np.mean([blur.row_transfer(frequency, wavelength) ** 2 for blur in some], 0))
 
 
 class SeparableTransfer(Effect):
@@ -295,11 +360,9 @@ class SeparableTransfer(Effect):
         """Width and height of the area that it averages over evenly [m]; None for another shape."""
         return None
 
-    def mean_transfer(
-        self, fx: NDArray, fy: NDArray, spectrum: Sequence[tuple[float, float]]
-    ) -> NDArray:
-        """Return its transfer at all pairs of fx (n,) and fy (m,) [cycles/m]: (m, n)."""
-        return np.outer(self.along_y(fy), self.along_x(fx))
+    def row_transfer(self, frequency: NDArray, wavelength: float) -> NDArray:
+        """Return the contrast (n,) that it leaves of waves along a row."""
+        return np.abs(self.along_x(frequency))
 
     @abstractmethod
     def along_x(self, frequency: NDArray) -> NDArray:
@@ -312,8 +375,6 @@ class SeparableTransfer(Effect):
 
 class ImageMotion(Effect):
     """Motion of the image: a blur, and a displacement of what rows see at their own times."""
-
-    costly = True
 
     @property
     @abstractmethod
@@ -330,10 +391,14 @@ class ImageMotion(Effect):
     def travel(self) -> float:
         """How far from its place light comes to lie [m]."""
 
+    def spread(self, wavelengths: NDArray) -> NDArray:
+        """Return a bound (J,) on |1 - H(f)| / (2 pi |f|): no light moves further [m]."""
+        return np.full(len(wavelengths), self.travel)
+
     @property
-    def needs_survey(self) -> bool:
-        """Whether image formation cannot tell what it changes: it knows of blurs alone."""
-        return any((*self.drift, *self.displacement))
+    def is_uniform(self) -> bool:
+        """Whether all rows see the image in the same place."""
+        return not any(self.drift)
 
     def mean_error(self, signal: SignalLevels) -> float:
         """Return the most that leaving it out can change, light in place of dark [electrons]."""
@@ -342,8 +407,6 @@ class ImageMotion(Effect):
 
 class Gain(Effect):
     """A factor on the photo signal that varies slowly over the array."""
-
-    costly = True
 
     @abstractmethod
     def gain(self, x: NDArray, y: NDArray) -> NDArray:

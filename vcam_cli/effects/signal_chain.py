@@ -178,7 +178,7 @@ class NoiseSource(ElectronEffect):
         rest = [e for e in noise_sources(others, self.scope) if e.name != self.name]
         total = total_variance([*rest, self], signal)
         share = total_variance([self], signal) / np.maximum(total, 1e-300)
-        return float(share.max()), f"of the {_KINDS_OF_VARIANCE[self.scope]} variance"
+        return float(share.max()), f"of {_KINDS_OF_VARIANCE[self.scope]} variance"
 
 
 def noise_sources(effects: Iterable[Effect], scope: str) -> tuple[NoiseSource, ...]:
@@ -272,7 +272,7 @@ class Quantizer(Effect):
             for level, noise in zip(signal.weighed, total, strict=True)
         ]
         share = np.array(rounding) / np.maximum(total + rounding, 1e-300)
-        return float(share.max()), "of the temporal variance"
+        return float(share.max()), "of temporal variance"
 
     def rounding(self, level: float, variance: float) -> float:
         """Return the largest mean square of the rounding error at a level [electrons squared].

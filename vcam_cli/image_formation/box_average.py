@@ -9,10 +9,7 @@ from vcam_cli.camera.derived.geometry import Geometry, pixel_centers
 from vcam_cli.image_formation.cosine_series import Axis
 from vcam_cli.scenes.bands import bands_of_rows
 from vcam_cli.scenes.base import ChartScene, SampledScene
-from vcam_cli.scenes.cells import uneven_points
 
-JUDGED_ROWS = 256
-"""Rows of an array, at most, that tell what the area of its photodetectors changes."""
 SLIVER = 1e-9
 """Gaps between photodetectors below this part of the pitch are rounding errors."""
 
@@ -50,16 +47,7 @@ def box_averages(
     )
 
 
-def judged_rows(rows: int) -> NDArray:
-    """Return rows of an array at uneven distances, or all where they are few."""
-    if rows <= JUDGED_ROWS:
-        return np.arange(rows)
-    return (uneven_points(rows, JUDGED_ROWS) + rows / 2).astype(int)
-
-
-def point_values(
-    scene: SampledScene, mix: NDArray, geometry: Geometry, rows: NDArray | None = None
-) -> NDArray:
+def point_values(scene: SampledScene, mix: NDArray, geometry: Geometry) -> NDArray:
     """Return a scene at the centers of the collecting areas.
 
     Parameters
@@ -70,8 +58,6 @@ def point_values(
         Signal (C, K) of each component in each color [e/s].
     geometry : Geometry
         Geometry of the array.
-    rows : NDArray, optional
-        Numbers of the rows that are asked for, rising; all by default.
 
     Returns
     -------
@@ -79,7 +65,7 @@ def point_values(
         Signal (C, rows, columns) [e/s].
     """
     x, y = pixel_centers(geometry, detector=True)
-    return scene.values_at(x, y if rows is None else y[rows], mix)
+    return scene.values_at(x, y, mix)
 
 
 def _chart_averages(

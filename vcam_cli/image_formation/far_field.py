@@ -19,6 +19,7 @@ import scipy.fft
 from numpy.typing import NDArray
 
 from vcam_cli.camera.derived.geometry import Geometry
+from vcam_cli.image_formation.closed_spectrum import closed_spectrum
 from vcam_cli.image_formation.cosine_series import Axis
 from vcam_cli.image_formation.estimates.bandwidth import axes
 from vcam_cli.image_formation.field_dependence import Mode, filtered_layers
@@ -26,7 +27,6 @@ from vcam_cli.image_formation.filtering import Filter
 from vcam_cli.image_formation.optical_path import Layer, OpticalPath
 from vcam_cli.image_formation.scene_spectrum import (
     SceneSpectrum,
-    rectangle_spectrum,
     transform_painted,
 )
 from vcam_cli.scenes.base import ChartScene
@@ -86,10 +86,9 @@ class FarPart:
         SceneSpectrum
             Spectrum of R planes.
         """
-        rectangles = self.scene.rectangles(mix)
         x, y = axes(path, self.scene, highest)
-        if rectangles is not None:
-            return rectangle_spectrum(rectangles, self.scene.shape, (y, x), np.float64)
+        if not self.scene.is_painted:
+            return closed_spectrum(self.scene, mix, (y, x), np.float64)
         terms = y.terms, x.terms
         spectrum, _ = transform_painted(self.scene, mix, terms, np.float64, path.workers)
         return spectrum

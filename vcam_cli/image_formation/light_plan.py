@@ -1,10 +1,10 @@
 """Which effects on the light a scene calls for, decided before any light is computed.
 
-An effect that changes the light at the pixels by next to nothing is left out, as long as all that
-are left out together stay within their share of the tolerance: transfer functions of a scene with
-little detail, gains and veiling glare whose change of the surveyed light is small. What is left out
-saves its work; without any blur, the light is a mean over the photodetectors, and no spectrum is
-computed.
+An effect is left out where a bound says that the light at the pixels changes by next to nothing
+without it, as long as the bounds of all that are left out together stay within their share of the
+tolerance. Each kind of scene bounds what a blur changes of it (`scenes.blur_change`); gains and
+veiling glare have bounds of their own. Of the sets that may go, the one is left out that saves most
+time.
 """
 
 from __future__ import annotations
@@ -12,17 +12,15 @@ from __future__ import annotations
 import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vcam_cli.effects.base import (
     Blur,
     Effect,
     FieldTransfer,
     Gain,
-    ImageMotion,
-    RadialTransfer,
     SeparableTransfer,
     SignalLevels,
     Transport,
@@ -31,30 +29,33 @@ from vcam_cli.effects.base import (
 )
 from vcam_cli.effects.pixel.pixel_aperture import PixelAperture
 from vcam_cli.effects.temporal.sub_exposed_motion import SubExposedMotion
-from vcam_cli.image_formation.estimates.scene_detail import (
-    SceneDetail,
-    change_by_omission,
-    scene_detail,
-    transfer_functions,
-)
+from vcam_cli.image_formation.estimates.edge_changes import exact_changes, has_straight_edges
+from vcam_cli.image_formation.estimates.light_cost import light_seconds
 from vcam_cli.image_formation.optical_path import OpticalPath
+from vcam_cli.scenes.base import ChartScene
+from vcam_cli.scenes.blur_change import BlurLoss
 from vcam_cli.scenes.depth_scene import DepthScene
 from vcam_cli.scenes.layered import AnyScene, LayeredScene
+from vcam_cli.scenes.waves import WaveScene
 
 OMITTED_SHARE = 0.5
 """Part of the mean's tolerance for all effects that are left out; those on electrons may use what
 those on the light leave of it."""
 LEVEL_SHARE = 0.5
-"""Part of the tolerance by which they may shift a percentile of the light, relative to it: shot
-noise has the variance of the signal."""
+"""Part of the tolerance by which they may shift the light of any pixel, relative to it: shot noise
+has the variance of the signal, and is promised at percentiles of the light."""
 PERCENTILES = (1, 10, 50, 90, 99)
 """Percentiles of the scene's own light at which noise is promised."""
 PLACES = 33
-"""Places along each side of the array at which the least gain is sought."""
+"""Places along each side of the array at which a gain, which is smooth, is looked at."""
 BLURS = (Blur, SeparableTransfer, FieldTransfer, SubExposedMotion)
 """Kinds of effects that blur the light."""
 KINDS = (*BLURS, Gain, VeilingGlare, Transport)
 """Kinds of effects on the light, and on the charge that it makes."""
+LOOSEST = 8.0
+"""Bounds over exact sums, at most, of edges that lie anywhere to the pixels: larger ones stay."""
+MOST_TRIED = 10
+"""Effects of which all subsets are tried; of more, those that change least."""
 
 
 @dataclass(frozen=True)
@@ -63,12 +64,16 @@ class LightPlan:
 
     omitted: tuple[Effect, ...] = ()
     """Effects that are left out."""
-    bounding: tuple[Effect, ...] = ()
-    """Blurs that seemed to count for little, but stay: without them the spectrum of others would
-    reach further."""
+    idle: tuple[Effect, ...] = ()
+    """Effects that could be left out, but would save nothing beside those that stay."""
     shares: dict[str, float] = field(default_factory=dict)
-    """Estimated rms change by leaving out each omitted effect, and motion, which is more than its
-    blur; relative to full signal."""
+    """Bound on the rms change by leaving out each effect, where there is one, relative to full
+    signal."""
+    saved: dict[str, float] = field(default_factory=dict)
+    """Core seconds that each omitted effect would take if it were simulated beside those that act
+    [s]."""
+    saved_together: float = 0.0
+    """Core seconds that all of them would take [s]."""
 
     @property
     def share(self) -> float:
@@ -87,8 +92,9 @@ class LightPlan:
         kept = tuple(effect for effect in path.effects if effect not in self.omitted)
         gone = {effect.name for effect in self.omitted}
         layers = tuple(layer.without_effects(gone) for layer in path.layers)
-        transfer = path.transfer.with_effects(kept)
-        transfer = replace(transfer, weights=transfer.weights / (self.on_axis or 1.0))
+        transfer, on_axis = path.transfer.with_effects(kept), self.on_axis or 1.0
+        transfer = replace(transfer, weights=transfer.weights / on_axis)
+        path = replace(path, full=min(path.full / on_axis, path.ceiling))
         return replace(path, transfer=transfer, effects=kept, optional=(), layers=layers)
 
 
@@ -101,138 +107,132 @@ def light_plan(path: OpticalPath, scene: AnyScene) -> LightPlan:
         Lens and pixels with all effects that are wanted; `optional` names those that may go.
     scene : AnyScene
         Scene before the lens.
+
+    Returns
+    -------
+    LightPlan
+        What is left out, and what each effect changes at most.
     """
     candidates = of_kind(path.optional, *KINDS)
     if not candidates:
         return LightPlan()
-    # The least gain is at most that of the axis.
-    if path.transfer.is_dark or (path.fullness >= 1 and path.fullness * _least_gain(path) >= 1):
-        return LightPlan(candidates, shares=dict.fromkeys((e.name for e in candidates), 0.0))
+    if path.transfer.is_dark or _is_full(path):
+        none = dict.fromkeys((e.name for e in candidates), 0.0)
+        return LightPlan(candidates, (), none, *_saved(path, scene, candidates))
     budget = OMITTED_SHARE * path.settings.tolerance
-    functions: dict[Effect, NDArray] = {}
-    displacing = tuple(e for e in of_kind(candidates, ImageMotion) if e.needs_survey)
-
-    # Beside a lens that counts, the pixel's average stays whatever the scene has for it.
-    decisive = blurs = of_kind(candidates, *BLURS)
-    if of_kind(blurs, Blur, FieldTransfer):
-        decisive = of_kind(blurs, Blur, FieldTransfer, SubExposedMotion)
-
-    # Of transfers of |f| some save nothing as long as others stay.
-    radial = of_kind(decisive, RadialTransfer)
-    groups: list[Sequence[Effect]] = [(blur,) for blur in decisive if blur not in radial]
-    groups += [radial] if radial else []
-
-    def nothing_is_saved(found: SceneDetail) -> bool:
-        if displacing or found.even or not found.brightest:
-            return False
-        if not functions:
-            functions.update(transfer_functions(path, found))
-        return all(_joint_share(found, functions, group, {}) > budget for group in groups)
-
-    surveyed = scene.flat if isinstance(scene, LayeredScene | DepthScene) else scene
-    detail = scene_detail(path, surveyed, nothing_is_saved)
-    if detail is not None and not functions:
-        functions.update(transfer_functions(path, detail))
-    shares = {effect: _share(detail, functions, effect) for effect in candidates}
-    chosen: list[Effect] = []
-    # Without the pixel's average alone nothing is saved: it goes if the others leave room.
-    averages = of_kind(candidates, PixelAperture)
-    for group in ([e for e in candidates if e not in averages], averages):
-        for effect in sorted(group, key=shares.__getitem__):
-            together = [*chosen, effect]
-            if _joint_share(detail, functions, together, shares) > budget:
-                break
-            if _levels_stay(path, detail, effect):
-                chosen = together
-    bounding = _bounding_blurs(path, chosen)
-    omitted = tuple(effect for effect in chosen if effect not in bounding)
-    told = (*omitted, *displacing)
-    return LightPlan(omitted, bounding, {effect.name: shares[effect] for effect in told})
+    shares = _blur_shares(path, scene, budget)
+    shares |= {e: _share(path, scene, e) for e in candidates if e not in shares}
+    small = sorted((e for e in candidates if shares[e] <= budget), key=shares.__getitem__)
+    omitted = _best_set(path, scene, small[:MOST_TRIED], shares, budget)
+    known = {e.name: share for e, share in shares.items() if math.isfinite(share)}
+    idle = tuple(e for e in small if e not in omitted)
+    return LightPlan(omitted, idle, known, *_saved(path, scene, omitted))
 
 
-def _least_gain(path: OpticalPath) -> float:
-    """Return the least product of all gains over the array, relative to that on the axis."""
-    g, least = path.geometry, 1.0
-    x, y = (np.linspace(-size / 2, size / 2, PLACES) for size in (g.sensor_width, g.sensor_height))
-    for gain in of_kind(path.effects, Gain):
-        least *= float(gain.gain(x, y).min()) / (gain.on_axis or 1.0)
-    return least
+def _saved(
+    path: OpticalPath, scene: AnyScene, omitted: Collection[Effect]
+) -> tuple[dict[str, float], float]:
+    """Return the core seconds that omitted effects save, each beside those that act, and all."""
+    if not omitted:
+        return {}, 0.0
+
+    def seconds(left_out: Collection[Effect]) -> float:
+        acting = [e for e in path.effects if e not in left_out]
+        return light_seconds(path, scene, acting)
+
+    least = seconds(omitted)
+    each = {e.name: seconds([o for o in omitted if o is not e]) - least for e in omitted}
+    return each, seconds(()) - least
 
 
-Functions = Mapping[Effect, NDArray]
-"""Transfer functions at the frequencies of a scene's detail."""
+def _is_full(path: OpticalPath) -> bool:
+    """Return whether all pixels are full, whatever the effects on the light are."""
+    if path.fullness < 1:  # by white on the axis
+        return False
+    return path.fullness * _range_of_gains(path, of_kind(path.effects, Gain))[0] >= 1
 
 
-def _share(detail: SceneDetail | None, functions: Functions, effect: Effect) -> float:
-    """Return the share that leaving out one effect changes; inf where no bound is known.
-
-    Without knowledge of the scene it is that of a scene of full contrast.
-    """
-    if detail is not None and detail.brightest and effect in functions:
-        return change_by_omission(detail, functions, [effect]) / detail.brightest
-    if detail is not None and detail.even and of_kind([effect], *BLURS):
-        return 0.0
-    bound = effect.mean_error(SignalLevels(full_signal=1.0, time=1.0))
-    bound = math.inf if bound is None else bound
-    if detail is None or not detail.brightest:
-        return bound
-    if of_kind([effect], Transport):
-        return bound * min(1.0, 2 * _rms(detail.light) / detail.brightest)
-    return min(bound, _rms(np.subtract(*_light_behind(detail, effect))) / detail.brightest)
-
-
-def _joint_share(
-    detail: SceneDetail | None,
-    functions: Functions,
-    effects: Sequence[Effect],
-    shares: Mapping[Effect, float],
-) -> float:
-    """Return the same for several effects, as if what they change added up."""
-    blurs = [effect for effect in effects if effect in functions]
-    others = sum(shares[effect] for effect in effects if effect not in blurs)
-    if not blurs or detail is None:
-        return others
-    return others + change_by_omission(detail, functions, blurs) / detail.brightest
+def _blur_shares(path: OpticalPath, scene: AnyScene, budget: float) -> dict[Effect, float]:
+    """Return a bound on what each blur of a path changes, relative to full signal."""
+    transfer = path.transfer
+    spreads = {e: e.spread(transfer.wavelengths) for e in of_kind(path.effects, *BLURS)}
+    losses = {
+        e: BlurLoss(transfer.weights, spread, e.largest_loss, e.is_even, e.is_uniform)
+        for e, spread in spreads.items()
+        if spread is not None
+    }
+    if not losses or path.layers:  # what layers hide of each other has no bound
+        return dict.fromkeys(losses, math.inf)
+    flat = scene.flat if isinstance(scene, LayeredScene | DepthScene) else scene
+    bounds = flat.change_bounds(list(losses.values()), path.geometry, path.ceiling, budget)
+    shares: dict[Effect, float] = dict(zip(losses, bounds.shares(), strict=True))
+    open_ones = [e for e in of_kind(shares, Blur) if budget < shares[e] <= LOOSEST * budget]
+    if open_ones and has_straight_edges(flat):
+        exact = exact_changes(path, flat, open_ones)
+        shares |= {blur: change / bounds.full for blur, change in exact.items()}
+    # Points in place of averages alias what detail there is: only of even light is that nothing.
+    detailed = [e for e in of_kind(shares, PixelAperture) if shares[e] > 0]
+    return shares | dict.fromkeys(detailed, math.inf)
 
 
-def _light_behind(detail: SceneDetail, effect: Effect) -> tuple[NDArray, NDArray]:
-    """Return the surveyed light behind a gain or veiling glare, and without it.
-
-    The light that was surveyed has the gain of the axis in it.
-    """
-    behind = without = detail.light
+def _share(path: OpticalPath, scene: AnyScene, effect: Effect) -> float:
+    """Return a bound on what a gain, glare or transport changes; inf for none."""
+    share = effect.mean_error(SignalLevels(full_signal=1.0, time=1.0))
+    share = math.inf if share is None else share
+    allowed = LEVEL_SHARE * path.settings.tolerance
     for gain in of_kind([effect], Gain):
-        without = detail.light / (gain.on_axis or 1.0)
-        behind = without * gain.gain(detail.x, detail.y)
+        low, high = _range_of_gains(path, (gain,))
+        if max(abs(1 - low), abs(1 - high)) > allowed:  # of some pixel's light
+            return math.inf
     for glare in of_kind([effect], VeilingGlare):
-        behind = without + glare.fraction * (without.mean() - without)
-    return behind, without
+        before = path.effects[: path.effects.index(effect)]
+        low, high = _range_of_gains(path, of_kind(before, Gain))
+        darkest, brightest = _range_of_light(scene)
+        least, moved = low * darkest, glare.fraction * (high * brightest - low * darkest)
+        share = 0.0 if moved == 0 else moved / least if least > 0 else math.inf
+        if share > allowed:  # of the darkest pixel's light
+            return math.inf
+    return share
 
 
-def _rms(values: NDArray) -> float:
-    return math.sqrt(float(np.mean(np.square(values))))
+def _range_of_gains(path: OpticalPath, gains: Collection[Gain]) -> tuple[float, float]:
+    """Return the least and the largest product of gains over the array, 1 on the axis."""
+    g = path.geometry
+    x, y = (np.linspace(-size / 2, size / 2, PLACES) for size in (g.sensor_width, g.sensor_height))
+    product = np.ones((1, 1))
+    for gain in gains:
+        product = product * gain.gain(x, y) / (gain.on_axis or 1.0)
+    return float(product.min()), float(product.max())
 
 
-def _levels_stay(path: OpticalPath, detail: SceneDetail | None, effect: Effect) -> bool:
-    """Return whether the percentiles of the light stay where they are without a gain or glare."""
-    if detail is None or not of_kind([effect], Gain, VeilingGlare):
-        return True
-    before, after = np.percentile(_light_behind(detail, effect), PERCENTILES, axis=(1, 2)).T
-    return bool(np.all(np.abs(after - before) <= LEVEL_SHARE * path.settings.tolerance * before))
+def _range_of_light(scene: AnyScene) -> tuple[float, float]:
+    """Return bounds on a scene's darkest and brightest light, over white; 0 and inf unknown."""
+    if isinstance(scene, WaveScene):
+        return scene.darkest, scene.brightest
+    if isinstance(scene, ChartScene):
+        return scene.chart.darkest, scene.chart.brightest
+    return 0.0, math.inf
 
 
-def _bounding_blurs(path: OpticalPath, chosen: Collection[Effect]) -> tuple[Effect, ...]:
-    """Return blurs that could go, but without which the spectrum of others would reach further.
+def _best_set(
+    path: OpticalPath,
+    scene: AnyScene,
+    small: Sequence[Effect],
+    shares: Mapping[Effect, float],
+    budget: float,
+) -> tuple[Effect, ...]:
+    """Return the effects without which most time is saved, and together within the budget.
 
-    Where it is followed for another blur, transfers along the axes or of |f| alone cost nothing and
-    end it earlier. Where no other blur has a last frequency, those that have one stay.
+    Of sets that save alike it is the one with the most effects, and of these the one that changes
+    least.
     """
-    wavelength = float(path.transfer.wavelengths[-1])
-    kept = [blur for blur in of_kind(path.effects, Blur) if blur not in chosen]
-    if not (kept or path.field not in (None, *chosen)):
-        return ()
-    costless = of_kind(chosen, SeparableTransfer, RadialTransfer)
-    if any(math.isfinite(blur.cutoff(wavelength)) for blur in kept):
-        return costless
-    others = [blur for blur in of_kind(chosen, Blur) if blur not in costless]
-    return (*costless, *(blur for blur in others if math.isfinite(blur.cutoff(wavelength))))
+
+    def worth(omitted: tuple[Effect, ...]) -> tuple[float, int, float]:
+        kept = [effect for effect in path.effects if effect not in omitted]
+        saved = whole - light_seconds(path, scene, kept)
+        return round(saved, 6), len(omitted), -sum(shares[e] for e in omitted)
+
+    whole = light_seconds(path, scene, path.effects)
+    sets = (s for n in range(len(small) + 1) for s in combinations(small, n))
+    within = (s for s in sets if sum(shares[e] for e in s) <= budget)
+    return max(within, key=worth)

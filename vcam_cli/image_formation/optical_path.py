@@ -54,6 +54,9 @@ class OpticalPath:
     ceiling: float = np.inf
     """Rate that fills a pixel by the end of the exposure, as far as it is known; brighter ones all
     look alike [e/s]."""
+    full: float = np.inf
+    """Signal to which errors are relative: the largest on the array, at most the ceiling, as far as
+    it is known [e/s]."""
     fullness: float = 0.0
     """Light of the darkest place of the scene over that which fills a pixel whatever its noise, by
     white on the axis; 0 where it is not known."""
@@ -193,8 +196,6 @@ class SpectrumReport:
     """Whether they had to be painted, as those of a chart."""
     edge_seconds: float = 0.0
     """What a painted chart costs beside its cells: see `Chart`."""
-    trials: int = 0
-    """Times that crops of a chart were painted to choose its cells."""
     far_parts: int = 0
     """Rectangles of the far field, each with a spectrum of its own."""
     far_cells: int = 0

@@ -32,6 +32,9 @@ from vcam_cli.scenes.base import View
 from vcam_cli.scenes.layered import AnyScene
 from vcam_cli.spectra import Spectrum
 
+USED_SHARE = 0.95
+"""Part of the tolerance that all errors of the mean signal may use together. Where the light turns
+out so much darker than assumed that they are more, it is computed again."""
 CELL_ERROR = 0.5
 """Error of the means over a chart's cells where edges meet, relative to white, over the tolerance.
 As cells are finer than the blur, pixels err by 0.07 tolerances by it at most: measured on leaves
@@ -207,6 +210,18 @@ def photo_rate(path: OpticalPath, scene: AnyScene, planes: bool = False) -> Rate
     """
     plan = light_plan(path, scene)
     path = plan.reduced(path)
+    while True:
+        found = _gathered(path, scene, planes)
+        full = min(float(found.values.max(initial=0.0)), path.ceiling)
+        # What is left out lies below the frequencies that are lost: their squares add.
+        error = math.hypot(found.spectrum.lost_rms, plan.share * full)
+        if full >= path.full or error <= USED_SHARE * path.settings.tolerance * full:
+            return replace(found, plan=plan)
+        path = replace(path, full=full)
+
+
+def _gathered(path: OpticalPath, scene: AnyScene, planes: bool) -> Rate:
+    """Return the light in every place of the lattice, all effects acting that a path has."""
     layers, report = image_layers(path, scene)
     if path.is_displaced:  # more changes than the blur, of which the report knows
         moved = {motion.name for motion in of_kind(path.effects, ImageMotion)}
@@ -246,7 +261,7 @@ def photo_rate(path: OpticalPath, scene: AnyScene, planes: bool = False) -> Rate
     for glare, behind in zip(glares, gains[1:], strict=True):
         _spread(out, mosaic, glare)
         each(partial(apply_gains, behind), blocks(g.rows), path.workers)
-    return Rate(out if planes else out[0], plan, report)
+    return Rate(out if planes else out[0], LightPlan(), report)
 
 
 def _glares_and_gains(

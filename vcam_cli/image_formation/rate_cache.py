@@ -18,6 +18,7 @@ from vcam_cli.effects.base import Charge
 from vcam_cli.effects.order import ORDER
 from vcam_cli.effects.signal_chain import NoiseSource
 from vcam_cli.image_formation.photon_rate import Rate
+from vcam_cli.image_formation.settings import camera_settings
 from vcam_cli.image_formation.transfer_functions import Transfer
 from vcam_cli.physics.cache import ByteCache
 
@@ -64,6 +65,7 @@ def light_key(camera: Camera) -> str:
     for path in INDEPENDENT_KEYS:
         if path != moving:
             _drop(form, path)
+    form["tolerance"] = camera_settings(camera).tolerance  # not that of the file alone
     accuracy = form["accuracy"]  # a preset by itself is written as its name
     if isinstance(accuracy, dict) and set(accuracy) == {"preset"}:
         form["accuracy"] = accuracy["preset"]

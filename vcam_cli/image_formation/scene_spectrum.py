@@ -1,24 +1,21 @@
 """The cosine spectrum of a scene: DCT-II coefficients of its planes.
 
-Planes of samples are transformed. A chart of even rectangles is never sampled: its coefficients
-are known in closed form, and few numbers along each axis make all of them.
+Planes of samples are transformed; charts in closed form are not sampled (`closed_spectrum.py`).
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations_with_replacement, pairwise
+from itertools import combinations_with_replacement
 from typing import Protocol
 
 import numpy as np
 import scipy.fft
 from numpy.typing import NDArray
 
-from vcam_cli.image_formation.cosine_series import Axis
-from vcam_cli.parallel import each, pieces, product, rows_at_once, slices_within
+from vcam_cli.parallel import each, pieces, rows_at_once, slices_within
 from vcam_cli.scenes.bands import bands_of_rows
-from vcam_cli.scenes.base import ChartScene, Rectangles
+from vcam_cli.scenes.base import ChartScene
 
 Index = NDArray | slice
 
@@ -49,9 +46,6 @@ class SceneSpectrum(Protocol):
         NDArray
             Coefficients (n, count).
         """
-
-    def terms(self, plane: int, y: NDArray, x: NDArray) -> NDArray:
-        """Return a plane's coefficients of these indices along both axes: (len(y), len(x))."""
 
     def products(self, y: NDArray, x: NDArray, workers: int) -> NDArray:
         """Return sums of products of two planes' coefficients over blocks of terms.
@@ -93,10 +87,6 @@ class SampledSpectrum:
     def rows(self, plane: int, index: Index, count: int | None = None) -> NDArray:
         """Return rows of a plane's coefficients: (n, count)."""
         return self.coefficients[plane, index, :count]
-
-    def terms(self, plane: int, y: NDArray, x: NDArray) -> NDArray:
-        """Return a plane's coefficients of these indices along both axes: (len(y), len(x))."""
-        return self.coefficients[plane][np.ix_(y, x)]
 
     def products(self, y: NDArray, x: NDArray, workers: int) -> NDArray:
         """Return sums of products of two planes' coefficients over blocks of terms."""
@@ -227,107 +217,3 @@ def transform_painted(
     for plane in half:
         _transform_columns(plane, terms[0], workers)
     return SampledSpectrum(half[:, : terms[0]]), brightest.max(axis=0)
-
-
-@dataclass(frozen=True, eq=False)
-class RectangleSpectrum:
-    """The spectrum of even rectangles, as far as it is asked for."""
-
-    along_y: NDArray
-    """(ny, d) coefficients along y of the d rows of rectangles."""
-    along_x: NDArray
-    """(R, d, nx) coefficients along x of the light in these rows."""
-
-    @property
-    def dtype(self) -> np.dtype:
-        """Floating-point type of the coefficients."""
-        return self.along_x.dtype
-
-    def __len__(self) -> int:
-        return len(self.along_x)
-
-    def rows(self, plane: int, index: Index, count: int | None = None) -> NDArray:
-        """Return rows of a plane's coefficients: (n, count)."""
-        return product(self.along_y[index], self.along_x[plane, :, :count])
-
-    def terms(self, plane: int, y: NDArray, x: NDArray) -> NDArray:
-        """Return a plane's coefficients of these indices along both axes: (len(y), len(x))."""
-        return product(self.along_y[y], self.along_x[plane][:, x])
-
-    def products(self, y: NDArray, x: NDArray, workers: int) -> NDArray:
-        """Return sums of products of two planes' coefficients over blocks of terms."""
-        planes, runs, columns = self.along_x.shape
-        below = self.along_y.astype(np.float64)
-        in_rows = np.array([below[s].T @ below[s] for s in _blocks(y)]).reshape(-1, runs**2)
-        out = []
-        for plane in range(planes):
-            others = self.along_x[plane:].reshape(-1, columns).astype(np.float64)
-            in_columns = np.array([others[:runs, s] @ others[:, s].T for s in _blocks(x)])
-            for other in np.split(in_columns, planes - plane, axis=2):
-                out.append(product(in_rows, other.reshape(-1, runs**2).T))
-        return np.array(out)
-
-
-def _blocks(edges: NDArray) -> list[slice]:
-    return [slice(*ends) for ends in pairwise(edges)]
-
-
-def rectangle_spectrum(
-    rectangles: Rectangles, cells: tuple[int, int], axes: Sequence[Axis], dtype: type
-) -> RectangleSpectrum:
-    """Return the first terms of the spectrum of a chart of even rectangles, in closed form.
-
-    Frequencies that cells of a grid would fold are not in it.
-
-    Parameters
-    ----------
-    rectangles : Rectangles
-        The chart.
-    cells : tuple of int
-        Cells (ny, nx) of the grid that scales the coefficients.
-    axes : sequence of Axis
-        Axes along y and x, whose terms are computed.
-    dtype : type
-        Floating-point type.
-
-    Returns
-    -------
-    RectangleSpectrum
-        Coefficients, unnormalized.
-    """
-    along_y = terms_of_runs(rectangles.y, cells[0], axes[0].terms)
-    along_x = terms_of_runs(rectangles.x, cells[1], axes[1].terms)
-    values = rectangles.values.reshape(-1, along_x.shape[1])  # one product: NumPy's of each is slow
-    in_rows = product(values, along_x.T).reshape(*rectangles.values.shape[:2], -1)
-    return RectangleSpectrum(along_y.astype(dtype), in_rows.astype(dtype))
-
-
-def terms_of_runs(edges: NDArray, cells: int, terms: int) -> NDArray:
-    """Return the first terms of the DCT-II of light that is 1 from edge to edge.
-
-    With the edges as parts b of the way between the borders, the cosine series of a run has the
-    terms (sin(pi k b') - sin(pi k b)) / pi k; means over N cells multiply them by sinc(k / 2N), and
-    a DCT-II counts them 2N times.
-
-    Parameters
-    ----------
-    edges : NDArray
-        Edges (runs + 1,) from border to border [m].
-    cells : int
-        Number of cells N.
-    terms : int
-        Number of terms.
-
-    Returns
-    -------
-    NDArray
-        Coefficients (terms, runs).
-    """
-    parts = (edges - edges[0]) / (edges[-1] - edges[0])
-    k = np.arange(1, terms)
-    sines = np.sin(np.pi * (np.outer(k, parts) % 2))
-    out = np.empty((terms, len(parts) - 1))
-    out[0] = 2 * cells * np.diff(parts)
-    scale = 2 * cells * np.sinc(k / (2 * cells)) / (np.pi * k)
-    out[1:] = np.diff(sines, axis=1) * scale[:, None]
-    return out

@@ -69,6 +69,9 @@ STANDARD = Settings(10e-9, 2049, 5e-4, 4, 8, 32)
 FINE = Settings(10e-9, 4097, 2e-4, 5, 10, 32)
 REFERENCE = Settings(2.5e-9, 32769, 2e-5, 6, 16, 64)
 
+PERCENTILE_SHARE = 0.5
+"""Part of the tolerance for light of which a percentile times the exposure: what that one pixel
+errs, all pixels do."""
 LADDER = ((0.02, DRAFT), (0.005, STANDARD), (0.001, FINE), (0.0, REFERENCE))
 """Settings for tolerances from the first number of each pair upward."""
 
@@ -78,7 +81,9 @@ def camera_settings(camera: Camera) -> Settings:
     accuracy = camera.accuracy
     chosen = next(s for least, s in LADDER if accuracy.tolerance >= least)
     mixing = min(chosen.mixing_tolerance, accuracy.tolerance / 10)
-    chosen = replace(chosen, tolerance=accuracy.tolerance, mixing_tolerance=mixing)
+    auto = camera.exposure.auto
+    share = PERCENTILE_SHARE if auto is not None and auto.method == "percentile" else 1.0
+    chosen = replace(chosen, tolerance=share * accuracy.tolerance, mixing_tolerance=mixing)
     if camera.scene.wavelengths.step is not None:
         chosen = replace(chosen, wavelength_step=camera.scene.wavelengths.step)
     if "float_width" in accuracy.knobs:

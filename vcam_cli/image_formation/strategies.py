@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from vcam_cli import memory
 from vcam_cli.effects.base import Blur, FieldTransfer, SeparableTransfer, of_kind
-from vcam_cli.image_formation.box_average import box_averages, judged_rows, point_values
+from vcam_cli.image_formation.box_average import box_averages, point_values
 from vcam_cli.image_formation.estimates import memory_model
 from vcam_cli.image_formation.estimates.bandwidth import (
     LOWEST,
@@ -52,6 +52,7 @@ from vcam_cli.image_formation.harmonic_scenes import (
 from vcam_cli.image_formation.layers.cut_image import cut_image
 from vcam_cli.image_formation.layers.layered import layered_image
 from vcam_cli.image_formation.optical_path import Layer, Layers, OpticalPath, SpectrumReport
+from vcam_cli.image_formation.profile_scenes import profile_layers
 from vcam_cli.image_formation.sub_exposures import sub_exposed_layers, sub_exposed_motion
 from vcam_cli.image_formation.transfer_tables import Tables, mixtures, tabulate
 from vcam_cli.scenes.base import ChartScene, HarmonicScene, SampledScene
@@ -108,6 +109,10 @@ def image_layers(path: OpticalPath, scene: AnyScene) -> tuple[Layers, SpectrumRe
         scene = scene.chart
     if not path.transfer.effects and not path.field and path.averages_over_box:
         return _mean_layers(path, scene)
+    if isinstance(scene, ChartScene) and (profile := scene.chart.profile()) is not None:
+        found = profile_layers(path, profile)
+        if found is not None:
+            return found
     return _filtered_layers(path, scene)
 
 
@@ -125,16 +130,11 @@ def _mean_layers(path: OpticalPath, scene: SampledScene) -> tuple[Layers, Spectr
     samples = 0 if isinstance(scene, ChartScene) else math.prod(scene.shape)
     needed = memory_model.box_average_bytes(samples, len(level), g, path.settings)
     memory.require(needed, g.rows, g.columns)
-    changes = {}
     if path.separable:
         signal = box_averages(scene, level, g, axes(path, scene, 1.0), path.workers)
-        rows = judged_rows(g.rows)
-        both = zip(signal[:, rows], point_values(scene, level, g, rows), strict=True)
-        change = max(float(np.square(a - b, dtype=np.float64).mean()) for a, b in both)
-        changes = {effect.name: math.sqrt(change) for effect in path.separable}
     else:
         signal = point_values(scene, level, g)
-    report = SpectrumReport(is_averaged=True, changes=changes, memory=needed)
+    report = SpectrumReport(is_averaged=True, memory=needed)
     return iter([Layer(lambda color, rows: signal[color, rows])]), report
 
 
@@ -149,7 +149,7 @@ def _filtered_layers(path: OpticalPath, scene: SampledScene) -> tuple[Layers, Sp
     near = near_field(path, scene, widest)
     rings = far_parts(path, near, scene, widest)
     highest, chosen = highest_passed(path, near), None
-    if scene.chart.edges() is None:
+    if scene.is_painted:
         chosen = cells_per_pixel(path, near, highest)
         near = near.with_cells(cell_grid(near, path.geometry, chosen.per_pixel))
         highest = min(highest, chosen.per_pixel)
@@ -186,16 +186,15 @@ def _spectral_layers(
     modes, field_change = needed_modes(path, image, modes)
     image_filter = _filter(path, image.scene, tables, image.highest)
     far = FarField(path, rings, image_filter, image.highest)
-    followed = far.parts_with_modes(image.full_signal) if modes else 0
+    followed = far.parts_with_modes(path.full) if modes else 0
     planes = [plane for plane in tables.planes if plane is not None]
     report = SpectrumReport(
         oversampling=image.highest,
         lost_rms=math.hypot(image.lost_rms, chosen.error if chosen else 0.0),
-        cells=0 if scene.rectangles(mixing[0]) is not None else math.prod(scene.shape),
+        cells=0 if isinstance(scene, ChartScene) and not painted else math.prod(scene.shape),
         cells_per_pixel=g.pitch_x / scene.pitch_x if painted else 0.0,
         is_painted=painted is not None,
         edge_seconds=painted.chart.edge_seconds if painted else 0.0,
-        trials=chosen.trials if chosen else 0,
         far_parts=len(rings),
         far_cells=sum(math.prod(part.scene.shape) for part in rings),
         far_filters=len(tables.parities) * len(rings) + len(modes) * followed,

@@ -128,7 +128,7 @@ def sub_exposed_layers(
     count, left = _instants(path, image, motion, x, probe)
     exposure = _Exposure(image, motion, *_quadrature(count))
     changes = {}
-    if not motion.needs_survey:
+    if motion.blur is None:  # the still image has the blur in it
         changes[motion.name] = _change(image, exposure, x, probe)
     layer = Layer(lambda color, rows: exposure.signal(color, x, y[rows]))
     full = image.full_signal or 1.0

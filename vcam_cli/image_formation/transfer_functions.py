@@ -26,6 +26,8 @@ from vcam_cli.spectra import Spectrum, pair_weights, photons
 
 VALUES = 1 << 17
 """Values of a transfer that are computed together, about."""
+MOST_APART = 41e-9
+"""Wavelengths between which a transfer is taken as linear: two steps of the coarsest band [m]."""
 
 
 @dataclass(frozen=True)
@@ -123,18 +125,18 @@ class Transfer:
         """Return the same light on every second wavelength.
 
         Neighbors share the weight of those dropped: the transfer is taken as linear between them,
-        which it is to second order.
+        which it is to second order. Lines further apart are all kept.
         """
         count = len(self.wavelengths)
-        if count < 3:
-            return self
-        weights = self.weights.copy()
+        weights, keep = self.weights.copy(), np.ones(count, bool)
         for j in range(1, count - 1, 2):
             low, here, high = self.wavelengths[j - 1 : j + 2]
+            if high - low > MOST_APART:
+                continue
             share = (here - low) / (high - low)
             weights[..., j - 1] += (1 - share) * self.weights[..., j]
             weights[..., j + 1] += share * self.weights[..., j]
-        keep = np.array([j % 2 == 0 or j == count - 1 for j in range(count)])
+            keep[j] = False
         return replace(self, wavelengths=self.wavelengths[keep], weights=weights[..., keep])
 
     def with_effects(self, effects: Sequence[Effect]) -> Transfer:

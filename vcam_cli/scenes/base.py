@@ -11,15 +11,19 @@ in closed form and stay exact, all else is samples.
 
 import math
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Literal, Protocol
 
 import numpy as np
 from numpy.typing import DTypeLike, NDArray
 
+from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.scenes.bands import bands_of_rows, paint_by_bands
-from vcam_cli.scenes.cells import cell_edges, edges_within, uneven_points
+from vcam_cli.scenes.blur_change import BlurLoss, ChangeBounds, profile_bounds, rectangle_bounds
+from vcam_cli.scenes.cells import cell_edges, edges_within
+from vcam_cli.scenes.closed_form import LightDisc, Products, Profile, Rectangles
+from vcam_cli.scenes.edge_energy import EdgeEnergy, Region, counted_height, rectangle_energy
 from vcam_cli.scenes.waves import WaveScene
 from vcam_cli.spectra import Spectrum
 
@@ -108,6 +112,12 @@ class HarmonicScene:
         """Return sum_k mix[r, k] B_k at the points (y[i], x[j]): (R, m, n)."""
         return self.chart.values_at(x, y, mix)
 
+    def change_bounds(
+        self, losses: Sequence[BlurLoss], geometry: Geometry, ceiling: float, allowed: float
+    ) -> ChangeBounds:
+        """Return that no bound is known: a lens that ends the series saves more than it costs."""
+        return ChangeBounds(0.0, [math.inf] * len(losses))
+
 
 @dataclass(frozen=True)
 class SampledScene(ABC):
@@ -167,28 +177,37 @@ class SampledScene(ABC):
             Values (R, m, n).
         """
 
+    @property
     @abstractmethod
-    def mean_and_rms(self, mix: Array, size: tuple[float, float]) -> tuple[Array, Array]:
-        """Return the mean of sum_k mix[r, k] B_k over a centered rectangle, and an rms: (R,) each.
+    def brightest(self) -> float:
+        """Brightest light of a component, relative to what the perfect white has of it."""
 
-        The rectangle's size is its width and height [m]; the rms is that over the grid, at least.
-        """
-
-    def rectangles(self, mix: Array) -> "Rectangles | None":
+    def rectangles(self, mix: Array) -> Rectangles | None:
         """Return the whole grid's area as even rectangles; None where it is not made of them."""
         return None
 
+    def change_bounds(
+        self, losses: Sequence[BlurLoss], geometry: Geometry, ceiling: float, allowed: float
+    ) -> ChangeBounds:
+        """Return bounds on what blurs change of the mean signal.
 
-@dataclass(frozen=True)
-class Rectangles:
-    """Even light in rectangles that lie in rows and columns."""
+        Parameters
+        ----------
+        losses : sequence of BlurLoss
+            The blurs, all of one light.
+        geometry : Geometry
+            Geometry of the array.
+        ceiling : float
+            Rate that fills a pixel [e/s].
+        allowed : float
+            Change over full signal that matters: larger ones need not be told apart from inf.
 
-    x: Array
-    """(e + 1,) rising: left edges, and the last right one [m]"""
-    y: Array
-    """(d + 1,) the same from the top"""
-    values: Array
-    """(R, d, e) float64"""
+        Returns
+        -------
+        ChangeBounds
+            The bounds.
+        """
+        return ChangeBounds(0.0, [math.inf] * len(losses))
 
 
 class Chart(ABC):
@@ -255,16 +274,63 @@ class Chart(ABC):
     def edges(self) -> tuple[Array, Array] | None:
         """Return where the light of a chart of even rectangles may change, x and y rising [m].
 
-        It is None for all others: the light must be the same all over between neighboring edges.
+        It is None for all others: the light must be the same all over between neighboring edges,
+        its `discs` aside.
         """
         return None
 
-    def across_edge(self) -> tuple[float, float] | None:
-        """Return the unit vector (x, y) across the only edge, between two even half planes.
+    def even_values(self, x: Array, y: Array, mix: Array) -> Array:
+        """Return the values (R, len(y), len(x)) of even rectangles at points, without discs."""
+        return self.values(x, y, mix)
 
-        It passes through the array's center. It is None for all other charts.
-        """
+    def discs(self, mix: Array) -> tuple[LightDisc, ...]:
+        """Return the discs that lie on a chart of even rectangles, if it has any."""
+        return ()
+
+    separates: ClassVar[bool] = False
+    """Whether its light is a sum of few products of functions of x and y: `products`."""
+
+    def products(self, x_edges: Array, y_edges: Array, mix: Array) -> Products:
+        """Return the light as such a sum, averaged over cells between edges [m]."""
+        raise ValueError(f"{type(self).__name__} is no sum of products")
+
+    def profile(self) -> Profile | None:
+        """Return the light of a gray chart of parallel straight edges without end; else None."""
         return None
+
+    def edge_energy(self, region: Region, level: Array, ceiling: float) -> EdgeEnergy:
+        """Return how much edge the chart has, at most.
+
+        Parameters
+        ----------
+        region : Region
+            Where edges count.
+        level : Array
+            Light (K,) of each component where it is 1, in any unit.
+        ceiling : float
+            Light that fills a pixel, in the same unit: edges between brighter ones do not count.
+
+        Returns
+        -------
+        EdgeEnergy
+            Sums of squared heights times lengths, over the region's area.
+        """
+        edges = self.edges()
+        if edges is None:
+            raise ValueError(f"{type(self).__name__} does not say how much edge it has")
+        x, y = (
+            np.concatenate([[c - size], np.sort(e[np.abs(e - c) < size]), [c + size]])
+            for e, c, size in zip(edges, region.center, region.size, strict=True)
+        )
+        middle_x, middle_y = ((e[1:] + e[:-1]) / 2 for e in (x, y))
+        mix = np.asarray(level, float)[None]
+        light = self.even_values(middle_x, middle_y, mix)[0]
+        energy = rectangle_energy(x, y, light, region, ceiling)
+        for disc in self.discs(mix):
+            around = self.even_values(np.array([disc.x]), np.array([disc.y]), mix)[0, 0]
+            height = float(counted_height(around, around + disc.height, ceiling)[0])
+            energy += EdgeEnergy(oblique=2 * math.pi * disc.radius * height / region.area)
+        return energy
 
     def averages(self, x_edges: Array, y_edges: Array, mix: Array) -> Array:
         """Return the averages over the cells: (R, len(y_edges) - 1, len(x_edges) - 1)."""
@@ -311,22 +377,42 @@ class ChartScene(SampledScene):
 
         return paint
 
-    def mean_and_rms(self, mix: Array, size: tuple[float, float]) -> tuple[Array, Array]:
-        """Return the mean over a centered rectangle and the rms over the grid, from points."""
-        inside, everywhere = (
-            self.values_at(uneven_points(width), uneven_points(height), mix).astype(np.float64)
-            for width, height in (size, self.extent)
-        )
-        return inside.mean(axis=(1, 2)), np.sqrt(np.square(everywhere).mean(axis=(1, 2)))
+    @property
+    def brightest(self) -> float:
+        """Brightest light of the chart, relative to the perfect white."""
+        return self.chart.brightest
 
     def rectangles(self, mix: Array) -> Rectangles | None:
-        """Return the grid's area as even rectangles, of a chart that is made of them."""
-        edges = self.chart.edges()
-        if edges is None:
+        """Return the grid's area as even rectangles, of a chart that is made of them.
+
+        Its discs are not in them; they must lie within that area.
+        """
+        edges, discs = self.chart.edges(), self.chart.discs(mix)
+        if edges is None or not all(disc.lies_within(*self.extent) for disc in discs):
             return None
         x, y = (edges_within(e, size / 2) for e, size in zip(edges, self.extent, strict=True))
         middle_x, middle_y = ((e[1:] + e[:-1]) / 2 for e in (x, y))
-        return Rectangles(x, y, self.chart.values(middle_x, middle_y, np.asarray(mix, float)))
+        values = self.chart.even_values(middle_x, middle_y, np.asarray(mix, float))
+        return Rectangles(x, y, values)
+
+    @property
+    def is_painted(self) -> bool:
+        """Whether it has no closed form."""
+        chart = self.chart
+        return not chart.separates and self.rectangles(np.zeros((1, len(self.spectra)))) is None
+
+    def change_bounds(
+        self, losses: Sequence[BlurLoss], geometry: Geometry, ceiling: float, allowed: float
+    ) -> ChangeBounds:
+        """Return bounds for charts of straight edges; no bound is known of others."""
+        components = len(losses[0].weights)
+        profile = self.chart.profile()
+        if profile is not None:
+            return profile_bounds(profile, losses, geometry, ceiling)
+        found = self.rectangles(np.eye(components))
+        if found is None or self.chart.discs(np.eye(components)):
+            return super().change_bounds(losses, geometry, ceiling, allowed)
+        return rectangle_bounds(found.x, found.y, found.values, losses, geometry, ceiling)
 
     def values_at(self, x: Array, y: Array, mix: Array) -> Array:
         """Return the chart's values at points: (R, m, n)."""

@@ -7,8 +7,6 @@ from numpy.typing import NDArray
 
 Array = NDArray[Any]
 
-POINTS = 96
-"""Points along each side of a chart that is looked at."""
 GOLDEN = 0.6180339887498949
 """Inverse golden ratio, which no fraction of small numbers comes near."""
 EVEN = (0.7548776662466927, 0.5698402909980532)
@@ -18,15 +16,6 @@ EVEN = (0.7548776662466927, 0.5698402909980532)
 def cell_edges(count: int, pitch: float) -> Array:
     """Return the count + 1 edges of cells centered on 0 [m]."""
     return (np.arange(count + 1) - count / 2) * pitch
-
-
-def uneven_points(length: float, count: int = POINTS, step: float = GOLDEN) -> Array:
-    """Return points over a centered length, rising, whose steps share no factor with it.
-
-    There is one in each of so many parts of it, whose place within the part goes on by `step`.
-    """
-    k = np.arange(count)
-    return ((k + k * step % 1) / count - 0.5) * length
 
 
 def clip_cells(edges: Array, half: float) -> tuple[slice, Array, Array]:

@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from vcam_cli.scenes.base import Array, SampledScene, View
-from vcam_cli.scenes.cells import uneven_points
 from vcam_cli.scenes.depth_cut import (
     LEAST_JUMP,
     DepthCut,
@@ -99,13 +98,10 @@ class CutLayer(SampledScene):
             light = planes[:, self.sources[np.ix_(rows, columns)]]
         return (light + mix[:, -1, None, None]) * self.coverage[np.ix_(rows, columns)]
 
-    def mean_and_rms(self, mix: Array, size: tuple[float, float]) -> tuple[Array, Array]:
-        """Return the mean over a centered rectangle and the rms over the grid, from points."""
-        inside, everywhere = (
-            self.values_at(uneven_points(width), uneven_points(height), mix).astype(np.float64)
-            for width, height in (size, self.extent)
-        )
-        return inside.mean(axis=(1, 2)), np.sqrt(np.square(everywhere).mean(axis=(1, 2)))
+    @property
+    def brightest(self) -> float:
+        """Brightest sample, at least that of the coverage."""
+        return max(self.flat.brightest, 1.0)
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,8 @@ import numpy as np
 
 from vcam_cli.scenes.base import Array, Chart, ChartScene, Frame, View
 from vcam_cli.scenes.cells import clip_cells, edges_within
+from vcam_cli.scenes.closed_form import LightDisc, Products
+from vcam_cli.scenes.edge_energy import EdgeEnergy, Region, counted_height
 from vcam_cli.spectra import Spectrum
 
 
@@ -54,10 +56,41 @@ class Framed(Chart):
             picture *= np.outer(cover_y, cover_x).astype(mix.dtype)
             out[:, rows, columns] = picture
 
+    separates = property(lambda self: self.chart.separates)
+
+    def products(self, x_edges: Array, y_edges: Array, mix: Array) -> Products:
+        """Return the chart's products, 0 outside the frame."""
+        columns, cover_x, inside_x = clip_cells(x_edges, self.frame.width / 2)
+        rows, cover_y, inside_y = clip_cells(y_edges, self.frame.height / 2)
+        own = self.chart.products(inside_x, inside_y, mix)
+        terms = own.down.shape[1]
+        down = np.zeros((len(y_edges) - 1, terms))
+        along = np.zeros((len(mix), terms, len(x_edges) - 1))
+        down[rows], along[..., columns] = own.down * cover_y[:, None], own.along * cover_x
+        return Products(down, along)
+
+    def even_values(self, x: Array, y: Array, mix: Array) -> Array:
+        """Return the values without discs at points: 0 outside the frame."""
+        inside = np.outer(abs(y) <= self.frame.height / 2, abs(x) <= self.frame.width / 2)
+        return self.chart.even_values(x, y, mix) * inside
+
+    def discs(self, mix: Array) -> tuple[LightDisc, ...]:
+        """Return the chart's discs."""
+        return self.chart.discs(mix)
+
+    def edge_energy(self, region: Region, level: Array, ceiling: float) -> EdgeEnergy:
+        """Return the energy of the chart and of the frame's border, as bright as the chart is."""
+        bright = self.chart.brightest * float(np.abs(level).max())
+        border = 2 * (self.frame.width + self.frame.height)
+        height = float(counted_height(np.zeros(1), np.full(1, bright), ceiling)[0])
+        own = self.chart.edge_energy(region, level, ceiling)
+        return own + EdgeEnergy(aligned=height * border / region.area)
+
     def edges(self) -> tuple[Array, Array] | None:
         """Return where the light may change, the frame's own edges included."""
-        inner = self.chart.edges()
-        if inner is None:
+        inner, size = self.chart.edges(), (self.frame.width, self.frame.height)
+        discs = self.chart.discs(np.zeros((1, 1)))
+        if inner is None or not all(disc.lies_within(*size) for disc in discs):
             return None
         sides = (self.frame.width / 2, self.frame.height / 2)
         x, y = (edges_within(e, half) for e, half in zip(inner, sides, strict=True))

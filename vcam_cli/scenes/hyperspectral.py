@@ -20,6 +20,7 @@ the cube once: 0.02 s for 31 bands of a megapixel.
 
 import math
 from dataclasses import dataclass, fields
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
@@ -99,6 +100,12 @@ class CubeScene(ImageScene):
 
         paint_by_bands(paint, height, width, workers)
         return out
+
+    @cached_property
+    def brightest(self) -> float:
+        """Largest sample of a band over that of white there."""
+        most = self.picture.reshape(-1, self.picture.shape[2]).max(axis=0) / self.units
+        return max(float(most.max()), 0.0)
 
     def _channel_weights(self, mix: Array) -> Array:
         """Return what the bands count in combinations of the components (R, K)."""

@@ -6,12 +6,16 @@ that width and centered, with black samples around it until array and margin are
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
+from vcam_cli.camera.derived.geometry import Geometry, pixel_centers
 from vcam_cli.scenes.bands import paint_by_bands
 from vcam_cli.scenes.base import Array, SampledScene, View
+from vcam_cli.scenes.blur_change import BlurLoss, ChangeBounds, squares_factor
 from vcam_cli.spectra import Spectrum
 
 ROWS = 64
@@ -74,12 +78,6 @@ def _surplus_samples(samples: int, needed: float) -> int:
     return min(math.floor((samples - needed) / 2 + SLIVER), (samples - 1) // 2)
 
 
-def _centered(count: int, needed: float) -> slice:
-    """Return the samples in the middle of so many that a length of some of them reaches."""
-    start = max(math.floor((count - needed) / 2 + SLIVER), 0)
-    return slice(min(start, (count - 1) // 2), max(count - start, count // 2 + 1))
-
-
 @dataclass(frozen=True)
 class ImageScene(SampledScene):
     """A picture on the sensor plane, linear, where 1 is the scene's white."""
@@ -121,31 +119,78 @@ class ImageScene(SampledScene):
         rows, _ = self._samples_at(y, self.pitch_y, 0)
         return rows, self._samples_at(x, self.pitch_x, 1)[0]
 
-    def mean_and_rms(self, mix: Array, size: tuple[float, float]) -> tuple[Array, Array]:
-        """Return the mean over a centered rectangle and an rms over the grid, of all samples.
+    @cached_property
+    def brightest(self) -> float:
+        """Largest sample, in units of white."""
+        return max(float(self.picture.max(initial=0.0)), 0.0)
 
-        The rms is at least the true one: that of channels of which each is bright where all are.
+    def change_bounds(
+        self, losses: Sequence[BlurLoss], geometry: Geometry, ceiling: float, allowed: float
+    ) -> ChangeBounds:
+        """Return bounds from the steps between samples: exact sums, in one pass at most.
+
+        Sums of squares only grow: as soon as they exceed all that is allowed the pass ends.
         """
-        weights = self._channel_weights(mix)
-        rows, columns = (
-            _centered(count, length / pitch)
-            for count, length, pitch in zip(
-                self.picture.shape, size[::-1], (self.pitch_y, self.pitch_x), strict=False
-            )
-        )
-        area = math.prod(size) / (self.pitch_x * self.pitch_y)
-        inside = self.picture[rows, columns]
-        total, squares = np.zeros(self.picture.shape[2]), 0.0
-        for top in range(0, len(inside), ROWS):
-            block = inside[top : top + ROWS].reshape(-1, len(total))
-            total += np.ones(len(block), block.dtype) @ block
+        level = self._channel_weights(losses[0].level.T).T
+        mean = self._mean_on_pixels(level, geometry)
+        factors = np.array([self._step_factors(loss, geometry) for loss in losses])  # (n, K, C)
+        full = min(float(mean.max()), ceiling)
+        steps = np.zeros(len(level))
         for top in range(0, len(self.picture), ROWS):
-            samples = self.picture[top : top + ROWS].ravel()
-            with np.errstate(over="ignore"):
-                found = float(samples @ samples)
-            squares += found if math.isfinite(found) else _squares(samples)
-        mean = weights @ total / max(area, inside.shape[0] * inside.shape[1])
-        return mean, np.linalg.norm(weights, axis=1) * math.sqrt(squares / math.prod(self.shape))
+            steps += self._squared_steps(top)
+            changes = (np.sqrt(steps)[:, None] * factors).sum(axis=1)
+            if changes.max(axis=1).min() > allowed * full:
+                return ChangeBounds(0.0, [math.inf] * len(losses))
+        # The brightest pixel is at least as bright as the mean behind all blurs.
+        least = min(float((mean - changes.sum(axis=0)).max()), ceiling)
+        return ChangeBounds(max(least, 0.0), changes.max(axis=1).tolist())
+
+    def _mean_on_pixels(self, level: Array, geometry: Geometry) -> Array:
+        """Return the mean of the light on all collecting areas, in every color (C,).
+
+        `level` is (channels, C).
+        """
+        g, weights = geometry, []
+        centers = pixel_centers(g, detector=True)
+        sizes = g.collecting_width, g.collecting_height
+        for axis, pitch in ((1, self.pitch_x), (0, self.pitch_y)):
+            place = centers[1 - axis] / pitch + self.shape[axis] / 2
+            half = sizes[1 - axis] / pitch / 2
+            weights.append(samples_in_boxes(place, half, self.shape[axis], self.black[axis]))
+        kind = self.picture.dtype if self.picture.dtype.kind == "f" else np.dtype(float)
+        across, down = (w.astype(kind) for w in weights)
+        line = down @ self.picture.reshape(len(down), -1)
+        return np.asarray(across @ line.reshape(len(across), -1) @ level)
+
+    def _step_factors(self, loss: BlurLoss, geometry: Geometry) -> Array:
+        """Return the rms change over the array by steps of squared sum 1: (channels, C)."""
+        if not loss.is_uniform:
+            return np.full((self.picture.shape[2], loss.level.shape[1]), math.inf)
+        factor = squares_factor(min(self.pitch_x, self.pitch_y), loss)
+        by_component = np.abs(loss.weights) @ factor
+        area = geometry.sensor_width * geometry.sensor_height * geometry.fill_of_pitch
+        mirrored = 1.0 if loss.is_even else 2.0
+        per_sample = mirrored * math.sqrt(self.pitch_x * self.pitch_y / area)
+        return per_sample * self._channel_weights(by_component.T).T
+
+    def _squared_steps(self, top: int) -> Array:
+        """Return the sums over some rows of the squared steps to the next samples: (channels,).
+
+        Black samples around the picture make steps, too.
+        """
+        height, _, channels = self.picture.shape
+        rows = self.picture[top : top + ROWS + 1].astype(np.float64)
+        own = rows[:ROWS]
+        total = np.zeros(channels)
+        for steps in (np.diff(rows, axis=0), np.diff(own, axis=1)):
+            flat = steps.reshape(-1, channels)
+            total += np.einsum("nk,nk->k", flat, flat)
+        if self.black[1]:
+            total += np.square(own[:, [0, -1]]).sum(axis=(0, 1))
+        if self.black[0]:
+            ends = [own[0]] * (top == 0) + [own[-1]] * (top + ROWS >= height)
+            total += sum((np.square(end).sum(axis=0) for end in ends), np.zeros(channels))
+        return total
 
     def _channel_weights(self, mix: Array) -> Array:
         """Return what the file's channels count in combinations of the components (R, K)."""
@@ -160,10 +205,27 @@ class ImageScene(SampledScene):
         return np.clip(index, 0, size - 1), lit.astype(self.dtype)
 
 
-def _squares(samples: Array) -> float:
-    """Return the sum of squares of samples that are too bright for 32 bits."""
-    wide = samples.astype(np.float64)
-    return float(wide @ wide)
+def samples_in_boxes(place: Array, half: float, count: int, black: int) -> Array:
+    """Return how much each sample along an axis counts in the mean over boxes, (count - 2 black,).
+
+    Parameters
+    ----------
+    place : Array
+        Centers (n,) of the boxes, counted in samples from the first one's edge.
+    half : float
+        Half the width of a box, likewise.
+    count : int
+        Samples; light beyond them does not count.
+    black : int
+        Black ones among them on either side.
+    """
+    covered = np.zeros(count)
+    for side in (-1, 1):  # of an edge at t, samples before it are whole and its own one is in part
+        at = np.clip(place + side * half, 0, count)
+        own = np.minimum(at.astype(int), count - 1)
+        parts = np.bincount(own, at - own, count)
+        covered += side * (parts + len(at) - np.cumsum(np.bincount(own, minlength=count)))
+    return covered[black : count - black] / (2 * half * len(place))
 
 
 def image_scene(

@@ -5,6 +5,7 @@ part 1 - a of the light behind it pass. Behind a lens both are blurred by what t
 asks for, which is image formation's business; `flat` is the scene as a pinhole sees it.
 """
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,6 +13,7 @@ import numpy as np
 from vcam_cli.scenes.base import Array, Chart, ChartScene, Frame, Scene, View
 from vcam_cli.scenes.cells import cell_means
 from vcam_cli.scenes.depth_scene import DepthScene
+from vcam_cli.scenes.edge_energy import EdgeEnergy, Region, total_energy
 from vcam_cli.scenes.framed import chart_scene
 from vcam_cli.scenes.picture_chart import PictureChart
 from vcam_cli.spectra import Spectrum
@@ -52,6 +54,12 @@ class MaskedChart(Chart):
         """Return the values at points."""
         light = self.light.values(x, y, mix[:, :-1]) + mix[:, -1, None, None]
         return light * self.opacity.values(x, y, np.ones((1, 1), mix.dtype))
+
+    def edge_energy(self, region: Region, level: Array, ceiling: float) -> EdgeEnergy:
+        """Return the energy of the light's edges, and of the opacity's before the brightest."""
+        bright = self.light.brightest * float(np.abs(level[:-1]).max(initial=0.0)) + abs(level[-1])
+        own = self.light.edge_energy(region, level[:-1], ceiling)
+        return own + self.opacity.edge_energy(region, np.ones(1), math.inf).scaled(bright**2)
 
     def edges(self) -> tuple[Array, Array] | None:
         """Return where light or opacity may change, if both are made of even rectangles."""
@@ -102,6 +110,10 @@ class LayerChart(Chart):
         x, y = x_edges - self.center[0], y_edges - self.center[1]
         return replace(self, layer=self.layer.crop_to_cells(x, y))
 
+    def edge_energy(self, region: Region, level: Array, ceiling: float) -> EdgeEnergy:
+        """Return the energy of the layer in its place."""
+        return self.layer.edge_energy(region.moved(*self.center), level, ceiling)
+
     def values(self, x: Array, y: Array, mix: Array) -> Array:
         """Return the values at points."""
         return self.layer.values(x - self.center[0], y - self.center[1], mix)
@@ -140,6 +152,15 @@ class FlatLayers(Chart):
         x, y = _parts_of(x_edges, count), _parts_of(y_edges, count)
         found = self._compose(mix, lambda chart, m: chart.averages(x, y, m))
         out[:] = cell_means(found, count)
+
+    def edge_energy(self, region: Region, level: Array, ceiling: float) -> EdgeEnergy:
+        """Return the energy of all layers: an edge may have the brightest light behind it."""
+        brightest = self.brightest * float(np.abs(level).max())
+        levels = (np.append(level[part.components], brightest) for part in self.parts)
+        return total_energy(
+            part.chart.edge_energy(region, own, ceiling)
+            for part, own in zip(self.parts, levels, strict=True)
+        )
 
     def values(self, x: Array, y: Array, mix: Array) -> Array:
         """Return the values at points."""

@@ -8,6 +8,7 @@ import numpy as np
 from vcam_cli.parallel import product
 from vcam_cli.scenes.base import Array, Chart, Frame
 from vcam_cli.scenes.cells import clip_cells
+from vcam_cli.scenes.edge_energy import EdgeEnergy, Region, counted_height
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,6 +52,17 @@ class PictureChart(Chart):
         half = self.frame.width / 2, self.frame.height / 2
         x, y = (np.empty(0) if self.mirrored else np.array([-end, end]) for end in half)
         return x, y
+
+    def edge_energy(self, region: Region, level: Array, ceiling: float) -> EdgeEnergy:
+        """Return the energy of the steps from sample to sample, and of the picture's border."""
+        light = self.picture @ np.asarray(level, self.picture.dtype)
+        down, across = self.frame.height / len(light), self.frame.width / light.shape[1]
+        if not self.mirrored:
+            light = np.pad(light, 1)
+        steps_x = counted_height(light[:, 1:], light[:, :-1], ceiling).sum(dtype=float)
+        steps_y = counted_height(light[1:], light[:-1], ceiling).sum(dtype=float)
+        area = self.frame.width * self.frame.height if self.mirrored else region.area
+        return EdgeEnergy(aligned=float(steps_x * down + steps_y * across) / area)
 
     def cells(self, x_edges: Array, y_edges: Array) -> tuple[slice, slice]:
         """Return the columns and rows of cells that the picture reaches."""

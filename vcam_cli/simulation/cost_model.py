@@ -17,55 +17,20 @@ from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.camera.derived.mosaic import Mosaic
 from vcam_cli.effects.base import Effect, of_kind
 from vcam_cli.effects.signal_chain import ElectronEffect, Quantizer
+from vcam_cli.image_formation.estimates.light_cost import image_seconds
 from vcam_cli.image_formation.optical_path import SpectrumReport
 from vcam_cli.image_formation.settings import Settings
 from vcam_cli.image_formation.transfer_functions import Band
 from vcam_cli.quality.display import display_screen
 from vcam_cli.quality.scielab import places_per_pixel
 from vcam_cli.readout.layout import Layout
-from vcam_cli.scenes.base import ChartScene
-from vcam_cli.scenes.layered import AnyScene
 from vcam_cli.scheduling.estimators import PASSES
 from vcam_cli.simulation.plan import Plan
 
 NORMAL = 7.1e-9
 """Drawing one normal number, the unit of speed [s]."""
-SAMPLE = 6e-9
-"""Transforming one sample of one plane of the scene [s]."""
-PAINT = 5e-9
-"""Painting one sample of one plane of a chart, its edges aside [s]."""
-TRIAL = 1.5e-3
-"""Trying cells on crops of a chart once, its edges aside [s]."""
-TRIAL_EDGES = 0.18
-"""Share of the edges of a chart that its crops see."""
-FIXED = 0.04
-"""What does not depend on the size: tables of transfer, colors of patches, the survey of the scene,
-the plan [s]."""
 INTERPOLATE = 1.5e-6
 """One color of a scattered pixel onto the picture's grid [s]."""
-TERM = 1.3e-9
-"""Filtering one term of the spectrum for one plane and color [s]."""
-SPLINE = 40e-9
-"""One value of the still image behind sub-exposures into coefficients of splines [s]."""
-LOOK = 110e-9
-"""One pixel of one color at one instant of its exposure [s]."""
-PROBED = 4
-"""Instants on all of the array that as much work as their choice would be."""
-TABLE = 1e-6
-"""One value of a transfer function of fx and fy, its part of the pupil's transforms too [s]."""
-EVALUATE = 5e-9
-"""One pixel of one color from its spectrum [s]."""
-FAR = 20e-9
-"""The same from the spectrum of a part of the far field, whose cells and pixels have no common grid
-[s]."""
-OCCLUDE = 30e-9
-"""One cell of light or opacity put before what is behind, covariance included [s]."""
-RAY = 12e-9
-"""One value of a cell's light or cover moved to where a ray sees it, and composed [s]."""
-MOVE = 10e-9
-"""One value of a layer transformed to where a ray sees it, and composed [s]."""
-WAVE = 12e-9
-"""One pixel of one wave, or of one box [s]."""
 PROCESS = 14e-9
 """One pixel through demosaic to the render's codes [s]."""
 JUDGE = 60e-9
@@ -74,8 +39,6 @@ EXR = 28e-9
 """One noisy value into an EXR file [s]."""
 ESTIMATE = 25e-9
 """One sample of a pixel into its photocurrent, once [s]."""
-PAINTED = 9
-"""Cells a pixel on which charts are painted, as often as not."""
 BANDS_AT_ONCE = 4
 """Bands of the spectral irradiance that are computed together, as the colors of a frame are."""
 PNG = 14e-9
@@ -98,55 +61,6 @@ def slowness() -> float:
 def threads(workers: int) -> float:
     """Return how much faster so many threads are than one: memory is shared between them."""
     return workers**0.75
-
-
-def image_seconds(geometry: Geometry, colors: int, report: SpectrumReport) -> float:
-    """Return the core seconds of image formation, that of layers included."""
-    rays = RAY * report.cut.ray_values if report.cut else 0.0
-    rays += MOVE * report.depth.ray_values if report.depth else 0.0
-    return (
-        rays
-        + _flat_seconds(geometry, colors, report)
-        + sum(
-            _flat_seconds(cells, planes, own) + OCCLUDE * cells.rows * cells.columns * planes
-            for cells, planes, own in report.parts
-        )
-    )
-
-
-def _flat_seconds(geometry: Geometry, colors: int, report: SpectrumReport) -> float:
-    pixels = geometry.rows * geometry.columns
-    always = FIXED + _sub_exposure_seconds(pixels * colors, colors, report)
-    if not report.terms:
-        return always + WAVE * pixels * colors
-    return (
-        always
-        + (SAMPLE + PAINT * report.is_painted) * report.cells * report.planes
-        + report.edge_seconds * (1 + TRIAL_EDGES * report.trials)
-        + TRIAL * report.trials
-        + TERM * report.terms * report.planes * colors * report.filters
-        + (EVALUATE * report.filters + FAR * report.far_filters) * pixels * colors
-        + (SAMPLE + PAINT) * report.far_cells * report.planes
-        + TERM * colors * report.far_filters * report.planes * _cells_of_a_part(report)
-        + TABLE * report.table_values
-    )
-
-
-def _cells_of_a_part(report: SpectrumReport) -> float:
-    """Return the samples of one plane of a part of the far field, in the mean."""
-    return report.far_cells / max(1, report.far_parts)
-
-
-def _sub_exposure_seconds(values: int, colors: int, report: SpectrumReport) -> float:
-    """Return the core seconds of the mean over the instants of an exposure.
-
-    `values` are the pixels' values of all colors; a mosaic needs about half of them.
-    """
-    if not report.sub_exposures:
-        return 0.0
-    half = 0.5 if colors > 1 else 1.0
-    fine = (EVALUATE + SPLINE) * report.fine_pixels * colors
-    return fine + LOOK * values * half * (report.sub_exposures + PROBED)
 
 
 def output_seconds(camera: Camera, geometry: Geometry, mosaic: Mosaic) -> float:
@@ -199,32 +113,6 @@ def irradiance_seconds(
     return files * count * (together + EXR * geometry.rows * geometry.columns)
 
 
-def usual_spectrum(geometry: Geometry, is_painted: bool = False) -> SpectrumReport:
-    """Return the spectrum that a scene in color with much detail would have.
-
-    `is_painted` says that it is a chart of which no closed form is known.
-    """
-    samples = 2 * geometry.rows * geometry.columns
-    if is_painted:
-        cells = PAINTED * geometry.rows * geometry.columns
-        return SpectrumReport(cells=cells, terms=samples, planes=1, filters=1, is_painted=True)
-    return SpectrumReport(cells=samples, terms=samples, planes=3, filters=1)
-
-
-def blur_seconds(layout: Layout, report: SpectrumReport, scene: AnyScene) -> float:
-    """Return the core seconds that a first blur would add to the light, 0 where one is there."""
-    if not report.is_averaged:
-        return 0.0
-    is_painted = isinstance(scene, ChartScene) and scene.chart.edges() is None
-    blurred = usual_spectrum(layout.lattice, is_painted)
-    colors = len(layout.mosaic.colors)
-    return max(
-        0.0,
-        image_seconds(layout.lattice, colors, blurred)
-        - image_seconds(layout.lattice, colors, report),
-    )
-
-
 def light_seconds(layout: Layout, report: SpectrumReport, workers: int) -> float:
     """Return the seconds of image formation alone, on this machine."""
     core = image_seconds(layout.lattice, len(layout.mosaic.colors), report)
@@ -233,8 +121,10 @@ def light_seconds(layout: Layout, report: SpectrumReport, workers: int) -> float
 
 def first_estimate(camera: Camera, layout: Layout, workers: int) -> float:
     """Return the seconds of a whole run, before anything is known of its scene."""
-    guess = usual_spectrum(layout.lattice)
-    core = image_seconds(layout.lattice, len(layout.mosaic.colors), guess)
+    g = layout.lattice
+    samples = 2 * g.rows * g.columns
+    guess = SpectrumReport(cells=samples, terms=samples, planes=3, filters=1)
+    core = image_seconds(g, len(layout.mosaic.colors), guess)
     core += output_seconds(camera, layout.geometry, layout.mosaic)
     return core * slowness() / threads(workers)
 

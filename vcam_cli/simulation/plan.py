@@ -11,8 +11,8 @@ what is left to the plan is decided by two promises, with tolerance T:
 Why two: a read noise of 5 electrons is 0.06 % of full signal and most of the variance in the
 shadows. One number cannot serve both; and a scene without shadows does not call for it.
 
-Effects on the light are decided first, from a survey of the scene (`image_formation.light_plan`);
-all others here, with the light at hand.
+Effects on the light are decided first, on bounds (`image_formation.light_plan`); all others here,
+with the light at hand. Of the sets that keep the promises the one is left out that saves most time.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
+from itertools import chain, combinations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,6 +45,9 @@ from vcam_cli.image_formation.settings import Settings
 
 VARIANCE_SHARE = 0.8
 """Part of the variance's tolerance for them; the rest is for percentiles that are estimated."""
+
+MOST_TRIED = 8
+"""Effects on electrons of which all subsets are tried; of more, those that change least."""
 
 
 @dataclass(frozen=True)
@@ -191,8 +195,9 @@ def make(
     """
     effects = camera_effects(camera, geometry)
     present = _enabled(camera, effects.values())
-    shares = {name: min(c * signal.time / signal.full_signal, 1.0) for name, c in changes.items()}
-    shares |= light.shares
+    known = {name: min(c * signal.time / signal.full_signal, 1.0) for name, c in changes.items()}
+    left_out = {effect.name: light.shares[effect.name] for effect in light.omitted}
+    shares = light.shares | known | left_out
     variances = _SceneVariances(present, signal, camera.accuracy.tolerance)
     omitted = {*light.omitted, *_negligible(camera, variances, light, shares)}
     on = tuple(effect for effect in present if effect not in omitted)
@@ -215,10 +220,9 @@ def _wish(camera: Camera, effect: Effect) -> str:
 def _negligible(
     camera: Camera, variances: _SceneVariances, light: LightPlan, shares: Mapping[str, float]
 ) -> tuple[Effect, ...]:
-    """Effects on electrons that may all be left out together, those that change least first."""
+    """Return the effects on electrons that may go together, without which most time is saved."""
     present, signal = variances.present, variances.signal
     budget = OMITTED_SHARE * camera.accuracy.tolerance - light.share
-    out: tuple[Effect, ...] = ()
     # Late charge is some of the dark signal's: with transport, the two stay together.
     moved = any(transport not in light.omitted for transport in of_kind(present, Transport))
     kinds = (ElectronEffect,) if moved else (Charge, ElectronEffect)
@@ -237,12 +241,21 @@ def _negligible(
         of_mean = mean_share(effect) / (OMITTED_SHARE * camera.accuracy.tolerance)
         return max(of_mean, variance_share([effect]))
 
+    def worth(effects: tuple[Effect, ...]) -> tuple[float, int, float]:
+        return (
+            sum(e.seconds_per_pixel for e in effects),
+            len(effects),
+            -sum(uses[e] for e in effects),
+        )
+
     uses = {effect: use(effect) for effect in rest}
-    for effect in sorted((e for e in rest if uses[e] <= 1), key=uses.__getitem__):
-        together = (*out, effect)
-        if sum(map(mean_share, together)) <= budget and variance_share(together) <= 1:
-            out = together
-    return out
+    small = sorted((e for e in rest if uses[e] <= 1), key=uses.__getitem__)[:MOST_TRIED]
+    sets = chain.from_iterable(combinations(small, count) for count in range(len(small) + 1))
+    return next(
+        together
+        for together in sorted(sets, key=worth, reverse=True)
+        if sum(map(mean_share, together)) <= budget and variance_share(together) <= 1
+    )
 
 
 @dataclass(frozen=True)
@@ -369,16 +382,16 @@ def _decide(
     if wish == "off":
         return Decision(kind.name, "off", "user", "switched off in effects", *weighed, 0.0)
     if effect in omitted:
-        reason = f"{what}; not called for here"
+        reason = f"{what}; skipped"
         return Decision(kind.name, "off", "plan", reason, *weighed, 0.0, saved=seconds)
     free = (
-        effect in light.bounding
+        effect in light.idle
         and contribution is not None
         and light.share + contribution <= OMITTED_SHARE * camera.accuracy.tolerance
     )
     if free:
-        what += f"; free: {contribution:.2%} (could go; costs nothing)"
+        what += "; free: could be skipped, which would save no time"
     if idle := weigh.idle.get(kind.name):
-        what += f"; not drawn, since not called for here: {', '.join(idle)}"
+        what += f"; skipped parts: {', '.join(idle)}"
     by = "user" if wish == "on" else "plan"
     return Decision(kind.name, "on", by, what, *weighed, seconds, free=free)

@@ -17,9 +17,7 @@ from vcam_cli.camera.derived.electrical import Electrical
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.camera.derived.mosaic import Mosaic
 from vcam_cli.effects.base import (
-    Blur,
     Effect,
-    FieldTransfer,
     ImageMotion,
     TemporalGain,
     of_kind,
@@ -37,13 +35,16 @@ from vcam_cli.quality import scielab
 from vcam_cli.quality.display import display_screen
 from vcam_cli.readout import auto_exposure, exposure
 from vcam_cli.readout.layout import Layout
-from vcam_cli.scenes.base import ChartScene
+from vcam_cli.scenes.base import ChartScene, HarmonicScene
+from vcam_cli.scenes.depth_scene import DepthScene
 from vcam_cli.scenes.layered import AnyScene, LayeredScene
 from vcam_cli.scenes.waves import WaveScene
 from vcam_cli.simulation import cost_model, exposed_light, plan
 from vcam_cli.simulation.scene_files import ScenePicture, build_scene, layer_optics, scene_bytes
 from vcam_cli.simulation.setup import CameraSetup, camera_setup
 
+ASSUMED = 0.9
+"""Full signal over the scene's brightest light, as assumed before there is any signal."""
 OVERFULL = 2.0
 """Full wells of light from which on a pixel counts as full, if six standard deviations of its noise
 leave it so."""
@@ -182,7 +183,7 @@ def _prepare(
         brightest, summed = float(white_rate.max()), layout.binning_groups.summed_charges
         saturation = setup.electrical.saturation / summed
         ceiling = auto_exposure.ceiling(camera, brightest, saturation)
-        overexposure = _brightest(scene) * brightest / ceiling
+        overexposure = _brightest_around(scene) * brightest / ceiling
         if overexposure > 1:  # of what lies beside the array, too
             scene = _scene(setup, picture, effects, overexposure)
         optional = plan.optional_effects(camera, effects)
@@ -194,6 +195,7 @@ def _prepare(
             effects=effects,
             workers=workers,
             ceiling=ceiling,
+            full=min(ASSUMED * _brightest(scene) * brightest, ceiling),
             fullness=_fullness(setup, scene, float(white_rate.min())),
             optional=optional,
             layers=layer_optics(camera, effects, scene),
@@ -220,7 +222,7 @@ def _prepare(
         if of_kind(effects, ImageMotion):  # every sample of an integration has light of its own
             once = cost_model.light_seconds(layout, light.spectrum, workers)
             earlier += len(exposed.times) * once
-        decided = _with_seconds(setup, light, scene, decided, workers, earlier)
+        decided = _with_seconds(setup, light, decided, workers, earlier)
         stages.watch.expect(decided.seconds)
     return Prepared(
         camera=setup.camera,
@@ -269,10 +271,14 @@ def _light_during(
 
 
 def _brightest(scene: AnyScene) -> float:
+    """Return a scene's brightest light, relative to white."""
+    flat = scene.flat if isinstance(scene, DepthScene) else scene
+    return flat.chart.brightest if isinstance(flat, HarmonicScene) else flat.brightest
+
+
+def _brightest_around(scene: AnyScene) -> float:
     """Return the brightest light that a chart has beyond the array, relative to white; else 0."""
-    if isinstance(scene, LayeredScene):
-        scene = scene.flat
-    return scene.chart.brightest if isinstance(scene, ChartScene) else 0.0
+    return _brightest(scene) if isinstance(scene, ChartScene | LayeredScene) else 0.0
 
 
 def _fullness(setup: CameraSetup, scene: AnyScene, white_rate: float) -> float:
@@ -299,27 +305,23 @@ def _fullness(setup: CameraSetup, scene: AnyScene, white_rate: float) -> float:
 def _with_seconds(
     setup: CameraSetup,
     light: photon_rate.Rate,
-    scene: AnyScene,
     decided: plan.Plan,
     workers: int,
     earlier: float,
 ) -> plan.Plan:
-    """Return the plan with the seconds of the frame, and of one with everything on.
-
-    Blurs that are left out save what a first one would take, each an equal part.
-    """
+    """Return the plan with the seconds of the frame, and of one with everything on."""
     known = (setup.camera, setup.geometry, setup.layout, setup.settings, light.spectrum)
-    blurs = {blur.name for blur in of_kind(light.plan.omitted, Blur, FieldTransfer)}
-    of_blurs = cost_model.blur_seconds(setup.layout, light.spectrum, scene)
+    saved = light.plan.saved
     decisions = tuple(
-        replace(d, saved=d.saved + of_blurs / len(blurs)) if d.name in blurs else d
+        replace(d, saved=saved[d.name]) if d.name in saved and d.state == "off" else d
         for d in decided.decisions
     )
-    whole = replace(decided, seconds=decided.seconds + sum(d.saved for d in decisions))
-    seconds, every = (
-        earlier + cost_model.frame_seconds(*known, each, workers) for each in (decided, whole)
+    of_electrons = sum(d.saved for d in decisions if d.name not in saved)
+    every = replace(decided, seconds=decided.seconds + of_electrons + light.plan.saved_together)
+    seconds, of_all = (
+        earlier + cost_model.frame_seconds(*known, each, workers) for each in (decided, every)
     )
-    return replace(decided, decisions=decisions, seconds=seconds, seconds_of_all=every)
+    return replace(decided, decisions=decisions, seconds=seconds, seconds_of_all=of_all)
 
 
 def _require_memory(setup: CameraSetup) -> int:

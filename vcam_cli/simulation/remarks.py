@@ -1,7 +1,10 @@
 """Notes of a run: what it chose, left out or took for granted where the file left that open."""
 
 import math
+from collections.abc import Iterator, Sequence
+from functools import cached_property
 from pathlib import Path
+from typing import overload
 
 import numpy as np
 
@@ -13,6 +16,7 @@ from vcam_cli.camera.scene.scene_files import ImageFile
 from vcam_cli.camera.sensor.architecture import ARCHITECTURES
 from vcam_cli.effects.base import ImageMotion, of_kind
 from vcam_cli.effects.order import quantizer
+from vcam_cli.floats import own_float_errors
 from vcam_cli.image_formation.light_plan import BLURS
 from vcam_cli.scenes.base import ChartScene
 from vcam_cli.scenes.build import picture_model
@@ -36,6 +40,42 @@ FAR_OVEREXPOSED = 1e5
 beyond it, ringing of less than a hundred-thousandth of that light is a pixel's full signal."""
 VISIBLE_CROP = 5e-4
 """Part of a picture that is worth a word when it is cut off."""
+
+
+class Notes(Sequence[str]):
+    """Notes for the user, found when they are first read: a sweep of frames reads none.
+
+    Parameters
+    ----------
+    ready : Prepared
+        The camera, or its frame.
+    earlier : tuple of str
+        Notes on what came before, which are the first.
+    """
+
+    def __init__(self, ready: Prepared, earlier: tuple[str, ...] = ()) -> None:
+        self._ready, self._earlier = ready, earlier
+
+    @cached_property
+    @own_float_errors
+    def _found(self) -> tuple[str, ...]:
+        return self._earlier + remarks(self._ready)
+
+    @overload
+    def __getitem__(self, index: int) -> str: ...
+    @overload
+    def __getitem__(self, index: slice) -> tuple[str, ...]: ...
+    def __getitem__(self, index: int | slice) -> str | tuple[str, ...]:
+        """Return one note, or several."""
+        return self._found[index]
+
+    def __iter__(self) -> Iterator[str]:
+        """Return an iterator over the notes."""
+        return iter(self._found)
+
+    def __len__(self) -> int:
+        """Return the number of notes."""
+        return len(self._found)
 
 
 def remarks(ready: Prepared) -> tuple[str, ...]:
@@ -91,24 +131,21 @@ def _motion(ready: Prepared) -> tuple[str, ...]:
     pixels = sum((e.travel for e in of_kind(ready.plan.active, ImageMotion)), 0.0) / g.pitch_x
     if pixels >= 1 and isinstance(_picture(ready), ImageScene):
         notes.append(
-            f"the scene's file ends at the border: what moves in, up to {pixels:.0f} pixels, is its"
-            " mirror image"
+            f"the picture ends at the border: up to {pixels:.0f} pixels move in and are mirrored"
         )
     if ready.spectrum.sub_exposures:
         notes.append(_sub_exposures(ready))
     if ready.camera.exposure.is_timed_by_scene and pixels:
-        notes.append("the exposure is metered on the scene as it stands where its file says")
+        notes.append("the automatic exposure meters the scene without motion")
     if turn is not None and turn.file is not None:
         read = camera_angles(turn.file)
-        left = f"; {', '.join(read.ignored)} are left aside" if read.ignored else ""
-        notes.append(
-            f"{Path(turn.file).name}: the camera's path is that of {', '.join(read.columns)}{left}"
-        )
+        left = f"; {', '.join(read.ignored)} are ignored" if read.ignored else ""
+        notes.append(f"{Path(turn.file).name}: the camera moves by {', '.join(read.columns)}{left}")
     if pixels and turn is not None and (turn.pan or turn.tilt or turn.file):
         corner = float(np.hypot(g.sensor_width, g.sensor_height)) / 2 / g.image_distance
         notes.append(
-            f"the camera's turn is simulated as on the axis; in the corners the image moves up to"
-            f" {100 * corner**2:.2g} % faster"
+            "rotation uses the on-axis approximation: corner motion is underestimated by up to"
+            f" {100 * corner**2:.2g} %"
         )
     return tuple(notes)
 
@@ -127,7 +164,8 @@ def _sub_exposures(ready: Prepared) -> str:
 def _edge_without_blur(ready: Prepared) -> tuple[str, ...]:
     """Return that a straight edge, from which an MTF is measured, lacks a blur."""
     scene = ready.scene
-    if not isinstance(scene, ChartScene) or scene.chart.across_edge() is None:
+    profile = scene.chart.profile() if isinstance(scene, ChartScene) else None
+    if profile is None or len(profile.places) != 1:
         return ()
     omitted = {d.name for d in ready.plan.decisions if d.state == "off" and d.by == "plan"}
     wanted = plan.enabled_effects(ready.camera, ready.geometry)
@@ -177,14 +215,14 @@ def _cut(ready: Prepared) -> tuple[str, ...]:
         how = f", put one before the other by rays on cells of {found.cell * 1e6:.3g} um"
     more = ", more than accuracy asks for" if found.error > ready.settings.tolerance else ""
     notes = [
-        f"depth from {near} to {far} is cut into {found.layers} layers, points of which become"
-        f" {min(pixels):.3g} to {max(pixels):.3g} pixels wide by defocus{how}: predicted error"
+        f"depth from {near} to {far} is cut into {found.layers} layers: defocus blurs points to"
+        f" {min(pixels):.3g} to {max(pixels):.3g} pixels{how}: predicted error"
         f" {100 * found.error:.2g} % of full signal{more}"
     ]
     if found.hidden_most:
         notes.append(
-            f"hidden background unknown: up to {100 * found.hidden_most:.2g} % of full signal, rms"
-            f" {100 * found.hidden_rms:.2g} %; behind edges it goes on as what is beside them"
+            "occluded background is extrapolated from its surroundings: unknown by up to"
+            f" {100 * found.hidden_most:.2g} % of full signal, rms {100 * found.hidden_rms:.2g} %"
         )
     return tuple(notes)
 
@@ -224,8 +262,8 @@ def _unused_codes(ready: Prepared) -> tuple[str, ...]:
     if iso is not None:
         what = f"ISO {iso:g} is below the base ISO of {ready.base_iso:.4g}: at a gain of {gain:.4g}"
     return (
-        f"{what} pixels are full at {100 * share:.3g} % of the ADC's full scale; highlights ask for"
-        " less time, not for less gain",
+        f"{what} pixels are full at {100 * share:.3g} % of the ADC's full scale; to avoid clipping,"
+        " shorten the exposure: a lower gain does not help",
     )
 
 
@@ -241,10 +279,10 @@ def _overflow(ready: Prepared) -> tuple[str, ...]:
     if share < VISIBLE_OVERFLOW:
         return ()
     ccd = ARCHITECTURES[ready.camera.pixel.architecture].transfers
-    smear = ", and none is collected while charge is transferred (smear)" if ccd else ""
+    smear = ", and neither is smear" if ccd else ""
     return (
-        f"charge beyond the full well, {share:.3g} times what all wells hold, is drained: none"
-        f" spills to neighbors (blooming){smear}",
+        f"excess charge, {share:.3g} times the capacity of all wells, is discarded: blooming is"
+        f" not simulated{smear}",
     )
 
 

@@ -1,4 +1,4 @@
-"""The plans of one camera before many scenes: which effects each scene calls for.
+"""The plans of one camera before many scenes: which effects are simulated before each.
 
 Without files of the user's own, the scenes are six charts in the light of a street at night, of a
 room, and of the sun.
@@ -12,9 +12,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from vcam_cli.effects.order import ORDER
+from vcam_cli.progress import Observer, Silent
 from vcam_cli.simulation.checks import load
 from vcam_cli.simulation.plan import Decision, Plan
-from vcam_cli.simulation.simulate import prepare
+from vcam_cli.simulation.scene_times import SceneTimes, measure
+from vcam_cli.simulation.simulate import prepare, threads
 
 CHARTS = (
     "uniform", "step-wedge", "colorchecker", "dead-leaves", "slanted-edge", "hdr-patches",
@@ -22,6 +24,12 @@ CHARTS = (
 LUMINANCES = (0.5, 100, 20000)
 """Luminances of the perfect white [cd/m2]."""
 COLUMNS = ("scene", "effect", "state", "contribution", "allowed", "seconds")
+MEASURED = ("seconds_auto", "seconds_all")
+"""Further columns where frames were taken."""
+NEVER_SKIPPED = frozenset(kind.name for kind in ORDER if not kind.removable)
+"""Effects that no plan skips."""
+LEAST_SAVED = 5e-5
+"""Least time that is shown as saved [s]: a twentieth of a millisecond."""
 
 
 @dataclass(frozen=True)
@@ -30,6 +38,8 @@ class ScenePlan:
 
     scene: str
     plan: Plan
+    times: SceneTimes | None = None
+    """Measured seconds, where frames were taken."""
 
     @property
     def decisions(self) -> tuple[Decision, ...]:
@@ -37,9 +47,11 @@ class ScenePlan:
         return tuple(d for d in self.plan.decisions if d.by != "camera")
 
     @property
-    def saved(self) -> float:
-        """Estimated time that the plan saves of a frame with every effect [s]."""
-        return max(0.0, self.plan.seconds_of_all - self.plan.seconds)
+    def seconds(self) -> tuple[float, float]:
+        """Seconds of a frame with the plan and with all effects [s]: measured, else estimated."""
+        if self.times is not None:
+            return self.times.seconds_auto, self.times.seconds_all
+        return self.plan.seconds, max(self.plan.seconds, self.plan.seconds_of_all)
 
 
 def scene_settings(names: Sequence[str]) -> dict[str, tuple[str, ...]]:
@@ -70,9 +82,14 @@ def scene_settings(names: Sequence[str]) -> dict[str, tuple[str, ...]]:
 
 
 def plan_scenes(
-    camera: str, overrides: Sequence[str], scenes: Sequence[str], workers: int | None = None
+    camera: str,
+    overrides: Sequence[str],
+    scenes: Sequence[str],
+    workers: int | None = None,
+    turns: int = 0,
+    watch: Observer | None = None,
 ) -> Iterator[ScenePlan]:
-    """Plan a camera before each of several scenes; no frame is exposed.
+    """Plan a camera before each of several scenes, and measure its frames where that is wanted.
 
     Parameters
     ----------
@@ -84,6 +101,16 @@ def plan_scenes(
         Scenes as for `scene_settings`.
     workers : int, optional
         Number of threads.
+    turns : int
+        Frames taken before each scene with the plan, and as many with all effects; 0: no frame is
+        taken.
+    watch : Observer, optional
+        Observer of the scenes.
+
+    Yields
+    ------
+    ScenePlan
+        Plan before one scene, in their order.
 
     Raises
     ------
@@ -92,17 +119,47 @@ def plan_scenes(
     CannotDo
         Where memory does not suffice.
     """
-    for scene, sets in scene_settings(scenes).items():
-        ready, _ = prepare(load(camera, (*overrides, *sets)), workers)
-        yield ScenePlan(scene, ready.plan)
+    watch, settings = watch or Silent(), scene_settings(scenes)
+    watch.begin("scenes")
+    for number, (scene, sets) in enumerate(settings.items()):
+        watch.step(number, len(settings))
+        made = load(camera, (*overrides, *sets))
+        plan = prepare(made, workers)[0].plan
+        times = measure(made, plan.decisions, workers or threads(made), turns) if turns else None
+        yield ScenePlan(scene, plan, times)
+
+
+def columns(plans: Sequence[ScenePlan]) -> tuple[str, ...]:
+    """Return the columns of scenes.csv, with those of measured seconds where there are some."""
+    return COLUMNS + MEASURED if any(each.times for each in plans) else COLUMNS
 
 
 def rows(plans: Sequence[ScenePlan]) -> Iterator[tuple[str | float, ...]]:
-    """Return the rows of scenes.csv: one effect before one scene each, by `COLUMNS`."""
+    """Return the rows of scenes.csv: one effect before one scene each, by `columns`."""
     for each in plans:
+        taken = each.seconds if each.times else ()
         for d in each.decisions:
             amounts = ("" if value is None else value for value in (d.contribution, d.allowed))
-            yield (each.scene, d.name, d.state, *amounts, d.seconds if d.state == "on" else d.saved)
+            seconds = d.seconds if d.state == "on" else d.saved
+            yield (each.scene, d.name, d.state, *amounts, seconds, *taken)
+
+
+def seconds_text(seconds: float) -> str:
+    """Return seconds to two digits, without a power of ten [s]."""
+    return f"{seconds:.2g}" if seconds < 9.95 else f"{seconds:.0f}"
+
+
+def mark(decision: Decision) -> str:
+    """Return what tables show of an effect before a scene.
+
+    "on" if it is simulated, "free" if it is simulated because skipping it would save nothing, "off"
+    if the file switches it off; if the plan skips it, the milliseconds that this saves, or nothing.
+    """
+    if decision.state == "on":
+        return "free" if decision.free else "on"
+    if decision.by == "user":
+        return "off"
+    return f"{1000 * decision.saved:.2g}" if decision.saved >= LEAST_SAVED else ""
 
 
 def effect_names(plans: Sequence[ScenePlan]) -> list[str]:

@@ -62,7 +62,7 @@ class Result:
     """Threads."""
     process: Callable[[Sequence[Step]], ProcessedPicture]
     """Prepares steps of processing: measures gains, fits the color correction."""
-    remarks: tuple[str, ...] = ()
+    remarks: Sequence[str] = ()
     """What a user should know of the frame."""
 
     @cached_property
@@ -76,7 +76,7 @@ class Result:
     def notes(self) -> tuple[str, ...]:
         """What a user should know of the frame, and of the picture where one is asked for."""
         shown = needs_picture(self.frame.camera)
-        return self.remarks + (self.processed.notes if shown else ())
+        return (*self.remarks, *(self.processed.notes if shown else ()))
 
     @property
     def dn(self) -> NDArray:
@@ -315,13 +315,13 @@ def simulate(
 @own_float_errors
 def prepare(
     camera: Camera, workers: int | None = None, watch: Observer | Callback | None = None
-) -> tuple[Prepared, tuple[str, ...]]:
+) -> tuple[Prepared, remarks.Notes]:
     """Return the camera ready to take its frame, and notes: what `vcam plan` shows."""
     try:
         stages, workers = Stages(watch=observer(watch)), workers or threads(camera)
         camera, picture, notes, seconds = _in_focus(camera, workers, stages, Shared())
         ready = bring_light(camera, picture, workers, stages, earlier=seconds)
-        return ready, notes + remarks.remarks(ready)
+        return ready, remarks.Notes(ready, notes)
     except BadInput as error:
         raise error.with_places(camera.locate) from None
 
@@ -381,7 +381,7 @@ def _simulate(camera: Camera, workers: int, stages: Stages, shared: Shared) -> R
         layout=frame.layout if frame.layout.is_scattered else None,
     )
     steps = partial(process, frame.picture_dn, context, workers=workers)
-    result = Result(frame, stages, workers, steps, notes + remarks.remarks(frame))
+    result = Result(frame, stages, workers, steps, remarks.Notes(frame, notes))
     if needs_picture(camera):  # what is wrong with its steps is said before anything is written
         _ = result.processed
     return result

@@ -104,7 +104,11 @@ def _bands(
     omitted = {d.name for d in ready.plan.decisions if d.state == "off"}
     optics = layer_optics(ready.camera, effects, ready.scene)
     kept = tuple(layer.without_effects(omitted) for layer in optics)
-    light = OpticalPath(transfer, g, ready.settings, bands, effects, workers, layers=kept)
+    # As bright in every band, relative to white, as the frame is.
+    full = min(1.0, float(ready.rate.max()) / float(ready.white_rate.max()))
+    light = OpticalPath(
+        transfer, g, ready.settings, bands, effects, workers, full=full, layers=kept
+    )
     dtype = ready.settings.dtype
     x, y = pixel_centers(g)
     gains = [e.gain(x.astype(dtype), y.astype(dtype)) for e in of_kind(in_lens, Gain)]

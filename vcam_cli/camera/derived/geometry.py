@@ -128,6 +128,11 @@ class Geometry:
         area = self.collecting_width * self.collecting_height
         return area / (self.pixel_width * self.pixel_height)
 
+    @property
+    def fill_of_pitch(self) -> float:
+        """Collecting area over the area of a cell, pitch by pitch."""
+        return self.collecting_width * self.collecting_height / (self.pitch_x * self.pitch_y)
+
     def report(self, oversampling: float) -> dict[str, float | int]:
         """Return the numbers of `run.json`'s `geometry`.
 

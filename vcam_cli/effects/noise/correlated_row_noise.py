@@ -30,7 +30,7 @@ class CorrelatedRowNoise(NoiseSource):
 
     name = "correlated_row_noise"
     reference = "EMVA 1288 release 4.0, section 8 (row noise); Box and Jenkins 1976, section 3.2.3"
-    absent = "the file gives no pixel.readout.correlated_row_noise, or 0"
+    absent = "pixel.readout.correlated_row_noise is none or 0"
     seconds_per_pixel = 1e-9
     origin = "readout"
 
@@ -42,7 +42,7 @@ class CorrelatedRowNoise(NoiseSource):
 
     def describe(self) -> str:
         """Return a short clause with this camera's numbers and units."""
-        return f"{self.rms:.4g} electrons rms of every row, {self.correlation:g} of it the next's"
+        return f"{self.rms:.4g} e rms per row, correlation {self.correlation:g} between rows"
 
     def split(self):
         """Return nothing of pixels by themselves nor of columns: all of it is the rows'."""

@@ -51,7 +51,7 @@ class FixedPattern(NoiseSource):
 
     name = "fpn"
     reference = "Chen 2003, eq 2.26 (Q_f); El Gamal et al., Proc. SPIE 3301, 1998"
-    absent = "the file gives no pixel.fpn or pixel.defects that its architecture has"
+    absent = "pixel.fpn and pixel.defects have nothing that the architecture has"
     seconds_per_pixel = 20e-9
     scope = "sensor"
     sample_draws = "common"
@@ -76,19 +76,15 @@ class FixedPattern(NoiseSource):
 
     def describe(self) -> str:
         """Return a short clause with this camera's numbers and units."""
-        said = (
-            f"offsets of {self.offset_pixel:.4g} e a pixel and {self.offset_column:.4g} e a column,"
-            f" gains of {self.gain_pixel:.3%} a pixel and {self.gain_column:.3%} a column"
-        )
+        said = f"per pixel {self.offset_pixel:.4g} e, {100 * self.gain_pixel:.3g} % rms"
         if self.no_columns:
-            said = (
-                f"offsets of {self.offset_pixel:.4g} e and gains of {self.gain_pixel:.3%} a pixel"
-                f" (columns do not differ in a {self.no_columns})"
-            )
+            said += f" (no column pattern in a {self.no_columns})"
+        else:
+            said += f"; per column {self.offset_column:.4g} e, {100 * self.gain_column:.3g} %"
         if self.dark:
-            said += f", dark currents of {self.dark:.3%}"
+            said += f"; dark current {100 * self.dark:.3g} %"
         if self.hot or self.dead:
-            said += f", {self.hot:.4%} of the pixels hot and {self.dead:.4%} dead"
+            said += f"; {100 * self.hot:.3g} % hot, {100 * self.dead:.3g} % dead pixels"
         return said
 
     def without_parts(self, names):

@@ -34,7 +34,7 @@ class PatternShading(NoiseSource):
 
     name = "fpn_shading"
     reference = "EMVA 1288 release 4.0, section 8 (low frequencies of the spectrogram); own model"
-    absent = "the file gives no pixel.fpn.shading, or 0"
+    absent = "pixel.fpn.shading is none or 0"
     seconds_per_pixel = 6e-9
     scope = "sensor"
     sample_draws = "common"
@@ -50,8 +50,8 @@ class PatternShading(NoiseSource):
     def describe(self) -> str:
         """Return a short clause with this camera's numbers and units."""
         return (
-            f"offsets of {self.offset:.4g} e rms and gains of {self.gain:.3%}, up to"
-            f" {self.cycles} cycles over the array"
+            f"{self.offset:.4g} e, {100 * self.gain:.3g} % rms, up to {self.cycles} cycles over the"
+            " array"
         )
 
     def apply(self, electrons, site):

@@ -74,7 +74,7 @@ class HeavyTailedNoise(NoiseSource):
         "Wei et al., A physics-based noise formation model for extreme low-light raw denoising,"
         " CVPR 2020, section 3.2 (read noise)"
     )
-    absent = "the file gives no pixel.readout.heavy_tailed_noise, or 0"
+    absent = "pixel.readout.heavy_tailed_noise is none or 0"
     seconds_per_pixel = 60e-9
     origin = "readout"
 
@@ -86,7 +86,7 @@ class HeavyTailedNoise(NoiseSource):
 
     def describe(self) -> str:
         """Return a short clause with this camera's numbers and units."""
-        return f"{self.rms:.4g} electrons rms, Tukey lambda of shape {self.shape:g}"
+        return f"{self.rms:.4g} e rms, Tukey lambda of shape {self.shape:g}"
 
     def apply(self, electrons, site):
         """Return the block with the noise of one readout in it; it reuses the array [electrons]."""

@@ -43,7 +43,7 @@ class Quantization(Quantizer):
 
     def describe(self) -> str:
         """Return a short clause with this camera's numbers and units."""
-        return f"{self.electrons_per_dn:.4g} electrons a step, {2**self.bits} codes"
+        return f"{self.electrons_per_dn:.4g} e per step, {2**self.bits} codes"
 
     def response(self, electrons):
         """Return the codes before rounding and clipping [DN]."""
@@ -89,7 +89,7 @@ class LogarithmicQuantization(Quantizer):
         """Return a short clause with this camera's numbers and units."""
         step = self.bend / self._slope
         return (
-            f"{step:.4g} electrons a step in the dark and {step * (1 + self.full / self.bend):.4g}"
+            f"{step:.4g} e per step in the dark and {step * (1 + self.full / self.bend):.4g}"
             f" at full scale, {2**self.bits} codes"
         )
 
@@ -150,10 +150,10 @@ class CurvedQuantization(Quantizer):
     def describe(self) -> str:
         """Return a short clause with this camera's numbers and units."""
         dark = 1 / (self.curve.slope * self._codes_per_volt)
-        known = ", which the processing takes out" if self.curve.corrected else ""
+        known = ", corrected in the processing" if self.curve.corrected else ""
         return (
-            f"{dark:.4g} electrons a step in the dark, {2**self.bits} codes; the transfer curve is"
-            f" off a line by at most {self.curve.nonlinearity:.2%} of its output{known}"
+            f"{dark:.4g} e per step in the dark, {2**self.bits} codes; nonlinearity residual of at"
+            f" most {100 * self.curve.nonlinearity:.3g} % of the output{known}"
         )
 
     @property

@@ -28,7 +28,7 @@ class ReadNoise(NoiseSource):
 
     name = "read_noise"
     reference = "Chen 2003, eq 2.26 (Q_r); column and row parts: EMVA 1288 release 4.0, section 8"
-    absent = "the file gives no read, column or row noise that its architecture has, or 0"
+    absent = "pixel.readout has no read, column or row noise that its architecture has"
     seconds_per_pixel = 9e-9
     origin = "readout"
 
@@ -44,13 +44,13 @@ class ReadNoise(NoiseSource):
 
     def describe(self) -> str:
         """Return a short clause with this camera's numbers and units."""
-        said = f"{self.electrons:.4g} electrons rms"
+        said = f"{self.electrons:.4g} e rms per pixel"
         if self.column:
-            said += f", {self.column:.4g} of every column"
+            said += f", {self.column:.4g} e per column"
         if self.row:
-            said += f", {self.row:.4g} of every row"
+            said += f", {self.row:.4g} e per row"
         if self.no_columns:
-            said += f" (columns have no noise in a {self.no_columns})"
+            said += f" (no column noise in a {self.no_columns})"
         return said
 
     def split(self):

@@ -27,7 +27,7 @@ class ResetNoise(NoiseSource):
     name = "reset_noise"
     reference = "Chen 2003, section 2.2.3: kTC, sigma^2 = kTC/q^2"
     absent = (
-        "the file gives no pixel.readout.reset_noise, or correlated double sampling removes it"
+        "pixel.readout.reset_noise is none or 0, or correlated double sampling removes it"
         " (aps-4t, ccd)"
     )
     seconds_per_pixel = 9e-9
@@ -41,7 +41,7 @@ class ResetNoise(NoiseSource):
 
     def describe(self) -> str:
         """Return a short clause with this camera's numbers and units."""
-        return f"{self.electrons:.4g} electrons rms"
+        return f"{self.electrons:.4g} e rms"
 
     def apply(self, electrons, site):
         """Return the block with the noise of a reset in it; it reuses the array [electrons]."""

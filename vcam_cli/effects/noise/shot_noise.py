@@ -32,7 +32,7 @@ class ShotNoise(NoiseSource):
 
     def describe(self) -> str:
         """Return a short clause with this camera's numbers and units."""
-        return "variance equal to the number of electrons collected"
+        return "variance equal to the mean signal in electrons"
 
     def apply(self, electrons, site):
         """Return Poisson numbers of the block's means [electrons]."""

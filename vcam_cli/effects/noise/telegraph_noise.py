@@ -40,7 +40,7 @@ class TelegraphNoise(NoiseSource):
         "Wang, Rao, Mierop and Theuwissen, Random telegraph signal in CMOS image sensor pixels,"
         " IEDM 2006, doi:10.1109/IEDM.2006.346973"
     )
-    absent = "the file gives no pixel.readout.telegraph_noise, or 0"
+    absent = "pixel.readout.telegraph_noise is none or 0"
     seconds_per_pixel = 20e-9
 
     @classmethod
@@ -58,8 +58,8 @@ class TelegraphNoise(NoiseSource):
         """Return a short clause with this camera's numbers and units."""
         levels = "three levels" if self.double_sampled else "two levels"
         return (
-            f"{self.fraction:.4%} of the pixels with {levels}, {self.amplitude:.4g} electrons"
-            f" apart in the mean, filled {self.occupancy:.3g} of the time"
+            f"{100 * self.fraction:.4g} % of the pixels, {levels} {self.amplitude:.4g} e apart,"
+            f" occupancy {100 * self.occupancy:.3g} %"
         )
 
     def apply(self, electrons, site):

@@ -52,6 +52,7 @@ class Depth(Effect):
     def describe(self) -> str:
         """Return a short clause with this camera's numbers and units."""
         if not self.blurs:
-            return "a picture cut into layers by its map of depth, each out of focus by itself"
-        pixels = ", ".join(f"{blur / self.pitch:.3g}" for blur in self.blurs)
-        return f"{len(self.blurs)} layers, points of which become {pixels} pixels wide by defocus"
+            return "the picture is cut into layers by depth, each with its own defocus"
+        *others, last = (f"{blur / self.pitch:.3g}" for blur in self.blurs)
+        pixels = f"{', '.join(others)} and {last}" if others else last
+        return f"{len(self.blurs)} layers: defocus blurs points to {pixels} pixels"

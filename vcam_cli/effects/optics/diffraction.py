@@ -10,6 +10,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from vcam_cli.effects.base import RadialTransfer, switched_off
 from vcam_cli.physics import diffraction
 
@@ -23,8 +25,9 @@ class Diffraction(RadialTransfer):
 
     name = "diffraction"
     reference = "Chen 2003, section 2.2.1; Goodman, Introduction to Fourier Optics, section 6.3"
-    absent = "the file says optics.diffraction: false, or gives psf or mtf instead"
+    absent = "optics.diffraction is false, or psf or mtf replaces it"
     origin = "lens"
+    largest_loss = 1.0
 
     @classmethod
     def from_camera(cls, camera, geometry):
@@ -37,7 +40,7 @@ class Diffraction(RadialTransfer):
     def describe(self) -> str:
         """Return a short clause with this camera's numbers and units."""
         cutoff = self.cutoff(550e-9) / 1e3
-        return f"cuts off at {cutoff:.4g} lp/mm at 550 nm"
+        return f"cut-off {cutoff:.4g} lp/mm at 550 nm"
 
     def otf(self, frequency, wavelength):
         """Return the transfer at `frequency` [cycles/m] and `wavelength` [m]."""
@@ -46,6 +49,13 @@ class Diffraction(RadialTransfer):
     def spectral_otf(self, frequency, wavelengths):
         """Return the transfer at every wavelength (J,) [m]: (J, *shape of `frequency`)."""
         return self.otf(frequency, wavelengths.reshape(-1, *(1,) * frequency.ndim))
+
+    def spread(self, wavelengths):
+        """Return a bound (J,) on |1 - H(f)| / (2 pi |f|) [m].
+
+        The transfer is convex in nu: it lies above its tangent 1 - 4 nu / pi.
+        """
+        return 2 / np.pi**2 / self.cutoff(wavelengths)
 
     def cutoff(self, wavelength):
         """Return the frequency from which the transfer is zero, or inf [cycles/m]."""

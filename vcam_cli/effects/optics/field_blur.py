@@ -66,6 +66,19 @@ class FieldBlur(AberrationBlur, FieldTransfer):
         """How far from its place the blur throws almost all of the light, diffraction aside [m]."""
         return max(self.lens.reach(self.wavefront(place)) for place, _ in self.places)
 
+    def spread(self, wavelengths: NDArray) -> NDArray:
+        """Return a bound (J,) on |1 - H(f)| / (2 pi |f|) [m].
+
+        Wavefronts change evenly between places, so that no slope exceeds those there.
+        """
+        farthest = max(self.lens.farthest_ray(self.wavefront(p)) for p in self._ends)
+        return np.full(len(wavelengths), farthest)
+
+    @property
+    def _ends(self) -> tuple[float, ...]:
+        """Places between which the wavefront changes evenly, center and corner among them."""
+        return (0.0, *(place for place, _ in self.places if 0 < place < 1), 1.0)
+
     def wavefront(self, place: float) -> Terms:
         """Return the wavefront on the half-axis to the right, at a place from 0 to 1."""
         every = sorted({index for _, terms in self.places for index, _ in terms})
@@ -106,7 +119,7 @@ class FieldBlur(AberrationBlur, FieldTransfer):
     @property
     def _changes(self) -> list[tuple[float, float, float]]:
         """Ends of the stretches on which the wavefront changes evenly, and the change [m rms]."""
-        edges = [0.0, *(place for place, _ in self.places if 0 < place < 1), 1.0]
+        edges = self._ends
         minus = [tuple((i, -c) for i, c in self.wavefront(place)) for place in edges[:-1]]
         changes = [
             zernike.combine(a, self.wavefront(b)) for a, b in zip(minus, edges[1:], strict=True)
@@ -131,8 +144,8 @@ class FieldBlur(AberrationBlur, FieldTransfer):
     def mean_error(self, signal) -> float:
         """Return a bound of the rms change of the mean signal by leaving it out [electrons]."""
         # Wavefronts change evenly in between: none is worse than that of one of its ends.
-        places = {0.0, 1.0, *(place for place, _ in self.places if 0 < place < 1)}
-        return max(DirectedBlur(self.lens, self.wavefront(p)).mean_error(signal) for p in places)
+        blurs = (DirectedBlur(self.lens, self.wavefront(place)) for place in self._ends)
+        return max(blur.mean_error(signal) for blur in blurs)
 
 
 @dataclass(frozen=True)

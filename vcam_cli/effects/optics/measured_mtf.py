@@ -60,12 +60,12 @@ class MeasuredMtf(MtfBlur, RadialTransfer):
         """Return up to which frequency half of the contrast is left, in green light."""
         f = np.linspace(0, self.cutoff(GREEN), 4097)
         half = f[np.argmax(self.otf(f, GREEN) < 0.5)]
-        return f"measured transfer: 50 % at {half / 1e3:.3g} lp/mm"
+        return f"measured MTF: 50 % at {half / 1e3:.3g} lp/mm"
 
     def ending_clause(self) -> str:
         """Return what holds beyond the last measured frequency; "" where nothing is left there."""
         last = min((c.frequencies[-1] for c in self.measured.curves if c.values[-1] > 0), default=0)
-        return f"; beyond {last / 1e3:g} lp/mm like diffraction" if last else ""
+        return f"; beyond {last / 1e3:g} lp/mm as diffraction" if last else ""
 
     def otf(self, frequency: NDArray, wavelength: float) -> NDArray:
         """Return the transfer at `frequency` [cycles/m] and `wavelength` [m]."""
@@ -155,6 +155,10 @@ class FieldMtf(MtfBlur, FieldTransfer):
     def reach(self) -> float:
         """How far from its place it throws most of the light, what diffraction throws aside [m]."""
         return max(place.reach for place in self.places)
+
+    def spread(self, wavelengths: NDArray) -> NDArray:
+        """Return a bound (J,) on |1 - H(f)| / (2 pi |f|) at all places [m]."""
+        return np.max([place.spread(wavelengths) for place in self.places], axis=0)
 
     def zones(self, count):
         """Return the measured places, each with its weight; between two both are straight."""

@@ -37,7 +37,7 @@ class OffAxis(Gain):
 
     name = "off_axis"
     reference = "Chen 2003, eq 2.22 (exact) and 2.21 (cos4)"
-    absent = "the file says optics.off_axis: none"
+    absent = "optics.off_axis is none"
     origin = "lens"
     seconds_per_pixel = 8e-9
 
@@ -60,7 +60,7 @@ class OffAxis(Gain):
     def describe(self) -> str:
         """Return a short clause with this camera's numbers and units."""
         loss = 1 - float(self._relative_illumination((self.corner / self.image_distance) ** 2))
-        return f"the corners receive {loss:.2%} less than the center"
+        return f"corners {100 * loss:.3g} % darker than the center"
 
     def _relative_illumination(self, tan2):
         if self.model == "cos4":
@@ -131,8 +131,8 @@ class MeasuredFalloff(Gain):
     def describe(self) -> str:
         """Return a short clause with this camera's numbers and units."""
         corner = float(self._relative_illumination(np.hypot(self.half_width, self.half_height)))
-        kind = "less" if corner <= 1 else "more"
-        return f"the corners receive {abs(1 - corner):.2%} {kind} than the center, as measured"
+        kind = "darker" if corner <= 1 else "brighter"
+        return f"measured: corners {100 * abs(1 - corner):.3g} % {kind} than the center"
 
     def _relative_illumination(self, radius):
         return np.interp(radius, self.heights, self.values)

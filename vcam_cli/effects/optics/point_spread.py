@@ -51,12 +51,21 @@ class PointSpread(AberrationBlur, PlaneTransfer):
         text = f"point spread function sampled every {self.pitch * 1e6:.4g} um"
         if self.samples is None:
             return text
-        return f"{text}: 90% of the light within {2e6 * self._radius(0.9):.3g} um"
+        return f"{text}; 90 % of the light within {2e6 * self._radius(0.9):.3g} um"
 
     @property
     def reach(self) -> float:
         """How far from its place the blur throws almost all of the light, diffraction aside [m]."""
         return self._radius(0.99)
+
+    def spread(self, wavelengths: NDArray) -> NDArray:
+        """Return the mean distance (J,) of the light from its place [m]; inf before it is read."""
+        if self.samples is None:
+            return np.full(len(wavelengths), np.inf)
+        x, y = self._coordinates
+        light = np.abs(self.samples)
+        radius = np.hypot(x[None, :], y[:, None])
+        return np.full(len(wavelengths), float((light * radius).sum(axis=(1, 2)).max()))
 
     def _loaded_samples(self) -> NDArray:
         if self.samples is None:

@@ -23,7 +23,7 @@ class StrayLight(VeilingGlare):
 
     name = "stray_light"
     reference = "ISO 9358:1994 (veiling glare index); Matsuda and Nitoh, Appl. Opt. 11, 1972"
-    absent = "the file gives no optics.stray_light, or 0"
+    absent = "optics.stray_light is 0"
     origin = "lens"
     seconds_per_pixel = 1.5e-9
 
@@ -35,7 +35,7 @@ class StrayLight(VeilingGlare):
 
     def describe(self) -> str:
         """Return a short clause with this camera's numbers and units."""
-        return f"{self.fraction:.3%} of the light lies evenly over the sensor"
+        return f"{100 * self.fraction:.4g} % of the light, evenly over the sensor"
 
     def mean_error(self, signal) -> float:
         """Return a bound of the rms change of the mean signal by leaving it out [electrons]."""

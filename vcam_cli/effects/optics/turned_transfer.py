@@ -50,6 +50,16 @@ class TurnedTransfer(PlaneTransfer):
         width, height = self.still.box or (0.0, 0.0)
         return math.hypot(width, height) / 2
 
+    def spread(self, wavelengths: NDArray) -> NDArray:
+        """Return how far it displaces light, at most (J,) [m]."""
+        return np.full(len(wavelengths), self.reach)
+
+    def otf_along(self, frequency, across, wavelength):
+        """Return the transfer (n,) of waves in one direction."""
+        cosine, sine = math.cos(self.angle), math.sin(self.angle)
+        along_x = self.still.along_x((cosine * across[0] - sine * across[1]) * frequency)
+        return along_x * self.still.along_y((sine * across[0] + cosine * across[1]) * frequency)
+
     def otf_plane(self, fx: NDArray, fy: NDArray, wavelength: float) -> NDArray:
         """Return the transfer at all pairs of fx (n,) and fy (m,) [cycles/m]: (m, n)."""
         cosine, sine = math.cos(self.angle), math.sin(self.angle)

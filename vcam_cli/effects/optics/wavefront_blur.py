@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry
@@ -21,6 +22,8 @@ from vcam_cli.physics.zernike import Terms
 
 GREEN = 550e-9
 """Wavelength that descriptions refer to [m]."""
+SURE_OF_SLOPE = 1.02
+"""Factor on the largest slope of a wavefront, which is found to about 1 %."""
 MANY_WAVES = 0.18
 """Rms wavefront error from which the Strehl ratio says less than the blur's width [waves]."""
 
@@ -30,7 +33,7 @@ class AberrationBlur(Effect):
 
     name = "aberration"
     reference = "Hopkins 1955, doi:10.1098/rspa.1955.0158; Noll 1976, doi:10.1364/JOSA.66.000207"
-    absent = "the file gives no defocus, no zernike, no psf and no mtf"
+    absent = "optics has no defocus, zernike, psf or mtf"
     origin = "lens"
 
 
@@ -61,8 +64,12 @@ class Lens:
         airy = 2 * GREEN * self.working_f_number if self.diffracts else 0.0
         return moved + ray_blur.blur_radius(terms, self.working_f_number) + airy
 
+    def farthest_ray(self, terms: Terms) -> float:
+        """Return how far from the ideal image point a ray meets the sensor, at most [m]."""
+        return 2 * self.working_f_number * SURE_OF_SLOPE * zernike.max_slope(terms)
+
     def describe(self, terms: Terms) -> str:
-        """Return a clause that says with numbers what a wavefront does."""
+        """Return a clause with the numbers of a wavefront."""
         rest, tilt = zernike.split_tilt(terms)
         waves = zernike.rms(rest) / GREEN
         if not zernike.combine(terms):
@@ -70,11 +77,11 @@ class Lens:
         if not rest:
             moved = [2e6 * self.working_f_number * slope for slope in tilt]
             return f"moves the image by {moved[0]:.4g} um to the right and {moved[1]:.4g} um down"
-        error = f"wavefront error of {waves:.3g} waves rms at 550 nm"
+        error = f"{waves:.3g} waves rms at 550 nm"
         if self.diffracts and waves < MANY_WAVES:
-            return f"{error}: Strehl ratio {zernike.strehl(rest, GREEN):.2f}"
+            return f"{error}, Strehl ratio {zernike.strehl(rest, GREEN):.2f}"
         width = 2e6 * ray_blur.blur_radius(rest, self.working_f_number)
-        return f"{error}: points of light become up to {width:.4g} um wide"
+        return f"{error}, blurs points to {width:.4g} um"
 
 
 def wavefronts(camera: Camera, geometry: Geometry) -> tuple[tuple[float | None, Terms], ...]:
@@ -117,6 +124,14 @@ class UniformBlur(AberrationBlur):
     def cutoff(self, wavelength: float) -> float:
         """Return the frequency from which the transfer is zero, or inf [cycles/m]."""
         return self.lens.cutoff(wavelength)
+
+    def spread(self, wavelengths: NDArray) -> NDArray:
+        """Return a bound (J,) on |1 - H(f)| / (2 pi |f|): no ray comes to lie further [m].
+
+        The phases that are averaged are those of points of the pupil 2 lambda N f radii apart, and
+        at most 2 pi f times 2 N times the steepest slope of the wavefront.
+        """
+        return np.full(len(wavelengths), self.lens.farthest_ray(self.terms))
 
 
 @dataclass(frozen=True)
@@ -176,6 +191,16 @@ class DirectedBlur(UniformBlur, PlaneTransfer):
             return ray_blur.otf(fx, fy, self.lens.working_f_number, turned)
 
         return self._transfer_cache.get((fx.tobytes(), fy.tobytes()), compute)
+
+    def otf_along(self, frequency, across, wavelength):
+        """Return the transfer (n,) of waves in one direction; None by rays, which need a plane."""
+        if not self.lens.diffracts:
+            return None
+        cos, sin = math.cos(self.angle), math.sin(self.angle)
+        x, y = across
+        turned = (cos * x + sin * y) * frequency, (cos * y - sin * x) * frequency
+        working = self.lens.working_f_number
+        return aberration.otf_ratio(*turned, wavelength, working, self.terms)
 
     @cached_property
     def _transfer_cache(self) -> ByteCache:

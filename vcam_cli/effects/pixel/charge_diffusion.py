@@ -41,7 +41,8 @@ class ChargeDiffusion(RadialTransfer):
 
     name = "charge_diffusion"
     reference = "Chen 2003, eqs 2.27-2.29; absorption of silicon: Green 2008"
-    absent = "the file gives no diffusion of charge"
+    absent = "pixel.photodetector.charge_diffusion is none"
+    largest_loss = 1.0
 
     @classmethod
     def from_camera(cls, camera, geometry):
@@ -55,7 +56,7 @@ class ChargeDiffusion(RadialTransfer):
         """Return a short clause with this camera's numbers and units."""
         at = np.array([100e3])
         green, red = (100 * float(self.otf(at, w)[0]) for w in (550e-9, 650e-9))
-        return f"leaves {green:.3g}% of the contrast at 100 lp/mm in 550 nm, {red:.3g}% in 650 nm"
+        return f"MTF at 100 lp/mm: {green:.3g} % at 550 nm, {red:.3g} % at 650 nm"
 
     def otf(self, frequency, wavelength):
         """Return the transfer at `frequency` [cycles/m] and `wavelength` [m]."""

@@ -47,7 +47,7 @@ class ChargeTransfer(Transport):
 
     name = "charge_transfer"
     reference = "Janesick, Scientific Charge-Coupled Devices, 2001, section 5.2.3"
-    absent = "the file gives no pixel.readout.charge_transfer, or an inefficiency of 0"
+    absent = "pixel.readout.charge_transfer has no inefficiency"
     seconds_per_pixel = 4e-9
 
     @classmethod
@@ -62,7 +62,7 @@ class ChargeTransfer(Transport):
         """Return a short clause with this camera's numbers and units."""
         most = (self.rows + self.columns) * self.phases
         lost = float(_deferred_share(self.inefficiency, most))
-        return f"the last pixel defers {lost:.3%} of its charge in {most} transfers"
+        return f"the last pixel defers {100 * lost:.3g} % of its charge in {most} transfers"
 
     def transport(self, signal: NDArray) -> NDArray:
         """Return what arrives of a mean signal (rows, columns), in its unit and float type."""

@@ -28,7 +28,7 @@ class DarkCurrent(Charge):
     reference = (
         "Chen 2003, eqs 2.26 and 2.31; temperature: Janesick, Scientific CCDs, 2001, section 7.1.1"
     )
-    absent = "the file gives no dark current, or 0"
+    absent = "the photodetector has no dark current"
     seconds_per_pixel = 0.5e-9
 
     @classmethod
@@ -40,8 +40,8 @@ class DarkCurrent(Charge):
 
     def describe(self) -> str:
         """Return a short clause with this camera's numbers and units."""
-        where = "every pixel" if self.pixels == 1 else f"every {self.pixels} pixels read as one"
-        return f"{self.electrons_per_second:.4g} electrons a second in {where}"
+        where = "pixel" if self.pixels == 1 else f"group of {self.pixels} binned pixels"
+        return f"{self.electrons_per_second:.4g} e/s per {where}"
 
     def rate(self) -> float:
         """Return the mean electrons that a pixel collects per second [e/s]."""

@@ -31,7 +31,7 @@ class Microlens(Gain):
     reference = (
         "Chen 2003, section 3.5.4; Catrysse, Liu and El Gamal 2000, doi:10.1117/12.385460 (shift)"
     )
-    absent = "the file gives no microlens"
+    absent = "pixel.microlens is none"
 
     @classmethod
     def from_camera(cls, camera, geometry):
@@ -46,8 +46,8 @@ class Microlens(Gain):
     def describe(self) -> str:
         """Return a short clause with this camera's numbers and units."""
         if self.ratio == 1:
-            return f"averages over {self.share:.3%} of the pixel; its light is in the pixel's QE"
-        return f"collects {self.ratio:.4g} times the light, that of {self.share:.3%} of the pixel"
+            return f"effective fill factor {100 * self.share:.4g} %; its gain is part of the QE"
+        return f"{self.ratio:.4g} times the light; effective fill factor {100 * self.share:.4g} %"
 
     def gain(self, x, y):
         """Return the factor at the positions x (columns,), y (rows,) [m]: (rows, columns)."""

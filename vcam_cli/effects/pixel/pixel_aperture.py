@@ -45,6 +45,10 @@ class PixelAperture(SeparableTransfer):
         """Width and height of the area that it averages over evenly [m]."""
         return self.width, self.height
 
+    def spread(self, wavelengths):
+        """Return a bound (J,) on |1 - H(f)| / (2 pi |f|): the rms distance from the center [m]."""
+        return np.full(len(wavelengths), np.hypot(self.width, self.height) / np.sqrt(12))
+
     def along_x(self, frequency):
         """Return the transfer along x at `frequency` [cycles/m]."""
         return np.sinc(frequency * self.width)

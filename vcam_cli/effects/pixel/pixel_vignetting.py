@@ -66,7 +66,7 @@ class PixelVignetting(Gain):
 
     name = "pixel_vignetting"
     reference = "Catrysse, Liu and El Gamal 2000, doi:10.1117/12.385460; Chen 2003, section 2.2.2"
-    absent = "the file gives no stack of layers above the photodetector"
+    absent = "pixel.stack is none"
     seconds_per_pixel = 3e-9
 
     @classmethod
@@ -93,7 +93,8 @@ class PixelVignetting(Gain):
         """Return a short clause with this camera's numbers and units."""
         ends = np.array([0, self.half_width]), np.array([0, self.half_height])
         loss = 1 - np.diag(self.gain(*ends))
-        return f"takes {loss[0]:.2%} of the light in the center, {loss[1]:.2%} in the corners"
+        center, corners = (f"{100 * share:.3g} %" for share in loss)
+        return f"blocks {center} of the light in the center, {corners} in the corners"
 
     def exact_gain(self, x: NDArray, y: NDArray) -> NDArray:
         """Return the gain at x, y (rows, columns) [m], integrated over the whole pupil."""

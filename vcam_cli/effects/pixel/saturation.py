@@ -33,7 +33,7 @@ class Saturation(Limit):
 
     def describe(self) -> str:
         """Return a short clause with this camera's numbers and units."""
-        return f"full well of {self.full_well:.6g} electrons"
+        return f"full well {self.full_well:.6g} e"
 
     @property
     def ceiling(self) -> float:

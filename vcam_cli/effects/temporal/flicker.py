@@ -30,7 +30,7 @@ class Flicker(TemporalGain):
 
     name = "flicker"
     reference = "CIE TN 006:2016; the mean over an exposure is in closed form"
-    absent = "the file gives no scene.illuminant.flicker, or a depth of 0"
+    absent = "scene.illuminant has no flicker"
     seconds_per_pixel = 1e-9
 
     @classmethod
@@ -45,10 +45,10 @@ class Flicker(TemporalGain):
         """Return a short clause with this camera's numbers and units."""
         lamp = self.lamp
         if self.lines.last == 0:
-            where = "all pixels alike"
+            where = "no bands"
         else:
-            where = f"{self.lines.last * lamp.frequency:.3g} bands from the first line to the last"
-        return f"light of {lamp.frequency:.6g} Hz, modulated by {lamp.depth:.3g}: {where}"
+            where = f"{self.lines.last * lamp.frequency:.3g} bands over the frame"
+        return f"{lamp.frequency:.6g} Hz, depth {100 * lamp.depth:.3g} %, {where}"
 
     def gain(self, x, y, start, stop):
         """Return the mean light from `start` to `stop` after a line's exposure begins [s]."""

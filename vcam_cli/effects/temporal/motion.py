@@ -35,7 +35,7 @@ class Motion(Effect):
 
     name = "motion"
     reference = "mean over the path: Bracewell, The Fourier Transform and Its Applications, 2000"
-    absent = "the file gives no motion of its source, and no scene.camera_motion"
+    absent = "neither the source nor the camera moves"
 
     @classmethod
     def from_camera(cls, camera, geometry):
@@ -90,9 +90,9 @@ class EvenMotion(ImageMotion, Motion):
     def describe(self) -> str:
         """Return a short clause with this camera's numbers and units."""
         path = float(np.hypot(*self.path))
-        said = f"the image goes {path * 1e6:.4g} um, {path / self.pitch:.3g} pixels"
+        said = f"image path {path * 1e6:.3g} um ({path / self.pitch:.3g} pixels)"
         drift = float(np.hypot(*self.drift))
-        return f"{said}; skewed by {drift:.3g} of its height" if drift else said
+        return f"{said}, skew {100 * drift:.2g} % of the height" if drift else said
 
     @property
     def drift(self) -> tuple[float, float]:
@@ -121,21 +121,6 @@ class EvenMotion(ImageMotion, Motion):
         """Return the motion from `start` to `stop` after a line's exposure begins [s]."""
         exposed = self.exposed.part_of_exposure(start, stop)
         return type(self)(exposed, self.width, self.height, self.pitch)
-
-    def mean_transfer(self, fx: NDArray, fy: NDArray, spectrum) -> NDArray:
-        """Return a transfer that loses as much, rms over all rows: (m, n).
-
-        Of a wave that a row sees displaced by s, sinc(b) exp(2 pi i f s) is left; over all rows
-        the exponential is sinc(f S) exp(2 pi i f D) in the mean, S being the displacement from
-        first row to last, D that in the middle.
-        """
-        (path_x, path_y), (drift_x, drift_y) = self.path, self.drift
-        moved_x, moved_y = self.displacement
-        x, y = fx[None, :], fy[:, None]
-        blur = np.sinc(x * path_x + y * path_y)
-        shift = np.sinc((x * drift_x + y * drift_y) * self.height)
-        shift = shift * np.cos(2 * np.pi * (x * moved_x + y * moved_y))
-        return np.asarray(1 - np.sqrt(np.maximum(1 - 2 * blur * shift + blur**2, 0)))
 
 
 @dataclass(frozen=True)
@@ -169,6 +154,10 @@ class ObliqueMotion(EvenMotion, PlaneTransfer):
         path_x, path_y = self.path
         return np.sinc(fx[None, :] * path_x + fy[:, None] * path_y)
 
+    def otf_along(self, frequency, across, wavelength):
+        """Return the transfer (n,) of waves in one direction."""
+        return np.sinc(frequency * (across[0] * self.path[0] + across[1] * self.path[1]))
+
 
 @dataclass(frozen=True)
 class RecordedMotion(ImageMotion, PlaneTransfer, Motion):
@@ -188,8 +177,8 @@ class RecordedMotion(ImageMotion, PlaneTransfer, Motion):
         times, x, y = self._path()
         length = float(np.hypot(np.diff(x), np.diff(y)).sum())
         return (
-            f"the image goes {length * 1e6:.4g} um, {length / self.pitch:.3g} pixels, along a path"
-            f" of {len(times)} points"
+            f"image path {length * 1e6:.4g} um ({length / self.pitch:.3g} pixels) over"
+            f" {len(times)} points"
         )
 
     def _path(self) -> tuple[NDArray, NDArray, NDArray]:
@@ -236,9 +225,3 @@ class RecordedMotion(ImageMotion, PlaneTransfer, Motion):
     def otf_plane(self, fx, fy, wavelength):
         """Return the transfer at all pairs of fx (n,) and fy (m,) [cycles/m]: (m, n)."""
         return path_transfer(fx, fy, *self._path())
-
-    def mean_transfer(self, fx: NDArray, fy: NDArray, spectrum) -> NDArray:
-        """Return a transfer that loses as much, the displacement included: (m, n)."""
-        moved_x, moved_y = self.displacement
-        moved = np.exp(-2j * np.pi * (fx[None, :] * moved_x + fy[:, None] * moved_y))
-        return np.asarray(1 - np.abs(1 - path_transfer(fx, fy, *self._path()) * moved))

@@ -49,10 +49,10 @@ class SubExposedMotion(ImageMotion):
         """Return a short clause with this camera's numbers and units."""
         path = self.longest_path
         turn = self._turn_in_exposure()
-        said = f"the image turns {np.degrees(turn):.3g} deg in the exposure; " if turn else ""
+        said = f"; the image turns by {np.degrees(turn):.3g} deg" if turn else ""
         return (
-            f"{said}up to {path * 1e6:.4g} um, {path / self.pitch:.3g} pixels, in a line's"
-            f" exposure; up to {self.travel / self.pitch:.3g} pixels from its place"
+            f"image path up to {path * 1e6:.4g} um ({path / self.pitch:.3g} pixels) in the exposure"
+            f" of a line, displacement up to {self.travel / self.pitch:.3g} pixels{said}"
         )
 
     def _turn_in_exposure(self) -> float:
@@ -100,9 +100,9 @@ class SubExposedMotion(ImageMotion):
         return 0.0, 0.0
 
     @property
-    def needs_survey(self) -> bool:
-        """Whether image formation cannot tell what it changes: it knows the image with its blur."""
-        return self.blur_kind is not None
+    def is_uniform(self) -> bool:
+        """No: places, or lines, move each by itself."""
+        return False
 
     @property
     def travel(self) -> float:
@@ -136,14 +136,3 @@ class SubExposedMotion(ImageMotion):
     def part_of_exposure(self, start: float, stop: float) -> SubExposedMotion:
         """Return the motion from `start` to `stop` after a line's exposure begins [s]."""
         return replace(self, exposed=self.exposed.part_of_exposure(start, stop))
-
-    def mean_transfer(self, fx: NDArray, fy: NDArray, spectrum) -> NDArray:
-        """Return a transfer that loses as much, rms over some places: (m, n)."""
-        dx, dy = self._moved()
-        some = np.unique(np.linspace(0, dx.shape[1] - 1, PLACES**2).round().astype(int))
-        lost = np.zeros((len(fy), len(fx)))
-        for place in some:
-            along_x = np.exp(-2j * np.pi * np.outer(dx[:, place], fx))
-            along_y = np.exp(-2j * np.pi * np.outer(fy, dy[:, place]))
-            lost += np.square(np.abs(1 - along_y @ along_x / len(dx)))
-        return np.asarray(1 - np.sqrt(lost / len(some)))

@@ -110,7 +110,7 @@ def needed_modes(
             for mode in modes
         ]
     )
-    allowed = MODES_SHARE * path.settings.tolerance * image.full_signal
+    allowed = MODES_SHARE * path.settings.tolerance * path.full
     weakest = np.argsort(squares)
     dropped = set(weakest[np.cumsum(squares[weakest]) <= allowed**2].tolist())
     kept = tuple(mode for i, mode in enumerate(modes) if i not in dropped)

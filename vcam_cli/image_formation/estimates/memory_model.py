@@ -96,7 +96,7 @@ def _values(
     rows, columns = scene.shape
     if not isinstance(scene, ChartScene):
         samples = planes * rows * columns
-    elif scene.chart.edges() is not None:
+    elif not scene.is_painted:
         samples = 4 * g.rows * g.columns
     else:  # painted in bands, of which the terms along x are kept
         bands = columns * bands_of_rows(rows, columns)[0].stop * path.workers

@@ -214,7 +214,7 @@ class PowerSpectrum:
         power : NDArray
             Mean squares (C, ...) from `filtered_power` or `upper_bound` [(e/s)^2].
         budget : float
-            Rms that may be left [e/s].
+            Rms that may be left at the pixels [e/s].
         pitch : tuple of float
             Pixel pitch along y and x [m].
 
@@ -223,11 +223,9 @@ class PowerSpectrum:
         float
             Frequency [pixel Nyquist].
         """
-        shell = self._shell(pitch).ravel()
-        order = np.argsort(shell, kind="stable")
-        sums = np.cumsum(power.reshape(len(power), -1)[:, order[::-1]], axis=1)[:, ::-1]
-        needed = np.flatnonzero(sums.max(axis=0) > budget**2)
-        return float(shell[order[needed[-1]]]) if len(needed) else 0.0
+        frequency, left = self._left_beyond(power, pitch)
+        needed = np.flatnonzero(left.max(axis=0) > budget)
+        return float(frequency[needed[-1]]) if len(needed) else 0.0
 
     def tail_rms(self, power: NDArray, frequency: float, pitch: tuple[float, float]) -> float:
         """Return the rms of all that lies beyond a frequency, in the color of most.
@@ -244,15 +242,30 @@ class PowerSpectrum:
         Returns
         -------
         float
-            Rms [e/s].
+            Rms at the pixels, at most [e/s].
         """
-        beyond = self._shell(pitch) > frequency * (1 + 1e-9)
-        return float(np.sqrt(power[:, beyond].sum(axis=1).max()))
+        every, left = self._left_beyond(power, pitch)
+        beyond = int(np.searchsorted(every, frequency * (1 + 1e-9), side="right"))
+        return float(left[:, beyond].max()) if beyond < left.shape[1] else 0.0
 
-    def _shell(self, pitch: tuple[float, float]) -> NDArray:
-        """Return the frequency of every block, (blocks along y, blocks along x) [pixel Nyquist]."""
+    def _left_beyond(self, power: NDArray, pitch: tuple[float, float]) -> tuple[NDArray, NDArray]:
+        """Return frequencies (n,) [pixel Nyquist], and what is left from each on, rms (C, n).
+
+        Pixels cannot tell apart a term of each zone between multiples of their Nyquist frequency:
+        within a zone mean squares add up, those of zones as if all of them met in phase.
+        """
         along_y, along_x = 2 * pitch[0] * self.y.high, 2 * pitch[1] * self.x.high
-        return np.maximum(along_y[:, None], along_x)
+        frequency, shell = np.unique(np.maximum(along_y[:, None], along_x), return_inverse=True)
+        zones = [np.maximum(np.ceil(at - 1e-6), 1).astype(int) - 1 for at in (along_y, along_x)]
+        count = int(zones[1].max()) + 1
+        zone = zones[0][:, None] * count + zones[1]
+        bins = zone.ravel() * len(frequency) + shell.ravel()
+        size = (int(zones[0].max()) + 1) * count * len(frequency)
+        left = []
+        for color in power.reshape(len(power), -1):
+            of_zones = np.bincount(bins, color, size).reshape(-1, len(frequency))
+            left.append(np.sqrt(np.cumsum(of_zones[:, ::-1], axis=1)[:, ::-1]).sum(axis=0))
+        return frequency, np.array(left)
 
 
 def _largest(transfer, blocks: Blocks) -> NDArray:

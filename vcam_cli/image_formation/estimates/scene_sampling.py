@@ -8,14 +8,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from vcam_cli.image_formation.closed_spectrum import closed_spectrum
 from vcam_cli.image_formation.estimates.bandwidth import FREQUENCY_SHARE, LOWEST, axes, table_size
-from vcam_cli.image_formation.estimates.chart_cells import BEYOND_CUTOFF, cell_grid
-from vcam_cli.image_formation.estimates.peak_bound import brightest_of_mosaic
+from vcam_cli.image_formation.estimates.chart_cells import cell_grid
 from vcam_cli.image_formation.estimates.power_spectrum import PowerSpectrum, power_spectrum
 from vcam_cli.image_formation.optical_path import OpticalPath
 from vcam_cli.image_formation.scene_spectrum import (
     SceneSpectrum,
-    rectangle_spectrum,
     transform_painted,
     transform_planes,
 )
@@ -23,9 +22,11 @@ from vcam_cli.image_formation.transfer_tables import Mixing, Tables, bounding_ta
 from vcam_cli.scenes.base import ChartScene, SampledScene
 
 SINGLE = 5e-7
-"""Rms error of transforms of 32-bit numbers, relative to the rms of what is transformed."""
+"""Rms error of transforms of 32-bit numbers, relative to the largest of what is transformed."""
 SINGLE_SHARE = 0.1
 """Part of the tolerance that it may use: else numbers have 64 bits."""
+BEYOND_CUTOFF = 1.1
+"""Cells of a chart in closed form over the highest frequency: they scale its terms, no more."""
 ENTRIES = 513
 """Entries of tables with which power is judged."""
 
@@ -45,8 +46,6 @@ class SampledImage:
     """Frequency up to which it is filtered [pixel Nyquist]."""
     lost_rms: float
     """Rms of the signal beyond [electrons / s]."""
-    full_signal: float
-    """Largest signal on the array, at least; at most the ceiling [electrons / s]."""
     peak: float
     """Bound on the signal before blur [electrons / s]."""
     density: float
@@ -73,12 +72,11 @@ def with_sufficient_precision(path: OpticalPath, scene: SampledScene) -> Optical
     """Return the path with as many bits as its spectrum calls for.
 
     They are 64 where 32 would take more than their share of the tolerance; else what the settings
-    say of charts and of pictures. Full signal is at least the mean over the array, or the ceiling.
+    say of charts and of pictures.
     """
-    g, knobs = path.geometry, path.settings
-    mean, rms = scene.mean_and_rms(path.transfer.level.T, (g.sensor_width, g.sensor_height))
-    full = min(float(mean.max()), path.ceiling)
-    suffices = float(rms.max()) * SINGLE <= SINGLE_SHARE * knobs.tolerance * full
+    knobs = path.settings
+    brightest = scene.brightest * float(np.abs(path.transfer.level).sum(axis=0).max())
+    suffices = brightest * SINGLE <= SINGLE_SHARE * knobs.tolerance * path.full
     least = knobs.chart_width if isinstance(scene, ChartScene) else knobs.float_width
     return replace(path, settings=replace(knobs, float_width=least if suffices else 64))
 
@@ -126,22 +124,10 @@ def sampled_image(
         if directed
         else power.pixel_power(lens_power)
     )
-    rms = float(np.sqrt(squares.reshape(len(squares), -1).sum(axis=1).max()))
-    aside = max((blur.reach for blur in directed), default=0.0)
     pitch = g.pitch_y, g.pitch_x
-    top = 2 * min(pitch[0] * y.bandwidth, pitch[1] * x.bandwidth)
-
-    def rms_beyond(part: float) -> float:
-        return power.tail_rms(squares, part * top, pitch)
-
-    brightest = brightest_of_mosaic(
-        path.mosaic, spectrum, (x, y), tables, path.separable, rms, rms_beyond, aside
-    )
-    full = min(brightest, path.ceiling)
     density = math.prod(scene.extent) / (g.sensor_width * g.sensor_height)
     if knobs.oversampling is None:
-        allowed = FREQUENCY_SHARE * knobs.tolerance * full
-        budget = allowed / math.sqrt(density * _more_than_mean(g.rows * g.columns))
+        budget = FREQUENCY_SHARE * knobs.tolerance * path.full / math.sqrt(density)
         needed = power.needed_frequency(squares, budget, pitch) * (1 + 1e-9)
         highest = min(max(needed, least), highest)
     else:
@@ -154,19 +140,9 @@ def sampled_image(
         lens_power=lens_power,
         highest=highest,
         lost_rms=float(np.sqrt(density)) * power.tail_rms(squares, highest, pitch),
-        full_signal=full,
         peak=peak,
         density=density,
     )
-
-
-def _more_than_mean(pixels: int) -> float:
-    """Return how many times the mean square of all places that of some pixels may be.
-
-    It is two standard errors of the mean of so many squares of normal numbers: the middle of a
-    picture, where its waves meet in phase, is all that a single pixel sees.
-    """
-    return 1 + 2 * math.sqrt(2 / pixels)
 
 
 def _scene_spectrum(
@@ -175,13 +151,11 @@ def _scene_spectrum(
     """Return the spectrum of a scene's planes, and a bound on the signal before blur [e/s]."""
     dtype = path.settings.dtype
     level = np.abs(path.transfer.with_mixtures(mix).level)
-    rectangles = scene.rectangles(mix)
-    if isinstance(scene, ChartScene) and rectangles is not None:
+    if isinstance(scene, ChartScene) and not scene.is_painted:
         scene = scene.with_cells(cell_grid(scene, path.geometry, BEYOND_CUTOFF * highest))
         x, y = axes(path, scene, highest)
-        brightest = np.abs(rectangles.values).max(axis=(1, 2))
-        known = rectangle_spectrum(rectangles, scene.shape, (y, x), dtype)
-        return scene, known, float((level.T @ brightest).max())
+        known = closed_spectrum(scene, mix, (y, x), dtype)
+        return scene, known, scene.brightest * float(np.abs(path.transfer.level).sum(axis=0).max())
     if isinstance(scene, ChartScene):
         x, y = axes(path, scene, highest)
         terms = y.terms, x.terms

@@ -123,6 +123,7 @@ def _layer_path(path: OpticalPath, optics: LayerOptics) -> OpticalPath:
         optional=(),
         layers=(),
         ceiling=math.inf,
+        full=brightest,
         has_opacity=True,
     )
 

@@ -266,6 +266,7 @@ def _layer_path(
         optional=(),
         layers=(),
         ceiling=math.inf,
+        full=level,
         has_opacity=hides,
     )
     return window, own, beyond

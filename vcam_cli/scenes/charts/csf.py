@@ -26,6 +26,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from vcam_cli.scenes.base import Array, Chart, Frame
+from vcam_cli.scenes.closed_form import Products
+from vcam_cli.scenes.edge_energy import EdgeEnergy, Region
 from vcam_cli.spectra import Spectrum, srgb_reflectances
 
 LUMINANCES = (0.2126, 0.7152, 0.0722)
@@ -76,6 +78,18 @@ class Csf(Chart):
         at_edge = self.max_frequency * (0.5 + half_width / self.frame.width)
         return 2 * at_edge + 8 / min(self.frame.width, self.frame.height)
 
+    def edge_energy(self, region: Region, level: Array, ceiling: float) -> EdgeEnergy:
+        """Return the energy that steps would have which change as much as the chirp does.
+
+        A wave of amplitude a and frequency f rises by 4 a f over a length in the mean; cells that
+        resolve it see steps of a part of a.
+        """
+        bright = self.mean * float(np.abs(level).sum()) * self.max_contrast
+        highest = self.max_frequency * (
+            0.5 + (abs(region.center[0]) + region.size[0] / 2) / self.frame.width
+        )
+        return EdgeEnergy(aligned=4 * highest * bright**2)
+
     def paint(self, x_edges: Array, y_edges: Array, mix: Array, out: Array) -> None:
         """Write the exact averages over the cells into `out`.
 
@@ -84,6 +98,17 @@ class Csf(Chart):
         chirp = np.diff(self._chirp_integral(x_edges)) / np.diff(x_edges)
         contrast = np.diff(self._contrast_integral(y_edges)) / np.diff(y_edges)
         self._mix(contrast, chirp, mix, out)
+
+    separates = True
+
+    def products(self, x_edges: Array, y_edges: Array, mix: Array) -> Products:
+        """Return the mean, and contrast times chirp."""
+        chirp = np.diff(self._chirp_integral(x_edges)) / np.diff(x_edges)
+        contrast = np.diff(self._contrast_integral(y_edges)) / np.diff(y_edges)
+        down = np.stack([np.ones(len(contrast)), contrast], axis=1)
+        level, swing = self._levels(np.asarray(mix, float))
+        along = np.stack([np.outer(level, np.ones(len(chirp))), np.outer(swing, chirp)], axis=1)
+        return Products(down, along)
 
     def values(self, x: Array, y: Array, mix: Array) -> Array:
         """Return the values at points."""
@@ -97,13 +122,15 @@ class Csf(Chart):
 
     def _mix(self, contrast: Array, chirp: Array, mix: Array, out: Array) -> None:
         pattern = np.outer(contrast.astype(mix.dtype), chirp.astype(mix.dtype))
-        first, second = mix[:, 0], mix[:, 1] if mix.shape[1] > 1 else np.zeros(len(mix), mix.dtype)
-        mean = mix.dtype.type(self.mean)
-        for plane, level, swing in zip(
-            out, mean * (first + second), mean * (first - second), strict=True
-        ):
+        for plane, level, swing in zip(out, *self._levels(mix), strict=True):
             np.multiply(pattern, swing, out=plane)
             plane += level
+
+    def _levels(self, mix: Array) -> tuple[Array, Array]:
+        """Return the mean light (R,) and its largest difference from it, of both colors."""
+        first, second = mix[:, 0], mix[:, 1] if mix.shape[1] > 1 else np.zeros(len(mix), mix.dtype)
+        mean = mix.dtype.type(self.mean)
+        return mean * (first + second), mean * (first - second)
 
     def _chirp_integral(self, x: Array) -> Array:
         """Return the integral of cos(pi F x^2/W + phase) from the left edge to x [m]."""

@@ -29,6 +29,7 @@ from vcam_cli.scenes.base import Array, Chart, Frame
 from vcam_cli.scenes.cells import cell_edges, cell_means
 from vcam_cli.scenes.disc_edges import MOST, Discs, divisions
 from vcam_cli.scenes.discs import Cells
+from vcam_cli.scenes.edge_energy import EdgeEnergy, Region, counted_height
 from vcam_cli.spectra import Spectrum, colorchecker
 
 SMALLEST, LARGEST = 1 / 400, 1 / 4
@@ -51,6 +52,9 @@ EDGE_SECONDS = 0.047, 0.0166
 calibrated."""
 DARKEST = 0.25
 """Lower bound of a leaf's own factor, which is uniform between this and 1."""
+
+FACTORS = 16
+"""Factors of leaves that stand for all, where the mean over them is taken."""
 
 PIGMENTS = {
     "dark skin": 4,
@@ -117,6 +121,35 @@ def generate_leaves(seed: int) -> Leaves:
     return Leaves(Discs(x, y, radius), pigment, factor)
 
 
+def leaf_energy(unit: float, level: Array, ceiling: float) -> EdgeEnergy:
+    """Return the energy of leaves: visible outlines for each area, times squares of their heights.
+
+    An outline is seen until a leaf falls on it, so that there is as much of it on an area as leaves
+    have over their own, 2 E[r] / E[r^2] for radii r [1]_. Heights are those of two random leaves.
+
+    Parameters
+    ----------
+    unit : float
+        Longer side of the frame [m].
+    level : Array
+        Light (12,) of each pigment.
+    ceiling : float
+        Light that fills a pixel, in its unit.
+
+    References
+    ----------
+    .. [1] G. Matheron, "Schema booleen sequentiel de partition aleatoire", Ecole des Mines de
+       Paris, 1968; C. Bordenave, Y. Gousseau, F. Roueff, Adv. Appl. Probab. 38, 31-46, 2006.
+    """
+    outline = 2 * (1 / SMALLEST - 1 / LARGEST) / math.log(LARGEST / SMALLEST) / unit
+    often = np.array(list(PIGMENTS.values()), float)
+    factors = DARKEST + (1 - DARKEST) * (np.arange(FACTORS) + 0.5) / FACTORS
+    light = np.outer(np.asarray(level, float), factors).ravel()
+    share = np.repeat(often / often.sum() / FACTORS, FACTORS)
+    squares = counted_height(light[:, None], light, ceiling)
+    return EdgeEnergy(oblique=outline * float(share @ squares @ share))
+
+
 @dataclass(frozen=True)
 class PlacedLeaves(Chart):
     """Leaves at given places; `mix` is (R, 12) in the order of `PIGMENTS`."""
@@ -140,6 +173,10 @@ class PlacedLeaves(Chart):
         x, y = x_edges / self.unit, y_edges / self.unit
         discs.paint(self.leaves.discs, color, x, y, out, hidden, self.divided)
 
+    def edge_energy(self, region: Region, level: Array, ceiling: float) -> EdgeEnergy:
+        """Return the energy of leaves anywhere."""
+        return leaf_energy(self.unit, level, ceiling)
+
     def values(self, x: Array, y: Array, mix: Array) -> Array:
         """Return the values at points."""
         color = self.leaves.color(mix)
@@ -158,6 +195,10 @@ class DeadLeaves(Chart):
     """How often cells are divided in which edges meet."""
     edge_seconds = property(lambda self: EDGE_SECONDS[0] + EDGE_SECONDS[1] * self.divided)
     undivided = property(lambda self: self.unit / FINEST)
+
+    def edge_energy(self, region: Region, level: Array, ceiling: float) -> EdgeEnergy:
+        """Return the energy of leaves anywhere."""
+        return leaf_energy(self.unit, level, ceiling)
 
     @property
     def darkest(self) -> float:

@@ -15,6 +15,7 @@ from vcam_cli.parallel import product
 from vcam_cli.scenes import discs
 from vcam_cli.scenes.base import Array, Chart, Frame
 from vcam_cli.scenes.cells import clip_cells, overlap
+from vcam_cli.scenes.closed_form import LightDisc
 from vcam_cli.scenes.disc_edges import Discs
 
 CLOTH = 0.5
@@ -77,15 +78,30 @@ class HdrPatches(Chart):
             )
         self._mix_levels(light, mix, out)
 
+    def edges(self) -> tuple[Array, Array]:
+        """Return where patches start and stop, x and y [m]."""
+        x, y = (np.concatenate([e, e + self.side]) for e in (self.left, self.top))
+        return np.sort(x), np.sort(y)
+
+    def discs(self, mix: Array) -> tuple[LightDisc, ...]:
+        """Return the lamp."""
+        height = (self.lamp - self.cloth) * np.asarray(mix)[:, 0]
+        return (LightDisc(0.0, self.lamp_y, self.radius, height),)
+
     def values(self, x: Array, y: Array, mix: Array) -> Array:
         """Return the values at points."""
-        x, y = np.asarray(x), np.asarray(y)
+        out = self.even_values(x, y, mix)
+        is_lamp = np.add.outer((np.asarray(y) - self.lamp_y) ** 2, np.asarray(x) ** 2)
+        out[:, is_lamp <= self.radius**2] = self.lamp * mix[:, :1]
+        return out
+
+    def even_values(self, x: Array, y: Array, mix: Array) -> Array:
+        """Return the values of cloth and patches at points."""
         columns, rows = (
             np.array([(at >= start) & (at <= start + self.side) for start in starts], float)
             for at, starts in ((x, self.left), (y, self.top))
         )
         light = self._patches(columns, rows)
-        light[np.add.outer((y - self.lamp_y) ** 2, x**2) <= self.radius**2] = self.lamp
         out = np.empty((len(mix), len(y), len(x)), mix.dtype)
         self._mix_levels(light, mix, out)
         return out

@@ -11,6 +11,7 @@ import numpy as np
 from vcam_cli.scenes import discs
 from vcam_cli.scenes.base import Array, Chart
 from vcam_cli.scenes.disc_edges import Discs
+from vcam_cli.scenes.edge_energy import EdgeEnergy, Region, counted_height
 
 
 @dataclass(frozen=True)
@@ -35,6 +36,11 @@ class PointGrid(Chart):
         )
         light = np.add.outer(down**2, across**2) <= (self.diameter / 2) ** 2
         return np.asarray(np.multiply.outer(mix[:, 0], light.astype(mix.dtype)))
+
+    def edge_energy(self, region: Region, level: Array, ceiling: float) -> EdgeEnergy:
+        """Return the energy of the points' outlines."""
+        height = float(counted_height(np.zeros(1), level[:1], ceiling)[0])
+        return EdgeEnergy(oblique=height * math.pi * self.diameter / self.spacing**2)
 
     @property
     def period(self) -> tuple[float, float]:

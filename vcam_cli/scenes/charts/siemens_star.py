@@ -12,6 +12,7 @@ import numpy as np
 
 from vcam_cli.scenes import polygons
 from vcam_cli.scenes.base import Array, Chart
+from vcam_cli.scenes.edge_energy import EdgeEnergy, Region, counted_height
 
 MEAN = 0.5
 """Mean reflectance."""
@@ -43,6 +44,16 @@ class SiemensStar(Chart):
         bright[np.hypot.outer(y, x) == 0.0] = 0.5
         self._mix_levels(bright, mix, out)
         return out
+
+    def edge_energy(self, region: Region, level: Array, ceiling: float) -> EdgeEnergy:
+        """Return the energy of the spokes' sides."""
+        far = 2 * math.hypot(*np.abs(region.center) + region.size)
+        angle = (np.arange(2 * self.spokes) + 0.5) * (math.pi / self.spokes)
+        ends = far * np.stack([np.cos(angle), np.sin(angle)])
+        length = float(region.lengths_inside(np.zeros_like(ends), ends).sum())
+        dark, bright = (MEAN * (1 + s * self.contrast) * float(level[0]) for s in (-1, 1))
+        height = float(counted_height(np.array(dark), np.array(bright), ceiling))
+        return EdgeEnergy(oblique=height * length / region.area)
 
     def _triangles(self, reach: float) -> polygons.Sides:
         """Return the bright spokes up to a distance [m]."""

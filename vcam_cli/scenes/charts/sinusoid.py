@@ -8,8 +8,12 @@ counterclockwise as seen, so that at 90 degrees it runs up a column.
 import math
 from dataclasses import dataclass
 
+import numpy as np
+
 from vcam_cli.scenes.base import Array, Chart
-from vcam_cli.scenes.waves import Wave, wave_averages, wave_values
+from vcam_cli.scenes.closed_form import Products
+from vcam_cli.scenes.edge_energy import EdgeEnergy, Region
+from vcam_cli.scenes.waves import Wave, wave_averages, wave_products, wave_values
 
 
 def waves(
@@ -54,6 +58,18 @@ class WaveChart(Chart):
     def paint(self, x_edges: Array, y_edges: Array, mix: Array, out: Array) -> None:
         """Write the exact averages over the cells into `out`."""
         out[:] = wave_averages(self.waves, x_edges, y_edges, mix)
+
+    def edge_energy(self, region: Region, level: Array, ceiling: float) -> EdgeEnergy:
+        """Return the energy that steps would have which change as much as the waves do."""
+        amplitudes = [abs(float(np.dot(w.weights, level))) for w in self.waves]
+        energies = (4 * w.frequency * a**2 for w, a in zip(self.waves, amplitudes, strict=True))
+        return EdgeEnergy(aligned=sum(energies))
+
+    separates = True
+
+    def products(self, x_edges: Array, y_edges: Array, mix: Array) -> Products:
+        """Return cosines and sines along both axes, which wave for wave make the light."""
+        return wave_products(self.waves, x_edges, y_edges, mix)
 
     def values(self, x: Array, y: Array, mix: Array) -> Array:
         """Return the values at points."""

@@ -12,6 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from vcam_cli.scenes.base import Array, Chart
+from vcam_cli.scenes.closed_form import Profile
+from vcam_cli.scenes.edge_energy import EdgeEnergy, Region, counted_height
 from vcam_cli.scenes.runs import expand_ranges
 
 MEAN = 0.5
@@ -38,7 +40,7 @@ class SlantedEdge(Chart):
         Exact: the bright half plane's area in every cell.
         """
         x, y = (x_edges[1:] + x_edges[:-1]) / 2, (y_edges[1:] + y_edges[:-1]) / 2
-        across, down = self.across_edge()
+        across, down = self._across
         widths = abs(across) * np.diff(x_edges), abs(down) * np.diff(y_edges)
         if across < 0.0:  # so that every row grows brighter from left to right
             x, widths, out = x[::-1], (widths[0][::-1], widths[1]), out[:, :, ::-1]
@@ -56,12 +58,28 @@ class SlantedEdge(Chart):
 
     def values(self, x: Array, y: Array, mix: Array) -> Array:
         """Return the values at points."""
-        across, down = self.across_edge()
+        across, down = self._across
         distance = np.add.outer(down * np.asarray(y), across * np.asarray(x))
         return self._mix_levels(np.heaviside(distance, 0.5), mix)
 
-    def across_edge(self) -> tuple[float, float]:
-        """Return the unit vector (x, y down) toward the bright side."""
+    def edge_energy(self, region: Region, level: Array, ceiling: float) -> EdgeEnergy:
+        """Return the energy of the edge, as if it lay along rows or columns."""
+        across, down = self._across
+        far = 2 * math.hypot(*np.abs(region.center) + region.size)
+        end = far * np.array([[-down], [across]])
+        length = float(region.lengths_inside(-end, end)[0])
+        dark, bright = (MEAN * (1 + s * self.contrast) * float(level[0]) for s in (-1, 1))
+        height = float(counted_height(np.array(dark), np.array(bright), ceiling))
+        return EdgeEnergy(aligned=height * length / region.area)
+
+    def profile(self) -> Profile:
+        """Return the two sides of the edge."""
+        sides = np.array([1 - self.contrast, 1 + self.contrast])
+        return Profile(self._across, np.zeros(1), MEAN * sides)
+
+    @property
+    def _across(self) -> tuple[float, float]:
+        """Unit vector (x, y down) toward the bright side."""
         return math.cos(self.angle), math.sin(self.angle)
 
     def _mix_levels(self, bright: Array, mix: Array) -> Array:

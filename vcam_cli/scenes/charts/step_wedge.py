@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vcam_cli.scenes.base import Array, Chart, Frame
+from vcam_cli.scenes.closed_form import Profile
 
 
 @dataclass(frozen=True)
@@ -32,6 +33,10 @@ class StepWedge(Chart):
     def edges(self) -> tuple[Array, Array]:
         """Return where bars start and stop, x and y [m]."""
         return self.borders, np.empty(0)
+
+    def profile(self) -> Profile:
+        """Return the bars as light between parallel edges."""
+        return Profile((1.0, 0.0), self.borders, self.levels)
 
     def values(self, x: Array, y: Array, mix: Array) -> Array:
         """Return the values at points."""

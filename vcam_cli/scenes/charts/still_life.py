@@ -10,8 +10,9 @@ import numpy as np
 
 from vcam_cli.scenes.base import Array, Chart
 from vcam_cli.scenes.cells import clip_cells
-from vcam_cli.scenes.charts.colorchecker import Card
+from vcam_cli.scenes.charts.colorchecker import Card, ColorChecker
 from vcam_cli.scenes.charts.dead_leaves import PIGMENTS, DeadLeaves, PlacedLeaves
+from vcam_cli.scenes.edge_energy import EdgeEnergy, Region
 from vcam_cli.spectra import colorchecker
 
 
@@ -28,6 +29,11 @@ class LeavesWithColorChecker(Chart):
     def darkest(self) -> float:
         """Least reflectance of leaves and card at any wavelength."""
         return min(self.leaves.darkest, self.card.darkest)
+
+    def edge_energy(self, region: Region, level: Array, ceiling: float) -> EdgeEnergy:
+        """Return the energy of leaves all over, and of the card on them."""
+        card = ColorChecker(self.card).edge_energy(region, level, ceiling)
+        return self.leaves.edge_energy(region, level[_patches_of_pigments()], ceiling) + card
 
     def crop_to_cells(self, x_edges: Array, y_edges: Array) -> "LeavesWithColorChecker":
         """Return the chart with only those leaves that may be seen beside the card."""

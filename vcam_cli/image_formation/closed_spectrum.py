@@ -1,0 +1,293 @@
+"""The cosine spectrum of charts in closed form: even rectangles, discs on them, sums of products.
+
+They are never sampled in two dimensions. Few numbers along each axis make all coefficients.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+import scipy.fft
+from numpy.typing import NDArray
+
+from vcam_cli.image_formation.cosine_series import Axis
+from vcam_cli.image_formation.scene_spectrum import Index, SceneSpectrum, pairs
+from vcam_cli.parallel import product
+from vcam_cli.scenes.base import ChartScene
+from vcam_cli.scenes.cells import cell_edges
+from vcam_cli.scenes.closed_form import LightDisc, Rectangles
+
+FINER = 32
+"""Cells along an axis over the terms that are used, on which functions of one variable are
+averaged: what they fold is at most 2e-4 of an edge's own terms, and they cost nothing."""
+
+
+def closed_spectrum(
+    scene: ChartScene, mix: NDArray, axes: Sequence[Axis], dtype: type
+) -> SceneSpectrum:
+    """Return the first terms of the spectrum of a chart that is not painted.
+
+    Frequencies that cells of a grid would fold are not in it.
+
+    Parameters
+    ----------
+    scene : ChartScene
+        The chart, on the cells that scale the coefficients.
+    mix : NDArray
+        Mixtures (R, K) of its components.
+    axes : sequence of Axis
+        Axes along y and x, whose terms are computed.
+    dtype : type
+        Floating-point type.
+
+    Returns
+    -------
+    SceneSpectrum
+        Coefficients, unnormalized.
+    """
+    if scene.chart.separates:
+        return product_spectrum(scene, mix, axes, dtype)
+    rectangles = scene.rectangles(mix)
+    assert rectangles is not None
+    discs = scene.chart.discs(np.asarray(mix, float))
+    if not discs:
+        return rectangle_spectrum(rectangles, scene.shape, axes, dtype)
+    even = rectangle_spectrum(rectangles, scene.shape, axes, np.float64)
+    waves = tuple(disc_waves(disc, scene, axes) for disc in discs)
+    return DiscSpectrum(even, waves, np.dtype(dtype))
+
+
+def product_spectrum(
+    scene: ChartScene, mix: NDArray, axes: Sequence[Axis], dtype: type
+) -> ProductSpectrum:
+    """Return the spectrum of a sum of products, each factor transformed by itself.
+
+    Parameters are those of `closed_spectrum`.
+    """
+    counts = [FINER * max(axis.terms, 64) for axis in axes]
+    y, x = (
+        cell_edges(count, size / count)
+        for count, size in zip(counts, scene.extent[::-1], strict=True)
+    )
+    found = scene.chart.products(x + scene.center[0], y + scene.center[1], mix)
+    along_y = _scaled_terms(found.down.T, axes[0]).T
+    along_x = _scaled_terms(found.along, axes[1])
+    return ProductSpectrum(along_y.astype(dtype), along_x.astype(dtype))
+
+
+def _scaled_terms(values: NDArray, axis: Axis) -> NDArray:
+    """Return the terms (..., terms) of means over fine cells as if over those of an axis.
+
+    A mean over N cells multiplies the term k by sinc(k / 2N), and a DCT-II counts it 2N times.
+    """
+    k, fine = np.arange(axis.terms), values.shape[-1]
+    scale = axis.samples / fine * np.sinc(k / (2 * axis.samples)) / np.sinc(k / (2 * fine))
+    return np.asarray(scipy.fft.dct(values, type=2)[..., : axis.terms] * scale)
+
+
+@dataclass(frozen=True, eq=False)
+class DiscWaves:
+    """The spectrum of a disc: a function of |f|, times one function of y and one of x.
+
+    Its integral times two cosines is theirs at its center, times pi r^2 2 J1(z) / z with z = 2 pi r
+    |f|.
+    """
+
+    height: NDArray
+    """(R,) its light."""
+    down: NDArray
+    """(ny,) what multiplies the terms along y."""
+    along: NDArray
+    """(nx,) what multiplies the terms along x."""
+    z_down: NDArray
+    """(ny,) 2 pi r f along y, rising."""
+    z_along: NDArray
+    """(nx,) 2 pi r f along x, rising."""
+    shape: NDArray
+    """2 J1(z) / z at z = 0, `STEP`, 2 `STEP` ..."""
+
+    def terms(self, y: Index, x: Index) -> NDArray:
+        """Return the terms (len(y), len(x)) of these indices, of a disc of height 1."""
+        place = np.hypot(self.z_down[y][:, None], self.z_along[x]) * (1 / STEP)
+        index = place.astype(np.intp)
+        place -= index
+        found = self.shape.take(index + 1) - self.shape.take(index)
+        found *= place
+        found += self.shape.take(index)
+        found *= self.along[x]
+        found *= self.down[y][:, None]
+        return found
+
+    def power(self, y: NDArray, x: NDArray) -> NDArray:
+        """Return the sums of squared terms over blocks between edges, at most.
+
+        J1^2 is at most J1^2 + Y1^2, and half of it in the mean where a block holds a whole wave.
+        """
+        from scipy.special import j1, y1
+
+        low = np.hypot(self.z_down[y[:-1]][:, None], self.z_along[x[:-1]])
+        high = np.hypot(self.z_down[y[1:] - 1][:, None], self.z_along[x[1:] - 1])
+        z = np.maximum(low, 1.0)
+        squares = np.minimum(4 * (j1(z) ** 2 + y1(z) ** 2) / z**2, 1.0)
+        squares[high - low > np.pi] /= 2
+        sums = (np.add.reduceat(np.square(w[: e[-1]]), e[:-1]) for w, e in
+                ((self.down, y), (self.along, x)))  # fmt: skip
+        return squares * np.outer(*sums)
+
+
+STEP = 0.01
+"""Step of the table of 2 J1(z) / z: straight lines between its entries err by 1e-5 of its waves."""
+
+
+@dataclass(frozen=True, eq=False)
+class DiscSpectrum:
+    """The spectrum of even rectangles and of discs on them, as far as it is used."""
+
+    even: ProductSpectrum
+    discs: tuple[DiscWaves, ...]
+    dtype: np.dtype
+
+    def __len__(self) -> int:
+        return len(self.even)
+
+    def rows(self, plane: int, index: Index, count: int | None = None) -> NDArray:
+        """Return rows of a plane's coefficients: (n, count)."""
+        light = self.even.rows(plane, index, count)
+        for disc in self.discs:
+            light += disc.height[plane] * disc.terms(index, slice(count))
+        return light.astype(self.dtype)
+
+    def products(self, y: NDArray, x: NDArray, workers: int) -> NDArray:
+        """Return sums of products over blocks of terms, at most: as if all were in phase."""
+        every = self.even.products(y, x, workers)
+        of_discs = [disc.power(y, x) for disc in self.discs]
+        own = {}
+        for number, (r, s) in enumerate(pairs(len(self))):
+            if r == s:
+                amplitude = np.sqrt(np.maximum(every[number], 0))
+                for disc, power in zip(self.discs, of_discs, strict=True):
+                    amplitude = amplitude + abs(disc.height[r]) * np.sqrt(power)
+                own[r] = amplitude
+        return np.array([own[r] * own[s] for r, s in pairs(len(self))])
+
+
+def disc_waves(disc: LightDisc, scene: ChartScene, axes: Sequence[Axis]) -> DiscWaves:
+    """Return the spectrum of a disc on a scene's area, for axes along y and x."""
+    from scipy.special import j1
+
+    width, height = scene.extent
+    places = disc.y - scene.center[1] + height / 2, disc.x - scene.center[0] + width / 2
+    waves, phases = [], []
+    for axis, place in zip(axes, places, strict=True):
+        f = axis.frequencies
+        scale = 2 / axis.sample_pitch * np.sinc(f * axis.sample_pitch)
+        waves.append(scale * np.cos(2 * np.pi * f * place))
+        phases.append(2 * np.pi * disc.radius * f)
+    z = STEP * np.arange(math.ceil(math.hypot(phases[0][-1], phases[1][-1]) / STEP) + 2)
+    shape = np.divide(2 * j1(z), z, out=np.ones_like(z), where=z > 0)
+    area = np.pi * disc.radius**2
+    return DiscWaves(disc.height, area * waves[0], waves[1], phases[0], phases[1], shape)
+
+
+@dataclass(frozen=True, eq=False)
+class ProductSpectrum:
+    """A spectrum as a sum of products of functions of both axes, as far as it is used."""
+
+    along_y: NDArray
+    """(ny, d) coefficients along y of d functions."""
+    along_x: NDArray
+    """(R, d, nx) coefficients along x of what multiplies each."""
+
+    @property
+    def dtype(self) -> np.dtype:
+        """Floating-point type of the coefficients."""
+        return self.along_x.dtype
+
+    def __len__(self) -> int:
+        return len(self.along_x)
+
+    def rows(self, plane: int, index: Index, count: int | None = None) -> NDArray:
+        """Return rows of a plane's coefficients: (n, count)."""
+        return product(self.along_y[index], self.along_x[plane, :, :count])
+
+    def products(self, y: NDArray, x: NDArray, workers: int) -> NDArray:
+        """Return sums of products of two planes' coefficients over blocks of terms."""
+        planes, runs, columns = self.along_x.shape
+        below = self.along_y.astype(np.float64)
+        in_rows = np.array([below[s].T @ below[s] for s in _blocks(y)]).reshape(-1, runs**2)
+        out = []
+        for plane in range(planes):
+            others = self.along_x[plane:].reshape(-1, columns).astype(np.float64)
+            in_columns = np.array([others[:runs, s] @ others[:, s].T for s in _blocks(x)])
+            for other in np.split(in_columns, planes - plane, axis=2):
+                out.append(product(in_rows, other.reshape(-1, runs**2).T))
+        return np.array(out)
+
+
+def _blocks(edges: NDArray) -> list[slice]:
+    return [slice(*ends) for ends in pairwise(edges)]
+
+
+def rectangle_spectrum(
+    rectangles: Rectangles, cells: tuple[int, int], axes: Sequence[Axis], dtype: type
+) -> ProductSpectrum:
+    """Return the first terms of the spectrum of a chart of even rectangles, in closed form.
+
+    Frequencies that cells of a grid would fold are not in it.
+
+    Parameters
+    ----------
+    rectangles : Rectangles
+        The chart.
+    cells : tuple of int
+        Cells (ny, nx) of the grid that scales the coefficients.
+    axes : sequence of Axis
+        Axes along y and x, whose terms are computed.
+    dtype : type
+        Floating-point type.
+
+    Returns
+    -------
+    ProductSpectrum
+        Coefficients, unnormalized.
+    """
+    along_y = terms_of_runs(rectangles.y, cells[0], axes[0].terms)
+    along_x = terms_of_runs(rectangles.x, cells[1], axes[1].terms)
+    values = rectangles.values.reshape(-1, along_x.shape[1])  # one product: NumPy's of each is slow
+    in_rows = product(values, along_x.T).reshape(*rectangles.values.shape[:2], -1)
+    return ProductSpectrum(along_y.astype(dtype), in_rows.astype(dtype))
+
+
+def terms_of_runs(edges: NDArray, cells: int, terms: int) -> NDArray:
+    """Return the first terms of the DCT-II of light that is 1 from edge to edge.
+
+    With the edges as parts b of the way between the borders, the cosine series of a run has the
+    terms (sin(pi k b') - sin(pi k b)) / pi k; means over N cells multiply them by sinc(k / 2N), and
+    a DCT-II counts them 2N times.
+
+    Parameters
+    ----------
+    edges : NDArray
+        Edges (runs + 1,) from border to border [m].
+    cells : int
+        Number of cells N.
+    terms : int
+        Number of terms.
+
+    Returns
+    -------
+    NDArray
+        Coefficients (terms, runs).
+    """
+    parts = (edges - edges[0]) / (edges[-1] - edges[0])
+    k = np.arange(1, terms)
+    sines = np.sin(np.pi * (np.outer(k, parts) % 2))
+    out = np.empty((terms, len(parts) - 1))
+    out[0] = 2 * cells * np.diff(parts)
+    scale = 2 * cells * np.sinc(k / (2 * cells)) / (np.pi * k)
+    out[1:] = np.diff(sines, axis=1) * scale[:, None]
+    return out

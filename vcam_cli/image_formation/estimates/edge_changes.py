@@ -1,0 +1,217 @@
+"""What a blur changes of straight edges at the pixels themselves, summed exactly.
+
+Bounds over all places (`scenes.blur_change`) do not know where edges lie to the pixels. An edge
+within a photodetector changes nothing of its mean, one at its border all. Behind the average over
+the photodetector a blur H takes from an edge of height 1 at u = 0
+
+    e(u) = (1 - h) (B(u) - 1/2) - integral_0^F Im[(H(f) - h) A(f) exp(2 pi i f u)] / (pi f) df,
+
+B the part of the photodetector beyond the edge, A its transfer, h = H(F) what is left of H at the
+end of the integral.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import TypeGuard
+
+import numpy as np
+import scipy.fft
+from numpy.typing import NDArray
+
+from vcam_cli.camera.derived.geometry import pixel_centers
+from vcam_cli.effects.base import Blur
+from vcam_cli.image_formation.optical_path import OpticalPath
+from vcam_cli.scenes.base import ChartScene, Scene
+from vcam_cli.scenes.charts.slanted_edge import half_plane_cover
+
+END = 16.0
+"""Frequency at which the integral ends, at most [cycles per pixel pitch]."""
+AROUND = 8.0
+"""Distance from an edge within which pixels count [pixel pitches, and spreads of the blur]: light
+further away is less than a hundredth of what changes."""
+
+
+FINER = 16
+"""Places of a table over the frequencies that make it: straight lines err by a hundredth of the
+highest one's wave."""
+
+
+@dataclass(frozen=True)
+class EdgeGroup:
+    """Parallel edges, and the pixels beside them."""
+
+    across: tuple[float, float]
+    """Unit vector (x, y) across them."""
+    heights: NDArray
+    """(K, strips, n) steps of the components."""
+    distances: NDArray
+    """(n, m) of some pixels from each edge [m]."""
+    pixels: NDArray
+    """(n, m) numbers of these pixels in a strip."""
+    counts: NDArray
+    """(strips,) how many pixels each stands for."""
+
+
+def has_straight_edges(scene: Scene) -> TypeGuard[ChartScene]:
+    """Return whether a scene is even light between straight edges and nothing else."""
+    if not isinstance(scene, ChartScene):
+        return False
+    if scene.chart.profile() is not None:
+        return True
+    none = np.zeros((1, len(scene.spectra)))
+    return scene.rectangles(none) is not None and not scene.chart.discs(none)
+
+
+def exact_changes(path: OpticalPath, scene: ChartScene, blurs: Sequence[Blur]) -> dict[Blur, float]:
+    """Return the rms change of the array by each of some blurs, as if it were the only one.
+
+    Corners count as if their edges went on.
+
+    Parameters
+    ----------
+    path : OpticalPath
+        Lens and pixels.
+    scene : ChartScene
+        Chart of even light between straight edges.
+    blurs : sequence of Blur
+        The blurs.
+
+    Returns
+    -------
+    dict
+        Blur -> rms change in the color of most [e/s]; those whose transfer along one direction is
+        not known by itself are missing.
+    """
+    found: dict[Blur, float] = {}
+    pixels = path.geometry.rows * path.geometry.columns
+    for blur in blurs:
+        spread = float(blur.spread(path.transfer.wavelengths).max())
+        squares = np.zeros(len(path.mosaic.colors))
+        for group in _groups(path, scene, spread):
+            own = _group_squares(path, group, blur)
+            if own is None:
+                break
+            squares += own
+        else:
+            found[blur] = math.sqrt(float(squares.max()) / pixels)
+    return found
+
+
+def _groups(path: OpticalPath, scene: ChartScene, spread: float) -> Iterator[EdgeGroup]:
+    """Yield the edges of a chart that has a profile, or of even rectangles along x and y."""
+    g = path.geometry
+    x, y = pixel_centers(g, detector=True)
+    profile = scene.chart.profile()
+    if profile is not None:
+        heights = np.diff(profile.levels)[None, None]
+        yield _along_profile(path, profile.across, profile.places, heights, spread)
+        return
+    rectangles = scene.rectangles(np.eye(len(scene.spectra)))
+    assert rectangles is not None
+    for axis, (edges, others, at, lines) in enumerate(
+        ((rectangles.x, rectangles.y, x, y), (rectangles.y, rectangles.x, y, x))
+    ):
+        values = rectangles.values if axis == 0 else np.swapaxes(rectangles.values, 1, 2)
+        counts = np.diff(np.searchsorted(lines, others))
+        some = counts > 0
+        yield EdgeGroup(
+            (1.0, 0.0) if axis == 0 else (0.0, 1.0),
+            np.diff(values[:, some], axis=2),
+            *_near(at, edges[1:-1], _reach(path, spread)),
+            counts[some],
+        )
+
+
+def _reach(path: OpticalPath, spread: float) -> float:
+    return AROUND * max(path.geometry.pitch_x, path.geometry.pitch_y, spread)
+
+
+def _near(at: NDArray, places: NDArray, reach: float) -> tuple[NDArray, NDArray]:
+    """Return the distances (n, m) of pixels at places from edges, and their numbers.
+
+    Of pixels beyond the array the distance is inf.
+    """
+    pitch = at[1] - at[0] if len(at) > 1 else reach
+    window = np.arange(-math.ceil(reach / pitch), math.ceil(reach / pitch) + 1)
+    index = np.rint((places - at[0]) / pitch).astype(int)[:, None] + window
+    inside = (index >= 0) & (index < len(at))
+    index = np.clip(index, 0, len(at) - 1)
+    return np.where(inside, at[index] - places[:, None], math.inf), index
+
+
+def _along_profile(
+    path: OpticalPath,
+    across: tuple[float, float],
+    places: NDArray,
+    heights: NDArray,
+    spread: float,
+) -> EdgeGroup:
+    """Return edges that are seen by all rows of pixels, or all columns, each in another place."""
+    x, y = pixel_centers(path.geometry, detector=True)
+    steep = abs(across[0]) >= abs(across[1])
+    at, lines = (x, y) if steep else (y, x)
+    over, beside = across if steep else across[::-1]
+    # Where an edge crosses a line, and from there along the line.
+    crossed = (places[:, None] - beside * lines) / over
+    reach = _reach(path, spread) / abs(over)
+    distances, index = _near(at, crossed.ravel(), reach)
+    shape = len(places), -1
+    number = index + len(at) * np.tile(np.arange(len(lines)), len(places))[:, None]
+    return EdgeGroup(
+        across, heights, (over * distances).reshape(shape), number.reshape(shape), np.ones(1, int)
+    )
+
+
+def _group_squares(path: OpticalPath, group: EdgeGroup, blur: Blur) -> NDArray | None:
+    """Return the sums (C,) over pixels of the squared change by a blur [(e/s)^2]."""
+    g, weights = path.geometry, path.transfer.weights
+    reach = float(np.abs(group.distances[np.isfinite(group.distances)]).max(initial=0.0))
+    if not reach:
+        return np.zeros(weights.shape[1])
+    top = END / min(g.pitch_x, g.pitch_y)
+    count = math.ceil(4 * reach * top) + 1
+    f = (np.arange(count) + 0.5) * (top / count)
+    widths = np.abs([g.collecting_width, g.collecting_height]) * np.abs(group.across)
+    aperture = np.sinc(f * widths[0]) * np.sinc(f * widths[1])
+    otf = [blur.otf_along(f, group.across, float(w)) for w in path.transfer.wavelengths]
+    if any(row is None for row in otf):
+        return None
+    transfer = np.array(otf)
+    left = np.real(transfer[:, -1:])
+    distance = np.where(np.isfinite(group.distances), group.distances, 0.0)
+    mix = np.eye(weights.shape[2])
+    if len(weights) == 1:  # of one component all wavelengths are seen together
+        mix, weights = weights[0], np.eye(weights.shape[1])[None]
+    parts = mix @ ((transfer - left) * aperture / (np.pi * f))
+    waves = _waves(parts, f, distance.ravel()).reshape(-1, *distance.shape)
+    box = half_plane_cover(distance, widths[:1], widths[1:]) - 0.5
+    taken = np.multiply.outer(mix @ (1 - left[:, 0]), box) - waves  # (J, n, m)
+    taken[:, ~np.isfinite(group.distances)] = 0
+    steps = np.tensordot(weights, group.heights, axes=(0, 0))  # (C, J, strips, n)
+    change = np.einsum("cjsn,jnm->csnm", steps, taken, optimize=True)
+    size = int(group.pixels.max()) + 1
+    squares = np.zeros(len(change))
+    for color, strips in enumerate(change):
+        for strip, count in zip(strips, group.counts, strict=True):
+            at_pixels = np.bincount(group.pixels.ravel(), strip.ravel(), size)
+            squares[color] += count * float(np.square(at_pixels).sum())
+    return squares
+
+
+def _waves(parts: NDArray, f: NDArray, places: NDArray) -> NDArray:
+    """Return the integrals (J, n) of Im[parts exp(2 pi i f u)] over f at places u (n,) [m].
+
+    `parts` are (J, k) at the midpoints f of k equal steps. A transform gives the integrals at
+    places close together, straight lines between them all others.
+    """
+    step, count = 2 * f[0], scipy.fft.next_fast_len(FINER * len(f))
+    number = np.arange(count) - count // 2
+    spectrum = np.zeros((len(parts), count), complex)
+    spectrum[:, : len(f)] = parts * step
+    sums = np.fft.fftshift(scipy.fft.ifft(spectrum, axis=1) * count, axes=1)
+    table = np.imag(sums * np.exp(1j * np.pi * number / count))
+    at = number / (count * step)
+    return np.array([np.interp(places, at, line) for line in table])

@@ -1,0 +1,118 @@
+"""How much edge a chart has: what the errors of the cells on which it is painted follow from.
+
+An edge of height A and length L has the energy A^2 L / (2 pi f)^2 at the frequency f across it.
+Edges along rows and columns lie alike to the cells of a grid; others, of all directions alike, do
+not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[Any]
+
+RINGING = 0.1
+"""Part of an edge's height by which light beside it may err: edges between two lights that both
+fill pixels count as far as that may leave one of them not full."""
+
+
+@dataclass(frozen=True)
+class Region:
+    """A rectangle of the sensor plane."""
+
+    center: tuple[float, float]
+    """x and y from the array's center [m]."""
+    size: tuple[float, float]
+    """Width and height [m]."""
+
+    @property
+    def area(self) -> float:
+        """Area [m2]."""
+        return self.size[0] * self.size[1]
+
+    def moved(self, x: float, y: float) -> Region:
+        """Return the region as it is seen from a place (x, y) [m]."""
+        return Region((self.center[0] - x, self.center[1] - y), self.size)
+
+    def lengths_inside(self, start: Array, stop: Array) -> Array:
+        """Return the lengths (n,) of straight lines from (2, n) to (2, n) within it [m]."""
+        along = stop - start
+        low, high = np.zeros(start.shape[1]), np.ones(start.shape[1])
+        for axis in (0, 1):
+            half = self.size[axis] / 2
+            ends = (np.array([[-half], [half]]) + self.center[axis] - start[axis]) / np.where(
+                along[axis] == 0, 1e-300, along[axis]
+            )
+            low = np.maximum(low, ends.min(axis=0))
+            high = np.minimum(high, ends.max(axis=0))
+        return np.hypot(*along) * np.maximum(high - low, 0.0)
+
+
+@dataclass(frozen=True)
+class EdgeEnergy:
+    """Sums of A^2 L over the edges in a region, over its area."""
+
+    aligned: float = 0.0
+    """Of edges along rows and columns [square of the light's unit / m]."""
+    oblique: float = 0.0
+    """Of edges of other directions, likewise."""
+
+    def __add__(self, other: EdgeEnergy) -> EdgeEnergy:
+        """Return the energy of both."""
+        return EdgeEnergy(self.aligned + other.aligned, self.oblique + other.oblique)
+
+    def scaled(self, factor: float) -> EdgeEnergy:
+        """Return it times a factor."""
+        return EdgeEnergy(self.aligned * factor, self.oblique * factor)
+
+
+def counted_height(first: Array, second: Array, ceiling: float) -> Array:
+    """Return the squared heights of edges between two lights, 0 where both fill pixels.
+
+    Parameters
+    ----------
+    first, second : Array
+        Lights on both sides, of shapes that broadcast, in the unit of the ceiling.
+    ceiling : float
+        Light that fills a pixel.
+    """
+    height = np.abs(first - second)
+    counts = np.minimum(first, second) < ceiling + RINGING * height
+    return np.where(counts, np.square(height), 0.0)
+
+
+def rectangle_energy(
+    x: Array, y: Array, light: Array, region: Region, ceiling: float
+) -> EdgeEnergy:
+    """Return the energy of even rectangles in rows and columns.
+
+    Parameters
+    ----------
+    x, y : Array
+        Edges (e + 1,) and (d + 1,), rising, between which the light is even [m].
+    light : Array
+        Light (d, e) of each.
+    region : Region
+        Where edges count.
+    ceiling : float
+        Light that fills a pixel.
+    """
+    total = 0.0
+    for axis, (across, along) in enumerate(((x, y), (y, x))):
+        low, high = (region.center[1 - axis] + side * region.size[1 - axis] / 2 for side in (-1, 1))
+        lengths = np.diff(np.clip(along, low, high))
+        inside = np.abs(across[1:-1] - region.center[axis]) < region.size[axis] / 2
+        rows = light if axis == 0 else light.T
+        squares = counted_height(rows[:, 1:], rows[:, :-1], ceiling)[:, inside]
+        total += float((lengths @ squares).sum())
+    return EdgeEnergy(aligned=total / region.area)
+
+
+def total_energy(parts: Iterable[EdgeEnergy]) -> EdgeEnergy:
+    """Return the energy of several parts together."""
+    return sum(parts, EdgeEnergy())
