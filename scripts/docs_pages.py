@@ -108,7 +108,7 @@ def _effects() -> tuple[str, dict[str, bytes]]:
     lines = [
         "# Effects and their equations\n",
         "In the order in which they act on the light. Numbers of equations without another source",
-        "are those of Chen's thesis. `vcam plan CAMERA` says which of them a scene calls for.\n",
+        "are those of Chen's thesis. `vcam plan CAMERA` says which of them a scene needs.\n",
         "Each has two photographs, without it at the left and with it at the right, by a shipped",
         "camera that was changed until the effect is large: most cameras have less of it.\n",
     ]
