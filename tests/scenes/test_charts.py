@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from support import brute, scene, view
 
-from vcam_cli.camera.scene.sources import CHARTS
 from vcam_cli.scenes.base import ChartScene, Frame, HarmonicScene
 from vcam_cli.scenes.build import build
 from vcam_cli.scenes.cells import cell_edges
@@ -514,45 +513,3 @@ class TestColorsOfTheContrastChart:
         # Contrast 1, phases 0 and pi: all of the first color, then all of the second.
         np.testing.assert_allclose(of_each[:, 0], [[1, 0], [0, 1]], atol=1e-9)
         np.testing.assert_allclose(chart.values(x, -y, np.eye(2)), 0.5)
-
-
-EVERY = [*SMOOTH, EDGE, CHECKER, LEAVES, BOTH, *SHARP, DARK]
-"""Every kind of chart, as `test_every_kind_of_chart_is_among_them` holds."""
-
-
-def test_every_kind_of_chart_is_among_them():
-    assert {source["chart"] for source in EVERY} == set(CHARTS)
-
-
-@pytest.mark.parametrize("width", [None, 33e-6, 150e-6])
-@pytest.mark.parametrize("source", EVERY)
-def test_mean_and_rms_are_those_of_fine_cells(source, width):
-    """From points, within a tenth: what is told by them is factors apart.
-
-    The cells are painted as exact averages. A frame of 33 um leaves black around the chart, one of
-    150 um shows the middle of it.
-    """
-    if source in (WAVE, FLAT, DARK) and width != 33e-6:
-        pytest.skip("known in closed form: no samples, and no statistics of them")
-    seen = view(rows=12, columns=16)
-    chart = sampled(source, margin=1, oversampling=20, scene_width=width)
-    mix = mix_of(chart)
-    planes = chart.planes(mix)
-    inside = planes[:, 20:-20, 20:-20]
-    mean, rms = chart.mean_and_rms(mix, (seen.width, seen.height))
-    np.testing.assert_allclose(mean, inside.mean(axis=(1, 2)), rtol=0.1)
-    np.testing.assert_allclose(rms, np.sqrt(np.square(planes).mean(axis=(1, 2))), rtol=0.1)
-
-
-def test_the_rms_is_that_of_the_margin_too():
-    """Light on a part of the sensor and black around it: 11 of 16 pixels, or of 40."""
-    bare, padded = (sampled(FLAT, scene_width=33e-6, margin=m) for m in (0, 12))
-    (mean, rms), (same, less) = (
-        chart.mean_and_rms(np.ones((1, 1)), (48e-6, 36e-6)) for chart in (bare, padded)
-    )
-    part = 11 / 16
-    # points at the border are inside or outside by chance: of 96 along each axis, at most two
-    assert mean == pytest.approx(0.4 * part**2, rel=0.05)
-    assert same == mean
-    assert rms == pytest.approx(0.4 * part, rel=0.05)
-    assert less == pytest.approx(0.4 * math.sqrt(11 * 8.25 / (40 * 36)), rel=0.05)

@@ -190,26 +190,6 @@ class TestRefuses:
         assert text.startswith("scene.luminance: the file holds reflectances")
 
 
-@pytest.mark.parametrize("width", [None, 33e-6, 150e-6])
-def test_mean_and_rms_are_those_of_the_samples(width):
-    """The mean over what the array sees; an rms of all bands is no less than that of a mixture."""
-    cube = np.random.default_rng(8).uniform(0.1, 1.0, (90, 120, 5)).astype(np.float32)
-    cube[:, :60, 2] *= 0.2
-    seen = view(rows=9, columns=12, scene_width=width)
-    shown = on_sensor(cube, quantity="reflectance", seen=seen)
-    mix = np.random.default_rng(5).random((2, 5))
-    mean, rms = shown.mean_and_rms(mix, (seen.width, seen.height))
-    y, x = (
-        (np.arange(700) + 0.5) / 700 * length - length / 2 for length in (seen.height, seen.width)
-    )
-    light = shown.values_at(x, y, mix)
-    # samples that the array's border cuts count as a whole: some 110 of 21 x 28, of 0.3 rms each
-    np.testing.assert_allclose(mean, light.mean(axis=(1, 2)), rtol=0.02)
-    exact = np.sqrt(np.square(shown.planes(mix)).mean(axis=(1, 2)))
-    assert (rms >= exact * (1 - 1e-6)).all()
-    assert (rms <= 3 * exact).all()
-
-
 @pytest.mark.parametrize("width", [None, 33e-6])
 def test_few_points_have_the_values_of_many(width):
     """Whether the bands of some points are read, or the whole cube: the sample under the point."""

@@ -268,31 +268,3 @@ def test_mallett_reflectances_reflect_at_most_all():
     for basis in srgb_reflectances():
         assert basis.tables[0].value.min() >= 0
         assert basis.tables[0].value.max() <= 1
-
-
-@pytest.mark.parametrize("width", [None, 33e-6, 150e-6])
-@pytest.mark.parametrize("channels", [1, 3])
-def test_mean_and_rms_are_those_of_the_samples(channels, width):
-    """The mean over what the array sees; the rms is no less than that of the planes.
-
-    Of several channels it is larger by the cosine between their values and their weights, below 3.
-    """
-    given_picture = picture(70, 90, channels)
-    given_picture[:, :, -1] *= 0.3
-    seen = view(rows=24, columns=32, scene_width=width)
-    shown = image_scene(given_picture, (WHITE,) * channels, WHITE, seen)
-    mix = np.random.default_rng(3).random((2, channels))
-    planes = shown.planes(mix)
-    mean, rms = shown.mean_and_rms(mix, (seen.width, seen.height))
-    exact = np.sqrt(np.square(planes).mean(axis=(1, 2)))
-    assert (rms >= exact * (1 - 1e-6)).all()
-    assert (rms <= exact * (1 + 1e-6 if channels == 1 else 3.0)).all()
-    # a sample at the border is inside or outside as a whole
-    down, across = (
-        max(0, round((n * pitch - length) / 2 / pitch))
-        for n, pitch, length in zip(
-            shown.shape, (shown.pitch_y, shown.pitch_x), (seen.height, seen.width), strict=True
-        )
-    )
-    inside = planes[:, down : planes.shape[1] - down, across : planes.shape[2] - across]
-    np.testing.assert_allclose(mean, inside.mean(axis=(1, 2)), rtol=0.02)

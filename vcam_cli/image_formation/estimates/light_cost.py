@@ -72,6 +72,8 @@ SHIFTED = 4
 """Cost of pixels that share no grid with the scene over that of others."""
 ENTRIES_OF_PLANE = 41
 """Entries along an axis of a table over fx and fy, at least."""
+WAVES = WaveScene | HarmonicScene
+"""Scenes of few waves, whose frequencies are known."""
 
 
 def image_seconds(geometry: Geometry, colors: int, report: SpectrumReport) -> float:
@@ -154,7 +156,8 @@ def light_seconds(path: OpticalPath, scene: AnyScene, effects: Sequence[Effect])
     """
     g = path.geometry
     gains = sum(e.seconds_per_pixel for e in effects) * g.rows * g.columns
-    blurs = of_kind(effects, Blur, FieldTransfer)
+    # Waves need their transfer at their own frequencies alone, no table of it.
+    blurs = () if isinstance(scene, WAVES) else of_kind(effects, Blur, FieldTransfer)
     otfs = OTF * ENTRIES * len(path.transfer.wavelengths) * len(blurs)
     report = expected_report(path, scene, effects)
     return gains + otfs + image_seconds(g, len(path.mosaic.colors), report)
@@ -173,7 +176,7 @@ def expected_report(
     blurs = of_kind(effects, Blur, SeparableTransfer, FieldTransfer, ImageMotion)
     blurs = tuple(blur for blur in blurs if blur not in of_kind(blurs, PixelAperture))
     field, moving = of_kind(blurs, FieldTransfer), of_kind(blurs, ImageMotion)
-    if isinstance(scene, WaveScene | HarmonicScene):
+    if isinstance(scene, WAVES):
         return SpectrumReport()
     pixels = path.geometry.rows * path.geometry.columns
     samples = 0 if isinstance(scene, ChartScene) else math.prod(getattr(scene, "shape", (0,)))
