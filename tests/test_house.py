@@ -11,7 +11,6 @@ import re
 import subprocess
 import sys
 import tokenize
-from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -51,10 +50,6 @@ FLOORS = (
 FLOOR = {room: number for number, rooms in enumerate(FLOORS) for room in rooms}
 FLOOR[""] = len(FLOORS)  # vcam_cli/__init__.py, the face of it all
 HEAVY = ("colour", "matplotlib", "scipy.signal", "scipy.optimize", "scipy.interpolate")
-LONGEST = 400
-"""Lines of a module."""
-FULLEST = 25
-"""Modules of a folder; what outgrows it is two things."""
 UNFINISHED = ("TODO", "FIXME", "XXX", "HACK", "NotImplementedError")
 WRITERS = {
     "write_text", "write_bytes", "touch", "tofile", "savetxt", "savez", "savez_compressed",
@@ -189,11 +184,6 @@ def _opens_to_write(call: ast.Call, whole: str) -> bool:
     return any(not isinstance(m, ast.Constant) or set(str(m.value)) & set("wax+") for m in given)
 
 
-def too_long(module: Module) -> list[str]:
-    lines = len(module.text.splitlines())
-    return [f"{module.name}: {lines} lines"] if lines > LONGEST else []
-
-
 def undocumented(module: Module) -> list[str]:
     """Modules, public classes and public functions without a docstring.
 
@@ -267,7 +257,7 @@ def asks_for_an_effects_kind(module: Module) -> list[str]:
 
 
 RULES = (
-    climbs, image_library, heavy, writes, too_long, undocumented, unfinished, names_a_camera,
+    climbs, image_library, heavy, writes, undocumented, unfinished, names_a_camera,
     asks_for_an_effects_kind,
 )  # fmt: skip
 
@@ -300,7 +290,6 @@ BROKEN = [
     (writes, "sweeps.x", "import numpy as np\nnp.save('a', b)\n"),
     (writes, "sweeps.x", "array.tofile('a')\n"),
     (writes, "sweeps.x", "from shutil import rmtree\n"),
-    (too_long, "x", "a = 1\n" * (LONGEST + 1)),
     (undocumented, "x", "a = 1\n"),
     (undocumented, "x", "'''Module.'''\ndef public():\n    pass\n"),
     (undocumented, "x", "'''Module.'''\nclass Public:\n    pass\n"),
@@ -364,17 +353,6 @@ def test_no_rule_forbids_too_much(rule, name, text):
 def test_every_room_has_a_floor():
     rooms = {m.room for m in MODULES} - {"", "data"}
     assert rooms <= set(FLOOR)
-
-
-def full_folders(modules: list[Module]) -> list[str]:
-    """Rooms and folders in them that hold more modules and folders than one looks over."""
-    counts = Counter(m.name.rpartition(".")[0] for m in modules if "." in m.name)
-    return [f"{name}: {count} modules" for name, count in counts.items() if count > FULLEST]
-
-
-def test_no_folder_is_too_full():
-    assert full_folders(MODULES) == []
-    assert full_folders([Module(f"physics.lens{i}", "") for i in range(FULLEST + 1)])
 
 
 def test_configs_and_tests_are_no_part_of_the_sources():

@@ -14,8 +14,8 @@ STUDY = """kind: sweep
 camera: starter
 vary: {exposure.time: {values: [5 ms, 1 ms]}, exposure.gain: {values: [1, 4]}}
 cases:
-  day: {array.rows: 16, array.columns: 18, accuracy: draft}
-  night: {array.rows: 16, array.columns: 18, accuracy: draft, scene.luminance: 10 cd/m2}
+  day: {array.rows: 16, array.columns: 18}
+  night: {array.rows: 16, array.columns: 18, scene.luminance: 10 cd/m2}
 seeds: 2
 metrics: [mean_electrons, picture_snr_db]
 """

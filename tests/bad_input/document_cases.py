@@ -34,7 +34,7 @@ CASES.add(
 )
 CASES.add(
     "a deep nest",
-    text="a: " + "[" * 1000,
+    text="a: " + "[" * 100 + "]" * 100,
     says=[("1:67", "a", "nested deeper than 64 levels", "flatten")],
 )
 CASES.add(

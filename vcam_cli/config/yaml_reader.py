@@ -256,6 +256,9 @@ def _syntax_error(error: yaml.MarkedYAMLError, text: str, source: Source) -> Bad
     here = lines[min(line, len(lines) - 1)]
     indent = here[: len(here) - len(here.lstrip())]
     message = (error.problem or "syntax error").removeprefix("found ")
+    if "maximum nesting depth" in message:  # a parser that gives up before it hands on a level
+        nested = f"nested deeper than {MAX_DEPTH} levels"
+        return _refusal(source, nested, "flatten it", line + 1, column + 1)
     remedy = "check indentation, colons, quotes and brackets on this line and the one before"
     if "\t" in indent or here[column : column + 1] == "\t":
         column = here.index("\t")
