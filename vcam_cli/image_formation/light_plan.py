@@ -87,15 +87,11 @@ class LightPlan:
 
     def reduced(self, path: OpticalPath) -> OpticalPath:
         """Return the path without the omitted effects."""
-        if not self.omitted:
-            return replace(path, optional=())
-        kept = tuple(effect for effect in path.effects if effect not in self.omitted)
-        gone = {effect.name for effect in self.omitted}
-        layers = tuple(layer.without_effects(gone) for layer in path.layers)
-        transfer, on_axis = path.transfer.with_effects(kept), self.on_axis or 1.0
-        transfer = replace(transfer, weights=transfer.weights / on_axis)
-        path = replace(path, full=min(path.full / on_axis, path.ceiling))
-        return replace(path, transfer=transfer, effects=kept, optional=(), layers=layers)
+        path = path.with_effects([e for e in path.effects if e not in self.omitted])
+        on_axis = self.on_axis or 1.0
+        transfer = replace(path.transfer, weights=path.transfer.weights / on_axis)
+        full = min(path.full / on_axis, path.ceiling)
+        return replace(path, transfer=transfer, full=full) if self.omitted else path
 
 
 def light_plan(path: OpticalPath, scene: AnyScene) -> LightPlan:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -66,6 +66,17 @@ class OpticalPath:
     """What acts on each layer of a scene, the nearest first; () where it is seen as flat."""
     has_opacity: bool = False
     """Whether it is that of a layer, half of whose colors are its opacity."""
+
+    def with_effects(self, kept: Sequence[Effect]) -> OpticalPath:
+        """Return the path with some of its effects alone."""
+        gone = {effect.name for effect in self.effects if effect not in kept}
+        return replace(
+            self,
+            transfer=self.transfer.with_effects(kept),
+            effects=tuple(kept),
+            optional=(),
+            layers=tuple(layer.without_effects(gone) for layer in self.layers),
+        )
 
     @property
     def judged_weights(self) -> NDArray:

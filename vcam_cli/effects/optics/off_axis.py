@@ -39,7 +39,7 @@ class OffAxis(Gain):
     reference = "Chen 2003, eq 2.22 (exact) and 2.21 (cos4)"
     absent = "optics.off_axis is none"
     origin = "lens"
-    seconds_per_pixel = 8e-9
+    seconds_per_pixel = 2e-9
 
     @classmethod
     def from_camera(cls, camera, geometry):

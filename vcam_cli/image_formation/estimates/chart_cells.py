@@ -155,6 +155,20 @@ class CellError:
             passed = passed * np.square(effect.along_x(fx) * effect.along_y(fy))
         return passed
 
+    def end(self, error: float) -> float:
+        """Return the frequency beyond which edges have no more than an rms error [cycles/m].
+
+        Parameters
+        ----------
+        error : float
+            Rms error [e/s].
+        """
+        f, _ = self._table
+        across = 2 * self._passed(f, np.zeros_like(f)) / np.square(2 * np.pi * (f + 1e-9 * f[-1]))
+        steps = (across[1:] + across[:-1]) / 2 * np.diff(f)
+        beyond = (self.energy.aligned + self.energy.oblique) * steps[::-1].cumsum()[::-1]
+        return float(f[np.count_nonzero(beyond > error**2)])
+
     def rms(self, per_pixel: float) -> float:
         """Return the error of so many cells per pixel pitch [e/s]."""
         g = self.path.geometry

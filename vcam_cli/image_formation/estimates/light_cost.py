@@ -8,44 +8,52 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 
 from vcam_cli.camera.derived.geometry import Geometry
-from vcam_cli.effects.base import (
-    Blur,
-    Effect,
-    FieldTransfer,
-    ImageMotion,
-    PlaneTransfer,
-    SeparableTransfer,
-    of_kind,
+from vcam_cli.effects.base import Blur, Effect, FieldTransfer, PlaneTransfer, of_kind
+from vcam_cli.image_formation.estimates.bandwidth import FREQUENCY_SHARE, highest_passed, reach
+from vcam_cli.image_formation.estimates.chart_cells import (
+    SURE,
+    CellError,
+    cell_grid,
+    cells_per_pixel,
 )
-from vcam_cli.effects.pixel.pixel_aperture import PixelAperture
+from vcam_cli.image_formation.far_field import far_parts, near_field
 from vcam_cli.image_formation.optical_path import OpticalPath, SpectrumReport
-from vcam_cli.scenes.base import ChartScene, HarmonicScene
-from vcam_cli.scenes.layered import AnyScene
+from vcam_cli.scenes.base import ChartScene, HarmonicScene, SampledScene
+from vcam_cli.scenes.depth_scene import DepthScene
+from vcam_cli.scenes.layered import AnyScene, LayeredScene
 from vcam_cli.scenes.waves import WaveScene
 
-FIXED = 8e-3
-"""What does not depend on the size: geometry, colors of patches, the plan [s]."""
+FIXED = 1.5e-3
+"""What does not depend on the size of a frame's light [s]."""
+SPECTRUM = 10e-3
+"""The same where it has a spectrum: tables of the transfer function, edges of a chart [s]."""
+FAR_PART = 4e-3
+"""The same of each ring of a far field [s]."""
 SAMPLE = 6e-9
 """Transforming one sample of one plane of the scene [s]."""
-PAINT = 5e-9
+PAINT = 2.5e-9
 """Painting one sample of one plane of a chart, its edges aside [s]."""
-TERM = 1.3e-9
+TERM = 0.7e-9
 """Filtering one term of the spectrum for one plane and color [s]."""
-EVALUATE = 5e-9
+EVALUATE = 4e-9
 """One pixel of one color from its spectrum [s]."""
 FAR = 20e-9
 """The same from the spectrum of a part of the far field, whose cells and pixels have no common grid
 [s]."""
-OTF = 40e-9
+OTF = 25e-9
 """One value of a round transfer function at one wavelength [s]."""
 TABLE = 1e-6
 """One value of a transfer function of fx and fy, its part of the pupil's transforms too [s]."""
-AVERAGE = 12e-9
-"""One pixel of one color as the mean over its photodetector, and one sample of a picture for it
-[s]."""
-WAVE = 12e-9
+AVERAGE = 1.2e-9
+"""One pixel of one color as the mean of a chart over its photodetector [s]."""
+AVERAGE_SAMPLED = 25e-9
+"""More for one of a picture, and one sample of it [s]."""
+PAINT_PIXEL = 13e-9
+"""One pixel painted as the exact mean of a chart [s]."""
+WAVE = 5e-9
 """One pixel of one wave, or behind one edge, in one color [s]."""
 SPLINE = 40e-9
 """One value of the still image behind sub-exposures into coefficients of splines [s]."""
@@ -62,9 +70,7 @@ MOVE = 10e-9
 
 ENTRIES = 2560
 """Frequencies at which a round transfer function is known, for its tables and to judge them."""
-HIGHEST = 1.8
-"""Highest frequency of a scene with much detail, as often as not [pixel Nyquist]."""
-PLANES = 3
+PLANES = 4
 """Mixtures that stand for a scene's spectra, at most, as often as not."""
 PARITIES, MODES = 4, 8
 """Filters of a blur with a direction, and of one that changes over the field, about."""
@@ -72,6 +78,8 @@ SHIFTED = 4
 """Cost of pixels that share no grid with the scene over that of others."""
 ENTRIES_OF_PLANE = 41
 """Entries along an axis of a table over fx and fy, at least."""
+HIGHEST = 2.0
+"""Highest frequency of a picture that is filtered, as often as not [pixel Nyquist]."""
 WAVES = WaveScene | HarmonicScene
 """Scenes of few waves, whose frequencies are known."""
 
@@ -107,16 +115,19 @@ def image_seconds(geometry: Geometry, colors: int, report: SpectrumReport) -> fl
 
 def _flat_seconds(geometry: Geometry, colors: int, report: SpectrumReport) -> float:
     values = geometry.rows * geometry.columns * colors
-    always = FIXED + _sub_exposure_seconds(values, colors, report)
+    always = FIXED + _sub_exposure_seconds(values, colors, report) + report.edge_seconds
     if report.is_averaged:
-        return always + AVERAGE * (values + report.cells)
+        painted = PAINT_PIXEL * geometry.rows * geometry.columns if report.is_painted else 0.0
+        sampled = AVERAGE_SAMPLED * (values + report.cells) if report.cells else 0.0
+        return always + AVERAGE * values + painted + sampled
     if not report.terms:
         return always + WAVE * values
     cells_of_part = report.far_cells / max(1, report.far_parts)
     return (
         always
+        + SPECTRUM
+        + FAR_PART * report.far_parts
         + (SAMPLE + PAINT * report.is_painted) * report.cells * report.planes
-        + report.edge_seconds
         + TERM * report.terms * report.planes * colors * report.filters
         + (EVALUATE * report.filters + FAR * report.far_filters) * values
         + (SAMPLE + PAINT) * report.far_cells * report.planes
@@ -166,30 +177,61 @@ def light_seconds(path: OpticalPath, scene: AnyScene, effects: Sequence[Effect])
 def expected_report(
     path: OpticalPath, scene: AnyScene, effects: Sequence[Effect]
 ) -> SpectrumReport:
-    """Return how a scene would be sampled and filtered, if it has much detail.
+    """Return how a scene would be sampled and filtered.
+
+    The spectrum of a chart ends where its edges let it, that of a picture where the lens does.
 
     Parameters
     ----------
     path, scene, effects
         As those of `light_seconds`.
     """
-    blurs = of_kind(effects, Blur, SeparableTransfer, FieldTransfer, ImageMotion)
-    blurs = tuple(blur for blur in blurs if blur not in of_kind(blurs, PixelAperture))
-    field, moving = of_kind(blurs, FieldTransfer), of_kind(blurs, ImageMotion)
+    scene = scene.flat if isinstance(scene, LayeredScene | DepthScene) else scene
+    path = path.with_effects(effects)
     if isinstance(scene, WAVES):
         return SpectrumReport()
-    pixels = path.geometry.rows * path.geometry.columns
-    samples = 0 if isinstance(scene, ChartScene) else math.prod(getattr(scene, "shape", (0,)))
-    if not blurs:
-        return SpectrumReport(is_averaged=True, cells=samples)
-    if isinstance(scene, ChartScene) and scene.chart.profile() is not None and not field:
+    if not path.transfer.effects and not path.field and path.averages_over_box:
+        if not isinstance(scene, ChartScene):
+            return SpectrumReport(is_averaged=True, cells=math.prod(scene.shape))
+        edges = scene.chart.edge_seconds if scene.is_painted else 0.0
+        return SpectrumReport(is_averaged=True, is_painted=scene.is_painted, edge_seconds=edges)
+    if isinstance(scene, ChartScene) and scene.chart.profile() is not None and not path.field:
         return SpectrumReport()
-    filters = (PARITIES if of_kind(blurs, PlaneTransfer) else 1) + (MODES if field else 0)
-    filters *= SHIFTED if any(any(motion.drift) for motion in moving) else 1
-    return SpectrumReport(
-        cells=samples,
-        terms=round(pixels * HIGHEST**2),
+    filters = PARITIES if of_kind(path.transfer.effects, PlaneTransfer) or path.field else 1
+    filters += MODES if path.field else 0
+    filters *= SHIFTED if any(path.drift) else 1
+    found = _sampled(path, scene)
+    return replace(
+        found,
         planes=min(PLANES, len(path.transfer.weights)),
         filters=filters,
+        far_filters=filters * found.far_filters,
         table_values=ENTRIES_OF_PLANE**2 * (filters - 1),
+    )
+
+
+def _sampled(path: OpticalPath, scene: SampledScene) -> SpectrumReport:
+    """Return the cells of a scene and the terms of its spectrum, as far as they are foreseen."""
+    g = path.geometry
+    pixels = g.rows * g.columns
+    if not isinstance(scene, ChartScene):
+        end = min(highest_passed(path, scene), HIGHEST)
+        return SpectrumReport(cells=math.prod(scene.shape), terms=round(pixels * end**2))
+    widest = reach(path) + path.travel
+    near = near_field(path, scene, widest)
+    rings = far_parts(path, near, scene, widest)
+    highest, cells = highest_passed(path, near), 0
+    error = FREQUENCY_SHARE * path.settings.tolerance * path.full
+    end = 2 * max(g.pitch_x, g.pitch_y) * CellError.of_chart(path, near, highest).end(error / SURE)
+    if scene.is_painted:
+        highest = cells_per_pixel(path, near, highest).per_pixel
+        cells = math.prod(cell_grid(near, g, highest))
+    return SpectrumReport(
+        cells=cells,
+        terms=round(pixels * min(end, highest) ** 2),
+        is_painted=scene.is_painted,
+        edge_seconds=scene.chart.edge_seconds if scene.is_painted else 0.0,
+        far_parts=len(rings),
+        far_cells=sum(math.prod(part.scene.shape) for part in rings),
+        far_filters=len(rings),
     )
