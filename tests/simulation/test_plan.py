@@ -480,7 +480,7 @@ def test_a_plan_is_frozen(tmp_path):
 
 def test_an_edge_says_that_it_lacks_the_lens(tmp_path):
     """The array as a whole hardly shows it, an MTF that is measured from it would."""
-    edge = EDGE | {"accuracy": "draft", "array.rows": 240, "array.columns": 320}
+    edge = EDGE | BAYER | {"accuracy": "draft", "array.rows": 240, "array.columns": 320}
     _, notes = prepare(camera(tmp_path, edge | {"effects": "auto"}))
     [note] = [note for note in notes if "MTF" in note]
     assert "lacks diffraction," in note
