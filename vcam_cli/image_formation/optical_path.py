@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -77,6 +78,14 @@ class OpticalPath:
             optional=(),
             layers=tuple(layer.without_effects(gone) for layer in self.layers),
         )
+
+    @property
+    def scatter(self) -> float:
+        """Factor by which a mean square over the pixels may lie above that of all places.
+
+        Two standard errors of the squares of normal numbers.
+        """
+        return 1 + 2 * math.sqrt(2 / (self.geometry.rows * self.geometry.columns))
 
     @property
     def judged_weights(self) -> NDArray:

@@ -173,12 +173,10 @@ class CellError:
         """Return the error of so many cells per pixel pitch [e/s]."""
         g = self.path.geometry
         side = max(g.pitch_x, g.pitch_y) / per_pixel
-        # Of few pixels a mean square scatters: two standard errors of normal numbers.
-        scatter = 1 + 2 * math.sqrt(2 / (g.rows * g.columns))
         squares = self.energy.aligned * self._of_aligned(side) if self.energy.aligned else 0.0
         if self.energy.oblique:
             squares += self.energy.oblique * self._of_oblique(side)
-        return SURE * math.sqrt(squares * scatter)
+        return SURE * math.sqrt(squares * self.path.scatter)
 
     def _of_aligned(self, side: float) -> float:
         """Return the mean square for edges along rows and columns of energy 1 [m]."""

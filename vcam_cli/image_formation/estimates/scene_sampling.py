@@ -127,7 +127,7 @@ def sampled_image(
     pitch = g.pitch_y, g.pitch_x
     density = math.prod(scene.extent) / (g.sensor_width * g.sensor_height)
     if knobs.oversampling is None:
-        budget = FREQUENCY_SHARE * knobs.tolerance * path.full / math.sqrt(density)
+        budget = FREQUENCY_SHARE * knobs.tolerance * path.full / math.sqrt(density * path.scatter)
         needed = power.needed_frequency(squares, budget, pitch) * (1 + 1e-9)
         highest = min(max(needed, least), highest)
     else:
