@@ -91,7 +91,7 @@ def test_rings_tile_the_margin(shape, pitch, blurs):
         sides = zip(two.scene.extent, scene.extent, size, strict=True)
         clear = min((a - c) / 2 - widest for a, b, c in sides if b > a * (1 + 1e-9))
         assert clear >= far_field.NEAR / optical_path.transfer.cutoff * (1 - 1e-9)
-        assert max(pitches[0]) <= clear / far_field.CELLS * (1 + 1e-9)
+        assert max(pitches[0]) <= clear / optical_path.settings.far_cells * (1 + 1e-9)
     extents = [near.extent, *(part.scene.extent for part in outer)]
     for one, two in pairwise(extents):
         assert two > one

@@ -36,8 +36,6 @@ NEAR = 12.0
 inverse cut-off frequencies: there the tail is smooth but for 0.2 % of itself."""
 LEAST_PIXELS, LEAST_PART = 8, 1 / 64
 """That distance in pixels, and in shorter sides of the array, at least."""
-CELLS = 16
-"""Cells of a ring over the distance from the array to its inner border, at least."""
 GROWTH = 4
 """Distance to the outer border of a ring over that to its inner one."""
 ROUNDING = 1e-9
@@ -253,7 +251,7 @@ def far_parts(
     sensor = path.geometry.sensor_width, path.geometry.sensor_height
     inner, parts = near.extent, list[FarPart]()
     clear = min(a - b for a, b in zip(inner, sensor, strict=True)) / 2 - widest
-    cells = [math.ceil(CELLS * size / clear / 2) for size in inner]
+    cells = [math.ceil(path.settings.far_cells * size / clear / 2) for size in inner]
     pitch = [size / n / 2 for size, n in zip(inner, cells, strict=True)]
     while any(a < b * (1 - ROUNDING) for a, b in zip(inner, whole.extent, strict=True)):
         clear *= GROWTH

@@ -51,6 +51,9 @@ class Settings:
     """Error that these settings have to keep, relative to full signal."""
     coarse_normals: bool = False
     """Whether the normal numbers of pixels have 16 random bits."""
+    far_cells: int = 16
+    """Cells of a ring of a chart's far field over the distance from the array to its inner border,
+    at least."""
     margin_scale: float = 1.0
     """Factor on the margin of charts; a converged reference takes 2."""
 
@@ -67,7 +70,7 @@ class Settings:
 DRAFT = Settings(20e-9, 2049, 2e-3, 3, 4, 32, coarse_normals=True)
 STANDARD = Settings(10e-9, 2049, 5e-4, 4, 8, 32)
 FINE = Settings(10e-9, 4097, 2e-4, 5, 10, 32)
-REFERENCE = Settings(2.5e-9, 32769, 2e-5, 6, 16, 64)
+REFERENCE = Settings(2.5e-9, 32769, 2e-5, 6, 16, 64, far_cells=32)
 
 PERCENTILE_SHARE = 0.5
 """Part of the tolerance for light of which a percentile times the exposure: what that one pixel
