@@ -2,6 +2,7 @@
 
 import math
 
+import imageio.v3 as imageio
 import numpy as np
 import pytest
 from making import QUIET, camera, radiance_for
@@ -153,6 +154,7 @@ SPOT = {
     "effects": QUIET,
     "pixel.readout.charge_transfer": {"inefficiency": 0},
 }
+ON_LIGHT = ("dark_current", "diffraction", "pixel_aperture")
 TRANSFER = {"pixel.readout.charge_transfer": {"inefficiency": 1e-3, "phases": 2}}
 
 
@@ -192,7 +194,8 @@ def test_the_plan_says_what_it_changes(tmp_path):
 def test_no_more_than_the_well_travels(over, tmp_path):
     """Light far beyond a well of 20 ke leaves behind what a full well leaves, and no more."""
     bright = {"scene.radiance": radiance_for(over * 20e3), "pixel.readout.full_well": "20 ke"}
-    bright |= {"effects": QUIET | {"dark_current": "on"}}
+    # All pixels are full, so that the plan of the still camera would skip what acts on light.
+    bright |= {"effects": QUIET | dict.fromkeys(ON_LIGHT, "on")}
     still = simulate(camera(tmp_path, SPOT | bright)).mean_electrons
     moved = simulate(camera(tmp_path, SPOT | bright | TRANSFER)).mean_electrons
     held = np.minimum(still, 20e3)
@@ -212,6 +215,71 @@ def test_what_a_lamp_leaves_behind_is_a_full_wells_share(tmp_path):
     assert dark.any()
     transfers = 2 * (48 + 64)
     assert moved[dark].max() <= 20e3 * 1e-3 * transfers
+
+
+@pytest.mark.parametrize("noise", ["off", "on"])
+@pytest.mark.parametrize("over", [3, 300])
+def test_a_lone_full_pixel_is_read_without_what_it_defers(over, noise, tmp_path):
+    """10,000 (1 - 1e-4)^102 = 9,898.5 electrons after 102 transfers, and no shot noise of its own.
+
+    Full pixels that stand together read what packets before them left behind, too.
+    """
+    row, column, well = 30, 19, 10e3
+    assert 2 * (row + 1 + column + 1) == 102
+    picture = np.zeros((48, 64), np.uint8)
+    picture[row, column] = 255
+    picture[2:7, 40:48] = 255
+    imageio.imwrite(tmp_path / "star.png", picture)
+    made = SPOT | {
+        "scene.source": {"kind": "image", "file": "star.png", "encoding": "linear"},
+        "scene.illuminant": {"monochromatic": "550 nm"},
+        "scene.radiance": radiance_for(over * well),
+        "pixel.photodetector.dark_current": "0 e/s",
+        "pixel.readout.full_well": f"{well} e",
+        "optics.diffraction": False,
+        "effects": QUIET | {"shot_noise": noise},
+    }
+    transfer = {"pixel.readout.charge_transfer": {"inefficiency": 1e-4, "phases": 2}}
+    still = simulate(camera(tmp_path, made)).mean_electrons.astype(float)
+    result = simulate(camera(tmp_path, made | transfer))
+    full = still >= well
+    assert full[row, column]
+    expected = clocked(clocked(np.minimum(still, well), 1e-4, 2).T, 1e-4, 2).T
+    assert result.electrons[row, column] == pytest.approx(expected[row, column], abs=0.01)
+    assert expected[row, column] == pytest.approx(well * (1 - 1e-4) ** 102, abs=2)
+    np.testing.assert_allclose(result.electrons[full], expected[full], atol=0.01)
+    allowed = 6 * np.sqrt(expected + 1) if noise == "on" else 0.01
+    assert np.all(abs(result.electrons - expected) <= allowed)
+    assert result.metrics["saturated_fraction"] == pytest.approx(full.mean())
+    clean = result.frame.to_dn(expected)
+    np.testing.assert_allclose(result.clean_dn, clean, atol=0.01)
+
+
+def test_full_pixels_amid_full_ones_are_read_as_saturated(tmp_path):
+    """A field far beyond the wells loses next to nothing: what each defers the next has left it."""
+    bright = {
+        "scene.source": {"kind": "chart", "chart": "uniform"},
+        "scene.radiance": radiance_for(10 * 20e3),
+        "pixel.readout.full_well": "20 ke",
+        "adc.bits": 16,
+    }
+    frame = simulate(camera(tmp_path, SPOT | bright | TRANSFER)).frame
+    full = clocked(clocked(np.full((48, 64), 20e3), 1e-3, 2).T, 1e-3, 2).T
+    np.testing.assert_allclose(frame.electrons, full, rtol=1e-6)
+    assert np.all(frame.dn >= frame.saturated_dn)
+    assert frame.saturated_dn > 0.99 * 65535
+
+
+def test_joined_full_pixels_are_read_without_what_they_defer(tmp_path):
+    """A field of wells that are full, 2 x 2 joined by a node that holds no more than one."""
+    joined = {
+        "scene.radiance": radiance_for(10 * 20e3),
+        "pixel.readout.full_well": "20 ke",
+        "array.binning": {"rows": 2, "columns": 2, "kind": "charge"},
+    }
+    result = simulate(camera(tmp_path, SPOT | joined | TRANSFER))
+    assert result.electrons.shape == (24, 32)
+    assert result.electrons.max() == 20e3
 
 
 def test_without_a_limit_all_charge_travels(tmp_path):

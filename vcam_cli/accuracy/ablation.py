@@ -20,7 +20,6 @@ from vcam_cli.camera.derived.geometry import geometry
 from vcam_cli.effects.base import Charge, of_kind
 from vcam_cli.effects.order import ORDER, quantizer
 from vcam_cli.effects.signal_chain import (
-    Limit,
     NoiseSource,
     Quantizer,
     full_well,
@@ -93,11 +92,7 @@ def with_exposure_time(camera: Camera, time: float, gain: float | None = None) -
 
 def mean_raw(ready: Prepared) -> NDArray:
     """Return every pixel's noise-free signal, clipped at the full well, float64 [electrons]."""
-    mean = exposure.mean_electrons(ready.rate, ready.exposure_time, ready.plan.active)
-    mean = mean.astype(np.float64)
-    for limit in of_kind(ready.plan.active, Limit):
-        mean = limit.apply(mean)
-    return mean
+    return ready.held_electrons.astype(np.float64)
 
 
 def full_signal(ready: Prepared) -> float:

@@ -183,5 +183,6 @@ def _shot(result: Result) -> Shot:
         steps = frame.camera.processing
         clean = process(codes, processed.context, steps, workers=processed.workers).linear
     names = Prepared.__dataclass_fields__
-    kept = {name: getattr(frame, name) for name in names} | {"rate": np.empty((0, 0))}
+    kept = {name: getattr(frame, name) for name in names}
+    kept |= {"rate": np.empty((0, 0)), "full_charge": None}
     return Shot(Prepared(**kept), ablation.mean_raw(frame), clean, result.linear if shown else None)

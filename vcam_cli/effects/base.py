@@ -454,3 +454,7 @@ class Transport(Effect):
     @abstractmethod
     def transport(self, signal: NDArray) -> NDArray:
         """Return what arrives of a mean signal (rows, columns), in its unit and float type."""
+
+    @abstractmethod
+    def timely_share(self, rows: int, columns: int) -> NDArray:
+        """Return the share (rows, columns) of a pixel's own charge that does not arrive late."""

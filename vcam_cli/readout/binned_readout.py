@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 
 from numpy.typing import NDArray
 
@@ -16,7 +17,7 @@ from vcam_cli.readout.exposure import codes_type
 SURE = 3
 """Standard deviations of the readout by which a pixel of full wells may read less than they hold,
 where noise comes behind the wells."""
-Take = Callable[[NDArray, float, tuple[Effect, ...]], tuple[NDArray, NDArray]]
+Take = Callable[..., tuple[NDArray, NDArray]]
 """A frame of a rate [e/s] in a time [s] with effects: (electrons, dn)."""
 
 
@@ -27,6 +28,7 @@ def read(
     effects: Sequence[Effect],
     take: Take,
     bits: int,
+    full_charge: NDArray | None = None,
 ) -> tuple[NDArray, NDArray]:
     """Return one frame of binned pixels.
 
@@ -46,6 +48,8 @@ def read(
         What makes a frame of a rate, a time and effects.
     bits : int
         Resolution of the ADC.
+    full_charge : NDArray, optional
+        As that of `exposure.capture`, in the shape of `rate` [electrons].
 
     Returns
     -------
@@ -60,15 +64,16 @@ def read(
     Trans. Electron Devices 44(10), 1997.
     """
     kind, effects = binning_groups.binning.kind, tuple(effects)
+    take_pixels = take if full_charge is None else partial(take, full_charge=full_charge)
     if kind == "charge":
-        return take(rate, time, effects)
+        return take_pixels(rate, time, effects)
     if kind == "digital":
-        electrons, dn = take(rate, time, effects)
+        electrons, dn = take_pixels(rate, time, effects)
         return binning_groups.join(electrons), binning_groups.sums(
             dn, codes_type(bits, binning_groups.count)
         )
     in_pixels = tuple(part for effect in effects for part in effect.parts_in_pixels())
-    electrons, _ = take(rate, time, in_pixels)
+    electrons, _ = take_pixels(rate, time, in_pixels)
     return take(binning_groups.join(electrons), 1.0, effects_in_readout(effects))
 
 

@@ -158,6 +158,7 @@ def capture(
     done: Callable[[slice], None] | None = None,
     layer: int = 0,
     coarse_normals: bool = False,
+    full_charge: NDArray | None = None,
 ) -> tuple[NDArray, NDArray]:
     """Return one frame of an array whose rate of electrons is known.
 
@@ -182,6 +183,9 @@ def capture(
         Index of the layer of stacked pixels.
     coarse_normals : bool, optional
         Whether the normal numbers of pixels are `rng.coarse_normals`.
+    full_charge : NDArray, optional
+        Electrons, in the shape of `rate`, that full pixels are read with where that is less than
+        the full well [electrons].
 
     Returns
     -------
@@ -195,9 +199,10 @@ def capture(
     T. Chen, PhD thesis, Stanford University, 2003, eq 2.26.
     """
     if rate.ndim == 3:
+        full = [None] * len(rate) if full_charge is None else full_charge
         layers = [
-            capture(plane, time, effects, adc, seeds, workers, None, number, coarse_normals)
-            for number, plane in enumerate(rate)
+            capture(plane, time, effects, adc, seeds, workers, None, number, coarse_normals, most)
+            for number, (plane, most) in enumerate(zip(rate, full, strict=True))
         ]
         return np.array([e for e, _ in layers]), np.array([dn for _, dn in layers])
     dark = mean_dark(time, effects)
@@ -214,6 +219,8 @@ def capture(
                 tile = source.before_shot(tile, here[source.scope])
             for effect in of_kind(effects, ElectronEffect):
                 tile = effect.apply(tile, here[effect.scope])
+            if full_charge is not None:
+                np.minimum(tile, full_charge[rows], out=tile)
             electrons[rows] = tile
             dn[rows] = adc.apply(tile)
         if done is not None:

@@ -26,6 +26,7 @@ from vcam_cli.floats import rms
 from vcam_cli.image_formation import photon_rate, pixelwise, timed_gains
 from vcam_cli.image_formation.light_plan import PERCENTILES, LightPlan
 from vcam_cli.readout import auto_exposure, exposure, sample_times
+from vcam_cli.readout.binning import BinningGroups
 from vcam_cli.readout.layout import Layout
 from vcam_cli.simulation import plan
 from vcam_cli.simulation.setup import CameraSetup
@@ -50,6 +51,8 @@ class ExposedLight:
     """That of the light, with what is left out now that the exposure time is known."""
     step_rates: tuple[NDArray, ...]
     """As `Prepared.step_rates`."""
+    full_charge: NDArray | None
+    """As `Prepared.full_charge`."""
 
 
 def expose(
@@ -87,8 +90,9 @@ def expose(
     groups, white = layout.binning_groups, float(white_rate.max())
     enabled = plan.enabled_effects(camera, setup.geometry)
     dark = exposure.mean_dark(1.0, enabled)
+    pixel_dark = dark / groups.summed_charges
     collected = layout.select_pixels(light.values)
-    rate = groups.collect(_transport(collected, dark / groups.summed_charges, effects))
+    rate = groups.collect(_transported(collected, pixel_dark, effects))
     adc = quantizer(camera, setup.geometry)
     times = sample_times.choose_sample_times(camera, rate, circuit, enabled, adc)
     chosen = auto_exposure.exposure_settings(camera, rate, white, dark, circuit)
@@ -102,15 +106,20 @@ def expose(
     )
     timed = tuple(e for e in of_kind(effects, TemporalGain) if e not in light_plan.omitted)
 
-    def collect(values: NDArray, start: float, stop: float) -> NDArray:
-        lit = collected if values is light.values else layout.select_pixels(values)
+    def select(values: NDArray, start: float, stop: float) -> NDArray:
         if timed:
-            lit = layout.select_pixels(
-                timed_gains.apply(values, timed, layout.lattice, start, stop)
-            )
-        return groups.collect(_transport(lit, dark / groups.summed_charges, effects, full_rate))
+            values = timed_gains.apply(values, timed, layout.lattice, start, stop)
+        return collected if values is light.values else layout.select_pixels(values)
+
+    def collect(values: NDArray, start: float, stop: float) -> NDArray:
+        lit = select(values, start, stop)
+        return groups.collect(_transported(lit, pixel_dark, effects, full_rate))
 
     rate = collect(light.values, 0.0, time)
+    full_charge = None
+    if of_kind(effects, Transport) and math.isfinite(full_rate):
+        lit = select(light.values, 0.0, time)
+        full_charge = _full_charge(groups, lit, rate, pixel_dark, effects, full_rate) * time
     moving = of_kind(effects, ImageMotion)
     steps = pairwise((0.0, *times)) if timed or moving else ()
     step_rates = tuple(collect(light_during(start, stop), start, stop) for start, stop in steps)
@@ -124,7 +133,8 @@ def expose(
         changes[effect.name] = rms(np.subtract(lit, without))
     if transports := [transport.name for transport in of_kind(enabled, Transport)]:
         well = min(circuit.full_well / time - dark, MOST_ELECTRONS)
-        deferred = np.minimum(rate, well) - np.minimum(groups.collect(collected), well)
+        most = well if full_charge is None else full_charge / time - dark
+        deferred = np.minimum(rate, most) - np.minimum(groups.collect(collected), well)
         changes |= dict.fromkeys(transports, rms(deferred))
     full = max(1.0, min(circuit.full_well, peak))
     alone = not times and camera.array.binning is None
@@ -136,7 +146,7 @@ def expose(
         _levels(layout, rate, dark, time, circuit.full_well),
         extreme_signal(of_kind(enabled, NoiseSource), peak, dark * time) if alone else math.inf,
     )
-    return ExposedLight(rate, times, signal, chosen, changes, light_plan, step_rates)
+    return ExposedLight(rate, times, signal, chosen, changes, light_plan, step_rates, full_charge)
 
 
 def refuse_too_much(electrons: float) -> None:
@@ -184,14 +194,15 @@ def _pixel_changes(
     return largest
 
 
-def _transport(
+def _transported(
     rate: NDArray, dark: float, effects: Sequence[Effect], full_rate: float = math.inf
 ) -> NDArray:
     """Return the photo-electrons per second that arrive where charge is transported [e/s].
 
-    With the dark rate [e/s] they are what arrives of both. What a packet does not hold, beyond
-    `full_rate` [e/s] for the time of the exposure, stays where it is and is clipped there. Below
-    that transport is linear, so that an exposure can be timed by the picture as it is read.
+    With the dark rate [e/s] they are what arrives of both. Light beyond `full_rate` [e/s], which
+    the well does not hold, is not transported: it stays in the pixel's mean signal, so that noise
+    does not lift a full pixel off `_full_charge`. Below that transport is linear, so that an
+    exposure can be timed by the picture as it is read.
     """
     for transport in of_kind(effects, Transport):
         signal = rate + rate.dtype.type(dark)
@@ -203,3 +214,43 @@ def _transport(
         signal -= rate.dtype.type(dark)
         rate = signal
     return rate
+
+
+def _full_charge(
+    groups: BinningGroups,
+    lit: NDArray,
+    arrived: NDArray,
+    dark: float,
+    effects: Sequence[Effect],
+    full_rate: float,
+) -> NDArray:
+    """Return the electrons per second that a pixel is read with if its well is full [e/s].
+
+    A full well arrives without what it defers, and with what earlier packets have deferred.
+
+    Parameters
+    ----------
+    groups : BinningGroups
+        Pixels that are read as one.
+    lit : NDArray
+        Photo-electrons per second that every pixel collects (..., rows, columns) [e/s].
+    arrived : NDArray
+        Those that are read, as `_transported` returns them, of groups where charge is joined [e/s].
+    dark : float
+        Dark rate of a pixel [e/s].
+    effects : sequence of Effect
+        Effects, of which the transports count.
+    full_rate : float
+        Rate that fills a well [e/s].
+    """
+    kind = lit.dtype.type
+    beyond = np.maximum(lit + kind(dark - full_rate), kind(0))
+    # Mean charge of a full pixel's own packet is the well: what else it reads was deferred to it.
+    found = arrived + kind(dark * groups.summed_charges) - groups.collect(beyond)
+    if groups.summed_charges > 1:
+        # Of joined pixels some may be full and others not: their mean is then the most.
+        full = kind(full_rate)
+        return np.where(groups.collect(beyond) > 0, np.minimum(found, full), full)
+    shares = [each.timely_share(*lit.shape[-2:]) for each in of_kind(effects, Transport)]
+    room = np.maximum(kind(full_rate - dark) - lit, kind(0))
+    return np.minimum(found + np.prod(shares, axis=0).astype(kind) * room, kind(full_rate))

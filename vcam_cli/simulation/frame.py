@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.scene.sources import Layers
-from vcam_cli.effects.base import Gain, of_kind
+from vcam_cli.effects.base import Gain, Transport, of_kind
 from vcam_cli.effects.order import quantizer
 from vcam_cli.effects.signal_chain import NoiseSource, Quantizer
 from vcam_cli.floats import own_float_errors
@@ -130,9 +130,12 @@ class Frame(Prepared):
     def saturated_dn(self) -> float:
         """The lowest code of a saturated pixel: of a full well, or the ADC's highest [DN].
 
-        Of pixels that are read as one, where all of them are.
+        Of pixels that are read as one, and of a ccd that defers charge, where all of them are.
         """
         well, highest = self.electrical.full_well, float(self.electrical.highest_code)
+        # Amid full pixels the first one loses most: no packet before it has left it any charge.
+        for transport in of_kind(self.plan.active, Transport):
+            well *= float(transport.timely_share(1, 1)[0, 0])
         if self.layout.binning_groups.binning.kind == "voltage":
             well -= binned_readout.SURE * self._noise_of_full
         # In both float types: where the well lies half way between two codes they round apart.
@@ -175,11 +178,8 @@ class Frame(Prepared):
 
         They end where the well and the ADC are full, as those of `dn` do.
         """
-        n, circuit = self.summed_codes, self.electrical
-        well = self.mean_electrons.dtype.type(n * circuit.full_well)
-        return np.clip(
-            self.to_dn(np.minimum(self.mean_electrons, well)), 0, n * circuit.highest_code
-        )
+        held = self.layout.binning_groups.join(self.held_electrons)
+        return np.clip(self.to_dn(held), 0, self.summed_codes * self.electrical.highest_code)
 
     def depth(self) -> NDArray:
         """Return how far away is what the pixels' centers see, along the axis (rows, columns) [m].
@@ -260,7 +260,9 @@ def take_frame(ready: Prepared, workers: int, stages: Stages | None = None) -> F
                 exposure.capture, adc=adc, seeds=seeds, workers=workers, coarse_normals=coarse
             )
             groups, time = ready.layout.binning_groups, ready.exposure_time
-            electrons, dn = binned_readout.read(groups, ready.rate, time, active, take, adc.bits)
+            electrons, dn = binned_readout.read(
+                groups, ready.rate, time, active, take, adc.bits, ready.full_charge
+            )
             return Frame(**known, electrons=electrons, dn=dn)
         electrons, dn = nondestructive_samples.samples(
             *(ready.rate, times, active, adc, seeds, workers),

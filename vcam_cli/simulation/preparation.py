@@ -9,6 +9,7 @@ import math
 from dataclasses import dataclass, replace
 from functools import partial
 
+import numpy as np
 from numpy.typing import NDArray
 
 from vcam_cli import memory
@@ -20,9 +21,10 @@ from vcam_cli.effects.base import (
     Effect,
     ImageMotion,
     TemporalGain,
+    Transport,
     of_kind,
 )
-from vcam_cli.effects.signal_chain import SIGMAS, NoiseSource, full_well
+from vcam_cli.effects.signal_chain import SIGMAS, Limit, NoiseSource, full_well
 from vcam_cli.errors import bad
 from vcam_cli.image_formation import photon_rate
 from vcam_cli.image_formation.estimates import bandwidth, memory_model
@@ -86,6 +88,17 @@ class Prepared:
     step_rates: tuple[NDArray, ...]
     """Rates (N, ...) as `rate` between each sample and the one before, where light changes with
     time [e/s]; () elsewhere."""
+    full_charge: NDArray | None
+    """Electrons that every node is read with if it is full, in the shape of `rate`, where transfer
+    defers some of them [electrons]; None elsewhere: all of the full well."""
+
+    @property
+    def held_electrons(self) -> NDArray:
+        """Noise-free signal of every node, at most that of a full one [electrons]."""
+        mean = exposure.mean_electrons(self.rate, self.exposure_time, self.plan.active)
+        if self.full_charge is not None:
+            mean = np.minimum(mean, self.full_charge)
+        return np.minimum(mean, mean.dtype.type(full_well(self.plan.active)))
 
     @property
     def dark_rate(self) -> float:
@@ -242,6 +255,7 @@ def _prepare(
         times=exposed.times,
         plan=decided,
         step_rates=exposed.step_rates,
+        full_charge=exposed.full_charge if of_kind(decided.active, Limit) else None,
     )
 
 
@@ -290,7 +304,8 @@ def _fullness(setup: CameraSetup, scene: AnyScene, white_rate: float) -> float:
     camera, time = setup.camera, setup.camera.exposure.time
     enabled = plan.enabled_effects(camera, setup.geometry)
     well = full_well(enabled)
-    joined = camera.array.binning is not None or of_kind(enabled, TemporalGain)
+    # Of full packets that are transferred, too, some charge is late.
+    joined = camera.array.binning is not None or of_kind(enabled, TemporalGain, Transport)
     if time is None or joined or math.isinf(well) or not isinstance(scene, ChartScene | WaveScene):
         return 0.0
     darkest = scene.chart.darkest if isinstance(scene, ChartScene) else scene.darkest

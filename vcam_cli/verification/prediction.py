@@ -91,7 +91,7 @@ def predict(camera: Camera, point: Point) -> Signal:
     Raises BadInput where the camera cannot be brought under the point's conditions.
     """
     frame = simulate(conditions(camera, point)).frame
-    electrons = np.minimum(frame.mean_electrons, frame.electrical.full_well)
+    electrons = frame.layout.binning_groups.join(frame.held_electrons)
     chosen = electrons[_pixels(frame, point.channel)].astype(np.float64)
     if point.signal.channel == "electrons":
         value = chosen

@@ -37,7 +37,8 @@ class ChargeTransfer(Transport):
     electrons splits into independent Poisson numbers by when they arrive (displacement theorem,
     Kingman, Poisson Processes, 1993, section 5.5). So every pixel is Poisson again, independent
     of its neighbors, and its mean is all that has changed. Transfer is linear up to the full well,
-    which is all that a packet holds: light beyond it leaves no trail.
+    which is all that a packet holds: light beyond it leaves no trail. A full pixel is read with its
+    well without what it defers; the noise of that, of a few electrons, is not simulated.
     """
 
     inefficiency: float
@@ -68,6 +69,11 @@ class ChargeTransfer(Transport):
         """Return what arrives of a mean signal (rows, columns), in its unit and float type."""
         along_columns = _transfer_rows(signal, self.inefficiency, self.phases)
         return _transfer_rows(along_columns.T, self.inefficiency, self.phases).T
+
+    def timely_share(self, rows: int, columns: int) -> NDArray:
+        """Return the share (rows, columns) of a pixel's own charge that does not arrive late."""
+        down, along = (self.phases * np.arange(1, count + 1) for count in (rows, columns))
+        return 1 - _deferred_share(self.inefficiency, down[:, None] + along)
 
     def mean_error(self, signal) -> float:
         """Return a bound of the rms change of the mean signal by leaving it out [electrons]."""
