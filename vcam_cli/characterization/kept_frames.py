@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from vcam_cli.characterization.bench import Bench
 from vcam_cli.files.atomic import write_text
-from vcam_cli.files.images.tiff import library, whole_numbers, write_tiff
+from vcam_cli.files.images.tiff import whole_numbers, write_tiff
 
 DESCRIPTOR = "emva1288.txt"
 Kind = Literal["pair", "stack", "dark"]
@@ -53,15 +53,9 @@ class FrameFiles:
     ----------
     new_file : function
         What gives a path to write to for a name.
-
-    Raises
-    ------
-    CannotDo
-        If tifffile is not installed.
     """
 
     def __init__(self, new_file: Callable[[str], Path]) -> None:
-        library("tifffile")
         self._new_file = new_file
         self._groups: dict[tuple[Kind, float, float], int] = {}
         self._texts: dict[str, list[str]] = {}

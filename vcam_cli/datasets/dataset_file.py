@@ -20,7 +20,7 @@ from vcam_cli.datasets.model import Dataset
 from vcam_cli.errors import BadInput, Collector, Problem
 from vcam_cli.files.images.images import picture_size
 from vcam_cli.floats import own_float_errors
-from vcam_cli.simulation.checks import CHECKS, missing_library
+from vcam_cli.simulation.checks import CHECKS
 from vcam_cli.sweeps.model import KINDS
 
 FILES = ("scenes", "files")
@@ -98,7 +98,6 @@ def read(
     pictures = sorted({scene.file for scene in scenes if scene.file is not None})
     inputs = tuple(dict.fromkeys((*model.files, *base.inputs, *pictures)))
     found = DatasetFile(model, base, scenes, inputs)
-    _check_format(model)
     for camera in found.cameras():
         _check_camera(model, camera)
     return found
@@ -120,12 +119,6 @@ def _node(model: Dataset, *path: str) -> Node:
 
 def _problem(model: Dataset, path: tuple[str, ...], message: str, remedy: str) -> Problem:
     return Problem(path, message, remedy, model.locate(path))
-
-
-def _check_format(model: Dataset) -> None:
-    reason = missing_library("tiff") if model.format == "tiff" else None
-    if reason is not None:
-        raise BadInput([_problem(model, ("format",), *reason)])
 
 
 def _check_camera(model: Dataset, camera: Camera) -> None:

@@ -5,7 +5,6 @@ processing or the picture to know.
 """
 
 from collections.abc import Sequence
-from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -185,27 +184,6 @@ def check_display(camera: Camera) -> None:
         display_screen(camera.display, camera_layout(camera, geometry(camera)).picture_shape[1])
 
 
-LIBRARIES = {"dng": ("tifffile", "imagecodecs"), "tiff": ("tifffile",)}
-"""Format of the raw frame -> libraries that write it."""
-
-
-def check_formats(camera: Camera) -> None:
-    """Refuse formats of the raw frame whose libraries are not installed (BadInput)."""
-    for asked in LIBRARIES:
-        missing = missing_library(asked) if getattr(camera.output, asked) else None
-        if missing is not None:
-            raise bad(("output", asked), *missing)
-
-
-def missing_library(asked: str) -> tuple[str, str] | None:
-    """Return which library a format of the raw frame lacks, and the remedy; None where none."""
-    for library in LIBRARIES[asked]:
-        if not find_spec(library):
-            message = f"needs the library {library}, which is not installed"
-            return message, "pip install 'vcam-cli[dng]'"
-    return None
-
-
 CHECKS: tuple[files.CameraCheck, ...] = (
     (check_effects, "optics pixel effects"),
     (check_shutter, "array exposure"),
@@ -218,7 +196,6 @@ CHECKS: tuple[files.CameraCheck, ...] = (
     (check_depth, "scene optics pixel array"),
     (check_spectral_file, "scene optics pixel array exposure adc accuracy"),
     (check_lens, "optics scene pixel array effects"),
-    (check_formats, "output"),
     (raw_dng.check, "pixel array exposure adc output"),
     (spectral_irradiance.check, "scene output"),
     (isetcam_files.check, "pixel array exposure adc output"),

@@ -1,13 +1,14 @@
-"""DNG files: raw frames for raw converters, compressed without loss.
+"""DNG files: raw frames for raw converters.
 
-A TIFF with the tags of Adobe's Digital Negative specification 1.7.1. What the camera was set to
-(ExposureTime, FNumber, ...) stands in the first directory, where TIFF/EP has it: readers of EXIF
-look there too, and tifffile writes no directory of EXIF.
+A TIFF with the tags of Adobe's Digital Negative specification 1.7.1. The first directory is the raw
+frame; within it are a small JPEG picture for programs that do not develop, and a directory of EXIF
+with what the camera was set to.
 
-Samples are lossless JPEG (ITU-T T.81, process 14) in tiles. Neighbors in a row are two components,
-as they are in other cameras' files, so that each is predicted from one of its own color: 12
-megapixels of a noisy mosaic are 0.6 to 0.9 times as large with it as without. Tiles are encoded by
-as many threads as there are processors, 12 megapixels in 0.30 to 0.37 s of one.
+Where imagecodecs is installed, samples are lossless JPEG (ITU-T T.81, process 14) in tiles, else
+uncompressed. Neighbors in a row are two components, as they are in other cameras' files, so that
+each is predicted from one of its own color: 12 megapixels of a noisy mosaic are 0.6 to 0.9 times as
+large with it as without. Tiles are encoded by as many threads as there are processors, 12
+megapixels in 0.30 to 0.37 s of one.
 
 Every reader knows predictor 1. liblj92 encodes in two thirds of the time with predictor 6, which
 darktable 4.2 refuses; deflate is for floating point alone (specification, tag Compression).
@@ -18,6 +19,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from importlib import import_module
+from importlib.util import find_spec
+from io import BytesIO
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -25,9 +29,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vcam_cli.files.atomic import write_whole
 from vcam_cli.files.images.dng_opcodes import gain_maps
-from vcam_cli.files.images.tiff import SOFTWARE, Tag, extra, library, mosaic_tags
+from vcam_cli.files.images.tiff import (
+    GRAY,
+    SOFTWARE,
+    YCBCR,
+    Directory,
+    Tag,
+    image_tags,
+    mosaic_tags,
+    raw_bytes,
+    text,
+    write_directory,
+)
 from vcam_cli.parallel import available_workers, results
 
 TILE = 256
@@ -45,10 +59,6 @@ CODES: dict[str, tuple[int, str]] = {
     "Make": (271, "s"),
     "Model": (272, "s"),
     "Orientation": (274, "H"),
-    "ExposureTime": (33434, "2I"),
-    "FNumber": (33437, "2I"),
-    "ISOSpeedRatings": (34855, "H"),
-    "FocalLength": (37386, "2I"),
     "DNGVersion": (50706, "B"),
     "DNGBackwardVersion": (50707, "B"),
     "UniqueCameraModel": (50708, "s"),
@@ -68,9 +78,33 @@ CODES: dict[str, tuple[int, str]] = {
     "NoiseProfile": (51041, "d"),
 }
 """Tag -> its number, and its type as `files.tiff` has them."""
+EXIF_CODES: dict[str, tuple[int, str]] = {
+    "ExposureTime": (33434, "2I"),
+    "FNumber": (33437, "2I"),
+    "ISOSpeedRatings": (34855, "H"),
+    "SensitivityType": (34864, "H"),
+    "ISOSpeed": (34867, "I"),
+    "ExifVersion": (36864, "x"),
+    "DateTimeOriginal": (36867, "s"),
+    "FocalLength": (37386, "2I"),
+}
+"""The same of tags in the directory of EXIF 2.3."""
+MOST_ISO = (1 << 16) - 1
+"""The highest number of ISOSpeedRatings: it says there that ISOSpeed has the speed (EXIF 2.3)."""
+DATE = "2000:01:01 00:00:00"
+"""Date of all frames: a scene that is simulated has none, and a camera gives the same bytes."""
 LIGHT_SOURCES = {"A": 17, "D65": 21}
 """Illuminant -> its number in EXIF 2.3."""
-_LINEAR_RAW, _PHOTOMETRIC, _JPEG = 34892, 262, 7
+LEAST_DELTA = 1e-3
+"""Part of a code below which a black level counts as whole [DN]."""
+_BLACK_LEVEL_DELTA = (50716, "2i")
+"""Tag BlackLevelDeltaV, a level of every row beside BlackLevel."""
+_EXIF, _SUB_DIRECTORY = 34665, 330
+_CFA, _LINEAR_RAW, _NO_COMPRESSION, _JPEG = 32803, 34892, 1, 7
+_ISO_SPEED = 3
+"""SensitivityType: the speed is an ISO speed of ISO 12232."""
+PREVIEW_QUALITY = 85
+"""Of JPEG, from 0 to 95."""
 
 
 @dataclass(frozen=True)
@@ -118,37 +152,50 @@ class RawImage:
     iso: float
     """ISO speed; 0 where it has none."""
     description: str
+    preview: NDArray
+    """A small picture in sRGB, uint8 (rows, columns) or (rows, columns, 3)."""
 
 
 def write_dng(path: Path | str, image: RawImage) -> None:
-    """Write a DNG file. Raise CannotDo (disk full, permission, a library missing)."""
-    tifffile, planes = library("tifffile"), image.codes.shape[2:]
-    mosaic = bool(image.block)
-    with write_whole(path) as temporary:
-        tifffile.imwrite(
-            temporary,
-            iter(_tiles(image.codes)),
-            shape=image.codes.shape,
-            dtype=np.uint16,
-            tile=_tile_size(*image.codes.shape[:2]),
-            compression=_JPEG,
-            bitspersample=MOST_BITS,  # else tifffile takes those of common JPEG, 12
-            photometric="cfa" if mosaic else _LINEAR_RAW if planes else "minisblack",
-            planarconfig="contig" if planes or mosaic else None,
-            subfiletype=0,
-            description=image.description,
-            software=SOFTWARE,
-            metadata=None,
-            extratags=extra([*mosaic_tags(image.block), *_tags(image)]),
-        )
-        if not planes and not mosaic:  # tifffile refuses linear raw of one sample
-            with tifffile.TiffFile(temporary, mode="r+") as file:
-                file.pages[0].tags[_PHOTOMETRIC].overwrite(_LINEAR_RAW)
+    """Write a DNG file. Raise CannotDo (disk full, permission)."""
+    codes, compressed = image.codes, find_spec("imagecodecs") is not None
+    described = image_tags(
+        codes.shape,
+        _CFA if image.block else _LINEAR_RAW,
+        MOST_BITS,
+        _JPEG if compressed else _NO_COMPRESSION,
+        tile=_tile_size(*codes.shape[:2]) if compressed else None,
+    )
+    described += [
+        text(270, image.description),
+        text(305, SOFTWARE),
+        text(306, DATE),
+        *mosaic_tags(image.block),
+    ]
+    first = Directory(
+        [*described, *_tags(image)],
+        _tiles(codes) if compressed else [raw_bytes(codes.astype(np.uint16))],
+        tiled=compressed,
+        within={_EXIF: Directory(_exif_tags(image)), _SUB_DIRECTORY: _preview(image.preview)},
+    )
+    write_directory(path, first)
+
+
+def _preview(picture: NDArray) -> Directory:
+    """Return a small picture as a JPEG."""
+    from PIL import Image
+
+    data = BytesIO()
+    Image.fromarray(picture).save(data, "JPEG", quality=PREVIEW_QUALITY, subsampling=0)
+    color = picture.ndim == 3
+    tags = image_tags(picture.shape, YCBCR if color else GRAY, 8, _JPEG, reduced=True)
+    sampling: list[Tag] = [(530, "H", 2, (1, 1))] if color else []
+    return Directory([*tags, *sampling, (50970, "I", 1, 2 if color else 1)], [data.getvalue()])
 
 
 def _tiles(codes: NDArray) -> list[bytes]:
     """Return all tiles, compressed, row by row."""
-    encode = library("imagecodecs").jpeg8_encode
+    encode = import_module("imagecodecs").jpeg8_encode
     rows, columns = codes.shape[:2]
     height, width = _tile_size(rows, columns)
 
@@ -179,6 +226,10 @@ def _tags(image: RawImage) -> list[Tag]:
     rows, columns, *planes = image.codes.shape
     count = planes[0] if planes else 1
     margin = MARGIN if image.block else 0
+    # LibRaw cuts off fractions of BlackLevel. The delta, which other readers add, is at most half
+    # a code, of which LibRaw makes 0: so that it comes to the nearest whole level.
+    level = round(image.black)
+    rest = image.black - level
     said: dict[str, Any] = {
         "Make": "vcam",
         "Model": image.name,
@@ -186,16 +237,13 @@ def _tags(image: RawImage) -> list[Tag]:
         "Orientation": [1],
         "DNGVersion": [1, 4, 0, 0],
         "DNGBackwardVersion": [1, 3, 0, 0],
-        "BlackLevel": [image.black] * count,
+        "BlackLevel": [level] * count,
         "WhiteLevel": [image.white] * count,
         "ActiveArea": [0, 0, rows, columns],
         "DefaultCropOrigin": [margin, margin],
         "DefaultCropSize": [columns - 2 * margin, rows - 2 * margin],
         "BaselineExposure": [image.baseline_exposure],
-        "ExposureTime": [image.exposure_time],
     }
-    if np.isfinite(image.f_number):
-        said |= {"FNumber": [image.f_number], "FocalLength": [image.focal_length * 1e3]}
     if image.noise[0] > 0:  # else Adobe's reader warns of it
         said["NoiseProfile"] = [*image.noise] * (count if image.colors is None else 3)
     if image.shading is not None:
@@ -208,18 +256,34 @@ def _tags(image: RawImage) -> list[Tag]:
         for number, (name, matrix) in enumerate(image.colors.matrices.items(), start=1):
             said[f"CalibrationIlluminant{number}"] = [LIGHT_SOURCES[name]]
             said[f"ColorMatrix{number}"] = matrix
-    if 0 < round(image.iso) < 1 << 16:
-        said["ISOSpeedRatings"] = [round(image.iso)]
-    return [_tag(name, value) for name, value in said.items()]
+    tags = [_tag(*CODES[name], value) for name, value in said.items()]
+    if abs(rest) > LEAST_DELTA:
+        tags.append(_tag(*_BLACK_LEVEL_DELTA, [rest] * rows))
+    return tags
 
 
-def _tag(name: str, value: Any) -> Tag:
+def _exif_tags(image: RawImage) -> list[Tag]:
+    """Return the tags of what the camera was set to."""
+    said: dict[str, Any] = {
+        "ExifVersion": b"0230",
+        "DateTimeOriginal": DATE,
+        "ExposureTime": [image.exposure_time],
+    }
+    if np.isfinite(image.f_number):
+        said |= {"FNumber": [image.f_number], "FocalLength": [image.focal_length * 1e3]}
+    iso = round(min(image.iso, (1 << 32) - 1))
+    if iso > 0:
+        said |= {"ISOSpeedRatings": [min(iso, MOST_ISO)], "SensitivityType": [_ISO_SPEED]}
+        said["ISOSpeed"] = [iso]
+    return [_tag(*EXIF_CODES[name], value) for name, value in said.items()]
+
+
+def _tag(code: int, kind: str, value: Any) -> Tag:
     """Return a tag; a text, bytes, or numbers in any shape."""
-    code, kind = CODES[name]
     if kind == "x":
         return code, kind, len(value), value
     if kind == "s":
-        return code, kind, len(value) + 1, value
+        return text(code, value)
     numbers = np.ravel(value).tolist()
     if not kind.startswith("2"):
         return code, kind, len(numbers), tuple(numbers) if len(numbers) > 1 else numbers[0]

@@ -34,6 +34,7 @@ from vcam_cli.files.images.dng import (
 )
 from vcam_cli.processing.base import Patches
 from vcam_cli.processing.color_correction import BRADFORD, RGB_TO_XYZ, Fit, fit_matrix
+from vcam_cli.processing.tone import srgb
 from vcam_cli.processing.white_balance import illuminant_gains
 from vcam_cli.readout.layout import camera_layout
 from vcam_cli.simulation.frame import Frame
@@ -44,6 +45,8 @@ RANGE = (360e-9, 830e-9)
 BAYER = tuple(BLOCKS[f"bayer-{name}"] for name in ("rggb", "grbg", "gbrg", "bggr"))
 MAP_POINTS = 65
 """Rows and columns of a gain map."""
+PREVIEW_SIZE = 1024
+"""Most rows and columns of the small picture."""
 LARGEST_GAIN = 64.0
 """Of a gain map: what is darker than that is left dark."""
 TOP = (1 << MOST_BITS) - 1
@@ -110,8 +113,49 @@ def write_raw_dng(path: Path, frame: Frame, description: str) -> None:
         focal_length=frame.geometry.focal_length,
         iso=frame.base_iso * frame.camera.exposure_gain,
         description=description,
+        preview=_preview(frame, codes, linear),
     )
     write_dng(path, image)
+
+
+def _preview(frame: Frame, codes: NDArray, levels: NDArray) -> NDArray:
+    """Return the frame as a small picture (rows, columns[, 3]) in sRGB codes, uint8.
+
+    Pixels of a mosaic's block are one of the picture. `levels` are black, saturation and white of
+    codes of a linear ADC [DN].
+    """
+    black, saturation, white = levels
+    signal = (_small(frame, codes) - black) / max(saturation - black, 1e-9)
+    exposure = max((saturation - black) / max(white - black, 1e-9), 1.0)
+    if len(frame.mosaic.colors) == 1:
+        return _srgb_codes(signal[..., 0] * exposure)
+    colors = _colors(frame)
+    to_camera = colors.matrices["D65"] @ RGB_TO_XYZ
+    to_display = np.linalg.inv(to_camera / to_camera.sum(axis=1, keepdims=True))
+    return _srgb_codes(np.minimum(signal / colors.neutral * exposure, 1.0) @ to_display.T)
+
+
+def _small(frame: Frame, codes: NDArray) -> NDArray:
+    """Return means over squares of whole blocks (rows, columns, colors), of a linear ADC [DN]."""
+    block = frame.mosaic.block if frame.camera.array.mosaic else ((frame.mosaic.colors[0],),)
+    size = np.array([len(block), len(block[0])])
+    square = size * -(-max(codes.shape[:2] // size) // PREVIEW_SIZE)
+    rows, columns = codes.shape[:2] // square
+    whole = codes[: rows * square[0], : columns * square[1]]
+    if frame.layout.full_color:
+        kept = whole.reshape(rows, square[0], columns, square[1], -1)
+        return np.asarray(frame.linear(kept.astype(np.float32)).mean(axis=(1, 3), dtype=float))
+    means = dict.fromkeys(frame.mosaic.colors, 0.0)
+    names = [name for line in block for name in line]
+    for (row, column), name in zip(np.ndindex(*size), names, strict=True):
+        part = frame.linear(whole[row :: size[0], column :: size[1]].astype(np.float32))
+        kept = part.reshape(rows, square[0] // size[0], columns, square[1] // size[1])
+        means[name] = means[name] + kept.mean(axis=(1, 3), dtype=float) / names.count(name)
+    return np.stack(list(means.values()), axis=-1)
+
+
+def _srgb_codes(light: NDArray) -> NDArray:
+    return np.rint(255 * srgb(np.clip(light, 0.0, 1.0))).astype(np.uint8)
 
 
 def _shading(frame: Frame) -> NDArray | None:
