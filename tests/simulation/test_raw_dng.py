@@ -5,12 +5,15 @@ and prints its warnings. What a file is to say comes from the camera here, and n
 """
 
 import struct
+import sys
+from io import BytesIO
 from pathlib import Path
 
 import numpy as np
 import pytest
 import yaml
 from making import camera
+from PIL import Image
 from raw_readers import (
     adobe_codes,
     dngpy,
@@ -24,6 +27,7 @@ from raw_readers import (
 
 from vcam_cli import BadInput, load, simulate
 from vcam_cli.config import shipped
+from vcam_cli.files.images import dng
 from vcam_cli.files.images.dng import CODES
 from vcam_cli.processing import color_correction
 from vcam_cli.simulation import checks
@@ -375,3 +379,83 @@ def test_noise_profile_is_the_variance_of_flat_fields(more, tmp_path):
 def test_the_same_camera_gives_the_same_bytes(tmp_path):
     first = taken(tmp_path)[1].read_bytes()
     assert taken(tmp_path)[1].read_bytes() == first
+
+
+@pytest.mark.parametrize("pattern", PATTERNS)
+def test_uncompressed_where_imagecodecs_is_missing(pattern, tmp_path, monkeypatch, capfd):
+    """The package alone writes raw.dng: neither tifffile nor imagecodecs is needed."""
+    for name in ("tifffile", "imagecodecs"):
+        monkeypatch.setitem(sys.modules, name, None)
+    monkeypatch.setattr(dng, "find_spec", lambda name: None)
+    more = {"array.filters": "silicon-layers"} if pattern == "stacked" else {}
+    camera(tmp_path, COLOR | {"array.pattern": pattern} | more)
+    checks.load(tmp_path / "made.yaml")
+    result, path = taken(tmp_path, {"array.pattern": pattern} | more)
+    iso = round(result.metrics["base_iso"])
+    monkeypatch.undo()
+    assert complaints(path, result, capfd, iso, PATTERNS[pattern]) == []
+    with tifffile.TiffFile(path) as file:
+        assert file.pages[0].compression == 1
+
+
+def test_readers_of_exif_find_what_the_camera_was_set_to(tmp_path):
+    result, path = taken(tmp_path)
+    with rawpy.imread(str(path)) as file:
+        other = file.other
+    assert other.shutter_speed == pytest.approx(0.01)
+    assert other.aperture == pytest.approx(2.8)
+    assert other.focal_length == pytest.approx(5.0)
+    assert other.iso_speed == round(result.metrics["base_iso"])
+    assert other.timestamp.year == 2000
+
+
+def test_iso_speeds_beyond_sixteen_bits_are_told(tmp_path):
+    """EXIF 2.3: ISOSpeedRatings 65535 sends readers to the tag of the SensitivityType."""
+    result, path = taken(tmp_path, {"exposure.gain": 8000})
+    iso = round(8000 * result.metrics["base_iso"])
+    assert iso > 65535
+    assert dngpy.Dng(str(path)).exif.iso == iso
+    with tifffile.TiffFile(path) as file:
+        exif = file.pages[0].tags[34665].value
+    assert (exif["ISOSpeedRatings"], exif["SensitivityType"], exif["ISOSpeed"]) == (65535, 3, iso)
+
+
+@pytest.mark.parametrize("dark", [1.0, 3.0, 5.0, 7.0])
+def test_black_levels_between_codes_are_not_cut(dark, tmp_path):
+    """LibRaw comes to the nearest whole level, readers of BlackLevelDeltaV to the level itself."""
+    current = {"pixel.photodetector.dark_current": f"{dark} ke/s", "exposure.time": "2 ms"}
+    result, path = taken(tmp_path, current)
+    black = result.frame.black_dn
+    assert abs(black - round(black)) > 0.05
+    with rawpy.imread(str(path)) as file:
+        assert file.black_level_per_channel == [round(black)] * 4
+    with tifffile.TiffFile(path) as file:
+        tags = {tag.code: tag.value for tag in file.pages[0].tags}
+    whole, delta = (np.divide(*np.reshape(tags[code], (-1, 2)).T) for code in (50714, 50716))
+    assert len(delta) == HEIGHT
+    assert whole + delta == pytest.approx(np.full(HEIGHT, black), abs=1e-6)
+
+
+@pytest.mark.parametrize("name", ["colorchecker-d65", "colorchecker-a"])
+def test_the_small_picture_is_the_render_about(name, tmp_path):
+    """Patches within 12 codes of the render: its matrix is that of D65, as LibRaw's is."""
+    sets = ("array.rows=96", "array.columns=128", "output.dng=true", "quality=[]")
+    result = simulate(load(name, sets))
+    with rawpy.imread(str(result.save(tmp_path / "out") / "raw.dng")) as file:
+        thumbnail = file.extract_thumb()
+    assert thumbnail.format == rawpy.ThumbFormat.JPEG
+    small = np.asarray(Image.open(BytesIO(thumbnail.data)).convert("RGB")).astype(float)
+    assert small.shape == (48, 64, 3)
+    ours = (result.render.astype(float).reshape(48, 2, 64, 2, 3)).mean(axis=(1, 3))
+    assert np.median(np.abs(small - ours)) < 12
+    assert np.abs(small.mean(axis=(0, 1)) - ours.mean(axis=(0, 1))).max() < 12
+
+
+def test_small_pictures_of_gray_and_of_large_frames(tmp_path):
+    for changes, size in (
+        ({"array.pattern": "monochrome"}, (WIDTH, HEIGHT)),
+        ({"array.columns": 2100, "array.rows": 24}, (1050 // 2, 12 // 2)),
+    ):
+        path = taken(tmp_path, changes)[1]
+        with rawpy.imread(str(path)) as file:
+            assert Image.open(BytesIO(file.extract_thumb().data)).size == size

@@ -7,11 +7,11 @@ import pytest
 from making import QUIET, camera
 from PIL import Image
 
-from vcam_cli import BadInput, simulate
+from vcam_cli import simulate
+from vcam_cli.files.images import tiff
 from vcam_cli.files.images.exr import read_exr
-from vcam_cli.simulation import checks
 
-tifffile = pytest.importorskip("tifffile", reason="tifffile writes raw.tif")
+tifffile = pytest.importorskip("tifffile", reason="tifffile reads raw.tif")
 
 DESCRIPTION = 270
 """Tag of TIFF 6.0."""
@@ -115,9 +115,15 @@ def test_the_same_camera_gives_the_same_bytes(tmp_path):
     assert (tmp_path / "a/raw.tif").read_bytes() == (tmp_path / "b/raw.tif").read_bytes()
 
 
-def test_a_missing_library_is_told_before_anything_is_computed(tmp_path, monkeypatch):
-    monkeypatch.setattr(checks, "find_spec", lambda name: None)
-    camera(tmp_path, COLOR)
-    with pytest.raises(BadInput, match=r"output.tiff.*needs the library tifffile") as refused:
-        checks.load(tmp_path / "made.yaml")
-    assert "vcam-cli[dng]" in str(refused.value)
+@pytest.mark.parametrize("dtype", [np.uint16, np.uint32])
+@pytest.mark.parametrize("shape", [(7, 5), (6, 9, 3), (6, 9, 4)])
+def test_files_beyond_four_gigabytes_are_bigtiff(dtype, shape, tmp_path, monkeypatch):
+    monkeypatch.setattr(tiff, "_CLASSIC_BYTES", 0)
+    codes = np.random.default_rng(1).integers(0, 1 << 16, shape).astype(dtype)
+    tiff.write_tiff(tmp_path / "a.tif", codes, "a text", tiff.mosaic_tags([["R", "G"]]))
+    with tifffile.TiffFile(tmp_path / "a.tif") as file:
+        assert file.is_bigtiff
+        page = file.pages[0]
+        assert np.array_equal(page.asarray(), codes)
+        assert page.description == "a text"
+        assert page.tags[33422].value == bytes([0, 1])

@@ -222,7 +222,8 @@ class Output(Model):
         default=False,
     )
     dng: Annotated[bool, Strict()] = key(
-        "also write raw.dng, for raw converters: of Bayer mosaics, gray and stacked pixels",
+        "also write raw.dng, for raw converters: of Bayer mosaics, gray and stacked pixels;"
+        " compressed without loss where imagecodecs is installed",
         default=False,
     )
     tiff: Annotated[bool, Strict()] = key(

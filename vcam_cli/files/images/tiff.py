@@ -142,7 +142,7 @@ def write_directory(path: Path | str, first: Directory) -> None:
 
 @dataclass(frozen=True)
 class _Writer:
-    """Writes directories: tags before samples, so that a file that is cut off still says its size."""
+    """Writes directories: tags before samples, so that a file that is cut off still says so."""
 
     file: BinaryIO
     offset: str
