@@ -161,6 +161,20 @@ GUESSES = {
     "optics.psf=psf.csv": "optics.psf: {file: psf.csv, pitch: 0.5 um}",
     "optics.mtf=mtf.csv": "optics.mtf: {file: mtf.csv}",
     "optics.off_axis=falloff.csv": "optics.off_axis: {file: falloff.csv}",
+    "optics.vignetting=falloff.csv": "optics.off_axis: {file: falloff.csv}",
+    # shutters, noise, gains as makers of cameras write them
+    "shutter=rolling": "exposure.shutter: {rolling: {line_time: 15 us}}",
+    "shutter={rolling: {readout_time: 20 ms}}": "exposure.shutter: {rolling: {line_time: 15 us}}",
+    "shutter=global": "exposure.shutter: global",
+    "shutter=1/60 s": "exposure.time: 1/60 s",
+    "shutter=1/60": "exposure.time: 1/60 s",
+    "noise={read: 5 e}": "pixel.readout.read_noise: 5 e",
+    "noise=3 e-": "pixel.readout.read_noise: 3 e",
+    "noise=off": "effects: {shot_noise: off, read_noise: off, fpn: off}",
+    "adc.gain=2.5 e-/ADU": "adc.gain: 0.4 DN/e",
+    "adc.gain=2.5 e/DN": "adc.gain: 0.4 DN/e",
+    "adc.gain=0.4 ADU/e-": "adc.gain: 0.4 DN/e",
+    "pixel.readout.read_noise=5 e-": "pixel.readout.read_noise: 5 e",
 }
 """A first guess -> what it is to be led to."""
 
@@ -207,6 +221,8 @@ def test_what_is_meant_is_right(meant):
         ("pixel:\n  width:3 um", "write width: 3 um, with a space behind the colon"),
         ("optics: {f_number: 2,8}", "write numbers with a decimal point, as in 2.8"),
         ("pixel: {width: “3 um”}", "write 3 um, with straight quotes or none"),
+        ("optics.focal_length: 5 mm", "write optics: {focal_length: 5 mm}"),
+        ("pixel: {readout.read_noise: 5 e-}", "write readout: {read_noise: 5 e}"),
         ("kind: camera", "remove it: a file without kind is a camera"),
     ],
 )
@@ -215,6 +231,13 @@ def test_yaml_that_is_not_quite(wrong, meant):
     with pytest.raises(BadInput) as caught:
         load("mine.yaml")
     assert caught.value.problems[0].remedy == meant
+
+
+def test_the_time_of_all_rows_is_led_to_that_of_one():
+    with pytest.raises(BadInput) as caught:
+        load_with("exposure.shutter={rolling: {readout_time: 20 ms}}")
+    remedies = [problem.remedy for problem in caught.value.problems]
+    assert any(said.endswith("20 ms over 1000 rows are line_time: 20 us") for said in remedies)
 
 
 def test_a_field_of_view_is_that_of_film():

@@ -65,3 +65,19 @@ def test_shipped_files_are_named_once():
     names = [n for kind in ("cameras", "studies", "measurements") for n in shipped.names(kind)]
     assert len(names) == len(set(names))
     assert not {Path(name).stem for name in names} & COMMANDS.keys()
+
+
+@pytest.mark.parametrize("name", ["shot.png", "a/table.csv", "raw.DNG"])
+def test_a_file_in_place_of_a_folder_is_refused(name, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    done = CliRunner().invoke(app, ["run", "starter", "-o", name])
+    said = " ".join(done.stderr.replace("│", " ").split())
+    assert done.exit_code == 2
+    assert f"write -o {name.rpartition('.')[0]}" in said
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_option_for_a_switch_is_led_to_the_switch_on():
+    done = CliRunner().invoke(app, ["run", "starter", "--dng"])
+    assert done.exit_code == 2
+    assert '--set output.dng="true"' in done.stderr

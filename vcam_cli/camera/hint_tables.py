@@ -76,6 +76,8 @@ KEYS: Mapping[str, str] = {
     "lux": "scene.illuminance: 300 lx",
     "color_temperature": "scene.illuminant: {blackbody: 5500 K}",
     "cct": "scene.illuminant: {blackbody: 5500 K}",
+    "readout_time": "exposure.shutter: {rolling: {line_time: 15 us}}",
+    "frame_readout_time": "exposure.shutter: {rolling: {line_time: 15 us}}",
     "rolling_shutter": "exposure.shutter: {rolling: {line_time: 15 us}}",
     "hdr": "exposure.captures: [5 ms, 30 ms]",
     "ir_cut": "optics.transmittance: [0.95, ir-cut-650]",
@@ -111,7 +113,7 @@ ELSEWHERE: Mapping[Path, Mapping[str, str]] = {
         "columns": "array.columns: 640",
         "lens": "optics: {f_number: 2.8, focal_length: 4.5 mm}",
         "sensor": "pixel: {width: 4 um} and array: {rows: 480, columns: 640}",
-        "noise": "effects: {shot_noise: off, read_noise: off, fpn: off}",
+        "shutter": "exposure.shutter: {rolling: {line_time: 15 us}}",
     },
     ("scene", "source"): dict.fromkeys(
         ("path", "filename", "name"), "scene.source: {kind: image, file: photo.png}"

@@ -35,6 +35,8 @@ AT_MOST_1 = "it must be at most 1"
 """What is said of a fraction that is too large, mostly since it is in percent."""
 _SEPARATE = {"name", "kind", "file", "value", "rows", "columns"}
 """Keys that many mappings have: elsewhere they mean something else."""
+NOTHING = {"none", "off", "no", "false", "0"}
+"""Words for what is not to be."""
 _CLOSE = 0.75
 """How alike a word must be to one of another section."""
 _FILM_DIAGONAL = math.hypot(36, 24)
@@ -58,6 +60,9 @@ def set_option(name: str) -> str:
     word = _plain(name.lstrip("-"))
     entry = re.split(" or | and ", _meant_key((word,), None))[0]
     path, _, value = entry.partition(": ")
+    key = next((key for key in index() if f"write {key.dotted}" == path), None)
+    if key is not None and value == "false":  # who names a switch wants it
+        value = "true"
     if path.startswith("write "):
         return f'--set {path.removeprefix("write ")}="{value}"'
     return f"--set {word}.KEY=VALUE" if word in Camera.model_fields else ""
@@ -85,6 +90,10 @@ def _meant_key(path: Path, given: object) -> str:
     word, above = _plain(path[-1]), tuple(path[:-1])
     if word in NOT_SIMULATED:
         return f"remove it, as this is not simulated: {NOT_SIMULATED[word]}"
+    if dotted := _below(path):
+        return f"write {_nested(dotted.path[len(above) :], _value(given, dotted, dotted.example))}"
+    if "readout_time" in word and (said := _line_time(yaml_text(given))):
+        return said
     if path == ("kind",):
         return "remove it: a file without kind is a camera"
     if isinstance(path[-1], int) and given is None:
@@ -94,6 +103,10 @@ def _meant_key(path: Path, given: object) -> str:
     if isinstance(given, Mapping) and (meant := _meant_section(word, given)):
         return meant
     here = [key.name for key in index() if key.path[:-1] == above]
+    if word == "shutter" and isinstance(given, str) and (said := _shutter(given)):
+        return said
+    if word == "noise" and not above and _plain(yaml_text(given)) in NOTHING:
+        return f"write {ELSEWHERE[('effects',)]['noise']}"
     if said := ELSEWHERE.get(above, {}).get(word):
         return f"write {_with_value(said, given)}"
     if (
@@ -115,6 +128,45 @@ def _meant_key(path: Path, given: object) -> str:
         return f"write {_entry(close, given)}"
     same = [key for key in places if key.name == close]
     return f"did you mean {_place(same[0], given)}?" if same else ""
+
+
+def _below(path: Path) -> Key | None:
+    """Return the key that is meant by a name with dots in it, such as optics.focal_length."""
+    if not isinstance(path[-1], str) or "." not in path[-1]:
+        return None
+    meant = (*path[:-1], *path[-1].split("."))
+    return next((key for key in index() if key.path == meant), None)
+
+
+def _nested(path: Path, value: str) -> str:
+    """Return a key as a file has it: a mapping in each section that leads to it."""
+    first, *rest = path
+    return f"{first}: {{{_nested(tuple(rest), value)}}}" if rest else f"{first}: {value}"
+
+
+def _line_time(text: str) -> str:
+    """Return what is meant by the time that all rows take; "" for no time."""
+    try:
+        number, unit = units.split(text)
+        units.convert(number, unit, "s")
+    except ValueError:
+        return ""
+    each = units.render(units.parse(f"{float(number / 1000):.6g} {unit}", "time"), "time")
+    return (
+        "write exposure.shutter: {rolling: {line_time: ..}}, the time from a row to the next:"
+        f" {text} over 1000 rows are line_time: {each}"
+    )
+
+
+def _shutter(text: str) -> str:
+    """Return what is meant by a shutter: how rows are exposed, or how long; "" for neither."""
+    if _plain(text) == "global":
+        return "write exposure.shutter: global"
+    try:
+        units.parse(text if re.search("[a-z]", text) else f"{text} s", "time")
+    except ValueError:
+        return ""
+    return f"write exposure.time: {text if re.search('[a-z]', text) else text + ' s'}"
 
 
 def _meant_section(word: str, given: Mapping[object, object]) -> str:
@@ -155,7 +207,21 @@ def _with_value(entry: str, given: object) -> str:
             width = round(height * 4 / 3)
         return f"array.columns: {width} and array.rows: {height}"
     key = next((key for key in index() if key.dotted == path), None)
+    if isinstance(given, Mapping) and len(given) == 1 and not example.startswith("{"):
+        given = next(iter(given.values()))  # noise: {read: 5 e}
+    if key is not None and (file := _in_file(key.path, given)):
+        return f"{path}: {file}"
     return f"{path}: {_value(given, key, example)}" if key else entry
+
+
+def _in_file(path: Path, given: object) -> str:
+    """Return the mapping that names a file of data; "" where no key there is a file's."""
+    file = next((key for key in index() if key.path == (*path, "file")), None)
+    if file is None or not isinstance(given, str) or PurePath(given).suffix.lower() not in DATA:
+        return ""
+    beside = [key for key in index() if key.path[:-1] == path and key.model is file.model]
+    needed = [f"{key.name}: {key.example}" for key in beside if key.required][1:]
+    return f"{{{', '.join((f'file: {given}', *needed))}}}"
 
 
 def _place(key: Key, given: object) -> str:
@@ -207,6 +273,8 @@ def _meant_value(problem: Problem, given: object) -> str:
     for form, remedy in FORMS.get(path, ()):
         if match := re.fullmatch(form, word.strip()):
             return match.expand(remedy)
+    if problem.path == ("adc", "gain") and (meant := _in_codes_per_electron(word)):
+        return f"write {meant}"
     if (plain := in_electrons(word)) != word and " unit " in problem.message:
         return f"write {plain}"
     if "equivalent" in word and (meant := _field_of_view(word)):
@@ -225,16 +293,30 @@ def _meant_value(problem: Problem, given: object) -> str:
             return f"write {{kind: image, file: {word}}}"
         chart = VALUES["scene.source.chart"].get(_plain(word)) or nearest(word, CHARTS)
         return f"write {{kind: chart, chart: {chart}}}" if chart else ""
-    file = next((key for key in index() if key.path == (*problem.path, "file")), None)
-    if file is not None and PurePath(word).suffix.lower() in DATA:
-        beside = [k for k in index() if k.path[:-1] == problem.path and k.model is file.model]
-        needed = [f"{key.name}: {key.example}" for key in beside if key.required][1:]
-        return f"write {{{', '.join((f'file: {word}', *needed))}}}"
+    if file := _in_file(problem.path, word):
+        return f"write {file}"
     key = next((key for key in index() if key.path == problem.path), None)
     if key is not None and key.unit and "bare number" in problem.message:
         before, has_example, _ = problem.remedy.partition("for example ")
         example = f"{word} {BARE[key.unit]}" if key.unit in BARE else key.example
         return f"{before}for example {example}" if has_example else ""
+    return ""
+
+
+def _in_codes_per_electron(text: str) -> str:
+    """Return a gain in DN/e for one in ADU/e-, or in e-/ADU, which is its inverse; "" for none."""
+    match = re.fullmatch(r"([\d.eE+-]+) ?([A-Za-z-]+)/([A-Za-z-]+)", in_electrons(text))
+    if match is None:
+        return ""
+    codes, electrons = {"DN", "ADU", "LSB", "counts", "count"}, {"e", "e-", "electron", "electrons"}
+    try:
+        number = float(match[1])
+    except ValueError:
+        return ""
+    if match[2] in codes and match[3] in electrons:
+        return f"{number:.6g} DN/e"
+    if match[2] in electrons and match[3] in codes and number:
+        return f"{1 / number:.6g} DN/e, the inverse of {text}"
     return ""
 
 

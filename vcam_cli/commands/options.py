@@ -77,6 +77,32 @@ def check_accuracy(value: str | None) -> str | None:
     return value
 
 
+FILES = {
+    ".png",
+    ".jpg",
+    ".jpeg",
+    ".tif",
+    ".tiff",
+    ".exr",
+    ".dng",
+    ".csv",
+    ".json",
+    ".html",
+    ".yaml",
+}
+"""Ends of names that are of files and of no folder."""
+
+
+def check_folder(value: Path | None) -> Path | None:
+    """Refuse the name of a file for a folder, unless there is such a folder."""
+    if value is None or value.suffix.lower() not in FILES or value.is_dir():
+        return value
+    message = (
+        f"{value} is the name of a file, and -o names a folder; write -o {value.with_suffix('')}"
+    )
+    raise typer.BadParameter(message)
+
+
 Camera = Annotated[
     str,
     typer.Argument(
@@ -97,7 +123,13 @@ Study = Annotated[
 ]
 Out = Annotated[
     Path | None,
-    typer.Option("-o", "--out", metavar="DIR", help="Folder to write into; default out/NAME."),
+    typer.Option(
+        "-o",
+        "--out",
+        metavar="DIR",
+        callback=check_folder,
+        help="Folder to write into; default out/NAME.",
+    ),
 ]
 Set = Annotated[
     list[str] | None,
