@@ -5,12 +5,14 @@ import json
 import pytest
 from typer.testing import CliRunner
 
+from vcam_cli import load, simulate
 from vcam_cli.camera import hints
 from vcam_cli.camera.scene.scene_files import ImageFile
 from vcam_cli.camera.scene.sources import CHARTS, PICTURE_MODELS
-from vcam_cli.commands import explain
-from vcam_cli.commands.main import app
+from vcam_cli.commands import explain, glossary
+from vcam_cli.commands.main import COMMANDS, app
 from vcam_cli.effects.order import ORDER
+from vcam_cli.sweeps.quantities import METRICS, QUANTITIES
 
 
 def vcam(*words, code=0):
@@ -89,3 +91,71 @@ def test_what_is_not_simulated_is_told():
 def test_a_metric_by_its_name_without_unit():
     assert vcam("snr").stdout.startswith("snr_db (metric)")
     assert vcam("dynamic range").stdout.startswith("dynamic_range_db (metric)")
+
+
+CHART_CAMERA = """
+scene: {SOURCE, luminance: 100 cd/m2}
+optics: {f_number: 2.8, focal_length: 4.5 mm}
+pixel:
+  width: 4 um
+  photodetector: {fill_factor: 0.5, quantum_efficiency: 0.5}
+  readout: {conversion_gain: 40 uV/e, full_well: 25 ke}
+array: {rows: 48, columns: 64}
+exposure: {time: 60 ms}
+"""
+
+
+@pytest.mark.parametrize("chart", CHARTS)
+def test_the_example_of_a_chart_is_taken(chart, tmp_path):
+    [entry] = (e for e in explain.explanations(chart) if e["title"].endswith("(chart)"))
+    path = tmp_path / "a.yaml"
+    path.write_text(CHART_CAMERA.replace("SOURCE", entry["example"]), encoding="utf-8")
+    assert load(path).scene.source.chart == chart
+
+
+def test_every_value_that_is_told_is_taken_by_its_key():
+    """A pattern, an architecture, a method: each is found, with the key that it is a value of."""
+    for word in ("quad-bayer", "aps-4t", "edge-aware", "gray-world", "rectilinear"):
+        found = [e["title"] for e in explain.explanations(word)]
+        if word != "rectilinear":
+            assert any(title.startswith(f"{word} (value of ") for title in found), word
+
+
+def test_everything_that_a_run_or_a_table_names_is_explained(tmp_path):
+    """Metrics of a run that asks for all of them, columns, quantities of studies, commands."""
+    result = simulate(load("starter", ["quality=[mse, psnr, cielab, s-cielab]"]))
+    words = [*result.metrics, *QUANTITIES, *COMMANDS, *METRICS]
+    words += [name for table in glossary.written().values() for name in table]
+    for word in words:
+        assert list(explain.explanations(word)), word
+    for column in (name for table in glossary.written().values() for name in table):
+        assert column in glossary.COLUMNS | glossary.QUANTITIES, column
+
+
+def test_columns_with_their_units_are_explained():
+    assert vcam("time [s]").stdout.startswith("time (column)")
+    assert "pixel.width" in vcam("pixel.width [um]").stdout
+
+
+@pytest.mark.parametrize(
+    ("word", "said"),
+    [
+        ("lux", "files write lx"),
+        ("e-", "files write e"),
+        ("electrons", "files write e"),
+        ("2.5 e-/ADU", "2.5 e-/ADU is 0.4 DN/e"),
+        ("DN/e", "Unit of an ADC gain"),
+        ("PTC", "Photon transfer curve"),
+        ("photon transfer", "vcam explain ptc"),
+        ("responsivity", "V/(lx s)"),
+        ("NIR", "scene.wavelengths"),
+        ("video", "--frames N --fps F"),
+        ("mtf50", "ISO 12233"),
+        ("gray_snr_db", "18 %"),
+        ("metrics", "metrics.csv"),
+        ("columns", "table"),
+        ("sweep", "Run a sweep study"),
+    ],
+)
+def test_words_of_tables_data_sheets_and_units_are_explained(word, said):
+    assert said in " ".join(vcam(word).stdout.split())

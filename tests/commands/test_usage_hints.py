@@ -5,10 +5,11 @@ import sys
 from pathlib import Path
 
 import pytest
+from typer.testing import CliRunner
 
 from vcam_cli.commands import usage_hints
 from vcam_cli.commands.list_ import KINDS, WORDS
-from vcam_cli.commands.main import COMMANDS
+from vcam_cli.commands.main import COMMANDS, app
 
 
 def said(tmp_path, *arguments):

@@ -92,8 +92,8 @@ def _meant_key(path: Path, given: object) -> str:
         return f"remove it, as this is not simulated: {NOT_SIMULATED[word]}"
     if dotted := _below(path):
         return f"write {_nested(dotted.path[len(above) :], _value(given, dotted, dotted.example))}"
-    if "readout_time" in word and (said := _line_time(yaml_text(given))):
-        return said
+    if "readout_time" in word and (meant := _line_time(yaml_text(given))):
+        return meant
     if path == ("kind",):
         return "remove it: a file without kind is a camera"
     if isinstance(path[-1], int) and given is None:
@@ -103,8 +103,8 @@ def _meant_key(path: Path, given: object) -> str:
     if isinstance(given, Mapping) and (meant := _meant_section(word, given)):
         return meant
     here = [key.name for key in index() if key.path[:-1] == above]
-    if word == "shutter" and isinstance(given, str) and (said := _shutter(given)):
-        return said
+    if word == "shutter" and isinstance(given, str) and (meant := _shutter(given)):
+        return meant
     if word == "noise" and not above and _plain(yaml_text(given)) in NOTHING:
         return f"write {ELSEWHERE[('effects',)]['noise']}"
     if said := ELSEWHERE.get(above, {}).get(word):

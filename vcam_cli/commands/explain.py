@@ -45,16 +45,26 @@ def names() -> list[str]:
     """Return all that can be explained."""
     from vcam_cli.camera import hint_tables
     from vcam_cli.camera.scene.sources import CHARTS
+    from vcam_cli.commands import glossary
+    from vcam_cli.commands.main import COMMANDS
+    from vcam_cli.sweeps.quantities import QUANTITIES
 
     found = [key.dotted for _, key in _all_keys()] + [key.name for _, key in _all_keys()]
-    return [*found, *_effects(), *_metrics(), *CHARTS, *hint_tables.KEYS]
+    columns = [name for table in glossary.written().values() for name in table]
+    words = [*glossary.TERMS, *glossary.QUANTITIES, *columns, *QUANTITIES, *COMMANDS, *_units()]
+    values = [value for value, _ in _values()]
+    return [*found, *_effects(), *_metrics(), *CHARTS, *hint_tables.KEYS, *words, *values]
 
 
 def explanations(name: str) -> Iterator[dict[str, Any]]:
     """Yield what there is to say of a name: title, about, and further lines by their headings."""
     from vcam_cli.camera import hint_tables
 
-    word = re.sub(r"^f/[\d.]*$", "f_number", name.strip().lower().replace(" ", "_"))
+    yield from _of_unit(name.strip())
+    plain = re.sub(r" ?\[.*\]$", "", name.strip())  # of a column with its unit
+    word = re.sub(r"^f/[\d.]*$", "f_number", plain.lower().replace(" ", "_"))
+    yield from _of_command(word)
+    yield from _of_word(word.replace("-", "_"))
     yield from _of_effect(word)
     yield from _of_metric(word)
     yield from _of_chart(word)
@@ -64,6 +74,7 @@ def explanations(name: str) -> Iterator[dict[str, Any]]:
         first = _keys_called(meant.partition(": ")[0])
         found = [*first, *(key for key in found if key not in first)]
     yield from (_of_key(where, key) for where, key in found)
+    yield from _of_value(word)
     if about := hint_tables.NOT_SIMULATED.get(word.replace("-", "_")):
         yield {"title": f"{word} (not simulated)", "about": f"{about[:1].upper()}{about[1:]}."}
 
@@ -199,13 +210,124 @@ def _of_chart(word: str) -> Iterator[dict[str, Any]]:
     if chart is None:
         return
     own = [key for key in keys(chart) if key.name not in ("kind", "chart")]
+    needed = [f"{key.name}: {key.example}" for key in own if key.required and len(key.path) == 1]
+    named = ", ".join(("kind: chart", f"chart: {word.replace('_', '-')}", *needed))
     yield {
         "title": f"{word.replace('_', '-')} (chart)",
         "about": (chart.__doc__ or "").strip(),
         "keys": "; ".join(f"{key.name}: {key.example} ({key.description})" for key in own)
         or "none",
-        "example": f"source: {{kind: chart, chart: {word.replace('_', '-')}}}",
+        "example": f"source: {{{named}}}",
     }
+
+
+def _of_command(word: str) -> Iterator[dict[str, Any]]:
+    """Yield what a command does: the first line of its help."""
+    from importlib import import_module
+
+    from vcam_cli.commands.main import COMMANDS
+
+    if word not in COMMANDS:
+        return
+    module, function = COMMANDS[word].split(":")
+    called = getattr(import_module(f"vcam_cli.commands.{module}"), function)
+    about = (called.__doc__ or "").strip().partition("\n\n")[0]
+    yield {
+        "title": f"vcam {word} (command)",
+        "about": " ".join(about.split()),
+        "more": f"vcam {word} -h",
+    }
+
+
+def _of_word(word: str) -> Iterator[dict[str, Any]]:
+    """Yield a term of the trade, and what a quantity or column of a table is."""
+    from vcam_cli.commands import glossary
+    from vcam_cli.sweeps.quantities import QUANTITIES, unit
+
+    tables = [name for name, columns in glossary.written().items() if word in columns]
+    about = glossary.COLUMNS.get(word)
+    if tables and about:
+        entry = {"title": f"{word} (column)", "about": _sentence(about)}
+        yield entry | {"in": ", ".join(tables)}
+    about = glossary.TERMS.get(word) or glossary.QUANTITIES.get(word)
+    if about is None and word in QUANTITIES and word not in _metrics():
+        about = f"property of a camera that studies take, `{word}`"
+        about += f" [{unit(word)}]" if unit(word) else ""
+        if _keys_called(word):  # which is explained as a key
+            about = None
+    if about is not None and not (tables and word in glossary.COLUMNS):
+        yield {"title": word, "about": _sentence(about)}
+
+
+def _sentence(text: str) -> str:
+    return f"{text[:1].upper()}{text[1:]}."
+
+
+def _units() -> dict[str, str]:
+    """Return units, and how they are also written, with what they measure."""
+    from vcam_cli.units import DIMENSIONS
+
+    found = {unit: kind.title for kind in DIMENSIONS.values() for unit in kind.units}
+    also = {"e-": "e", "electrons": "e", "electron": "e", "lux": "lx", "ADU": "DN", "LSB": "DN"}
+    also |= {"ADU/e-": "DN/e", "DN/e-": "DN/e", "e-/s": "e/s", "uV/e-": "uV/e"}
+    found |= {word: f"{found[unit]}; files write {unit}" for word, unit in also.items()}
+    inverse = f"{found['DN/e']}, inverted; files write DN/e: 2.5 {{}} is 0.4 DN/e"
+    return found | {unit: inverse.format(unit) for unit in ("e-/ADU", "e/ADU", "e-/DN", "e/DN")}
+
+
+def _of_unit(name: str) -> Iterator[dict[str, Any]]:
+    """Yield what a unit measures."""
+    word = re.sub(r"^[\d.]+ +", "", name)
+    about = _units().get(word)
+    if about is not None:
+        yield {"title": f"{word} (unit)", "about": f"Unit of {about}."}
+
+
+@cache
+def _values() -> tuple[tuple[str, Any], ...]:
+    """Return words that stand as values, with their keys."""
+    from vcam_cli.camera.hints import index
+
+    found = []
+    for key in index():
+        field = key.model.model_fields.get(key.name)
+        if field is not None and key.path[0] != "effects":
+            found += [(word, key) for word in dict.fromkeys(_literals(field))]
+    return tuple(found)
+
+
+def _literals(forms: Any) -> Iterator[str]:
+    """Yield the words among the forms of a value."""
+    from typing import Literal, get_args, get_origin
+
+    from pydantic import BaseModel
+    from pydantic.fields import FieldInfo
+
+    from vcam_cli.config.yaml_type import YamlType
+
+    if isinstance(forms, FieldInfo):
+        yield from _literals((forms.annotation, *forms.metadata))
+    elif isinstance(forms, YamlType):
+        yield from _literals(forms.forms)
+    elif isinstance(forms, tuple):
+        for form in forms:
+            yield from _literals(form)
+    elif get_origin(forms) is Literal:
+        yield from (word for word in get_args(forms) if isinstance(word, str))
+    elif not (isinstance(forms, type) and issubclass(forms, BaseModel)):
+        yield from _literals(get_args(forms))
+
+
+def _of_value(word: str) -> Iterator[dict[str, Any]]:
+    """Yield the keys that a word is a value of."""
+    for value, key in _values():
+        if value == word.replace("_", "-") or value == word:
+            about = f"{key.description[:1].upper()}{key.description[1:]}."
+            yield {
+                "title": f"{value} (value of {key.dotted})",
+                "about": about,
+                "example": f"{key.name}: {value}",
+            }
 
 
 def _text(entry: dict[str, Any]) -> str:

@@ -1,0 +1,181 @@
+"""Words that tables, data sheets and the trade have beside keys, effects and charts.
+
+A test holds that every column, metric and quantity that a file has is explained.
+"""
+
+from collections.abc import Mapping
+
+TERMS: Mapping[str, str] = {
+    "metrics": "numbers of a run in metrics.csv: `vcam list metrics` names them; those that judge"
+    " the picture are asked for in `quality`",
+    "columns": "every column of every table is a word of its own here, as in `vcam explain"
+    " gain_pixel`; units stand in brackets behind it, or in the column unit",
+    "mtf": "modulation transfer function: contrast of the image over that of the scene, by spatial"
+    " frequency. `vcam characterize` measures the system's at a slanted edge (ISO 12233); a"
+    " measured lens is given in optics.mtf",
+    "mtf50": "spatial frequency at which the MTF is one half, from a slanted edge (e-SFR of ISO"
+    " 12233): in metrics.csv [cycles/pixel], in characterize.csv [lp/mm]",
+    "mtf50_per_pixel": "mtf50 times the pixel pitch [cycles/pixel]",
+    "mtf_nyquist": "MTF at half a cycle per pixel, from a slanted edge (ISO 12233)",
+    "gray_snr_db": "mean signal over temporal noise of a gray that reflects 18 %, in this exposure,"
+    " 20 log10 [dB]",
+    "ptc": "photon transfer curve: variance of the raw over its mean, from dark to saturation. Its"
+    " slope is the system gain K, its start the dark noise, its fall the saturation (EMVA 1288"
+    " release 4.0); `vcam characterize CAMERA` measures it, `vcam fit` takes it from real frames",
+    "photon_transfer": "see PTC: `vcam explain ptc`",
+    "responsivity": "signal for exposure: V/(lx s) in data sheets, DN per photon in EMVA 1288;"
+    " `vcam characterize` states both, and `adc.gain` [DN/e] times the quantum efficiency is the"
+    " latter",
+    "emva": "EMVA 1288 release 4.0, the standard by which cameras are characterized: `vcam"
+    " characterize`, `vcam fit`",
+    "emva_1288": "see EMVA: `vcam explain emva`",
+    "nir": "near infrared, about 700 to 1100 nm, which silicon sees: extend scene.wavelengths to"
+    " simulate it, and leave the infrared cut (ir-cut-650) out of optics.transmittance",
+    "video": "`vcam run CAMERA --frames N --fps F` takes frames one after another; everything that"
+    " moves goes on, noise is drawn anew, the fixed pattern stays",
+    "fixed_pattern_noise": "differences between pixels that stay from frame to frame: pixel.fpn",
+    "dark_noise": "temporal noise of a pixel without light: reset, readout and the shot noise of"
+    " the dark current",
+    "temporal_dark_noise": "temporal noise of a pixel without light [e] (EMVA 1288, eqs 53 and 54)",
+    "delta_e": "difference of two colors in CIELAB: 1 is about the least that the eye sees",
+    "s_cielab": "difference of two pictures as the eye sees it: CIELAB behind the blur of the eye",
+    "dng": "raw.dng, the raw frame for raw converters: `output.dng: true`",
+    "optimum": "value of the varied key at which a study's metric is best; low..high is what"
+    " repeats and seeds cannot tell apart",
+    "full_signal": "largest noise-free mean signal on the array, at most the full well, at least"
+    " 1 e: errors are relative to it",
+    "tolerance": "error of the mean raw that `accuracy` allows, over full signal",
+    "linearity_error": "deviation of the mean signal from a straight line (EMVA 1288, eq 62)",
+}
+"""A word of the trade -> what it means."""
+QUANTITIES: Mapping[str, str] = {
+    "mean_delta_e": "mean CIELAB Delta E of two pictures; ask for `cielab` in `quality`",
+    "mean_s_cielab": "mean S-CIELAB Delta E of two pictures; ask for `s-cielab` in `quality`",
+    "median_s_cielab": "median S-CIELAB Delta E of two pictures",
+    "p95_s_cielab": "S-CIELAB Delta E that 95 % of the pixels do not exceed",
+    "max_s_cielab": "largest S-CIELAB Delta E of two pictures",
+    "psnr_db": "peak signal-to-noise ratio of two pictures, white = 1 [dB]",
+    "effective_fill_factor": "fraction of a pixel whose light a photodetector gets, microlens"
+    " included",
+    "photodetector_area": "area of the photodetector [um2]",
+    "photodetector_perimeter": "perimeter of the photodetector [um]",
+    "nyquist_frequency": "half a cycle per pixel pitch [lp/mm]",
+    "corner_vignetting": "light in the corner over that on the axis, by the pixel's tunnel",
+    "system_mtf": "MTF of lens and pixel together",
+    "sensor_mtf": "MTF of the pixel alone: aperture and diffusion of charge",
+    "relative_qe": "quantum efficiency over that on the axis",
+    "qe_over_no_vignetting": "quantum efficiency over that without the pixel's tunnel",
+    "lens_falloff": "illumination by the lens over that on the axis",
+    "relative_signal": "signal over that on the axis",
+    "saturation_capacity": "electrons at saturation, mu_e.sat [e] (EMVA 1288, eq 24)",
+    "saturation_photons": "photons on a pixel at saturation, mu_p.sat (EMVA 1288, section 6)",
+    "threshold_electrons": "least signal that can be told, SNR = 1, mu_e.min [e] (EMVA 1288, eq"
+    " 27)",
+    "threshold_photons": "photons of the least signal that can be told, mu_p.min (EMVA 1288, eq"
+    " 26)",
+    "emva_dynamic_range_db": "saturation capacity over the least signal [dB] (EMVA 1288, eq 28)",
+    "linearity_error_min": "lowest deviation from a straight line [%] (EMVA 1288, eq 62)",
+    "linearity_error_max": "highest deviation from a straight line [%] (EMVA 1288, eq 62)",
+}
+"""A quantity of a table -> what it is, beside metrics and keys."""
+COLUMNS: Mapping[str, str] = {
+    "metric": "name of a metric: `vcam explain NAME`",
+    "value": "the number, in the unit beside it",
+    "unit": "unit of the number in this row",
+    "quantity": "name of what was measured",
+    "channel": "color of the pixels, or channel of the raw",
+    "measured": "what was measured of frames",
+    "expected": "what follows from the camera file in closed form",
+    "predicted": "what the camera file predicts of a measured frame",
+    "error_percent": "predicted less measured, over measured [%]",
+    "frame": "entry of the measurement's list of frames",
+    "definition": "equation and standard of the quantity",
+    "parameter": "key or number of the camera that was estimated",
+    "low": "lower end of the interval",
+    "high": "upper end of the interval",
+    "method": "how the number was found; of a schedule: how its times were chosen",
+    "knob": "setting of the accuracy that was varied; `preset` for the presets, `effect:NAME` for"
+    " an effect left out",
+    "setting": "value of the knob",
+    "rms_error": "rms error of the mean raw against the reference, over full signal",
+    "max_error": "largest error of the mean raw against the reference, over full signal",
+    "rms_electrons": "rms error of the mean raw against the reference [e]",
+    "seconds": "time that it took [s]",
+    "seconds_spread": "half the range of repeated times [s]",
+    "tolerance_spent": "error over what the tolerance allows; at most 1 holds",
+    "scene": "scene before which the plan was made",
+    "effect": "name of an effect: `vcam explain NAME`",
+    "state": "whether the effect is simulated: on or off",
+    "contribution": "what the effect changes, in its unit",
+    "allowed": "what may be left out, in the same unit",
+    "seconds_auto": "measured time with the effects of the plan [s]",
+    "seconds_all": "measured time with all effects [s]",
+    "count": "number of captures",
+    "capture": "number of a capture, from 1",
+    "captures": "number of captures; as a key: exposure.captures",
+    "time_ratio": "time of a capture over that of the first",
+    "photocurrent": "largest photocurrent that does not saturate a capture, in the pdf's units",
+    "time": "time of a capture [s]",
+    "expected_snr": "mean SNR over the photocurrents of the scene (a power ratio)",
+    "single_capture_snr": "the same of the best single capture",
+    "gain": "expected SNR over that of a single capture; as a key: exposure.gain",
+    "upper_bound": "most that any schedule can reach",
+    "gap": "certified relative distance from the global optimum",
+    "used": "captures that differ",
+    "segments": "segments of the pdf",
+    "density": "how dense the pdf's values are chosen",
+    "target": "gain that is to be reached",
+    "start": "how a capture is planned before anything is known",
+    "replans": "how often the rest of the captures was planned anew",
+    "offline_snr": "expected SNR if the pdf were known before",
+    "loss_db": "what is lost against that [dB]",
+    "largest_loss_db": "largest loss of all runs [dB]",
+    "searching": "share of captures that search",
+    "may_switch": "whether the plan may change while captures are taken",
+    "schedule": "how the times were chosen",
+    "estimator": "how samples are made into a photocurrent: exposure.estimator",
+    "measured_snr": "SNR of simulated frames",
+    "standard_error": "standard error of the number before it",
+    "noisy_snr": "expected SNR where noise decides what is saturated",
+    "noisy_standard_error": "standard error of noisy_snr",
+    "noisy_loss": "what noise at saturation costs, relative",
+    "below_best_db": "distance from the best schedule [dB]",
+    "times": "times of the captures [s]",
+    "case": "case of the study",
+    "seed": "frame seed of the point; as a key: seed.frame",
+    "error": "why a point failed; empty where it did not",
+    "optimum": TERMS["optimum"],
+    "spread": "standard deviation over repeats and seeds",
+    "image_height_mm": "distance from the axis in the image plane [mm]",
+    "x_um": "center of a pixel, right of the array's center [um]",
+    "y_um": "center of a pixel, below the array's center [um]",
+    "frequency_lp_per_mm": "spatial frequency in the image plane [lp/mm]",
+    "wavelength_nm": "wavelength [nm]",
+}
+"""A column of a table -> what it holds."""
+
+
+def written() -> dict[str, tuple[str, ...]]:
+    """Return the columns of the tables that commands write, by the table's name."""
+    from vcam_cli.accuracy import setting_errors
+    from vcam_cli.capture_schedules import frames, online_loss, tables
+    from vcam_cli.characterization import datasheet
+    from vcam_cli.files.tables import METRIC_COLUMNS
+    from vcam_cli.fitting import edge, parameters
+
+    return {
+        "metrics.csv": METRIC_COLUMNS,
+        "accuracy.csv": setting_errors.COLUMNS,
+        "characterize.csv": datasheet.COLUMNS,
+        "parameters.csv": parameters.COLUMNS,
+        "mtf.csv": edge.COLUMNS,
+        "schedule.csv": (*tables.SCHEDULE, "time"),
+        "summary.csv": tables.SUMMARY,
+        "segments.csv": tables.SEGMENTS,
+        "targets.csv": tables.TARGETS,
+        "online.csv": online_loss.COLUMNS,
+        "frames.csv": frames.COLUMNS,
+        "verify.csv": ("frame", "channel", "quantity", "measured", "predicted", "error_percent"),
+        "scenes.csv": ("scene", "effect", "state", "contribution", "allowed", "seconds"),
+        "optimum.csv": ("case", "parameter", "unit", "optimum", "low", "high", "metric", "value"),
+    }
