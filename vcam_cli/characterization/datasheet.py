@@ -31,10 +31,14 @@ from vcam_cli.quality.photon_transfer import (
     linearity,
     sensitivity_threshold,
 )
+from vcam_cli.readout.iso_speed import electrons_per_exposure
+from vcam_cli.spectra import Spectrum, illuminant
 
 COLUMNS = ("quantity", "channel", "measured", "expected", "unit", "definition")
 SNR_LEVEL = 0.2
 """Signal at which the SNR of eq 3.2 is reported, over saturation."""
+GREEN = 550e-9
+"""Wavelength of the green light by which data sheets state responsivity [m]."""
 R4 = "EMVA 1288 R4"
 
 Row = tuple[str, float, float, str, str]
@@ -127,6 +131,7 @@ def _response_rows(bench: Bench, channel: Channel) -> Iterator[Row]:
     definition = f"electrons per photon on the pixel, in this light; {R4} eq 52"
     yield "quantum_efficiency", 100 * transfer.quantum_efficiency, 100 * efficiency, "%", definition
     yield "responsivity", transfer.responsivity, gain * efficiency, "DN/photon", f"R, {R4} eq 49"
+    yield from _photometric_rows(bench, channel)
     definition = f"sigma_d, {R4} eqs 53 and 54"
     yield "temporal_dark_noise", transfer.dark_noise, dark_noise, "e", definition
     definition = "noise of reset and readout: temporal dark noise at no exposure time"
@@ -138,6 +143,28 @@ def _response_rows(bench: Bench, channel: Channel) -> Iterator[Row]:
     definition = f"of the deviations, {R4} eq 62"
     yield "linearity_error_min", 100 * straight.min_deviation, 100 * low, "%", definition
     yield "linearity_error_max", 100 * straight.max_deviation, 100 * high, "%", definition
+
+
+def _photometric_rows(bench: Bench, channel: Channel) -> Iterator[Row]:
+    """Yield what data sheets state: volts of a pixel's output, at exposure.gain 1, by lux."""
+    ready, camera = bench.ready, bench.ready.camera
+    if not ready.electrical.has_volts:
+        return
+    volts = ready.electrical.conversion_gain * camera.pixel.readout.gain
+    index = ready.mosaic.colors.index(channel.color)
+    efficiency = channel.transfer.quantum_efficiency / bench.efficiency(channel.color)
+    band = camera.scene.wavelengths
+    lights = [("a", illuminant("A"), "illuminant A (2856 K)")]
+    if band.start <= GREEN <= band.stop:
+        lights.append(("green", Spectrum.line(GREEN), f"light of {GREEN * 1e9:.0f} nm"))
+    for name, light, said in lights:
+        per_exposure = electrons_per_exposure(camera, ready.geometry, ready.layout, light)
+        expected = volts * float(per_exposure[index])
+        definition = (
+            f"of the pixel's output in {said}, light measured behind the lens;"
+            " measured: by the measured quantum efficiency"
+        )
+        yield f"responsivity_{name}", efficiency * expected, expected, "V/(lx s)", definition
 
 
 def _expected_linearity(bench: Bench, channel: Channel) -> tuple[float, float, float]:

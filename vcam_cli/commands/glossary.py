@@ -23,9 +23,13 @@ TERMS: Mapping[str, str] = {
     " slope is the system gain K, its start the dark noise, its fall the saturation (EMVA 1288"
     " release 4.0); `vcam characterize CAMERA` measures it, `vcam fit` takes it from real frames",
     "photon_transfer": "see PTC: `vcam explain ptc`",
-    "responsivity": "signal for exposure: V/(lx s) in data sheets, DN per photon in EMVA 1288;"
-    " `vcam characterize` states both, and `adc.gain` [DN/e] times the quantum efficiency is the"
-    " latter",
+    "responsivity": "signal for exposure: V/(lx s) in data sheets (responsivity_a in illuminant A,"
+    " responsivity_green at 550 nm), DN per photon in EMVA 1288 (R, eq 49), which is system gain"
+    " times quantum efficiency; `vcam characterize` states all three",
+    "responsivity_a": "output of the pixel for the exposure of the sensor in illuminant A"
+    " [V/(lx s)], light measured behind the lens",
+    "responsivity_green": "output of the pixel for the exposure of the sensor by light of 550 nm"
+    " [V/(lx s)], light measured behind the lens",
     "emva": "EMVA 1288 release 4.0, the standard by which cameras are characterized: `vcam"
     " characterize`, `vcam fit`",
     "emva_1288": "see EMVA: `vcam explain emva`",

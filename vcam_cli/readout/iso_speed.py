@@ -8,6 +8,9 @@ against infrared; dark signal does not count, as it depends on the time.
 
 from __future__ import annotations
 
+import numpy as np
+from numpy.typing import NDArray
+
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.electrical import electrical
 from vcam_cli.camera.derived.geometry import Geometry
@@ -18,7 +21,7 @@ from vcam_cli.image_formation import photon_rate
 from vcam_cli.image_formation.settings import camera_settings
 from vcam_cli.physics import readout
 from vcam_cli.readout.layout import Layout
-from vcam_cli.spectra import VISIBLE, illuminant, luminance
+from vcam_cli.spectra import VISIBLE, Spectrum, illuminant, luminance
 
 DAYLIGHT = "D55"
 """Illuminant of ISO 12232 for daylight, ISO 7589."""
@@ -45,26 +48,52 @@ def base_iso(camera: Camera, geometry: Geometry, layout: Layout) -> float:
     ----------
     ISO 12232:2019, section 6.2.
     """
-    daylight = illuminant(DAYLIGHT)
+    per_exposure = electrons_per_exposure(camera, geometry, layout, illuminant(DAYLIGHT))
+    most = float(per_exposure.max()) * layout.binning_groups.summed_charges
+    if most <= 0:
+        return 0.0
+    circuit = electrical(camera.with_exposure_gain(1.0))
+    return float(readout.saturation_speed(circuit.saturation / most))
+
+
+def electrons_per_exposure(
+    camera: Camera, geometry: Geometry, layout: Layout, light: Spectrum
+) -> NDArray:
+    """Return the electrons of a pixel on the axis for an exposure of the focal plane.
+
+    Light is measured behind the lens.
+
+    Parameters
+    ----------
+    camera : Camera
+        The camera.
+    geometry : Geometry
+        Its geometry.
+    layout : Layout
+        Which colors its pixels have.
+    light : Spectrum
+        Spectral radiance of the scene's white, in any scale.
+
+    Returns
+    -------
+    NDArray
+        Electrons of every color (C,) [e / (lx s)].
+    """
     kinds = [kind for kind in ORDER if issubclass(kind, Gain)]
     wanted = [k.from_camera(camera, geometry) for k in kinds if not switched_off(camera, k.name)]
     gains = of_kind((gain for gain in wanted if gain is not None), Gain)
     levels = photon_rate.axis_levels(
-        camera, geometry, camera_settings(camera), [daylight], layout.mosaic, gains
+        camera, geometry, camera_settings(camera), [light], layout.mosaic, gains
     )
-    rate = float(levels.max()) * layout.binning_groups.summed_charges
-    if rate <= 0:
-        return 0.0
-    circuit = electrical(camera.with_exposure_gain(1.0))
-    return float(readout.saturation_speed(circuit.saturation * _lux(camera, geometry) / rate))
+    return np.asarray(levels[0] / _lux(camera, geometry, light))
 
 
-def _lux(camera: Camera, geometry: Geometry) -> float:
-    """Return the illuminance behind the lens before a scene of unscaled daylight [lx]."""
+def _lux(camera: Camera, geometry: Geometry, light: Spectrum) -> float:
+    """Return the illuminance behind the lens before a scene of a light, unscaled [lx]."""
     lens = camera.optics.transmittance.resolve()
     band = camera.scene.wavelengths
     start, stop = VISIBLE if lens.covers(*VISIBLE) else (band.start, band.stop)
-    behind = luminance(illuminant(DAYLIGHT).multiply(lens), start, stop)
+    behind = luminance(light.multiply(lens), start, stop)
     return geometry.irradiance_per_radiance * behind
 
 
