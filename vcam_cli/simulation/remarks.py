@@ -26,6 +26,7 @@ from vcam_cli.scenes.image import ImageScene
 from vcam_cli.scenes.layered import AnyScene, LayeredScene
 from vcam_cli.scenes.light import visible_range
 from vcam_cli.simulation import idle_keys, plan
+from vcam_cli.simulation.advice import advice
 from vcam_cli.simulation.preparation import Prepared
 from vcam_cli.spectra import luminance
 
@@ -90,6 +91,7 @@ def remarks(ready: Prepared) -> tuple[str, ...]:
         *_unused_codes(ready),
         *_overflow(ready),
         *_far_overexposed(ready),
+        *advice(ready),
         *_colors_of_picture(ready),
         *_cropped(ready),
         *_motion(ready),

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vcam_cli.camera.camera import Camera
-from vcam_cli.camera.derived.dark_current import dark_rate
+from vcam_cli.camera.derived.dark_current import DOUBLING, dark_rate, junction_parts
 from vcam_cli.camera.derived.junction import depletion_width, depths
 from vcam_cli.camera.derived.process import Need, process
 from vcam_cli.camera.derived.sense_node import capacitance
@@ -28,6 +28,12 @@ from vcam_cli.spectra import Spectrum
 
 ABSORPTION_TEMPERATURE = 300.0
 """Temperature of the table of silicon's absorption [K]."""
+MOST_DARK_CURRENT = 10e-5
+"""Dark current of photodiodes whose surface is depleted, at most, as data sheets have it [A/m2]."""
+USUAL_DARK_CURRENT = {"pinned": 1e-5}
+"""The same of kinds whose surface is shielded [A/m2]."""
+ROOM_TEMPERATURE = 300.0
+"""Temperature of these [K]."""
 _STEP = 0.25e-9
 """Step of the wavelengths of a QE that follows from the junction [m]: straight lines between them
 are within 6e-5 of the curve, relatively."""
@@ -57,12 +63,32 @@ def check(camera: Camera) -> None:
 def remarks(camera: Camera) -> tuple[str, ...]:
     """Return what a user should know of the models used."""
     own, kelvin = camera.pixel.photodetector, camera.pixel.temperature
+    notes = _unusual_dark_current(camera)
     asked = own.quantum_efficiency.given is None or own.charge_diffusion is not None
     if not asked or kelvin == ABSORPTION_TEMPERATURE:
-        return ()
+        return notes
     return (
+        *notes,
         f"silicon absorbs light as at {ABSORPTION_TEMPERATURE:g} K here, though the pixel is at"
         f" {kelvin:g} K",
+    )
+
+
+def _unusual_dark_current(camera: Camera) -> tuple[str, ...]:
+    """Return that the junction's dark current is more than such photodiodes are sold with."""
+    own = camera.pixel.photodetector
+    if own.dark_current is not None or own.dark_current_density != "junction":
+        return ()
+    usual = USUAL_DARK_CURRENT.get(own.kind, MOST_DARK_CURRENT)
+    density = own.dark_current_scale * sum(junction_parts(camera, process(camera)))
+    cooler = 2 ** ((camera.pixel.temperature - ROOM_TEMPERATURE) / DOUBLING)
+    if density <= usual * max(cooler, 1):
+        return ()
+    return (
+        f"the equation of the junction gives {1e5 * density:.4g} nA/cm2 of dark current, and"
+        f" photodetectors of the kind {own.kind} have mostly less than {1e5 * usual:.2g} nA/cm2 at"
+        f" {ROOM_TEMPERATURE:.0f} K: lifetimes in the junction may be those of another process;"
+        " give dark_current_density as a number to use what was measured",
     )
 
 
