@@ -359,3 +359,34 @@ def test_an_option_that_is_a_key_is_led_to_set(option, meant):
     assert done.returncode == 2
     assert f'--set {path}="{value}"' in done.stderr
     load("camera.yaml", [meant])
+
+
+NEEDS_MORE = {
+    "optics.aperture_diameter",  # two of three are given
+    "pixel.photodetector.dark_current_density.doubling",  # needs the temperature
+    "pixel.photodetector.dark_current.doubling",
+    "pixel.readout.charge_transfer",  # of a ccd
+    "adc.reference",  # of a logarithmic ADC
+    *(f"array.filters.{name}" for name in ("column", "unit", "table", "outside", "silicon")),
+}
+"""Keys whose examples are right beside another key that the plain camera does not have."""
+
+
+@pytest.mark.long
+def test_every_example_of_a_key_is_taken_by_it():
+    """`vcam explain` prints them; what else the key needs may be missing."""
+    elsewhere = ("there is no file", "there is no such key", "is missing")
+    refused = []
+    for key in hints.index():
+        if key.path[0] == "processing" or key.dotted in NEEDS_MORE:
+            continue
+        try:
+            load("camera.yaml", [f"{key.dotted}={key.example}"])
+        except BadInput as error:
+            refused += [
+                f"{key.dotted}: {problem.message}"
+                for problem in error.problems
+                if ".".join(map(str, problem.path)).startswith(key.dotted)
+                and not any(said in problem.message for said in elsewhere)
+            ]
+    assert refused == []
