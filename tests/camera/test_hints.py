@@ -372,7 +372,6 @@ NEEDS_MORE = {
 """Keys whose examples are right beside another key that the plain camera does not have."""
 
 
-@pytest.mark.long
 def test_every_example_of_a_key_is_taken_by_it():
     """`vcam explain` prints them; what else the key needs may be missing."""
     elsewhere = ("there is no file", "there is no such key", "is missing")
