@@ -102,13 +102,13 @@ def cameras() -> dict[Path, str]:
         Path(f"configs/filters/nikon-5100-{color}.csv"): _text(
             [
                 f"Relative spectral sensitivity of a Nikon 5100, {color}, its largest value 1;",
-                "infrared cut and silicon are in it. Taken as electrons per photon.",
+                "infrared cut and silicon are in it. Electrons per watt of light, as measured.",
                 "Measured at NPL: M. M. Darrodi, G. Finlayson, T. Goodman, M. Mackiewicz (2015),",
                 "doi:10.1364/JOSAA.32.000381.",
                 LICENSE.format(version=colour.__version__),
             ],
             measured.wavelengths,
-            {"value": values},
+            {"value (per watt)": values},
         )
         for color, values in zip(measured.labels, measured.values.T, strict=True)
     }

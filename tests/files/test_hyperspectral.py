@@ -11,6 +11,7 @@ import spectral_files as made
 from spectral_files import CUBE, NM
 
 from vcam_cli import memory
+from vcam_cli.camera.scene.scene_files import Variables
 from vcam_cli.errors import BadInput, CannotDo
 from vcam_cli.files.spectral.exr import write_spectral
 from vcam_cli.files.spectral.hyperspectral import companions, read_bands, read_cube
@@ -79,6 +80,13 @@ class TestSpectralExr:
         assert notes == ("its polarization is not used",)
         picked = {round(w * 1e9): k for k, w in enumerate(found.bands.wavelengths)}
         np.testing.assert_allclose(found.data[:, :, picked[500]], CUBE[:, :, 3] * 1e9, rtol=2e-7)
+
+    def test_bispectral_channels_are_told(self, tmp_path):
+        names = [f"T.{value:g},000000nm" for value in NM]
+        names += ["T.400,000000nm.500,000000nm", "T.450,000000nm.500,000000nm"]
+        path = made.exr(tmp_path / "a.exr", names, np.dstack([CUBE, CUBE[:, :, :2]]))
+        [note] = holds(path)
+        assert "2 bispectral channels are not used" in note
 
     def test_refuses_what_is_no_radiance(self, tmp_path):
         path = made.spectral_exr(tmp_path / "a.exr", emissiveUnits="cd.m^-2.nm^-1")
@@ -172,6 +180,34 @@ class TestEnvi:
         cube[1, 2] = 0
         (note,) = holds(path, cube=cube)
         assert note == "5 of 120 values are marked as no data and taken as 0"
+
+    def test_bad_bands_are_left_out_and_told(self, tmp_path):
+        """What is in them counts in no way: no light, no error."""
+        cube = CUBE.copy()
+        cube[:, :, 2], cube[0, 0, 4] = 1e6, np.nan
+        path = made.envi(
+            tmp_path / "a.hdr", cube=cube, bbl="{1, 1, 0, 1, 0}", data_units="W/(m2 nm sr)"
+        )
+        kept = [0, 1, 3]
+        notes = holds(path, PER_NM, cube=CUBE[:, :, kept], nm=NM[kept])
+        assert notes == ("2 of 5 bands are marked as bad (bbl), not used",)
+        falling = made.envi(
+            tmp_path / "b.hdr", nm=NM[::-1], cube=cube[:, :, ::-1], bbl="{0, 1, 0, 1, 1}",
+            reflectance_scale_factor=1,
+        )  # fmt: skip
+        holds(falling, cube=CUBE[:, :, kept], nm=NM[kept])
+        refused(made.envi(tmp_path / "c.hdr", bbl="{1, 0}", reflectance_scale_factor=1), "bbl")
+
+    @pytest.mark.parametrize("value", ["-1.23e34", "-9999.1", "nan"])
+    def test_no_data_is_rounded_as_its_samples_are(self, value, tmp_path):
+        cube = CUBE.copy()
+        cube[0, 1] = np.float32(value)
+        path = made.envi(
+            tmp_path / "a.hdr", cube=cube, data_ignore_value=value, reflectance_scale_factor=1
+        )
+        found, notes = read(path)
+        assert not found.data[0, 1].any()
+        assert notes == ("5 of 120 values are marked as no data and taken as 0",)
 
     @pytest.mark.parametrize("ending", ["", ".img", ".DAT", ".bil"])
     def test_names_of_the_raw_file(self, ending, tmp_path):
@@ -330,6 +366,51 @@ class TestIsetcam:
         path.write_bytes(b"MATLAB 7.3 MAT-file".ljust(512) + b"\x89HDF\r\n\x1a\n" + b"0" * 64)
         refused(path, "MATLAB 7.3", "pip install 'vcam-cli[hdf5]'")
 
+    @pytest.mark.parametrize("version", ["5", "7.3"])
+    def test_variables_of_other_names(self, version, tmp_path):
+        """Those of public sets: cube or rad, with bands."""
+        path = tmp_path / "a.mat"
+        if version == "5":
+            made.savemat(path, {"cube": CUBE, "bands": NM[None], "norm": 3.0})
+        else:
+            h5py = pytest.importorskip("h5py")
+            with h5py.File(path, "w") as file:
+                file["cube"], file["bands"] = CUBE.T, NM[:, None]
+                file["norm"] = np.array([[3.0]])
+        text = refused(path, "cube (4 x 6 x 5)", "bands (1 x 5)", "norm (1 x 1)")
+        assert "variables: {radiance: cube, wavelength: bands}" in text
+        assert "photons'" not in text
+        for quantity, unit in (("radiance", PER_NM), ("reflectance", 1.0)):
+            given = Variables.model_validate({quantity: "cube", "wavelength": "bands"})
+            cube, notes = read_cube(path, (), given)
+            np.testing.assert_allclose(cube.data, CUBE * unit, rtol=2.5e-7)
+            np.testing.assert_allclose(cube.bands.wavelengths, NM * 1e-9)
+            assert cube.bands.quantity == quantity
+            said = ("cube is taken as radiance in W/(sr m2 nm)",)
+            assert notes == (said if quantity == "radiance" else ())
+        wrong = Variables.model_validate({"radiance": "rad", "wavelength": "bands"})
+        with pytest.raises(BadInput, match=r"has no rad; it holds .*cube"):
+            read_cube(path, (), wrong)
+
+    def test_wavelengths_tell_their_unit(self, tmp_path):
+        given = Variables.model_validate({"reflectance": "r", "wavelength": "s.w"})
+        made.savemat(tmp_path / "a.mat", {"r": CUBE, "s": {"w": NM / 1000}})
+        bands = read_bands(tmp_path / "a.mat", (), given)
+        np.testing.assert_allclose(bands.wavelengths, NM * 1e-9)
+        made.savemat(tmp_path / "a.mat", {"r": CUBE, "s": {"w": NM / 10}})
+        with pytest.raises(BadInput, match="neither in nm nor in um"):
+            read_bands(tmp_path / "a.mat", (), given)
+
+    def test_a_dataset_without_data_is_refused(self, tmp_path):
+        """HDF5 calls that a null dataspace."""
+        h5py = pytest.importorskip("h5py")
+        with h5py.File(tmp_path / "a.mat", "w") as file:
+            file["photons"], file["wave"] = h5py.Empty("f8"), NM[:, None]
+        refused(tmp_path / "a.mat", "photons")
+        with h5py.File(tmp_path / "b.mat", "w") as file:
+            file["photons"], file["wave"] = made.photons().T, h5py.Empty("f8")
+        refused(tmp_path / "b.mat", "wave")
+
     def test_version_7_3(self, tmp_path):
         """MATLAB's axes come reversed in HDF5."""
         h5py = pytest.importorskip("h5py")
@@ -485,6 +566,17 @@ class TestValues:
         cube = CUBE / CUBE.max()
         cube[1, 2, 3] = -0.02
         refused(self.write(tmp_path, cube), "negative values, down to -0.02", "by 0")
+
+    @pytest.mark.parametrize("white", [1e300, 1e60, 1e-300])
+    def test_a_white_beyond_all_light_is_refused(self, white, tmp_path):
+        """A line each, and no warning of NumPy's."""
+        path = tmp_path / "a.npz"
+        made.npz(path, wavelength_nm=NM, radiance=CUBE, white=np.full(len(NM), white))
+        refused(path, "white")
+
+    def test_light_beyond_all_units_is_refused(self, tmp_path):
+        path = self.write(tmp_path, CUBE.astype(float) * 1e35)
+        refused(path, "beyond 1e+30")
 
     def test_more_than_white_is_told(self, tmp_path):
         (note,) = holds(self.write(tmp_path, CUBE * 3), cube=CUBE * 3)

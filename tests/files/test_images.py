@@ -10,7 +10,8 @@ import pytest
 
 from vcam_cli.errors import BadInput, CannotDo
 from vcam_cli.files.images import images
-from vcam_cli.files.images.images import decode_srgb, read_picture
+from vcam_cli.files.images.color import decode_srgb
+from vcam_cli.files.images.images import read_picture
 
 RANDOM = np.random.default_rng(2)
 RGB8 = RANDOM.integers(0, 256, (6, 5, 3)).astype(np.uint8)
@@ -425,3 +426,30 @@ def test_names_that_look_like_options_or_patterns(tmp_path):
         write(tmp_path / "plain.png", RGB8)
         os.replace(tmp_path / "plain.png", tmp_path / name)
         np.testing.assert_allclose(read(tmp_path / name).data, RGB8 / 255, rtol=6e-8)
+
+
+def test_kinds_that_the_library_does_not_read_are_named(tmp_path):
+    """They are whole: to say that they are damaged sends their owner the wrong way."""
+    tifffile = pytest.importorskip("tifffile")
+    pytest.importorskip("imagecodecs")
+    zstd = tmp_path / "zstd.tif"
+    tifffile.imwrite(zstd, RGB8, photometric="rgb", compression="zstd")
+    refused(zstd, "ZSTD compression support is not configured")
+    heic = tmp_path / "a.heic"
+    heic.write_bytes(b"\0\0\0\x18ftypheic\0\0\0\0mif1heic" + bytes(300))
+    refused(heic, "HEIC")
+    data = write(
+        tmp_path / "a.exr", FLOAT[:4, :4], ("Y", "RY", "BY"), compression="none"
+    ).read_bytes()
+    place = data.index(b"BY\0") + 3 + 8  # behind the channel's type and flag
+    thinned = tmp_path / "thinned.exr"
+    thinned.write_bytes(data[:place] + struct.pack("<ii", 2, 2) + data[place + 8 :])
+    refused(thinned, "[Ss]ubsampled channels are not supported")
+
+
+@pytest.mark.parametrize("name", ["a.dng", "a.NEF", "a.cr2"])
+def test_raw_files_of_cameras_are_no_scene(tmp_path, name):
+    path = write(tmp_path / "a.tif", RGB8).rename(tmp_path / name)
+    with pytest.raises(BadInput, match="raw file") as caught:
+        read(path)
+    assert "develop it" in caught.value.problems[0].remedy

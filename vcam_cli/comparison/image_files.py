@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcam_cli.errors import bad
+from vcam_cli.files.file_checks import is_raw
 from vcam_cli.files.folder import OutputFolder
-from vcam_cli.files.images.camera_raw import develop, is_raw
+from vcam_cli.files.images.camera_raw import develop
 from vcam_cli.files.images.exr import write_exr
 from vcam_cli.files.images.images import LinearImage, read_picture
 from vcam_cli.files.images.maps import write_map
@@ -24,8 +25,7 @@ from vcam_cli.quality.mse import mse, psnr_of_mse
 from vcam_cli.quality.scielab import cielab_map, s_cielab_map
 
 Space = Literal["srgb", "linear-srgb", "xyz"]
-LINEAR_FILES = (".exr", ".hdr", ".rgbe", ".pfm")
-"""Ends of the names of files that hold linear light where no space is given."""
+_ENCODINGS = {None: "auto", "srgb": "srgb", "linear-srgb": "linear", "xyz": "linear"}
 
 
 @dataclass(frozen=True)
@@ -35,18 +35,11 @@ class Settings:
     samples_per_degree: float
     """Pixels in one degree of visual angle."""
     space: Space | None = None
-    """Color space of both files' values; None is linear for files of linear light, else sRGB."""
+    """Color space of both files' values; None is what each says (`files.images.color`)."""
     white: tuple[float, float, float] = D65
     """X, Y, Z of white for the space xyz."""
     formula: Formula = "1976"
     filters: Filters = "zhang-wandell-1996"
-
-    def space_of(self, path: Path) -> Space:
-        """Return the color space of one file's values."""
-        if self.space is not None:
-            return self.space
-        linear = path.suffix.lower() in LINEAR_FILES or is_raw(path)
-        return "linear-srgb" if linear else "srgb"
 
     @property
     def screen(self) -> Screen:
@@ -66,6 +59,8 @@ class Comparison:
     image: NDArray
     reference: NDArray
     settings: Settings
+    codings: tuple[str, str] = ("srgb", "srgb")
+    """How the codes of the two files were read."""
     notes: tuple[str, ...] = ()
     workers: int | None = None
 
@@ -135,7 +130,8 @@ def compare(
         for path, picture in zip((image, reference), pictures, strict=True)
         for note in picture.notes
     ]
-    return Comparison(first, second, settings, tuple(notes), workers)
+    codings = settings.space or pictures[0].coding, settings.space or pictures[1].coding
+    return Comparison(first, second, settings, codings, tuple(notes), workers)
 
 
 def _read(path: Path, settings: Settings, name: str) -> LinearImage:
@@ -144,9 +140,8 @@ def _read(path: Path, settings: Settings, name: str) -> LinearImage:
             message = f"{path} is a raw file, which is developed to linear sRGB"
             raise bad((name,), message, "compare it without --space")
         return develop(path, (name,))
-    space = settings.space_of(path)
-    encoding = "srgb" if space == "srgb" else "linear"
-    channels = ("X", "Y", "Z") if space == "xyz" else ("R", "G", "B")
+    encoding = _ENCODINGS[settings.space]
+    channels = ("X", "Y", "Z") if settings.space == "xyz" else ("R", "G", "B")
     return read_picture(path, encoding, 1.0, (name,), channels, signed=True)
 
 

@@ -26,21 +26,12 @@ from vcam_cli.files.file_checks import (
 from vcam_cli.files.images.images import LinearImage
 from vcam_cli.files.optional_library import optional_library
 
-SUFFIXES = (
-    ".dng", ".cr2", ".cr3", ".nef", ".arw", ".raf", ".orf", ".rw2", ".pef", ".srw", ".3fr", ".iiq",
-)  # fmt: skip
-"""Ends of the names of raw files."""
 BYTES_PER_PIXEL = 32
 """Memory that developing takes: LibRaw's four channels of 16 bits twice, its picture, and ours."""
 MOST_STOPS = 32
 """A file that asks for more is taken to have none [EV]."""
 _BASELINE_EXPOSURE = 50730
 _REMEDY = "give a whole raw file of a camera that LibRaw knows"
-
-
-def is_raw(path: Path) -> bool:
-    """Return whether a file is a camera's raw file, by its name."""
-    return path.suffix.lower() in SUFFIXES
 
 
 def develop(path: Path, yaml_path: tuple[str | int, ...] | str) -> LinearImage:

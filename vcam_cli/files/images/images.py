@@ -2,10 +2,12 @@
 
 OpenImageIO expands palettes and small bit depths, and scales 10- and 12-bit samples to
 16 bits. What it does not do, and is done here: turn the image upright, keep color apart
-from alpha, map channels by name, place an EXR's data window, notice that a JPEG ends too early,
-and refuse what is no picture of light (CMYK, CIELAB, NaN, negative values).
+from alpha, map channels by name, manage colors (`color.py`), place an EXR's data window, notice
+that a JPEG ends too early, and refuse what is no picture of light (CMYK, CIELAB, NaN, negative
+values).
 """
 
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -17,11 +19,15 @@ import numpy as np
 from vcam_cli import memory
 from vcam_cli.files.file_checks import (
     UnusableFile,
+    brief_reason,
     check_file,
     convert_errors,
+    is_raw,
     too_large,
     truncated_file,
 )
+from vcam_cli.files.images.color import Coding, picture_coding
+from vcam_cli.files.images.icc import converted_by_tables
 from vcam_cli.files.images.image_library import oiio
 from vcam_cli.files.images.rows import pending_error
 
@@ -42,6 +48,10 @@ _OIIO_NAMES: dict[type[np.integer], str] = {
     np.int32: "int",
 }  # "uint32" would mean something else
 _BLOCK = 64  # rows
+MOST_NEGATIVE = 0.01
+"""Part of the largest value that noise and resampling may leave below zero."""
+_ROUNDING = 1e-3
+"""Part of the largest color below which a negative one is a profile's rounding."""
 _CONVERT = "convert it to a PNG, TIFF or EXR with one (gray) or three (R, G, B) channels"
 
 
@@ -55,6 +65,8 @@ class LinearImage:
     """The channels' names in the file."""
     notes: tuple[str, ...]
     """What was left aside, for the user."""
+    coding: str = "linear-srgb"
+    """How its codes were read: srgb, linear-srgb, or what the file says (`color.py`)."""
 
 
 def read_picture(
@@ -67,7 +79,8 @@ def read_picture(
 ) -> LinearImage:
     """Return an image file as linear light divided by `white`.
 
-    `encoding` is "srgb" (decoded by IEC 61966-2-1) or "linear". Integer samples run from 0 to 1
+    Light is in the primaries of Rec. 709. `encoding` is "auto" (what the file says, see
+    `color.py`), "srgb" (decoded by IEC 61966-2-1) or "linear". Integer samples run from 0 to 1
     = the largest code; `white` is the linear value that becomes 1. Orientation tags are obeyed.
     Alpha is dropped (color values stay as stored); the first of several parts is
     read; both leave a note, as does anything else left aside. `channels`: the names of the color
@@ -78,13 +91,13 @@ def read_picture(
     truncated, of a kind that is no light, with two color channels, negative or not finite;
     CannotDo when it may not be read or the memory does not suffice.
     """
-    if encoding not in ("srgb", "linear") or not white > 0:
+    if encoding not in ("auto", "srgb", "linear") or not white > 0:
         raise ValueError(f"encoding {encoding!r}, white {white!r}")
     path = Path(path)
     with convert_errors(path, yaml_path, _CONVERT):
-        check_file(path)
+        _check_picture(path)
         with open_image(path) as source:
-            return _read(source, encoding == "srgb", white, channels, signed)
+            return _read(path, source, encoding, white, channels, signed)
 
 
 def color_channels(
@@ -93,7 +106,7 @@ def color_channels(
     """Return the number of channels that `read_picture` gives, by the header; raise the same."""
     path = Path(path)
     with convert_errors(path, yaml_path, _CONVERT):
-        check_file(path)
+        _check_picture(path)
         with open_image(path) as source:
             return len(_header(source.spec(), channels)[0])
 
@@ -102,7 +115,7 @@ def picture_size(path: Path | str, yaml_path: tuple[str | int, ...] | str) -> tu
     """Return rows and columns of what `read_picture` gives, by the header; raise the same."""
     path = Path(path)
     with convert_errors(path, yaml_path, _CONVERT):
-        check_file(path)
+        _check_picture(path)
         with open_image(path) as source:
             spec = source.spec()
             _header(spec, _RGB)
@@ -113,11 +126,14 @@ def picture_size(path: Path | str, yaml_path: tuple[str | int, ...] | str) -> tu
             return size[::-1] if is_turned else size
 
 
-def decode_srgb(code: np.ndarray) -> np.ndarray:
-    """Return the linear light of sRGB-coded values (1 = white), IEC 61966-2-1, float64."""
-    code = np.asarray(code)
-    high = ((np.maximum(code, 0.04045) + 0.055) / 1.055) ** 2.4
-    return np.where(code <= 0.04045, code / 12.92, high)
+def _check_picture(path: Path) -> None:
+    """Refuse what is no whole regular file, and raw files of cameras. Raise UnusableFile."""
+    check_file(path)
+    if is_raw(path):
+        raise UnusableFile(
+            "is a raw file: a camera's codes, not light",
+            "develop it with a raw converter, and give a 16-bit TIFF with its color profile",
+        )
 
 
 @contextmanager
@@ -127,8 +143,10 @@ def open_image(path: Path) -> Iterator[Any]:
     config.attribute("oiio:UnassociatedAlpha", 1)  # else colors come multiplied by alpha
     source = oiio.ImageInput.open(str(path.absolute()), config)
     if source is None:
-        pending_error(oiio.geterror)  # text of a library, which names places in its own code
-        raise UnusableFile("is no image that can be read: of no known format, or damaged")
+        reason = pending_error(oiio.geterror)
+        raise _unsupported(path, reason) or UnusableFile(
+            "is no image that can be read: of no known format, or damaged"
+        )
     try:
         if source.format_name() == "null":
             raise UnusableFile("is no image")
@@ -138,21 +156,40 @@ def open_image(path: Path) -> Iterator[Any]:
         pending_error(source.geterror)
 
 
+def _unsupported(path: Path | None, reason: str) -> UnusableFile | None:
+    """Return the error for a file that is whole, but of a kind that OpenImageIO cannot read."""
+    if path is not None:
+        with open(path, "rb") as file:
+            if file.read(8)[4:] == b"ftyp":
+                kinds = "HEIC, AVIF or a video"
+                return UnusableFile(f"is of a kind that is not read ({kinds})", _CONVERT)
+    if not re.search("not (supported|configured)|unsupported", reason.lower()):
+        return None  # other words speak of places in the library's own code
+    first = reason.partition(". ")[0].rpartition(": ")[2].rstrip(".")  # it says some things twice
+    said = brief_reason(first, path or Path())
+    return UnusableFile(f"cannot be read: {said}", "save it in another way: " + _CONVERT)
+
+
 def _read(
-    source: Any, srgb: bool, white: float, wanted: tuple[str, ...], signed: bool
+    path: Path, source: Any, encoding: str, white: float, wanted: tuple[str, ...], signed: bool
 ) -> LinearImage:
     spec = source.spec()
     chosen, notes = _header(spec, wanted)
+    if wanted != _RGB and len(wanted) == 3:  # X, Y, Z are no colors of a display
+        coding, said = picture_coding(path, "linear", source, spec, 1)
+    else:
+        coding, said = picture_coding(path, encoding, source, spec, len(chosen))
     data, more = read_samples(source, spec, chosen)
     if source.seek_subimage(1, 0):
         more.append("only the first of several images in the file is used")
     pending_error(source.geterror)
     if source.format_name() == "openexr":
         data = extract_display_window(data, spec, more)
-    light = _linear(data, srgb, white, signed)
+    light = _linear(data, coding, white, signed, more)
     light = np.ascontiguousarray(upright(light, spec, more))
     names = tuple(spec.channelnames[index] for index in chosen)
-    return LinearImage(light, names, (*notes, *more, *_remarks(spec)))
+    more += [*said, *_remarks(spec), *(_unused_bits(data, spec) if white == 1 else [])]
+    return LinearImage(light, names, (*notes, *more), coding.name)
 
 
 def _header(spec: Any, wanted: tuple[str, ...]) -> tuple[tuple[int, ...], tuple[str, ...]]:
@@ -269,7 +306,7 @@ def read_samples(
         data = source.read_image(page, 0, first, last, name)
     reason = pending_error(source.geterror)
     if data is None or (reason and "extraneous bytes" not in reason):
-        raise truncated_file()
+        raise _unsupported(None, reason) or truncated_file()
     order = [index - first for index in chosen]
     notes = ["the file has stray bytes in it"] if reason else []
     return (data if order == list(range(last - first)) else data[:, :, order]), notes
@@ -305,28 +342,100 @@ def extract_display_window(data: np.ndarray, spec: Any, notes: list[str]) -> np.
     return window
 
 
-def _linear(data: np.ndarray, srgb: bool, white: float, signed: bool) -> np.ndarray:
-    """Return linear light / white, float32: by table up to 16 bits, else block by block."""
-    if data.dtype.kind == "u" and data.dtype.itemsize <= 2:
-        code = np.arange(np.iinfo(data.dtype).max + 1) / np.iinfo(data.dtype).max
-        light = _relative_to_white(code, srgb, white)[data]
-        _check_light(light, data, 0)
-        return light
-    full = 1.0 if data.dtype.kind == "f" else float(np.iinfo(data.dtype).max)
-    light = np.empty(data.shape, np.float32)
-    for row in range(0, len(data), _BLOCK):
-        block = data[row : row + _BLOCK]
-        _check_values(block, row, signed)
-        code = block.astype(np.float64) / full
-        light[row : row + _BLOCK] = _relative_to_white(code, srgb, white)
-        _check_light(light[row : row + _BLOCK], block, row)
+def _linear(
+    data: np.ndarray, coding: Coding, white: float, signed: bool, notes: list[str]
+) -> np.ndarray:
+    """Return linear light / white in Rec. 709, float32."""
+    if coding.profile:
+        try:
+            found = converted_by_tables(coding.profile, _eight_bits(data))
+        except ValueError as error:
+            remedy = "convert it to sRGB, or write encoding: srgb to go without it"
+            raise UnusableFile(f"{coding.name} {error}", remedy) from None
+        data = found[:, :, : data.shape[2]]
+    light = _decoded(data, coding, white, signed, notes)
+    below = 0 if coding.to_rec709 is None else _to_rec709(light, coding.to_rec709, signed)
+    _check_light(light, data, 0)
+    said = coding.note(below / light[:, :, 0].size)
+    notes += [said] if said else []
     return light
 
 
-def _relative_to_white(code: np.ndarray, srgb: bool, white: float) -> np.ndarray:
+def _decoded(
+    data: np.ndarray, coding: Coding, white: float, signed: bool, notes: list[str]
+) -> np.ndarray:
+    """Return linear light / white: by table up to 16 bits, else block by block."""
+    if data.dtype.kind == "u" and data.dtype.itemsize <= 2:
+        codes = np.arange(np.iinfo(data.dtype).max + 1) / np.iinfo(data.dtype).max
+        codes = np.broadcast_to(codes[:, np.newaxis], (len(codes), len(coding.curves)))
+        tables = _relative_to_white(codes, coding, white)
+        if len(coding.curves) == 1:
+            return np.asarray(tables[:, 0][data])
+        return np.stack([tables[:, c][data[:, :, c]] for c in range(data.shape[2])], axis=2)
+    full = 1.0 if data.dtype.kind == "f" else float(np.iinfo(data.dtype).max)
+    light = np.empty(data.shape, np.float32)
+    lowest, below, largest = 0.0, 0, 0.0
+    for row in range(0, len(data), _BLOCK):
+        block = data[row : row + _BLOCK]
+        _check_finite(block, row)
+        if not signed and block.min(initial=0.0) < 0:
+            lowest = min(lowest, float(block.min()))
+            below += int(np.count_nonzero(block < 0))
+            block = np.maximum(block, 0)
+        largest = max(largest, float(block.max(initial=0.0)))
+        light[row : row + _BLOCK] = _relative_to_white(
+            block.astype(np.float64) / full, coding, white
+        )
+        _check_light(light[row : row + _BLOCK], block, row)
+    if lowest < -MOST_NEGATIVE * largest:
+        y, x, channel = np.argwhere(data == data.min())[0]
+        raise UnusableFile(
+            f"holds a negative value ({data[y, x, channel]:g} at row {y}, column {x}; the largest"
+            f" is {largest:g}); light is 0 or more",
+            "replace such values, for example by 0",
+        )
+    if below:
+        notes.append(
+            f"{below} of {data.size} values are negative, down to {lowest:.3g}; they are taken as 0"
+        )
+    return light
+
+
+def _eight_bits(data: np.ndarray) -> np.ndarray:
+    """Return codes of 8 bits; those of other kinds rounded, and clipped to 0 and 1."""
+    if data.dtype == np.uint8:
+        return data
+    full = 1.0 if data.dtype.kind == "f" else float(np.iinfo(data.dtype).max)
+    return np.rint(np.clip(np.nan_to_num(data / full), 0, 1) * 255).astype(np.uint8)
+
+
+def _to_rec709(light: np.ndarray, matrix: np.ndarray, signed: bool) -> int:
+    """Convert light in place; return how many samples are outside the gamut, and clip those.
+
+    `signed`: they are kept.
+    """
+    outside = 0
+    for row in range(0, len(light), _BLOCK):
+        block = light[row : row + _BLOCK]
+        found = block @ matrix.T.astype(np.float32)
+        if not signed:
+            limit = -_ROUNDING * np.maximum(block.max(axis=2), 0)
+            outside += int(np.count_nonzero(found.min(axis=2) < limit))
+            found = np.maximum(found, 0)
+        block[:] = found
+    return outside
+
+
+def _relative_to_white(code: np.ndarray, coding: Coding, white: float) -> np.ndarray:
     """Return the light of codes (full scale = 1) over `white`, float32; infinite beyond that."""
+    out = np.empty(code.shape, np.float32)
     with np.errstate(over="ignore"):
-        return ((decode_srgb(code) if srgb else code) / white).astype(np.float32)
+        if len(coding.curves) == 1:
+            out[...] = coding.curves[0](code) / white
+        else:
+            for channel, curve in enumerate(coding.curves):
+                out[..., channel] = curve(code[..., channel]) / white
+    return out
 
 
 def _check_light(light: np.ndarray, stored: np.ndarray, row: int) -> None:
@@ -340,16 +449,26 @@ def _check_light(light: np.ndarray, stored: np.ndarray, row: int) -> None:
     )
 
 
-def _check_values(block: np.ndarray, row: int, signed: bool) -> None:
-    wrong = ~(np.isfinite(block) & ((block >= 0) | signed))
+def _check_finite(block: np.ndarray, row: int) -> None:
+    wrong = ~np.isfinite(block)
     if wrong.any():
         y, x, channel = np.argwhere(wrong)[0]
-        value = block[y, x, channel]
-        kind = "a negative value" if value < 0 and np.isfinite(value) else "a value not finite"
         raise UnusableFile(
-            f"holds {kind} ({value:g} at row {row + y}, column {x}); light is 0 or more",
+            f"holds a value not finite ({block[y, x, channel]:g} at row {row + y}, column {x})",
             "replace such values, for example by 0",
         )
+
+
+def _unused_bits(data: np.ndarray, spec: Any) -> list[str]:
+    """Return a note where codes of 16 bits use fewer."""
+    largest = int(data.max(initial=0)) if data.dtype == np.uint16 else 0
+    bits = largest.bit_length()
+    if not 8 <= bits <= 14 or spec.get_int_attribute("oiio:BitsPerSample", 16) < 16:
+        return []
+    return [
+        f"its largest code is {largest} of 65535; if its samples are linear, of {bits} bits, write"
+        f" encoding: linear and white: {(2**bits - 1) / 65535:.6g}"
+    ]
 
 
 def upright(data: np.ndarray, spec: Any, notes: list[str]) -> np.ndarray:
@@ -371,7 +490,4 @@ def _remarks(spec: Any) -> list[str]:
     notes = []
     if abs(spec.get_float_attribute("PixelAspectRatio", 1.0) - 1) > 1e-3:
         notes.append("its pixels are not square but taken as square")
-    profile = spec.get_string_attribute("ICCProfile:profile_description")
-    if profile and "srgb" not in profile.lower():
-        notes.append(f"its color profile ({profile[:60]}) is not used")
     return notes
