@@ -268,3 +268,14 @@ def test_mallett_reflectances_reflect_at_most_all():
     for basis in srgb_reflectances():
         assert basis.tables[0].value.min() >= 0
         assert basis.tables[0].value.max() <= 1
+
+
+def test_what_is_cropped_goes_on_beyond_the_array():
+    """As far as array and margin reach, and no black: mirrored where the picture ends."""
+    given_picture = picture(24, 60)
+    shown = image_scene(given_picture, (WHITE,), WHITE, view(margin=3))  # 32 and 2 x 6 samples
+    assert shown.shape == (24, 44)
+    assert shown.black == (0, 0)
+    np.testing.assert_array_equal(shown.planes(np.ones((1, 1)))[0], given_picture[:, 8:52, 0])
+    wide = image_scene(given_picture, (WHITE,), WHITE, view(margin=30))
+    assert wide.shape == (24, 60)

@@ -10,7 +10,12 @@ from typing import Any
 
 from vcam_cli.errors import BadInput, CannotDo, bad
 
-_PNG_START = b"\x89PNG\r\n\x1a\n"
+PNG_START = b"\x89PNG\r\n\x1a\n"
+
+RAW_SUFFIXES = (
+    ".dng", ".cr2", ".cr3", ".nef", ".arw", ".raf", ".orf", ".rw2", ".pef", ".srw", ".3fr", ".iiq",
+)  # fmt: skip
+"""Ends of the names of raw files."""
 
 
 class UnusableFile(Exception):
@@ -41,6 +46,11 @@ def convert_errors(
         raise too_large(f"{path} does not fit the memory") from None
 
 
+def is_raw(path: Path) -> bool:
+    """Return whether a file is a camera's raw file, by its name."""
+    return path.suffix.lower() in RAW_SUFFIXES
+
+
 def check_file(path: Path) -> None:
     """Refuse what is no whole regular file, before OpenImageIO sees it."""
     str(path).encode("utf-8")  # OpenImageIO takes no other names
@@ -55,7 +65,7 @@ def check_file(path: Path) -> None:
     if status.st_size == 0:
         raise UnusableFile("the file is empty", "give a whole image file")
     with open(path, "rb") as file:
-        if file.read(8) == _PNG_START and not _png_is_whole(file, status.st_size):
+        if file.read(8) == PNG_START and not _png_is_whole(file, status.st_size):
             raise truncated_file()
 
 
@@ -64,7 +74,7 @@ def _png_is_whole(file: Any, size: int) -> bool:
 
     Those that it can do without may be damaged: their name begins with a small letter.
     """
-    place = len(_PNG_START)
+    place = len(PNG_START)
     while place + 12 <= size:
         file.seek(place)
         head = file.read(8)

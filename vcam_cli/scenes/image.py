@@ -1,8 +1,9 @@
 """An image file as a scene: every sample a uniform square of light on the sensor plane.
 
-A scene that covers the sensor is scaled by one factor until it does (never stretched), and cropped
-centrally to the whole samples that the array touches. A scene with a width of its own is scaled to
-that width and centered, with black samples around it until array and margin are covered.
+A scene that covers the sensor is centered, and scaled by one factor until it does (never
+stretched). Beyond the array it goes on as far as blurs reach, to the whole samples that array and
+margin touch. A scene with a width of its own is scaled to that width and centered, with black
+samples around it until array and margin are covered.
 """
 
 import math
@@ -42,17 +43,15 @@ def placement(rows: int, columns: int, view: View) -> Placement:
         pitch = max(view.width / columns, view.height / rows)
         while pitch * columns < view.width or pitch * rows < view.height:  # a rounding error
             pitch = math.nextafter(pitch, math.inf)
-        return Placement(
-            pitch,
-            _surplus_samples(columns, view.width / pitch),
-            _surplus_samples(rows, view.height / pitch),
-        )
-    # A stated size: what lies beyond the array, black or not, is there and is blurred into it.
-    pitch = view.scene_width / columns
+    else:
+        pitch = view.scene_width / columns
+    # What lies beyond the array is there and is blurred into it: the rest of the picture, and black
+    # around one of a stated size. One that covers the array is mirrored where it ends.
     width, height = _extent_with_margin(view)
-    return Placement(
-        pitch, _surplus_samples(columns, width / pitch), _surplus_samples(rows, height / pitch)
-    )
+    cut_x, cut_y = _surplus_samples(columns, width / pitch), _surplus_samples(rows, height / pitch)
+    if view.scene_width is None:
+        cut_x, cut_y = max(cut_x, 0), max(cut_y, 0)
+    return Placement(pitch, cut_x, cut_y)
 
 
 def _extent_with_margin(view: View) -> tuple[float, float]:

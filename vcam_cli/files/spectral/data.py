@@ -22,6 +22,10 @@ GAINS: dict[Quantity, float] = {
     "reflectance": 1.0,
 }
 """Factors on what files hold per nanometer, with which scenes are made."""
+MOST = 1e100
+"""The largest number of a list: what units make of it is finite in 64 bits."""
+MOST_LIGHT = 1e30
+"""The largest radiance [W/(sr m2 m)] or reflectance: 32 bits end at 3.4e38."""
 MOST_WAVELENGTHS = 10**6
 """A file may hold so many wavelengths at most."""
 
@@ -45,7 +49,9 @@ class SpectralData:
     offset: float | np.ndarray = 0.0
     """The offset of all bands, or one for each."""
     no_data: float | None = None
-    """The value that stands for missing data."""
+    """The value that stands for missing data; perhaps NaN."""
+    used: np.ndarray | None = None
+    """Whether each band (bands,) is in use; None for all."""
     white: np.ndarray | None = None
     """The radiance (bands,) of a perfect white [W/(sr m2 m)], where the file holds it."""
     notes: tuple[str, ...] = ()
@@ -59,6 +65,8 @@ def finite_numbers(values: Any, what: str) -> np.ndarray:
         raise UnusableFile(f"{what} is not a list of numbers") from None
     if found.size != max(found.shape, default=1) or not np.isfinite(found).all():
         raise UnusableFile(f"{what} is not a list of finite numbers")
+    if np.abs(found).max(initial=0.0) > MOST:
+        raise UnusableFile(f"{what} has a number beyond {MOST:g}", "look for a wrong unit")
     return found.ravel()
 
 

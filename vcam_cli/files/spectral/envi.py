@@ -1,7 +1,8 @@
 """ENVI: a text header NAME.hdr and a raw file beside it.
 
 The header's keys are those of "ENVI Header Files" (NV5 Geospatial): samples, lines, bands, header
-offset, data type, interleave, byte order, wavelength, wavelength units, data ignore value.
+offset, data type, interleave, byte order, wavelength, wavelength units, data ignore value, bbl (1
+for a band in use, 0 for a bad one, whose light is that between its neighbors).
 
 ENVI has no key that says what the values are, so it is read off the keys that scale them:
 - `reflectance scale factor`: the value in the file that is a reflectance of 1;
@@ -65,10 +66,12 @@ def open_envi(path: Path) -> SpectralData:
         mapped = np.memmap(raw, kind.newbyteorder(order), "r", offset, shape)
         return mapped.transpose(INTERLEAVES[interleave])
 
-    ignored = keys.get("data ignore value")
+    used = _bands_in_use(keys, bands)
+    if used is not None:
+        notes = (*notes, f"{bands - used.sum()} of {bands} bands are marked as bad (bbl), not used")
     return SpectralData(
         (height, width), wavelengths, **_scale(keys, bands), read=read, notes=notes,
-        no_data=None if ignored is None else _number(ignored, "its data ignore value"),
+        no_data=_no_data(keys, kind), used=used,
     )  # fmt: skip
 
 
@@ -112,8 +115,26 @@ def _whole_number(keys: dict[str, str], name: str, default: int | None = None) -
     return int(text)
 
 
-def _number(text: str, name: str) -> float:
-    return float(finite_numbers(text, name)[0])
+def _bands_in_use(keys: dict[str, str], bands: int) -> np.ndarray | None:
+    """Return whether each band is in use; None where all are."""
+    if not keys.get("bbl"):
+        return None
+    said = _list(keys, "bbl")
+    check_length(bands, said, "values of bbl")
+    used = said != 0
+    return None if used.all() else used
+
+
+def _no_data(keys: dict[str, str], kind: np.dtype) -> float | None:
+    """Return the value of missing data, rounded as the file's samples are; None without one."""
+    text = keys.get("data ignore value", "")
+    if not text:
+        return None
+    if text.lower().strip("+-") in ("nan", "inf"):
+        return float(text)
+    value = float(finite_numbers(text, "its data ignore value")[0])
+    with np.errstate(over="ignore"):
+        return float(kind.type(value)) if kind.kind == "f" else value
 
 
 def _sample(keys: dict[str, str]) -> tuple[np.dtype, Any]:

@@ -38,6 +38,9 @@ RADIANCE = ("W.m^-2.sr^-1", "W.m^-2.sr^-1.nm^-1")
 IRRADIANCE = "W.m^-2.nm^-1"
 """The unit of what falls on a surface, as vcam writes it."""
 _CHANNEL = re.compile(r"(S[0-3]|T)\.(\d*,?\d*(?:[Ee][+-]?\d+)?)([EPTGMkhdcmunp]?)(m|Hz)")
+_NUMBER = r"\d*,?\d*(?:[Ee][+-]?\d+)?[EPTGMkhdcmunp]?(?:m|Hz)"
+_BISPECTRAL = re.compile(rf"T(\.{_NUMBER}){{2}}")
+"""Light that is absorbed at one wavelength and emitted at another, as the layout has it."""
 _PREFIX = {
     "": 0, "E": 18, "P": 15, "T": 12, "G": 9, "M": 6, "k": 3, "h": 2, "d": -1, "c": -2, "m": -3,
     "u": -6, "n": -9, "p": -12,
@@ -134,8 +137,13 @@ def _channels(names: Sequence[str]) -> tuple[list[tuple[float, int]], list[str]]
     found = by_kind.get("S0") or by_kind.get("T")
     if not found:
         raise UnusableFile("has no channels named like S0.550,000000nm or T.550,000000nm")
-    dark = {"S1", "S2", "S3"} & set(by_kind)
-    return sorted(found), ["its polarization is not used"] if dark else []
+    notes = ["its polarization is not used"] if {"S1", "S2", "S3"} & set(by_kind) else []
+    shifting = sum(bool(_BISPECTRAL.fullmatch(name)) for name in names)
+    if shifting:
+        notes.append(
+            f"its {shifting} bispectral channels are not used: what fluoresces is darker here"
+        )
+    return sorted(found), notes
 
 
 def _named_channels(

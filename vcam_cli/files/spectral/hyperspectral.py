@@ -7,36 +7,46 @@ come radiances in W/(sr m2 m), or reflectances, as float32, bands by rising wave
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from vcam_cli import memory
+from vcam_cli.camera.scene.scene_files import Variables
 from vcam_cli.errors import CannotDo
 from vcam_cli.files.file_checks import UnusableFile, check_file, convert_errors
-from vcam_cli.files.spectral.data import SpectralData
+from vcam_cli.files.spectral.data import MOST_LIGHT, SpectralData
 from vcam_cli.scenes.hyperspectral import Bands, Cube
 
 MOST_SAMPLES = 10**11
 """Samples of all bands that are read."""
 MOST_NEGATIVE = 0.01
 """Part of the largest value that noise and dark frames may go below zero."""
+MOST_OVER_WHITE = 1e9
+"""Light over a white: the sun is 1e4 times as bright as a sheet that it lights."""
 _BLOCK = 32  # rows
 _REMEDY = "give a whole spectral .exr, ENVI .hdr, ISETCam .mat, .npz or multichannel .tif"
 
 YamlPath = tuple[str | int, ...] | str
-Channels = Mapping[str, float] | None
-"""Name of a channel of an EXR -> its wavelength [m]; None where the names say it."""
+Order = slice | np.ndarray
+"""Indices of bands."""
+Names = Mapping[str, float] | Variables | None
+"""Name of a channel of an EXR -> its wavelength [m], or what a MATLAB file's variables are called;
+None where the names say it."""
 
 
 def _exr(path: Path) -> SpectralData:
-    return _named_exr(path, None)
-
-
-def _named_exr(path: Path, channels: Channels) -> SpectralData:
     from vcam_cli.files.spectral.exr import open_spectral
 
-    return open_spectral(path, channels)
+    return open_spectral(path)
+
+
+def _named(path: Path, names: Mapping[str, float] | Variables) -> SpectralData:
+    from vcam_cli.files.spectral.exr import open_spectral
+    from vcam_cli.files.spectral.isetcam import open_variables
+
+    if isinstance(names, Variables):
+        return open_variables(path, names)
+    return open_spectral(path, names)
 
 
 def _envi(path: Path) -> SpectralData:
@@ -73,22 +83,20 @@ READERS: dict[str, Callable[[Path], SpectralData]] = {
 }
 
 
-def read_bands(path: Path | str, yaml_path: YamlPath, channels: Channels = None) -> Bands:
+def read_bands(path: Path | str, yaml_path: YamlPath, names: Names = None) -> Bands:
     """Return what a file of spectra holds, by its header. Raise as `read_cube` does."""
-    with _open_bands(Path(path), yaml_path, channels) as (stored, order):
+    with _open_bands(Path(path), yaml_path, names) as (stored, order):
         return _bands(stored, order)
 
 
-def spectra_size(
-    path: Path | str, yaml_path: YamlPath, channels: Channels = None
-) -> tuple[int, int]:
+def spectra_size(path: Path | str, yaml_path: YamlPath, names: Names = None) -> tuple[int, int]:
     """Return rows and columns of a file of spectra, by its header. Raise as `read_cube` does."""
-    with _open_bands(Path(path), yaml_path, channels) as (stored, _):
+    with _open_bands(Path(path), yaml_path, names) as (stored, _):
         return stored.shape
 
 
 def read_cube(
-    path: Path | str, yaml_path: YamlPath, channels: Channels = None
+    path: Path | str, yaml_path: YamlPath, names: Names = None
 ) -> tuple[Cube, tuple[str, ...]]:
     """Return a file of spectra, and notes for the user.
 
@@ -97,7 +105,7 @@ def read_cube(
     that are not finite or clearly negative; CannotDo when it may not be read or the memory does
     not suffice.
     """
-    with _open_bands(Path(path), yaml_path, channels) as (stored, order):
+    with _open_bands(Path(path), yaml_path, names) as (stored, order):
         data, notes = _si_samples(stored, order)
         return Cube(data, _bands(stored, order)), (*stored.notes, *notes)
 
@@ -118,32 +126,41 @@ def companions(path: Path | str) -> tuple[Path, ...]:
 
 @contextmanager
 def _open_bands(
-    path: Path, yaml_path: YamlPath, channels: Channels
-) -> Iterator[tuple[SpectralData, slice]]:
-    """Open a file: its header, and its bands in the order of wavelength."""
+    path: Path, yaml_path: YamlPath, names: Names
+) -> Iterator[tuple[SpectralData, Order]]:
+    """Open a file: its header, and its bands in use in the order of wavelength."""
     with convert_errors(path, yaml_path, _REMEDY):
         reader = READERS.get(path.suffix.lower())
         if reader is None:
             known = ", ".join(READERS)
             raise UnusableFile(f"has the ending {path.suffix or 'none'!r}; known are {known}")
         check_file(path)
-        stored = reader(path) if channels is None else _named_exr(path, channels)
-        order = _order(stored.wavelengths)
+        stored = reader(path) if names is None else _named(path, names)
+        order = _order(stored)
         _check_size(path, stored)
         yield stored, order
 
 
-def _bands(stored: SpectralData, order: slice) -> Bands:
+def _bands(stored: SpectralData, order: Order) -> Bands:
     white = stored.white
     if white is not None:
         if white.min() < 0 or not white.max() > 0:
             raise UnusableFile("its white is negative or black", "correct the white, or remove it")
+        if white.max() > MOST_LIGHT:
+            raise UnusableFile(f"its white is beyond {MOST_LIGHT:g}", "look for a wrong unit")
         white = white[order]
     return Bands(stored.wavelengths[order], stored.quantity, white)
 
 
-def _order(wavelengths: np.ndarray) -> slice:
-    """Return the slice of bands by rising wavelength; a file may also begin with the longest."""
+def _order(stored: SpectralData) -> Order:
+    """Return the bands in use by rising wavelength; a file may also begin with the longest."""
+    if stored.used is None:
+        return _rising(stored.wavelengths)
+    return np.flatnonzero(stored.used)[_rising(stored.wavelengths[stored.used])]
+
+
+def _rising(wavelengths: np.ndarray) -> slice:
+    """Return the slice of all bands by rising wavelength."""
     if len(wavelengths) < 2:
         raise UnusableFile(f"has {len(wavelengths)} band; spectra need at least two wavelengths")
     if not wavelengths.min() > 0:
@@ -176,19 +193,21 @@ def _check_size(path: Path, stored: SpectralData) -> None:
         )
 
 
-def _si_samples(stored: SpectralData, order: slice) -> tuple[np.ndarray, list[str]]:
+def _si_samples(stored: SpectralData, order: Order) -> tuple[np.ndarray, list[str]]:
     """Return the samples in SI units, float32, checked block by block, and notes."""
     data = stored.read()
     shape = (*stored.shape, len(stored.wavelengths))
     if data.shape != shape:
         raise UnusableFile(f"holds samples {data.shape} where its header says {shape}")
-    out = np.empty(shape, np.float32)
     wavelengths = stored.wavelengths[order]
+    bands = np.shape(stored.wavelengths)
+    gain, offset = (np.broadcast_to(v, bands)[order] for v in (stored.gain, stored.offset))
+    out = np.empty((*stored.shape, len(wavelengths)), np.float32)
     lowest, largest, below, missing = 0.0, 0.0, 0, 0
     for top in range(0, len(out), _BLOCK):
         rows = slice(top, top + _BLOCK)
-        block, gaps = _si_block(data[rows], stored)
-        out[rows] = block[:, :, order]
+        block = np.asarray(data[rows])[:, :, order]
+        out[rows], gaps = _si_block(block, gain, offset, stored.no_data)
         low, high = float(out[rows].min()), float(out[rows].max())
         if not (np.isfinite(low) and np.isfinite(high)):
             raise _not_finite(out[rows], top, wavelengths)
@@ -196,6 +215,16 @@ def _si_samples(stored: SpectralData, order: slice) -> tuple[np.ndarray, list[st
             below += int(np.count_nonzero(out[rows] < 0))
             np.maximum(out[rows], 0, out=out[rows])
         lowest, largest, missing = min(lowest, low), max(largest, high), missing + gaps
+    if largest > MOST_LIGHT:
+        raise UnusableFile(
+            f"holds values up to {largest:.3g}, beyond {MOST_LIGHT:g}", "look for a wrong unit"
+        )
+    white = 0.0 if stored.white is None else float(stored.white.max())
+    if 0 < MOST_OVER_WHITE * white < largest:
+        raise UnusableFile(
+            f"its white is {largest / white:.2g} times darker than its brightest light",
+            "correct the unit of its white, or remove it",
+        )
     if lowest < -MOST_NEGATIVE * largest:
         raise UnusableFile(
             f"holds negative values, down to {lowest:.3g} (the largest is {largest:.3g}); "
@@ -205,16 +234,18 @@ def _si_samples(stored: SpectralData, order: slice) -> tuple[np.ndarray, list[st
     return out, list(_remarks(stored, lowest, largest, below, missing, out.size))
 
 
-def _si_block(block: Any, stored: SpectralData) -> tuple[np.ndarray, int]:
+def _si_block(
+    block: np.ndarray, gain: np.ndarray, offset: np.ndarray, no_data: float | None
+) -> tuple[np.ndarray, int]:
     """Return some rows in SI units, float32, and how many of their values are no data, now 0."""
     with np.errstate(over="ignore", invalid="ignore"):  # what overflows is not finite, and told
-        values = np.asarray(block).astype(np.float32)
-        values *= np.asarray(stored.gain, np.float32)
-    if np.any(stored.offset):
-        values += np.asarray(stored.offset, np.float32)
-    if stored.no_data is None:
+        values = block.astype(np.float32)
+        values *= gain.astype(np.float32)
+    if offset.any():
+        values += offset.astype(np.float32)
+    if no_data is None:
         return values, 0
-    missing = np.asarray(block) == stored.no_data
+    missing = np.isnan(block) if np.isnan(no_data) else block == no_data
     values[missing] = 0.0
     return values, int(np.count_nonzero(missing))
 

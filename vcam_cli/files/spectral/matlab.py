@@ -62,6 +62,25 @@ def read_variables(path: Path, names: Collection[str]) -> dict[str, Value]:
             raise UnusableFile(f"is no whole MATLAB file ({str(error)[:80]})") from None
 
 
+def read_shapes(path: Path) -> dict[str, tuple[int, ...]]:
+    """Return name and shape of a file's variables of real numbers. Raise UnusableFile."""
+    with (
+        open(path, "rb") as file,
+        closing(mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)) as m,
+    ):
+        order: Order = "<" if m[126:128] == b"IM" else ">"
+        bytes_, found = _Bytes(m, order, HEADER, len(m)), dict[str, tuple[int, ...]]()
+        while bytes_.position < bytes_.stop:
+            try:
+                kind, inside = bytes_.element(padded=False)
+                flags, shape, name = _head(_beginning(inside) if kind == PACKED else inside)
+            except (_Damaged, zlib.error):
+                break  # what is whole before it is known
+            if flags & 0xFF in NUMBERS and not flags & COMPLEX:
+                found[name] = shape
+        return found
+
+
 class _Damaged(Exception):
     """A claim of a file that its bytes do not bear out."""
 
@@ -125,11 +144,8 @@ def _variables(bytes_: _Bytes, names: Collection[str], path: Path) -> dict[str, 
 
 def _unpack(packed: _Bytes, names: Collection[str], path: Path) -> _Bytes | None:
     """Return the element that is packed; None for a variable that is not wanted."""
-    data = packed.data[packed.position : min(packed.position + PIECE, packed.stop)]
-    begin = zlib.decompressobj().decompress(data, 4 * LONGEST_NAME + 512)
-    head = _Bytes(begin, packed.order, 8, len(begin))
     try:
-        if _head(head)[2] not in names:
+        if _head(_beginning(packed))[2] not in names:
             return None
     except _Damaged:
         return None  # nothing of ours: it has so long a name, or so many axes
@@ -143,6 +159,13 @@ def _unpack(packed: _Bytes, names: Collection[str], path: Path) -> _Bytes | None
                 raise _Damaged(f"it unpacks to more than {MOST_RATIO} times its size")
             check_memory(path, len(out))
     return _Bytes(memoryview(out), packed.order, 0, len(out))
+
+
+def _beginning(packed: _Bytes) -> _Bytes:
+    """Return the head of an array that is packed."""
+    data = packed.data[packed.position : min(packed.position + PIECE, packed.stop)]
+    begin = zlib.decompressobj().decompress(data, 4 * LONGEST_NAME + 512)
+    return _Bytes(begin, packed.order, 8, len(begin))
 
 
 def check_memory(path: Path, count: int) -> None:
