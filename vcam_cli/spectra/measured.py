@@ -26,6 +26,7 @@ _WAVELENGTH = re.compile(
     r"(?<![a-z])(wave ?-?_?length|wavelen|wl|lambda|λ)(?![a-z])|^ *\(?(nm|um)\)? *$"
 )
 _PERCENT = re.compile(r"%|percent")
+_PER_WATT = re.compile(r"per[ _-]?watt")
 MAX_NUMBERS = 1 << 22
 """Numbers of a file of many columns: a thousand spectra at a thousand wavelengths, and more."""
 PREAMBLE = 1000
@@ -102,6 +103,17 @@ def column_names(path: str | PathLike[str]) -> tuple[str, ...]:
     names = _read_sheet(Path(path)).names
     of_wavelength = _wavelength_column(names)
     return tuple(bare_name(name) for i, name in enumerate(names) if i != of_wavelength)
+
+
+def is_per_watt(path: str | PathLike[str], column: str | None = None) -> bool:
+    """Return whether the name of a column says that it is a sensitivity per watt.
+
+    Raises as `read_spectrum`.
+    """
+    file = Path(path)
+    names = _read_sheet(file).names
+    chosen = _value_column(file, names, _wavelength_column(names), column)
+    return bool(_PER_WATT.search(names[chosen].lower()))
 
 
 def bare_name(name: str) -> str:

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import model_validator
 from pydantic_core import InitErrorDetails
 
-from vcam_cli.camera.spectrum import Spectral, SpectrumSpec
+from vcam_cli.camera.spectrum import Spectral, SpectrumSpec, balanced
 from vcam_cli.config import shipped, yaml_reader
 from vcam_cli.config.lists import read_items
 from vcam_cli.config.model import Model, all_or_none, at_most_one, key
@@ -180,7 +180,9 @@ class Array(Model):
     ] = key(
         "transmittance of each color's filter (a spectrum), or the name of a shipped set; "
         "or {file: rgb.csv} with a column for each color; default generic-rgb, and no filter on "
-        "monochrome pixels (color Y) and on W",
+        "monochrome pixels (color Y) and on W. Filters act on photons: measured sensitivities of "
+        "cameras are mostly per watt, which read as if per photon leaves red 10 % low and blue "
+        "13 % high; write {file: rgb.csv, per: watt}",
         example={"R": {"file": "r.csv"}, "G": {"file": "g.csv"}, "B": {"file": "b.csv"}},
         default=None,
     )
@@ -237,5 +239,6 @@ class Array(Model):
             if color not in filters and color not in CLEAR:
                 message = f"has no filter for {color}, a color of {describe(to_yaml(self.pattern))}"
                 raise refusal(("filters",), message, f"add {color}: and its spectrum")
-        self._fill(filters={c: filters[c] for c in self.colors if c in filters} or filters)
+        chosen = {c: filters[c] for c in self.colors if c in filters} or filters
+        self._fill(filters=balanced(chosen))
         return self
