@@ -118,6 +118,16 @@ def one_minus_m(focal_length: float, distance: float) -> float:
     return 1.0 if math.isinf(distance) else distance / (distance - focal_length)
 
 
+def working_number(setup: Setup) -> float:
+    """N (1 - m / P): image-side cone through an exit pupil P times as large as the entrance one.
+
+    The exit pupil is (P - m) f from the sensor.
+    """
+    m = 1 - one_minus_m(setup.focal_length, setup.distance)
+    larger = 1.0 if setup.pupil is None else setup.pupil / setup.focal_length + m
+    return setup.f_number * (1 - m / larger)
+
+
 def relative_illumination(setup: Setup, x: np.ndarray, y: np.ndarray) -> np.ndarray:
     """E(phi) / E(0) at sensor places; eq 2.22 as it is printed, in extended precision, or cos^4."""
     image_distance = one_minus_m(setup.focal_length, setup.distance) * setup.focal_length
@@ -128,7 +138,7 @@ def relative_illumination(setup: Setup, x: np.ndarray, y: np.ndarray) -> np.ndar
         return np.interp(np.sqrt(np.asarray(b, float)) * image_distance, *setup.illumination)
     if setup.off_axis == "cos4":
         return np.asarray((1 + b) ** -2, float)
-    working = np.longdouble(setup.f_number) * one_minus_m(setup.focal_length, setup.distance)
+    working = np.longdouble(working_number(setup))
     a = 1 / (4 * working**2)  # tan^2 theta: sin^2 theta = 1 / (1 + 4 (N (1 - m))^2)
 
     def disk(b: np.ndarray) -> np.ndarray:
@@ -144,7 +154,7 @@ def displacements(setup: Setup, step: float, reach: float) -> tuple[np.ndarray, 
     rings single points on a spiral, each standing for the same share of what is left there. The
     last row of shares, one more than there are displacements, is what goes further than `reach`.
     """
-    ring = setup.wavelength * setup.f_number * one_minus_m(setup.focal_length, setup.distance)
+    ring = setup.wavelength * working_number(setup)
     core = 15 * ring.min()
     node, weight = np.polynomial.legendre.leggauss(4)
     edges = np.linspace(0, core, 31)
@@ -172,7 +182,7 @@ def displacements(setup: Setup, step: float, reach: float) -> tuple[np.ndarray, 
 
 def electrons_per_light(setup: Setup) -> np.ndarray:
     """(K, C, J): electrons per m2 of photodetector for B_k = 1 on axis, at each wavelength."""
-    working = setup.f_number * one_minus_m(setup.focal_length, setup.distance)
+    working = working_number(setup)
     photons = setup.radiance * setup.wavelength / (PLANCK * LIGHT) * setup.weight
     geometry = np.pi / (1 + 4 * working**2)  # eq 2.18
     return setup.time * geometry * photons[:, None, :] * setup.response[None]
@@ -220,7 +230,7 @@ def collectors(setup: Setup, room: float) -> Sequence[Collector | Rectangle | Pr
 def electrons_of_areas(setup: Setup) -> np.ndarray:
     """Mean photo-electrons of every pixel, of whatever is not waves: (rows, columns)."""
     off_x, off_y, width, height = setup.aperture
-    ring = setup.wavelength.max() * setup.f_number * one_minus_m(setup.focal_length, setup.distance)
+    ring = setup.wavelength.max() * working_number(setup)
     reach = max(*setup.size, 60 * ring) if setup.diffraction else 0.0
     places, shares = np.zeros((1, 2)), np.eye(2, 1) * np.ones(len(setup.wavelength))
     if setup.diffraction:
@@ -289,7 +299,7 @@ def lens_shares(setup: Setup, patch: Patch, lens: Aberrated, wavelength: float) 
 
     What goes further than half the period is spread evenly over it.
     """
-    working = setup.f_number * one_minus_m(setup.focal_length, setup.distance)
+    working = working_number(setup)
     shares = lens.spread(patch.x, patch.y, wavelength, working)
     return shares + (1 - shares.sum()) / shares.size
 
@@ -306,7 +316,7 @@ def lens_on_patch(setup: Setup, patch: Patch, wavelength: float) -> tuple[np.nda
         return one, 0 * one
     if lens is None and not setup.diffraction:
         return one, one
-    ring = wavelength * setup.f_number * one_minus_m(setup.focal_length, setup.distance)
+    ring = wavelength * working_number(setup)
     found = np.fft.fft2(lens_shares(setup, patch, lens or Aberrated(Wavefront()), wavelength))
     return found * (np.hypot(fx, fy[:, None]) < 1 / ring), 0 * one
 
@@ -380,7 +390,7 @@ def electrons_of_field(setup: Setup, chosen: np.ndarray) -> np.ndarray:
 def passed_by(setup: Setup, fx: float, fy: float) -> np.ndarray:
     """What lens and silicon leave of a wave, at each wavelength: (J,)."""
     f = math.hypot(fx, fy)
-    working = setup.f_number * one_minus_m(setup.focal_length, setup.distance)
+    working = working_number(setup)
     passed = np.ones(len(setup.wavelength), complex)
     if setup.lens is not None:
         passed *= [setup.lens.transfer(fx, fy, w, working) for w in setup.wavelength]
@@ -413,7 +423,7 @@ def electrons_of_waves(setup: Setup, waves: Waves) -> np.ndarray:
 
 def pupil_of(setup: Setup) -> Pupil:
     image = one_minus_m(setup.focal_length, setup.distance) * setup.focal_length
-    working = setup.f_number * one_minus_m(setup.focal_length, setup.distance)
+    working = working_number(setup)
     return Pupil(image if setup.pupil is None else setup.pupil, working)
 
 

@@ -236,7 +236,7 @@ def read(path: Path) -> tuple[list[str], list[list[str]]]:
     lines = path.read_text("utf-8").splitlines()
     comments = [line for line in lines if line.startswith("#")]
     header, *rows = csv.reader(line for line in lines if not line.startswith("#"))
-    assert header == ["wavelength_nm", "value"]
+    assert header in (["wavelength_nm", "value"], ["wavelength_nm", "value (per watt)"])
     return comments, rows
 
 

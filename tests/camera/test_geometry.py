@@ -45,6 +45,51 @@ def lens(*names: str, **more) -> dict:
     return {"optics": {name: TRIPLE[name] for name in names} | more}
 
 
+@pytest.mark.parametrize(
+    ("pupil", "working"), [("15 mm", 3.0), ("20 mm", 2.0), ("auto", 2.0), ("10 m", 1.001001)]
+)
+def test_near_by_the_exit_pupil_sets_the_working_f_number(pupil, working, tmp_path):
+    """Life size through 10 mm: f (P + 1) from the sensor, of diameter P f / N."""
+    given = {"focal_length": "10 mm", "f_number": 4, "exit_pupil_distance": pupil}
+    g = solved(tmp_path, optics=given, scene__distance="20 mm")
+    assert g.magnification == pytest.approx(-1)
+    assert g.working_f_number == pytest.approx(4 * working, rel=1e-6)
+    cone = math.pi * math.sin(math.atan(1 / (2 * 4 * working))) ** 2
+    assert g.irradiance_per_radiance == pytest.approx(cone, rel=1e-6)
+    assert g.report(1)["diffraction_cutoff_550nm"] == pytest.approx(
+        1 / (550e-9 * 4 * working), rel=1e-6
+    )
+    by_aperture = {"focal_length": "10 mm", "exit_pupil_distance": pupil}
+    by_aperture["numerical_aperture"] = math.sqrt(cone / math.pi)
+    same = solved(tmp_path, optics=by_aperture, scene__distance="20 mm")
+    assert same.f_number == pytest.approx(4, rel=1e-6)
+    by_both = {n: v for n, v in by_aperture.items() if n != "focal_length"}
+    by_both["aperture_diameter"] = "2.5 mm"
+    same = solved(tmp_path, optics=by_both, scene__distance="20 mm")
+    assert (same.focal_length, same.f_number) == pytest.approx((10e-3, 4), rel=1e-6)
+
+
+@pytest.mark.parametrize("distance", ["15 mm", "40 mm", "infinity"])
+def test_blur_beside_the_focus_through_pupils_of_different_size(distance, tmp_path):
+    """The cone of a point fills the entrance pupil, and is cut in the plane that is in focus."""
+    f, number, larger = 10e-3, 4.0, 0.5
+    given = {"focal_length": "10 mm", "f_number": number, "exit_pupil_distance": "15 mm"}
+    given["focus_distance"] = "20 mm"
+    g = solved(tmp_path, optics=given, scene__distance=distance)
+    behind = f * (1 / larger - 1)  # of the principal plane: the entrance pupil
+    sharp = 20e-3 + behind
+    at = math.inf if distance == "infinity" else float(distance.split()[0]) * 1e-3 + behind
+    blur = f / number * (1 - sharp / at)  # in the plane in focus, and at life size on the sensor
+    assert g.focus_shift / g.working_f_number == pytest.approx(-blur, rel=1e-9)
+
+
+def test_an_exit_pupil_that_no_light_leaves_is_refused(tmp_path):
+    given = {"focal_length": "10 mm", "f_number": 4, "exit_pupil_distance": "9 mm"}
+    [problem] = refused(tmp_path, {"optics": given, "scene.distance": "20 mm"})
+    assert problem.path == ("optics", "exit_pupil_distance")
+    assert "10 mm before the sensor" in problem.message
+
+
 @pytest.mark.parametrize("pair", PAIRS, ids=" and ".join)
 def test_every_pair_determines_the_lens(pair, tmp_path):
     g = solved(tmp_path, **lens(*pair))

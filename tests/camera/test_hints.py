@@ -367,7 +367,7 @@ NEEDS_MORE = {
     "pixel.photodetector.dark_current.doubling",
     "pixel.readout.charge_transfer",  # of a ccd
     "adc.reference",  # of a logarithmic ADC
-    *(f"array.filters.{name}" for name in ("column", "unit", "table", "outside", "silicon")),
+    *(f"array.filters.{name}" for name in ("column", "unit", "table", "outside", "silicon", "per")),
 }
 """Keys whose examples are right beside another key that the plain camera does not have."""
 

@@ -204,10 +204,9 @@ class TestDefaults:
         filters = camera(array__pattern="monochrome", array__filters=given).array.filters
         assert filters["Y"].factors == (0.5,)
 
-    def test_an_image_file_is_srgb_but_exr_is_linear(self):
-        for name, encoding in {"a.png": "srgb", "a.EXR": "linear", "a.jpg": "srgb"}.items():
-            source = camera(scene__source={"kind": "image", "file": name}).scene.source
-            assert source.encoding == encoding
+    def test_an_image_file_says_how_it_codes_light(self):
+        source = camera(scene__source={"kind": "image", "file": "a.png"}).scene.source
+        assert source.encoding == "auto"
         given = {"kind": "image", "file": "a.exr", "encoding": "srgb"}
         assert camera(scene__source=given).scene.source.encoding == "srgb"
 

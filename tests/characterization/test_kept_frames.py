@@ -100,3 +100,17 @@ def test_the_files_are_all_that_was_taken(folder):
     assert codes.shape == (SIDE, SIDE // 3)
     assert codes.dtype == np.uint16
     assert "n 12 72 216" in lines
+
+
+def test_the_dark_pairs_of_the_noise_are_kept(folder):
+    """Four at the exposure time and four at none: 2 and 6 frames, and 8 beside the dark series."""
+    text = (folder / "frames" / "R" / "emva1288.txt").read_text()
+    of_time = text.partition("\nd ")[2].partition("\nb ")[0]
+    assert of_time.count("\ni pair_") == 2
+    assert of_time.count("\n# i dark_") == 6
+    none = [part for part in text.split("\n# d ")[1:] if part.startswith("0\n")]
+    assert sum(part.count("# i dark_") for part in none) == 1 + 8
+    for line in text.splitlines():
+        name = line.partition("i ")[2]
+        if name.endswith(".tif"):
+            assert (folder / "frames" / "R" / name).is_file()

@@ -198,6 +198,7 @@ def test_what_is_refused() -> None:
         (("a.exr", "a.exr", "--white", "1,1,1"), "--white"),
         (("a.exr", "a.exr", "--space", "xyz", "--white", "1,1"), "X,Y,Z"),
         (("a.exr", "a.exr", "--space", "xyz", "--white", "1,nan,1"), "X,Y,Z"),
+        (("a.exr", "a.exr", "--space", "xyz", "--white", "1e-300,1,1"), "X,Y,Z"),
         (("a.exr", "a.exr", "--ppd", "0"), "not a positive number"),
         (("a.exr", "a.exr", "--dpi", "nan"), "not a positive number"),
         (("a.exr", "a.exr", "--ppd", "1e9"), "at most 1e+06"),

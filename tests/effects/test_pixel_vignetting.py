@@ -107,7 +107,9 @@ def test_layers_like_air_without_depth_take_nothing(tmp_path):
 def test_the_exit_pupil_sets_the_angles(tmp_path):
     """From half the distance light comes to a pixel as it else does to one twice as far out."""
     near, far = (
-        effect(tmp_path, pixel__stack=STACK, optics__exit_pupil_distance=d)
+        effect(
+            tmp_path, pixel__stack=STACK, optics__exit_pupil_distance=d, scene__distance="infinity"
+        )
         for d in ("2.5 mm", "5 mm")
     )
     assert near.cone == far.cone  # the f-number is that of the light

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from vcam_cli.files.images.images import decode_srgb
+from vcam_cli.files.images.color import decode_srgb
 from vcam_cli.quality.error_map import false_color, scale_limit
 
 

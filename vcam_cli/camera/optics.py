@@ -259,7 +259,8 @@ class Optics(Model):
         float | None, Quantity("length", above=0, words={"auto": None})
     ] = key(
         "from the sensor; auto = the image distance (1 - m) f; sets the chief ray angles (CRA) at"
-        " the pixels",
+        " the pixels and, near by, the working f-number N (1 - m / P), with P = exit pupil distance"
+        " / f + m",
         unit="mm",
         example="auto",
         default=None,

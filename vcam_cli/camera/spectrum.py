@@ -5,13 +5,14 @@ A `SpectrumSpec` is what the file says: a product of numbers, names, files and t
 when the model is built, so that a model is no more than what was written.
 """
 
+import contextlib
 import math
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import pairwise
-from typing import Annotated, Any, Self
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from pydantic import model_validator
@@ -104,8 +105,8 @@ class ColumnName(YamlType):
         return str(given)
 
 
-class SpectrumFile(Model):
-    """A spectrum in a CSV file."""
+class CurveFile(Model):
+    """A curve in a CSV file."""
 
     file: File = key(
         "CSV file of wavelengths and values, with any header, separator and decimal sign; relative "
@@ -129,11 +130,15 @@ class SpectrumFile(Model):
 
         Raises BadInput, about `path`.
         """
-        return _read_file(self, self.outside or outside, (*path, "file"))
+        return spectra.Spectrum(tables=(self.read_table(path, outside),))
+
+    def read_table(self, path: Path, outside: Outside) -> spectra.Table:
+        """Return the values of the file. Raises as `resolve`."""
+        return _read_file(self, self.outside or outside, (*path, "file"))[0]
 
 
-class SpectrumTable(Model):
-    """A spectrum written out."""
+class CurveTable(Model):
+    """A curve written out."""
 
     table: Annotated[Points, PointTable()] = key(
         "wavelength in nm -> value, straight lines between", unit="nm", example={400: 0.1, 700: 0.3}
@@ -142,8 +147,50 @@ class SpectrumTable(Model):
 
     def resolve(self, path: Path, outside: Outside) -> spectra.Spectrum:
         """Return the spectrum of the table, beyond which `outside` holds if it does not say."""
+        return spectra.Spectrum(tables=(self.read_table(path, outside),))
+
+    def read_table(self, path: Path, outside: Outside) -> spectra.Table:
+        """Return the values of the table."""
         wavelength, value = np.array(self.table).T
-        return spectra.Spectrum.from_samples(wavelength / 1e9, value, self.outside or outside)
+        return spectra.Table(wavelength / 1e9, value, self.outside or outside)
+
+
+Per = Literal["photon", "watt"]
+_PER: Any = key(
+    "whether a sensitivity counts electrons per photon or per watt of light: published curves of"
+    " cameras are mostly per watt, and become electrons per photon by 1 / wavelength, unchanged"
+    " at their largest value, that of all filters of an array; default photon, watt where the"
+    " name of a file's column says per watt",
+    example="watt",
+    default=None,
+)
+
+
+class SpectrumFile(CurveFile):
+    """A spectrum in a CSV file."""
+
+    per: Per | None = _PER
+
+    @property
+    def is_per_watt(self) -> bool:
+        """Whether values are per watt of light; of a file that cannot be read, as far as stated."""
+        if self.per is not None:
+            return self.per == "watt"
+        try:
+            return _read_file(self, "error", ())[1]
+        except BadInput:
+            return False
+
+
+class SpectrumTable(CurveTable):
+    """A spectrum written out."""
+
+    per: Per | None = _PER
+
+    @property
+    def is_per_watt(self) -> bool:
+        """Whether values are per watt of light."""
+        return self.per == "watt"
 
 
 class SiliconLayer(Model):
@@ -185,12 +232,15 @@ class SiliconLayer(Model):
         return spectra.Spectrum.from_samples(wavelength, share)
 
 
-_FORM_MODELS: dict[str, type[SpectrumFile | SpectrumTable | SiliconLayer]] = {
+Form = SpectrumFile | SpectrumTable | SiliconLayer
+_FORM_MODELS: dict[str, type[Form]] = {
     "silicon": SiliconLayer,
     "file": SpectrumFile,
     "table": SpectrumTable,
 }
 Factor = float | str | SpectrumFile | SpectrumTable | SiliconLayer
+_FINE = 1e-9
+"""Step of a curve per watt over the wavelength: straight lines between err less than 1e-5 [m]."""
 
 
 @dataclass(frozen=True)
@@ -201,6 +251,8 @@ class SpectrumSpec:
     most: float | None = None
     outside: Outside = "error"
     """What holds beyond the factors that do not say it."""
+    together: tuple[Factor, ...] = ()
+    """Factors of all filters of a set: those per watt keep their balance."""
 
     def resolve(self, path: Path = ()) -> spectra.Spectrum:
         """Return the spectrum, dimensionless.
@@ -217,7 +269,7 @@ class SpectrumSpec:
         """
         several = len(self.factors) > 1
         parts = [
-            _resolve(factor, (*path, i) if several else path, self.outside)
+            _resolve(factor, (*path, i) if several else path, self.outside, self.together)
             for i, factor in enumerate(self.factors)
         ]
         product = spectra.Spectrum.flat(1.0).multiply(*parts)
@@ -242,30 +294,78 @@ def flat(value: float, most: float | None = 1.0) -> SpectrumSpec:
     return SpectrumSpec((value,), most)
 
 
-def _read_file(given: SpectrumFile, outside: Outside, path: Path) -> spectra.Spectrum:
+def balanced(filters: Mapping[str, SpectrumSpec]) -> dict[str, SpectrumSpec]:
+    """Return the filters of a set, of which those per watt keep their balance."""
+    together = tuple(factor for spec in filters.values() for factor in spec.factors)
+    return {color: replace(spec, together=together) for color, spec in filters.items()}
+
+
+def _read_file(given: CurveFile, outside: Outside, path: Path) -> tuple[spectra.Table, bool]:
+    """Return the values of a file, and whether their column says that they are per watt."""
     file, remedy = given.file, "write rows of wavelength and value, such as 400,0.31"
     with data_file_problems(file, path, remedy):
         state = os.stat(file)
         changed = (state.st_mtime_ns, state.st_size, state.st_ino)
-        table = _read_table(file, outside, given.column, given.unit, changed)
-    return spectra.Spectrum(tables=(table,))
+        return _read_table(file, outside, given.column, given.unit, changed)
 
 
 @lru_cache(256)
 def _read_table(
     file: str, outside: Outside, column: str | None, unit: str | None, changed: tuple[int, ...]
-) -> spectra.Table:
+) -> tuple[spectra.Table, bool]:
     """Return the table of a file, read once as long as it does not change: sweeps ask often."""
-    return spectra.read_spectrum(file, outside, column, unit)
+    table = spectra.read_spectrum(file, outside, column, unit)
+    return table, spectra.is_per_watt(file, column)
 
 
-def _resolve(factor: Factor, path: Path, outside: Outside) -> spectra.Spectrum:
+def _resolve(
+    factor: Factor, path: Path, outside: Outside, together: tuple[Factor, ...]
+) -> spectra.Spectrum:
     if isinstance(factor, float):
         return spectra.Spectrum.flat(factor)
+    factor = _opened(factor, path)
+    if isinstance(factor, SiliconLayer) or not factor.is_per_watt:
+        return factor.resolve(path, outside)
+    table = factor.read_table(path, outside)
+    return spectra.Spectrum(tables=(_per_photon(table, _balance(table, together, outside)),))
+
+
+def _opened(factor: str | Form, path: Path) -> Form:
+    """Return what a shipped name means."""
     if isinstance(factor, str):
-        file = SpectrumFile(file=str(shipped.find("spectra", factor, path)))
-        return _read_file(file, outside, path)
-    return factor.resolve(path, outside)
+        return SpectrumFile(file=str(shipped.find("spectra", factor, path)))
+    return factor
+
+
+def _balance(table: spectra.Table, together: tuple[Factor, ...], outside: Outside) -> float:
+    """Return the wavelength at which sensitivities per watt are those per photon [m].
+
+    It is that of the largest value of all that belong together, or a shorter one where else a
+    fraction would become more than 1.
+    """
+    tables = [table]
+    for factor in together:
+        if isinstance(factor, float | SiliconLayer):
+            continue
+        with contextlib.suppress(BadInput):  # which is told where it stands
+            peer = _opened(factor, ())
+            if not isinstance(peer, SiliconLayer) and peer.is_per_watt:
+                tables.append(peer.read_table((), outside))
+    brightest = max(tables, key=lambda one: float(one.value.max()))
+    at = float(brightest.wavelength[np.argmax(brightest.value)])
+    largest = max(float((one.value / one.wavelength).max()) for one in tables) * at
+    return at / largest if largest > 1 >= float(brightest.value.max()) else at
+
+
+@lru_cache(64)
+def _per_photon(table: spectra.Table, balance: float) -> spectra.Table:
+    """Return a sensitivity per watt as one per photon, equal at the wavelength `balance` [m]."""
+    steps = np.ceil(np.diff(table.wavelength) / _FINE).clip(1, 100).astype(int)
+    ends = zip(table.wavelength[:-1], table.wavelength[1:], steps, strict=True)
+    parts = [np.linspace(low, high, count, endpoint=False) for low, high, count in ends]
+    wavelength = np.concatenate([*parts, table.wavelength[-1:]])
+    value = np.interp(wavelength, table.wavelength, table.value)
+    return spectra.Table(wavelength, value * balance / wavelength, table.outside)
 
 
 def _bound(spectrum: spectra.Spectrum) -> float:

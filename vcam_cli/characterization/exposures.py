@@ -214,14 +214,14 @@ def _pair_statistics(
 ) -> dict[str, tuple[float, float]]:
     """Return mean and temporal variance of every color, averaged over pairs of frames.
 
-    The first pair is kept.
+    All are kept, the first at the bench's exposure time as the pair of its level.
     """
     time = bench.time if time is None else time
-    kind: Kind = "pair" if time == bench.time else "dark"
     pairs: dict[str, list[tuple[float, float]]] = {color: [] for color in bench.colors}
     for done in range(count):
         frames = [bench.flat_frame(electrons, next(numbers), time) for _ in range(2)]
-        for frame in frames if done == 0 else ():
+        kind: Kind = "pair" if time == bench.time and done == 0 else "dark"
+        for frame in frames:
             keeper.add(bench, kind, electrons, time, frame)
         for color, statistics in pairs.items():
             first, second = (bench.color_pixels(frame, color) for frame in frames)

@@ -6,8 +6,8 @@ width and height; `b` light, `d` dark; `i` an image. Two images of a kind are fo
 more for nonuniformity. That program measures one color on one grid, so every color of a mosaic has
 a folder and a descriptor of its own; one with several pixels in the block has one for each.
 
-The program wants light for every exposure time, so that dark frames of other times stand there as
-comments.
+The program wants light for every exposure time, and one pair of dark frames at each, so that dark
+frames of other times and further pairs stand there as comments.
 """
 
 from __future__ import annotations
@@ -59,6 +59,7 @@ class FrameFiles:
         self._new_file = new_file
         self._groups: dict[tuple[Kind, float, float], int] = {}
         self._texts: dict[str, list[str]] = {}
+        self._last: tuple[Kind, float, float] | None = None
 
     def add(self, bench: Bench, kind: Kind, electrons: float, time: float, frame: NDArray) -> None:
         """Write the pixels of every color of a frame."""
@@ -76,7 +77,7 @@ class FrameFiles:
                 )
                 photons = electrons / bench.efficiency(color)
                 comment = "# " if kind == "dark" else ""
-                if number == 0:
+                if group != self._last:
                     light = f"b {time * 1e9:.12g} {photons:.12g}"
                     text.append(comment + (light if electrons else f"d {time * 1e9:.12g}"))
                 name = f"{kind}_{level:03d}_{number:02d}.tif"
@@ -84,6 +85,7 @@ class FrameFiles:
                 codes = whole_numbers(pixels, 2.0**bits)
                 said = f"{time:.9g} s, {photons:.9g} photons, {electrons:.9g} e"
                 write_tiff(self._new_file(f"{folder}/{name}"), codes, said)
+        self._last = group
 
     def finish(self) -> None:
         """Write the descriptors."""

@@ -8,6 +8,8 @@ import typer
 from vcam_cli.commands import options
 
 DPI, DISTANCE = 72.0, "18 in"
+LEAST_WHITE, MOST_WHITE = 1e-9, 1e9
+"""X, Y or Z of a white, in whatever unit: what files hold is compared in 32 bits."""
 
 
 def check_positive(value: float | None) -> float | None:
@@ -30,8 +32,11 @@ def parse_white(text: str) -> tuple[float, float, float]:
         x, y, z = (float(part) for part in text.split(","))
     except ValueError:
         x = y = z = -1.0
-    if not all(0 < part < float("inf") for part in (x, y, z)):
-        message = f"{text!r} is not X,Y,Z; write for example 95.047,100,108.883"
+    if not all(LEAST_WHITE <= part <= MOST_WHITE for part in (x, y, z)):
+        message = (
+            f"{text!r} is not X,Y,Z of {LEAST_WHITE:g} to {MOST_WHITE:g}; write for example"
+            " 95.047,100,108.883"
+        )
         raise typer.BadParameter(message)
     return x, y, z
 
@@ -93,7 +98,7 @@ def compare(
     space: Annotated[
         Literal["srgb", "linear-srgb", "xyz"] | None,
         typer.Option(
-            "--space", help="Color space of the values; default linear-srgb for EXR, else srgb."
+            "--space", help="Color space of the values; default what each file says, else srgb."
         ),
     ] = None,
     white: Annotated[
@@ -146,7 +151,7 @@ def compare(
         "metrics": {name: value for name, value, _ in found.metrics},
         "settings": {
             "samples_per_degree": settings.samples_per_degree,
-            "space": [settings.space_of(path) for path in (image, reference)],
+            "space": list(found.codings),
             "white": list(settings.screen.white),
             "delta_e": delta_e,
             "filters": filters,

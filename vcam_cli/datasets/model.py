@@ -157,7 +157,8 @@ class Dataset(FileModel):
         default=None,
     )
     write: Annotated[tuple[str, ...], words_of(KINDS, 1)] = key(
-        "what is written of a frame: raw (codes), clean (the same without noise and rounding),"
+        "what is written of a frame: raw (codes), clean (the same without noise and rounding,"
+        " clipped: near saturation the mean of raw frames lies below it),"
         " ideal (the scene at the pixels' centers, all colors, in codes), depth (in m along the"
         " axis; of layers that of the nearest)",
         example=["raw", "clean"],

@@ -111,7 +111,7 @@ def check_picture(camera: Camera) -> None:
     if source.kind == "hyperspectral":
         from vcam_cli.files.spectral.hyperspectral import read_bands
 
-        bands = read_bands(source.file, path, source.channels)
+        bands = read_bands(source.file, path, source.names)
         check_place(bands, camera.optics.is_lens)
         check_bands(camera.scene, bands)
 
@@ -128,7 +128,7 @@ def check_depth(camera: Camera) -> None:
     if source.kind == "hyperspectral":
         from vcam_cli.files.spectral.hyperspectral import spectra_size
 
-        read_map(camera, spectra_size(source.file, path, source.channels))
+        read_map(camera, spectra_size(source.file, path, source.names))
 
 
 def _check_crops_of_layers(source: Layers) -> None:
@@ -154,7 +154,7 @@ def check_spectral_file(camera: Camera) -> None:
     if source.kind == "hyperspectral":
         from vcam_cli.files.spectral.hyperspectral import read_bands
 
-        bands = read_bands(source.file, (*SOURCE, "file"), source.channels)
+        bands = read_bands(source.file, (*SOURCE, "file"), source.names)
         if scene_bands.unseen_share(camera, bands) > camera.accuracy.tolerance:
             check_coverage(camera.scene, bands)
 

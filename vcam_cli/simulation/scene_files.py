@@ -66,7 +66,7 @@ def read_scene(camera: Camera, stages: Stages) -> tuple[Any, tuple[str, ...]]:
         from vcam_cli.scenes.hyperspectral import check_place
 
         with stages("read"):
-            cube, notes = read_cube(source.file, path, source.channels)
+            cube, notes = read_cube(source.file, path, source.names)
             check_place(cube.bands, camera.optics.is_lens)
             return _with_depth(camera, cube, notes)
     if isinstance(source, Layers):
@@ -162,7 +162,10 @@ def _flat(camera: Camera, view: View, picture: DepthPicture) -> ImageScene:
 def _blur(camera: Camera) -> LensBlur:
     """Return how a camera's lens blurs points by their distance."""
     solved = geometry(camera)
-    slope = solved.image_distance**2 / (2 * solved.working_f_number)
+    # Blur over 1 / distance, at what is in focus; f (1 / P - 1) before the entrance pupil.
+    behind = solved.focal_length * (1 / solved.pupil_magnification - 1)
+    slope = solved.image_distance * solved.focal_length / (2 * solved.f_number)
+    slope /= 1 + behind / solved.focus_distance
     shift = camera.optics.defocus / (2 * solved.working_f_number)
     off = isinstance(camera.effects, dict) and camera.effects.get("diffraction") == "off"
     wavelength = camera.scene.wavelengths.start
@@ -170,7 +173,7 @@ def _blur(camera: Camera) -> LensBlur:
     def sharp(frequency: NDArray) -> NDArray:
         if off or not camera.optics.diffraction:
             return np.ones_like(frequency)
-        return otf_circular(frequency, wavelength, solved.f_number, solved.magnification)
+        return otf_circular(frequency, wavelength, solved.working_f_number)
 
     return LensBlur(slope, shift - slope / solved.focus_distance, sharp)
 

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from vcam_cli.camera.derived.mosaic import BLOCKS
 from vcam_cli.errors import BadInput, Collector, bad
-from vcam_cli.files.file_checks import UnusableFile
-from vcam_cli.files.images.camera_raw import is_raw, read_codes
+from vcam_cli.files.file_checks import UnusableFile, is_raw
+from vcam_cli.files.images.camera_raw import read_codes
 from vcam_cli.files.images.exr import read_exr
 from vcam_cli.files.images.images import open_image, read_samples
 from vcam_cli.verification.frame_sets import FrameSet

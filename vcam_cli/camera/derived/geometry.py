@@ -40,7 +40,7 @@ class Geometry:
     focus_distance: float
     """From the lens to what is in focus."""
     magnification: float
-    """Of what is in focus, negative; the cone of light at the sensor follows from it."""
+    """Of what is in focus, negative."""
     scene_scale: float
     """Size of the scene's image over that of the scene; 0 of a scene at infinity."""
     rows: int
@@ -70,6 +70,8 @@ class Geometry:
     exit_pupil_distance: float
     scene_width_on_sensor: float | None
     """Width of the scene's image where the file states the scene's extent."""
+    pupil_magnification: float = 1.0
+    """Diameter of the exit pupil over that of the entrance pupil, P."""
 
     @property
     def image_distance(self) -> float:
@@ -82,20 +84,30 @@ class Geometry:
 
         Of a point at d before a lens focused at s it is v^2 (1/d - 1/s): with the image distance v
         and the aperture A its wavefront and its blur, of the diameter A v |1/d - 1/s|, are exact.
+        With pupils of different size, that of the entrance lies f (1/P - 1) behind the plane from
+        which distances count, and v is f (1 - m/P) once.
         """
         if self.object_distance == self.focus_distance:
             return 0.0
-        return self.image_distance**2 * (1 / self.object_distance - 1 / self.focus_distance)
+        v, behind = self.image_distance, self.focal_length * (1 / self.pupil_magnification - 1)
+        cone = float(radiometry.image_distance(self.focal_length, self.cone_magnification))
+        defocus = 1 / self.object_distance - 1 / self.focus_distance
+        return v * cone * defocus / (1 + behind / self.object_distance)
+
+    @property
+    def cone_magnification(self) -> float:
+        """Magnification over that of the pupils, m / P: that of the cone at the sensor."""
+        return self.magnification / self.pupil_magnification
 
     @property
     def working_f_number(self) -> float:
-        """N (1 - m), the f-number that the image sees."""
-        return self.f_number * (1 - self.magnification)
+        """N (1 - m/P), the f-number that the image sees."""
+        return self.f_number * (1 - self.cone_magnification)
 
     @property
     def numerical_aperture(self) -> float:
         """Sine of the half-angle of the image-side cone, eq 2.17."""
-        return float(radiometry.numerical_aperture(self.f_number, self.magnification))
+        return float(radiometry.numerical_aperture(self.f_number, self.cone_magnification))
 
     @property
     def has_lens(self) -> bool:
@@ -110,7 +122,7 @@ class Geometry:
         """
         if not self.has_lens:
             return math.pi
-        return float(radiometry.irradiance_per_radiance(self.f_number, self.magnification))
+        return float(radiometry.irradiance_per_radiance(self.f_number, self.cone_magnification))
 
     @property
     def detector_area(self) -> float:
@@ -179,7 +191,7 @@ class Geometry:
             "effective_fill_factor": self.effective_fill_factor,
             "nyquist_frequency": 0.5 / self.pitch_x,
             "diffraction_cutoff_550nm": float(
-                diffraction.cutoff_frequency(550e-9, self.f_number, self.magnification)
+                diffraction.cutoff_frequency(550e-9, self.f_number, self.cone_magnification)
             ),
             "sample_pitch_sensor": sample,
             "sample_pitch_scene": sample / self.scene_scale if finite else math.inf,
@@ -249,6 +261,7 @@ def geometry(camera: Camera) -> Geometry:
         sampling_scale=sampling_scale(camera, pupil, pixels.width, pixels.height),
         exit_pupil_distance=pupil,
         scene_width_on_sensor=_scene_width(camera, optics.scale_at(scene_distance(camera))),
+        pupil_magnification=optics.pupil_magnification,
     )
 
 

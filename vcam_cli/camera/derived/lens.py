@@ -28,6 +28,8 @@ class Lens:
     """Magnification of what is in focus, negative; 0 at infinity."""
     focus_distance: float
     """From the lens to what is in focus [m]."""
+    pupil_magnification: float = 1.0
+    """Diameter of the exit pupil over that of the entrance pupil."""
 
     def scale_at(self, distance: float) -> float:
         """Return the size of an image over that of what is seen, by the lens's central ray.
@@ -76,12 +78,14 @@ def lens(camera: Camera) -> Lens:
             "focus further away, or use a shorter focal length",
         )
     m = float(radiometry.magnification(f, focus))
+    pupils = _pupil_magnification(camera, f, m)
     found: dict[str, float] = {}
     if optics.f_number is not None:
         found["f_number"] = optics.f_number
     if optics.numerical_aperture is not None:
         sine = optics.numerical_aperture
-        found["numerical_aperture"] = float(radiometry.f_number_of_numerical_aperture(sine, m))
+        of_cone = radiometry.f_number_of_numerical_aperture(sine, m / pupils)
+        found["numerical_aperture"] = float(of_cone)
     if optics.aperture_diameter is not None:
         found["aperture_diameter"] = f / optics.aperture_diameter
         _require_f_number(found["aperture_diameter"], f, optics.aperture_diameter)
@@ -91,7 +95,28 @@ def lens(camera: Camera) -> Lens:
             "the lens is not determined: its f-number is missing",
             "give f_number, aperture_diameter or numerical_aperture beside the focal length",
         )
-    return Lens(f, _common_value(found, "", lambda number: f"f/{number:.5g}"), m, focus)
+    number = _common_value(found, "", lambda number: f"f/{number:.5g}")
+    return Lens(f, number, m, focus, pupils)
+
+
+def _pupil_magnification(camera: Camera, focal_length: float, magnification: float) -> float:
+    """Return the pupil magnification P by which the exit pupil is (P - m) f from the sensor.
+
+    Raises BadInput for a pupil through which no light meets the sensor.
+    """
+    distance = camera.optics.exit_pupil_distance
+    if distance is None:
+        return 1.0
+    found = distance / focal_length + magnification
+    if found <= 0:
+        least = -magnification * focal_length
+        raise bad(
+            "optics.exit_pupil_distance",
+            f"{distance * 1e3:.4g} mm is not beyond the image of an infinitely far pupil,"
+            f" {least * 1e3:.4g} mm before the sensor (focal length times magnification)",
+            "give a larger distance, or focus further away",
+        )
+    return found
 
 
 def _require_f_number(number: float, focal_length: float, diameter: float) -> None:
@@ -126,11 +151,21 @@ def _focal_length(camera: Camera) -> float:
             found["aperture_diameter"] = optics.aperture_diameter * optics.f_number
         elif optics.numerical_aperture is not None:
             tangent = math.tan(math.asin(optics.numerical_aperture))
-            image_distance = optics.aperture_diameter / 2 / tangent
-            found["aperture_diameter"] = image_distance / (1 + image_distance / distance)
+            cone = optics.aperture_diameter / 2 / tangent  # f (1 - m/P)
+            pupil = optics.exit_pupil_distance
+            found["aperture_diameter"] = _focal_length_of_cone(cone, distance, pupil)
     if not found:
         raise bad("optics", "the lens is not determined: its focal length is missing", _GIVE_TWO)
     return _common_value(found, "a focal length of ", lambda length: f"{length * 1e3:.6g} mm")
+
+
+def _focal_length_of_cone(cone: float, distance: float, pupil: float | None) -> float:
+    """Return f of f (1 - m/P), where m = -f / (distance - f) and P = pupil / f + m, or 1."""
+    if pupil is None:
+        return cone / (1 + cone / distance)
+    half = pupil * (1 + cone / distance)  # of a quadratic equation, in the form that stays exact
+    root = math.sqrt(half**2 - 4 * (pupil - cone) * cone * pupil / distance)
+    return 2 * cone * pupil / (half + root)
 
 
 def _common_value(values: Mapping[str, float], what: str, text: Callable[[float], str]) -> float:

@@ -77,7 +77,7 @@ def _require_aperture(place: MtfAtHeight, shortest: float, geometry: Geometry) -
     """Refuse contrast that the lens's aperture cannot leave; `shortest` wavelength in m."""
     for number, curve in enumerate(place.curves):
         wavelength = place.wavelengths[number] if place.wavelengths else shortest
-        cutoff = diffraction.cutoff_frequency(wavelength, geometry.f_number, geometry.magnification)
+        cutoff = diffraction.cutoff_frequency(wavelength, geometry.working_f_number)
         for frequency, value in zip(curve.frequencies, curve.values, strict=True):
             if frequency > cutoff and value > NOISE:
                 raise bad(

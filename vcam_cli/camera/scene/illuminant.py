@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from typing import Annotated, Any
 
 from vcam_cli import spectra
-from vcam_cli.camera.spectrum import Spectral, SpectrumFile, SpectrumSpec
+from vcam_cli.camera.spectrum import CurveFile, CurveTable, Spectral, SpectrumSpec
 from vcam_cli.config.model import Model, key
 from vcam_cli.config.quantities import Percentage, Quantity
 from vcam_cli.config.validation_messages import describe
@@ -16,8 +16,8 @@ from vcam_cli.spectra.spectrum import Outside
 
 _FORMS = (
     "a CIE name such as D65, equal-energy, {blackbody: 5500 K}, {monochromatic: 550 nm}, "
-    "{file: lamp.csv}, or a list of one and the filters before it; with flicker: "
-    "{frequency: 100 Hz, depth: 30 %} where it flickers"
+    "{file: lamp.csv}, {table: {400: 0.5, 700: 1}}, or a list of one and the filters "
+    "before it; with flicker: {frequency: 100 Hz, depth: 30 %} where it flickers"
 )
 
 
@@ -84,15 +84,21 @@ class Monochromatic(Lamp):
     monochromatic: Wavelength = key("its wavelength", example="550 nm")
 
 
-class LampFile(SpectrumFile, Lamp):
+class LampFile(CurveFile, Lamp):
     """The relative spectral power of a lamp, from a CSV file."""
 
 
-_FORM_MODELS: dict[str, type[Named | Blackbody | Monochromatic | LampFile]] = {
+class LampTable(CurveTable, Lamp):
+    """The relative spectral power of a lamp, written out."""
+
+
+_LampForm = Named | Blackbody | Monochromatic | LampFile | LampTable
+_FORM_MODELS: dict[str, type[_LampForm]] = {
     "lamp": Named,
     "blackbody": Blackbody,
     "monochromatic": Monochromatic,
     "file": LampFile,
+    "table": LampTable,
 }
 
 
@@ -103,7 +109,7 @@ _GLASS = Spectral(most=1.0)
 class IlluminantSpec:
     """A lamp: a name, or one of the forms above."""
 
-    lamp: str | Named | Blackbody | Monochromatic | LampFile
+    lamp: str | _LampForm
     filters: tuple[SpectrumSpec, ...] = ()
     """What its light goes through; a stated level is that behind them."""
     outside: Outside = "error"
@@ -125,7 +131,7 @@ class IlluminantSpec:
             raise bad(path, message, remedy or f"write {_FORMS}") from None
         if isinstance(lamp, Monochromatic):
             return spectra.Spectrum.line(lamp.monochromatic)
-        assert isinstance(lamp, LampFile)
+        assert isinstance(lamp, LampFile | LampTable)
         return lamp.resolve(path, self.outside)
 
     @property
@@ -166,7 +172,7 @@ class IlluminantSpec:
 class Illuminant(YamlType):
     """The type of a key that holds a lamp."""
 
-    forms = Named | Blackbody | Monochromatic | LampFile
+    forms = _LampForm
 
     def read(self, given: Any) -> IlluminantSpec:
         """Return the lamp of what is written in YAML; raise ValueError with a sentence."""

@@ -4,10 +4,10 @@ from collections.abc import Mapping
 from pathlib import PurePath
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import model_validator
+from pydantic import StringConstraints, model_validator
 
 from vcam_cli.camera.scene.motion import MOTION, MaybeMotion, MovingSource
-from vcam_cli.config.model import Model, key
+from vcam_cli.config.model import Model, at_most_one, key
 from vcam_cli.config.quantities import Quantity, Whole
 from vcam_cli.config.validation_messages import describe, refusal
 from vcam_cli.config.values import (
@@ -68,10 +68,11 @@ class ImageFile(MovingSource):
     kind: Literal["image"] = key("what kind of source this is", example="image")
     motion: MaybeMotion = MOTION
     file: File = key("any image file that OpenImageIO reads", example="photo.png")
-    encoding: Annotated[str, Choice("srgb", "linear")] = key(
-        "how the file codes light; default srgb, for .exr, .hdr and .pfm linear",
-        example="srgb",
-        default=None,
+    encoding: Annotated[str, Choice("auto", "srgb", "linear")] = key(
+        "how the file codes light: auto (what it says itself: ICC profile, PNG cICP, gAMA and"
+        " cHRM, EXR chromaticities, Radiance EXPOSURE and PRIMARIES, EXIF; else srgb, for .exr,"
+        " .hdr and .pfm linear), srgb, linear; the latter two are in the primaries of Rec. 709",
+        default="auto",
     )
     white: Positive = key("value in the file that has the stated luminance", default=1.0)
     model: Literal["auto", "reflectance", "laser", "rgb-display", "mallett"] = key(
@@ -94,13 +95,6 @@ class ImageFile(MovingSource):
         default=None,
     )
 
-    @model_validator(mode="after")
-    def _encoding(self) -> Self:
-        if "encoding" not in self.model_fields_set:
-            linear = PurePath(self.file).suffix.lower() in (".exr", ".hdr", ".pfm")
-            self._fill(encoding="linear" if linear else "srgb")
-        return self
-
 
 _CHANNEL = Quantity("length", above=0, least=1e-9, most=1e-3)
 
@@ -111,6 +105,29 @@ def _channels(given: Any) -> Mapping[str, float]:
             f"{describe(given)} names no channels; write for example {{w400: 400 nm, w450: 450 nm}}"
         )
     return {str(name): _CHANNEL.read(value) for name, value in given.items()}
+
+
+_Name = Annotated[str, StringConstraints(strict=True, min_length=1)]
+
+
+class Variables(Model):
+    """Names of what a MATLAB file holds."""
+
+    radiance: _Name | None = key(
+        "the variable of radiances (h, w, bands) in W/(sr m2 nm)", example="rad", default=None
+    )
+    reflectance: _Name | None = key(
+        "or of reflectances, 1 that of a perfect white", example="refl", default=None
+    )
+    wavelength: _Name = key("the variable of wavelengths, in nm or um", example="bands")
+
+    rules = (at_most_one("radiance", "reflectance"),)
+
+    @model_validator(mode="after")
+    def _has_values(self) -> Self:
+        if self.radiance is None and self.reflectance is None:
+            raise refusal((), "names no spectra", "add radiance: or reflectance: with a name")
+        return self
 
 
 class Hyperspectral(MovingSource):
@@ -130,6 +147,13 @@ class Hyperspectral(MovingSource):
         default=None,
     )
 
+    variables: Annotated[Variables | None, mapping(Variables)] = key(
+        "of a .mat that is no scene of ISETCam: the names of what it holds, a field of a structure"
+        " as scene.rad",
+        example={"radiance": "rad", "wavelength": "bands"},
+        default=None,
+    )
+
     depth: Annotated[str | DepthMap | None, Either(_channel_or_map, str | DepthMap)] = key(
         "of an .exr: the name of its channel of distances along the axis [m]; or {file: depth.exr}:"
         " the scene is cut into layers by it, each with its own sharpness",
@@ -137,11 +161,19 @@ class Hyperspectral(MovingSource):
         default=None,
     )
 
+    @property
+    def names(self) -> Mapping[str, float] | Variables | None:
+        """Names of what the file holds, where it does not follow a convention."""
+        return self.variables or self.channels
+
     @model_validator(mode="after")
     def _named(self) -> Self:
         if self.channels is not None and PurePath(self.file).suffix.lower() != ".exr":
             message = "only the channels of an .exr have names of their own"
             raise refusal(("channels",), message, "remove it, or give an .exr")
+        if self.variables is not None and PurePath(self.file).suffix.lower() != ".mat":
+            message = "only a .mat has variables to be named"
+            raise refusal(("variables",), message, "remove it, or give a .mat")
         if isinstance(self.depth, str) and PurePath(self.file).suffix.lower() != ".exr":
             message = "only an .exr has its distances in a channel of its own"
             raise refusal(("depth",), message, "write depth: {file: depth.exr}")

@@ -22,6 +22,7 @@ class Diffraction(RadialTransfer):
 
     f_number: float
     magnification: float
+    """Of what is in focus, over that of the pupils."""
 
     name = "diffraction"
     reference = "Chen 2003, section 2.2.1; Goodman, Introduction to Fourier Optics, section 6.3"
@@ -35,7 +36,7 @@ class Diffraction(RadialTransfer):
         replaced = camera.optics.measured_blur and not switched_off(camera, "aberration")
         if replaced or not camera.optics.diffraction:
             return None
-        return cls(geometry.f_number, geometry.magnification)
+        return cls(geometry.f_number, geometry.cone_magnification)
 
     def describe(self) -> str:
         """Return a short clause with this camera's numbers and units."""

@@ -50,7 +50,7 @@ class MeasuredMtf(MtfBlur, RadialTransfer):
         found = lens_mtf(camera, geometry)
         if len(found) != 1:
             return None
-        return cls(found[0], geometry.f_number, geometry.magnification)
+        return cls(found[0], geometry.f_number, geometry.cone_magnification)
 
     def describe(self) -> str:
         """Return a short clause with this camera's numbers and units."""
@@ -139,7 +139,7 @@ class FieldMtf(MtfBlur, FieldTransfer):
         found = lens_mtf(camera, geometry)
         if len(found) < 2:
             return None
-        lens = geometry.f_number, geometry.magnification
+        lens = geometry.f_number, geometry.cone_magnification
         half_diagonal = math.hypot(geometry.sensor_width, geometry.sensor_height) / 2
         return cls(tuple(MeasuredMtf(place, *lens) for place in found), half_diagonal)
 
