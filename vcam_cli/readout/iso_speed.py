@@ -77,7 +77,7 @@ def electrons_per_exposure(
     Returns
     -------
     NDArray
-        Electrons of every color (C,) [e / (lx s)].
+        Electrons of every color (C,) [e / (lx s)]; 0 behind a lens that passes no light.
     """
     kinds = [kind for kind in ORDER if issubclass(kind, Gain)]
     wanted = [k.from_camera(camera, geometry) for k in kinds if not switched_off(camera, k.name)]
@@ -85,7 +85,8 @@ def electrons_per_exposure(
     levels = photon_rate.axis_levels(
         camera, geometry, camera_settings(camera), [light], layout.mosaic, gains
     )
-    return np.asarray(levels[0] / _lux(camera, geometry, light))
+    lux = _lux(camera, geometry, light)
+    return np.asarray(levels[0] / lux if lux > 0 else np.zeros(len(levels[0])))
 
 
 def _lux(camera: Camera, geometry: Geometry, light: Spectrum) -> float:

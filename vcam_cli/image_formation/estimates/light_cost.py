@@ -188,7 +188,7 @@ def expected_report(
     """
     scene = scene.flat if isinstance(scene, LayeredScene | DepthScene) else scene
     path = path.with_effects(effects)
-    if isinstance(scene, WAVES):
+    if isinstance(scene, WAVES) or path.transfer.is_dark:
         return SpectrumReport()
     if not path.transfer.effects and not path.field and path.averages_over_box:
         if not isinstance(scene, ChartScene):
