@@ -343,3 +343,15 @@ def test_whole_numbers_are_meters_and_that_is_said(tmp_path):
     result = simulate(camera(tmp_path, STILL | FLAT | {"scene.source": source}))
     assert any("taken as meters" in note and "unit: 1 mm" in note for note in result.notes)
     assert result.frame.scene.distances == pytest.approx([1.0, 3.0])
+
+
+def test_small_photodetectors_ask_for_more_layers(tmp_path):
+    """They show finer detail, which differs more from one blur to the next."""
+    light = patches(np.random.default_rng(1), 128)
+    inverse = 1 / 0.8 + (1 / 1.3 - 1 / 0.8) * (np.arange(128) + 0.5) / 128
+    given = with_depth(tmp_path, light, np.repeat(1 / inverse[:, None], 128, axis=1), 0.9)
+    counts = []
+    for fill in (1.0, 0.15):
+        _, frame = seen(tmp_path, given, {"pixel.photodetector.fill_factor": fill})
+        counts.append(frame.spectrum.cut.layers)
+    assert counts[1] > counts[0]

@@ -6,13 +6,12 @@ from scipy.signal import fftconvolve
 
 from vcam_cli.scenes.depth_cut import (
     LEAST_JUMP,
-    Detail,
     cut_depth,
     disc_transfer,
     full_signal,
     picture_detail,
 )
-from vcam_cli.scenes.depth_slopes import MARGIN, SlopeBlur, displaced, mean_slope, undisplaced_error
+from vcam_cli.scenes.depth_slopes import mean_slope, slope_error, slopes, source, steepest
 
 PITCH = 1e-6
 PIXEL = 4e-6
@@ -30,7 +29,7 @@ def noise(seed: int = 0) -> np.ndarray:
 def cut(radius: np.ndarray, allowed: float = 1e-3, picture: np.ndarray | None = None):
     picture = noise() if picture is None else picture
     full = full_signal(picture, PITCH, PIXEL)
-    detail = picture_detail(picture, PITCH, PIXEL, passes, full)
+    detail = picture_detail(picture, PITCH, (PIXEL, PIXEL), passes, full)
     return cut_depth(radius, picture, PITCH, PIXEL, detail, allowed)
 
 
@@ -45,7 +44,7 @@ def test_the_power_of_a_wave_is_half_its_squared_amplitude():
     """Of a wave much longer than a pixel, whose full signal is 1."""
     x = (np.arange(256) + 0.5) / 256
     wave = 0.5 + 0.5 * np.cos(2 * np.pi * x) * np.ones((256, 1))
-    detail = picture_detail(wave, PITCH, PIXEL, passes, full_signal(wave, PITCH, PIXEL))
+    detail = picture_detail(wave, PITCH, (PIXEL, PIXEL), passes, full_signal(wave, PITCH, PIXEL))
     assert detail.power.sum() == pytest.approx(0.5 * 0.5**2, rel=2e-2)
     at = float((detail.power * detail.frequency).sum() / detail.power.sum())
     assert at == pytest.approx(1 / 256e-6, rel=2e-2)
@@ -129,44 +128,35 @@ def test_even_backgrounds_are_known():
     assert (hidden.unknown, hidden.most_unknown) == (0, 0)
 
 
-def test_a_slope_changes_what_a_sum_over_rays_says():
-    """Of one frequency: the mean of u cos over points of the aperture."""
-    radius, frequency = 5e-6, 70e3
-    k = np.arange(4000) + 0.5
-    rho, angle = np.sqrt(k / len(k)), np.pi * (1 + 5**0.5) * k
-    u, v = rho * np.cos(angle), rho * np.sin(angle)
-    mean = (u * np.exp(-2j * np.pi * frequency * radius * u)).mean()
-    # The light of a wave of amplitude 1 on a slope of 1, displaced by r / 4, has this power.
-    power = (2 * np.pi * frequency * radius / 4) ** 2 / 2
-    detail = Detail(np.array([frequency]), np.array([power]))
-    slopes = SlopeBlur(np.array([radius]), np.ones(1), 1e-9)
-    told = slopes.change(detail) / MARGIN
-    assert told == pytest.approx(abs(mean) / np.sqrt(2), rel=1e-3)
-    assert slopes.error(detail) < 0.5 * slopes.change(detail)
-    assert abs((v * np.exp(-2j * np.pi * frequency * radius * u)).mean()) < 1e-3
-
-
-def test_light_of_a_slope_is_displaced_by_a_quarter_of_radius_times_slope():
-    """A ramp of light goes by r g / 4 toward larger blur; steps and even radii move none."""
-    light = np.add.outer(0.02 * np.arange(32), 0.01 * np.arange(48))
+def test_slopes_are_the_gradient_of_a_paraboloid_and_keep_light():
+    """Even light on an even slope of radius r and rise g: Q = -g^2 / 4; steps have no slope."""
     radius = 0.1 * np.arange(48) * np.ones((32, 1))
-    moved = displaced(light, radius)
-    inner = (slice(1, -1), slice(1, -1))
-    assert moved[inner] == pytest.approx((light - radius * 0.1 / 4 * 0.01)[inner], rel=1e-12)
-    for high, jump in ((5.0, 1.0), (0.4, 0.3)):
+    down, right = slopes(radius)
+    assert not down.any()
+    assert right == pytest.approx(0.1)
+    assert steepest((down, right)) == pytest.approx(0.2 / 3)
+    tilted = source(np.ones((1, 32, 48)), (down, right), 2.0, 2)[0]
+    assert tilted.shape == (64, 96)
+    assert tilted[:, 3:-3] == pytest.approx(0, abs=1e-12)  # its flux is even
+    light = noise()[None]
+    moved = source(
+        light, slopes(0.1 * np.arange(light.shape[2]) * np.ones(light.shape[1:])), 3.0, 3
+    )
+    assert moved.sum() == pytest.approx(0, abs=1e-9)  # to one side comes what the other lacks
+    for high, jump in ((5.0, 1.0), (0.4, 0.3), (0.4, 1.0)):
         step = np.where(np.arange(48) < 24, high, 0.0) * np.ones((32, 1))
-        assert displaced(light, step, jump) == pytest.approx(light, abs=0)
+        assert not any(rise.any() for rise in slopes(step, jump))
 
 
 def test_a_map_in_steps_rises_as_a_smooth_one_and_its_error_is_predicted():
-    """Of 0.1 a sample, in steps of four, which are a pixel: no sample moves, as the minmod asks."""
+    """Of 0.1 a sample, in steps of four, which are a pixel."""
     smooth = 0.1 * np.arange(48.0) + np.zeros((48, 48))
     steps = 0.4 * (np.arange(48) // 4) + np.zeros((48, 48))
     assert mean_slope(steps, 4) == pytest.approx(mean_slope(smooth, 4), rel=0.05)
     assert mean_slope(smooth, 4) == pytest.approx(0.1, rel=1e-12)
-    assert np.array_equal(displaced(noise(), steps), noise())
     picture = noise()
-    detail = picture_detail(picture, PITCH, PIXEL, passes, full_signal(picture, PITCH, PIXEL))
-    found = [undisplaced_error(detail, PITCH * r, PITCH, 4) for r in (steps, smooth)]
+    full = full_signal(picture, PITCH, PIXEL)
+    detail = picture_detail(picture, PITCH, (PIXEL, PIXEL), passes, full)
+    found = [slope_error(detail, PITCH * r, PITCH, 4, 0) for r in (steps, smooth)]
     assert found[0] == pytest.approx(found[1], rel=0.1)
-    assert found[0] > 0
+    assert 0 < slope_error(detail, PITCH * smooth, PITCH, 4, 2) < found[1]

@@ -167,16 +167,17 @@ class DepthReport:
     """How the layers of a scene were put one before the other."""
 
     cells: int
-    """Cells along each side of a pixel on which that was done."""
-    rings: int
-    """Rings of points of the aperture, through which it was followed what layers out of focus hide
-    of each other; 0 where there was no need to."""
+    """Cells along each side of a pixel on which rays meet the layers where they are finest; 0 where
+    all rays of each pixel see the same."""
+    rays: int
+    """Rays of each pixel there."""
     error: float
     """Predicted rms error of both and of the layers' own images, relative to full signal."""
     left_out: float = 0.0
-    """What of it is that the layers hide of each other and that was not added, likewise."""
+    """Bound on what of it layers hide of each other from some rays alone where that was not summed,
+    likewise."""
     ray_values: int = 0
-    """Values of layers that were moved to where rays see them."""
+    """Values of layers that rays looked up."""
 
 
 @dataclass(frozen=True)

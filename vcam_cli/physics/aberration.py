@@ -241,3 +241,24 @@ def _gauss_legendre(points: int) -> tuple[Floats, Floats]:
 
     node, weight = roots_legendre(points)
     return (node + 1) / 2, weight / 2
+
+
+def paraboloid_transfer(frequency: NDArray, radius: float) -> NDArray:
+    """Return the transfer 8 J2(z) / z^2, z = 2 pi f r, of a paraboloid.
+
+    Parameters
+    ----------
+    frequency : NDArray
+        Spatial frequencies of any shape [cycles/m].
+    radius : float
+        Where the paraboloid ends; its sign does not matter [m].
+
+    Returns
+    -------
+    NDArray
+        Transfer without unit.
+    """
+    from scipy.special import jv
+
+    z = 2 * np.pi * np.asarray(frequency, float) * abs(radius)
+    return np.where(z > 1e-3, 8 * jv(2, z) / np.where(z > 1e-3, z, 1.0) ** 2, 1.0)

@@ -39,7 +39,6 @@ EDGE = 1.0
 """Samples by which the middles of those at an edge are apart."""
 BINS = 256
 """Frequencies of a power spectrum."""
-DIRECTIONS = 16
 FEW = 10_000
 """Samples that tell whether a map has few values."""
 
@@ -146,7 +145,7 @@ def full_signal(picture: NDArray, pitch: float, pixel: float) -> float:
 def picture_detail(
     picture: NDArray,
     pitch: float,
-    pixel: float,
+    aperture: tuple[float, float],
     lens: Callable[[NDArray], NDArray],
     full: float,
 ) -> Detail:
@@ -158,8 +157,8 @@ def picture_detail(
         Light (h, w) of its samples, relative to white.
     pitch : float
         Pitch of the samples on the sensor [m].
-    pixel : float
-        Side of the pixels [m].
+    aperture : tuple of float
+        Width and height of the areas over which pixels average [m].
     lens : callable
         What the lens passes at frequencies (n,) [cycles/m] where it is in focus.
     full : float
@@ -170,22 +169,20 @@ def picture_detail(
     Detail
         The detail.
     """
-    together = max(int(pixel / pitch) // 2, 1)  # finer than the pixels nothing is seen
+    together = max(int(min(aperture) / pitch) // 2, 1)  # finer than these nothing is seen
     picture, pitch = block_means(picture, together), pitch * together
     squares = np.square(scipy.fft.dctn(picture.astype(np.float32), type=2, norm="ortho"))
     squares[0, 0] = 0
     fy, fx = (np.arange(count) / (2 * count * pitch) for count in picture.shape)
     length = np.hypot(fx[None, :], fy[:, None])
+    squares *= np.outer(np.square(np.sinc(fy * aperture[1])), np.square(np.sinc(fx * aperture[0])))
     top = float(np.hypot(0.5, 0.5) / pitch)
     bins = np.minimum((np.sqrt(length / top) * BINS).astype(int), BINS - 1).ravel()
     power = np.bincount(bins, squares.ravel(), BINS) / picture.size
     weighted = np.bincount(bins, (squares * length).ravel(), BINS) / picture.size
     seen = power > 0
     frequency = weighted[seen] / power[seen]
-    angle = (np.arange(DIRECTIONS) + 0.5) * (np.pi / 2 / DIRECTIONS)
-    across = np.outer(frequency * pixel, np.cos(angle)), np.outer(frequency * pixel, np.sin(angle))
-    aperture = np.square(np.sinc(across[0]) * np.sinc(across[1])).mean(axis=1)
-    passed = np.square(lens(frequency)) * aperture
+    passed = np.square(lens(frequency))
     return Detail(frequency, power[seen] * passed / (full**2 or 1.0))
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from vcam_cli.scenes.depth_cut import (
     is_flat,
     picture_detail,
 )
-from vcam_cli.scenes.depth_slopes import SlopeBlur, displaced, slope_light, undisplaced_error
+from vcam_cli.scenes.depth_slopes import FINE, slope_error, slopes, source, steepest
 from vcam_cli.scenes.hyperspectral import Cube
 from vcam_cli.scenes.image import ImageScene, image_scene
 from vcam_cli.spectra import Spectrum
@@ -55,6 +55,8 @@ class LensBlur:
     """Radius of a point infinitely far, with its sign [m]."""
     sharp: Callable[[Array], Array]
     """Transfer of what is in focus, at frequencies (n,) [cycles/m]."""
+    aperture: tuple[float, float]
+    """Width and height of the areas over which pixels average [m]."""
 
     def radius(self, depth: Array) -> Array:
         """Return the radius of the blur at distances, positive when nearer than the focus [m]."""
@@ -105,6 +107,38 @@ class CutLayer(SampledScene):
 
 
 @dataclass(frozen=True)
+class SlopeLayer(SampledScene):
+    """What slopes of a layer add to its light and, as the last part, to its cover."""
+
+    layer: CutLayer
+    rises: tuple[Array, Array]
+    """Rises of the blur's radius from sample to sample [samples]."""
+    radius: float
+    """Of the layer's blur, with its sign [samples]."""
+    finer: int
+    """Samples along the side of one of the layer's."""
+
+    def planes(self, mix: Array, workers: int = 1) -> Array:
+        """Return the linear combinations (R, h, w) of the parts."""
+        return source(self.layer.planes(mix, workers), self.rises, self.radius, self.finer)
+
+    def values_at(self, x: Array, y: Array, mix: Array) -> Array:
+        """Return the sample under each point."""
+        rows, columns = (
+            np.clip((at / pitch + count / 2).astype(int), 0, count - 1)
+            for at, pitch, count in zip(
+                (y, x), (self.pitch_y, self.pitch_x), self.shape, strict=True
+            )
+        )
+        return np.asarray(self.planes(mix)[:, rows[:, None], columns])
+
+    @property
+    def brightest(self) -> float:
+        """Brightest sample of the layer, in place of its slopes'."""
+        return self.layer.brightest
+
+
+@dataclass(frozen=True)
 class DepthScene:
     """A picture, and how far away each of its samples is."""
 
@@ -115,8 +149,10 @@ class DepthScene:
     cut: DepthCut
     distances: tuple[float, ...]
     """Of the layers [m]."""
-    sloped: ImageScene
-    """The picture with its light where rays see slopes in the mean; `flat` where none counts."""
+    rises: tuple[Array, Array] | None
+    """Rises of the blur's radius from sample to sample; None where no slope counts [samples]."""
+    finer: int
+    """Fine samples along the side of one on which the light of slopes is known."""
     slope_error: float
     """Predicted rms error by slopes, relative to full signal."""
 
@@ -157,8 +193,27 @@ class DepthScene:
         shape = self.depth.shape
         return self._layer(coverage.reshape(shape), sources.reshape(shape))
 
+    def sloped(self, number: int) -> SlopeLayer | None:
+        """Return what slopes add to a layer behind a paraboloid; None where none counts."""
+        if self.rises is None:
+            return None
+        shown, finer = self.shown(number), self.finer
+        return SlopeLayer(
+            spectra=shown.spectra,
+            white=shown.white,
+            shape=(shown.shape[0] * finer, shown.shape[1] * finer),
+            pitch_x=shown.pitch_x / finer,
+            pitch_y=shown.pitch_y / finer,
+            samples="squares",
+            dtype=shown.dtype,
+            layer=shown,
+            rises=self.rises,
+            radius=float(self.cut.radii[number]) / shown.pitch_x,
+            finer=finer,
+        )
+
     def _layer(self, coverage: Array, sources: Array | None) -> CutLayer:
-        flat = self.sloped
+        flat = self.flat
         return CutLayer(
             spectra=(*flat.spectra, flat.white),
             white=flat.white,
@@ -220,32 +275,15 @@ def depth_scene(
     pixel = max(view.pitch_x, view.pitch_y)
     detail = _detail(flat, view, blur)
     cut = cut_depth(radius, light, flat.pitch_x, pixel, detail, SHARE * tolerance)
-    sloped, error = _sloped(flat, radius, light, view, blur, SLOPE_SHARE * tolerance)
+    pitch, side = flat.pitch_x, max(int(min(view.pitch_x, view.pitch_y) / flat.pitch_x), 1)
+    rises, finer = (
+        slopes(radius / pitch, LEAST_JUMP * pixel / pitch),
+        max(math.ceil(FINE / side), 1),
+    )
+    counts = steepest(rises) > SLOPE_SHARE * tolerance
+    error = slope_error(detail, radius, pitch, side, finer if counts else 0)
     distances = tuple(blur.distance(float(r)) for r in cut.radii)
-    return DepthScene(flat, depth, cut, distances, sloped, error)
-
-
-def _sloped(
-    flat: ImageScene, radius: Array, light: Array, view: View, blur: LensBlur, allowed: float
-) -> tuple[ImageScene, float]:
-    """Return the picture with the light of slopes, and the error that they leave."""
-    pitch = flat.pitch_x
-    jump = LEAST_JUMP * max(view.pitch_x, view.pitch_y) / pitch
-    change = slope_light(light, radius / pitch, jump)
-    side = max(int(min(view.pitch_x, view.pitch_y) / pitch), 1)
-    as_it_is = undisplaced_error(_detail(flat, view, blur), radius, pitch, side)
-    if not change.any():
-        return flat, as_it_is
-    full = full_signal(light, pitch, max(view.pitch_x, view.pitch_y))
-    detail = picture_detail(change, pitch, min(view.pitch_x, view.pitch_y), blur.sharp, full)
-    slopes = SlopeBlur.of(change, radius, pitch)
-    changed = slopes.change(detail)
-    if changed <= allowed:
-        return flat, max(changed, as_it_is)
-    picture = flat.picture.astype(flat.dtype)
-    for channel in np.moveaxis(picture, 2, 0):
-        channel[:] = displaced(channel, radius / pitch, jump)
-    return replace(flat, picture=picture), slopes.error(detail)
+    return DepthScene(flat, depth, cut, distances, rises if counts else None, finer, error)
 
 
 def _on_sensor(flat: ImageScene, given: DepthPicture, view: View) -> Array:
@@ -263,4 +301,4 @@ def _brightness(flat: ImageScene) -> Array:
 def _detail(flat: ImageScene, view: View, blur: LensBlur) -> Detail:
     light, pixel = _brightness(flat), min(view.pitch_x, view.pitch_y)
     full = full_signal(light, flat.pitch_x, pixel)
-    return picture_detail(light, flat.pitch_x, pixel, blur.sharp, full)
+    return picture_detail(light, flat.pitch_x, blur.aperture, blur.sharp, full)

@@ -2,45 +2,40 @@
 
 The rays through the point u of the aperture (in its radii) see the sample at x of a picture at
 p = x - r u, where r(x) is the radius of its blur. A surface whose r rises by g = grad r a length
-lies under them 1 - g u times as densely, which its image has to first order,
+lies under them 1 - g u times as densely, which its image has exactly where nothing folds,
 
     E(p) = integral L(x) mean_u[(1 - g u) delta(p - x + r u)] dx.
 
-A sample that faces the lens has the 1 alone. What is missing has the transfer
-i g f / |f| 2 J2(z) / z with z = 2 pi |f| r, that of a disc of light displaced by d = r g / 4 has
-i g f / |f| J1(z) / 2, and both start as z / 4. So samples are taken to lie at x + d, their light to
-be L - d grad L; that is exact for light which changes little over a blur, and what is left of finer
-detail is predicted.
+A sample that faces the lens has the 1 alone: a disc. The rest is a disc weighted by the distance
+from its center, and so the gradient of a paraboloid: the source
+
+    Q = -div(r g L) / 4,
+
+behind the transfer 8 J2(z) / z^2, z = 2 pi |f| r, of a paraboloid (`Paraboloid`).
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vcam_cli.scenes.depth_cut import Detail, block_means, disc_transfer
+from vcam_cli.physics.aberration import paraboloid_transfer
+from vcam_cli.scenes.depth_cut import Detail, block_means
 
 STEEPEST = 1.0
 """Difference of the radii of samples side by side from which on they are no slope, whatever else
 says so: it would fold under the rays [samples]."""
-GROUPS = 16
-"""Groups of radii by which what slopes change is predicted."""
-MARGIN = 1.7
-"""Factor on what is predicted, fitted: without it, on four slopes of 0.13 to 0.19 with pictures of
-discs, 0.57 to 0.71 of what was measured was predicted."""
+FINE = 8
+"""Samples along a pixel's side on which differences are taken, at least."""
 
 
-def displaced(light: NDArray, radius: NDArray, jump: float = STEEPEST) -> NDArray:
-    """Return light as if each sample lay where a slope's rays see it in the mean.
+def slopes(radius: NDArray, jump: float = STEEPEST) -> tuple[NDArray, NDArray]:
+    """Return by how much the radius of the blur rises from sample to sample, on slopes.
 
     Parameters
     ----------
-    light : NDArray
-        Light (h, w) of samples.
     radius : NDArray
         Radius (h, w) of the blur at every sample's distance, with its sign [samples].
     jump : float, optional
@@ -48,49 +43,112 @@ def displaced(light: NDArray, radius: NDArray, jump: float = STEEPEST) -> NDArra
 
     Returns
     -------
+    down, right : NDArray
+        Rises (h - 1, w) and (h, w - 1) [samples]. A rise is at most what it is on one side, and 0
+        where it stands alone: planes one behind the other have no slope.
+    """
+    found = []
+    for axis in (0, 1):
+        rise = np.moveaxis(np.diff(radius, axis=axis), axis, 0)
+        rise = np.where(np.abs(rise) < min(jump, STEEPEST), rise, 0)
+        if not len(rise):
+            found.append(np.moveaxis(rise, 0, axis))
+            continue
+        before, after = (
+            np.concatenate(pair) for pair in ((rise[:1], rise[:-1]), (rise[1:], rise[-1:]))
+        )
+        alike = [np.where(rise * other > 0, np.abs(other), 0) for other in (before, after)]
+        most = np.maximum(*alike)
+        found.append(np.moveaxis(np.clip(rise, -most, most), 0, axis))
+    return found[0], found[1]
+
+
+def source(light: NDArray, rises: tuple[NDArray, NDArray], radius: float, finer: int) -> NDArray:
+    """Return Q of samples of one radius, on samples that are so many times as fine.
+
+    Parameters
+    ----------
+    light : NDArray
+        Light (R, h, w) of the samples, even in each.
+    rises : tuple of NDArray
+        Those of `slopes`.
+    radius : float
+        Radius of the blur, with its sign [samples].
+    finer : int
+        Fine samples along the side of one.
+
+    Returns
+    -------
     NDArray
-        Light (h, w), in the same type.
+        Source (R, finer h, finer w), in the light's unit.
     """
-    change = np.zeros(light.shape, light.dtype)
-    for axis in (0, 1):
-        slope, (before, after) = _slope(light, radius, axis, jump)
-        change += slope * (before + after) / 2
-    return np.asarray(light - change * (radius / 4).astype(light.dtype))
+    fine = light.repeat(finer, axis=1).repeat(finer, axis=2)
+    out = np.zeros_like(fine)
+    for axis, rise in ((1, rises[0]), (2, rises[1])):
+        along, across = axis - 1, 2 - axis
+        faces = _on_faces(rise, along, finer).repeat(finer, axis=across).astype(fine.dtype)
+        low, high = (
+            tuple(slice(*ends) if k == axis else slice(None) for k in range(3))
+            for ends in ((None, -1), (1, None))
+        )
+        flux = faces * (fine[low] + fine[high]) * fine.dtype.type(radius * finer / 8)
+        out[low] -= flux
+        out[high] += flux
+    return out
 
 
-def slope_light(light: NDArray, radius: NDArray, jump: float = STEEPEST) -> NDArray:
-    """Return d grad L (h, w), the change of light by slopes, taken between samples side by side.
+def _on_faces(rise: NDArray, axis: int, finer: int) -> NDArray:
+    """Return the rise of the radius a length, along an axis, between fine samples.
 
-    Parameters are those of `displaced`, which takes it over two samples.
+    Between the middles of two samples it is that from one to the other, in the ends of a row none.
     """
-    change = np.zeros(light.shape)
-    for axis in (0, 1):
-        slope, (_, after) = _slope(light, radius, axis, jump)
-        change += slope * after
-    return np.asarray(change * radius / 4)
+    rise = np.moveaxis(rise, axis, 0)
+    ends = np.zeros_like(rise, shape=(1, *rise.shape[1:]))
+    padded = np.concatenate([ends, rise, ends]) if len(rise) else np.concatenate([ends, ends])
+    count = (len(padded) - 1) * finer
+    at = (np.arange(1, count) / finer + 0.5).astype(int)
+    middle = np.arange(1, count) % finer * 2 == finer  # in the middle of a sample: of both sides
+    found = padded[at]
+    if middle.any():
+        found[middle] = (padded[at[middle]] + padded[at[middle] - 1]) / 2
+    return np.moveaxis(found, 0, axis)
 
 
-def _slope(
-    light: NDArray, radius: NDArray, axis: int, jump: float
-) -> tuple[NDArray, tuple[NDArray, NDArray]]:
-    """Return the slope of the radius along an axis, and the rises of light before and after.
+def steepest(rises: tuple[NDArray, NDArray]) -> float:
+    """Return a bound on what slopes change of light that is 1 at most: two thirds of the largest.
 
-    The slope is the smaller of both sides', and 0 where they differ in sign (the minmod limiter of
-    P. L. Roe, Annu. Rev. Fluid Mech. 18, 337, 1986): planes one behind the other have none.
+    That is the mean of |u| over the aperture.
     """
-    rise = np.diff(radius, axis=axis)
-    is_slope = np.abs(rise) < min(jump, STEEPEST)
-    before, after = _sides(np.where(is_slope, rise, 0).astype(light.dtype), axis)
-    smaller = np.where(np.abs(before) < np.abs(after), before, after)
-    slope = np.where(before * after > 0, smaller, 0)
-    return slope, _sides(np.where(is_slope, np.diff(light, axis=axis), 0), axis)
+    down, right = (float(np.abs(rise).max(initial=0.0)) for rise in rises)
+    return 2 / 3 * math.hypot(down, right)
 
 
-def _sides(rises: NDArray, axis: int) -> tuple[NDArray, NDArray]:
-    """Return the rises between samples before and after each sample; none beyond the ends."""
-    ends = [(1, 1) if along == axis else (0, 0) for along in (0, 1)]
-    padded = np.pad(rises, ends)
-    return np.split(padded, [-1], axis)[0], np.split(padded, [1], axis)[1]
+def slope_error(detail: Detail, radius: NDArray, pitch: float, side: int, finer: int) -> float:
+    """Return the rms error, over full signal, by differences between fine samples.
+
+    Parameters
+    ----------
+    detail : Detail
+        Detail of the picture.
+    radius : NDArray
+        Radius (h, w) of the blur at every sample's distance, with its sign [m].
+    pitch : float
+        Pitch of the samples [m].
+    side : int
+        Side of a pixel, within which steps of a map are taken together [samples].
+    finer : int
+        Fine samples along the side of one; 0 where slopes are not computed.
+
+    Returns
+    -------
+    float
+        Error without unit.
+    """
+    middle = float(np.sqrt(np.square(radius).mean()))
+    z = 2 * np.pi * detail.frequency * middle
+    lost = 1 - np.sinc(2 * detail.frequency * pitch / finer) if finer else np.ones_like(z)
+    tilt = detail.rms(z / 4 * paraboloid_transfer(detail.frequency, middle) * lost)
+    return mean_slope(radius / pitch, side) * tilt
 
 
 def mean_slope(radius: NDArray, side: int) -> float:
@@ -115,85 +173,3 @@ def mean_slope(radius: NDArray, side: int) -> float:
             means = block_means(np.where(np.abs(rise) < STEEPEST, rise, 0), side)
             squares += float(np.square(means).mean())
     return math.sqrt(squares)
-
-
-def undisplaced_error(detail: Detail, radius: NDArray, pitch: float, side: int) -> float:
-    """Return the rms error, over full signal, of a picture whose samples stay where they are.
-
-    It counts what slopes change as 2 J2(z) / z of all detail, and so the steps of a coarse map,
-    over which no sample is displaced.
-
-    Parameters
-    ----------
-    detail : Detail
-        Detail of the picture.
-    radius : NDArray
-        Radius (h, w) of the blur at every sample's distance, with its sign [m].
-    pitch : float
-        Pitch of the samples [m].
-    side : int
-        Side of a pixel [samples].
-
-    Returns
-    -------
-    float
-        Error without unit.
-    """
-    middle = float(np.sqrt(np.square(radius).mean()))
-    z = 2 * np.pi * detail.frequency * middle
-    tilt = detail.rms(z / 4 * _paraboloid(detail, middle)) / math.sqrt(2)
-    return mean_slope(radius / pitch, side) * tilt
-
-
-@dataclass(frozen=True)
-class SlopeBlur:
-    """How far the light of slopes is blurred, in groups of radii."""
-
-    radii: NDArray
-    """Radii (n,) [m]."""
-    shares: NDArray
-    """Part (n,) of the mean square of `slope_light` that each group has."""
-    pitch: float
-    """Pitch of the samples [m]."""
-
-    @classmethod
-    def of(cls, light: NDArray, radius: NDArray, pitch: float) -> SlopeBlur:
-        """Return that of light (h, w) of slopes with radii (h, w) [m]."""
-        size, squares = np.abs(radius).ravel(), np.square(light).ravel()
-        edges = np.linspace(size.min(), size.max(), GROUPS + 1)
-        group = np.clip(np.searchsorted(edges, size) - 1, 0, GROUPS - 1)
-        weight = np.bincount(group, squares, GROUPS)
-        there = weight > 0
-        mean = np.bincount(group, squares * np.square(size), GROUPS)[there] / weight[there]
-        return cls(np.sqrt(mean), weight[there] / weight.sum(), pitch)
-
-    def change(self, detail: Detail) -> float:
-        """Return the rms, over full signal, of what slopes change, by the detail of their light."""
-        return self._rms(detail, lambda radius: _paraboloid(detail, radius))
-
-    def error(self, detail: Detail) -> float:
-        """Return the rms, over full signal, of what displaced samples leave of that."""
-        along = np.sinc(2 * self._cycles(detail))
-        return self._rms(
-            detail,
-            lambda radius: (
-                _paraboloid(detail, radius) - along * disc_transfer(detail.frequency, radius)
-            ),
-        )
-
-    def _rms(self, detail: Detail, transfer: Callable[[float], NDArray]) -> float:
-        between = np.sinc(self._cycles(detail))
-        squares = [detail.rms(transfer(float(radius)) / between) ** 2 for radius in self.radii]
-        return MARGIN * math.sqrt(float(self.shares @ squares))
-
-    def _cycles(self, detail: Detail) -> NDArray:
-        """Return frequencies [cycles/sample], those beyond a row's last one as that."""
-        return np.minimum(detail.frequency * self.pitch, 0.5)
-
-
-def _paraboloid(detail: Detail, radius: float) -> NDArray:
-    """Return the transfer 8 J2(z) / z^2 of a paraboloid, what 2 J2(z) / z is over z / 4."""
-    from scipy.special import jv
-
-    z = 2 * np.pi * detail.frequency * abs(radius)
-    return np.where(z > 1e-3, 8 * jv(2, z) / np.where(z > 1e-3, z, 1.0) ** 2, 1.0)

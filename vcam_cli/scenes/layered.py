@@ -82,7 +82,7 @@ class MaskedChart(Chart):
 class LayerChart(Chart):
     """A layer's light times its opacity, and, as the last component, its opacity, in its place."""
 
-    layer: Chart
+    layer: MaskedChart | PictureChart
     """The same around the origin."""
     center: tuple[float, float] = (0.0, 0.0)
     """Of the layer, right and down [m]."""
@@ -93,6 +93,13 @@ class LayerChart(Chart):
     def brightest(self) -> float:
         """Brightest light, relative to the perfect white; opacity is as bright as white."""
         return max(self.layer.brightest, 1.0)
+
+    @property
+    def cover(self) -> PictureChart:
+        """Its opacity alone, around the origin."""
+        if isinstance(self.layer, MaskedChart):
+            return self.layer.opacity
+        return self.layer.channel(-1)
 
     def paint(self, x_edges: Array, y_edges: Array, mix: Array, out: Array) -> None:
         """Write the averages over the cells."""
@@ -107,6 +114,8 @@ class LayerChart(Chart):
 
     def crop_to_cells(self, x_edges: Array, y_edges: Array) -> "LayerChart":
         """Return the same layer as a chart that may be faster on these cells."""
+        if isinstance(self.layer, PictureChart):
+            return self
         x, y = x_edges - self.center[0], y_edges - self.center[1]
         return replace(self, layer=self.layer.crop_to_cells(x, y))
 
@@ -240,7 +249,7 @@ AnyScene = Scene | LayeredScene | DepthScene
 class Layer:
     """What one layer is made of."""
 
-    chart: Chart
+    chart: MaskedChart | PictureChart
     """Light times opacity, and opacity as the last component, around the origin."""
     spectra: tuple[Spectrum, ...]
     """Of the light."""

@@ -1,6 +1,6 @@
 """A picture as a chart: its averages over cells of any size, at any place."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -63,6 +63,15 @@ class PictureChart(Chart):
         steps_y = counted_height(light[1:], light[:-1], ceiling).sum(dtype=float)
         area = self.frame.width * self.frame.height if self.mirrored else region.area
         return EdgeEnergy(aligned=float(steps_x * down + steps_y * across) / area)
+
+    def channel(self, number: int) -> "PictureChart":
+        """Return one of its channels alone."""
+        return replace(self, picture=self.picture[..., number, None])
+
+    @property
+    def squared(self) -> "PictureChart":
+        """Return the same chart of squared values."""
+        return replace(self, picture=np.square(self.picture))
 
     def cells(self, x_edges: Array, y_edges: Array) -> tuple[slice, slice]:
         """Return the columns and rows of cells that the picture reaches."""

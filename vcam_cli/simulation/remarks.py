@@ -192,14 +192,15 @@ def _depth(ready: Prepared) -> tuple[str, ...]:
             " scene.distance; give optics.focus_distance"
         )
     if found is not None:
-        points = f"{found.rings} rings of points of the aperture"
-        how = f", covariance over {points}" if found.rings else ""
-        if found.left_out:
-            how = f", without their covariance of {100 * found.left_out:.2g} %"
         more = found.error > ready.settings.tolerance
+        how = "every pixel's rays meet the same layers"
+        if found.rays:
+            size = f"{found.cells} x {found.cells} cells a pixel"
+            how = f"around edges of layers, up to {found.rays} rays a pixel are traced on {size}"
+        if found.left_out:
+            how += f", elsewhere at most {100 * found.left_out:.2g} % of full signal is skipped"
         notes.append(
-            f"layers are put one before the other on {found.cells} x {found.cells} cells a"
-            f" pixel{how}: predicted error {100 * found.error:.2g} % of full signal"
+            f"{how}: predicted error {100 * found.error:.2g} % of full signal"
             + (", more than accuracy asks for" if more else "")
         )
     return (*notes, *_cut(ready))

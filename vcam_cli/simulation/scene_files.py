@@ -175,7 +175,8 @@ def _blur(camera: Camera) -> LensBlur:
             return np.ones_like(frequency)
         return otf_circular(frequency, wavelength, solved.working_f_number)
 
-    return LensBlur(slope, shift - slope / solved.focus_distance, sharp)
+    aperture = solved.collecting_width, solved.collecting_height
+    return LensBlur(slope, shift - slope / solved.focus_distance, sharp, aperture)
 
 
 def _read_layers(source: Layers) -> tuple[tuple[LayerFiles, ...], tuple[str, ...]]:

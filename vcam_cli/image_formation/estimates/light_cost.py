@@ -62,11 +62,11 @@ LOOK = 110e-9
 PROBED = 4
 """Instants on all of the array that as much work as their choice would be."""
 OCCLUDE = 30e-9
-"""One cell of light or opacity put before what is behind, covariance included [s]."""
+"""One pixel of light or opacity put before what is behind [s]."""
 RAY = 12e-9
 """One value of a cell's light or cover moved to where a ray sees it, and composed [s]."""
-MOVE = 10e-9
-"""One value of a layer transformed to where a ray sees it, and composed [s]."""
+LOOK_UP = 5e-9
+"""One value of a layer that a ray looks up, painted and composed [s]."""
 
 ENTRIES = 2560
 """Frequencies at which a round transfer function is known, for its tables and to judge them."""
@@ -102,7 +102,7 @@ def image_seconds(geometry: Geometry, colors: int, report: SpectrumReport) -> fl
         Seconds.
     """
     rays = RAY * report.cut.ray_values if report.cut else 0.0
-    rays += MOVE * report.depth.ray_values if report.depth else 0.0
+    rays += LOOK_UP * report.depth.ray_values if report.depth else 0.0
     return (
         rays
         + _flat_seconds(geometry, colors, report)

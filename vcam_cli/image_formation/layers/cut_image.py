@@ -24,6 +24,8 @@ from numpy.typing import NDArray
 from vcam_cli import memory
 from vcam_cli.camera.derived.mosaic import Mosaic
 from vcam_cli.effects.base import Blur, SeparableTransfer, of_kind
+from vcam_cli.effects.optics.paraboloid import Paraboloid
+from vcam_cli.effects.optics.wavefront_blur import AberrationBlur
 from vcam_cli.image_formation.layers.layered import PART, gathered, is_of_lens
 from vcam_cli.image_formation.layers.ray_composition import composed, ray_correction
 from vcam_cli.image_formation.optical_path import (
@@ -35,11 +37,11 @@ from vcam_cli.image_formation.optical_path import (
     SpectrumReport,
 )
 from vcam_cli.image_formation.transfer_functions import Transfer
-from vcam_cli.scenes.depth_scene import CutLayer, DepthScene
+from vcam_cli.scenes.depth_scene import CutLayer, DepthScene, SlopeLayer
 
 PLANES = 10
 """Values of every pixel and color that are kept at once."""
-FormImage = Callable[[OpticalPath, CutLayer], tuple[Layers, SpectrumReport]]
+FormImage = Callable[[OpticalPath, CutLayer | SlopeLayer], tuple[Layers, SpectrumReport]]
 """What forms the image of a flat scene."""
 
 
@@ -69,18 +71,25 @@ def cut_image(
     memory.require(held, path.geometry.rows, path.geometry.columns)
     used = [int(number) for number in np.flatnonzero(scene.cut.is_used())]
 
-    def formed(layer: CutLayer, optics: LayerOptics) -> tuple[NDArray, NDArray]:
-        own = _layer_path(path, optics)
+    def formed(
+        layer: CutLayer, optics: LayerOptics, slope: SlopeLayer | None = None
+    ) -> tuple[NDArray, NDArray]:
+        own = _layer_path(path, optics, len(used))
         parts, report = form(own, layer)
         reports.append(report)
-        both = gathered(parts, path.geometry, np.empty((len(own.mosaic.colors), 0), own_type))
+        like: NDArray = np.empty((len(own.mosaic.colors), 0), own_type)
+        both = gathered(parts, path.geometry, like)
+        if slope is not None:
+            parts, report = form(_layer_path(path, _with_paraboloid(optics), len(used)), slope)
+            reports.append(report)
+            both += gathered(parts, path.geometry, like)
         colors = len(both) // 2
         level = own.transfer.level[-1, colors:, None, None]
         cover = both[colors:] / np.where(level > 0, level, 1.0).astype(own_type)
         return both[:colors], np.clip(cover, 0, 1, out=cover)
 
     own_type = path.settings.dtype
-    shown = (formed(scene.shown(number), path.layers[number]) for number in used)
+    shown = (formed(scene.shown(n), path.layers[n], scene.sloped(n)) for n in used)
     hidden_layers = ((scene.hidden(number), path.layers[number]) for number in used)
     hidden = (formed(layer, optics) for layer, optics in hidden_layers if layer is not None)
     light, opened = composed(shown, hidden)
@@ -88,10 +97,11 @@ def cut_image(
     rays = ray_correction(path, scene, full)
     light = np.maximum(light + rays.light, 0)
     opened = np.clip(opened + rays.opened, 0, 1)
+    lost = sum(own.lost_rms for own in reports)
     behind = scene.cut.hidden
     cut = CutReport(
         layers=len(used),
-        error=math.hypot(scene.cut.error, scene.slope_error, rays.error / (full or 1.0)),
+        error=math.hypot(scene.cut.error, scene.slope_error, (rays.error + lost) / (full or 1.0)),
         cell=rays.cell,
         hidden_rms=behind.unknown * float(np.sqrt(np.square(opened, dtype=float).mean())),
         hidden_most=behind.most_unknown * float(opened.max(initial=0.0)),
@@ -100,10 +110,11 @@ def cut_image(
     return iter([Layer(lambda color, rows: light[color, rows])]), _report(path, reports, cut, held)
 
 
-def _layer_path(path: OpticalPath, optics: LayerOptics) -> OpticalPath:
+def _layer_path(path: OpticalPath, optics: LayerOptics, count: int) -> OpticalPath:
     """Return the path of a layer's light, with twice the colors: those of its cover come last.
 
-    Cover is seen in the light of all the picture's parts together.
+    Cover is seen in the light of all the picture's parts together. What layers lose is detail of
+    one picture, which adds up: of so many, each may lose a part of what all may.
     """
     behind = (e for e in of_kind(path.effects, Blur, SeparableTransfer) if not is_of_lens(e))
     effects = (*(e for e in optics.effects if is_of_lens(e)), *behind)
@@ -113,7 +124,8 @@ def _layer_path(path: OpticalPath, optics: LayerOptics) -> OpticalPath:
     doubled = np.zeros((len(weights) + 1, 2 * colors, weights.shape[2]))
     doubled[:-1, :colors], doubled[-1, colors:] = weights, white
     brightest = float(path.transfer.level.sum(axis=0).max())
-    tolerance = PART * path.settings.tolerance * min(1.0, path.ceiling / (brightest or 1.0))
+    tolerance = PART / count * path.settings.tolerance
+    tolerance *= min(1.0, path.ceiling / (brightest or 1.0))
     return replace(
         path,
         transfer=Transfer(transfer.wavelengths, doubled, of_kind(effects, Blur)),
@@ -123,21 +135,27 @@ def _layer_path(path: OpticalPath, optics: LayerOptics) -> OpticalPath:
         optional=(),
         layers=(),
         ceiling=math.inf,
-        full=brightest,
+        full=min(brightest, path.full),
         has_opacity=True,
     )
+
+
+def _with_paraboloid(optics: LayerOptics) -> LayerOptics:
+    """Return optics that blur points to a paraboloid in place of a disc."""
+    discs = of_kind(optics.effects, AberrationBlur)
+    kept = tuple(e for e in optics.effects if e not in discs)
+    return replace(optics, effects=(*kept, Paraboloid(abs(optics.radius))))
 
 
 def _held_bytes(path: OpticalPath, scene: DepthScene) -> int:
     """Return the memory of what is kept while layers are formed, one by one [bytes].
 
     Of pixels: light, cover and what is still clear, and the same of what is hidden. Of samples:
-    light for the rays, that of slopes displaced too, and of a layer its shares and sources.
+    light for the rays, and of a layer its shares and sources.
     """
     size, pixels = path.settings.float_width // 8, path.geometry.rows * path.geometry.columns
     colors = len(path.mosaic.colors)
-    pictures = 2 if scene.sloped is not scene.flat else 1
-    samples = (pictures * colors * size + 40) * scene.depth.size
+    samples = (colors * size + 40) * scene.depth.size
     return PLANES * colors * pixels * size + samples
 
 
@@ -148,7 +166,7 @@ def _report(
     names = {name for own in reports for name in own.changes}
     return SpectrumReport(
         oversampling=max((own.oversampling for own in reports), default=0.0),
-        lost_rms=math.hypot(*(own.lost_rms for own in reports)),
+        lost_rms=sum(own.lost_rms for own in reports),
         changes={
             name: math.hypot(*(own.changes.get(name, 0.0) for own in reports)) for name in names
         },

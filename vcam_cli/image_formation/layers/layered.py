@@ -5,20 +5,18 @@ lens makes of its light E_i a_i and its opacity a_i, each with the transfer of i
 
     E = sum_i T_i[E_i a_i] prod_{j < i} (1 - T_j[a_j]).
 
-That is exact where of two layers that overlap at most one is out of focus: a ray through one part
-of the aperture then meets the sharp one in the same place as all others. What is missing
-where both are is the covariance over the aperture.
+That is exact where all rays of a pixel see the same of all layers but one. What is missing
+elsewhere, around edges, is the covariance over rays (`ray_windows.py`).
 
 Each layer's image is formed as that of any flat scene, with its opacity for so many more colors.
-Where light and opacity both change within pixels, what that changes is computed on cells finer than
-the pixels (`_correction`).
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -33,11 +31,16 @@ from vcam_cli.effects.base import (
     SeparableTransfer,
     of_kind,
 )
-from vcam_cli.effects.pixel.pixel_aperture import PixelAperture
 from vcam_cli.image_formation.estimates.bandwidth import margin
-from vcam_cli.image_formation.layers.layer_covariance import add_covariance
-from vcam_cli.image_formation.layers.layer_lattice import Lattice, Window
-from vcam_cli.image_formation.layers.seen_layers import SeenLayer, partly_hidden
+from vcam_cli.image_formation.layers.layer_edges import (
+    even_motion,
+    moves_otherwise,
+    partly_hidden,
+    ray_reach,
+)
+from vcam_cli.image_formation.layers.occlusion import RayLayer
+from vcam_cli.image_formation.layers.ray_cells import BORDER, Cells, Window
+from vcam_cli.image_formation.layers.ray_windows import LEFT_OUT, RaySum, windows_with
 from vcam_cli.image_formation.optical_path import (
     DepthReport,
     Layer,
@@ -53,19 +56,35 @@ from vcam_cli.spectra import Spectrum
 
 FormImage = Callable[[OpticalPath, ChartScene | ImageScene], tuple[Layers, SpectrumReport]]
 """What forms the image of a flat scene."""
-CELLS_SHARE = 0.2
-"""Part of the tolerance that edges within the cells of the lattice may use."""
-HIDDEN_SHARE = 0.3
-"""The same of the covariance, where the rest leaves it no more."""
-MOST_CELLS = 6
-"""Cells along each side of a pixel, at most."""
-EDGES = 9.5
-"""Heights of two edges in a cell over the rms covariance of both within it: sqrt(90)."""
+RAYS_SHARE = 0.4
+"""Part of the tolerance that the covariance may err, at least; more where the layers' own images
+err less."""
 PART = 0.5
 """Part of the tolerance that the image of each layer may use."""
-SURE_OF_LAYERS, SURE = 1.4, 1.8
-"""Predicted error over the rms that is expected, of the layers' own images and of their order: of
-134 scenes of discs and bars none errs more, nor is any predicted to err more than the tolerance."""
+
+
+@dataclass(frozen=True)
+class SeenLayer:
+    """A layer behind the lens."""
+
+    number: int
+    """In the scene, the nearest first."""
+    window: Window
+    """Pixels that its light reaches."""
+    light: NDArray
+    """Light (C, rows, columns) in the window [e/s]."""
+    cover: NDArray
+    """Opacity (C, rows, columns)."""
+    path: OpticalPath
+    beyond: int
+    """Pixels by which its chart goes on beyond the window."""
+    report: SpectrumReport
+
+    def lost_rms(self, g: Geometry) -> float:
+        """Return a bound on what the layer's own image lacks, rms over all of an array [e/s]."""
+        rows, columns = self.window.pixels
+        area = rows * columns / _share_seen(self.window, self.beyond)
+        return self.report.lost_rms * math.sqrt(area / (g.rows * g.columns))
 
 
 def layered_image(
@@ -89,100 +108,97 @@ def layered_image(
     report : SpectrumReport
         How the scene was sampled and filtered.
     """
-    layers = list(_layers_seen(path, scene, Lattice(path.geometry), form))
-    light, error = _composed(path, layers, path.geometry)
+    g, tolerance = path.geometry, path.settings.tolerance
+    layers = list(_layers_seen(path, scene, form))
+    light, bound = _composed(path, scene, layers)
+    own = math.hypot(*(layer.lost_rms(g) for layer in layers))
     full = min(float(light.max(initial=0.0)), path.ceiling)
-    allowed, count = CELLS_SHARE * path.settings.tolerance * full, 1
-    if error > allowed:
-        count = min(math.ceil((error / allowed) ** 0.5), MOST_CELLS)
-        added, error = _correction(path, scene, count, form)
-        light += added
-    own = math.hypot(*(layer.lost_rms(path.geometry) for layer in layers))
-    error = math.hypot(SURE_OF_LAYERS * own, SURE * error)
-    left = _allowed(path.settings.tolerance * full, error)
-    hidden = add_covariance(path, scene, light, partly_hidden(layers, path), left)
-    error = math.hypot(error, SURE * hidden.error)
+    allowed = math.sqrt(max((tolerance * full) ** 2 - own**2, (RAYS_SHARE * tolerance * full) ** 2))
+    windows, left_out = windows_with(bound, LEFT_OUT * allowed)
+    if any(map(moves_otherwise, path.layers)):  # at rest they would hide other light of each other
+        windows, left_out = [], float(np.sqrt(np.square(bound, dtype=float).mean()))
+    far = [max(lengths) for lengths in zip(*map(ray_reach, path.layers), strict=True)]
+    rays = RaySum(path, (far[0], far[1]), partial(_painted, path, scene))
+    hidden = rays.add(light, windows, math.sqrt(max(allowed**2 - left_out**2, 0.0)))
+    error = math.hypot(own, hidden.error, left_out)
     full = min(float(light.max(initial=0.0)), path.ceiling)
     over_full = 1 / full if full else 0.0
-    left_out = SURE * hidden.left_out * over_full
-    depth = DepthReport(count, hidden.rings, error * over_full, left_out, hidden.values)
+    depth = DepthReport(
+        cells=hidden.cells,
+        rays=hidden.rays,
+        error=error * over_full,
+        left_out=left_out * over_full,
+        ray_values=hidden.values,
+    )
     layer = Layer(lambda color, rows: light[color, rows])
     return iter([layer]), _report(layers, error, depth)
 
 
-def _allowed(tolerance: float, error: float) -> float:
-    """Return what the covariance may err where all else errs so much, rms [e/s]."""
-    left = (tolerance**2 - error**2) / SURE**2
-    return math.sqrt(max(left, (HIDDEN_SHARE * tolerance) ** 2))
-
-
-def _layers_seen(
-    path: OpticalPath, scene: LayeredScene, lattice: Lattice, form: FormImage
-) -> Iterator[SeenLayer]:
-    """Yield the layers that a lattice sees, the nearest first.
-
-    Its cells are the pixels themselves, or average over all of their area.
-    """
-    g = lattice.geometry
-    behind: tuple[Effect, ...] = (PixelAperture(g.pitch_x, g.pitch_y),)
-    if g is path.geometry:
-        kinds = Blur, SeparableTransfer
-        behind = tuple(e for e in of_kind(path.effects, *kinds) if not is_of_lens(e))
-    for part, optics in zip(scene.parts, path.layers, strict=True):
+def _layers_seen(path: OpticalPath, scene: LayeredScene, form: FormImage) -> Iterator[SeenLayer]:
+    """Yield the layers that the array sees, the nearest first."""
+    behind = tuple(e for e in of_kind(path.effects, Blur, SeparableTransfer) if not is_of_lens(e))
+    for number, (part, optics) in enumerate(zip(scene.parts, path.layers, strict=True)):
         effects = (*(e for e in optics.effects if is_of_lens(e)), *behind)
         hides = part is not scene.parts[-1]
-        seen = _layer_path(path, part, effects, lattice, scene.brightest, hides)
+        seen = _layer_path(path, part, effects, scene.brightest, hides)
         if seen is not None:
             window, own, beyond = seen
-            light, cover, report = _light_and_cover(own, part, window, beyond, scene.white, form)
-            yield SeenLayer(window, light, cover, own, report)
+            light, cover, report = _light_and_cover(
+                own, part, window.center(path.geometry), beyond, scene.white, form
+            )
+            yield SeenLayer(number, window, light, cover, own, beyond, report)
 
 
-def _composed(path: OpticalPath, layers: Iterable[SeenLayer], g: Geometry) -> tuple[NDArray, float]:
-    """Return the light (C, rows, columns) of layers one before the other, and its error [e/s].
+def _composed(
+    path: OpticalPath, scene: LayeredScene, layers: Sequence[SeenLayer]
+) -> tuple[NDArray, NDArray]:
+    """Return the light (C, rows, columns) of layers one before the other [e/s].
 
-    The error is that of light and opacity that both change within a cell, rms.
+    And a bound (rows, columns) on what is missing from it in the color where it is most [e/s].
     """
+    g, white = path.geometry, float(path.transfer.level[-1].max())
     colors = len(path.transfer.weights[-1])
     total: NDArray = np.zeros((colors, g.rows, g.columns), path.settings.dtype)
-    clear, squares = np.ones_like(total), 0.0
+    clear, bound = np.ones_like(total), np.zeros_like(total[0])
     for layer in layers:
         here = slice(None), layer.window.rows, layer.window.columns
-        squares += product_error(clear[here], layer.light)
         total[here] += clear[here] * layer.light
-        clear[here] *= 1 - layer.cover
-    return total, math.sqrt(squares / (g.rows * g.columns))
+        behind = scene.parts[layer.number + 1 :]
+        if behind:
+            chart, optics = scene.parts[layer.number].chart, path.layers[layer.number]
+            part = partly_hidden(g, chart, optics, layer.window, layer.cover)
+            most = white * max(part.brightest for part in behind)
+            bound[here[1:]] += most * np.minimum(part, clear[here].max(axis=0))
+            clear[here] *= 1 - layer.cover
+    return total, bound
 
 
-def _correction(
-    path: OpticalPath, scene: LayeredScene, count: int, form: FormImage
-) -> tuple[NDArray, float]:
-    """Return what pixels see more where layers are put one before the other within them [e/s].
-
-    That is done on so many cells along each side of a pixel, and the pixels' means are taken
-    behind; from it, the same with means taken before. The error of the cells is the second value.
-    """
-    lattice = Lattice.over_array(path.geometry, count)
-    g, pixels = lattice.geometry, _pixel_path(path)
-
-    def at_pixels(light: NDArray) -> NDArray:
-        layers, _ = form(pixels, _on_the_sensor(scene, light, g))
-        return gathered(layers, path.geometry, light)
-
-    layers = list(_layers_seen(path, scene, lattice, form))
-    fine, error = _composed(path, layers, g)
-    coarse, clear = (np.zeros_like(at_pixels(fine)) for _ in range(2))
-    clear += 1
-    for layer in layers:
-        planes = []
-        for values in (layer.light, layer.cover):
-            whole = np.zeros_like(fine)
-            whole[:, layer.window.rows, layer.window.columns] = values
-            planes.append(at_pixels(whole))
-        coarse += clear * planes[0]
-        clear *= 1 - planes[1]
-    # Cells of a pixel err alike along an edge: as few of them have it as there are in a row.
-    return at_pixels(fine) - coarse, error / math.sqrt(count)
+def _painted(path: OpticalPath, scene: LayeredScene, cells: Cells) -> list[RayLayer]:
+    """Return the layers that are seen on cells, the nearest first; none where one hides all."""
+    edges, (side_x, side_y) = cells.edges(), cells.sides
+    found: list[RayLayer] = []
+    for part, optics in zip(scene.parts, path.layers, strict=True):
+        level = path.transfer.level[part.components].T
+        mix = np.zeros((len(level) + 1, level.shape[1] + 1), path.settings.dtype)
+        mix[:-1, :-1], mix[-1, -1] = level, 1
+        if not _meets(part, *edges):
+            continue
+        planes = part.chart.averages(*edges, mix)
+        path_x, path_y, place_x, place_y = 0.0, 0.0, 0.0, 0.0
+        motion = even_motion(optics)
+        if motion is not None:
+            (path_x, path_y), (place_x, place_y) = motion.path, motion.displacement
+            middle = cells.middle * path.geometry.sampling_scale
+            place_x, place_y = (
+                place_x + motion.drift[0] * middle,
+                place_y + motion.drift[1] * middle,
+            )
+        radius = optics.radius / side_x, optics.radius / side_y
+        moved = (path_x / side_x, path_y / side_y), (place_x / side_x, place_y / side_y)
+        found.append(RayLayer(planes, radius, *moved))
+        if planes[-1].min() >= 1:
+            break
+    return found if len(found) > 1 else []
 
 
 def gathered(
@@ -198,37 +214,8 @@ def gathered(
     return out
 
 
-def product_error(a: NDArray, b: NDArray) -> float:
-    """Return the error of the mean over a cell of a product, taken as the product of the means.
-
-    Of two edges in one cell, of heights A and B and anywhere in it, it is A B / 9.5 rms; heights
-    are told by the changes from one cell to the next.
-
-    Parameters
-    ----------
-    a, b : NDArray
-        Means (C, h, w) of both factors over the cells.
-
-    Returns
-    -------
-    float
-        Sum of squares over all cells, of the color where it is most.
-    """
-    squares = np.zeros(len(a))
-    for axis in (1, 2):
-        if a.shape[axis] > 1:
-            changes = np.diff(a, axis=axis) * np.diff(b, axis=axis)
-            squares += np.square(changes).sum(axis=(1, 2), dtype=float)
-    return float(squares.max(initial=0.0)) / EDGES**2
-
-
 def _layer_path(
-    path: OpticalPath,
-    part: LayerPart,
-    effects: tuple[Effect, ...],
-    lattice: Lattice,
-    brightest: float,
-    hides: bool,
+    path: OpticalPath, part: LayerPart, effects: tuple[Effect, ...], brightest: float, hides: bool
 ) -> tuple[Window, OpticalPath, int] | None:
     """Return where a layer is seen, and the path of its light; None where it is beside the array.
 
@@ -236,19 +223,21 @@ def _layer_path(
     opacity in light as bright as the scene's brightest, relative to white. The third value are the
     pixels by which its chart is to go on beyond the window.
     """
-    g = lattice.geometry
+    g = path.geometry
     # Opacity counts as the scene's brightest light, which may lie behind it; no light is cut.
     level = brightest * float(path.transfer.level[-1].max())
     tolerance = PART * path.settings.tolerance * min(1.0, path.ceiling / (level or 1.0))
     knobs = replace(path.settings, tolerance=tolerance)
     band = float(path.transfer.wavelengths[0]), float(path.transfer.wavelengths[-1])
     beyond = margin(g, effects, band, knobs)
-    pitch = max(g.pitch_x, g.pitch_y)
-    window = lattice.window(
-        part, math.inf if of_kind(effects, FieldTransfer, ImageMotion) else beyond * pitch
-    )
-    if window.rows.start == window.rows.stop or window.columns.start == window.columns.stop:
+    far = beyond * max(g.pitch_x, g.pitch_y)
+    if of_kind(effects, FieldTransfer, ImageMotion):
+        far = math.inf
+    window = _window(g, part, far)
+    if 0 in window.pixels:
         return None
+    # What is lost of the layer's detail may all lie on the array, none of it beside it.
+    knobs = replace(knobs, tolerance=tolerance * math.sqrt(_share_seen(window, beyond)))
     transfer = path.transfer.with_half_the_wavelengths()
     weights, white = transfer.weights[part.components], transfer.weights[-1]
     colors = len(white)
@@ -259,14 +248,14 @@ def _layer_path(
     own = replace(
         path,
         transfer=Transfer(transfer.wavelengths, every, of_kind(effects, Blur)),
-        geometry=window.geometry,
+        geometry=window.geometry(g),
         settings=knobs,
         mosaic=_colors(every.shape[1]),
         effects=effects,
         optional=(),
         layers=(),
         ceiling=math.inf,
-        full=level,
+        full=min(level, path.full),
         has_opacity=hides,
     )
     return window, own, beyond
@@ -275,16 +264,16 @@ def _layer_path(
 def _light_and_cover(
     path: OpticalPath,
     part: LayerPart,
-    window: Window,
+    center: tuple[float, float],
     beyond: int,
     white: Spectrum,
     form: FormImage,
 ) -> tuple[NDArray, NDArray, SpectrumReport]:
-    """Return a layer's light [e/s] and opacity (C, rows, columns) in its window.
+    """Return a layer's light [e/s] and opacity (C, rows, columns) around a place on the array [m].
 
     The opacity of one that hides nothing is 1.
     """
-    g, (at_x, at_y) = window.geometry, window.center
+    g, (at_x, at_y) = path.geometry, center
     x, y = part.chart.center
     chart = replace(part.chart, center=(x - at_x, y - at_y))
     scene = ChartScene(
@@ -299,7 +288,7 @@ def _light_and_cover(
     )
     layers, report = form(path, scene)
     planes: NDArray = np.empty((len(path.mosaic.colors), 0), path.settings.dtype)
-    both = gathered(layers, g, planes, window.center)
+    both = gathered(layers, g, planes, center)
     if not path.has_opacity:
         return (
             np.maximum(both, 0, out=both),
@@ -313,32 +302,37 @@ def _light_and_cover(
     return np.maximum(light, 0, out=light), np.clip(cover, 0, 1, out=cover), report
 
 
-def _on_the_sensor(scene: LayeredScene, light: NDArray, g: Geometry) -> ImageScene:
-    """Return the light (C, rows, columns) on a lattice as a scene of C components [e/s]."""
-    return ImageScene(
-        spectra=(scene.white,) * len(light),
-        white=scene.white,
-        shape=(g.rows, g.columns),
-        pitch_x=g.pitch_x,
-        pitch_y=g.pitch_y,
-        samples="squares",
-        dtype=light.dtype,
-        picture=np.moveaxis(light, 0, -1),
-        black=(0, 0),
-        seen=(1.0, 1.0),
-    )
+def _share_seen(window: Window, beyond: int) -> float:
+    """Return the part that a window sees of a chart and of its margin near the window.
+
+    The chart goes on so many pixels beyond; what is lost of its detail is lost close to it.
+    """
+    rows, columns = window.pixels
+    beyond = min(beyond, BORDER)
+    return rows * columns / ((rows + 2 * beyond) * (columns + 2 * beyond))
 
 
-def _pixel_path(path: OpticalPath) -> OpticalPath:
-    """Return what silicon and pixels do to light that lies on the sensor, each color to its own."""
-    white = path.transfer.weights[-1]
-    level = white.sum(axis=1, keepdims=True)
-    weights = np.zeros((len(white), *white.shape))
-    for color, share in enumerate(white / np.where(level > 0, level, 1)):
-        weights[color, color] = share
-    effects = tuple(effect for effect in path.effects if not is_of_lens(effect))
-    transfer = Transfer(path.transfer.wavelengths, weights, of_kind(effects, Blur))
-    return replace(path, transfer=transfer, effects=effects, layers=())
+def _meets(part: LayerPart, x: NDArray, y: NDArray) -> bool:
+    """Return whether there is a part of a layer between the first and last of some places [m]."""
+    if part.size is None:
+        return True
+    (center_x, center_y), half = part.chart.center, (part.size.width / 2, part.size.height / 2)
+    meets_x = x[0] < center_x + half[0] and x[-1] > center_x - half[0]
+    return bool(meets_x and y[0] < center_y + half[1] and y[-1] > center_y - half[1])
+
+
+def _window(g: Geometry, part: LayerPart, beyond: float) -> Window:
+    """Return the pixels that a layer's light reaches, so far beyond its frame [m]."""
+    spans = []
+    for axis, (count, pitch) in enumerate(((g.columns, g.pitch_x), (g.rows, g.pitch_y))):
+        first, last = 0, count
+        if part.size is not None:
+            half = (part.size.width, part.size.height)[axis] / 2 + beyond
+            center = part.chart.center[axis]
+            first = math.floor(max((center - half) / pitch + count / 2, 0))
+            last = math.ceil(min((center + half) / pitch + count / 2, count))
+        spans.append(slice(first, max(first, last)))
+    return Window(rows=spans[1], columns=spans[0])
 
 
 def is_of_lens(effect: Effect) -> bool:

@@ -1,21 +1,23 @@
-"""What layers out of focus hide of each other, beyond the product of their means.
+"""What layers hide of each other, ray by ray, beyond the product of their means.
 
-A ray through the point u of the aperture (in its radii) meets a layer whose points blur to the
-radius r in x - r u. In the mean over all rays, light behind an edge is not the mean light times the
-mean of what the edge lets pass: both depend on u, and their covariance over the aperture is
-missing. It is the mean over u of the layers put one before the other, as the rays through u see
-them, less the layers' means put one before the other:
+A ray reaches the sensor at x through the point u of the aperture (in its radii) at the instant t of
+the exposure. It meets a layer whose points blur to the radius r, and whose image moves by m, where
+the layer's image has x + r u - m t. There it sees the layers one before the other. The signal of a
+pixel is the mean of that over u, over t, and over the x that the pixel collects. A layer's mean
+light times the mean of what the layers before it let pass is not the same: both depend on the ray.
+Their covariance is missing,
 
-    <L_1 + (1 - a_1) (L_2 + (1 - a_2) (...))> - (<L_1> + (1 - <a_1>) (<L_2> + (1 - <a_2>) (...))).
+    C = K <L_1 + (1 - a_1) (L_2 + ...)> - (K <L_1> + (1 - K <a_1>) (K <L_2> + ...)),
 
-The mean is a sum over points of the aperture: Gauss's in the squared radius, evenly spaced along
-each ring.
+with the mean < > over rays, and K for what sharp lens, silicon and photodetector do to an image.
 
-In waves, a frequency f of incoherent light is transferred by the points of the pupil that are
-lambda N f / 2 away from two others, one each way (in the pupil's diameters) [1]_. So the picture
-through u has those frequencies alone for which both of them lie in the pupil. A point stands for a
-patch around it, and counts by how much of that lies in their overlap: whole points, in or out,
-would take twice as many rings.
+Layers are known by their means over cells. Of such layers each ray has the exact value: it looks up
+the cells that it meets. What is left are the size of the cells and the number of rays, which
+`ray_windows.py` chooses.
+
+Diffraction acts on the composed image as that of the lens in focus. A point of the pupil stands for
+pairs of points on both sides of it [1]_, which are the closer together the nearer it lies to the
+pupil's edge; that is neglected in C, where it is little beside blurs wider than diffraction.
 
 References
 ----------
@@ -26,109 +28,136 @@ References
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
-import scipy.fft
 from numpy.typing import NDArray
 
-from vcam_cli.physics.diffraction import otf_circular
+from vcam_cli.scenes.cells import cell_means
 
-SPOKES = 4
-"""Points along the aperture's edge, over the number of rings."""
+TURNS = (math.sqrt(5) - 1) / 2, math.sqrt(2) - 1
+"""Turns from one point of the aperture to the next: numbers that fractions approximate worst."""
+STEPS = (
+    (0.8191725133961645, 0.6710436067037893, 0.5497004779019703),
+    (math.sqrt(3) - 1, math.sqrt(7) - 2, math.sqrt(13) - 3),
+)
+"""Steps of instant and place from one ray to the next, of two sets without a common structure."""
+
+Planes = tuple[NDArray, NDArray]
+"""Light times opacity (C, h, w), and opacity (h, w) or (C, h, w)."""
+Compose = Callable[[Sequence[Planes]], NDArray]
+"""What makes light (C, h, w) of layers, the nearest first."""
 
 
-@dataclass(frozen=True, eq=False)
-class BlurredLayer:
-    """A layer's light and opacity before the lens, and how widely a point of it blurs."""
+@dataclass(frozen=True)
+class RayLayer:
+    """A layer as rays meet it. Lengths are in cells, along x and y."""
 
     planes: NDArray
-    """Light times opacity of every color, in any unit, and opacity from 0 to 1 (..., C + 1, h, w).
-    What comes first are places that do not see each other."""
+    """Light times opacity of every color, and opacity (C + 1, h, w)."""
     radius: tuple[float, float]
-    """Radius of a point's blur along x and y [samples]; its sign is that of the distance before the
-    focus."""
+    """Radius of a point's blur; positive where the layer is nearer than what is in focus."""
+    path: tuple[float, float] = (0.0, 0.0)
+    """What its image goes during the exposure."""
+    place: tuple[float, float] = (0.0, 0.0)
+    """How far its image is displaced in the middle of the exposure."""
 
-    @cached_property
-    def spectrum(self) -> NDArray:
-        """Transform (..., C + 1, h, w // 2 + 1) of light and opacity."""
-        return np.asarray(scipy.fft.rfft2(self.planes))
+    def together(self, count: int) -> RayLayer:
+        """Return the means over so many cells along either side."""
+        radius, path, place = (
+            (x / count, y / count) for x, y in (self.radius, self.path, self.place)
+        )
+        return RayLayer(cell_means(self.planes, count), radius, path, place)
 
-    def shift(self, u: float, v: float) -> NDArray:
-        """Return the transfer (h, w // 2 + 1) to what rays through a point of the aperture see."""
-        rows, columns = self.planes.shape[-2:]
-        down = np.exp(-2j * np.pi * self.radius[1] * v * scipy.fft.fftfreq(rows))
-        right = np.exp(-2j * np.pi * self.radius[0] * u * scipy.fft.rfftfreq(columns))
-        return np.outer(down, right).astype(self.spectrum.dtype)
-
-    def filtered(self, transfer: NDArray) -> NDArray:
-        """Return light and opacity (..., C + 1, h, w) behind a transfer."""
-        return np.asarray(scipy.fft.irfft2(self.spectrum * transfer, self.planes.shape[-2:]))
-
-
-def aperture_points(rings: int) -> Iterator[tuple[float, float, float]]:
-    """Yield points (u, v) of a disc of radius 1 and their weights, whose sum is 1."""
-    nodes, weights = np.polynomial.legendre.leggauss(rings)
-    for ring, (node, weight) in enumerate(zip(nodes, weights, strict=True)):
-        radius = math.sqrt((1 + node) / 2)
-        count = math.ceil(SPOKES * rings * radius)
-        for angle in 2 * np.pi / count * (np.arange(count) + ring / 2):
-            yield radius * math.cos(angle), radius * math.sin(angle), weight / 2 / count
+    def offsets(self, rays: NDArray) -> NDArray:
+        """Return by how many cells (n, 2) right and down of its own each ray meets the layer."""
+        u, t, within = rays[:, :2], rays[:, 2:3] - 0.5, rays[:, 3:]
+        met = within + u * self.radius - t * self.path - self.place
+        return np.floor(met).astype(int)
 
 
-def covariance(
-    layers: Sequence[BlurredLayer], rings: int, period: tuple[float, float] = (0.0, 0.0)
-) -> NDArray:
-    """Return the covariance over the aperture that the product of means lacks.
+def rays(count: int, kind: int) -> NDArray:
+    """Return rays (n, 5): a point of the aperture [radii], an instant and a place, 0 to 1.
 
     Parameters
     ----------
-    layers : sequence of BlurredLayer
-        Layers of one shape, the nearest first. Their border is taken to repeat.
-    rings : int
-        Rings of points in the aperture.
-    period : tuple of float, optional
-        Along x and y, of the frequency from which the lens transfers nothing, lambda N [samples]; 0
-        without diffraction.
+    count : int
+        Number of rays.
+    kind : int
+        0 or 1: which of two sets that share neither radii nor angles.
 
     Returns
     -------
     NDArray
-        What is to be added to the product of means (..., C, h, w), in the light's unit.
+        Rays, which fill the disc evenly on a spiral [1]_.
+
+    References
+    ----------
+    .. [1] H. Vogel, "A better way to construct the sunflower head", Math. Biosciences 44, 179-189,
+       1979, doi:10.1016/0025-5564(79)90080-4.
+    """
+    k = np.arange(count) + 0.5
+    radius, angle = np.sqrt(k / count), 2 * np.pi * TURNS[kind] * k
+    rest = np.outer(k, STEPS[kind]) % 1
+    return np.column_stack([radius * np.cos(angle), radius * np.sin(angle), rest])
+
+
+def front_to_back(layers: Sequence[Planes]) -> NDArray:
+    """Return the light (C, h, w) of layers one before the other."""
+    light, opacity = layers[0]
+    total = light.copy()
+    clear = 1 - opacity
+    for light, opacity in layers[1:-1]:
+        total += clear * light
+        clear *= 1 - opacity
+    if len(layers) > 1:
+        total += clear * layers[-1][0]
+    return total
+
+
+def covariance(
+    layers: Sequence[RayLayer],
+    rays: NDArray,
+    reach: tuple[int, int],
+    seen: Callable[[Sequence[NDArray]], Sequence[NDArray]],
+    compose: Compose = front_to_back,
+) -> NDArray:
+    """Return what the product of the layers' means lacks, at the pixels.
+
+    Parameters
+    ----------
+    layers : sequence of RayLayer
+        Layers on cells of one shape, the nearest first.
+    rays : NDArray
+        Rays (n, 5).
+    reach : tuple of int
+        Rows and columns of cells at each border that only rays from elsewhere meet.
+    seen : callable
+        What lens, silicon and photodetectors make of images (C, h, w), or (1, h, w) for all colors,
+        on the inner cells: their values (C, rows, columns) at the pixels.
+    compose : callable, optional
+        What puts the layers one before the other.
+
+    Returns
+    -------
+    NDArray
+        Light (C, rows, columns) at the pixels, in the unit of the layers.
     """
     shape = layers[0].planes.shape[-2:]
-    fx, fy = scipy.fft.rfftfreq(shape[1])[None, :], scipy.fft.fftfreq(shape[0])[:, None]
-    apart_x, apart_y = period[0] * fx, period[1] * fy
-    spectrum = np.zeros_like(layers[0].spectrum[..., :-1, :, :])
-    transfers = [np.zeros(spectrum.shape[-2:], spectrum.dtype) for _ in layers]
-    counted = np.zeros(spectrum.shape[-2:], spectrum.real.dtype)
-    points = list(aperture_points(rings))
-    half = math.sqrt(math.pi / len(points)) / 2
-    for u, v, weight in points:
-        # The further of u + apart and u - apart from the middle.
-        between = 2 * np.abs(u * apart_x + v * apart_y)
-        furthest = np.sqrt(u**2 + v**2 + apart_x**2 + apart_y**2 + between)
-        steep = 2 * min(half, 1 - math.hypot(u, v))
-        inside = weight * np.clip(0.5 + (1 - furthest) / steep, 0, 1)
-        inside = inside.astype(counted.dtype)
-        shifts = [layer.shift(u, v) for layer in layers]
-        seen = _composed([a.filtered(b) for a, b in zip(layers, shifts, strict=True)])
-        spectrum += inside * scipy.fft.rfft2(seen)
-        counted += inside
-        for transfer, shift in zip(transfers, shifts, strict=True):
-            transfer += inside * shift
-    share = otf_circular(np.hypot(apart_x, apart_y), 1.0, 1.0) / np.where(counted > 0, counted, 1)
-    share = share.astype(counted.dtype)
-    means = [a.filtered(share * b) for a, b in zip(layers, transfers, strict=True)]
-    together = scipy.fft.irfft2(share * spectrum, shape)
-    return np.asarray(together - _composed(means))
-
-
-def _composed(layers: Sequence[NDArray]) -> NDArray:
-    """Return the light (..., C, h, w) of layers (..., C + 1, h, w) one before the other."""
-    total = np.zeros_like(layers[0][..., :-1, :, :])
-    for layer in reversed(layers):
-        total = layer[..., :-1, :, :] + (1 - layer[..., -1:, :, :]) * total
-    return total
+    rows, columns = (n - 2 * around for n, around in zip(shape, reach, strict=True))
+    offsets = [layer.offsets(rays) for layer in layers]
+    sums = [np.zeros((len(layer.planes), rows, columns), layer.planes.dtype) for layer in layers]
+    total: NDArray | float = 0.0
+    for number in range(len(rays)):
+        met = []
+        for layer, own, mean in zip(layers, offsets, sums, strict=True):
+            top, left = reach[0] + own[number, 1], reach[1] + own[number, 0]
+            part = layer.planes[:, top : top + rows, left : left + columns]
+            mean += part
+            met.append((part[:-1], part[-1]))
+        total = np.add(total, compose(met))
+    images = seen([np.asarray(total), *(mean[:-1] for mean in sums), *(mean[-1:] for mean in sums)])
+    together, *rest = (image / len(rays) for image in images)
+    means = list(zip(rest[: len(layers)], rest[len(layers) :], strict=True))
+    return np.asarray(together - compose(means))

@@ -17,7 +17,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcam_cli.camera.derived.geometry import pixel_centers
-from vcam_cli.image_formation.layers.edge_tiles import box_means
 from vcam_cli.image_formation.optical_path import OpticalPath
 from vcam_cli.parallel import each
 from vcam_cli.scenes.cells import cell_means
@@ -124,13 +123,10 @@ def ray_correction(path: OpticalPath, scene: DepthScene, full: float) -> RayCorr
         return RayCorrection()
     allowed = SHARE * path.settings.tolerance * full
     light = scene.flat.planes(path.transfer.level.T, path.workers)
-    sloped = light
-    if scene.sloped is not scene.flat:  # rays see slopes as they are, means have them displaced
-        sloped = scene.sloped.planes(path.transfer.level.T, path.workers)
 
     def on_cells(width: float) -> _Cells:
         together = max(round(width / scene.flat.pitch_x), 1)
-        return _Cells(scene, light, sloped, together, path.workers)
+        return _Cells(scene, light, together, path.workers)
 
     finest = max(pitch / FINEST, float(np.abs(radii).max()) / FARTHEST)
     cells = on_cells(max(blur, finest))
@@ -165,8 +161,6 @@ class _Cells:
     scene: DepthScene
     light: NDArray
     """Light (C, h, w) of the samples [e/s]."""
-    sloped: NDArray
-    """The same as the layers' means have it; `light` itself where no slope counts."""
     together: int
     """Samples along the side of a cell."""
     workers: int
@@ -212,20 +206,15 @@ class _Cells:
     def _tile(self, tile: tuple[slice, slice], reach: int) -> tuple[NDArray, int]:
         """Return the same in one tile, and how many values were moved for it."""
         layers = list(self._layers(self.light, tile, reach))
-        taken = layers
-        if self.sloped is not self.light:
-            taken = list(self._layers(self.sloped, tile, reach))
         means = [np.zeros((len(p), TILE, TILE), p.dtype) for _, p, _ in layers]
         total: NDArray | float = 0.0
         for u, v in aperture_points(RAYS):
             seen = [_moved(p, radius * u, radius * v, reach) for radius, p, _ in layers]
             total = total + self._composed(layers, seen)
-            if taken is not layers:
-                seen = [_moved(p, radius * u, radius * v, reach) for radius, p, _ in taken]
             for mean, one in zip(means, seen, strict=True):
                 mean += one / RAYS
         lacking = np.asarray(total / RAYS - self._composed(layers, means))
-        return lacking, RAYS * sum(mean.size for mean in means) * (1 + (taken is not layers))
+        return lacking, RAYS * sum(mean.size for mean in means)
 
     def _composed(
         self, layers: list[tuple[float, NDArray, bool]], planes: list[NDArray]
@@ -305,3 +294,17 @@ def _moved(planes: NDArray, x: float, y: float, reach: int) -> NDArray:
         )
         out = low * (1 - part) + high * part
     return out
+
+
+def box_means(plane: NDArray, at: NDArray, width: float) -> NDArray:
+    """Return the means of even rows over boxes of a width around places, counted in rows."""
+    sums = np.concatenate([np.zeros_like(plane[:1]), np.cumsum(plane, axis=0)])
+    low, high = (_interpolated(sums, at + side * width / 2) for side in (-1, 1))
+    return (high - low) / plane.dtype.type(width)
+
+
+def _interpolated(plane: NDArray, at: NDArray) -> NDArray:
+    """Return a plane straight between its rows, at places counted in rows."""
+    index = np.clip(at.astype(int), 0, len(plane) - 2)
+    part = (at - index).astype(plane.dtype)[:, None]
+    return np.asarray(plane[index] * (1 - part) + plane[index + 1] * part)

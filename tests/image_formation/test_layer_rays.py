@@ -1,0 +1,249 @@
+"""What layers hide of each other beyond the product of their means, ray by ray around edges."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from layered_reference import FOCAL, PITCH, Flat, Scene, changes, random_scene, ray_sum, write_exr
+from making import QUIET, camera, radiance_for
+
+from vcam_cli import simulate
+from vcam_cli.image_formation.layers import ray_windows
+from vcam_cli.image_formation.layers.occlusion import RayLayer, covariance, rays
+from vcam_cli.image_formation.layers.ray_windows import windows_with
+
+LARGE = {"array.rows": 150, "array.columns": 190}
+"""So that there are some windows."""
+RAYS_ALONE = QUIET | {"diffraction": "off"}
+
+
+def light(folder, more=LARGE, seed=11) -> np.ndarray:
+    """Mean electrons over white of three layers, two of them far out of focus."""
+    scene = random_scene(np.random.default_rng(seed), 3)
+    given = {"scene.radiance": radiance_for(5000), "effects": QUIET, "accuracy": "0.2 %"}
+    frame = simulate(camera(folder, given | changes(scene, folder) | more)).frame
+    return frame.mean_electrons / (frame.white_rate[0] * frame.exposure_time)
+
+
+def test_windows_give_the_light_of_the_whole_frame(tmp_path, monkeypatch):
+    """Windows see all that blurs into them: their borders are not seen."""
+    apart = light(tmp_path)
+    monkeypatch.setattr(ray_windows, "SIDE", 1000)
+    whole = light(tmp_path)
+    assert np.sqrt(np.mean(np.square(apart - whole))) <= 0.001 * whole.max()
+
+
+def test_windows_are_what_a_bound_does_not_allow_to_be_left_out():
+    bound = np.zeros((100, 130))
+    bound[40:60, 20:90] = 1.0
+    bound[99, 129] = 0.1
+    windows, left_out = windows_with(bound, 0.01)
+    covered = np.zeros(bound.shape, int)
+    for window in windows:
+        covered[window.rows, window.columns] += 1
+    assert covered.max() == 1
+    assert covered[bound == 1].all()
+    assert covered[99, 129] == 0
+    assert left_out == pytest.approx(0.1 / np.sqrt(bound.size))
+    assert not windows_with(np.zeros((5, 7)), 0.0)[0]
+
+
+def test_sets_of_rays_share_neither_radii_nor_angles():
+    one, other = rays(40, 0), rays(64, 1)
+    for rows in (one, other):
+        assert np.hypot(rows[:, 0], rows[:, 1]).max() < 1
+        assert rows[:, :2].mean(axis=0) == pytest.approx(0, abs=0.03)
+    apart = np.abs(one[:, None, :2] - other[None, :, :2]).max(axis=2)
+    assert apart.min() > 1e-4
+
+
+def test_covariance_of_stripes_is_that_of_their_waves():
+    """A wave of cover before a wave of light: the mean over the aperture in closed form.
+
+    With cover (1 + cos k x) / 2 of radius r before light (1 + cos k x) / 2 of radius s, rays
+    through u miss cos(k (x - r u)) cos(k (x - s u)) / 4. The part of it that does not vary with x
+    is cos(k (r - s) u) / 8.
+    """
+    n, r, s, reach = 256, 40.0, -24.0, 64
+    k = 2 * np.pi / 32
+    wave = np.broadcast_to((1 + np.cos(k * np.arange(n))) / 2, (n, n))
+    front = RayLayer(np.stack([np.zeros((n, n)), wave]), (r, 0.0))
+    back = RayLayer(np.stack([wave, np.ones((n, n))]), (s, 0.0))
+    found = covariance([front, back], rays(4000, 0), (reach, reach), list)[0].mean()
+    u = rays(60_000, 1)[:, 0]
+    mean = [np.cos(k * radius * u).mean() for radius in (r - s, r, s)]
+    assert found == pytest.approx(-(mean[0] - mean[1] * mean[2]) / 8, abs=2e-4)
+
+
+@pytest.mark.parametrize("kind", ["rectangle", "half", "ramp"])
+@pytest.mark.parametrize(("accuracy", "tolerance"), [("draft", 0.02), ("standard", 0.005)])
+def test_layers_out_of_focus_before_bars(kind, accuracy, tolerance, tmp_path):
+    """Both out of focus: periodic backgrounds once fooled rings of points that agreed."""
+    n = 16
+    mask = {
+        "rectangle": np.ones((n, n)),
+        "half": np.full((n, n), 0.5),
+        "ramp": np.broadcast_to((np.arange(n) + 0.5) / n, (n, n)),
+    }[kind].astype(np.float32)
+    bars = np.broadcast_to(np.arange(64) // 4 % 2, (64, 64)).astype(np.float32)
+    scene = Scene(
+        (
+            Flat(0.45, np.full((n, n), 0.2, np.float32), mask, 0.012),
+            Flat(0.7, bars, np.ones((64, 64), np.float32), None),
+        ),
+        1.0,
+    )
+    given = {"scene.radiance": radiance_for(5000), "effects": RAYS_ALONE, "accuracy": accuracy}
+    frame = simulate(camera(tmp_path, given | changes(scene, tmp_path))).frame
+    found = frame.mean_electrons / (frame.white_rate[0] * frame.exposure_time)
+    truth = ray_sum(scene, 2500, 6)
+    error = np.sqrt(np.mean(np.square(found - truth))) / truth.max()
+    assert error <= min(frame.spectrum.depth.error + 5e-4, tolerance)
+
+
+def test_a_tighter_accuracy_is_never_worse(tmp_path):
+    scene = random_scene(np.random.default_rng(4), 3)
+    truth = ray_sum(scene, 3000, 4)
+    given = {"scene.radiance": radiance_for(5000), "effects": RAYS_ALONE}
+    made, errors = camera(tmp_path, given | changes(scene, tmp_path)), []
+    for tolerance in (0.02, 0.005, 0.002):
+        frame = simulate(made.with_({"accuracy": tolerance})).frame
+        found = frame.mean_electrons / (frame.white_rate[0] * frame.exposure_time)
+        errors.append(np.sqrt(np.mean(np.square(found - truth))) / truth.max())
+        assert errors[-1] <= tolerance
+    for tight, loose in zip(errors[1:], errors, strict=False):
+        assert tight <= loose + 3e-4  # which the truth errs
+
+
+def mesh_before_mesh(period: float, front: float, back: float) -> Scene:
+    """Stripes of a period and with blurs of these radii [pixels], and the same behind them."""
+    samples, pixels = 1360, 136
+    place = (np.arange(samples) + 0.5) * pixels / samples
+    stripes = np.broadcast_to(np.floor(place / (period / 2)) % 2, (samples, samples))
+    stripes, none = stripes.astype(np.float32), np.zeros((samples, samples), np.float32)
+
+    def layer(radius: float, light: np.ndarray, opacity: np.ndarray) -> Flat:
+        distance = 1 / (1 + radius / 1.25)
+        return Flat(distance, light, opacity, pixels * PITCH * distance * (1 / FOCAL - 1))
+
+    return Scene((layer(front, none, stripes), layer(back, stripes, none + 1)), 1.0)
+
+
+def stripes_by_rays(scene: Scene, pixels: int = 4) -> np.ndarray:
+    """Light over a period of stripes, whose mean over the aperture is a sum along x alone.
+
+    The part of the aperture at u is as high as a chord; 400 points are taken within each pixel.
+    """
+    angle = ((np.arange(8001) + 0.5) / 8001 - 0.5) * np.pi
+    u, weight = np.sin(angle), np.cos(angle) ** 2 / np.square(np.cos(angle)).sum()
+    x = ((np.arange(pixels * 400) + 0.5) / 400 * PITCH)[:, None]
+
+    def met(layer: Flat, line: np.ndarray) -> np.ndarray:
+        width, at = scene.size(layer)[0], x + scene.blur_radius(layer) * u
+        return line[np.floor(at / width * len(line) + len(line) / 2).astype(int)]
+
+    front, back = scene.layers
+    light = (1 - met(front, front.opacity[0])) * met(back, back.light[0])
+    return (light @ weight).reshape(pixels, 400).mean(axis=1)
+
+
+@pytest.mark.parametrize(
+    ("front", "back"), [(14, 12), pytest.param(20, 19, marks=pytest.mark.long)]
+)
+def test_detail_that_blur_hides_is_not_missed(front, back, tmp_path):
+    """Much finer than the blur, and hidden by the same: in their means there is nothing of it.
+
+    The product of the means is 0.25; what stripes of one period hide of each other is more.
+    """
+    scene = mesh_before_mesh(4, front, back)
+    given = {"scene.radiance": radiance_for(5000), "effects": RAYS_ALONE, "accuracy": "standard"}
+    frame = simulate(camera(tmp_path, given | changes(scene, tmp_path))).frame
+    found = frame.mean_electrons / (frame.white_rate[0] * frame.exposure_time)
+    truth = np.tile(stripes_by_rays(scene), 8)
+    assert truth.max() < 0.24
+    error = np.sqrt(np.mean(np.square(found - truth))) / truth.max()
+    assert error <= min(frame.spectrum.depth.error, 0.005)
+
+
+def test_dim_layers_err_as_bright_ones(tmp_path):
+    """Relative to their own full signal: opacity does not count as if white lay behind it."""
+    scene = random_scene(np.random.default_rng(11), 3)
+    dim = replace(scene, layers=tuple(replace(x, light=x.light * 0.02) for x in scene.layers))
+    given = {"scene.radiance": radiance_for(5000), "effects": QUIET, "accuracy": "standard"}
+    found = []
+    for made in (scene, dim):
+        frame = simulate(camera(tmp_path, given | changes(made, tmp_path))).frame
+        found.append((frame.mean_electrons, frame.spectrum.depth.error))
+    np.testing.assert_allclose(found[1][0], 0.02 * found[0][0], rtol=2e-4, atol=1e-3)
+    assert found[1][1] == pytest.approx(found[0][1], rel=0.01)
+
+
+def test_layers_in_a_corner_and_nothing_behind(tmp_path):
+    """Light that diffraction throws far makes an edge where a tile sees no layer."""
+    white = write_exr(tmp_path / "white.exr", np.ones((8, 8), np.float32))
+    layers = []
+    for distance in (0.5, 0.6):
+        pixel = PITCH * distance * (1 / FOCAL - 1)
+        layers.append(
+            {
+                "source": {"kind": "image", "file": white},
+                "distance": f"{distance} m",
+                "width": f"{20 * pixel} m",
+                "position": [f"{-90 * pixel} m", f"{-90 * pixel} m"],
+            }
+        )
+    given = {
+        "scene.source": {"kind": "layers", "layers": layers},
+        "scene.radiance": radiance_for(5000),
+        "effects": QUIET,
+        "accuracy": "reference",
+        "array.rows": 200,
+        "array.columns": 200,
+        "optics": {"f_number": 8, "focal_length": "5 mm", "focus_distance": "1 m"},
+    }
+    frame = simulate(camera(tmp_path, given)).frame
+    assert frame.mean_electrons[10, 10] > 100 * frame.mean_electrons[-10, -10]
+    assert frame.spectrum.depth.rays > 0
+
+
+def wedge_before_star(speed: float) -> list[dict]:
+    """A step wedge that moves, before a star chart."""
+    wedge = {
+        "source": {"kind": "chart", "chart": "step-wedge"},
+        "distance": "0.6 m",
+        "width": "60 mm",
+    }
+    if speed:
+        wedge["motion"] = {"x": f"{speed} m/s"}
+    star = {"source": {"kind": "chart", "chart": "siemens-star"}, "distance": "2 m"}
+    return [wedge, star]
+
+
+@pytest.mark.parametrize("exposure", [{"exposure.time": "100 ms"}, {"exposure": {"auto": {}}}])
+def test_a_layer_may_move_far(exposure, tmp_path):
+    """Beyond the frame, while it is exposed."""
+    source = {"kind": "layers", "layers": wedge_before_star(0.5)}
+    made = camera(
+        tmp_path, {"scene.source": source, "effects": QUIET, "accuracy": "standard", **exposure}
+    )
+    frame = simulate(made).frame
+    assert np.isfinite(frame.mean_electrons).all()
+    assert frame.spectrum.depth.error <= 1.05 * made.accuracy.tolerance
+
+
+def test_what_moving_layers_hide_is_the_mean_over_instants(tmp_path):
+    """Against still frames of the layers at places along their paths."""
+    scene = random_scene(np.random.default_rng(3), 2, sharp=False)
+    given = {"scene.radiance": radiance_for(5000), "effects": QUIET, "accuracy": "0.2 %"}
+    given |= {"exposure.time": "20 ms"} | changes(scene, tmp_path)
+    near, speed = given["scene.source"]["layers"][0], 0.05
+    place = [float(length.split()[0]) for length in near["position"]]
+    near["motion"] = {"x": f"{speed} m/s"}
+    moved = simulate(camera(tmp_path, given)).frame
+    del near["motion"]
+    total, instants = 0.0, 24
+    for share in (np.arange(instants) + 0.5) / instants - 0.5:
+        near["position"] = [f"{place[0] + share * speed * 0.02} m", f"{place[1]} m"]
+        total = total + simulate(camera(tmp_path, given)).frame.mean_electrons / instants
+    error = np.sqrt(np.mean(np.square(moved.mean_electrons - total))) / total.max()
+    assert error <= 0.002

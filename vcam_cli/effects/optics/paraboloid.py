@@ -1,0 +1,48 @@
+"""The blur of slopes of depth: a paraboloid, as wide as the disc to which a point blurs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vcam_cli.effects.base import RadialTransfer
+from vcam_cli.physics.aberration import paraboloid_transfer
+
+
+@dataclass(frozen=True)
+class Paraboloid(RadialTransfer):
+    """What slopes of depth add to a disc, by the transfer of its gradient's potential.
+
+    No camera has it as such: image formation puts it in place of a layer's defocus.
+    """
+
+    radius: float
+    """Of the disc [m]."""
+
+    name = "depth"
+    reference = "Hopkins, Proc. R. Soc. A 231, 91, 1955, its limit by rays"
+    absent = "the scene has no depth"
+    origin = "lens"
+
+    @classmethod
+    def from_camera(cls, camera, geometry):
+        """Return None: cameras have it by their scene alone."""
+        return None
+
+    def describe(self) -> str:
+        """Return a short clause with its numbers and units."""
+        return f"radius {self.radius * 1e6:.3g} um"
+
+    @property
+    def reach(self) -> float:
+        """How far from its place the blur throws light [m]."""
+        return self.radius
+
+    def cutoff(self, wavelength):
+        """Return the frequency from which the transfer is zero, or inf [cycles/m]."""
+        return np.inf
+
+    def otf(self, frequency, wavelength):
+        """Return the transfer at `frequency` [cycles/m] and `wavelength` [m]."""
+        return paraboloid_transfer(frequency, self.radius)

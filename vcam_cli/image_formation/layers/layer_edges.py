@@ -1,0 +1,96 @@
+"""How much of the light behind a layer some rays of a pixel alone may see: a bound.
+
+Of a pixel's rays that meet opacities from m to M, A in the mean, no more can be missing from the
+product of means than (M - m) A' (1 - A') of the brightest light behind, A' = (A - m) / (M - m):
+there each ray meets either m or M, and sees nothing or all of that light.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcam_cli.camera.derived.geometry import Geometry, pixel_centers
+from vcam_cli.effects.base import ImageMotion, of_kind
+from vcam_cli.effects.temporal.motion import EvenMotion
+from vcam_cli.image_formation.layers.ray_cells import BORDER, Window
+from vcam_cli.image_formation.optical_path import LayerOptics
+from vcam_cli.scenes.layered import LayerChart
+
+EVEN = 1e-5
+"""Variance within a pixel below which opacity is even there: twice the rounding of its square."""
+
+
+def ray_reach(optics: LayerOptics) -> tuple[float, float]:
+    """Return how far rays meet a layer from where they reach the sensor, along x and y [m]."""
+    travel = sum((motion.travel for motion in of_kind(optics.effects, ImageMotion)), 0.0)
+    return abs(optics.radius) + travel, abs(optics.radius) + travel
+
+
+def even_motion(optics: LayerOptics) -> EvenMotion | None:
+    """Return the motion of a layer along a straight line; None where it is still."""
+    found = of_kind(optics.effects, EvenMotion)
+    return found[0] if found else None
+
+
+def moves_otherwise(optics: LayerOptics) -> bool:
+    """Return whether a layer moves along a path that rays do not follow."""
+    return bool(of_kind(optics.effects, ImageMotion)) and even_motion(optics) is None
+
+
+def partly_hidden(
+    g: Geometry, chart: LayerChart, optics: LayerOptics, window: Window, mean: NDArray
+) -> NDArray:
+    """Return the part of the light behind a layer that may be missing from the product of means.
+
+    Parameters
+    ----------
+    g : Geometry
+        Geometry of the array.
+    chart : LayerChart
+        The layer.
+    optics : LayerOptics
+        What acts on its light.
+    window : Window
+        Pixels that the layer's light reaches.
+    mean : NDArray
+        The layer's opacity behind the lens (C, rows, columns) there.
+
+    Returns
+    -------
+    NDArray
+        Bound (rows, columns), 0 where all rays see the same.
+    """
+    low, high = _opacity_range(g, chart, optics, window)
+    spread = high - low
+    varied = spread > EVEN
+    share = np.clip((mean - low) / np.where(varied, spread, 1), 0, 1)
+    return np.where(varied, spread * (share * (1 - share)).max(axis=0), 0)
+
+
+def _opacity_range(
+    g: Geometry, chart: LayerChart, optics: LayerOptics, window: Window
+) -> tuple[NDArray, NDArray]:
+    """Return the least and the largest opacity (rows, columns) that rays of each pixel meet."""
+    from scipy.ndimage import maximum_filter, minimum_filter
+
+    cover, center = chart.cover, chart.center
+    far, centers = ray_reach(optics), pixel_centers(g, detector=True)
+    edges, around = [], []
+    for at, pitch, cells, reach in zip(
+        centers, (g.pitch_x, g.pitch_y), (window.columns, window.rows), far, strict=True
+    ):
+        beyond = math.ceil(reach / pitch) + BORDER
+        first = at[0] + (cells.start - beyond - 0.5) * pitch
+        edges.append(first + np.arange(cells.stop - cells.start + 2 * beyond + 1) * pitch)
+        around.append(beyond)
+    one = np.ones((1, 1), cover.picture.dtype)
+    x, y = edges[0] - center[0], edges[1] - center[1]
+    mean, square = (chart.averages(x, y, one)[0] for chart in (cover, cover.squared))
+    uneven = square - np.square(mean) > EVEN
+    inner = tuple(slice(n, -n) for n in around[::-1])
+    size = tuple(2 * n + 1 for n in around[::-1])
+    high = maximum_filter(np.where(uneven, cover.picture.max(), mean), size)[inner]
+    return minimum_filter(np.where(uneven, 0, mean), size)[inner], high

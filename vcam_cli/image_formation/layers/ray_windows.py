@@ -1,0 +1,233 @@
+"""Where layers hide something from some rays alone, and how finely that is summed there.
+
+All rays of a pixel see the same unless the opacity of a nearer layer changes within what they meet
+of it: elsewhere nothing is missing from the product of means, exactly. Around these edges the
+array is divided into windows. What edges of an opacity from m to M hide of light up to B is at most
+
+    (M - m) A (1 - A) B,        A = (mean opacity - m) / (M - m),
+
+so windows where the squares of that add up to little are left out, and the bound is stated.
+
+In all others the covariance is summed over rays (`occlusion.py`), by two sets that share neither
+radii nor angles nor cells. The finer of the two is taken, and their difference is its error. Where
+that is too much a still finer set of the other kind follows, window by window, until all errors
+together are within what is allowed.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcam_cli.image_formation.layers.occlusion import (
+    Compose,
+    RayLayer,
+    covariance,
+    front_to_back,
+    rays,
+)
+from vcam_cli.image_formation.layers.ray_cells import BORDER, Cells, SharpImage, Window
+from vcam_cli.image_formation.optical_path import OpticalPath
+from vcam_cli.parallel import results
+
+LEVELS = (
+    (1, 24), (2, 40), (3, 64), (4, 108), (6, 180), (8, 300), (11, 500), (15, 840), (20, 1400),
+    (27, 2300), (36, 3900),
+)  # fmt: skip
+"""Cells along a pixel's side, and rays, from coarse to fine. Errors by cells and by rays fall about
+alike; each level errs half as much as the one before and costs three to four times as much."""
+MOST_VALUES = 1 << 33
+"""Values that rays look up in a window, at most."""
+SIDE, LONGEST = 16, 16
+"""Side of a tile [pixels], and tiles along either side of a window, at most."""
+GROWTH = 4
+"""Values that a level takes over those of all before it, about."""
+LEFT_OUT = 0.3
+"""Part of what is allowed that windows left out may have, by their bound."""
+
+
+Paint = Callable[[Cells], Sequence[RayLayer]]
+"""What gives the layers that are seen on cells, the nearest first; none where all rays see the
+same."""
+
+
+@dataclass(frozen=True)
+class Hidden:
+    """What is known of the covariance that was added."""
+
+    cells: int = 0
+    """Cells along a pixel's side where they are finest; 0 where none was added."""
+    rays: int = 0
+    """Rays where they are most."""
+    error: float = 0.0
+    """Difference of two sums that share no structure, rms over the array [e/s]."""
+    left_out: float = 0.0
+    """Bound on the rms of what was left out [e/s]."""
+    values: int = 0
+    """Values that were looked up."""
+
+
+@dataclass(eq=False)
+class _Sum:
+    """The covariance in a window."""
+
+    window: Window
+    level: int
+    light: NDArray
+    """(C, rows, columns) [e/s]"""
+    error: float = 0.0
+    """Sum of the squares of its difference from the sum before [(e/s)^2]."""
+    values: int = 0
+
+
+@dataclass(frozen=True)
+class RaySum:
+    """The covariance of layers in windows of an array."""
+
+    path: OpticalPath
+    furthest: tuple[float, float]
+    """How far a ray meets a layer from where it reaches the sensor, along x and y [m]."""
+    paint: Paint
+    compose: Compose = front_to_back
+    sharp: SharpImage = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "sharp", SharpImage(self.path))
+
+    def add(self, light: NDArray, windows: Sequence[Window], allowed: float) -> Hidden:
+        """Add the covariance in windows to the light of pixels.
+
+        Parameters
+        ----------
+        light : NDArray
+            Light (C, rows, columns) that is changed [e/s].
+        windows : sequence of Window
+            Windows that do not overlap.
+        allowed : float
+            Error to be reached, rms over the array [e/s].
+
+        Returns
+        -------
+        Hidden
+            How finely it was summed, and its error.
+        """
+        g = self.path.geometry
+        budget = allowed**2 * g.rows * g.columns
+        sums = results(self._begun, windows, self.path.workers)
+        while coarse := _too_coarse(sums, budget):
+            fine = results(self._refined, coarse, self.path.workers)
+            sums = [one for one in sums if one not in coarse] + fine
+        for one in sums:
+            light[:, one.window.rows, one.window.columns] += one.light
+        np.maximum(light, 0, out=light)
+        used = [one for one in sums if one.light.any()]
+        if not used:
+            return Hidden()
+        finest = max(one.level for one in used)
+        error = math.sqrt(sum(one.error for one in sums) / (g.rows * g.columns))
+        return Hidden(*LEVELS[finest], error, 0.0, sum(one.values for one in sums))
+
+    def _begun(self, window: Window) -> _Sum:
+        """Return the sum of the second level, whose cells are halves of the first one's."""
+        cells = self._cells(window, 1)
+        layers = self.paint(cells)
+        if all(layer.planes[-1].min() == layer.planes[-1].max() for layer in layers[:-1]):
+            colors = len(self.path.mosaic.colors)
+            return _Sum(window, 1, np.zeros((colors, *window.pixels), self.path.settings.dtype))
+        halves = LEVELS[1][0] // LEVELS[0][0]
+        coarse = self._summed(0, cells.together(halves), [own.together(halves) for own in layers])
+        return self._compared(self._summed(1, cells, layers), coarse)
+
+    def _refined(self, coarse: _Sum) -> _Sum:
+        level = coarse.level + 1
+        cells = self._cells(coarse.window, level)
+        return self._compared(self._summed(level, cells, self.paint(cells)), coarse)
+
+    def _compared(self, fine: _Sum, coarse: _Sum) -> _Sum:
+        squares = np.square(fine.light - coarse.light, dtype=float).sum(axis=(1, 2))
+        return replace(fine, error=float(squares.max()), values=fine.values + coarse.values)
+
+    def _cells(self, window: Window, level: int) -> Cells:
+        per_pixel, g = LEVELS[level][0], self.path.geometry
+        border = 0 if self.sharp.is_local else BORDER * per_pixel
+        down, right = (
+            2 * math.ceil((far / pitch * per_pixel + 2) / 2 + 1)
+            for far, pitch in zip(self.furthest[::-1], (g.pitch_y, g.pitch_x), strict=True)
+        )
+        single = self.path.settings.dtype == np.float32
+        return Cells(g, window, per_pixel, border, (down, right), single)
+
+    def _summed(self, level: int, cells: Cells, layers: Sequence[RayLayer]) -> _Sum:
+        count, dtype = LEVELS[level][1], self.path.settings.dtype
+        seen = partial(self.sharp.at_pixels, cells)
+        light = covariance(layers, rays(count, level % 2), cells.reach, seen, self.compose)
+        values = count * len(layers) * len(layers[0].planes) * math.prod(cells.inner)
+        return _Sum(cells.window, level, light.astype(dtype), values=values)
+
+
+def _too_coarse(sums: Sequence[_Sum], budget: float) -> list[_Sum]:
+    """Return the windows that err too much for all errors together to be within a budget."""
+    if sum(one.error for one in sums) <= budget:
+        return []
+    left, found = budget / 2, []
+    for one in sorted(sums, key=lambda each: each.error):
+        left -= one.error
+        if left < 0 and one.level + 1 < len(LEVELS) and GROWTH * one.values <= MOST_VALUES:
+            found.append(one)
+    return found
+
+
+def windows_with(bound: NDArray, allowed: float) -> tuple[list[Window], float]:
+    """Return the windows of an array in which there may be too much to leave it out.
+
+    Parameters
+    ----------
+    bound : NDArray
+        What there is in each pixel at most (rows, columns), in any unit.
+    allowed : float
+        What may be left out, rms over the array, in the same unit.
+
+    Returns
+    -------
+    windows : list of Window
+        The windows.
+    left_out : float
+        Bound on what is left out, rms over the array, in the same unit.
+    """
+    rows, columns = bound.shape
+    tops, lefts = np.arange(0, rows, SIDE), np.arange(0, columns, SIDE)
+    squares = np.add.reduceat(np.square(bound, dtype=float), tops, axis=0)
+    squares = np.add.reduceat(squares, lefts, axis=1)
+    order = np.argsort(squares, axis=None)
+    sums = np.cumsum(squares.ravel()[order])
+    out = order[sums <= allowed**2 * bound.size]
+    kept = np.ones(squares.shape, bool)
+    kept.ravel()[out] = False
+    left_out = math.sqrt(float(squares.ravel()[out].sum()) / bound.size)
+    windows = [
+        Window(
+            slice(top * SIDE, min(bottom * SIDE, rows)),
+            slice(left * SIDE, min(right * SIDE, columns)),
+        )
+        for top, bottom, left, right in _rectangles(kept)
+    ]
+    return windows, left_out
+
+
+def _rectangles(kept: NDArray) -> Iterator[tuple[int, int, int, int]]:
+    """Yield rectangles (top, bottom, left, right) that together are all that is kept."""
+    kept = kept.copy()
+    while kept.any():
+        top, left = (int(at[0]) for at in np.nonzero(kept))
+        bottom, right = top, left
+        while right < min(left + LONGEST, kept.shape[1]) and kept[top, right]:
+            right += 1
+        while bottom < min(top + LONGEST, len(kept)) and kept[bottom, left:right].all():
+            bottom += 1
+        kept[top:bottom, left:right] = False
+        yield top, bottom, left, right
