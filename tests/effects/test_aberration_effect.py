@@ -230,23 +230,6 @@ def test_weights_follow_polynomials_and_waves(count, angle, distance):
     assert found == pytest.approx(expected, abs=1e-9)
 
 
-@pytest.mark.parametrize("terms", [((8, 1e-7),), ((7, 4e-8), (8, 1e-7)), ((6, 1e-7), (9, 5e-8))])
-def test_a_blur_is_its_model_mirrored_and_turned(terms):
-    for sector in range(16):
-        blur = DirectedBlur(WAVES, terms, 2 * math.pi * sector / 16)
-        model, quarters, mirrored = blur.model
-        assert 0 <= model.angle < math.pi / 2
-        expected = blur.otf_plane(F, F, GREEN)
-        found = model.otf_plane(F, F, GREEN)
-        if mirrored:
-            assert 7 not in dict(terms)
-            assert 9 not in dict(terms)
-            found = found[::-1]
-        for _ in range(quarters):
-            found = found[::-1].T  # at (fx, fy) what was at (fy, -fx)
-        np.testing.assert_allclose(found, expected, atol=2e-6)  # a grid in 32 bits
-
-
 # --- point spread functions ----------------------------------------------------------------------
 
 

@@ -18,7 +18,6 @@ from vcam_cli.effects.optics.diffraction import Diffraction
 from vcam_cli.errors import CannotDo
 from vcam_cli.image_formation import strategies
 from vcam_cli.image_formation.estimates import memory_model
-from vcam_cli.image_formation.estimates.bandwidth import table_size
 from vcam_cli.image_formation.settings import STANDARD, camera_settings
 from vcam_cli.image_formation.transfer_tables import TableSize
 from vcam_cli.scenes.charts.siemens_star import SiemensStar
@@ -208,11 +207,10 @@ def test_an_image_needs_more_for_planes_cells_and_directions():
     g = sensor(1000, 1500, (0.5, 0.5))
     lens = Diffraction(4.0, 0.0), aperture(g)
     optical_path = path(g, *lens)
-    size = table_size(optical_path, 2.0)
     scene = on_chart(optical_path, SiemensStar(9, 1.0), margin=20)
 
     def needed(optical_path=optical_path, scene=scene, planes=1):
-        return memory_model.image_bytes(optical_path, scene, 2.0, planes, size)
+        return memory_model.image_bytes(optical_path, scene, 2.0, planes)
 
     least = needed()
     shape = 2 * scene.shape[0], 2 * scene.shape[1]
@@ -226,21 +224,19 @@ def test_an_image_needs_more_for_planes_cells_and_directions():
 def test_tables_of_strong_blurs_are_as_large_as_they_get():
     """Their entries end somewhere, however far a blur throws light."""
     g = sensor(100, 150)
-    scene = on_chart(path(g), SiemensStar(9, 1.0), margin=20)
     size = TableSize(5e5, 2049, 1e-3, 8)
     strong, absurd = (
         path(g, Diffraction(2.0, 0.0), Leaning(reach, 0, 1e-6, 1e-6)) for reach in (1e-3, 1.0)
     )
-    needed = [memory_model.image_bytes(p, scene, 2.0, 1, size) for p in (strong, absurd)]
-    assert needed[0] == needed[1] < 2e9
+    needed = [memory_model.table_bytes(p, 1, size) for p in (strong, absurd)]
+    assert 0 < needed[0] == needed[1] < 2e9
 
 
 def test_the_estimate_of_a_picture_counts_its_samples():
     g = sensor(100, 150)
     optical_path = path(g, Diffraction(2.0, 0.0))
-    size = table_size(optical_path, 2.0)
     few, many = (
-        memory_model.image_bytes(optical_path, of_picture([[0.5] * n] * n, 1e-6), 2.0, 1, size)
+        memory_model.image_bytes(optical_path, of_picture([[0.5] * n] * n, 1e-6), 2.0, 1)
         for n in (400, 800)
     )
     assert many - few >= (800**2 - 400**2) * 4

@@ -15,7 +15,7 @@ F = np.linspace(0, 500e3, 41)
 def tables_of(exact, entries, tolerance):
     """Tables of as few mixtures of the spectra as the tolerance allows."""
     size = TableSize(exact.cutoff, entries, tolerance, 8)
-    return tabulate(exact, size, mixtures([exact], size))
+    return tabulate(exact, size, mixtures(exact, size))
 
 
 def bell(center, width=40e-9):

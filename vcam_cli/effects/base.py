@@ -234,6 +234,17 @@ class Blur(Effect):
         """
         return np.full(len(wavelengths), np.inf)
 
+    def largest(self, frequency: NDArray, wavelength: float) -> NDArray:
+        """Return a bound (n,) on the contrast of waves in any direction; 1 where none is known."""
+        return np.ones(frequency.shape)
+
+    def kept_bytes(self, wavelengths: NDArray, by_harmonics: bool = False) -> int:
+        """Return the memory that its transfer takes at wavelengths (J,) [m] beside tables.
+
+        It may be asked for on planes, or only for its harmonics of the direction.
+        """
+        return 0
+
     def otf_along(
         self, frequency: NDArray, across: tuple[float, float], wavelength: float
     ) -> NDArray | None:
@@ -259,15 +270,6 @@ class Blur(Effect):
         """Return the contrast (n,) that it leaves of waves along a row."""
         return np.abs(self.otf_plane(frequency, np.zeros(1), wavelength)[0])
 
-    @property
-    def model(self) -> tuple[Blur, int, bool]:
-        """A blur that this one is made of, so that what many have in common is computed once.
-
-        With it come the quarter turns from x to y by which it is turned, and whether y is mirrored
-        before.
-        """
-        return self, 0, False
-
 
 class RadialTransfer(Blur):
     """A transfer function that depends on the length of the spatial frequency only."""
@@ -289,6 +291,10 @@ class RadialTransfer(Blur):
     def spread(self, wavelengths: NDArray) -> NDArray:
         """Return a bound (J,) on |1 - H(f)| / (2 pi |f|) at wavelengths (J,) [m]."""
         return np.array(_radial_spread(self, tuple(wavelengths.tolist())))
+
+    def largest(self, frequency: NDArray, wavelength: float) -> NDArray:
+        """Return the contrast (n,), which is that of all directions."""
+        return np.abs(self.otf(frequency, wavelength))
 
     def otf_along(
         self, frequency: NDArray, across: tuple[float, float], wavelength: float
@@ -316,6 +322,14 @@ class PlaneTransfer(Blur):
     integral h(x, y) exp(-2 pi i (fx x + fy y)) dx dy, x to the right and y down.
     """
 
+    def harmonics(self, frequency: NDArray, wavelengths: NDArray) -> NDArray:
+        """Return the transfer as harmonics of the direction, complex A_m (J, n, m).
+
+        Frequencies (n,) lie evenly from 0 [cycles/m], for wavelengths (J,) [m]; `pupil_harmonics`
+        says what they are. Those of a `FieldTransfer` have them, which are turned with the azimuth.
+        """
+        raise TypeError(f"{type(self).__name__} has no harmonics of the direction")
+
 
 @dataclass(frozen=True)
 class Zone:
@@ -329,16 +343,21 @@ class Zone:
 class FieldTransfer(Effect):
     """A transfer function that changes slowly over the field: a sum of few, weighted by place.
 
-    A camera has at most one of the kind.
+    The lens is symmetric about its axis: what it does on the half-axis from the center to the right
+    it does elsewhere turned with the azimuth. A camera has at most one of the kind.
     """
 
     @abstractmethod
-    def zones(self, count: int) -> tuple[Zone, ...]:
-        """Return blurs whose weights sum to 1 in every place.
+    def rings(self, count: int) -> tuple[Zone, ...]:
+        """Return blurs on that half-axis, whose weights sum to 1 in every place.
 
         `count` is the number of places from center to corner; there are more where that is known
-        not to be enough.
+        not to be enough. All are `RadialTransfer`, or all are `PlaneTransfer`.
         """
+
+    def zones(self, count: int) -> tuple[Zone, ...]:
+        """Return blurs that are turned already, whose weights sum to 1 in every place."""
+        return self.rings(count)
 
     @property
     def is_uniform(self) -> bool:

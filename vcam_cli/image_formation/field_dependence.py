@@ -1,18 +1,24 @@
 """Blur that changes over the field: few tables, and how much of each there is in every place.
 
-A lens's blur is known at some places, its zones, and is a weighted mean of theirs in between.
-Filtering the picture once for each of dozens of zones would cost dozens of times one filter; but
-zones are much alike. The mean of all of them and a few singular vectors of what is left stand for
-them within a known error (as eigen-images of point spread functions do: Lauer, Proc. SPIE 4847,
-2002), and each is one filter whose result is weighted by a smooth map.
+A lens's blur is known at some places from center to corner, its rings, and is a weighted mean of
+theirs in between. Filtering the picture once for each place would cost dozens of times one filter;
+but a lens that is symmetric about its axis only turns with the azimuth. By harmonics of the
+direction of the frequency that is a factor: cos m(theta - phi) = cos m theta cos m phi + sin m
+theta sin m phi. So the mean of all places, and of each harmonic a few singular vectors over the
+rings, stand for the field within a known error (as eigen-images of point spread functions do:
+Lauer, Proc. SPIE 4847, 2002). Each is one table over |f| and one filter, whose result is weighted
+by a smooth map.
+
+Modes are found at few frequencies, since transfer functions are smooth; those that a picture needs
+are resampled.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,22 +30,18 @@ from vcam_cli.image_formation.optical_path import Layer
 from vcam_cli.image_formation.scene_spectrum import SceneSpectrum
 from vcam_cli.image_formation.transfer_functions import Transfer
 from vcam_cli.image_formation.transfer_tables import (
-    LARGEST_OF_FIELD,
-    PARITIES,
+    LARGEST_PLANE,
     Mixing,
     Tables,
     TableSize,
     mixtures,
-    plane_grid,
     radial_table,
-    turn_table,
 )
 
 PLACES = 97
 """Points of a map along each side of the sensor; between them it is straight."""
-SMALL = 0.1
-"""Part of the tolerance below which a parity of the mean transfer is left out: of zones all around
-the axis only rounding is there."""
+JUDGED_HERE = 33
+"""Frequencies at which mixtures of spectra are judged in some rings."""
 
 
 @dataclass(frozen=True)
@@ -63,6 +65,12 @@ class Map:
         return _linear(rows.T, along_x).T
 
     @property
+    def azimuth(self) -> NDArray:
+        """The azimuth of its places, from x towards y [rad]."""
+        at = np.linspace(-1, 1, PLACES)
+        return np.arctan2(at[:, None] * self.half_height, at * self.half_width)
+
+    @property
     def mean_square(self) -> float:
         """Mean square over the sensor."""
         return float(np.mean(self.values**2))
@@ -84,15 +92,15 @@ class Mode:
     map: Map
 
 
-def field_mixtures(uniform_transfer: Transfer, zones: Sequence[Zone], size: TableSize) -> Mixing:
-    """Return the fewest mixtures of the components that serve all zones.
+def field_mixtures(uniform_transfer: Transfer, rings: Sequence[Zone], size: TableSize) -> Mixing:
+    """Return the fewest mixtures of the components that serve the whole field.
 
     Parameters
     ----------
     uniform_transfer : Transfer
-        Transfer without the blur that has zones.
-    zones : sequence of Zone
-        Zones of the blur.
+        Transfer without the blur that changes over the field.
+    rings : sequence of Zone
+        That blur on the half-axis to the right.
     size : TableSize
         Size of the tables.
 
@@ -101,30 +109,51 @@ def field_mixtures(uniform_transfer: Transfer, zones: Sequence[Zone], size: Tabl
     Mixing
         Mixtures, and the error that they leave.
     """
-    return mixtures(_zone_transfers(uniform_transfer, zones)[:: max(1, len(zones) // 6)], size)
+
+    def changes() -> list[NDArray]:
+        frequency = np.linspace(0, size.top, JUDGED_HERE)
+        count = len(uniform_transfer.weights)
+        some = rings[:: max(1, len(rings) // 4)]
+        found = [_change(uniform_transfer, ring.blur, frequency) for ring in some]
+        return [np.moveaxis(c, 1, 0).reshape(count, -1).view(np.float64) for c in found]
+
+    return mixtures(uniform_transfer, size, changes)
 
 
-def _zone_transfers(uniform_transfer: Transfer, zones: Sequence[Zone]) -> list[Transfer]:
-    return [
-        replace(uniform_transfer, effects=(*uniform_transfer.effects, zone.blur)) for zone in zones
-    ]
+def _change(uniform_transfer: Transfer, blur: Blur, frequency: NDArray) -> NDArray:
+    """Return what a blur adds to a transfer, by harmonics of the direction (m, K, C, n) [e/s].
+
+    They are complex, see `direction_harmonics`. What depends on the direction is small: it is
+    computed at every second wavelength.
+    """
+    directed = of_kind([blur], PlaneTransfer)
+    if not directed:
+        through = replace(uniform_transfer, effects=(*uniform_transfer.effects, blur))
+        change = through.radial_response(frequency) - uniform_transfer.radial_response(frequency)
+        return change[None].astype(np.complex128)
+    light = uniform_transfer.with_half_the_wavelengths()
+    change = np.moveaxis(directed[0].harmonics(frequency, light.wavelengths), -1, 1)
+    change = change * light.otf_radial(frequency)[:, None]
+    change[:, 0] -= light.otf_radial(frequency)
+    parts = np.stack([change.real, change.imag], axis=-1)
+    return np.moveaxis(light.spectral_sum(parts), 2, 0).copy().view(np.complex128)[..., 0]
 
 
 def tabulate_field(
     uniform_transfer: Transfer,
-    zones: Sequence[Zone],
+    rings: Sequence[Zone],
     geometry: Geometry,
     size: TableSize,
     mixing: Mixing,
 ) -> tuple[Tables, tuple[Mode, ...]]:
-    """Return the mean transfer function of all zones, and what differs from it by place.
+    """Return the mean transfer function of all places, and what differs from it by place.
 
     Parameters
     ----------
     uniform_transfer : Transfer
-        Transfer without the blur that has zones.
-    zones : sequence of Zone
-        Zones of the blur.
+        Transfer without the blur that changes over the field.
+    rings : sequence of Zone
+        That blur on the half-axis to the right.
     geometry : Geometry
         Geometry of the array.
     size : TableSize
@@ -146,106 +175,119 @@ def tabulate_field(
     mix, error = mixing
     uniform_transfer = uniform_transfer.with_mixtures(mix)
     base = radial_table(uniform_transfer, size)
-    blurs = [zone.blur for zone in zones]
-    directed = bool(of_kind(blurs, PlaneTransfer))
-    if directed:
-        stack = _stack_planes(uniform_transfer, blurs, size)
-    else:
-        each = [radial_table(t, size)[None] for t in _zone_transfers(uniform_transfer, zones)]
-        stack = Stack(each, [(i, 0, False) for i in range(len(each))])
+    frequency = np.linspace(0, size.top, ring_entries(rings, size))
+    changes = [_change(uniform_transfer, ring.blur, frequency) for ring in rings]
     level = np.abs(uniform_transfer.level).max() or 1.0
-    power = _expected_power(stack.tables[0].shape, directed) / uniform_transfer.weights.shape[1]
-    shares, left = _shares(stack, power, size.tolerance * level)
-    maps = zone_maps(zones, geometry)
-    weights = np.array([m.values for m in maps])
+    families, left = _families(changes, size.tolerance * level)
     error += left / level
+    maps = zone_maps(rings, geometry)
+    weights = np.array([m.values for m in maps])
+    azimuth = maps[0].azimuth
 
-    def tables(share: NDArray, parity: int) -> Tables:
-        mixed = stack.weighted_sum(parity, share - share.mean())
-        if not directed:
-            return Tables(mix, mixed, size.top, error)
-        planes = tuple(mixed if parity == p else None for p in range(len(PARITIES)))
-        return Tables(mix, None, size.top, error, planes)
+    def tables(family: Family, is_sine: bool, share: NDArray) -> Tables:
+        table = _resampled(family.table(changes, share), base.shape[-1])
+        sign = -1 if family.order % 2 or is_sine else 1  # of a wave, by `split_by_parity`
+        return Tables(mix, sign * table, size.top, error, order=family.order, is_sine=is_sine)
 
-    modes = tuple(
-        Mode(partial(tables, share, p), replace(maps[0], values=np.tensordot(share, weights, 1)))
-        for p, share in shares
-    )
-    even = np.full(len(zones), 1 / len(zones))
-    means = [stack.weighted_sum(p, even) for p in range(stack.parities)]
+    modes = []
+    for family, share in families:
+        around = np.tensordot(share, weights, 1)
+        modes += [
+            Mode(partial(tables, family, is_sine, share), replace(maps[0], values=around * turned))
+            for is_sine, turned in family.turned(azimuth)
+        ]
+    mean = _resampled(np.mean([change[0].real for change in changes], axis=0), base.shape[-1])
+    return Tables(mix, base + mean, size.top, error), tuple(modes)
+
+
+def ring_entries(rings: Sequence[Zone], size: TableSize) -> int:
+    """Return the entries over |f| at which the blurs of a field are computed.
+
+    Parameters
+    ----------
+    rings : sequence of Zone
+        The blurs on the half-axis to the right.
+    size : TableSize
+        Size of the tables.
+
+    Returns
+    -------
+    int
+        Entries from 0 to the end of the tables.
+    """
+    directed = of_kind([ring.blur for ring in rings], PlaneTransfer)
     if not directed:
-        return Tables(mix, means[0], size.top, error), modes
-    small = SMALL * size.tolerance * level
-    planes = (mean if _rms(mean, power) > small else None for mean in means)
-    return Tables(mix, base, size.top, error, tuple(planes)), modes
+        return size.entries
+    return min(2 * size.plane_entries(directed) - 1, LARGEST_PLANE, size.entries)
 
 
-@dataclass(frozen=True, eq=False)
-class Stack:
-    """Tables of all zones, made of those of fewer blurs when they are asked for."""
+@dataclass(frozen=True)
+class Family:
+    """The real or the imaginary parts of one harmonic of the direction, in all rings.
 
-    tables: list[NDArray]
-    """(parities, R, C, ...) each"""
-    zones: list[tuple[int, int, bool]]
-    """Of each zone: index into them, quarter turns, whether y is mirrored before."""
+    A lens turned by the azimuth phi has A exp(-i m phi) for A: each part has a cosine and a sine of
+    the direction, times one of the azimuth.
+    """
 
-    @property
-    def parities(self) -> int:
-        """Number of parities of the tables."""
-        return len(self.tables[0])
+    order: int
+    is_imaginary: bool
 
-    def rows(self, parity: int, at: tuple[int, ...]) -> NDArray:
-        """Return the tables of all zones of a component and color, (zones, ...), in 64 bits."""
-        found = [self._zone_table(zone, parity, (slice(None), *at)) for zone in self.zones]
-        return np.array(found, dtype=np.float64)
-
-    def weighted_sum(self, parity: int, shares: NDArray) -> NDArray:
-        """Return the sum of all zones' tables, each with its share: (R, C, ...)."""
-        total = np.zeros(self.tables[0].shape[1:])
-        for zone, share in zip(self.zones, shares, strict=True):
-            total += share * self._zone_table(zone, parity, slice(None))
+    def table(self, changes: Sequence[NDArray], share: NDArray) -> NDArray:
+        """Return the sum of all rings' tables, each with its share: (R, C, n) [e/s]."""
+        total: NDArray = np.zeros(changes[0].shape[1:])
+        for change, part in zip(changes, share, strict=True):
+            total += part * self.of_ring(change)
         return total
 
-    def _zone_table(self, zone: tuple[int, int, bool], parity: int, at: Any) -> NDArray:
-        model, quarters, mirrored = zone
-        return turn_table(self.tables[model][at], parity, quarters, mirrored)
+    def of_ring(self, change: NDArray) -> NDArray:
+        """Return the table (R, C, n) of a ring's harmonics (m, R, C, n) [e/s]."""
+        if self.order >= len(change):
+            return np.zeros(change.shape[1:])
+        harmonic = change[self.order]
+        return np.asarray(harmonic.imag if self.is_imaginary else harmonic.real)
+
+    def turned(self, azimuth: NDArray) -> list[tuple[bool, NDArray]]:
+        """Return whether the direction has a sine, and the factor by azimuth, of both parts."""
+        if not self.order:
+            return [(False, np.ones_like(azimuth))]
+        cosine, sine = np.cos(self.order * azimuth), np.sin(self.order * azimuth)
+        # Re(A exp(im(theta - phi))) of even orders, Im(A exp(im(theta - phi))) of odd ones.
+        if self.order % 2 == 0:
+            return (
+                [(False, sine), (True, -cosine)]
+                if self.is_imaginary
+                else [(False, cosine), (True, sine)]
+            )
+        return (
+            [(False, cosine), (True, sine)]
+            if self.is_imaginary
+            else [(False, -sine), (True, cosine)]
+        )
 
 
-def _stack_planes(uniform_transfer: Transfer, blurs: Sequence[Blur], size: TableSize) -> Stack:
-    """Return what the zones' blurs add to the transfer.
-
-    Those that are others turned are computed once.
-    """
-    directed = of_kind(blurs, PlaneTransfer)
-    grid = plane_grid(uniform_transfer, size.top, size.plane_entries(directed, LARGEST_OF_FIELD))
-    models = [blur.model for blur in blurs]
-    known = list(dict.fromkeys(blur for blur, _, _ in models))
-    return Stack(
-        [grid.change([blur]).astype(np.float32) for blur in known],
-        [(known.index(blur), quarters, mirrored) for blur, quarters, mirrored in models],
-    )
-
-
-def _shares(
-    stack: Stack, power: NDArray, allowed: float
-) -> tuple[list[tuple[int, NDArray]], float]:
+def _families(
+    changes: Sequence[NDArray], allowed: float
+) -> tuple[list[tuple[Family, NDArray]], float]:
     """Return the modes, strongest first, and the error of what is left.
 
-    A mode is its parity, and its share in each zone. The error of a zone is the rms of its tables',
+    A mode is its family, and its share in each ring. The error of a ring is the rms of its tables,
     each entry weighed by its expected power, in the mean over colors. Singular vectors come from
-    the zones' products with each other, of which there are few; by parity, so that a mode has only
-    one.
+    the rings' products with each other, of which there are few. Means over all azimuths are 0 but
+    of order 0, whose mean over the rings is no mode.
     """
-    found, left = [], np.zeros(len(stack.zones))
-    for parity in range(stack.parities):
-        products = np.zeros((len(left), len(left)))
-        for at in np.ndindex(stack.tables[0].shape[1:3]):
-            rows = stack.rows(parity, at)
-            rows = ((rows - rows.mean(axis=0)) * np.sqrt(power)).reshape(len(left), -1)
-            products += rows @ rows.T
-        left += np.diag(products)
-        strengths, vectors = np.linalg.eigh(products)
-        found += [(s, parity, v) for s, v in zip(strengths, vectors.T, strict=True)]
+    power = _expected_power(changes[0].shape[-1]) / changes[0].shape[2]
+    found, left = [], np.zeros(len(changes))
+    for order in range(max(len(change) for change in changes)):
+        for is_imaginary in (False, True) if order else (False,):
+            family = Family(order, is_imaginary)
+            rows = np.array([family.of_ring(change) for change in changes])
+            # the mean square of a cosine is 1/2
+            rows = rows / math.sqrt(2) if order else rows - rows.mean(axis=0)
+            rows = (rows * np.sqrt(power)).reshape(len(changes), -1)
+            products = rows @ rows.T
+            left += np.diag(products)
+            strengths, vectors = np.linalg.eigh(products)
+            found += [(s, family, v) for s, v in zip(strengths, vectors.T, strict=True)]
     found.sort(key=lambda mode: -mode[0])
     for count, (strength, _, share) in enumerate(found):
         error = float(np.sqrt(max(left.max(), 0.0)))
@@ -255,22 +297,31 @@ def _shares(
     return [mode[1:] for mode in found], 0.0
 
 
-def _rms(table: NDArray, power: NDArray) -> float:
-    """Return what a table adds to a picture, relative to the light that it is for."""
-    return float(np.sqrt((table**2 * power).sum()))
-
-
-def _expected_power(shape: tuple[int, ...], directed: bool) -> NDArray:
-    """Return how much of a picture's variance lies at each entry of a table.
+def _expected_power(count: int) -> NDArray:
+    """Return how much of a picture's variance lies at each of the entries over |f|.
 
     It is as much in each octave: its power falls with the square of the frequency (D. L. Ruderman,
     Network 5, 1994). The sum is 1.
     """
-    count = shape[-1]
-    at = np.arange(count)
-    length = np.hypot(at[None, :], at[:, None]) if directed else at
-    power = np.maximum(length, 1.0) ** (-2.0 if directed else -1.0)
+    power = 1 / np.maximum(np.arange(count), 1.0)
     return np.asarray(power / power.sum())
+
+
+def _resampled(table: NDArray, entries: int) -> NDArray:
+    """Return a table over |f| (..., n) at more entries, by cubics through four neighbors."""
+    count = table.shape[-1]
+    if count == entries:
+        return table
+    at = np.linspace(0, count - 1, entries)
+    first = np.clip(at.astype(int) - 1, 0, count - 4)
+    t = at - first - 1
+    weights = (
+        -t * (t - 1) * (t - 2) / 6,
+        (t + 1) * (t - 1) * (t - 2) / 2,
+        -t * (t + 1) * (t - 2) / 2,
+        t * (t + 1) * (t - 1) / 6,
+    )
+    return np.asarray(sum(w * table[..., first + k] for k, w in enumerate(weights)))
 
 
 def zone_maps(zones: Sequence[Zone], geometry: Geometry) -> list[Map]:

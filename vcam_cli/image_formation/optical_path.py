@@ -139,8 +139,13 @@ class OpticalPath:
         return found[0] if found else None
 
     @cached_property
+    def field_rings(self) -> tuple[Zone, ...]:
+        """Places of that blur on the half-axis to the right; none where there is none."""
+        return () if self.field is None else self.field.rings(self.settings.field_zones)
+
+    @cached_property
     def zones(self) -> tuple[Zone, ...]:
-        """The zones of that blur; none where there is none."""
+        """Its zones, turned with the azimuth; none where there is none."""
         return () if self.field is None else self.field.zones(self.settings.field_zones)
 
 

@@ -169,18 +169,21 @@ def _spectral_layers(
     cells of a chart that is painted.
     """
     path = with_sufficient_precision(path, scene)
-    exact, g, zones = path.transfer, path.geometry, path.zones
+    exact, g, field_rings = path.transfer, path.geometry, path.field_rings
     painted = scene if chosen and isinstance(scene, ChartScene) else None
     size = table_size(path, highest)
-    mixing = field_mixtures(exact, zones, size) if zones else mixtures([exact], size)
-    needed = memory_model.image_bytes(path, scene, highest, len(mixing[0]), size, rings)
+    mixing = field_mixtures(exact, field_rings, size) if field_rings else mixtures(exact, size)
+    needed = memory_model.image_bytes(path, scene, highest, len(mixing[0]), rings)
     memory.require(needed, g.rows, g.columns)
     least = max((part.nyquist(g) for part in rings), default=LOWEST)
     image = sampled_image(path, scene, highest, mixing, least)
     size = table_size(path, image.highest)
+    if of_tables := memory_model.table_bytes(path, len(mixing[0]), size):
+        needed += of_tables
+        memory.require(needed, g.rows, g.columns)
     modes: tuple[Mode, ...] = ()
-    if zones:
-        tables, modes = tabulate_field(exact, zones, g, size, mixing)
+    if field_rings:
+        tables, modes = tabulate_field(exact, field_rings, g, size, mixing)
     else:
         tables = tabulate(exact, size, mixing)
     modes, field_change = needed_modes(path, image, modes)
@@ -202,7 +205,7 @@ def _spectral_layers(
         planes=len(tables.mix),
         changes=changes_by_omission(path, image, tables, field_change),
         filters=len(tables.parities) + len(modes),
-        table_values=sum(plane.size for plane in planes) * max(1, len(zones)),
+        table_values=sum(plane.size for plane in planes),
         peak=image.peak,
         memory=needed,
     )

@@ -8,8 +8,9 @@ coarse table will do.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,8 +23,6 @@ PARITIES = ((False, False), (True, True), (True, False), (False, True))
 """Whether a transfer function turns the cosines along x, and along y, into sines."""
 SMALLEST_PLANE, LARGEST_PLANE = 41, 513
 """Entries along an axis of a table over fx and fy."""
-LARGEST_OF_FIELD = 193
-"""The same where every zone of a field has such a table."""
 JUDGED = 256
 """Frequencies at which mixtures of spectra are judged: transfer functions are smooth."""
 
@@ -43,10 +42,10 @@ class TableSize:
     rank: int | None = None
     """Largest number of mixtures; None: as many as the tolerance asks for."""
 
-    def plane_entries(self, blurs: Sequence[PlaneTransfer], largest: int = LARGEST_PLANE) -> int:
+    def plane_entries(self, blurs: Sequence[PlaneTransfer]) -> int:
         """Return the entries along an axis of a table over fx and fy for these blurs."""
         periods = self.top * max(blur.reach for blur in blurs)
-        return int(min(max(self.steps_per_period * periods + 1, SMALLEST_PLANE), largest))
+        return int(min(max(self.steps_per_period * periods + 1, SMALLEST_PLANE), LARGEST_PLANE))
 
 
 Mixing = tuple[NDArray, float]
@@ -71,6 +70,10 @@ class Tables:
     planes: tuple[NDArray | None, ...] = (None,) * 4
     """By `PARITIES`, (R, C, m, m) over fy and fx from 0 to `top`: what is added to the radial part.
     A wave cos(2 pi fx x) cos(2 pi fy y) becomes the sum of its cosines and sines times these."""
+    order: int = 0
+    """The radial part is times the cosine of so many times the direction of f from x towards y,"""
+    is_sine: bool = False
+    """or times its sine, and has the parity that it thereby has."""
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -104,7 +107,13 @@ class Tables:
     def parities(self) -> list[int]:
         """Indices of the `PARITIES` that occur."""
         directed = {p for p, plane in enumerate(self.planes) if plane is not None}
-        return sorted(directed | ({0} if self.radial is not None else set()))
+        return sorted(directed | ({self.radial_parity} if self.radial is not None else set()))
+
+    @property
+    def radial_parity(self) -> int:
+        """Index into `PARITIES` of the radial part: waves odd in fy change sign with it."""
+        odd_y = self.is_sine
+        return PARITIES.index((odd_y != bool(self.order % 2), odd_y))
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,9 +127,9 @@ class TableReader:
     """Entries over |f| (R, C, entries) and the steps to the next; None where this parity has no
     radial part."""
     plane: NDArray | None
-    """(R, C, m, m) over fy and fx, where there is such a part."""
-    spline_x: NDArray | None
-    """(n, m) what its entries count along x."""
+    """Spline coefficients (R, C, m, m) over fy and fx, where there is such a part."""
+    spline_x: Any
+    """Sparse (n, m): what each of them counts along x, four at a time."""
 
     def values(self, fy: NDArray, count: int | None = None) -> NDArray:
         """Return H_rc at some frequencies along y.
@@ -142,9 +151,15 @@ class TableReader:
         radius = np.hypot(fx, fy[:, None])
         if self.radial is not None:
             total = self._linear(radius)
+            if self.tables.order:
+                angle = self.tables.order * np.arctan2(fy[:, None], fx)
+                total *= np.sin(angle) if self.tables.is_sine else np.cos(angle)
         if self.plane is not None and self.spline_x is not None:
             along_y = spline_weights(self.plane.shape[-1], fy / top)
-            on_top = (along_y @ self.plane) @ self.spline_x[: len(fx)].T
+            near = slice(along_y.indices.min(), along_y.indices.max() + 1)
+            rows = along_y.toarray()[:, near] @ self.plane[..., near, :]
+            flat = rows.reshape(-1, rows.shape[-1])
+            on_top = (self.spline_x[: len(fx)] @ flat.T).T.reshape(*rows.shape[:-1], len(fx))
             total = (on_top if total is None else total + on_top) * (radius <= top)
         assert total is not None
         return total
@@ -165,22 +180,34 @@ class TableReader:
 def reader(tables: Tables, parity: int, fx: NDArray) -> TableReader:
     """Return a reader of the tables of one parity at the frequencies fx (n,), rising [cycles/m]."""
     plane, radial = tables.planes[parity], None
-    if parity == 0 and tables.radial is not None:
+    if parity == tables.radial_parity and tables.radial is not None:
         radial = tables.radial, np.diff(tables.radial)
-    spline = None if plane is None else spline_weights(plane.shape[-1], fx / tables.top)
-    return TableReader(tables, fx, radial, plane, spline)
+    if plane is None:
+        return TableReader(tables, fx, radial, None, None)
+    spline = spline_weights(plane.shape[-1], fx / tables.top)
+    return TableReader(tables, fx, radial, _spline_coefficients(plane), spline)
 
 
-def spline_weights(entries: int, position: NDArray) -> NDArray:
-    """Return what each entry of a table counts in a cubic spline: (n, entries).
-
-    Positions (n,) are parts of the table's length; weights are 0 beyond 1.
-    """
+def _spline_coefficients(plane: NDArray) -> NDArray:
+    """Return the coefficients (R, C, m, m) of the cubic splines through tables over fy and fx."""
     from scipy.interpolate import make_interp_spline
 
-    spline = make_interp_spline(np.linspace(0, 1, entries), np.eye(entries), k=3)
-    weights = spline(np.minimum(position, 1.0))
-    return np.asarray(np.where(position[:, None] <= 1 + 1e-12, weights, 0.0))
+    at = np.linspace(0, 1, plane.shape[-1])
+    along_y = make_interp_spline(at, np.moveaxis(plane, -2, 0), k=3).c
+    along_x = make_interp_spline(at, np.moveaxis(along_y, -1, 0), k=3).c
+    return np.ascontiguousarray(np.moveaxis(along_x, (1, 0), (-2, -1)))
+
+
+def spline_weights(entries: int, position: NDArray) -> Any:
+    """Return what each coefficient of a table counts in a cubic spline: sparse (n, entries).
+
+    Positions (n,) are parts of the table's length; beyond 1 that of the end holds.
+    """
+    from scipy.interpolate import BSpline
+
+    at = np.linspace(0, 1, entries)
+    knots = np.concatenate([[0.0] * 4, at[2:-2], [1.0] * 4])  # as `make_interp_spline` has them
+    return BSpline.design_matrix(np.minimum(position, 1.0), knots, 3)
 
 
 def tabulate(exact: Transfer, size: TableSize, mixing: Mixing) -> Tables:
@@ -283,38 +310,9 @@ def plane_grid(transfer: Transfer, top: float, entries: int) -> PlaneGrid:
     return PlaneGrid(radial_transfer, f, radial_transfer.otf_radial(length))
 
 
-def turn_table(parts: NDArray, parity: int, quarters: int, mirrored: bool) -> NDArray:
-    """Return one of the tables by parity of a blur with y mirrored, then turned.
-
-    A quarter turn from x to y is T'(fx, fy) = T(fy, -fx).
-
-    Parameters
-    ----------
-    parts : NDArray
-        Tables (4, ..., m, m) of the blur.
-    parity : int
-        Index into `PARITIES` of the table that is returned.
-    quarters : int
-        Number of quarter turns.
-    mirrored : bool
-        Whether y is mirrored before.
-
-    Returns
-    -------
-    NDArray
-        Table (..., m, m).
-    """
-    source, sign = [0, 1, 2, 3], [1, -1, 1, -1] if mirrored else [1, 1, 1, 1]
-    for _ in range(quarters):
-        source = [source[p] for p in (0, 1, 3, 2)]
-        sign = [sign[0], -sign[1], -sign[3], sign[2]]
-    part = parts[source[parity]]
-    if quarters % 2:
-        part = np.swapaxes(part, -1, -2)
-    return part if sign[parity] > 0 else -part
-
-
-def mixtures(transfers: Sequence[Transfer], size: TableSize) -> Mixing:
+def mixtures(
+    exact: Transfer, size: TableSize, more: Callable[[], Sequence[NDArray]] = list
+) -> Mixing:
     """Return the fewest mixtures of a scene's components that keep its transfer functions.
 
     Where a scene has more components than colors can tell apart, singular vectors of H_kc over all
@@ -323,23 +321,24 @@ def mixtures(transfers: Sequence[Transfer], size: TableSize) -> Mixing:
 
     Parameters
     ----------
-    transfers : sequence of Transfer
-        Transfers of the same light that the mixtures have to serve.
+    exact : Transfer
+        Transfer of the components.
     size : TableSize
         Size of the tables.
+    more : callable, optional
+        Makes what else the mixtures have to serve, (K, any number) each [e/s].
 
     Returns
     -------
     Mixing
         Mixtures (R, K), and the largest relative error that they leave.
     """
-    exact = transfers[0]
     components, colors = exact.weights.shape[:2]
     every = np.eye(components)
     most = components if size.rank is None else size.rank
     if components <= min(max(colors, 3), most):
         return every, 0.0
-    table = np.concatenate([part for t in transfers for part in _samples(t, size.top)], axis=1)
+    table = np.concatenate([*_samples(exact, size.top), *more()], axis=1)
     directions = np.linalg.eigh(product(table, table.T))[1].T[::-1]
     peak = np.abs(exact.level).max() or 1.0
     for rank in range(1, components):

@@ -8,9 +8,10 @@ over the unit disk, P = exp(2 pi i W / wavelength) (`zernike` has the coordinate
 Divided by the same integral for W = 0 it is the mean of exp(2 pi i dW / wavelength) over the
 overlap, dW = W(u - s/2) - W(u + s/2): a factor of at most 1 for the closed form of diffraction.
 
-Two methods compute it. A wavefront that is symmetric about the axis has a factor of |f| alone,
-which is analytic in |f|: Gauss-Legendre sums over the overlap at Chebyshev nodes. Any other is
-sampled on a grid and correlated with itself by Fourier transforms (`pupil_grid`).
+A wavefront that is symmetric about the axis has a factor of |f| alone, which is analytic in |f|:
+Gauss-Legendre sums over the overlap at Chebyshev nodes. Any other is sampled on a grid and
+correlated with itself by Fourier transforms (`pupil_grid`); one of few waves that many directions
+and wavelengths are asked of has a series by direction (`pupil_harmonics`).
 
 References
 ----------
@@ -25,7 +26,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vcam_cli.physics import pupil_grid, zernike
+from vcam_cli.physics import pupil_grid, pupil_harmonics, zernike
 from vcam_cli.physics.cache import ByteCache
 from vcam_cli.physics.zernike import Floats, Terms
 
@@ -37,6 +38,7 @@ NEGLIGIBLE = 1e-11
 _SERIES_CACHE: ByteCache[Floats] = ByteCache(20_000_000)
 GRID_CACHE_BYTES = 500_000_000
 """Memory that grids of wavefronts are kept in [bytes]."""
+_HARMONICS_CACHE: ByteCache[pupil_harmonics.PupilHarmonics] = ByteCache(20_000_000)
 _GRID_CACHE: ByteCache[pupil_grid.OtfRatioGrid] = ByteCache(GRID_CACHE_BYTES)
 
 
@@ -143,6 +145,100 @@ def otf_ratio(
         turns = 2 * working_f_number * (fx * slope_x + fy * slope_y)
         ratio = ratio * np.where(ratio == 0, 0, np.exp(-2j * np.pi * turns))
     return ratio[()]
+
+
+def otf_ratio_harmonics(
+    frequency: Floats, wavelengths: Floats, working_f_number: float, terms: Terms
+) -> NDArray[np.complex128]:
+    """Return the aberrated over the perfect OTF by harmonics of the direction.
+
+    Parameters
+    ----------
+    frequency : ndarray
+        Spatial frequencies (n,) on the sensor, from 0 [cycles/m].
+    wavelengths : ndarray
+        Wavelengths (J,) [m].
+    working_f_number : float
+        Working f-number N (1 - m) [dimensionless].
+    terms : Terms
+        Noll indices and coefficients [m] of the wavefront.
+
+    Returns
+    -------
+    ndarray of complex
+        A_m (J, n, m) as `direction_harmonics` has them [dimensionless]: good to 1e-5 up to
+        `pupil_harmonics.MOST_SLOPE`, beyond which, and with tilt, they are those of `otf_ratio`.
+
+    Raises
+    ------
+    ValueError
+        The slope of the wavefront, without its tilt, exceeds `MAX_SLOPE`.
+    """
+    rest, _ = zernike.split_tilt(terms)
+    if not has_few_waves(wavelengths, terms):
+
+        def values(angles: Floats) -> NDArray[np.complex128]:
+            fx, fy = (np.multiply.outer(frequency, along(angles)) for along in (np.cos, np.sin))
+            return np.array(
+                [otf_ratio(fx, fy, w, working_f_number, terms) for w in wavelengths.tolist()]
+            )
+
+        return pupil_harmonics.direction_harmonics(values)
+    if not rest:
+        inside = np.multiply.outer(wavelengths * working_f_number, frequency) < 1
+        return inside[..., None].astype(np.complex128)
+    found = _HARMONICS_CACHE.get(
+        (rest, wavelengths.tobytes()),
+        lambda: pupil_harmonics.pupil_harmonics(rest, wavelengths, zernike.max_slope(rest)),
+    )
+    return np.array(
+        [found.amplitudes(w * working_f_number * frequency, w) for w in wavelengths.tolist()]
+    )
+
+
+def has_few_waves(wavelengths: Floats, terms: Terms) -> bool:
+    """Return whether a wavefront has harmonics of the direction without a grid of the pupil.
+
+    Parameters
+    ----------
+    wavelengths : ndarray
+        Wavelengths (J,) [m].
+    terms : Terms
+        Noll indices and coefficients [m] of the wavefront.
+
+    Returns
+    -------
+    bool
+        Whether it has no tilt and is no steeper than `pupil_harmonics.MOST_SLOPE`.
+    """
+    rest, tilt = zernike.split_tilt(terms)
+    steepest = pupil_harmonics.MOST_SLOPE * float(wavelengths.min())
+    return not any(tilt) and zernike.max_slope(rest) <= steepest
+
+
+def grid_bytes(wavelengths: Floats, terms: Terms) -> int:
+    """Return the memory that grids of a wavefront take.
+
+    Parameters
+    ----------
+    wavelengths : ndarray
+        Wavelengths (J,) at which `otf_ratio` is asked for [m].
+    terms : Terms
+        Noll indices and coefficients [m] of the wavefront.
+
+    Returns
+    -------
+    int
+        Bytes of the grids that are kept, and of what makes one of them; 0 where there are none.
+    """
+    rest, _ = zernike.split_tilt(terms)
+    if zernike.is_symmetric(rest):
+        return 0
+    order = max(zernike.noll_orders(index)[0] for index, _ in rest)
+    slope = zernike.max_slope(rest)
+    sizes = [pupil_grid.grid_bytes(slope / w, order) for w in wavelengths.tolist()]
+    kept = min(sum(size for size, _ in sizes), GRID_CACHE_BYTES)
+    return kept + max(work for _, work in sizes)
 
 
 def _checked_slope(terms: Terms, wavelength: float) -> float:

@@ -169,6 +169,26 @@ def samples_across(slope: float, order: int) -> int:
     )
 
 
+def grid_bytes(slope: float, order: int) -> tuple[int, int]:
+    """Return the memory of a grid of lags, and that in which it is made.
+
+    Parameters
+    ----------
+    slope : float
+        Largest slope of the wavefront [wavelengths per pupil radius].
+    order : int
+        Highest radial order of its polynomials.
+
+    Returns
+    -------
+    kept, work : int
+        Memory [bytes]: 8 for each lag, and some six of such grids.
+    """
+    samples = samples_across(slope, order)
+    kept = 8 * (2 * samples + 1) * (samples + 1 + MIRRORED_LAGS)
+    return kept, 6 * kept
+
+
 def _step(samples: int) -> float:
     """Return the distance of the samples [pupil radii]; two samples lie around the pupil."""
     return 2 / (samples - 4)

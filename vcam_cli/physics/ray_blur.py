@@ -13,11 +13,13 @@ References
 """
 
 import math
+from collections.abc import Callable
 
 import numpy as np
+import scipy.fft
 from numpy.typing import ArrayLike, NDArray
 
-from vcam_cli.physics import zernike
+from vcam_cli.physics import pupil_harmonics, zernike
 from vcam_cli.physics.zernike import Floats, Terms
 
 MAX_CYCLES = 40.0
@@ -27,6 +29,8 @@ The transfer, about 1 in 100 there and falling, counts as 0 beyond.
 """
 CELLS_PER_CYCLE = 16
 """Cells that rays are gathered in, for a period of the highest frequency."""
+DIRECTIONS = 12
+"""Directions in half a turn in which the largest transfer is sought."""
 MAX_CYCLES_SYMMETRIC = 3000.0
 """Limit as `MAX_CYCLES` for a symmetric wavefront, for which a sum along the radius is enough."""
 
@@ -130,6 +134,85 @@ def otf(
     if move_x or move_y:
         found *= np.exp(-2j * np.pi * (fx[None, :] * move_x + fy[:, None] * move_y))
     return found
+
+
+def largest(frequency: Floats, working_f_number: float, terms: Terms) -> Floats:
+    """Return the largest modulus of the geometrical OTF in some directions.
+
+    Parameters
+    ----------
+    frequency : ndarray
+        Spatial frequencies (n,), evenly from 0 [cycles/m].
+    working_f_number : float
+        Working f-number N (1 - m) [dimensionless].
+    terms : Terms
+        Noll indices and coefficients [m] of the wavefront.
+
+    Returns
+    -------
+    ndarray
+        Modulus (n,) [dimensionless].
+    """
+    values = _by_direction(frequency, working_f_number, terms)
+    return np.asarray(np.abs(values(np.pi * np.arange(DIRECTIONS) / DIRECTIONS)).max(axis=1))
+
+
+def otf_harmonics(frequency: Floats, working_f_number: float, terms: Terms) -> NDArray:
+    """Return the geometrical OTF by harmonics of the direction [1].
+
+    Parameters
+    ----------
+    frequency : ndarray
+        Spatial frequencies (n,), evenly from 0 [cycles/m].
+    working_f_number : float
+        Working f-number N (1 - m) [dimensionless].
+    terms : Terms
+        Noll indices and coefficients [m] of the wavefront.
+
+    Returns
+    -------
+    ndarray of complex
+        A_m (n, m) as `direction_harmonics` has them [dimensionless], of what `otf` is.
+    """
+    return pupil_harmonics.direction_harmonics(_by_direction(frequency, working_f_number, terms))
+
+
+def _by_direction(
+    frequency: Floats, working_f_number: float, terms: Terms
+) -> Callable[[Floats], NDArray]:
+    """Return the function from directions (d,) [rad] to the geometrical OTF (n, d) there."""
+    rest, tilt = zernike.split_tilt(terms)
+    if zernike.is_symmetric(rest):
+        mean = otf_symmetric(frequency, working_f_number, rest)[:, None]
+        return lambda angles: mean * _moved(frequency, angles, working_f_number, tilt)
+    radius = blur_radius(rest, working_f_number)
+    within = frequency <= MAX_CYCLES / radius
+    highest, step = float(frequency[within].max(initial=0.0)), float(frequency[1])
+    right, down, share = _rays(highest, working_f_number, rest)
+    # A wave of any of the frequencies repeats after 1 / step: so may the cells.
+    cells = scipy.fft.next_fast_len(math.ceil(CELLS_PER_CYCLE * max(highest, 1 / radius) / step))
+    spread = np.sinc(frequency[within] / (cells * step)) ** 4
+
+    def values(angles: Floats) -> NDArray:
+        found = _moved(frequency, angles, working_f_number, tilt) * within[:, None]
+        for k, angle in enumerate(angles.tolist()):
+            place = (math.cos(angle) * right + math.sin(angle) * down) * (cells * step)
+            index = np.floor(place).astype(int)
+            light = np.zeros(cells)
+            for j, part in enumerate(_spline_weights(place - index)):
+                light += np.bincount((index + j - 1) % cells, share * part, minlength=cells)
+            found[within, k] *= np.fft.fft(light)[: len(spread)] / spread
+        return found
+
+    return values
+
+
+def _moved(
+    frequency: Floats, angles: Floats, working_f_number: float, tilt: tuple[float, float]
+) -> NDArray[np.complex128]:
+    """Return the factor (n, d) of an image that tilt moves."""
+    along = 2 * working_f_number * (tilt[0] * np.cos(angles) + tilt[1] * np.sin(angles))
+    return np.asarray(np.exp(-2j * np.pi * np.outer(frequency, along)))
 
 
 def _mean_over_pupil(

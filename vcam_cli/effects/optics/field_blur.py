@@ -7,7 +7,7 @@ symmetric about its axis, so that elsewhere the wavefront is turned about it.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -90,31 +90,47 @@ class FieldBlur(AberrationBlur, FieldTransfer):
             )
         )
 
-    def zones(self, count):
-        """Return zones at `count` places from center to corner, or more, whose weights sum to 1.
+    def rings(self, count):
+        """Return `count` places from center to corner, or more, whose weights sum to 1.
 
         Places are added for every wave by which the wavefront changes, up to `MAX_PLACES`.
         """
+        stretches = self._stretches(self._enough(count))
+        kind = DirectedBlur if self._azimuthal_order else SymmetricBlur
+        return tuple(
+            Zone(
+                kind(self.lens, self.wavefront(place)),
+                ZoneWeight(stretches, place, 0, 0, self.half_diagonal),
+            )
+            for place in sorted({place for nodes in stretches for place in nodes})
+        )
+
+    def zones(self, count):
+        """Return the rings cut into sectors, in each of which the wavefront is turned."""
+        rings = self.rings(count)
+        if not self._azimuthal_order:
+            return rings
+        # As many harmonics around as powers outwards; a multiple of 4 has its quarter turns.
+        around = 4 * math.ceil((2 * self._azimuthal_order * (self._enough(count) - 1) + 1) / 4)
+        return tuple(
+            Zone(
+                replace(ring.blur, angle=2 * math.pi * sector / around),
+                replace(ring.weight, sector=sector, around=around),
+            )
+            for ring in rings
+            for sector in range(around)
+        )
+
+    def _enough(self, count: int) -> int:
+        """Return the number of places, `count` or more."""
         waves = sum(change for _, _, change in self._changes) / GREEN
-        count = max(count, min(count + math.ceil(PLACES_PER_WAVE * waves), MAX_PLACES))
-        stretches = self._stretches(count)
-        rings = sorted({place for nodes in stretches for place in nodes})
+        return max(count, min(count + math.ceil(PLACES_PER_WAVE * waves), MAX_PLACES))
+
+    @property
+    def _azimuthal_order(self) -> int:
+        """The highest azimuthal order of the wavefronts; 0 where all are symmetric."""
         orders = {zernike.noll_orders(index)[1] for _, terms in self.places for index, _ in terms}
-        most = max((abs(m) for m in orders), default=0)
-        found = []
-        for place in rings:
-            terms = self.wavefront(place)
-            if not most:
-                weight = ZoneWeight(stretches, place, 0, 0, self.half_diagonal)
-                found.append(Zone(SymmetricBlur(self.lens, terms), weight))
-                continue
-            # As many harmonics around as powers outwards; a multiple of 4 has its quarter turns.
-            around = 4 * math.ceil((2 * most * (count - 1) + 1) / 4)
-            for sector in range(around):
-                angle = 2 * math.pi * sector / around
-                weight = ZoneWeight(stretches, place, sector, around, self.half_diagonal)
-                found.append(Zone(DirectedBlur(self.lens, terms, angle), weight))
-        return tuple(found)
+        return max((abs(m) for m in orders), default=0)
 
     @property
     def _changes(self) -> list[tuple[float, float, float]]:

@@ -160,7 +160,7 @@ class FieldMtf(MtfBlur, FieldTransfer):
         """Return a bound (J,) on |1 - H(f)| / (2 pi |f|) at all places [m]."""
         return np.max([place.spread(wavelengths) for place in self.places], axis=0)
 
-    def zones(self, count):
+    def rings(self, count):
         """Return the measured places, each with its weight; between two both are straight."""
         rings = [place.measured.height / self.half_diagonal for place in self.places]
         stretches = tuple(pairwise(rings))

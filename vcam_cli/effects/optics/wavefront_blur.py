@@ -7,7 +7,7 @@ switched off it is the blur of geometrical rays.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -202,26 +202,38 @@ class DirectedBlur(UniformBlur, PlaneTransfer):
         working = self.lens.working_f_number
         return aberration.otf_ratio(*turned, wavelength, working, self.terms)
 
+    def cutoff(self, wavelength: float) -> float:
+        """Return the frequency from which the transfer is zero, or counts as zero [cycles/m]."""
+        rest, _ = zernike.split_tilt(self.terms)
+        if self.lens.diffracts or zernike.is_symmetric(rest):
+            return self.lens.cutoff(wavelength)
+        return ray_blur.MAX_CYCLES / ray_blur.blur_radius(rest, self.lens.working_f_number)
+
+    def kept_bytes(self, wavelengths, by_harmonics=False):
+        """Return the memory of grids of the pupil, where there are any [bytes]."""
+        few = by_harmonics and aberration.has_few_waves(wavelengths, self.terms)
+        if few or not self.lens.diffracts:
+            return 0
+        return aberration.grid_bytes(wavelengths, self.terms)
+
+    def largest(self, frequency, wavelength):
+        """Return the largest contrast (n,) in any direction by rays; 1 by waves, which end."""
+        if self.lens.diffracts:
+            return np.ones(frequency.shape)
+        return ray_blur.largest(frequency, self.lens.working_f_number, self.terms)
+
+    def harmonics(self, frequency, wavelengths):
+        """Return the transfer (J, n, m) as harmonics of the direction, for the angle 0."""
+        working = self.lens.working_f_number
+        if self.lens.diffracts:
+            return aberration.otf_ratio_harmonics(frequency, wavelengths, working, self.terms)
+        rays = ray_blur.otf_harmonics(frequency, working, self.terms)
+        return np.broadcast_to(rays, (len(wavelengths), *rays.shape))
+
     @cached_property
     def _transfer_cache(self) -> ByteCache:
         """The last transfer by rays, which is the same at all wavelengths."""
         return ByteCache(0)
-
-    @property
-    def model(self) -> tuple[DirectedBlur, int, bool]:
-        """The blur that this one is made of, its quarter turns, and whether y is mirrored before.
-
-        An angle is brought into the first quarter of a turn, of wavefronts even in y into the first
-        eighth.
-        """
-        # Rounded, so that one angle computed in two ways is the same number.
-        quarters = math.floor(self.angle / (math.pi / 2) + 1e-9)
-        rest = round(self.angle - quarters * (math.pi / 2), 12)
-        even = all(zernike.noll_orders(index)[1] >= 0 for index, _ in self.terms)
-        if even and rest > math.pi / 4 + 1e-9:
-            rest = round(math.pi / 2 - rest, 12)
-            return replace(self, angle=rest), (quarters + 1) % 4, True
-        return replace(self, angle=rest), quarters % 4, False
 
     def mean_error(self, signal) -> float:
         """Return a bound of the rms change of the mean signal by leaving it out [electrons]."""

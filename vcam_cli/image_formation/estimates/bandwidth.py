@@ -223,12 +223,29 @@ def highest_passed(path: OpticalPath, scene: Scene) -> float:
     values = np.abs(path.transfer.radial_response(f / (2 * pitch))).sum(axis=0).max(axis=0)
     width = min(g.collecting_width, g.collecting_height) if path.separable else 0.0
     envelope = values / (values[0] or 1.0) / np.maximum(1, np.pi * f / (2 * pitch) * width)
+    if math.isinf(path.transfer.cutoff):
+        envelope = envelope * _passed_by_rays(path, f / (2 * pitch))
+        if isinstance(scene, SampledScene) and scene.samples == "squares":
+            size = min(scene.pitch_x, scene.pitch_y)
+            envelope = envelope / np.maximum(1, np.pi * f / (2 * pitch) * size)
     counts = np.flatnonzero(envelope > LEAST_PASSED * path.settings.tolerance)
     limit = float(f[min(counts[-1] + 1, len(f) - 1)]) if len(counts) else 1.0
     if isinstance(scene, ChartScene):
         half_width = scene.pitch_x * scene.shape[1] / 2
         limit = min(limit, KINKS * 2 * pitch * scene.chart.highest_frequency(half_width))
     return max(limit, LOWEST)
+
+
+def _passed_by_rays(path: OpticalPath, frequency: NDArray) -> NDArray:
+    """Return the contrast (n,) that blurs with a direction or over the field leave at most."""
+    passed = np.ones(frequency.shape)
+    green = float(np.median(path.transfer.wavelengths))  # rays have no wavelength
+    for blur in path.transfer.plane_blurs:
+        passed = passed * blur.largest(frequency, green)
+    if path.field_rings:
+        rings = [ring.blur.largest(frequency, green) for ring in path.field_rings]
+        passed = passed * np.max(rings, axis=0)
+    return passed
 
 
 def axes(path: OpticalPath, scene: SampledScene, highest: float) -> tuple[Axis, Axis]:
@@ -296,7 +313,7 @@ def table_size(path: OpticalPath, highest: float, entries: int | None = None) ->
     knobs, g = path.settings, path.geometry
     corner = math.hypot(0.5 / g.pitch_x, 0.5 / g.pitch_y)
     tolerance = knobs.mixing_tolerance
-    if path.zones:
+    if path.field_rings:
         tolerance = max(tolerance, FIELD_SHARE * knobs.tolerance)
     return TableSize(
         top=min(path.transfer.cutoff, highest * corner),
@@ -309,5 +326,5 @@ def table_size(path: OpticalPath, highest: float, entries: int | None = None) ->
 
 def reach(path: OpticalPath) -> float:
     """Return how far the blurs of a lens throw light, its diffraction aside [m]."""
-    blurs = [*path.transfer.effects, *(zone.blur for zone in path.zones)]
+    blurs = [*path.transfer.effects, *(ring.blur for ring in path.field_rings)]
     return max((blur.reach for blur in blurs), default=0.0)

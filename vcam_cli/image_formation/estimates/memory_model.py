@@ -5,20 +5,22 @@ One sum of what is held at once at the worst moment; a test compares it with mea
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.effects.base import PlaneTransfer, of_kind
 from vcam_cli.image_formation.estimates.bandwidth import axes
 from vcam_cli.image_formation.far_field import FarPart
+from vcam_cli.image_formation.field_dependence import ring_entries
 from vcam_cli.image_formation.optical_path import OpticalPath
 from vcam_cli.image_formation.settings import Settings
 from vcam_cli.image_formation.transfer_tables import (
-    LARGEST_OF_FIELD,
-    LARGEST_PLANE,
     PARITIES,
     TableSize,
 )
+from vcam_cli.physics.aberration import GRID_CACHE_BYTES
+from vcam_cli.physics.pupil_harmonics import MOST
 from vcam_cli.scenes.bands import bands_of_rows
 from vcam_cli.scenes.base import ChartScene, SampledScene
 
@@ -26,8 +28,9 @@ BASE = 170_000_000
 """Interpreter and libraries [bytes]."""
 SLACK = 1.1
 """Memory of the process over what is in use: freed memory is not given back at once."""
-PUPIL_GRIDS = 300_000_000
-"""Grids of the pupil that are kept for lenses with aberrations, at most [bytes]."""
+FEW_HARMONICS = 64
+"""Harmonics of the direction of wavefronts of few waves: up to 73 are seen where slopes are
+steepest, half as many in the mean over the rings."""
 WORK = 24_000_000
 """Temporary arrays of one thread [bytes]."""
 SCATTERED = 120
@@ -40,10 +43,9 @@ def image_bytes(
     scene: SampledScene,
     highest: float,
     planes: int,
-    size: TableSize,
     rings: Sequence[FarPart] = (),
 ) -> int:
-    """Return the memory of an image through the cosine spectrum.
+    """Return the memory of an image through the cosine spectrum, tables with a direction aside.
 
     The scene and the rings around it are computed one after the other.
 
@@ -57,8 +59,6 @@ def image_bytes(
         Frequency beyond which nothing counts [pixel Nyquist].
     planes : int
         Number of mixtures of the scene's components.
-    size : TableSize
-        Size of the tables.
     rings : sequence of FarPart
         Rings around a near field.
 
@@ -69,20 +69,50 @@ def image_bytes(
     """
     g, width, colors = path.geometry, path.settings.float_width // 8, len(path.mosaic.colors)
     waves = (2 if g.collecting_x else 1) * (2 if g.collecting_y else 1)
-    tables = 0
-    directed = (*path.transfer.plane_blurs, *of_kind([z.blur for z in path.zones], PlaneTransfer))
-    if directed:
-        waves = 4
-        zones = len({blur.model[0] for blur in directed})
-        entries = size.plane_entries(directed, LARGEST_OF_FIELD if path.zones else LARGEST_PLANE)
-        per_table = entries**2 * planes * colors * len(PARITIES)
-        count = len(path.transfer.with_half_the_wavelengths().wavelengths)
-        tables = 8 * per_table * (3 + zones) + count * 2 * entries**2 * 24 + PUPIL_GRIDS
-    series = colors * (waves + (2 if path.zones else 0))
+    waves = 4 if path.transfer.plane_blurs else waves
+    series = colors * (waves + (2 if path.field_rings else 0))
     near = width * _values(path, scene, highest, planes, series)
     far = [8 * _values(path, part.scene, highest, planes, series) for part in rings]
-    held = max([near, *far]) + g.rows * g.columns * width + tables
+    held = max([near, *far]) + g.rows * g.columns * width
     return BASE + round(SLACK * held) + WORK * path.workers
+
+
+def table_bytes(path: OpticalPath, planes: int, size: TableSize) -> int:
+    """Return the memory of tables of blurs that have a direction, beside the image.
+
+    How far they reach is known once the scene's spectrum is.
+
+    Parameters
+    ----------
+    path : OpticalPath
+        Lens, pixels and settings.
+    planes : int
+        Number of mixtures of the scene's components.
+    size : TableSize
+        Size of the tables.
+
+    Returns
+    -------
+    int
+        Bytes, at least those measured; 0 where there are none.
+    """
+    colors = len(path.mosaic.colors)
+    light = path.transfer.with_half_the_wavelengths().wavelengths
+    if directed := path.transfer.plane_blurs:
+        entries = size.plane_entries(directed)
+        per_table = entries**2 * planes * colors * len(PARITIES)
+        # by wavelength, by parity, and copies of the latter
+        tables = len(light) * 2 * entries**2 * 24 + 3 * 8 * per_table
+        return round(SLACK * (tables + sum(blur.kept_bytes(light) for blur in directed)))
+    directed = of_kind([ring.blur for ring in path.field_rings], PlaneTransfer)
+    if not directed:
+        return 0
+    grids = [blur.kept_bytes(light, by_harmonics=True) for blur in directed]
+    harmonics = MOST if any(grids) or math.isinf(path.transfer.cutoff) else FEW_HARMONICS
+    # of every ring all harmonics; of one of them by wavelength, its copy, and real parts
+    values = len(directed) * planes * colors + 4 * len(light)
+    tables = 16 * ring_entries(path.field_rings, size) * values * harmonics
+    return round(SLACK * (tables + min(sum(grids), GRID_CACHE_BYTES + max(grids))))
 
 
 def _values(

@@ -118,7 +118,7 @@ def sampled_image(
     x, y = axes(path, scene, highest)
     power = power_spectrum(spectrum, x, y, path.separable, path.workers)
     lens_power = power.lens_power(tables)
-    directed = (*exact.plane_blurs, *(zone.blur for zone in path.zones))
+    directed = (*exact.plane_blurs, *(ring.blur for ring in path.field_rings))
     squares = (
         power.upper_bound(bounding_tables(exact, size, mixing))
         if directed
