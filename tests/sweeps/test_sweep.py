@@ -15,7 +15,7 @@ from vcam_cli import load, simulate, sweep
 from vcam_cli.errors import BadInput, CannotDo
 from vcam_cli.files import atomic
 from vcam_cli.files.points_store import SweepFolder
-from vcam_cli.sweeps import point_execution, point_work, workers
+from vcam_cli.sweeps import computation, point_execution, point_work, workers
 from vcam_cli.sweeps.sweep import Share
 
 TABLES = ("points.csv", "optimum.csv")
@@ -148,6 +148,34 @@ def test_two_processes_share_a_folder(long, tmp_path):
     # No point is computed twice: each is claimed.
     assert sum(t["computed"] for t in told) == 48
     assert tables(out) == expected
+
+
+@pytest.mark.parametrize("first", [1, 2])
+def test_shares_that_finish_at_once_lose_no_row(first, tmp_path, monkeypatch):
+    """One share computes and writes while the other, which began before it, is on its last point.
+
+    The one that writes last has a view of the folder from before; its tables have all rows.
+    """
+    study = written(tmp_path, optimize=OPTIMIZE)
+    expected = sweep(study, tmp_path / "whole", workers=1).points
+    second, out = 3 - first, tmp_path / "out"
+    command = [*VCAM, "sweep", str(study), "-o", str(out), "--workers", "1", "-q"]
+
+    def other(*arguments):
+        run = subprocess.run(
+            [*command, "--shard", f"{second}/2"], env=environment(), capture_output=True, text=True
+        )
+        assert run.returncode == 0
+        assert "points.csv has" in run.stderr, "also with -q"
+        return compute(*arguments)
+
+    compute = computation.compute
+    monkeypatch.setattr(computation, "compute", other)
+    result = sweep(study, out, workers=1, shard=(first, 2))
+    assert result.missing == 0
+    assert result.points == expected
+    assert len(rows(out)) == 3
+    assert tables(out) == tables(tmp_path / "whole")
 
 
 def test_a_finished_sweep_computes_nothing_and_fresh_everything(tmp_path):

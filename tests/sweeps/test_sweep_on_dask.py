@@ -1,9 +1,12 @@
 """A sweep on a Dask scheduler and two workers in processes of their own, one of them killed."""
 
 import json
+import socket
 import subprocess
 import sys
 import time
+from contextlib import suppress
+from threading import Thread
 
 import pytest
 from sweeping import VCAM, Cluster, environment, written
@@ -98,3 +101,26 @@ def test_a_scheduler_that_does_not_answer(tmp_path, monkeypatch):
     assert time.monotonic() - start < 10
     with pytest.raises(BadInput, match="--scheduler"):
         sweep(written(tmp_path), tmp_path / "out", scheduler="nonsense://x")
+
+
+@pytest.mark.filterwarnings("ignore::ResourceWarning", "ignore::DeprecationWarning")
+@pytest.mark.parametrize(
+    "greeting", [b"SSH-2.0-OpenSSH_9.6\r\n", b"HTTP/1.1 400 Bad Request\r\n\r\n", b"\0" * 64]
+)
+def test_what_listens_may_be_another_program(greeting, tmp_path, monkeypatch):
+    pytest.importorskip("distributed")
+    monkeypatch.setattr(workers, "CONNECT_TIMEOUT", 1.0)
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        server.settimeout(20)
+
+        def greet():
+            with suppress(OSError):
+                while True:
+                    server.accept()[0].sendall(greeting)
+
+        Thread(target=greet, daemon=True).start()
+        address = f"tcp://127.0.0.1:{server.getsockname()[1]}"
+        with pytest.raises(CannotDo, match=f"{address}.*") as caught:
+            sweep(written(tmp_path), tmp_path / "out", scheduler=address)
+    assert "no Dask scheduler" in str(caught.value)
+    assert "memory" not in str(caught.value)

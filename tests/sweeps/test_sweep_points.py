@@ -203,7 +203,7 @@ def test_every_mistake_of_a_study_at_once_with_its_place(tmp_path):
 @pytest.mark.parametrize(
     ("study", "said"),
     [
-        ({"vary": {}}, "the grid is empty"),
+        ({"vary": {}, "optimize": {"metric": "snr_db", "goal": "max"}}, "varies nothing"),
         ({"vary": {"pixel.width": {"values": []}}}, "empty list"),
         ({"vary": {"pixel.width": {"start": "4 um", "stop": "6 um", "count": 0}}}, "at least 1"),
         ({"vary": {"pixel.width": {"start": "4 um", "stop": "6 ms", "count": 2}}}, "together"),

@@ -12,7 +12,7 @@ from sweeping import environment, written
 
 from vcam_cli import sweep
 from vcam_cli.errors import BadInput
-from vcam_cli.files.points_store import record_check
+from vcam_cli.files.records import record_check
 from vcam_cli.sweeps import sweep_points, sweep_result
 
 STUDY = {

@@ -77,22 +77,24 @@ def computed_sweep(
         computed = 0 if points.are_final else _compute(points, execution, watch, tell)
         if differences := effect_differences(grid.points):
             tell(differences)
-        findings = Findings(grid, points.outcomes)
-        compared = tuple(each.result(findings) for each in expected)
-        result = sweep_tables.result(findings, out, compared, computed)
-        files = sweep_tables.writers(findings) | figures.metric_plots(findings)
-        if compared:
-            files["expected.csv"] = partial(expectations.write, compared)
-        if not result.missing:
-            made, unmade = figures.writers(planned, findings, watch, tell)
-            files, result = files | made, replace(result, unmade=unmade)
-        watch.begin("tables")
-        asked = request if points.are_final and not result.unmade else ""
-        plain = study.model.model_dump(mode="json")
-        record = result.record() | {"study": plain, "hashes": hashes, "asked": asked}
-        report = partial(sweep_report.report_file, result) if extras.report else None
-        files = in_formats(files, extras.formats)
-        folder.finish(files, record, grid.inputs, report)
+        with folder.summarizing():
+            points.read_missing()
+            findings = Findings(grid, points.outcomes)
+            compared = tuple(each.result(findings) for each in expected)
+            result = sweep_tables.result(findings, out, compared, computed)
+            files = sweep_tables.writers(findings) | figures.metric_plots(findings)
+            if compared:
+                files["expected.csv"] = partial(expectations.write, compared)
+            if not result.missing:
+                made, unmade = figures.writers(planned, findings, watch, tell)
+                files, result = files | made, replace(result, unmade=unmade)
+            watch.begin("tables")
+            asked = request if points.are_final and not result.unmade else ""
+            plain = study.model.model_dump(mode="json")
+            record = result.record() | {"study": plain, "hashes": hashes, "asked": asked}
+            report = partial(sweep_report.report_file, result) if extras.report else None
+            files = in_formats(files, extras.formats)
+            folder.finish(files, record, grid.inputs, report)
     return result
 
 
@@ -113,6 +115,12 @@ class _Points:
         """Read the outcomes of points that are finished."""
         if not self._fresh:
             for point in self._points:
+                self._read(point)
+
+    def read_missing(self) -> None:
+        """Read the outcomes of points that other processes have finished meanwhile."""
+        for point in self._points:
+            if point not in self.outcomes or not self.outcomes[point].final:
                 self._read(point)
 
     def _read(self, point: str) -> bool:

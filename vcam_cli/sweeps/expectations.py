@@ -99,7 +99,9 @@ class _Planner:
     def resolve(self) -> PlannedExpectation:
         """Return the expectation with the numbers that it names."""
         item = self._item
-        own = self._parameter.unit if item.quantity == OPTIMUM else quantities.unit(item.quantity)
+        own = quantities.unit(item.quantity)
+        if item.quantity == OPTIMUM:
+            own = self._varied("quantity").unit
         unit = "" if item.over is not None else own
         least, most = (self._number(given, unit) for given in item.between)
         if least > most:
@@ -114,12 +116,21 @@ class _Planner:
             raise self._wrong(key, *one_of(name, tuple(self._grid.cases)))
         return name
 
-    def _only_parameter(self) -> Parameter:
+    def _only_parameter(self) -> Parameter | None:
+        """Return what is varied; None of a case that is a single point."""
         parameters = tuple(self._grid.cases[self._case].parameters.values())
-        if len(parameters) != 1:
+        if not parameters:
+            return None
+        if len(parameters) > 1:
             message = f"the case {self._case} varies {len(parameters)} parameters"
             raise self._wrong("case", message, "expectations are of studies that vary one")
         return parameters[0]
+
+    def _varied(self, key: str) -> Parameter:
+        if self._parameter is None:
+            message = f"the case {self._case} varies nothing"
+            raise self._wrong(key, message, "remove this key, or name another case")
+        return self._parameter
 
     def _number(self, given: object, unit: str) -> float:
         if isinstance(given, float) and math.isinf(given):
@@ -142,7 +153,7 @@ class _Planner:
 
     def _optimum(self, case: str, name: str) -> Lookup:
         """Return the place of a case's optimum, or the value there."""
-        path = self._parameter.path
+        path = self._varied("quantity").path
         return lambda findings: float(getattr(findings.optimum(case, path), name, math.nan))
 
     def _term(self, key: str) -> Lookup:
@@ -163,18 +174,28 @@ class _Planner:
         return self._optimum(self._case, "value")
 
     def _metric(self, key: str) -> Lookup:
-        (wanted,) = self._grid.study.values(self._parameter, EXPECT, self._name, key).cells
-        cells = self._parameter.cells
+        case, metric = self._case, self._item.quantity
+        if self._is_point(key):
+            return lambda findings: float(findings.surface(case, metric).mean)
+        parameter = self._varied(key)
+        (wanted,) = self._grid.study.values(parameter, EXPECT, self._name, key).cells
+        cells = parameter.cells
         near = [i for i, cell in enumerate(cells) if _is_same(cell, wanted)]
         if not near:
-            message = f"the study has no point at {wanted} {self._parameter.unit}".rstrip()
+            message = f"the study has no point at {wanted} {parameter.unit}".rstrip()
             raise self._wrong(key, message, f"write one of its values, for example {cells[0]}")
-        case, metric = self._case, self._item.quantity
         return lambda findings: float(findings.surface(case, metric).mean[near[0]])
 
+    def _is_point(self, key: str) -> bool:
+        """Return whether a case is a single point, of which no place is written."""
+        return self._parameter is None and getattr(self._item, key) is None
+
     def _property(self, key: str) -> Lookup:
-        (node,) = self._grid.study.values(self._parameter, EXPECT, self._name, key).nodes
-        place, nodes = (EXPECT, self._name), {self._parameter.path: node}
+        place, nodes = (EXPECT, self._name), {}
+        if not self._is_point(key):
+            parameter = self._varied(key)
+            (node,) = self._grid.study.values(parameter, EXPECT, self._name, key).nodes
+            nodes = {parameter.path: node}
         (camera,) = self._cameras.frames(place, self._case, nodes)
         value = properties.value(camera, self._item.quantity)
         return lambda _: value

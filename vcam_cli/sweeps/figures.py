@@ -79,6 +79,8 @@ def writers(
 def metric_plots(findings: Findings) -> Writers:
     """Return what writes the plot of every metric over the parameter of most values."""
     grid, found = findings.grid, Writers()
+    if not grid.case_parameters:  # a single point has no curve
+        return found
     parameter = max(grid.case_parameters, key=lambda p: len(p.nodes))
     cases = tuple(c.name for c in grid.cases.values() if parameter.path in c.parameters)
     for metric in grid.study.model.metrics:

@@ -18,12 +18,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcam_cli.sweeps.optimum import (
-    CONFIDENCE,
+    FEW_DRAWS,
     MAX_MISFIT,
     Optimum,
     bootstrap_means,
+    excess_error,
     snap_to_range,
     variance_of_mean,
+    widened_interval,
 )
 
 MIN_POINTS = 3
@@ -67,11 +69,12 @@ def find_joint_optimum(
     places, fitted = fit.minimum(fit.mean[None])
     drawn = bootstrap_means(fit.curves, fit.rest, MIN_BOOTSTRAP_CURVES)
     found = fit.minimum(drawn)[0] if len(drawn) else np.empty((0, len(axes)))
+    errors = _interpolation_errors(fit, (scales, y, best))
     value = max(float(fitted[0]), float(y.mean(axis=0).min()))
     return tuple(
         _along(
             axis,
-            (scale, best[i], float(places[0, i]), found[:, i], fit.follows),
+            (scale, best[i], float(places[0, i]), found[:, i], errors[i], fit.follows),
             sign * value,
             sign * float(fitted[0]),
         )
@@ -79,16 +82,39 @@ def find_joint_optimum(
     )
 
 
+def _interpolation_errors(
+    fit: _Fit, known: tuple[Sequence[NDArray], NDArray, Sequence[int]]
+) -> NDArray:
+    """Return the standard error (k,) of the minimum that the spread does not explain.
+
+    By how much the quadratic through the points of another reach differs; as its error goes with
+    the square of the reach, the narrower one has a third of the difference.
+    """
+    scales, y, best = known
+    other = _Fit(scales, y, best, tuple(reach for reach in REACHES if reach != fit.reach))
+    drawn = bootstrap_means(y.reshape(len(y), -1), fit.rest, MIN_BOOTSTRAP_CURVES)[:FEW_DRAWS]
+    curves = np.concatenate([y.mean(axis=0).reshape(1, -1), drawn])
+    shape = (len(curves), *y.shape[1:])
+    every = curves.reshape(shape)
+    differences = (
+        other.minimum(other.fitted_part(every))[0] - fit.minimum(fit.fitted_part(every))[0]
+    )
+    spreads = differences[1:].std(axis=0) if len(drawn) else np.zeros(len(scales))
+    share = 1.0 if fit.reach == max(REACHES) else 1 / 3
+    return np.array(
+        [share * excess_error(differences[:1, i], spreads[i]) for i in range(len(scales))]
+    )
+
+
 def _along(
-    axis: NDArray, known: tuple[NDArray, int, float, NDArray, bool], value: float, fitted: float
+    axis: NDArray,
+    known: tuple[NDArray, int, float, NDArray, float, bool],
+    value: float,
+    fitted: float,
 ) -> Optimum:
     """Return the optimum of one of the parameters."""
-    scale, best, place, drawn, follows = known
-    low = high = math.nan
-    if drawn.size:
-        tail = (1 - CONFIDENCE) / 2
-        low, high = np.quantile(drawn, [tail, 1 - tail], method="inverted_cdf")
-        low, high = min(low, place), max(high, place)
+    scale, best, place, drawn, error, follows = known
+    low, high = widened_interval(place, drawn, error, (scale[0], scale[-1]))
     if not follows:
         low = np.fmin(low, min(place, scale[max(0, best - 1)]))
         high = np.fmax(high, max(place, scale[min(len(scale) - 1, best + 1)]))
@@ -112,9 +138,16 @@ class _Fit:
         Their mean's best point.
     """
 
-    def __init__(self, scales: Sequence[NDArray], y: NDArray, best: Sequence[int]) -> None:
+    def __init__(
+        self,
+        scales: Sequence[NDArray],
+        y: NDArray,
+        best: Sequence[int],
+        reaches: Sequence[int] = REACHES,
+    ) -> None:
         noise = variance_of_mean(y.reshape(len(y), -1))
-        for reach in REACHES:
+        for reach in reaches:
+            self.reach = reach
             self._choose(scales, y, best, reach)
             square = self._misfit()
             self.follows = square <= MAX_MISFIT * noise
@@ -142,9 +175,14 @@ class _Fit:
         self.pairs = list(itertools.combinations_with_replacement(range(len(some)), 2))
         products = [places[:, i] * places[:, j] for i, j in self.pairs]
         self.powers = np.column_stack([np.ones(len(places)), places, *products])
-        self.curves = y[(slice(None), *windows)].reshape(len(y), -1)
+        self._windows = windows
+        self.curves = self.fitted_part(y)
         """(m, points) of what is fitted."""
         self.mean = self.curves.mean(axis=0)
+
+    def fitted_part(self, y: NDArray) -> NDArray:
+        """Return of curves (m, n_1, n_2, ...) the points that are fitted: (m, points)."""
+        return y[(slice(None), *self._windows)].reshape(len(y), -1)
 
     def _misfit(self) -> float:
         """Return the mean square from the mean to its fit by degree of freedom; nan without."""

@@ -4,7 +4,7 @@ Overrides are keys of a camera by their dotted path, as in `--set`. Their values
 part of each camera that they make (see `sweep_points`).
 """
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import model_validator
@@ -189,8 +189,9 @@ class Sweep(Model):
         "name or path of a camera file, or a list of them", example="starter"
     )
     vary: dict[str, Variation] = key(
-        "path in the camera -> its values; several make a grid",
+        "path in the camera -> its values; several make a grid, none is one point",
         example={"pixel.width": {"start": "3 um", "stop": "8 um", "count": 20}},
+        default=dict,
     )
     cases: dict[Word, Case] = key(
         "name -> overrides by path: the sweep is repeated for each",
@@ -230,19 +231,25 @@ class Sweep(Model):
     @model_validator(mode="after")
     def _agrees(self) -> Self:
         mistakes = list(self._wrong_paths())
-        if not self.vary:
-            message = "varies nothing: the grid is empty"
-            mistakes.append(fault((VARY,), message, "name a path and its values"))
+        if not self.varies:
+            given = {"optimize": self.optimize is not None, "figures": bool(self.figures)}
+            message, remedy = "the study varies nothing", "add vary, or remove this"
+            mistakes += [fault((name,), message, remedy) for name in given if given[name]]
         if self.optimize is not None and self.optimize.metric not in self.metrics:
             message = f"{self.optimize.metric} is not among the metrics"
             mistakes.append(fault(("optimize", "metric"), message, "add it to metrics"))
         sought = self.optimize is not None
         mistakes += figure_model.mistakes(self.figures, self.metrics, sought)
         for name, item in self.expect.items():
-            mistakes += _wrong_expectation(("expect", name), item, self.metrics, sought)
+            mistakes += _wrong_expectation(("expect", name), item, self, sought)
         if mistakes:
             raise failure(mistakes)
         return self
+
+    @property
+    def varies(self) -> bool:
+        """Whether the study has more than a point in some case."""
+        return bool(self.vary) or any(case.vary for case in self.cases.values())
 
     def _wrong_paths(self) -> Iterator[InitErrorDetails]:
         found: dict[tuple[str, ...], InitErrorDetails] = {}
@@ -287,9 +294,10 @@ def overlap(path: str, other: str) -> bool:
 
 
 def _wrong_expectation(
-    place: tuple[str, ...], item: Expectation, metrics: Collection[str], sought: bool
+    place: tuple[str, ...], item: Expectation, study: Sweep, sought: bool
 ) -> Iterator[InitErrorDetails]:
     """Mistakes of an expectation that take the rest of the study to tell; see `Figure`."""
+    metrics = study.metrics
     known = (OPTIMUM, *metrics, *PROPERTIES)
     if item.quantity not in known:
         yield fault((*place, "quantity"), *one_of(item.quantity, known), given=item.quantity)
@@ -301,7 +309,7 @@ def _wrong_expectation(
     if is_place and (item.at is not None or item.over is not None):
         wrong = "at" if item.at is not None else "over"
         yield fault((*place, wrong), "an optimum has no place of its own", f"remove {wrong}")
-    if not is_place and item.at is None:
+    if not is_place and item.at is None and study.varies:
         yield fault((*place, "at"), "is missing", "write a value of the parameter, or optimum")
     if item.set and (is_place or is_measured(item.quantity, metrics, item.set)):
         message = f"{item.quantity} is taken from the sweep, which has no such overrides"

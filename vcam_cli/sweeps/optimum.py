@@ -12,6 +12,11 @@ there is a single curve and the spread is not known, the cubic is not believed: 
 drawn as well, and the interval reaches to the neighbors of the best point at least, between which
 the optimum of any curve with a single one lies.
 
+A cubic may also follow within the spread and still miss the optimum, all the more of a coarse grid:
+beside a pole its error at the points is small and its minimum lies off. Cubics through fewer of the
+points, and quartics, err otherwise. By how much their optima differ from the cubic's, beyond what
+the spread explains, is taken as the standard error of the interpolation, and added in squares.
+
 Reference: B. Efron, R. J. Tibshirani, An Introduction to the Bootstrap, Chapman & Hall, 1993,
 sections 6.2 and 13.3.
 """
@@ -36,6 +41,12 @@ MIN_FIT_POINTS = 5
 """Number of points that are fitted at least: a cubic passes through fewer, whatever they say."""
 REACH_SHARE, MIN_REACH = 0.2, 3
 """Points on either side of the best that are fitted at first: a share of all, a number at least."""
+LEAST_SHARE = 0.5
+"""Share of the fitted points that a further fit has at least: fewer tell of noise alone."""
+FEW_DRAWS = 200
+"""Draws that tell how far optima of fits differ by the spread: their standard deviation to 5 %."""
+QUANTILE = 1.96
+"""Of the normal distribution, for the share `CONFIDENCE`."""
 MAX_MISFIT = 4.0
 """Mean square by which the mean may depart from its fit, over its own variance."""
 
@@ -46,9 +57,9 @@ class Optimum:
 
     place: float
     low: float
-    """The lower end of the interval of the place; nan where a single curve leaves it open."""
+    """The lower end of the interval of the place."""
     high: float
-    """The upper end of the interval, nan likewise."""
+    """The upper end of the interval."""
     value: float
     """The metric at the optimum, no better than at the best point."""
     edge: str = ""
@@ -72,12 +83,10 @@ def find_optimum(parameter: NDArray, curves: NDArray, goal: str) -> Optimum:
     scale = np.log(x) if x[0] > 0 else x
     window, rest, follows = _fit_window(scale, y)
     best, value = (float(part[0]) for part in _minima(scale, y.mean(axis=0)[None], window))
-    found = _minima(scale, bootstrap_means(y, rest), window)[0]
-    low, high = math.nan, math.nan
-    if found.size:
-        tail = (1 - CONFIDENCE) / 2
-        low, high = np.quantile(found, [tail, 1 - tail], method="inverted_cdf")
-        low, high = min(low, best), max(high, best)
+    drawn = bootstrap_means(y, rest)
+    found = _minima(scale, drawn, window)[0]
+    error = _interpolation_error(scale, y.mean(axis=0), drawn[:FEW_DRAWS], window)
+    low, high = widened_interval(best, found, error, (scale[0], scale[-1]))
     if not follows and len(x) > 2:
         i = int(y.mean(axis=0).argmin())
         low = np.fmin(low, min(best, scale[max(0, i - 1)]))
@@ -90,6 +99,68 @@ def find_optimum(parameter: NDArray, curves: NDArray, goal: str) -> Optimum:
     sign = 1 if goal == "min" else -1
     inside = max(value, float(y.mean(axis=0).min()))
     return Optimum(place, low, high, sign * inside, edge, sign * value)
+
+
+def widened_interval(
+    best: float, drawn: NDArray, error: float, ends: tuple[float, float]
+) -> tuple[float, float]:
+    """Return the interval of optima that are drawn, with an error of the fit added in squares.
+
+    error: the standard error that is in no draw; ends: of the range, beyond which nothing lies.
+    """
+    low = high = best
+    if drawn.size:
+        tail = (1 - CONFIDENCE) / 2
+        low, high = np.quantile(drawn, [tail, 1 - tail], method="inverted_cdf")
+        low, high = min(low, best), max(high, best)
+    reach = QUANTILE * error
+    low, high = best - math.hypot(best - low, reach), best + math.hypot(high - best, reach)
+    return max(low, min(best, ends[0])), min(high, max(best, ends[1]))
+
+
+def excess_error(differences: NDArray, spreads: NDArray | float) -> float:
+    """Return the rms by which optima of further fits differ, beyond what noise explains.
+
+    differences: of each fit's optimum from that of the fit that is used (n,); spreads: the standard
+    deviations of these differences over draws (n,), 0 where there are none.
+    """
+    if not differences.size:
+        return 0.0
+    return math.sqrt(np.maximum(0.0, differences**2 - spreads**2).mean())
+
+
+def _interpolation_error(x: NDArray, mean: NDArray, drawn: NDArray, window: _Window) -> float:
+    """Return the standard error of the cubic's minimum that the spread does not explain.
+
+    From cubics through fewer points, and from quartics through a few more, whose own error is of a
+    higher order; the two are independent. drawn: means of curves drawn again (n, points).
+    """
+    curves = np.concatenate([mean[None], drawn])
+    used = _window_minima(x, curves, window, DEGREE)
+    best, square = int(mean.argmin()), 0.0
+    for others, degree in (
+        (window.parts(best, LEAST_SHARE), DEGREE),
+        (window.extensions(len(x)), DEGREE + 1),
+    ):
+        different = [_window_minima(x, curves, other, degree) - used for other in others]
+        if different:
+            d = np.array(different)
+            spread = d[:, 1:].std(axis=1) if len(drawn) else 0.0
+            square += excess_error(d[:, 0], spread) ** 2
+    return math.sqrt(square)
+
+
+def _window_minima(x: NDArray, curves: NDArray, window: _Window, degree: int) -> NDArray:
+    """Return where polynomials through curves (n, points) in a window are least.
+
+    To 1/200 of half the window, which is little beside the differences of fits.
+    """
+    some = x[window.points]
+    middle, half = (some[0] + some[-1]) / 2, (some[-1] - some[0]) / 2
+    t = np.linspace(-1.0, 1.0, 401)
+    powers, tried = (np.vander(u, degree + 1) for u in ((some - middle) / half, t))
+    c = np.linalg.lstsq(powers, curves[:, window.points].T, rcond=None)[0]
+    return np.asarray(middle + half * t[(tried @ c).argmin(axis=0)])
 
 
 def _best_point(x: NDArray, mean: NDArray, goal: str) -> Optimum:
@@ -118,6 +189,25 @@ class _Window:
     def points(self) -> slice:
         """The points as a slice."""
         return slice(self.start, self.start + self.size)
+
+    def parts(self, best: int, share: float) -> list[_Window]:
+        """Return the shorter windows in it that have the best point inside, of a share at least."""
+        least = max(MIN_FIT_POINTS, math.ceil(share * self.size))
+        end = self.start + self.size
+        return [
+            _Window(start, size)
+            for start in range(self.start, best)
+            for size in range(max(least, best + 2 - start), end - start + 1)
+            if size < self.size
+        ]
+
+    def extensions(self, points: int) -> list[_Window]:
+        """Return it with a point more at one end or both, of a row of points; itself, if long."""
+        first, last = self.start, self.start + self.size
+        ends = {
+            (max(0, first - a), min(points, last + b)) for a, b in ((0, 0), (1, 0), (0, 1), (1, 1))
+        }
+        return [_Window(a, b - a) for a, b in sorted(ends) if b - a > MIN_FIT_POINTS]
 
     def centered_on(self, best: int, points: int) -> _Window:
         """Return itself where it has the best point of a curve, moved there otherwise."""

@@ -7,29 +7,11 @@ of a spatial frequency, a wavelength or a place on the sensor.
 
 from collections.abc import Collection
 
-METRICS = {
-    "exposure_time": "s",
-    "mean_electrons": "e",
-    "saturated_fraction": "",
-    "snr_db": "dB",
-    "dynamic_range_db": "dB",
-    "well_capacity": "e",
-    "quantized_dynamic_range_db": "dB",
-    "picture_snr_db": "dB",
-    "base_iso": "",
-    "digital_gain": "",
-    "mse": "",
-    "psnr_db": "dB",
-    "mean_delta_e": "",
-    "mean_s_cielab": "",
-}
-"""Metric -> its unit."""
-QUALITY = {
-    "mse": "mse",
-    "psnr_db": "psnr",
-    "mean_delta_e": "cielab",
-    "mean_s_cielab": "s-cielab",
-}
+from vcam_cli.camera.quality import METRICS_OF, UNITS
+
+METRICS = {name: unit for name, unit in UNITS.items() if not name.startswith("hdr_")}
+"""Metric that a study can measure -> its unit."""
+QUALITY = {metric: asked for asked, metric in METRICS_OF.items()}
 """Metric -> the entry of a camera's `quality` that it needs; every run has the other metrics."""
 PROPERTIES = {
     "fill_factor": "",
@@ -69,6 +51,8 @@ _LABELS = {
     "dynamic_range_db": "dynamic range",
     "quantized_dynamic_range_db": "dynamic range with the ADC",
     "picture_snr_db": "SNR of the picture",
+    "gray_snr_db": "SNR of 18 % gray",
+    "mtf50": "MTF50",
     "base_iso": "base ISO speed",
     "mse": "mean squared error",
     "psnr_db": "PSNR",

@@ -21,10 +21,14 @@ from vcam_cli.arguments import (
     require_overrides,
     require_whole,
 )
+from vcam_cli.camera.expectations import notes
+from vcam_cli.config.study_overrides import split_sets
 from vcam_cli.errors import bad
 from vcam_cli.floats import own_float_errors
 from vcam_cli.progress import Callback, Observer, observer
 from vcam_cli.sweeps import sweep_file
+from vcam_cli.sweeps.limits import missed_limits, study_limits
+from vcam_cli.sweeps.model import Sweep
 from vcam_cli.sweeps.sweep_result import Extras, SweepResult, finished_result, request_hash
 
 
@@ -103,24 +107,33 @@ def sweep(
     tell: Callable[[str], None] | None = None,
     report: bool = False,
     formats: Sequence[str] = (),
+    expect: Sequence[str] = (),
 ) -> SweepResult:
     """Run a sweep study, or what is left of it, and write its tables and plots.
 
     study: a file, or the name of a shipped study; out: folder, default out/NAME; sets: overrides
-    "PATH=VALUE" laid over every camera; workers: processes, default all processors; scheduler:
-    address of a Dask scheduler in their place; shard: (i, n), the i-th of n shares of the points;
-    fresh: computes all of them again; watch follows the progress, as that of `simulate` does;
-    tell gets messages; report: also writes report.html; formats: "svg", "pdf" of plots, beside
-    PNG. Raises BadInput (wrong study, or no camera of it is valid), CannotDo (disk, scheduler), and
-    TypeError or ValueError for arguments that are none of these.
+    "PATH=VALUE" of the study, and of every camera where PATH begins with no key of a study;
+    workers: processes, default all processors; scheduler: address of a Dask scheduler in their
+    place; shard: (i, n), the i-th of n shares of the points; fresh: computes all of them again;
+    watch follows the progress, as that of `simulate` does; tell gets messages; report: also writes
+    report.html; formats: "svg", "pdf" of plots, beside PNG; expect: limits "METRIC >= VALUE" that
+    every point keeps, or "optimum <= 7 um": see `missed` of the result. Raises BadInput (wrong
+    study, or no camera of it is valid), CannotDo (disk, scheduler), and TypeError or ValueError for
+    arguments that are none of these.
     """
     start = time.perf_counter()
     _check_arguments(study, out, sets, workers, shard)
     execution = Execution(Share(*shard) if shard else None, workers, scheduler, fresh)
     watch, tell = observer(watch), tell or (lambda _: None)
     watch.begin("points")
-    file = sweep_file.read(study)
+    own, sets = split_sets(sets, Sweep.model_fields)
+    file = sweep_file.read(study, sets=own)
     place = Path(out) if out is not None else Path("out") / file.model.name
+    limits = study_limits(file, expect)
+    expected = [limit.metric for limit in limits]
+    expected += [item.quantity for item in file.model.expect.values()]
+    for note in notes(expected):
+        tell(note)
     extras = Extras(report, tuple(formats))
     request = request_hash(file, sets, extras)
     result = None if fresh else finished_result(place, file, request)
@@ -132,4 +145,5 @@ def sweep(
     else:
         for problem in result.refused:
             tell(problem)
-    return replace(result, seconds=time.perf_counter() - start)
+    missed = missed_limits(limits, result)
+    return replace(result, missed=missed, seconds=time.perf_counter() - start)

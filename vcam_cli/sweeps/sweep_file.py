@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
@@ -23,6 +23,8 @@ from vcam_cli.camera.load import merge
 from vcam_cli.config import validation_messages
 from vcam_cli.config.document import Document, given_at, place_order
 from vcam_cli.config.file_names import argument_file, current_folder, referenced_file
+from vcam_cli.config.merge import Alternatives, MergeRules
+from vcam_cli.config.study_overrides import lay_over
 from vcam_cli.config.validation_messages import yaml_text
 from vcam_cli.config.yaml_reader import read_file
 from vcam_cli.config.yaml_tree import Node, Origin, PlacedKeys, Source, tree_at
@@ -32,6 +34,7 @@ from vcam_cli.sweeps.model import VARY, Sweep
 from vcam_cli.sweeps.quantities import QUALITY, symbol
 
 Cell = float | str
+MERGE_RULES = MergeRules(alternatives=(Alternatives.parse("start stop count spacing | values"),))
 NOMINAL = "nominal"
 """The case of a study that names none."""
 OTHERS = {
@@ -171,18 +174,21 @@ class StudyFile(PlacedKeys):
         return out
 
 
-def read(study: str | Path, folder: Path | None = None) -> StudyFile:
+def read(study: str | Path, folder: Path | None = None, sets: Sequence[str] = ()) -> StudyFile:
     """Read a study file, or a shipped study's. Raises BadInput with everything wrong, CannotDo.
 
-    The cameras that it makes are not looked at: see `sweep_points`.
+    sets: overrides "PATH=VALUE" of keys of the study. The cameras that it makes are not looked at:
+    see `sweep_points`.
     """
-    file = argument_file(study, folder or current_folder(), "studies")
+    start = folder or current_folder()
+    file = argument_file(study, start, "studies")
     tree = read_file(file)
     if tree.mapping is None:
         raise BadInput(
             [tree.problem((), "a mapping is needed here", "write lines of `key: value`")]
         )
     refuse_others(tree, "sweep")
+    tree = lay_over(tree, sets, start, MERGE_RULES)
     value = tree.plain()
     assert isinstance(value, dict)
     if "name" not in value:

@@ -22,6 +22,7 @@ from typing import Any
 from vcam_cli.camera import load as cameras
 from vcam_cli.camera import step_plugins
 from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.expectations import unmeasured
 from vcam_cli.camera.load import FILE_KEYS, merge
 from vcam_cli.camera.simulation import Seed
 from vcam_cli.config.document import Document
@@ -179,6 +180,7 @@ def _points(
         try:
             file = case_file(case, nodes, over)
             camera = file.validate(CHECKS)
+            _require_metrics(camera, model)
         except BadInput as error:
             refused = replace(here, problems=error.problems, inputs=file.inputs)
             yield from itertools.repeat(refused, model.seeds)
@@ -189,6 +191,19 @@ def _points(
             own = with_next_seed(camera, i)
             point = hash_text(f"{content} {own.seed.frame}")[:32]
             yield replace(here, seed=own.seed.frame, camera=own, id=point, content=content)
+
+
+def _require_metrics(camera: Camera, model: Sweep) -> None:
+    """Raise BadInput where a camera does not measure a metric of the study."""
+    measures = camera.quality, camera.has_edge, bool(camera.exposure.captures)
+    found = [(name, unmeasured(name, *measures)) for name in model.metrics]
+    problems = [
+        Problem(("metrics",), f"this camera does not measure {name}", remedy)
+        for name, remedy in found
+        if remedy is not None
+    ]
+    if problems:
+        raise BadInput(problems)
 
 
 def case_file(case: StudyCase, nodes: Mapping[str, Node], over: Node) -> Document:
@@ -208,7 +223,7 @@ def with_next_seed(camera: Camera, number: int) -> Camera:
 def _content(camera: Camera, model: Sweep) -> str:
     """Return the hash of all that a point's numbers depend on, but for the seed of its frame."""
     form = camera.model_dump(mode="json")
-    for name in ("name", "quality") if model.keep else ("name", "quality", "output"):
+    for name in ("name", "quality", "expect", *(() if model.keep else ("output",))):
         form.pop(name, None)
     form["seed"] = form["seed"]["sensor"]
     return hash_of(camera, form, {"metrics": sorted(model.metrics), "keep": sorted(model.keep)})

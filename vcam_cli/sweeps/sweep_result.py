@@ -20,8 +20,8 @@ from vcam_cli.camera import load as cameras
 from vcam_cli.config.document import Document
 from vcam_cli.config.file_names import current_folder
 from vcam_cli.errors import CannotDo, Problem, dotted_path, one_line
-from vcam_cli.files.points_store import RECORD, SweepFolder, record_check
-from vcam_cli.files.records import Proofs, read_record
+from vcam_cli.files.points_store import RECORD, SweepFolder
+from vcam_cli.files.records import Proofs, read_record, record_check
 from vcam_cli.files.report import hash_file, hash_text, to_json
 from vcam_cli.files.spectral.hyperspectral import companions
 from vcam_cli.files.tables import Cell
@@ -169,6 +169,8 @@ class SweepResult:
     computed: int = 0
     """Number of points computed now; the others were there."""
     seconds: float = 0.0
+    missed: tuple[str, ...] = ()
+    """A sentence for each limit of `expect` that was not kept."""
     unmade: dict[str, str] = field(default_factory=dict)
     """Figures that could not be made, and why."""
 
@@ -210,6 +212,11 @@ class SweepResult:
         """0; 4 where some points or figures failed, 2 where every point was refused."""
         return 2 if self.all_refused else 4 if self.failed or self.unmade else 0
 
+    @property
+    def missed_expectations(self) -> tuple[str, ...]:
+        """A sentence for each expectation of the study itself that is not met."""
+        return tuple(e.summary for e in self.expectations if e.verdict != "inside")
+
     def summary(self) -> dict[str, Any]:
         """Return what `--json` prints."""
         return {
@@ -221,6 +228,7 @@ class SweepResult:
             "missing": self.missing,
             "optimum": [optimum.plain for optimum in self.optima],
             "missed": [item.name for item in self.expectations if item.verdict == "missed"],
+            "limits_missed": list(self.missed),
             "seconds": self.seconds,
             "unmade": self.unmade,
         }

@@ -309,6 +309,9 @@ def _client(distributed: Any, address: str) -> Any:
     except (OSError, ValueError) as error:
         message = f"no Dask scheduler answers at {address} within {CONNECT_TIMEOUT:g} s"
         raise CannotDo(message, "start one with: dask scheduler") from error
+    except Exception as error:  # whatever Dask makes of bytes that another program sends
+        message = f"what listens at {address} is no Dask scheduler"
+        raise CannotDo(message, "look for the port in what dask scheduler prints") from error
 
 
 def _slots(client: Any, address: str, report: Callable[[str], None]) -> list[tuple[str, int]]:
