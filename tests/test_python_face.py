@@ -3,6 +3,7 @@
 import csv
 import json
 import pickle
+from importlib import import_module
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from vcam_cli import BadInput, load, schedule, simulate, sweep
 from vcam_cli.commands.main import app
 from vcam_cli.config import shipped
 from vcam_cli.files.records import RECORDS
+from vcam_cli.files.report import to_json
 
 SMALL = ["array.rows=16", "array.columns=18", "accuracy=draft", "exposure.time=5 ms"]
 CHANGES = {"exposure.time": "10 ms", "array.rows": 20, "quality": ["mse"]}
@@ -40,7 +42,7 @@ def swept(tmp_path_factory):
 
 def test_the_face_lists_itself():
     assert dir(vcam_cli) == sorted(vcam_cli.__all__)
-    assert {"load", "simulate", "sweep", "schedule"} <= set(dir(vcam_cli))
+    assert {"load", "simulate", "verify", *COMMANDS} <= set(dir(vcam_cli))
     assert all(getattr(vcam_cli, name) is not None for name in dir(vcam_cli))
 
 
@@ -188,3 +190,89 @@ def test_wrong_arguments_are_named(wrong, said):
         if set(wrong) <= takes[name]:
             with pytest.raises((TypeError, ValueError), match=said):
                 call()
+
+
+COMMANDS = {"accuracy", "characterize", "compare", "dataset", "fit", "plan", "schedule", "sweep"}
+
+
+def test_each_command_that_computes_is_a_function():
+    """Also after the folder that is called as one of them was imported."""
+    import_module("vcam_cli.accuracy.study")
+    for name in (*COMMANDS, "verify", "simulate"):
+        found = getattr(vcam_cli, name)
+        assert found.__name__ == name, f"{name} is {found}"
+
+
+def json_of(*arguments):
+    done = CliRunner().invoke(app, [*arguments, "--json", "-q"], prog_name="vcam")
+    assert done.exit_code == 0, done.output
+    return json.loads(done.stdout)
+
+
+def test_plan_is_what_the_command_prints():
+    sets = [part for word in SMALL for part in ("--set", word)]
+    found = vcam_cli.plan(load("starter", SMALL))
+    printed = json_of("plan", "starter", *sets)
+    assert json.loads(to_json(found.geometry)) == printed["geometry"]
+    named = [{k: e[k] for k in ("name", "state", "reason")} for e in found.effects]
+    assert named == [{k: e[k] for k in ("name", "state", "reason")} for e in printed["effects"]]
+    assert repr(found).startswith("<PlannedRun starter: ")
+    assert "\n" not in repr(found)
+
+
+def test_compare_is_what_the_command_prints(result, tmp_path):
+    one = result.save(tmp_path / "one") / "render.png"
+    other = simulate(load("starter", [*SMALL, "seed.frame=9"])).save(tmp_path / "two")
+    found = vcam_cli.compare(one, other / "render.png", tmp_path / "ab", ppd=30)
+    printed = json_of("compare", str(one), str(other / "render.png"), "--ppd", "30")
+    assert found.report() == {k: v for k, v in printed.items() if k != "out"}
+    assert {p.name for p in (tmp_path / "ab").iterdir()} >= {"compare.csv", "s_cielab.png"}
+    with pytest.raises(BadInput, match="cannot both be given"):
+        vcam_cli.compare(one, one, ppd=3, dpi=3)
+    with pytest.raises(BadInput, match="for the space xyz only"):
+        vcam_cli.compare(one, one, white=(1, 1, 1))
+
+
+def test_dataset_writes_what_the_command_writes(tmp_path):
+    (tmp_path / "pairs.yaml").write_text(
+        "kind: dataset\ncamera: starter\nvary: {exposure.time: {choice: [5 ms, 9 ms]}}\nframes: 9\n"
+        "size: {rows: 8, columns: 8}\nwrite: [raw]\nshards: 2\n"
+    )
+    sets = ["frames=4", "vary.exposure.time.choice=[5 ms]", "accuracy=draft"]
+    found = vcam_cli.dataset(tmp_path / "pairs.yaml", tmp_path / "out", sets, workers=1)
+    assert (found.frames, found.computed, found.shards) == (4, 4, 2)
+    with open(tmp_path / "out/manifest.csv", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert len(rows) == 4
+
+
+def test_verify_reads_a_measurement_and_writes_where_it_is_told(tmp_path):
+    found = vcam_cli.verify(
+        "test-pixel-0.18um", "test-pixel-simulated", tmp_path / "out", formats=["svg"]
+    )
+    assert {p.name for p in (tmp_path / "out").iterdir()} >= {"verify.csv", "errors.svg"}
+    assert found.rows
+    assert not found.missed
+
+
+@pytest.mark.parametrize(
+    ("name", "arguments"),
+    [
+        ("plan", (5,)),
+        ("accuracy", (None,)),
+        ("characterize", (b"x",)),
+        ("fit", (3.0,)),
+        ("verify", ("starter", None)),
+        ("dataset", ([],)),
+        ("compare", (1, "x.png")),
+        ("plan", ("starter", "two")),
+    ],
+)
+def test_arguments_of_another_type_are_refused(name, arguments):
+    with pytest.raises(TypeError, match="write "):
+        getattr(vcam_cli, name)(*arguments)
+
+
+def test_frames_can_only_be_kept_somewhere():
+    with pytest.raises(ValueError, match="needs a folder"):
+        vcam_cli.characterize("starter", keep_frames=True)

@@ -12,14 +12,18 @@
 
 `result.save("out/mine")` writes what `vcam run` writes.
 
-`sweep` and `schedule` run studies and give their tables as rows. `BadInput` and `CannotDo` are
+`sweep`, `schedule` and `dataset` run studies and write into a folder; their tables are rows.
+`plan`, `accuracy`, `characterize`, `fit`, `verify` and `compare` return what the commands of these
+names find, and write what those write where `out` names a folder. `BadInput` and `CannotDo` are
 what all of them raise.
 
 Names are imported when they are first used, so that `import vcam_cli` costs a millisecond: that of
 listing its files, by which results know the code that made them.
 """
 
+import sys
 from importlib import import_module
+from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from vcam_cli import source_code  # noqa: F401  first: before files change
@@ -32,16 +36,50 @@ _HOMES = {
     "schedule": "vcam_cli.capture_schedules.study",
     "simulate": "vcam_cli.simulation.simulate",
     "sweep": "vcam_cli.sweeps.sweep",
+    **dict.fromkeys(
+        ("accuracy", "characterize", "compare", "dataset", "fit", "plan", "verify"),
+        "vcam_cli.face",
+    ),
 }
 """Name of the face -> the module that has it."""
-__all__ = ["BadInput", "CannotDo", "__version__", "load", "schedule", "simulate", "sweep"]
+__all__ = [
+    "BadInput",
+    "CannotDo",
+    "__version__",
+    "accuracy",
+    "characterize",
+    "compare",
+    "dataset",
+    "fit",
+    "load",
+    "plan",
+    "schedule",
+    "simulate",
+    "sweep",
+    "verify",
+]
 
 if TYPE_CHECKING:
     from vcam_cli.camera.load import load
     from vcam_cli.capture_schedules.study import schedule
     from vcam_cli.errors import BadInput, CannotDo
+    from vcam_cli.face import accuracy, characterize, compare, dataset, fit, plan, verify
     from vcam_cli.simulation.simulate import simulate
     from vcam_cli.sweeps.sweep import sweep
+
+
+class _Face(ModuleType):
+    """The package itself. `accuracy` is a function of it although a folder has that name, too.
+
+    Whoever imports the folder would leave it in the function's place.
+    """
+
+    def __setattr__(self, name: str, value: object) -> None:
+        if not (name in _HOMES and isinstance(value, ModuleType)):
+            super().__setattr__(name, value)
+
+
+sys.modules[__name__].__class__ = _Face
 
 
 def __getattr__(name: str) -> Any:
