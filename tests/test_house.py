@@ -44,6 +44,7 @@ FLOORS = (
     {"datasets"},
     {"verification"},
     {"fitting"},
+    {"face"},
     {"commands"},
 )
 """From the bottom: a module imports from floors below its own, and from its own room (package)."""

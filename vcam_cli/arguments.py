@@ -6,11 +6,17 @@ from os import PathLike
 from pathlib import Path
 from typing import Any
 
-_EXAMPLES = {"camera": "camera.yaml", "study": "study.yaml"}
+_EXAMPLES = {
+    "camera": "camera.yaml",
+    "study": "study.yaml",
+    "measurement": "bench.yaml",
+    "image": "render.png",
+    "reference": "reference.png",
+}
 
 
 def require_name(given: Any, kind: str) -> None:
-    """Raise TypeError for what is no file or name of a kind, "camera" or "study"."""
+    """Raise TypeError for what is no file or name of a kind, of `_EXAMPLES`."""
     if not isinstance(given, str | PathLike) or isinstance(given, bytes):
         raise TypeError(f'{brief(given)} is no file or name of a {kind}; write "{_EXAMPLES[kind]}"')
 

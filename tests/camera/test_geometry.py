@@ -189,6 +189,29 @@ def test_temperatures_that_silicon_does_not_stand(tmp_path, key: str, given: str
     assert "out of range" in problem.message
 
 
+SIDES = [("horizontal", 64), ("vertical", 48), ("diagonal", 80)]
+
+
+@pytest.mark.parametrize(("side", "extent"), SIDES)
+def test_a_field_of_view_says_what_it_is_over(side, extent, tmp_path):
+    """Of 64 x 48 pixels: 90 degrees are an image distance of half the extent."""
+    g = solved(
+        tmp_path,
+        optics={"f_number": 2, "field_of_view": {side: "90 deg"}},
+        scene__distance="infinity",
+    )
+    report = g.report(1)
+    assert report[f"field_of_view_{side}"] == pytest.approx(math.pi / 2, rel=1e-9)
+    assert report["focal_pixels_x"] == pytest.approx(extent / 2, rel=1e-9)
+    assert report["focal_pixels_y"] == pytest.approx(extent / 2, rel=1e-9)
+
+
+@pytest.mark.parametrize("wrong", [{}, {"horizontal": "9 deg", "vertical": "8 deg"}, {"x": 1}])
+def test_a_field_of_view_is_over_one_thing(wrong, tmp_path):
+    problems = refused(tmp_path, {"optics": {"f_number": 2, "field_of_view": wrong}})
+    assert all("field_of_view" in problem.path for problem in problems)
+
+
 def test_a_field_of_view_spans_the_diagonal_of_the_array(tmp_path):
     """90 degrees over 5 x 4 um pixels with gaps: the image distance is half the diagonal."""
     g = solved(

@@ -96,6 +96,8 @@ GUESSES = {
     "scene.distance=inf": "scene.distance: infinity",
     "adc.offset=64": "adc.offset: 64 DN",
     "optics.fov=80": "optics.field_of_view: 80 deg",
+    "optics.hfov=80 deg": "optics.field_of_view: {horizontal: 80 deg}",
+    "optics.vertical_fov=40": "optics.field_of_view: {vertical: 40 deg}",
     "optics.field_of_view=80": "optics.field_of_view: 80 deg",
     "name=my phone": "name: my-phone",
     "name=“phone”": "name: phone",
@@ -359,6 +361,11 @@ def test_an_option_that_is_a_key_is_led_to_set(option, meant):
     assert done.returncode == 2
     assert f'--set {path}="{value}"' in done.stderr
     load("camera.yaml", [meant])
+
+
+def test_a_field_of_view_of_no_side_is_told_that_it_is_the_diagonals():
+    with pytest.raises(BadInput, match=r"which is over the diagonal, or {horizontal: 80 deg}"):
+        load("starter", ["optics.fov=80 deg"])
 
 
 NEEDS_MORE = {

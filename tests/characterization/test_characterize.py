@@ -11,9 +11,11 @@ import numpy as np
 import pytest
 from making import LIGHT, PLANCK, camera, radiance_for
 
+from vcam_cli.camera.expectations import read_limits
 from vcam_cli.characterization import bench as benches
 from vcam_cli.characterization import exposures
 from vcam_cli.characterization.characterize import characterize
+from vcam_cli.characterization.datasheet import UNITS
 from vcam_cli.progress import Stages
 from vcam_cli.quality.mtf import crossing_frequency
 
@@ -45,6 +47,13 @@ NOISE = math.sqrt(13**2 + DARK)
 @pytest.fixture(scope="module")
 def sheet(tmp_path_factory):
     return characterize(camera(tmp_path_factory.mktemp("sheet"), SHEET))
+
+
+def test_every_quantity_can_be_expected_in_its_unit(sheet):
+    assert {q.name: q.unit for q in sheet.quantities} == UNITS
+    (kept, missed) = read_limits(["read_noise <= 14", "dark_current < 0.5 ke/s"], UNITS)
+    (said,) = sheet.misses([kept, missed])
+    assert said.startswith("missed: expected dark_current < 500 e/s, but dark_current is 9")
 
 
 CLOSED = {

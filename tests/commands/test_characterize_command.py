@@ -7,7 +7,7 @@ import pytest
 from typer.testing import CliRunner
 
 from vcam_cli.characterization import bench, exposures
-from vcam_cli.commands.characterize import SHOWN
+from vcam_cli.characterization.output import SHOWN
 from vcam_cli.commands.main import app
 
 FILES = {

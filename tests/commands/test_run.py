@@ -256,7 +256,7 @@ class TestFiles:
         assert list(found) == [
             "exposure_time", "mean_electrons", "saturated_fraction",
             "snr_db", "dynamic_range_db", "well_capacity", "quantized_dynamic_range_db",
-            "picture_snr_db", "base_iso", "digital_gain",
+            "picture_snr_db", "gray_snr_db", "base_iso", "digital_gain",
         ]  # fmt: skip
         assert found["exposure_time"] == (0.02, "s")
         mean = raw()["electrons"].mean(dtype=float)

@@ -273,7 +273,7 @@ class TestValidate:
     def test_what_is_missing_in_a_study(self):
         Path("study.yaml").write_text("kind: sweep\nname: pixel-size\n")
         text = vcam("validate", "study.yaml", code=2).stderr
-        assert [line.split(": ")[1] for line in text.splitlines()] == ["camera", "vary", "metrics"]
+        assert [line.split(": ")[1] for line in text.splitlines()] == ["camera", "metrics"]
 
     def test_a_machine_that_cannot_ends_with_3(self, monkeypatch):
         def refuse(*_):

@@ -110,8 +110,72 @@ def test_a_step_that_changes_the_size_of_the_picture_is_refused(folder, monkeypa
     made = camera(folder, f"{BEFORE}, {{median: 3x3}}")
     kind = type(made.processing[-1])
     monkeypatch.setattr(kind, "process", lambda self, picture: picture[:, 1:])
-    with pytest.raises(BadInput, match=r"processing.3.median.*this step makes"):
+    with pytest.raises(BadInput, match=r"processing.3.median.*the step median makes"):
         _ = simulate(made).render
+
+
+def raising(error):
+    def process(self, picture):
+        raise error
+
+    return process
+
+
+def with_nan(self, picture):
+    picture[0, 0, 0] = np.nan
+    return picture
+
+
+@pytest.mark.parametrize(
+    ("method", "process", "said"),
+    [
+        ("process", raising(RuntimeError("no luck")), "ends with RuntimeError: no luck"),
+        ("process", raising(SystemExit(3)), "ends with SystemExit: 3"),
+        ("process", raising(KeyError()), "ends with KeyError"),
+        ("process", with_nan, "makes values that are not finite"),
+        ("process", lambda self, picture: None, r"makes \(\) of"),
+        ("process", lambda self, picture: [[1, 2], [3]], "ends with ValueError"),
+        (
+            "process",
+            lambda self, picture: picture.astype(complex),
+            "makes numbers of the type complex128",
+        ),
+        ("process", lambda self, picture: picture.astype(str), "makes numbers of the type <U"),
+        ("process_ideal", lambda self, colors: colors[:1], "makes"),
+        ("process_ideal", raising(ZeroDivisionError("x")), "ends with ZeroDivisionError: x"),
+    ],
+)
+def test_whatever_a_step_does_is_told_with_its_name(folder, monkeypatch, method, process, said):
+    made = camera(folder, f"{BEFORE}, {{median: 3x3}}")
+    monkeypatch.setattr(type(made.processing[-1]), method, process)
+    with pytest.raises(BadInput, match=rf"processing.3.median: the step median {said}"):
+        _ = simulate(made).metrics["mse"]
+
+
+@pytest.mark.parametrize(
+    ("attribute", "value", "said"),
+    [
+        ("acts_on", "pixels", "acts_on 'pixels', not one of light, colors, codes"),
+        ("acts_on", None, "acts_on None"),
+        ("halo", -1, "halo is -1, not a whole number from 0 to 1000"),
+        ("halo", 10**9, "halo is 1000000000"),
+        ("halo", 2.5, "halo is 2.5"),
+        (
+            "model_validate",
+            classmethod(raising(RuntimeError("no"))),
+            "cannot be made: RuntimeError: no",
+        ),
+        ("model_validate", classmethod(raising(SystemExit())), "cannot be made: SystemExit"),
+    ],
+)
+def test_what_a_step_says_wrongly_of_itself_is_refused(folder, monkeypatch, attribute, value, said):
+    kind = plugin("median")
+    monkeypatch.setattr(kind, attribute, value)
+    plugin.cache_clear()
+    with pytest.raises(BadInput) as caught:
+        camera(folder, f"{BEFORE}, {{median: 3x3}}")
+    assert said in str(caught.value)
+    assert "median" in str(caught.value)
 
 
 def test_they_are_listed_beside_our_own(installed):

@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 from tests.making import camera as made
 from vcam_cli import load, simulate
 from vcam_cli.commands.main import app
-from vcam_cli.reports import page, pictures, study_report
+from vcam_cli.reports import page, pictures, side_by_side, study_report
 from vcam_cli.reports.page import Facts, Page, Picture, Scale, Section, Table, Text
 from vcam_cli.simulation.output import report_plots
 
@@ -202,6 +202,22 @@ def test_runs_side_by_side(runs, tmp_path):
     assert run("report", runs / "bare", "-q", "-o", tmp_path / "bare.html").exit_code == 0
     again = run("report", runs / "a", runs / "b", "-o", tmp_path / "both.html", "-q")
     assert (again.exit_code, again.stdout) == (0, "")
+
+
+def test_a_page_in_the_folder_of_a_run_leaves_it_a_runs(tmp_path):
+    """Before and after a run that writes a report of its own, and in the folder of a sweep."""
+    place = tmp_path / "run"
+    for words in ((), ("--report",), ()):
+        assert run(*small("run", "starter", *words), "-o", place).exit_code == 0
+        done = run("report", place, "-o", place / "report.html", "-q")
+        assert done.exit_code == 0, done.output
+    assert run(*small("run", "starter", "--report"), "-o", place).exit_code == 0
+
+
+def test_notes_of_all_runs_are_said_once(tmp_path):
+    notes = {"a": ["same", "own of a"], "b": ["same", "two"], "c": ["same", "two"]}
+    read = [(label, tmp_path, {"notes": said}) for label, said in notes.items()]
+    assert list(side_by_side._notes(read)) == ["same", "a: own of a", "b, c: two"]
 
 
 def test_what_is_no_run_or_no_page_is_refused(runs, tmp_path):

@@ -1,11 +1,19 @@
 """The whole camera file."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Annotated, Any, Self
 
 from pydantic import PrivateAttr, model_validator
 from pydantic_core import InitErrorDetails
 
+from vcam_cli.camera.expectations import (
+    LIMIT_LIST,
+    Limit,
+    read_limit,
+    read_limits,
+    unmeasured,
+    unmeasured_mistakes,
+)
 from vcam_cli.camera.exposure import Exposure
 from vcam_cli.camera.lens_choice import OPTICS
 from vcam_cli.camera.optics import Optics
@@ -18,7 +26,8 @@ from vcam_cli.camera.processing import (
     order_mistakes,
     picture_mistakes,
 )
-from vcam_cli.camera.quality import METRIC_LIST, Display
+from vcam_cli.camera.quality import METRIC_LIST, UNITS, Display
+from vcam_cli.camera.scene.charts import SlantedEdge
 from vcam_cli.camera.scene.scene import Scene
 from vcam_cli.camera.sensor.adc import Adc
 from vcam_cli.camera.sensor.architecture import ARCHITECTURES, article
@@ -28,6 +37,7 @@ from vcam_cli.camera.simulation import ACCURACY, Accuracy, Effects, Output, Seed
 from vcam_cli.config.model import FileModel, key
 from vcam_cli.config.validation_messages import failure, fault
 from vcam_cli.config.values import Word
+from vcam_cli.errors import BadInput, Problem
 from vcam_cli.spectra.spectrum import Outside
 
 
@@ -58,6 +68,11 @@ class Camera(FileModel):
     )
     quality: Annotated[tuple[str, ...], METRIC_LIST] = key(
         "metrics of the picture against the ideal image", example=["mse", "psnr"], default=()
+    )
+    expect: Annotated[tuple[str, ...], LIMIT_LIST] = key(
+        "limits that metrics of the run keep; where one is missed, vcam run exits with 4",
+        example=["mean_electrons >= 1000", "gray_snr_db >= 30"],
+        default=(),
     )
     display: Display = key(
         "the display on which pictures are compared", example={"dpi": 72}, default=Display
@@ -92,6 +107,9 @@ class Camera(FileModel):
             *light_mistakes(self.processing, self.scene.emits),
             *code_mistakes(self.processing, render),
             *self._capture_mistakes(),
+            *unmeasured_mistakes(
+                self.expect, self.quality, self.has_edge, bool(self.exposure.captures)
+            ),
         ]
         if mistakes:
             raise failure(mistakes)
@@ -127,6 +145,29 @@ class Camera(FileModel):
             message = f"pixels joined by {binning.kind} binning are read once in an integration"
             remedy = "write kind: charge in array.binning, or give one exposure time"
             yield fault(place, message, remedy)
+
+    @property
+    def has_edge(self) -> bool:
+        """Whether the scene is a slanted edge on rows and columns, whose MTF can be measured."""
+        return isinstance(self.scene.source, SlantedEdge) and not self.array.is_scattered
+
+    @property
+    def limits(self) -> tuple[Limit, ...]:
+        """What the file expects of the metrics."""
+        return tuple(read_limit(text, UNITS) for text in self.expect)
+
+    def with_expectations(self, texts: Sequence[str]) -> "Camera":
+        """Return the same camera with further limits, those of `--expect`. Raises BadInput."""
+        limits = read_limits(texts, UNITS)
+        measures = self.quality, self.has_edge, bool(self.exposure.captures)
+        problems = [
+            Problem((), f"this camera does not measure {limit.metric}", remedy, "--expect")
+            for limit in limits
+            if (remedy := unmeasured(limit.metric, *measures)) is not None
+        ]
+        if problems:
+            raise BadInput(problems)
+        return self.model_copy(update={"expect": (*self.expect, *texts)})
 
     def with_(self, changes: Mapping[str, Any]) -> "Camera":
         """Return the camera with some keys changed, validated as its file is.

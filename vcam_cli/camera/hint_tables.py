@@ -9,6 +9,12 @@ from fractions import Fraction
 
 from vcam_cli.errors import Path
 
+SIDES_SEEN = {
+    **dict.fromkeys(("hfov", "horizontal_fov"), "horizontal"),
+    **dict.fromkeys(("vfov", "vertical_fov"), "vertical"),
+    "dfov": "diagonal",
+}
+"""A word for a field of view -> what it is over."""
 KEYS: Mapping[str, str] = {
     "iso": "exposure.iso: 800",
     "gain": "exposure.gain: 8",
@@ -27,7 +33,10 @@ KEYS: Mapping[str, str] = {
     "fstop": "optics.f_number: 2.8",
     "fnumber": "optics.f_number: 2.8",
     "n": "optics.f_number: 2.8",
-    "fov": "optics.field_of_view: 60 deg",
+    **dict.fromkeys(
+        ("fov", "angle_of_view", "hfov", "horizontal_fov", "vfov", "vertical_fov", "dfov"),
+        "optics.field_of_view: 60 deg",
+    ),
     "na": "optics.numerical_aperture: 0.2",
     "transmission": "optics.transmittance: 0.95",
     "vignetting": "optics.off_axis: exact",

@@ -23,6 +23,7 @@ from vcam_cli.camera.hint_tables import (
     NOT_SIMULATED,
     PICTURES,
     SECTIONS,
+    SIDES_SEEN,
     SWITCHES,
     VALUES,
 )
@@ -194,7 +195,14 @@ def _field_of_view(text: str) -> str:
 
 def _entry(word: str, given: object) -> str:
     """Return what is meant by a word of `KEYS`, with the value that was given if it will do."""
-    return _with_value(KEYS[word], given)
+    if word in SIDES_SEEN:
+        angle = _with_value(KEYS["fov"], given).partition(": ")[2]
+        return f"optics.field_of_view: {{{SIDES_SEEN[word]}: {angle}}}"
+    meant = _with_value(KEYS[word], given)
+    if word in ("fov", "angle_of_view"):
+        angle = meant.partition(": ")[2]
+        meant += f", which is over the diagonal, or {{horizontal: {angle}}}"
+    return meant
 
 
 def _with_value(entry: str, given: object) -> str:

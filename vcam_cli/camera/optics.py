@@ -11,10 +11,11 @@ from pydantic_core import InitErrorDetails
 
 from vcam_cli.camera.spectrum import Spectral, SpectrumSpec, flat
 from vcam_cli.config.lists import read_items, repeats
-from vcam_cli.config.model import Model, Rule, at_most_one, key
+from vcam_cli.config.model import Model, Rule, at_most_one, exactly_one, key
 from vcam_cli.config.quantities import Number, Quantity
 from vcam_cli.config.validation_messages import describe, failure, fault
 from vcam_cli.config.values import (
+    Either,
     File,
     Fraction,
     Length,
@@ -24,7 +25,7 @@ from vcam_cli.config.values import (
     mapping,
     word_or,
 )
-from vcam_cli.config.yaml_type import YamlType
+from vcam_cli.config.yaml_type import YamlType, to_yaml
 
 
 class FocusWindow(Model):
@@ -226,6 +227,52 @@ def _neutral(name: str, given: Any) -> bool:
         return True
 
 
+_FULL_ANGLE = Quantity("angle", above=0, below=math.pi)
+
+
+class FieldOfView(Model):
+    """A field of view: the full angle over one side of the array, or over its diagonal."""
+
+    horizontal: Annotated[float | None, _FULL_ANGLE] = key(
+        "over the array's width", example="40 deg", default=None
+    )
+    vertical: Annotated[float | None, _FULL_ANGLE] = key(
+        "over the array's height", example="30 deg", default=None
+    )
+    diagonal: Annotated[float | None, _FULL_ANGLE] = key(
+        "over the array's diagonal", example="46 deg", default=None
+    )
+
+    rules: ClassVar[tuple[Rule, ...]] = (
+        exactly_one(
+            "horizontal", "vertical", "diagonal", of="the angle", remedy="write {diagonal: 46 deg}"
+        ),
+    )
+
+    def over(self, width: float, height: float) -> tuple[float, float]:
+        """Return the angle [rad], and the side or diagonal that it is over, in the unit of both."""
+        if self.horizontal is not None:
+            return self.horizontal, width
+        if self.vertical is not None:
+            return self.vertical, height
+        assert self.diagonal is not None
+        return self.diagonal, math.hypot(width, height)
+
+
+def _field_of_view(given: Any) -> FieldOfView:
+    if isinstance(given, (Mapping, FieldOfView)):
+        return FieldOfView.model_validate(given)
+    angle = _FULL_ANGLE.read(given)
+    return FieldOfView.model_construct(horizontal=None, vertical=None, diagonal=angle)
+
+
+def _written_field(value: FieldOfView) -> Any:
+    """Return the YAML form of a field of view: that of the diagonal is a bare angle."""
+    if value.diagonal is not None:
+        return _FULL_ANGLE.write(value.diagonal)
+    return to_yaml(value)
+
+
 class Optics(Model):
     """The lens: any two of f_number, focal_length and aperture_diameter; more must agree."""
 
@@ -236,8 +283,11 @@ class Optics(Model):
     aperture_diameter: MaybeLength = key(
         "diameter of the entrance pupil", example="1.14 mm", default=None
     )
-    field_of_view: Annotated[float | None, Quantity("angle", above=0, below=math.pi)] = key(
-        "full, over the array's diagonal; may stand for focal_length",
+    field_of_view: Annotated[
+        FieldOfView | None, Either(_field_of_view, str | FieldOfView, yaml_form=_written_field)
+    ] = key(
+        "full angle over the array's diagonal, or {horizontal: 90 deg}; may stand for focal_length",
+        unit="deg",
         example="46 deg",
         default=None,
     )

@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, get_args
 
+from pydantic import ValidationError
 from pydantic_core import InitErrorDetails
 
 from vcam_cli.camera.processing_steps import (
@@ -20,11 +21,12 @@ from vcam_cli.camera.processing_steps import (
     WhiteBalance,
 )
 from vcam_cli.camera.sensor.array import Array
-from vcam_cli.camera.step_plugins import plugin, registered
+from vcam_cli.camera.step_plugins import PluginStep, checked_halo, plugin, registered
 from vcam_cli.config.lists import read_items
 from vcam_cli.config.validation_messages import describe, fault, one_of, refusal, yaml_text
 from vcam_cli.config.values import Either
 from vcam_cli.config.yaml_type import to_yaml
+from vcam_cli.errors import one_line
 
 SHOWN = (0, 1, 3)
 """Numbers of colors that make a picture as they are; 0 where only the file of positions knows."""
@@ -68,11 +70,26 @@ def _step(given: Any) -> Step:
             f"{describe(given)} is not a step; write one key, such as demosaic: bilinear"
         )
     name = next(iter(given))
-    model = STEPS.get(name) or _plugin(name, given)
-    return model.model_validate(given)
+    if name in STEPS:
+        return STEPS[name].model_validate(given)
+    return _plugin_step(_plugin(name, given), name, given)
 
 
-def _plugin(name: Any, given: Any) -> type[Step]:
+def _plugin_step(model: type[PluginStep], name: str, given: Mapping) -> Step:
+    """Return a step of a package, whose own checks may end in any way."""
+    try:
+        step = model.model_validate(given)
+        checked_halo(step)
+    except ValidationError:
+        raise
+    except (Exception, SystemExit) as error:
+        what = str(error) if isinstance(error, ValueError) else f"{type(error).__name__}: {error}"
+        message = one_line(f"the step cannot be made: {what}")
+        raise refusal((name,), message, "mend its package, or remove the step", given) from None
+    return step
+
+
+def _plugin(name: Any, given: Any) -> type[PluginStep]:
     """Return the model of a step that an installed package registers."""
     try:
         found = plugin(name) if isinstance(name, str) else None

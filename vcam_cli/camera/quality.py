@@ -9,7 +9,41 @@ from vcam_cli.config.model import Model, at_most_one, key
 from vcam_cli.config.quantities import Quantity
 from vcam_cli.config.values import Length, MaybeLength, MaybePositive, Positive
 
-METRICS = ("mse", "psnr", "cielab", "s-cielab")
+UNITS = {
+    "exposure_time": "s",
+    "mean_electrons": "e",
+    "saturated_fraction": "",
+    "snr_db": "dB",
+    "dynamic_range_db": "dB",
+    "well_capacity": "e",
+    "quantized_dynamic_range_db": "dB",
+    "picture_snr_db": "dB",
+    "gray_snr_db": "dB",
+    "base_iso": "",
+    "digital_gain": "",
+    "mtf50": "cycles/pixel",
+    "hdr_saturated_fraction": "",
+    "hdr_dynamic_range_db": "dB",
+    "mse": "",
+    "psnr_db": "dB",
+    "mean_delta_e": "",
+    "mean_s_cielab": "",
+}
+"""Metric of a frame, in the order of metrics.csv -> its unit."""
+METRICS_OF = {
+    "mse": "mse",
+    "psnr": "psnr_db",
+    "cielab": "mean_delta_e",
+    "s-cielab": "mean_s_cielab",
+}
+"""Entry of `quality` -> the metric that it asks for."""
+NEEDS = {
+    "mtf50": {"edge": "write scene.source: {kind: chart, chart: slanted-edge}"},
+    "hdr_saturated_fraction": {"samples": "give exposure.captures"},
+    "hdr_dynamic_range_db": {"samples": "give exposure.captures"},
+}
+"""Metric that not every run has -> what it needs, and the remedy where that is missing."""
+METRICS = tuple(METRICS_OF)
 
 
 METRIC_LIST = words_of(METRICS, 0, "[mse, psnr]", "a list of metrics")

@@ -19,12 +19,16 @@ from contextlib import suppress
 from functools import cache, lru_cache
 from importlib.metadata import EntryPoint, entry_points
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any, ClassVar, get_args
 
-from vcam_cli.camera.processing_steps import Step
+from vcam_cli.camera.processing_steps import ActsOn, Step
 
 GROUP = "vcam.processing"
 """The group of entry points."""
+
+
+MOST_HALO = 1000
+"""The largest `halo` [pixels]: blocks of rows take memory for so many more on every side."""
 
 
 class PluginStep(Step):
@@ -90,7 +94,10 @@ def plugin(name: str) -> type[PluginStep] | None:
     remedy = f"mend {origin(point)}, or remove the step"
     try:
         found = point.load()
-    except Exception as error:  # whatever a foreign package raises while it is imported
+    except (
+        Exception,
+        SystemExit,
+    ) as error:  # whatever a foreign package raises while it is imported
         what = f"{type(error).__name__}: {error}"
         raise ValueError(f"{point.value} cannot be imported ({what}); {remedy}") from error
     if not (inspect.isclass(found) and issubclass(found, PluginStep)):
@@ -99,7 +106,18 @@ def plugin(name: str) -> type[PluginStep] | None:
         raise ValueError(f"{point.value} must have one key, called {name}; {remedy}")
     if inspect.isabstract(found):
         raise ValueError(f"{point.value} has no method `process`; {remedy}")
+    if found.acts_on not in get_args(ActsOn):
+        allowed = ", ".join(get_args(ActsOn))
+        raise ValueError(f"{point.value} acts_on {found.acts_on!r}, not one of {allowed}; {remedy}")
     return found
+
+
+def checked_halo(step: PluginStep) -> int:
+    """Return the halo of a step [pixels]. Raises ValueError for what is none, in words."""
+    halo = step.halo
+    if isinstance(halo, bool) or not isinstance(halo, int) or not 0 <= halo <= MOST_HALO:
+        raise ValueError(f"its halo is {halo!r}, not a whole number from 0 to {MOST_HALO} pixels")
+    return halo
 
 
 def origin(point: EntryPoint) -> str:
@@ -119,5 +137,8 @@ def code(steps: Iterable[Step]) -> dict[str, str]:
 
 
 def _file_hash(kind: type) -> str:
-    file = inspect.getsourcefile(kind)
+    try:
+        file = inspect.getsourcefile(kind)
+    except (TypeError, OSError):  # a class that was made by no file
+        return ""
     return hashlib.sha256(Path(file).read_bytes()).hexdigest()[:16] if file else ""

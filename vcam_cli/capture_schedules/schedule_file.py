@@ -24,8 +24,8 @@ from vcam_cli.capture_schedules.pdf_source import MOST_PHOTOCURRENT, PdfSource
 from vcam_cli.config import validation_messages
 from vcam_cli.config.document import given_at, place_order
 from vcam_cli.config.file_names import argument_file, current_folder, existing_file, referenced_file
-from vcam_cli.config.merge import Alternatives, MergeRules, merge
-from vcam_cli.config.overrides import overlay
+from vcam_cli.config.merge import Alternatives, MergeRules
+from vcam_cli.config.study_overrides import lay_over, split_sets
 from vcam_cli.config.yaml_reader import display_path, read_file
 from vcam_cli.config.yaml_tree import Node, Origin
 from vcam_cli.errors import BadInput, Problem
@@ -105,7 +105,8 @@ def read(
     study : str or Path
         The study's file, or the name of a shipped one.
     sets : sequence of str
-        Overrides "PATH=VALUE" of the study.
+        Overrides "PATH=VALUE" of the study, and of its cameras where PATH begins with no key of a
+        study.
     accuracy : str, optional
         Accuracy of the cameras that it names; by default their own.
     folder : Path, optional
@@ -125,16 +126,26 @@ def read(
         message, remedy = "a mapping is needed here", "write lines of `key: value`"
         raise BadInput([tree.problem((), message, remedy)])
     refuse_others(tree, "schedule")
-    tree = merge(tree, overlay(sets, start, MERGE_RULES), MERGE_RULES)
+    own, others = split_sets(sets, ScheduleStudy.model_fields)
+    if others and not _names_camera(lay_over(tree, own, start, MERGE_RULES)):
+        own, others = tuple(sets), ()  # what is no key of the study is said
+    tree = lay_over(tree, own, start, MERGE_RULES)
     model = _validate(file, tree)
     reader = _SourceReader(file, tree, model)
-    files, known, camera, pixels = reader.read_pdf(accuracy)
+    over = [*others, *([f"accuracy={accuracy}"] if accuracy else [])]
+    files, known, camera, pixels = reader.read_pdf(over)
     known = None if known is None else reader.scale(known)
-    frames_camera = reader.read_frames_camera(accuracy, camera)
+    frames_camera = reader.read_frames_camera(over, camera)
     if frames_camera is not None:
         files = (*files, *frames_camera.files, *provenance.data_files(frames_camera))
     inputs = tuple(dict.fromkeys((file, *files)))
     return ScheduleFile(file, tree, model, known, camera, frames_camera, pixels, inputs)
+
+
+def _names_camera(tree: Node) -> bool:
+    """Return whether a study takes its photocurrents or its frames from a camera."""
+    sections = (tree.get(PDF), tree.get("frames"))
+    return any(section is not None and section.get("camera") is not None for section in sections)
 
 
 def _validate(file: Path, tree: Node) -> ScheduleStudy:
@@ -159,11 +170,11 @@ class _SourceReader:
     tree: Node
     model: ScheduleStudy
 
-    def read_pdf(self, accuracy: str | None) -> _PdfInputs:
-        """Read the pdf, or the camera to simulate for it."""
+    def read_pdf(self, over: Sequence[str]) -> _PdfInputs:
+        """Read the pdf, or the camera to simulate for it, with overrides."""
         source: PdfSource = self.model.pdf
         if source.camera is not None:
-            camera = self._camera(accuracy)
+            camera = self._camera(over)
             files = (*camera.files, *provenance.data_files(camera))
             return tuple(dict.fromkeys(files)), None, camera, 0.0
         if source.uniform is not None:
@@ -203,14 +214,14 @@ class _SourceReader:
         assert node is not None
         return node
 
-    def read_frames_camera(self, accuracy: str | None, pdf_camera: Camera | None) -> Camera | None:
+    def read_frames_camera(self, over: Sequence[str], pdf_camera: Camera | None) -> Camera | None:
         """Read the camera that takes the pictures, where any are asked for."""
         frames = self.model.frames
         if frames is None or frames.camera is None:
             return None if frames is None else pdf_camera
-        return self._camera(accuracy, "frames")
+        return self._camera(over, "frames")
 
-    def _camera(self, accuracy: str | None, key: str = PDF) -> Camera:
+    def _camera(self, over: Sequence[str], key: str = PDF) -> Camera:
         node = self._node(key, "camera")
         try:
             file = referenced_file(node, "cameras")
@@ -219,7 +230,7 @@ class _SourceReader:
                 replace(p, path=(key, "camera"), where=p.where or node.where)
                 for p in error.problems
             ) from None
-        return checks.load(file, [f"accuracy={accuracy}"] if accuracy else [])
+        return checks.load(file, over)
 
     def _table_path(self, text: str) -> Path:
         node = self._node(PDF, self._kind, "file")

@@ -7,10 +7,12 @@ nothing of the file. Its closed forms stand beside each number (`datasheet.py`).
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
 from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.expectations import Limit
 from vcam_cli.characterization.bench import Bench, prepare_bench
 from vcam_cli.characterization.datasheet import COLUMNS, Quantity, notes, quantities
 from vcam_cli.characterization.exposures import Channel, measure_channels
@@ -62,6 +64,15 @@ class Characterization:
             if q.name == name and channel in (None, q.channel):
                 return q
         raise KeyError(name)
+
+    def misses(self, limits: Iterable[Limit]) -> tuple[str, ...]:
+        """Return a sentence for each limit that a color does not keep."""
+        return tuple(
+            limit.miss(q.measured, q.channel)
+            for limit in limits
+            for q in self.quantities
+            if q.name == limit.metric and not limit.holds(q.measured)
+        )
 
     def report(self) -> dict[str, Any]:
         """Return what `characterize.json` and `--json` say."""

@@ -35,6 +35,25 @@ from vcam_cli.readout.iso_speed import electrons_per_exposure
 from vcam_cli.spectra import Spectrum, illuminant
 
 COLUMNS = ("quantity", "channel", "measured", "expected", "unit", "definition")
+_PARTS = ("", "_row", "_column", "_pixel")
+UNITS = {
+    "system_gain": "DN/e",
+    "quantum_efficiency": "%",
+    "responsivity": "DN/photon",
+    "temporal_dark_noise": "e",
+    "read_noise": "e",
+    "dark_current": "e/s",
+    **dict.fromkeys(("linearity_error", "linearity_error_min", "linearity_error_max"), "%"),
+    **dict.fromkeys(("full_well", "saturation_capacity", "threshold_electrons"), "e"),
+    **dict.fromkeys(("saturation_photons", "threshold_photons"), "photons"),
+    **dict.fromkeys(("snr_max_db", "emva_dynamic_range_db", "dynamic_range_db", "snr_db"), "dB"),
+    **{f"dsnu{part}": "e" for part in _PARTS},
+    **{f"prnu{part}": "%" for part in _PARTS},
+    "mtf50": "lp/mm",
+    "mtf50_per_pixel": "cycles/pixel",
+    "mtf_nyquist": "",
+}
+"""Quantity that can be expected (`--expect`) -> its unit."""
 SNR_LEVEL = 0.2
 """Signal at which the SNR of eq 3.2 is reported, over saturation."""
 GREEN = 550e-9
@@ -218,8 +237,7 @@ def _pattern_rows(bench: Bench, channel: Channel) -> Iterator[Row]:
     )
     for name, pattern, model, scale, unit, symbol, equation in kinds:
         parts = (pattern.total, pattern.row, pattern.column, pattern.pixel)
-        names = ("", "_row", "_column", "_pixel")
-        for part, measured, expected in zip(names, parts, model, strict=True):
+        for part, measured, expected in zip(_PARTS, parts, model, strict=True):
             definition = f"{symbol}{part.replace('_', '.')}, {R4} eq {equation}"
             yield name + part, scale * measured, scale * expected, unit, definition
 

@@ -18,8 +18,6 @@ SETTINGS = (
 EFFECTS = (
     "effect", "state", "expected %", "measured %", "ratio", "share of", "S-CIELAB", "saves ms",
 )  # fmt: skip
-TOTAL = ("preset", "tolerance", "auto", "all", "file", "combined")
-"""The rows whose error is that of all knobs together."""
 
 
 def accuracy(
@@ -44,86 +42,21 @@ def accuracy(
       vcam accuracy starter
       vcam accuracy camera.yaml -o out/knobs --set optics.f_number=8
     """
-    from vcam_cli.accuracy import study
-    from vcam_cli.accuracy.plots import pareto
-    from vcam_cli.files import tables
-    from vcam_cli.files.folder import OutputFolder
+    from vcam_cli import face
     from vcam_cli.simulation.checks import load
-    from vcam_cli.simulation.output import provenance
-    from vcam_cli.simulation.output.study_files import write_study
 
     model = load(camera, options.overrides(set_, seed, level))
-    inputs = provenance.inputs(model)
     path = out or Path("out") / model.name
-    with (
-        OutputFolder(path, record="accuracy.json", inputs=inputs) as folder,
-        Progress(quiet) as bar,
-    ):
-        found = study.accuracy(model, workers, bar)
-        rows = (point.row for point in found.points)
-        tables.write_table(folder.new("accuracy.csv"), study.COLUMNS, rows)
-        drawn = {"accuracy.png": lambda path: pareto(path, *pareto_arguments(found))}
-        page = report_arguments(found) if wants_report else None
-        record = found.report() | {"camera": model.model_dump(mode="json")}
-        write_study(folder, drawn, formats, page, record)
+    with Progress(quiet) as bar:
+        found = face.accuracy(model, path, workers, bar, wants_report, formats or ())
     options.print_found(found, path, as_json, quiet, print_report)
-
-
-def pareto_arguments(found: "Study"):
-    """Return the arguments of `plots.pareto`: title, presets, curves, tolerance, panels, all on."""
-    from vcam_cli.accuracy.plots import Curve, Pair
-
-    def points(*knobs: str):
-        return tuple((p.seconds, p.rms_error, p.setting) for p in found.points if p.knob in knobs)
-
-    curves = [
-        Curve(knob.replace("_", " "), points(knob))
-        for knob in dict.fromkeys(p.knob for p in found.points if not p.effect)
-        if knob not in TOTAL and knob != "shot_noise"  # which changes no mean
-    ]
-    panels = []
-    for label, wanted in (("of full signal", False), ("of the variance", True)):
-        pairs = [
-            Pair(e.name, e.predicted, e.measured)
-            for e in found.effects
-            if e.unit.endswith("variance") == wanted and (e.measured or e.predicted)
-        ]
-        if pairs:
-            panels.append((f"change by leaving it out, {label}", pairs))
-    tolerance = found.camera.accuracy.tolerance
-    title = f"{found.camera.name}: what accuracy costs"
-    return title, points("preset", "tolerance"), curves, tolerance, panels, points("all")
-
-
-def report_arguments(found: "Study") -> dict[str, Any]:
-    """Return title, text, facts and captions of the report."""
-    from vcam_cli.reports.page import Facts
-
-    facts = [
-        ("recommended", found.recommendation.sentence.replace("`", "")),
-        *(("tolerance missed", text.replace("`", "")) for text in found.recommendation.missed),
-        ("reference", convergence(found)),
-    ]
-    facts += [(f"{knob} does not apply", why) for knob, why in found.absent.items()]
-    captions = {
-        "accuracy.csv": "Errors are relative to full signal, of the mean raw frame against the"
-        " reference; a knob's is its own, with all others converged.",
-        "accuracy.png": "Error over seconds of every preset and along every knob; what the plan"
-        " expected of each effect over what leaving it out did",
-    }
-    about = "Error of the mean raw frame against a converged reference, and the seconds it takes."
-    title = f"{found.camera.name}: what accuracy costs"
-    return {
-        "title": title,
-        "about": about,
-        "facts": [Facts("In short", facts)],
-        "captions": captions,
-    }
 
 
 def print_report(found: "Study", path: Path) -> None:
     """Print the tables and the recommendation."""
     from rich.console import Console
+
+    from vcam_cli.accuracy.output import convergence
 
     width = None if sys.stdout.isatty() else 120
     console = Console(width=width, soft_wrap=True, highlight=False)
@@ -138,28 +71,6 @@ def print_report(found: "Study", path: Path) -> None:
         console.print(f"{sentence}.")
     console.print(f"recommended: {found.recommendation.sentence}")
     console.print(f"{path}/accuracy.csv, accuracy.png, accuracy.json")
-
-
-def convergence(found: "Study") -> str:
-    """Return how accurate the reference is against which errors are measured."""
-    from vcam_cli.accuracy.setting_errors import FLOOR
-
-    reference = found.reference
-    shown = [p for p in found.points if not p.effect]
-    unsure = sorted({p.knob for p in shown if not p.is_certain})
-    text = (
-        f"full signal: {reference.full_signal:.6g} electrons; estimated error of the reference:"
-        f" {100 * reference.lost:.1g} % of it"
-    )
-    if unsure:
-        return (
-            f"{text}; <: upper bound, since the reference is not ten times better"
-            f" ({', '.join(unsure)})"
-        )
-    return (
-        f"{text}; each knob was refined until the change was a tenth of its least error, or below"
-        f" {100 * FLOOR:.0e} % (rounding)"
-    )
 
 
 def _table(console: Any, title: str, head: tuple[str, ...], rows: list[tuple[str, ...]]) -> None:

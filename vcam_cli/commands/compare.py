@@ -7,9 +7,7 @@ import typer
 
 from vcam_cli.commands import options
 
-DPI, DISTANCE = 72.0, "18 in"
-LEAST_WHITE, MOST_WHITE = 1e-9, 1e9
-"""X, Y or Z of a white, in whatever unit: what files hold is compared in 32 bits."""
+DISTANCE = "18 in"
 
 
 def check_positive(value: float | None) -> float | None:
@@ -28,16 +26,14 @@ def check_white(value: str | None) -> str | None:
 
 def parse_white(text: str) -> tuple[float, float, float]:
     """Parse a white such as "95.047,100,108.883"."""
+    from vcam_cli.comparison.image_files import white_problem
+
     try:
         x, y, z = (float(part) for part in text.split(","))
     except ValueError:
         x = y = z = -1.0
-    if not all(LEAST_WHITE <= part <= MOST_WHITE for part in (x, y, z)):
-        message = (
-            f"{text!r} is not X,Y,Z of {LEAST_WHITE:g} to {MOST_WHITE:g}; write for example"
-            " 95.047,100,108.883"
-        )
-        raise typer.BadParameter(message)
+    if problem := white_problem((x, y, z), text):
+        raise typer.BadParameter(problem)
     return x, y, z
 
 
@@ -129,57 +125,29 @@ def compare(
       vcam compare out/a/raw.dng out/a/render.png
       vcam compare a.exr b.exr --space xyz --ppd 23 --delta-e 2000 -o out/ab
     """
-    from vcam_cli.comparison import image_files as study
-    from vcam_cli.files.folder import OutputFolder
-    from vcam_cli.files.report import hash_file, to_json
+    from vcam_cli import face
+    from vcam_cli.files.report import to_json
 
-    if white is not None and space != "xyz":
-        raise typer.BadParameter("it is for --space xyz only", param_hint="--white")
-    settings = study.Settings(
-        samples_per_degree=_per_degree(ppd, dpi, distance),
-        space=space,
-        white=study.D65 if white is None else parse_white(white),
-        formula=delta_e,
-        filters=filters,
+    found = face.compare(
+        image,
+        reference,
+        out,
+        ppd,
+        dpi,
+        distance,
+        space,
+        None if white is None else parse_white(white),
+        delta_e,
+        filters,
+        workers,
     )
-    found = study.compare(image, reference, settings, workers)
     for note in found.notes:
         options.say(note, quiet)
-    report = {
-        "image": str(image),
-        "reference": str(reference),
-        "metrics": {name: value for name, value, _ in found.metrics},
-        "settings": {
-            "samples_per_degree": settings.samples_per_degree,
-            "space": list(found.codings),
-            "white": list(settings.screen.white),
-            "delta_e": delta_e,
-            "filters": filters,
-        },
-    }
-    if out is not None:
-        with OutputFolder(out, "compare.json", inputs=(image, reference)) as folder:
-            study.write(found, folder)
-            hashes = {"inputs": {str(path): hash_file(path) for path in (image, reference)}}
-            folder.finish(report | {"hashes": hashes, "notes": list(found.notes)})
     if as_json:
-        print(to_json(report | {"out": None if out is None else str(out)}), end="")
+        print(to_json(found.report() | {"out": None if out is None else str(out)}), end="")
     else:
         rows = [(name, f"{value:.6g}", unit) for name, value, unit in found.metrics]
         plain = "\n".join(f"{n:<20} {v:>12} {unit}".rstrip() for n, v, unit in rows)
         options.print_rows(("metric", ">value", "unit"), rows, plain)
         if out is not None:
             print(f"map and numbers: {out}/")
-
-
-def _per_degree(ppd: float | None, dpi: float | None, distance: str | None) -> float:
-    """Return the pixels in one degree of visual angle."""
-    from vcam_cli.quality.display import samples_per_degree
-    from vcam_cli.units import parse
-
-    if ppd is not None:
-        for name, given in (("--dpi", dpi), ("--distance", distance)):
-            if given is not None:
-                raise typer.BadParameter("it and --ppd cannot both be given", param_hint=name)
-        return ppd
-    return samples_per_degree(DPI if dpi is None else dpi, parse(distance or DISTANCE, "length"))

@@ -1,13 +1,12 @@
 """`vcam dataset`: labeled frames for learning and testing."""
 
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import typer
 
 from vcam_cli.commands import options
 from vcam_cli.commands.progress import Progress
-from vcam_cli.commands.sweep import Fresh, Processes, Scheduler, Shard, share_numbers
+from vcam_cli.commands.sweep import Fresh, Processes, Scheduler, Shard, say_missing, share_numbers
 from vcam_cli.interrupts import INTERRUPTED, restore_interrupt
 
 if TYPE_CHECKING:
@@ -38,25 +37,29 @@ def dataset(
       vcam dataset noise-pairs
       vcam dataset pairs.yaml --workers 4 -o out/pairs
     """
-    from vcam_cli.datasets import dataset as work
-    from vcam_cli.datasets import dataset_file
+    from vcam_cli import face
     from vcam_cli.files.report import to_json
-    from vcam_cli.sweeps.sweep import Execution, Share
 
-    numbers = share_numbers(shard)
-    share = Share(*numbers) if numbers else None
-    execution = Execution(share, workers, scheduler, fresh)
-    file = dataset_file.read(study, set_ or (), seed, accuracy)
-    path = out or Path("out") / file.model.name
     with Progress(quiet, log="frames") as progress:
         try:
             with restore_interrupt():
-                found = work.dataset(
-                    file, path, execution, progress, lambda message: options.say(message, quiet)
+                found = face.dataset(
+                    study,
+                    out,
+                    set_ or (),
+                    seed,
+                    accuracy,
+                    workers,
+                    scheduler,
+                    share_numbers(shard),
+                    fresh,
+                    progress,
+                    lambda message: options.say(message, quiet),
                 )
         except KeyboardInterrupt as error:
             options.say("interrupted; finished frames are kept, the same command goes on with them")
             raise typer.Exit(INTERRUPTED) from error
+    say_missing("manifest.csv", "frames", found.frames, found.missing)
     if as_json:
         print(to_json(found.summary()), end="")
     elif not quiet:
@@ -69,7 +72,5 @@ def report(found: "DatasetResult") -> str:
     lines = [f"{found.frames} frames, {found.computed} computed in {found.seconds:.1f} s"]
     if found.failed:
         lines.append(f"{found.failed} failed: see the column error of manifest.csv")
-    if found.missing:
-        lines.append(f"{found.missing} are left to other shares")
     lines.append(f"{found.name}: {found.out}/, {found.shards} shards, manifest.csv")
     return "\n".join(lines)

@@ -51,6 +51,7 @@ def _scene(g: Mapping[str, float], step: float, band: tuple[float, float]) -> It
 
 
 def _optics(g: Mapping[str, float]) -> Iterator[Row]:
+    yield "fx, fy", f"{g['focal_pixels_x']:.6g}, {g['focal_pixels_y']:.6g} pixels"
     yield "f-number", f"{g['f_number']:.6g}, working {g['working_f_number']:.6g}"
     yield "focal length", f"{g['focal_length'] * 1e3:.6g} mm"
     yield "numerical aperture", f"{g['numerical_aperture']:.6g}"

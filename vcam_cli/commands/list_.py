@@ -206,6 +206,8 @@ def _metrics() -> list[Item]:
         "quantized_dynamic_range_db": "the same up to the ADC's end, with its rounding: what a data"
         " sheet's range is to be compared with [dB]",
         "picture_snr_db": "mean signal of this picture over its temporal noise [dB]",
+        "gray_snr_db": "signal of 18 % gray on the axis over its temporal noise, in this exposure"
+        " [dB]",
         "digital_gain": "what the render multiplies the raw by, raw saturation = white = 1",
         "base_iso": "ISO speed at exposure.gain 1: 78 lx s / H, with the exposure H of the sensor"
         " by daylight D55 that fills the brightest color (ISO 12232, saturation-based)",
@@ -217,6 +219,8 @@ def _metrics() -> list[Item]:
         "s-cielab": "mean S-CIELAB Delta E, as the eye sees it there; ask for it in `quality`",
     }
     sampled = {
+        "mtf50": "first frequency at which the MTF of the raw frame is one half, by the e-SFR of"
+        " ISO 12233 [cycles/pixel]; before a slanted edge",
         "hdr_saturated_fraction": "fraction of pixels full in all samples; with `captures`",
         "hdr_dynamic_range_db": "dynamic range of the photocurrent [dB]; with `captures`",
     }

@@ -1,7 +1,8 @@
 """The program `vcam`: its commands and its exit codes.
 
 Exit codes: 0 done, 2 bad input or usage, 3 this machine cannot do it, 4 some points of a sweep
-failed or a prediction missed its tolerance, 1 a bug (only then a traceback), 130 interrupted.
+failed, an expectation was missed or a prediction its tolerance, 1 a bug (only then a traceback),
+130 interrupted.
 
 Why commands are looked up by name: a command's module is imported when that command is called,
 and imports its physics when it runs, so `vcam --help` and shell completion are quick.
@@ -22,16 +23,18 @@ try:
     with interrupts.exit_on_interrupt():  # most of the time until a command begins goes by here
         import errno
         import io
+        import warnings
         from collections.abc import Iterator
         from contextlib import contextmanager, suppress
         from importlib import import_module
+        from pathlib import Path
         from typing import Annotated, Any
 
         import typer
         from typer.core import TyperGroup
 
         from vcam_cli import memory
-        from vcam_cli.errors import CannotDo, VcamError
+        from vcam_cli.errors import CannotDo, VcamError, one_line
 except KeyboardInterrupt:
     sys.exit(interrupts.INTERRUPTED)
 
@@ -188,6 +191,7 @@ def _main() -> None:
     _replace_closed_streams()
     for name in ("stdout", "stderr"):
         _outlive_reader(name)
+    _say_warnings()
     memory.limit_blas_threads()
     try:
         memory.require_address_space()
@@ -207,6 +211,21 @@ def _main() -> None:
         _print_error(CannotDo(f"cannot write to stdout: {error.strerror}", "send it elsewhere"))
         _discard_stdout()
         sys.exit(3)
+
+
+def _say_warnings() -> None:
+    """Let warnings of libraries be a line each on stderr, without their source code."""
+    told: set[str] = set()
+
+    def show(
+        message: Warning | str, category: type, filename: str, lineno: int, *_: object
+    ) -> None:
+        text = one_line(f"note: {category.__name__}: {message} ({Path(filename).name}:{lineno})")
+        if text not in told:
+            told.add(text)
+            _print_error(text)
+
+    warnings.showwarning = show  # type: ignore[assignment]
 
 
 WRITE_ERRORS = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO}

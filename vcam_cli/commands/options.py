@@ -8,9 +8,12 @@ import shutil
 import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+
+if TYPE_CHECKING:
+    from vcam_cli.camera.expectations import Limit
 
 PRESETS = ("draft", "standard", "reference")
 
@@ -163,6 +166,14 @@ FrameRate = Annotated[
     float | None,
     typer.Option("--fps", metavar="F", min=1e-6, max=1e6, help="Frames a second, of --frames."),
 ]
+Expect = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--expect",
+        metavar="'METRIC >= VALUE'",
+        help="A limit that a metric keeps; exit with 4 where it does not. Repeatable.",
+    ),
+]
 Json = Annotated[
     bool, typer.Option("--json", help="Machine-readable summary on stdout, nothing else there.")
 ]
@@ -239,6 +250,18 @@ def say(message: object, quiet: bool = False) -> None:
     """Print a line for the user on stderr."""
     if not quiet:
         print(message, file=sys.stderr, flush=True)
+
+
+def end_with_expectations(limits: "Sequence[Limit]", missed: Sequence[str], quiet: bool) -> None:
+    """Say what is missed of the limits that are expected; exit with 4 where something is."""
+    from vcam_cli.camera.expectations import MISSED, notes
+
+    for note in notes(limit.metric for limit in limits):
+        say(note, quiet)
+    for sentence in missed:
+        say(sentence)
+    if missed:
+        raise typer.Exit(MISSED)
 
 
 def line_width(most: int = 96) -> int:

@@ -94,28 +94,25 @@ def plan(
         count = (turns or TURNS) if measure else 0
         plan_scenes(camera, scenes, out, asked, quiet, workers, formats, count)
         return
-    from vcam_cli.camera.derived.frame_rate import frame_rate
+    from vcam_cli import face
     from vcam_cli.commands.plan_story import print_story
     from vcam_cli.files.report import to_json
     from vcam_cli.simulation.checks import load
-    from vcam_cli.simulation.simulate import prepare
 
     model = load(camera, options.overrides(set_, accuracy=accuracy))
     with Progress(quiet) as progress:
-        ready, notes = prepare(model, workers, progress)
-    for note in notes:
+        found = face.plan(model, workers, progress)
+    for note in found.notes:
         options.say(note, quiet)
-    report = ready.plan.report()
-    solved = ready.layout.report(ready.spectrum.oversampling)
-    readout = frame_rate(model)
-    said, rate_of_frames = {}, ""
-    if readout is not None:
-        rate = readout.rate(ready.exposure_time)
-        said = {"frame_rate": {"readout_time": readout.readout_time, "frames_per_second": rate}}
-        rate_of_frames = f"{rate:.4g} frames/s, {readout.rate():.4g} at most: {readout.reason}"
+    report, solved = found.report(), found.geometry
+    ready, rate_of_frames = found.ready, ""
+    if found.readout is not None:
+        most = found.readout.rate()
+        rate_of_frames = (
+            f"{found.frames_per_second:.4g} frames/s, {most:.4g} at most: {found.readout.reason}"
+        )
     if as_json:
-        samples = {"captures": list(ready.times)} if ready.times else {}
-        print(to_json({**report, **samples, **said, "geometry": solved}), end="")
+        print(to_json(report), end="")
     elif geometry:
         from vcam_cli.commands.geometry_table import geometry_table
 

@@ -31,6 +31,7 @@ def report(
     """
     from vcam_cli.errors import bad
     from vcam_cli.files.atomic import cannot_write
+    from vcam_cli.files.records import adopt
     from vcam_cli.reports import page
     from vcam_cli.reports.side_by_side import read_runs, side_by_side
 
@@ -42,5 +43,6 @@ def report(
     except OSError as error:
         raise cannot_write(out, error) from error
     page.write(out, side_by_side(read_runs(folders)))
+    adopt(out)
     if not quiet:
         print(out)

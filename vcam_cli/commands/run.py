@@ -21,6 +21,7 @@ def run(
     report: options.Report = False,
     frames: options.Frames = None,
     fps: options.FrameRate = None,
+    expect: options.Expect = None,
 ) -> None:
     """Simulate a camera and write raw.exr, render.png, metrics.csv and run.json.
 
@@ -41,6 +42,7 @@ def run(
         raise typer.BadParameter("--frames and --fps go together: --frames 30 --fps 30")
     asked = ["output.report=true"] if report else []
     model = load(camera, [*options.overrides(set_, seed, accuracy), *asked])
+    model = model.with_expectations(expect or ())
     from vcam_cli.files.folder import OutputFolder
     from vcam_cli.files.report import to_json
     from vcam_cli.simulation.output import outputs, provenance
@@ -60,9 +62,10 @@ def run(
     for note in result.notes:
         options.say(note, quiet)
     if as_json:
-        print(to_json(summary(record, folder.path)), end="")
+        print(to_json(summary(record, folder.path) | {"missed": result.missed}), end="")
     elif not quiet:
         print_summary(result.metrics.rows, record, folder.path, folder.names)
+    options.end_with_expectations(model.limits, result.missed, quiet)
 
 
 def summary(record: dict, path: Path) -> dict:
@@ -96,6 +99,8 @@ LABELS = {
     "dynamic_range_db": "of a pixel, eq 3.1",
     "quantized_dynamic_range_db": "with the ADC's end and rounding",
     "picture_snr_db": "of this picture, mean signal over its temporal noise",
+    "gray_snr_db": "of 18 % gray in this exposure",
+    "mtf50": "of the slanted edge in the raw frame",
     "base_iso": "ISO speed at gain 1",
     "digital_gain": "of the render, over raw saturation = white",
 }

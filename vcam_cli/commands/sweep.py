@@ -62,6 +62,10 @@ Shard = Annotated[
     ),
 ]
 Fresh = Annotated[bool, typer.Option("--fresh", help="Compute finished points again.")]
+Strict = Annotated[
+    bool,
+    typer.Option("--strict", help="Exit with 4 where the study's own `expect` is not met."),
+]
 
 
 def sweep(
@@ -78,6 +82,8 @@ def sweep(
     fresh: Fresh = False,
     wants_report: options.Report = False,
     formats: options.Formats = None,
+    expect: options.Expect = None,
+    strict: Strict = False,
 ) -> None:
     """Run a sweep study; print its results, write points.csv, optimum.csv and plots.
 
@@ -88,6 +94,7 @@ def sweep(
       vcam sweep exposure-and-noise
       vcam sweep study.yaml --workers 4 -o out/study
     """
+    from vcam_cli.camera.expectations import MISSED
     from vcam_cli.files.report import to_json
     from vcam_cli.sweeps.sweep import sweep as run
 
@@ -113,17 +120,31 @@ def sweep(
                     tell,
                     wants_report,
                     formats or (),
+                    expect or (),
                 )
         except KeyboardInterrupt as error:
             options.say("interrupted; finished points are kept, the same command goes on with them")
             raise typer.Exit(INTERRUPTED) from error
     if len(messages) > MOST_MESSAGES:
         options.say(f"and {len(messages) - MOST_MESSAGES} more", quiet)
+    say_missing("points.csv", "points", len(result.ids), result.missing)
     if as_json:
         print(to_json(result.summary()), end="")
     elif not quiet:
         print_report(result)
-    raise typer.Exit(result.exit_code)
+    missed = [*result.missed]
+    if strict and not result.missing:
+        missed += [f"missed: {sentence}" for sentence in result.missed_expectations]
+    for sentence in missed:
+        options.say(sentence)
+    raise typer.Exit(result.exit_code or (MISSED if missed else 0))
+
+
+def say_missing(table: str, rows: str, total: int, missing: int) -> None:
+    """Say that a table is not whole, also to those who asked for quiet: they may go on with it."""
+    if missing:
+        there = total - missing
+        options.say(f"{table} has {there} of {total} {rows} so far; other shares compute the rest")
 
 
 def print_report(result: "SweepResult") -> None:
@@ -186,9 +207,7 @@ def closing_lines(result: "SweepResult") -> list[str]:
     lines = [f"{there} of {total} points, {result.computed} computed in {result.seconds:.1f} s"]
     if result.failed:
         lines.append(f"{result.failed} failed: see the column error of points.csv")
-    if result.missing:
-        lines.append(f"{result.missing} are left to other shares")
-    else:
+    if not result.missing:
         lines += _expectations_text(result.expectations)
     lines.append(f"{result.name}: {result.out}/")
     return lines

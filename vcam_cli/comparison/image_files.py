@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +27,18 @@ from vcam_cli.quality.scielab import cielab_map, s_cielab_map
 
 Space = Literal["srgb", "linear-srgb", "xyz"]
 _ENCODINGS = {None: "auto", "srgb": "srgb", "linear-srgb": "linear", "xyz": "linear"}
+
+
+LEAST_WHITE, MOST_WHITE = 1e-9, 1e9
+"""X, Y or Z of a white, in whatever unit: what files hold is compared in 32 bits."""
+
+
+def white_problem(white: Sequence[float], text: str) -> str:
+    """Return why something, written as `text`, is no X, Y, Z of a white; "" where it is one."""
+    if len(white) == 3 and all(LEAST_WHITE <= part <= MOST_WHITE for part in white):
+        return ""
+    limits = f"X,Y,Z of {LEAST_WHITE:g} to {MOST_WHITE:g}"
+    return f"{text!r} is not {limits}; write for example 95.047,100,108.883"
 
 
 @dataclass(frozen=True)
@@ -63,6 +76,30 @@ class Comparison:
     """How the codes of the two files were read."""
     notes: tuple[str, ...] = ()
     workers: int | None = None
+    names: tuple[str, str] = ("", "")
+    """Of the two files, as they were given."""
+
+    def report(self) -> dict[str, Any]:
+        """Return what `--json` prints."""
+        s = self.settings
+        return {
+            "image": self.names[0],
+            "reference": self.names[1],
+            "metrics": {name: value for name, value, _ in self.metrics},
+            "settings": {
+                "samples_per_degree": s.samples_per_degree,
+                "space": list(self.codings),
+                "white": list(s.screen.white),
+                "delta_e": s.formula,
+                "filters": s.filters,
+            },
+        }
+
+    def __repr__(self) -> str:
+        """Return a line: the files, and how they differ."""
+        values = {name: value for name, value, _ in self.metrics}
+        said = ", ".join(f"{name}={values[name]:.4g}" for name in ("psnr_db", "mean_s_cielab"))
+        return f"<Comparison {' and '.join(self.names)}: {said}>"
 
     @cached_property
     def s_cielab(self) -> NDArray:

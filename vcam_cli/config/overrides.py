@@ -22,7 +22,7 @@ def overlay(sets: Sequence[str], folder: Path, rules: MergeRules) -> Node:
     problems = Collector()
     for item in sets:
         try:
-            whole = merge(whole, _override(item, folder), rules)
+            whole = merge(whole, tree_at(*read_override(item, folder)), rules)
         except BadInput as error:
             problems.extend(error)
     problems.raise_if_any()
@@ -60,11 +60,12 @@ def _example(item: str) -> str:
     return "pixel.width=8um"
 
 
-def _override(item: str, folder: Path) -> Node:
+def read_override(item: str, folder: Path) -> tuple[errors.Path, Node]:
+    """Return path and value of an override "PATH=VALUE". Raises BadInput for what is none."""
     path, _, text = item.partition("=")
     keys = errors.split(path.strip())
     if "" in path.strip().split(".") or not text.strip():
         message = f"{item!r} is not PATH=VALUE"
         raise BadInput([Problem((), message, f"write {_example(item)}", "--set")])
     source = Source(f"--set {one_line(item)}", folder, lines=False)
-    return tree_at(keys, read_text(text, source))
+    return keys, read_text(text, source)

@@ -89,7 +89,7 @@ def dataset(
                 points.packed.update(shard.ids)
         groups = _groups(file, mine, ids, points, versions)
         computed = compute(groups, points, execution, watch, tell, "frames")
-        with folder.packing():
+        with folder.summarizing():
             found, there = _pack_all(packer, points, whole)
             record = _record(file, versions) | {"packed": len(found)}
             table = partial(manifest.write, file, packer, found)
@@ -111,7 +111,7 @@ def dataset(
 def frame_ids(file: DatasetFile) -> list[str]:
     """Return the hash of every frame: of all that its arrays depend on, wherever files lie."""
     form = file.camera.model_dump(mode="json")
-    for name in ("name", "quality", "output", "seed"):
+    for name in ("name", "quality", "expect", "output", "seed"):
         form.pop(name, None)
     form["sensor"] = file.camera.seed.sensor
     content = hash_of(file.camera, form, {"write": sorted(file.model.write)})

@@ -14,6 +14,8 @@ from vcam_cli.config import document
 from vcam_cli.config.document import Document
 from vcam_cli.config.file_format import FileFormat
 from vcam_cli.config.file_names import current_folder, referenced_file
+from vcam_cli.config.merge import NO_RULES
+from vcam_cli.config.study_overrides import lay_over, split_sets
 from vcam_cli.config.yaml_tree import Node, Source, node_of, tree_at
 from vcam_cli.datasets.drawing import Frame, Scene, crop_size, draw_frame, extremes
 from vcam_cli.datasets.model import Dataset
@@ -85,11 +87,14 @@ def read(
 ) -> DatasetFile:
     """Return a data set with its camera and scenes, all of it checked.
 
-    sets: overrides "PATH=VALUE" of the camera; seed: in place of the file's. Raises BadInput with
+    sets: overrides "PATH=VALUE" of the file, and of the camera where PATH begins with no key of a
+    data set; seed: in place of the file's. Raises BadInput with
     what is wrong, CannotDo.
     """
     start = folder or current_folder()
-    model = document.read(study, start, FORMAT).validate()
+    own, sets = split_sets(sets, Dataset.model_fields)
+    written = document.read(study, start, FORMAT)
+    model = replace(written, tree=lay_over(written.tree, own, start, NO_RULES)).validate()
     if seed is not None:
         model = model.model_copy(update={"seed": seed})
     words = [*sets, *([f"accuracy={accuracy}"] if accuracy else [])]

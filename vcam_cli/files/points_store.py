@@ -24,16 +24,23 @@ from vcam_cli.errors import CannotDo, bad
 from vcam_cli.files import atomic
 from vcam_cli.files.folder import is_foreign
 from vcam_cli.files.in_use import CLAIMS, POINTS, STUDIES, STUDIES_END, require_no_run
-from vcam_cli.files.records import PROGRAM, Fingerprint, Proofs, fingerprint, read_record
-from vcam_cli.files.report import file_digest, hash_text, to_json
+from vcam_cli.files.records import (
+    PROGRAM,
+    Fingerprint,
+    Proofs,
+    fingerprint,
+    read_record,
+    record_check,
+)
+from vcam_cli.files.report import file_digest, to_json
 
 RECORD = "study.json"
 _KEPT = r"[0-9a-f]{32}\.(json|raw\.exr|render\.png|npz)"
 _UNFINISHED = re.compile(rf"\.{_KEPT}\.\d+-[0-9a-f]{{8}}\.part")
 _POINT_FILE = re.compile(rf"{_KEPT}|\.claims|\..*\.part")
 """The names in the folder of points."""
-_STARTING, _FINISHING, _PACKING = (1 << 61) + 1, (1 << 61) + 2, (1 << 61) + 3
-"""Bytes that a process holds while it looks for other studies, replaces tables, packs points."""
+_STARTING, _FINISHING, _SUMMARY = (1 << 61) + 1, (1 << 61) + 2, (1 << 61) + 3
+"""Bytes that a process holds while it looks for other studies, replaces tables, summarizes."""
 _LARGEST = 1 << 26
 """The most bytes that a point's own file can have."""
 _ABANDONED = 3600.0
@@ -176,9 +183,13 @@ class SweepFolder:
                 self.file(key, name).unlink(missing_ok=True)
 
     @contextmanager
-    def packing(self) -> Iterator[None]:
-        """Wait until no other process packs points of this folder, and do it alone."""
-        with self._locked(_PACKING):
+    def summarizing(self) -> Iterator[None]:
+        """Wait until no other process makes tables or shards of these points, and do it alone.
+
+        What is read, made and written within misses no point: of processes that finish at once,
+        each one reads what those before it have kept.
+        """
+        with self._locked(_SUMMARY):
             yield
 
     def claim(self, point: str) -> bool:
@@ -276,11 +287,6 @@ class SweepFolder:
         atomic.write_text(
             self.path / self._record, to_json({**whole, "check": record_check(whole)})
         )
-
-
-def record_check(record: Mapping[str, Any]) -> str:
-    """Return the hash of all that a record says, but for this hash itself."""
-    return hash_text(to_json({name: value for name, value in record.items() if name != "check"}))
 
 
 def _byte(point: str) -> int:

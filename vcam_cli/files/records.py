@@ -14,7 +14,8 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from vcam_cli.errors import bad
-from vcam_cli.files.atomic import STAGING
+from vcam_cli.files.atomic import STAGING, write_text
+from vcam_cli.files.report import hash_text, to_json
 
 PROGRAM = "vcam"
 """A record is vcam's when it says {"program": "vcam", "files": [...]}."""
@@ -45,7 +46,7 @@ def read_record(path: Path) -> dict[str, Any] | None:
         status = path.lstat()
         if not stat.S_ISREG(status.st_mode) or not 0 < status.st_size <= _LARGEST_RECORD:
             return None
-        value = json.loads(path.read_text(encoding="utf-8"))
+        value = json.loads(path.read_text(encoding="utf-8"), parse_int=_whole)
     except (OSError, ValueError, RecursionError):
         return None
     if not isinstance(value, dict) or value.get("program") != PROGRAM:
@@ -54,6 +55,11 @@ def read_record(path: Path) -> dict[str, Any] | None:
     if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
         return None
     return value
+
+
+def _whole(digits: str) -> int | float:
+    """Return a whole number of JSON; as a float where 64 bits do not hold it, as others have it."""
+    return int(digits) if len(digits) < 19 else float(digits)
 
 
 def fingerprint(data: bytes) -> Fingerprint:
@@ -154,3 +160,30 @@ def has_real_parents(folder: Path, name: str) -> bool:
         if os.path.lexists(path) and (path.is_symlink() or not path.is_dir()):
             return False
     return True
+
+
+def record_check(record: Mapping[str, Any]) -> str:
+    """Return the hash of all that a record says, but for this hash itself."""
+    return hash_text(to_json({name: value for name, value in record.items() if name != "check"}))
+
+
+def adopt(path: Path) -> None:
+    """Name a file that a command has written into a folder of another one in that one's record.
+
+    So the next run there knows it as vcam's. Nothing happens where the folder has no record.
+    Raises CannotDo.
+    """
+    for record in (path.parent / name for name in RECORDS):
+        known = read_record(record)
+        if known is None:
+            continue
+        written = known.get("written")
+        whole = known | {
+            "files": sorted({*known["files"], path.name}),
+            "written": (written if isinstance(written, dict) else {})
+            | {path.name: file_fingerprint(path)},
+        }
+        if "check" in known:
+            whole["check"] = record_check(whole)
+        write_text(record, to_json(whole))
+        return

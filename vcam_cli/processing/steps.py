@@ -19,11 +19,13 @@ from typing import Any
 
 import numpy as np
 
-from vcam_cli.errors import BadInput, bad
+from vcam_cli.camera.step_plugins import checked_halo
+from vcam_cli.errors import bad
 from vcam_cli.processing import (
     black_level,
     bright_block,
     color_correction,
+    foreign_step,
     jpeg,
     picture_steps,
     scattered_pixels,
@@ -265,28 +267,10 @@ def _gamut_mapping(draft: Draft, step: Step, path: Path) -> Draft:
 def _plugin(draft: Draft, step: Any, path: Path) -> Draft:
     """Return the draft with a step of an installed package."""
     if step.acts_on == "codes":
-        return _with_codes(draft, partial(_checked_codes, step.process, path))
-    work = partial(_checked_planes, step.process, path)
-    return _with_neighbors(draft, work, step.halo, step.process_ideal)
-
-
-def _checked_planes(process: Callable, path: Path, planes: np.ndarray) -> np.ndarray:
-    done = np.asarray(process(planes.copy()))
-    if done.shape != planes.shape:
-        raise _wrong_shape(path, planes.shape, done.shape)
-    return done
-
-
-def _checked_codes(process: Callable, path: Path, codes: np.ndarray) -> np.ndarray:
-    done = np.asarray(process(codes))
-    if done.shape != codes.shape or done.dtype != codes.dtype:
-        given, made = (f"{a.shape} of {a.dtype}" for a in (codes, done))
-        raise _wrong_shape(path, given, made)
-    return done
-
-
-def _wrong_shape(path: Path, given: object, made: object) -> BadInput:
-    return bad(path, f"this step makes {made} of {given}", "mend the package, or remove the step")
+        return _with_codes(draft, partial(foreign_step.codes, step.process, path))
+    planes = partial(foreign_step.planes, step.process, path)
+    ideal = partial(foreign_step.planes, step.process_ideal, path)
+    return _with_neighbors(draft, planes, checked_halo(step), ideal)
 
 
 def _jpeg(draft: Draft, step: Step, path: Path) -> Draft:

@@ -45,7 +45,7 @@ def side_by_side(runs: Runs) -> Page:
     """
     try:
         return _page(runs)
-    except (KeyError, TypeError, ValueError, AttributeError):
+    except (KeyError, TypeError, ValueError, AttributeError, ArithmeticError):
         names = ", ".join(str(folder) for _, folder, _ in runs)
         message = f"a run.json of {names} is not as this version of vcam writes it"
         raise bad("DIR", message, "run the cameras again") from None
@@ -56,7 +56,7 @@ def _page(runs: Runs) -> Page:
     return Page(
         title=" and ".join(labels) if len(labels) < 4 else f"{len(labels)} runs",
         about="Runs side by side. What differs stands out.",
-        notes=[f"{label}: {note}" for label, _, record in runs for note in record["notes"]],
+        notes=list(_notes(runs)),
         sections=(
             *(Section(title, list(_pictures(runs, name))) for name, title in SHOWN.items()),
             Section("Settings that differ", list(_settings(runs))),
@@ -71,6 +71,16 @@ def _page(runs: Runs) -> Page:
             Section("Effects", [_table("Effects", labels, [_effects(r) for _, _, r in runs])]),
         ),
     )
+
+
+def _notes(runs: Runs) -> Iterator[str]:
+    """Yield each note once, with the labels of its runs where it is not of all."""
+    labels: dict[str, list[str]] = {}
+    for label, _, record in runs:
+        for note in dict.fromkeys(record["notes"]):
+            labels.setdefault(note, []).append(label)
+    for note, own in labels.items():
+        yield note if len(own) == len(runs) else f"{', '.join(own)}: {note}"
 
 
 def _pictures(runs: Runs, name: str) -> Iterator[Part]:

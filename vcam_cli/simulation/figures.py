@@ -19,9 +19,16 @@ from numpy.typing import NDArray
 from vcam_cli.effects.signal_chain import NoiseSource, noise_sources
 from vcam_cli.physics import readout
 from vcam_cli.processing.tone_map import sensor_white
+from vcam_cli.quality import mtf
 from vcam_cli.scheduling import estimators
 from vcam_cli.simulation.frame import Frame
 from vcam_cli.simulation.pixel_figures import pixel_figures
+
+GRAY = 0.18
+"""Reflectance of the gray card that exposure meters are set to."""
+EDGE_REACH = 32
+"""Distance from the edge up to which its profile is measured [pixels]: half of the 64 x 64 regions
+that ISO 12233 takes at least."""
 
 
 def figures(frame: Frame) -> list[tuple[str, float, str]]:
@@ -41,9 +48,12 @@ def figures(frame: Frame) -> list[tuple[str, float, str]]:
         ("well_capacity", known.well_capacity, "e"),
         ("quantized_dynamic_range_db", known.quantized_dynamic_range_db, "dB"),
         ("picture_snr_db", picture_snr_db(frame), "dB"),
+        ("gray_snr_db", gray_snr_db(frame), "dB"),
         ("base_iso", frame.base_iso, ""),
         ("digital_gain", digital_gain(frame), ""),
     ]
+    if frame.camera.has_edge:
+        listed.append(("mtf50", edge_mtf50(frame), "cycles/pixel"))
     return listed + _sample_figures(frame, known.dark, known.draws) if frame.times else listed
 
 
@@ -87,19 +97,67 @@ def picture_snr_db(frame: Frame) -> float:
     are straight lines of the signal, so that the mean variance is that of the mean signal. It is
     -inf without light, or where all pixels saturate.
     """
-    groups, binning = frame.layout.binning_groups, frame.camera.array.binning
-    summed = groups.summed_codes
-    signal = groups.join(frame.rate) * frame.exposure_time / summed
-    dark = frame.dark_rate * frame.exposure_time
-    usable = signal + dark < frame.electrical.saturation
+    groups = frame.layout.binning_groups
+    signal = groups.join(frame.rate) * frame.exposure_time / groups.summed_codes
+    usable = signal + frame.dark_rate * frame.exposure_time < frame.electrical.saturation
     count = int(usable.sum())
-    light = float(signal.sum(where=usable, dtype=np.float64)) / max(count, 1)
+    return _snr_db(frame, float(signal.sum(where=usable, dtype=np.float64)) / max(count, 1))
+
+
+def gray_snr_db(frame: Frame) -> float:
+    """Return the signal of 18 % gray on the axis over its temporal noise, as exposed [dB].
+
+    Mean over the pixels, of those colors that do not saturate; else as `picture_snr_db`.
+    """
+    layout, colors = frame.layout, len(frame.mosaic.colors)
+    counts = np.ones(colors)
+    if not layout.full_color:
+        counts = np.bincount(layout.color.ravel(), minlength=colors).astype(float)
+    signal = GRAY * frame.white_rate * frame.exposure_time
+    usable = signal + frame.dark_rate * frame.exposure_time < frame.electrical.saturation
+    weights = counts * usable
+    return _snr_db(frame, float((weights * signal).sum() / max(weights.sum(), 1)))
+
+
+def _snr_db(frame: Frame, light: float) -> float:
+    """Return a mean signal [electrons] over its temporal noise, rounding included [dB]."""
     if light <= 0:
         return -math.inf
+    groups, binning = frame.layout.binning_groups, frame.camera.array.binning
+    summed, dark = groups.summed_codes, frame.dark_rate * frame.exposure_time
     sources = noise_sources(frame.plan.active, "frame")
     noise = sum(source.binned_variance(light + dark, dark, binning) for source in sources)
     rounding = frame.adc.rounding(light + dark, summed * noise) / summed
     return 20 * math.log10(light / math.sqrt(noise + rounding))
+
+
+def edge_mtf50(frame: Frame) -> float:
+    """Return the MTF50 of the raw frame of a slanted edge [cycles/pixel]: ISO 12233's e-SFR.
+
+    Of the color with the most pixels, the brightest of these. It is nan where no edge is found, inf
+    where the transfer falls to no half.
+    """
+    layout, codes = frame.layout, frame.linear(frame.picture_dn)
+    if layout.full_color:
+        plane = codes[int(frame.white_rate.argmax())]
+        parts = [(slice(None), slice(None))]
+    else:
+        plane, mosaic = codes, layout.raw_mosaic
+        block = np.array(mosaic.block)
+        counts = [int((block == name).sum()) for name in mosaic.colors]
+        color = max(zip(counts, frame.white_rate, mosaic.colors, strict=True))[2]
+        rows, columns = block.shape
+        parts = [
+            (slice(int(i), None, rows), slice(int(j), None, columns))
+            for i, j in np.argwhere(block == color)
+        ]
+    x, y = layout.centers
+    lattices = [mtf.Lattice(plane[rows, columns], x[columns], y[rows]) for rows, columns in parts]
+    pitch = min(layout.geometry.pitch_x, layout.geometry.pitch_y)
+    try:
+        return mtf.slanted_edge_sfr(lattices, pitch, EDGE_REACH * pitch).mtf50 * pitch
+    except ValueError:
+        return math.nan
 
 
 def digital_gain(frame: Frame) -> float:

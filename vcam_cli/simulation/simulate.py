@@ -16,6 +16,7 @@ from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.electrical import no_volts
 from vcam_cli.camera.derived.geometry import geometry
 from vcam_cli.camera.derived.scene_layers import with_flat_scene
+from vcam_cli.camera.expectations import misses
 from vcam_cli.camera.processing_steps import Step
 from vcam_cli.camera.sensor.array import Positions
 from vcam_cli.errors import BadInput
@@ -246,6 +247,11 @@ class Result:
         if "s-cielab" in self.frame.camera.quality:
             out.append(("mean_s_cielab", float(self.s_cielab.mean(dtype=float)), ""))
         return Metrics(out)
+
+    @property
+    def missed(self) -> tuple[str, ...]:
+        """A sentence for each limit of the camera's `expect` that the metrics do not keep."""
+        return misses(self.frame.camera.limits, self.metrics)
 
     def save(self, folder: str | Path) -> Path:
         """Write what `vcam run` writes, and return the folder. Raises BadInput, CannotDo."""

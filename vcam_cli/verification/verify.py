@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import partial
@@ -75,7 +76,8 @@ class Row:
         """The row of verify.csv."""
         named = (self.frame, self.channel, self.quantity)
         told = ["" if v is None else v for v in (self.deviation, self.bound)]
-        return (*named, self.measured, self.predicted, 100 * self.error, *told, self.verdict)
+        error = 100 * self.error if math.isfinite(self.error) else ""
+        return (*named, self.measured, self.predicted, error, *told, self.verdict)
 
 
 @dataclass(frozen=True)
@@ -89,8 +91,9 @@ class Verification:
 
     @property
     def errors(self) -> NDArray:
-        """The errors of all means, relative."""
-        return np.array([row.error for row in self.rows if row.quantity.startswith("mean")])
+        """The errors of all means, relative; those of means that were measured as 0 have none."""
+        every = np.array([row.error for row in self.rows if row.quantity.startswith("mean")])
+        return every[np.isfinite(every)]
 
     @property
     def missed(self) -> tuple[Row, ...]:
@@ -108,7 +111,7 @@ class Verification:
         These are all, those that miss a tolerance, those of which it is known what is chance, and
         those that differ by more than that.
         """
-        percent = 100 * self.errors
+        percent = 100 * self.errors if self.errors.size else np.full(1, math.nan)
         return {
             "count": len(self.rows),
             "mean_error_percent": float(percent.mean()),

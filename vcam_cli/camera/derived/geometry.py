@@ -169,6 +169,8 @@ class Geometry:
             "object_distance": self.object_distance,
             "focus_distance": self.focus_distance,
             "image_distance": si,
+            "focal_pixels_x": si / self.pitch_x,
+            "focal_pixels_y": si / self.pitch_y,
             "exit_pupil_distance": self.exit_pupil_distance,
             "numerical_aperture": self.numerical_aperture,
             "aperture_diameter": self.aperture_diameter,

@@ -141,10 +141,9 @@ def _focal_length(camera: Camera) -> float:
         found["focal_length"] = optics.focal_length
     if optics.field_of_view is not None:
         pixels = lattice(camera)
-        diagonal = math.hypot(pixels.width, pixels.height)
-        angle = optics.field_of_view
+        angle, extent = optics.field_of_view.over(pixels.width, pixels.height)
         found["field_of_view"] = float(
-            radiometry.focal_length_of_field_of_view(angle, diagonal, distance)
+            radiometry.focal_length_of_field_of_view(angle, extent, distance)
         )
     if optics.aperture_diameter is not None:
         if optics.f_number is not None:

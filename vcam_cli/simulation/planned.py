@@ -1,0 +1,64 @@
+"""What `vcam plan` shows of a camera: effects, settings, cost, geometry, frame rate."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.derived.frame_rate import FrameRate, frame_rate
+from vcam_cli.progress import Observer
+from vcam_cli.simulation.preparation import Prepared
+from vcam_cli.simulation.remarks import Notes
+from vcam_cli.simulation.simulate import prepare
+
+
+@dataclass(frozen=True)
+class PlannedRun:
+    """A camera that is ready to take its frame."""
+
+    ready: Prepared
+    notes: Notes
+    """What to know of it, a sentence each."""
+    readout: FrameRate | None
+    """How fast it takes frames; None where the file does not say."""
+
+    @property
+    def effects(self) -> list[dict[str, Any]]:
+        """Each effect with its state, who decided it, why, its contribution and its seconds."""
+        return list(self.ready.plan.report()["effects"])
+
+    @property
+    def geometry(self) -> dict[str, float | int]:
+        """Name -> value of the solved geometry, in SI units."""
+        return self.ready.layout.report(self.ready.spectrum.oversampling)
+
+    @property
+    def frames_per_second(self) -> float | None:
+        """Frames per second at this exposure; None where the file does not say."""
+        return None if self.readout is None else self.readout.rate(self.ready.exposure_time)
+
+    def report(self) -> dict[str, Any]:
+        """Return what `vcam plan --json` prints."""
+        found = dict(self.ready.plan.report())
+        if self.ready.times:
+            found["captures"] = list(self.ready.times)
+        if self.readout is not None:
+            found["frame_rate"] = {
+                "readout_time": self.readout.readout_time,
+                "frames_per_second": self.frames_per_second,
+            }
+        return found | {"geometry": self.geometry}
+
+    def __repr__(self) -> str:
+        """Return a line: name, effects that run, seconds and memory expected."""
+        plan, name = self.ready.plan.report(), self.ready.camera.name
+        on = sum(effect["state"] == "on" for effect in plan["effects"])
+        cost = f"{plan['seconds']:.2g} s, {plan['memory_bytes'] / 1e6:.0f} MB"
+        return f"<PlannedRun {name}: {on} of {len(plan['effects'])} effects, {cost}>"
+
+
+def planned_run(camera: Camera, workers: int | None, watch: Observer) -> PlannedRun:
+    """Return the plan of a camera's frame. Raises BadInput, CannotDo."""
+    ready, notes = prepare(camera, workers, watch)
+    return PlannedRun(ready, notes, frame_rate(camera))
