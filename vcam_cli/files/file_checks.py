@@ -53,6 +53,14 @@ def is_raw(path: Path) -> bool:
 
 def check_file(path: Path) -> None:
     """Refuse what is no whole regular file, before OpenImageIO sees it."""
+    size = check_regular(path)
+    with open(path, "rb") as file:
+        if file.read(8) == PNG_START and not _png_is_whole(file, size):
+            raise truncated_file()
+
+
+def check_regular(path: Path) -> int:
+    """Return the size of a regular file [bytes]; refuse all else unopened: a pipe would hang."""
     str(path).encode("utf-8")  # OpenImageIO takes no other names
     try:
         status = os.stat(path)
@@ -64,9 +72,7 @@ def check_file(path: Path) -> None:
         raise UnusableFile("is a device, pipe or socket", "give a regular image file")
     if status.st_size == 0:
         raise UnusableFile("the file is empty", "give a whole image file")
-    with open(path, "rb") as file:
-        if file.read(8) == PNG_START and not _png_is_whole(file, status.st_size):
-            raise truncated_file()
+    return status.st_size
 
 
 def _png_is_whole(file: Any, size: int) -> bool:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import glob
+import hashlib
 import itertools
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -14,10 +15,8 @@ from numpy.typing import NDArray
 
 from vcam_cli.camera.derived.mosaic import BLOCKS
 from vcam_cli.errors import BadInput, Collector, bad
-from vcam_cli.files.file_checks import UnusableFile, is_raw
-from vcam_cli.files.images.camera_raw import read_codes
-from vcam_cli.files.images.exr import read_exr
-from vcam_cli.files.images.images import open_image, read_samples
+from vcam_cli.files.file_checks import UnusableFile
+from vcam_cli.verification.frame_files import Page, pages, read_page
 from vcam_cli.verification.frame_sets import FrameSet
 from vcam_cli.verification.model import Measurement
 from vcam_cli.verification.stack_statistics import robust_deviation
@@ -27,7 +26,11 @@ OUTLIER = 10.0
 LEAST_OUTLIER = 0.02
 """The same relative to the mean, whatever the others do."""
 
-_FORMATS = "give TIFF, PNG, npy, EXR, DNG or other raw files of cameras"
+LEAST_SIDE = 4
+"""Rows and columns of a color that statistics of rows and columns need."""
+SPREAD = 0.5
+"""Standard deviation of codes from which two frames are never alike by chance [DN]."""
+_FORMATS = "give TIFF, PNG, PGM, npy, EXR, DNG or other raw files of cameras"
 
 
 @dataclass(frozen=True)
@@ -42,11 +45,19 @@ class Stack:
     """Names of frames whose mean is far from the others'."""
     drift: float
     """Largest less smallest mean of a frame over their mean."""
+    shift: int = 0
+    """Bits by which the codes in the files are shifted left."""
 
     @property
     def notes(self) -> list[str]:
         """What the user is told of frames that are left out."""
-        return [f"{self.label}: {name} is unlike the others and left out" for name in self.dropped]
+        told = [f"{self.label}: {name} is unlike the others and left out" for name in self.dropped]
+        if self.shift:
+            told.append(
+                f"{self.label}: the codes in the files are shifted left by {self.shift} bits, which"
+                " is undone"
+            )
+        return told
 
 
 def color_block(measurement: Measurement) -> tuple[tuple[str, ...], ...]:
@@ -66,13 +77,14 @@ def color_planes(measurement: Measurement) -> dict[str, list[tuple[slice, slice]
 
 def paths(
     measurement: Measurement, held_out: bool = False, edges: bool = False
-) -> dict[int, list[Path]]:
-    """Return the files of every entry that is to be fitted: number of the entry -> files.
+) -> dict[int, list[Page]]:
+    """Return the frames of every entry that are to be fitted: number of the entry -> pages.
 
     held_out: those that are to be predicted instead: all where none are held out; of edges alone
     where `edges` says so, else of all others.
 
-    Raises BadInput where an entry has too few: one to predict, two to fit.
+    Raises BadInput where a file is no file of frames, or an entry has too few of them: one to
+    predict, two to fit.
     """
     folder = measurement.origin.parent if measurement.origin else Path()
     found, problems = {}, Collector()
@@ -80,16 +92,31 @@ def paths(
         is_edge = isinstance(entry, FrameSet) and entry.target == "slanted-edge"
         if not isinstance(entry, FrameSet) or (held_out and is_edge != edges):
             continue
-        files = [Path(name) for name in sorted(glob.glob(str(folder / entry.files)))]
-        kept = len(files) - math.floor(measurement.hold_out * len(files))
-        found[number] = files[:kept] if not held_out else files[kept:] or files
+        where = ("frames", number, "files")
+        try:
+            files = _named(folder, entry.files)
+            listed = [page for file in files for page in pages(file)]
+        except UnusableFile as error:
+            raise _refusal(measurement, number, str(error), error.remedy or _FORMATS) from None
+        kept = len(listed) - math.floor(measurement.hold_out * len(listed))
+        found[number] = listed[:kept] if not held_out else listed[kept:] or listed
         least = 1 if held_out or is_edge else 2
         if len(found[number]) < least:
-            where = ("frames", number, "files")
-            message = f"{len(files)} files in {folder} are {entry.files}, of which {kept} fit"
+            message = (
+                f"{len(files)} files in {folder} are {entry.files}: {len(listed)} frames, of which"
+                f" {kept} are not held out"
+            )
             problems.add(where, message, f"give {least} frames or more that are not held out")
     raise_if_any(problems, measurement)
     return found
+
+
+def _named(folder: Path, name: str) -> list[Path]:
+    """Return the files of a name in a folder: the one of just this name, or all of a pattern."""
+    alone = folder / name
+    if alone.exists():
+        return [alone]
+    return sorted(Path(each) for each in glob.glob(glob.escape(str(folder)) + "/" + name))
 
 
 def raise_if_any(problems: Collector, measurement: Measurement) -> None:
@@ -109,29 +136,64 @@ def stacks(measurement: Measurement) -> Iterator[Stack]:
 
 
 def numbered_stacks(
-    measurement: Measurement, files_of: dict[int, list[Path]]
+    measurement: Measurement, pages_of: dict[int, list[Page]]
 ) -> Iterator[tuple[int, Stack]]:
     """Yield number and stack of entries, likewise.
 
-    Raises BadInput where a file is no frame, or frames differ in size.
+    Raises BadInput where a file is no frame, frames differ in size, or one is listed twice.
     """
     shape: tuple[int, ...] | None = None
-    for number, files in files_of.items():
+    seen: dict[object, Page] = {}
+    shift = _shift(measurement, pages_of) if pages_of else 0
+    for number, listed in pages_of.items():
         entry = measurement.frames[number]
         assert isinstance(entry, FrameSet)
         frames = []
-        for file in files:
-            frame = _read(file, measurement, number)
+        for page in listed:
+            frame = _read(page, measurement, number, shift)
             shape = shape or frame.shape
             if frame.shape != shape:
-                message = f"{file.name} has {frame.shape} pixels, the first frame {shape}"
+                message = f"{page.name} has {frame.shape} pixels, the first frame {shape}"
                 raise _refusal(measurement, number, message, "give frames of one size")
+            for mark in _marks(page, frame):
+                other = seen.setdefault(mark, page)
+                if other is not page:
+                    message = f"{page.name} is a copy of {other.name}: no frame of its own"
+                    raise _refusal(measurement, number, message, "list every frame once")
             frames.append(frame)
-        stack = _without_outliers(entry, measurement.label(number), files, np.stack(frames))
-        yield number, stack
+        stack = _without_outliers(entry, measurement.label(number), listed, np.stack(frames))
+        yield number, replace(stack, shift=shift)
 
 
-def _without_outliers(entry: FrameSet, label: str, files: list[Path], frames: NDArray) -> Stack:
+def _marks(page: Page, frame: NDArray) -> Iterator[object]:
+    """Yield what no two frames have in common: file and page, and codes that have noise."""
+    yield page.path.resolve(), page.number
+    inner = frame[(frame > 0) & (frame < frame.max())]
+    if inner.size and float(inner.std()) > SPREAD:
+        yield hashlib.blake2b(frame.tobytes(), digest_size=16).digest()
+
+
+def _shift(measurement: Measurement, pages_of: dict[int, list[Page]]) -> int:
+    """Return by how many bits the codes of all frames are shifted left in their files.
+
+    Instruments write 12 bits at the upper end of 16. All codes are multiples of 16 then, those of
+    dark frames, too, which are within 12 bits.
+    """
+    assert measurement.levels is not None
+    common = most = 0
+    for number, listed in pages_of.items():
+        codes = _stored(listed[0], measurement, number)
+        if codes.dtype.kind != "u":
+            return 0
+        spare = 8 * codes.dtype.itemsize - measurement.levels.bits
+        common = int(np.gcd(common, np.gcd.reduce(codes, axis=None)))
+        most = max(most, int(codes.max()))
+        if spare <= 0 or common % 2**spare:
+            return 0
+    return spare if common and most >= 2**measurement.levels.bits else 0
+
+
+def _without_outliers(entry: FrameSet, label: str, files: list[Page], frames: NDArray) -> Stack:
     means = frames.mean(axis=(1, 2))
     center = np.median(means)
     limit = max(OUTLIER * robust_deviation(means), LEAST_OUTLIER * center)
@@ -143,42 +205,38 @@ def _without_outliers(entry: FrameSet, label: str, files: list[Path], frames: ND
     return Stack(entry, label, frames[good], dropped, float(np.ptp(used) / max(used.mean(), 1.0)))
 
 
-def _read(file: Path, measurement: Measurement, number: int) -> NDArray:
+def _stored(page: Page, measurement: Measurement, number: int) -> NDArray:
+    """Return the codes of a frame as they are in its file, (rows, columns)."""
     try:
-        codes = _codes(file, measurement)
-    except (UnusableFile, OSError, ValueError) as error:
-        message = f"{file.name} cannot be read: {error}"
+        codes = read_page(page, "".join(itertools.chain(*color_block(measurement))))
+    except (UnusableFile, OSError, ValueError, EOFError) as error:
+        message = f"{page.name} cannot be read: {error}"
         raise _refusal(measurement, number, message, _FORMATS) from None
+    if codes.ndim != 2 or not codes.size or not np.array_equal(codes, np.rint(codes)):
+        message = f"{page.name} is no raw frame: one channel of whole numbers is needed"
+        raise _refusal(measurement, number, message, "give raw frames, not pictures")
+    block = color_block(measurement)
+    least = [LEAST_SIDE * side for side in (len(block), len(block[0]))]
+    if codes.shape[0] < least[0] or codes.shape[1] < least[1]:
+        message = f"{page.name} has {codes.shape[0]} x {codes.shape[1]} pixels"
+        remedy = f"give frames of {least[0]} x {least[1]} pixels or more"
+        raise _refusal(measurement, number, message, remedy)
+    return codes
+
+
+def _read(page: Page, measurement: Measurement, number: int, shift: int) -> NDArray:
+    codes = _stored(page, measurement, number)
+    if shift:
+        codes = codes >> shift
     assert measurement.levels is not None
     highest = 2**measurement.levels.bits - 1
-    if codes.ndim != 2 or not np.array_equal(codes, np.rint(codes)):
-        message = f"{file.name} is no raw frame: one channel of whole numbers is needed"
-        raise _refusal(measurement, number, message, "give raw frames, not pictures")
-    if codes.min() < 0 or codes.max() > highest:
-        message = f"{file.name} has codes up to {codes.max():g}, more than {highest}"
+    if codes.min() < 0:
+        message = f"{page.name} has codes down to {codes.min():g}, an ADC gives none below 0"
+        raise _refusal(measurement, number, message, "give frames with their black level in them")
+    if codes.max() > highest:
+        message = f"{page.name} has codes up to {codes.max():g}, more than {highest}"
         raise _refusal(measurement, number, message, "correct levels.bits")
     return codes.astype(np.uint16 if highest < 1 << 16 else np.uint32)
-
-
-def _codes(file: Path, measurement: Measurement) -> NDArray:
-    """Return the numbers of a file, (rows, columns) where it has one channel."""
-    if is_raw(file):
-        codes, colors = read_codes(file)
-        meant = "".join(itertools.chain(*color_block(measurement)))
-        if colors and colors != meant:
-            raise UnusableFile(f"its pixels are {colors}, and pattern says {meant}")
-        return codes
-    if file.suffix == ".npy":
-        return np.load(file, allow_pickle=False)
-    if file.suffix == ".exr":
-        channels, _ = read_exr(file)
-        if "dn" in channels:
-            return channels["dn"]
-        return next(iter(channels.values())) if len(channels) == 1 else np.zeros((1, 1, 2))
-    with open_image(file) as source:
-        spec = source.spec()
-        data, _ = read_samples(source, spec, tuple(range(spec.nchannels)))
-    return data[:, :, 0] if data.shape[2] == 1 else data
 
 
 def _refusal(measurement: Measurement, number: int, message: str, remedy: str) -> BadInput:
