@@ -32,11 +32,12 @@ def tree(found: Fit, conditions: Conditions, curves: list[Transfer]) -> dict[str
     assert measurement.pixel.width is not None
     entry = curves[0].conditions[len(curves[0].conditions) // 2].entry
     pixel = measurement.pixel
-    gain, black = found.value("system_gain") or 0.0, found.value("black_level") or 0.0
+    gain, levels = found.value("system_gain") or 0.0, _black_levels(found)
+    black = sum(levels.values()) / len(levels)
     offset = max(0, round(black))
     well = found.value("full_well") or (2**measurement.levels.bits - 1 - offset) / gain
     readout = {"full_well": _charge(well), **_noise(found)}
-    if abs(black - offset) > 0.05:
+    if len(levels) == 1 and abs(black - offset) > 0.05:
         found.notes.append(f"the black level {black:.3f} DN is rounded to {offset} in the camera")
     height = {} if pixel.height is None else {"height": units.render(pixel.height, "length")}
     detector: dict[str, Any] = {"fill_factor": 1.0, "quantum_efficiency": BLACK}
@@ -97,11 +98,19 @@ def tree(found: Fit, conditions: Conditions, curves: list[Transfer]) -> dict[str
         "exposure": {"time": units.render(entry.exposure, "time")},
         "adc": {
             "bits": measurement.levels.bits,
-            "offset": f"{offset} DN",
+            "offset": f"{offset} DN"
+            if len(levels) == 1
+            else {color: f"{max(level, 0):.2f} DN" for color, level in levels.items()},
             "gain": f"{gain:.6g} DN/e",
         },
         "processing": [],
     }
+
+
+def _black_levels(found: Fit) -> dict[str, float]:
+    """Return the black level of every color, or one of "" where they are alike [DN]."""
+    listed = [p for p in found.parameters if p.name.startswith("black_level")]
+    return {p.name.partition(".")[2]: p.value for p in listed}
 
 
 def _dark_current(found: Fit) -> dict[str, Any]:

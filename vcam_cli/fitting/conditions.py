@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from vcam_cli.fitting.noise_shape import difference_counts
 from vcam_cli.fitting.pattern import Pattern, pattern
 from vcam_cli.fitting.traps import PixelMoments, pixel_moments
 from vcam_cli.progress import Observer
@@ -51,6 +52,8 @@ class Condition:
     """Color -> share of its codes that are the highest."""
     moments: tuple[PixelMoments, ...] = ()
     """Of the pixels of each plane, of the dark frames of the shortest exposure time."""
+    differences: tuple[NDArray, ...] = ()
+    """Of each plane of these, how often pixels differ by so many codes (groups, codes)."""
 
     def mean(self, color: str) -> Estimate:
         """Return the mean of a color [DN]."""
@@ -154,8 +157,12 @@ def measure(measurement: Measurement, watch: Observer) -> Conditions:
             is_usual = stack.entry.temperature in (None, usual)
             if stack.entry.is_dark and is_usual and stack.entry.exposure == shortest:
                 places = [p for each in color_planes(measurement).values() for p in each]
-                moments = (pixel_moments(stack.frames[:, *p], good[p]) for p in places)
-                condition = replace(condition, moments=tuple(moments))
+                planes = [(stack.frames[:, *p], good[p]) for p in places]
+                condition = replace(
+                    condition,
+                    moments=tuple(pixel_moments(*plane) for plane in planes),
+                    differences=tuple(difference_counts(*plane) for plane in planes),
+                )
             found.append(condition)
     dark = sorted((c for c in found if c.entry.is_dark), key=lambda c: c.entry.exposure)
     return Conditions(

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from vcam_cli.errors import Collector, bad
 from vcam_cli.fitting import camera_file, edge, sensor
@@ -23,6 +24,7 @@ from vcam_cli.fitting.conditions import (
     shared,
     usual_temperature,
 )
+from vcam_cli.fitting.light_check import check_light
 from vcam_cli.fitting.noise_shape import is_significant, neighbor_correlation, tail_shape
 from vcam_cli.fitting.parameters import COLUMNS, SIGMAS, Parameter, deviation, parameter
 from vcam_cli.fitting.pattern import CYCLES
@@ -98,6 +100,7 @@ def fit(measurement: Measurement, watch: Observer | None = None) -> Fit:
     out = Fit(measurement)
     found = measure(measurement, watch or Silent())
     out.notes += found.notes
+    check_light(found, measurement)
     line = sensor.dark_line(found.dark)
     curves, against = sensor.transfers(found, measurement, line)
     out.notes += against
@@ -111,7 +114,7 @@ def fit(measurement: Measurement, watch: Observer | None = None) -> Fit:
     _of_dark(out, found, line, gain)
     _of_gain(out, curves, gain)
     _of_patterns(out, found, curves, line, gain)
-    _of_range(out, curves, line, gain)
+    _of_range(out, curves, sensor.black_levels(found.dark, line), gain)
     _of_edge(out, measurement)
     out.dark, out.line, out.curves = found.dark, line, curves
     out.camera = camera_file.tree(out, found, curves)
@@ -146,10 +149,17 @@ def _check(measurement: Measurement) -> None:
 def _of_dark(out: Fit, found: Conditions, line: sensor.Dark, gain: Estimate) -> None:
     first = found.dark[0]
     add = out.parameters.append
-    add(parameter("black_level", line.black, "DN", "mean of dark frames at no exposure time"))
+    method = "mean of dark frames at no exposure time"
+    levels = sensor.black_levels(found.dark, line)
+    for color, each in levels.items():
+        add(parameter(f"black_level.{color}" if color else "black_level", each, "DN", method))
+    if len(levels) > 1:
+        listed = ", ".join(f"{color} {each.value:.2f}" for color, each in levels.items())
+        out.notes.append(f"the black level differs from color to color: {listed} DN")
     stated = out.measurement.levels.black if out.measurement.levels else None
-    if stated is not None and abs(stated - line.black.value) > 5 * line.black.error + 0.5:
-        out.notes.append(f"levels.black is {stated:g}, but dark frames have {line.black.value:.2f}")
+    for each in levels.values():
+        if stated is not None and abs(stated - each.value) > 5 * each.error + 0.5:
+            out.notes.append(f"levels.black is {stated:g}, but dark frames have {each.value:.2f}")
     if first.at_zero > CLIPPED:
         out.notes.append(f"{first.label}: {first.at_zero:.1%} of the dark codes are 0, so that"
                          " read noise and black level are not what they seem")  # fmt: skip
@@ -159,13 +169,23 @@ def _of_dark(out: Fit, found: Conditions, line: sensor.Dark, gain: Estimate) -> 
     else:
         current = line.current / gain
         add(parameter("dark_current", current, "e/s", "EMVA 1288 R4 eq 57, slope of the means"))
-    traps = find_traps(list(first.moments))
+    hidden = sensor.is_hidden(first)
+    traps = None if hidden else find_traps(list(first.moments))
     _of_temperature(out, found, line, gain)
     read = sensor.read_variance(first, line, gain, traps.core if traps else None)
-    if read.value <= 0 or first.every("pixel").value < 0.24:
-        out.notes.append("noise of the readout is lost in the rounding of the ADC")
-    add(deviation("read_noise", read, gain, "e", "EMVA 1288 R4 eq 53, without rounding and shot"
-                  " noise of the dark current, of pixels by themselves"))  # fmt: skip
+    method = (
+        "EMVA 1288 R4 eq 53, without rounding and shot noise of the dark current, of pixels by"
+        " themselves"
+    )
+    if hidden:
+        method = "EMVA 1288 R4 eq 54, upper limit: rounding hides smaller noise"
+        out.notes.append(
+            "rounding to whole codes hides the read noise: its upper limit by EMVA 1288 eq 54 is"
+            " written, and the intervals of dark current, black level and dark patterns include"
+            " what rounding can hide. Raise the gain or the bits to measure them"
+        )
+        out.unknown.append("tails, traps and row correlation of the noise: rounding hides them")
+    add(deviation("read_noise", read, gain, "e", method))
     rows_apart = len(color_block(out.measurement))
     lag_one, excess = first.every("row_correlation"), sensor.readout_excess(first, line, gain)
     r = lag_one.value if is_significant(lag_one) else 0.0
@@ -185,15 +205,25 @@ def _of_dark(out: Fit, found: Conditions, line: sensor.Dark, gain: Estimate) -> 
     if traps is not None:
         _of_traps(out, traps, gain)
     elif is_significant(excess):
-        reach = SIGMAS * excess.error
-        value, low, high = (tail_shape(excess.value + step) for step in (0.0, reach, -reach))
-        method = "Tukey's lambda of the pixels' kurtosis"
-        add(Parameter("read_noise_shape", value, low, high, "1", method))
+        lines = sum(max(first.lines(name).value, 0.0) for name in ("row", "column"))
+        dark = max(line.mean(first.entry.exposure) / gain.value, 0.0)
+        shape = tail_shape(_all_differences(first), lines, dark, gain.value)
+        method = "Tukey's lambda, maximum likelihood of differences of dark frames; jackknife"
+        add(parameter("read_noise_shape", shape, "1", method))
         if first.moments[0].frames < LEAST_FRAMES:
             out.notes.append(
                 "read noise has heavy tails; so few dark frames do not tell whether those are all"
                 " pixels' or those of few that have traps"
             )
+
+
+def _all_differences(dark: Condition) -> NDArray:
+    """Return how often pixels of all planes differ by so many codes (groups, codes)."""
+    most = max(counts.shape[1] for counts in dark.differences)
+    total = np.zeros((max(len(counts) for counts in dark.differences), most))
+    for counts in dark.differences:
+        total[: len(counts), : counts.shape[1]] += counts
+    return total
 
 
 def _of_temperature(out: Fit, found: Conditions, line: sensor.Dark, gain: Estimate) -> None:
@@ -224,6 +254,7 @@ def _of_gain(out: Fit, curves: list[sensor.Transfer], gain: Estimate) -> None:
     add = out.parameters.append
     add(parameter("system_gain", gain, "DN/e", "EMVA 1288 R4 eq 50, variance over mean"))
     for curve in curves:
+        out.notes += curve.bends
         where = f"{curve.color}, {curve.light}"
         if curve.efficiency is None:
             out.unknown.append(f"quantum efficiency of {where}: no photons or irradiance given")
@@ -261,6 +292,8 @@ def _of_patterns(
         variance = combine([each[number] for each in gains], weights)
         variance = replace(variance, error=variance.error * lights**0.5)
         variance = shared(variance, *lines) if name == "gain_column" else variance
+        bent = max(variance.value, 0.0) * ((1 + max(curve.bend for curve in curves)) ** 2 - 1)
+        variance = replace(variance, below=variance.below + bent, above=variance.above + bent)
         one = Estimate(1.0, 0.0)
         add(deviation(name, variance, one, "1", "EMVA 1288 R4 eq 67, near half of saturation"))
     lit = [(curve.conditions[i], curve.color) for curve, i in zip(curves, chosen, strict=True)]
@@ -296,7 +329,7 @@ def _of_patterns(
         reach = (
             SIGMAS / (1 + SIGMAS**2 / n) * ((share * (1 - share) + SIGMAS**2 / (4 * n)) / n) ** 0.5
         )
-        ends = max(center - reach, 0.0), center + reach
+        ends = max(center - reach, 0.0) if share else 0.0, center + reach
         told = Parameter(name, share, *ends, "1", f"share of {n} pixels, Wilson's interval")
         add(told)
 
@@ -317,7 +350,9 @@ def _near_half(curve: sensor.Transfer, found: Conditions, line: sensor.Dark) -> 
     return int(min(near, key=lambda i: _gain_variances(curve, i, found, line)[0].error))
 
 
-def _of_range(out: Fit, curves: list[sensor.Transfer], line: sensor.Dark, gain: Estimate) -> None:
+def _of_range(
+    out: Fit, curves: list[sensor.Transfer], black: dict[str, Estimate], gain: Estimate
+) -> None:
     full = [curve for curve in curves if curve.saturated is not None]
     if not full:
         out.unknown.append("full well: no flat frames are saturated; it is set where the ADC is"
@@ -330,8 +365,9 @@ def _of_range(out: Fit, curves: list[sensor.Transfer], line: sensor.Dark, gain: 
         if curve.saturated.at_most[curve.color] > 0.5:
             out.unknown.append("full well: the ADC is full before the pixel is")
             return
-        levels.append(replace(mean, error=max(mean.error, 12**-0.5)))  # rounding of one code
-    well = (combine(levels) - line.black) / gain
+        code = replace(mean, error=max(mean.error, 12**-0.5))  # rounding of one code
+        levels.append(code - (black.get(curve.color) or black[""]))
+    well = combine(levels) / gain
     out.parameters.append(parameter("full_well", well, "e", "mean of saturated frames over K"))
 
 

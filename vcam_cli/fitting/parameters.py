@@ -33,7 +33,8 @@ class Parameter:
 def parameter(name: str, found: Estimate, unit: str, method: str) -> Parameter:
     """Return a parameter whose error is normal."""
     reach = SIGMAS * found.error
-    return Parameter(name, found.value, found.value - reach, found.value + reach, unit, method)
+    ends = found.value - reach - found.below, found.value + reach + found.above
+    return Parameter(name, found.value, *ends, unit, method)
 
 
 def deviation(name: str, variance: Estimate, scale: Estimate, unit: str, method: str) -> Parameter:
@@ -48,7 +49,8 @@ def deviation(name: str, variance: Estimate, scale: Estimate, unit: str, method:
     if is_significant(variance):
         factor = math.exp(reach / variance.value)
         ends = variance.value / factor, variance.value * factor
-    relative = SIGMAS * scale.error / scale.value
+    ends = ends[0] - variance.below, ends[1] + variance.above
+    relative = (SIGMAS * scale.error + scale.reach) / scale.value
     value, low, high = (math.sqrt(max(v, 0.0)) / scale.value for v in (variance.value, *ends))
     low = value - math.hypot(value - low, value * relative)
     high = value + math.hypot(high - value, value * relative)

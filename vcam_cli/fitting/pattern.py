@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vcam_cli.fitting.noise_shape import is_significant
-from vcam_cli.quality import nonuniformity
-from vcam_cli.verification.stack_statistics import Estimate, StackStatistics, robust_deviation
+from vcam_cli.quality import nonuniformity, rounding
+from vcam_cli.verification.stack_statistics import (
+    Estimate,
+    StackStatistics,
+    robust_deviation,
+    with_rounding,
+)
 
 CYCLES = 2
 """Highest spatial frequency of what changes slowly [cycles over the array]."""
@@ -87,17 +92,33 @@ def pattern(stack: StackStatistics, good: NDArray) -> Pattern:
     }
     left = {"pixel": stack.pixel, "column": stack.column, "row": stack.row}
     whole = {name: math.hypot(error, left[name].error / n) for name, error in errors.items()}
+    values = {"pixel": pixel, "column": column, "row": row}
+    parts = {
+        name: with_rounding(Estimate(value, whole[name]), stack.hidden[0])
+        for name, value in values.items()
+    }
     every = pixel + row + column + (slow.value if is_significant(slow) else 0.0)
     every += float((off**2).sum()) / columns
+    total = with_rounding(Estimate(every, math.hypot(*whole.values())), stack.hidden[0])
+    # Noise and pattern together are a rounded number, too, and each is a part of them.
+    low, high = rounding.deviations(stack.temporal + every, total.error)
+    least = max(low**2 - stack.hidden[1] ** 2, 0.0)
+    rest = column + row + parts["column"].above + parts["row"].above
     return Pattern(
-        total=Estimate(every, math.hypot(*whole.values())),
-        pixel=Estimate(pixel, whole["pixel"]),
-        column=Estimate(column, whole["column"]),
-        row=Estimate(row, whole["row"]),
-        slow=slow,
+        total=_within(total, least, high**2),
+        pixel=_within(parts["pixel"], least - rest, high**2),
+        column=_within(parts["column"], 0.0, high**2),
+        row=_within(parts["row"], 0.0, high**2),
+        slow=with_rounding(slow, stack.hidden[0]),
         alien=tuple(int(column) for column in np.flatnonzero(off)),
         largest=float(off[np.argmax(abs(off))]),
     )
+
+
+def _within(found: Estimate, low: float, high: float) -> Estimate:
+    """Return a variance whose bounds reach no farther than to both ends [DN^2]."""
+    below, above = max(found.value - max(low, 0.0), 0.0), max(high - found.value, 0.0)
+    return replace(found, below=min(found.below, below), above=min(found.above, above))
 
 
 def _of_lines(found: float, pixels: float, count: int, freedom: int) -> float:
