@@ -1,4 +1,4 @@
-"""A camera with all kinds of noise, frames of it on a bench, and twenty ways to have it wrong.
+"""A camera with all kinds of noise, frames of it on a bench, and the ways to have it wrong.
 
 `python tests/verification/planted.py` prints what `vcam verify` makes of each, and of right files.
 """
@@ -86,6 +86,13 @@ WRONG: dict[str, dict[str, Any]] = {
     "no column gains": {f"{FPN}.gain_column": "0 %"},
     "no hot pixels": {"pixel.defects.hot": 0},
     "no dead pixels": {"pixel.defects.dead": 0},
+    "gain 5 % low, efficiency matched": {
+        "adc.gain": "0.285 DN/e",
+        "pixel.photodetector.quantum_efficiency": EFFICIENCY / 0.95,
+    },
+    "read noise 5 % low": {f"{READOUT}.heavy_tailed_noise.rms": "4.75 e"},
+    "DSNU 10 % high": {f"{FPN}.offset_pixel": "4.4 e"},
+    "PRNU 10 % low": {f"{FPN}.gain_pixel": "0.9 %"},
 }
 """What is wrong -> changes of the true camera."""
 CONDITIONS = {

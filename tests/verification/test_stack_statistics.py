@@ -5,7 +5,6 @@ import math
 import numpy as np
 import pytest
 
-from vcam_cli.fitting.noise_shape import tail_shape
 from vcam_cli.fitting.pattern import pattern
 from vcam_cli.verification.stack_statistics import Estimate, stack_statistics
 
@@ -75,15 +74,6 @@ def test_rows_that_resemble_their_neighbors():
     frames = 2 * rows[:, :, None] + rng.standard_normal((30, 400, 60))
     told = stack_statistics(frames, np.ones((400, 60), bool))
     assert told.row_correlation.value == pytest.approx(0.7, abs=5 * math.sqrt(3 / (30 * 400)))
-
-
-@pytest.mark.parametrize("shape", [-0.15, -0.05, 0.0, 0.1])
-def test_kurtosis_tells_the_shape_of_the_tails(shape):
-    """Kurtosis by a sum over the quantile; in the midst of a million its error is 1e-3."""
-    u = (np.arange(4_000_000) + 0.5) / 4_000_000
-    q = (u**shape - (1 - u) ** shape) / shape if shape else np.log(u / (1 - u))
-    excess = np.mean(q**4) / np.mean(q**2) ** 2 - 3
-    assert tail_shape(excess) == pytest.approx(shape, abs=3e-3)
 
 
 def test_kurtosis_of_a_short_stack_is_that_of_the_noise():

@@ -13,11 +13,15 @@ from typer.testing import CliRunner
 
 from vcam_cli.commands.main import app
 from vcam_cli.verification import measured_points
-from vcam_cli.verification.stack_prediction import FALSE_ALARMS, STACKS, bound
+from vcam_cli.verification.pooled import SURE, pool
+from vcam_cli.verification.stack_prediction import FALSE_ALARMS, STACKS, Judged, bound
 from vcam_cli.verification.stack_quantities import quantities
 
 FEW = "dark, short", "half"
-QUICK = ("gain 3 % high", "no row noise", "PRNU 15 % low", "no telegraph noise")
+QUICK = (
+    *("gain 3 % high", "no row noise", "PRNU 15 % low", "no telegraph noise"),
+    *("gain 5 % low, efficiency matched", "read noise 5 % low", "DSNU 10 % high"),
+)
 
 
 @pytest.fixture(scope="module")
@@ -77,11 +81,45 @@ def test_the_bound_holds_the_false_alarms_of_all_quantities():
     assert bound(200) > bound(100) > bound(1)
 
 
+def judged(deviation, rng, spread=0.02):
+    others = tuple(rng.standard_normal(STACKS))
+    return Judged(
+        "", "temporal variance of pixels [DN2]", 1.0, 1.0, deviation, others, spread, True
+    )
+
+
+def test_small_deviations_of_one_kind_add_up():
+    """Seven of 2 standard deviations are 14 of 7^1/2; the least error by hand, to the others' 20 %.
+
+    None of them is beyond a bound of 4; all of them are.
+    """
+    rng = np.random.default_rng(8)
+    [found] = pool({"lit frames": [judged(2.0, rng) for _ in range(7)]})
+    assert found.judged.deviation == pytest.approx(14 / math.sqrt(7), rel=0.2)
+    assert found.least_error(4.0) == pytest.approx((4 + SURE) * 0.02 / math.sqrt(7), rel=0.2)
+    assert pool({"lit frames": [judged(2.0, rng)]}) == []
+
+
+def test_frames_of_one_sensor_have_their_pattern_in_common():
+    """The same deviations in all frames: they are one, however many frames there are."""
+    rng = np.random.default_rng(9)
+    one = judged(2.0, rng)
+    [found] = pool({"lit frames": [one] * 7})
+    assert found.judged.deviation == pytest.approx(2.0, rel=0.3)
+
+
+def test_it_is_said_what_would_have_been_found(taken):
+    camera, _, file = taken
+    least = planted.judged(camera, {}, file).least_errors
+    assert any(name.startswith("temporal variance of pixels") for name in least)
+    assert all(0.002 < value < 0.5 for value in least.values())
+
+
 def test_a_right_file_agrees(taken):
     camera, _, file = taken
     found = planted.judged(camera, {}, file)
     assert [row for row in found.judged if row.differs] == []
-    assert {row.frame for row in found.judged} == set(FEW)
+    assert {row.frame for row in found.judged} == {*FEW, "all frames"}
     assert found.summary()["differing"] == 0
 
 
@@ -103,6 +141,7 @@ def test_the_command_ends_with_4_where_a_tolerance_is_missed(taken, tmp_path, mo
         result = CliRunner().invoke(app, [*command, "--set", "adc.gain=0.309 DN/e"])
         assert result.exit_code == code, result.output
         assert "quantities of frames differ by more than chance" in result.output
+        assert "errors found nine times in ten" in result.output
         with open(out / "verify.csv", newline="", encoding="utf-8") as listed:
             rows = list(csv.DictReader(listed))
         verdicts = {row["verdict"] for row in rows}
@@ -121,7 +160,7 @@ def test_large_frames_are_judged_in_their_middle(taken, monkeypatch):
 
 
 @pytest.mark.long
-def test_twenty_right_files_agree_and_twenty_wrong_ones_differ(tmp_path):
+def test_twenty_right_files_agree_and_all_wrong_ones_differ(tmp_path):
     """Each right one beside frames of a sensor of its own; 1 % of right ones would differ."""
     camera = planted.true_camera(tmp_path)
     alarms = 0

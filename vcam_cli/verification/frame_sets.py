@@ -1,10 +1,14 @@
 """What a measurement file says of frames: files, conditions they were taken under, the sensor."""
 
-from typing import Annotated, Literal
+from collections.abc import Iterator, Mapping
+from typing import Annotated, Any, Literal
+
+from pydantic_core import InitErrorDetails
 
 from vcam_cli.camera.scene.illuminant import IlluminantSpec
 from vcam_cli.config.model import Model, at_most_one, key
 from vcam_cli.config.quantities import Number, Quantity, Whole
+from vcam_cli.config.validation_messages import fault
 from vcam_cli.config.values import TIME, Length, MaybePositive, MaybeSiliconTemperature, Text
 from vcam_cli.verification.light import Light
 
@@ -12,12 +16,23 @@ PixelSize = Annotated[float | None, Quantity("length", above=0, least=1e-9, most
 PATTERNS = Literal["monochrome", "bayer-rggb", "bayer-grbg", "bayer-gbrg", "bayer-bggr"]
 
 
+def _is_dark_or_lit(given: Mapping[str, Any]) -> Iterator[InitErrorDetails]:
+    """Refuse an amount of light where there is none."""
+    named = [name for name in ("irradiance", "photons") if given.get(name) is not None]
+    if named and given.get("light", "none") in ("none", None) and not given.get("target"):
+        message, remedy = (
+            "light is none, and there is an amount of it",
+            "give light, or leave it out",
+        )
+        yield fault((named[0],), message, remedy, given[named[0]])
+
+
 class FrameSet(Model):
     """Raw frames that were taken under the same conditions."""
 
     files: Text = key(
-        "the frames, *.tif for several: whole numbers in TIFF, PNG, npy, EXR as vcam writes it, DNG"
-        " or another raw file of a camera",
+        "the frames, *.tif for several: whole numbers in TIFF (all pages), PNG, PGM, npy, EXR as"
+        " vcam writes it, DNG or another raw file of a camera",
         example="dark_10ms_*.tif",
     )
     name: Text = key("name in tables; default its number", example="dark, shortest", default="")
@@ -40,7 +55,7 @@ class FrameSet(Model):
         "of the sensor; default that of the flat frames", example="310 K", default=None
     )
 
-    rules = (at_most_one("irradiance", "photons"),)
+    rules = (at_most_one("irradiance", "photons"), _is_dark_or_lit)
 
     @property
     def is_dark(self) -> bool:

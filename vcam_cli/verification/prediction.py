@@ -96,7 +96,8 @@ def predict(camera: Camera, point: Point) -> Signal:
     if point.signal.channel == "electrons":
         value = chosen
     elif point.signal.channel == "dn":
-        value = np.clip(frame.to_dn(chosen), 0, frame.electrical.highest_code * frame.summed_codes)
+        codes = frame.to_dn(chosen) + dict(frame.electrical.black_steps).get(point.channel, 0.0)
+        value = np.clip(codes, 0, frame.electrical.highest_code * frame.summed_codes)
     else:
         value = frame.electrical.volts_of(chosen)
     return Signal(float(value.mean()), point.signal.channel)

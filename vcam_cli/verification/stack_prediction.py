@@ -32,7 +32,7 @@ from vcam_cli.verification.model import Point
 from vcam_cli.verification.prediction import conditions
 from vcam_cli.verification.stack_quantities import Quantity
 
-STACKS = 20
+STACKS = 40
 """Number of stacks that are predicted."""
 FALSE_ALARMS = 0.01
 """Share of right camera files of which any quantity is said to differ."""
@@ -55,6 +55,12 @@ class Judged:
     """Mean over the predicted stacks."""
     deviation: float
     """Student's t of the measured one."""
+    others: tuple[float, ...] = ()
+    """The same of each predicted one among the others."""
+    spread: float = math.inf
+    """What a deviation of 1 is, in the form that is nearly normal."""
+    is_logarithm: bool = False
+    """Whether that form is a logarithm."""
 
 
 def judge(
@@ -107,7 +113,9 @@ def take_stack(ready: Prepared, count: int, turn: int) -> NDArray:
     first = ready.camera.seed
     frames = []
     for frame in range(count):
-        seed = Seed(sensor=first.sensor + 1 + turn, frame=first.frame + (turn + 1) * count + frame)
+        # One sensor takes the stacks of a turn of all entries, as one has taken those measured.
+        sensor = first.sensor + 1 + turn % STACKS
+        seed = Seed(sensor=sensor, frame=first.frame + (turn + 1) * count + frame)
         camera = ready.camera.model_copy(update={"seed": seed})
         frames.append(take_frame(replace(ready, camera=camera), 1).dn)
     return np.stack(frames)
@@ -119,14 +127,35 @@ def compare(channel: str, measured: Quantity, predicted: list[Quantity]) -> Judg
     least = LEAST_DEVIATION * max(abs(float(forms.mean())), 1.0)
     if measured.is_count:
         least = COUNT_DEVIATION
-    spread = max(float(forms.std(ddof=1)), least) * math.sqrt(1 + 1 / len(forms))
+    center, spread = _normal_of(forms, least)
     mean = float(np.mean([q.value for q in predicted]))
-    deviation = (measured.normal - float(forms.mean())) / spread
-    return Judged(channel, measured.name, measured.value, mean, deviation)
+    others = []
+    for number, form in enumerate(forms):
+        middle, wide = _normal_of(np.delete(forms, number), least)
+        others.append((float(form) - middle) / wide)
+    return Judged(
+        channel,
+        measured.name,
+        measured.value,
+        mean,
+        (measured.normal - center) / spread,
+        tuple(others),
+        spread,
+        measured.is_logarithm,
+    )
 
 
-def bound(count: int) -> float:
-    """Return the deviation beyond which one of so many quantities differs; see `FALSE_ALARMS`."""
+def _normal_of(forms: NDArray, least: float) -> tuple[float, float]:
+    """Return the mean, and the standard deviation of one more number from it."""
+    spread = max(float(forms.std(ddof=1)), least) * math.sqrt(1 + 1 / len(forms))
+    return float(forms.mean()), spread
+
+
+def bound(count: int, share: float = 1.0) -> float:
+    """Return the deviation beyond which one of so many quantities differs.
+
+    share: of `FALSE_ALARMS` that all of them may have.
+    """
     from scipy.stats import t
 
-    return float(t.isf(FALSE_ALARMS / (2 * max(count, 1)), STACKS - 1))
+    return float(t.isf(share * FALSE_ALARMS / (2 * max(count, 1)), STACKS - 1))

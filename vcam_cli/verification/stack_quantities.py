@@ -42,6 +42,8 @@ class Quantity:
     """The value in a form whose distribution is nearly normal."""
     is_count: bool = False
     """Whether that is the root of a count."""
+    is_logarithm: bool = False
+    """Whether that is the logarithm."""
 
 
 def quantities(frames: NDArray, highest: int) -> list[Quantity]:
@@ -79,7 +81,8 @@ def quantities(frames: NDArray, highest: int) -> list[Quantity]:
 
 
 def _variance(name: str, value: float) -> Quantity:
-    return Quantity(f"{name} [DN2]", value, math.log(max(value, LEAST_VARIANCE)))
+    form = math.log(max(value, LEAST_VARIANCE))
+    return Quantity(f"{name} [DN2]", value, form, is_logarithm=True)
 
 
 def _share(name: str, where: NDArray) -> Quantity:
@@ -102,7 +105,9 @@ def _temporal(frames: NDArray, good: NDArray) -> Iterator[Quantity]:
     deviation = max(float(np.sqrt(np.mean(residual[:, good] ** 2))), LEAST_VARIANCE)
     for limit in TAILS:
         yield _share(f"temporal noise beyond {limit:g} sigma", abs(residual) > limit * deviation)
-    yield Quantity("excess kurtosis of temporal noise [1]", told.excess.value, told.excess.value)
+    # The kurtosis of heavy tails has tails itself, which its reciprocal ends at 0.
+    form = -3 / max(told.excess.value + 3, 0.1)
+    yield Quantity("excess kurtosis of temporal noise [1]", told.excess.value, form)
 
 
 def _spatial(average: NDArray, good: NDArray, frames: int) -> Iterator[Quantity]:
@@ -142,7 +147,8 @@ def _widths(name: str, values: NDArray, step: float) -> Iterator[Quantity]:
     for number, share in enumerate(WIDTHS):
         width = float(quantiles[len(WIDTHS) + number] - quantiles[number])
         form = math.log(max(width, LEAST_VARIANCE))
-        yield Quantity(f"width of {share:.0%} of the {name} [DN]", width, form)
+        label = f"width of {share:.0%} of the {name} [DN]"
+        yield Quantity(label, width, form, is_logarithm=True)
 
 
 def _spectrum(name: str, profiles: NDArray) -> Iterator[Quantity]:
@@ -165,6 +171,7 @@ def mean_of_planes(planes: list[list[Quantity]]) -> list[Quantity]:
             float(np.mean([q.value for q in each])),
             float(np.mean([q.normal for q in each])),
             each[0].is_count,
+            each[0].is_logarithm,
         )
         for each in zip(*planes, strict=True)
     ]

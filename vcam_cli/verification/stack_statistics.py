@@ -9,22 +9,39 @@ the variances do not depend on how many frames and pixels there are.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vcam_cli.quality import rounding
+from vcam_cli.quality.photon_transfer import ROUNDING
+
 
 @dataclass(frozen=True)
 class Estimate:
-    """A number and its standard error."""
+    """A number, its standard error, and bounds of what no average takes away: rounding."""
 
     value: float
     error: float
+    below: float = 0.0
+    """How far below the value the truth may be beside the error."""
+    above: float = 0.0
+    """How far above."""
+
+    @property
+    def reach(self) -> float:
+        """The larger of both bounds."""
+        return max(self.below, self.above)
 
     def __add__(self, other: Estimate) -> Estimate:
-        """Return the sum of two numbers of independent errors."""
-        return Estimate(self.value + other.value, math.hypot(self.error, other.error))
+        """Return the sum of two numbers of independent errors; bounds add up."""
+        return Estimate(
+            self.value + other.value,
+            math.hypot(self.error, other.error),
+            self.below + other.below,
+            self.above + other.above,
+        )
 
     def __sub__(self, other: Estimate) -> Estimate:
         """Return the difference of two numbers of independent errors."""
@@ -32,12 +49,21 @@ class Estimate:
 
     def __mul__(self, factor: float) -> Estimate:
         """Return a multiple."""
-        return Estimate(self.value * factor, self.error * abs(factor))
+        ends = self.below * abs(factor), self.above * abs(factor)
+        return Estimate(
+            self.value * factor, self.error * abs(factor), *(ends if factor >= 0 else ends[::-1])
+        )
 
     def __truediv__(self, other: Estimate) -> Estimate:
         """Return the ratio of two numbers of independent errors."""
-        ratio = self.value / other.value
-        return Estimate(ratio, math.hypot(self.error, ratio * other.error) / abs(other.value))
+        ratio, size = self.value / other.value, abs(other.value)
+        more = abs(ratio) * other.reach
+        return Estimate(
+            ratio,
+            math.hypot(self.error, ratio * other.error) / size,
+            (self.below + more) / size,
+            (self.above + more) / size,
+        )
 
 
 def combine(estimates: list[Estimate], weights: list[float] | None = None) -> Estimate:
@@ -71,6 +97,13 @@ class StackStatistics:
     """Correlation of neighboring rows of the plane."""
     excess: Estimate
     """Excess kurtosis of the pixels' noise."""
+    hidden: tuple[float, float]
+    """Least and largest standard deviation of the temporal noise before rounding [DN]."""
+
+    @property
+    def is_hidden(self) -> bool:
+        """Whether rounding may hide all of the temporal noise (EMVA 1288 release 4.0, eq 54)."""
+        return self.hidden[0] == 0.0
 
     @property
     def temporal(self) -> float:
@@ -120,18 +153,51 @@ def stack_statistics(frames: NDArray, good: NDArray) -> StackStatistics:
     own_row = row - pixel / columns
     correlation = lagged / ((n - 1) * (rows - 1)) / own_row if own_row > 0 else 0.0
     correlation_error = (row / own_row if own_row > 0 else 1.0) / math.sqrt((n - 1) * rows)
+    error = math.hypot(pixel * spread, row * math.sqrt(2 / ((n - 1) * (rows - 1))))
+    temporal = pixel + max(row, 0.0) + max(column, 0.0)
+    low, high = rounding.deviations(temporal, error)
+    spatial = float(average[good].var())
+    # Pixels whose means are spread over the codes round up and down alike.
+    off = rounding.mean_error(rounding.deviations(temporal + spatial, error)[0])
+    unknown = (math.inf, math.inf) if low == 0 else (0.0, 0.0)
     mean_error = math.sqrt(max(pixel, 1 / 12) / (n * rows * columns) + _share(row, rows, n)
                            + _share(column, columns, n))  # fmt: skip
     return StackStatistics(
         n,
         average,
-        Estimate(float(average[good].mean()), mean_error),
-        Estimate(pixel, pixel * spread),
-        Estimate(own_row, row * math.sqrt(2 / ((n - 1) * (rows - 1)))),
-        Estimate(column - pixel / rows, column * math.sqrt(2 / ((n - 1) * (columns - 1)))),
-        Estimate(correlation, correlation_error),
-        Estimate(excess, math.sqrt(24 / freedom) / shrink),
+        Estimate(float(average[good].mean()), mean_error, off, off),
+        Estimate(pixel, pixel * spread, *_bounds(temporal - ROUNDING, low, high)),
+        _line(own_row, row * math.sqrt(2 / ((n - 1) * (rows - 1))), low, high),
+        _line(column - pixel / rows, column * math.sqrt(2 / ((n - 1) * (columns - 1))), low, high),
+        Estimate(correlation, correlation_error, *unknown),
+        Estimate(excess, math.sqrt(24 / freedom) / shrink, *unknown),
+        (low, high),
     )
+
+
+def _bounds(variance: float, low: float, high: float) -> tuple[float, float]:
+    """Return how far below and above a variance the squares of two deviations are [DN^2]."""
+    return max(variance - low**2, 0.0), max(high**2 - variance, 0.0)
+
+
+def _line(variance: float, error: float, low: float, high: float) -> Estimate:
+    """Return the variance of lines with the bounds that rounding sets.
+
+    low, high: standard deviations of all temporal noise [DN].
+    """
+    found = with_rounding(Estimate(variance, error), low)
+    return replace(found, above=min(found.above, max(high**2 - variance, 0.0)))
+
+
+def with_rounding(found: Estimate, deviation: float) -> Estimate:
+    """Return a variance of mean codes with the bounds that rounding sets.
+
+    deviation: least standard deviation of the noise that is averaged [DN].
+    """
+    spread = math.sqrt(max(found.value, 0.0))
+    off = rounding.spread_error(deviation, max(spread, math.sqrt(found.error)))
+    bounds = _bounds(found.value, max(spread - off, 0.0), spread + off) if off else (0.0, 0.0)
+    return replace(found, below=bounds[0], above=bounds[1])
 
 
 def _share(line_variance: float, lines: int, frames: int) -> float:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
 
@@ -19,6 +19,7 @@ from vcam_cli.verification.edges import judge_edge
 from vcam_cli.verification.frames import numbered_stacks, paths, raise_if_any
 from vcam_cli.verification.measured_points import Points, measured_points, quantities_of_colors
 from vcam_cli.verification.model import UNITS, Measurement
+from vcam_cli.verification.pooled import MAIN, Pooled, is_clipped, pool
 from vcam_cli.verification.prediction import check, predict
 from vcam_cli.verification.stack_prediction import Judged, bound, judge
 
@@ -88,6 +89,8 @@ class Verification:
     measurement: Measurement
     rows: tuple[Row, ...]
     notes: tuple[str, ...]
+    least_errors: dict[str, float] = field(default_factory=dict)
+    """Kind of variance and frames -> relative error that is found nine times in ten."""
 
     @property
     def errors(self) -> NDArray:
@@ -128,6 +131,7 @@ class Verification:
             "name": self.measurement.name,
             "camera_name": self.camera.name,
             **self.summary(),
+            "least_errors": self.least_errors,
             "rows": [dict(zip(COLUMNS, row.cells, strict=True)) for row in self.rows],
             "notes": list(self.notes),
         }
@@ -163,11 +167,51 @@ def verify(camera: Camera, measurement: Measurement, watch: Observer | None = No
             camera, stack.point, stack.frames, stack.shape, measure, stack.number
         )
     edges, more = _edges(camera, measurement)
-    limit = bound(sum(map(len, (*judged.values(), *edges.values()))))
+    pooled = pool(_groups(measurement, judged, edges))
+    main = [each for each in pooled if each.kind]
+    alone = [*judged.values(), *edges.values()]
+    count = sum(len(each) for each in alone) + len(pooled) - len(main)
+    limit, limit_of_main = bound(count, 0.5), bound(len(main), 0.5)
     rows = [*_with_noise(measurement, means, judged, limit)]
     for number, listed in edges.items():
-        rows += [_judged_row(measurement, number, each, limit) for each in listed]
-    return Verification(camera, measurement, tuple(rows), (*_notes(camera, points), *notes, *more))
+        label = measurement.label(number)
+        rows += [_judged_row(measurement, label, each, limit) for each in listed]
+    for kind in pooled:
+        own = limit_of_main if kind.kind else limit
+        rows.append(_judged_row(measurement, kind.group, kind.judged, own))
+    least = _least_errors(main, limit_of_main)
+    told = (*_notes(camera, points), *notes, *more)
+    return Verification(camera, measurement, tuple(rows), told, least)
+
+
+def _groups(
+    measurement: Measurement, judged: dict[int, list[Judged]], edges: dict[int, list[Judged]]
+) -> dict[str, list[Judged]]:
+    """Return what was judged of all frames, of dark ones, of lit ones, and of edges."""
+    groups: dict[str, list[Judged]] = {name: [] for name in ("all frames", "dark frames",
+                                                             "lit frames", "edges")}  # fmt: skip
+    for number, listed in judged.items():
+        entry = measurement.frames[number]
+        if is_clipped(listed):
+            continue
+        groups["all frames"] += listed
+        groups["dark frames" if entry.light is None else "lit frames"] += listed
+    for listed in edges.values():
+        groups["edges"] += listed
+    if not (groups["dark frames"] and groups["lit frames"]):
+        del groups["all frames"]
+    return groups
+
+
+def _least_errors(main: list[Pooled], limit: float) -> dict[str, float]:
+    """Return the least relative error that would have been found, by kind and frames."""
+    found: dict[str, float] = {}
+    for kind in MAIN:
+        same = [each for each in main if each.kind == kind]
+        if same:
+            best = min(same, key=lambda each: each.least_error(limit))
+            found[f"{kind} ({best.group})"] = best.least_error(limit)
+    return found
 
 
 def _edges(camera: Camera, measurement: Measurement) -> tuple[dict[int, list[Judged]], list[str]]:
@@ -185,9 +229,9 @@ def _edges(camera: Camera, measurement: Measurement) -> tuple[dict[int, list[Jud
     return found, notes
 
 
-def _judged_row(measurement: Measurement, number: int, each: Judged, limit: float) -> Row:
+def _judged_row(measurement: Measurement, label: str, each: Judged, limit: float) -> Row:
     return Row(
-        measurement.label(number),
+        label,
         each.channel,
         each.name,
         each.measured,
@@ -214,7 +258,7 @@ def _with_noise(
             yield row
         for each in own:
             if each.name != row.quantity:
-                yield _judged_row(measurement, number, each, limit)
+                yield _judged_row(measurement, measurement.label(number), each, limit)
 
 
 def _check_all(camera: Camera, measurement: Measurement, points: Points) -> None:
