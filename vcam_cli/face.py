@@ -106,7 +106,7 @@ def fit(
     from vcam_cli.verification.frames import paths
 
     measured = _measurement(measurement)
-    files = [file for found in paths(measured).values() for file in found]
+    files = [page.path for found in paths(measured).values() for page in found]
     with _folder(out, "fit.json", lambda: (*measured.files, *files)) as folder:
         found = fitting.fit(measured, observer(watch))
         if folder is not None:
@@ -129,7 +129,7 @@ def verify(
     from vcam_cli.verification.frames import paths
 
     model, measured = _camera(camera), _measurement(measurement)
-    files = [file for found in paths(measured, held_out=True).values() for file in found]
+    files = [page.path for found in paths(measured, held_out=True).values() for page in found]
 
     def inputs() -> tuple[Path, ...]:
         return (*provenance.inputs(model), *measured.files, *files)

@@ -95,6 +95,11 @@ class Context:
     """Whether every raw pixel has all its colors: the frame is (C, rows, columns), no mosaic."""
     layout: Layout | None = None
     """Positions of pixels that are scattered; None where they fill rows and columns."""
+    black_steps: np.ndarray | None = None
+    """How far the black level of each color is from `black_dn` (C,) [DN]; None where all are alike.
+
+    It is in the codes of pixels alone: signals that are free of noise have the level `black_dn`.
+    """
 
     @property
     def mosaic(self) -> bool:

@@ -36,11 +36,27 @@ class BlackLevel:
 
     level: float
     """Level that is taken off [DN]."""
+    mosaic: tuple[tuple[float, ...], ...] = ()
+    """What more is taken off the pixels of a mosaic's block [DN]; () where all are alike."""
+    colors: tuple[float, ...] = ()
+    """The same of each color, of pixels that have all of them [DN]."""
     halo: int = 0
 
     def process_block(self, block: Block) -> Block:
         """Return the block less the level."""
         np.subtract(block.planes, np.float32(self.level), out=block.planes)
+        if not self.mosaic:
+            return block
+        if len(block.planes) > 1:
+            block.planes[...] -= np.array(self.colors, np.float32)[:, None, None]
+            return block
+        # Mirrored rows keep their place in a block of two rows.
+        down, across = len(self.mosaic), len(self.mosaic[0])
+        for row in range(down):
+            for column in range(across):
+                first = (row - block.first_row) % down
+                part = block.planes[:, first::down, column::across]
+                part -= np.float32(self.mosaic[row][column])
         return block
 
     def process_colors(self, values: np.ndarray) -> np.ndarray:

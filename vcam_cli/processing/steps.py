@@ -127,7 +127,11 @@ def _black_level(draft: Draft, step: Step, path: Path) -> Draft:
         )
     if context.linearize is not None:
         level = float(context.linearize(np.array([level]))[0])
-    return draft.with_operations(black_level.BlackLevel(level))
+    if context.black_steps is None or step.value != "subtract":
+        return draft.with_operations(black_level.BlackLevel(level))
+    steps = dict(zip(context.colors, context.black_steps.tolist(), strict=True))
+    block = tuple(tuple(steps[color] for color in row) for row in context.pattern)
+    return draft.with_operations(black_level.BlackLevel(level, block, tuple(steps.values())))
 
 
 def _demosaic(draft: Draft, step: Step, path: Path) -> Draft:

@@ -159,6 +159,7 @@ def capture(
     layer: int = 0,
     coarse_normals: bool = False,
     full_charge: NDArray | None = None,
+    pedestal: NDArray | None = None,
 ) -> tuple[NDArray, NDArray]:
     """Return one frame of an array whose rate of electrons is known.
 
@@ -186,6 +187,8 @@ def capture(
     full_charge : NDArray, optional
         Electrons, in the shape of `rate`, that full pixels are read with where that is less than
         the full well [electrons].
+    pedestal : NDArray, optional
+        What the ADC adds to each pixel beside its offset (rows, columns) [electrons].
 
     Returns
     -------
@@ -222,7 +225,7 @@ def capture(
             if full_charge is not None:
                 np.minimum(tile, full_charge[rows], out=tile)
             electrons[rows] = tile
-            dn[rows] = adc.apply(tile)
+            dn[rows] = adc.apply(tile if pedestal is None else tile + pedestal[rows])
         if done is not None:
             done(block)
 

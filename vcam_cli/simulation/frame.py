@@ -106,6 +106,12 @@ class Frame(Prepared):
         return float(self.to_dn(np.array([dark]))[0])
 
     @property
+    def black_steps(self) -> NDArray:
+        """How far the black level of each color is from that of `black_dn` (C,) [DN]."""
+        steps = dict(self.electrical.black_steps)
+        return np.array([steps.get(color, 0.0) for color in self.mosaic.colors])
+
+    @property
     def summed_codes(self) -> int:
         """Pixels whose codes are added."""
         return self.layout.binning_groups.summed_codes
@@ -247,6 +253,15 @@ def expose(
     return take_frame(ready, workers, stages)
 
 
+def _pedestal(ready: Prepared) -> NDArray | None:
+    """Return what black levels by color add to each pixel [electrons]; None without them."""
+    steps = dict(ready.electrical.black_steps)
+    if not steps:
+        return None
+    listed = np.array([steps[color] for color in ready.mosaic.colors], ready.rate.dtype)
+    return listed[ready.layout.color] * ready.rate.dtype.type(ready.electrical.electrons_per_dn)
+
+
 def take_frame(ready: Prepared, workers: int, stages: Stages | None = None) -> Frame:
     """Return one frame of a camera that is ready for it."""
     stages, camera = stages or Stages(), ready.camera
@@ -257,7 +272,12 @@ def take_frame(ready: Prepared, workers: int, stages: Stages | None = None) -> F
         times, coarse = ready.times, ready.settings.coarse_normals
         if not times:
             take = partial(
-                exposure.capture, adc=adc, seeds=seeds, workers=workers, coarse_normals=coarse
+                exposure.capture,
+                adc=adc,
+                seeds=seeds,
+                workers=workers,
+                coarse_normals=coarse,
+                pedestal=_pedestal(ready),
             )
             groups, time = ready.layout.binning_groups, ready.exposure_time
             electrons, dn = binned_readout.read(

@@ -379,6 +379,7 @@ def _simulate(camera: Camera, workers: int, stages: Stages, shared: Shared) -> R
         colors=frame.mosaic.colors,
         white_dn=frame.white_dn,
         black_dn=frame.black_dn,
+        black_steps=frame.black_steps if frame.electrical.black_steps else None,
         linearize=frame.linear if frame.electrical.linearized else None,
         saturated_dn=frame.picture_saturated_dn,
         patches=partial(_patches, frame),

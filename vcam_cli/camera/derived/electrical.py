@@ -11,6 +11,7 @@ from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived import sense_node
 from vcam_cli.camera.derived.charge_storage import capacity
 from vcam_cli.camera.derived.dark_noise import SIGMAS, dark_noise
+from vcam_cli.camera.derived.mosaic import BLOCKS
 from vcam_cli.camera.derived.transfer_curve import PATH as CURVE
 from vcam_cli.camera.derived.transfer_curve import Curve, transfer_curve
 from vcam_cli.camera.sensor.adc import Adc
@@ -53,6 +54,8 @@ class Electrical:
     """Voltage at which a logarithmic ADC's curve bends [V]; None for a linear one."""
     curve: Curve | None = None
     """Volts over electrons at the end of the pixel; None where they are proportional."""
+    black_steps: tuple[tuple[str, float], ...] = ()
+    """Colors, and how far their black level is from `offset`, the mean of all [DN]."""
 
     @property
     def has_volts(self) -> bool:
@@ -129,7 +132,7 @@ def electrical(camera: Camera) -> Electrical:
     curve = transfer_curve(camera, swing, well)
     output, slope = (swing, gain) if curve is None else (curve.volts[-1], curve.slope)
     full_scale = output * given.gain if adc.full_scale is None else adc.full_scale
-    offset = adc.offset
+    offset = adc.level
     if offset is None:
         margin = SIGMAS * dark_noise(camera, capacitance) * camera.exposure_gain
         offset = _automatic_offset(adc, margin, slope * given.gain * margin, full_scale)
@@ -151,6 +154,7 @@ def electrical(camera: Camera) -> Electrical:
         full_scale=full_scale,
         reference=reference,
         curve=curve,
+        black_steps=tuple(adc.steps.items()),
     )
     _check_counts(found)
     return found
@@ -203,6 +207,8 @@ def check(camera: Camera) -> None:
     """Raise BadInput when the readout is open, contradicts itself or lacks volts it needs."""
     pixel, adc = camera.pixel, camera.adc
     found = electrical(camera)
+    if found.black_steps:
+        _check_black_levels(camera, found)
     if found.curve is not None and found.reference is not None:
         message = "a logarithmic ADC has a curve of its own"
         raise bad(CURVE, message, "write transfer_curve: linear, or adc.kind: linear")
@@ -218,6 +224,30 @@ def check(camera: Camera) -> None:
         raise no_volts("pixel.readout.reset_noise", "ktc", "give it in electrons")
     if "volts" in camera.output.raw:
         raise no_volts("output.raw", "volts", "leave volts out")
+
+
+def _check_black_levels(camera: Camera, found: Electrical) -> None:
+    """Raise BadInput for black levels by color of a sensor that has none simulated."""
+    block = BLOCKS.get(str(camera.array.pattern), ())
+    colors = {color for row in block for color in row}
+    given = {color for color, _ in found.black_steps}
+    alone = "write one offset for all pixels"
+    path = "adc.offset"
+    if len(colors) < 2 or (len(block), len(block[0])) != (2, 2):
+        raise bad(path, "black levels by color are for mosaics of 2 x 2 pixels", alone)
+    if given != colors:
+        message = f"the mosaic has {', '.join(sorted(colors))}, and levels are given for"
+        raise bad(path, f"{message} {', '.join(sorted(given))}", "give one for each color")
+    binning = camera.array.binning
+    if binning is not None and binning.count > 1:
+        raise bad(path, "black levels by color are not simulated of binned pixels", alone)
+    if camera.exposure.captures is not None:
+        raise bad(path, "black levels by color are not simulated of several captures", alone)
+    if found.linearized or found.curve is not None or found.reference is not None:
+        raise bad(path, "black levels by color are for a linear readout", alone)
+    if camera.output.dng:
+        message = "raw.dng has one black level for all colors"
+        raise bad("output.dng", message, "write dng: false, or one adc.offset")
 
 
 def no_volts(path: str, what: str, instead: str) -> BadInput:

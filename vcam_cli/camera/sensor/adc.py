@@ -9,6 +9,7 @@ from pydantic_core import InitErrorDetails
 from vcam_cli.config.model import Model, key
 from vcam_cli.config.quantities import Quantity, Whole
 from vcam_cli.config.validation_messages import fault, refusal
+from vcam_cli.config.yaml_type import YamlType
 
 
 def _one_scale(given: Mapping[str, Any]) -> Iterator[InitErrorDetails]:
@@ -24,6 +25,46 @@ def _logarithmic_only(given: Mapping[str, Any]) -> Iterator[InitErrorDetails]:
         yield fault(("gain",), "a logarithmic ADC has no one gain", "give full_scale instead")
 
 
+class BlackLevels(YamlType):
+    """The type of a black level: one, auto, or one of each color."""
+
+    forms = Any
+
+    def read(self, given: Any) -> float | Mapping[str, float] | None:
+        """Return the level or levels [DN]; raise ValueError with a sentence."""
+        if not isinstance(given, Mapping):
+            return _ONE_LEVEL.read(given)
+        if not given:
+            raise ValueError("a mapping of colors is empty; write {R: 66 DN, G: 64 DN, B: 61 DN}")
+        levels = {}
+        for color, level in given.items():
+            found = _ONE_LEVEL.read(level)
+            if found is None:
+                raise ValueError(f"{color}: auto is for all colors; write 64 DN")
+            levels[str(color)] = found
+        return levels
+
+    def write(self, value: float | Mapping[str, float] | None) -> Any:
+        """Return the YAML form."""
+        if isinstance(value, Mapping):
+            return {color: _ONE_LEVEL.write(level) for color, level in value.items()}
+        return _ONE_LEVEL.write(value)
+
+    def json_schema(self, forms: dict[str, Any]) -> dict[str, Any]:
+        """Return the JSON Schema of a level, or of one for each color."""
+        one = _ONE_LEVEL.json_schema({})
+        levels = {
+            "type": "object",
+            "additionalProperties": _ONE_LEVEL.number_schema(),
+            "minProperties": 1,
+        }
+        return {"anyOf": [*one["anyOf"], levels]}
+
+
+_ONE_LEVEL = Quantity("dn", least=0, words={"auto": None})
+BLACK = BlackLevels()
+
+
 class Adc(Model):
     """From volts to numbers, rounded and clipped to 0..2^bits - 1.
 
@@ -33,8 +74,9 @@ class Adc(Model):
 
     bits: Annotated[int, Whole(least=1, most=24, example="10")] = key("resolution", default=10)
     kind: Literal["linear", "logarithmic"] = key("its curve", default="linear")
-    offset: Annotated[float | None, Quantity("dn", least=0, words={"auto": None})] = key(
-        "the code for no signal, the black level (pedestal); auto = the fewest codes that keep four"
+    offset: Annotated[float | Mapping[str, float] | None, BLACK] = key(
+        "the code for no signal, the black level (pedestal), of all pixels or of each color of a"
+        " Bayer mosaic, {R: 66 DN, G: 64 DN, B: 61 DN}; auto = the fewest codes that keep four"
         " standard deviations of the dark noise above 0",
         unit="DN",
         example="auto",
@@ -61,7 +103,23 @@ class Adc(Model):
 
     @model_validator(mode="after")
     def _leaves_codes(self) -> Self:
-        if self.offset is not None and self.offset >= 2**self.bits - 1:
-            message = f"{self.offset:g} DN leaves no number for a signal in {self.bits} bits"
+        highest = max(self.offset.values()) if isinstance(self.offset, Mapping) else self.offset
+        if highest is not None and highest >= 2**self.bits - 1:
+            message = f"{highest:g} DN leaves no number for a signal in {self.bits} bits"
             raise refusal(("offset",), message, "lower it, or give more bits")
         return self
+
+    @property
+    def level(self) -> float | None:
+        """The offset, in the mean over colors where each has its own [DN]; None for auto."""
+        if isinstance(self.offset, Mapping):
+            return sum(self.offset.values()) / len(self.offset)
+        return self.offset
+
+    @property
+    def steps(self) -> dict[str, float]:
+        """How far the offset of each color is from their mean [DN]; none where they are alike."""
+        if not isinstance(self.offset, Mapping):
+            return {}
+        mean = sum(self.offset.values()) / len(self.offset)
+        return {color: level - mean for color, level in self.offset.items()}
