@@ -149,7 +149,7 @@ WRONG = {
     "nan": (np.nan, "a value not finite (nan at row 3, column 5)"),
     "inf": (np.inf, "a value not finite (inf at row 3, column 5)"),
     "-inf": (-np.inf, "a value not finite (-inf at row 3, column 5)"),
-    "negative": (-0.25, "a negative value (-0.25 at row 3, column 5)"),
+    "negative": (-0.25, "a negative value (-0.25 at row 3, column 5; the largest is 0.89"),
 }
 HOLDERS = {"exr": ("half", "float"), "tif": ("half", "float", "double"), "pfm": ("float",)}
 
@@ -163,7 +163,7 @@ def test_what_no_light_is_has_its_place_said_and_nothing_is_written(kind, sample
     path = image(tmp_path / f"a.{kind}", data, sample)
     done = run(tmp_path, image_of(path.name))
     assert done.exit_code == 2, (done.stderr, done.exception)
-    for words in (path.name, said, "light is 0 or more; replace such values", "scene.source.file"):
+    for words in (path.name, said, "replace such values", "scene.source.file"):
         assert words in done.stderr
     assert not (tmp_path / "out").exists()
 

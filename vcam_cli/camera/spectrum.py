@@ -155,7 +155,7 @@ class CurveTable(Model):
         return spectra.Table(wavelength / 1e9, value, self.outside or outside)
 
 
-Per = Literal["photon", "watt"]
+Per = Annotated[Literal["photon", "watt"] | None, Choice("photon", "watt")]
 _PER: Any = key(
     "whether a sensitivity counts electrons per photon or per watt of light: published curves of"
     " cameras are mostly per watt, and become electrons per photon by 1 / wavelength, unchanged"
@@ -169,7 +169,7 @@ _PER: Any = key(
 class SpectrumFile(CurveFile):
     """A spectrum in a CSV file."""
 
-    per: Per | None = _PER
+    per: Per = _PER
 
     @property
     def is_per_watt(self) -> bool:
@@ -185,7 +185,7 @@ class SpectrumFile(CurveFile):
 class SpectrumTable(CurveTable):
     """A spectrum written out."""
 
-    per: Per | None = _PER
+    per: Per = _PER
 
     @property
     def is_per_watt(self) -> bool:

@@ -1,6 +1,7 @@
 """Scenes that are files: pictures, and spectra at every place."""
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import PurePath
 from typing import Annotated, Any, Literal, Self
 
@@ -20,6 +21,7 @@ from vcam_cli.config.values import (
     Wavelength,
     mapping,
 )
+from vcam_cli.config.yaml_type import YamlType
 
 
 class DepthMap(Model):
@@ -107,16 +109,30 @@ def _channels(given: Any) -> Mapping[str, float]:
     return {str(name): _CHANNEL.read(value) for name, value in given.items()}
 
 
-_Name = Annotated[str, StringConstraints(strict=True, min_length=1)]
+@dataclass(frozen=True)
+class VariableName(YamlType):
+    """The name of a variable in a file."""
+
+    forms = Annotated[str, StringConstraints(min_length=1)]
+
+    def read(self, given: Any) -> str:
+        """Return the name, as written."""
+        if not isinstance(given, str) or not given.strip():
+            raise ValueError(f"{describe(given)} is not the name of a variable")
+        return given
+
+
+_Name = Annotated[str, VariableName()]
+_MaybeName = Annotated[str | None, VariableName()]
 
 
 class Variables(Model):
     """Names of what a MATLAB file holds."""
 
-    radiance: _Name | None = key(
+    radiance: _MaybeName = key(
         "the variable of radiances (h, w, bands) in W/(sr m2 nm)", example="rad", default=None
     )
-    reflectance: _Name | None = key(
+    reflectance: _MaybeName = key(
         "or of reflectances, 1 that of a perfect white", example="refl", default=None
     )
     wavelength: _Name = key("the variable of wavelengths, in nm or um", example="bands")
