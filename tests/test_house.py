@@ -37,7 +37,7 @@ FLOORS = (
     {"reports"},
     {"simulation"},
     {"comparison"},
-    {"accuracy"},
+    {"accuracy_study"},
     {"characterization"},
     {"sweeps"},
     {"capture_schedules"},

@@ -3,7 +3,6 @@
 import csv
 import json
 import pickle
-from importlib import import_module
 
 import numpy as np
 import pytest
@@ -196,8 +195,6 @@ COMMANDS = {"accuracy", "characterize", "compare", "dataset", "fit", "plan", "sc
 
 
 def test_each_command_that_computes_is_a_function():
-    """Also after the folder that is called as one of them was imported."""
-    import_module("vcam_cli.accuracy.study")
     for name in (*COMMANDS, "verify", "simulate"):
         found = getattr(vcam_cli, name)
         assert found.__name__ == name, f"{name} is {found}"

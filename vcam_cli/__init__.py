@@ -21,9 +21,7 @@ Names are imported when they are first used, so that `import vcam_cli` costs a m
 listing its files, by which results know the code that made them.
 """
 
-import sys
 from importlib import import_module
-from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
 from vcam_cli import source_code  # noqa: F401  first: before files change
@@ -66,20 +64,6 @@ if TYPE_CHECKING:
     from vcam_cli.face import accuracy, characterize, compare, dataset, fit, plan, verify
     from vcam_cli.simulation.simulate import simulate
     from vcam_cli.sweeps.sweep import sweep
-
-
-class _Face(ModuleType):
-    """The package itself. `accuracy` is a function of it although a folder has that name, too.
-
-    Whoever imports the folder would leave it in the function's place.
-    """
-
-    def __setattr__(self, name: str, value: object) -> None:
-        if not (name in _HOMES and isinstance(value, ModuleType)):
-            super().__setattr__(name, value)
-
-
-sys.modules[__name__].__class__ = _Face
 
 
 def __getattr__(name: str) -> Any:

@@ -21,7 +21,7 @@ from vcam_cli.files.folder import OutputFolder
 from vcam_cli.progress import Callback, Observer, observer
 
 if TYPE_CHECKING:
-    from vcam_cli.accuracy.study import Study
+    from vcam_cli.accuracy_study.study import Study
     from vcam_cli.characterization.characterize import Characterization
     from vcam_cli.comparison.image_files import Comparison, Filters, Formula, Space
     from vcam_cli.datasets.dataset import DatasetResult
@@ -53,7 +53,7 @@ def accuracy(
     formats: Sequence[str] = (),
 ) -> Study:
     """Return what accuracy costs, along every knob and for every preset: `vcam accuracy`."""
-    from vcam_cli.accuracy import output, study
+    from vcam_cli.accuracy_study import output, study
     from vcam_cli.simulation.output import provenance
 
     model = _camera(camera)

@@ -6,12 +6,13 @@ import numpy as np
 import pytest
 from making import camera, radiance_for
 
-from vcam_cli.accuracy import measurements, refinement
-from vcam_cli.accuracy.knobs import KNOBS, with_accuracy, with_knobs
-from vcam_cli.accuracy.measurements import Clock, Shot, is_median_known, settings_key
-from vcam_cli.accuracy.reference import MOST_BYTES, prepare_converged, sampling
-from vcam_cli.accuracy.refinement import is_same_camera, refine_reference
-from vcam_cli.accuracy.setting_errors import FLOOR, Point
+from vcam_cli.accuracy_study import measurements, refinement
+from vcam_cli.accuracy_study.knobs import KNOBS, with_accuracy, with_knobs
+from vcam_cli.accuracy_study.measurements import Clock, Shot, is_median_known, settings_key
+from vcam_cli.accuracy_study.output import convergence
+from vcam_cli.accuracy_study.reference import MOST_BYTES, prepare_converged, sampling
+from vcam_cli.accuracy_study.refinement import is_same_camera, refine_reference
+from vcam_cli.accuracy_study.setting_errors import FLOOR, Point
 from vcam_cli.commands import accuracy as command
 from vcam_cli.progress import Silent
 from vcam_cli.simulation.simulate import prepare
@@ -124,14 +125,14 @@ def test_errors_less_than_ten_times_the_last_change_are_bounds():
     assert not unsure.is_certain
     rows = command.settings(told(sure, unsure))
     assert [row[2] for row in rows] == ["0.1", "<0.12"]
-    assert "<: upper bound" in (text := command.convergence(told(sure, unsure)))
+    assert "<: upper bound" in (text := convergence(told(sure, unsure)))
     assert "field_zones" in text
     assert "table_size" not in text
 
 
 def test_smaller_than_rounding_is_sure():
     assert point("table_size", 0.0, FLOOR).is_certain
-    text = command.convergence(told(point("table_size", 0.0, FLOOR)))
+    text = convergence(told(point("table_size", 0.0, FLOOR)))
     assert "refined" in text
     assert "<" not in text
 

@@ -8,10 +8,10 @@ import yaml
 from making import camera, radiance_for
 
 from vcam_cli import simulate
-from vcam_cli.accuracy import ablation, measurements, reference, study
-from vcam_cli.accuracy.knobs import KNOBS
-from vcam_cli.accuracy.recommendation import coarser_knobs, recommend
-from vcam_cli.accuracy.setting_errors import COLUMNS, Point
+from vcam_cli.accuracy_study import ablation, measurements, reference, study
+from vcam_cli.accuracy_study.knobs import KNOBS
+from vcam_cli.accuracy_study.recommendation import coarser_knobs, recommend
+from vcam_cli.accuracy_study.setting_errors import COLUMNS, Point
 from vcam_cli.effects.order import ORDER
 from vcam_cli.files.images.png import write_png
 from vcam_cli.floats import rms

@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 
 from vcam_cli import load, simulate, sweep
-from vcam_cli.accuracy import ablation
-from vcam_cli.accuracy.study import without_effect
+from vcam_cli.accuracy_study import ablation
+from vcam_cli.accuracy_study.study import without_effect
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import geometry
 from vcam_cli.config import shipped

@@ -13,7 +13,7 @@ from bench.measure import Cost, Frames, Yardstick, median, peak_memory, start_co
 from bench.report import lines
 from bench.whole import PARTS, Size, measure
 
-from vcam_cli.accuracy import ablation
+from vcam_cli.accuracy_study import ablation
 
 TINY = Size(
     frame=(36, 48),

@@ -6,7 +6,7 @@ import json
 import pytest
 from typer.testing import CliRunner
 
-from vcam_cli.accuracy import measurements
+from vcam_cli.accuracy_study import measurements
 from vcam_cli.commands.main import app
 
 SMALL = ("--set", "array.rows=12", "--set", "array.columns=16")

@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from vcam_cli.accuracy.plots import Curve, Pair, pareto
+from vcam_cli.accuracy_study.plots import Curve, Pair, pareto
 from vcam_cli.files.plots import in_formats
 
 PRESETS = ((0.1, 1e-3, "draft"), (0.2, 2e-4, "standard"), (3.0, 0.0, "reference"))

@@ -12,7 +12,7 @@ from hypothesis import HealthCheck, given, note, settings
 from hypothesis import strategies as st
 from strategies import Tree, between, cameras, fractions
 
-from vcam_cli.accuracy.ablation import with_effects
+from vcam_cli.accuracy_study.ablation import with_effects
 from vcam_cli.camera.derived.electrical import electrical
 from vcam_cli.camera.derived.geometry import geometry
 from vcam_cli.readout.layout import camera_layout

@@ -13,7 +13,7 @@ import yaml
 from making import long_except
 
 from vcam_cli import load, schedule, sweep
-from vcam_cli.accuracy.study import accuracy
+from vcam_cli.accuracy_study.study import accuracy
 from vcam_cli.characterization import bench
 from vcam_cli.characterization.characterize import characterize
 from vcam_cli.errors import BadInput

@@ -28,7 +28,7 @@ from optical_paths import (
 )
 from scipy.special import erfc
 
-from vcam_cli.accuracy import ablation
+from vcam_cli.accuracy_study import ablation
 from vcam_cli.effects.optics.diffraction import Diffraction
 from vcam_cli.effects.optics.wavefront_blur import Lens, SymmetricBlur
 from vcam_cli.image_formation import photon_rate

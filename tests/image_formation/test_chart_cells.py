@@ -8,8 +8,8 @@ import pytest
 from optical_paths import PITCH, Gaussian, aperture, on_chart, path, rms, sensor, signal
 
 from vcam_cli import load
-from vcam_cli.accuracy import ablation
-from vcam_cli.accuracy.knobs import with_accuracy
+from vcam_cli.accuracy_study import ablation
+from vcam_cli.accuracy_study.knobs import with_accuracy
 from vcam_cli.effects.optics.diffraction import Diffraction
 from vcam_cli.image_formation.estimates import chart_cells
 from vcam_cli.image_formation.estimates.bandwidth import highest_passed

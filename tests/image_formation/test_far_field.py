@@ -9,7 +9,7 @@ import pytest
 from optical_paths import PITCH, Leaning, aperture, on_chart, path, rms, sensor, signal
 
 from vcam_cli import load
-from vcam_cli.accuracy import ablation
+from vcam_cli.accuracy_study import ablation
 from vcam_cli.effects.optics.diffraction import Diffraction
 from vcam_cli.effects.optics.wavefront_blur import Lens, SymmetricBlur
 from vcam_cli.image_formation import far_field, strategies

@@ -9,7 +9,7 @@ import scipy.fft
 from making import camera, radiance_for
 from optical_paths import rms
 
-from vcam_cli.accuracy.knobs import CONVERGED
+from vcam_cli.accuracy_study.knobs import CONVERGED
 from vcam_cli.image_formation.closed_spectrum import (
     ProductSpectrum,
     rectangle_spectrum,

@@ -18,7 +18,7 @@ import random_cameras
 import scene_matrix
 import spent
 
-from vcam_cli.accuracy import ablation
+from vcam_cli.accuracy_study import ablation
 from vcam_cli.config import shipped
 
 Figure = tuple[str, str, bool]

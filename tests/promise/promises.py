@@ -15,9 +15,9 @@ from pathlib import Path
 import numpy as np
 
 from vcam_cli import load, simulate
-from vcam_cli.accuracy import ablation
-from vcam_cli.accuracy.measurements import is_median_known
-from vcam_cli.accuracy.reference import effect_changes, prepare_converged
+from vcam_cli.accuracy_study import ablation
+from vcam_cli.accuracy_study.measurements import is_median_known
+from vcam_cli.accuracy_study.reference import effect_changes, prepare_converged
 from vcam_cli.camera.camera import Camera
 from vcam_cli.effects.order import ORDER
 from vcam_cli.effects.signal_chain import NoiseSource

@@ -15,9 +15,9 @@ import numpy as np
 from promises import picture_files, variance_lost_of
 
 from vcam_cli import load
-from vcam_cli.accuracy import ablation
-from vcam_cli.accuracy.knobs import with_accuracy
-from vcam_cli.accuracy.reference import prepare_converged
+from vcam_cli.accuracy_study import ablation
+from vcam_cli.accuracy_study.knobs import with_accuracy
+from vcam_cli.accuracy_study.reference import prepare_converged
 from vcam_cli.camera.camera import Camera
 from vcam_cli.floats import rms
 from vcam_cli.simulation.simulate import prepare

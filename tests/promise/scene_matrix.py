@@ -21,8 +21,8 @@ import promises
 import yaml
 
 from vcam_cli import load, simulate
-from vcam_cli.accuracy import ablation
-from vcam_cli.accuracy.reference import effect_changes, prepare_converged
+from vcam_cli.accuracy_study import ablation
+from vcam_cli.accuracy_study.reference import effect_changes, prepare_converged
 from vcam_cli.camera.camera import Camera
 from vcam_cli.effects.base import Charge, of_kind
 from vcam_cli.effects.signal_chain import NoiseSource

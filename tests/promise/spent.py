@@ -18,8 +18,8 @@ from pathlib import Path
 from promises import at_preset
 
 from vcam_cli import load, simulate
-from vcam_cli.accuracy import ablation
-from vcam_cli.accuracy.reference import prepare_converged
+from vcam_cli.accuracy_study import ablation
+from vcam_cli.accuracy_study.reference import prepare_converged
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import geometry
 from vcam_cli.floats import rms

@@ -4,7 +4,7 @@ import pytest
 import random_cameras
 from promises import CAMERAS, estimates, idle_work, kept, made, truth, worth_leaving_out
 
-from vcam_cli.accuracy import ablation
+from vcam_cli.accuracy_study import ablation
 from vcam_cli.effects.order import ORDER
 
 pytestmark = pytest.mark.long

@@ -362,7 +362,7 @@ def test_geometry_is_that_of_what_is_read(tmp_path):
     after = found.frame.layout.report(4.0)
     times = {
         "rows": 1 / 3, "columns": 1 / 2, "pixel_pitch_x": 2, "pixel_pitch_y": 3,
-        "nyquist_frequency": 1 / 2,
+        "nyquist_frequency": 1 / 2, "focal_pixels_x": 1 / 2, "focal_pixels_y": 1 / 3,
     }  # fmt: skip
     sharp = {
         *("circle_of_confusion", "hyperfocal_distance"),

@@ -10,7 +10,7 @@ import yaml
 from making import tree
 from typer.testing import CliRunner
 
-from vcam_cli.accuracy.ablation import with_exposure_time
+from vcam_cli.accuracy_study.ablation import with_exposure_time
 from vcam_cli.camera.load import load
 from vcam_cli.characterization.bench import prepare_bench
 from vcam_cli.commands.main import app

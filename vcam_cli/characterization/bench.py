@@ -29,7 +29,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vcam_cli.accuracy.ablation import with_effects, with_exposure_time
+from vcam_cli.accuracy_study.ablation import with_effects, with_exposure_time
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import geometry, pixel_centers
 from vcam_cli.camera.derived.mosaic import BLOCKS, NONE, mosaic

@@ -40,6 +40,7 @@ UNITS = {
     "system_gain": "DN/e",
     "quantum_efficiency": "%",
     "responsivity": "DN/photon",
+    **dict.fromkeys(("responsivity_a", "responsivity_green"), "V/(lx s)"),
     "temporal_dark_noise": "e",
     "read_noise": "e",
     "dark_current": "e/s",

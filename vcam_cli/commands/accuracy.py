@@ -9,8 +9,8 @@ from vcam_cli.commands.plan_story import TABLE_UNITS
 from vcam_cli.commands.progress import Progress
 
 if TYPE_CHECKING:
-    from vcam_cli.accuracy.setting_errors import Point
-    from vcam_cli.accuracy.study import Study
+    from vcam_cli.accuracy_study.setting_errors import Point
+    from vcam_cli.accuracy_study.study import Study
 
 SETTINGS = (
     "knob", "setting", "rms %", "of T", "largest %", "electrons", "S-CIELAB", "seconds", "spread",
@@ -56,7 +56,7 @@ def print_report(found: "Study", path: Path) -> None:
     """Print the tables and the recommendation."""
     from rich.console import Console
 
-    from vcam_cli.accuracy.output import convergence
+    from vcam_cli.accuracy_study.output import convergence
 
     width = None if sys.stdout.isatty() else 120
     console = Console(width=width, soft_wrap=True, highlight=False)

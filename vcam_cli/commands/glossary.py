@@ -161,7 +161,7 @@ COLUMNS: Mapping[str, str] = {
 
 def written() -> dict[str, tuple[str, ...]]:
     """Return the columns of the tables that commands write, by the table's name."""
-    from vcam_cli.accuracy import setting_errors
+    from vcam_cli.accuracy_study import setting_errors
     from vcam_cli.capture_schedules import frames, online_loss, tables
     from vcam_cli.characterization import datasheet
     from vcam_cli.files.tables import METRIC_COLUMNS

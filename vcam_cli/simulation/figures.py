@@ -52,8 +52,9 @@ def figures(frame: Frame) -> list[tuple[str, float, str]]:
         ("base_iso", frame.base_iso, ""),
         ("digital_gain", digital_gain(frame), ""),
     ]
-    if frame.camera.has_edge:
-        listed.append(("mtf50", edge_mtf50(frame), "cycles/pixel"))
+    mtf50 = edge_mtf50(frame) if frame.camera.has_edge else math.nan
+    if math.isfinite(mtf50):
+        listed.append(("mtf50", mtf50, "cycles/pixel"))
     return listed + _sample_figures(frame, known.dark, known.draws) if frame.times else listed
 
 

@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable
 
-from vcam_cli.accuracy.ablation import wanted_effects, with_effects
+from vcam_cli.accuracy_study.ablation import wanted_effects, with_effects
 from vcam_cli.camera.camera import Camera
 from vcam_cli.effects.order import ORDER
 from vcam_cli.sweeps.sweep_points import Point

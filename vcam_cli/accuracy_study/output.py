@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from vcam_cli.accuracy.plots import Curve, Pair, pareto
-from vcam_cli.accuracy.setting_errors import FLOOR
-from vcam_cli.accuracy.study import COLUMNS, Study
+from vcam_cli.accuracy_study.plots import Curve, Pair, pareto
+from vcam_cli.accuracy_study.setting_errors import FLOOR
+from vcam_cli.accuracy_study.study import COLUMNS, Study
 from vcam_cli.camera.camera import Camera
 from vcam_cli.files import tables
 from vcam_cli.files.folder import OutputFolder

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcam_cli import memory
-from vcam_cli.accuracy import ablation
-from vcam_cli.accuracy.knobs import CONVERGED, FINEST, with_accuracy
+from vcam_cli.accuracy_study import ablation
+from vcam_cli.accuracy_study.knobs import CONVERGED, FINEST, with_accuracy
 from vcam_cli.camera.camera import Camera
 from vcam_cli.effects.base import of_kind
 from vcam_cli.effects.signal_chain import NoiseSource, Quantizer

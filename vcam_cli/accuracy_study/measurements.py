@@ -14,7 +14,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from vcam_cli.accuracy import ablation
+from vcam_cli.accuracy_study import ablation
 from vcam_cli.camera.camera import Camera
 from vcam_cli.image_formation.settings import camera_settings
 from vcam_cli.processing import process

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from vcam_cli.accuracy import ablation
-from vcam_cli.accuracy.knobs import Knob
-from vcam_cli.accuracy.measurements import Shot
-from vcam_cli.accuracy.setting_errors import FLOOR
+from vcam_cli.accuracy_study import ablation
+from vcam_cli.accuracy_study.knobs import Knob
+from vcam_cli.accuracy_study.measurements import Shot
+from vcam_cli.accuracy_study.setting_errors import FLOOR
 from vcam_cli.camera.camera import Camera
 from vcam_cli.floats import rms
 from vcam_cli.image_formation.settings import camera_settings

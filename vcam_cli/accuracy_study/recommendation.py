@@ -6,9 +6,9 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from vcam_cli.accuracy import ablation
-from vcam_cli.accuracy.knobs import KNOBS
-from vcam_cli.accuracy.setting_errors import Point
+from vcam_cli.accuracy_study import ablation
+from vcam_cli.accuracy_study.knobs import KNOBS
+from vcam_cli.accuracy_study.setting_errors import Point
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.simulation import PRESETS
 

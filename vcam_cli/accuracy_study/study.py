@@ -17,9 +17,9 @@ from typing import Any
 
 from numpy.typing import NDArray
 
-from vcam_cli.accuracy import ablation, recommendation
-from vcam_cli.accuracy.ablation import Ablation
-from vcam_cli.accuracy.knobs import (
+from vcam_cli.accuracy_study import ablation, recommendation
+from vcam_cli.accuracy_study.ablation import Ablation
+from vcam_cli.accuracy_study.knobs import (
     CONVERGED,
     FINEST,
     Knob,
@@ -28,9 +28,9 @@ from vcam_cli.accuracy.knobs import (
     with_accuracy,
     with_knobs,
 )
-from vcam_cli.accuracy.measurements import Clock, Shot, settings_key
-from vcam_cli.accuracy.recommendation import Recommendation
-from vcam_cli.accuracy.reference import (
+from vcam_cli.accuracy_study.measurements import Clock, Shot, settings_key
+from vcam_cli.accuracy_study.recommendation import Recommendation
+from vcam_cli.accuracy_study.reference import (
     FINEST_CELLS,
     Reference,
     describe_reference,
@@ -39,8 +39,8 @@ from vcam_cli.accuracy.reference import (
     rms_and_largest,
     sampling,
 )
-from vcam_cli.accuracy.refinement import Refined, is_same_camera, refine_reference
-from vcam_cli.accuracy.setting_errors import COLUMNS, Point
+from vcam_cli.accuracy_study.refinement import Refined, is_same_camera, refine_reference
+from vcam_cli.accuracy_study.setting_errors import COLUMNS, Point
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.simulation import PRESETS
 from vcam_cli.floats import own_float_errors, rms
