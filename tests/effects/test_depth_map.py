@@ -265,7 +265,7 @@ def test_the_plan_tells_layers_and_what_is_hidden(tmp_path):
     assert any("cut into 2 layers" in note for note in notes)
     assert any("occluded background is extrapolated" in note for note in notes)
     flat = prepare(camera(tmp_path, STILL | given | {"effects": {"depth": "off"}}))[0]
-    assert ready.plan.seconds > 1.5 * flat.plan.seconds
+    assert ready.plan.seconds > 1.1 * flat.plan.seconds
 
 
 def test_depth_of_the_frame_is_that_of_the_map(tmp_path):
