@@ -65,8 +65,11 @@ def test_there_is_a_recipe_for_every_kind_of_addition():
 
 ANY_CHARTS = {"vcam_cli/simulation/scene_plans.py"}
 """Sources that name some charts, which any others could stand for."""
-FRAMES = re.compile(r"vcam_cli/(datasets/|files/(frame_archive|points_store)\.py)")
-"""Sources to which npz is a file of frames that vcam writes, and not one of spectra."""
+FRAMES = re.compile(
+    r"vcam_cli/(datasets/|files/(frame_archive|points_store)\.py"
+    r"|verification/(frame_files|measurement_file)\.py)"
+)
+"""Sources to which npz is a file of frames, and not one of spectra."""
 
 
 @pytest.mark.parametrize("recipe", RECIPES, ids=lambda recipe: recipe.example)

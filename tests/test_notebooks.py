@@ -47,4 +47,9 @@ def test_a_fit_finds_the_hidden_sensor():
         assert abs(p.value - value) <= p.high - p.low, name
     assert max(abs(names["predicted"].errors)) < 0.005
     assert len(names["predicted"].errors) == 12
-    assert not [row for row in names["predicted"].rows if row.differs]
+    # Chance alone does not bound how far a fitted camera predicts: its efficiency has an interval.
+    efficiency = found["quantum_efficiency.Y"]
+    least, most = efficiency.low / efficiency.value, efficiency.high / efficiency.value
+    for row in names["predicted"].rows:
+        ratio = (row.measured - 64) / (row.predicted - 64) if row.differs else 1.0
+        assert least <= ratio <= most, row

@@ -65,7 +65,11 @@ def test_the_picture_is_that_of_a_linear_adc(tmp_path):
     np.testing.assert_allclose(bent.linear, straight.linear, atol=1e-4)
     np.testing.assert_allclose(bent.ideal, straight.ideal, atol=1e-4)
     found, expected = dict(bent.metrics), straight.metrics
-    of_the_steps = {"picture_snr_db", "gray_snr_db", "quantized_dynamic_range_db"}  # finer where it is dark
+    of_the_steps = {
+        "picture_snr_db",
+        "gray_snr_db",
+        "quantized_dynamic_range_db",
+    }  # finer where it is dark
     for name in expected.keys() - of_the_steps:
         assert found[name] == pytest.approx(expected[name], rel=1e-3)
     assert all(found[name] > expected[name] for name in of_the_steps)

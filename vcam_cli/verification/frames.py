@@ -116,7 +116,8 @@ def _named(folder: Path, name: str) -> list[Path]:
     alone = folder / name
     if alone.exists():
         return [alone]
-    return sorted(Path(each) for each in glob.glob(glob.escape(str(folder)) + "/" + name))
+    pattern = name if Path(name).is_absolute() else f"{glob.escape(str(folder))}/{name}"
+    return sorted(Path(each) for each in glob.glob(pattern))
 
 
 def raise_if_any(problems: Collector, measurement: Measurement) -> None:
