@@ -236,6 +236,10 @@ class SpectrumReport:
     """Transfer function -> rms change of the signal by leaving it out [electrons / s]."""
     filters: int = 0
     """Times that the spectrum was filtered: for each parity, and for each mode of the field."""
+    has_field: bool = False
+    """Whether a blur changes over the field."""
+    is_sheared: bool = False
+    """Whether each row sees the image at another place, as a rolling shutter in motion does."""
     sub_exposures: int = 0
     """Instants whose mean an exposure is; 0 where it is no such mean."""
     sub_exposure_error: float = 0.0

@@ -201,6 +201,8 @@ def _spectral_layers(
         far_parts=len(rings),
         far_cells=sum(math.prod(part.scene.shape) for part in rings),
         far_filters=len(tables.parities) * len(rings) + len(modes) * followed,
+        has_field=path.field is not None,
+        is_sheared=any(path.drift),
         terms=image_filter.terms,
         planes=len(tables.mix),
         changes=changes_by_omission(path, image, tables, field_change),

@@ -45,6 +45,8 @@ FAR = 20e-9
 [s]."""
 OTF = 25e-9
 """One value of a round transfer function at one wavelength [s]."""
+PUPIL = 0.05
+"""Transforms of the pupil of one wavefront at all wavelengths [s]."""
 TABLE = 1e-6
 """One value of a transfer function of fx and fy, its part of the pupil's transforms too [s]."""
 AVERAGE = 1.2e-9
@@ -68,16 +70,23 @@ RAY = 12e-9
 LOOK_UP = 5e-9
 """One value of a layer that a ray looks up, painted and composed [s]."""
 
+DIRECTED = 4
+"""Cost of a transfer function of fx and fy along a line over that of a round one."""
 ENTRIES = 2560
 """Frequencies at which a round transfer function is known, for its tables and to judge them."""
 PLANES = 4
 """Mixtures that stand for a scene's spectra, at most, as often as not."""
-PARITIES, MODES = 4, 8
+PARITIES, MODES = 4, 4
 """Filters of a blur with a direction, and of one that changes over the field, about."""
-SHIFTED = 4
-"""Cost of pixels that share no grid with the scene over that of others."""
-ENTRIES_OF_PLANE = 41
-"""Entries along an axis of a table over fx and fy, at least."""
+FIELD = 0.16
+"""Finding the modes of a blur over the field up to the Nyquist frequency of the pixels, and by its
+square up to another [s]."""
+SHEARED = 3
+"""Cost of pixels whose rows see the scene at other places over that of others."""
+ENTRIES_OF_PLANE = 150
+"""Entries along an axis of a table over fx and fy, about."""
+BEYOND = 1.25
+"""Where the spectrum of a chart ends over where that of edges anywhere would, as often as not."""
 HIGHEST = 2.0
 """Highest frequency of a picture that is filtered, as often as not [pixel Nyquist]."""
 WAVES = WaveScene | HarmonicScene
@@ -129,10 +138,13 @@ def _flat_seconds(geometry: Geometry, colors: int, report: SpectrumReport) -> fl
         + FAR_PART * report.far_parts
         + (SAMPLE + PAINT * report.is_painted) * report.cells * report.planes
         + TERM * report.terms * report.planes * colors * report.filters
-        + (EVALUATE * report.filters + FAR * report.far_filters) * values
+        + EVALUATE * report.filters * values * (SHEARED if report.is_sheared else 1)
+        + FAR * report.far_filters * values
+        + FIELD * report.oversampling**2 * report.has_field
         + (SAMPLE + PAINT) * report.far_cells * report.planes
         + TERM * colors * report.far_filters * report.planes * cells_of_part
         + TABLE * report.table_values
+        + PUPIL * bool(report.table_values)
     )
 
 
@@ -169,7 +181,8 @@ def light_seconds(path: OpticalPath, scene: AnyScene, effects: Sequence[Effect])
     gains = sum(e.seconds_per_pixel for e in effects) * g.rows * g.columns
     # Waves need their transfer at their own frequencies alone, no table of it.
     blurs = () if isinstance(scene, WAVES) else of_kind(effects, Blur, FieldTransfer)
-    otfs = OTF * ENTRIES * len(path.transfer.wavelengths) * len(blurs)
+    lines = sum(DIRECTED if isinstance(blur, PlaneTransfer) else 1 for blur in blurs)
+    otfs = lines * OTF * ENTRIES * len(path.transfer.wavelengths)
     report = expected_report(path, scene, effects)
     return gains + otfs + image_seconds(g, len(path.mosaic.colors), report)
 
@@ -197,16 +210,18 @@ def expected_report(
         return SpectrumReport(is_averaged=True, is_painted=scene.is_painted, edge_seconds=edges)
     if isinstance(scene, ChartScene) and scene.chart.profile() is not None and not path.field:
         return SpectrumReport()
-    filters = PARITIES if of_kind(path.transfer.effects, PlaneTransfer) or path.field else 1
-    filters += MODES if path.field else 0
-    filters *= SHIFTED if any(path.drift) else 1
     found = _sampled(path, scene)
+    planes = min(PLANES, len(path.transfer.weights))
+    directed = bool(of_kind(path.transfer.effects, PlaneTransfer))
+    filters = MODES if path.field else PARITIES if directed else 1
     return replace(
         found,
-        planes=min(PLANES, len(path.transfer.weights)),
+        planes=planes,
         filters=filters,
         far_filters=filters * found.far_filters,
-        table_values=ENTRIES_OF_PLANE**2 * (filters - 1),
+        table_values=ENTRIES_OF_PLANE**2 * planes * directed,
+        has_field=path.field is not None,
+        is_sheared=any(path.drift),
     )
 
 
@@ -216,17 +231,20 @@ def _sampled(path: OpticalPath, scene: SampledScene) -> SpectrumReport:
     pixels = g.rows * g.columns
     if not isinstance(scene, ChartScene):
         end = min(highest_passed(path, scene), HIGHEST)
-        return SpectrumReport(cells=math.prod(scene.shape), terms=round(pixels * end**2))
+        cells, terms = math.prod(scene.shape), round(pixels * end**2)
+        return SpectrumReport(oversampling=end, cells=cells, terms=terms)
     widest = reach(path) + path.travel
     near = near_field(path, scene, widest)
     rings = far_parts(path, near, scene, widest)
     highest, cells = highest_passed(path, near), 0
     error = FREQUENCY_SHARE * path.settings.tolerance * path.full
-    end = 2 * max(g.pitch_x, g.pitch_y) * CellError.of_chart(path, near, highest).end(error / SURE)
+    edges = CellError.of_chart(path, near, highest).end(error / SURE)
+    end = BEYOND * 2 * max(g.pitch_x, g.pitch_y) * edges
     if scene.is_painted:
         highest = cells_per_pixel(path, near, highest).per_pixel
         cells = math.prod(cell_grid(near, g, highest))
     return SpectrumReport(
+        oversampling=min(end, highest),
         cells=cells,
         terms=round(pixels * min(end, highest) ** 2),
         is_painted=scene.is_painted,

@@ -47,7 +47,7 @@ SUMMED, SUMMED_FAR = 32, 4
 """Parts along each side of a cell from which on its average is read from sums over one period, of
 cells within and beyond one. Their edges then fall between those of the parts: of white, an rms of
 6e-5 in single cells, and of 1e-3 in those beyond, which lenses blur by the hundred."""
-EDGE_SECONDS = 0.047, 0.0166
+EDGE_SECONDS = 0.035, 0.0135
 """Core seconds to find the edges that a frame sees, and more for each division of cells,
 calibrated."""
 DARKEST = 0.25
