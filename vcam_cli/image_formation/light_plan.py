@@ -30,7 +30,7 @@ from vcam_cli.effects.base import (
 from vcam_cli.effects.pixel.pixel_aperture import PixelAperture
 from vcam_cli.effects.temporal.sub_exposed_motion import SubExposedMotion
 from vcam_cli.image_formation.estimates.edge_changes import exact_changes, has_straight_edges
-from vcam_cli.image_formation.estimates.light_cost import light_seconds
+from vcam_cli.image_formation.estimates.light_cost import LightCost
 from vcam_cli.image_formation.optical_path import OpticalPath
 from vcam_cli.scenes.base import ChartScene
 from vcam_cli.scenes.blur_change import BlurLoss
@@ -52,6 +52,9 @@ BLURS = (Blur, SeparableTransfer, FieldTransfer, SubExposedMotion)
 """Kinds of effects that blur the light."""
 KINDS = (*BLURS, Gain, VeilingGlare, Transport)
 """Kinds of effects on the light, and on the charge that it makes."""
+EXACT, EXACT_OVER_FIELD = 1e-3, 25e-3
+"""Time that exact sums take of what a blur changes of edges, beside round blurs alone and beside
+one that changes over the field [s]: a blur that saves less is kept instead."""
 LOOSEST = 8.0
 """Bounds over exact sums, at most, of edges that lie anywhere to the pixels: larger ones stay."""
 MOST_TRIED = 10
@@ -112,29 +115,27 @@ def light_plan(path: OpticalPath, scene: AnyScene) -> LightPlan:
     candidates = of_kind(path.optional, *KINDS)
     if not candidates:
         return LightPlan()
+    cost = LightCost(path, scene)
     if path.transfer.is_dark or _is_full(path):
         none = dict.fromkeys((e.name for e in candidates), 0.0)
-        return LightPlan(candidates, (), none, *_saved(path, scene, candidates))
+        return LightPlan(candidates, (), none, *_saved(cost, candidates))
     budget = OMITTED_SHARE * path.settings.tolerance
-    shares = _blur_shares(path, scene, budget)
+    shares = _blur_shares(cost, budget)
     shares |= {e: _share(path, scene, e) for e in candidates if e not in shares}
     small = sorted((e for e in candidates if shares[e] <= budget), key=shares.__getitem__)
-    omitted = _best_set(path, scene, small[:MOST_TRIED], shares, budget)
+    omitted = _best_set(cost, small[:MOST_TRIED], shares, budget)
     known = {e.name: share for e, share in shares.items() if math.isfinite(share)}
     idle = tuple(e for e in small if e not in omitted)
-    return LightPlan(omitted, idle, known, *_saved(path, scene, omitted))
+    return LightPlan(omitted, idle, known, *_saved(cost, omitted))
 
 
-def _saved(
-    path: OpticalPath, scene: AnyScene, omitted: Collection[Effect]
-) -> tuple[dict[str, float], float]:
+def _saved(cost: LightCost, omitted: Collection[Effect]) -> tuple[dict[str, float], float]:
     """Return the core seconds that omitted effects save, each beside those that act, and all."""
     if not omitted:
         return {}, 0.0
 
     def seconds(left_out: Collection[Effect]) -> float:
-        acting = [e for e in path.effects if e not in left_out]
-        return light_seconds(path, scene, acting)
+        return cost.seconds([e for e in cost.path.effects if e not in left_out])
 
     least = seconds(omitted)
     each = {e.name: seconds([o for o in omitted if o is not e]) - least for e in omitted}
@@ -148,8 +149,9 @@ def _is_full(path: OpticalPath) -> bool:
     return path.fullness * _range_of_gains(path, of_kind(path.effects, Gain))[0] >= 1
 
 
-def _blur_shares(path: OpticalPath, scene: AnyScene, budget: float) -> dict[Effect, float]:
+def _blur_shares(cost: LightCost, budget: float) -> dict[Effect, float]:
     """Return a bound on what each blur of a path changes, relative to full signal."""
+    path, scene = cost.path, cost.scene
     transfer = path.transfer
     spreads = {e: e.spread(transfer.wavelengths) for e in of_kind(path.effects, *BLURS)}
     losses = {
@@ -162,9 +164,11 @@ def _blur_shares(path: OpticalPath, scene: AnyScene, budget: float) -> dict[Effe
     flat = scene.flat if isinstance(scene, LayeredScene | DepthScene) else scene
     bounds = flat.change_bounds(list(losses.values()), path.geometry, path.ceiling, budget)
     shares: dict[Effect, float] = dict(zip(losses, bounds.shares(), strict=True))
-    open_ones = [e for e in of_kind(shares, Blur) if budget < shares[e] <= LOOSEST * budget]
-    if open_ones and has_straight_edges(flat):
-        exact = exact_changes(path, flat, open_ones)
+    if has_straight_edges(flat):
+        loose = [e for e in of_kind(shares, Blur) if budget < shares[e] <= LOOSEST * budget]
+        takes = EXACT_OVER_FIELD if path.field else EXACT
+        open_ones = [e for e in loose if _saved(cost, (e,))[1] > takes]
+        exact = exact_changes(path, flat, open_ones) if open_ones else {}
         shares |= {blur: change / bounds.full for blur, change in exact.items()}
     # Points in place of averages alias what detail there is: only of even light is that nothing.
     detailed = [e for e in of_kind(shares, PixelAperture) if shares[e] > 0]
@@ -211,11 +215,7 @@ def _range_of_light(scene: AnyScene) -> tuple[float, float]:
 
 
 def _best_set(
-    path: OpticalPath,
-    scene: AnyScene,
-    small: Sequence[Effect],
-    shares: Mapping[Effect, float],
-    budget: float,
+    cost: LightCost, small: Sequence[Effect], shares: Mapping[Effect, float], budget: float
 ) -> tuple[Effect, ...]:
     """Return the effects without which most time is saved, and together within the budget.
 
@@ -224,11 +224,9 @@ def _best_set(
     """
 
     def worth(omitted: tuple[Effect, ...]) -> tuple[float, int, float]:
-        kept = [effect for effect in path.effects if effect not in omitted]
-        saved = whole - light_seconds(path, scene, kept)
-        return round(saved, 6), len(omitted), -sum(shares[e] for e in omitted)
+        kept = [effect for effect in cost.path.effects if effect not in omitted]
+        return round(-cost.seconds(kept), 6), len(omitted), -sum(shares[e] for e in omitted)
 
-    whole = light_seconds(path, scene, path.effects)
     sets = (s for n in range(len(small) + 1) for s in combinations(small, n))
     within = (s for s in sets if sum(shares[e] for e in s) <= budget)
     return max(within, key=worth)

@@ -8,10 +8,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 
 from vcam_cli.camera.derived.geometry import Geometry
-from vcam_cli.effects.base import Blur, Effect, FieldTransfer, PlaneTransfer, of_kind
+from vcam_cli.effects.base import (
+    Blur,
+    Effect,
+    FieldTransfer,
+    ImageMotion,
+    PlaneTransfer,
+    SeparableTransfer,
+    of_kind,
+)
 from vcam_cli.image_formation.estimates.bandwidth import FREQUENCY_SHARE, highest_passed, reach
 from vcam_cli.image_formation.estimates.chart_cells import (
     SURE,
@@ -160,31 +168,35 @@ def _sub_exposure_seconds(values: int, colors: int, report: SpectrumReport) -> f
     return fine + LOOK * values * half * (report.sub_exposures + PROBED)
 
 
-def light_seconds(path: OpticalPath, scene: AnyScene, effects: Sequence[Effect]) -> float:
-    """Return the core seconds of the light through some of a path's effects, before it is computed.
+@dataclass(frozen=True)
+class LightCost:
+    """What light through some of a path's effects costs, before it is computed."""
 
-    Parameters
-    ----------
-    path : OpticalPath
-        Lens, pixels and settings.
-    scene : AnyScene
-        The scene, flat.
-    effects : sequence of Effect
-        Those that act.
+    path: OpticalPath
+    """Lens, pixels and settings."""
+    scene: AnyScene
+    """The scene, flat."""
+    _images: dict[tuple[Effect, ...], float] = field(default_factory=dict)
+    """Effects that blur -> seconds of the image that they make, as far as asked for."""
 
-    Returns
-    -------
-    float
-        Seconds, which tell more of the difference between two sets of effects than of either.
-    """
-    g = path.geometry
-    gains = sum(e.seconds_per_pixel for e in effects) * g.rows * g.columns
-    # Waves need their transfer at their own frequencies alone, no table of it.
-    blurs = () if isinstance(scene, WAVES) else of_kind(effects, Blur, FieldTransfer)
-    lines = sum(DIRECTED if isinstance(blur, PlaneTransfer) else 1 for blur in blurs)
-    otfs = lines * OTF * ENTRIES * len(path.transfer.wavelengths)
-    report = expected_report(path, scene, effects)
-    return gains + otfs + image_seconds(g, len(path.mosaic.colors), report)
+    def seconds(self, effects: Sequence[Effect]) -> float:
+        """Return the core seconds of the light through effects.
+
+        They tell more of the difference between two sets of effects than of either.
+        """
+        g = self.path.geometry
+        blurs = of_kind(effects, Blur, SeparableTransfer, FieldTransfer, ImageMotion)
+        if blurs not in self._images:
+            self._images[blurs] = self._image_seconds(blurs)
+        return sum(e.seconds_per_pixel for e in effects) * g.rows * g.columns + self._images[blurs]
+
+    def _image_seconds(self, blurs: Sequence[Effect]) -> float:
+        # Waves need their transfer at their own frequencies alone, no table of it.
+        tabulated = () if isinstance(self.scene, WAVES) else of_kind(blurs, Blur, FieldTransfer)
+        lines = sum(DIRECTED if isinstance(blur, PlaneTransfer) else 1 for blur in tabulated)
+        otfs = lines * OTF * ENTRIES * len(self.path.transfer.wavelengths)
+        report = expected_report(self.path, self.scene, blurs)
+        return otfs + image_seconds(self.path.geometry, len(self.path.mosaic.colors), report)
 
 
 def expected_report(
@@ -197,7 +209,7 @@ def expected_report(
     Parameters
     ----------
     path, scene, effects
-        As those of `light_seconds`.
+        As those of `LightCost`.
     """
     scene = scene.flat if isinstance(scene, LayeredScene | DepthScene) else scene
     path = path.with_effects(effects)
