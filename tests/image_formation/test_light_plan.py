@@ -153,10 +153,10 @@ def test_the_set_that_saves_most_is_left_out(tmp_path, monkeypatch):
     """Of two effects that change too much together, the one that takes longer goes."""
     seconds = {"diffraction": 2.0, "charge_diffusion": 1.0}
 
-    def cost(self, effects):
-        return sum(seconds.get(e.name, 0.0) for e in effects)
+    def cost(self, omitted):
+        return sum(seconds.get(e.name, 0.0) for e in omitted)
 
-    monkeypatch.setattr(light_plan.LightCost, "seconds", cost)
+    monkeypatch.setattr(light_plan.LightCost, "saved", cost)
     changes = SIZE | CLOSE | SILICON | WEDGE | {"effects": "auto"}
     both = prepare(camera(tmp_path, changes | {"accuracy": 0.5}), 1)[0].plan
     shares = {d.name: d.contribution for d in both.decisions if d.name in seconds}

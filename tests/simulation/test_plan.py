@@ -480,7 +480,8 @@ def test_a_plan_is_frozen(tmp_path):
 
 def test_an_edge_says_that_it_lacks_the_lens(tmp_path):
     """The array as a whole hardly shows it, an MTF that is measured from it would."""
-    edge = EDGE | BAYER | {"accuracy": "draft", "array.rows": 240, "array.columns": 320}
+    large = {"pixel.width": "20 um", "array.rows": 240, "array.columns": 320}
+    edge = EDGE | BAYER | large | {"accuracy": "draft"}
     _, notes = prepare(camera(tmp_path, edge | {"effects": "auto"}))
     [note] = [note for note in notes if "MTF" in note]
     assert "lacks diffraction," in note

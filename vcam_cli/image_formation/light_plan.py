@@ -52,7 +52,7 @@ BLURS = (Blur, SeparableTransfer, FieldTransfer, SubExposedMotion)
 """Kinds of effects that blur the light."""
 KINDS = (*BLURS, Gain, VeilingGlare, Transport)
 """Kinds of effects on the light, and on the charge that it makes."""
-EXACT, EXACT_OVER_FIELD = 1e-3, 25e-3
+EXACT, EXACT_OVER_FIELD = 10e-3, 25e-3
 """Time that exact sums take of what a blur changes of edges, beside round blurs alone and beside
 one that changes over the field [s]: a blur that saves less is kept instead."""
 LOOSEST = 8.0
@@ -131,15 +131,9 @@ def light_plan(path: OpticalPath, scene: AnyScene) -> LightPlan:
 
 def _saved(cost: LightCost, omitted: Collection[Effect]) -> tuple[dict[str, float], float]:
     """Return the core seconds that omitted effects save, each beside those that act, and all."""
-    if not omitted:
-        return {}, 0.0
-
-    def seconds(left_out: Collection[Effect]) -> float:
-        return cost.seconds([e for e in cost.path.effects if e not in left_out])
-
-    least = seconds(omitted)
-    each = {e.name: seconds([o for o in omitted if o is not e]) - least for e in omitted}
-    return each, seconds(()) - least
+    saved = cost.saved(omitted)
+    each = {e.name: saved - cost.saved([o for o in omitted if o is not e]) for e in omitted}
+    return each, saved
 
 
 def _is_full(path: OpticalPath) -> bool:
@@ -167,7 +161,7 @@ def _blur_shares(cost: LightCost, budget: float) -> dict[Effect, float]:
     if has_straight_edges(flat):
         loose = [e for e in of_kind(shares, Blur) if budget < shares[e] <= LOOSEST * budget]
         takes = EXACT_OVER_FIELD if path.field else EXACT
-        open_ones = [e for e in loose if _saved(cost, (e,))[1] > takes]
+        open_ones = [e for e in loose if cost.saved((e,)) > takes]
         exact = exact_changes(path, flat, open_ones) if open_ones else {}
         shares |= {blur: change / bounds.full for blur, change in exact.items()}
     # Points in place of averages alias what detail there is: only of even light is that nothing.
@@ -224,8 +218,7 @@ def _best_set(
     """
 
     def worth(omitted: tuple[Effect, ...]) -> tuple[float, int, float]:
-        kept = [effect for effect in cost.path.effects if effect not in omitted]
-        return round(-cost.seconds(kept), 6), len(omitted), -sum(shares[e] for e in omitted)
+        return round(cost.saved(omitted), 6), len(omitted), -sum(shares[e] for e in omitted)
 
     sets = (s for n in range(len(small) + 1) for s in combinations(small, n))
     within = (s for s in sets if sum(shares[e] for e in s) <= budget)

@@ -7,7 +7,7 @@ one is.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, field, replace
 
 from vcam_cli.camera.derived.geometry import Geometry
@@ -179,16 +179,21 @@ class LightCost:
     _images: dict[tuple[Effect, ...], float] = field(default_factory=dict)
     """Effects that blur -> seconds of the image that they make, as far as asked for."""
 
-    def seconds(self, effects: Sequence[Effect]) -> float:
-        """Return the core seconds of the light through effects.
+    def saved(self, omitted: Collection[Effect]) -> float:
+        """Return the core seconds that leaving out some effects saves."""
+        pixels = self.path.geometry.rows * self.path.geometry.columns
+        gains = sum(effect.seconds_per_pixel for effect in omitted) * pixels
+        kinds = Blur, SeparableTransfer, FieldTransfer, ImageMotion
+        if not of_kind(omitted, *kinds):  # the image is the same, whatever it takes
+            return gains
+        blurs = of_kind(self.path.effects, *kinds)
+        kept = tuple(blur for blur in blurs if blur not in omitted)
+        return gains + self._image(blurs) - self._image(kept)
 
-        They tell more of the difference between two sets of effects than of either.
-        """
-        g = self.path.geometry
-        blurs = of_kind(effects, Blur, SeparableTransfer, FieldTransfer, ImageMotion)
+    def _image(self, blurs: tuple[Effect, ...]) -> float:
         if blurs not in self._images:
             self._images[blurs] = self._image_seconds(blurs)
-        return sum(e.seconds_per_pixel for e in effects) * g.rows * g.columns + self._images[blurs]
+        return self._images[blurs]
 
     def _image_seconds(self, blurs: Sequence[Effect]) -> float:
         # Waves need their transfer at their own frequencies alone, no table of it.
