@@ -68,6 +68,16 @@ def cropped(picture: np.ndarray, width: float, height: float) -> Squares:
     return Squares(np.moveaxis(picture[tuple(kept)], 2, 0).astype(float), side, side)
 
 
+def covering(picture: np.ndarray, width: float, height: float) -> Squares:
+    """An image (h, w, K) that covers the array, never stretched, and goes on beyond it.
+
+    The sample's side is max(width / w, height / h); the image is mirrored where it ends.
+    """
+    h, w = picture.shape[:2]
+    side = max(width / w, height / h)
+    return Squares(np.moveaxis(picture, 2, 0).astype(float), side, side)
+
+
 def image_of(camera, picture: np.ndarray) -> Squares:
     pixel, array = camera.pixel, camera.array
     return cropped(

@@ -31,7 +31,7 @@ from frame import Frame
 from reference import Setup, electrons_per_light, one_minus_m, relative_illumination
 from reference_cameras import RGB, Light, lens_of, lines, setup_of
 from reference_light import Aberrated, Field, Measured
-from reference_scenes import OfWavelength, cropped, flat, infrared_cut, lamp, silicon
+from reference_scenes import OfWavelength, covering, flat, infrared_cut, lamp, silicon
 from reference_silicon import Diffusion, absorption
 
 from vcam_cli.camera.camera import Camera
@@ -185,7 +185,7 @@ def light(frame: Frame, camera: Camera, own: Setup) -> Truth:
         return frame_rays.mean_electrons(frame, camera, own)
     by_moves = not camera.optics.diffraction
     if chart == "image":
-        squares = cropped(frame.samples, *own.size)
+        squares = covering(frame.samples, *own.size)
         if by_moves:
             return frame_moves.mean_electrons(own, squares)
         if isinstance(own.lens, Field):
