@@ -10,7 +10,8 @@ from making import QUIET, camera, radiance_for
 from vcam_cli import simulate
 from vcam_cli.image_formation.layers import ray_windows
 from vcam_cli.image_formation.layers.occlusion import RayLayer, covariance, rays
-from vcam_cli.image_formation.layers.ray_windows import windows_with
+from vcam_cli.image_formation.layers.ray_cells import Window
+from vcam_cli.image_formation.layers.ray_windows import _Sum, _too_coarse, windows_with
 
 LARGE = {"array.rows": 150, "array.columns": 190}
 """So that there are some windows."""
@@ -48,6 +49,17 @@ def test_windows_are_what_a_bound_does_not_allow_to_be_left_out():
     assert not windows_with(np.zeros((5, 7)), 0.0)[0]
 
 
+def test_windows_are_refined_that_err_most_for_their_cost():
+    def summed(error: float, values: int) -> _Sum:
+        nowhere = Window(slice(0, 0), slice(0, 0))
+        return _Sum(nowhere, 1, np.zeros((1, 0, 0)), error, values)
+
+    dear, cheap, good = summed(3.0, 900), summed(2.0, 100), summed(0.5, 100)
+    assert not _too_coarse([dear, cheap, good], 5.5)
+    assert _too_coarse([dear, cheap, good], 5.0) == [cheap]
+    assert len(_too_coarse([dear, cheap, good], 1.0)) == 3
+
+
 def test_sets_of_rays_share_neither_radii_nor_angles():
     one, other = rays(40, 0), rays(64, 1)
     for rows in (one, other):
@@ -69,7 +81,9 @@ def test_covariance_of_stripes_is_that_of_their_waves():
     wave = np.broadcast_to((1 + np.cos(k * np.arange(n))) / 2, (n, n))
     front = RayLayer(np.stack([np.zeros((n, n)), wave]), (r, 0.0))
     back = RayLayer(np.stack([wave, np.ones((n, n))]), (s, 0.0))
-    found = covariance([front, back], rays(4000, 0), (reach, reach), list)[0].mean()
+    found = covariance(
+        [front, back], rays(4000, 0), (reach, reach), lambda light, cover: (light, cover[:, None])
+    )[0].mean()
     u = rays(60_000, 1)[:, 0]
     mean = [np.cos(k * radius * u).mean() for radius in (r - s, r, s)]
     assert found == pytest.approx(-(mean[0] - mean[1] * mean[2]) / 8, abs=2e-4)

@@ -32,6 +32,17 @@ def symmetric(terms, fraction):
     return aberration.otf_ratio_symmetric(np.asarray(fraction) * CUTOFF, LAMBDA, N, terms)
 
 
+def test_several_wavelengths_at_once_are_each_alone():
+    """Longer wavelengths have shorter series: all are summed in one."""
+    f = np.linspace(0, 1.1 * CUTOFF, 60).reshape(12, 5)
+    several = np.array([0.4, 0.55, 0.7, 1.0]) * 1e-6
+    for terms in ({4: 1.5e-6}, {4: 0.3e-6, 11: 0.2e-6}, {}):
+        terms = tuple(terms.items())
+        found = aberration.otf_ratio_symmetric(f, several, N, terms)
+        alone = [aberration.otf_ratio_symmetric(f, float(w), N, terms) for w in several]
+        np.testing.assert_allclose(found, alone, rtol=0, atol=1e-14)
+
+
 def overlap(path, fraction, angle, points=101):
     """Mean of exp(2 pi i (W(u - s/2) - W(u + s/2)) / wavelength) over the overlap of two disks.
 

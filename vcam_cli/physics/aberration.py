@@ -61,7 +61,7 @@ def slope_in_waves(terms: Terms, wavelength: float) -> float:
 
 
 def otf_ratio_symmetric(
-    frequency: ArrayLike, wavelength: float, working_f_number: float, terms: Terms
+    frequency: ArrayLike, wavelength: ArrayLike, working_f_number: float, terms: Terms
 ) -> Floats:
     """Return the aberrated over the perfect OTF of a wavefront symmetric about the axis [1].
 
@@ -69,8 +69,8 @@ def otf_ratio_symmetric(
     ----------
     frequency : array_like
         Spatial frequency on the sensor [cycles/m], of any shape and either sign.
-    wavelength : float
-        Wavelength [m].
+    wavelength : array_like
+        Wavelength, or wavelengths (J,) [m].
     working_f_number : float
         Working f-number N (1 - m) [dimensionless].
     terms : Terms
@@ -79,23 +79,29 @@ def otf_ratio_symmetric(
     Returns
     -------
     ndarray
-        Ratio in -1..1 [dimensionless], in the shape of `frequency`; 1 at frequency 0, and 0 beyond
-        the cut-off. It is negative where contrast is reversed. Good to 1e-9.
+        Ratio in -1..1 [dimensionless], in the shape of `frequency`, or (J, *shape) at several
+        wavelengths; 1 at frequency 0, and 0 beyond the cut-off. It is negative where contrast is
+        reversed. Good to 1e-9.
 
     Raises
     ------
     ValueError
         The wavefront is not symmetric, or its slope exceeds `MAX_SLOPE`.
     """
-    terms = zernike.combine(terms)
-    shift = np.minimum(np.abs(np.asarray(frequency)) * (wavelength * working_f_number), 1.0)
+    terms, length = zernike.combine(terms), np.abs(np.asarray(frequency))
+    scale = working_f_number * np.asarray(wavelength, dtype=np.float64)
+    shift = np.minimum(np.multiply.outer(scale, length), 1.0)
     if not terms:
         return np.where(shift < 1, 1.0, 0.0)[()]
-    slope = _checked_slope(terms, wavelength)
-    waves = zernike.legendre_coefficients(terms) / wavelength
-    series = _SERIES_CACHE.get((terms, wavelength), lambda: _chebyshev_series(waves, slope))
-    ratio = np.clip(np.polynomial.chebyshev.chebval(2 * shift - 1, series), -1, 1)
-    return np.where(shift == 0, 1.0, np.where(shift < 1, ratio, 0.0))[()]
+    series = [_series(terms, float(w)) for w in np.ravel(wavelength)]
+    # All wavelengths at once: a series has some fifty terms, and arrays are short.
+    every = np.zeros((max(map(len, series)), len(series)))
+    for column, own in zip(every.T, series, strict=True):
+        column[: len(own)] = own
+    every = every.reshape(-1, *scale.shape, *(1,) * length.ndim)
+    ratio = np.polynomial.chebyshev.chebval(2 * shift - 1, every, tensor=False)
+    ratio = np.where(shift < 1, np.clip(ratio, -1, 1), 0.0)
+    return np.where(shift == 0, 1.0, ratio)[()]
 
 
 def otf_ratio(
@@ -249,6 +255,16 @@ def _checked_slope(terms: Terms, wavelength: float) -> float:
             f"a wavefront of {slope:.3g} waves per pupil radius; at most {MAX_SLOPE:g}"
         )
     return slope
+
+
+def _series(terms: Terms, wavelength: float) -> Floats:
+    """Return the Chebyshev coefficients of the ratio for a wavefront that is symmetric."""
+
+    def compute() -> Floats:
+        slope = _checked_slope(terms, wavelength)
+        return _chebyshev_series(zernike.legendre_coefficients(terms) / wavelength, slope)
+
+    return _SERIES_CACHE.get((terms, wavelength), compute)
 
 
 def _chebyshev_series(waves: Floats, slope: float) -> Floats:

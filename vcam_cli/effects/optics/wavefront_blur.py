@@ -154,6 +154,14 @@ class SymmetricBlur(UniformBlur, RadialTransfer):
             frequency, wavelength, self.lens.working_f_number, self.terms
         )
 
+    def spectral_otf(self, frequency, wavelengths):
+        """Return the transfer at every wavelength (J,) [m]: (J, *shape of `frequency`)."""
+        if not self.lens.diffracts:
+            return super().spectral_otf(frequency, wavelengths)
+        return aberration.otf_ratio_symmetric(
+            frequency, wavelengths, self.lens.working_f_number, self.terms
+        )
+
     def mean_error(self, signal) -> float:
         """Return a bound of the rms change of the mean signal by leaving it out [electrons]."""
         otf = self.otf(np.linspace(0, _highest(self.lens, self.terms), 257), GREEN)

@@ -75,7 +75,7 @@ OCCLUDE = 30e-9
 """One pixel of light or opacity put before what is behind [s]."""
 RAY = 12e-9
 """One value of a cell's light or cover moved to where a ray sees it, and composed [s]."""
-LOOK_UP = 5e-9
+LOOK_UP = 3e-9
 """One value of a layer that a ray looks up, painted and composed [s]."""
 
 DIRECTED = 4

@@ -184,6 +184,8 @@ def _painted(path: OpticalPath, scene: LayeredScene, cells: Cells) -> list[RayLa
         if not _meets(part, *edges):
             continue
         planes = part.chart.averages(*edges, mix)
+        if not planes[-1].any():
+            continue
         path_x, path_y, place_x, place_y = 0.0, 0.0, 0.0, 0.0
         motion = even_motion(optics)
         if motion is not None:

@@ -46,6 +46,9 @@ STEPS = (
 
 Planes = tuple[NDArray, NDArray]
 """Light times opacity (C, h, w), and opacity (h, w) or (C, h, w)."""
+Seen = Callable[[NDArray, NDArray], tuple[NDArray, NDArray]]
+"""What makes of images of light (n, C, h, w) and of opacity (m, h, w) their values in every color
+at the pixels: (n, C, rows, columns) and (m, C, rows, columns)."""
 Compose = Callable[[Sequence[Planes]], NDArray]
 """What makes light (C, h, w) of layers, the nearest first."""
 
@@ -120,7 +123,7 @@ def covariance(
     layers: Sequence[RayLayer],
     rays: NDArray,
     reach: tuple[int, int],
-    seen: Callable[[Sequence[NDArray]], Sequence[NDArray]],
+    seen: Seen,
     compose: Compose = front_to_back,
 ) -> NDArray:
     """Return what the product of the layers' means lacks, at the pixels.
@@ -134,30 +137,33 @@ def covariance(
     reach : tuple of int
         Rows and columns of cells at each border that only rays from elsewhere meet.
     seen : callable
-        What lens, silicon and photodetectors make of images (C, h, w), or (1, h, w) for all colors,
-        on the inner cells: their values (C, rows, columns) at the pixels.
+        What lens, silicon and photodetectors make of images on the inner cells.
     compose : callable, optional
-        What puts the layers one before the other.
+        What puts the layers one before the other; it does not ask for the last one's opacity.
 
     Returns
     -------
     NDArray
         Light (C, rows, columns) at the pixels, in the unit of the layers.
     """
-    shape = layers[0].planes.shape[-2:]
+    colors, *shape = layers[0].planes.shape
+    colors -= 1
     rows, columns = (n - 2 * around for n, around in zip(shape, reach, strict=True))
     offsets = [layer.offsets(rays) for layer in layers]
-    sums = [np.zeros((len(layer.planes), rows, columns), layer.planes.dtype) for layer in layers]
-    total: NDArray | float = 0.0
+    dtype = layers[0].planes.dtype
+    light = np.zeros((len(layers) + 1, colors, rows, columns), dtype)  # of all together, and each
+    cover = np.zeros((len(layers) - 1, rows, columns), dtype)
     for number in range(len(rays)):
         met = []
-        for layer, own, mean in zip(layers, offsets, sums, strict=True):
+        for layer, own in zip(layers, offsets, strict=True):
             top, left = reach[0] + own[number, 1], reach[1] + own[number, 0]
             part = layer.planes[:, top : top + rows, left : left + columns]
-            mean += part
             met.append((part[:-1], part[-1]))
-        total = np.add(total, compose(met))
-    images = seen([np.asarray(total), *(mean[:-1] for mean in sums), *(mean[-1:] for mean in sums)])
-    together, *rest = (image / len(rays) for image in images)
-    means = list(zip(rest[: len(layers)], rest[len(layers) :], strict=True))
+        light[0] += compose(met)
+        for sums, (own_light, _) in zip(light[1:], met, strict=True):
+            sums += own_light
+        for sums, (_, opacity) in zip(cover, met[:-1], strict=True):
+            sums += opacity
+    (together, *alone), covers = seen(light / len(rays), cover / len(rays))
+    means = list(zip(alone, [*covers, np.ones_like(together)], strict=True))
     return np.asarray(together - compose(means))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -124,19 +123,30 @@ class SharpImage:
         """Whether pixels see their own area alone."""
         return not (self._transfer.effects or self._separable)
 
-    def at_pixels(self, cells: Cells, images: Sequence[NDArray]) -> list[NDArray]:
-        """Return the values (C, rows, columns) of images (C, h, w) on the inner cells.
+    def at_pixels(self, cells: Cells, light: NDArray, cover: NDArray) -> tuple[NDArray, NDArray]:
+        """Return the values of images on the inner cells in every color at the pixels.
 
-        Of an image (1, h, w) they are those in every color.
+        Parameters
+        ----------
+        cells : Cells
+            Cells of a window.
+        light, cover : NDArray
+            Images of light (n, C, h, w) and of opacity (m, h, w).
+
+        Returns
+        -------
+        light, cover : NDArray
+            Values (n, C, rows, columns) and (m, C, rows, columns) at the pixels.
         """
-        shape, colors = images[0].shape[-2:], len(images[0])
-        found = []
-        for image in images:
-            if not self.is_local:
-                image = scipy.fft.irfft2(scipy.fft.rfft2(image) * self._on(cells, shape), shape)
-            seen = self._collected(cells, image)
-            found.append(np.broadcast_to(seen, (colors, *seen.shape[-2:])))
-        return found
+        cover, shape = cover[:, None], light.shape[-2:]
+        if not self.is_local:
+            transfer = self._on(cells, shape)
+            light, cover = (
+                scipy.fft.irfft2(scipy.fft.rfft2(image) * transfer, shape)
+                for image in (light, cover)
+            )
+        light, cover = (self._collected(cells, image) for image in (light, cover))
+        return light, np.broadcast_to(cover, (len(cover), *light.shape[1:]))
 
     def _collected(self, cells: Cells, image: NDArray) -> NDArray:
         """Return the means over the collecting areas of an image, exactly on its even cells."""
