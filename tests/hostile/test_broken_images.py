@@ -23,6 +23,8 @@ from vcam_cli.files.images.exr import read_exr
 from vcam_cli.files.images.images import color_channels
 from vcam_cli.files.spectral.hyperspectral import read_cube
 
+pytestmark = pytest.mark.attack("pictures and spectra that are harmed")
+
 RGB = np.random.default_rng(7).uniform(0.1, 0.9, (20, 24, 3)).astype(np.float32)
 
 
