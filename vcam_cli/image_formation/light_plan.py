@@ -52,9 +52,9 @@ BLURS = (Blur, SeparableTransfer, FieldTransfer, SubExposedMotion)
 """Kinds of effects that blur the light."""
 KINDS = (*BLURS, Gain, VeilingGlare, Transport)
 """Kinds of effects on the light, and on the charge that it makes."""
-EXACT, EXACT_OVER_FIELD = 10e-3, 25e-3
-"""Time that exact sums take of what a blur changes of edges, beside round blurs alone and beside
-one that changes over the field [s]: a blur that saves less is kept instead."""
+EXACT = 10e-3
+"""Time that exact sums take of what a blur changes of edges [s]: one that saves less is kept
+instead. Beside a blur that changes over the field, which has the larger tables, none saves more."""
 LOOSEST = 8.0
 """Bounds over exact sums, at most, of edges that lie anywhere to the pixels: larger ones stay."""
 MOST_TRIED = 10
@@ -158,10 +158,9 @@ def _blur_shares(cost: LightCost, budget: float) -> dict[Effect, float]:
     flat = scene.flat if isinstance(scene, LayeredScene | DepthScene) else scene
     bounds = flat.change_bounds(list(losses.values()), path.geometry, path.ceiling, budget)
     shares: dict[Effect, float] = dict(zip(losses, bounds.shares(), strict=True))
-    if has_straight_edges(flat):
+    if has_straight_edges(flat) and not path.field:
         loose = [e for e in of_kind(shares, Blur) if budget < shares[e] <= LOOSEST * budget]
-        takes = EXACT_OVER_FIELD if path.field else EXACT
-        open_ones = [e for e in loose if cost.saved((e,)) > takes]
+        open_ones = [e for e in loose if cost.saved((e,)) > EXACT]
         exact = exact_changes(path, flat, open_ones) if open_ones else {}
         shares |= {blur: change / bounds.full for blur, change in exact.items()}
     # Points in place of averages alias what detail there is: only of even light is that nothing.
