@@ -298,6 +298,21 @@ class Chart(ABC):
         """Return the light of a gray chart of parallel straight edges without end; else None."""
         return None
 
+    def sample_borders(self, x_edges: Array, y_edges: Array) -> tuple[Array, Array]:
+        """Return where light that is even between lines along x and y may change, within cells.
+
+        Parameters
+        ----------
+        x_edges, y_edges : Array
+            Edges of the cells, rising [m].
+
+        Returns
+        -------
+        x, y : Array
+            Places along x and along y [m]; none of a chart of other light.
+        """
+        return np.empty(0), np.empty(0)
+
     def edge_energy(self, region: Region, level: Array, ceiling: float) -> EdgeEnergy:
         """Return how much edge the chart has, at most.
 

@@ -73,3 +73,29 @@ def cell_means(planes: Array, count: int) -> Array:
         sums += rows[..., k::count]
     sums /= count**2
     return sums
+
+
+def means_of_parts(planes: Array, parts: tuple[Array, Array], cells: tuple[Array, Array]) -> Array:
+    """Return the means over cells of planes on parts of them.
+
+    Parameters
+    ----------
+    planes : Array
+        Means (..., rows, columns) over the parts.
+    parts : tuple of Array
+        Edges of the parts along y and along x, rising, those of the cells among them [m].
+    cells : tuple of Array
+        Edges of the cells along y and along x [m].
+
+    Returns
+    -------
+    Array
+        Means (..., rows, columns) over the cells.
+    """
+    for axis, of_parts, of_cells in zip((-2, -1), parts, cells, strict=True):
+        shape = (-1, 1) if axis == -2 else (-1,)
+        first = np.searchsorted(of_parts, of_cells[:-1])
+        weighed = planes * np.diff(of_parts).astype(planes.dtype).reshape(shape)
+        sums = np.add.reduceat(weighed, first, axis=axis)
+        planes = sums / np.diff(of_cells).astype(planes.dtype).reshape(shape)
+    return planes

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from vcam_cli.scenes.base import Array, Chart, ChartScene, Frame, Scene, View
-from vcam_cli.scenes.cells import cell_means
+from vcam_cli.scenes.cells import means_of_parts
 from vcam_cli.scenes.depth_scene import DepthScene
 from vcam_cli.scenes.edge_energy import EdgeEnergy, Region, total_energy
 from vcam_cli.scenes.framed import chart_scene
@@ -21,6 +21,11 @@ from vcam_cli.spectra import Spectrum
 PARTS = 4
 """Parts along each side of a pixel or of a larger cell, in each of which layers are put one before
 the other. How fine cells within pixels are to be is chosen by what they err, with this in it."""
+MOST_BORDERS = 16
+"""Borders of samples in a cell that divide it, at most, in the mean: then their light and opacity
+vary together by a sixteenth of what they are, of one in so many squared samples."""
+SAME = 1e-6
+"""Part of a cell below which two places are one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,6 +54,12 @@ class MaskedChart(Chart):
             seen += mix[:, -1, None, None]
             seen *= self.opacity.averages(x, y, np.ones((1, 1), mix.dtype))
             out[:, rows, columns] = seen
+
+    def sample_borders(self, x_edges: Array, y_edges: Array) -> tuple[Array, Array]:
+        """Return where light or opacity may change within cells."""
+        both = (chart.sample_borders(x_edges, y_edges) for chart in (self.light, self.opacity))
+        x, y = (np.concatenate(places) for places in zip(*both, strict=True))
+        return x, y
 
     def values(self, x: Array, y: Array, mix: Array) -> Array:
         """Return the values at points."""
@@ -105,6 +116,11 @@ class LayerChart(Chart):
         """Write the averages over the cells."""
         self.layer.paint(x_edges - self.center[0], y_edges - self.center[1], mix, out)
 
+    def sample_borders(self, x_edges: Array, y_edges: Array) -> tuple[Array, Array]:
+        """Return where the layer may change within cells, in its place."""
+        x, y = self.layer.sample_borders(x_edges - self.center[0], y_edges - self.center[1])
+        return x + self.center[0], y + self.center[1]
+
     def edges(self) -> tuple[Array, Array] | None:
         """Return where the light of a layer of even rectangles may change."""
         inner = self.layer.edges()
@@ -155,12 +171,23 @@ class FlatLayers(Chart):
         return max(part.chart.brightest for part in self.parts)
 
     def paint(self, x_edges: Array, y_edges: Array, mix: Array, out: Array) -> None:
-        """Write the averages over the cells, as if two edges never met in a part of one."""
-        largest = max(float(np.diff(edges).max()) for edges in (x_edges, y_edges))
-        count = PARTS if largest > self.pitch * (1 - 1e-9) else 1
-        x, y = _parts_of(x_edges, count), _parts_of(y_edges, count)
+        """Write the averages over the cells.
+
+        They are exact of pictures, whose samples divide pixels; of other light as if two edges
+        never met in a part of a cell.
+        """
+        edges = (x_edges, y_edges)
+        if not any(self._are_pixels(np.diff(e)) for e in edges):
+            out[:] = self._compose(mix, lambda chart, m: chart.averages(x_edges, y_edges, m))
+            return
+        borders = zip(*(p.chart.sample_borders(x_edges, y_edges) for p in self.parts), strict=True)
+        x, y = (_divided(e, np.concatenate(b)) for e, b in zip(edges, borders, strict=True))
         found = self._compose(mix, lambda chart, m: chart.averages(x, y, m))
-        out[:] = cell_means(found, count)
+        out[:] = means_of_parts(found, (y, x), (y_edges, x_edges))
+
+    def _are_pixels(self, widths: Array) -> bool:
+        """Return whether cells are pixels, or collecting areas with gaps between them."""
+        return widths.max() > self.pitch * (1 - 1e-9) or np.ptp(widths) > 1e-6 * widths.max()
 
     def edge_energy(self, region: Region, level: Array, ceiling: float) -> EdgeEnergy:
         """Return the energy of all layers: an edge may have the brightest light behind it."""
@@ -192,11 +219,22 @@ def _edges(edges: Array, cells: slice) -> Array:
     return edges[cells.start : cells.stop + 1]
 
 
-def _parts_of(edges: Array, count: int) -> Array:
-    """Return the edges of cells, and those between so many parts of each."""
-    steps = np.arange(count) / count
-    within = edges[:-1, None] + np.diff(edges)[:, None] * steps
-    return np.append(within.ravel(), edges[-1])
+def _divided(edges: Array, borders: Array) -> Array:
+    """Return the edges of cells, those between so many parts of each, and borders within them.
+
+    More borders than a few a cell are left out: the parts average over them.
+    """
+    steps = np.arange(PARTS) / PARTS
+    parts = edges[:-1, None] + np.diff(edges)[:, None] * steps
+    parts = np.append(parts.ravel(), edges[-1])
+    if len(borders) > MOST_BORDERS * len(edges):
+        return parts
+    near = SAME * float(np.diff(edges).min())  # what differs by rounding is one place
+    borders = np.unique(borders)
+    after = np.clip(np.searchsorted(parts, borders), 1, len(parts) - 1)
+    clear = np.minimum(borders - parts[after - 1], parts[after] - borders) > near
+    clear &= np.diff(borders, prepend=-np.inf) > near
+    return np.sort(np.append(parts, borders[clear]))
 
 
 @dataclass(frozen=True)

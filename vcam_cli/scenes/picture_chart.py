@@ -1,5 +1,6 @@
 """A picture as a chart: its averages over cells of any size, at any place."""
 
+import math
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -52,6 +53,19 @@ class PictureChart(Chart):
         half = self.frame.width / 2, self.frame.height / 2
         x, y = (np.empty(0) if self.mirrored else np.array([-end, end]) for end in half)
         return x, y
+
+    def sample_borders(self, x_edges: Array, y_edges: Array) -> tuple[Array, Array]:
+        """Return the borders of the samples within cells."""
+
+        def along(edges: Array, size: float, count: int) -> Array:
+            pitch = size / count
+            first, last = edges[0] / pitch + count / 2, edges[-1] / pitch + count / 2
+            if not self.mirrored:
+                first, last = max(first, 0.0), min(last, count)
+            return (np.arange(math.ceil(first), math.floor(last) + 1) - count / 2) * pitch
+
+        height, width, _ = self.picture.shape
+        return along(x_edges, self.frame.width, width), along(y_edges, self.frame.height, height)
 
     def edge_energy(self, region: Region, level: Array, ceiling: float) -> EdgeEnergy:
         """Return the energy of the steps from sample to sample, and of the picture's border."""
