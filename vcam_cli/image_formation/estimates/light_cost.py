@@ -198,7 +198,7 @@ class LightCost:
     def _image_seconds(self, blurs: Sequence[Effect]) -> float:
         # Waves need their transfer at their own frequencies alone, no table of it.
         tabulated = () if isinstance(self.scene, WAVES) else of_kind(blurs, Blur, FieldTransfer)
-        lines = sum(DIRECTED if isinstance(blur, PlaneTransfer) else 1 for blur in tabulated)
+        lines = len(tabulated) + (DIRECTED - 1) * len(of_kind(tabulated, PlaneTransfer))
         otfs = lines * OTF * ENTRIES * len(self.path.transfer.wavelengths)
         report = expected_report(self.path, self.scene, blurs)
         return otfs + image_seconds(self.path.geometry, len(self.path.mosaic.colors), report)
