@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from making import long_except
 
 from vcam_cli.sweeps.optimum import find_optimum
 
@@ -40,7 +41,7 @@ def test_the_order_of_the_values_does_not_matter():
     assert find_optimum(X[mixed], curves[:, mixed], "min") == find_optimum(X, curves, "min")
 
 
-@pytest.mark.parametrize("count", [2, 4, 16])
+@pytest.mark.parametrize("count", long_except([4], [2, 4, 16]))
 def test_the_interval_covers_the_truth_as_often_as_it_says(count):
     """95 % intervals in 200 trials: fewer than 85 % would come about once in 1e8.
 
