@@ -13,6 +13,8 @@ import sys
 import tokenize
 from collections.abc import Iterator
 from dataclasses import dataclass
+from graphlib import CycleError, TopologicalSorter
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -349,6 +351,69 @@ KEPT = [
 )
 def test_no_rule_forbids_too_much(rule, name, text):
     assert rule(Module(name, text)) == []
+
+
+def circle(modules: list[Module]) -> list[str]:
+    """Modules that import each other in a circle, the first one again at the end; [] for none.
+
+    Imports inside functions and for types alone count: who needs a name needs its module. Those
+    of `vcam_cli` itself do not, whose `__init__` imports names when they are asked for.
+    """
+    names = {f"vcam_cli.{module.name}" for module in modules if module.name}
+    graph: dict[str, set[str]] = {}
+    for module in modules:
+        if not module.name:
+            continue
+        own = graph.setdefault(f"vcam_cli.{module.name}", set())
+        for _, name in imports(module):
+            while name and name not in names:  # a name in a module, which is what is imported
+                name = name.rpartition(".")[0]
+            own |= {name} - {"", f"vcam_cli.{module.name}"}
+    try:
+        TopologicalSorter(graph).prepare()
+    except CycleError as error:
+        return error.args[1][::-1]  # who imports before who is imported
+    return []
+
+
+def test_modules_import_each_other_in_no_circle():
+    assert circle(MODULES) == []
+
+
+@pytest.mark.parametrize(
+    "back",
+    [
+        "from vcam_cli.x.a import A\n",
+        "def f():\n    from vcam_cli.x import a\n",
+        "class B:\n    def f(self):\n        import vcam_cli.x.a as a\n",
+        "if TYPE_CHECKING:\n    from vcam_cli.x.a import A\n",
+        "from importlib import import_module\nimport_module('vcam_cli.x.a')\n",
+    ],
+)
+def test_a_circle_is_found(back):
+    modules = [
+        Module("x", "from vcam_cli.x.a import A\n"),
+        Module("x.a", "from vcam_cli.x import c\n"),
+        Module("x.b", back),
+        Module("x.c", "from vcam_cli.x.b import B\n"),
+    ]
+    found = circle(modules)
+    assert len(found) == 4
+    steps = {("a", "c"), ("c", "b"), ("b", "a")}
+    assert {(p[-1], q[-1]) for p, q in pairwise(found)} == steps
+
+
+def test_a_package_imported_from_within_is_a_circle():
+    face = Module("x", "from vcam_cli.x.a import A\n")
+    assert circle([face, Module("x.a", "from vcam_cli.x import A\n")])
+
+
+def test_what_is_no_circle_is_none():
+    """Two ways to one module, a module's own name, another package, the face of it all."""
+    face = Module("", "from vcam_cli.x.a import A\n")
+    top = Module("x.a", "from vcam_cli.x import b, c\nfrom vcam_cli import __version__\n")
+    left = Module("x.b", "import numpy\nfrom vcam_cli.x.c import C\n")
+    assert circle([face, top, left, Module("x.c", "import vcam_cli\n")]) == []
 
 
 def test_every_room_has_a_floor():

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from vcam_cli.characterization.characterize import Characterization
     from vcam_cli.comparison.image_files import Comparison, Filters, Formula, Space
     from vcam_cli.datasets.dataset import DatasetResult
-    from vcam_cli.fitting.fit import Fit
+    from vcam_cli.fitting.result import Fit
     from vcam_cli.simulation.planned import PlannedRun
     from vcam_cli.verification.model import Measurement
     from vcam_cli.verification.verify import Verification
@@ -160,7 +160,7 @@ def dataset(
     """
     from vcam_cli.datasets import dataset as work
     from vcam_cli.datasets import dataset_file
-    from vcam_cli.sweeps.sweep import Execution, Share
+    from vcam_cli.sweeps.execution import Execution, Share
 
     require_name(study, "study")
     require_overrides(sets)

@@ -14,6 +14,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.dark_current import dark_rate
+from vcam_cli.camera.model import CameraModel
 from vcam_cli.camera.processing import Step
 from vcam_cli.camera.quality import METRICS
 from vcam_cli.camera.scene.sources import CHARTS
@@ -66,7 +67,7 @@ class TestEveryKey:
     @pytest.mark.parametrize(("model", "name"), KEYS, ids=lambda v: getattr(v, "__name__", v))
     def test_takes_its_own_example(self, model, name):
         field = model.model_fields[name]
-        if model is Camera and field.is_required():
+        if issubclass(model, CameraModel) and field.is_required():
             return  # a section; its example is abridged
         if name == "photodetector":
             return

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from vcam_cli.camera.load import MERGE_RULES
+from vcam_cli.camera.camera import MERGE_RULES
 from vcam_cli.config.merge import Alternatives, MergeRules, merge
 from vcam_cli.config.yaml_reader import read_text
 from vcam_cli.config.yaml_tree import Node, Source

@@ -24,7 +24,7 @@ from vcam_cli.datasets import dataset_file
 from vcam_cli.datasets.dataset import dataset
 from vcam_cli.errors import BadInput
 from vcam_cli.files.images.png import write_png
-from vcam_cli.sweeps.sweep import Execution, Share
+from vcam_cli.sweeps.execution import Execution, Share
 
 STUDY = {
     "kind": "dataset",
@@ -393,7 +393,7 @@ import resource, sys
 from pathlib import Path
 from vcam_cli.datasets import dataset_file
 from vcam_cli.datasets.dataset import dataset
-from vcam_cli.sweeps.sweep import Execution
+from vcam_cli.sweeps.execution import Execution
 dataset(dataset_file.read(sys.argv[1]), Path(sys.argv[2]), Execution(workers=1))
 print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)
 """

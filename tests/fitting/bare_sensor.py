@@ -14,7 +14,8 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
-from vcam_cli.fitting.fit import Fit, fit
+from vcam_cli.fitting.fit import fit
+from vcam_cli.fitting.result import Fit
 from vcam_cli.verification import measurement_file
 
 DARK_TIMES = (1e-3, 10e-3, 400e-3)

@@ -15,7 +15,8 @@ import yaml
 
 from vcam_cli import load, simulate
 from vcam_cli.camera.camera import Camera
-from vcam_cli.fitting.fit import Fit, fit
+from vcam_cli.fitting.fit import fit
+from vcam_cli.fitting.result import Fit
 from vcam_cli.verification import measurement_file
 
 LEVELS = (0.04, 0.1, 0.18, 0.26, 0.34, 0.42, 0.5, 0.58, 0.66, 0.8, 1.5)

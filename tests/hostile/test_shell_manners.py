@@ -27,7 +27,7 @@ from vcam_cli.files.atomic import STAGING
 from vcam_cli.files.images import rows
 from vcam_cli.files.images.exr import ExrWriter
 from vcam_cli.files.images.png import write_png
-from vcam_cli.sweeps.sweep import Execution
+from vcam_cli.sweeps.execution import Execution
 
 pytestmark = pytest.mark.attack("manners in a shell")
 SMALL = {"array.rows": 8, "array.columns": 9, "accuracy": "draft"}

@@ -16,7 +16,7 @@ from vcam_cli.errors import BadInput, CannotDo
 from vcam_cli.files import atomic
 from vcam_cli.files.points_store import SweepFolder
 from vcam_cli.sweeps import computation, point_execution, point_work, workers
-from vcam_cli.sweeps.sweep import Share
+from vcam_cli.sweeps.execution import Share
 
 TABLES = ("points.csv", "optimum.csv")
 OPTIMIZE = {"metric": "mean_electrons", "goal": "max"}

@@ -1,174 +1,76 @@
-"""The whole camera file."""
+"""The camera, and the format of its file: what is read, and what a camera has to keep to."""
 
-from collections.abc import Iterator, Mapping, Sequence
-from typing import Annotated, Any, Self
+from collections.abc import Mapping
+from functools import cache
+from typing import Any
 
-from pydantic import PrivateAttr, model_validator
-from pydantic_core import InitErrorDetails
-
-from vcam_cli.camera.expectations import (
-    LIMIT_LIST,
-    Limit,
-    read_limit,
-    read_limits,
-    unmeasured,
-    unmeasured_mistakes,
+from vcam_cli import errors
+from vcam_cli.camera import hints
+from vcam_cli.camera.derived import (
+    electrical,
+    falloff,
+    frame_rate,
+    geometry,
+    lens_mtf,
+    named_spectra,
+    photodiode,
 )
-from vcam_cli.camera.exposure import Exposure
-from vcam_cli.camera.lens_choice import OPTICS
-from vcam_cli.camera.optics import Optics
-from vcam_cli.camera.processing import (
-    STEP_LIST,
-    Steps,
-    code_mistakes,
-    default_steps,
-    light_mistakes,
-    order_mistakes,
-    picture_mistakes,
+from vcam_cli.camera.model import CameraModel
+from vcam_cli.config import document, overrides, shipped
+from vcam_cli.config.file_format import FileFormat
+from vcam_cli.config.file_names import current_folder
+from vcam_cli.config.merge import Alternatives, MergeRules
+from vcam_cli.config.yaml_tree import Key, Node
+from vcam_cli.errors import BadInput
+from vcam_cli.floats import own_float_errors
+
+EXAMPLE = "starter"
+"""The shipped camera whose sections stand in for those that a file has wrong."""
+FILE_KEYS = frozenset({"file", "positions", "mask", "image.depth"})
+"""Keys that hold names of data files."""
+
+_EXCLUSIVE = (
+    "luminance | radiance | illuminance | irradiance",
+    "time | auto | captures",
+    "rows columns | die",
+    "fill_factor | width height x y",
+    "focal_length | field_of_view",
+    "f_number | numerical_aperture",
+    "dark_current | dark_current_density",
+    "full_scale | gain",
+    "offset_pixel | dsnu",
+    "gain_pixel | prnu",
+    "dpi | width",
+    "gain | efficiency",
+    "gain | iso",
+    "voltage_swing | thresholds",
+    "lamp | blackbody | monochromatic | file | table | pixel",
+    "block | positions",
 )
-from vcam_cli.camera.quality import METRIC_LIST, UNITS, Display
-from vcam_cli.camera.scene.charts import SlantedEdge
-from vcam_cli.camera.scene.scene import Scene
-from vcam_cli.camera.sensor.adc import Adc
-from vcam_cli.camera.sensor.architecture import ARCHITECTURES, article
-from vcam_cli.camera.sensor.array import Array
-from vcam_cli.camera.sensor.pixel import Pixel
-from vcam_cli.camera.simulation import ACCURACY, Accuracy, Effects, Output, Seed
-from vcam_cli.config.model import FileModel, key
-from vcam_cli.config.validation_messages import failure, fault
-from vcam_cli.config.values import Word
-from vcam_cli.errors import BadInput, Problem
-from vcam_cli.spectra.spectrum import Outside
+_PARTS: dict[errors.Path, str] = {
+    ("scene",): "scenes",
+    ("optics",): "optics",
+    ("pixel",): "pixels",
+    ("array",): "arrays",
+    ("array", "filters"): "filters",
+    ("pixel", "technology", "from"): "technologies",
+}
+_WORDS: dict[errors.Path, str] = {("optics",): "none"}
+_SHORTHANDS: dict[errors.Path, Key] = {("pixel", "technology"): "from"}
+MERGE_RULES = MergeRules(
+    alternatives=tuple(map(Alternatives.parse, _EXCLUSIVE)),
+    variants={("scene", "source"): ("kind", "chart")},
+    single_values=frozenset({"table"}),
+    part_keys={**dict.fromkeys(_PARTS, "use"), **_SHORTHANDS},
+    words=_WORDS,
+    step_lists=frozenset({("processing",)}),
+)
 
 
-class Camera(FileModel):
+class Camera(CameraModel):
     """A camera that looks at a scene: everything that a run depends on."""
 
-    name: Word = key(
-        "name of the camera and of its output folder; default the file's",
-        example="my-camera",
-        default="camera",
-    )
-    scene: Scene = key(
-        "what stands in front of the lens",
-        example={"source": {"kind": "chart", "chart": "colorchecker"}, "luminance": "100 cd/m2"},
-    )
-    optics: Annotated[Optics, OPTICS] = key(
-        "the lens; or none: the scene's light falls on the bare sensor, along its normal",
-        example={"f_number": 2.8, "focal_length": "3.2 mm"},
-    )
-    pixel: Pixel = key("one pixel", example={"width": "6.5 um"})
-    array: Array = key("the pixel array", example={"rows": 512, "columns": 512})
-    exposure: Exposure = key("exposure", example={"time": "30 ms"})
-    adc: Adc = key("analog-to-digital converter", example={"bits": 10}, default=Adc)
-    processing: Annotated[Steps, STEP_LIST] = key(
-        "steps on the raw frame, in order; [] for none; default by pattern",
-        example=[{"black_level": "subtract"}, {"demosaic": "bilinear"}, {"gamma": "srgb"}],
-        default=None,
-    )
-    quality: Annotated[tuple[str, ...], METRIC_LIST] = key(
-        "metrics of the picture against the ideal image", example=["mse", "psnr"], default=()
-    )
-    expect: Annotated[tuple[str, ...], LIMIT_LIST] = key(
-        "limits that metrics of the run keep; where one is missed, vcam run exits with 4",
-        example=["mean_electrons >= 1000", "gray_snr_db >= 30"],
-        default=(),
-    )
-    display: Display = key(
-        "the display on which pictures are compared", example={"dpi": 72}, default=Display
-    )
-    effects: Effects = key(
-        "auto, all, or a mapping of effects to auto, on or off; unnamed ones stay auto",
-        default="auto",
-    )
-    accuracy: Annotated[Accuracy, ACCURACY] = key(
-        "draft, standard, reference, a fraction of full signal, or {preset, knobs ...}",
-        example="standard",
-        default=Accuracy,
-    )
-    seed: Seed = key("seeds of the random numbers", example={"frame": 1}, default=Seed)
-    output: Output = key("what is written", example={"raw": ["dn"]}, default=Output)
-
-    _samples: tuple[tuple[str, Any], ...] = PrivateAttr(default=())
-    _exposure_gain: float | None = PrivateAttr(default=None)
-
-    @model_validator(mode="after")
-    def _agrees(self) -> Self:
-        array, colors = self.array, len(self.array.colors)
-        if "processing" not in self.model_fields_set:
-            emits = self.scene.emits
-            self._fill(processing=default_steps(array.mosaic, colors == 1, emits))
-        if (outside := self.scene.wavelengths.outside) != "error":
-            self._extend_spectra(outside)
-        render = self.output.render
-        mistakes = [
-            *order_mistakes(self.processing, array.mosaic, colors, array.is_scattered),
-            *picture_mistakes(self.processing, array, bool(self.quality), render is not None),
-            *light_mistakes(self.processing, self.scene.emits),
-            *code_mistakes(self.processing, render),
-            *self._capture_mistakes(),
-            *unmeasured_mistakes(
-                self.expect, self.quality, self.has_edge, bool(self.exposure.captures)
-            ),
-        ]
-        if mistakes:
-            raise failure(mistakes)
-        return self
-
-    def _extend_spectra(self, outside: Outside) -> None:
-        """Tell every measured spectrum what holds beyond its table, where it does not say."""
-        lamp, optics, pixel = self.scene.illuminant, self.optics, self.pixel
-        detector, filters = pixel.photodetector, self.array.filters
-        efficiency = detector.quantum_efficiency.with_outside(outside)
-        self._fill(
-            scene=self.scene.with_derived(illuminant=lamp and lamp.with_outside(outside)),
-            optics=optics.with_derived(transmittance=optics.transmittance.with_outside(outside)),
-            pixel=pixel.with_derived(
-                photodetector=detector.with_derived(quantum_efficiency=efficiency)
-            ),
-            array=self.array.with_derived(
-                filters={color: spec.with_outside(outside) for color, spec in filters.items()}
-            ),
-        )
-
-    def _capture_mistakes(self) -> Iterator[InitErrorDetails]:
-        """Yield why pixels cannot be read several times in an integration, where they are to be."""
-        if not self.exposure.captures:
-            return
-        place, name, binning = ("exposure", "captures"), self.pixel.architecture, self.array.binning
-        if ARCHITECTURES[name].destructive:
-            message = f"reading {article(name)} {name} pixel destroys its charge"
-            others = [n for n, kind in ARCHITECTURES.items() if not kind.destructive]
-            remedy = f"give one exposure time, or write architecture: {' or '.join(others)}"
-            yield fault(place, message, remedy)
-        if binning and binning.count > 1 and binning.kind != "charge":
-            message = f"pixels joined by {binning.kind} binning are read once in an integration"
-            remedy = "write kind: charge in array.binning, or give one exposure time"
-            yield fault(place, message, remedy)
-
-    @property
-    def has_edge(self) -> bool:
-        """Whether the scene is a slanted edge on rows and columns, whose MTF can be measured."""
-        return isinstance(self.scene.source, SlantedEdge) and not self.array.is_scattered
-
-    @property
-    def limits(self) -> tuple[Limit, ...]:
-        """What the file expects of the metrics."""
-        return tuple(read_limit(text, UNITS) for text in self.expect)
-
-    def with_expectations(self, texts: Sequence[str]) -> "Camera":
-        """Return the same camera with further limits, those of `--expect`. Raises BadInput."""
-        limits = read_limits(texts, UNITS)
-        measures = self.quality, self.has_edge, bool(self.exposure.captures)
-        problems = [
-            Problem((), f"this camera does not measure {limit.metric}", remedy, "--expect")
-            for limit in limits
-            if (remedy := unmeasured(limit.metric, *measures)) is not None
-        ]
-        if problems:
-            raise BadInput(problems)
-        return self.model_copy(update={"expect": (*self.expect, *texts)})
-
+    @own_float_errors
     def with_(self, changes: Mapping[str, Any]) -> "Camera":
         """Return the camera with some keys changed, validated as its file is.
 
@@ -185,45 +87,44 @@ class Camera(FileModel):
         TypeError
             For what is no such mapping.
         """
-        from vcam_cli.camera.load import changed
+        over = overrides.overlay_values(changes, current_folder(), MERGE_RULES)
+        return document.reopen(self, FORMAT).overlay(over).validate()
 
-        return changed(self, changes)
 
-    def __repr__(self) -> str:
-        """Return a line: name, size and colors of the array."""
-        array, die = self.array, self.array.die
-        size = f"{array.rows} x {array.columns} pixels"
-        if die is not None:
-            size = f"die of {die.width * 1e3:.4g} mm x {die.height * 1e3:.4g} mm"
-        return f"<Camera {self.name}: {size}, {' '.join(array.colors)}>"
+@cache
+def example() -> Camera:
+    """Return the shipped camera whose sections stand in for those that a file has wrong."""
+    file = shipped.find("cameras", EXAMPLE)
+    return document.read(file, shipped.folder(), FORMAT).validate()
 
-    __str__ = __repr__
 
-    @property
-    def exposure_gain(self) -> float:
-        """Analog gain of the exposure: the file's, or what follows from its ISO speed or scene.
+def _refuse_study(root: Node) -> None:
+    """Raise BadInput where the file is a study and not a camera."""
+    kind = root.get("kind")
+    if kind is not None and kind.value in ("sweep", "schedule", "dataset"):
+        message, remedy = f"this is a study (kind: {kind.value})", "give a camera file"
+        remedy += f", or run the study with vcam {kind.value}"
+        raise BadInput([kind.problem(("kind",), message, remedy)])
 
-        Before `with_exposure_gain` has told what follows, it is 1.
-        """
-        if self._exposure_gain is not None:
-            return self._exposure_gain
-        return 1.0 if self.exposure.gain is None else self.exposure.gain
 
-    def with_exposure_gain(self, gain: float) -> "Camera":
-        """Return the same camera set to a gain that follows from its ISO speed or its scene."""
-        camera = self.model_copy()
-        camera._exposure_gain = gain
-        return camera
-
-    def with_samples(self, samples: Mapping[str, Any]) -> "Camera":
-        """Return the same camera with what some of its files hold: {"optics.psf": array, ...}.
-
-        Why so: effects are made of a camera, and only `files` reads images.
-        """
-        camera = self.model_copy()
-        camera._samples = tuple(samples.items())
-        return camera
-
-    def samples(self, path: str) -> Any:
-        """Return what was read of the file at a dotted path; None before that."""
-        return dict(self._samples).get(path)
+FORMAT = FileFormat(
+    model=Camera,
+    kind="cameras",
+    parts=_PARTS,
+    words=_WORDS,
+    shorthands=_SHORTHANDS,
+    file_keys=FILE_KEYS,
+    merge_rules=MERGE_RULES,
+    refuse=_refuse_study,
+    advise=hints.advise,
+    checks=(
+        (named_spectra.check_spectra, "scene"),
+        (geometry.check, "scene optics pixel array"),
+        (electrical.check, "pixel adc"),
+        (falloff.check, "scene optics pixel array"),
+        (lens_mtf.check, "scene optics pixel array"),
+        (photodiode.check, "pixel"),
+        (frame_rate.check, "pixel array"),
+    ),
+    stand_in=example,
+)

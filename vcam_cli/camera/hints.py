@@ -12,7 +12,6 @@ from functools import cache
 from pathlib import PurePath
 
 from vcam_cli import units
-from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.hint_tables import (
     BARE,
     DATA,
@@ -27,6 +26,7 @@ from vcam_cli.camera.hint_tables import (
     SWITCHES,
     VALUES,
 )
+from vcam_cli.camera.model import CameraModel
 from vcam_cli.camera.scene.sources import CHARTS
 from vcam_cli.config.key_index import Key, keys
 from vcam_cli.config.validation_messages import NO_SUCH_KEY, yaml_text
@@ -52,7 +52,9 @@ _SIZE = re.compile(r"(\d+) *[xX*×] *(\d+)|(\d{1,3}(?:\.\d+)?) *(?:MP|Mpx|megapi
 @cache
 def index() -> tuple[Key, ...]:
     """Return all keys of a camera file, each path once; those of a technology file aside."""
-    found = {key.path: key for key in reversed(list(keys(Camera))) if "from" not in key.path[:-1]}
+    found = {
+        key.path: key for key in reversed(list(keys(CameraModel))) if "from" not in key.path[:-1]
+    }
     return tuple(reversed(found.values()))
 
 
@@ -66,7 +68,7 @@ def set_option(name: str) -> str:
         value = "true"
     if path.startswith("write "):
         return f'--set {path.removeprefix("write ")}="{value}"'
-    return f"--set {word}.KEY=VALUE" if word in Camera.model_fields else ""
+    return f"--set {word}.KEY=VALUE" if word in CameraModel.model_fields else ""
 
 
 def advise(problem: Problem, given: object) -> Problem:

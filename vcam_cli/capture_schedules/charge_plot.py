@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from vcam_cli.capture_schedules.methods import MethodResult, Task
 from vcam_cli.capture_schedules.pdf_plots import GRAY, Units
+from vcam_cli.capture_schedules.schedule_result import ScheduleResult
 from vcam_cli.files.plots import COLORS, plot_figure
 from vcam_cli.scheduling.pdf import Floats, Pdf
-
-if TYPE_CHECKING:
-    from vcam_cli.capture_schedules.study import ScheduleResult
 
 LIGHTS = ((0.95, "bright"), (0.25, "dark"))
 """Share of the scene's pixels that are darker, and name, of the photocurrents drawn."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
@@ -22,12 +22,10 @@ from vcam_cli.capture_schedules.pdf_plots import (
     is_wide,
     label_axes,
 )
+from vcam_cli.capture_schedules.schedule_result import ScheduleResult
 from vcam_cli.files.plots import COLORS, plot_figure
 from vcam_cli.scheduling.pdf import Pdf
 from vcam_cli.scheduling.sensor import Sensor
-
-if TYPE_CHECKING:
-    from vcam_cli.capture_schedules.study import ScheduleResult
 
 SHOWN = 8
 """Captures of the schedules that are drawn, or the number of the study nearest to it."""

@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
+from vcam_cli.capture_schedules.schedule_result import ScheduleResult
 from vcam_cli.files.folder import OutputFolder
 from vcam_cli.reports import study_report
 from vcam_cli.reports.page import Facts
-
-if TYPE_CHECKING:
-    from vcam_cli.capture_schedules.study import ScheduleResult
 
 CAPTIONS = {
     "schedule.csv": "The capture times of every method, relative to the first.",

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 from numpy.typing import NDArray
 
@@ -38,6 +37,7 @@ from vcam_cli.capture_schedules.online_loss import OnlineLoss
 from vcam_cli.capture_schedules.pdf_source import BINS
 from vcam_cli.capture_schedules.photocurrents import Approximation
 from vcam_cli.capture_schedules.schedule_file import ScheduleFile
+from vcam_cli.capture_schedules.schedule_result import ApproximationStep, ScheduleResult
 from vcam_cli.errors import BadInput
 from vcam_cli.files.folder import OutputFolder
 from vcam_cli.files.plots import in_formats
@@ -51,108 +51,6 @@ MOST_ASSIGNMENTS = 5000
 """Assignments of captures to segments that are searched: about a minute with one start."""
 LEAST_SNR = 1e-200
 """Least mean SNR of a single capture: below it, products of what schedules are worth underflow."""
-
-
-@dataclass(frozen=True)
-class ApproximationStep:
-    """A pdf approximated by so many segments, and the schedules found on it."""
-
-    density: str
-    segments: int
-    plan: Pdf
-    found: tuple[MethodResult, ...]
-
-
-@dataclass(frozen=True)
-class ScheduleResult:
-    """The schedules of a study, and what they are worth.
-
-    Parameters
-    ----------
-    study : ScheduleFile
-        The study as it was read.
-    out : Path
-        The output folder.
-    task : Task
-        The pdf, the sensor and their bounds.
-    approximation : Approximation or None
-        The pdf in fewer segments, where the study asks for it.
-    found : tuple of MethodResult
-        Schedules of all methods and numbers of captures, in the study's order.
-    steps : tuple of ApproximationStep
-        Schedules found on approximations, where the study asks for several.
-    targets : tuple of FewestCaptures
-        The fewest captures that reach each gain that the study names.
-    online : tuple of OnlineLoss
-        What choosing times while capturing loses, where the study asks for it.
-    frames : Frames or None
-        Pictures taken with several schedules, where the study asks for them.
-    notes : tuple of str
-        What a user should know beside the numbers.
-    seconds : float
-        Time the study took.
-    """
-
-    study: ScheduleFile
-    out: Path
-    task: Task
-    approximation: Approximation | None
-    found: tuple[MethodResult, ...]
-    steps: tuple[ApproximationStep, ...] = ()
-    targets: tuple[FewestCaptures, ...] = ()
-    online: tuple[OnlineLoss, ...] = ()
-    frames: Frames | None = None
-    notes: tuple[str, ...] = ()
-    seconds: float = 0.0
-
-    @property
-    def summary_rows(self) -> list[dict[str, Any]]:
-        """The rows of summary.csv, with the names of its columns; None where a cell is empty."""
-        return tables.summary_dicts(self.task, self.found)
-
-    @property
-    def schedule_rows(self) -> list[dict[str, Any]]:
-        """The rows of schedule.csv, with the names of its columns."""
-        columns = tables.schedule_columns(self.study.model)
-        rows = tables.schedule_rows(self.study.model, self.found)
-        return [dict(zip(columns, row, strict=True)) for row in rows]
-
-    @property
-    def rows(self) -> list[dict[str, Any]]:
-        """The rows of schedule.csv: what pandas and polars read, as `summary_rows`."""
-        return self.schedule_rows
-
-    def __repr__(self) -> str:
-        """Return a line: name, number of schedules, numbers of captures."""
-        model, counts = self.study.model, self.study.model.counts
-        several = f"{min(counts)} to {max(counts)}" if len(counts) > 1 else f"{counts[0]}"
-        return f"<ScheduleResult {model.name}: {len(self.found)} schedules of {several} captures>"
-
-    def times(self, method: str, count: int) -> NDArray:
-        """Return capture times (N,) [s]; without a sensor in 1 / the pdf's unit.
-
-        Raises
-        ------
-        KeyError
-            If the study has no such method and number of captures.
-        """
-        for one in self.found:
-            if (one.method, one.count) == (method, count):
-                return one.schedule.times
-        raise KeyError((method, count))
-
-    def summary(self) -> dict[str, Any]:
-        """Return what `--json` prints."""
-        return {
-            "name": self.study.model.name,
-            "out": str(self.out),
-            "summary": self.summary_rows,
-            "schedule": self.schedule_rows,
-            "targets": [vars(target) for target in self.targets],
-            **({"frames": list(self.frames.dicts())} if self.frames else {}),
-            "notes": list(self.notes),
-            "seconds": self.seconds,
-        }
 
 
 @own_float_errors

@@ -5,71 +5,31 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from vcam_cli.capture_schedules import online_loss, pdf_scale
 from vcam_cli.capture_schedules import schedule_plots as plots
 from vcam_cli.capture_schedules.methods import MethodResult, Task
 from vcam_cli.capture_schedules.model import ScheduleStudy
+from vcam_cli.capture_schedules.schedule_result import ScheduleResult
+from vcam_cli.capture_schedules.schedule_rows import (
+    SUMMARY,
+    Row,
+    schedule_columns,
+    schedule_rows,
+    summary_rows,
+)
 from vcam_cli.files.report import hash_file
-from vcam_cli.files.tables import Cell, write_table
+from vcam_cli.files.tables import write_table
 from vcam_cli.scheduling.objective import expected_snr_noisy_saturation
 from vcam_cli.simulation.output import provenance
 
-if TYPE_CHECKING:
-    from vcam_cli.capture_schedules.study import ScheduleResult
-
-SCHEDULE = ("count", "method", "capture", "time_ratio", "photocurrent")
-TIME = "time [s]"
-"""The further column where there is a sensor."""
-SUMMARY = (
-    *("count", "method", "expected_snr", "single_capture_snr", "gain"),
-    *("upper_bound", "gap", "used", "seconds"),
-)
 SEGMENTS = ("segments", *SUMMARY[:5], "density")
 TARGETS = ("target", "captures", "gain", "upper_bound")
 NOTED_LOSS = 0.05
 """Relative loss from which on a note is given."""
 
-Row = tuple[Cell, ...]
 Writers = dict[str, Callable[[Path], None]]
-
-
-def schedule_columns(study: ScheduleStudy) -> tuple[str, ...]:
-    """Return the columns of schedule.csv."""
-    return SCHEDULE if study.sensor is None else (*SCHEDULE, TIME)
-
-
-def schedule_rows(study: ScheduleStudy, found: Sequence[MethodResult]) -> Iterator[Row]:
-    """Yield the rows of schedule.csv, one a capture."""
-    for one in found:
-        times, photocurrents = one.schedule.times, one.schedule.photocurrents
-        for k, (when, i) in enumerate(zip(times, photocurrents, strict=True), 1):
-            row = (one.count, one.method, k, float(when / times[0]), float(i))
-            yield row if study.sensor is None else (*row, float(when))
-
-
-def summary_rows(task: Task, found: Sequence[MethodResult]) -> Iterator[Row]:
-    """Yield the rows of summary.csv; the gap is empty where none is certified."""
-    for one in found:
-        gap = one.schedule.gap
-        yield (
-            one.count,
-            one.method,
-            one.schedule.expected_snr,
-            task.single,
-            task.gain(one.schedule),
-            one.bound / task.single,
-            "" if gap is None else float(gap),
-            one.distinct_captures,
-            round(one.seconds, 6),
-        )
-
-
-def summary_dicts(task: Task, found: Sequence[MethodResult]) -> list[dict[str, Any]]:
-    """Return the rows of summary.csv as mappings, None in place of an empty cell."""
-    rows = (dict(zip(SUMMARY, row, strict=True)) for row in summary_rows(task, found))
-    return [{k: None if v == "" else v for k, v in row.items()} for row in rows]
 
 
 def segments_rows(result: ScheduleResult) -> Iterator[Row]:

@@ -9,7 +9,7 @@ from vcam_cli.commands import options
 from vcam_cli.commands.progress import Progress
 
 if TYPE_CHECKING:
-    from vcam_cli.fitting.fit import Fit
+    from vcam_cli.fitting.result import Fit
 
 
 def fit(

@@ -162,7 +162,7 @@ COLUMNS: Mapping[str, str] = {
 def written() -> dict[str, tuple[str, ...]]:
     """Return the columns of the tables that commands write, by the table's name."""
     from vcam_cli.accuracy_study import setting_errors
-    from vcam_cli.capture_schedules import frames, online_loss, tables
+    from vcam_cli.capture_schedules import frames, online_loss, schedule_rows, tables
     from vcam_cli.characterization import datasheet
     from vcam_cli.files.tables import METRIC_COLUMNS
     from vcam_cli.fitting import edge, parameters
@@ -173,8 +173,8 @@ def written() -> dict[str, tuple[str, ...]]:
         "characterize.csv": datasheet.COLUMNS,
         "parameters.csv": parameters.COLUMNS,
         "mtf.csv": edge.COLUMNS,
-        "schedule.csv": (*tables.SCHEDULE, "time"),
-        "summary.csv": tables.SUMMARY,
+        "schedule.csv": (*schedule_rows.SCHEDULE, "time"),
+        "summary.csv": schedule_rows.SUMMARY,
         "segments.csv": tables.SEGMENTS,
         "targets.csv": tables.TARGETS,
         "online.csv": online_loss.COLUMNS,

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from vcam_cli.capture_schedules.fewest_captures import FewestCaptures
-    from vcam_cli.capture_schedules.study import ScheduleResult
+    from vcam_cli.capture_schedules.schedule_result import ScheduleResult
 
 MOST_TIMES = 10
 """The number of captures whose times are shown."""

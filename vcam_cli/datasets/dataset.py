@@ -25,9 +25,9 @@ from vcam_cli.files.records import Fingerprint
 from vcam_cli.files.report import hash_file, hash_text, to_json
 from vcam_cli.progress import Observer, Silent
 from vcam_cli.simulation.output import provenance
+from vcam_cli.sweeps.execution import Execution
 from vcam_cli.sweeps.point_execution import claim_point, compute, keep_outcome
 from vcam_cli.sweeps.point_work import Task
-from vcam_cli.sweeps.sweep import Execution
 from vcam_cli.sweeps.sweep_points import LIBRARIES, hash_of
 from vcam_cli.sweeps.sweep_result import Outcome, read_outcome
 from vcam_cli.sweeps.workers import Verdict

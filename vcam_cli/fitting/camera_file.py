@@ -7,16 +7,14 @@ and falls off nowhere, since flat frames are taken without it.
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from vcam_cli import units
 from vcam_cli.fitting.conditions import Conditions, usual_temperature
 from vcam_cli.fitting.pattern import CYCLES
+from vcam_cli.fitting.result import Fit
 from vcam_cli.fitting.sensor import Transfer
 from vcam_cli.physics.radiometry import irradiance_per_radiance
-
-if TYPE_CHECKING:
-    from vcam_cli.fitting.fit import Fit
 
 MTF = "mtf.csv"
 """The file of the lens's transfer, beside the camera file."""

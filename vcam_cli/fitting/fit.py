@@ -7,8 +7,7 @@ measurement file -> frames (`frames`) -> statistics of each stack (`conditions`,
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,8 +25,9 @@ from vcam_cli.fitting.conditions import (
 )
 from vcam_cli.fitting.light_check import check_light
 from vcam_cli.fitting.noise_shape import is_significant, neighbor_correlation, tail_shape
-from vcam_cli.fitting.parameters import COLUMNS, SIGMAS, Parameter, deviation, parameter
+from vcam_cli.fitting.parameters import SIGMAS, Parameter, deviation, parameter
 from vcam_cli.fitting.pattern import CYCLES
+from vcam_cli.fitting.result import Fit
 from vcam_cli.fitting.traps import LEAST_FRAMES, Traps, find_traps
 from vcam_cli.progress import Observer, Silent
 from vcam_cli.quality.mtf import EdgeResponse
@@ -39,41 +39,6 @@ from vcam_cli.verification.stack_statistics import Estimate, combine
 
 NEAR = 0.15
 """How far from half of saturation a stack may be that tells the spread of gains."""
-
-
-@dataclass
-class Fit:
-    """A sensor as its frames tell it."""
-
-    measurement: Measurement
-    parameters: list[Parameter] = field(default_factory=list)
-    notes: list[str] = field(default_factory=list)
-    unknown: list[str] = field(default_factory=list)
-    """What the frames cannot tell, and is left at its default."""
-    camera: dict[str, Any] = field(default_factory=dict)
-    """The camera file."""
-    dark: tuple[Condition, ...] = ()
-    """The dark stacks, by exposure time."""
-    line: sensor.Dark | None = None
-    """The line of their means over time."""
-    curves: list[sensor.Transfer] = field(default_factory=list)
-    """The photon transfer of every color in every light."""
-    lens: edge.LensTransfer | None = None
-    """What an edge tells of the lens."""
-
-    def value(self, name: str) -> float | None:
-        """Return an estimate, None where there is none."""
-        return next((p.value for p in self.parameters if p.name == name), None)
-
-    def report(self) -> dict[str, Any]:
-        """Return what `fit.json` and `--json` say."""
-        return {
-            "name": self.measurement.name,
-            "parameters": [dict(zip(COLUMNS, p.cells, strict=True)) for p in self.parameters],
-            "notes": self.notes,
-            "unknown": self.unknown,
-            "camera": self.camera,
-        }
 
 
 def fit(measurement: Measurement, watch: Observer | None = None) -> Fit:

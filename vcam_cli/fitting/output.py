@@ -12,9 +12,9 @@ from vcam_cli.files.atomic import write_text
 from vcam_cli.files.folder import OutputFolder
 from vcam_cli.fitting.camera_file import MTF
 from vcam_cli.fitting.edge import COLUMNS as LENS_COLUMNS
-from vcam_cli.fitting.fit import Fit
 from vcam_cli.fitting.parameters import COLUMNS
 from vcam_cli.fitting.plots import plots
+from vcam_cli.fitting.result import Fit
 from vcam_cli.reports.page import note_facts
 from vcam_cli.simulation.output.study_files import write_study
 

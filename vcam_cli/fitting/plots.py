@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from vcam_cli.files.plots import COLORS, MARKERS, plot_figure
-from vcam_cli.fitting.fit import Fit
 from vcam_cli.fitting.parameters import Parameter
+from vcam_cli.fitting.result import Fit
 from vcam_cli.quality.photon_transfer import GAIN_RANGE
 
 MOST = 999.0

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcam_cli.camera import load as files
-from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.camera import Camera, example
 from vcam_cli.camera.derived.geometry import geometry
 from vcam_cli.camera.derived.image_motion import check_motion
 from vcam_cli.camera.derived.lattice import places
@@ -46,7 +46,7 @@ def check_effects(camera: Camera) -> None:
     """
     if not isinstance(camera.effects, dict) or "on" not in camera.effects.values():
         return
-    good = files.example()
+    good = example()
     names = ("conversion_gain", "voltage_swing", "full_well")
     solved = {name: getattr(good.pixel.readout, name) for name in names}
     readout = camera.pixel.readout.model_copy(update=solved)

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from vcam_cli.files.optional_library import optional_library
-
-if TYPE_CHECKING:
-    from vcam_cli.simulation.simulate import Result
+from vcam_cli.simulation.photograph import Photograph
 
 Labeled = tuple[tuple[str, ...], Any, dict[str, str]]
 """Dimensions, values, attributes: what xarray makes a variable of."""
@@ -16,7 +14,7 @@ NEEDS = "labeled arrays"
 """What needs xarray, as a message begins."""
 
 
-def frame_dataset(result: Result) -> Any:
+def frame_dataset(result: Photograph) -> Any:
     """Return the raw frame of a result as an `xarray.Dataset`.
 
     Variables are `dn`, `electrons`, `mean_electrons`, `volts` where the camera knows them, `color`,
@@ -40,7 +38,7 @@ def frame_dataset(result: Result) -> Any:
     return xarray.Dataset(variables, coordinates, _attributes(result))
 
 
-def _dimensions(result: Result) -> tuple[str, ...]:
+def _dimensions(result: Photograph) -> tuple[str, ...]:
     """Return the names of the dimensions of `dn`."""
     layout = result.frame.layout
     if result.dn.ndim == 1:
@@ -49,7 +47,7 @@ def _dimensions(result: Result) -> tuple[str, ...]:
     return (*rows, "plane") if layout.full_color else rows
 
 
-def _coordinates(result: Result, dims: tuple[str, ...]) -> Iterator[tuple[str, Labeled]]:
+def _coordinates(result: Photograph, dims: tuple[str, ...]) -> Iterator[tuple[str, Labeled]]:
     for name, values, said in (
         ("x", result.x, "right of the center of the array"),
         ("y", result.y, "below the center of the array"),
@@ -62,7 +60,7 @@ def _coordinates(result: Result, dims: tuple[str, ...]) -> Iterator[tuple[str, L
         yield "time", (("time",), list(result.times), {"units": "s"})
 
 
-def _raw_variables(result: Result, dims: tuple[str, ...]) -> Iterator[tuple[str, Labeled]]:
+def _raw_variables(result: Photograph, dims: tuple[str, ...]) -> Iterator[tuple[str, Labeled]]:
     named = {"dn": "DN", "electrons": "e", "mean_electrons": "e"}
     if result.frame.electrical.has_volts:
         named["volts"] = "V"
@@ -76,7 +74,7 @@ def _raw_variables(result: Result, dims: tuple[str, ...]) -> Iterator[tuple[str,
         yield "photocurrent", (dims, result.photocurrent, {"units": "e/s"})
 
 
-def _attributes(result: Result) -> dict[str, Any]:
+def _attributes(result: Photograph) -> dict[str, Any]:
     """Return what is said of the whole frame, as numbers and texts that NetCDF can hold."""
     camera, metrics = result.frame.camera, result.metrics
     return {

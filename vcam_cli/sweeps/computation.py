@@ -23,6 +23,7 @@ from vcam_cli.sweeps import (
     sweep_report,
     sweep_tables,
 )
+from vcam_cli.sweeps.execution import Execution
 from vcam_cli.sweeps.point_effects import effect_differences
 from vcam_cli.sweeps.point_execution import (
     claim_point,
@@ -32,7 +33,6 @@ from vcam_cli.sweeps.point_execution import (
 )
 from vcam_cli.sweeps.point_work import Job, Task
 from vcam_cli.sweeps.study_cameras import StudyCameras
-from vcam_cli.sweeps.sweep import Execution
 from vcam_cli.sweeps.sweep_file import StudyFile
 from vcam_cli.sweeps.sweep_points import LIBRARIES, Grid
 from vcam_cli.sweeps.sweep_result import (

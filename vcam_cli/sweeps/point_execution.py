@@ -15,8 +15,8 @@ from vcam_cli.errors import BadInput
 from vcam_cli.files.points_store import SweepFolder
 from vcam_cli.progress import Observer
 from vcam_cli.sweeps import workers
+from vcam_cli.sweeps.execution import Execution, Share
 from vcam_cli.sweeps.point_work import Task
-from vcam_cli.sweeps.sweep import Execution, Share
 from vcam_cli.sweeps.sweep_result import Outcome, error_cell
 from vcam_cli.sweeps.workers import Groups, Verdict
 

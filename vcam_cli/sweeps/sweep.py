@@ -10,9 +10,8 @@ from __future__ import annotations
 import sys
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
-from urllib.parse import urlsplit
 
 from vcam_cli.arguments import (
     brief,
@@ -23,45 +22,13 @@ from vcam_cli.arguments import (
 )
 from vcam_cli.camera.expectations import notes
 from vcam_cli.config.study_overrides import split_sets
-from vcam_cli.errors import bad
 from vcam_cli.floats import own_float_errors
 from vcam_cli.progress import Callback, Observer, observer
 from vcam_cli.sweeps import sweep_file
+from vcam_cli.sweeps.execution import Execution, Share
 from vcam_cli.sweeps.limits import missed_limits, study_limits
 from vcam_cli.sweeps.model import Sweep
 from vcam_cli.sweeps.sweep_result import Extras, SweepResult, finished_result, request_hash
-
-
-@dataclass(frozen=True)
-class Share:
-    """One of several shares of the points."""
-
-    number: int
-    count: int
-
-    def __post_init__(self) -> None:
-        if not 1 <= self.number <= self.count:
-            message = f"there is no share {self.number} of {self.count}"
-            raise bad(
-                "--shard", message, f"write 1/{max(1, self.count)} to {self.count}/{self.count}"
-            )
-
-
-@dataclass(frozen=True)
-class Execution:
-    """Which points of a sweep are computed, and by whom."""
-
-    share: Share | None = None
-    workers: int | None = None
-    """Processes; None for one a core."""
-    scheduler: str | None = None
-    """The address of a Dask scheduler that computes in their place."""
-    fresh: bool = False
-    """Whether finished points are computed again."""
-
-    def __post_init__(self) -> None:
-        if self.scheduler is not None:
-            _check_address(self.scheduler)
 
 
 def _check_arguments(
@@ -79,19 +46,6 @@ def _check_arguments(
             raise TypeError(f"shard={brief(shard)} is no share; write shard=(1, 4)")
         for part in shard:
             require_whole(part, "share", -sys.maxsize)
-
-
-def _check_address(address: str) -> None:
-    """Raise BadInput for what is no address of a scheduler, before Dask sees it."""
-    try:
-        parts = urlsplit(address if "://" in address else f"tcp://{address}")
-        is_address = parts.scheme in ("tcp", "tls") and parts.hostname and parts.port
-    except ValueError:
-        is_address = False
-    rest = address.rpartition("://")[2]
-    if not is_address or not rest.isprintable() or set(rest) & set(" /?#@\\"):
-        message = f"{address!a} is no address of a Dask scheduler"
-        raise bad("--scheduler", message, "write tcp://HOST:8786")
 
 
 @own_float_errors

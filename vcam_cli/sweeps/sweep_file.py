@@ -19,6 +19,7 @@ from pydantic import ValidationError
 
 from vcam_cli import errors, units
 from vcam_cli.camera import load as cameras
+from vcam_cli.camera.camera import FORMAT
 from vcam_cli.camera.load import merge
 from vcam_cli.config import validation_messages
 from vcam_cli.config.document import Document, given_at, place_order
@@ -138,7 +139,7 @@ class StudyFile(PlacedKeys):
         Names of parts are looked up anew for every camera, so what they lead to may change with no
         change of a file.
         """
-        nothing = Document(self.file, Node({}, Source("", self.file.parent)), cameras.FORMAT)
+        nothing = Document(self.file, Node({}, Source("", self.file.parent)), FORMAT)
         yield nothing.overlay(over)
         for case in (None, *self.model.cases):
             for parameter in (self.case_parameters(case) | self.averaged_parameters()).values():

@@ -21,9 +21,9 @@ from typing import Any
 
 from vcam_cli.camera import load as cameras
 from vcam_cli.camera import step_plugins
-from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.camera import FILE_KEYS, Camera
 from vcam_cli.camera.expectations import unmeasured
-from vcam_cli.camera.load import FILE_KEYS, merge
+from vcam_cli.camera.load import merge
 from vcam_cli.camera.simulation import Seed
 from vcam_cli.config.document import Document
 from vcam_cli.config.file_format import names_file

@@ -2,7 +2,8 @@
 
 from pathlib import Path
 
-from vcam_cli.camera.load import MERGE_RULES, PICTURES
+from vcam_cli.camera.camera import MERGE_RULES
+from vcam_cli.camera.hint_tables import PICTURES
 from vcam_cli.config import document
 from vcam_cli.config.file_format import FileFormat
 from vcam_cli.config.file_names import current_folder

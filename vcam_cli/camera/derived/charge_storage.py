@@ -13,9 +13,9 @@ holds is the less of its own capacity and the diffusion's.
 
 from __future__ import annotations
 
-from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.pixel_layout import detector
 from vcam_cli.camera.derived.process import Need, Process, process
+from vcam_cli.camera.model import CameraModel
 from vcam_cli.errors import bad
 from vcam_cli.physics import charge_storage as physics
 from vcam_cli.physics.silicon import intrinsic_concentration
@@ -67,7 +67,7 @@ def gate_well(made: Process, need: Need) -> physics.GateWell:
     return found
 
 
-def capacity(camera: Camera) -> float | None:
+def capacity(camera: CameraModel) -> float | None:
     """Return the electrons that the photodetector itself holds; None where its swing decides.
 
     Raises BadInput where numbers of its structure are missing.

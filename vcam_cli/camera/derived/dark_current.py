@@ -13,12 +13,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived import sense_node
 from vcam_cli.camera.derived.charge_storage import TRANSFERRED
 from vcam_cli.camera.derived.junction import depletion_width
 from vcam_cli.camera.derived.pixel_layout import detector
 from vcam_cli.camera.derived.process import Need, Process, process
+from vcam_cli.camera.model import CameraModel
 from vcam_cli.camera.sensor.photodetector import DarkCurrentDensity
 from vcam_cli.errors import bad
 from vcam_cli.physics import junction as physics
@@ -35,7 +35,7 @@ DOUBLING = 8.0
 _PATH = "pixel.photodetector.dark_current_density"
 
 
-def dark_rate(camera: Camera) -> float:
+def dark_rate(camera: CameraModel) -> float:
     """Return the dark current of a pixel at its temperature [e/s].
 
     It is what the file gives; `junction` is eq 2.31 of [1] and what the technology adds along the
@@ -69,12 +69,12 @@ def dark_rate(camera: Camera) -> float:
     return current / readout.ELEMENTARY_CHARGE * own.dark_current_scale
 
 
-def _junction_density(camera: Camera, made: Process) -> float:
+def _junction_density(camera: CameraModel, made: Process) -> float:
     """Return the dark current density by eq 2.31 of [1] at the pixel's temperature [A/m2]."""
     return sum(junction_parts(camera, made))
 
 
-def junction_parts(camera: Camera, made: Process) -> tuple[float, float, float]:
+def junction_parts(camera: CameraModel, made: Process) -> tuple[float, float, float]:
     """Return the terms of eq 2.31 of [1] at the pixel's temperature [A/m2].
 
     They are diffusion from the n region, generation in the depletion region, diffusion from the p
@@ -101,7 +101,7 @@ def junction_parts(camera: Camera, made: Process) -> tuple[float, float, float]:
     return float(holes), float(generation), float(electrons)
 
 
-def highest_field(camera: Camera, made: Process, need: Need, bias: float) -> float:
+def highest_field(camera: CameraModel, made: Process, need: Need, bias: float) -> float:
     """Return the highest field of an abrupt junction of the measured capacitance [V/m], [3].
 
     It is 2 (V + phi) / W at a reverse bias [V]. Raises BadInput where numbers are missing.
@@ -111,7 +111,7 @@ def highest_field(camera: Camera, made: Process, need: Need, bias: float) -> flo
     return 2 * (bias + built_in) / float(physics.depletion_width(per_area))
 
 
-def field_factor(camera: Camera, made: Process, need: Need) -> float:
+def field_factor(camera: CameraModel, made: Process, need: Need) -> float:
     """Return by how much tunneling by traps raises the generation, over the swing and the region.
 
     In an abrupt junction the field falls straight from its highest value to 0.
@@ -133,7 +133,7 @@ def _intrinsic(temperature: float) -> float:
         ) from None
 
 
-def _density_at_temperature(camera: Camera, made: Process, density: float | None) -> float:
+def _density_at_temperature(camera: CameraModel, made: Process, density: float | None) -> float:
     """Return a current density of the technology at the pixel's temperature; 0 where none is."""
     if not density:
         return 0.0
@@ -142,7 +142,7 @@ def _density_at_temperature(camera: Camera, made: Process, density: float | None
     return density * _growth(camera, given.temperature, doubling, path)
 
 
-def _growth(camera: Camera, temperature: float | None, doubling: float, path: str) -> float:
+def _growth(camera: CameraModel, temperature: float | None, doubling: float, path: str) -> float:
     """Return the factor on a dark current from a temperature [K], if any, to the pixel's, [2]."""
     if temperature is None:
         return 1.0

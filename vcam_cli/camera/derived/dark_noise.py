@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 
-from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.model import CameraModel
 from vcam_cli.camera.sensor.architecture import ARCHITECTURES
 from vcam_cli.physics import readout
 
@@ -17,12 +17,12 @@ SIGMAS = 4.0
 """Standard deviations below black that an automatic offset keeps: 3 of 100 000 pixels are lower."""
 
 
-def reset_noise(camera: Camera, capacitance: float | None) -> float:
+def reset_noise(camera: CameraModel, capacitance: float | None) -> float:
     """Return the noise that the reset leaves in a frame [e rms].
 
     Parameters
     ----------
-    camera : Camera
+    camera : CameraModel
         The camera.
     capacitance : float or None
         Capacitance of the photodiode's node [F]; needed where its kTC noise is asked for.
@@ -46,12 +46,12 @@ def reset_noise(camera: Camera, capacitance: float | None) -> float:
     return float(variance) ** 0.5
 
 
-def dark_noise(camera: Camera, capacitance: float | None) -> float:
+def dark_noise(camera: CameraModel, capacitance: float | None) -> float:
     """Return the spread of pixels in the dark, temporal and fixed pattern together [e rms].
 
     Parameters
     ----------
-    camera : Camera
+    camera : CameraModel
         The camera.
     capacitance : float or None
         Capacitance of the photodiode's node [F].

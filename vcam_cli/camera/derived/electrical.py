@@ -7,13 +7,13 @@ from dataclasses import dataclass
 
 from numpy.typing import NDArray
 
-from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived import sense_node
 from vcam_cli.camera.derived.charge_storage import capacity
 from vcam_cli.camera.derived.dark_noise import SIGMAS, dark_noise
 from vcam_cli.camera.derived.mosaic import BLOCKS
 from vcam_cli.camera.derived.transfer_curve import PATH as CURVE
 from vcam_cli.camera.derived.transfer_curve import Curve, transfer_curve
+from vcam_cli.camera.model import CameraModel
 from vcam_cli.camera.sensor.adc import Adc
 from vcam_cli.camera.sensor.architecture import ARCHITECTURES
 from vcam_cli.camera.sensor.pixel import AGREE
@@ -108,7 +108,7 @@ class Electrical:
         return (self.highest_code - self.offset) * self.electrons_per_dn
 
 
-def electrical(camera: Camera) -> Electrical:
+def electrical(camera: CameraModel) -> Electrical:
     """Return the solved readout of a camera: any two of gain, swing and well give the third.
 
     The technology fills in what the file leaves open: the capacitance and with it the gain
@@ -203,7 +203,7 @@ def _check_counts(found: Electrical) -> None:
             raise bad(path, message, "look for a wrong unit in conversion_gain, swing or gain")
 
 
-def check(camera: Camera) -> None:
+def check(camera: CameraModel) -> None:
     """Raise BadInput when the readout is open, contradicts itself or lacks volts it needs."""
     pixel, adc = camera.pixel, camera.adc
     found = electrical(camera)
@@ -226,7 +226,7 @@ def check(camera: Camera) -> None:
         raise no_volts("output.raw", "volts", "leave volts out")
 
 
-def _check_black_levels(camera: Camera, found: Electrical) -> None:
+def _check_black_levels(camera: CameraModel, found: Electrical) -> None:
     """Raise BadInput for black levels by color of a sensor that has none simulated."""
     block = BLOCKS.get(str(camera.array.pattern), ())
     colors = {color for row in block for color in row}
@@ -259,7 +259,7 @@ def no_volts(path: str, what: str, instead: str) -> BadInput:
     )
 
 
-def _swing(camera: Camera, capacitance: float | None) -> float | None:
+def _swing(camera: CameraModel, capacitance: float | None) -> float | None:
     """Return the technology's swing [V], or less where the photodetector holds less."""
     swing, gain = sense_node.voltage_swing(camera), camera.pixel.readout.conversion_gain
     if gain is None and capacitance is not None:
@@ -270,7 +270,7 @@ def _swing(camera: Camera, capacitance: float | None) -> float | None:
     return min(swing, held * gain)
 
 
-def _counts_only(camera: Camera) -> bool:
+def _counts_only(camera: CameraModel) -> bool:
     """Return whether the file gives the well in electrons and no volts, as data sheets do."""
     given = camera.pixel.readout
     volts = given.conversion_gain is not None or given.voltage_swing is not None

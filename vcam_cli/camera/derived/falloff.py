@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry, geometry
+from vcam_cli.camera.model import CameraModel
 from vcam_cli.camera.optics import FalloffFile
 from vcam_cli.errors import bad, data_file_problems
 from vcam_cli.spectra.text import read_rows
@@ -27,7 +27,7 @@ class Falloff:
     """Illumination relative to the axis: the first is 1."""
 
 
-def falloff(camera: Camera, geometry: Geometry) -> Falloff | None:
+def falloff(camera: CameraModel, geometry: Geometry) -> Falloff | None:
     """Return the table that `optics.off_axis` names; None where it names none.
 
     Raises BadInput for a file that cannot be read, is no such table, or ends before the corner of
@@ -48,7 +48,7 @@ def falloff(camera: Camera, geometry: Geometry) -> Falloff | None:
     return Falloff(tuple(heights), tuple(values / values[0]))
 
 
-def check(camera: Camera) -> None:
+def check(camera: CameraModel) -> None:
     """Raise BadInput where the relative illumination is not to be had."""
     if isinstance(camera.optics.off_axis, FalloffFile):
         falloff(camera, geometry(camera))

@@ -20,8 +20,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.lattice import lattice
+from vcam_cli.camera.model import CameraModel
 from vcam_cli.camera.sensor.architecture import ARCHITECTURES, article
 from vcam_cli.camera.sensor.pixel import ChargeTransfer, Timing
 from vcam_cli.errors import bad
@@ -48,7 +48,7 @@ class FrameRate:
         return 1 / (self.readout_time + exposure)
 
 
-def frame_rate(camera: Camera) -> FrameRate | None:
+def frame_rate(camera: CameraModel) -> FrameRate | None:
     """Return the readout of a camera's frame; None where its file says nothing of clocks.
 
     Raises BadInput where a clock is missing, or too fast for the charge transfer it comes with.
@@ -87,7 +87,7 @@ def frame_rate(camera: Camera) -> FrameRate | None:
     return FrameRate(rows * row, rolling is not None, reason)
 
 
-def _of_registers(camera: Camera, given: Timing, transfer: ChargeTransfer) -> FrameRate:
+def _of_registers(camera: CameraModel, given: Timing, transfer: ChargeTransfer) -> FrameRate:
     """Return the readout of a ccd, whose clocks wait for the charge."""
     rows, columns = _read(camera)
     solved = lattice(camera)
@@ -113,7 +113,7 @@ def _of_registers(camera: Camera, given: Timing, transfer: ChargeTransfer) -> Fr
     return FrameRate(rows * row, True, reason)
 
 
-def _read(camera: Camera) -> tuple[int, int]:
+def _read(camera: CameraModel) -> tuple[int, int]:
     """Return the rows and columns that are read, of pixels that are joined before that as one."""
     pixels, joined = lattice(camera), camera.array.binning
     if joined is None or joined.kind == "digital":
@@ -128,6 +128,6 @@ def _text(seconds: float) -> str:
     return f"{seconds * 1e9:.4g} ns"
 
 
-def check(camera: Camera) -> None:
+def check(camera: CameraModel) -> None:
     """Raise BadInput where the clocks contradict themselves."""
     frame_rate(camera)

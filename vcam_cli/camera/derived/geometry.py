@@ -13,7 +13,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.lattice import lattice
 from vcam_cli.camera.derived.lens import lens, scene_distance
 from vcam_cli.camera.derived.pixel_layout import (
@@ -23,6 +22,7 @@ from vcam_cli.camera.derived.pixel_layout import (
     detector_area,
     sampling_scale,
 )
+from vcam_cli.camera.model import CameraModel
 from vcam_cli.camera.scene.scene import Extent
 from vcam_cli.errors import Collector, bad
 from vcam_cli.physics import depth_of_field, diffraction, radiometry
@@ -218,7 +218,7 @@ class Geometry:
         }
 
 
-def geometry(camera: Camera) -> Geometry:
+def geometry(camera: CameraModel) -> Geometry:
     """Return the solved geometry of a camera.
 
     Raises BadInput with every contradiction found: an object at or inside the focal length, optics
@@ -293,18 +293,18 @@ def pixel_centers(geometry: Geometry, detector: bool = False) -> tuple[NDArray, 
     return x * g.sampling_scale + g.collecting_x, y * g.sampling_scale + g.collecting_y
 
 
-def check(camera: Camera) -> None:
+def check(camera: CameraModel) -> None:
     """Raise BadInput where the camera's geometry contradicts itself."""
     geometry(camera)
 
 
-def _areas(camera: Camera) -> tuple[Area, Area]:
+def _areas(camera: CameraModel) -> tuple[Area, Area]:
     """Return the photodetector, and the area whose light it receives."""
     found = detector_area(camera)
     return found, collecting_area(camera, found)
 
 
-def _scene_width(camera: Camera, scale: float) -> float | None:
+def _scene_width(camera: CameraModel, scale: float) -> float | None:
     extent = camera.scene.extent
     if not isinstance(extent, Extent):
         return None

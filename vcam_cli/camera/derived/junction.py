@@ -9,10 +9,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.charge_storage import gate_well, pinned_layer
 from vcam_cli.camera.derived.process import Need, Process, process
 from vcam_cli.camera.derived.sense_node import area_capacitance
+from vcam_cli.camera.model import CameraModel
 from vcam_cli.errors import bad
 from vcam_cli.physics import junction
 
@@ -29,7 +29,7 @@ class Depths:
     """Depth at which electrons are lost to the bottom."""
 
 
-def depths(camera: Camera, need: Need) -> Depths:
+def depths(camera: CameraModel, need: Need) -> Depths:
     """Return the depths of a camera's junction; a photogate's begin at the surface of the silicon.
 
     Raises BadInput where numbers are missing.
@@ -42,7 +42,7 @@ def depths(camera: Camera, need: Need) -> Depths:
     return Depths(x1, x1 + width, x1 + width + neutral)
 
 
-def depletion_width(camera: Camera, made: Process, given: float | str, need: Need) -> float:
+def depletion_width(camera: CameraModel, made: Process, given: float | str, need: Need) -> float:
     """Return the width of the depletion region [m].
 
     It is the number given; else of a diffusion or a well permittivity over the junction's mean

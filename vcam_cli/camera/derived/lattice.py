@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.model import CameraModel
 from vcam_cli.camera.sensor.array import CLEAR, Positions
 from vcam_cli.errors import bad, data_file_problems
 from vcam_cli.spectra.text import parse_numbers, read_table
@@ -58,7 +58,7 @@ class Places:
     colors: tuple[str, ...]
 
 
-def lattice(camera: Camera) -> Lattice:
+def lattice(camera: CameraModel) -> Lattice:
     """Return the lattice of a camera's pixels; pixels at places of their own are one row.
 
     Raises BadInput for a die smaller than a pixel, a file of positions that is none, and one of an
@@ -108,7 +108,7 @@ def _require_axis_inside(found: Places, pitch_x: float, pitch_y: float) -> None:
         )
 
 
-def places(camera: Camera) -> Places:
+def places(camera: CameraModel) -> Places:
     """Return the pixels of a camera whose pattern is a file of positions. Raises BadInput."""
     assert isinstance(camera.array.pattern, Positions)
     file = camera.array.pattern.positions

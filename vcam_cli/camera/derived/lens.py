@@ -6,8 +6,8 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.lattice import lattice
+from vcam_cli.camera.model import CameraModel
 from vcam_cli.camera.optics import LEAST_F_NUMBER, MOST_F_NUMBER
 from vcam_cli.camera.sensor.pixel import AGREE
 from vcam_cli.errors import bad
@@ -41,19 +41,19 @@ class Lens:
         return (1 - self.magnification) * self.focal_length / distance
 
 
-def scene_distance(camera: Camera) -> float:
+def scene_distance(camera: CameraModel) -> float:
     """Return the distance from the lens to the scene [m]; of many distances that in focus."""
     own = camera.scene.has_distances
     return focus_distance(camera) if own else camera.scene.distance
 
 
-def focus_distance(camera: Camera) -> float:
+def focus_distance(camera: CameraModel) -> float:
     """Return the distance from the lens to what is in focus [m]."""
     given = camera.optics.focus_distance
     return camera.scene.distance if given is None else given
 
 
-def lens(camera: Camera) -> Lens:
+def lens(camera: CameraModel) -> Lens:
     """Return the lens of a camera; without one, the narrowest cone from infinitely far away.
 
     Raises BadInput for a lens that is not determined, numbers that disagree, and a scene at or
@@ -99,7 +99,7 @@ def lens(camera: Camera) -> Lens:
     return Lens(f, number, m, focus, pupils)
 
 
-def _pupil_magnification(camera: Camera, focal_length: float, magnification: float) -> float:
+def _pupil_magnification(camera: CameraModel, focal_length: float, magnification: float) -> float:
     """Return the pupil magnification P by which the exit pupil is (P - m) f from the sensor.
 
     Raises BadInput for a pupil through which no light meets the sensor.
@@ -133,7 +133,7 @@ def _require_f_number(number: float, focal_length: float, diameter: float) -> No
     )
 
 
-def _focal_length(camera: Camera) -> float:
+def _focal_length(camera: CameraModel) -> float:
     """Return the focal length, from every pair that determines it."""
     optics, distance = camera.optics, focus_distance(camera)
     found: dict[str, float] = {}

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry, geometry
+from vcam_cli.camera.model import CameraModel
 from vcam_cli.errors import bad, data_file_problems
 from vcam_cli.physics import diffraction
 from vcam_cli.spectra.text import read_rows
@@ -44,7 +44,7 @@ class MtfAtHeight:
     curves: tuple[MtfCurve, ...]
 
 
-def lens_mtf(camera: Camera, geometry: Geometry) -> tuple[MtfAtHeight, ...]:
+def lens_mtf(camera: CameraModel, geometry: Geometry) -> tuple[MtfAtHeight, ...]:
     """Return the table that `optics.mtf` names, by rising image height; () where it names none.
 
     Raises BadInput for a file that cannot be read, is no such table, ends before the corner of the
@@ -67,7 +67,7 @@ def lens_mtf(camera: Camera, geometry: Geometry) -> tuple[MtfAtHeight, ...]:
     return found
 
 
-def check(camera: Camera) -> None:
+def check(camera: CameraModel) -> None:
     """Raise BadInput where the modulation transfer is not to be had."""
     if camera.optics.mtf is not None:
         lens_mtf(camera, geometry(camera))

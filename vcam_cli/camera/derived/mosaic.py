@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
-from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.model import CameraModel
 from vcam_cli.camera.sensor.array import Block
 
 NONE = "."
@@ -50,7 +50,7 @@ def channel_order(colors: Iterable[str]) -> tuple[str, ...]:
     return tuple(sorted(distinct, key=lambda c: ("RGB".find(c) % 4, distinct.index(c))))
 
 
-def mosaic(camera: Camera) -> Mosaic:
+def mosaic(camera: CameraModel) -> Mosaic:
     """Return the camera's mosaic."""
     pattern = camera.array.pattern
     return Mosaic(pattern.block if isinstance(pattern, Block) else BLOCKS[str(pattern)])

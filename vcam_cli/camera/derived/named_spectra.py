@@ -1,6 +1,6 @@
 """The spectra that a camera names or gives, each with its place in the file."""
 
-from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.model import CameraModel
 from vcam_cli.camera.scene.illuminant import IlluminantSpec
 from vcam_cli.camera.spectrum import SpectrumSpec
 from vcam_cli.errors import Collector, Path, bad
@@ -11,7 +11,7 @@ Spec = SpectrumSpec | IlluminantSpec
 EVERYWHERE = "scene.wavelengths: {outside: hold}"
 
 
-def spectra(camera: Camera) -> tuple[tuple[Path, Spec], ...]:
+def spectra(camera: CameraModel) -> tuple[tuple[Path, Spec], ...]:
     """Return every spectrum of a camera with its YAML path."""
     efficiency = camera.pixel.photodetector.quantum_efficiency
     per_pixel = ("pixel",) if efficiency.per_pixel else ()
@@ -24,7 +24,7 @@ def spectra(camera: Camera) -> tuple[tuple[Path, Spec], ...]:
     return tuple((path, spec) for path, spec in found if spec is not None)
 
 
-def check_spectra(camera: Camera) -> None:
+def check_spectra(camera: CameraModel) -> None:
     """Read every spectrum of the camera and see that it covers the wavelengths simulated.
 
     Raises BadInput with every file, name or table that is not as it should be.
@@ -57,14 +57,14 @@ def _check(spec: Spec, path: Path, start: float, stop: float) -> None:
         raise bad(path, message, remedy) from None
 
 
-def are_covered(camera: Camera) -> bool:
+def are_covered(camera: CameraModel) -> bool:
     """Return whether all tables cover the wavelengths, whatever the camera says holds beyond."""
     start, stop = camera.scene.wavelengths.start, camera.scene.wavelengths.stop
     specs = (spec.with_outside("error") for _, spec in spectra(camera))
     return all(spec.resolve().covers(start, stop) for spec in specs)
 
 
-def _asks_silicon(camera: Camera) -> bool:
+def _asks_silicon(camera: CameraModel) -> bool:
     """Return whether anything follows from how deep light goes in silicon."""
     off = isinstance(camera.effects, dict) and camera.effects.get("charge_diffusion") == "off"
     detector = camera.pixel.photodetector

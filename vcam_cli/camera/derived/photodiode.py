@@ -15,11 +15,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.dark_current import DOUBLING, dark_rate, junction_parts
 from vcam_cli.camera.derived.junction import depletion_width, depths
 from vcam_cli.camera.derived.process import Need, process
 from vcam_cli.camera.derived.sense_node import capacitance
+from vcam_cli.camera.model import CameraModel
 from vcam_cli.camera.sensor.photodetector import ChargeDiffusion
 from vcam_cli.errors import Collector, split
 from vcam_cli.physics import photodiode as physics
@@ -49,7 +49,7 @@ class Diffusion:
     neutral_depth: float
 
 
-def check(camera: Camera) -> None:
+def check(camera: CameraModel) -> None:
     """Raise BadInput with all that keeps the photodiode from following from its process."""
     problems = Collector()
     for part in (capacitance, dark_rate, diffusion):
@@ -60,7 +60,7 @@ def check(camera: Camera) -> None:
     problems.raise_if_any()
 
 
-def remarks(camera: Camera) -> tuple[str, ...]:
+def remarks(camera: CameraModel) -> tuple[str, ...]:
     """Return what a user should know of the models used."""
     own, kelvin = camera.pixel.photodetector, camera.pixel.temperature
     notes = _unusual_dark_current(camera)
@@ -74,7 +74,7 @@ def remarks(camera: Camera) -> tuple[str, ...]:
     )
 
 
-def _unusual_dark_current(camera: Camera) -> tuple[str, ...]:
+def _unusual_dark_current(camera: CameraModel) -> tuple[str, ...]:
     """Return that the junction's dark current is more than such photodiodes are sold with."""
     own = camera.pixel.photodetector
     if own.dark_current is not None or own.dark_current_density != "junction":
@@ -92,7 +92,7 @@ def _unusual_dark_current(camera: Camera) -> tuple[str, ...]:
     )
 
 
-def quantum_efficiency(camera: Camera) -> Spectrum:
+def quantum_efficiency(camera: CameraModel) -> Spectrum:
     """Return the electrons per photon that the file gives, else those of the junction.
 
     The latter, eq 2.30 of [1], is internal: times the technology's scale for reflection and stack,
@@ -123,7 +123,7 @@ def quantum_efficiency(camera: Camera) -> Spectrum:
     return Spectrum.from_samples(wavelength, value).scale_by(1.0 if scale is None else scale)
 
 
-def diffusion(camera: Camera) -> Diffusion | None:
+def diffusion(camera: CameraModel) -> Diffusion | None:
     """Return the lengths that decide the diffusion of charge, where the file asks for it.
 
     Raises BadInput for numbers of the process that are missing.

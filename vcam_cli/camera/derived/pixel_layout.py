@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.process import Process, process
+from vcam_cli.camera.model import CameraModel
 from vcam_cli.camera.sensor.pixel import Microlens
 from vcam_cli.errors import BadInput, bad
 from vcam_cli.physics import photodiode, vignetting
@@ -48,7 +48,7 @@ class Area:
     """Center, below the cell's."""
 
 
-def detector(camera: Camera) -> Detector:
+def detector(camera: CameraModel) -> Detector:
     """Return the photodetector's size: that of the file, else its technology's layout.
 
     Raises BadInput where neither gives it, and for a pixel too small for its transistors.
@@ -97,7 +97,7 @@ def _too_small(
     )
 
 
-def detector_area(camera: Camera) -> Area:
+def detector_area(camera: CameraModel) -> Area:
     """Return the photodetector's rectangle. Raises BadInput where it leaves its pixel."""
     pixel, own, size = camera.pixel, camera.pixel.photodetector, detector(camera)
     x = _left_edge(own.x, size.width, pixel.width, "width")
@@ -120,7 +120,7 @@ def _left_edge(given: float | None, size: float, cell: float, side: str) -> floa
     return start
 
 
-def layers(camera: Camera) -> tuple[tuple[float, float], ...]:
+def layers(camera: CameraModel) -> tuple[tuple[float, float], ...]:
     """Return thickness [m] and refractive index of the layers from the air down, if any."""
     stack = camera.pixel.stack
     if stack is None:
@@ -128,19 +128,19 @@ def layers(camera: Camera) -> tuple[tuple[float, float], ...]:
     return tuple((layer.thickness, layer.index) for layer in (stack.passivation, stack.oxide))
 
 
-def microlens(camera: Camera) -> Microlens | None:
+def microlens(camera: CameraModel) -> Microlens | None:
     """Return the microlens, where the file has one and does not switch it off."""
     off = isinstance(camera.effects, dict) and camera.effects.get("microlens") == "off"
     return None if off else camera.pixel.microlens
 
 
-def follows_chief_ray(camera: Camera) -> bool:
+def follows_chief_ray(camera: CameraModel) -> bool:
     """Return whether microlenses are shifted so that the chief ray meets the photodetector."""
     lens = microlens(camera)
     return lens is not None and lens.shift == "optimal"
 
 
-def collecting_area(camera: Camera, detector: Area) -> Area:
+def collecting_area(camera: CameraModel, detector: Area) -> Area:
     """Return where the light comes from that reaches the photodetector.
 
     Without a microlens that is the photodetector itself. With one, it is a rectangle of the pixel's
@@ -170,7 +170,7 @@ def collecting_area(camera: Camera, detector: Area) -> Area:
     return Area(side * pixel.width, side * pixel.height, 0.0, 0.0)
 
 
-def check_pupil(camera: Camera, distance: float) -> None:
+def check_pupil(camera: CameraModel, distance: float) -> None:
     """Raise BadInput where the exit pupil, at a distance [m], lies within the layers."""
     thickness = sum(thick for thick, _ in layers(camera))
     if thickness >= distance:
@@ -182,7 +182,7 @@ def check_pupil(camera: Camera, distance: float) -> None:
         )
 
 
-def sampling_scale(camera: Camera, distance: float, width: float, height: float) -> float:
+def sampling_scale(camera: CameraModel, distance: float, width: float, height: float) -> float:
     """Return the pitch of the collecting areas over that of the pixels.
 
     Microlenses that follow the chief ray stand nearer to the axis by what the ray falls sideways
@@ -193,7 +193,7 @@ def sampling_scale(camera: Camera, distance: float, width: float, height: float)
 
     Parameters
     ----------
-    camera : Camera
+    camera : CameraModel
         The camera.
     distance : float
         Distance of the exit pupil from the sensor [m].

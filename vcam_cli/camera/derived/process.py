@@ -15,7 +15,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, TypeVar, get_args
 
-from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.model import CameraModel
 from vcam_cli.camera.sensor.technology import (
     Gate,
     Junction,
@@ -123,7 +123,7 @@ class Process:
         return value
 
 
-def process(camera: Camera) -> Process:
+def process(camera: CameraModel) -> Process:
     """Return the process of a camera's pixel, scaled and with the camera's changes.
 
     Raises BadInput where its technology could not be read, or is too far from the feature size.

@@ -10,7 +10,6 @@ References
 
 from __future__ import annotations
 
-from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.charge_storage import (
     OXIDE_PERMITTIVITY,
     OXIDE_THICKNESS,
@@ -19,6 +18,7 @@ from vcam_cli.camera.derived.charge_storage import (
 )
 from vcam_cli.camera.derived.pixel_layout import detector
 from vcam_cli.camera.derived.process import Need, Process, process
+from vcam_cli.camera.model import CameraModel
 from vcam_cli.errors import bad
 from vcam_cli.physics import junction, readout
 
@@ -28,7 +28,7 @@ DIFFUSION_WIDTH = 2.5
 """Side of a floating diffusion, in feature sizes: the smallest that takes a contact, likewise."""
 
 
-def voltage_swing(camera: Camera) -> float | None:
+def voltage_swing(camera: CameraModel) -> float | None:
     """Return the voltage swing that the file gives, or its technology [V]; None for none.
 
     A technology gives it as a number or by its thresholds, eq 2.33 of [1]. A passive pixel has no
@@ -38,7 +38,7 @@ def voltage_swing(camera: Camera) -> float | None:
     return own if own is not None else _technology_swing(camera, process(camera))
 
 
-def _technology_swing(camera: Camera, made: Process) -> float | None:
+def _technology_swing(camera: CameraModel, made: Process) -> float | None:
     if camera.pixel.technology is None:
         return None
     path = "pixel.readout"
@@ -60,7 +60,7 @@ def _technology_swing(camera: Camera, made: Process) -> float | None:
     return swing
 
 
-def bias_range(camera: Camera, made: Process, need: Need) -> tuple[float, float]:
+def bias_range(camera: CameraModel, made: Process, need: Need) -> tuple[float, float]:
     """Return the reverse bias of the photodiode [V], full and empty.
 
     They are the reset voltage less the swing, and the reset voltage. Raises BadInput where numbers
@@ -86,7 +86,7 @@ def bias_range(camera: Camera, made: Process, need: Need) -> tuple[float, float]
     return max(reset - swing, 0.0), reset
 
 
-def reset_voltage(camera: Camera, made: Process, need: Need) -> float:
+def reset_voltage(camera: CameraModel, made: Process, need: Need) -> float:
     """Return the reset voltage [V]: supply less a threshold; a passive pixel loses none.
 
     Raises BadInput where numbers are missing or contradict each other.
@@ -112,7 +112,7 @@ def reset_voltage(camera: Camera, made: Process, need: Need) -> float:
     return supply - threshold
 
 
-def capacitance(camera: Camera) -> float | None:
+def capacitance(camera: CameraModel) -> float | None:
     """Return the capacitance of the photodiode's node [F]; None where the gain says it.
 
     It is the file's number; else, where the file says `junction` or leaves the conversion gain to
@@ -137,7 +137,7 @@ def capacitance(camera: Camera) -> float | None:
 
 
 def junction_capacitances(
-    camera: Camera, made: Process, need: Need
+    camera: CameraModel, made: Process, need: Need
 ) -> tuple[tuple[tuple[float, float, float], ...], float]:
     """Return what the capacitance of the photodiode's node is made of.
 
@@ -166,7 +166,7 @@ def junction_capacitances(
     return parts, _gate_capacitance(camera, made, need)
 
 
-def area_capacitance(camera: Camera, made: Process, need: Need) -> float:
+def area_capacitance(camera: CameraModel, made: Process, need: Need) -> float:
     """Return the capacitance of the junction per area, averaged over the swing [F/m2].
 
     Raises BadInput where numbers are missing.
@@ -181,7 +181,7 @@ def area_capacitance(camera: Camera, made: Process, need: Need) -> float:
     return float(junction.mean_capacitance(zero, *biases, built_in, grading))
 
 
-def _gate_capacitance(camera: Camera, made: Process, need: Need) -> float:
+def _gate_capacitance(camera: CameraModel, made: Process, need: Need) -> float:
     """Return the capacitance of the follower's gate [F]: W L C_ox, or the technology's.
 
     A passive pixel has none.

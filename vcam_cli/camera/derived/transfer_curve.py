@@ -17,9 +17,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived import sense_node
 from vcam_cli.camera.derived.process import Need, process
+from vcam_cli.camera.model import CameraModel
 from vcam_cli.camera.sensor.transfer_curve import Follower, Points
 from vcam_cli.errors import bad, data_file_problems
 from vcam_cli.physics import follower as physics
@@ -76,12 +76,12 @@ def _straight_beyond(
     return np.interp(at, x, y) + first * below + last * above
 
 
-def transfer_curve(camera: Camera, swing: float, full_well: float) -> Curve | None:
+def transfer_curve(camera: CameraModel, swing: float, full_well: float) -> Curve | None:
     """Return the curve of a camera's readout; None where it is a straight line.
 
     Parameters
     ----------
-    camera : Camera
+    camera : CameraModel
         The camera.
     swing : float
         Fall of the photodiode's voltage at the full well [V].
@@ -118,7 +118,7 @@ def transfer_curve(camera: Camera, swing: float, full_well: float) -> Curve | No
     return Curve(tuple(electrons.tolist()), tuple(volts.tolist()), given.corrected)
 
 
-def _reset_voltage(camera: Camera, swing: float) -> float:
+def _reset_voltage(camera: CameraModel, swing: float) -> float:
     """Return the photodiode's voltage at the start [V]; the swing where nothing depends on it."""
     given = camera.pixel.readout.transfer_curve
     assert given is not None
@@ -138,7 +138,7 @@ def _reset_voltage(camera: Camera, swing: float) -> float:
     return max(voltage, swing)
 
 
-def _junction_charge(camera: Camera, voltage: NDArray, reset: float) -> NDArray[np.float64]:
+def _junction_charge(camera: CameraModel, voltage: NDArray, reset: float) -> NDArray[np.float64]:
     """Return the charge of the technology's photodiode and the follower's gate [C]."""
     need = Need(f"{PATH}.capacitance", "the capacitance of the junction")
     parts, fixed = sense_node.junction_capacitances(camera, process(camera), need)

@@ -37,10 +37,10 @@ from vcam_cli.simulation.frame import Frame
 from vcam_cli.simulation.output import isetcam_files, provenance, raw_dng, raw_file
 from vcam_cli.simulation.output.provenance import versions
 from vcam_cli.simulation.output.raw_file import ROWS_AT_ONCE
-from vcam_cli.simulation.simulate import Result
+from vcam_cli.simulation.photograph import Photograph
 
 
-def save(result: Result, out: Path) -> Path:
+def save(result: Photograph, out: Path) -> Path:
     """Write all files of one run, the record too, into a folder; return it."""
     inputs = provenance.inputs(result.frame.camera)
     start = time.perf_counter()
@@ -52,7 +52,7 @@ def save(result: Result, out: Path) -> Path:
 
 
 def finish(
-    result: Result, folder: OutputFolder, inputs: tuple[Path, ...], seconds: Callable[[], float]
+    result: Photograph, folder: OutputFolder, inputs: tuple[Path, ...], seconds: Callable[[], float]
 ) -> dict[str, Any]:
     """Write the report where one is asked for, and the record; return what it says.
 
@@ -68,7 +68,7 @@ def finish(
     return found
 
 
-def write(result: Result, folder: OutputFolder) -> None:
+def write(result: Photograph, folder: OutputFolder) -> None:
     """Write the files of one run, all but the record `run.json`."""
     camera = result.frame.camera
     with ThreadPool(2) as pool:
@@ -110,7 +110,7 @@ def write(result: Result, folder: OutputFolder) -> None:
     write_metrics(folder.new("metrics.csv"), metrics.rows)
 
 
-def write_render(result: Result, path: Path, render: NDArray) -> None:
+def write_render(result: Photograph, path: Path, render: NDArray) -> None:
     """Write the render, and how it was taken as its description."""
     taken = raw_file.photograph(result.frame)
     write_png(path, render, "; ".join(f"{name} {value}" for name, value in taken.items()))
@@ -124,7 +124,7 @@ _SAMPLING = {
 """Sampling -> what a channel is."""
 
 
-def _irradiance(result: Result, path: Path) -> None:
+def _irradiance(result: Photograph, path: Path) -> None:
     """Spectral irradiance on the sensor, computed and written wavelength by wavelength."""
     frame = result.frame
     nodes = spectral_irradiance.nodes(frame)
@@ -147,12 +147,12 @@ def _irradiance(result: Result, path: Path) -> None:
     write_spectral(path, nodes, planes(), (g.rows, g.columns), "W.m^-2.nm^-1", said)
 
 
-def write_raw(result: Result, path: Path) -> None:
+def write_raw(result: Photograph, path: Path) -> None:
     """Write raw.exr."""
     raw_file.write_raw(path, result.frame, config_hash(result.frame.camera))
 
 
-def _raw_jobs(result: Result, folder: OutputFolder) -> Iterator[Callable[[], None]]:
+def _raw_jobs(result: Photograph, folder: OutputFolder) -> Iterator[Callable[[], None]]:
     """Jobs that write the raw frame in every format that is asked for."""
     yield partial(write_raw, result, folder.new("raw.exr"))
     frame = result.frame
@@ -164,7 +164,7 @@ def _raw_jobs(result: Result, folder: OutputFolder) -> Iterator[Callable[[], Non
         yield partial(raw_file.write_raw_tiff, folder.new("raw.tif"), frame, said)
 
 
-def _sample_jobs(result: Result, folder: OutputFolder) -> Iterator[Callable[[], None]]:
+def _sample_jobs(result: Photograph, folder: OutputFolder) -> Iterator[Callable[[], None]]:
     """Jobs that write every sample of one integration, and what they tell together."""
     frame = result.frame
     if not frame.times:
@@ -191,7 +191,7 @@ def _samples(frame: Frame) -> list[dict[str, Any]]:
     return said
 
 
-def _ideal(result: Result, path: Path) -> None:
+def _ideal(result: Photograph, path: Path) -> None:
     """Write the ideal image in linear display RGB (Y for monochrome)."""
     ideal = result.ideal
     names = ("Y",) if ideal.shape[2] == 1 else ("R", "G", "B")
@@ -219,7 +219,7 @@ def config_hash(camera: Camera) -> str:
     return hash_text(to_json(camera.model_dump(mode="json")))
 
 
-def record(result: Result, inputs: tuple[Path, ...], seconds: float) -> dict[str, Any]:
+def record(result: Photograph, inputs: tuple[Path, ...], seconds: float) -> dict[str, Any]:
     """Return what `run.json` says, but for the names of the files."""
     frame = result.frame
     camera = frame.camera

@@ -11,9 +11,8 @@ from pathlib import Path
 from typing import Any
 
 import vcam_cli
-from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.camera import FILE_KEYS, Camera
 from vcam_cli.camera.derived.named_spectra import spectra
-from vcam_cli.camera.load import FILE_KEYS
 from vcam_cli.camera.step_plugins import origin, registered
 from vcam_cli.config import shipped
 from vcam_cli.config.file_format import names_file

@@ -22,18 +22,18 @@ from vcam_cli.reports.page import Facts, Page, Part, Picture, Section, Table, Te
 from vcam_cli.reports.run_facts import exposure_rows, geometry_rows, metric_rows, spoken
 from vcam_cli.simulation.frame import Frame
 from vcam_cli.simulation.output import report_plots
-from vcam_cli.simulation.simulate import Result, needs_picture
+from vcam_cli.simulation.photograph import Photograph, needs_picture
 
 GROUP = "frame"
 """Pictures of the same pixels, which zoom together."""
 
 
-def write(path: Path, result: Result, record: Mapping[str, Any]) -> None:
+def write(path: Path, result: Photograph, record: Mapping[str, Any]) -> None:
     """Write report.html of a run; record: what `run.json` will say. Raise CannotDo."""
     page.write(path, report(result, record))
 
 
-def report(result: Result, record: Mapping[str, Any]) -> Page:
+def report(result: Photograph, record: Mapping[str, Any]) -> Page:
     """Return the report of a run; record: what `run.json` will say."""
     frame = result.frame
     return Page(
@@ -61,7 +61,7 @@ def _about(frame: Frame) -> str:
     return f"{columns} x {rows} pixels of {g.pitch_x * 1e6:.3g} um {lens}. Colors: {colors}."
 
 
-def _pictures(result: Result) -> Iterator[Part]:
+def _pictures(result: Photograph) -> Iterator[Part]:
     frame, name = result.frame, result.frame.camera.name
     if needs_picture(frame.camera):
         ideal, note = pictures.codes(tone.encode(result.ideal, "srgb", 8))
@@ -91,7 +91,7 @@ def _pictures(result: Result) -> Iterator[Part]:
         )  # fmt: skip
 
 
-def _raw(result: Result) -> Iterator[Part]:
+def _raw(result: Photograph) -> Iterator[Part]:
     dn = result.dn
     if dn.ndim == 1 or min(dn.shape[:2]) < 2 or (dn.ndim == 3 and dn.shape[2] != 3):
         return

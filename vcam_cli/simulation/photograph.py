@@ -1,0 +1,249 @@
+"""A simulated photograph: all that a frame tells, each computed when it is first asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.derived.electrical import no_volts
+from vcam_cli.camera.expectations import misses
+from vcam_cli.camera.processing_steps import Step
+from vcam_cli.camera.sensor.array import Positions
+from vcam_cli.floats import own_float_errors
+from vcam_cli.processing import ProcessedPicture
+from vcam_cli.progress import Stages
+from vcam_cli.quality import display
+from vcam_cli.quality.metrics import Metrics
+from vcam_cli.quality.mse import mse, psnr_db
+from vcam_cli.quality.scielab import cielab_map, s_cielab_map
+from vcam_cli.simulation.figures import figures
+from vcam_cli.simulation.frame import Frame
+
+
+@dataclass(frozen=True)
+class Photograph:
+    """A simulated photograph.
+
+    Arrays of the raw frame are (rows, columns); of stacked pixels (rows, columns, C), colors in the
+    order of `colors`; of a honeycomb (rows, columns) with every second row half a column to the
+    right; of pixels at places of their own (N,). Those of the picture are on a grid of squares,
+    which is the raw frame's own but for the last two.
+
+    Where pixels are read as one, a pixel is what is read. Its electrons are those of the charges or
+    codes that are added, and the mean of voltages.
+
+    Of several samples of one integration, the raw frame is the last of them; the picture shows the
+    photocurrent that all of them tell, scaled as ever so that the perfect white is 1.
+    """
+
+    frame: Frame
+    stages: Stages
+    workers: int
+    """Threads."""
+    process: Callable[[Sequence[Step]], ProcessedPicture]
+    """Prepares steps of processing: measures gains, fits the color correction."""
+    remarks: Sequence[str] = ()
+    """What a user should know of the frame."""
+
+    @cached_property
+    @own_float_errors
+    def processed(self) -> ProcessedPicture:
+        """The picture with its steps prepared; a raw frame alone does not need it."""
+        with self.stages("balance"):
+            return self.process(self.frame.camera.processing)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What a user should know of the frame, and of the picture where one is asked for."""
+        shown = needs_picture(self.frame.camera)
+        return (*self.remarks, *(self.processed.notes if shown else ()))
+
+    @property
+    def dn(self) -> NDArray:
+        """Raw digital numbers, whole [DN]."""
+        return self._displayed(self.frame.dn)
+
+    @property
+    def electrons(self) -> NDArray:
+        """Raw signal before the ADC, noisy, clipped above at the full well [electrons]."""
+        return self._displayed(self.frame.electrons)
+
+    @property
+    def volts(self) -> NDArray:
+        """Raw signal at the ADC's input [V].
+
+        It raises BadInput where the file gives no volts.
+        """
+        e = self.frame.electrical
+        if not e.has_volts:
+            raise no_volts("pixel.readout", "volts", "take electrons")
+        return e.volts_of(self.electrons)
+
+    @property
+    def mean_electrons(self) -> NDArray:
+        """Noise-free signal, photo and dark, before saturation [electrons]."""
+        return self._displayed(self.frame.mean_electrons)
+
+    @property
+    def clean_dn(self) -> NDArray:
+        """Raw digital numbers without noise and without rounding, clipped as `dn` is [DN]."""
+        return self._displayed(self.frame.clean_dn)
+
+    @property
+    def exposure_time(self) -> float:
+        """Exposure time [s]."""
+        return self.frame.exposure_time
+
+    @property
+    def times(self) -> tuple[float, ...]:
+        """Times of the samples of one integration (N,) [s]; () of a single exposure."""
+        return self.frame.times
+
+    @property
+    def samples_dn(self) -> NDArray | None:
+        """Codes of every sample (N, ...), as `dn` [DN]; None of a single exposure."""
+        return self._displayed_samples(self.frame.samples_dn)
+
+    @property
+    def samples_electrons(self) -> NDArray | None:
+        """Signal of every sample (N, ...), as `electrons`; None of a single exposure."""
+        return self._displayed_samples(self.frame.samples_electrons)
+
+    @property
+    def photocurrent(self) -> NDArray | None:
+        """Photocurrent that the samples tell, as `dn` [e/s]; None of a single exposure."""
+        found = self.frame.photocurrent
+        return None if found is None else self._displayed(found)
+
+    def _displayed_samples(self, values: NDArray | None) -> NDArray | None:
+        return None if values is None else np.stack([self._displayed(sample) for sample in values])
+
+    @property
+    def colors(self) -> tuple[str, ...]:
+        """Names of the colors, in the order of planes."""
+        return self.frame.mosaic.colors
+
+    @property
+    def color(self) -> NDArray:
+        """Index of each raw pixel's color, in the shape of `dn`."""
+        layout = self.frame.layout
+        if layout.full_color:
+            return np.broadcast_to(np.arange(len(self.colors)), self.dn.shape)
+        return self._displayed(layout.color)
+
+    @property
+    def x(self) -> NDArray:
+        """Centers of the raw frame's columns, right of the array's center, (columns,) [m].
+
+        Of a honeycomb and of pixels at places of their own: of every pixel, in the shape of `dn`.
+        """
+        layout = self.frame.layout
+        return self._displayed(layout.x) if layout.is_scattered else layout.centers[0]
+
+    @property
+    def y(self) -> NDArray:
+        """Centers of the raw frame's rows, below the array's center, (rows,) [m]; as `x`."""
+        layout = self.frame.layout
+        return self._displayed(layout.y) if layout.is_scattered else layout.centers[1]
+
+    def _displayed(self, values: NDArray) -> NDArray:
+        """Values of the raw frame in the shape that a user sees."""
+        if values.ndim == 3:
+            return np.moveaxis(values, 0, -1)
+        places = isinstance(self.frame.camera.array.pattern, Positions)
+        return values[0] if places else values
+
+    @cached_property
+    @own_float_errors
+    def render(self) -> NDArray:
+        """Codes of the render after `processing`: (rows, columns) or (rows, columns, 3).
+
+        Raises BadInput for scattered pixels without demosaic, and so do `linear` and `ideal`.
+        """
+        picture = self.processed
+        with self.stages("processing"):
+            return picture.encode(self.frame.camera.output.render or 8)
+
+    def renders_of_steps(self) -> Iterator[tuple[str, NDArray]]:
+        """Yield step_01_NAME.png and so on, with the render as it were if steps ended there.
+
+        Steps that do nothing are left out, and those after which no display can show the picture.
+        """
+        steps = self.frame.camera.processing
+        for number, step in enumerate(steps, 1):
+            if step.value == "none":
+                continue
+            with self.stages("processing"):
+                picture = self.process(steps[:number])
+                if picture.is_shown:
+                    render = picture.encode(self.frame.camera.output.render or 8)
+                    yield f"step_{number:02d}_{step.name}.png", render
+
+    @cached_property
+    @own_float_errors
+    def linear(self) -> NDArray:
+        """The render in linear light, perfect white = 1: (rows, columns, channels)."""
+        picture = self.processed
+        with self.stages("processing"):
+            return picture.linear
+
+    @cached_property
+    @own_float_errors
+    def ideal(self) -> NDArray:
+        """The scene point-sampled in the same colors and scale: (rows, columns, channels)."""
+        picture = self.processed
+        with self.stages("ideal"):
+            return picture.ideal(self.frame.ideal_dn())
+
+    @cached_property
+    @own_float_errors
+    def s_cielab(self) -> NDArray:
+        """S-CIELAB Delta E of the render from the ideal image on the camera's `display`."""
+        image, ideal, screen = self.linear, self.ideal, self._screen
+        with self.stages("quality"):
+            filters = self.frame.camera.display.filters
+            return s_cielab_map(image, ideal, screen, filters, workers=self.workers)
+
+    @property
+    def _screen(self) -> display.Screen:
+        return display.display_screen(self.frame.camera.display, self.frame.layout.picture_shape[1])
+
+    @cached_property
+    @own_float_errors
+    def metrics(self) -> Metrics:
+        """Metric -> value: those every run has, then those that `quality` asks for."""
+        out = figures(self.frame)
+        if {"mse", "psnr"} & set(self.frame.camera.quality):
+            image, ideal = self.linear, self.ideal
+            with self.stages("quality"):
+                error = mse(image, ideal)
+                out += [("mse", error, ""), ("psnr_db", psnr_db(image, ideal), "dB")]
+        if "cielab" in self.frame.camera.quality:
+            image, ideal = self.linear, self.ideal
+            with self.stages("quality"):
+                each = cielab_map(image, ideal, self._screen, workers=self.workers)
+                out.append(("mean_delta_e", float(each.mean(dtype=float)), ""))
+        if "s-cielab" in self.frame.camera.quality:
+            out.append(("mean_s_cielab", float(self.s_cielab.mean(dtype=float)), ""))
+        return Metrics(out)
+
+    @property
+    def missed(self) -> tuple[str, ...]:
+        """A sentence for each limit of the camera's `expect` that the metrics do not keep."""
+        return misses(self.frame.camera.limits, self.metrics)
+
+    def __repr__(self) -> str:
+        """Return a line: name, shape of the raw frame, exposure time."""
+        shape = " x ".join(map(str, self.dn.shape))
+        time = f"{1000 * self.exposure_time:.4g} ms"
+        return f"<Result {self.frame.camera.name}: {shape} pixels, {time}>"
+
+
+def needs_picture(camera: Camera) -> bool:
+    """Return whether a camera file asks for more than the raw frame."""
+    return camera.output.render is not None or bool(camera.quality)
