@@ -189,6 +189,9 @@ EXAMPLES = {
         _noise("pixel.readout.telegraph_noise={fraction: 3 %, amplitude: 30 e}"),
         "3 % of the pixels have a trap that shifts them by 30 electrons.",
     ),
+    "adc_noise": Example(
+        _noise("adc.noise=3 DN"), "An ADC of 3 DN rms: noise that no gain in front of it raises."
+    ),
     "saturation": Example(
         (*_chart("step-wedge"), *GRAY, "exposure.time=40 ms", "adc.full_scale=6 V"),
         "Pixels that are full take no more: the brightest steps become one.",

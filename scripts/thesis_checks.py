@@ -14,8 +14,8 @@ import yaml
 
 from vcam_cli import load, schedule, simulate
 from vcam_cli.camera.camera import Camera
-from vcam_cli.camera.derived.electrical import electrical
 from vcam_cli.camera.derived.frame_rate import frame_rate
+from vcam_cli.effects.readout_chain import electrical
 from vcam_cli.verification import measurement_file
 from vcam_cli.verification.verify import verify
 

@@ -45,7 +45,7 @@ QUIET = {
     name: "off"
     for name in (
         *("shot_noise", "fpn", "fpn_shading", "reset_noise", "read_noise"),
-        *("heavy_tailed_noise", "correlated_row_noise", "telegraph_noise"),
+        *("heavy_tailed_noise", "correlated_row_noise", "telegraph_noise", "adc_noise"),
     )
 }
 """`effects` of a camera without any randomness."""

@@ -13,13 +13,13 @@ import pytest
 from typer.testing import CliRunner
 
 from vcam_cli import load, simulate
-from vcam_cli.camera.derived.electrical import electrical
 from vcam_cli.camera.derived.geometry import geometry
 from vcam_cli.capture_schedules import schedule_file
 from vcam_cli.commands.list_ import first_comment
 from vcam_cli.commands.main import app
 from vcam_cli.config import shipped
 from vcam_cli.datasets import dataset_file
+from vcam_cli.effects.readout_chain import electrical
 from vcam_cli.simulation.plan import camera_effects
 from vcam_cli.simulation.scene_plans import scene_settings
 from vcam_cli.sweeps import expectations, figures, sweep_file, sweep_points
@@ -129,12 +129,11 @@ def test_the_benchmark_camera():
 
 
 def test_everything_has_every_effect_of_its_architecture():
-    """But for the transfer of a CCD, the reset noise that it cancels, and depth, which is a
-    scene's."""
+    """But for what a CCD has, depth, which is of a scene, and what its read noise includes."""
     camera = load("everything")
     described = camera_effects(camera, geometry(camera))
     missing = {name for name, effect in described.items() if effect is None}
-    assert missing == {"charge_transfer", "reset_noise", "depth"}
+    assert missing == {"charge_transfer", "reset_noise", "depth", "adc_noise"}
     assert camera.effects == "auto"
 
 

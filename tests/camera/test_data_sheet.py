@@ -7,7 +7,7 @@ import pytest
 from making import GONE, QUIET, camera, radiance_for
 
 from vcam_cli import load, simulate
-from vcam_cli.camera.derived.electrical import electrical
+from vcam_cli.effects.readout_chain import electrical
 from vcam_cli.errors import BadInput
 
 SHEET = {"pixel.readout": {"full_well": "9662 e", "read_noise": "2.5 e"}, "adc": {"bits": 10}}

@@ -6,7 +6,8 @@ from itertools import combinations
 import pytest
 from making import BOLTZMANN, CHARGE, camera
 
-from vcam_cli.camera.derived.electrical import Electrical, electrical
+from vcam_cli.camera.derived.electrical import Electrical
+from vcam_cli.effects.readout_chain import electrical
 from vcam_cli.errors import BadInput
 from vcam_cli.physics.readout import reset_noise_variance
 

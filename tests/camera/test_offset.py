@@ -6,8 +6,9 @@ import pytest
 from making import BOLTZMANN, CHARGE, GONE, camera, radiance_for
 
 from vcam_cli import load, simulate
-from vcam_cli.camera.derived.electrical import electrical
+from vcam_cli.effects.readout_chain import electrical
 from vcam_cli.errors import BadInput
+from vcam_cli.simulation import checks
 
 WELL, VOLTS = 100_000, 20e-6  # of the plain camera: electrons, and volts of one
 AUTO = {"adc.offset": "auto"}
@@ -90,8 +91,33 @@ def test_nothing_is_clipped_in_the_dark(kind: str, tmp_path) -> None:
 
 
 def test_an_adc_without_room_is_refused(tmp_path) -> None:
+    """Where the file is read for a command, and by a simulation in Python."""
+    made = camera(tmp_path, NOISES | AUTO | {"adc.bits": 4, "exposure.gain": 1e5})
     with pytest.raises(BadInput, match=r"adc\.offset"):
-        camera(tmp_path, NOISES | AUTO | {"adc.bits": 4, "exposure.gain": 1e5})
+        simulate(made)
+    with pytest.raises(BadInput, match=r"adc\.offset"):
+        checks.load(tmp_path / "made.yaml")
+
+
+def test_telegraph_noise_has_room(tmp_path) -> None:
+    """Traps in 60 % of the pixels, steps of 12 e: the mean square is that of the draws."""
+    traps = {"pixel.readout.telegraph_noise": {"fraction": "60 %", "amplitude": "12 e"}}
+    size = {"scene.radiance": "0 W/(sr m2)", "array.rows": 200, "array.columns": 200}
+    fine = {"adc.bits": 16, "pixel.readout.full_well": "20 ke"}
+    made = camera(tmp_path, AUTO | traps | size | fine)
+    noise = math.sqrt(0.6 * 2 * 12**2 * 0.5 * 0.5)
+    assert electrical(made).offset == fewest(noise, 2**16 - 1, 20_000)
+    assert (simulate(made).frame.dn == 0).mean() < 5e-3
+
+
+@pytest.mark.parametrize("pixel", [0, 30, 3000])
+@pytest.mark.parametrize("own", [0.5, 20, 300])
+@pytest.mark.parametrize("scale", [{}, {"adc.gain": "0.03 DN/e"}])
+def test_the_noise_of_the_adc_has_room(scale, own: float, pixel: float, tmp_path) -> None:
+    noise = {"pixel.readout.read_noise": f"{pixel} e", "adc.noise": f"{own} DN"}
+    found = offset(tmp_path, noise | scale)
+    steps = (lambda o: 0.03) if scale else (lambda o: (4095 - o) / WELL)
+    assert found == next(o for o in range(4095) if o >= 4 * math.hypot(pixel * steps(o), own))
 
 
 def test_it_is_written_as_a_word(tmp_path) -> None:

@@ -15,7 +15,6 @@ import yaml
 from making import BOLTZMANN, CHARGE, GONE, camera
 
 from vcam_cli.camera.derived.dark_current import dark_rate
-from vcam_cli.camera.derived.electrical import electrical
 from vcam_cli.camera.derived.geometry import geometry
 from vcam_cli.camera.derived.junction import depths
 from vcam_cli.camera.derived.photodiode import diffusion, quantum_efficiency
@@ -23,6 +22,7 @@ from vcam_cli.camera.derived.pixel_layout import detector
 from vcam_cli.camera.derived.process import Need
 from vcam_cli.camera.derived.sense_node import capacitance, voltage_swing
 from vcam_cli.config import shipped
+from vcam_cli.effects.readout_chain import electrical
 from vcam_cli.errors import BadInput
 from vcam_cli.physics.charge_storage import abrupt_capacitance
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from making import CHARGE, QUIET, camera, radiance_for
 
-from vcam_cli.camera.derived.electrical import electrical
+from vcam_cli.effects.readout_chain import electrical
 from vcam_cli.errors import BadInput
 from vcam_cli.simulation.idle_keys import idle_keys
 from vcam_cli.simulation.simulate import simulate

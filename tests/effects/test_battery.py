@@ -163,6 +163,7 @@ CASES: dict[str, Case] = {
         {"pixel.readout.telegraph_noise": {"fraction": "60 %", "amplitude": "20 e"}},
         {"pixel.readout.telegraph_noise": {"fraction": "0 %", "amplitude": "20 e"}},
     ),
+    "adc_noise": Case({"adc.noise": "2 DN"}, {"adc.noise": "0 DN"}),
     "saturation": Case({}, None, {"scene.radiance": radiance_for(2e5)}),
     "quantization": Case({}, None),
 }
@@ -434,6 +435,7 @@ NOISY = {
     "pixel.readout.heavy_tailed_noise": {"rms": "5 e"},
     "pixel.readout.correlated_row_noise": {"rms": "5 e"},
     "pixel.readout.telegraph_noise": {"fraction": "60 %", "amplitude": "20 e"},
+    "adc.noise": "1 DN",
     "scene.radiance": radiance_for(900),
     "array.rows": 150,
 }

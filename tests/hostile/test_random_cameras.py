@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from strategies import Tree, between, cameras, fractions
 
 from vcam_cli.accuracy_study.ablation import with_effects
-from vcam_cli.camera.derived.electrical import electrical
 from vcam_cli.camera.derived.geometry import geometry
+from vcam_cli.effects.readout_chain import electrical
 from vcam_cli.readout.layout import camera_layout
 from vcam_cli.simulation import checks
 from vcam_cli.simulation.pixel_figures import pixel_figures

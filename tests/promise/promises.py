@@ -276,6 +276,7 @@ pixel:
     telegraph_noise: {fraction: 3 %, amplitude: 30 e}
   fpn: {dark: 20 %, offset_column: 5 e, gain_column: 0.2 %, shading: {offset: 4 e, gain: 1 %}}
 array: {rows: 60, columns: 80}
+adc: {noise: 0.7 DN}
 exposure: {auto: {max: 100 ms}}
 """,
 }

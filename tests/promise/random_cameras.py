@@ -124,7 +124,7 @@ def tree(number: int) -> dict:
             "auto": {"max": "100 ms"},
             "shutter": {"rolling": {"line_time": "370 us"}},
         },
-        "adc": {"bits": int(rng.integers(8, 15))},
+        "adc": {"bits": int(rng.integers(8, 15)), "noise": "0.7 DN"},
     }
     lengths = drawn["pixel"]["width"], drawn["optics"]["focal_length"]
     width, focal_length = (float(length.split()[0]) for length in lengths)

@@ -78,6 +78,7 @@ CAMERAS = {
         "pixel.readout.heavy_tailed_noise": {"rms": "40 e"},
         "pixel.readout.correlated_row_noise": {"rms": "40 e"},
         "pixel.readout.telegraph_noise": {"fraction": "5 %", "amplitude": "90 e"},
+        "adc.noise": "1 DN",
         "pixel.fpn": {"dark": "20 %", "shading": {"offset": "20 e", "gain": "1 %"}},
         "pixel.defects": {"hot": 0.01, "dead": 0.02},
         "pixel.microlens": {"gain": 1.5},

@@ -60,6 +60,7 @@ KEYS: Mapping[str, str] = {
     "qe": "pixel.photodetector.quantum_efficiency: 0.5",
     "noise": "pixel.readout.read_noise: 5 e",
     "readout_noise": "pixel.readout.read_noise: 5 e",
+    **dict.fromkeys(("adc_noise", "digital_noise", "noise_dn"), "adc.noise: 2 DN"),
     "fwc": "pixel.readout.full_well: 20 ke",
     "well": "pixel.readout.full_well: 20 ke",
     "well_capacity": "pixel.readout.full_well: 20 ke",

@@ -33,6 +33,7 @@ EFFECTS = {
     "fpn": "differences between pixels and between columns",
     "fpn_shading": "slow differences over the array",
     "saturation": "a pixel holds so many electrons",
+    "adc_noise": "noise of the ADC, behind the gain",
     "quantization": "the ADC's whole numbers",
     "charge_transfer": "charge left behind in a ccd",
 }

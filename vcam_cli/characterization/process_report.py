@@ -14,10 +14,10 @@ from dataclasses import dataclass
 from vcam_cli.camera import load as cameras
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived import charge_storage, dark_current, sense_node
-from vcam_cli.camera.derived.electrical import electrical
 from vcam_cli.camera.derived.junction import Depths, depths
 from vcam_cli.camera.derived.pixel_layout import detector
 from vcam_cli.camera.derived.process import Need, Process, process
+from vcam_cli.effects.readout_chain import electrical
 from vcam_cli.errors import BadInput
 from vcam_cli.physics import photodiode, silicon
 

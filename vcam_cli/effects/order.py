@@ -19,13 +19,15 @@
                                               correlated_row_noise,
                                               telegraph_noise
     electrons              Limit              saturation                     electrons
+    electrons              NoiseSource        adc_noise                      electrons
     electrons              Quantizer          quantization                   DN
 
 Kinds are classes of `base.py` and `signal_chain.py`; an aberration that changes over the field is a
 FieldTransfer. Transfer functions multiply, so their order does not matter. Gains act on the blurred
 image: they are taken as constant over a pixel and a point spread function.
 
-Within a kind the order of this tuple is the order of action. It is written nowhere else.
+Within a kind the order of this tuple is the order of action; that of the noise in front of the ADC,
+which an automatic offset makes room for, is in `noise/sources.py`. It is written nowhere else.
 """
 
 from __future__ import annotations
@@ -33,15 +35,9 @@ from __future__ import annotations
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.effects.base import Effect
-from vcam_cli.effects.noise.correlated_row_noise import CorrelatedRowNoise
-from vcam_cli.effects.noise.fpn import FixedPattern
-from vcam_cli.effects.noise.fpn_shading import PatternShading
-from vcam_cli.effects.noise.heavy_tailed_noise import HeavyTailedNoise
+from vcam_cli.effects.noise.adc_noise import AdcNoise
 from vcam_cli.effects.noise.quantization import Quantization
-from vcam_cli.effects.noise.read_noise import ReadNoise
-from vcam_cli.effects.noise.reset_noise import ResetNoise
-from vcam_cli.effects.noise.shot_noise import ShotNoise
-from vcam_cli.effects.noise.telegraph_noise import TelegraphNoise
+from vcam_cli.effects.noise.sources import SOURCES
 from vcam_cli.effects.optics.aberration import Aberration
 from vcam_cli.effects.optics.depth import Depth
 from vcam_cli.effects.optics.diffraction import Diffraction
@@ -72,15 +68,9 @@ ORDER: tuple[type[Effect], ...] = (
     Flicker,
     DarkCurrent,
     ChargeTransfer,
-    ShotNoise,
-    FixedPattern,
-    PatternShading,
-    ResetNoise,
-    ReadNoise,
-    HeavyTailedNoise,
-    CorrelatedRowNoise,
-    TelegraphNoise,
+    *SOURCES,
     Saturation,
+    AdcNoise,
     Quantization,
 )
 

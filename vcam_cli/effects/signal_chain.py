@@ -93,9 +93,17 @@ class ElectronEffect(Effect):
     """In several samples of one integration: drawn anew in each, the same in all, or drawn anew
     for the charge of each step, which adds up."""
 
+    behind_well: ClassVar[bool] = False
+    """Whether it acts on what full pixels hold at most, behind the clamp."""
+
     @abstractmethod
     def apply(self, electrons: NDArray, site: Site) -> NDArray:
         """Return the block with this effect in it, which may reuse the array [electrons]."""
+
+
+def electron_effects(effects: Iterable[Effect], behind_well: bool) -> tuple[ElectronEffect, ...]:
+    """Return the effects on electrons up to the full well, or those behind it."""
+    return tuple(e for e in of_kind(effects, ElectronEffect) if e.behind_well == behind_well)
 
 
 class NoiseSource(ElectronEffect):
@@ -150,6 +158,10 @@ class NoiseSource(ElectronEffect):
         dark : float, optional
             How much of the mean signal is dark signal [electrons].
         """
+
+    def working_variance(self) -> float:
+        """Return the variance in the dark of pixels without defects [electrons squared]."""
+        return self.variance(0.0)
 
     def binned_variance(self, mean: float, dark: float, binning: Binning | None) -> float:
         """Return the variance that it adds to the mean of pixels that are read as one.
@@ -292,12 +304,23 @@ class Quantizer(Effect):
         ----------
         B. Widrow and I. Kollar, Quantization Noise, 2008, section 5.3.
         """
-        ends = np.array([level, level + max(1.0, 1e-3 * level)])
-        below, above = self.response(ends)
-        step = (ends[1] - ends[0]) / float(above - below)
+        step = self.step(level)
         k = np.arange(1, 30)
         dithered = np.exp(-2 * (np.pi * k) ** 2 * variance / step**2) / k**2
         return float(step**2 / 12 + (step / np.pi) ** 2 * dithered.sum())
+
+    def step(self, level: float) -> float:
+        """Return the width of a step of the ADC at a mean signal, both in [electrons]."""
+        ends = np.array([level, level + max(1.0, 1e-3 * level)])
+        below, above = self.response(ends)
+        return float((ends[1] - ends[0]) / float(above - below))
+
+    @abstractmethod
+    def moved(self, electrons: NDArray, codes: NDArray) -> NDArray:
+        """Return the signal whose response is by so many codes [DN] another one [electrons].
+
+        It has the float type of `electrons`, and may reuse both arrays.
+        """
 
     def linear(self, dn: NDArray) -> NDArray:
         """Return what a linear ADC of the same offset and full scale has for these codes [DN].

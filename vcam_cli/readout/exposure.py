@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcam_cli.effects.base import Charge, Effect, of_kind
-from vcam_cli.effects.signal_chain import ElectronEffect, NoiseSource, Quantizer, Site
+from vcam_cli.effects.signal_chain import NoiseSource, Quantizer, Site, electron_effects
 from vcam_cli.parallel import each, slices_within
 from vcam_cli.rng import BLOCK_ROWS, blocks, stream
 
@@ -193,7 +193,8 @@ def capture(
     Returns
     -------
     electrons : NDArray
-        Noisy signal, clipped above at the full well, in the float type of `rate` [electrons].
+        Noisy signal, clipped above at the full well, in the float type of `rate` [electrons]. Noise
+        of the ADC is in it, and behind that clamp.
     dn : NDArray
         Codes as whole numbers, uint16, or uint32 from 17 bits on [DN].
 
@@ -220,10 +221,12 @@ def capture(
             here = {scope: replace(site, **place) for scope, site in opened.items()}
             for source in of_kind(effects, NoiseSource):
                 tile = source.before_shot(tile, here[source.scope])
-            for effect in of_kind(effects, ElectronEffect):
+            for effect in electron_effects(effects, behind_well=False):
                 tile = effect.apply(tile, here[effect.scope])
             if full_charge is not None:
                 np.minimum(tile, full_charge[rows], out=tile)
+            for effect in electron_effects(effects, behind_well=True):
+                tile = effect.apply(tile, here[effect.scope])
             electrons[rows] = tile
             dn[rows] = adc.apply(tile if pedestal is None else tile + pedestal[rows])
         if done is not None:

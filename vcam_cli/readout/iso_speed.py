@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcam_cli.camera.camera import Camera
-from vcam_cli.camera.derived.electrical import electrical
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.effects.base import Gain, of_kind, switched_off
 from vcam_cli.effects.order import ORDER
+from vcam_cli.effects.readout_chain import electrical
 from vcam_cli.errors import bad
 from vcam_cli.image_formation import photon_rate
 from vcam_cli.image_formation.settings import camera_settings

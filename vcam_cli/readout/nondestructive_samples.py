@@ -32,6 +32,7 @@ from vcam_cli.effects.signal_chain import (
     NoiseSource,
     Quantizer,
     Site,
+    electron_effects,
     full_well,
     noise_sources,
 )
@@ -105,6 +106,8 @@ def samples(
             read = _read_charge(charge.copy(), effects, sample_sites, common_sites)
             read[full] = well
             full = read >= well
+            for effect in electron_effects(effects, behind_well=True):
+                read = effect.apply(read, _site(effect, sample_sites, common_sites))
             electrons[number, block] = read
             dn[number, block] = adc.apply(read)
             before = time
@@ -133,7 +136,7 @@ def _read_charge(
     charge: NDArray, effects: Sequence[Effect], sample_sites: Sites, common_sites: Sites
 ) -> NDArray:
     """Return one readout of the charge so far, which may reuse its array [electrons]."""
-    for effect in of_kind(effects, ElectronEffect):
+    for effect in electron_effects(effects, behind_well=False):
         if effect.sample_draws != "cumulative":
             charge = effect.apply(charge, _site(effect, sample_sites, common_sites))
     return charge
@@ -227,5 +230,4 @@ def variances(effects: tuple[Effect, ...], adc: Quantizer) -> tuple[float, float
     sources = noise_sources(effects, "frame")
     sample_sites = sum(e.variance(0.0) for e in sources if e.sample_draws == "independent")
     common = sum(e.variance(0.0) for e in sources if e.sample_draws == "common")
-    below, above = adc.response(np.array([0.0, 1.0]))
-    return float(sample_sites + (1 / (above - below)) ** 2 / 12), float(common)
+    return float(sample_sites + adc.step(0.0) ** 2 / 12), float(common)

@@ -21,6 +21,7 @@ from vcam_cli.camera.processing import SHOWN
 from vcam_cli.camera.scene.scene_files import Crop
 from vcam_cli.camera.scene.sources import Layers
 from vcam_cli.camera.sensor.array import Positions
+from vcam_cli.effects import readout_chain
 from vcam_cli.effects.optics import aberration, point_spread
 from vcam_cli.errors import bad, split
 from vcam_cli.processing import check as check_steps
@@ -51,7 +52,8 @@ def check_effects(camera: Camera) -> None:
     solved = {name: getattr(good.pixel.readout, name) for name in names}
     readout = camera.pixel.readout.model_copy(update=solved)
     pixel = camera.pixel.model_copy(update={"readout": readout})
-    plan.camera_effects(camera.model_copy(update={"pixel": pixel, "adc": good.adc}), geometry(good))
+    adc = good.adc.model_copy(update={"noise": camera.adc.noise})
+    plan.camera_effects(camera.model_copy(update={"pixel": pixel, "adc": adc}), geometry(good))
 
 
 def check_size(camera: Camera) -> None:
@@ -196,6 +198,7 @@ CHECKS: tuple[files.CameraCheck, ...] = (
     (check_depth, "scene optics pixel array"),
     (check_spectral_file, "scene optics pixel array exposure adc accuracy"),
     (check_lens, "optics scene pixel array effects"),
+    (readout_chain.check, "scene optics pixel array adc exposure"),
     (raw_dng.check, "pixel array exposure adc output"),
     (spectral_irradiance.check, "scene output"),
     (isetcam_files.check, "pixel array exposure adc output"),

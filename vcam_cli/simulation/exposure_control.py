@@ -16,7 +16,7 @@ from dataclasses import replace
 import numpy as np
 
 from vcam_cli.camera.camera import Camera
-from vcam_cli.camera.derived.electrical import electrical
+from vcam_cli.effects.readout_chain import electrical
 from vcam_cli.readout import auto_exposure, iso_speed
 from vcam_cli.readout.auto_exposure import ExposureSettings
 from vcam_cli.simulation.preparation import Prepared

@@ -84,7 +84,7 @@ def _sample_figures(
 def saturated_pixels(frame: Frame) -> NDArray:
     """Return which pixels of the raw frame are saturated, in the shape of `dn`."""
     e, groups = frame.electrical, frame.layout.binning_groups
-    if groups.count == groups.summed_charges:
+    if groups.count == groups.summed_charges and not frame.noise_of_full:
         full = e.full_well if frame.full_charge is None else frame.full_charge
         return np.asarray((frame.electrons >= full) | (frame.dn >= e.highest_code))
     return np.asarray(frame.dn >= frame.saturated_dn)

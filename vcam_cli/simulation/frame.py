@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.scene.sources import Layers
-from vcam_cli.effects.base import Gain, Transport, of_kind
+from vcam_cli.effects.base import Effect, Gain, Transport, of_kind
 from vcam_cli.effects.order import quantizer
-from vcam_cli.effects.signal_chain import NoiseSource, Quantizer
+from vcam_cli.effects.signal_chain import NoiseSource, Quantizer, electron_effects
 from vcam_cli.floats import own_float_errors
 from vcam_cli.image_formation import photon_rate
 from vcam_cli.image_formation.rate_cache import RateCache
@@ -142,17 +142,21 @@ class Frame(Prepared):
         # Amid full pixels the first one loses most: no packet before it has left it any charge.
         for transport in of_kind(self.plan.active, Transport):
             well *= float(transport.timely_share(1, 1)[0, 0])
-        if self.layout.binning_groups.binning.kind == "voltage":
-            well -= binned_readout.SURE * self._noise_of_full
+        well -= binned_readout.SURE * self.noise_of_full
         # In both float types: where the well lies half way between two codes they round apart.
         codes = [self.adc.apply(np.full(1, well, kind))[0] for kind in (np.float32, np.float64)]
         return self.summed_codes * float(min(*codes, highest))
 
     @property
-    def _noise_of_full(self) -> float:
-        """Noise behind the full wells of joined voltages, not clipped with them [e rms]."""
+    def noise_of_full(self) -> float:
+        """Noise behind full wells, not clipped with them [e rms].
+
+        It is the ADC's; of joined voltages all of the readout's.
+        """
         well = self.electrical.full_well
-        effects = binned_readout.effects_in_readout(self.plan.active)
+        effects: Sequence[Effect] = electron_effects(self.plan.active, behind_well=True)
+        if self.layout.binning_groups.binning.kind == "voltage":
+            effects = binned_readout.effects_in_readout(self.plan.active)
         sources = of_kind(effects, NoiseSource)
         return float(np.sqrt(sum(e.variance(well) for e in sources)))
 

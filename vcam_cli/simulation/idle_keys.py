@@ -16,11 +16,12 @@ import numpy as np
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived import named_spectra, photodiode
 from vcam_cli.camera.derived.dark_current import dark_rate
-from vcam_cli.camera.derived.electrical import Electrical, electrical
+from vcam_cli.camera.derived.electrical import Electrical
 from vcam_cli.camera.derived.pixel_layout import detector
 from vcam_cli.camera.sensor.architecture import ARCHITECTURES
 from vcam_cli.camera.sensor.photodetector import AtTemperature
 from vcam_cli.config.model import Model
+from vcam_cli.effects.readout_chain import electrical
 from vcam_cli.errors import BadInput
 from vcam_cli.spectra import Spectrum
 

@@ -10,12 +10,13 @@ import numpy as np
 
 from vcam_cli.camera.derived import photodiode
 from vcam_cli.camera.derived.camera_angles import camera_angles
-from vcam_cli.camera.derived.dark_noise import SIGMAS, dark_noise
 from vcam_cli.camera.processing import SHOWN
 from vcam_cli.camera.scene.scene_files import ImageFile
 from vcam_cli.camera.sensor.architecture import ARCHITECTURES
+from vcam_cli.camera.sensor.noise import NoiseTable
 from vcam_cli.effects.base import ImageMotion, of_kind
 from vcam_cli.effects.order import quantizer
+from vcam_cli.effects.readout_chain import SIGMAS, dark_noise
 from vcam_cli.floats import own_float_errors
 from vcam_cli.image_formation.light_plan import BLURS
 from vcam_cli.scenes.base import ChartScene
@@ -87,6 +88,7 @@ def remarks(ready: Prepared) -> tuple[str, ...]:
         *photodiode.remarks(ready.camera),
         *_scheduled_times(ready),
         *_blind_colors(ready),
+        *_noise_beyond_table(ready),
         *_clipped_dark(ready),
         *_unused_codes(ready),
         *_overflow(ready),
@@ -230,13 +232,27 @@ def _cut(ready: Prepared) -> tuple[str, ...]:
     return tuple(notes)
 
 
+def _noise_beyond_table(ready: Prepared) -> tuple[str, ...]:
+    """Return that a gain lies beyond those at which the noise of the readout is known."""
+    given, gain = ready.camera.pixel.readout.read_noise, ready.camera.exposure_gain
+    if not isinstance(given, NoiseTable):
+        return ()
+    (least, _), (most, _) = given.points[0], given.points[-1]
+    if least <= gain <= most:
+        return ()
+    return (
+        f"the read noise at an exposure.gain of {gain:.4g} is taken to be that at"
+        f" {min(max(gain, least), most):.4g}, {given.at(gain):.4g} e: the table of"
+        f" pixel.readout.read_noise has gains from {least:.4g} to {most:.4g}",
+    )
+
+
 def _clipped_dark(ready: Prepared) -> tuple[str, ...]:
     """Return how many pixels are so dark that the ADC's offset clips their noise."""
     e, time = ready.electrical, min(ready.times, default=ready.exposure_time)
-    margin = SIGMAS * dark_noise(ready.camera, e.capacitance)
-    below, above = quantizer(ready.camera, ready.geometry).response(np.array([0.0, 1.0]))
-    step = 1 / float(above - below)
-    missing = margin - e.offset * step
+    step = quantizer(ready.camera, ready.geometry).step(0.0)
+    own = ready.camera.adc.noise * step
+    missing = SIGMAS * math.hypot(dark_noise(ready.camera), own) - e.offset * step
     if ready.camera.adc.offset is None or missing <= 0:
         return ()
     threshold = missing / time - ready.dark_rate

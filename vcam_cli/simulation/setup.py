@@ -6,8 +6,9 @@ from dataclasses import dataclass, replace
 from typing import Self
 
 from vcam_cli.camera.camera import Camera
-from vcam_cli.camera.derived.electrical import Electrical, electrical
+from vcam_cli.camera.derived.electrical import Electrical
 from vcam_cli.camera.derived.geometry import Geometry, geometry
+from vcam_cli.effects.readout_chain import electrical
 from vcam_cli.image_formation.settings import Settings, camera_settings
 from vcam_cli.readout import iso_speed
 from vcam_cli.readout.layout import Layout, camera_layout

@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived import photodiode
 from vcam_cli.camera.derived.dark_current import dark_rate
-from vcam_cli.camera.derived.electrical import electrical
 from vcam_cli.camera.derived.geometry import Geometry, geometry
 from vcam_cli.camera.derived.pixel_layout import detector
 from vcam_cli.camera.derived.process import process
@@ -26,6 +25,7 @@ from vcam_cli.characterization.closed_form import directional_mtf
 from vcam_cli.effects.base import Effect, Gain, of_kind
 from vcam_cli.effects.optics.off_axis import OffAxis
 from vcam_cli.effects.pixel.pixel_vignetting import PixelVignetting
+from vcam_cli.effects.readout_chain import electrical
 from vcam_cli.errors import bad
 from vcam_cli.image_formation import photon_rate
 from vcam_cli.image_formation.settings import camera_settings

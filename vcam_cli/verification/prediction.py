@@ -12,9 +12,9 @@ import numpy as np
 
 from vcam_cli import units
 from vcam_cli.camera.camera import Camera
-from vcam_cli.camera.derived.electrical import electrical
 from vcam_cli.camera.derived.geometry import geometry
 from vcam_cli.camera.derived.lattice import places
+from vcam_cli.effects.readout_chain import electrical
 from vcam_cli.errors import bad
 from vcam_cli.simulation.frame import Frame
 from vcam_cli.simulation.simulate import simulate

@@ -1,20 +1,21 @@
-"""How electrons become volts and numbers: gain, swing, full well, ADC, solved and checked once."""
+"""How electrons become volts and numbers: gain, swing, full well, ADC.
+
+`circuit` solves what does not depend on the ADC's offset; an automatic offset follows from the
+noise in front of the ADC, which effects know: `effects/readout_chain.py`.
+"""
 
 from __future__ import annotations
 
-import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 from numpy.typing import NDArray
 
 from vcam_cli.camera.derived import sense_node
 from vcam_cli.camera.derived.charge_storage import capacity
-from vcam_cli.camera.derived.dark_noise import SIGMAS, dark_noise
 from vcam_cli.camera.derived.mosaic import BLOCKS
 from vcam_cli.camera.derived.transfer_curve import PATH as CURVE
 from vcam_cli.camera.derived.transfer_curve import Curve, transfer_curve
 from vcam_cli.camera.model import CameraModel
-from vcam_cli.camera.sensor.adc import Adc
 from vcam_cli.camera.sensor.architecture import ARCHITECTURES
 from vcam_cli.camera.sensor.pixel import AGREE
 from vcam_cli.errors import BadInput, bad
@@ -22,15 +23,13 @@ from vcam_cli.physics import readout
 
 NOMINAL_SWING = 1.0
 """Volts of a full well where the file gives no voltage; nothing that is counted depends on it."""
-NEGLIGIBLE_CODE = 1e-9
-"""Part of a code that rounding makes of none."""
 LEAST_COUNT, MOST_COUNT = 1e-12, 1e12
 """Electrons of a full well and of a step of the ADC: between them double precision tells codes."""
 
 
-@dataclass(frozen=True)
-class Electrical:
-    """Readout of one pixel."""
+@dataclass(frozen=True, kw_only=True)
+class Circuit:
+    """Readout of one pixel in front of the ADC, and the ADC's resolution."""
 
     conversion_gain: float
     """Voltage per electron on the sense node [V/e]."""
@@ -46,26 +45,13 @@ class Electrical:
     """Gain in front of the ADC, of which its full scale knows nothing."""
     bits: int
     """Resolution of the ADC."""
-    offset: float
-    """ADC code of no signal [DN]."""
-    full_scale: float
-    """Voltage of the highest ADC code [V]."""
-    reference: float | None = None
-    """Voltage at which a logarithmic ADC's curve bends [V]; None for a linear one."""
     curve: Curve | None = None
     """Volts over electrons at the end of the pixel; None where they are proportional."""
-    black_steps: tuple[tuple[str, float], ...] = ()
-    """Colors, and how far their black level is from `offset`, the mean of all [DN]."""
 
     @property
     def has_volts(self) -> bool:
         """Whether volts are volts; else they are parts of a nominal swing."""
         return self.capacitance is not None
-
-    @property
-    def linearized(self) -> bool:
-        """Whether codes are made linear before the processing."""
-        return self.reference is not None or (self.curve is not None and self.curve.corrected)
 
     @property
     def analog_gain(self) -> float:
@@ -76,6 +62,42 @@ class Electrical:
     def highest_code(self) -> int:
         """Highest ADC code [DN]."""
         return 2**self.bits - 1
+
+    @property
+    def output(self) -> float:
+        """Voltage of a full well at the end of the pixel [V]."""
+        return self.voltage_swing if self.curve is None else self.curve.volts[-1]
+
+    @property
+    def slope(self) -> float:
+        """Voltage per electron in the dark at the end of the pixel [V/e]."""
+        return self.conversion_gain if self.curve is None else self.curve.slope
+
+    def volts_of(self, electrons: NDArray) -> NDArray:
+        """Return the voltage at the ADC of charges [e], in their shape and float type [V]."""
+        if self.curve is None:
+            return electrons * electrons.dtype.type(self.conversion_gain * self.analog_gain)
+        volts = self.curve.volts_of(electrons) * self.analog_gain
+        return volts.astype(electrons.dtype)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Electrical(Circuit):
+    """Readout of one pixel, the ADC included."""
+
+    offset: float
+    """ADC code of no signal [DN]."""
+    full_scale: float
+    """Voltage of the highest ADC code [V]."""
+    reference: float | None = None
+    """Voltage at which a logarithmic ADC's curve bends [V]; None for a linear one."""
+    black_steps: tuple[tuple[str, float], ...] = ()
+    """Colors, and how far their black level is from `offset`, the mean of all [DN]."""
+
+    @property
+    def linearized(self) -> bool:
+        """Whether codes are made linear before the processing."""
+        return self.reference is not None or (self.curve is not None and self.curve.corrected)
 
     @property
     def electrons_per_dn(self) -> float:
@@ -90,13 +112,6 @@ class Electrical:
             self.conversion_gain * self.analog_gain * (self.highest_code - self.offset)
         )
 
-    def volts_of(self, electrons: NDArray) -> NDArray:
-        """Return the voltage at the ADC of charges [e], in their shape and float type [V]."""
-        if self.curve is None:
-            return electrons * electrons.dtype.type(self.conversion_gain * self.analog_gain)
-        volts = self.curve.volts_of(electrons) * self.analog_gain
-        return volts.astype(electrons.dtype)
-
     @property
     def saturation(self) -> float:
         """Electrons at which the well or the ADC is full, whichever comes first [e]."""
@@ -108,8 +123,8 @@ class Electrical:
         return (self.highest_code - self.offset) * self.electrons_per_dn
 
 
-def electrical(camera: CameraModel) -> Electrical:
-    """Return the solved readout of a camera: any two of gain, swing and well give the third.
+def circuit(camera: CameraModel) -> Circuit:
+    """Return the solved circuit of a camera: any two of gain, swing and well give the third.
 
     The technology fills in what the file leaves open: the capacitance and with it the gain
     (eq 2.32), then the swing (eq 2.33). A data sheet that counts in electrons and DN alone gives
@@ -117,7 +132,6 @@ def electrical(camera: CameraModel) -> Electrical:
 
     Raises BadInput where all together leave it open, or the file contradicts itself.
     """
-    adc = camera.adc
     capacitance = sense_node.capacitance(camera)
     given = camera.pixel.readout
     nominal = capacitance is None and _counts_only(camera)
@@ -129,67 +143,46 @@ def electrical(camera: CameraModel) -> Electrical:
     gain, swing, well = _solve(given.conversion_gain, swing, given.full_well, capacitance)
     if capacitance is None and not nominal:
         capacitance = float(readout.sense_capacitance(gain))
-    curve = transfer_curve(camera, swing, well)
-    output, slope = (swing, gain) if curve is None else (curve.volts[-1], curve.slope)
-    full_scale = output * given.gain if adc.full_scale is None else adc.full_scale
-    offset = adc.level
-    if offset is None:
-        margin = SIGMAS * dark_noise(camera, capacitance) * camera.exposure_gain
-        offset = _automatic_offset(adc, margin, slope * given.gain * margin, full_scale)
-    if adc.gain is not None:
-        codes = (adc.gain, adc.bits, offset)
-        full_scale = float(readout.adc_full_scale(slope, given.gain, *codes))
-    reference = None
-    if adc.kind == "logarithmic":
-        reference = full_scale / 1000 if adc.reference is None else adc.reference
-    found = Electrical(
+    return Circuit(
         conversion_gain=gain,
         voltage_swing=swing,
         full_well=well,
         capacitance=capacitance,
         readout_gain=given.gain,
         exposure_gain=camera.exposure_gain,
-        bits=adc.bits,
+        bits=camera.adc.bits,
+        curve=transfer_curve(camera, swing, well),
+    )
+
+
+def full_scale(camera: CameraModel, found: Circuit) -> float:
+    """Return the voltage of the highest code [V], unless `adc.gain` sets it from the offset."""
+    given = camera.adc.full_scale
+    return found.output * found.readout_gain if given is None else given
+
+
+def with_offset(camera: CameraModel, found: Circuit, offset: float) -> Electrical:
+    """Return the readout with the ADC, whose code of no signal is `offset` [DN].
+
+    Raises BadInput for a well, or a step of the ADC, of more or less than can be computed.
+    """
+    adc, volts = camera.adc, full_scale(camera, found)
+    if adc.gain is not None:
+        codes = (adc.gain, adc.bits, offset)
+        volts = float(readout.adc_full_scale(found.slope, found.readout_gain, *codes))
+    reference = None
+    if adc.kind == "logarithmic":
+        reference = volts / 1000 if adc.reference is None else adc.reference
+    known = {field.name: getattr(found, field.name) for field in fields(found)}
+    solved = Electrical(
+        **known,
         offset=offset,
-        full_scale=full_scale,
+        full_scale=volts,
         reference=reference,
-        curve=curve,
         black_steps=tuple(adc.steps.items()),
     )
-    _check_counts(found)
-    return found
-
-
-def _automatic_offset(adc: Adc, electrons: float, volts: float, full_scale: float) -> float:
-    """Return the fewest codes that keep so much noise below black unclipped [DN].
-
-    electrons, volts: the noise times the exposure gain; full_scale: of the ADC [V].
-    Raises BadInput where it takes all codes.
-    """
-    highest = 2**adc.bits - 1
-    if adc.gain is not None:
-        codes = electrons * adc.gain
-    else:
-        share = volts / full_scale
-        if adc.kind == "logarithmic":
-            bend = 1 / 1000 if adc.reference is None else adc.reference / full_scale
-            share = _logarithmic_share(share, bend)
-        codes = highest * share / (1 + share)
-    offset = math.ceil(codes - NEGLIGIBLE_CODE)
-    if offset >= highest:
-        message = f"auto would take {offset} of {highest} codes for the noise in the dark"
-        raise bad("adc.offset", message, "give it in DN, or lower noise or gain")
-    return float(offset)
-
-
-def _logarithmic_share(share: float, bend: float) -> float:
-    """Return the codes below black over those above it, for a noise as a part of full scale.
-
-    bend: the reference of the curve as a part of full scale. Below black the curve is as steep as a
-    logarithm; a noise beyond its pole counts by the slope in the dark.
-    """
-    below = share / bend
-    return (-math.log1p(-below) if below < 1 else below) / math.log1p(1 / bend)
+    _check_counts(solved)
+    return solved
 
 
 def _check_counts(found: Electrical) -> None:
@@ -206,10 +199,11 @@ def _check_counts(found: Electrical) -> None:
 def check(camera: CameraModel) -> None:
     """Raise BadInput when the readout is open, contradicts itself or lacks volts it needs."""
     pixel, adc = camera.pixel, camera.adc
-    found = electrical(camera)
-    if found.black_steps:
+    found = circuit(camera)
+    with_offset(camera, found, adc.level or 0.0)  # an automatic one changes its checks by little
+    if adc.steps:
         _check_black_levels(camera, found)
-    if found.curve is not None and found.reference is not None:
+    if found.curve is not None and adc.kind == "logarithmic":
         message = "a logarithmic ADC has a curve of its own"
         raise bad(CURVE, message, "write transfer_curve: linear, or adc.kind: linear")
     if found.has_volts:
@@ -226,11 +220,11 @@ def check(camera: CameraModel) -> None:
         raise no_volts("output.raw", "volts", "leave volts out")
 
 
-def _check_black_levels(camera: CameraModel, found: Electrical) -> None:
+def _check_black_levels(camera: CameraModel, found: Circuit) -> None:
     """Raise BadInput for black levels by color of a sensor that has none simulated."""
     block = BLOCKS.get(str(camera.array.pattern), ())
     colors = {color for row in block for color in row}
-    given = {color for color, _ in found.black_steps}
+    given = set(camera.adc.steps)
     alone = "write one offset for all pixels"
     path = "adc.offset"
     if len(colors) < 2 or (len(block), len(block[0])) != (2, 2):
@@ -243,7 +237,7 @@ def _check_black_levels(camera: CameraModel, found: Electrical) -> None:
         raise bad(path, "black levels by color are not simulated of binned pixels", alone)
     if camera.exposure.captures is not None:
         raise bad(path, "black levels by color are not simulated of several captures", alone)
-    if found.linearized or found.curve is not None or found.reference is not None:
+    if found.curve is not None or camera.adc.kind == "logarithmic":
         raise bad(path, "black levels by color are for a linear readout", alone)
     if camera.output.dng:
         message = "raw.dng has one black level for all colors"

@@ -93,6 +93,13 @@ class Adc(Model):
         example="0.25 DN/e",
         default=None,
     )
+    noise: Annotated[float, Quantity("dn", least=0)] = key(
+        "temporal noise of one conversion behind the gain, rms; referred to the pixel it falls as"
+        " exposure.gain rises; rounding comes on top",
+        unit="DN",
+        example="2 DN",
+        default=0.0,
+    )
     reference: Annotated[float | None, Quantity("voltage", above=0)] = key(
         "of a logarithmic ADC: where its curve bends; default full_scale / 1000",
         example="1.38 mV",
@@ -107,6 +114,9 @@ class Adc(Model):
         if highest is not None and highest >= 2**self.bits - 1:
             message = f"{highest:g} DN leaves no number for a signal in {self.bits} bits"
             raise refusal(("offset",), message, "lower it, or give more bits")
+        if self.noise >= 2**self.bits - 1:
+            message = f"{self.noise:g} DN is more than all codes of {self.bits} bits"
+            raise refusal(("noise",), message, "lower it, or give more bits")
         return self
 
     @property

@@ -1,13 +1,94 @@
 """Noise that takes more than one number to describe: tails, traps, bands, slow patterns."""
 
-from typing import Annotated
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Annotated, Any
 
 from pydantic import model_validator
 
+from vcam_cli.config.lists import read_items
 from vcam_cli.config.model import Model, key
-from vcam_cli.config.quantities import Number, Whole
-from vcam_cli.config.validation_messages import refusal
-from vcam_cli.config.values import Electrons, Percent
+from vcam_cli.config.quantities import Number, Quantity, Whole
+from vcam_cli.config.validation_messages import describe, refusal
+from vcam_cli.config.values import MOST_ELECTRONS, Electrons, Percent
+from vcam_cli.config.yaml_type import YamlType
+
+_ONE_NOISE = Quantity("charge", least=0, most=MOST_ELECTRONS)
+_NOISE_AT_GAIN = Quantity("charge", above=0, most=MOST_ELECTRONS)
+_GAIN = Number(above=0, most=1e9, example="16")
+
+
+@dataclass(frozen=True)
+class NoiseTable:
+    """Noise at some gains of the exposure; between them its logarithm is linear in the gain's."""
+
+    points: tuple[tuple[float, float], ...]
+    """((gain, noise [electrons rms]), ...), gains rising."""
+
+    def at(self, gain: float) -> float:
+        """Return the noise at a gain, at the nearest that is known beyond the ends [e rms]."""
+        first, last = self.points[0], self.points[-1]
+        if gain <= first[0]:
+            return first[1]
+        for (low, before), (high, after) in zip(self.points, self.points[1:], strict=False):
+            if gain <= high:
+                part = math.log(gain / low) / math.log(high / low)
+                return before * (after / before) ** part
+        return last[1]
+
+
+class NoiseByGain(YamlType):
+    """The type of a noise: one number, or a table by the exposure's gain."""
+
+    forms = Any
+
+    def read(self, given: Any) -> float | NoiseTable:
+        """Return the noise [electrons rms] or its table; raise ValueError with a sentence."""
+        if isinstance(given, NoiseTable):
+            return given
+        if not isinstance(given, Mapping):
+            noise: float = _ONE_NOISE.read(given)
+            return noise
+        example = "write for example {table: {1: 5 e, 16: 1.5 e}}"
+        table = given.get("table")
+        if set(given) != {"table"} or not isinstance(table, Mapping) or len(table) < 2:
+            raise ValueError(f"{describe(given)} is no table of two or more gains; {example}")
+        points = sorted(read_items(((("table", g), (g, n)) for g, n in table.items()), _point))
+        if len({gain for gain, _ in points}) < len(points):
+            raise ValueError("a gain comes twice in the table; keep one of them")
+        return NoiseTable(tuple(points))
+
+    def write(self, value: float | NoiseTable) -> Any:
+        """Return the YAML form."""
+        if not isinstance(value, NoiseTable):
+            return _ONE_NOISE.write(value)
+        return {"table": {f"{gain!r}": _NOISE_AT_GAIN.write(noise) for gain, noise in value.points}}
+
+    def json_schema(self, forms: dict[str, Any]) -> dict[str, Any]:
+        """Return the JSON Schema of a noise, or of a table of them by gain."""
+        table = {
+            "type": "object",
+            "patternProperties": {r"^\d+(\.\d*)?$": _NOISE_AT_GAIN.number_schema()},
+            "additionalProperties": False,
+            "minProperties": 2,
+        }
+        by_gain = {
+            "type": "object",
+            "properties": {"table": table},
+            "required": ["table"],
+            "additionalProperties": False,
+        }
+        return {"anyOf": [_ONE_NOISE.json_schema({}), by_gain]}
+
+
+def _point(item: tuple[Any, Any]) -> tuple[float, float]:
+    try:
+        gain = float(item[0])
+    except (TypeError, ValueError):
+        message = f"{describe(item[0])} is not a gain of the exposure, such as 16"
+        raise ValueError(message) from None
+    return _GAIN.read(gain), _NOISE_AT_GAIN.read(item[1])
 
 
 class HeavyTailedNoise(Model):

@@ -10,6 +10,8 @@ from vcam_cli.camera.sensor.architecture import ARCHITECTURES, article
 from vcam_cli.camera.sensor.noise import (
     CorrelatedRowNoise,
     HeavyTailedNoise,
+    NoiseByGain,
+    NoiseTable,
     PatternShading,
     TelegraphNoise,
 )
@@ -98,9 +100,12 @@ class Readout(Model):
     gain: Positive = key(
         "analog gain of the fixed readout chain; the photographer's is exposure.gain", default=1.0
     )
-    read_noise: Electrons = key(
+    read_noise: Annotated[float | NoiseTable, NoiseByGain()] = key(
         "temporal noise of one readout of a pixel, rms, in electrons of the pixel; reset noise,"
-        " that of columns and rows, and the ADC's rounding come on top",
+        " that of columns and rows, and the ADC's noise and rounding come on top; or a table by"
+        " exposure.gain, {table: {1: 5 e, 16: 1.5 e}}: between its gains the logarithm of the noise"
+        " is linear in that of the gain, beyond them the noise of the nearest holds",
+        unit="e",
         example="5 e",
         default=0.0,
     )
@@ -151,6 +156,11 @@ class Readout(Model):
     timing: Annotated[Timing | None, mapping(Timing)] = key(
         "clocks, for the frame rate of vcam plan alone", example={"row_time": "10 us"}, default=None
     )
+
+    def read_noise_at(self, gain: float) -> float:
+        """Return the noise of one readout at a gain of the exposure [e rms]."""
+        given = self.read_noise
+        return given.at(gain) if isinstance(given, NoiseTable) else given
 
     @model_validator(mode="after")
     def _check_agreement(self) -> Self:

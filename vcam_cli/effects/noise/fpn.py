@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vcam_cli.camera.derived.electrical import electrical
+from vcam_cli.camera.derived.electrical import circuit
 from vcam_cli.camera.sensor.architecture import ARCHITECTURES
 from vcam_cli.effects.signal_chain import NoiseSource
 
@@ -71,7 +71,7 @@ class FixedPattern(NoiseSource):
         strengths = (fpn.offset_pixel, offset, fpn.gain_pixel, gain, fpn.dark)
         if not any((*strengths, defects.hot, defects.dead)):
             return None
-        well = electrical(camera).full_well
+        well = circuit(camera).full_well
         return cls(*strengths, defects.hot, defects.dead, well, name if missing else "")
 
     def describe(self) -> str:
@@ -149,6 +149,10 @@ class FixedPattern(NoiseSource):
         center = self.hot * self.full_well + working * mean
         between = self.hot * (self.full_well - center) ** 2 + working * (mean - center) ** 2
         return within + between + self.dead * center**2
+
+    def working_variance(self):
+        """Return the variance of the offsets of working pixels [electrons squared]."""
+        return replace(self, hot=0.0, dead=0.0).variance(0.0)
 
     def _dark_variance(self, dark: float) -> float:
         """Variance of the dark signals [electrons squared]: of a normal number, 0 if below 0."""

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vcam_cli.camera.derived.electrical import electrical
 from vcam_cli.camera.derived.transfer_curve import Curve
+from vcam_cli.effects.readout_chain import electrical
 from vcam_cli.effects.signal_chain import Quantizer
 
 
@@ -48,6 +48,12 @@ class Quantization(Quantizer):
     def response(self, electrons):
         """Return the codes before rounding and clipping [DN]."""
         return electrons * (1 / self.electrons_per_dn) + self.offset
+
+    def moved(self, electrons, codes):
+        """Return the signal whose response is by so many codes [DN] another one [electrons]."""
+        codes *= codes.dtype.type(self.electrons_per_dn)
+        electrons += codes
+        return electrons
 
     def apply(self, electrons):
         """Return the codes of `electrons`, rounded and clipped [DN]."""
@@ -111,6 +117,18 @@ class LogarithmicQuantization(Quantizer):
         level += self.offset
         return level
 
+    def moved(self, electrons, codes):
+        """Return the signal whose response is by so many codes [DN] another one [electrons].
+
+        Where the curve has no value it stays; no signal moves by more than the whole scale.
+        """
+        most = float(np.log1p(self.full / self.bend))
+        codes *= 1 / self._slope
+        factor = np.exp(np.clip(codes, -most, most, out=codes), out=codes)
+        above = np.maximum(electrons + self.bend, 0)
+        electrons += above * (factor - 1)
+        return electrons
+
     def apply(self, electrons):
         """Return the codes of `electrons`, rounded and clipped [DN]."""
         return _round_and_clip(self.response(electrons), self.bits)
@@ -166,6 +184,11 @@ class CurvedQuantization(Quantizer):
         level *= self._codes_per_volt
         level += self.offset
         return level.astype(electrons.dtype)
+
+    def moved(self, electrons, codes):
+        """Return the signal whose response is by so many codes [DN] another one [electrons]."""
+        volts = self.curve.volts_of(electrons) + codes / self._codes_per_volt
+        return self.curve.electrons_of(volts).astype(electrons.dtype)
 
     def apply(self, electrons):
         """Return the codes of `electrons`, rounded and clipped [DN]."""

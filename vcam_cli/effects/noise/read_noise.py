@@ -38,9 +38,10 @@ class ReadNoise(NoiseSource):
         given, name = camera.pixel.readout, camera.pixel.architecture
         missing = given.column_noise > 0 and not ARCHITECTURES[name].column_terms
         column = 0.0 if missing else given.column_noise
-        if not any((given.read_noise, column, given.row_noise)):
+        pixel = given.read_noise_at(camera.exposure_gain)
+        if not any((pixel, column, given.row_noise)):
             return None
-        return cls(given.read_noise, column, given.row_noise, name if missing else "")
+        return cls(pixel, column, given.row_noise, name if missing else "")
 
     def describe(self) -> str:
         """Return a short clause with this camera's numbers and units."""

@@ -9,9 +9,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from vcam_cli.camera.derived.dark_noise import reset_noise
-from vcam_cli.camera.derived.electrical import electrical
+from vcam_cli.camera.derived.electrical import circuit
+from vcam_cli.camera.sensor.architecture import ARCHITECTURES
 from vcam_cli.effects.signal_chain import NoiseSource
+from vcam_cli.physics import readout
 
 
 @dataclass(frozen=True)
@@ -36,7 +37,7 @@ class ResetNoise(NoiseSource):
     @classmethod
     def from_camera(cls, camera, geometry):
         """Return the noise of the reset, or None where the architecture removes it."""
-        electrons = reset_noise(camera, electrical(camera).capacitance)
+        electrons = _noise(camera)
         return cls(electrons) if electrons else None
 
     def describe(self) -> str:
@@ -53,3 +54,20 @@ class ResetNoise(NoiseSource):
     def variance(self, mean, dark=0.0):
         """Return the variance that it adds to a pixel [electrons squared]."""
         return self.electrons**2
+
+
+def _noise(camera) -> float:
+    """Return the noise that the reset leaves in a frame [e rms]; 0 where there is none."""
+    given = camera.pixel.readout.reset_noise
+    of_what = ARCHITECTURES[camera.pixel.architecture].reset_noise
+    if given == "none" or of_what == "none":
+        return 0.0
+    if given != "ktc":
+        return float(given)
+    if of_what == "bit line":
+        capacitance = camera.pixel.readout.bit_line_capacitance
+    else:
+        capacitance = circuit(camera).capacitance
+    if capacitance is None:  # `electrical.check` refuses that where the file is read
+        return 0.0
+    return float(readout.reset_noise_variance(capacitance, camera.pixel.temperature)) ** 0.5

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vcam_cli.camera.derived.electrical import electrical
+from vcam_cli.camera.derived.electrical import circuit
 from vcam_cli.effects.signal_chain import Limit
 
 
@@ -29,7 +29,7 @@ class Saturation(Limit):
     @classmethod
     def from_camera(cls, camera, geometry):
         """Return the limit at the full well of the camera's pixel."""
-        return cls(electrical(camera).full_well)
+        return cls(circuit(camera).full_well)
 
     def describe(self) -> str:
         """Return a short clause with this camera's numbers and units."""

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from vcam_cli import memory
 from vcam_cli.camera.camera import Camera
-from vcam_cli.camera.derived.electrical import electrical
+from vcam_cli.effects.readout_chain import electrical
 from vcam_cli.errors import CannotDo, bad
 from vcam_cli.files.mat import LARGEST, write_mat
 from vcam_cli.simulation import spectral_irradiance
