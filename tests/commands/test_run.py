@@ -420,7 +420,7 @@ class TestSummary:
 
 class TestOptions:
     def test_json_is_one_document_and_nothing_else(self):
-        result = vcam("--json")
+        result = process("--json")
         summary = json.loads(result.stdout)
         run = record()
         assert result.stderr == ""

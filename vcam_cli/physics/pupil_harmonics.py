@@ -27,7 +27,7 @@ from vcam_cli.physics.zernike import Floats, Terms
 MOST_SLOPE = 8.0
 """Slope of a wavefront up to which it is computed so [wavelengths per pupil radius]: from there on
 points of pupil, frequency, direction and wavelength cost more than a grid."""
-LEFT = 3e-6
+LEFT = 2.5e-6
 """Size of the highest harmonics of a wavefront, above the rounding of 32 bits."""
 LEFT_OF_GRIDS = 1e-4
 """The same of a transfer that is looked up in a grid, which is no better than that."""
