@@ -22,7 +22,7 @@ def test_problems_have_yaml_paths():
 def test_an_unknown_key_gets_the_nearest_right_one_and_all_that_are_allowed():
     (mistake,) = mistakes({"adc.bitts": 10})
     assert mistake.startswith("adc.bitts: ")
-    assert "bits, kind, offset, full_scale, gain, reference" in mistake
+    assert "bits, kind, offset, full_scale, gain, noise, reference" in mistake
     assert mistake.endswith("did you mean bits?")
 
 
