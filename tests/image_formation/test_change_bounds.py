@@ -80,3 +80,14 @@ def test_the_change_of_a_picture_is_within_its_bound(kind, samples, channels):
     view = View(ROWS, COLUMNS, PITCH, PITCH)
     shown = image_scene(picture, (WHITE,) * channels, WHITE, view)
     check(shown)
+
+
+@pytest.mark.parametrize("value", [0.0, 0.4])
+def test_an_even_picture_changes_by_no_blur(value):
+    """Not by one of which no bound is known either, as one that changes over the field."""
+    shown = image_scene(
+        np.full((ROWS, COLUMNS, 1), value), (WHITE,), WHITE, View(ROWS, COLUMNS, PITCH, PITCH)
+    )
+    over_field = replace(blur(1, 2), is_uniform=False)
+    found = shown.change_bounds([over_field], sensor(ROWS, COLUMNS), math.inf, math.inf)
+    assert found.changes == [0.0]

@@ -249,7 +249,7 @@ class FieldOfView(Model):
         ),
     )
 
-    def over(self, width: float, height: float) -> tuple[float, float]:
+    def angle_and_extent(self, width: float, height: float) -> tuple[float, float]:
         """Return the angle [rad], and the side or diagonal that it is over, in the unit of both."""
         if self.horizontal is not None:
             return self.horizontal, width

@@ -134,7 +134,13 @@ def _mean_layers(path: OpticalPath, scene: SampledScene) -> tuple[Layers, Spectr
         signal = box_averages(scene, level, g, axes(path, scene, 1.0), path.workers)
     else:
         signal = point_values(scene, level, g)
-    report = SpectrumReport(is_averaged=True, memory=needed)
+    painted = isinstance(scene, ChartScene) and scene.is_painted
+    report = SpectrumReport(
+        is_averaged=True,
+        is_painted=painted,
+        edge_seconds=scene.chart.edge_seconds if isinstance(scene, ChartScene) and painted else 0.0,
+        memory=needed,
+    )
     return iter([Layer(lambda color, rows: signal[color, rows])]), report
 
 

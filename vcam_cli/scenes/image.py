@@ -137,8 +137,8 @@ class ImageScene(SampledScene):
         steps = np.zeros(len(level))
         for top in range(0, len(self.picture), ROWS):
             steps += self._squared_steps(top)
-            with np.errstate(invalid="ignore"):  # light beyond what floats hold has no bound
-                changes = np.nan_to_num((np.sqrt(steps)[:, None] * factors).sum(axis=1), nan=np.inf)
+            stepped = steps > 0  # even light changes by no blur, not by one without a bound either
+            changes = (np.sqrt(steps[stepped])[:, None] * factors[:, stepped]).sum(axis=1)
             if changes.max(axis=1).min() > allowed * full:
                 return ChangeBounds(0.0, [math.inf] * len(losses))
         # The brightest pixel is at least as bright as the mean behind all blurs.

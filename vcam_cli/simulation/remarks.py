@@ -242,7 +242,7 @@ def _noise_beyond_table(ready: Prepared) -> tuple[str, ...]:
         return ()
     return (
         f"the read noise at an exposure.gain of {gain:.4g} is taken to be that at"
-        f" {min(max(gain, least), most):.4g}, {given.at(gain):.4g} e: the table of"
+        f" {min(max(gain, least), most):.4g}, {given.at_gain(gain):.4g} e: the table of"
         f" pixel.readout.read_noise has gains from {least:.4g} to {most:.4g}",
     )
 

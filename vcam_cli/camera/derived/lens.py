@@ -141,7 +141,7 @@ def _focal_length(camera: CameraModel) -> float:
         found["focal_length"] = optics.focal_length
     if optics.field_of_view is not None:
         pixels = lattice(camera)
-        angle, extent = optics.field_of_view.over(pixels.width, pixels.height)
+        angle, extent = optics.field_of_view.angle_and_extent(pixels.width, pixels.height)
         found["field_of_view"] = float(
             radiometry.focal_length_of_field_of_view(angle, extent, distance)
         )

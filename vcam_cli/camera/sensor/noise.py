@@ -26,7 +26,7 @@ class NoiseTable:
     points: tuple[tuple[float, float], ...]
     """((gain, noise [electrons rms]), ...), gains rising."""
 
-    def at(self, gain: float) -> float:
+    def at_gain(self, gain: float) -> float:
         """Return the noise at a gain, at the nearest that is known beyond the ends [e rms]."""
         first, last = self.points[0], self.points[-1]
         if gain <= first[0]:

@@ -160,7 +160,7 @@ class Readout(Model):
     def read_noise_at(self, gain: float) -> float:
         """Return the noise of one readout at a gain of the exposure [e rms]."""
         given = self.read_noise
-        return given.at(gain) if isinstance(given, NoiseTable) else given
+        return given.at_gain(gain) if isinstance(given, NoiseTable) else given
 
     @model_validator(mode="after")
     def _check_agreement(self) -> Self:

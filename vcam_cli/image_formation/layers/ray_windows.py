@@ -122,7 +122,7 @@ class RaySum:
         """
         g = self.path.geometry
         budget = allowed**2 * g.rows * g.columns
-        sums = results(self._begun, windows, self.path.workers)
+        sums = results(self._first_sum, windows, self.path.workers)
         while coarse := _too_coarse(sums, budget):
             fine = results(self._refined, coarse, self.path.workers)
             sums = [one for one in sums if one not in coarse] + fine
@@ -136,7 +136,7 @@ class RaySum:
         error = math.sqrt(sum(one.error for one in sums) / (g.rows * g.columns))
         return Hidden(*LEVELS[finest], error, 0.0, sum(one.values for one in sums))
 
-    def _begun(self, window: Window) -> _Sum:
+    def _first_sum(self, window: Window) -> _Sum:
         """Return the sum of the second level, whose cells are halves of the first one's."""
         cells = self._cells(window, 1)
         layers = self.paint(cells)
