@@ -7,7 +7,6 @@ from number_grid import all_cases, cases, outcome
 
 from vcam_cli.config import shipped
 
-pytestmark = pytest.mark.attack("a camera's numbers at their limits")
 SAMPLE = 80
 """Cases of the quick slice, evenly spread over all of them."""
 

@@ -217,7 +217,7 @@ def _cut(ready: Prepared) -> tuple[str, ...]:
     pixels = [2 * abs(r) / ready.geometry.pitch_x for r in scene.cut.radii]
     how = ""
     if found.cell:
-        how = f", put one before the other by rays on cells of {found.cell * 1e6:.3g} um"
+        how = f", composited ray by ray on cells of {found.cell * 1e6:.3g} um"
     more = ", more than accuracy asks for" if found.error > ready.settings.tolerance else ""
     notes = [
         f"depth from {near} to {far} is cut into {found.layers} layers: defocus blurs points to"
