@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.files.images.png import write_png
 from vcam_cli.scenes.base import Frame
 from vcam_cli.scenes.charts.eye_chart import eye_chart
@@ -34,7 +35,7 @@ def mean(fine: Floats) -> Floats:
     return fine.reshape(SIZE, FINE, SIZE, FINE).mean(axis=(1, 3))
 
 
-def box(x: Floats, y: Floats, left: float, top: float, right: float, bottom: float) -> NDArray:
+def box(x: Floats, y: Floats, left: float, top: float, right: float, bottom: float) -> Array:
     """Return where samples lie in a rectangle."""
     return (x >= left) & (x < right) & (y >= top) & (y < bottom)
 

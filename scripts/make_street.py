@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.files.images.png import write_png
 
 SCENES = Path(__file__).resolve().parent.parent / "configs" / "scenes"
@@ -43,17 +44,17 @@ def grid() -> tuple[Floats, Floats]:
     return x[None, :], y[:, None]
 
 
-def box(x: Floats, y: Floats, left: float, low: float, right: float, high: float) -> NDArray:
+def box(x: Floats, y: Floats, left: float, low: float, right: float, high: float) -> Array:
     """Return where samples lie in a rectangle."""
     return (x >= left) & (x < right) & (y >= low) & (y < high)
 
 
-def disc(x: Floats, y: Floats, at: tuple[float, float], radius: float) -> NDArray:
+def disc(x: Floats, y: Floats, at: tuple[float, float], radius: float) -> Array:
     """Return where samples lie in a disc."""
     return (x - at[0]) ** 2 + (y - at[1]) ** 2 < radius**2
 
 
-def fill(picture: Floats, where: NDArray, color: Color) -> None:
+def fill(picture: Floats, where: Array, color: Color) -> None:
     """Paint a color where something is."""
     picture[where] = color
 

@@ -11,6 +11,8 @@ import numpy as np
 import OpenImageIO as oiio
 from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
+
 SCENES = Path(__file__).resolve().parent.parent / "configs" / "scenes"
 FINE = 4
 Floats = NDArray[np.float64]
@@ -25,7 +27,7 @@ class Canvas:
         self.color = np.zeros((height * FINE, width * FINE, 3))
         self.opacity = np.zeros((height * FINE, width * FINE))
 
-    def paint(self, where: NDArray, color: tuple[float, float, float], light: Floats | float = 1.0):
+    def paint(self, where: Array, color: tuple[float, float, float], light: Floats | float = 1.0):
         """Paint a color in a light (h, w) where samples are."""
         where = np.broadcast_to(where, self.opacity.shape)
         shade = np.broadcast_to(light, self.opacity.shape)[where, None]

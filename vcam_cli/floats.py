@@ -4,7 +4,8 @@ from collections.abc import Callable
 from typing import ParamSpec, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
+
+from vcam_cli.arrays import Array
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -18,6 +19,6 @@ def own_float_errors(function: Callable[P, T]) -> Callable[P, T]:
     return np.errstate(all="warn", under="ignore")(function)
 
 
-def rms(values: NDArray) -> float:
+def rms(values: Array) -> float:
     """Return the root of the mean square of values of any shape, in their unit."""
     return float(np.sqrt(np.square(values, dtype=np.float64).mean()))

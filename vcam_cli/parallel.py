@@ -13,8 +13,8 @@ from contextlib import suppress
 from typing import ParamSpec, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.errors import CannotDo
 from vcam_cli.interrupts import defer_interrupts
 
@@ -119,7 +119,7 @@ def slices_within(whole: slice, size: int) -> list[slice]:
     return [slice(i, min(i + size, whole.stop)) for i in range(whole.start, whole.stop, size)]
 
 
-def product(left: NDArray, right: NDArray) -> NDArray:
+def product(left: Array, right: Array) -> Array:
     """Return the product of two matrices of the same float type, computed in one thread."""
     out = np.empty((len(left), right.shape[1]), right.dtype)
     if left.size > PRODUCT >= right.size:

@@ -15,7 +15,8 @@ import hashlib
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
+
+from vcam_cli.arrays import Array
 
 BLOCK_ROWS = 64
 """Rows of the array that share one stream, and that flow together through the engine."""
@@ -43,7 +44,7 @@ def stream(seed: int, effect: str, capture: int = 0, block: int = 0) -> np.rando
     return np.random.Generator(np.random.Philox(key=key, counter=[0, 0, 0, block]))
 
 
-def coarse_normals(generator: np.random.Generator, rows: int, columns: int, dtype: type) -> NDArray:
+def coarse_normals(generator: np.random.Generator, rows: int, columns: int, dtype: type) -> Array:
     """Return standard normal numbers of 16 random bits each, in a fifth of the time.
 
     Each is one of 65536 equally probable values, of at most 4.3 standard deviations. Their mean is
@@ -60,7 +61,7 @@ def coarse_normals(generator: np.random.Generator, rows: int, columns: int, dtyp
 
     Returns
     -------
-    NDArray
+    Array
         Normal numbers (rows, columns).
     """
     words = -(-columns // 4)
@@ -70,7 +71,7 @@ def coarse_normals(generator: np.random.Generator, rows: int, columns: int, dtyp
 
 
 @lru_cache(maxsize=2)
-def _normal_quantiles(dtype: type) -> NDArray:
+def _normal_quantiles(dtype: type) -> Array:
     """Return the standard normal numbers in the middle of 65536 equal parts, with variance 1."""
     from scipy.special import ndtri
 

@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 import yaml
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.fitting.fit import fit
 from vcam_cli.fitting.result import Fit
 from vcam_cli.verification import measurement_file
@@ -55,7 +55,7 @@ class BareSensor:
         photons: float,
         count: int,
         rng: np.random.Generator,
-    ) -> NDArray:
+    ) -> Array:
         """Return frames (count, rows, columns) of one sensor of these numbers [DN]."""
         own = np.random.default_rng([77, number])
         offset = self.dsnu * own.standard_normal(shape)
@@ -71,7 +71,7 @@ class BareSensor:
         codes = np.rint(level + self.gain * drawn)
         return np.clip(codes, 0, 2**self.bits - 1).astype(np.uint16)
 
-    def _readout(self, shape: tuple[int, ...], rng: np.random.Generator) -> NDArray:
+    def _readout(self, shape: tuple[int, ...], rng: np.random.Generator) -> Array:
         if self.shape == NORMAL:
             return self.read_noise * rng.standard_normal(shape)
         from scipy.special import beta

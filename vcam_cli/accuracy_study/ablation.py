@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import geometry
 from vcam_cli.effects.base import Charge, of_kind
@@ -90,7 +90,7 @@ def with_exposure_time(camera: Camera, time: float, gain: float | None = None) -
     return camera.model_copy(update={"exposure": camera.exposure.single(time, gain)})
 
 
-def mean_raw(ready: Prepared) -> NDArray:
+def mean_raw(ready: Prepared) -> Array:
     """Return every pixel's noise-free signal, clipped at the full well, float64 [electrons]."""
     return ready.held_electrons.astype(np.float64)
 
@@ -100,7 +100,7 @@ def full_signal(ready: Prepared) -> float:
     return full_signal_of(ready, mean_raw(ready))
 
 
-def full_signal_of(ready: Prepared, mean: NDArray) -> float:
+def full_signal_of(ready: Prepared, mean: Array) -> float:
     """Return the full signal of a camera whose `mean_raw` is known [electrons]."""
     return max(1.0, min(ready.electrical.full_well, float(mean.max())))
 
@@ -149,7 +149,7 @@ def variance_shares(ready: Prepared, full: float, workers: int) -> dict[str, flo
     return {name: float(share) for name, share in shares.items()}
 
 
-def _rounding_share(adc: Quantizer, electrons: NDArray, times: int) -> float:
+def _rounding_share(adc: Quantizer, electrons: Array, times: int) -> float:
     """Mean square of the rounding error, a mean of so many, over the variance with it."""
     line = adc.response(electrons.copy())
     ends = electrons.mean() * np.array([1.0, 1.001]) + np.array([0.0, 1.0])
@@ -158,13 +158,13 @@ def _rounding_share(adc: Quantizer, electrons: NDArray, times: int) -> float:
     return error / max(error + float(np.var(electrons)), 1e-300)
 
 
-def _variance(charge: NDArray) -> float:
+def _variance(charge: Array) -> float:
     return max(float(np.var(charge)), 1e-300)
 
 
 def _draw_field(
-    ready: Prepared, field: NDArray, draws: tuple[NoiseSource, ...], workers: int
-) -> NDArray:
+    ready: Prepared, field: Array, draws: tuple[NoiseSource, ...], workers: int
+) -> Array:
     """Return a flat field [electrons], dark signal included, with these draws in it, never clipped.
 
     Hot pixels are full, as they are read. Of pixels that are read as one, their mean.

@@ -12,9 +12,9 @@ import time
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vcam_cli.accuracy_study import ablation
+from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
 from vcam_cli.image_formation.settings import camera_settings
 from vcam_cli.processing import process
@@ -38,11 +38,11 @@ class Shot:
     """A frame of one setting."""
 
     ready: Prepared
-    mean: NDArray
+    mean: Array
     """Noise-free raw signal [electrons]"""
-    clean: NDArray | None
+    clean: Array | None
     """(rows, columns, channels) its render in linear light; None where there is none to judge."""
-    noisy: NDArray | None
+    noisy: Array | None
     """The same of the frame as it is, with its noise."""
 
     @property

@@ -12,11 +12,11 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vcam_cli import memory
 from vcam_cli.accuracy_study import ablation
 from vcam_cli.accuracy_study.knobs import CONVERGED, FINEST, with_accuracy
+from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
 from vcam_cli.effects.base import of_kind
 from vcam_cli.effects.signal_chain import NoiseSource, Quantizer
@@ -112,7 +112,7 @@ def describe_reference(found: Prepared, coarse: Prepared, full: float, change: f
 
 def effect_changes(
     camera: Camera, exposure_time: float, names: tuple[str, ...], workers: int
-) -> dict[str, NDArray]:
+) -> dict[str, Array]:
     """Return the change of the mean raw by leaving out each effect: (rms, largest) [e].
 
     In 64 bits, to a part of the camera's tolerance: without an effect other cells and frequencies
@@ -151,7 +151,7 @@ def sampling(ready: Prepared) -> float:
     return ready.spectrum.cells_per_pixel or ready.spectrum.oversampling
 
 
-def rms_and_largest(difference: NDArray) -> NDArray:
+def rms_and_largest(difference: Array) -> Array:
     """Return the rms and the largest of a difference of signals, (2,) [electrons]."""
     return np.array([rms(difference), float(np.abs(difference).max())])
 

@@ -15,8 +15,6 @@ import math
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
-from numpy.typing import NDArray
-
 from vcam_cli.accuracy_study import ablation, recommendation
 from vcam_cli.accuracy_study.ablation import Ablation
 from vcam_cli.accuracy_study.knobs import (
@@ -41,6 +39,7 @@ from vcam_cli.accuracy_study.reference import (
 )
 from vcam_cli.accuracy_study.refinement import Refined, is_same_camera, refine_reference
 from vcam_cli.accuracy_study.setting_errors import COLUMNS, Point
+from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.simulation import PRESETS
 from vcam_cli.floats import own_float_errors, rms
@@ -234,7 +233,7 @@ class _Measurement:
     # --- as it is shown --------------------------------------------------------------------------
 
     def _point(
-        self, knob: str, setting: str, shot: Shot, other: Shot, moved: NDArray | None = None
+        self, knob: str, setting: str, shot: Shot, other: Shot, moved: Array | None = None
     ) -> Point:
         """Return the errors of a shot beside another, its time still unknown.
 

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic_core import InitErrorDetails
 
+from vcam_cli.arrays import Array
 from vcam_cli.camera.spectrum import Spectral, SpectrumSpec, flat
 from vcam_cli.config.lists import read_items, repeats
 from vcam_cli.config.model import Model, Rule, at_most_one, exactly_one, key
@@ -46,7 +47,7 @@ class FocusWindow(Model):
         down, across = (slice(a, max(b, a + 1)) for a, b in zip(first, last, strict=True))
         return down, across
 
-    def contains(self, across: NDArray, down: NDArray) -> NDArray[np.bool_]:
+    def contains(self, across: Array, down: Array) -> NDArray[np.bool_]:
         """Return which places lie in it, given from the upper-left corner as 0 to 1."""
         inside_x = np.abs(across - self.x) <= self.width / 2
         return np.asarray(inside_x & (np.abs(down - self.y) <= self.height / 2))

@@ -19,8 +19,8 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
 from vcam_cli.capture_schedules import frames_plots
 from vcam_cli.capture_schedules.frame_noise import MeasuredSnr, NoiseMeasurement
@@ -76,7 +76,7 @@ class Shot:
     name: str
     estimator: str
     times: tuple[float, ...]
-    photocurrent: NDArray
+    photocurrent: Array
     expected: float
     measured: MeasuredSnr
 
@@ -100,7 +100,7 @@ class Frames:
         One for each schedule and estimator, in the study's order.
     """
 
-    rate: NDArray
+    rate: Array
     sensor: Sensor
     shots: tuple[Shot, ...]
 
@@ -228,7 +228,7 @@ def write_frames(
 
 
 def _schedules(
-    asked: ScheduleFrames, rate: NDArray, sensor: Sensor, count: int
+    asked: ScheduleFrames, rate: Array, sensor: Sensor, count: int
 ) -> dict[str, tuple[float, ...]]:
     """Return rising times by name, each once [s]; those of the methods end at the same time."""
     pdf = photocurrent_levels(rate)
@@ -247,7 +247,7 @@ def _schedules(
     return schedules | asked.times
 
 
-def _heuristic_times(rate: NDArray, count: int, segments: int, sensor: Sensor) -> Floats:
+def _heuristic_times(rate: Array, count: int, segments: int, sensor: Sensor) -> Floats:
     """Return the heuristic's times with the longest one among them (count,) [s].
 
     What does not fill the well in the longest exposure is for the last capture, whatever its pdf;
@@ -270,7 +270,7 @@ def _take_frame(ready: Prepared, times: tuple[float, ...], estimator: str, worke
     return take_frame(replace(ready, camera=camera, exposure_time=times[-1], times=times), workers)
 
 
-def _expected_snr(rate: NDArray, times: Sequence[float], sensor: Sensor, estimator: str) -> float:
+def _expected_snr(rate: Array, times: Sequence[float], sensor: Sensor, estimator: str) -> float:
     """Return the mean SNR over the pixels by the closed form."""
     pdf = Pdf.levels(np.maximum(rate, 0).ravel().astype(float), np.ones(rate.size))
     if estimator == "weighted":

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.files.images.png import write_png
 from vcam_cli.files.plots import COLORS, plot_figure
 
@@ -32,10 +33,10 @@ class Picture:
 
     title: str
     text: str
-    values: NDArray
+    values: Array
 
 
-def tone_limits(values: NDArray) -> tuple[float, float]:
+def tone_limits(values: Array) -> tuple[float, float]:
     """Return what is black and what white in a picture of these positive values."""
     positive = values[values > 0]
     if positive.size == 0:
@@ -44,7 +45,7 @@ def tone_limits(values: NDArray) -> tuple[float, float]:
     return float(min(low, high / 2)), float(high)
 
 
-def tones(values: NDArray, low: float, high: float) -> NDArray[np.uint8]:
+def tones(values: Array, low: float, high: float) -> NDArray[np.uint8]:
     """Return 8-bit codes of positive values, log(value / low) / log(high / low).
 
     Values at `low` and below are black, as what is not a number.
@@ -55,7 +56,7 @@ def tones(values: NDArray, low: float, high: float) -> NDArray[np.uint8]:
     return np.rint(255 * np.clip(share, 0, 1)).astype(np.uint8)
 
 
-def write_tones(path: Path | str, values: NDArray, low: float, high: float) -> None:
+def write_tones(path: Path | str, values: Array, low: float, high: float) -> None:
     """Write a tone-mapped PNG of values (rows, columns).
 
     Raises
@@ -68,7 +69,7 @@ def write_tones(path: Path | str, values: NDArray, low: float, high: float) -> N
 
 
 def plot_details(
-    path: Path | str, title: str, scene: NDArray, square: Square, pictures: Sequence[Picture]
+    path: Path | str, title: str, scene: Array, square: Square, pictures: Sequence[Picture]
 ) -> None:
     """Plot the scene with a square on it, and that part of every picture, larger.
 
@@ -147,7 +148,7 @@ def plot_noise(path: Path | str, title: str, pictures: Sequence[Picture], limit:
 
 
 def _show_picture(
-    axes: Any, codes: NDArray, title: str, text: str, square: Square | None = None
+    axes: Any, codes: Array, title: str, text: str, square: Square | None = None
 ) -> None:
     from matplotlib.patches import Rectangle
 

@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.files.plots import COLORS, plot_figure
 from vcam_cli.scheduling.pdf import Floats, Indices, Pdf
 
@@ -58,7 +58,7 @@ def plot_pdf_and_captures(
     path: Path | str,
     title: str,
     panels: Sequence[tuple[str, Pdf]],
-    captures: Sequence[tuple[str, NDArray]],
+    captures: Sequence[tuple[str, Array]],
     units: Units,
 ) -> None:
     """Plot a pdf and its approximation below it, on the last one the captures of some methods.
@@ -286,7 +286,7 @@ def _largest_density(steps: Sequence[tuple[str, Pdf]], wide: bool) -> float:
     return 1.08 * max(most, usual) or 1.0
 
 
-def _draw_captures(axes: Any, captures: Sequence[tuple[str, NDArray]]) -> None:
+def _draw_captures(axes: Any, captures: Sequence[tuple[str, Array]]) -> None:
     """Draw the photocurrents that fill the well at each capture: lines, one height a method."""
     top = axes.get_ylim()[1]
     for number, (method, photocurrents) in enumerate(captures):

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
 from vcam_cli.progress import Observer
 from vcam_cli.scheduling import histogram_binning
@@ -22,7 +22,7 @@ SAME = 1e-9
 
 def camera_photocurrents(
     camera: Camera, workers: int | None = None, watch: Observer | None = None
-) -> NDArray:
+) -> Array:
     """Simulate the photocurrent of every pixel that a camera reads, without noise and dark current.
 
     Parameters
@@ -48,7 +48,7 @@ def camera_photocurrents(
     return np.maximum(np.asarray(ready.rate, dtype=np.float64).ravel(), 0.0)
 
 
-def photocurrent_histogram(values: NDArray, bins: int) -> Pdf:
+def photocurrent_histogram(values: Array, bins: int) -> Pdf:
     """Return the histogram of photocurrents in bins of equal ratio, from darkest to brightest.
 
     Why equal ratio: where light spans five decades, the first of 4096 equal bins holds all that

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from vcam_cli import errors
+from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
 from vcam_cli.capture_schedules import pdf_scale
 from vcam_cli.capture_schedules.model import ScheduleStudy
@@ -258,7 +259,7 @@ class _SourceReader:
         return BadInput([Problem(path, message, remedy, where)])
 
 
-def read_columns(file: Path, columns: tuple[str, ...]) -> list[NDArray]:
+def read_columns(file: Path, columns: tuple[str, ...]) -> list[Array]:
     """Read the numbers of a histogram or of levels, column by column.
 
     Raises
@@ -283,7 +284,7 @@ def read_columns(file: Path, columns: tuple[str, ...]) -> list[NDArray]:
 
 
 def _table_mistakes(
-    values: NDArray, columns: tuple[str, ...]
+    values: Array, columns: tuple[str, ...]
 ) -> list[tuple[NDArray[np.bool_], str, str]]:
     """Return each possible mistake of a table: (rows,) where it is, what it is, what to do."""
     counts, light = values[-1], values[:-1]

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from numpy.typing import NDArray
-
+from vcam_cli.arrays import Array
 from vcam_cli.capture_schedules import schedule_rows
 from vcam_cli.capture_schedules.fewest_captures import FewestCaptures
 from vcam_cli.capture_schedules.frames import Frames
@@ -93,7 +92,7 @@ class ScheduleResult:
         several = f"{min(counts)} to {max(counts)}" if len(counts) > 1 else f"{counts[0]}"
         return f"<ScheduleResult {model.name}: {len(self.found)} schedules of {several} captures>"
 
-    def times(self, method: str, count: int) -> NDArray:
+    def times(self, method: str, count: int) -> Array:
         """Return capture times (N,) [s]; without a sensor in 1 / the pdf's unit.
 
         Raises

@@ -7,14 +7,13 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from numpy.typing import NDArray
-
 from vcam_cli.arguments import (
     require_folder,
     require_name,
     require_overrides,
     require_whole,
 )
+from vcam_cli.arrays import Array
 from vcam_cli.capture_schedules import (
     frames,
     online_loss,
@@ -156,7 +155,7 @@ class _StudyRun:
     ) -> None:
         self.study, self.seed, self.workers, self.watch = study, seed, workers, watch
         self.model = study.model
-        self.light: NDArray | None = None
+        self.light: Array | None = None
         """(n,) photocurrents of the camera's pixels [e/s], where the pdf is of a camera."""
         self.pdf = study.known if study.known is not None else self._simulated_pdf()
         self.approximation = self._approximation(self.model.density[0])

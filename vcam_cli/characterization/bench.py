@@ -27,9 +27,9 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vcam_cli.accuracy_study.ablation import with_effects, with_exposure_time
+from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import geometry, pixel_centers
 from vcam_cli.camera.derived.mosaic import BLOCKS, NONE, mosaic
@@ -138,7 +138,7 @@ class Bench:
         index = self.ready.mosaic.colors.index(color)
         return float(self.ready.white_rate[index]) / self.photon_rate
 
-    def flat_frame(self, electrons: float, number: int, time: float | None = None) -> NDArray:
+    def flat_frame(self, electrons: float, number: int, time: float | None = None) -> Array:
         """Take a raw frame in even light, or a dark one.
 
         Parameters
@@ -158,10 +158,10 @@ class Bench:
         time = self.time if time is None else time
         g = self.ready.geometry
         dtype = self.ready.settings.dtype
-        rate: NDArray = np.full((g.rows, g.columns), electrons / (time or 1.0), dtype)
+        rate: Array = np.full((g.rows, g.columns), electrons / (time or 1.0), dtype)
         return self.take_frame(rate, number, time)
 
-    def take_frame(self, rate: NDArray, number: int, time: float) -> NDArray:
+    def take_frame(self, rate: Array, number: int, time: float) -> Array:
         """Take a raw frame, its codes moved up by the pedestal.
 
         Parameters
@@ -187,11 +187,11 @@ class Bench:
         dn = np.rint(adc.response(electrons)) + self.pedestal
         return np.clip(dn, 0, 2**adc.bits - 1 + self.pedestal)
 
-    def color_pixels(self, frame: NDArray, color: str) -> NDArray:
+    def color_pixels(self, frame: Array, color: str) -> Array:
         """Return the pixels of one color as lattices of equal size, (lattices, rows, columns)."""
         return np.stack([frame[rows, columns] for rows, columns in self.color_slices(color)])
 
-    def lattices(self, frame: NDArray, color: str) -> list[Lattice]:
+    def lattices(self, frame: Array, color: str) -> list[Lattice]:
         """Return the pixels of one color with their places on the detector."""
         x, y = pixel_centers(self.ready.geometry, detector=True)
         return [
@@ -278,7 +278,7 @@ def prepare_edge_bench(bench: Bench, stages: Stages) -> Bench:
     return replace(bench, ready=ready)
 
 
-def edge_rate(edge: Bench) -> NDArray:
+def edge_rate(edge: Bench) -> Array:
     """Return the edge's photo-electrons a second, every color as bright as the others [e/s]."""
     ready = edge.ready
     rate = ready.rate.copy()

@@ -12,8 +12,9 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from vcam_cli.arrays import Array
 from vcam_cli.effects.base import Effect, SeparableTransfer, of_kind
 from vcam_cli.image_formation.transfer_functions import Transfer
 from vcam_cli.simulation import plan
@@ -25,7 +26,7 @@ BATCH = 16
 """Frequencies at which a transfer of two dimensions is computed at once."""
 
 
-def clipped_variance(mean: ArrayLike, sigma: ArrayLike, limit: float) -> NDArray:
+def clipped_variance(mean: ArrayLike, sigma: ArrayLike, limit: float) -> Array:
     """Return the variance of min(X, limit) for a normal X, section 13.10.1 of [1]_.
 
     Parameters
@@ -95,8 +96,8 @@ def saturation_capacity(
 
 
 def system_mtf(
-    ready: Prepared, color: int, frequency: NDArray, direction: tuple[float, float]
-) -> NDArray:
+    ready: Prepared, color: int, frequency: Array, direction: tuple[float, float]
+) -> Array:
     """Return the MTF of optics, diffusion and aperture at the center, |H(f)| / H(0).
 
     Parameters
@@ -119,9 +120,9 @@ def directional_mtf(
     transfer: Transfer,
     effects: Sequence[Effect],
     color: int,
-    frequency: NDArray,
+    frequency: Array,
     direction: tuple[float, float],
-) -> NDArray:
+) -> Array:
     """Return |H(f)| / H(0) of a transfer's first component with the apertures among the effects.
 
     Parameters
@@ -149,7 +150,7 @@ def directional_mtf(
     return np.abs(out * _blur(transfer, color, fx, fy)) / float(transfer.level[0, color])
 
 
-def _blur(transfer: Transfer, color: int, fx: NDArray, fy: NDArray) -> NDArray:
+def _blur(transfer: Transfer, color: int, fx: Array, fy: Array) -> Array:
     """Return H of the lens and the silicon at pairs of fx and fy: (n,) [e/s]."""
     if not transfer.plane_blurs:
         return transfer.radial_response(np.hypot(fx, fy))[0, color]

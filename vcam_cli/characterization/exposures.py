@@ -7,8 +7,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.characterization import closed_form
 from vcam_cli.characterization.bench import Bench, edge_rate, prepare_edge_bench
 from vcam_cli.characterization.kept_frames import Keeper, Kind, NoFrames
@@ -62,7 +62,7 @@ class EdgeMeasurement:
     """The response of a slanted edge, and the model's MTF at its frequencies."""
 
     measured: mtf.EdgeResponse
-    expected: NDArray
+    expected: Array
 
 
 @dataclass(frozen=True)
@@ -169,7 +169,7 @@ def _transfer_and_linearity(series: Series, color: str) -> tuple[PhotonTransfer,
         raise bad(("adc",), message, "look at the ADC's full scale and bits") from None
 
 
-def flat_levels(bench: Bench) -> NDArray:
+def flat_levels(bench: Bench) -> Array:
     """Return the photo-electrons of the flat frames, rising [e]."""
     full = bench.saturation
     variance = full + bench.dark + bench.noise_floor + bench.pattern_variance(full + bench.dark)
@@ -229,7 +229,7 @@ def _pair_statistics(
     return {c: (float(np.mean(p, 0)[0]), float(np.mean(p, 0)[1])) for c, p in pairs.items()}
 
 
-def _frame_means(bench: Bench, frame: NDArray) -> dict[str, float]:
+def _frame_means(bench: Bench, frame: Array) -> dict[str, float]:
     """Return the mean of one frame, of every color."""
     pixels = {color: bench.color_pixels(frame, color) for color in bench.colors}
     return {color: float(values.mean(dtype=np.float64)) for color, values in pixels.items()}

@@ -16,8 +16,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Literal, Protocol
 
-from numpy.typing import NDArray
-
+from vcam_cli.arrays import Array
 from vcam_cli.characterization.bench import Bench
 from vcam_cli.files.atomic import write_text
 from vcam_cli.files.images.tiff import whole_numbers, write_tiff
@@ -29,7 +28,7 @@ Kind = Literal["pair", "stack", "dark"]
 class Keeper(Protocol):
     """What is shown the frames of flat fields as they are taken."""
 
-    def add(self, bench: Bench, kind: Kind, electrons: float, time: float, frame: NDArray) -> None:
+    def add(self, bench: Bench, kind: Kind, electrons: float, time: float, frame: Array) -> None:
         """Take a frame (rows, columns) [DN] of so many mean photo-electrons [e] and seconds."""
 
     def finish(self) -> None:
@@ -39,7 +38,7 @@ class Keeper(Protocol):
 class NoFrames:
     """A keeper that keeps nothing."""
 
-    def add(self, bench: Bench, kind: Kind, electrons: float, time: float, frame: NDArray) -> None:
+    def add(self, bench: Bench, kind: Kind, electrons: float, time: float, frame: Array) -> None:
         """Do nothing."""
 
     def finish(self) -> None:
@@ -61,7 +60,7 @@ class FrameFiles:
         self._texts: dict[str, list[str]] = {}
         self._last: tuple[Kind, float, float] | None = None
 
-    def add(self, bench: Bench, kind: Kind, electrons: float, time: float, frame: NDArray) -> None:
+    def add(self, bench: Bench, kind: Kind, electrons: float, time: float, frame: Array) -> None:
         """Write the pixels of every color of a frame."""
         group = kind, electrons, time
         number = self._groups[group] = self._groups.get(group, -1) + 1

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.characterization.characterize import Characterization
 from vcam_cli.characterization.exposures import Channel
 from vcam_cli.files.curves import Curve, Mark, Panel
@@ -89,7 +89,7 @@ def _snr_panel(result: Characterization) -> Panel:
     )
 
 
-def _model_snr(result: Characterization, channel: Channel, photons: NDArray) -> NDArray:
+def _model_snr(result: Characterization, channel: Channel, photons: Array) -> Array:
     """Return the SNR of the camera's model at some photons on a pixel, rounding included."""
     bench = result.bench
     rounding = ROUNDING * bench.ready.electrical.electrons_per_dn**2

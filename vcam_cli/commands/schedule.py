@@ -10,8 +10,7 @@ from vcam_cli.commands import options
 from vcam_cli.commands.progress import Progress
 
 if TYPE_CHECKING:
-    from numpy.typing import NDArray
-
+    from vcam_cli.arrays import Array
     from vcam_cli.capture_schedules.fewest_captures import FewestCaptures
     from vcam_cli.capture_schedules.schedule_result import ScheduleResult
 
@@ -148,7 +147,7 @@ def schedule_lines(result: "ScheduleResult") -> list[str]:
     return lines
 
 
-def _times_text(times: "NDArray", plain: bool) -> list[str]:
+def _times_text(times: "Array", plain: bool) -> list[str]:
     """Return capture times as text, those in the middle left out where they are many."""
     shown = [f"{v:.4f}" for v in times / times[0]] if plain else [f"{v:.5g}" for v in times * 1e3]
     return shown if len(shown) <= MOST_TIMES else [*shown[: MOST_TIMES - 2], "...", shown[-1]]

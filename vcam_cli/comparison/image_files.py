@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.errors import bad
 from vcam_cli.files.file_checks import is_raw
 from vcam_cli.files.folder import OutputFolder
@@ -69,8 +69,8 @@ class Comparison:
     Y/Yn, Z/Zn.
     """
 
-    image: NDArray
-    reference: NDArray
+    image: Array
+    reference: Array
     settings: Settings
     codings: tuple[str, str] = ("srgb", "srgb")
     """How the codes of the two files were read."""
@@ -102,7 +102,7 @@ class Comparison:
         return f"<Comparison {' and '.join(self.names)}: {said}>"
 
     @cached_property
-    def s_cielab(self) -> NDArray:
+    def s_cielab(self) -> Array:
         """S-CIELAB Delta E of every pixel, (rows, columns)."""
         s = self.settings
         return s_cielab_map(
@@ -182,7 +182,7 @@ def _read(path: Path, settings: Settings, name: str) -> LinearImage:
     return read_picture(path, encoding, 1.0, (name,), channels, signed=True)
 
 
-def _relative_to_white(picture: LinearImage, settings: Settings) -> NDArray:
+def _relative_to_white(picture: LinearImage, settings: Settings) -> Array:
     if settings.space != "xyz":
         return picture.data
     return picture.data / np.asarray(settings.white, np.float32)

@@ -6,8 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
 from vcam_cli.config.document import Document
 from vcam_cli.datasets.drawing import Frame
@@ -24,7 +24,7 @@ LIGHT = 1 << 24
 """Bytes of light that are kept: no frame comes back to the scene of an earlier one."""
 NPZ = "npz"
 """The file of a frame beside its point."""
-ARRAYS: dict[str, Callable[[Result], NDArray]] = {
+ARRAYS: dict[str, Callable[[Result], Array]] = {
     "raw": lambda result: result.dn,
     "clean": lambda result: result.clean_dn.astype(np.float32),
     "depth": lambda result: result.frame.depth().astype(np.float32),

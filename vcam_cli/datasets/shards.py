@@ -16,8 +16,8 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.datasets.frame_work import NPZ
 from vcam_cli.errors import bad
 from vcam_cli.files import frame_archive
@@ -28,7 +28,7 @@ from vcam_cli.files.records import Fingerprint, Proofs, file_fingerprint
 from vcam_cli.files.report import hash_text, to_json
 from vcam_cli.sweeps.sweep_result import read_outcome
 
-NamedArrays = tuple[str, dict[str, NDArray]]
+NamedArrays = tuple[str, dict[str, Array]]
 """The name of a frame, and its arrays by kind."""
 
 
@@ -143,7 +143,7 @@ def scale(kind: str, codes: int) -> int:
     return {"raw": 1, "depth": MILLIMETERS}.get(kind, codes)
 
 
-def whole_numbers(values: NDArray, factor: int) -> NDArray:
+def whole_numbers(values: Array, factor: int) -> Array:
     """Return values times `factor`, rounded: uint16, or uint32 where that is too small.
 
     What is larger than that holds, as an infinite depth, is its largest number.
@@ -152,7 +152,7 @@ def whole_numbers(values: NDArray, factor: int) -> NDArray:
     return whole.astype(np.uint16 if whole.max(initial=0) < 1 << 16 else np.uint32)
 
 
-def _hash(values: NDArray) -> str:
+def _hash(values: Array) -> str:
     """Return the SHA-256 of values in C order, little-endian."""
     little = values.astype(values.dtype.newbyteorder("<"), copy=False)
     return hashlib.sha256(np.ascontiguousarray(little).tobytes()).hexdigest()

@@ -33,8 +33,8 @@ from functools import lru_cache
 from typing import ClassVar, Literal, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.camera.sensor.array import Binning
@@ -156,7 +156,7 @@ class Effect(ABC):
         """Whether it blurs all places alike."""
         return True
 
-    def spread(self, wavelengths: NDArray) -> NDArray | None:
+    def spread(self, wavelengths: Array) -> Array | None:
         """Return how far it displaces light in the mean, at most.
 
         A point of light that comes to lie at distances r with the weights h takes from a wave
@@ -164,30 +164,30 @@ class Effect(ABC):
 
         Parameters
         ----------
-        wavelengths : NDArray
+        wavelengths : Array
             Wavelengths (J,) [m].
 
         Returns
         -------
-        NDArray or None
+        Array or None
             Bound (J,) on |1 - H(f)| / (2 pi |f|) at every frequency and place of the field [m];
             None where it blurs nothing.
         """
         return None
 
-    def row_transfer(self, frequency: NDArray, wavelength: float) -> NDArray | None:
+    def row_transfer(self, frequency: Array, wavelength: float) -> Array | None:
         """Return the contrast that it leaves of waves along a row, in the mean over the field.
 
         Parameters
         ----------
-        frequency : NDArray
+        frequency : Array
             Spatial frequencies (n,) [cycles/m].
         wavelength : float
             Wavelength [m].
 
         Returns
         -------
-        NDArray or None
+        Array or None
             Contrast (n,) without unit; None where it blurs nothing.
         """
         return None
@@ -221,24 +221,24 @@ class Blur(Effect):
         """Return the frequency from which the transfer is zero, or inf [cycles/m]."""
 
     @abstractmethod
-    def otf_plane(self, fx: NDArray, fy: NDArray, wavelength: float) -> NDArray:
+    def otf_plane(self, fx: Array, fy: Array, wavelength: float) -> Array:
         """Return the transfer at all pairs of fx (n,) and fy (m,) [cycles/m]: (m, n).
 
         It is 1 at frequency 0.
         """
 
-    def spread(self, wavelengths: NDArray) -> NDArray:
+    def spread(self, wavelengths: Array) -> Array:
         """Return a bound (J,) on |1 - H(f)| / (2 pi |f|) at wavelengths (J,) [m]; inf: none known.
 
         A blur without one is never left out.
         """
         return np.full(len(wavelengths), np.inf)
 
-    def largest(self, frequency: NDArray, wavelength: float) -> NDArray:
+    def largest(self, frequency: Array, wavelength: float) -> Array:
         """Return a bound (n,) on the contrast of waves in any direction; 1 where none is known."""
         return np.ones(frequency.shape)
 
-    def kept_bytes(self, wavelengths: NDArray, by_harmonics: bool = False) -> int:
+    def kept_bytes(self, wavelengths: Array, by_harmonics: bool = False) -> int:
         """Return the memory that its transfer takes at wavelengths (J,) [m] beside tables.
 
         It may be asked for on planes, or only for its harmonics of the direction.
@@ -246,13 +246,13 @@ class Blur(Effect):
         return 0
 
     def otf_along(
-        self, frequency: NDArray, across: tuple[float, float], wavelength: float
-    ) -> NDArray | None:
+        self, frequency: Array, across: tuple[float, float], wavelength: float
+    ) -> Array | None:
         """Return the transfer of waves in one direction, or None where it is not known by itself.
 
         Parameters
         ----------
-        frequency : NDArray
+        frequency : Array
             Spatial frequencies (n,) [cycles/m].
         across : tuple of float
             Unit vector (x, y) along which the waves change.
@@ -261,12 +261,12 @@ class Blur(Effect):
 
         Returns
         -------
-        NDArray or None
+        Array or None
             Transfer (n,), complex where the blur is not symmetric.
         """
         return None
 
-    def row_transfer(self, frequency: NDArray, wavelength: float) -> NDArray:
+    def row_transfer(self, frequency: Array, wavelength: float) -> Array:
         """Return the contrast (n,) that it leaves of waves along a row."""
         return np.abs(self.otf_plane(frequency, np.zeros(1), wavelength)[0])
 
@@ -277,28 +277,26 @@ class RadialTransfer(Blur):
     is_even = True
 
     @abstractmethod
-    def otf(self, frequency: NDArray, wavelength: float) -> NDArray:
+    def otf(self, frequency: Array, wavelength: float) -> Array:
         """Return the transfer at `frequency` [cycles/m] and `wavelength` [m]; 1 at frequency 0."""
 
-    def spectral_otf(self, frequency: NDArray, wavelengths: NDArray) -> NDArray:
+    def spectral_otf(self, frequency: Array, wavelengths: Array) -> Array:
         """Return the transfer at every wavelength (J,) [m]: (J, *shape of `frequency`)."""
         return np.array([self.otf(frequency, float(w)) for w in wavelengths])
 
-    def otf_plane(self, fx: NDArray, fy: NDArray, wavelength: float) -> NDArray:
+    def otf_plane(self, fx: Array, fy: Array, wavelength: float) -> Array:
         """Return the transfer at all pairs of fx (n,) and fy (m,) [cycles/m]: (m, n)."""
         return self.otf(np.hypot(fx[None, :], fy[:, None]), wavelength)
 
-    def spread(self, wavelengths: NDArray) -> NDArray:
+    def spread(self, wavelengths: Array) -> Array:
         """Return a bound (J,) on |1 - H(f)| / (2 pi |f|) at wavelengths (J,) [m]."""
         return np.array(_radial_spread(self, tuple(wavelengths.tolist())))
 
-    def largest(self, frequency: NDArray, wavelength: float) -> NDArray:
+    def largest(self, frequency: Array, wavelength: float) -> Array:
         """Return the contrast (n,), which is that of all directions."""
         return np.abs(self.otf(frequency, wavelength))
 
-    def otf_along(
-        self, frequency: NDArray, across: tuple[float, float], wavelength: float
-    ) -> NDArray:
+    def otf_along(self, frequency: Array, across: tuple[float, float], wavelength: float) -> Array:
         """Return the transfer (n,) of waves in one direction, which is that of all."""
         return self.otf(np.abs(frequency), wavelength)
 
@@ -322,7 +320,7 @@ class PlaneTransfer(Blur):
     integral h(x, y) exp(-2 pi i (fx x + fy y)) dx dy, x to the right and y down.
     """
 
-    def harmonics(self, frequency: NDArray, wavelengths: NDArray) -> NDArray:
+    def harmonics(self, frequency: Array, wavelengths: Array) -> Array:
         """Return the transfer as harmonics of the direction, complex A_m (J, n, m).
 
         Frequencies (n,) lie evenly from 0 [cycles/m], for wavelengths (J,) [m]; `pupil_harmonics`
@@ -336,7 +334,7 @@ class Zone:
     """A blur, and how much of it there is in every place of the sensor."""
 
     blur: Blur
-    weight: Callable[[NDArray, NDArray], NDArray]
+    weight: Callable[[Array, Array], Array]
     """At the positions x (columns,), y (rows,) [m]: (rows, columns)."""
 
 
@@ -364,7 +362,7 @@ class FieldTransfer(Effect):
         """No: it blurs places of the field each by itself."""
         return False
 
-    def row_transfer(self, frequency: NDArray, wavelength: float) -> NDArray:
+    def row_transfer(self, frequency: Array, wavelength: float) -> Array:
         """Return the contrast (n,) that it leaves of waves along a row, rms over some zones."""
         zones = self.zones(PLACES)
         some = [zone.blur for zone in zones[:: max(1, len(zones) // PLACES)]]
@@ -379,16 +377,16 @@ class SeparableTransfer(Effect):
         """Width and height of the area that it averages over evenly [m]; None for another shape."""
         return None
 
-    def row_transfer(self, frequency: NDArray, wavelength: float) -> NDArray:
+    def row_transfer(self, frequency: Array, wavelength: float) -> Array:
         """Return the contrast (n,) that it leaves of waves along a row."""
         return np.abs(self.along_x(frequency))
 
     @abstractmethod
-    def along_x(self, frequency: NDArray) -> NDArray:
+    def along_x(self, frequency: Array) -> Array:
         """Return the transfer along x at `frequency` [cycles/m]."""
 
     @abstractmethod
-    def along_y(self, frequency: NDArray) -> NDArray:
+    def along_y(self, frequency: Array) -> Array:
         """Return the transfer along y at `frequency` [cycles/m]."""
 
 
@@ -410,7 +408,7 @@ class ImageMotion(Effect):
     def travel(self) -> float:
         """How far from its place light comes to lie [m]."""
 
-    def spread(self, wavelengths: NDArray) -> NDArray:
+    def spread(self, wavelengths: Array) -> Array:
         """Return a bound (J,) on |1 - H(f)| / (2 pi |f|): no light moves further [m]."""
         return np.full(len(wavelengths), self.travel)
 
@@ -428,7 +426,7 @@ class Gain(Effect):
     """A factor on the photo signal that varies slowly over the array."""
 
     @abstractmethod
-    def gain(self, x: NDArray, y: NDArray) -> NDArray:
+    def gain(self, x: Array, y: Array) -> Array:
         """Return the factor at the positions x (columns,), y (rows,) [m]: (rows, columns).
 
         Its shape is (1, 1) where it is the same everywhere.
@@ -451,7 +449,7 @@ class TemporalGain(Effect):
     """A factor on the photo signal that depends on when a line is exposed."""
 
     @abstractmethod
-    def gain(self, x: NDArray, y: NDArray, start: float, stop: float) -> NDArray:
+    def gain(self, x: Array, y: Array, start: float, stop: float) -> Array:
         """Return the mean factor from `start` to `stop` after a line's exposure begins [s].
 
         Its shape at the positions x (columns,), y (rows,) [m] is (rows or 1, columns or 1): 1
@@ -471,9 +469,9 @@ class Transport(Effect):
     """Charge that arrives late: every electron by its own chance, so means are enough."""
 
     @abstractmethod
-    def transport(self, signal: NDArray) -> NDArray:
+    def transport(self, signal: Array) -> Array:
         """Return what arrives of a mean signal (rows, columns), in its unit and float type."""
 
     @abstractmethod
-    def timely_share(self, rows: int, columns: int) -> NDArray:
+    def timely_share(self, rows: int, columns: int) -> Array:
         """Return the share (rows, columns) of a pixel's own charge that does not arrive late."""

@@ -9,8 +9,8 @@ from dataclasses import dataclass, field
 from typing import ClassVar, Literal, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.camera.sensor.array import Binning
 from vcam_cli.effects.base import Effect, SignalLevels, of_kind
 from vcam_cli.rng import coarse_normals
@@ -42,7 +42,7 @@ class Site:
     another one than `stream`."""
     coarse_normals: bool = False
     """Whether the normal numbers of pixels are `rng.coarse_normals`."""
-    lines_drawn: dict[str, NDArray] = field(default_factory=dict)
+    lines_drawn: dict[str, Array] = field(default_factory=dict)
     """Draws per column and per row of the array that are at hand."""
 
     @property
@@ -54,13 +54,13 @@ class Site:
         """Return the generator of a named stream for this block that stays with the sensor."""
         return (self.sensor or self.stream)(name)
 
-    def normal(self, name: str) -> NDArray:
+    def normal(self, name: str) -> Array:
         """Return one standard normal number a pixel, (rows, columns)."""
         if self.coarse_normals:
             return coarse_normals(self.stream(name), self.rows, self.columns, self.dtype)
         return self.stream(name).standard_normal((self.rows, self.columns), dtype=self.dtype)
 
-    def normal_columns(self, name: str) -> NDArray:
+    def normal_columns(self, name: str) -> Array:
         """Return one standard normal number a column, the same for every block, (columns,)."""
         if name not in self.lines_drawn:
             drawn = self.line_stream(name).standard_normal(self.columns, dtype=self.dtype)
@@ -68,11 +68,11 @@ class Site:
             self.lines_drawn[name] = drawn
         return self.lines_drawn[name]
 
-    def normal_rows(self, name: str) -> NDArray:
+    def normal_rows(self, name: str) -> Array:
         """Return one standard normal number a row, the same for every column, (rows, 1)."""
         return self.stream(name).standard_normal((self.rows, 1), dtype=self.dtype)
 
-    def of_all_rows(self, name: str, shape: Callable[[NDArray], NDArray]) -> NDArray:
+    def of_all_rows(self, name: str, shape: Callable[[Array], Array]) -> Array:
         """Return the block's part (rows, 1) of a sequence over all rows of the array.
 
         `shape` makes the sequence of one standard normal number a row, in 64 bits.
@@ -97,7 +97,7 @@ class ElectronEffect(Effect):
     """Whether it acts on what full pixels hold at most, behind the clamp."""
 
     @abstractmethod
-    def apply(self, electrons: NDArray, site: Site) -> NDArray:
+    def apply(self, electrons: Array, site: Site) -> Array:
         """Return the block with this effect in it, which may reuse the array [electrons]."""
 
 
@@ -140,7 +140,7 @@ class NoiseSource(ElectronEffect):
         """Whether it fills some pixels, however little light there is."""
         return False
 
-    def before_shot(self, mean: NDArray, site: Site) -> NDArray:
+    def before_shot(self, mean: Array, site: Site) -> Array:
         """Return the block's mean signal as this source changes it [electrons].
 
         It may reuse the array.
@@ -198,7 +198,7 @@ def noise_sources(effects: Iterable[Effect], scope: str) -> tuple[NoiseSource, .
     return tuple(source for source in of_kind(effects, NoiseSource) if source.scope == scope)
 
 
-def total_variance(sources: Iterable[NoiseSource], signal: SignalLevels) -> NDArray:
+def total_variance(sources: Iterable[NoiseSource], signal: SignalLevels) -> Array:
     """Return the summed variance of noise sources at each of the levels [electrons squared].
 
     Of pixels that are read as one, of their mean.
@@ -251,7 +251,7 @@ class Limit(ElectronEffect):
         return (self,)
 
     @abstractmethod
-    def apply(self, electrons: NDArray, site: Site | None = None) -> NDArray:
+    def apply(self, electrons: Array, site: Site | None = None) -> Array:
         """Return the clamped block, which may reuse the array [electrons]."""
 
 
@@ -268,11 +268,11 @@ class Quantizer(Effect):
     bits: int
 
     @abstractmethod
-    def apply(self, electrons: NDArray) -> NDArray:
+    def apply(self, electrons: Array) -> Array:
         """Return the digital numbers of `electrons`, whole and of the same float type [DN]."""
 
     @abstractmethod
-    def response(self, electrons: NDArray) -> NDArray:
+    def response(self, electrons: Array) -> Array:
         """Return the same relation before rounding and clipping [DN]."""
 
     def contribution(self, signal: SignalLevels, others: Sequence[Effect]) -> tuple[float, str]:
@@ -316,13 +316,13 @@ class Quantizer(Effect):
         return float((ends[1] - ends[0]) / float(above - below))
 
     @abstractmethod
-    def moved(self, electrons: NDArray, codes: NDArray) -> NDArray:
+    def moved(self, electrons: Array, codes: Array) -> Array:
         """Return the signal whose response is by so many codes [DN] another one [electrons].
 
         It has the float type of `electrons`, and may reuse both arrays.
         """
 
-    def linear(self, dn: NDArray) -> NDArray:
+    def linear(self, dn: Array) -> Array:
         """Return what a linear ADC of the same offset and full scale has for these codes [DN].
 
         It is a straight line of electrons whatever the curve is, in the same float type.

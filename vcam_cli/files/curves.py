@@ -11,8 +11,8 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.files.plots import COLORS, MARKERS, plot_figure
 
 Look = Literal["points", "line", "dashed"]
@@ -35,8 +35,8 @@ class Curve:
     """
 
     name: str
-    x: NDArray
-    y: NDArray
+    x: Array
+    y: Array
     look: Look = "points"
     color: int = 0
 

@@ -12,10 +12,11 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
+
+from vcam_cli.arrays import Array
 
 
-def archive_bytes(arrays: Mapping[str, NDArray]) -> bytes:
+def archive_bytes(arrays: Mapping[str, Array]) -> bytes:
     """Return an archive of arrays by their names."""
     data = io.BytesIO()
     with zipfile.ZipFile(data, "w", zipfile.ZIP_STORED) as archive:
@@ -24,20 +25,20 @@ def archive_bytes(arrays: Mapping[str, NDArray]) -> bytes:
     return data.getvalue()
 
 
-def add_array(archive: zipfile.ZipFile, name: str, values: NDArray) -> None:
+def add_array(archive: zipfile.ZipFile, name: str, values: Array) -> None:
     """Add an array to an archive."""
     member = zipfile.ZipInfo(f"{name}.npy")  # of the year 1980
     with archive.open(member, "w", force_zip64=True) as file:
         np.lib.format.write_array(file, np.ascontiguousarray(values), allow_pickle=False)
 
 
-def read_arrays(path: Path) -> dict[str, NDArray]:
+def read_arrays(path: Path) -> dict[str, Array]:
     """Return the arrays of an archive. Raise OSError or ValueError where it is none."""
     with np.load(path, allow_pickle=False) as archive:
         return {name: archive[name] for name in archive.files}
 
 
-def write_archive(path: Path, frames: Iterable[tuple[str, Mapping[str, NDArray]]]) -> None:
+def write_archive(path: Path, frames: Iterable[tuple[str, Mapping[str, Array]]]) -> None:
     """Write the arrays of frames, each under the frame's name, a dot, and its own."""
     with zipfile.ZipFile(path, "w", zipfile.ZIP_STORED) as archive:
         for frame, arrays in frames:

@@ -7,8 +7,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.fitting.noise_shape import difference_counts
 from vcam_cli.fitting.pattern import Pattern, pattern
 from vcam_cli.fitting.traps import PixelMoments, pixel_moments
@@ -52,7 +52,7 @@ class Condition:
     """Color -> share of its codes that are the highest."""
     moments: tuple[PixelMoments, ...] = ()
     """Of the pixels of each plane, of the dark frames of the shortest exposure time."""
-    differences: tuple[NDArray, ...] = ()
+    differences: tuple[Array, ...] = ()
     """Of each plane of these, how often pixels differ by so many codes (groups, codes)."""
 
     def mean(self, color: str) -> Estimate:
@@ -94,13 +94,13 @@ def shared(found: Estimate, planes: int, freedom: int) -> Estimate:
 class Defects:
     """Pixels that do not work, each (rows, columns)."""
 
-    hot: NDArray
-    dead: NDArray
-    judged: NDArray
+    hot: Array
+    dead: Array
+    judged: Array
     """Pixels that some light is bright enough for to tell whether they are dead."""
 
     @property
-    def good(self) -> NDArray:
+    def good(self) -> Array:
         """The pixels that work."""
         return ~(self.hot | self.dead)
 
@@ -133,7 +133,7 @@ def measure(measurement: Measurement, watch: Observer) -> Conditions:
     """
     assert measurement.levels is not None
     highest = 2**measurement.levels.bits - 1
-    averages: list[tuple[FrameSet, NDArray]] = []
+    averages: list[tuple[FrameSet, Array]] = []
     notes: list[str] = []
     for stack in stacks(measurement):
         if stack.entry.target == "flat":
@@ -182,7 +182,7 @@ def usual_temperature(measurement: Measurement) -> float | None:
 
 
 def _defects(
-    averages: Iterable[tuple[FrameSet, NDArray]], highest: int, measurement: Measurement
+    averages: Iterable[tuple[FrameSet, Array]], highest: int, measurement: Measurement
 ) -> Defects:
     """Return which pixels do not work, each beside the others of its color."""
     listed = list(averages)
@@ -206,7 +206,7 @@ def _defects(
 
 
 def _condition(
-    entry: FrameSet, label: str, frames: NDArray, good: NDArray, measurement: Measurement
+    entry: FrameSet, label: str, frames: Array, good: Array, measurement: Measurement
 ) -> Condition:
     assert measurement.levels is not None
     highest = 2**measurement.levels.bits - 1

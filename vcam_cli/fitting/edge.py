@@ -11,8 +11,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.physics.diffraction import cutoff_frequency
 from vcam_cli.quality.mtf import EdgeResponse
 from vcam_cli.verification.model import Measurement
@@ -33,9 +33,9 @@ COLUMNS = ("frequency_lp_per_mm", "value")
 class LensTransfer:
     """Modulation transfer of the lens, in the mean over frames and colors."""
 
-    frequency: NDArray
+    frequency: Array
     """Spatial frequencies (n,), rising from 0 [cycles/m]."""
-    value: NDArray
+    value: Array
     """Modulation transfer (n,), 1 at frequency 0."""
 
     def rows(self) -> list[tuple[float, float]]:
@@ -95,7 +95,7 @@ def lens_transfer(responses: list[EdgeResponse], measurement: Measurement) -> Le
     return LensTransfer(frequency[:count], value / value[0])
 
 
-def _noise(values: NDArray, frequency: NDArray) -> NDArray:
+def _noise(values: Array, frequency: Array) -> Array:
     """Return the standard deviation of a frame's transfer (n,).
 
     The derivative of the edge makes white noise rise with the frequency, so that all frequencies
@@ -103,9 +103,9 @@ def _noise(values: NDArray, frequency: NDArray) -> NDArray:
 
     Parameters
     ----------
-    values : NDArray
+    values : Array
         Transfers of the frames (frames, n).
-    frequency : NDArray
+    frequency : Array
         Spatial frequencies (n,), rising from 0 [cycles/pixel].
     """
     if len(values) < 2:

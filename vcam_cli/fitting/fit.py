@@ -10,8 +10,8 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.errors import Collector, bad
 from vcam_cli.fitting import camera_file, edge, sensor
 from vcam_cli.fitting.conditions import (
@@ -182,7 +182,7 @@ def _of_dark(out: Fit, found: Conditions, line: sensor.Dark, gain: Estimate) -> 
             )
 
 
-def _all_differences(dark: Condition) -> NDArray:
+def _all_differences(dark: Condition) -> Array:
     """Return how often pixels of all planes differ by so many codes (groups, codes)."""
     most = max(counts.shape[1] for counts in dark.differences)
     total = np.zeros((max(len(counts) for counts in dark.differences), most))

@@ -6,8 +6,8 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.quality.photon_transfer import ROUNDING
 from vcam_cli.verification.stack_statistics import Estimate
 
@@ -31,7 +31,7 @@ def is_significant(found: Estimate) -> bool:
     return found.value > SIGNIFICANT * found.error + found.below
 
 
-def difference_counts(frames: NDArray, good: NDArray) -> NDArray:
+def difference_counts(frames: Array, good: Array) -> Array:
     """Return how often pixels differ by so many codes between two frames (groups, codes).
 
     Two and two frames are compared, so that no pair shares a frame. The last code counts all that
@@ -39,9 +39,9 @@ def difference_counts(frames: NDArray, good: NDArray) -> NDArray:
 
     Parameters
     ----------
-    frames : NDArray
+    frames : Array
         Codes (n, rows, columns) [DN].
-    good : NDArray
+    good : Array
         Which pixels count (rows, columns).
     """
     pairs = len(frames) // 2
@@ -54,7 +54,7 @@ def difference_counts(frames: NDArray, good: NDArray) -> NDArray:
     )
 
 
-def tail_shape(counts: NDArray, normal: float, electrons: float, gain: float) -> Estimate:
+def tail_shape(counts: Array, normal: float, electrons: float, gain: float) -> Estimate:
     """Return the shape of Tukey's lambda distribution of the readout, by maximum likelihood.
 
     Kurtosis would not do: of shapes below -1/8 that of a sample has no finite error, and falls
@@ -64,7 +64,7 @@ def tail_shape(counts: NDArray, normal: float, electrons: float, gain: float) ->
 
     Parameters
     ----------
-    counts : NDArray
+    counts : Array
         Of `difference_counts`.
     normal : float
         Variance of rows and columns [DN^2].
@@ -92,7 +92,7 @@ def tail_shape(counts: NDArray, normal: float, electrons: float, gain: float) ->
     beside = np.exp(-(turn**2) * normal - 2 * electrons * (1 - np.cos(gain * turn)))
     beside *= np.sinc(turn / (2 * math.pi)) ** 2
 
-    def likeliest(numbers: NDArray, start: NDArray) -> NDArray:
+    def likeliest(numbers: Array, start: Array) -> Array:
         def cost(place: Any) -> Any:
             mass = _readout(place, half, points)
             expected = _differences(mass, beside, size, codes, points)
@@ -109,7 +109,7 @@ def tail_shape(counts: NDArray, normal: float, electrons: float, gain: float) ->
     return Estimate(float(np.clip(best[0], *SHAPES)), error)
 
 
-def _readout(place: NDArray, half: int, points: int) -> NDArray:
+def _readout(place: Array, half: int, points: int) -> Array:
     """Return the probability of the readout's noise in every cell of a grid (2 half + 1,).
 
     place: shape, and logarithm of the standard deviation [DN]; points: cells in a code.
@@ -127,7 +127,7 @@ def _readout(place: NDArray, half: int, points: int) -> NDArray:
     return np.diff(expit(np.interp(edges, values, logits, left=-np.inf, right=np.inf)))
 
 
-def _differences(mass: NDArray, beside: NDArray, size: int, codes: int, points: int) -> NDArray:
+def _differences(mass: Array, beside: Array, size: int, codes: int, points: int) -> Array:
     """Return the probability that two frames differ by so many codes, of either sign (codes,).
 
     beside: transform of the difference of all else (size // 2 + 1,).

@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.fitting.noise_shape import is_significant
 from vcam_cli.quality import nonuniformity, rounding
 from vcam_cli.verification.stack_statistics import (
@@ -44,7 +44,7 @@ class Pattern:
     """How far the mean of one of these is off, at most [DN]."""
 
 
-def pattern(stack: StackStatistics, good: NDArray) -> Pattern:
+def pattern(stack: StackStatistics, good: Array) -> Pattern:
     """Return the spatial variances, freed of the temporal noise that is left in the mean.
 
     What is taken out has an error of its own, which is independent of that of the mean: of n
@@ -54,7 +54,7 @@ def pattern(stack: StackStatistics, good: NDArray) -> Pattern:
     ----------
     stack : StackStatistics
         The stack.
-    good : NDArray
+    good : Array
         Which pixels count; the others take the mean of all.
 
     Returns
@@ -129,7 +129,7 @@ def _of_lines(found: float, pixels: float, count: int, freedom: int) -> float:
     return (found + pixels) * count / freedom - pixels
 
 
-def _aliens(means: NDArray) -> NDArray:
+def _aliens(means: Array) -> Array:
     """Return by how much columns are off that are unlike all others (columns,), else 0 [DN].
 
     Off the cosines through all columns' means, by least absolute deviations: a few bright columns
@@ -153,7 +153,7 @@ def _aliens(means: NDArray) -> NDArray:
     return np.where(abs(apart) > limit, apart, 0.0)
 
 
-def slow_part(average: NDArray) -> tuple[Estimate, NDArray]:
+def slow_part(average: Array) -> tuple[Estimate, Array]:
     """Return the variance of what changes slowly over the array, and its surface.
 
     It is what the cosines of `effects/noise/fpn_shading.py` hold, up to `CYCLES` cycles over the
@@ -161,14 +161,14 @@ def slow_part(average: NDArray) -> tuple[Estimate, NDArray]:
 
     Parameters
     ----------
-    average : NDArray
+    average : Array
         Mean frame (rows, columns) [DN].
 
     Returns
     -------
     variance : Estimate
         Variance [DN^2].
-    surface : NDArray
+    surface : Array
         The sum of the cosines (rows, columns) [DN].
     """
     rows, columns = average.shape
@@ -192,7 +192,7 @@ def slow_part(average: NDArray) -> tuple[Estimate, NDArray]:
     return Estimate(value, error), surface
 
 
-def _cosines(length: int, count: int) -> NDArray:
+def _cosines(length: int, count: int) -> Array:
     """Return cosines of unit mean square over so many pixels (length, count)."""
     waves = np.cos(np.pi / length * np.outer(np.arange(length) + 0.5, np.arange(count)))
     waves[:, 1:] *= math.sqrt(2)

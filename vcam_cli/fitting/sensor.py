@@ -10,8 +10,8 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.fitting.conditions import Condition, Conditions, photons_per_pixel
 from vcam_cli.fitting.noise_shape import is_significant
 from vcam_cli.fitting.straightness import slope_misfit
@@ -268,7 +268,7 @@ def _gain_error(
     variances: list[Estimate],
     dark: Estimate,
     unlit: Estimate,
-    used: NDArray,
+    used: Array,
 ) -> Estimate:
     """Return the slope of a photon transfer with the error and the bounds of its variances.
 

@@ -8,7 +8,8 @@ the points says nothing of that: the difference from a parabola and from the poi
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+
+from vcam_cli.arrays import Array
 
 CHANCE = 1e-3
 """Probability of residuals that large below which they are no chance."""
@@ -18,16 +19,14 @@ LEAST_PART = 0.05
 """Part of the largest x below which a point's own slope means little."""
 
 
-def slope_misfit(
-    x: NDArray, y: NDArray, errors: NDArray, slope: float, is_free: bool = False
-) -> float:
+def slope_misfit(x: Array, y: Array, errors: Array, slope: float, is_free: bool = False) -> float:
     """Return how far a slope may be off because the points lie on no straight line.
 
     Parameters
     ----------
-    x, y : NDArray
+    x, y : Array
         Points (n,), x above 0.
-    errors : NDArray
+    errors : Array
         Standard errors of y (n,).
     slope : float
         Slope of the line that was fitted.

@@ -25,8 +25,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.verification.stack_statistics import Estimate
 
 LEAST_FRAMES = 6
@@ -73,17 +73,17 @@ class PixelMoments:
     """Moments of the temporal noise of every pixel (pixels,)."""
 
     frames: int
-    variance: NDArray
+    variance: Array
     """Of all frames [DN^2]."""
-    halves: tuple[NDArray, NDArray]
+    halves: tuple[Array, Array]
     """Of each half of the stack [DN^2]."""
-    third: NDArray
+    third: Array
     """Sum of cubes [DN^3]."""
     lines: float
     """What the means of rows and columns that are taken out add to each variance [DN^2]."""
 
 
-def pixel_moments(frames: NDArray, good: NDArray) -> PixelMoments:
+def pixel_moments(frames: Array, good: Array) -> PixelMoments:
     """Return the moments of the good pixels, noise of frames, rows and columns taken out.
 
     A mean over a row has a share of the pixel itself in it, which would go with it: what is left is
@@ -92,9 +92,9 @@ def pixel_moments(frames: NDArray, good: NDArray) -> PixelMoments:
 
     Parameters
     ----------
-    frames : NDArray
+    frames : Array
         Codes (n, rows, columns) [DN].
-    good : NDArray
+    good : Array
         Which pixels count (rows, columns).
     """
     residual = np.where(good, frames - frames.mean(axis=0), 0.0)
@@ -110,7 +110,7 @@ def pixel_moments(frames: NDArray, good: NDArray) -> PixelMoments:
     return PixelMoments(len(frames), variance, halves, (each**3).sum(axis=0), lines)
 
 
-def _variance(values: NDArray) -> NDArray:
+def _variance(values: Array) -> Array:
     """Return the variance of each column (pixels,), 0 of a single frame."""
     return np.asarray(values.var(axis=0, ddof=min(1, len(values) - 1)))
 
@@ -137,7 +137,7 @@ def find_traps(moments: list[PixelMoments]) -> Traps | None:
     unit = float(np.median(variance))
     counts = _histogram(variance / unit, third)
 
-    def cost(place: NDArray, nodes: int = NODES) -> float:
+    def cost(place: Array, nodes: int = NODES) -> float:
         expected = _probabilities(place, frames, nodes)
         return -float((counts * np.log(np.maximum(expected, 1e-300))).sum())
 
@@ -164,7 +164,7 @@ def find_traps(moments: list[PixelMoments]) -> Traps | None:
     return Traps(fraction, amplitude, occupancy, core - lines)
 
 
-def _most_likely(cost: Cost) -> tuple[NDArray, NDArray] | None:
+def _most_likely(cost: Cost) -> tuple[Array, Array] | None:
     """Return where the cost is least, and the standard errors there; None where it is nowhere.
 
     Rare and frequent steps may each be a minimum by itself.
@@ -192,7 +192,7 @@ def _go_together(moments: list[PixelMoments]) -> bool:
     return float((large[0] & large[1]).sum()) > chance + SURE * math.sqrt(max(chance, 1.0))
 
 
-def _histogram(variance: NDArray, third: NDArray) -> NDArray:
+def _histogram(variance: Array, third: Array) -> Array:
     """Return counts (2, bins): below and above 0 is the third moment where it tells the state."""
     number = np.clip(np.searchsorted(EDGES, variance, "right") - 1, 0, len(EDGES) - 2)
     sign = ((third > 0) & (EDGES[number] >= CLEAR)).astype(int)
@@ -201,7 +201,7 @@ def _histogram(variance: NDArray, third: NDArray) -> NDArray:
     return counts
 
 
-def _values(place: NDArray, frames: int) -> tuple[float, float, float, float]:
+def _values(place: Array, frames: int) -> tuple[float, float, float, float]:
     """Return core variance, fraction, mean step and occupancy, in units of the median pixel.
 
     A trap that is filled, or empty, in less than one of so many frames is none that is seen again
@@ -217,13 +217,13 @@ def _values(place: NDArray, frames: int) -> tuple[float, float, float, float]:
     )
 
 
-def _slopes(place: NDArray, frames: int) -> tuple[float, float, float, float]:
+def _slopes(place: Array, frames: int) -> tuple[float, float, float, float]:
     """Return how fast the values change with the place."""
     core, fraction, amplitude, occupancy = _values(place, frames)
     return core, fraction, amplitude, occupancy * (1 - occupancy)
 
 
-def _probabilities(place: NDArray, frames: int, nodes: int = NODES) -> NDArray:
+def _probabilities(place: Array, frames: int, nodes: int = NODES) -> Array:
     """Return the probability of every bin of the histogram (2, bins)."""
     from scipy.special import chdtr, chndtr
     from scipy.stats import binom
@@ -257,7 +257,7 @@ def _probabilities(place: NDArray, frames: int, nodes: int = NODES) -> NDArray:
     return (1 - fraction) * plain_part + fraction * out
 
 
-def _errors(cost: Cost, place: NDArray) -> NDArray:
+def _errors(cost: Cost, place: Array) -> Array:
     """Return standard errors from the curvature of the negative logarithm of the likelihood.
 
     Where it has none along the occupancy, which then ends its range, that is not known, and the

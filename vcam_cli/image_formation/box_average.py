@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.camera.derived.geometry import Geometry, pixel_centers
 from vcam_cli.image_formation.cosine_series import Axis
 from vcam_cli.scenes.bands import bands_of_rows
@@ -15,15 +15,15 @@ SLIVER = 1e-9
 
 
 def box_averages(
-    scene: SampledScene, mix: NDArray, geometry: Geometry, axes: tuple[Axis, Axis], workers: int
-) -> NDArray:
+    scene: SampledScene, mix: Array, geometry: Geometry, axes: tuple[Axis, Axis], workers: int
+) -> Array:
     """Return the means of a scene over the collecting areas of all pixels.
 
     Parameters
     ----------
     scene : SampledScene
         The scene: a chart, or samples.
-    mix : NDArray
+    mix : Array
         Signal (C, K) of each component in each color [e/s].
     geometry : Geometry
         Geometry of the array.
@@ -34,7 +34,7 @@ def box_averages(
 
     Returns
     -------
-    NDArray
+    Array
         Signal (C, rows, columns) [e/s].
     """
     size = geometry.collecting_width, geometry.collecting_height
@@ -47,21 +47,21 @@ def box_averages(
     )
 
 
-def point_values(scene: SampledScene, mix: NDArray, geometry: Geometry) -> NDArray:
+def point_values(scene: SampledScene, mix: Array, geometry: Geometry) -> Array:
     """Return a scene at the centers of the collecting areas.
 
     Parameters
     ----------
     scene : SampledScene
         The scene.
-    mix : NDArray
+    mix : Array
         Signal (C, K) of each component in each color [e/s].
     geometry : Geometry
         Geometry of the array.
 
     Returns
     -------
-    NDArray
+    Array
         Signal (C, rows, columns) [e/s].
     """
     x, y = pixel_centers(geometry, detector=True)
@@ -69,8 +69,8 @@ def point_values(scene: SampledScene, mix: NDArray, geometry: Geometry) -> NDArr
 
 
 def _chart_averages(
-    scene: ChartScene, mix: NDArray, geometry: Geometry, size: tuple[float, float]
-) -> NDArray:
+    scene: ChartScene, mix: Array, geometry: Geometry, size: tuple[float, float]
+) -> Array:
     """Paint the chart on cells that are the collecting areas, and the gaps between them."""
     centers = pixel_centers(geometry, detector=True)
     (x_edges, step_x), (y_edges, step_y) = (
@@ -85,7 +85,7 @@ def _chart_averages(
     return out
 
 
-def _edges(center: NDArray, size: float) -> tuple[NDArray, int]:
+def _edges(center: Array, size: float) -> tuple[Array, int]:
     """Return edges of boxes and of the gaps between them [m]; cells from one box to the next."""
     pitch = center[1] - center[0] if len(center) > 1 else size
     low, high = center - size / 2, center + size / 2
@@ -94,12 +94,12 @@ def _edges(center: NDArray, size: float) -> tuple[NDArray, int]:
     return np.append(low, high[-1]), 1
 
 
-def square_averages(plane: NDArray, axis: Axis, size: float, along: int) -> NDArray:
+def square_averages(plane: Array, axis: Axis, size: float, along: int) -> Array:
     """Return the means of uniform squares of light over boxes, by running sums.
 
     Parameters
     ----------
-    plane : NDArray
+    plane : Array
         Samples of one plane, in any unit.
     axis : Axis
         Samples and pixels along the axis.
@@ -110,7 +110,7 @@ def square_averages(plane: NDArray, axis: Axis, size: float, along: int) -> NDAr
 
     Returns
     -------
-    NDArray
+    Array
         Means in place of the samples along that axis, in the type of `plane`.
     """
     center = (axis.first + np.arange(axis.pixels) * axis.pixel_pitch) / axis.sample_pitch
@@ -120,7 +120,7 @@ def square_averages(plane: NDArray, axis: Axis, size: float, along: int) -> NDAr
     return ((high - low) / (2 * half)).astype(plane.dtype)
 
 
-def _mirrored_integral(sums: NDArray, plane: NDArray, position: NDArray, along: int) -> NDArray:
+def _mirrored_integral(sums: Array, plane: Array, position: Array, along: int) -> Array:
     """Return the integral of samples, mirrored at both ends, from the edge to a position.
 
     Positions are counted in samples.
@@ -134,7 +134,7 @@ def _mirrored_integral(sums: NDArray, plane: NDArray, position: NDArray, along: 
     return np.where(beyond, whole - read, np.where(before, -read, read))
 
 
-def _integral(sums: NDArray, plane: NDArray, position: NDArray, along: int) -> NDArray:
+def _integral(sums: Array, plane: Array, position: Array, along: int) -> Array:
     """Return the integral of the samples from the edge to `position`, counted in samples."""
     index = np.minimum(position.astype(int), plane.shape[along] - 1)
     shape = (-1, 1) if along == 0 else (1, -1)

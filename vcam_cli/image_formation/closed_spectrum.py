@@ -12,8 +12,8 @@ from itertools import pairwise
 
 import numpy as np
 import scipy.fft
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.image_formation.cosine_series import Axis
 from vcam_cli.image_formation.scene_spectrum import Index, SceneSpectrum, pairs
 from vcam_cli.parallel import product
@@ -27,7 +27,7 @@ averaged: what they fold is at most 2e-4 of an edge's own terms, and they cost n
 
 
 def closed_spectrum(
-    scene: ChartScene, mix: NDArray, axes: Sequence[Axis], dtype: type
+    scene: ChartScene, mix: Array, axes: Sequence[Axis], dtype: type
 ) -> SceneSpectrum:
     """Return the first terms of the spectrum of a chart that is not painted.
 
@@ -37,7 +37,7 @@ def closed_spectrum(
     ----------
     scene : ChartScene
         The chart, on the cells that scale the coefficients.
-    mix : NDArray
+    mix : Array
         Mixtures (R, K) of its components.
     axes : sequence of Axis
         Axes along y and x, whose terms are computed.
@@ -62,7 +62,7 @@ def closed_spectrum(
 
 
 def product_spectrum(
-    scene: ChartScene, mix: NDArray, axes: Sequence[Axis], dtype: type
+    scene: ChartScene, mix: Array, axes: Sequence[Axis], dtype: type
 ) -> ProductSpectrum:
     """Return the spectrum of a sum of products, each factor transformed by itself.
 
@@ -79,7 +79,7 @@ def product_spectrum(
     return ProductSpectrum(along_y.astype(dtype), along_x.astype(dtype))
 
 
-def _scaled_terms(values: NDArray, axis: Axis) -> NDArray:
+def _scaled_terms(values: Array, axis: Axis) -> Array:
     """Return the terms (..., terms) of means over fine cells as if over those of an axis.
 
     A mean over N cells multiplies the term k by sinc(k / 2N), and a DCT-II counts it 2N times.
@@ -97,20 +97,20 @@ class DiscWaves:
     |f|.
     """
 
-    height: NDArray
+    height: Array
     """(R,) its light."""
-    down: NDArray
+    down: Array
     """(ny,) what multiplies the terms along y."""
-    along: NDArray
+    along: Array
     """(nx,) what multiplies the terms along x."""
-    z_down: NDArray
+    z_down: Array
     """(ny,) 2 pi r f along y, rising."""
-    z_along: NDArray
+    z_along: Array
     """(nx,) 2 pi r f along x, rising."""
-    shape: NDArray
+    shape: Array
     """2 J1(z) / z at z = 0, `STEP`, 2 `STEP` ..."""
 
-    def terms(self, y: Index, x: Index) -> NDArray:
+    def terms(self, y: Index, x: Index) -> Array:
         """Return the terms (len(y), len(x)) of these indices, of a disc of height 1."""
         place = np.hypot(self.z_down[y][:, None], self.z_along[x]) * (1 / STEP)
         index = place.astype(np.intp)
@@ -122,7 +122,7 @@ class DiscWaves:
         found *= self.down[y][:, None]
         return found
 
-    def power(self, y: NDArray, x: NDArray) -> NDArray:
+    def power(self, y: Array, x: Array) -> Array:
         """Return the sums of squared terms over blocks between edges, at most.
 
         J1^2 is at most J1^2 + Y1^2, and half of it in the mean where a block holds a whole wave.
@@ -154,14 +154,14 @@ class DiscSpectrum:
     def __len__(self) -> int:
         return len(self.even)
 
-    def rows(self, plane: int, index: Index, count: int | None = None) -> NDArray:
+    def rows(self, plane: int, index: Index, count: int | None = None) -> Array:
         """Return rows of a plane's coefficients: (n, count)."""
         light = self.even.rows(plane, index, count)
         for disc in self.discs:
             light += disc.height[plane] * disc.terms(index, slice(count))
         return light.astype(self.dtype)
 
-    def products(self, y: NDArray, x: NDArray, workers: int) -> NDArray:
+    def products(self, y: Array, x: Array, workers: int) -> Array:
         """Return sums of products over blocks of terms, at most: as if all were in phase."""
         every = self.even.products(y, x, workers)
         of_discs = [disc.power(y, x) for disc in self.discs]
@@ -197,9 +197,9 @@ def disc_waves(disc: LightDisc, scene: ChartScene, axes: Sequence[Axis]) -> Disc
 class ProductSpectrum:
     """A spectrum as a sum of products of functions of both axes, as far as it is used."""
 
-    along_y: NDArray
+    along_y: Array
     """(ny, d) coefficients along y of d functions."""
-    along_x: NDArray
+    along_x: Array
     """(R, d, nx) coefficients along x of what multiplies each."""
 
     @property
@@ -210,11 +210,11 @@ class ProductSpectrum:
     def __len__(self) -> int:
         return len(self.along_x)
 
-    def rows(self, plane: int, index: Index, count: int | None = None) -> NDArray:
+    def rows(self, plane: int, index: Index, count: int | None = None) -> Array:
         """Return rows of a plane's coefficients: (n, count)."""
         return product(self.along_y[index], self.along_x[plane, :, :count])
 
-    def products(self, y: NDArray, x: NDArray, workers: int) -> NDArray:
+    def products(self, y: Array, x: Array, workers: int) -> Array:
         """Return sums of products of two planes' coefficients over blocks of terms."""
         planes, runs, columns = self.along_x.shape
         below = self.along_y.astype(np.float64)
@@ -228,7 +228,7 @@ class ProductSpectrum:
         return np.array(out)
 
 
-def _blocks(edges: NDArray) -> list[slice]:
+def _blocks(edges: Array) -> list[slice]:
     return [slice(*ends) for ends in pairwise(edges)]
 
 
@@ -262,7 +262,7 @@ def rectangle_spectrum(
     return ProductSpectrum(along_y.astype(dtype), in_rows.astype(dtype))
 
 
-def terms_of_runs(edges: NDArray, cells: int, terms: int) -> NDArray:
+def terms_of_runs(edges: Array, cells: int, terms: int) -> Array:
     """Return the first terms of the DCT-II of light that is 1 from edge to edge.
 
     With the edges as parts b of the way between the borders, the cosine series of a run has the
@@ -271,7 +271,7 @@ def terms_of_runs(edges: NDArray, cells: int, terms: int) -> NDArray:
 
     Parameters
     ----------
-    edges : NDArray
+    edges : Array
         Edges (runs + 1,) from border to border [m].
     cells : int
         Number of cells N.
@@ -280,7 +280,7 @@ def terms_of_runs(edges: NDArray, cells: int, terms: int) -> NDArray:
 
     Returns
     -------
-    NDArray
+    Array
         Coefficients (terms, runs).
     """
     parts = (edges - edges[0]) / (edges[-1] - edges[0])

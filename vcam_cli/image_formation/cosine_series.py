@@ -29,7 +29,8 @@ from functools import cached_property
 
 import numpy as np
 import scipy.fft
-from numpy.typing import NDArray
+
+from vcam_cli.arrays import Array
 
 NEAR = 1e-7
 """Distances below this are rounding errors [pixel pitches]."""
@@ -52,7 +53,7 @@ class Axis:
     squares: bool
     bandwidth: float
     """Highest spatial frequency kept [cycles/m]."""
-    row_shifts: NDArray | None = None
+    row_shifts: Array | None = None
     """Displacement of the photodetectors of every row (rows,), where it is not the same [m]."""
 
     @property
@@ -67,12 +68,12 @@ class Axis:
         return max(1, most if self.squares else min(most, self.samples))
 
     @cached_property
-    def frequencies(self) -> NDArray:
+    def frequencies(self) -> Array:
         """Frequency of every term, (terms,) [cycles/m]."""
         return np.arange(self.terms) / (2 * self.length)
 
     @cached_property
-    def weights(self) -> NDArray:
+    def weights(self) -> Array:
         """Factors (terms,) that turn a DCT-II coefficient into a DCT-III one."""
         box = np.sinc(np.arange(self.terms) / (2 * self.samples))
         return (box if self.squares else 1 / box) / (2 * self.samples)
@@ -105,7 +106,7 @@ class Axis:
         shift = self._start - round(self._start)
         return 0.0 if self.virtual_pixels is None or abs(shift) <= NEAR else shift
 
-    def pixel_waves(self, odd: bool = False) -> list[tuple[bool, NDArray | None]]:
+    def pixel_waves(self, odd: bool = False) -> list[tuple[bool, Array | None]]:
         """Return of which of the pixels' own waves the scene's waves are made.
 
         cos(a + b) = cos a cos b - sin a sin b, sin(a + b) = sin a cos b + cos a sin b.
@@ -132,19 +133,19 @@ class Axis:
         """Number of values along this axis after folding: what `evaluate` takes."""
         return self.virtual_pixels or self.terms
 
-    def coefficient_index(self, terms: NDArray) -> tuple[NDArray, NDArray]:
+    def coefficient_index(self, terms: Array) -> tuple[Array, Array]:
         """Return the DCT-II coefficient behind every cosine term.
 
         Parameters
         ----------
-        terms : NDArray
+        terms : Array
             Indices (n,) of terms.
 
         Returns
         -------
-        index : NDArray
+        index : Array
             Indices (n,) of coefficients.
-        sign : NDArray
+        sign : Array
             Signs (n,) of the coefficients, 0 for none.
         """
         period = 2 * self.samples
@@ -154,19 +155,19 @@ class Axis:
         index = np.where(rest > self.samples, period - rest, rest)
         return np.minimum(index, self.samples - 1), sign
 
-    def extend(self, coefficients: NDArray, terms: int) -> NDArray:
+    def extend(self, coefficients: Array, terms: int) -> Array:
         """Return DCT-II coefficients continued to more cosine terms.
 
         Parameters
         ----------
-        coefficients : NDArray
+        coefficients : Array
             Coefficients (..., samples).
         terms : int
             Number of terms.
 
         Returns
         -------
-        NDArray
+        Array
             Coefficients (..., terms), which may be a view.
         """
         if terms <= coefficients.shape[-1]:
@@ -177,7 +178,7 @@ class Axis:
         out[..., self.samples :: 2 * self.samples] = 0
         return out
 
-    def folding(self, folded: slice, odd: bool = False) -> list[tuple[slice, NDArray, NDArray]]:
+    def folding(self, folded: slice, odd: bool = False) -> list[tuple[slice, Array, Array]]:
         """Return where a piece of the folded axis comes from.
 
         Parameters
@@ -212,12 +213,12 @@ class Axis:
                 out.append((slice(int(at[0]), int(at[-1]) + 1), terms, weights))
         return out
 
-    def fold(self, terms: NDArray, odd: bool = False, overwrite: bool = False) -> NDArray:
+    def fold(self, terms: Array, odd: bool = False, overwrite: bool = False) -> Array:
         """Fold terms onto the pixels' own cosines, or sines.
 
         Parameters
         ----------
-        terms : NDArray
+        terms : Array
             Terms (..., n).
         odd : bool, optional
             Whether they are sines.
@@ -226,7 +227,7 @@ class Axis:
 
         Returns
         -------
-        NDArray
+        Array
             Folded terms (..., folded_terms).
         """
         n = terms.shape[-1]
@@ -268,15 +269,15 @@ class Axis:
         return int(scipy.fft.next_fast_len(self.terms + self.pixels - 1))
 
     def evaluate(
-        self, values: NDArray, axis: int, odd: bool = False, overwrite: bool = False
-    ) -> NDArray:
+        self, values: Array, axis: int, odd: bool = False, overwrite: bool = False
+    ) -> Array:
         """Evaluate folded terms at the photodetectors.
 
         Each of their `pixel_waves` is evaluated by itself; the sum is the signal.
 
         Parameters
         ----------
-        values : NDArray
+        values : Array
             Folded terms of two dimensions.
         axis : int
             The axis of `values` to be evaluated, 0 or 1.
@@ -287,7 +288,7 @@ class Axis:
 
         Returns
         -------
-        NDArray
+        Array
             Values at the photodetectors in place of the terms.
         """
         if self.window is None:
@@ -297,7 +298,7 @@ class Axis:
         return full[self.window] if axis == 0 else full[:, self.window]
 
     @cached_property
-    def _chirp_parts(self) -> tuple[int, NDArray, NDArray, NDArray]:
+    def _chirp_parts(self) -> tuple[int, Array, Array, Array]:
         """Transform length, chirp on the terms, kernel spectrum, chirp on the pixels."""
         k, i = np.arange(self.terms), np.arange(self.pixels)
         size = self.transform
@@ -310,14 +311,14 @@ class Axis:
         after = 2 * np.exp(1j * half * i.astype(float) ** 2)
         return size, before, scipy.fft.fft(kernel), after
 
-    def _chirp(self, values: NDArray, axis: int, odd: bool) -> NDArray:
+    def _chirp(self, values: Array, axis: int, odd: bool) -> Array:
         """Evaluate a sum of exponentials by Bluestein's algorithm: its real or imaginary part."""
         size, before, kernel, after = self._chirp_parts
         kind = np.complex64 if values.dtype == np.float32 else np.complex128
         shape = (-1, 1) if axis == 0 else (1, -1)
         count, padded = values.shape[axis], list(values.shape)
         padded[axis] = size
-        work: NDArray = np.zeros(padded, kind)
+        work: Array = np.zeros(padded, kind)
         inside = work[:count] if axis == 0 else work[:, :count]
         np.multiply(values, np.asarray(before, kind).reshape(shape), out=inside)
         work = scipy.fft.fft(work, axis=axis, overwrite_x=True)

@@ -16,8 +16,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.fft
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.image_formation.closed_spectrum import closed_spectrum
 from vcam_cli.image_formation.cosine_series import Axis
@@ -67,7 +67,7 @@ class FarPart:
         pixels = geometry.pitch_x / self.scene.pitch_x, geometry.pitch_y / self.scene.pitch_y
         return max(pixels)
 
-    def spectrum(self, path: OpticalPath, highest: float, mix: NDArray) -> SceneSpectrum:
+    def spectrum(self, path: OpticalPath, highest: float, mix: Array) -> SceneSpectrum:
         """Return the spectrum of its planes, in 64 bits.
 
         Parameters
@@ -76,7 +76,7 @@ class FarPart:
             Lens, pixels and settings.
         highest : float
             Frequency at which the near field's filter ends [pixel Nyquist].
-        mix : NDArray
+        mix : Array
             Mixtures (R, K) of the scene's components.
 
         Returns
@@ -155,7 +155,7 @@ class FarField:
         )
         judged = replace(self, path=replace(self.path, geometry=some), highest=self.highest * step)
         allowed = MODES_SHARE * self.path.settings.tolerance * full_signal
-        light: NDArray = np.zeros((self.near.tables.colors, some.rows, some.columns))
+        light: Array = np.zeros((self.near.tables.colors, some.rows, some.columns))
         for count in range(len(self.parts), 0, -2):
             ring = replace(judged, parts=self.parts[count - 2 : count])
             for layer in ring.layers():
@@ -187,7 +187,7 @@ class FarField:
             yield from filtered_layers(image_filter, own, spectrum, self.path.workers)
 
 
-def _low_pass(axis: Axis) -> NDArray:
+def _low_pass(axis: Axis) -> Array:
     return np.exp(-((2 * LOW_PASS * axis.sample_pitch * axis.frequencies) ** 4))
 
 

@@ -21,8 +21,8 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.effects.base import Blur, PlaneTransfer, Zone, of_kind
 from vcam_cli.image_formation.filtering import Filter
@@ -48,12 +48,12 @@ JUDGED_HERE = 33
 class Map:
     """A smooth function on the sensor."""
 
-    values: NDArray
+    values: Array
     """(PLACES, PLACES) from edge to edge"""
     half_width: float
     half_height: float
 
-    def __call__(self, x: NDArray, y: NDArray) -> NDArray:
+    def __call__(self, x: Array, y: Array) -> Array:
         """Return the values (rows, columns) at the positions x (columns,), y (rows,) [m].
 
         They have the type of x.
@@ -65,7 +65,7 @@ class Map:
         return _linear(rows.T, along_x).T
 
     @property
-    def azimuth(self) -> NDArray:
+    def azimuth(self) -> Array:
         """The azimuth of its places, from x towards y [rad]."""
         at = np.linspace(-1, 1, PLACES)
         return np.arctan2(at[:, None] * self.half_height, at * self.half_width)
@@ -76,7 +76,7 @@ class Map:
         return float(np.mean(self.values**2))
 
 
-def _linear(values: NDArray, position: NDArray) -> NDArray:
+def _linear(values: Array, position: Array) -> Array:
     """Return rows of a table at positions between them (n,), by linear interpolation."""
     index = np.minimum(position.astype(int), len(values) - 2)
     part = (position - index).astype(values.dtype)[:, None]
@@ -110,7 +110,7 @@ def field_mixtures(uniform_transfer: Transfer, rings: Sequence[Zone], size: Tabl
         Mixtures, and the error that they leave.
     """
 
-    def changes() -> list[NDArray]:
+    def changes() -> list[Array]:
         frequency = np.linspace(0, size.top, JUDGED_HERE)
         count = len(uniform_transfer.weights)
         some = rings[:: max(1, len(rings) // 4)]
@@ -120,7 +120,7 @@ def field_mixtures(uniform_transfer: Transfer, rings: Sequence[Zone], size: Tabl
     return mixtures(uniform_transfer, size, changes)
 
 
-def _change(uniform_transfer: Transfer, blur: Blur, frequency: NDArray) -> NDArray:
+def _change(uniform_transfer: Transfer, blur: Blur, frequency: Array) -> Array:
     """Return what a blur adds to a transfer, by harmonics of the direction (m, K, C, n) [e/s].
 
     They are complex, see `direction_harmonics`. What depends on the direction is small: it is
@@ -184,7 +184,7 @@ def tabulate_field(
     weights = np.array([m.values for m in maps])
     azimuth = maps[0].azimuth
 
-    def tables(family: Family, is_sine: bool, share: NDArray) -> Tables:
+    def tables(family: Family, is_sine: bool, share: Array) -> Tables:
         table = _resampled(family.table(changes, share), base.shape[-1])
         sign = -1 if family.order % 2 or is_sine else 1  # of a wave, by `split_by_parity`
         return Tables(mix, sign * table, size.top, error, order=family.order, is_sine=is_sine)
@@ -232,21 +232,21 @@ class Family:
     order: int
     is_imaginary: bool
 
-    def table(self, changes: Sequence[NDArray], share: NDArray) -> NDArray:
+    def table(self, changes: Sequence[Array], share: Array) -> Array:
         """Return the sum of all rings' tables, each with its share: (R, C, n) [e/s]."""
-        total: NDArray = np.zeros(changes[0].shape[1:])
+        total: Array = np.zeros(changes[0].shape[1:])
         for change, part in zip(changes, share, strict=True):
             total += part * self.of_ring(change)
         return total
 
-    def of_ring(self, change: NDArray) -> NDArray:
+    def of_ring(self, change: Array) -> Array:
         """Return the table (R, C, n) of a ring's harmonics (m, R, C, n) [e/s]."""
         if self.order >= len(change):
             return np.zeros(change.shape[1:])
         harmonic = change[self.order]
         return np.asarray(harmonic.imag if self.is_imaginary else harmonic.real)
 
-    def turned(self, azimuth: NDArray) -> list[tuple[bool, NDArray]]:
+    def turned(self, azimuth: Array) -> list[tuple[bool, Array]]:
         """Return whether the direction has a sine, and the factor by azimuth, of both parts."""
         if not self.order:
             return [(False, np.ones_like(azimuth))]
@@ -265,9 +265,7 @@ class Family:
         )
 
 
-def _families(
-    changes: Sequence[NDArray], allowed: float
-) -> tuple[list[tuple[Family, NDArray]], float]:
+def _families(changes: Sequence[Array], allowed: float) -> tuple[list[tuple[Family, Array]], float]:
     """Return the modes, strongest first, and the error of what is left.
 
     A mode is its family, and its share in each ring. The error of a ring is the rms of its tables,
@@ -297,7 +295,7 @@ def _families(
     return [mode[1:] for mode in found], 0.0
 
 
-def _expected_power(count: int) -> NDArray:
+def _expected_power(count: int) -> Array:
     """Return how much of a picture's variance lies at each of the entries over |f|.
 
     It is as much in each octave: its power falls with the square of the frequency (D. L. Ruderman,
@@ -307,7 +305,7 @@ def _expected_power(count: int) -> NDArray:
     return np.asarray(power / power.sum())
 
 
-def _resampled(table: NDArray, entries: int) -> NDArray:
+def _resampled(table: Array, entries: int) -> Array:
     """Return a table over |f| (..., n) at more entries, by cubics through four neighbors."""
     count = table.shape[-1]
     if count == entries:

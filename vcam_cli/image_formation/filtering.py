@@ -14,8 +14,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.image_formation.cosine_series import Axis
 from vcam_cli.image_formation.scene_spectrum import SceneSpectrum
 from vcam_cli.image_formation.transfer_tables import PARITIES, TableReader, Tables, reader
@@ -33,7 +33,7 @@ SHORTEST = 8
 
 Waves = tuple[bool, bool]
 """Whether waves along x, and along y, are sines."""
-Share = tuple[bool, NDArray | None]
+Share = tuple[bool, Array | None]
 """Waves of the pixels, and what part of every term they are; None for all of it."""
 
 
@@ -42,10 +42,10 @@ class Series:
     """A signal that is known at the rows of photodetectors, and as a series along x."""
 
     x: Axis
-    parts: dict[bool, NDArray]
+    parts: dict[bool, Array]
     """Cosines (False) and sines (True): (C, rows, folded x) [electrons / s]."""
 
-    def signal(self, color: int, rows: slice) -> NDArray:
+    def signal(self, color: int, rows: slice) -> Array:
         """Return the signal (rows, columns) of a color at the photodetectors of some rows [e/s]."""
         parts = {odd: part[color, rows] for odd, part in self.parts.items()}
         if self.x.row_shifts is not None:
@@ -53,7 +53,7 @@ class Series:
         found = [self.x.evaluate(part, axis=1, odd=odd) for odd, part in parts.items()]
         return found[0] if len(found) == 1 else found[0] + found[1]
 
-    def _shift_rows(self, parts: dict[bool, NDArray], shifts: NDArray) -> dict[bool, NDArray]:
+    def _shift_rows(self, parts: dict[bool, Array], shifts: Array) -> dict[bool, Array]:
         """Return the waves of rows as photodetectors see them that are displaced by `shifts` [m].
 
         cos(a + b) = cos a cos b - sin a sin b, sin(a + b) = sin a cos b + cos a sin b.
@@ -72,9 +72,9 @@ class Filter:
     x: Axis
     y: Axis
     tables: Tables
-    along_x: NDArray
+    along_x: Array
     """Separable transfer along x at every term of the axis, without unit."""
-    along_y: NDArray
+    along_y: Array
     cubic_range: float
     """Frequency range over which the tables are a cubic [cycles/m]."""
 
@@ -93,10 +93,10 @@ class Filter:
         Series
             Signal of every color, still a series along x.
         """
-        folded: dict[Waves, NDArray] = {}
+        folded: dict[Waves, Array] = {}
         for parity in self.tables.parities:
             self._multiply(spectrum, parity, folded, workers)
-        parts: dict[bool, NDArray] = {}
+        parts: dict[bool, Array] = {}
         for waves in sorted(folded):
             found = self._evaluate_columns(folded.pop(waves), waves[1], workers)
             if waves[0] in parts:
@@ -111,7 +111,7 @@ class Filter:
         return int(self._counts(self.y.frequencies).sum())
 
     def _multiply(
-        self, spectrum: SceneSpectrum, parity: int, folded: dict[Waves, NDArray], workers: int
+        self, spectrum: SceneSpectrum, parity: int, folded: dict[Waves, Array], workers: int
     ) -> None:
         """Add what the planes give through one parity of the tables to the pixels' waves."""
         odd_x, odd_y = PARITIES[parity]
@@ -127,8 +127,8 @@ class Filter:
             def multiply(
                 rows: slice,
                 wave_y: bool = wave_y,
-                share_y: NDArray | None = share_y,
-                targets: list[tuple[NDArray, bool, NDArray | None]] = targets,
+                share_y: Array | None = share_y,
+                targets: list[tuple[Array, bool, Array | None]] = targets,
             ) -> None:
                 for target, terms, weights in self.y.folding(rows, wave_y):
                     if share_y is not None:
@@ -143,8 +143,8 @@ class Filter:
             each(multiply, pieces(self.y.folded_terms, LONGEST), workers)
 
     def _filter_rows(
-        self, spectrum: SceneSpectrum, table: TableReader, terms: NDArray, weights: NDArray
-    ) -> Iterator[tuple[slice, int, NDArray]]:
+        self, spectrum: SceneSpectrum, table: TableReader, terms: Array, weights: Array
+    ) -> Iterator[tuple[slice, int, Array]]:
         """Yield rows of the filtered spectrum: (which of `terms`, color, (n, count)).
 
         `terms` (n,) are consecutive rows, rising or falling; `weights` are factors on them.
@@ -165,7 +165,7 @@ class Filter:
                 planes = self._rows(spectrum, terms[rows], count)
                 at = slice(rows.start - stretch.start, rows.stop - stretch.start)
                 for color in range(self.tables.colors):
-                    total: NDArray | None = None
+                    total: Array | None = None
                     for plane, of_plane in zip(planes, values[:, color], strict=True):
                         light = product(shares[at], of_plane)
                         light *= plane
@@ -174,10 +174,10 @@ class Filter:
                     yield rows, color, total
 
     @cached_property
-    def _weights_x(self) -> NDArray:
+    def _weights_x(self) -> Array:
         return self.x.weights * self.along_x
 
-    def _stretches(self, terms: NDArray) -> Iterator[slice]:
+    def _stretches(self, terms: Array) -> Iterator[slice]:
         """Yield consecutive rows over which the tables are a cubic in fy."""
         widest = min(LONGEST, int(self.cubic_range * 2 * self.y.length))
         start, count = 0, len(terms)
@@ -191,23 +191,23 @@ class Filter:
             yield slice(start, min(start + size, count))
             start += size
 
-    def _rows(self, spectrum: SceneSpectrum, terms: NDArray, count: int) -> list[NDArray]:
+    def _rows(self, spectrum: SceneSpectrum, terms: Array, count: int) -> list[Array]:
         """Return rows of every plane's spectrum without factors: R of (n, count)."""
         index = _consecutive(self.y.coefficient_index(terms)[0])
         planes = range(len(spectrum))
         return [self.x.extend(spectrum.rows(plane, index, count), count) for plane in planes]
 
-    def _count(self, fy: NDArray) -> int:
+    def _count(self, fy: Array) -> int:
         """Return the terms along x that the tables reach at some of these frequencies along y."""
         return int(self._counts(fy.min()))
 
-    def _counts(self, fy: NDArray) -> NDArray:
+    def _counts(self, fy: Array) -> Array:
         """Return the terms along x that the tables reach at each of these frequencies along y."""
         left = self.tables.top**2 - fy**2
         count = (np.sqrt(np.maximum(left, 0)) * 2 * self.x.length).astype(int) + 1
         return np.where(left < 0, 0, np.minimum(count, self.x.terms))
 
-    def _evaluate_columns(self, folded: NDArray, odd: bool, workers: int) -> NDArray:
+    def _evaluate_columns(self, folded: Array, odd: bool, workers: int) -> Array:
         """Return the signal at the rows of photodetectors of waves (C, rows, folded x) along y.
 
         It takes the place of its argument where the virtual pixels' rows do.
@@ -228,21 +228,21 @@ class Filter:
         return out if window is None else out[:, window]
 
 
-def chebyshev(at: NDArray) -> tuple[NDArray, NDArray]:
+def chebyshev(at: Array) -> tuple[Array, Array]:
     """Return Chebyshev's nodes in a range, and the weights of the cubic through them.
 
     The cubic through the values at the nodes is `weights @ values`.
 
     Parameters
     ----------
-    at : NDArray
+    at : Array
         Places (n,) between whose ends the nodes lie.
 
     Returns
     -------
-    nodes : NDArray
+    nodes : Array
         Nodes (NODES,), in the unit of the places.
-    weights : NDArray
+    weights : Array
         Weights (n, NODES) at the places.
     """
     low, high = float(at.min()), float(at.max())
@@ -255,7 +255,7 @@ def chebyshev(at: NDArray) -> tuple[NDArray, NDArray]:
     return nodes, weights
 
 
-def _consecutive(index: NDArray) -> NDArray | slice:
+def _consecutive(index: Array) -> Array | slice:
     """Return consecutive indices, rising or falling, as a slice, of which NumPy makes a view."""
     steps = np.diff(index)
     if not len(steps) or abs(steps[0]) != 1 or (steps != steps[0]).any():

@@ -12,8 +12,8 @@ from dataclasses import replace
 from functools import cache, partial
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.camera.derived.geometry import pixel_centers
 from vcam_cli.effects.base import Blur, Effect, FieldTransfer, SeparableTransfer, of_kind
 from vcam_cli.image_formation.field_dependence import Map, zone_maps
@@ -30,7 +30,7 @@ LEFT = 0.01
 ROWS = 64
 """Rows of pixels, about, on which changes are measured."""
 
-Weight = Callable[[NDArray, NDArray], NDArray] | None
+Weight = Callable[[Array, Array], Array] | None
 """A factor at positions x (columns,), y (rows,) [m]; None for 1 everywhere."""
 
 
@@ -61,8 +61,8 @@ def wave_layers(path: OpticalPath, scene: WaveScene) -> tuple[Layers, SpectrumRe
         for w in scene.waves
     ]
 
-    def layer(levels: NDArray, weight: Weight) -> Layer:
-        def values(color: int, s: slice) -> NDArray:
+    def layer(levels: Array, weight: Weight) -> Layer:
+        def values(color: int, s: slice) -> Array:
             total = np.zeros((len(y[s]), len(x)))
             for level, (ex, ey) in zip(levels, shapes, strict=True):
                 total += (level[color] * ey[s, None] * ex[None, :]).real
@@ -73,7 +73,7 @@ def wave_layers(path: OpticalPath, scene: WaveScene) -> tuple[Layers, SpectrumRe
     zones = [_zone_otfs(path, w) for w in scene.waves]
     maps = cache(partial(zone_maps, path.zones, path.geometry))
 
-    def layers(effects: tuple[Effect, ...]) -> list[tuple[NDArray, Weight]]:
+    def layers(effects: tuple[Effect, ...]) -> list[tuple[Array, Weight]]:
         of_waves = [
             _wave_levels(path, effects, w, otfs if path.field in effects else np.ones((1, 1)))
             for w, otfs in zip(scene.waves, zones, strict=True)
@@ -86,7 +86,7 @@ def wave_layers(path: OpticalPath, scene: WaveScene) -> tuple[Layers, SpectrumRe
     return (layer(*parts) for parts in whole), SpectrumReport(changes=changes)
 
 
-def _zone_otfs(path: OpticalPath, wave: Wave) -> NDArray:
+def _zone_otfs(path: OpticalPath, wave: Wave) -> Array:
     """Return the transfer (zones, J) of each zone's own blur; 1 where there is no zone."""
     count = len(path.transfer.wavelengths)
     if not path.zones or not (wave.fx or wave.fy):
@@ -96,9 +96,7 @@ def _zone_otfs(path: OpticalPath, wave: Wave) -> NDArray:
     return np.array(found).reshape(-1, count)
 
 
-def _wave_levels(
-    path: OpticalPath, effects: tuple[Effect, ...], wave: Wave, zones: NDArray
-) -> NDArray:
+def _wave_levels(path: OpticalPath, effects: tuple[Effect, ...], wave: Wave, zones: Array) -> Array:
     """Return the complex amplitude (zones, C) of a wave's signal in each color [e/s].
 
     `zones` is the transfer (zones, J) of their own blurs.
@@ -110,14 +108,14 @@ def _wave_levels(
 
 
 def _modes(
-    levels: NDArray, maps: Callable[[], list[Map]], tolerance: float
-) -> list[tuple[NDArray, Weight]]:
+    levels: Array, maps: Callable[[], list[Map]], tolerance: float
+) -> list[tuple[Array, Weight]]:
     """Return the mean of the zones' amplitudes, and what differs from it: amplitudes, and weights.
 
     `levels` are (zones, ...). As many singular vectors are kept as leave `LEFT` of the tolerance.
     """
     mean = levels.mean(axis=0)
-    modes: list[tuple[NDArray, Weight]] = [(mean, None)]
+    modes: list[tuple[Array, Weight]] = [(mean, None)]
     rest = np.ascontiguousarray((levels - mean).reshape(len(levels), -1)).view(np.float64)
     allowed = LEFT * tolerance * float(np.abs(levels).max())
     if np.linalg.norm(rest, axis=1).max() <= allowed:
@@ -133,7 +131,7 @@ def _modes(
     return modes
 
 
-def _separable(effects: tuple[Effect, ...], fx: NDArray, fy: NDArray) -> NDArray:
+def _separable(effects: tuple[Effect, ...], fx: Array, fy: Array) -> Array:
     """Return the product of the separable transfer functions: (fy, fx)."""
     total = np.ones((len(fy), len(fx)))
     for effect in of_kind(effects, SeparableTransfer):
@@ -203,13 +201,13 @@ def harmonic_layers(
 
     maps = cache(partial(zone_maps, path.zones, path.geometry))
 
-    def layers(effects: tuple[Effect, ...]) -> list[tuple[NDArray, Weight]]:
+    def layers(effects: tuple[Effect, ...]) -> list[tuple[Array, Weight]]:
         common = amplitudes * _separable(effects, fx, fy)
         levels = [_harmonic_levels(t, fx, fy) * common for t in _zone_transfers(path, effects)]
         return _modes(np.array(levels), maps, path.settings.tolerance)
 
-    def layer(levels: NDArray, weight: Weight) -> Layer:
-        def values(color: int, s: slice) -> NDArray:
+    def layer(levels: Array, weight: Weight) -> Layer:
+        def values(color: int, s: slice) -> Array:
             total = np.zeros((len(y[s]), len(x)))
             for (odd_x, odd_y), part in zip(PARITIES, levels[:, color], strict=True):
                 if part.any():
@@ -223,7 +221,7 @@ def harmonic_layers(
     return (layer(*parts) for parts in whole), SpectrumReport(changes=changes)
 
 
-def _harmonic_levels(transfer: Transfer, fx: NDArray, fy: NDArray) -> NDArray:
+def _harmonic_levels(transfer: Transfer, fx: Array, fy: Array) -> Array:
     """Return the signal of harmonics of amplitude 1 by parity: (4, C, fy, fx) [e/s]."""
     if not transfer.plane_blurs:
         radial = transfer.radial_response(np.hypot(fx[None, :], fy[:, None]))[0]
@@ -234,9 +232,9 @@ def _harmonic_levels(transfer: Transfer, fx: NDArray, fy: NDArray) -> NDArray:
 
 def _changes(
     path: OpticalPath,
-    whole: list[tuple[NDArray, Weight]],
-    layers: Callable[[tuple[Effect, ...]], list[tuple[NDArray, Weight]]],
-    layer: Callable[[NDArray, Weight], Layer],
+    whole: list[tuple[Array, Weight]],
+    layers: Callable[[tuple[Effect, ...]], list[tuple[Array, Weight]]],
+    layer: Callable[[Array, Weight], Layer],
 ) -> dict[str, float]:
     """Return the rms change of the signal by leaving out each effect, on some rows [e/s]."""
     g = path.geometry

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.camera.derived.mosaic import Mosaic
 from vcam_cli.effects.base import (
@@ -88,7 +88,7 @@ class OpticalPath:
         return 1 + 2 * math.sqrt(2 / (self.geometry.rows * self.geometry.columns))
 
     @property
-    def judged_weights(self) -> NDArray:
+    def judged_weights(self) -> Array:
         """Spectral weights (K, J) by which detail is judged: those of the color with most light.
 
         Of a layer they are those of all colors together: a black one has detail in its opacity.
@@ -157,9 +157,9 @@ class Layer:
     each mode; their weights are the layers'. Each ring of a far field adds twice as many.
     """
 
-    values: Callable[[int, slice], NDArray]
+    values: Callable[[int, slice], Array]
     """From a color and array rows to its signal there, (rows, columns) [electrons / s]."""
-    weight: Callable[[NDArray, NDArray], NDArray] | None = None
+    weight: Callable[[Array, Array], Array] | None = None
     """A factor at the positions x (columns,), y (rows,) [m]: (rows, columns); None for 1."""
 
 

@@ -14,8 +14,8 @@ from functools import partial
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry, pixel_centers
 from vcam_cli.camera.derived.mosaic import Mosaic
@@ -153,7 +153,7 @@ def axis_levels(
     spectra: Sequence[Spectrum],
     mosaic: Mosaic,
     gains: Sequence[Gain],
-) -> NDArray:
+) -> Array:
     """Return the electrons per second of uniform radiances on the axis.
 
     Parameters
@@ -177,7 +177,7 @@ def axis_levels(
 class Rate:
     """What the linear part gives."""
 
-    values: NDArray
+    values: Array
     """(rows, columns), each pixel in its own color, or (C, rows, columns) with every color; a
     honeycomb's have places without a pixel [electrons / s]"""
     plan: LightPlan
@@ -229,7 +229,7 @@ def _gathered(path: OpticalPath, scene: AnyScene, planes: bool) -> Rate:
         report = replace(report, changes=known)
     g, mosaic = path.geometry, path.mosaic
     count = len(mosaic.colors) if planes else 1
-    out: NDArray = np.zeros((count, g.rows, g.columns), path.settings.dtype)
+    out: Array = np.zeros((count, g.rows, g.columns), path.settings.dtype)
     x, y = (axis.astype(out.dtype) for axis in pixel_centers(g))
     glares, gains = _glares_and_gains(path.effects)
     # The light has the gain of the axis in it: see `scene_transfer`.
@@ -273,7 +273,7 @@ def _glares_and_gains(
     return glares, [of_kind(effects[start:stop], Gain) for start, stop in pairwise(ends)]
 
 
-def _fill(tile: NDArray, layer: Layer, mosaic: Mosaic, block: slice) -> None:
+def _fill(tile: Array, layer: Layer, mosaic: Mosaic, block: slice) -> None:
     """Put a layer's light where it belongs: every color in its plane, or each in its places."""
     if len(tile) > 1:
         for color, plane in enumerate(tile):
@@ -288,7 +288,7 @@ def _fill(tile: NDArray, layer: Layer, mosaic: Mosaic, block: slice) -> None:
                 tile[0, phase::period, columns] = found[:, columns]
 
 
-def _spread(rate: NDArray, mosaic: Mosaic, glare: VeilingGlare) -> None:
+def _spread(rate: Array, mosaic: Mosaic, glare: VeilingGlare) -> None:
     """Take the glare's share of the light and lay it evenly over the pixels of its color."""
     if len(rate) > 1:
         for plane in rate:

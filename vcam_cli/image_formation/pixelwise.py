@@ -10,8 +10,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.camera.derived.geometry import Geometry, pixel_centers
 from vcam_cli.camera.derived.mosaic import Mosaic
 from vcam_cli.effects.base import Charge, Effect, Gain, VeilingGlare, of_kind
@@ -27,13 +27,13 @@ LEAST = 1e-6
 class _Factors:
     """A gain at some pixels."""
 
-    factors: NDArray
+    factors: Array
 
-    def apply(self, light: NDArray) -> NDArray:
+    def apply(self, light: Array) -> Array:
         """Return the light behind the gain."""
         return light * self.factors
 
-    def undo(self, signal: NDArray) -> NDArray:
+    def undo(self, signal: Array) -> Array:
         """Return the light in front of the gain."""
         return signal / np.maximum(self.factors, LEAST)
 
@@ -43,20 +43,20 @@ class _Glare:
     """Veiling glare at some pixels, which keeps the mean of every color."""
 
     fraction: float
-    colors: Sequence[NDArray]
+    colors: Sequence[Array]
 
-    def apply(self, light: NDArray) -> NDArray:
+    def apply(self, light: Array) -> Array:
         """Return the light behind the glare."""
         return (1 - self.fraction) * light + self.fraction * _means(light, self.colors)
 
-    def undo(self, signal: NDArray) -> NDArray:
+    def undo(self, signal: Array) -> Array:
         """Return the light in front of the glare."""
         own = signal - self.fraction * _means(signal, self.colors)
         return own / max(1 - self.fraction, LEAST)
 
 
 def changes_by_omission(
-    rate: NDArray,
+    rate: Array,
     geometry: Geometry,
     mosaic: Mosaic,
     present: Sequence[Effect],
@@ -70,7 +70,7 @@ def changes_by_omission(
 
     Parameters
     ----------
-    rate : NDArray
+    rate : Array
         Photo-electrons per second (rows, columns) with the gains and the glare among `running` in
         them, anything where the mosaic has no pixel [e/s].
     geometry : Geometry
@@ -105,7 +105,7 @@ def changes_by_omission(
         light = on_pixels[effect].undo(light)
 
     raw = _clip(photo + dark, limits)
-    others: dict[str, NDArray] = {}
+    others: dict[str, Array] = {}
     for toggled in ordered:
         signal = light
         for effect in ordered:
@@ -124,12 +124,12 @@ def changes_by_omission(
     }
 
 
-def percentiles(rate: NDArray, mosaic: Mosaic, shares: Sequence[float]) -> NDArray:
+def percentiles(rate: Array, mosaic: Mosaic, shares: Sequence[float]) -> Array:
     """Return percentiles of a signal in every color, from every n-th row and column.
 
     Parameters
     ----------
-    rate : NDArray
+    rate : Array
         Signal (rows, columns), anything where the mosaic has no pixel [e/s].
     mosaic : Mosaic
         Colors of the pixels.
@@ -138,7 +138,7 @@ def percentiles(rate: NDArray, mosaic: Mosaic, shares: Sequence[float]) -> NDArr
 
     Returns
     -------
-    NDArray
+    Array
         Percentiles (colors, shares) [e/s].
     """
     rows, columns = (_every_nth(count, rate.shape) for count in rate.shape)
@@ -147,14 +147,14 @@ def percentiles(rate: NDArray, mosaic: Mosaic, shares: Sequence[float]) -> NDArr
     return np.array([np.percentile(some[pixels], shares) for pixels in colors if pixels.any()])
 
 
-def _clip(signal: NDArray, limits: Iterable[Limit]) -> NDArray:
+def _clip(signal: Array, limits: Iterable[Limit]) -> Array:
     """Return a mean signal behind clamps, which may reuse its array [electrons]."""
     for limit in limits:
         signal = limit.apply(signal)
     return signal
 
 
-def _means(values: NDArray, colors: Sequence[NDArray]) -> NDArray:
+def _means(values: Array, colors: Sequence[Array]) -> Array:
     """Return for every pixel the mean over those of its color."""
     out = np.empty_like(values)
     for pixels in colors:
@@ -162,7 +162,7 @@ def _means(values: NDArray, colors: Sequence[NDArray]) -> NDArray:
     return out
 
 
-def _colors(mosaic: Mosaic, rows: NDArray, columns: NDArray) -> list[NDArray]:
+def _colors(mosaic: Mosaic, rows: Array, columns: Array) -> list[Array]:
     """Return masks (rows, columns) of the pixels of each color."""
     block = np.array(mosaic.block)
     names = block[np.ix_(rows % block.shape[0], columns % block.shape[1])]

@@ -20,8 +20,8 @@ from functools import cached_property
 
 import numpy as np
 import scipy.fft
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.camera.derived.geometry import pixel_centers
 from vcam_cli.effects.base import Blur, Effect, of_kind
 from vcam_cli.image_formation.optical_path import Layer, Layers, OpticalPath, SpectrumReport
@@ -71,11 +71,11 @@ def profile_layers(path: OpticalPath, profile: Profile) -> tuple[Layers, Spectru
     table, first = edge.table()
     x, y, drifting = edge.pixel_distances()
 
-    def values(color: int, rows: slice) -> NDArray:
+    def values(color: int, rows: slice) -> Array:
         """Return the signal of some rows; where all rows are alike it is that of one."""
         y_rows = y[rows] if drifting else y[:1]
         place = (x[None, :] + y_rows[:, None]) * (1 / edge.step)
-        signal: NDArray = np.full(place.shape, profile.levels[0] * edge.level[color])
+        signal: Array = np.full(place.shape, profile.levels[0] * edge.level[color])
         for height, at in zip(np.diff(profile.levels), profile.places, strict=True):
             signal += height * _linear(table[color], place - (at / edge.step + first))
         return np.broadcast_to(signal, (len(y[rows]), len(x))).astype(path.settings.dtype)
@@ -84,14 +84,14 @@ def profile_layers(path: OpticalPath, profile: Profile) -> tuple[Layers, Spectru
     return iter([Layer(values)]), report
 
 
-def _otfs(path: OpticalPath, across: tuple[float, float]) -> dict[Effect, NDArray] | None:
+def _otfs(path: OpticalPath, across: tuple[float, float]) -> dict[Effect, Array] | None:
     """Return the transfer (J or 1, n) of every blur of a path at frequencies across edges.
 
     They lie evenly from 0 to the cut-off.
     """
     count = min(path.settings.table_size, MOST_ENTRIES)
     frequency = np.linspace(0, path.transfer.cutoff, count)
-    found: dict[Effect, NDArray] = {}
+    found: dict[Effect, Array] = {}
     for blur in of_kind(path.effects, Blur):
         rows = [blur.otf_along(frequency, across, float(w)) for w in path.transfer.wavelengths]
         if any(row is None for row in rows):
@@ -112,11 +112,11 @@ class EdgeImage:
 
     path: OpticalPath
     profile: Profile
-    otfs: dict[Effect, NDArray]
+    otfs: dict[Effect, Array]
     """Effect -> transfer (J or 1, n) evenly from 0 to the cut-off."""
 
     @property
-    def level(self) -> NDArray:
+    def level(self) -> Array:
         """Signal (C,) of white [e/s]."""
         return self.path.transfer.level[0]
 
@@ -133,10 +133,10 @@ class EdgeImage:
         full = min(1.0, self.path.ceiling / white)
         return SHARE * self.path.settings.tolerance * full / (heights or 1.0)
 
-    def response(self, effects: Sequence[Effect]) -> NDArray:
+    def response(self, effects: Sequence[Effect]) -> Array:
         """Return the transfer (C, n) through some of the effects [e/s]."""
         weights = self.path.transfer.weights[0]
-        otf: NDArray = np.ones((weights.shape[1], next(iter(self.otfs.values())).shape[1]))
+        otf: Array = np.ones((weights.shape[1], next(iter(self.otfs.values())).shape[1]))
         for effect in effects:
             if effect in self.otfs:
                 otf = otf * self.otfs[effect]
@@ -145,11 +145,11 @@ class EdgeImage:
         return product(weights, otf)
 
     @cached_property
-    def whole(self) -> NDArray:
+    def whole(self) -> Array:
         """The transfer (C, n) through all effects [e/s]."""
         return self.response(self.path.effects)
 
-    def tails(self) -> tuple[NDArray, NDArray]:
+    def tails(self) -> tuple[Array, Array]:
         """Return displacement s and fall c (C,) of a line's light: H = 1 - 2 pi i f s - c |f| [m].
 
         Terms with the square of f do not count.
@@ -218,7 +218,7 @@ class EdgeImage:
         """Distance of the refined entries [m]."""
         return self.period / self.entries / self.refined
 
-    def table(self) -> tuple[NDArray, int]:
+    def table(self) -> tuple[Array, int]:
         """Return the image of an edge (C, entries) [e/s], and the place of the first [steps]."""
         count = math.ceil(self.farthest / (self.period / self.entries)) + 3
         top, terms = self.path.transfer.cutoff, int(self.period * self.path.transfer.cutoff)
@@ -242,7 +242,7 @@ class EdgeImage:
         first = (1 - count) * self.refined
         return np.array([_refined(line, self.refined) for line in coarse]), first
 
-    def pixel_distances(self) -> tuple[NDArray, NDArray, bool]:
+    def pixel_distances(self) -> tuple[Array, Array, bool]:
         """Return the parts of the pixels' distances across the edges from columns and rows [m].
 
         With them, (columns,) and (rows,), comes whether rows differ.
@@ -277,7 +277,7 @@ class EdgeImage:
         return found
 
 
-def _refined(line: NDArray, parts: int) -> NDArray:
+def _refined(line: Array, parts: int) -> Array:
     """Return a line (n,) with cubics between its entries: ((n - 3) parts + 1,), from the second."""
     t = np.arange(parts) / parts
     weights = np.stack(
@@ -292,7 +292,7 @@ def _refined(line: NDArray, parts: int) -> NDArray:
     return np.append(product(np.ascontiguousarray(windows), weights).ravel(), line[-2])
 
 
-def _linear(table: NDArray, place: NDArray) -> NDArray:
+def _linear(table: Array, place: Array) -> Array:
     """Return a table (n,) between its entries, at places counted in them."""
     index = place.astype(np.intp)
     rest = place - index

@@ -11,13 +11,13 @@ from typing import Protocol
 
 import numpy as np
 import scipy.fft
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.parallel import each, pieces, rows_at_once, slices_within
 from vcam_cli.scenes.bands import bands_of_rows
 from vcam_cli.scenes.base import ChartScene
 
-Index = NDArray | slice
+Index = Array | slice
 
 
 class SceneSpectrum(Protocol):
@@ -29,7 +29,7 @@ class SceneSpectrum(Protocol):
 
     def __len__(self) -> int: ...
 
-    def rows(self, plane: int, index: Index, count: int | None = None) -> NDArray:
+    def rows(self, plane: int, index: Index, count: int | None = None) -> Array:
         """Return rows of a plane's coefficients.
 
         Parameters
@@ -43,23 +43,23 @@ class SceneSpectrum(Protocol):
 
         Returns
         -------
-        NDArray
+        Array
             Coefficients (n, count).
         """
 
-    def products(self, y: NDArray, x: NDArray, workers: int) -> NDArray:
+    def products(self, y: Array, x: Array, workers: int) -> Array:
         """Return sums of products of two planes' coefficients over blocks of terms.
 
         Parameters
         ----------
-        y, x : NDArray
+        y, x : Array
             Edges of the blocks along each axis, rising from 0.
         workers : int
             Number of threads; the result does not depend on it.
 
         Returns
         -------
-        NDArray
+        Array
             Sums (pairs, blocks along y, blocks along x) of all `pairs`, in 64 bits.
         """
 
@@ -73,7 +73,7 @@ def pairs(planes: int) -> list[tuple[int, int]]:
 class SampledSpectrum:
     """The spectrum of planes of samples."""
 
-    coefficients: NDArray
+    coefficients: Array
     """(R, ny, nx)"""
 
     @property
@@ -84,18 +84,16 @@ class SampledSpectrum:
     def __len__(self) -> int:
         return len(self.coefficients)
 
-    def rows(self, plane: int, index: Index, count: int | None = None) -> NDArray:
+    def rows(self, plane: int, index: Index, count: int | None = None) -> Array:
         """Return rows of a plane's coefficients: (n, count)."""
         return self.coefficients[plane, index, :count]
 
-    def products(self, y: NDArray, x: NDArray, workers: int) -> NDArray:
+    def products(self, y: Array, x: Array, workers: int) -> Array:
         """Return sums of products of two planes' coefficients over blocks of terms."""
         every = pairs(len(self))
         return np.array([self._pair_products(pair, y, x, workers) for pair in every])
 
-    def _pair_products(
-        self, pair: tuple[int, int], y: NDArray, x: NDArray, workers: int
-    ) -> NDArray:
+    def _pair_products(self, pair: tuple[int, int], y: Array, x: Array, workers: int) -> Array:
         first, second = (self.coefficients[plane, :, : x[-1]] for plane in pair)
         out = np.empty((len(y) - 1, len(x) - 1))
 
@@ -112,7 +110,7 @@ class SampledSpectrum:
         return out
 
 
-def _block_groups(edges: NDArray, longest: int) -> list[slice]:
+def _block_groups(edges: Array, longest: int) -> list[slice]:
     """Return neighboring blocks of terms, together at most `longest` or one block alone."""
     out, start = [], 0
     for stop in range(1, len(edges)):
@@ -122,7 +120,7 @@ def _block_groups(edges: NDArray, longest: int) -> list[slice]:
     return out
 
 
-def transform_planes(planes: NDArray, workers: int) -> SampledSpectrum:
+def transform_planes(planes: Array, workers: int) -> SampledSpectrum:
     """Return the DCT-II of planes along both axes; it overwrites them.
 
     Columns are copied before they are transformed: those of a plane whose rows are 2^n numbers
@@ -130,7 +128,7 @@ def transform_planes(planes: NDArray, workers: int) -> SampledSpectrum:
 
     Parameters
     ----------
-    planes : NDArray
+    planes : Array
         Samples (R, ny, nx).
     workers : int
         Number of threads; the result does not depend on it.
@@ -142,7 +140,7 @@ def transform_planes(planes: NDArray, workers: int) -> SampledSpectrum:
     """
     for plane in planes:
 
-        def along_rows(s: slice, plane: NDArray = plane) -> None:
+        def along_rows(s: slice, plane: Array = plane) -> None:
             plane[s] = scipy.fft.dct(plane[s], type=2, axis=1, overwrite_x=True)
 
         rows, columns = plane.shape
@@ -151,7 +149,7 @@ def transform_planes(planes: NDArray, workers: int) -> SampledSpectrum:
     return SampledSpectrum(planes)
 
 
-def _transform_columns(plane: NDArray, terms: int, workers: int) -> None:
+def _transform_columns(plane: Array, terms: int, workers: int) -> None:
     """Put the first terms of the DCT-II of its columns in the first rows of a plane."""
 
     def along_columns(s: slice) -> None:
@@ -163,8 +161,8 @@ def _transform_columns(plane: NDArray, terms: int, workers: int) -> None:
 
 
 def transform_painted(
-    scene: ChartScene, mix: NDArray, terms: tuple[int, int], dtype: type, workers: int
-) -> tuple[SampledSpectrum, NDArray]:
+    scene: ChartScene, mix: Array, terms: tuple[int, int], dtype: type, workers: int
+) -> tuple[SampledSpectrum, Array]:
     """Return the first terms of the DCT-II of a chart's planes, and how bright they are.
 
     Rows are painted and transformed band by band, and of each only the terms are kept: all cells of
@@ -174,7 +172,7 @@ def transform_painted(
     ----------
     scene : ChartScene
         The chart on its cells.
-    mix : NDArray
+    mix : Array
         Mixtures (R, K) of the scene's components.
     terms : tuple of int
         Number of terms along y and x.
@@ -187,18 +185,18 @@ def transform_painted(
     -------
     spectrum : SampledSpectrum
         Coefficients, unnormalized.
-    brightest : NDArray
+    brightest : Array
         Largest absolute value of every plane (R,).
     """
     if np.dtype(dtype).itemsize < np.dtype(scene.dtype).itemsize:
         scene = replace(scene, dtype=dtype)
     rows, columns = scene.shape
     bands = bands_of_rows(rows, columns)
-    half: NDArray = np.empty((len(mix), rows, terms[1]), dtype)
+    half: Array = np.empty((len(mix), rows, terms[1]), dtype)
     brightest = np.zeros((len(bands), len(mix)))
     paint = scene.painter(mix)
     # Memory that is new to the process costs more than what is done in it.
-    spare: list[NDArray] = []
+    spare: list[Array] = []
 
     def along_rows(number: int) -> None:
         band = bands[number]

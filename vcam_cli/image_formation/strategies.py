@@ -17,9 +17,9 @@ from collections.abc import Sequence
 from itertools import chain
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vcam_cli import memory
+from vcam_cli.arrays import Array
 from vcam_cli.effects.base import Blur, FieldTransfer, SeparableTransfer, of_kind
 from vcam_cli.image_formation.box_average import box_averages, point_values
 from vcam_cli.image_formation.estimates import memory_model
@@ -118,7 +118,7 @@ def image_layers(path: OpticalPath, scene: AnyScene) -> tuple[Layers, SpectrumRe
 
 def _dark_layers(path: OpticalPath) -> tuple[Layers, SpectrumReport]:
     """Return the image where no color sees light: there is none, whatever blurs it."""
-    dark: NDArray = np.zeros((path.geometry.rows, path.geometry.columns), path.settings.dtype)
+    dark: Array = np.zeros((path.geometry.rows, path.geometry.columns), path.settings.dtype)
     blurs = of_kind(path.effects, Blur, SeparableTransfer, FieldTransfer)
     report = SpectrumReport(changes=dict.fromkeys((effect.name for effect in blurs), 0.0))
     return iter([Layer(lambda color, rows: dark[rows])]), report

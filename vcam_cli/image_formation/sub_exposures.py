@@ -20,10 +20,10 @@ from functools import partial
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import ndimage
 
 from vcam_cli import memory
+from vcam_cli.arrays import Array
 from vcam_cli.camera.derived.geometry import Geometry, pixel_centers
 from vcam_cli.effects.base import Effect, of_kind
 from vcam_cli.effects.temporal.sub_exposed_motion import SubExposedMotion
@@ -65,7 +65,7 @@ FormImage = Callable[[OpticalPath, Scene], tuple[Layers, SpectrumReport]]
 class FineImage:
     """The still image as pixels at closely spaced places see it, as coefficients of splines."""
 
-    coefficients: NDArray
+    coefficients: Array
     """(C, rows, columns) [e/s]"""
     geometry: Geometry
     """Of the places, as if they were pixels."""
@@ -74,7 +74,7 @@ class FineImage:
     full_signal: float
     """Largest signal that counts [e/s]."""
 
-    def look(self, color: int, x: NDArray, y: NDArray) -> NDArray:
+    def look(self, color: int, x: Array, y: Array) -> Array:
         """Return the signal of a color at places x, y of one shape [m], in that shape [e/s]."""
         g = self.geometry
         pitches = g.pitch_x * g.sampling_scale, g.pitch_y * g.sampling_scale
@@ -212,7 +212,7 @@ def _image_on(
     needed = memory_model.sub_exposure_bytes(fine, knobs, count)
     memory.require(needed, g.rows, g.columns)
     layers, report = form_image(there, scene)
-    values: NDArray = np.zeros((count, rows, columns), knobs.dtype)
+    values: Array = np.zeros((count, rows, columns), knobs.dtype)
     x, y = (axis.astype(values.dtype) for axis in pixel_centers(fine))
     for layer in layers:
         each(partial(_add, values, layer, x, y), blocks(rows), still.workers)
@@ -223,21 +223,21 @@ def _image_on(
     return FineImage(values, fine, error, full), replace(report, memory=needed)
 
 
-def _add(values: NDArray, layer: Layer, x: NDArray, y: NDArray, rows: slice) -> None:
+def _add(values: Array, layer: Layer, x: Array, y: Array, rows: slice) -> None:
     """Add a layer to rows of the fine image of every color."""
     for color, plane in enumerate(values):
         tile = layer.values(color, rows)
         plane[rows] += tile if layer.weight is None else tile * layer.weight(x, y[rows])
 
 
-def _filter_plane(values: NDArray, color: int) -> None:
+def _filter_plane(values: Array, color: int) -> None:
     """Put the coefficients of splines in the place of the values of a color."""
     values[color] = ndimage.spline_filter(
         values[color], order=ORDER, output=values.dtype, mode="mirror"
     )
 
 
-def _error_between(plane: NDArray) -> float:
+def _error_between(plane: Array) -> float:
     """Return the rms error of splines through every second value at those left out.
 
     Along each axis by itself, on some lines; of the two together the sum of squares.
@@ -256,7 +256,7 @@ def _error_between(plane: NDArray) -> float:
     return math.sqrt(squares)
 
 
-def _between(coefficients: NDArray, at: NDArray) -> NDArray:
+def _between(coefficients: Array, at: Array) -> Array:
     """Return splines along the second axis, of coefficients (m, n), at places (p,): (m, p)."""
     return np.array(
         [
@@ -272,10 +272,10 @@ class _Exposure:
 
     image: FineImage
     motion: SubExposedMotion
-    shares: NDArray
-    weights: NDArray
+    shares: Array
+    weights: Array
 
-    def signal(self, color: int, x: NDArray, y: NDArray) -> NDArray:
+    def signal(self, color: int, x: Array, y: Array) -> Array:
         """Return the signal of a color in rows y (rows,) and columns x (columns,) [e/s]."""
         out = np.zeros((len(y), len(x)), self.image.coefficients.dtype)
         for share, weight in self.instants():
@@ -289,7 +289,7 @@ class _Exposure:
         yield from zip(self.shares.tolist(), self.weights.tolist(), strict=True)
 
 
-def _change(image: FineImage, exposure: _Exposure, x: NDArray, y: NDArray) -> float:
+def _change(image: FineImage, exposure: _Exposure, x: Array, y: Array) -> float:
     """Return the rms change of some rows by the motion, in the color where it is most [e/s]."""
     at_x, at_y = np.broadcast_arrays(x[None, :], y[:, None])
     found = []
@@ -299,14 +299,14 @@ def _change(image: FineImage, exposure: _Exposure, x: NDArray, y: NDArray) -> fl
     return math.sqrt(max(found))
 
 
-def _quadrature(count: int) -> tuple[NDArray, NDArray]:
+def _quadrature(count: int) -> tuple[Array, Array]:
     """Return instants of the exposure as shares of it, and their weights."""
     nodes, weights = np.polynomial.legendre.leggauss(count)
     return (nodes + 1) / 2, weights / 2
 
 
 def _instants(
-    path: OpticalPath, image: FineImage, motion: SubExposedMotion, x: NDArray, y: NDArray
+    path: OpticalPath, image: FineImage, motion: SubExposedMotion, x: Array, y: Array
 ) -> tuple[int, float]:
     """Return the fewest instants whose error is within its share, and that error [e/s]."""
     if motion.blur is not None:
@@ -318,7 +318,7 @@ def _instants(
     count = min(least, MOST_INSTANTS) if asked is None else asked
     colors = range(len(image.coefficients))
 
-    def rows(count: int) -> NDArray:
+    def rows(count: int) -> Array:
         exposure = _Exposure(image, motion, *_quadrature(count))
         return np.array([exposure.signal(color, x, y) for color in colors])
 

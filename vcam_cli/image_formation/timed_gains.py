@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from numpy.typing import NDArray
-
+from vcam_cli.arrays import Array
 from vcam_cli.camera.derived.geometry import Geometry, pixel_centers
 from vcam_cli.effects.base import Effect, SignalLevels, TemporalGain, of_kind
 from vcam_cli.image_formation.light_plan import OMITTED_SHARE, LightPlan
@@ -51,13 +50,13 @@ def light_plan(
 
 
 def apply(
-    light: NDArray, gains: Sequence[TemporalGain], lattice: Geometry, start: float, stop: float
-) -> NDArray:
+    light: Array, gains: Sequence[TemporalGain], lattice: Geometry, start: float, stop: float
+) -> Array:
     """Return the mean light from `start` to `stop` after a line's exposure begins.
 
     Parameters
     ----------
-    light : NDArray
+    light : Array
         Mean light over all times (..., rows, columns) [e/s]; it is not changed.
     gains : sequence of TemporalGain
         Gains that act.
@@ -68,7 +67,7 @@ def apply(
 
     Returns
     -------
-    NDArray
+    Array
         Light of the same shape and float type [e/s].
     """
     x, y = pixel_centers(lattice)

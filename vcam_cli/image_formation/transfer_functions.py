@@ -18,8 +18,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.effects.base import Blur, Effect, PlaneTransfer, RadialTransfer, of_kind
 from vcam_cli.parallel import pieces, product
 from vcam_cli.spectra import Spectrum, pair_weights, photons
@@ -38,7 +38,7 @@ class Band:
     stop: float
     step: float
 
-    def nodes(self) -> NDArray:
+    def nodes(self) -> Array:
         """Return evenly spaced nodes that include both ends, at most `step` apart [m]."""
         count = max(2, int(np.ceil((self.stop - self.start) / self.step - 1e-9)) + 1)
         return np.linspace(self.start, self.stop, count)
@@ -48,9 +48,9 @@ class Band:
 class Transfer:
     """H_kc as spectral weights on a few wavelengths [e/s at frequency 0]."""
 
-    wavelengths: NDArray
+    wavelengths: Array
     """(J,) [m]"""
-    weights: NDArray
+    weights: Array
     """(K, C, J) [electrons / s]"""
     effects: tuple[Blur, ...]
 
@@ -64,17 +64,17 @@ class Transfer:
         """Blurs that depend on the direction too."""
         return of_kind(self.effects, PlaneTransfer)
 
-    def radial_response(self, frequency: NDArray) -> NDArray:
+    def radial_response(self, frequency: Array) -> Array:
         """Return H_kc through the radial blurs alone.
 
         Parameters
         ----------
-        frequency : NDArray
+        frequency : Array
             Frequencies of any shape [cycles/m].
 
         Returns
         -------
-        NDArray
+        Array
             Transfer (K, C, *shape) [e/s].
         """
         if not self.radial_blurs:
@@ -82,24 +82,24 @@ class Transfer:
             return np.broadcast_to(level, (*self.level.shape, *frequency.shape)).copy()
         return self.spectral_sum(self.otf_radial(frequency))
 
-    def plane_response(self, fx: NDArray, fy: NDArray) -> NDArray:
+    def plane_response(self, fx: Array, fy: Array) -> Array:
         """Return H_kc through all blurs at all pairs of two frequencies.
 
         Parameters
         ----------
-        fx : NDArray
+        fx : Array
             Frequencies (n,) along x [cycles/m].
-        fy : NDArray
+        fy : Array
             Frequencies (m,) along y [cycles/m].
 
         Returns
         -------
-        NDArray
+        Array
             Complex transfer (K, C, m, n) [e/s].
         """
         return self.spectral_sum(self.otf(fx, fy))
 
-    def otf(self, fx: NDArray, fy: NDArray) -> NDArray:
+    def otf(self, fx: Array, fy: Array) -> Array:
         """Return the complex transfer (J, m, n) of all blurs at every wavelength."""
         otf = self.otf_radial(np.hypot(fx[None, :], fy[:, None])).astype(np.complex128)
         for plane, wavelength in zip(otf, self.wavelengths, strict=True):
@@ -107,7 +107,7 @@ class Transfer:
                 plane *= effect.otf_plane(fx, fy, float(wavelength))
         return otf
 
-    def otf_radial(self, frequency: NDArray) -> NDArray:
+    def otf_radial(self, frequency: Array) -> Array:
         """Return the transfer (J, *shape) of the radial blurs at every wavelength."""
         otf = np.ones((len(self.wavelengths), *frequency.shape))
         for some in pieces(len(otf), max(1, VALUES // max(1, frequency.size))):
@@ -115,7 +115,7 @@ class Transfer:
                 otf[some] *= effect.spectral_otf(frequency, self.wavelengths[some])
         return otf
 
-    def spectral_sum(self, otf: NDArray) -> NDArray:
+    def spectral_sum(self, otf: Array) -> Array:
         """Return the spectral sum (K, C, *shape) of transfers (J, *shape) [e/s]."""
         components, colors, count = self.weights.shape
         total = product(self.weights.reshape(-1, count), otf.reshape(count, -1))
@@ -143,12 +143,12 @@ class Transfer:
         """Return the same light through other effects, of which only blurs count."""
         return replace(self, effects=of_kind(effects, Blur))
 
-    def with_mixtures(self, mix: NDArray) -> Transfer:
+    def with_mixtures(self, mix: Array) -> Transfer:
         """Return the transfer of mixtures (R, K) of the components."""
         return replace(self, weights=np.tensordot(mix, self.weights, axes=1))
 
     @property
-    def level(self) -> NDArray:
+    def level(self) -> Array:
         """H_kc at frequency 0, the signal (K, C) of a uniform scene [e/s]."""
         return self.weights.sum(axis=-1)
 

@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.effects.base import Blur, PlaneTransfer
 from vcam_cli.image_formation.transfer_functions import Transfer
 from vcam_cli.parallel import product
@@ -48,7 +48,7 @@ class TableSize:
         return int(min(max(self.steps_per_period * periods + 1, SMALLEST_PLANE), LARGEST_PLANE))
 
 
-Mixing = tuple[NDArray, float]
+Mixing = tuple[Array, float]
 """Mixtures (R, K) of a scene's components, and the largest relative error that they leave."""
 
 
@@ -59,15 +59,15 @@ class Tables:
     sum_k B_k H_kc = sum_r (mix B)_r H_rc up to `error`.
     """
 
-    mix: NDArray
+    mix: Array
     """(R, K) without unit."""
-    radial: NDArray | None
+    radial: Array | None
     """(R, C, n) over |f| from 0 to `top` [electrons / s]; None where there is no such part."""
     top: float
     """Frequency of the last entry [cycles/m]."""
     error: float
     """Bound on the error by mixtures, relative to the largest level."""
-    planes: tuple[NDArray | None, ...] = (None,) * 4
+    planes: tuple[Array | None, ...] = (None,) * 4
     """By `PARITIES`, (R, C, m, m) over fy and fx from 0 to `top`: what is added to the radial part.
     A wave cos(2 pi fx x) cos(2 pi fy y) becomes the sum of its cosines and sines times these."""
     order: int = 0
@@ -121,33 +121,33 @@ class TableReader:
     """Tables of one parity, interpolated at given frequencies along x."""
 
     tables: Tables
-    fx: NDArray
+    fx: Array
     """(n,) rising [cycles/m]."""
-    radial: tuple[NDArray, NDArray] | None
+    radial: tuple[Array, Array] | None
     """Entries over |f| (R, C, entries) and the steps to the next; None where this parity has no
     radial part."""
-    plane: NDArray | None
+    plane: Array | None
     """Spline coefficients (R, C, m, m) over fy and fx, where there is such a part."""
     spline_x: Any
     """Sparse (n, m): what each of them counts along x, four at a time."""
 
-    def values(self, fy: NDArray, count: int | None = None) -> NDArray:
+    def values(self, fy: Array, count: int | None = None) -> Array:
         """Return H_rc at some frequencies along y.
 
         Parameters
         ----------
-        fy : NDArray
+        fy : Array
             Frequencies (m,) along y [cycles/m].
         count : int, optional
             Number of the frequencies along x that are read; by default all.
 
         Returns
         -------
-        NDArray
+        Array
             Transfer (R, C, m, count) [e/s]; with a direction, nothing beyond the end of the tables.
         """
         fx, top = self.fx[:count], self.tables.top
-        total: NDArray | None = None
+        total: Array | None = None
         radius = np.hypot(fx, fy[:, None])
         if self.radial is not None:
             total = self._linear(radius)
@@ -164,7 +164,7 @@ class TableReader:
         assert total is not None
         return total
 
-    def _linear(self, radius: NDArray) -> NDArray:
+    def _linear(self, radius: Array) -> Array:
         """Return the radial part at frequencies (m, n); its last entry holds beyond its end."""
         assert self.radial is not None
         entries, steps = self.radial
@@ -177,7 +177,7 @@ class TableReader:
         return values.reshape(*self.tables.shape, *radius.shape)
 
 
-def reader(tables: Tables, parity: int, fx: NDArray) -> TableReader:
+def reader(tables: Tables, parity: int, fx: Array) -> TableReader:
     """Return a reader of the tables of one parity at the frequencies fx (n,), rising [cycles/m]."""
     plane, radial = tables.planes[parity], None
     if parity == tables.radial_parity and tables.radial is not None:
@@ -188,7 +188,7 @@ def reader(tables: Tables, parity: int, fx: NDArray) -> TableReader:
     return TableReader(tables, fx, radial, _spline_coefficients(plane), spline)
 
 
-def _spline_coefficients(plane: NDArray) -> NDArray:
+def _spline_coefficients(plane: Array) -> Array:
     """Return the coefficients (R, C, m, m) of the cubic splines through tables over fy and fx."""
     from scipy.interpolate import make_interp_spline
 
@@ -198,7 +198,7 @@ def _spline_coefficients(plane: NDArray) -> NDArray:
     return np.ascontiguousarray(np.moveaxis(along_x, (1, 0), (-2, -1)))
 
 
-def spline_weights(entries: int, position: NDArray) -> Any:
+def spline_weights(entries: int, position: Array) -> Any:
     """Return what each coefficient of a table counts in a cubic spline: sparse (n, entries).
 
     Positions (n,) are parts of the table's length; beyond 1 that of the end holds.
@@ -223,7 +223,7 @@ def tabulate(exact: Transfer, size: TableSize, mixing: Mixing) -> Tables:
     return tables
 
 
-def radial_table(transfer: Transfer, size: TableSize) -> NDArray:
+def radial_table(transfer: Transfer, size: TableSize) -> Array:
     """Return the radial part of a transfer function over |f|: (K, C, entries) [e/s]."""
     return transfer.radial_response(np.linspace(0, size.top, size.entries))
 
@@ -244,12 +244,12 @@ class PlaneGrid:
 
     radial_transfer: Transfer
     """The radial part at every second wavelength: what is added to it is small."""
-    frequency: NDArray
+    frequency: Array
     """(m,) from 0 [cycles/m]."""
-    radial: NDArray
+    radial: Array
     """(J, 2 m, m) transfer at fy = frequency, then -frequency, and at fx = frequency."""
 
-    def change(self, blurs: Sequence[Blur]) -> NDArray:
+    def change(self, blurs: Sequence[Blur]) -> Array:
         """Return what blurs add to the light, by parity.
 
         Parameters
@@ -259,7 +259,7 @@ class PlaneGrid:
 
         Returns
         -------
-        NDArray
+        Array
             Transfer (4, K, C, m, m) [e/s].
         """
         m = len(self.frequency)
@@ -275,21 +275,21 @@ class PlaneGrid:
         return split_by_parity(both[..., :m, :], both[..., m:, :])
 
 
-def split_by_parity(plus: NDArray, minus: NDArray) -> NDArray:
+def split_by_parity(plus: Array, minus: Array) -> Array:
     """Return a transfer function by `PARITIES` from its values at (fx, fy) and at (fx, -fy).
 
     H(-f) = conj(H(f)), so a half-plane tells all.
 
     Parameters
     ----------
-    plus : NDArray
+    plus : Array
         Complex values at (fx, fy), of any shape.
-    minus : NDArray
+    minus : Array
         Complex values at (fx, -fy).
 
     Returns
     -------
-    NDArray
+    Array
         Real parts (4, *shape).
     """
     return np.array(
@@ -311,7 +311,7 @@ def plane_grid(transfer: Transfer, top: float, entries: int) -> PlaneGrid:
 
 
 def mixtures(
-    exact: Transfer, size: TableSize, more: Callable[[], Sequence[NDArray]] = list
+    exact: Transfer, size: TableSize, more: Callable[[], Sequence[Array]] = list
 ) -> Mixing:
     """Return the fewest mixtures of a scene's components that keep its transfer functions.
 
@@ -349,7 +349,7 @@ def mixtures(
     return every, 0.0
 
 
-def _samples(transfer: Transfer, top: float) -> list[NDArray]:
+def _samples(transfer: Transfer, top: float) -> list[Array]:
     """Return H_kc at some frequencies: (K, any number) [e/s]."""
     components = len(transfer.weights)
     samples = [transfer.radial_response(np.linspace(0, top, JUDGED)).reshape(components, -1)]

@@ -26,6 +26,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.physics import pupil_grid, pupil_harmonics, zernike
 from vcam_cli.physics.cache import ByteCache
 from vcam_cli.physics.zernike import Floats, Terms
@@ -355,19 +356,19 @@ def _gauss_legendre(points: int) -> tuple[Floats, Floats]:
     return (node + 1) / 2, weight / 2
 
 
-def paraboloid_transfer(frequency: NDArray, radius: float) -> NDArray:
+def paraboloid_transfer(frequency: Array, radius: float) -> Array:
     """Return the transfer 8 J2(z) / z^2, z = 2 pi f r, of a paraboloid.
 
     Parameters
     ----------
-    frequency : NDArray
+    frequency : Array
         Spatial frequencies of any shape [cycles/m].
     radius : float
         Where the paraboloid ends; its sign does not matter [m].
 
     Returns
     -------
-    NDArray
+    Array
         Transfer without unit.
     """
     from scipy.special import jv

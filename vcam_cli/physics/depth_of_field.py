@@ -11,12 +11,14 @@ References
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
+
+from vcam_cli.arrays import Array
 
 
 def blur_diameter(
     distance: ArrayLike, focus_distance: float, focal_length: float, f_number: float
-) -> NDArray:
+) -> Array:
     """Return the diameter on the sensor of the blur of a point, by rays.
 
     It is A |1 / d - 1 / s| v: the cone from the aperture A to the image of a point at the distance
@@ -35,7 +37,7 @@ def blur_diameter(
 
     Returns
     -------
-    NDArray
+    Array
         Diameters in the shape of `distance` [m].
     """
     image_distance = 1 / (1 / focal_length - 1 / focus_distance)

@@ -1,12 +1,14 @@
 """Light that goes up and down: its mean over an exposure."""
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
+
+from vcam_cli.arrays import Array
 
 
 def sinusoid_mean(
     start: ArrayLike, time: float, frequency: float, depth: float, phase: float = 0.0
-) -> NDArray:
+) -> Array:
     """Return the mean over an exposure of 1 + depth cos(2 pi frequency t + phase).
 
     The mean of a cosine is its value in the middle of the exposure times sinc(frequency time), so
@@ -27,7 +29,7 @@ def sinusoid_mean(
 
     Returns
     -------
-    NDArray
+    Array
         Light relative to its mean over all times, in the shape of `start`.
 
     References
@@ -41,7 +43,7 @@ def sinusoid_mean(
 
 def pulse_mean(
     start: ArrayLike, time: float, frequency: float, depth: float, duty: float, phase: float = 0.0
-) -> NDArray:
+) -> Array:
     """Return the mean over an exposure of a light that is switched between two levels.
 
     Parameters
@@ -55,7 +57,7 @@ def pulse_mean(
 
     Returns
     -------
-    NDArray
+    Array
         Light relative to its mean over all times, in the shape of `start`.
 
     References
@@ -66,7 +68,7 @@ def pulse_mean(
     begin = frequency * np.asarray(start, dtype=float) + phase / (2 * np.pi)
     end = begin + frequency * time
 
-    def bright(turns: NDArray) -> NDArray:
+    def bright(turns: Array) -> Array:
         whole = np.floor(turns)
         return np.asarray(whole * duty + np.minimum(turns - whole, duty))
 

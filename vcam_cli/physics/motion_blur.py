@@ -1,7 +1,9 @@
 """Blur by an image that moves while it is exposed: its mean over the path."""
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
+
+from vcam_cli.arrays import Array
 
 LEAST_NODES = 4
 """Gauss-Legendre nodes of a straight piece of a path, at least."""
@@ -10,9 +12,7 @@ NODES_PER_WAVE = 3
 1e-6."""
 
 
-def path_transfer(
-    fx: NDArray, fy: NDArray, times: ArrayLike, x: ArrayLike, y: ArrayLike
-) -> NDArray:
+def path_transfer(fx: Array, fy: Array, times: ArrayLike, x: ArrayLike, y: ArrayLike) -> Array:
     """Return what a path leaves of waves: the mean of exp(-2 pi i f . x(t)) over its time.
 
     The path is straight and its speed constant between its points. Of one straight piece the mean
@@ -20,7 +20,7 @@ def path_transfer(
 
     Parameters
     ----------
-    fx, fy : NDArray
+    fx, fy : Array
         Spatial frequencies along x (n,) and y (m,) [cycles/m].
     times : array_like
         Times of the points (p,), rising, at least two [s].
@@ -29,7 +29,7 @@ def path_transfer(
 
     Returns
     -------
-    NDArray
+    Array
         Complex transfer (m, n), 1 at frequency 0.
 
     References
@@ -51,19 +51,19 @@ def path_transfer(
     return np.asarray((along_y * share) @ along_x)
 
 
-def turned_back(x: NDArray, y: NDArray, angle: ArrayLike) -> tuple[NDArray, NDArray]:
+def turned_back(x: Array, y: Array, angle: ArrayLike) -> tuple[Array, Array]:
     """Return where points lay before the picture was turned about its center.
 
     Parameters
     ----------
-    x, y : NDArray
+    x, y : Array
         Positions right of the center and below it, of shapes that go together [m].
     angle : array_like
         Turn of the picture, clockwise as it is seen, of a shape that goes with them [rad].
 
     Returns
     -------
-    tuple of NDArray
+    tuple of Array
         Positions x and y before [m].
     """
     cosine, sine = np.cos(angle), np.sin(angle)

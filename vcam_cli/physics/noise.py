@@ -21,6 +21,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
+
 CORNISH_FISHER_MEAN = 8.0
 """Mean from which the expansion is used [electrons]; below, the distribution is inverted."""
 FEW = 0.25
@@ -29,7 +31,7 @@ LEAST_TAIL = 1e-15
 """Probability of larger numbers below which they do not occur."""
 
 
-def poisson_from_normal(mean: NDArray[np.floating], z: NDArray[np.floating]) -> NDArray:
+def poisson_from_normal(mean: NDArray[np.floating], z: NDArray[np.floating]) -> Array:
     """Return a Poisson variable made from one standard normal variable a pixel.
 
     Below `CORNISH_FISHER_MEAN` the Poisson distribution function is inverted at Phi(z): exact.
@@ -71,7 +73,7 @@ def poisson_from_normal(mean: NDArray[np.floating], z: NDArray[np.floating]) -> 
     return out
 
 
-def _invert(mean: NDArray, z: NDArray) -> NDArray:
+def _invert(mean: Array, z: Array) -> Array:
     """Return the smallest k with P(X <= k | mean) >= Phi(z), summing the distribution upwards."""
     from scipy.special import ndtr
 
@@ -80,7 +82,7 @@ def _invert(mean: NDArray, z: NDArray) -> NDArray:
     upper = ndtr(-z.astype(np.float64))
     tail = -np.expm1(-m)  # P(X > k)
     count = np.zeros_like(mean)
-    place: NDArray = np.flatnonzero(tail > upper)
+    place: Array = np.flatnonzero(tail > upper)
     m, tail, upper = m[place], tail[place], np.maximum(upper[place], LEAST_TAIL)
     term, above = np.exp(-m), np.full(m.shape, True)
     k = 0
@@ -96,7 +98,7 @@ def _invert(mean: NDArray, z: NDArray) -> NDArray:
     return count
 
 
-def _invert_even(mean: NDArray, z: NDArray) -> NDArray:
+def _invert_even(mean: Array, z: Array) -> Array:
     """Return the same where all means are one: how many of the distribution's steps lie below z.
 
     Each is compared with all numbers, of their own float type: that takes a fifth of the time of
@@ -120,7 +122,7 @@ def _invert_even(mean: NDArray, z: NDArray) -> NDArray:
     return count.astype(mean.dtype)
 
 
-def gaussian_shot_noise(mean: NDArray[np.floating], z: NDArray[np.floating]) -> NDArray:
+def gaussian_shot_noise(mean: NDArray[np.floating], z: NDArray[np.floating]) -> Array:
     """Return electrons with the normal approximation of shot noise, m + z sqrt(m), not rounded [1].
 
     Parameters

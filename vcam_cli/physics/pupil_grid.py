@@ -20,6 +20,7 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.physics import zernike
 from vcam_cli.physics.zernike import Floats, Terms
 
@@ -61,7 +62,7 @@ class OtfRatioGrid:
 
     step: float
     """Spacing of the lags [pupil radii]."""
-    spline: NDArray
+    spline: Array
     """Complex spline coefficients (rows, columns); the lag 0 is at (rows // 2, MIRRORED_LAGS)."""
 
     @property
@@ -69,7 +70,7 @@ class OtfRatioGrid:
         """Memory that the coefficients take [bytes]."""
         return self.spline.nbytes
 
-    def interpolate(self, sx: NDArray, sy: NDArray) -> NDArray:
+    def interpolate(self, sx: Array, sy: Array) -> Array:
         """Return the ratio at any lags.
 
         Parameters
@@ -223,7 +224,7 @@ def _wavefront_samples(terms: Terms, samples: int) -> Floats:
     return zernike.wavefront(terms, at[x], at[y])
 
 
-def _correlation(pupil: NDArray) -> NDArray:
+def _correlation(pupil: Array) -> Array:
     """Return the sum of P(u) P*(u + s) over u, for lags s to the right.
 
     Its shape is (2 samples + 1, samples + 1), with the lag 0 at (samples, 0).
@@ -239,7 +240,7 @@ def _correlation(pupil: NDArray) -> NDArray:
 
 
 @lru_cache(maxsize=4)
-def _perfect_correlation(samples: int) -> NDArray:
+def _perfect_correlation(samples: int) -> Array:
     """Return the correlation of the pupil without aberrations; 1 where nothing overlaps."""
     overlap = _correlation(_weights(samples).astype(np.complex64)).real
     thin, none = _edge(samples)
@@ -286,7 +287,7 @@ def _wavefront_difference(
     return one - zernike.wavefront(terms, np.add(x, sx), np.add(y, sy))
 
 
-def _with_mirrored_lags(ratio: NDArray) -> NDArray:
+def _with_mirrored_lags(ratio: Array) -> Array:
     """Return the ratio with some lags of the left half, conjugate to the opposite ones."""
     left = ratio[::-1, MIRRORED_LAGS:0:-1].conj()
     return np.concatenate([left, ratio], axis=1)

@@ -19,8 +19,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.physics import zernike
 from vcam_cli.physics.zernike import Floats, Terms
 
@@ -39,9 +39,9 @@ FEWEST, MOST = 16, 256
 class PupilHarmonics:
     """Aberrated over perfect OTF of a wavefront by direction, frequency and wavelength."""
 
-    wavenumbers: NDArray
+    wavenumbers: Array
     """(n,) nodes of 1 / wavelength [1/m]."""
-    series: NDArray
+    series: Array
     """Complex Chebyshev coefficients (n, degrees, m) of every harmonic over h from 0 to 1."""
 
     @property
@@ -49,7 +49,7 @@ class PupilHarmonics:
         """Memory that the coefficients take [bytes]."""
         return self.series.nbytes
 
-    def amplitudes(self, h: NDArray, wavelength: float) -> NDArray:
+    def amplitudes(self, h: Array, wavelength: float) -> Array:
         """Return the harmonics of a wavelength among or between the nodes'.
 
         Parameters
@@ -70,7 +70,7 @@ class PupilHarmonics:
         return np.asarray((at * inside[:, None]) @ series)
 
 
-def pupil_harmonics(terms: Terms, wavelengths: NDArray, slope: float) -> PupilHarmonics:
+def pupil_harmonics(terms: Terms, wavelengths: Array, slope: float) -> PupilHarmonics:
     """Return the harmonics of a wavefront.
 
     Parameters
@@ -93,9 +93,7 @@ def pupil_harmonics(terms: Terms, wavelengths: NDArray, slope: float) -> PupilHa
     return PupilHarmonics(nodes, _chebyshev(found))
 
 
-def direction_harmonics(
-    values: Callable[[Floats], NDArray], left: float = LEFT_OF_GRIDS
-) -> NDArray:
+def direction_harmonics(values: Callable[[Floats], Array], left: float = LEFT_OF_GRIDS) -> Array:
     """Return the harmonics of a transfer function in polar coordinates.
 
     Parameters
@@ -135,7 +133,7 @@ def _wavenumbers(wanted: Floats, slope: float) -> Floats:
     return wanted[0] + half * (1 - np.cos(np.pi * (np.arange(count) + 0.5) / count))
 
 
-def _values(terms: Terms, wavenumbers: Floats, radians: float, angles: Floats) -> NDArray:
+def _values(terms: Terms, wavenumbers: Floats, radians: float, angles: Floats) -> Array:
     """Return the ratio (n, h, directions) at Chebyshev nodes of h, in angles over half a turn."""
     count = 14 + math.ceil(1.2 * radians)
     h = (np.cos((np.arange(count) + 0.5) * (np.pi / count)) + 1) / 2
@@ -171,7 +169,7 @@ def _values(terms: Terms, wavenumbers: Floats, radians: float, angles: Floats) -
     return values
 
 
-def _half_overlaps(h: Floats, points: int) -> tuple[Floats, Floats, NDArray]:
+def _half_overlaps(h: Floats, points: int) -> tuple[Floats, Floats, Array]:
     """Return points x > 0, y, and weights (h, any number) of overlaps of unit disks 2 h apart.
 
     x = cos a - h, y = t sin a with a = 0 .. acos(h), t = -1 .. 1: dx dy = sin^2 a da dt.
@@ -186,7 +184,7 @@ def _half_overlaps(h: Floats, points: int) -> tuple[Floats, Floats, NDArray]:
     return x.reshape(flat), y.reshape(flat), part.reshape(flat).astype(np.float32)
 
 
-def _chebyshev(values: NDArray) -> NDArray:
+def _chebyshev(values: Array) -> Array:
     """Return Chebyshev coefficients (n, h, ...) of values at the nodes."""
     count = values.shape[1]
     angle = (np.arange(count) + 0.5) * (np.pi / count)

@@ -19,6 +19,7 @@ import numpy as np
 import scipy.fft
 from numpy.typing import ArrayLike, NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.physics import pupil_harmonics, zernike
 from vcam_cli.physics.zernike import Floats, Terms
 
@@ -157,7 +158,7 @@ def largest(frequency: Floats, working_f_number: float, terms: Terms) -> Floats:
     return np.asarray(np.abs(values(np.pi * np.arange(DIRECTIONS) / DIRECTIONS)).max(axis=1))
 
 
-def otf_harmonics(frequency: Floats, working_f_number: float, terms: Terms) -> NDArray:
+def otf_harmonics(frequency: Floats, working_f_number: float, terms: Terms) -> Array:
     """Return the geometrical OTF by harmonics of the direction [1].
 
     Parameters
@@ -179,7 +180,7 @@ def otf_harmonics(frequency: Floats, working_f_number: float, terms: Terms) -> N
 
 def _by_direction(
     frequency: Floats, working_f_number: float, terms: Terms
-) -> Callable[[Floats], NDArray]:
+) -> Callable[[Floats], Array]:
     """Return the function from directions (d,) [rad] to the geometrical OTF (n, d) there."""
     rest, tilt = zernike.split_tilt(terms)
     if zernike.is_symmetric(rest):
@@ -193,7 +194,7 @@ def _by_direction(
     cells = scipy.fft.next_fast_len(math.ceil(CELLS_PER_CYCLE * max(highest, 1 / radius) / step))
     spread = np.sinc(frequency[within] / (cells * step)) ** 4
 
-    def values(angles: Floats) -> NDArray:
+    def values(angles: Floats) -> Array:
         found = _moved(frequency, angles, working_f_number, tilt) * within[:, None]
         for k, angle in enumerate(angles.tolist()):
             place = (math.cos(angle) * right + math.sin(angle) * down) * (cells * step)

@@ -6,15 +6,15 @@ from collections.abc import Callable
 from typing import NoReturn
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.errors import BadInput, CannotDo, bad, one_line
 
 Path = tuple[str | int, ...]
-Work = Callable[[NDArray], object]
+Work = Callable[[Array], object]
 
 
-def planes(process: Work, path: Path, given: NDArray) -> NDArray:
+def planes(process: Work, path: Path, given: Array) -> Array:
     """Return light (C, ...) after a step, of the same shape and finite, or raise BadInput."""
     done = _array(process, path, given.copy())
     if done.shape != given.shape:
@@ -26,7 +26,7 @@ def planes(process: Work, path: Path, given: NDArray) -> NDArray:
     return done
 
 
-def codes(process: Work, path: Path, given: NDArray) -> NDArray:
+def codes(process: Work, path: Path, given: Array) -> Array:
     """Return codes of the render after a step, of the same shape and type, or raise BadInput."""
     done = _array(process, path, given.copy())
     if done.shape != given.shape or done.dtype != given.dtype:
@@ -35,7 +35,7 @@ def codes(process: Work, path: Path, given: NDArray) -> NDArray:
     return done
 
 
-def _array(process: Work, path: Path, given: NDArray) -> NDArray:
+def _array(process: Work, path: Path, given: Array) -> Array:
     try:
         return np.asarray(process(given))
     except (BadInput, CannotDo, MemoryError):

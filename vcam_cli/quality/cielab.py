@@ -18,7 +18,8 @@ from collections.abc import Callable
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
+
+from vcam_cli.arrays import Array
 
 Formula = Literal["1976", "1994", "2000"]
 THRESHOLD = 0.008856
@@ -28,7 +29,7 @@ DIM_LIGHTNESS = 903.3
 _SLOPE, _OFFSET = 7.787, 16.0 / 116.0
 
 
-def lab(relative: NDArray) -> NDArray:
+def lab(relative: Array) -> Array:
     """Return CIELAB of colors relative to white [1].
 
     L* = 116 f(Y/Yn) - 16, a* = 500 (f(X/Xn) - f(Y/Yn)), b* = 200 (f(Y/Yn) - f(Z/Zn)) with
@@ -58,7 +59,7 @@ def lab(relative: NDArray) -> NDArray:
     return out
 
 
-def delta_e(color: NDArray, reference: NDArray, formula: Formula = "1976") -> NDArray:
+def delta_e(color: Array, reference: Array, formula: Formula = "1976") -> Array:
     """Return the color difference Delta E of colors from a reference [1].
 
     Parameters
@@ -88,7 +89,7 @@ def delta_e(color: NDArray, reference: NDArray, formula: Formula = "1976") -> ND
     return FORMULAS[formula](color, reference)
 
 
-def delta_e_1976(color: NDArray, reference: NDArray) -> NDArray:
+def delta_e_1976(color: Array, reference: Array) -> Array:
     """Return the CIE 1976 color difference: the Euclidean distance in CIELAB [1].
 
     Parameters
@@ -106,7 +107,7 @@ def delta_e_1976(color: NDArray, reference: NDArray) -> NDArray:
     return np.sqrt(change[0] + change[1] + change[2])
 
 
-def delta_e_1994(color: NDArray, reference: NDArray) -> NDArray:
+def delta_e_1994(color: Array, reference: Array) -> Array:
     """Return the CIE94 color difference for graphic arts [1].
 
     The weights are 1, 1 + 0.045 C, 1 + 0.015 C with the reference's chroma C.
@@ -129,7 +130,7 @@ def delta_e_1994(color: NDArray, reference: NDArray) -> NDArray:
     return np.sqrt(light * light + chroma * chroma + hue2 / (1.0 + 0.015 * of_reference) ** 2)
 
 
-def delta_e_2000(color: NDArray, reference: NDArray) -> NDArray:
+def delta_e_2000(color: Array, reference: Array) -> Array:
     """Return the CIEDE2000 color difference, as [2] writes it (equation numbers of that paper).
 
     Parameters
@@ -170,13 +171,13 @@ def delta_e_2000(color: NDArray, reference: NDArray) -> NDArray:
     return np.sqrt(np.maximum(dl * dl + dc * dc + dh * dh + twist * dc * dh, 0.0))  # 22
 
 
-def _toward_one(chroma: NDArray) -> NDArray:
+def _toward_one(chroma: Array) -> Array:
     """Return sqrt(C^7 / (C^7 + 25^7)), which does not overflow for any C."""
     seventh = (25.0 / np.maximum(chroma, 1e-3)) ** 7
     return 1.0 / np.sqrt(1.0 + seventh)
 
 
-FORMULAS: dict[str, Callable[[NDArray, NDArray], NDArray]] = {
+FORMULAS: dict[str, Callable[[Array, Array], Array]] = {
     "1976": delta_e_1976,
     "1994": delta_e_1994,
     "2000": delta_e_2000,

@@ -7,6 +7,8 @@ between: lightness rises steadily, so the map reads right in gray and for color-
 import numpy as np
 from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
+
 INFERNO = (
     "000004", "1b0c41", "4a0c6b", "781c6d", "a52c60",
     "cf4446", "ed6925", "fb9b06", "f7d13d", "fcffa4",
@@ -18,7 +20,7 @@ _SHARE = 99.0
 _BLOCK = 256  # rows
 
 
-def scale_limit(values: NDArray) -> float:
+def scale_limit(values: Array) -> float:
     """Return the upper end of a map's scale: the smallest of 1, 2, 5, 10, 20 ... that holds 99 %.
 
     Steps, so that maps of similar pictures have the same scale. At least 1: less than one Delta E
@@ -42,7 +44,7 @@ def scale_limit(values: NDArray) -> float:
     return float(steps[np.searchsorted(steps, most)])
 
 
-def false_color(values: NDArray, upper: float) -> NDArray[np.uint8]:
+def false_color(values: Array, upper: float) -> NDArray[np.uint8]:
     """Return a map of differences as a picture.
 
     Parameters

@@ -14,7 +14,8 @@ References
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+
+from vcam_cli.arrays import Array
 
 MAX_WIDTH = 1 / 12
 """Widest mean along a map, as a part of its width: where bars are wider or there are none."""
@@ -27,7 +28,7 @@ HEIGHT = 1 / 32
 """Height of the means down a map, as a part of its height."""
 
 
-def envelope(values: NDArray, widths: NDArray) -> NDArray:
+def envelope(values: Array, widths: Array) -> Array:
     """Return the largest value of a map within a window around every column.
 
     Parameters
@@ -53,7 +54,7 @@ def envelope(values: NDArray, widths: NDArray) -> NDArray:
     return np.stack(parts, axis=1)
 
 
-def moving_average(values: NDArray, widths: NDArray | float, height: float) -> NDArray:
+def moving_average(values: Array, widths: Array | float, height: float) -> Array:
     """Return the moving average of a map over windows around every pixel.
 
     Parts of pixels count in part. At the borders windows shrink on both sides alike, so that what
@@ -78,7 +79,7 @@ def moving_average(values: NDArray, widths: NDArray | float, height: float) -> N
     return _row_means(out.T, np.full(out.shape[0], float(height))).T
 
 
-def _row_means(values: NDArray, widths: NDArray) -> NDArray:
+def _row_means(values: Array, widths: Array) -> Array:
     """Return means along the rows of values (rows, n) over windows of widths (n,) [pixels]."""
     n = values.shape[1]
     center = np.arange(n) + 0.5
@@ -89,14 +90,14 @@ def _row_means(values: NDArray, widths: NDArray) -> NDArray:
     )
 
 
-def _interpolate_rows(total: NDArray, at: NDArray) -> NDArray:
+def _interpolate_rows(total: Array, at: Array) -> Array:
     """Return values along rows between their points, straight: (rows, n)."""
     left = np.minimum(at.astype(int), total.shape[1] - 2)
     part = at - left
     return (1 - part) * total[:, left] + part * total[:, left + 1]
 
 
-def averaging_widths(frequency: NDArray, pitch: float, columns: int) -> NDArray:
+def averaging_widths(frequency: Array, pitch: float, columns: int) -> Array:
     """Return the widths to average a chart's columns over: a period of its bars, within limits.
 
     Parameters
@@ -118,7 +119,7 @@ def averaging_widths(frequency: NDArray, pitch: float, columns: int) -> NDArray:
     return np.clip(bars, MIN_WIDTH * columns, MAX_WIDTH * columns)
 
 
-def level_heights(values: NDArray, scale: NDArray, level: float) -> NDArray:
+def level_heights(values: Array, scale: Array, level: float) -> Array:
     """Return where each column of a map first reaches a level.
 
     Parameters
@@ -145,7 +146,7 @@ def level_heights(values: NDArray, scale: NDArray, level: float) -> NDArray:
     return np.where(above.any(axis=0), found, np.nan)
 
 
-def contours(values: NDArray, x: NDArray, y: NDArray, level: float) -> list[NDArray]:
+def contours(values: Array, x: Array, y: Array, level: float) -> list[Array]:
     """Return the lines along which a map is at a level.
 
     Parameters
@@ -168,7 +169,7 @@ def contours(values: NDArray, x: NDArray, y: NDArray, level: float) -> list[NDAr
     return sorted((np.asarray(line) for line in lines), key=lambda line: -len(line))
 
 
-def map_lines(values: NDArray, x: NDArray, y: NDArray, level: float) -> list[NDArray]:
+def map_lines(values: Array, x: Array, y: Array, level: float) -> list[Array]:
     """Return the lines along which an averaged map of any scene is at a level.
 
     Parameters
@@ -186,8 +187,8 @@ def map_lines(values: NDArray, x: NDArray, y: NDArray, level: float) -> list[NDA
 
 
 def chart_line(
-    values: NDArray, frequency: NDArray, contrast: NDArray, pitch: float, level: float
-) -> NDArray:
+    values: Array, frequency: Array, contrast: Array, pitch: float, level: float
+) -> Array:
     """Return the contrast up to which the map of a chart of bars stays below a level [1].
 
     Parameters

@@ -19,7 +19,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.fft
-from numpy.typing import NDArray
+
+from vcam_cli.arrays import Array
 
 MIN_PROMINENCE = 0.01
 """Part of the highest maximum that another must rise above the dip beside it to count."""
@@ -49,7 +50,7 @@ class Modes:
     """Standard deviation of the values."""
 
 
-def density_modes(counts: NDArray, width: float, independent: float) -> Modes:
+def density_modes(counts: Array, width: float, independent: float) -> Modes:
     """Return the maxima of the density of values that are not negative [1], [2].
 
     Parameters
@@ -91,7 +92,7 @@ def density_modes(counts: NDArray, width: float, independent: float) -> Modes:
     )
 
 
-def density(counts: NDArray, width: float, bandwidth: float) -> NDArray:
+def density(counts: Array, width: float, bandwidth: float) -> Array:
     """Return the smoothed density of counted values; what would fall below 0 is folded back.
 
     Parameters
@@ -117,7 +118,7 @@ class _Smoother:
     In cosines, whose ends are mirrors, the Gaussian is a factor on each.
     """
 
-    def __init__(self, counts: NDArray, width: float) -> None:
+    def __init__(self, counts: Array, width: float) -> None:
         self._count, self._width = len(counts), width
         length = scipy.fft.next_fast_len(2 * len(counts), real=True)
         padded = np.zeros(length)
@@ -125,12 +126,12 @@ class _Smoother:
         self._cosines = scipy.fft.dct(padded)
         self._angle = np.pi * np.arange(length) / length
 
-    def __call__(self, bandwidth: float) -> NDArray:
+    def __call__(self, bandwidth: float) -> Array:
         factor = np.exp(-((self._angle * bandwidth / self._width) ** 2) / 2)
         return np.asarray(scipy.fft.idct(self._cosines * factor)[: self._count])
 
 
-def _maxima(values: NDArray) -> NDArray:
+def _maxima(values: Array) -> Array:
     """Return the indices of the maxima of enough prominence, from left to right."""
     from scipy.signal import find_peaks
 

@@ -33,6 +33,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.floats import rms
 
 Floats = NDArray[np.floating]
@@ -51,7 +52,7 @@ FIT_ITERATIONS = 3
 class Lattice:
     """Pixels on straight rows and columns, all of one color."""
 
-    values: NDArray
+    values: Array
     """Values (rows, columns) in any unit."""
     x: Floats
     """Positions of the columns (columns,), rising [m]."""

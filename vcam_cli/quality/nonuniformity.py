@@ -20,6 +20,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
+
 Floats = NDArray[np.float64]
 
 
@@ -54,7 +56,7 @@ class RunningStack:
         self._average: Floats = np.zeros(())
         self._scatter: Floats = np.zeros(())
 
-    def add(self, frame: NDArray) -> None:
+    def add(self, frame: Array) -> None:
         """Add one more frame.
 
         Parameters

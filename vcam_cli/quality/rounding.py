@@ -17,8 +17,8 @@ import math
 from functools import cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.quality.photon_transfer import MIN_DARK_VARIANCE, ROUNDING
 
 LIMIT = MIN_DARK_VARIANCE - ROUNDING
@@ -31,7 +31,7 @@ CODES = np.arange(-12, 13)
 
 
 @cache
-def _tables() -> tuple[NDArray, NDArray, NDArray]:
+def _tables() -> tuple[Array, Array, Array]:
     """Return least and largest variance [DN^2], and largest error of the mean [DN]."""
     from scipy.special import ndtr
 

@@ -29,9 +29,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.fft
-from numpy.typing import NDArray
 
 from vcam_cli import memory
+from vcam_cli.arrays import Array
 from vcam_cli.parallel import available_workers, each, pieces
 from vcam_cli.quality.cielab import Formula, delta_e, lab
 from vcam_cli.quality.display import Screen
@@ -53,12 +53,12 @@ pixel it is 35 % too large.
 
 
 def cielab_map(
-    image: NDArray,
-    reference: NDArray,
+    image: Array,
+    reference: Array,
     screen: Screen,
     formula: Formula = "1976",
     workers: int | None = None,
-) -> NDArray:
+) -> Array:
     """Return Delta E of every pixel, without regard to its neighbors.
 
     Parameters
@@ -96,13 +96,13 @@ def cielab_map(
 
 
 def s_cielab_map(
-    image: NDArray,
-    reference: NDArray,
+    image: Array,
+    reference: Array,
     screen: Screen,
     filters: Filters = "zhang-wandell-1996",
     formula: Formula = "1976",
     workers: int | None = None,
-) -> NDArray:
+) -> Array:
     """Return S-CIELAB Delta E of every pixel [1]; pictures are mirrored at their borders.
 
     Parameters
@@ -201,7 +201,7 @@ class _Places:
         transformed = _transform_length(block + 2 * halo, reach), _transform_length(columns, reach)
         return cls(shape, along, per_degree * along, inside, block, halo, transformed)
 
-    def mean(self, different: NDArray) -> NDArray:
+    def mean(self, different: Array) -> Array:
         """Return the mean over every pixel of what is at its places: (rows, columns)."""
         n = self.along
         if n == 1:
@@ -231,11 +231,11 @@ class _Places:
 class _Blur:
     """Takes rows of a picture to X/Xn, Y/Yn, Z/Zn as the eye gets them; `prepare` makes one."""
 
-    to_opponent: NDArray
+    to_opponent: Array
     """Matrix (3, 3) from display values to opponent planes."""
-    to_relative: NDArray
+    to_relative: Array
     """Matrix (3, 3) from opponent planes to X/Xn, Y/Yn, Z/Zn."""
-    response: NDArray
+    response: Array
     """Factors (3, rows, columns) on the DCT-II of a block."""
     places: _Places
     """Where the picture is looked at."""
@@ -249,7 +249,7 @@ class _Blur:
         back = np.linalg.inv(opponent) / to_xyz.sum(axis=1)[:, None]
         return cls(_cast(opponent @ to_xyz, dtype), _cast(back, dtype), response, places)
 
-    def __call__(self, picture: NDArray, rows: slice) -> NDArray:
+    def __call__(self, picture: Array, rows: slice) -> Array:
         """(3, rows, columns) X/Xn, Y/Yn, Z/Zn of some rows, blurred as the eye blurs."""
         n, halo, (tall, wide) = self.places.along, self.places.halo, self.places.transformed
         first, columns = rows.start * n - halo, picture.shape[1] * n
@@ -287,7 +287,7 @@ def _transform_length(count: int, reach: int) -> int:
     return scipy.fft.next_fast_len(count + reach, real=True)
 
 
-def _pixel_indices(first: int, length: int, count: int, places: int) -> slice | NDArray:
+def _pixel_indices(first: int, length: int, count: int, places: int) -> slice | Array:
     """Return the pixels, of `count` in a row, of the places first .. first + length - 1."""
     found = _mirrored_indices(first, length, count * places)
     if places == 1:
@@ -296,7 +296,7 @@ def _pixel_indices(first: int, length: int, count: int, places: int) -> slice | 
     return every // places
 
 
-def _mirrored_indices(first: int, length: int, count: int) -> slice | NDArray:
+def _mirrored_indices(first: int, length: int, count: int) -> slice | Array:
     """Return indices first .. first + length - 1 of `count` rows, mirrored at their borders.
 
     The border itself is the mirror, as in the DCT-II: index -1 is 0, `count` is count - 1.
@@ -307,7 +307,7 @@ def _mirrored_indices(first: int, length: int, count: int) -> slice | NDArray:
     return np.minimum(folded, 2 * count - 1 - folded)
 
 
-def _with_three_channels(image: NDArray, reference: NDArray) -> tuple[NDArray, NDArray]:
+def _with_three_channels(image: Array, reference: Array) -> tuple[Array, Array]:
     """Return both pictures with three channels; gray has equal red, green and blue."""
     if image.shape != reference.shape:
         raise ValueError(f"shapes differ: {image.shape} and {reference.shape}")
@@ -317,7 +317,7 @@ def _with_three_channels(image: NDArray, reference: NDArray) -> tuple[NDArray, N
     return np.broadcast_to(image, shape), np.broadcast_to(reference, shape)
 
 
-def _float_type(*pictures: NDArray) -> np.dtype:
+def _float_type(*pictures: Array) -> np.dtype:
     """Return float32 where it serves, else float64."""
     double = any(picture.dtype == np.float64 for picture in pictures)
     if double or not all(float(picture.max()) <= SINGLE_PEAK for picture in pictures):
@@ -325,16 +325,16 @@ def _float_type(*pictures: NDArray) -> np.dtype:
     return np.dtype(np.float32)
 
 
-def _cast(matrix: NDArray, dtype: np.dtype) -> NDArray:
+def _cast(matrix: Array, dtype: np.dtype) -> Array:
     return np.asarray(matrix, dtype)
 
 
-def _planes(rows: NDArray, dtype: np.dtype) -> NDArray:
+def _planes(rows: Array, dtype: np.dtype) -> Array:
     """Return a copy (3, rows, columns) of rows (rows, columns, 3)."""
     return np.array(np.moveaxis(rows, 2, 0), dtype, order="C")
 
 
-def _mix(matrix: NDArray, planes: NDArray) -> NDArray:
+def _mix(matrix: Array, planes: Array) -> Array:
     """Return matrix @ planes (3, rows, columns) at every pixel, always summed in the same order."""
     out = np.empty(planes.shape, planes.dtype)
     for mixed, (a, b, c) in zip(out, matrix, strict=True):

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.electrical import Electrical
 from vcam_cli.camera.exposure import AutoExposure
@@ -26,7 +26,7 @@ class ExposureSettings:
 
 
 def exposure_settings(
-    camera: Camera, rate: NDArray, white_rate: float, dark_rate: float, circuit: Electrical
+    camera: Camera, rate: Array, white_rate: float, dark_rate: float, circuit: Electrical
 ) -> ExposureSettings:
     """Return time and gain of a camera's exposure, given or chosen for the scene.
 
@@ -38,7 +38,7 @@ def exposure_settings(
     ----------
     camera : Camera
         Camera whose exposure is sought.
-    rate : NDArray
+    rate : Array
         Photo-electrons per second of every pixel, of any shape [e/s].
     white_rate : float
         Rate of the scene's perfect white on the axis in its brightest color [e/s].
@@ -78,7 +78,7 @@ def _target(camera: Camera) -> float:
     return camera.exposure.auto.target * 2**camera.exposure.compensation
 
 
-def _level(auto: AutoExposure, rate: NDArray, white_rate: float) -> float:
+def _level(auto: AutoExposure, rate: Array, white_rate: float) -> float:
     """Return the photo rate that an automatic exposure judges [e/s]."""
     if auto.method == "white":
         return white_rate
@@ -114,12 +114,12 @@ def ceiling(camera: Camera, white_rate: float, saturation: float) -> float:
     return max(white_rate / _target(camera), saturation / auto.max)
 
 
-def percentile(values: NDArray, percent: float) -> float:
+def percentile(values: Array, percent: float) -> float:
     """Return the value below which a percentage of the values lie, by partial sorting.
 
     Parameters
     ----------
-    values : NDArray
+    values : Array
         Values, of any shape and unit.
     percent : float
         Percentage of the values, 0 to 100.

@@ -8,8 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from functools import partial
 
-from numpy.typing import NDArray
-
+from vcam_cli.arrays import Array
 from vcam_cli.effects.base import Effect
 from vcam_cli.readout.binning import BinningGroups
 from vcam_cli.readout.exposure import codes_type
@@ -17,19 +16,19 @@ from vcam_cli.readout.exposure import codes_type
 SURE = 3
 """Standard deviations of the readout by which a pixel of full wells may read less than they hold,
 where noise comes behind the wells."""
-Take = Callable[..., tuple[NDArray, NDArray]]
+Take = Callable[..., tuple[Array, Array]]
 """A frame of a rate [e/s] in a time [s] with effects: (electrons, dn)."""
 
 
 def read(
     binning_groups: BinningGroups,
-    rate: NDArray,
+    rate: Array,
     time: float,
     effects: Sequence[Effect],
     take: Take,
     bits: int,
-    full_charge: NDArray | None = None,
-) -> tuple[NDArray, NDArray]:
+    full_charge: Array | None = None,
+) -> tuple[Array, Array]:
     """Return one frame of binned pixels.
 
     Voltages are held by the pixels, joined, and read: two frames, one after the other.
@@ -38,7 +37,7 @@ def read(
     ----------
     binning_groups : BinningGroups
         Groups of pixels that are read as one.
-    rate : NDArray
+    rate : Array
         Rate of every pixel, or of every node where charges are joined [e/s].
     time : float
         Exposure time [s].
@@ -48,14 +47,14 @@ def read(
         What makes a frame of a rate, a time and effects.
     bits : int
         Resolution of the ADC.
-    full_charge : NDArray, optional
+    full_charge : Array, optional
         As that of `exposure.capture`, in the shape of `rate` [electrons].
 
     Returns
     -------
-    electrons : NDArray
+    electrons : Array
         Signal of the raw frame [electrons].
-    dn : NDArray
+    dn : Array
         Codes of the raw frame [DN].
 
     References

@@ -25,8 +25,8 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.camera.sensor.array import Binning
@@ -117,32 +117,32 @@ class BinningGroups:
             pitch_y=g.pitch_y * down,
         )
 
-    def collect(self, light: NDArray) -> NDArray:
+    def collect(self, light: Array) -> Array:
         """Return what each node collects of the light of all pixels.
 
         Parameters
         ----------
-        light : NDArray
+        light : Array
             Light of every pixel, (..., rows, columns), in any unit.
 
         Returns
         -------
-        NDArray
+        Array
             Sums over the groups where charges are added, else the light itself, in its unit.
         """
         return self.sums(light) if self.summed_charges > 1 else light
 
-    def join(self, electrons: NDArray) -> NDArray:
+    def join(self, electrons: Array) -> Array:
         """Return the raw frame's signal from that of each node.
 
         Parameters
         ----------
-        electrons : NDArray
+        electrons : Array
             Signal of every node, (..., rows, columns) [electrons].
 
         Returns
         -------
-        NDArray
+        Array
             Signal of the raw frame [electrons]: the mean of joined voltages, the sum of added
             codes.
         """
@@ -151,19 +151,19 @@ class BinningGroups:
         total = self.sums(electrons)
         return total if self.summed_codes > 1 else total / total.dtype.type(self.count)
 
-    def sums(self, values: NDArray, dtype: type | None = None) -> NDArray:
+    def sums(self, values: Array, dtype: type | None = None) -> Array:
         """Return the sums over all groups.
 
         Parameters
         ----------
-        values : NDArray
+        values : Array
             Values of every pixel, (..., rows, columns), in any unit.
         dtype : type, optional
             Type of the sums, by default that of the values.
 
         Returns
         -------
-        NDArray
+        Array
             Sums of the groups, (..., rows, columns) of the raw frame.
         """
         dtype = values.dtype.type if dtype is None else dtype
@@ -172,17 +172,17 @@ class BinningGroups:
         total = _sums(values, self.binning.rows, self.step[0], values.ndim - 2, dtype)
         return _sums(total, self.binning.columns, self.step[1], values.ndim - 1, dtype)
 
-    def centers(self, x: NDArray, y: NDArray) -> tuple[NDArray, NDArray]:
+    def centers(self, x: Array, y: Array) -> tuple[Array, Array]:
         """Return the centers of gravity of the groups' columns and rows.
 
         Parameters
         ----------
-        x, y : NDArray
+        x, y : Array
             Centers of the array's columns (columns,) and rows (rows,) [m].
 
         Returns
         -------
-        tuple of NDArray
+        tuple of Array
             Centers of the raw frame's columns and rows [m].
         """
         down, along = self.binning.rows, self.binning.columns
@@ -190,7 +190,7 @@ class BinningGroups:
         return columns, _sums(y, down, self.step[0], 0, np.float64) / down
 
 
-def _sums(values: NDArray, count: int, step: int, axis: int, dtype: type) -> NDArray:
+def _sums(values: Array, count: int, step: int, axis: int, dtype: type) -> Array:
     """Return the sums of every `count` values a `step` apart along an axis."""
     before, after = values.shape[:axis], values.shape[axis + 1 :]
     parts = np.moveaxis(values.reshape(*before, -1, count, step, *after), axis + 1, 0)

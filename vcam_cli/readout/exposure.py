@@ -11,8 +11,8 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.effects.base import Charge, Effect, of_kind
 from vcam_cli.effects.signal_chain import NoiseSource, Quantizer, Site, electron_effects
 from vcam_cli.parallel import each, slices_within
@@ -24,12 +24,12 @@ LAYER = 32
 """Bits of a block's number: those above are the layer's of stacked pixels."""
 
 
-def mean_electrons(rate: NDArray, time: float, effects: tuple[Effect, ...]) -> NDArray:
+def mean_electrons(rate: Array, time: float, effects: tuple[Effect, ...]) -> Array:
     """Return the noise-free signal before saturation, photo-electrons and dark current.
 
     Parameters
     ----------
-    rate : NDArray
+    rate : Array
         Photo-electrons per second, of any shape [e/s].
     time : float
         Exposure time [s].
@@ -38,7 +38,7 @@ def mean_electrons(rate: NDArray, time: float, effects: tuple[Effect, ...]) -> N
 
     Returns
     -------
-    NDArray
+    Array
         Mean signal in the shape and float type of `rate` [electrons].
     """
     return rate * rate.dtype.type(time) + rate.dtype.type(mean_dark(time, effects))
@@ -64,7 +64,7 @@ def mean_dark(time: float, effects: tuple[Effect, ...]) -> float:
 
 
 def sites(
-    rate: NDArray,
+    rate: Array,
     dark: float,
     seeds: dict[str, int],
     layer: int,
@@ -78,7 +78,7 @@ def sites(
 
     Parameters
     ----------
-    rate : NDArray
+    rate : Array
         An array of the shape (rows, columns) and float type of the whole layer.
     dark : float
         Mean dark signal [electrons].
@@ -149,7 +149,7 @@ def codes_type(bits: int, count: int = 1) -> type[np.unsignedinteger]:
 
 
 def capture(
-    rate: NDArray,
+    rate: Array,
     time: float,
     effects: tuple[Effect, ...],
     adc: Quantizer,
@@ -158,14 +158,14 @@ def capture(
     done: Callable[[slice], None] | None = None,
     layer: int = 0,
     coarse_normals: bool = False,
-    full_charge: NDArray | None = None,
-    pedestal: NDArray | None = None,
-) -> tuple[NDArray, NDArray]:
+    full_charge: Array | None = None,
+    pedestal: Array | None = None,
+) -> tuple[Array, Array]:
     """Return one frame of an array whose rate of electrons is known.
 
     Parameters
     ----------
-    rate : NDArray
+    rate : Array
         Rate (rows, columns), or (C, rows, columns) of stacked pixels, which are drawn one layer
         after the other [e/s].
     time : float
@@ -184,18 +184,18 @@ def capture(
         Index of the layer of stacked pixels.
     coarse_normals : bool, optional
         Whether the normal numbers of pixels are `rng.coarse_normals`.
-    full_charge : NDArray, optional
+    full_charge : Array, optional
         Electrons, in the shape of `rate`, that full pixels are read with where that is less than
         the full well [electrons].
-    pedestal : NDArray, optional
+    pedestal : Array, optional
         What the ADC adds to each pixel beside its offset (rows, columns) [electrons].
 
     Returns
     -------
-    electrons : NDArray
+    electrons : Array
         Noisy signal, clipped above at the full well, in the float type of `rate` [electrons]. Noise
         of the ADC is in it, and behind that clamp.
-    dn : NDArray
+    dn : Array
         Codes as whole numbers, uint16, or uint32 from 17 bits on [DN].
 
     References

@@ -9,8 +9,8 @@ against infrared; dark signal does not count, as it depends on the time.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.effects.base import Gain, of_kind, switched_off
@@ -58,7 +58,7 @@ def base_iso(camera: Camera, geometry: Geometry, layout: Layout) -> float:
 
 def electrons_per_exposure(
     camera: Camera, geometry: Geometry, layout: Layout, light: Spectrum
-) -> NDArray:
+) -> Array:
     """Return the electrons of a pixel on the axis for an exposure of the focal plane.
 
     Light is measured behind the lens.
@@ -76,7 +76,7 @@ def electrons_per_exposure(
 
     Returns
     -------
-    NDArray
+    Array
         Electrons of every color (C,) [e / (lx s)]; 0 behind a lens that passes no light.
     """
     kinds = [kind for kind in ORDER if issubclass(kind, Gain)]

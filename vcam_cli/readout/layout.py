@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry, pixel_centers
 from vcam_cli.camera.derived.lattice import Places, places
@@ -110,18 +110,18 @@ class Layout:
             return settings
         return replace(settings, oversampling=1.0)
 
-    def select_pixels(self, light: NDArray) -> NDArray:
+    def select_pixels(self, light: Array) -> Array:
         """Return the raw frame's pixels from the lattice's light.
 
         Parameters
         ----------
-        light : NDArray
+        light : Array
             Light (rows, columns) of the lattice, or (C, rows, columns) where all colors are
             computed.
 
         Returns
         -------
-        NDArray
+        Array
             Light (rows, columns) of the pixels, of stacked pixels (C, rows, columns), in the same
             unit.
         """
@@ -135,17 +135,17 @@ class Layout:
         return out
 
     @cached_property
-    def x(self) -> NDArray:
+    def x(self) -> Array:
         """Centers of all pixels, right of the axis, in the frame's shape [m]."""
         return self._pixel_positions(0)
 
     @cached_property
-    def y(self) -> NDArray:
+    def y(self) -> Array:
         """Centers of all pixels, below the axis, in the frame's shape [m]."""
         return self._pixel_positions(1)
 
     @cached_property
-    def centers(self) -> tuple[NDArray, NDArray]:
+    def centers(self) -> tuple[Array, Array]:
         """Centers of the raw frame's columns and rows, where it has any [m].
 
         Of joined pixels the center of gravity: those of a mosaic are not evenly spaced.
@@ -155,7 +155,7 @@ class Layout:
         return self._picture
 
     @cached_property
-    def color(self) -> NDArray:
+    def color(self) -> Array:
         """Index of each pixel's color, in the frame's shape."""
         if self.places is not None:
             index = [self.mosaic.colors.index(c) for c in self.places.colors]
@@ -180,17 +180,17 @@ class Layout:
         return max(1, round(g.sensor_height / pitch_y)), max(1, round(g.sensor_width / pitch_x))
 
     @cached_property
-    def picture_x(self) -> NDArray:
+    def picture_x(self) -> Array:
         """Centers of the picture's columns, a square grid of the pixels' own width and gap [m]."""
         return self._picture[0]
 
     @cached_property
-    def picture_y(self) -> NDArray:
+    def picture_y(self) -> Array:
         """Centers of the picture's rows [m]."""
         return self._picture[1]
 
     @property
-    def _picture(self) -> tuple[NDArray, NDArray]:
+    def _picture(self) -> tuple[Array, Array]:
         g = self.geometry
         if not self.is_scattered:
             return pixel_centers(g)
@@ -218,13 +218,13 @@ class Layout:
             pitch_y=self.geometry.sensor_height / rows,
         )
 
-    def _pixel_positions(self, axis: int) -> NDArray:
+    def _pixel_positions(self, axis: int) -> Array:
         if self.places is not None:
             return (self.places.x, self.places.y)[axis][None]
         x, y = pixel_centers(self.lattice)
         return self.select_pixels(np.broadcast_arrays(x[None, :], y[:, None])[axis])
 
-    def _interpolate_at_places(self, light: NDArray) -> NDArray:
+    def _interpolate_at_places(self, light: Array) -> Array:
         assert self.places is not None
         g = self.lattice
         out = np.empty((1, len(self.places.x)), light.dtype)
@@ -291,19 +291,19 @@ def _fine_lattice(g: Geometry, finer: int) -> Geometry:
     return replace(g, rows=rows, columns=columns, pitch_x=pitch_x, pitch_y=pitch_y)
 
 
-def interpolate(plane: NDArray, row: NDArray, column: NDArray) -> NDArray:
+def interpolate(plane: Array, row: Array, column: Array) -> Array:
     """Return a plane between its points, by Lagrange's polynomial through 8 x 8 of them.
 
     Parameters
     ----------
-    plane : NDArray
+    plane : Array
         Values of the points (rows, columns), in any unit.
-    row, column : NDArray
+    row, column : Array
         Positions (n,), counted in points from that of index 0.
 
     Returns
     -------
-    NDArray
+    Array
         Values (n,) in the unit and float type of the plane.
     """
     top, down = _weights(row, plane.shape[0])
@@ -319,7 +319,7 @@ def interpolate(plane: NDArray, row: NDArray, column: NDArray) -> NDArray:
     return out.astype(plane.dtype)
 
 
-def _weights(position: NDArray, count: int) -> tuple[NDArray, NDArray]:
+def _weights(position: Array, count: int) -> tuple[Array, Array]:
     """Return the first point around each position (n,), and the points' weights (REACH, n)."""
     first = np.clip(np.floor(position).astype(int) - REACH // 2 + 1, 0, count - REACH)
     t = position - first

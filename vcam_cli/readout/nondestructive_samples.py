@@ -23,8 +23,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.camera.derived.electrical import Electrical
 from vcam_cli.effects.base import Effect, of_kind
 from vcam_cli.effects.signal_chain import (
@@ -43,16 +43,16 @@ from vcam_cli.scheduling import estimators
 
 
 def samples(
-    rate: NDArray,
+    rate: Array,
     times: Sequence[float],
     effects: tuple[Effect, ...],
     adc: Quantizer,
     seeds: dict[str, int],
     workers: int,
     layer: int = 0,
-    step_rates: Sequence[NDArray] = (),
+    step_rates: Sequence[Array] = (),
     coarse_normals: bool = False,
-) -> tuple[NDArray, NDArray]:
+) -> tuple[Array, Array]:
     """Return all samples of one integration.
 
     Parameters
@@ -61,15 +61,15 @@ def samples(
         As those of `exposure.capture`.
     times : sequence of float
         Times of the N samples, rising [s].
-    step_rates : sequence of NDArray, optional
+    step_rates : sequence of Array, optional
         Mean rate between each sample and the one before, where it is not the same all the time:
         N times the shape of `rate` [e/s].
 
     Returns
     -------
-    electrons : NDArray
+    electrons : Array
         Samples (N, ...) in the shape of `rate`, clipped above at the full well [electrons].
-    dn : NDArray
+    dn : Array
         Codes of the samples, uint16, or uint32 from 17 bits on [DN].
 
     References
@@ -120,8 +120,8 @@ Sites = dict[str, Site]
 
 
 def _collect_charge(
-    mean: NDArray, effects: Sequence[Effect], sample_sites: Sites, common_sites: Sites
-) -> NDArray:
+    mean: Array, effects: Sequence[Effect], sample_sites: Sites, common_sites: Sites
+) -> Array:
     """Return the charge that one step adds, with its shot noise [electrons]."""
     sources = of_kind(effects, NoiseSource)
     for source in sources:
@@ -133,8 +133,8 @@ def _collect_charge(
 
 
 def _read_charge(
-    charge: NDArray, effects: Sequence[Effect], sample_sites: Sites, common_sites: Sites
-) -> NDArray:
+    charge: Array, effects: Sequence[Effect], sample_sites: Sites, common_sites: Sites
+) -> Array:
     """Return one readout of the charge so far, which may reuse its array [electrons]."""
     for effect in electron_effects(effects, behind_well=False):
         if effect.sample_draws != "cumulative":
@@ -147,7 +147,7 @@ def _site(effect: ElectronEffect, sample_sites: Sites, common_sites: Sites) -> S
 
 
 def photocurrent(
-    dn: NDArray,
+    dn: Array,
     times: Sequence[float],
     estimator: str,
     effects: tuple[Effect, ...],
@@ -155,7 +155,7 @@ def photocurrent(
     electrical: Electrical,
     saturated_dn: float,
     workers: int,
-) -> NDArray:
+) -> Array:
     """Return the photocurrent of every pixel, estimated from the codes of its samples.
 
     Variances count the rounding of the ADC, q^2 / 12, of a logarithmic one its step in the dark.
@@ -163,7 +163,7 @@ def photocurrent(
 
     Parameters
     ----------
-    dn : NDArray
+    dn : Array
         Codes of the samples (N, ..., rows, columns) [DN].
     times : sequence of float
         Times of the N samples, rising [s].
@@ -183,7 +183,7 @@ def photocurrent(
 
     Returns
     -------
-    NDArray
+    Array
         Photocurrents (..., rows, columns), float32 [e/s]; of a pixel that is full in the first
         sample a lower bound.
 

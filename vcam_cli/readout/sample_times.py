@@ -12,8 +12,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.electrical import Electrical
 from vcam_cli.effects.base import Effect
@@ -60,7 +60,7 @@ def sensor(
 
 def choose_sample_times(
     camera: Camera,
-    rate: NDArray,
+    rate: Array,
     electrical: Electrical,
     effects: Sequence[Effect],
     adc: Quantizer,
@@ -71,7 +71,7 @@ def choose_sample_times(
     ----------
     camera : Camera
         Camera whose file gives the times or asks for a schedule.
-    rate : NDArray
+    rate : Array
         Photo-electrons per second of every pixel, of any shape [e/s].
     electrical : Electrical
         Full well and end of the ADC.
@@ -92,12 +92,12 @@ def choose_sample_times(
     return optimal_times(rate, asked.count, sensor(electrical, effects, adc, asked.max))
 
 
-def optimal_times(rate: NDArray, count: int, pixel: Sensor) -> tuple[float, ...]:
+def optimal_times(rate: Array, count: int, pixel: Sensor) -> tuple[float, ...]:
     """Return the times of at most `count` samples whose mean SNR is largest.
 
     Parameters
     ----------
-    rate : NDArray
+    rate : Array
         Photo-electrons per second of every pixel, of any shape [e/s].
     count : int
         Number of samples.

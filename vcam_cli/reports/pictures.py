@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.files import atomic, plots
 from vcam_cli.files.images.png import write_png
 from vcam_cli.quality import error_map
@@ -26,7 +27,7 @@ def png(data: bytes) -> str:
     return "data:image/png;base64," + base64.b64encode(data).decode("ascii")
 
 
-def without_mosaic(image: NDArray) -> str:
+def without_mosaic(image: Array) -> str:
     """Return codes with squares of 2 x 2 pixels averaged as a URL; "" of a picture that is small.
 
     Pixels behind a mosaic alternate: shown smaller, they would beat with those of the screen.
@@ -48,7 +49,7 @@ def drawing(draw: Callable[[Any], None], size: tuple[float, float]) -> str:
     return "data:image/svg+xml;base64," + base64.b64encode(svg).decode("ascii")
 
 
-def codes(image: NDArray, is_mosaic: bool = False) -> tuple[str, str]:
+def codes(image: Array, is_mosaic: bool = False) -> tuple[str, str]:
     """Return a picture of sRGB codes as a URL, and how far it was shrunk, in words.
 
     Parameters
@@ -67,7 +68,7 @@ def codes(image: NDArray, is_mosaic: bool = False) -> tuple[str, str]:
     return png(data), shrunk
 
 
-def shades(values: NDArray, white: float) -> NDArray[np.uint8]:
+def shades(values: Array, white: float) -> NDArray[np.uint8]:
     """Return values from 0 to `white` as codes of sRGB that look evenly spaced.
 
     Parameters
@@ -83,7 +84,7 @@ def shades(values: NDArray, white: float) -> NDArray[np.uint8]:
 
 def map_picture(
     title: str,
-    values: NDArray,
+    values: Array,
     upper: float,
     unit: str,
     alt: str,
@@ -114,7 +115,7 @@ def map_picture(
     return Picture(title, source, alt, f"{note} {shrunk}".strip(), scale, group, far)
 
 
-def _averaged(image: NDArray, step: int) -> NDArray:
+def _averaged(image: Array, step: int) -> Array:
     """Return means of squares of `step` pixels, what is left at the ends dropped."""
     if step <= 1:
         return image

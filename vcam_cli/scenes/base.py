@@ -13,11 +13,12 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar, Literal, Protocol
+from typing import ClassVar, Literal, Protocol
 
 import numpy as np
-from numpy.typing import DTypeLike, NDArray
+from numpy.typing import DTypeLike
 
+from vcam_cli.arrays import Array
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.scenes.bands import bands_of_rows, paint_by_bands
 from vcam_cli.scenes.blur_change import BlurLoss, ChangeBounds, profile_bounds, rectangle_bounds
@@ -26,8 +27,6 @@ from vcam_cli.scenes.closed_form import LightDisc, Products, Profile, Rectangles
 from vcam_cli.scenes.edge_energy import EdgeEnergy, Region, counted_height, rectangle_energy
 from vcam_cli.scenes.waves import WaveScene
 from vcam_cli.spectra import Spectrum
-
-Array = NDArray[Any]
 
 
 @dataclass(frozen=True)

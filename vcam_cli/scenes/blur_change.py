@@ -20,15 +20,12 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.scenes.closed_form import Profile
-
-Array = NDArray[Any]
 
 
 @dataclass(frozen=True)

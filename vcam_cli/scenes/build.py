@@ -1,11 +1,12 @@
 """From what the camera file says about the scene to light on the sensor plane."""
 
+from vcam_cli.arrays import Array
 from vcam_cli.camera.scene import charts
 from vcam_cli.camera.scene.scene import Scene as SceneModel
 from vcam_cli.camera.scene.scene_files import Hyperspectral, ImageFile
 from vcam_cli.errors import BadInput, bad
 from vcam_cli.scenes import light
-from vcam_cli.scenes.base import Array, Chart, HarmonicScene, SampledScene, Scene, View
+from vcam_cli.scenes.base import Chart, HarmonicScene, SampledScene, Scene, View
 from vcam_cli.scenes.charts import (
     colorchecker,
     csf,

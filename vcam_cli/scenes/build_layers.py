@@ -5,10 +5,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from vcam_cli.arrays import Array
 from vcam_cli.camera.scene.scene import Scene as SceneModel
 from vcam_cli.camera.scene.scene_files import ImageFile
 from vcam_cli.scenes import light
-from vcam_cli.scenes.base import Array, Chart, Frame, View
+from vcam_cli.scenes.base import Chart, Frame, View
 from vcam_cli.scenes.build import chart_and_reflectances, picture_spectra
 from vcam_cli.scenes.layered import Layer, LayeredScene, MaskedChart, layered_scene
 from vcam_cli.scenes.picture_chart import PictureChart

@@ -1,11 +1,8 @@
 """Cells along one axis: their edges, and what of them lies within an interval."""
 
-from typing import Any
-
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[Any]
+from vcam_cli.arrays import Array
 
 GOLDEN = 0.6180339887498949
 """Inverse golden ratio, which no fraction of small numbers comes near."""

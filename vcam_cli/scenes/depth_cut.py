@@ -22,7 +22,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.fft
-from numpy.typing import NDArray
+
+from vcam_cli.arrays import Array
 
 MOST_LAYERS = 256
 """Layers of a picture, at most."""
@@ -47,12 +48,12 @@ FEW = 10_000
 class Detail:
     """What the pixels of a lens see of a picture's detail by length of the spatial frequency."""
 
-    frequency: NDArray
+    frequency: Array
     """(n,) [cycles/m]."""
-    power: NDArray
+    power: Array
     """Mean squares (n,) of the picture without its mean, relative to the square of full signal."""
 
-    def rms(self, transfer: NDArray) -> float:
+    def rms(self, transfer: Array) -> float:
         """Return the rms, over full signal, of the detail behind a transfer (n,)."""
         return float(np.sqrt((self.power * np.square(transfer)).sum()))
 
@@ -66,9 +67,9 @@ class Detail:
 class Hidden:
     """What lies behind samples that other samples beside them are far behind of."""
 
-    samples: NDArray
+    samples: Array
     """Index (n,) of the samples that hide it, in the flattened map."""
-    sources: NDArray
+    sources: Array
     """Index (n,) of the samples as which it goes on."""
     unknown: float
     """Rms difference of two guesses of its light, relative to full signal."""
@@ -80,29 +81,29 @@ class Hidden:
 class DepthCut:
     """A map of depth in layers."""
 
-    radii: NDArray
+    radii: Array
     """Radius (N,) of the blur at each layer's distance, falling: the nearest first [m]."""
-    first: NDArray
+    first: Array
     """Layer (h, w) that a sample belongs to, or the nearer one of both."""
-    share: NDArray
+    share: Array
     """Share (h, w) of each sample that belongs to the layer behind it."""
     hidden: Hidden
     error: float
     """Predicted rms error by the layers' spacing, relative to full signal."""
 
-    def coverage(self, layer: int, rows: NDArray, columns: NDArray) -> NDArray:
+    def coverage(self, layer: int, rows: Array, columns: Array) -> Array:
         """Return what of samples (rows x columns) belongs to a layer, 0 to 1."""
         here = np.ix_(rows, columns)
         first, share = self.first[here], self.share[here]
         return np.where(first == layer, 1 - share, np.where(first == layer - 1, share, 0))
 
-    def radius(self, samples: NDArray) -> NDArray:
+    def radius(self, samples: Array) -> Array:
         """Return the blur's radius of samples (n,), given by their index in the flattened map."""
         first, share = self.first.ravel()[samples].astype(int), self.share.ravel()[samples]
         behind = np.minimum(first + 1, len(self.radii) - 1)
         return np.asarray(self.radii[first] * (1 - share) + self.radii[behind] * share)
 
-    def is_used(self) -> NDArray:
+    def is_used(self) -> Array:
         """Return which layers (N,) anything lies in."""
         count = len(self.radii)
         near = np.bincount(self.first.ravel(), minlength=count)
@@ -110,19 +111,19 @@ class DepthCut:
         return np.asarray(near[:count] + behind[:count] > 0)
 
 
-def disc_transfer(frequency: NDArray, radius: float) -> NDArray:
+def disc_transfer(frequency: Array, radius: float) -> Array:
     """Return the transfer 2 J1(z) / z, z = 2 pi f r, of an even disc.
 
     Parameters
     ----------
-    frequency : NDArray
+    frequency : Array
         Spatial frequencies (n,) [cycles/m].
     radius : float
         Radius of the disc; its sign does not matter [m].
 
     Returns
     -------
-    NDArray
+    Array
         Transfer (n,) without unit.
 
     References
@@ -136,24 +137,24 @@ def disc_transfer(frequency: NDArray, radius: float) -> NDArray:
     return np.where(z > 1e-6, 2 * j1(z) / np.where(z > 1e-6, z, 1.0), 1.0)
 
 
-def full_signal(picture: NDArray, pitch: float, pixel: float) -> float:
+def full_signal(picture: Array, pitch: float, pixel: float) -> float:
     """Return the brightest light (h, w) of a picture in the means over pixels, at most white."""
     together = max(int(pixel / pitch), 1)
     return min(float(block_means(picture, together).max(initial=0.0)), 1.0)
 
 
 def picture_detail(
-    picture: NDArray,
+    picture: Array,
     pitch: float,
     aperture: tuple[float, float],
-    lens: Callable[[NDArray], NDArray],
+    lens: Callable[[Array], Array],
     full: float,
 ) -> Detail:
     """Return the detail of a picture in the color of all its channels together.
 
     Parameters
     ----------
-    picture : NDArray
+    picture : Array
         Light (h, w) of its samples, relative to white.
     pitch : float
         Pitch of the samples on the sensor [m].
@@ -186,7 +187,7 @@ def picture_detail(
     return Detail(frequency, power[seen] * passed / (full**2 or 1.0))
 
 
-def block_means(picture: NDArray, side: int) -> NDArray:
+def block_means(picture: Array, side: int) -> Array:
     """Return the means over whole blocks of samples; of a smaller picture over all of it."""
     down, across = (min(side, count) for count in picture.shape)
     rows, columns = picture.shape[0] // down, picture.shape[1] // across
@@ -194,7 +195,7 @@ def block_means(picture: NDArray, side: int) -> NDArray:
     return np.asarray(whole.reshape(rows, down, columns, across).mean(axis=(1, 3)))
 
 
-def is_flat(radius: NDArray, detail: Detail, allowed: float) -> bool:
+def is_flat(radius: Array, detail: Detail, allowed: float) -> bool:
     """Return whether a map of blur radii may be taken as one distance, in the middle of all."""
     low, high = float(radius.min()), float(radius.max())
     middle = (low + high) / 2
@@ -202,15 +203,15 @@ def is_flat(radius: NDArray, detail: Detail, allowed: float) -> bool:
 
 
 def cut_depth(
-    radius: NDArray, picture: NDArray, pitch: float, pixel: float, detail: Detail, allowed: float
+    radius: Array, picture: Array, pitch: float, pixel: float, detail: Detail, allowed: float
 ) -> DepthCut:
     """Cut a picture into layers.
 
     Parameters
     ----------
-    radius : NDArray
+    radius : Array
         Radius (h, w) of the blur at every sample's distance, with its sign [m].
-    picture : NDArray
+    picture : Array
         Light (h, w), relative to white, by which the guesses of what is hidden are judged.
     pitch : float
         Pitch of the samples on the sensor [m].
@@ -240,7 +241,7 @@ def cut_depth(
     return DepthCut(radii, first, share, hidden, error)
 
 
-def _layer_radii(radius: NDArray, detail: Detail, allowed: float) -> tuple[NDArray, float]:
+def _layer_radii(radius: Array, detail: Detail, allowed: float) -> tuple[Array, float]:
     """Return the layers' radii, from the largest to the smallest, and the error between them."""
     high, low = float(radius.max()), float(radius.min())
     if is_flat(radius, detail, allowed):
@@ -270,7 +271,7 @@ def _next_radius(start: float, low: float, detail: Detail, allowed: float) -> fl
     return near if near < start - 1e-9 * abs(start - low) else (start + far) / 2
 
 
-def _few_values(radius: NDArray, most: int) -> NDArray | None:
+def _few_values(radius: Array, most: int) -> Array | None:
     """Return the values of a map, falling, where they are few; else None."""
     flat = radius.ravel()
     for part in (flat[:: max(len(flat) // FEW, 1)], flat):
@@ -280,7 +281,7 @@ def _few_values(radius: NDArray, most: int) -> NDArray | None:
     return np.asarray(values)
 
 
-def _hidden(radius: NDArray, picture: NDArray, jump: float) -> Hidden:
+def _hidden(radius: Array, picture: Array, jump: float) -> Hidden:
     """Return what lies hidden; radii and the least jump are counted in samples."""
     samples, sources = [], []
     for behind, source in _sources(radius, jump):
@@ -296,7 +297,7 @@ def _hidden(radius: NDArray, picture: NDArray, jump: float) -> Hidden:
     return Hidden(behind, source, rms, float(np.abs(difference).max()) / full)
 
 
-def _sources(radius: NDArray, jump: float) -> Iterator[tuple[NDArray, NDArray]]:
+def _sources(radius: Array, jump: float) -> Iterator[tuple[Array, Array]]:
     """Yield samples behind which something lies hidden, and the farther ones as which it goes on.
 
     Rays see as far behind a sample as both radii differ.
@@ -330,7 +331,7 @@ def _sources(radius: NDArray, jump: float) -> Iterator[tuple[NDArray, NDArray]]:
         )
 
 
-def _mirrored(radius: NDArray, behind: NDArray, source: NDArray, jump: float) -> NDArray:
+def _mirrored(radius: Array, behind: Array, source: Array, jump: float) -> Array:
     """Return the samples as which what is hidden goes on mirrored at its edge, where they may be.
 
     Elsewhere they are the sources themselves.

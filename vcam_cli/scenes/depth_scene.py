@@ -8,7 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vcam_cli.scenes.base import Array, SampledScene, View
+from vcam_cli.arrays import Array
+from vcam_cli.scenes.base import SampledScene, View
 from vcam_cli.scenes.depth_cut import (
     LEAST_JUMP,
     DepthCut,

@@ -19,8 +19,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.physics.aberration import paraboloid_transfer
 from vcam_cli.scenes.depth_cut import Detail, block_means
 
@@ -31,19 +31,19 @@ FINE = 8
 """Samples along a pixel's side on which differences are taken, at least."""
 
 
-def slopes(radius: NDArray, jump: float = STEEPEST) -> tuple[NDArray, NDArray]:
+def slopes(radius: Array, jump: float = STEEPEST) -> tuple[Array, Array]:
     """Return by how much the radius of the blur rises from sample to sample, on slopes.
 
     Parameters
     ----------
-    radius : NDArray
+    radius : Array
         Radius (h, w) of the blur at every sample's distance, with its sign [samples].
     jump : float, optional
         Difference of radii from which on one sample hides another, and is no slope [samples].
 
     Returns
     -------
-    down, right : NDArray
+    down, right : Array
         Rises (h - 1, w) and (h, w - 1) [samples]. A rise is at most what it is on one side, and 0
         where it stands alone: planes one behind the other have no slope.
     """
@@ -63,14 +63,14 @@ def slopes(radius: NDArray, jump: float = STEEPEST) -> tuple[NDArray, NDArray]:
     return found[0], found[1]
 
 
-def source(light: NDArray, rises: tuple[NDArray, NDArray], radius: float, finer: int) -> NDArray:
+def source(light: Array, rises: tuple[Array, Array], radius: float, finer: int) -> Array:
     """Return Q of samples of one radius, on samples that are so many times as fine.
 
     Parameters
     ----------
-    light : NDArray
+    light : Array
         Light (R, h, w) of the samples, even in each.
-    rises : tuple of NDArray
+    rises : tuple of Array
         Those of `slopes`.
     radius : float
         Radius of the blur, with its sign [samples].
@@ -79,7 +79,7 @@ def source(light: NDArray, rises: tuple[NDArray, NDArray], radius: float, finer:
 
     Returns
     -------
-    NDArray
+    Array
         Source (R, finer h, finer w), in the light's unit.
     """
     fine = light.repeat(finer, axis=1).repeat(finer, axis=2)
@@ -97,7 +97,7 @@ def source(light: NDArray, rises: tuple[NDArray, NDArray], radius: float, finer:
     return out
 
 
-def _on_faces(rise: NDArray, axis: int, finer: int) -> NDArray:
+def _on_faces(rise: Array, axis: int, finer: int) -> Array:
     """Return the rise of the radius a length, along an axis, between fine samples.
 
     Between the middles of two samples it is that from one to the other, in the ends of a row none.
@@ -114,7 +114,7 @@ def _on_faces(rise: NDArray, axis: int, finer: int) -> NDArray:
     return np.moveaxis(found, 0, axis)
 
 
-def steepest(rises: tuple[NDArray, NDArray]) -> float:
+def steepest(rises: tuple[Array, Array]) -> float:
     """Return a bound on what slopes change of light that is 1 at most: two thirds of the largest.
 
     That is the mean of |u| over the aperture.
@@ -123,14 +123,14 @@ def steepest(rises: tuple[NDArray, NDArray]) -> float:
     return 2 / 3 * math.hypot(down, right)
 
 
-def slope_error(detail: Detail, radius: NDArray, pitch: float, side: int, finer: int) -> float:
+def slope_error(detail: Detail, radius: Array, pitch: float, side: int, finer: int) -> float:
     """Return the rms error, over full signal, by differences between fine samples.
 
     Parameters
     ----------
     detail : Detail
         Detail of the picture.
-    radius : NDArray
+    radius : Array
         Radius (h, w) of the blur at every sample's distance, with its sign [m].
     pitch : float
         Pitch of the samples [m].
@@ -151,12 +151,12 @@ def slope_error(detail: Detail, radius: NDArray, pitch: float, side: int, finer:
     return mean_slope(radius / pitch, side) * tilt
 
 
-def mean_slope(radius: NDArray, side: int) -> float:
+def mean_slope(radius: Array, side: int) -> float:
     """Return by how much the radius rises over a length, rms, where nothing is hidden.
 
     Parameters
     ----------
-    radius : NDArray
+    radius : Array
         Radius (h, w) of the blur at every sample's distance, with its sign [samples].
     side : int
         Side of a pixel, within which steps of a map are taken together [samples].

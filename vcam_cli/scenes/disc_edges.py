@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vcam_cli.scenes.base import Array
+from vcam_cli.arrays import Array
 
 MOST = 5
 """Divisions of a cell that several edges cross, at most."""

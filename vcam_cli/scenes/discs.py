@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vcam_cli.arrays import Array
 from vcam_cli.scenes import disc_edges
-from vcam_cli.scenes.base import Array
 from vcam_cli.scenes.disc_edges import CrossedCells, Discs
 from vcam_cli.scenes.runs import concatenate_ranges, expand_ranges, topmost_numbers
 

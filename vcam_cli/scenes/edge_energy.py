@@ -9,12 +9,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[Any]
+from vcam_cli.arrays import Array
 
 RINGING = 0.1
 """Part of an edge's height by which light beside it may err: edges between two lights that both

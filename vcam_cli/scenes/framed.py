@@ -4,7 +4,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from vcam_cli.scenes.base import Array, Chart, ChartScene, Frame, View
+from vcam_cli.arrays import Array
+from vcam_cli.scenes.base import Chart, ChartScene, Frame, View
 from vcam_cli.scenes.cells import clip_cells, edges_within
 from vcam_cli.scenes.closed_form import LightDisc, Products
 from vcam_cli.scenes.edge_energy import EdgeEnergy, Region, counted_height

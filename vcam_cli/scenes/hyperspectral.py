@@ -25,12 +25,13 @@ from typing import Literal
 
 import numpy as np
 
+from vcam_cli.arrays import Array
 from vcam_cli.camera.scene.illuminant import IlluminantSpec
 from vcam_cli.camera.scene.scene import Scene
 from vcam_cli.errors import bad
 from vcam_cli.scenes import light
 from vcam_cli.scenes.bands import paint_by_bands
-from vcam_cli.scenes.base import Array, View
+from vcam_cli.scenes.base import View
 from vcam_cli.scenes.image import ImageScene, image_scene
 from vcam_cli.spectra import Spectrum, Table, integral, luminance
 from vcam_cli.spectra.spectrum import Outside

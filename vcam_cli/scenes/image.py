@@ -13,9 +13,10 @@ from functools import cached_property
 
 import numpy as np
 
+from vcam_cli.arrays import Array
 from vcam_cli.camera.derived.geometry import Geometry, pixel_centers
 from vcam_cli.scenes.bands import paint_by_bands
-from vcam_cli.scenes.base import Array, SampledScene, View
+from vcam_cli.scenes.base import SampledScene, View
 from vcam_cli.scenes.blur_change import BlurLoss, ChangeBounds, squares_factor
 from vcam_cli.spectra import Spectrum
 

@@ -10,7 +10,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from vcam_cli.scenes.base import Array, Chart, ChartScene, Frame, Scene, View
+from vcam_cli.arrays import Array
+from vcam_cli.scenes.base import Chart, ChartScene, Frame, Scene, View
 from vcam_cli.scenes.cells import means_of_parts
 from vcam_cli.scenes.depth_scene import DepthScene
 from vcam_cli.scenes.edge_energy import EdgeEnergy, Region, total_energy

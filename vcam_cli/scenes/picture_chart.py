@@ -6,8 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from vcam_cli.arrays import Array
 from vcam_cli.parallel import product
-from vcam_cli.scenes.base import Array, Chart, Frame
+from vcam_cli.scenes.base import Chart, Frame
 from vcam_cli.scenes.cells import clip_cells
 from vcam_cli.scenes.edge_energy import EdgeEnergy, Region, counted_height
 

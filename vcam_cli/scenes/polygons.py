@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vcam_cli.scenes.base import Array
+from vcam_cli.arrays import Array
 from vcam_cli.scenes.runs import expand_ranges
 
 

@@ -7,7 +7,7 @@ length. So a picture takes a few passes over its cells, and no loop over its run
 
 import numpy as np
 
-from vcam_cli.scenes.base import Array
+from vcam_cli.arrays import Array
 
 CELLS_AT_ONCE = 1 << 17
 """Cells of a pass, which are to stay in the processor's cache."""

@@ -3,17 +3,14 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.scenes.blur_change import BlurLoss, ChangeBounds
 from vcam_cli.scenes.closed_form import Products
 from vcam_cli.spectra import Spectrum
-
-Array = NDArray[Any]
 
 
 @dataclass(frozen=True)

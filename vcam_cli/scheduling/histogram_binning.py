@@ -26,8 +26,9 @@ from dataclasses import dataclass
 from fractions import Fraction
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from vcam_cli.arrays import Array
 from vcam_cli.scheduling.pdf import Floats, Indices, Pdf
 
 Histogram = tuple[ArrayLike, ArrayLike]
@@ -201,7 +202,7 @@ def _merges(widths: Floats, counts: Floats, segments: int) -> Iterator[Merge]:
 class _Sums:
     """Sums over bins first..end-1, of whole numbers (as fractions) or of floats."""
 
-    def __init__(self, widths: NDArray, counts: NDArray, exact: bool) -> None:
+    def __init__(self, widths: Array, counts: Array, exact: bool) -> None:
         self.widths, self.counts, self.exact = widths, counts, exact
         zero = widths[:1] * 0
         self.width_below = np.concatenate([zero, np.cumsum(widths)])

@@ -21,8 +21,8 @@ References
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.scheduling import full_noise
 from vcam_cli.scheduling.pdf import Floats, Pdf, photocurrent_levels
 from vcam_cli.scheduling.sensor import UNCONSTRAINED, Constraints, Sensor
@@ -65,7 +65,7 @@ class ExposureSearch:
         if not (self.first > 0 and self.factor > 1 and self.least_snr > 0):
             raise ValueError("first and least_snr must be above 0, and factor above 1")
 
-    def next_time(self, charge: NDArray, time: float, sensor: Sensor) -> float | None:
+    def next_time(self, charge: Array, time: float, sensor: Sensor) -> float | None:
         """Return the next capture that still searches [s].
 
         The longer exposure fills no pixel of that percentile: three sigma are kept from the well.
@@ -95,7 +95,7 @@ class ExposureSearch:
 
 
 def plan_times(
-    estimates: NDArray,
+    estimates: Array,
     time: float,
     count: int,
     sensor: Sensor,

@@ -20,6 +20,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from vcam_cli.arrays import Array
+
 Floats = NDArray[np.float64]
 Indices = NDArray[np.intp]
 
@@ -160,7 +162,7 @@ class Pdf:
 
 
 def photocurrent_levels(
-    photocurrents: NDArray, bins: int = BINS, darkest: float = DARKEST
+    photocurrents: Array, bins: int = BINS, darkest: float = DARKEST
 ) -> Pdf | None:
     """Gather the photocurrents of many pixels in levels of equal ratio.
 

@@ -18,8 +18,8 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import geometry
 from vcam_cli.camera.optics import FocusWindow
@@ -144,7 +144,7 @@ def _contrast_of_pixels(ready: Prepared, window: FocusWindow) -> float:
     return contrast(ready.rate, len(block), len(block[0]), window)
 
 
-def spread(light: NDArray, color: NDArray) -> float:
+def spread(light: Array, color: Array) -> float:
     """Return how sharp a picture is whose pixels have no neighbors.
 
     Parameters
@@ -164,7 +164,7 @@ def spread(light: NDArray, color: NDArray) -> float:
 
 
 def contrast(
-    light: NDArray, period_y: int, period_x: int, window: FocusWindow | None = None
+    light: Array, period_y: int, period_x: int, window: FocusWindow | None = None
 ) -> float:
     """Return how sharp a picture is in a window.
 

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.camera import load as files
 from vcam_cli.camera.camera import Camera, example
 from vcam_cli.camera.derived.geometry import geometry
@@ -166,7 +166,7 @@ def check_lens(camera: Camera) -> None:
     read_lens(camera)
 
 
-def read_lens(camera: Camera) -> dict[str, NDArray]:
+def read_lens(camera: Camera) -> dict[str, Array]:
     """Return what the files of the camera's optics hold, for `Camera.with_samples`."""
     aberration.check(camera, geometry(camera))
     for number, alone in enumerate(layer_cameras(camera)):

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.camera.derived.mosaic import Mosaic
 from vcam_cli.effects.base import (
     Effect,
@@ -39,7 +39,7 @@ MOST_ELECTRONS = 1e25
 class ExposedLight:
     """The light of a timed exposure, as it is read out."""
 
-    rate: NDArray
+    rate: Array
     """Photo-electrons per second of every node (..., rows, columns) [e/s]."""
     times: tuple[float, ...]
     """Times of the samples of one integration, rising [s]; () of a single exposure."""
@@ -49,19 +49,19 @@ class ExposedLight:
     """Effect on pixels or charge -> rms change of the mean signal by leaving it out [e/s]."""
     light_plan: LightPlan
     """That of the light, with what is left out now that the exposure time is known."""
-    step_rates: tuple[NDArray, ...]
+    step_rates: tuple[Array, ...]
     """As `Prepared.step_rates`."""
-    full_charge: NDArray | None
+    full_charge: Array | None
     """As `Prepared.full_charge`."""
 
 
 def expose(
     setup: CameraSetup,
     light: photon_rate.Rate,
-    white_rate: NDArray,
+    white_rate: Array,
     effects: Sequence[Effect],
     optional: Sequence[Effect],
-    light_during: Callable[[float, float], NDArray],
+    light_during: Callable[[float, float], Array],
 ) -> ExposedLight:
     """Return the light of an exposure whose time is given or chosen for the scene.
 
@@ -71,7 +71,7 @@ def expose(
         The camera, at the gain that its file gives.
     light : Rate
         Light of the whole exposure.
-    white_rate : NDArray
+    white_rate : Array
         Rate of the scene's perfect white on the axis in every color (C,) [e/s].
     effects : sequence of Effect
         Effects that act before electrons are counted.
@@ -106,12 +106,12 @@ def expose(
     )
     timed = tuple(e for e in of_kind(effects, TemporalGain) if e not in light_plan.omitted)
 
-    def select(values: NDArray, start: float, stop: float) -> NDArray:
+    def select(values: Array, start: float, stop: float) -> Array:
         if timed:
             values = timed_gains.apply(values, timed, layout.lattice, start, stop)
         return collected if values is light.values else layout.select_pixels(values)
 
-    def collect(values: NDArray, start: float, stop: float) -> NDArray:
+    def collect(values: Array, start: float, stop: float) -> Array:
         lit = select(values, start, stop)
         return groups.collect(_transported(lit, pixel_dark, effects, full_rate))
 
@@ -160,7 +160,7 @@ def refuse_too_much(electrons: float) -> None:
 
 
 def _levels(
-    layout: Layout, rate: NDArray, dark: float, time: float, well: float
+    layout: Layout, rate: Array, dark: float, time: float, well: float
 ) -> tuple[float, ...]:
     """Return the signals of the scene at which noise is promised, with the dark [electrons]."""
     mosaic, planes = layout.charge_pixels[1], rate.ndim == 3
@@ -175,7 +175,7 @@ def _levels(
 
 def _pixel_changes(
     layout: Layout,
-    light: NDArray,
+    light: Array,
     present: Sequence[Effect],
     running: Sequence[Effect],
     time: float,
@@ -195,8 +195,8 @@ def _pixel_changes(
 
 
 def _transported(
-    rate: NDArray, dark: float, effects: Sequence[Effect], full_rate: float = math.inf
-) -> NDArray:
+    rate: Array, dark: float, effects: Sequence[Effect], full_rate: float = math.inf
+) -> Array:
     """Return the photo-electrons per second that arrive where charge is transported [e/s].
 
     With the dark rate [e/s] they are what arrives of both. Light beyond `full_rate` [e/s], which
@@ -218,12 +218,12 @@ def _transported(
 
 def _full_charge(
     groups: BinningGroups,
-    lit: NDArray,
-    arrived: NDArray,
+    lit: Array,
+    arrived: Array,
     dark: float,
     effects: Sequence[Effect],
     full_rate: float,
-) -> NDArray:
+) -> Array:
     """Return the electrons per second that a pixel is read with if its well is full [e/s].
 
     A full well arrives without what it defers, and with what earlier packets have deferred.
@@ -232,9 +232,9 @@ def _full_charge(
     ----------
     groups : BinningGroups
         Pixels that are read as one.
-    lit : NDArray
+    lit : Array
         Photo-electrons per second that every pixel collects (..., rows, columns) [e/s].
-    arrived : NDArray
+    arrived : Array
         Those that are read, as `_transported` returns them, of groups where charge is joined [e/s].
     dark : float
         Dark rate of a pixel [e/s].

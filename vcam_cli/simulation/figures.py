@@ -14,8 +14,8 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.effects.signal_chain import NoiseSource, noise_sources
 from vcam_cli.physics import readout
 from vcam_cli.processing.tone_map import sensor_white
@@ -81,7 +81,7 @@ def _sample_figures(
     ]
 
 
-def saturated_pixels(frame: Frame) -> NDArray:
+def saturated_pixels(frame: Frame) -> Array:
     """Return which pixels of the raw frame are saturated, in the shape of `dn`."""
     e, groups = frame.electrical, frame.layout.binning_groups
     if groups.count == groups.summed_charges and not frame.noise_of_full:

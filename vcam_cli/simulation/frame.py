@@ -10,8 +10,8 @@ from dataclasses import dataclass, fields, replace
 from functools import cached_property, partial
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.scene.sources import Layers
 from vcam_cli.effects.base import Effect, Gain, Transport, of_kind
@@ -36,15 +36,15 @@ class Frame(Prepared):
     Where the camera takes several samples of one integration, it is the last of them.
     """
 
-    electrons: NDArray
+    electrons: Array
     """(rows, columns) noisy signal, clipped at the full well [electrons]"""
-    dn: NDArray
+    dn: Array
     """(rows, columns) [DN]"""
-    samples_electrons: NDArray | None = None
+    samples_electrons: Array | None = None
     """(N, rows, columns) as `electrons`; None of a single exposure."""
-    samples_dn: NDArray | None = None
+    samples_dn: Array | None = None
     """(N, rows, columns) as `dn`; None of a single exposure."""
-    photocurrent: NDArray | None = None
+    photocurrent: Array | None = None
     """(rows, columns) what the samples tell of the light [e/s]; None of a single exposure."""
 
     def sample(self, number: int) -> Frame:
@@ -63,7 +63,7 @@ class Frame(Prepared):
 
     @cached_property
     @own_float_errors
-    def picture_dn(self) -> NDArray:
+    def picture_dn(self) -> Array:
         """What is made into a picture, in the shape of `dn` [DN].
 
         Of several samples: the codes of the photocurrent in the last one's time, as if neither
@@ -84,12 +84,12 @@ class Frame(Prepared):
         least = charge / self.times[0] * (1 - 1e-6) - self.dark_rate
         return float(self._unclipped_codes(np.array([least]))[0])
 
-    def _unclipped_codes(self, photocurrent: NDArray) -> NDArray:
+    def _unclipped_codes(self, photocurrent: Array) -> Array:
         """Return codes of a photocurrent [e/s], neither rounded nor clipped [DN]."""
         return self.to_dn((photocurrent + self.dark_rate) * self.exposure_time)
 
     @property
-    def mean_electrons(self) -> NDArray:
+    def mean_electrons(self) -> Array:
         """Noise-free signal before saturation, photo and dark, (rows, columns) [electrons]."""
         mean = exposure.mean_electrons(self.rate, self.exposure_time, self.plan.active)
         return self.layout.binning_groups.join(mean)
@@ -106,7 +106,7 @@ class Frame(Prepared):
         return float(self.to_dn(np.array([dark]))[0])
 
     @property
-    def black_steps(self) -> NDArray:
+    def black_steps(self) -> Array:
         """How far the black level of each color is from that of `black_dn` (C,) [DN]."""
         steps = dict(self.electrical.black_steps)
         return np.array([steps.get(color, 0.0) for color in self.mosaic.colors])
@@ -116,18 +116,18 @@ class Frame(Prepared):
         """Pixels whose codes are added."""
         return self.layout.binning_groups.summed_codes
 
-    def to_dn(self, electrons: NDArray) -> NDArray:
+    def to_dn(self, electrons: Array) -> Array:
         """Return the ADC's curve before rounding and clipping; added codes are equal [DN]."""
         n = self.summed_codes
         return self.adc.response(electrons) if n == 1 else n * self.adc.response(electrons / n)
 
-    def linear(self, dn: NDArray) -> NDArray:
+    def linear(self, dn: Array) -> Array:
         """Return what a linear ADC has for these codes, added where `to_dn` adds them [DN]."""
         n = self.summed_codes
         return self.adc.linear(dn) if n == 1 else n * self.adc.linear(dn / n)
 
     @property
-    def white_dn(self) -> NDArray:
+    def white_dn(self) -> Array:
         """Codes (C,) of perfect white on the axis, noise-free, with dark, not clipped [DN]."""
         electrons = (self.white_rate + self.dark_rate) * self.exposure_time
         return np.asarray(self.to_dn(electrons * self.summed_codes))
@@ -160,18 +160,18 @@ class Frame(Prepared):
         sources = of_kind(effects, NoiseSource)
         return float(np.sqrt(sum(e.variance(well) for e in sources)))
 
-    def patches_dn(self) -> NDArray:
+    def patches_dn(self) -> Array:
         """Return the codes (C, 24) of a ColorChecker in the scene's light, as `white_dn` [DN]."""
         lit = [self.scene.white.multiply(reflectance) for _, reflectance in colorchecker()]
         rate = self.axis_rate(lit) + self.dark_rate * self.summed_codes
         return self.to_dn(rate * self.exposure_time)
 
-    def primaries_dn(self) -> NDArray:
+    def primaries_dn(self) -> Array:
         """Return the codes (C, 3) of each channel of a picture that emits, as `white_dn` [DN]."""
         rate = self.axis_rate(self.scene.spectra) + self.dark_rate * self.summed_codes
         return self.to_dn(rate * self.exposure_time)
 
-    def axis_rate(self, spectra: Sequence[Spectrum]) -> NDArray:
+    def axis_rate(self, spectra: Sequence[Spectrum]) -> Array:
         """Return electrons per second (C, K) of K radiances on the axis, as they are read out.
 
         Electrons of pixels whose codes are added are, too.
@@ -183,7 +183,7 @@ class Frame(Prepared):
         return np.asarray(levels.T * self.layout.binning_groups.signal_ratio)
 
     @property
-    def clean_dn(self) -> NDArray:
+    def clean_dn(self) -> Array:
         """Codes without noise and without rounding, in the shape of `dn` [DN].
 
         They end where the well and the ADC are full, as those of `dn` do.
@@ -191,7 +191,7 @@ class Frame(Prepared):
         held = self.layout.binning_groups.join(self.held_electrons)
         return np.clip(self.to_dn(held), 0, self.summed_codes * self.electrical.highest_code)
 
-    def depth(self) -> NDArray:
+    def depth(self) -> Array:
         """Return how far away is what the pixels' centers see, along the axis (rows, columns) [m].
 
         Of layers the nearest one counts that covers half of a place or more.
@@ -204,7 +204,7 @@ class Frame(Prepared):
             return self.scene.depth_at(layout.picture_x, layout.picture_y)
         return np.full(layout.picture_shape, self.camera.scene.distance)
 
-    def ideal_dn(self) -> NDArray:
+    def ideal_dn(self) -> Array:
         """Return the scene point-sampled at the pixels' centers, all colors everywhere [DN].
 
         It is (C, rows, columns) of the picture, without blur, falloff and noise; black is included.
@@ -222,7 +222,7 @@ class Frame(Prepared):
 
 def expose(
     camera: Camera,
-    picture: NDArray | None,
+    picture: Array | None,
     workers: int | None,
     stages: Stages,
     rate_cache: RateCache | None = None,
@@ -234,7 +234,7 @@ def expose(
     ----------
     camera : Camera
         The camera.
-    picture : NDArray or None
+    picture : Array or None
         Samples of the scene's image file (h, w, channels) in linear light; None for charts.
     workers : int or None
         Number of threads; all processors by default.
@@ -257,7 +257,7 @@ def expose(
     return take_frame(ready, workers, stages)
 
 
-def _pedestal(ready: Prepared) -> NDArray | None:
+def _pedestal(ready: Prepared) -> Array | None:
     """Return what black levels by color add to each pixel [electrons]; None without them."""
     steps = dict(ready.electrical.black_steps)
     if not steps:

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.electrical import no_volts
 from vcam_cli.camera.expectations import misses
@@ -64,17 +64,17 @@ class Photograph:
         return (*self.remarks, *(self.processed.notes if shown else ()))
 
     @property
-    def dn(self) -> NDArray:
+    def dn(self) -> Array:
         """Raw digital numbers, whole [DN]."""
         return self._displayed(self.frame.dn)
 
     @property
-    def electrons(self) -> NDArray:
+    def electrons(self) -> Array:
         """Raw signal before the ADC, noisy, clipped above at the full well [electrons]."""
         return self._displayed(self.frame.electrons)
 
     @property
-    def volts(self) -> NDArray:
+    def volts(self) -> Array:
         """Raw signal at the ADC's input [V].
 
         It raises BadInput where the file gives no volts.
@@ -85,12 +85,12 @@ class Photograph:
         return e.volts_of(self.electrons)
 
     @property
-    def mean_electrons(self) -> NDArray:
+    def mean_electrons(self) -> Array:
         """Noise-free signal, photo and dark, before saturation [electrons]."""
         return self._displayed(self.frame.mean_electrons)
 
     @property
-    def clean_dn(self) -> NDArray:
+    def clean_dn(self) -> Array:
         """Raw digital numbers without noise and without rounding, clipped as `dn` is [DN]."""
         return self._displayed(self.frame.clean_dn)
 
@@ -105,22 +105,22 @@ class Photograph:
         return self.frame.times
 
     @property
-    def samples_dn(self) -> NDArray | None:
+    def samples_dn(self) -> Array | None:
         """Codes of every sample (N, ...), as `dn` [DN]; None of a single exposure."""
         return self._displayed_samples(self.frame.samples_dn)
 
     @property
-    def samples_electrons(self) -> NDArray | None:
+    def samples_electrons(self) -> Array | None:
         """Signal of every sample (N, ...), as `electrons`; None of a single exposure."""
         return self._displayed_samples(self.frame.samples_electrons)
 
     @property
-    def photocurrent(self) -> NDArray | None:
+    def photocurrent(self) -> Array | None:
         """Photocurrent that the samples tell, as `dn` [e/s]; None of a single exposure."""
         found = self.frame.photocurrent
         return None if found is None else self._displayed(found)
 
-    def _displayed_samples(self, values: NDArray | None) -> NDArray | None:
+    def _displayed_samples(self, values: Array | None) -> Array | None:
         return None if values is None else np.stack([self._displayed(sample) for sample in values])
 
     @property
@@ -129,7 +129,7 @@ class Photograph:
         return self.frame.mosaic.colors
 
     @property
-    def color(self) -> NDArray:
+    def color(self) -> Array:
         """Index of each raw pixel's color, in the shape of `dn`."""
         layout = self.frame.layout
         if layout.full_color:
@@ -137,7 +137,7 @@ class Photograph:
         return self._displayed(layout.color)
 
     @property
-    def x(self) -> NDArray:
+    def x(self) -> Array:
         """Centers of the raw frame's columns, right of the array's center, (columns,) [m].
 
         Of a honeycomb and of pixels at places of their own: of every pixel, in the shape of `dn`.
@@ -146,12 +146,12 @@ class Photograph:
         return self._displayed(layout.x) if layout.is_scattered else layout.centers[0]
 
     @property
-    def y(self) -> NDArray:
+    def y(self) -> Array:
         """Centers of the raw frame's rows, below the array's center, (rows,) [m]; as `x`."""
         layout = self.frame.layout
         return self._displayed(layout.y) if layout.is_scattered else layout.centers[1]
 
-    def _displayed(self, values: NDArray) -> NDArray:
+    def _displayed(self, values: Array) -> Array:
         """Values of the raw frame in the shape that a user sees."""
         if values.ndim == 3:
             return np.moveaxis(values, 0, -1)
@@ -160,7 +160,7 @@ class Photograph:
 
     @cached_property
     @own_float_errors
-    def render(self) -> NDArray:
+    def render(self) -> Array:
         """Codes of the render after `processing`: (rows, columns) or (rows, columns, 3).
 
         Raises BadInput for scattered pixels without demosaic, and so do `linear` and `ideal`.
@@ -169,7 +169,7 @@ class Photograph:
         with self.stages("processing"):
             return picture.encode(self.frame.camera.output.render or 8)
 
-    def renders_of_steps(self) -> Iterator[tuple[str, NDArray]]:
+    def renders_of_steps(self) -> Iterator[tuple[str, Array]]:
         """Yield step_01_NAME.png and so on, with the render as it were if steps ended there.
 
         Steps that do nothing are left out, and those after which no display can show the picture.
@@ -186,7 +186,7 @@ class Photograph:
 
     @cached_property
     @own_float_errors
-    def linear(self) -> NDArray:
+    def linear(self) -> Array:
         """The render in linear light, perfect white = 1: (rows, columns, channels)."""
         picture = self.processed
         with self.stages("processing"):
@@ -194,7 +194,7 @@ class Photograph:
 
     @cached_property
     @own_float_errors
-    def ideal(self) -> NDArray:
+    def ideal(self) -> Array:
         """The scene point-sampled in the same colors and scale: (rows, columns, channels)."""
         picture = self.processed
         with self.stages("ideal"):
@@ -202,7 +202,7 @@ class Photograph:
 
     @cached_property
     @own_float_errors
-    def s_cielab(self) -> NDArray:
+    def s_cielab(self) -> Array:
         """S-CIELAB Delta E of the render from the ideal image on the camera's `display`."""
         image, ideal, screen = self.linear, self.ideal, self._screen
         with self.stages("quality"):

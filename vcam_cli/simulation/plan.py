@@ -24,8 +24,8 @@ from functools import cached_property
 from itertools import chain, combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.camera.derived.geometry import geometry as solve
@@ -266,15 +266,15 @@ class _SceneVariances:
     """All effects that are wanted."""
     signal: SignalLevels
     tolerance: float
-    _known: dict[tuple[Effect, float], NDArray] = field(default_factory=dict)
+    _known: dict[tuple[Effect, float], Array] = field(default_factory=dict)
     """Variances of one source at the levels, without so much dark signal."""
 
     @cached_property
-    def whole(self) -> NDArray:
+    def whole(self) -> Array:
         """With all effects: (2, levels) [electrons squared]."""
         return self.of_effects(self.present)
 
-    def of_effects(self, kept: Sequence[Effect]) -> NDArray:
+    def of_effects(self, kept: Sequence[Effect]) -> Array:
         """Return them with some effects alone: (2, levels) [electrons squared].
 
         Without a charge, both the dark signal and the level are lower.

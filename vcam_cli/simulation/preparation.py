@@ -10,9 +10,9 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vcam_cli import memory
+from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.electrical import Electrical
 from vcam_cli.camera.derived.geometry import Geometry
@@ -65,9 +65,9 @@ class Prepared:
     scene: AnyScene
     transfer: Transfer
     """Transfer of the scene's components to one pixel of the lattice."""
-    white_rate: NDArray
+    white_rate: Array
     """Photo-electrons per second (C,) of the perfect white on the axis, in every color [e/s]."""
-    rate: NDArray
+    rate: Array
     """Photo-electrons per second (rows, columns) of every pixel, as they are read out [e/s].
 
     Stacked pixels have (C, rows, columns). Of pixels that are read as one: where charges are
@@ -85,15 +85,15 @@ class Prepared:
     times: tuple[float, ...]
     """Times (N,) of the samples of one integration, rising [s]; () of a single exposure."""
     plan: plan.Plan
-    step_rates: tuple[NDArray, ...]
+    step_rates: tuple[Array, ...]
     """Rates (N, ...) as `rate` between each sample and the one before, where light changes with
     time [e/s]; () elsewhere."""
-    full_charge: NDArray | None
+    full_charge: Array | None
     """Electrons that every node is read with if it is full, in the shape of `rate`, where transfer
     defers some of them [electrons]; None elsewhere: all of the full well."""
 
     @property
-    def held_electrons(self) -> NDArray:
+    def held_electrons(self) -> Array:
         """Noise-free signal of every node, at most that of a full one [electrons]."""
         mean = exposure.mean_electrons(self.rate, self.exposure_time, self.plan.active)
         if self.full_charge is not None:
@@ -266,7 +266,7 @@ def _light_during(
     light: photon_rate.Rate,
     start: float,
     stop: float,
-) -> NDArray:
+) -> Array:
     """Return the light from `start` to `stop` after a line's exposure begins [s], as `light` is.
 
     It is that of the whole exposure where nothing is simulated to move.
@@ -383,7 +383,7 @@ def _transfer(
     scene: AnyScene,
     effects: tuple[Effect, ...],
     rate_cache: RateCache | None,
-) -> tuple[Transfer, NDArray]:
+) -> tuple[Transfer, Array]:
     """Return the transfer of the scene's components, and the rate (C,) of perfect white [e/s].
 
     Spectra that do not cover the wavelengths are the user's error.

@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import geometry
 from vcam_cli.camera.derived.scene_layers import (
@@ -43,7 +43,7 @@ from vcam_cli.scenes.image import ImageScene
 from vcam_cli.scenes.layered import AnyScene
 from vcam_cli.simulation import plan
 
-ScenePicture = NDArray | Cube | DepthPicture | tuple[LayerFiles, ...] | None
+ScenePicture = Array | Cube | DepthPicture | tuple[LayerFiles, ...] | None
 """Samples of an image file (h, w, channels) in linear light, the cube of a hyperspectral file, one
 of both with its map of depth, the files of each layer; None for charts."""
 SOURCE = ("scene", "source")
@@ -76,7 +76,7 @@ def read_scene(camera: Camera, stages: Stages) -> tuple[Any, tuple[str, ...]]:
 
 
 def _with_depth(
-    camera: Camera, picture: NDArray | Cube, notes: tuple[str, ...]
+    camera: Camera, picture: Array | Cube, notes: tuple[str, ...]
 ) -> tuple[ScenePicture, tuple[str, ...]]:
     """Return a picture with its map of depth, where it has one."""
     if not camera.scene.has_depth:
@@ -86,7 +86,7 @@ def _with_depth(
     return DepthPicture(picture, depth), (*notes, *more)
 
 
-def read_map(camera: Camera, size: tuple[int, int]) -> tuple[NDArray, tuple[str, ...]]:
+def read_map(camera: Camera, size: tuple[int, int]) -> tuple[Array, tuple[str, ...]]:
     """Return the map of depth (h, w) [m] beside a scene's file of so many samples, and notes.
 
     Raises BadInput for a map that does not go with it, or with what the lens cannot image.
@@ -170,7 +170,7 @@ def _blur(camera: Camera) -> LensBlur:
     off = isinstance(camera.effects, dict) and camera.effects.get("diffraction") == "off"
     wavelength = camera.scene.wavelengths.start
 
-    def sharp(frequency: NDArray) -> NDArray:
+    def sharp(frequency: Array) -> Array:
         if off or not camera.optics.diffraction:
             return np.ones_like(frequency)
         return otf_circular(frequency, wavelength, solved.working_f_number)

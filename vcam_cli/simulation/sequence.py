@@ -12,8 +12,8 @@ from contextlib import ExitStack
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import geometry
 from vcam_cli.camera.derived.line_times import line_times
@@ -139,7 +139,7 @@ def write_sequence(
     Result
         The first frame, with a note where there is no video.
     """
-    rows, shown = [], list[NDArray]()
+    rows, shown = [], list[Array]()
     chosen = set(np.linspace(0, count - 1, min(count, STRIP)).round().astype(int).tolist())
     first: Result | None = None
     program = ffmpeg()

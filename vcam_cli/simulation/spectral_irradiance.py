@@ -21,8 +21,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry, pixel_centers
 from vcam_cli.camera.derived.mosaic import Mosaic
@@ -62,13 +62,13 @@ def check(camera: Camera) -> None:
         raise bad(("output", "irradiance", "sampling"), message, "write irradiance: true")
 
 
-def nodes(ready: Prepared) -> NDArray:
+def nodes(ready: Prepared) -> Array:
     """Return the wavelengths at which it is given, (J,) rising [m]."""
     band = ready.camera.scene.wavelengths
     return Band(band.start, band.stop, ready.settings.wavelength_step).nodes()
 
 
-def planes(ready: Prepared, workers: int) -> Iterator[NDArray]:
+def planes(ready: Prepared, workers: int) -> Iterator[Array]:
     """Yield the spectral irradiance at each of the `nodes`, one by one: (rows, columns) [W/(m2 m)].
 
     Raises CannotDo where memory does not suffice.
@@ -88,9 +88,7 @@ def planes(ready: Prepared, workers: int) -> Iterator[NDArray]:
             yield np.zeros((g.rows, g.columns), ready.settings.dtype)
 
 
-def _bands(
-    ready: Prepared, wavelengths: NDArray, level: NDArray, workers: int
-) -> Iterator[NDArray]:
+def _bands(ready: Prepared, wavelengths: Array, level: Array, workers: int) -> Iterator[Array]:
     """Return the light of a few bands, as if each were a color of its own.
 
     level: (K, n) of the scene's components in every band. Yields (rows, columns) in its unit.
@@ -112,7 +110,7 @@ def _bands(
     dtype = ready.settings.dtype
     x, y = pixel_centers(g)
     gains = [e.gain(x.astype(dtype), y.astype(dtype)) for e in of_kind(in_lens, Gain)]
-    out: NDArray = np.zeros((len(wavelengths), g.rows, g.columns), dtype)
+    out: Array = np.zeros((len(wavelengths), g.rows, g.columns), dtype)
     layers, _ = image_layers(light, _scene(ready))
     for layer in layers:
 
@@ -144,7 +142,7 @@ def _scene(ready: Prepared) -> AnyScene:
     return build(ready.camera.scene, view, None)
 
 
-def levels(ready: Prepared, wavelengths: NDArray) -> NDArray:
+def levels(ready: Prepared, wavelengths: Array) -> Array:
     """Return the irradiance of the K components on the axis, without blur: (K, J) [W/(m2 m)]."""
     per_radiance = ready.geometry.irradiance_per_radiance
     transmittance = ready.camera.optics.transmittance.resolve()
@@ -152,7 +150,7 @@ def levels(ready: Prepared, wavelengths: NDArray) -> NDArray:
     return per_radiance * spectral_levels(ready.camera, spectra, wavelengths)
 
 
-def spectral_levels(camera: Camera, spectra: Sequence[Spectrum], wavelengths: NDArray) -> NDArray:
+def spectral_levels(camera: Camera, spectra: Sequence[Spectrum], wavelengths: Array) -> Array:
     """Return spectra as `output.irradiance` samples them: (K, J) [their unit per m]."""
     if camera.output.irradiance_sampling == "point":
         return np.array([s.evaluate(wavelengths) for s in spectra])

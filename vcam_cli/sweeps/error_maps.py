@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import geometry
 from vcam_cli.camera.scene.charts import Csf
@@ -36,9 +36,9 @@ class MapAxes:
     """What columns and rows of a map stand for: places on the sensor, or what a chart shows."""
 
     labels: tuple[str, str]
-    x: NDArray
+    x: Array
     """(columns,) places [mm], or frequencies of the chart's bars [lp/mm]."""
-    y: NDArray
+    y: Array
     """(rows,) places downward [mm], or contrasts of the chart, from the top."""
     pitch: float
     """The pitch of the columns [m]."""
@@ -50,7 +50,7 @@ class MapAxes:
         content |= {"x_limits": _edges(self.x), "y_limits": _edges(self.y)[::-1]}
         return Panel(*self.labels, title=title, is_square=self.chart is None, **content)
 
-    def lines(self, values: NDArray, level: float) -> list[NDArray]:
+    def lines(self, values: Array, level: float) -> list[Array]:
         """Return the lines along which a map is at a level, each (n, 2); of a chart one."""
         if self.chart is None:
             return iso_lines.map_lines(values, self.x, self.y, level)
@@ -60,13 +60,13 @@ class MapAxes:
         return [np.stack([self.x, contrast], axis=1)[self.x >= 0]]
 
 
-def _edges(centers: NDArray) -> tuple[float, float]:
+def _edges(centers: Array) -> tuple[float, float]:
     """Return the first edge and the last of cells with these centers."""
     step = (centers[-1] - centers[0]) / max(1, len(centers) - 1)
     return float(centers[0] - step / 2), float(centers[-1] + step / 2)
 
 
-def _axes(camera: Camera, x: NDArray, y: NDArray) -> MapAxes:
+def _axes(camera: Camera, x: Array, y: Array) -> MapAxes:
     """Return the axes of maps with columns at x and rows at y, downward [m]."""
     chart, pitch = camera.scene.source, float(np.ptp(x)) / max(1, len(x) - 1)
     if not isinstance(chart, Csf) or not chart.max_frequency or not pitch:
@@ -83,15 +83,15 @@ def _axes(camera: Camera, x: NDArray, y: NDArray) -> MapAxes:
 class ErrorMaps:
     """The frames of a camera against their perfect images."""
 
-    delta_e: NDArray
+    delta_e: Array
     """(rows, columns) S-CIELAB of the first frame."""
-    worst_delta_e: NDArray
+    worst_delta_e: Array
     """(rows, columns) the largest S-CIELAB of the repeats, each the mean of its seeds."""
-    ideal: NDArray
+    ideal: Array
     """(rows, columns, 1 or 3) sRGB codes of the perfect image of the first frame."""
-    image: NDArray
+    image: Array
     """(rows, columns, 1 or 3) sRGB codes of the camera's image."""
-    counts: NDArray
+    counts: Array
     """(n,) pixels of all frames whose Delta E lies in a bin of `BIN`, from 0."""
     mean: float
     """The mean Delta E of all pixels of all frames."""
@@ -215,6 +215,6 @@ def distribution(planned: PlannedFigure, cache: MapCache) -> FigureContent:
     return FigureContent((*planned.head, "what", "at", "value"), rows, (panel,))
 
 
-def _cumulative_shares(maps: ErrorMaps) -> NDArray:
+def _cumulative_shares(maps: ErrorMaps) -> Array:
     """Return the share of pixels below every edge of a bin."""
     return np.concatenate([[0.0], np.cumsum(maps.counts) / maps.counts.sum()])

@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.errors import BadInput, Collector, VcamError, bad, one_line
 from vcam_cli.files.tables import write_table
 from vcam_cli.progress import Observer
@@ -114,9 +114,9 @@ class _Series:
     case: str
     others: tuple[tuple[Parameter, Cell], ...]
     cells: tuple[Cell, ...]
-    values: NDArray
-    low: NDArray | None = None
-    high: NDArray | None = None
+    values: Array
+    low: Array | None = None
+    high: Array | None = None
     optimum: CaseOptimum | None = None
 
     @property

@@ -15,8 +15,8 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.sweeps.optimum import (
     FEW_DRAWS,
     MAX_MISFIT,
@@ -39,7 +39,7 @@ what that leaves."""
 
 
 def find_joint_optimum(
-    parameters: Sequence[NDArray], curves: NDArray, goal: str
+    parameters: Sequence[Array], curves: Array, goal: str
 ) -> tuple[Optimum, ...]:
     """Return the optimum of each parameter, all of them together.
 
@@ -82,9 +82,7 @@ def find_joint_optimum(
     )
 
 
-def _interpolation_errors(
-    fit: _Fit, known: tuple[Sequence[NDArray], NDArray, Sequence[int]]
-) -> NDArray:
+def _interpolation_errors(fit: _Fit, known: tuple[Sequence[Array], Array, Sequence[int]]) -> Array:
     """Return the standard error (k,) of the minimum that the spread does not explain.
 
     By how much the quadratic through the points of another reach differs; as its error goes with
@@ -107,8 +105,8 @@ def _interpolation_errors(
 
 
 def _along(
-    axis: NDArray,
-    known: tuple[NDArray, int, float, NDArray, float, bool],
+    axis: Array,
+    known: tuple[Array, int, float, Array, float, bool],
     value: float,
     fitted: float,
 ) -> Optimum:
@@ -140,8 +138,8 @@ class _Fit:
 
     def __init__(
         self,
-        scales: Sequence[NDArray],
-        y: NDArray,
+        scales: Sequence[Array],
+        y: Array,
         best: Sequence[int],
         reaches: Sequence[int] = REACHES,
     ) -> None:
@@ -157,9 +155,7 @@ class _Fit:
         self.rest = math.nan if math.isnan(square) else math.sqrt(max(0.0, square - left))
         """Rms of what the fit leaves beside the spread; nan where nothing is known of it."""
 
-    def _choose(
-        self, scales: Sequence[NDArray], y: NDArray, best: Sequence[int], reach: int
-    ) -> None:
+    def _choose(self, scales: Sequence[Array], y: Array, best: Sequence[int], reach: int) -> None:
         """Take the points that are fitted, and their powers."""
         sizes = [min(len(scale), 2 * reach + 1) for scale in scales]
         starts = [
@@ -180,7 +176,7 @@ class _Fit:
         """(m, points) of what is fitted."""
         self.mean = self.curves.mean(axis=0)
 
-    def fitted_part(self, y: NDArray) -> NDArray:
+    def fitted_part(self, y: Array) -> Array:
         """Return of curves (m, n_1, n_2, ...) the points that are fitted: (m, points)."""
         return y[(slice(None), *self._windows)].reshape(len(y), -1)
 
@@ -190,7 +186,7 @@ class _Fit:
         fit = self.powers @ np.linalg.lstsq(self.powers, self.mean, rcond=None)[0]
         return float(np.square(self.mean - fit).sum()) / free if free > 0 else math.nan
 
-    def minimum(self, means: NDArray) -> tuple[NDArray, NDArray]:
+    def minimum(self, means: Array) -> tuple[Array, Array]:
         """Return where quadratics fitted to means (d, points) are least: (d, k); the values (d,).
 
         Within the box of what is fitted: on the inside, or on one of its faces, edges or corners,

@@ -27,7 +27,8 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
+
+from vcam_cli.arrays import Array
 
 DRAWS = 1000
 """Number of means of curves that are drawn."""
@@ -68,7 +69,7 @@ class Optimum:
     """The metric of the fit there, which may be better than at any point; nan without a fit."""
 
 
-def find_optimum(parameter: NDArray, curves: NDArray, goal: str) -> Optimum:
+def find_optimum(parameter: Array, curves: Array, goal: str) -> Optimum:
     """Return the optimum of curves (n, points) over a parameter (points,), for the goal min or max.
 
     Raises ValueError for curves without points, or with what is not finite.
@@ -102,7 +103,7 @@ def find_optimum(parameter: NDArray, curves: NDArray, goal: str) -> Optimum:
 
 
 def widened_interval(
-    best: float, drawn: NDArray, error: float, ends: tuple[float, float]
+    best: float, drawn: Array, error: float, ends: tuple[float, float]
 ) -> tuple[float, float]:
     """Return the interval of optima that are drawn, with an error of the fit added in squares.
 
@@ -118,7 +119,7 @@ def widened_interval(
     return max(low, min(best, ends[0])), min(high, max(best, ends[1]))
 
 
-def excess_error(differences: NDArray, spreads: NDArray | float) -> float:
+def excess_error(differences: Array, spreads: Array | float) -> float:
     """Return the rms by which optima of further fits differ, beyond what noise explains.
 
     differences: of each fit's optimum from that of the fit that is used (n,); spreads: the standard
@@ -129,7 +130,7 @@ def excess_error(differences: NDArray, spreads: NDArray | float) -> float:
     return math.sqrt(np.maximum(0.0, differences**2 - spreads**2).mean())
 
 
-def _interpolation_error(x: NDArray, mean: NDArray, drawn: NDArray, window: _Window) -> float:
+def _interpolation_error(x: Array, mean: Array, drawn: Array, window: _Window) -> float:
     """Return the standard error of the cubic's minimum that the spread does not explain.
 
     From cubics through fewer points, and from quartics through a few more, whose own error is of a
@@ -150,7 +151,7 @@ def _interpolation_error(x: NDArray, mean: NDArray, drawn: NDArray, window: _Win
     return math.sqrt(square)
 
 
-def _window_minima(x: NDArray, curves: NDArray, window: _Window, degree: int) -> NDArray:
+def _window_minima(x: Array, curves: Array, window: _Window, degree: int) -> Array:
     """Return where polynomials through curves (n, points) in a window are least.
 
     To 1/200 of half the window, which is little beside the differences of fits.
@@ -163,7 +164,7 @@ def _window_minima(x: NDArray, curves: NDArray, window: _Window, degree: int) ->
     return np.asarray(middle + half * t[(tried @ c).argmin(axis=0)])
 
 
-def _best_point(x: NDArray, mean: NDArray, goal: str) -> Optimum:
+def _best_point(x: Array, mean: Array, goal: str) -> Optimum:
     """Return the best point itself, and its neighbors as the interval: too few for a curve."""
     i = int(mean.argmin())
     low, high = x[max(0, i - 1)], x[min(len(x) - 1, i + 1)]
@@ -172,7 +173,7 @@ def _best_point(x: NDArray, mean: NDArray, goal: str) -> Optimum:
     return Optimum(float(x[i]), float(low), float(high), value, ends.get(i, ""))
 
 
-def snap_to_range(value: float, x: NDArray) -> float:
+def snap_to_range(value: float, x: Array) -> float:
     """Return the value, with what the logarithm did to values of the range undone."""
     nearest = float(x[np.abs(x - value).argmin()]) if math.isfinite(value) else value
     return nearest if math.isclose(value, nearest, rel_tol=1e-12) else value
@@ -223,7 +224,7 @@ class _Window:
         return left + right
 
 
-def _fit_window(x: NDArray, curves: NDArray) -> tuple[_Window, float, bool]:
+def _fit_window(x: Array, curves: Array) -> tuple[_Window, float, bool]:
     """Return the points around the best one of the mean that a cubic follows.
 
     Ends that it cannot follow are left out one by one: near a pole, only on its side. Also the rms
@@ -248,7 +249,7 @@ def _fit_window(x: NDArray, curves: NDArray) -> tuple[_Window, float, bool]:
     return window, rest, square <= MAX_MISFIT * noise
 
 
-def _misfit(x: NDArray, mean: NDArray, window: _Window) -> float:
+def _misfit(x: Array, mean: Array, window: _Window) -> float:
     """Return the mean square from a curve to its cubic by degree of freedom; nan without."""
     powers, y = _powers(x[window.points]), mean[window.points]
     free = window.size - powers.shape[1]
@@ -256,7 +257,7 @@ def _misfit(x: NDArray, mean: NDArray, window: _Window) -> float:
     return float(np.square(y - fit).sum()) / free if free else math.nan
 
 
-def variance_of_mean(curves: NDArray) -> float:
+def variance_of_mean(curves: Array) -> float:
     """Return the variance of the mean of curves, but for shifts of the whole; nan of a single one.
 
     The same at all points, which makes it well known from few curves.
@@ -269,7 +270,7 @@ def variance_of_mean(curves: NDArray) -> float:
     return float(np.square(rest).sum()) / ((count - 1) * (points - 1) * count)
 
 
-def bootstrap_means(curves: NDArray, rest: float, least: int = MIN_BOOTSTRAP_CURVES) -> NDArray:
+def bootstrap_means(curves: Array, rest: float, least: int = MIN_BOOTSTRAP_CURVES) -> Array:
     """Return means of curves drawn with replacement: (DRAWS, points).
 
     The spread of n curves around their own mean is too small by (n - 1) / n, which is undone. Few
@@ -292,7 +293,7 @@ def bootstrap_means(curves: NDArray, rest: float, least: int = MIN_BOOTSTRAP_CUR
     return np.asarray(out + rest * rng.standard_normal((DRAWS, points)))
 
 
-def _powers(x: NDArray) -> NDArray:
+def _powers(x: Array) -> Array:
     """Return powers (points, degree + 1) of the parameter, from -1 to 1 over these points.
 
     One point is left to smooth, where there are enough.
@@ -302,7 +303,7 @@ def _powers(x: NDArray) -> NDArray:
     return np.vander((x - middle) / half, degree + 1, increasing=True)
 
 
-def _minima(x: NDArray, curves: NDArray, window: _Window) -> tuple[NDArray, NDArray]:
+def _minima(x: Array, curves: Array, window: _Window) -> tuple[Array, Array]:
     """Return where every curve is least, and how much it is there.
 
     The minimum of the cubic, or an end of the range that is better; the best point itself where
@@ -332,7 +333,7 @@ def _minima(x: NDArray, curves: NDArray, window: _Window) -> tuple[NDArray, NDAr
     return places, values
 
 
-def _cubic_minima(c: NDArray) -> tuple[NDArray, NDArray]:
+def _cubic_minima(c: Array) -> tuple[Array, Array]:
     """Return where cubics c0 + c1 t + c2 t^2 + c3 t^3 are least, and whether in -1..1.
 
     The root of the derivative at which the curve bends upward, in the form that loses no digits.

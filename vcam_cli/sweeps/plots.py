@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.files.plots import COLORS, MARKERS, plot_figure
 from vcam_cli.files.tables import Cell
 from vcam_cli.sweeps.sweep_result import CaseOptimum
@@ -32,14 +32,14 @@ class Curve:
 
     name: str
     """Its entry in the legend; "" for none."""
-    x: Sequence[Cell] | NDArray
-    y: NDArray
+    x: Sequence[Cell] | Array
+    y: Array
     color: int = 0
     dash: int | None = 0
     """None for points without a line."""
     has_points: bool = False
-    low: NDArray | None = None
-    high: NDArray | None = None
+    low: Array | None = None
+    high: Array | None = None
     """From where to where each value may be."""
     optimum: CaseOptimum | None = None
     """A cross, with its interval."""
@@ -57,7 +57,7 @@ class Panel:
     """Places on the horizontal axis that dotted lines mark, and their colors."""
     x_limits: tuple[float, float] | None = None
     y_limits: tuple[float, float | None] | None = None
-    image: NDArray | None = None
+    image: Array | None = None
     """(rows, columns, 1 or 3) sRGB codes, or a map (rows, columns) of numbers, from the top."""
     scale: float = 0.0
     """The largest number of a map."""

@@ -13,8 +13,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived import photodiode
 from vcam_cli.camera.derived.dark_current import dark_rate
@@ -120,9 +120,9 @@ class Curves:
 
     color: str
     """"" where the color does not matter."""
-    x: dict[str, NDArray]
+    x: dict[str, Array]
     """Abscissa by column, and what else it may be counted in."""
-    y: dict[str, NDArray]
+    y: dict[str, Array]
     """Values by the name of the quantity."""
 
 
@@ -149,7 +149,7 @@ def _mtf(camera: Camera, nyquist: float) -> list[Curves]:
     g, frequency = geometry(camera), np.linspace(0, nyquist * 1e3, FREQUENCIES)
     mosaic, white = camera_layout(camera, g).mosaic, (light.white_radiance(camera.scene),)
 
-    def transfer(effects: tuple[Effect, ...]) -> list[NDArray]:
+    def transfer(effects: tuple[Effect, ...]) -> list[Array]:
         found = photon_rate.scene_transfer(
             camera, g, camera_settings(camera), white, mosaic, effects
         )
@@ -213,7 +213,7 @@ def _diagonal_curves(camera: Camera) -> Curves:
     )
 
 
-def _tunnel_transmission(tunnel: PixelVignetting, x: NDArray, y: NDArray) -> NDArray:
+def _tunnel_transmission(tunnel: PixelVignetting, x: Array, y: Array) -> Array:
     """Return the share of the light behind the layers that meets the photodetector."""
     share = np.asarray(tunnel.exact_gain(x, y), float)
     straight = float(vignetting.stack_transmission(1.0, tunnel.layers))

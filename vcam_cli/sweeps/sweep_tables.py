@@ -9,8 +9,8 @@ from functools import cached_property, partial
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.files.tables import Cell, write_table
 from vcam_cli.sweeps.joint_optimum import MIN_POINTS, find_joint_optimum
 from vcam_cli.sweeps.model import Optimize
@@ -44,10 +44,10 @@ class Surface:
     """A metric over the grid of a case: (values of each parameter ..., repeats x seeds)."""
 
     parameters: tuple[Parameter, ...]
-    values: NDArray
+    values: Array
 
     @property
-    def mean(self) -> NDArray:
+    def mean(self) -> Array:
         """Over repeats and seeds; nan where one of them is missing or not finite."""
         with np.errstate(invalid="ignore"):
             mean = self.values.mean(axis=-1)
@@ -125,7 +125,7 @@ def _joint_optima(
     }
 
 
-def _optimum(case: str, parameter: Parameter, values: NDArray, wanted: Optimize) -> CaseOptimum:
+def _optimum(case: str, parameter: Parameter, values: Array, wanted: Optimize) -> CaseOptimum:
     """Return the optimum of values (values of the parameter, repeats x seeds)."""
     good = np.isfinite(values).all(axis=1)
     about = (case, parameter.path, parameter.unit)

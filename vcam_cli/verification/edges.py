@@ -15,9 +15,9 @@ import math
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vcam_cli import units
+from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
 from vcam_cli.quality.mtf import EdgeResponse, Lattice, slanted_edge_sfr
 from vcam_cli.simulation.preparation import Prepared
@@ -36,12 +36,12 @@ MIDDLE = 0.25
 """Frequency at which the transfer is compared [cycles/pixel]."""
 
 
-def edge_responses(frames: NDArray, measurement: Measurement) -> dict[str, list[EdgeResponse]]:
+def edge_responses(frames: Array, measurement: Measurement) -> dict[str, list[EdgeResponse]]:
     """Return the response of the edge in every frame, color by color.
 
     Parameters
     ----------
-    frames : NDArray
+    frames : Array
         Codes (n, rows, columns) [DN].
     measurement : Measurement
         Pitch and colors of the pixels.

@@ -13,9 +13,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vcam_cli import memory
+from vcam_cli.arrays import Array
 from vcam_cli.errors import BadInput
 from vcam_cli.files.file_checks import UnusableFile, check_file, check_regular, is_raw
 from vcam_cli.files.images.camera_raw import read_codes
@@ -70,7 +70,7 @@ def pages(path: Path) -> list[Page]:
     return [Page(path, number, len(numbers)) for number in numbers]
 
 
-def read_page(page: Page, colors: str) -> NDArray:
+def read_page(page: Page, colors: str) -> Array:
     """Return the codes of a frame as they are stored, (rows, columns) where it has one channel.
 
     Parameters
@@ -117,7 +117,7 @@ def _check_pixels(count: int, each: int = 8) -> None:
         raise UnusableFile(f"its {count:.2g} pixels do not fit the memory")
 
 
-def _read_array(path: Path) -> NDArray:
+def _read_array(path: Path) -> Array:
     header = np.load(path, mmap_mode="r", allow_pickle=False)
     if not isinstance(header, np.ndarray):
         header.close()
@@ -134,7 +134,7 @@ _KINDS = {
 }  # fmt: skip
 
 
-def _read_exr(path: Path, source: Any) -> NDArray:
+def _read_exr(path: Path, source: Any) -> Array:
     if source.seek_subimage(1, 0):
         raise UnusableFile("is an EXR of several parts", "save each frame as a file of its own")
     try:
@@ -156,7 +156,7 @@ def _highest(path: Path, spec: Any, kind: str) -> int:
     return 2**bits - 1 if bits else 0
 
 
-def _unscaled(data: NDArray, highest: int) -> NDArray:
+def _unscaled(data: Array, highest: int) -> Array:
     """Return codes whose largest was scaled to that of their type."""
     if data.dtype.kind != "u" or not highest or highest >= np.iinfo(data.dtype).max:
         return data

@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.camera.derived.mosaic import BLOCKS
 from vcam_cli.errors import BadInput, Collector, bad
 from vcam_cli.files.file_checks import UnusableFile
@@ -39,7 +39,7 @@ class Stack:
 
     entry: FrameSet
     label: str
-    frames: NDArray
+    frames: Array
     """Codes (n, rows, columns) [DN]."""
     dropped: tuple[str, ...]
     """Names of frames whose mean is far from the others'."""
@@ -166,7 +166,7 @@ def numbered_stacks(
         yield number, replace(stack, shift=shift)
 
 
-def _marks(page: Page, frame: NDArray) -> Iterator[object]:
+def _marks(page: Page, frame: Array) -> Iterator[object]:
     """Yield what no two frames have in common: file and page, and codes that have noise."""
     yield page.path.resolve(), page.number
     inner = frame[(frame > 0) & (frame < frame.max())]
@@ -194,7 +194,7 @@ def _shift(measurement: Measurement, pages_of: dict[int, list[Page]]) -> int:
     return spare if common and most >= 2**measurement.levels.bits else 0
 
 
-def _without_outliers(entry: FrameSet, label: str, files: list[Page], frames: NDArray) -> Stack:
+def _without_outliers(entry: FrameSet, label: str, files: list[Page], frames: Array) -> Stack:
     means = frames.mean(axis=(1, 2))
     center = np.median(means)
     limit = max(OUTLIER * robust_deviation(means), LEAST_OUTLIER * center)
@@ -206,7 +206,7 @@ def _without_outliers(entry: FrameSet, label: str, files: list[Page], frames: ND
     return Stack(entry, label, frames[good], dropped, float(np.ptp(used) / max(used.mean(), 1.0)))
 
 
-def _stored(page: Page, measurement: Measurement, number: int) -> NDArray:
+def _stored(page: Page, measurement: Measurement, number: int) -> Array:
     """Return the codes of a frame as they are in its file, (rows, columns)."""
     try:
         codes = read_page(page, "".join(itertools.chain(*color_block(measurement))))
@@ -225,7 +225,7 @@ def _stored(page: Page, measurement: Measurement, number: int) -> NDArray:
     return codes
 
 
-def _read(page: Page, measurement: Measurement, number: int, shift: int) -> NDArray:
+def _read(page: Page, measurement: Measurement, number: int, shift: int) -> Array:
     codes = _stored(page, measurement, number)
     if shift:
         codes = codes >> shift

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.lattice import places
 from vcam_cli.errors import Collector
@@ -36,7 +36,7 @@ class Taken:
     """Of the entry."""
     point: Point
     """The conditions."""
-    frames: NDArray
+    frames: Array
     """Codes in the middle (n, rows, columns) [DN]."""
     shape: tuple[int, int]
     """Rows and columns of the whole frames."""
@@ -86,7 +86,7 @@ def measured_points(
     return sorted(points, key=lambda each: each[0]), taken, notes
 
 
-def middle(frames: NDArray, measurement: Measurement) -> NDArray:
+def middle(frames: Array, measurement: Measurement) -> Array:
     """Return the middle of frames, of whole blocks of the color filter array."""
     block = color_block(measurement)
     cuts = []
@@ -98,7 +98,7 @@ def middle(frames: NDArray, measurement: Measurement) -> NDArray:
 
 
 def quantities_of_colors(
-    measurement: Measurement, frames: NDArray
+    measurement: Measurement, frames: Array
 ) -> dict[str, list[stack_quantities.Quantity]]:
     """Return what the middle of a stack is judged by, color by color; "" of the only one."""
     assert measurement.levels is not None

@@ -20,8 +20,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.simulation import Seed
 from vcam_cli.simulation.frame import take_frame
@@ -40,7 +40,7 @@ LEAST_DEVIATION = 1e-9
 """Least standard deviation of a quantity, relative to its mean: rounding."""
 COUNT_DEVIATION = 0.5
 """Least standard deviation of the root of a count: that of a Poisson number."""
-Measure = Callable[[NDArray], dict[str, list[Quantity]]]
+Measure = Callable[[Array], dict[str, list[Quantity]]]
 """From frames (n, rows, columns) to the quantities of each color."""
 
 
@@ -66,7 +66,7 @@ class Judged:
 def judge(
     camera: Camera,
     point: Point,
-    frames: NDArray,
+    frames: Array,
     shape: tuple[int, int],
     measure: Measure,
     number: int,
@@ -79,7 +79,7 @@ def judge(
         The camera.
     point : Point
         The conditions of the frames.
-    frames : NDArray
+    frames : Array
         Measured codes (n, rows, columns), the middle of the frames where these are large [DN].
     shape : tuple of int
         Rows and columns of the whole frames.
@@ -108,7 +108,7 @@ def judge(
     return found
 
 
-def take_stack(ready: Prepared, count: int, turn: int) -> NDArray:
+def take_stack(ready: Prepared, count: int, turn: int) -> Array:
     """Return frames of one more sensor (n, rows, columns) [DN]."""
     first = ready.camera.seed
     frames = []
@@ -145,7 +145,7 @@ def compare(channel: str, measured: Quantity, predicted: list[Quantity]) -> Judg
     )
 
 
-def _normal_of(forms: NDArray, least: float) -> tuple[float, float]:
+def _normal_of(forms: Array, least: float) -> tuple[float, float]:
     """Return the mean, and the standard deviation of one more number from it."""
     spread = max(float(forms.std(ddof=1)), least) * math.sqrt(1 + 1 / len(forms))
     return float(forms.mean()), spread

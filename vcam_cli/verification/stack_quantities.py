@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.verification.stack_statistics import robust_deviation, stack_statistics
 
 BANDS = 0.0, 0.125, 0.25, 0.5
@@ -46,12 +46,12 @@ class Quantity:
     """Whether that is the logarithm."""
 
 
-def quantities(frames: NDArray, highest: int) -> list[Quantity]:
+def quantities(frames: Array, highest: int) -> list[Quantity]:
     """Return what a stack of frames of one place of the color filter array is judged by.
 
     Parameters
     ----------
-    frames : NDArray
+    frames : Array
         Codes (n, rows, columns); of one frame there is no temporal noise [DN].
     highest : int
         Highest code of the ADC [DN].
@@ -85,13 +85,13 @@ def _variance(name: str, value: float) -> Quantity:
     return Quantity(f"{name} [DN2]", value, form, is_logarithm=True)
 
 
-def _share(name: str, where: NDArray) -> Quantity:
+def _share(name: str, where: Array) -> Quantity:
     """Return a share; the root of a count of Poisson has a variance of 1/4 (Anscombe 1948)."""
     count = int(where.sum())
     return Quantity(f"{name} [1]", count / where.size, math.sqrt(count + 3 / 8), True)
 
 
-def _temporal(frames: NDArray, good: NDArray) -> Iterator[Quantity]:
+def _temporal(frames: Array, good: Array) -> Iterator[Quantity]:
     """Yield variance, spectra and tails of what is new in every frame."""
     told = stack_statistics(frames, good)
     yield _variance("temporal variance of pixels", told.pixel.value)
@@ -110,7 +110,7 @@ def _temporal(frames: NDArray, good: NDArray) -> Iterator[Quantity]:
     yield Quantity("excess kurtosis of temporal noise [1]", told.excess.value, form)
 
 
-def _spatial(average: NDArray, good: NDArray, frames: int) -> Iterator[Quantity]:
+def _spatial(average: Array, good: Array, frames: int) -> Iterator[Quantity]:
     """Yield variance and spectra of the mean of so many frames: pattern, and noise left in it.
 
     That of pixels is without slow differences, which are those of blocks.
@@ -130,14 +130,14 @@ def _spatial(average: NDArray, good: NDArray, frames: int) -> Iterator[Quantity]
     yield from _widths("pattern of pixels", each[_good_cells(good, each.shape)], 1 / frames)
 
 
-def _good_cells(good: NDArray, shape: tuple[int, ...]) -> NDArray:
+def _good_cells(good: Array, shape: tuple[int, ...]) -> Array:
     """Return which pixels count, in the shape of blocks where there are any."""
     if len(shape) == 2:
         return good
     return good[: shape[0] * shape[1], : shape[2] * shape[3]].reshape(shape)
 
 
-def _widths(name: str, values: NDArray, step: float) -> Iterator[Quantity]:
+def _widths(name: str, values: Array, step: float) -> Iterator[Quantity]:
     """Yield how far apart quantiles are, which few large values do not change.
 
     step: of the values, which are spread over it, so that quantiles are no multiples of it.
@@ -151,7 +151,7 @@ def _widths(name: str, values: NDArray, step: float) -> Iterator[Quantity]:
         yield Quantity(label, width, form, is_logarithm=True)
 
 
-def _spectrum(name: str, profiles: NDArray) -> Iterator[Quantity]:
+def _spectrum(name: str, profiles: Array) -> Iterator[Quantity]:
     """Yield the variance of profiles (n, length) that falls into each band of frequencies."""
     length = profiles.shape[1]
     power = (abs(np.fft.rfft(profiles, axis=1)) ** 2).mean(axis=0) / length**2

@@ -12,8 +12,8 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.quality import rounding
 from vcam_cli.quality.photon_transfer import ROUNDING
 
@@ -73,7 +73,7 @@ def combine(estimates: list[Estimate], weights: list[float] | None = None) -> Es
     return sum(scaled[1:], scaled[0]) * (1 / sum(weights))
 
 
-def robust_deviation(values: NDArray) -> float:
+def robust_deviation(values: Array) -> float:
     """Return the standard deviation of normal numbers by their median absolute deviation."""
     return 1.4826 * float(np.median(abs(values - np.median(values))))
 
@@ -83,7 +83,7 @@ class StackStatistics:
     """A plane of one color of a stack: means, and variances with their errors [DN, DN^2]."""
 
     frames: int
-    average: NDArray
+    average: Array
     """Mean of the frames (rows, columns) [DN]."""
     mean: Estimate
     """Mean of the good pixels [DN]."""
@@ -111,14 +111,14 @@ class StackStatistics:
         return self.pixel.value + max(self.row.value, 0.0) + max(self.column.value, 0.0)
 
 
-def stack_statistics(frames: NDArray, good: NDArray) -> StackStatistics:
+def stack_statistics(frames: Array, good: Array) -> StackStatistics:
     """Return the statistics of a stack of two frames or more.
 
     Parameters
     ----------
-    frames : NDArray
+    frames : Array
         Codes (n, rows, columns) [DN].
-    good : NDArray
+    good : Array
         Which pixels count (rows, columns).
 
     Returns

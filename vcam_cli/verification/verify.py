@@ -9,8 +9,8 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
 from vcam_cli.errors import BadInput, Collector
 from vcam_cli.floats import rms
@@ -93,7 +93,7 @@ class Verification:
     """Kind of variance and frames -> relative error that is found nine times in ten."""
 
     @property
-    def errors(self) -> NDArray:
+    def errors(self) -> Array:
         """The errors of all means, relative; those of means that were measured as 0 have none."""
         every = np.array([row.error for row in self.rows if row.quantity.startswith("mean")])
         return every[np.isfinite(every)]

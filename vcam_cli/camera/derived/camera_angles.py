@@ -8,8 +8,8 @@ from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.errors import bad, data_file_problems
 from vcam_cli.spectra.text import parse_numbers, read_table
 
@@ -45,9 +45,9 @@ class CameraAngles:
     Two are equal only where they are the same: a file is read once.
     """
 
-    times: NDArray
+    times: Array
     """Times (n,), rising from the file's first row [s]."""
-    angles: NDArray
+    angles: Array
     """Pan to the right, tilt upward, roll clockwise (3, n), from the first row on [rad]."""
     columns: tuple[str, ...]
     """Names of the columns that they are of."""
@@ -64,7 +64,7 @@ class CameraAngles:
         """Whether the camera turns about its axis."""
         return bool(np.ptp(self.angles[2]))
 
-    def angles_at(self, times: NDArray) -> tuple[NDArray, NDArray, NDArray]:
+    def angles_at(self, times: Array) -> tuple[Array, Array, Array]:
         """Return pan, tilt and roll at times of any shape [rad]."""
         pan, tilt, roll = (np.interp(times, self.times, angle) for angle in self.angles)
         return pan, tilt, roll
@@ -165,7 +165,7 @@ def _name_and_unit(column: str) -> tuple[str, str]:
     return text, ""
 
 
-def _integral(times: NDArray, rates: NDArray) -> NDArray:
+def _integral(times: Array, rates: Array) -> Array:
     """Return the integral of rates from the first time on, by the trapezoidal rule."""
     steps = np.diff(times) * (rates[1:] + rates[:-1]) / 2
     return np.append(0.0, np.cumsum(steps))

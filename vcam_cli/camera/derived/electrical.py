@@ -8,8 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields
 
-from numpy.typing import NDArray
-
+from vcam_cli.arrays import Array
 from vcam_cli.camera.derived import sense_node
 from vcam_cli.camera.derived.charge_storage import capacity
 from vcam_cli.camera.derived.mosaic import BLOCKS
@@ -73,7 +72,7 @@ class Circuit:
         """Voltage per electron in the dark at the end of the pixel [V/e]."""
         return self.conversion_gain if self.curve is None else self.curve.slope
 
-    def volts_of(self, electrons: NDArray) -> NDArray:
+    def volts_of(self, electrons: Array) -> Array:
         """Return the voltage at the ADC of charges [e], in their shape and float type [V]."""
         if self.curve is None:
             return electrons * electrons.dtype.type(self.conversion_gain * self.analog_gain)

@@ -11,8 +11,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.camera.derived.lattice import lattice
 from vcam_cli.camera.derived.lens import lens, scene_distance
 from vcam_cli.camera.derived.pixel_layout import (
@@ -267,7 +267,7 @@ def geometry(camera: CameraModel) -> Geometry:
     )
 
 
-def pixel_centers(geometry: Geometry, detector: bool = False) -> tuple[NDArray, NDArray]:
+def pixel_centers(geometry: Geometry, detector: bool = False) -> tuple[Array, Array]:
     """Return the centers of the array's columns and rows on the sensor.
 
     Parameters

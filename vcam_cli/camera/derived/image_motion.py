@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.camera_angles import CameraAngles, camera_angles, require_times
 from vcam_cli.camera.derived.geometry import Geometry
@@ -64,7 +64,7 @@ class Trajectory:
         """Whether the image moves at all."""
         return self.recorded is not None or self.turns or any(self.velocity)
 
-    def camera_angles(self, times: NDArray) -> tuple[NDArray, NDArray, NDArray]:
+    def camera_angles(self, times: Array) -> tuple[Array, Array, Array]:
         """Return the camera's pan, tilt and roll since the reference, at times [rad]."""
         late = np.asarray(times, dtype=float) - self.reference
         if self.recorded is None:
@@ -74,12 +74,12 @@ class Trajectory:
         pan, tilt, roll = (after - before for after, before in zip(now, first, strict=True))
         return pan, tilt, roll
 
-    def image_turn(self, times: NDArray) -> NDArray:
+    def image_turn(self, times: Array) -> Array:
         """Return by how much the image is turned at times, clockwise [rad]."""
         late = np.asarray(times, dtype=float) - self.reference
         return np.asarray(self.scene_turn * late - self.camera_angles(times)[2])
 
-    def displacement(self, times: NDArray) -> tuple[NDArray, NDArray]:
+    def displacement(self, times: Array) -> tuple[Array, Array]:
         """Return where the image's center is at times, if nothing turns about it [m]."""
         late = np.asarray(times, dtype=float) - self.reference
         pan, tilt, _ = self.camera_angles(times)
@@ -88,19 +88,19 @@ class Trajectory:
             self.scene_y * late + tilt * self.image_distance,
         )
 
-    def still_places(self, x: NDArray, y: NDArray, times: NDArray) -> tuple[NDArray, NDArray]:
+    def still_places(self, x: Array, y: Array, times: Array) -> tuple[Array, Array]:
         """Return where in the still image is what lies at places of the sensor at their times.
 
         Parameters
         ----------
-        x, y : NDArray
+        x, y : Array
             Positions right of the axis and below it [m].
-        times : NDArray
+        times : Array
             Times [s]; the three have shapes that go together.
 
         Returns
         -------
-        tuple of NDArray
+        tuple of Array
             Positions in the image as it is at the reference [m].
         """
         late = times - self.reference
@@ -135,7 +135,7 @@ class ExposedMotion:
         begin = self.trajectory.reference - self.time / 2
         return replace(self, lines=replace(self.lines, line_time=0.0), begin=begin)
 
-    def times(self, x: NDArray, y: NDArray, share: float) -> NDArray:
+    def times(self, x: Array, y: Array, share: float) -> Array:
         """Return when pixels at x (columns,), y (rows,) [m] have had a share of their exposure [s].
 
         The shape is (rows or 1, columns or 1).

@@ -15,8 +15,8 @@ from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.camera.model import CameraModel
 from vcam_cli.camera.sensor.array import CLEAR, Positions
 from vcam_cli.errors import bad, data_file_problems
@@ -51,9 +51,9 @@ class Lattice:
 class Places:
     """Pixels at places of their own."""
 
-    x: NDArray
+    x: Array
     """Places right of the axis [m], (N,)."""
-    y: NDArray
+    y: Array
     """Places below the axis [m], (N,)."""
     colors: tuple[str, ...]
 

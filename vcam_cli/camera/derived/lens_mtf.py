@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.camera.derived.geometry import Geometry, geometry
 from vcam_cli.camera.model import CameraModel
 from vcam_cli.errors import bad, data_file_problems
@@ -106,7 +106,7 @@ def _table(file: str) -> tuple[MtfAtHeight, ...]:
         return tuple(_at_height(file, columns, height) for height in heights.tolist())
 
 
-def _at_height(file: str, columns: dict[str, NDArray], height: float) -> MtfAtHeight:
+def _at_height(file: str, columns: dict[str, Array], height: float) -> MtfAtHeight:
     here = columns[HEIGHT] == height if HEIGHT in columns else np.ones(len(columns[VALUE]), bool)
     waves = np.unique(columns[WAVELENGTH][here]).tolist() if WAVELENGTH in columns else []
     chosen = [here & (columns[WAVELENGTH] == wave) for wave in waves] or [here]
@@ -114,7 +114,7 @@ def _at_height(file: str, columns: dict[str, NDArray], height: float) -> MtfAtHe
     return MtfAtHeight(height / 1e3, tuple(wave / 1e9 for wave in waves), tuple(curves))
 
 
-def _curve(file: str, frequency: NDArray, value: NDArray) -> MtfCurve:
+def _curve(file: str, frequency: Array, value: Array) -> MtfCurve:
     """Return a curve of its rows, from 1 at frequency 0."""
     if (np.diff(frequency) <= 0).any() or frequency[0] < 0:
         raise ValueError(f"{file}: the frequencies of a curve must rise from 0")

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.camera.sensor.array import Positions
@@ -36,7 +36,7 @@ class LineTimes:
         """When the exposure of the last line begins, after that of the first [s]."""
         return self.line_time * ((self.rows if self.go_along_y else self.columns) - 1)
 
-    def starts(self, x: NDArray, y: NDArray) -> NDArray:
+    def starts(self, x: Array, y: Array) -> Array:
         """Return when the exposure of pixels begins, after that of the first line [s].
 
         Their positions are right of the axis (columns,) and below it (rows,) [m]. The shape is

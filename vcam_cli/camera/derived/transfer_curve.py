@@ -17,6 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.camera.derived import sense_node
 from vcam_cli.camera.derived.process import Need, process
 from vcam_cli.camera.model import CameraModel
@@ -46,11 +47,11 @@ class Curve:
     corrected: bool
     """Whether the processing takes it out."""
 
-    def volts_of(self, electrons: float | NDArray) -> NDArray[np.float64]:
+    def volts_of(self, electrons: float | Array) -> NDArray[np.float64]:
         """Return the output of charges, of any shape [V]."""
         return _straight_beyond(electrons, self.electrons, self.volts)
 
-    def electrons_of(self, volts: float | NDArray) -> NDArray[np.float64]:
+    def electrons_of(self, volts: float | Array) -> NDArray[np.float64]:
         """Return the charges of outputs, of any shape [e]."""
         return _straight_beyond(volts, self.volts, self.electrons)
 
@@ -67,7 +68,7 @@ class Curve:
 
 
 def _straight_beyond(
-    value: float | NDArray, x: tuple[float, ...], y: tuple[float, ...]
+    value: float | Array, x: tuple[float, ...], y: tuple[float, ...]
 ) -> NDArray[np.float64]:
     """Return the line through the points at some values, which goes on beyond both ends."""
     at = np.asarray(value, np.float64)
@@ -138,7 +139,7 @@ def _reset_voltage(camera: CameraModel, swing: float) -> float:
     return max(voltage, swing)
 
 
-def _junction_charge(camera: CameraModel, voltage: NDArray, reset: float) -> NDArray[np.float64]:
+def _junction_charge(camera: CameraModel, voltage: Array, reset: float) -> NDArray[np.float64]:
     """Return the charge of the technology's photodiode and the follower's gate [C]."""
     need = Need(f"{PATH}.capacitance", "the capacitance of the junction")
     parts, fixed = sense_node.junction_capacitances(camera, process(camera), need)
@@ -148,7 +149,7 @@ def _junction_charge(camera: CameraModel, voltage: NDArray, reset: float) -> NDA
     return np.asarray(charge)
 
 
-def _output(given: Follower, voltage: NDArray) -> NDArray[np.float64]:
+def _output(given: Follower, voltage: Array) -> NDArray[np.float64]:
     """Return the follower's output at falling voltages of its gate [V]."""
     if given.gain is not None:
         return given.gain * voltage
@@ -180,7 +181,7 @@ def _points(given: Follower) -> Points:
     return tuple(map(tuple, rows.tolist()))
 
 
-def _measured(points: Points, voltage: NDArray) -> NDArray[np.float64]:
+def _measured(points: Points, voltage: Array) -> NDArray[np.float64]:
     """Return the output by lines between measured points. Raises BadInput where they end."""
     x, y = np.array(sorted(points)).T
     path = f"{PATH}.follower"

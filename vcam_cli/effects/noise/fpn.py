@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.camera.derived.electrical import circuit
 from vcam_cli.camera.sensor.architecture import ARCHITECTURES
 from vcam_cli.effects.signal_chain import NoiseSource
@@ -117,7 +117,7 @@ class FixedPattern(NoiseSource):
     def apply(self, electrons, site):
         """Return the block with gains and offsets in it; it reuses the array [electrons]."""
         if self.gain_pixel or self.gain_column:
-            gain: NDArray = 1 + self.gain_column * site.normal_columns("fpn gain column")
+            gain: Array = 1 + self.gain_column * site.normal_columns("fpn gain column")
             if self.gain_pixel:
                 g = site.normal("fpn gain pixel")
                 g *= self.gain_pixel

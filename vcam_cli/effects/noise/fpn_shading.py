@@ -10,8 +10,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.effects.signal_chain import NoiseSource
 
 
@@ -63,7 +63,7 @@ class PatternShading(NoiseSource):
             electrons += self.offset * _cosines(offsets, site).astype(electrons.dtype)
         return electrons
 
-    def _strengths(self, site) -> tuple[NDArray, NDArray]:
+    def _strengths(self, site) -> tuple[Array, Array]:
         """Return the strengths of the cosines, (along y, along x), for offsets and for gains."""
         half_cycles = 2 * self.cycles
         rows = np.arange(min(half_cycles + 1, site.all_rows))
@@ -85,7 +85,7 @@ class PatternShading(NoiseSource):
         return self.variance(mean, dark)
 
 
-def _cosines(strengths: NDArray, site) -> NDArray:
+def _cosines(strengths: Array, site) -> Array:
     """Return the sum of cosines at the pixels of a block, (rows, columns)."""
     rows = site.first_row + np.arange(site.rows)
     along_y = _basis(rows, site.all_rows, strengths.shape[0])
@@ -93,7 +93,7 @@ def _cosines(strengths: NDArray, site) -> NDArray:
     return along_y @ strengths @ along_x.T
 
 
-def _basis(places: NDArray, length: int, count: int) -> NDArray:
+def _basis(places: Array, length: int, count: int) -> Array:
     """Return cosines of unit mean square over `length` pixels, (places, count)."""
     waves = np.cos(np.pi / length * np.outer(places + 0.5, np.arange(count)))
     waves[:, 1:] *= np.sqrt(2)

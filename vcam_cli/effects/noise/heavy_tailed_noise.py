@@ -12,27 +12,27 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.effects.signal_chain import NoiseSource
 
 LEAST_CHANCE = 2.0**-54
 """A number drawn evenly from 0 to 1 is kept this far from 0, half of the generator's step."""
 
 
-def tukey_lambda(chance: NDArray, shape: float) -> NDArray:
+def tukey_lambda(chance: Array, shape: float) -> Array:
     """Return the quantile of Tukey's lambda distribution, (u^s - (1 - u)^s) / s; the logit for 0.
 
     Parameters
     ----------
-    chance : NDArray
+    chance : Array
         Probabilities u, above 0 and below 1.
     shape : float
         Shape s of the distribution.
 
     Returns
     -------
-    NDArray
+    Array
         Quantiles, symmetric about 0 [dimensionless].
 
     References

@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.effects.base import FieldTransfer, Zone
@@ -66,7 +66,7 @@ class FieldBlur(AberrationBlur, FieldTransfer):
         """How far from its place the blur throws almost all of the light, diffraction aside [m]."""
         return max(self.lens.reach(self.wavefront(place)) for place, _ in self.places)
 
-    def spread(self, wavelengths: NDArray) -> NDArray:
+    def spread(self, wavelengths: Array) -> Array:
         """Return a bound (J,) on |1 - H(f)| / (2 pi |f|) [m].
 
         Wavefronts change evenly between places, so that no slope exceeds those there.
@@ -183,7 +183,7 @@ class ZoneWeight:
     half_diagonal: float
     """Half the diagonal of the sensor [m]."""
 
-    def __call__(self, x: NDArray, y: NDArray) -> NDArray:
+    def __call__(self, x: Array, y: Array) -> Array:
         """Return the weight at x (columns,), y (rows,) [m]: (rows, columns), in the type of x."""
         radius = np.minimum(np.hypot(x[None, :], y[:, None]) / self.half_diagonal, 1.0)
         weight = np.zeros(radius.shape)
@@ -197,7 +197,7 @@ class ZoneWeight:
         return weight.astype(x.dtype)
 
 
-def _polynomial(place: NDArray, nodes: tuple[float, ...], own: float) -> NDArray:
+def _polynomial(place: Array, nodes: tuple[float, ...], own: float) -> Array:
     """Return Lagrange's polynomial, which is 1 at its own node and 0 at the others."""
     out = np.ones_like(place)
     for node in nodes:
@@ -206,7 +206,7 @@ def _polynomial(place: NDArray, nodes: tuple[float, ...], own: float) -> NDArray
     return out
 
 
-def _waves(angle: NDArray, count: int) -> NDArray:
+def _waves(angle: Array, count: int) -> Array:
     """Return the sum of waves that is 1 at angle 0 and 0 at the others of `count` (even)."""
     half = angle / 2
     near = np.abs(np.sin(half)) < 1e-6

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.camera.derived.lens_mtf import MtfAtHeight, MtfCurve, lens_mtf
@@ -67,7 +67,7 @@ class MeasuredMtf(MtfBlur, RadialTransfer):
         last = min((c.frequencies[-1] for c in self.measured.curves if c.values[-1] > 0), default=0)
         return f"; beyond {last / 1e3:g} lp/mm as diffraction" if last else ""
 
-    def otf(self, frequency: NDArray, wavelength: float) -> NDArray:
+    def otf(self, frequency: Array, wavelength: float) -> Array:
         """Return the transfer at `frequency` [cycles/m] and `wavelength` [m]."""
         frequency = np.abs(frequency)
         return sum(
@@ -85,7 +85,7 @@ class MeasuredMtf(MtfBlur, RadialTransfer):
         parts = (low, 1 - (at - low)), (low + 1, at - low)
         return tuple((i, part) for i, part in parts if part)
 
-    def _transfer(self, curve: MtfCurve, frequency: NDArray, wavelength: float) -> NDArray:
+    def _transfer(self, curve: MtfCurve, frequency: Array, wavelength: float) -> Array:
         inside = np.interp(frequency, curve.frequencies, curve.values, right=0.0)
         last, value = curve.frequencies[-1], curve.values[-1]
         at_last = self._diffraction(np.array(last), wavelength)
@@ -94,7 +94,7 @@ class MeasuredMtf(MtfBlur, RadialTransfer):
         beyond = value / at_last * self._diffraction(frequency, wavelength)
         return np.where(frequency > last, beyond, inside)
 
-    def _diffraction(self, frequency: NDArray, wavelength: float) -> NDArray:
+    def _diffraction(self, frequency: Array, wavelength: float) -> Array:
         return diffraction.otf_circular(frequency, wavelength, self.f_number, self.magnification)
 
     def cutoff(self, wavelength: float) -> float:
@@ -156,7 +156,7 @@ class FieldMtf(MtfBlur, FieldTransfer):
         """How far from its place it throws most of the light, what diffraction throws aside [m]."""
         return max(place.reach for place in self.places)
 
-    def spread(self, wavelengths: NDArray) -> NDArray:
+    def spread(self, wavelengths: Array) -> Array:
         """Return a bound (J,) on |1 - H(f)| / (2 pi |f|) at all places [m]."""
         return np.max([place.spread(wavelengths) for place in self.places], axis=0)
 

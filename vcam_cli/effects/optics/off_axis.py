@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.camera.derived.falloff import falloff
 from vcam_cli.effects.base import Gain
 from vcam_cli.floats import rms
@@ -170,7 +170,7 @@ class MeasuredFalloff(Gain):
         return 1.002 * rms(change) * signal.full_signal
 
 
-def _quadrant(half_width: float, half_height: float) -> NDArray:
+def _quadrant(half_width: float, half_height: float) -> Array:
     """Return the squared distances from the axis of points all over a quadrant of the sensor [m2].
 
     A bound is the rms over a field at full signal everywhere, by the midpoint rule: 64 points a

@@ -10,8 +10,8 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.effects.base import PlaneTransfer
@@ -35,7 +35,7 @@ class PointSpread(AberrationBlur, PlaneTransfer):
     """Distance of the samples [m]."""
     wavelengths: tuple[float, ...]
     """Wavelengths of the channels [m]; empty where there is one for all wavelengths."""
-    samples: NDArray | None = field(compare=False, repr=False)
+    samples: Array | None = field(compare=False, repr=False)
     """Samples (channels, rows, columns), each of sum 1; None before the file was read."""
 
     @classmethod
@@ -58,7 +58,7 @@ class PointSpread(AberrationBlur, PlaneTransfer):
         """How far from its place the blur throws almost all of the light, diffraction aside [m]."""
         return self._radius(0.99)
 
-    def spread(self, wavelengths: NDArray) -> NDArray:
+    def spread(self, wavelengths: Array) -> Array:
         """Return the mean distance (J,) of the light from its place [m]; inf before it is read."""
         if self.samples is None:
             return np.full(len(wavelengths), np.inf)
@@ -67,7 +67,7 @@ class PointSpread(AberrationBlur, PlaneTransfer):
         radius = np.hypot(x[None, :], y[:, None])
         return np.full(len(wavelengths), float((light * radius).sum(axis=(1, 2)).max()))
 
-    def _loaded_samples(self) -> NDArray:
+    def _loaded_samples(self) -> Array:
         if self.samples is None:
             raise RuntimeError(f"{self.file} has not been read")
         return self.samples
@@ -81,7 +81,7 @@ class PointSpread(AberrationBlur, PlaneTransfer):
         return float(radius[order][np.searchsorted(light, share * light[-1])])
 
     @property
-    def _coordinates(self) -> tuple[NDArray, NDArray]:
+    def _coordinates(self) -> tuple[Array, Array]:
         _, rows, columns = self._loaded_samples().shape
         x = (np.arange(columns) - (columns - 1) / 2) * self.pitch
         y = (np.arange(rows) - (rows - 1) / 2) * self.pitch
@@ -104,7 +104,7 @@ class PointSpread(AberrationBlur, PlaneTransfer):
         """The last transfer of the channels, which the wavelengths share."""
         return ByteCache(0)
 
-    def _channel_transfers(self, fx: NDArray, fy: NDArray) -> NDArray:
+    def _channel_transfers(self, fx: Array, fy: Array) -> Array:
         """Return the Fourier sums of the samples: (channels, m, n).
 
         They are 0 beyond the Nyquist frequency of the samples.

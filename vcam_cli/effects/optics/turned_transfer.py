@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.effects.base import PlaneTransfer, SeparableTransfer
 
 
@@ -50,7 +50,7 @@ class TurnedTransfer(PlaneTransfer):
         width, height = self.still.box or (0.0, 0.0)
         return math.hypot(width, height) / 2
 
-    def spread(self, wavelengths: NDArray) -> NDArray:
+    def spread(self, wavelengths: Array) -> Array:
         """Return how far it displaces light, at most (J,) [m]."""
         return np.full(len(wavelengths), self.reach)
 
@@ -60,7 +60,7 @@ class TurnedTransfer(PlaneTransfer):
         along_x = self.still.along_x((cosine * across[0] - sine * across[1]) * frequency)
         return along_x * self.still.along_y((sine * across[0] + cosine * across[1]) * frequency)
 
-    def otf_plane(self, fx: NDArray, fy: NDArray, wavelength: float) -> NDArray:
+    def otf_plane(self, fx: Array, fy: Array, wavelength: float) -> Array:
         """Return the transfer at all pairs of fx (n,) and fy (m,) [cycles/m]: (m, n)."""
         cosine, sine = math.cos(self.angle), math.sin(self.angle)
         x, y = fx[None, :], fy[:, None]

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.effects.base import Effect, PlaneTransfer, RadialTransfer, switched_off
@@ -125,7 +125,7 @@ class UniformBlur(AberrationBlur):
         """Return the frequency from which the transfer is zero, or inf [cycles/m]."""
         return self.lens.cutoff(wavelength)
 
-    def spread(self, wavelengths: NDArray) -> NDArray:
+    def spread(self, wavelengths: Array) -> Array:
         """Return a bound (J,) on |1 - H(f)| / (2 pi |f|): no ray comes to lie further [m].
 
         The phases that are averaged are those of points of the pupil 2 lambda N f radii apart, and

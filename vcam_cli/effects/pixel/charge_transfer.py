@@ -11,8 +11,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.effects.base import Transport
 
 REST = 1e-9
@@ -65,12 +65,12 @@ class ChargeTransfer(Transport):
         lost = float(_deferred_share(self.inefficiency, most))
         return f"the last pixel defers {100 * lost:.3g} % of its charge in {most} transfers"
 
-    def transport(self, signal: NDArray) -> NDArray:
+    def transport(self, signal: Array) -> Array:
         """Return what arrives of a mean signal (rows, columns), in its unit and float type."""
         along_columns = _transfer_rows(signal, self.inefficiency, self.phases)
         return _transfer_rows(along_columns.T, self.inefficiency, self.phases).T
 
-    def timely_share(self, rows: int, columns: int) -> NDArray:
+    def timely_share(self, rows: int, columns: int) -> Array:
         """Return the share (rows, columns) of a pixel's own charge that does not arrive late."""
         down, along = (self.phases * np.arange(1, count + 1) for count in (rows, columns))
         return 1 - _deferred_share(self.inefficiency, down[:, None] + along)
@@ -84,12 +84,12 @@ class ChargeTransfer(Transport):
         return min(1.0, float(np.sqrt(square))) * signal.full_signal
 
 
-def _deferred_share(inefficiency: float, transfers: NDArray | int) -> NDArray:
+def _deferred_share(inefficiency: float, transfers: Array | int) -> Array:
     """Return the share of a packet that does not arrive in time."""
     return -np.expm1(transfers * np.log1p(-inefficiency))
 
 
-def _transfer_rows(signal: NDArray, inefficiency: float, phases: int) -> NDArray:
+def _transfer_rows(signal: Array, inefficiency: float, phases: int) -> Array:
     """Return what arrives of the packets in the rows of `signal`, the first at the exit.
 
     Shape and float type stay. The shares are a triangular matrix with few diagonals; it is
@@ -106,7 +106,7 @@ def _transfer_rows(signal: NDArray, inefficiency: float, phases: int) -> NDArray
     return out
 
 
-def _shares(inefficiency: float, phases: int, arriving: NDArray, leaving: NDArray) -> NDArray:
+def _shares(inefficiency: float, phases: int, arriving: Array, leaving: Array) -> Array:
     """Return the shares of the packets `leaving` that come with those `arriving`: a matrix."""
     from scipy.special import gammaln
 

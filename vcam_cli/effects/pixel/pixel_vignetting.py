@@ -21,8 +21,8 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.polynomial import chebyshev
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.camera.derived import pixel_layout
 from vcam_cli.effects.base import Gain
 from vcam_cli.floats import rms
@@ -96,7 +96,7 @@ class PixelVignetting(Gain):
         center, corners = (f"{100 * share:.3g} %" for share in loss)
         return f"blocks {center} of the light in the center, {corners} in the corners"
 
-    def exact_gain(self, x: NDArray, y: NDArray) -> NDArray:
+    def exact_gain(self, x: Array, y: Array) -> Array:
         """Return the gain at x, y (rows, columns) [m], integrated over the whole pupil."""
         share = vignetting.collected_fraction(
             x / self.pupil_distance,
@@ -133,7 +133,7 @@ class PixelVignetting(Gain):
 
 
 @lru_cache(maxsize=16)
-def _series(effect: PixelVignetting) -> NDArray:
+def _series(effect: PixelVignetting) -> Array:
     """Coefficients (y, x) of T_i(2 |y| / half - 1) T_j(2 |x| / half - 1).
 
     The gain is good to a few 1e-5 where the light fades slowly. In cones so narrow and tunnels so

@@ -18,8 +18,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.camera.derived.image_motion import ExposedMotion, exposed_motion
 from vcam_cli.effects.base import Effect, ImageMotion, PlaneTransfer, SeparableTransfer
@@ -181,7 +181,7 @@ class RecordedMotion(ImageMotion, PlaneTransfer, Motion):
             f" {len(times)} points"
         )
 
-    def _path(self) -> tuple[NDArray, NDArray, NDArray]:
+    def _path(self) -> tuple[Array, Array, Array]:
         """Return the times of the path's points, and displacements there from its mean place."""
         recorded, begin = self.exposed.trajectory.recorded, self.exposed.begin
         assert recorded is not None

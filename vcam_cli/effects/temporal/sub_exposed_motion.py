@@ -11,8 +11,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.camera.derived.image_motion import ExposedMotion
 from vcam_cli.effects.base import ImageMotion
 
@@ -59,19 +59,19 @@ class SubExposedMotion(ImageMotion):
         end = np.array([0.0, self.exposed.time]) + self.exposed.begin
         return float(np.ptp(self.exposed.trajectory.image_turn(end)))
 
-    def still_places(self, x: NDArray, y: NDArray, share: float) -> tuple[NDArray, NDArray]:
+    def still_places(self, x: Array, y: Array, share: float) -> tuple[Array, Array]:
         """Return where in the still image pixels look when they had a share of their exposure.
 
         Parameters
         ----------
-        x, y : NDArray
+        x, y : Array
             Positions (columns,) right of the axis and (rows,) below it [m].
         share : float
             Time since a line's exposure began over all of it, 0 to 1.
 
         Returns
         -------
-        tuple of NDArray
+        tuple of Array
             Positions x and y in the still image, of shapes that broadcast to (rows, columns) [m].
         """
         times = self.exposed.times(x, y, share)
@@ -115,7 +115,7 @@ class SubExposedMotion(ImageMotion):
         x, y = self._moved()
         return float(np.hypot(np.ptp(x, axis=0), np.ptp(y, axis=0)).max())
 
-    def _moved(self) -> tuple[NDArray, NDArray]:
+    def _moved(self) -> tuple[Array, Array]:
         """Return by how much the image is displaced at some instants and places (n, places) [m]."""
         x, y = (np.linspace(-0.5, 0.5, PLACES) * size for size in (self.width, self.height))
         count, recorded = INSTANTS, self.exposed.trajectory.recorded

@@ -13,9 +13,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vcam_cli import memory
+from vcam_cli.arrays import Array
 from vcam_cli.files.file_checks import (
     UnusableFile,
     check_file,
@@ -63,7 +63,7 @@ def develop(path: Path, yaml_path: tuple[str | int, ...] | str) -> LinearImage:
     return LinearImage(light, ("R", "G", "B"), (said + more,))
 
 
-def read_codes(path: Path) -> tuple[NDArray, str]:
+def read_codes(path: Path) -> tuple[Array, str]:
     """Return the codes of a raw file, and the colors of its first 2 x 2 pixels.
 
     Codes are uint16 (rows, columns), or (rows, columns, 3) where every pixel has all colors,

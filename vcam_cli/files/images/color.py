@@ -27,8 +27,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.files.file_checks import PNG_START
 from vcam_cli.files.images.icc import D50, Curve, linear, power, read_profile
 from vcam_cli.processing.color_correction import BRADFORD, CHROMATICITIES, RGB_TO_XYZ
@@ -68,7 +68,7 @@ class Coding:
     """What says so, for the user; "srgb" and "linear-srgb" of these two."""
     curves: tuple[Curve, ...]
     """Linear light of codes, 1 the largest: one for all channels, or one for each."""
-    to_rec709: NDArray | None = None
+    to_rec709: Array | None = None
     """Matrix (3, 3) to the primaries of Rec. 709; None where they are its own."""
     profile: bytes = b""
     """An ICC profile of tables, which comes before: its codes of 8 bits become sRGB's."""
@@ -101,7 +101,7 @@ class Coding:
         return said
 
 
-def decode_srgb(code: NDArray) -> NDArray:
+def decode_srgb(code: Array) -> Array:
     """Return the linear light of sRGB-coded values (1 = white) [7], float64."""
     code = np.asarray(code)
     high = ((np.maximum(code, 0.04045) + 0.055) / 1.055) ** 2.4
@@ -269,7 +269,7 @@ def _of_radiance(path: Path, channels: int) -> Coding:
     return Coding(name, curves[:1] if channels == 1 else curves, matrix)
 
 
-def _scaled(factor: float, code: NDArray) -> NDArray:
+def _scaled(factor: float, code: Array) -> Array:
     return np.asarray(code, float) * factor
 
 
@@ -302,7 +302,7 @@ def _interoperability(path: Path) -> str:
         return ""
 
 
-def _matrix(places: tuple[float, ...], channels: int) -> NDArray | None:
+def _matrix(places: tuple[float, ...], channels: int) -> Array | None:
     """Return the matrix to Rec. 709 from x, y of red, green, blue and white; None for its own."""
     if channels == 1:
         return None
@@ -321,7 +321,7 @@ def _matrix(places: tuple[float, ...], channels: int) -> NDArray | None:
     return _from_xyz(columns[:, :3] * scale, white)
 
 
-def _from_xyz(to_xyz: NDArray, white: NDArray) -> NDArray | None:
+def _from_xyz(to_xyz: Array, white: Array) -> Array | None:
     """Return the matrix to Rec. 709, white adapted to D65; None where it changes nothing."""
     gains = (BRADFORD @ _D65) / (BRADFORD @ white)
     adapt = np.linalg.solve(BRADFORD, gains[:, np.newaxis] * BRADFORD)
@@ -329,7 +329,7 @@ def _from_xyz(to_xyz: NDArray, white: NDArray) -> NDArray | None:
     return None if np.abs(found - np.eye(3)).max() < SAME_MATRIX else found
 
 
-def _rec709(code: NDArray) -> NDArray:
+def _rec709(code: Array) -> Array:
     """Return the light that Rec. 709 codes, by the inverse of its curve."""
     code = np.asarray(code, float)
     alpha, beta = 1.09929682680944, 0.018053968510807
@@ -337,17 +337,17 @@ def _rec709(code: NDArray) -> NDArray:
     return np.where(code < 4.5 * beta, code / 4.5, high)
 
 
-def _pq(code: NDArray) -> NDArray:
+def _pq(code: Array) -> Array:
     """Return light by SMPTE ST 2084, where 203 cd/m2 are white [6]."""
     m1, m2, c1, c2, c3 = 1305 / 8192, 2523 / 32, 107 / 128, 2413 / 128, 2392 / 128
     root = np.clip(code, 0, 1) ** (1 / m2)
     return (np.maximum(root - c1, 0) / (c2 - c3 * root)) ** (1 / m1) * (10_000 / 203)
 
 
-def _hlg(code: NDArray) -> NDArray:
+def _hlg(code: Array) -> Array:
     """Return the scene's light by ARIB STD-B67, where a code of 75 % is white [6]."""
 
-    def light(code: NDArray) -> NDArray:
+    def light(code: Array) -> Array:
         a, b, c = 0.17883277, 0.28466892, 0.55991073
         high = (np.exp((np.maximum(code, 0.5) - c) / a) + b) / 12
         return np.where(code <= 0.5, np.square(np.maximum(code, 0)) / 3, high)

@@ -27,8 +27,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.files.images.dng_opcodes import gain_maps
 from vcam_cli.files.images.tiff import (
     GRAY,
@@ -111,9 +111,9 @@ PREVIEW_QUALITY = 85
 class Colors:
     """How a camera sees colors."""
 
-    matrices: Mapping[str, NDArray]
+    matrices: Mapping[str, Array]
     """Illuminant -> matrix (3, 3) from XYZ to the camera's R, G, B, colder light last."""
-    neutral: NDArray
+    neutral: Array
     """The camera's R, G, B of the scene's white, 1 the largest."""
 
 
@@ -121,7 +121,7 @@ class Colors:
 class RawImage:
     """A raw frame, and what a raw converter must know to develop it."""
 
-    codes: NDArray
+    codes: Array
     """Whole numbers (rows, columns), or (rows, columns, 3) where every pixel has all colors; of
     any type."""
     block: Sequence[Sequence[str]]
@@ -132,11 +132,11 @@ class RawImage:
     """Level of no light, behind `table` [DN]."""
     white: int
     """Level of a saturated pixel, behind `table` [DN]."""
-    table: NDArray | None
+    table: Array | None
     """Level of every code (N,), uint16; None where codes are levels."""
     baseline_exposure: float
     """Stops that bring the scene's white to the brightest of the picture [EV]."""
-    shading: NDArray | None
+    shading: Array | None
     """Factors (M, N) that make even light even, at places from edge to edge; None for 1."""
     noise: tuple[float, float]
     """Variance of a level from 0 (black) to 1 (white): so much times the level, and so much
@@ -152,7 +152,7 @@ class RawImage:
     iso: float
     """ISO speed; 0 where it has none."""
     description: str
-    preview: NDArray
+    preview: Array
     """A small picture in sRGB, uint8 (rows, columns) or (rows, columns, 3)."""
 
 
@@ -181,7 +181,7 @@ def write_dng(path: Path | str, image: RawImage) -> None:
     write_directory(path, first)
 
 
-def _preview(picture: NDArray) -> Directory:
+def _preview(picture: Array) -> Directory:
     """Return a small picture as a JPEG."""
     from PIL import Image
 
@@ -193,7 +193,7 @@ def _preview(picture: NDArray) -> Directory:
     return Directory([*tags, *sampling, (50970, "I", 1, 2 if color else 1)], [data.getvalue()])
 
 
-def _tiles(codes: NDArray) -> list[bytes]:
+def _tiles(codes: Array) -> list[bytes]:
     """Return all tiles, compressed, row by row."""
     encode = import_module("imagecodecs").jpeg8_encode
     rows, columns = codes.shape[:2]

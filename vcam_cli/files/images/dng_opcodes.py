@@ -6,12 +6,13 @@ Opcodes are big-endian in every file (Digital Negative specification 1.7.1, chap
 import struct
 
 import numpy as np
-from numpy.typing import NDArray
+
+from vcam_cli.arrays import Array
 
 _GAIN_MAP, _SINCE, _MAY_BE_SKIPPED = 9, 0x01030000, 1
 
 
-def gain_maps(shape: tuple[int, ...], block: tuple[int, int], gains: NDArray) -> bytes:
+def gain_maps(shape: tuple[int, ...], block: tuple[int, int], gains: Array) -> bytes:
     """Return an OpcodeList2 that multiplies a raw frame, after its black is subtracted.
 
     Parameters

@@ -18,9 +18,10 @@ from functools import partial
 from io import BytesIO
 
 import numpy as np
-from numpy.typing import NDArray
 
-Curve = Callable[[NDArray], NDArray]
+from vcam_cli.arrays import Array
+
+Curve = Callable[[Array], Array]
 """Linear light of codes, where 1 is the largest code and white."""
 D50 = np.array([0.9642, 1.0, 0.8249])
 """XYZ of the profile connection space's white [1, section 7.2.16]."""
@@ -36,7 +37,7 @@ class Profile:
 
     curves: tuple[Curve, ...]
     """One of gray, three of R, G, B; () where tables say it."""
-    to_xyz: NDArray | None
+    to_xyz: Array | None
     """Matrix (3, 3) from linear R, G, B to XYZ under D50; None of gray, or where tables say it."""
 
 
@@ -98,24 +99,24 @@ def _curve(tag: bytes) -> Curve:
     return partial(_sampled, values / 65535)
 
 
-def linear(code: NDArray) -> NDArray:
+def linear(code: Array) -> Array:
     """Return codes that are light."""
     return np.asarray(code, float)
 
 
-def power(exponent: float, code: NDArray) -> NDArray:
+def power(exponent: float, code: Array) -> Array:
     """Return the light of codes by a power law, odd around 0."""
     return np.copysign(np.abs(code) ** exponent, code)
 
 
-def _sampled(values: NDArray, code: NDArray) -> NDArray:
+def _sampled(values: Array, code: Array) -> Array:
     """Return values between those of a table, and beyond 1 along its last step."""
     place = np.linspace(0, 1, len(values))
     beyond = np.maximum(np.asarray(code) - 1, 0) * (values[-1] - values[-2]) * (len(values) - 1)
     return np.interp(code, place, values) + beyond
 
 
-def _parametric(kind: int, given: tuple[float, ...], code: NDArray) -> NDArray:
+def _parametric(kind: int, given: tuple[float, ...], code: Array) -> Array:
     """Return a parametric curve [1, section 10.18]."""
     g, a, b, c, d, e, f = 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 0.0
     match kind:
@@ -133,7 +134,7 @@ def _parametric(kind: int, given: tuple[float, ...], code: NDArray) -> NDArray:
     return np.where(code >= d, above, c * code + f)
 
 
-def converted_by_tables(data: bytes, codes: NDArray) -> NDArray:
+def converted_by_tables(data: bytes, codes: Array) -> Array:
     """Return codes of 8 bits (h, w, channels) as sRGB's (h, w, 3), relative to white.
 
     Raises

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.files.file_checks import UnusableFile, brief_reason, check_file, convert_errors
 from vcam_cli.files.images.images import (
     check_size,
@@ -59,7 +60,7 @@ def read_psf(
         return np.array([_normalize(stored[:, :, k]) for k in range(channels)])
 
 
-def _read_channels(source: Any, channels: int) -> NDArray:
+def _read_channels(source: Any, channels: int) -> Array:
     """Return the channels as they are in the file, (rows, columns, channels)."""
     spec = source.spec()
     if spec.deep or spec.depth > 1:
@@ -77,7 +78,7 @@ def _read_channels(source: Any, channels: int) -> NDArray:
     return data
 
 
-def _read_npy(path: Path, channels: int) -> NDArray:
+def _read_npy(path: Path, channels: int) -> Array:
     """Return an array (rows, columns) or (channels, rows, columns) as (rows, columns, channels)."""
     try:
         stored = np.load(path, mmap_mode="r", allow_pickle=False)
@@ -97,7 +98,7 @@ def _read_npy(path: Path, channels: int) -> NDArray:
     return np.moveaxis(np.asarray(planes, np.float64), 0, -1)
 
 
-def _read_text(path: Path, channels: int) -> NDArray:
+def _read_text(path: Path, channels: int) -> Array:
     """Return the grid of a text file (rows, columns, 1): its first run of rows of numbers."""
     if channels != 1:
         raise UnusableFile(_wrong_channel_count(1, channels))
@@ -153,7 +154,7 @@ def _wrong_channel_count(found: int, wanted: int) -> str:
     return f"{has}, but psf.wavelengths lists {wanted}"
 
 
-def _normalize(plane: NDArray) -> NDArray[np.float64]:
+def _normalize(plane: Array) -> NDArray[np.float64]:
     """Return a plane of light with the sum 1."""
     light = plane.astype(np.float64)
     if not np.isfinite(light).all():

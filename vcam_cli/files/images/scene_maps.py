@@ -3,8 +3,8 @@
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.errors import bad
 from vcam_cli.files.file_checks import UnusableFile, check_file, convert_errors
 from vcam_cli.files.images.images import (
@@ -19,7 +19,7 @@ from vcam_cli.files.images.images import (
 YamlPath = tuple[str | int, ...]
 
 
-def read_opacity(path: Path | str, yaml_path: YamlPath) -> NDArray:
+def read_opacity(path: Path | str, yaml_path: YamlPath) -> Array:
     """Return the opacity (h, w) of an image file, 0 to 1: its alpha, or its only channel.
 
     Codes are opacity, and no light: full scale is 1, whatever their encoding.
@@ -51,7 +51,7 @@ def read_depth(
     yaml_path: YamlPath,
     size: tuple[int, int],
     channel: str | None = None,
-) -> tuple[NDArray, tuple[str, ...]]:
+) -> tuple[Array, tuple[str, ...]]:
     """Return the distances (h, w) that a file has for every sample of a picture, and notes.
 
     Parameters
@@ -69,7 +69,7 @@ def read_depth(
 
     Returns
     -------
-    depth : NDArray
+    depth : Array
         Distances [m], above 0; infinite for the sky.
     notes : tuple of str
         What was taken for granted, for the user.
@@ -108,14 +108,14 @@ def read_depth(
     return depth, tuple(notes)
 
 
-def _numpy_map(path: Path) -> NDArray:
+def _numpy_map(path: Path) -> Array:
     found = np.load(path, mmap_mode="r", allow_pickle=False)
     if not isinstance(found, np.ndarray) or found.ndim != 2 or found.dtype.kind not in "fui":
         raise UnusableFile("is no array of rows x columns of numbers")
     return found
 
 
-def _image_map(path: Path, channel: str | None) -> NDArray:
+def _image_map(path: Path, channel: str | None) -> Array:
     with open_image(path) as source:
         spec = source.spec()
         if spec.deep or spec.depth > 1:

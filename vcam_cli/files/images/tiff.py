@@ -14,9 +14,9 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
-from numpy.typing import NDArray
 
 import vcam_cli
+from vcam_cli.arrays import Array
 from vcam_cli.files.atomic import write_whole
 
 Tag = tuple[int, str, int, Any]
@@ -54,7 +54,7 @@ class Directory:
 
 
 def write_tiff(
-    path: Path | str, samples: NDArray, description: str, tags: Sequence[Tag] = ()
+    path: Path | str, samples: Array, description: str, tags: Sequence[Tag] = ()
 ) -> None:
     """Write whole numbers (rows, columns) or (rows, columns, C), uncompressed.
 
@@ -121,7 +121,7 @@ def text(code: int, value: str) -> Tag:
     return code, "s", len(data), data
 
 
-def raw_bytes(samples: NDArray) -> memoryview:
+def raw_bytes(samples: Array) -> memoryview:
     """Return samples as a file has them, little-endian."""
     ordered = np.ascontiguousarray(samples, samples.dtype.newbyteorder("<"))
     return ordered.reshape(-1).view(np.uint8).data
@@ -217,6 +217,6 @@ def mosaic_tags(block: Sequence[Sequence[str]]) -> list[Tag]:
     return [(33421, "H", 2, size), (33422, "B", len(numbers), tuple(numbers))]
 
 
-def whole_numbers(values: NDArray, highest: float) -> NDArray:
+def whole_numbers(values: Array, highest: float) -> Array:
     """Return codes as uint16, or uint32 where the highest one asks for it."""
     return values.astype(np.uint16 if highest < 1 << 16 else np.uint32)

@@ -9,8 +9,8 @@ from types import TracebackType
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.errors import CannotDo
 
 CODECS = (("-c:v", "libx264", "-crf", "16"), ("-c:v", "mpeg4", "-q:v", "2"))
@@ -53,7 +53,7 @@ class VideoWriter:
         )
         return self
 
-    def write(self, render: NDArray) -> None:
+    def write(self, render: Array) -> None:
         """Append a render (rows, columns) or (rows, columns, 3) of 8 or 16 bits."""
         codes = render if render.dtype == np.uint8 else (render >> 8).astype(np.uint8)
         codes = codes if codes.ndim == 3 else codes[:, :, None]

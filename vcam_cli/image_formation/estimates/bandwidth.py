@@ -17,8 +17,8 @@ from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.camera.derived.geometry import Geometry, pixel_centers
 from vcam_cli.effects.base import Effect, ImageMotion, RadialTransfer, of_kind
 from vcam_cli.image_formation.cosine_series import Axis
@@ -112,9 +112,7 @@ def margin(
     return _fast(geometry, round(pixels * knobs.margin_scale))
 
 
-def line_spread_tail(
-    blurs: Sequence[RadialTransfer], wavelength: float, distance: NDArray
-) -> NDArray:
+def line_spread_tail(blurs: Sequence[RadialTransfer], wavelength: float, distance: Array) -> Array:
     """Return the part of the light of a line that falls further to one side than a distance.
 
     It is 1/2 - (1/pi) integral of H(f) sin(2 pi f x) / f over f > 0. From where that cancels to
@@ -127,19 +125,19 @@ def line_spread_tail(
         Blurs whose transfers multiply.
     wavelength : float
         Wavelength [m].
-    distance : NDArray
+    distance : Array
         Distances (n,), rising [m].
 
     Returns
     -------
-    NDArray
+    Array
         Parts (n,) of the light, 0 to 1/2, falling.
     """
     if not blurs:
         return np.zeros(len(distance))
     cutoff = min(blur.cutoff(wavelength) for blur in blurs)
 
-    def otf(f: NDArray) -> NDArray:
+    def otf(f: Array) -> Array:
         return np.prod([blur.otf(f, wavelength) for blur in blurs], axis=0)
 
     if math.isinf(cutoff):
@@ -160,7 +158,7 @@ def line_spread_tail(
     return np.maximum.accumulate(np.clip(tail, 0, 0.5)[::-1])[::-1]
 
 
-def _periods() -> tuple[NDArray, NDArray]:
+def _periods() -> tuple[Array, Array]:
     """Return nodes (n,) of an integral over the periods of a wave, and their weights (n,).
 
     Weights fall to 0 within 48 periods, as if a line were as wide as a fiftieth of the distance:
@@ -236,7 +234,7 @@ def highest_passed(path: OpticalPath, scene: Scene) -> float:
     return max(limit, LOWEST)
 
 
-def _passed_by_rays(path: OpticalPath, frequency: NDArray) -> NDArray:
+def _passed_by_rays(path: OpticalPath, frequency: Array) -> Array:
     """Return the contrast (n,) that blurs with a direction or over the field leave at most."""
     passed = np.ones(frequency.shape)
     green = float(np.median(path.transfer.wavelengths))  # rays have no wavelength

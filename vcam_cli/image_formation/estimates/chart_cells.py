@@ -21,8 +21,8 @@ from typing import NamedTuple
 
 import numpy as np
 import scipy.fft
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.image_formation.optical_path import OpticalPath
 from vcam_cli.scenes.base import ChartScene
@@ -140,14 +140,14 @@ class CellError:
         return cls(path, energy, min(path.transfer.cutoff, highest / (2 * pitch)))
 
     @cached_property
-    def _table(self) -> tuple[NDArray, NDArray]:
+    def _table(self) -> tuple[Array, Array]:
         """Frequencies (n,) [cycles/m], and what the lens passes of the color of most light."""
         f = np.linspace(0, self.top, 8 * FREQUENCIES + 1)
         weights = self.path.judged_weights.sum(axis=0)
         otf = (weights / (weights.sum() or 1.0)) @ self.path.transfer.otf_radial(f)
         return f, np.square(otf)
 
-    def _passed(self, fx: NDArray, fy: NDArray) -> NDArray:
+    def _passed(self, fx: Array, fy: Array) -> Array:
         """Return the squared transfer at frequencies of one shape [cycles/m]."""
         f, squares = self._table
         passed = np.interp(np.hypot(fx, fy), f, squares, right=0.0)
@@ -213,6 +213,6 @@ FOLDS = (-2, -1, 1, 2)
 """Multiples of the cells' frequency from which edges are folded that count."""
 
 
-def _folded(turns: NDArray, k: int) -> NDArray:
+def _folded(turns: Array, k: int) -> Array:
     """Return what is left of a wave of f + k / d after the mean over cells, over that of f."""
     return turns / (turns + k) if k else np.ones_like(turns)

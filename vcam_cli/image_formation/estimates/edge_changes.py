@@ -19,8 +19,8 @@ from typing import TypeGuard
 
 import numpy as np
 import scipy.fft
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.camera.derived.geometry import pixel_centers
 from vcam_cli.effects.base import Blur
 from vcam_cli.image_formation.optical_path import OpticalPath
@@ -45,13 +45,13 @@ class EdgeGroup:
 
     across: tuple[float, float]
     """Unit vector (x, y) across them."""
-    heights: NDArray
+    heights: Array
     """(K, strips, n) steps of the components."""
-    distances: NDArray
+    distances: Array
     """(n, m) of some pixels from each edge [m]."""
-    pixels: NDArray
+    pixels: Array
     """(n, m) numbers of these pixels in a strip."""
-    counts: NDArray
+    counts: Array
     """(strips,) how many pixels each stands for."""
 
 
@@ -129,7 +129,7 @@ def _reach(path: OpticalPath, spread: float) -> float:
     return AROUND * max(path.geometry.pitch_x, path.geometry.pitch_y, spread)
 
 
-def _near(at: NDArray, places: NDArray, reach: float) -> tuple[NDArray, NDArray]:
+def _near(at: Array, places: Array, reach: float) -> tuple[Array, Array]:
     """Return the distances (n, m) of pixels at places from edges, and their numbers.
 
     Of pixels beyond the array the distance is inf.
@@ -145,8 +145,8 @@ def _near(at: NDArray, places: NDArray, reach: float) -> tuple[NDArray, NDArray]
 def _along_profile(
     path: OpticalPath,
     across: tuple[float, float],
-    places: NDArray,
-    heights: NDArray,
+    places: Array,
+    heights: Array,
     spread: float,
 ) -> EdgeGroup:
     """Return edges that are seen by all rows of pixels, or all columns, each in another place."""
@@ -165,7 +165,7 @@ def _along_profile(
     )
 
 
-def _group_squares(path: OpticalPath, group: EdgeGroup, blur: Blur) -> NDArray | None:
+def _group_squares(path: OpticalPath, group: EdgeGroup, blur: Blur) -> Array | None:
     """Return the sums (C,) over pixels of the squared change by a blur [(e/s)^2]."""
     g, weights = path.geometry, path.transfer.weights
     reach = float(np.abs(group.distances[np.isfinite(group.distances)]).max(initial=0.0))
@@ -201,7 +201,7 @@ def _group_squares(path: OpticalPath, group: EdgeGroup, blur: Blur) -> NDArray |
     return squares
 
 
-def _waves(parts: NDArray, f: NDArray, places: NDArray) -> NDArray:
+def _waves(parts: Array, f: Array, places: Array) -> Array:
     """Return the integrals (J, n) of Im[parts exp(2 pi i f u)] over f at places u (n,) [m].
 
     `parts` are (J, k) at the midpoints f of k equal steps. A transform gives the integrals at

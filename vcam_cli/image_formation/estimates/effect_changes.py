@@ -9,8 +9,8 @@ import math
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.effects.base import Effect, FieldTransfer, PlaneTransfer, RadialTransfer, of_kind
 from vcam_cli.image_formation.estimates.scene_sampling import SampledImage
 from vcam_cli.image_formation.field_dependence import Mode
@@ -45,7 +45,7 @@ def changes_by_omission(
     behind_lens = image.lens_power  # that of its radial part, which bounds what it passes
     if path.field is None and of_kind(path.effects, PlaneTransfer):
         behind_lens = image.power.lens_power(tables)
-    squares: dict[Effect, NDArray] = {
+    squares: dict[Effect, Array] = {
         effect: image.power.omission_power(behind_lens, effect) for effect in path.separable
     }
     for effect in of_kind(path.effects, RadialTransfer):

@@ -12,8 +12,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.effects.base import SeparableTransfer
 from vcam_cli.image_formation.cosine_series import Axis
 from vcam_cli.image_formation.scene_spectrum import SceneSpectrum, pairs
@@ -30,17 +30,17 @@ WIDTH = 1 / 20
 class Blocks:
     """Blocks of neighboring terms along one axis."""
 
-    edges: NDArray
+    edges: Array
     """(b + 1,) first coefficients of blocks of the samples' spectrum, from 0, and the end."""
-    weights: NDArray
+    weights: Array
     """(n, b) from squares of those coefficients to mean squares of the terms in every block."""
-    low: NDArray
+    low: Array
     """(n,) lowest frequency of every block of terms [cycles/m]."""
-    high: NDArray
+    high: Array
     """(n,) highest frequency of every block of terms [cycles/m]."""
 
     @property
-    def center(self) -> NDArray:
+    def center(self) -> Array:
         """Frequencies (n,) in the middle of the blocks [cycles/m]."""
         return (self.low + self.high) / 2
 
@@ -86,7 +86,7 @@ def blocks(axis: Axis) -> Blocks:
     return Blocks(edges, weights, start[merged] * step, np.maximum.reduceat(stop, merged) * step)
 
 
-def _starts(terms: int) -> NDArray:
+def _starts(terms: int) -> Array:
     """Return the first terms of blocks whose width grows with the frequency."""
     starts = [*range(min(ALONE, terms))]
     at = len(starts)
@@ -102,12 +102,12 @@ class PowerSpectrum:
 
     x: Blocks
     y: Blocks
-    products: NDArray
+    products: Array
     """(pairs, blocks along y, blocks along x) of planes (r, s), r <= s, twice where they differ."""
     planes: int
     separable: tuple[SeparableTransfer, ...]
 
-    def filtered_power(self, tables: Tables) -> NDArray:
+    def filtered_power(self, tables: Tables) -> Array:
         """Return the mean squares of every color's signal.
 
         Parameters
@@ -117,12 +117,12 @@ class PowerSpectrum:
 
         Returns
         -------
-        NDArray
+        Array
             Mean squares (C, blocks along y, blocks along x) [(e/s)^2].
         """
         return self.pixel_power(self.lens_power(tables))
 
-    def lens_power(self, tables: Tables) -> NDArray:
+    def lens_power(self, tables: Tables) -> Array:
         """Return the mean squares before the separable transfer functions.
 
         Parameters
@@ -132,7 +132,7 @@ class PowerSpectrum:
 
         Returns
         -------
-        NDArray
+        Array
             Mean squares (C, blocks along y, blocks along x) [(e/s)^2].
         """
         power = np.zeros((tables.colors, len(self.y.low), len(self.x.low)))
@@ -142,22 +142,22 @@ class PowerSpectrum:
                 power += values[r] * values[s] * squares
         return np.maximum(power, 0)
 
-    def pixel_power(self, power: NDArray) -> NDArray:
+    def pixel_power(self, power: Array) -> Array:
         """Return mean squares behind the separable transfer functions.
 
         Parameters
         ----------
-        power : NDArray
+        power : Array
             Mean squares before them, from `lens_power`.
 
         Returns
         -------
-        NDArray
+        Array
             Mean squares (C, blocks along y, blocks along x) [(e/s)^2].
         """
         return power * self._separable_squares(self.separable)
 
-    def upper_bound(self, tables: Tables) -> NDArray:
+    def upper_bound(self, tables: Tables) -> Array:
         """Return mean squares that no lens exceeds whose radial part is given.
 
         Planes whose light cancels through one lens need not through another: it is as if none did.
@@ -169,7 +169,7 @@ class PowerSpectrum:
 
         Returns
         -------
-        NDArray
+        Array
             Mean squares (C, blocks along y, blocks along x) [(e/s)^2].
         """
         values = np.abs(reader(tables, 0, self.x.center).values(self.y.center))
@@ -177,26 +177,26 @@ class PowerSpectrum:
         amplitudes = values * np.sqrt(np.maximum(own, 0))[:, None]
         return self.pixel_power(np.square(amplitudes.sum(axis=0)))
 
-    def omission_power(self, power: NDArray, effect: SeparableTransfer) -> NDArray:
+    def omission_power(self, power: Array, effect: SeparableTransfer) -> Array:
         """Return mean squares of what leaving out a separable transfer function adds.
 
         Parameters
         ----------
-        power : NDArray
+        power : Array
             Mean squares from `lens_power`.
         effect : SeparableTransfer
             The transfer function that is left out.
 
         Returns
         -------
-        NDArray
+        Array
             Mean squares (C,) [(e/s)^2].
         """
         others = self._separable_squares([e for e in self.separable if e is not effect])
         own = np.outer(effect.along_y(self.y.center), effect.along_x(self.x.center))
         return np.asarray((power * (others * np.square(1 - own))).sum(axis=(1, 2)))
 
-    def _separable_squares(self, effects: Sequence[SeparableTransfer]) -> NDArray:
+    def _separable_squares(self, effects: Sequence[SeparableTransfer]) -> Array:
         """Return the largest squares of separable transfer functions in the blocks."""
         along_x, along_y = np.ones(len(self.x.low)), np.ones(len(self.y.low))
         for effect in effects:
@@ -204,14 +204,14 @@ class PowerSpectrum:
             along_y *= _largest(effect.along_y, self.y)
         return np.outer(along_y, along_x)
 
-    def needed_frequency(self, power: NDArray, budget: float, pitch: tuple[float, float]) -> float:
+    def needed_frequency(self, power: Array, budget: float, pitch: tuple[float, float]) -> float:
         """Return the frequency beyond which little enough is left.
 
         That of a term is the larger of those along both axes, each in its own Nyquist frequency.
 
         Parameters
         ----------
-        power : NDArray
+        power : Array
             Mean squares (C, ...) from `filtered_power` or `upper_bound` [(e/s)^2].
         budget : float
             Rms that may be left at the pixels [e/s].
@@ -227,12 +227,12 @@ class PowerSpectrum:
         needed = np.flatnonzero(left.max(axis=0) > budget)
         return float(frequency[needed[-1]]) if len(needed) else 0.0
 
-    def tail_rms(self, power: NDArray, frequency: float, pitch: tuple[float, float]) -> float:
+    def tail_rms(self, power: Array, frequency: float, pitch: tuple[float, float]) -> float:
         """Return the rms of all that lies beyond a frequency, in the color of most.
 
         Parameters
         ----------
-        power : NDArray
+        power : Array
             Mean squares (C, ...) from `filtered_power` or `upper_bound` [(e/s)^2].
         frequency : float
             Frequency [pixel Nyquist].
@@ -248,7 +248,7 @@ class PowerSpectrum:
         beyond = int(np.searchsorted(every, frequency * (1 + 1e-9), side="right"))
         return float(left[:, beyond].max()) if beyond < left.shape[1] else 0.0
 
-    def _left_beyond(self, power: NDArray, pitch: tuple[float, float]) -> tuple[NDArray, NDArray]:
+    def _left_beyond(self, power: Array, pitch: tuple[float, float]) -> tuple[Array, Array]:
         """Return frequencies (n,) [pixel Nyquist], and what is left from each on, rms (C, n).
 
         Pixels cannot tell apart a term of each zone between multiples of their Nyquist frequency:
@@ -268,7 +268,7 @@ class PowerSpectrum:
         return frequency, np.array(left)
 
 
-def _largest(transfer, blocks: Blocks) -> NDArray:
+def _largest(transfer, blocks: Blocks) -> Array:
     """Return the largest square of a transfer function along one axis in every block."""
     ends = [transfer(f) for f in (blocks.low, blocks.center, blocks.high)]
     return np.asarray(np.square(ends).max(axis=0))

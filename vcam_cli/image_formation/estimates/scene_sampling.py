@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.image_formation.closed_spectrum import closed_spectrum
 from vcam_cli.image_formation.estimates.bandwidth import FREQUENCY_SHARE, LOWEST, axes, table_size
 from vcam_cli.image_formation.estimates.chart_cells import cell_grid
@@ -40,7 +40,7 @@ class SampledImage:
     power: PowerSpectrum
     tables: Tables
     """The radial part of the lens, up to where power is judged."""
-    lens_power: NDArray
+    lens_power: Array
     """Mean squares of the signal behind them, before the separable transfer functions."""
     highest: float
     """Frequency up to which it is filtered [pixel Nyquist]."""
@@ -51,12 +51,12 @@ class SampledImage:
     density: float
     """Area of the scene over that of the array: as if all of its light fell on the array."""
 
-    def rms(self, squares: NDArray) -> float:
+    def rms(self, squares: Array) -> float:
         """Return the rms of a signal in the color of most [e/s].
 
         Parameters
         ----------
-        squares : NDArray
+        squares : Array
             Mean squares over the scene (C, ...) [(e/s)^2].
 
         Returns
@@ -146,7 +146,7 @@ def sampled_image(
 
 
 def _scene_spectrum(
-    path: OpticalPath, scene: SampledScene, highest: float, mix: NDArray
+    path: OpticalPath, scene: SampledScene, highest: float, mix: Array
 ) -> tuple[SampledScene, SceneSpectrum, float]:
     """Return the spectrum of a scene's planes, and a bound on the signal before blur [e/s]."""
     dtype = path.settings.dtype
@@ -161,6 +161,6 @@ def _scene_spectrum(
         terms = y.terms, x.terms
         painted, brightest = transform_painted(scene, mix, terms, dtype, path.workers)
         return scene, painted, float((level.T @ brightest).max())
-    planes: NDArray = scene.planes(mix, path.workers).astype(dtype, copy=False)
+    planes: Array = scene.planes(mix, path.workers).astype(dtype, copy=False)
     brightest = np.array([max(float(p.max()), -float(p.min())) for p in planes])
     return scene, transform_planes(planes, path.workers), float((level.T @ brightest).max())

@@ -19,9 +19,9 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vcam_cli import memory
+from vcam_cli.arrays import Array
 from vcam_cli.camera.derived.mosaic import Mosaic
 from vcam_cli.effects.base import Blur, SeparableTransfer, of_kind
 from vcam_cli.effects.optics.paraboloid import Paraboloid
@@ -73,11 +73,11 @@ def cut_image(
 
     def formed(
         layer: CutLayer, optics: LayerOptics, slope: SlopeLayer | None = None
-    ) -> tuple[NDArray, NDArray]:
+    ) -> tuple[Array, Array]:
         own = _layer_path(path, optics, len(used))
         parts, report = form(own, layer)
         reports.append(report)
-        like: NDArray = np.empty((len(own.mosaic.colors), 0), own_type)
+        like: Array = np.empty((len(own.mosaic.colors), 0), own_type)
         both = gathered(parts, path.geometry, like)
         if slope is not None:
             parts, report = form(_layer_path(path, _with_paraboloid(optics), len(used)), slope)

@@ -10,8 +10,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.camera.derived.geometry import Geometry, pixel_centers
 from vcam_cli.effects.base import ImageMotion, of_kind
 from vcam_cli.effects.temporal.motion import EvenMotion
@@ -41,8 +41,8 @@ def moves_otherwise(optics: LayerOptics) -> bool:
 
 
 def partly_hidden(
-    g: Geometry, chart: LayerChart, optics: LayerOptics, window: Window, mean: NDArray
-) -> NDArray:
+    g: Geometry, chart: LayerChart, optics: LayerOptics, window: Window, mean: Array
+) -> Array:
     """Return the part of the light behind a layer that may be missing from the product of means.
 
     Parameters
@@ -55,12 +55,12 @@ def partly_hidden(
         What acts on its light.
     window : Window
         Pixels that the layer's light reaches.
-    mean : NDArray
+    mean : Array
         The layer's opacity behind the lens (C, rows, columns) there.
 
     Returns
     -------
-    NDArray
+    Array
         Bound (rows, columns), 0 where all rays see the same.
     """
     low, high = _opacity_range(g, chart, optics, window)
@@ -72,7 +72,7 @@ def partly_hidden(
 
 def _opacity_range(
     g: Geometry, chart: LayerChart, optics: LayerOptics, window: Window
-) -> tuple[NDArray, NDArray]:
+) -> tuple[Array, Array]:
     """Return the least and the largest opacity (rows, columns) that rays of each pixel meet."""
     from scipy.ndimage import maximum_filter, minimum_filter
 

@@ -19,8 +19,8 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.camera.derived.geometry import Geometry, pixel_centers
 from vcam_cli.camera.derived.mosaic import Mosaic
 from vcam_cli.effects.base import (
@@ -71,9 +71,9 @@ class SeenLayer:
     """In the scene, the nearest first."""
     window: Window
     """Pixels that its light reaches."""
-    light: NDArray
+    light: Array
     """Light (C, rows, columns) in the window [e/s]."""
-    cover: NDArray
+    cover: Array
     """Opacity (C, rows, columns)."""
     path: OpticalPath
     beyond: int
@@ -151,14 +151,14 @@ def _layers_seen(path: OpticalPath, scene: LayeredScene, form: FormImage) -> Ite
 
 def _composed(
     path: OpticalPath, scene: LayeredScene, layers: Sequence[SeenLayer]
-) -> tuple[NDArray, NDArray]:
+) -> tuple[Array, Array]:
     """Return the light (C, rows, columns) of layers one before the other [e/s].
 
     And a bound (rows, columns) on what is missing from it in the color where it is most [e/s].
     """
     g, white = path.geometry, float(path.transfer.level[-1].max())
     colors = len(path.transfer.weights[-1])
-    total: NDArray = np.zeros((colors, g.rows, g.columns), path.settings.dtype)
+    total: Array = np.zeros((colors, g.rows, g.columns), path.settings.dtype)
     clear, bound = np.ones_like(total), np.zeros_like(total[0])
     for layer in layers:
         here = slice(None), layer.window.rows, layer.window.columns
@@ -204,10 +204,10 @@ def _painted(path: OpticalPath, scene: LayeredScene, cells: Cells) -> list[RayLa
 
 
 def gathered(
-    layers: Layers, g: Geometry, like: NDArray, at: tuple[float, float] = (0.0, 0.0)
-) -> NDArray:
+    layers: Layers, g: Geometry, like: Array, at: tuple[float, float] = (0.0, 0.0)
+) -> Array:
     """Return the sum (C, rows, columns) of parts of an image whose center lies at a place [m]."""
-    out: NDArray = np.zeros((len(like), g.rows, g.columns), like.dtype)
+    out: Array = np.zeros((len(like), g.rows, g.columns), like.dtype)
     columns, rows = pixel_centers(g)
     for layer in layers:
         weight = 1.0 if layer.weight is None else layer.weight(columns + at[0], rows + at[1])
@@ -270,7 +270,7 @@ def _light_and_cover(
     beyond: int,
     white: Spectrum,
     form: FormImage,
-) -> tuple[NDArray, NDArray, SpectrumReport]:
+) -> tuple[Array, Array, SpectrumReport]:
     """Return a layer's light [e/s] and opacity (C, rows, columns) around a place on the array [m].
 
     The opacity of one that hides nothing is 1.
@@ -289,7 +289,7 @@ def _light_and_cover(
         chart=chart,
     )
     layers, report = form(path, scene)
-    planes: NDArray = np.empty((len(path.mosaic.colors), 0), path.settings.dtype)
+    planes: Array = np.empty((len(path.mosaic.colors), 0), path.settings.dtype)
     both = gathered(layers, g, planes, center)
     if not path.has_opacity:
         return (
@@ -314,7 +314,7 @@ def _share_seen(window: Window, beyond: int) -> float:
     return rows * columns / ((rows + 2 * beyond) * (columns + 2 * beyond))
 
 
-def _meets(part: LayerPart, x: NDArray, y: NDArray) -> bool:
+def _meets(part: LayerPart, x: Array, y: Array) -> bool:
     """Return whether there is a part of a layer between the first and last of some places [m]."""
     if part.size is None:
         return True

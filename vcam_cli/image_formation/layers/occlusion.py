@@ -32,8 +32,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.scenes.cells import cell_means
 
 TURNS = (math.sqrt(5) - 1) / 2, math.sqrt(2) - 1
@@ -44,12 +44,12 @@ STEPS = (
 )
 """Steps of instant and place from one ray to the next, of two sets without a common structure."""
 
-Planes = tuple[NDArray, NDArray]
+Planes = tuple[Array, Array]
 """Light times opacity (C, h, w), and opacity (h, w) or (C, h, w)."""
-Seen = Callable[[NDArray, NDArray], tuple[NDArray, NDArray]]
+Seen = Callable[[Array, Array], tuple[Array, Array]]
 """What makes of images of light (n, C, h, w) and of opacity (m, h, w) their values in every color
 at the pixels: (n, C, rows, columns) and (m, C, rows, columns)."""
-Compose = Callable[[Sequence[Planes]], NDArray]
+Compose = Callable[[Sequence[Planes]], Array]
 """What makes light (C, h, w) of layers, the nearest first."""
 
 
@@ -57,7 +57,7 @@ Compose = Callable[[Sequence[Planes]], NDArray]
 class RayLayer:
     """A layer as rays meet it. Lengths are in cells, along x and y."""
 
-    planes: NDArray
+    planes: Array
     """Light times opacity of every color, and opacity (C + 1, h, w)."""
     radius: tuple[float, float]
     """Radius of a point's blur; positive where the layer is nearer than what is in focus."""
@@ -73,14 +73,14 @@ class RayLayer:
         )
         return RayLayer(cell_means(self.planes, count), radius, path, place)
 
-    def offsets(self, rays: NDArray) -> NDArray:
+    def offsets(self, rays: Array) -> Array:
         """Return by how many cells (n, 2) right and down of its own each ray meets the layer."""
         u, t, within = rays[:, :2], rays[:, 2:3] - 0.5, rays[:, 3:]
         met = within + u * self.radius - t * self.path - self.place
         return np.floor(met).astype(int)
 
 
-def rays(count: int, kind: int) -> NDArray:
+def rays(count: int, kind: int) -> Array:
     """Return rays (n, 5): a point of the aperture [radii], an instant and a place, 0 to 1.
 
     Parameters
@@ -92,7 +92,7 @@ def rays(count: int, kind: int) -> NDArray:
 
     Returns
     -------
-    NDArray
+    Array
         Rays, which fill the disc evenly on a spiral [1]_.
 
     References
@@ -106,7 +106,7 @@ def rays(count: int, kind: int) -> NDArray:
     return np.column_stack([radius * np.cos(angle), radius * np.sin(angle), rest])
 
 
-def front_to_back(layers: Sequence[Planes]) -> NDArray:
+def front_to_back(layers: Sequence[Planes]) -> Array:
     """Return the light (C, h, w) of layers one before the other."""
     light, opacity = layers[0]
     total = light.copy()
@@ -121,18 +121,18 @@ def front_to_back(layers: Sequence[Planes]) -> NDArray:
 
 def covariance(
     layers: Sequence[RayLayer],
-    rays: NDArray,
+    rays: Array,
     reach: tuple[int, int],
     seen: Seen,
     compose: Compose = front_to_back,
-) -> NDArray:
+) -> Array:
     """Return what the product of the layers' means lacks, at the pixels.
 
     Parameters
     ----------
     layers : sequence of RayLayer
         Layers on cells of one shape, the nearest first.
-    rays : NDArray
+    rays : Array
         Rays (n, 5).
     reach : tuple of int
         Rows and columns of cells at each border that only rays from elsewhere meet.
@@ -143,7 +143,7 @@ def covariance(
 
     Returns
     -------
-    NDArray
+    Array
         Light (C, rows, columns) at the pixels, in the unit of the layers.
     """
     colors, *shape = layers[0].planes.shape

@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.fft
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.camera.derived.geometry import Geometry, pixel_centers
 from vcam_cli.effects.base import Blur, SeparableTransfer, of_kind
 from vcam_cli.effects.optics.diffraction import Diffraction
@@ -85,7 +85,7 @@ class Cells:
         reach, border = (down // count, right // count), self.border // count
         return replace(self, per_pixel=self.per_pixel // count, border=border, reach=reach)
 
-    def edges(self) -> tuple[NDArray, NDArray]:
+    def edges(self) -> tuple[Array, Array]:
         """Return the edges of columns and of rows of all cells [m]."""
         g, (side_x, side_y) = self.geometry, self.sides
         x, y = pixel_centers(g, detector=True)
@@ -116,26 +116,26 @@ class SharpImage:
         white = path.transfer.weights.sum(axis=0, keepdims=True)
         blurs = (*lens, *of_kind(behind, Blur))
         self._transfer = Transfer(path.transfer.wavelengths, white, blurs)
-        self._known: dict[tuple[int, tuple[int, int]], NDArray] = {}
+        self._known: dict[tuple[int, tuple[int, int]], Array] = {}
 
     @property
     def is_local(self) -> bool:
         """Whether pixels see their own area alone."""
         return not (self._transfer.effects or self._separable)
 
-    def at_pixels(self, cells: Cells, light: NDArray, cover: NDArray) -> tuple[NDArray, NDArray]:
+    def at_pixels(self, cells: Cells, light: Array, cover: Array) -> tuple[Array, Array]:
         """Return the values of images on the inner cells in every color at the pixels.
 
         Parameters
         ----------
         cells : Cells
             Cells of a window.
-        light, cover : NDArray
+        light, cover : Array
             Images of light (n, C, h, w) and of opacity (m, h, w).
 
         Returns
         -------
-        light, cover : NDArray
+        light, cover : Array
             Values (n, C, rows, columns) and (m, C, rows, columns) at the pixels.
         """
         cover, shape = cover[:, None], light.shape[-2:]
@@ -148,7 +148,7 @@ class SharpImage:
         light, cover = (self._collected(cells, image) for image in (light, cover))
         return light, np.broadcast_to(cover, (len(cover), *light.shape[1:]))
 
-    def _collected(self, cells: Cells, image: NDArray) -> NDArray:
+    def _collected(self, cells: Cells, image: Array) -> Array:
         """Return the means over the collecting areas of an image, exactly on its even cells."""
         n, start = cells.per_pixel, cells.border
         pitches = cells.geometry.pitch_y, cells.geometry.pitch_x
@@ -158,7 +158,7 @@ class SharpImage:
             edges = np.arange(n + 1)
             share = np.minimum(edges[1:], max(high, low + TINY)) - np.maximum(edges[:-1], low)
             share = np.maximum(share, 0)
-            total: NDArray | float = 0.0
+            total: Array | float = 0.0
             for k in np.flatnonzero(share):
                 part = slice(start + int(k), start + int(k) + n * pixels, n)
                 cut = image[..., part, :] if axis == -2 else image[..., part]
@@ -166,14 +166,14 @@ class SharpImage:
             image = np.asarray(total)
         return image
 
-    def _on(self, cells: Cells, shape: tuple[int, int]) -> NDArray:
+    def _on(self, cells: Cells, shape: tuple[int, int]) -> Array:
         """Return the transfer (C, h, w) of all but the photodetectors."""
         key = cells.per_pixel, shape
         if key in self._known:
             return self._known[key]
         (side_x, side_y), blur = cells.sides, self._transfer
         fx, fy = scipy.fft.rfftfreq(shape[1]) / side_x, scipy.fft.fftfreq(shape[0]) / side_y
-        found: NDArray = np.ones((1, len(fy), len(fx)))
+        found: Array = np.ones((1, len(fy), len(fx)))
         if blur.effects:
             level = blur.level[0][:, None, None]
             found = self._blur(fx, fy) / np.where(level > 0, level, 1.0)
@@ -183,7 +183,7 @@ class SharpImage:
         self._known[key] = found.astype(kind if np.iscomplexobj(found) else kind(0).real.dtype)
         return self._known[key]
 
-    def _blur(self, fx: NDArray, fy: NDArray) -> NDArray:
+    def _blur(self, fx: Array, fy: Array) -> Array:
         """Return the response (C, m, n) of lens and silicon at pairs of frequencies [e/s]."""
         if self._transfer.plane_blurs:
             return self._transfer.plane_response(fx, fy)[0]

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.camera.derived.geometry import pixel_centers
 from vcam_cli.image_formation.optical_path import OpticalPath
 from vcam_cli.parallel import each
@@ -40,7 +40,7 @@ TILE = 64
 LEAST_COVER = 0.05
 """Cover below which nothing is known to be seen."""
 
-Planes = tuple[NDArray, NDArray]
+Planes = tuple[Array, Array]
 """Light (C, h, w), and cover in the same shape or (h, w)."""
 
 
@@ -48,9 +48,9 @@ Planes = tuple[NDArray, NDArray]
 class RayCorrection:
     """What the composition of means lacks."""
 
-    light: NDArray | float = 0.0
+    light: Array | float = 0.0
     """(C, rows, columns) at the pixels [e/s]; 0 where it is nothing."""
-    opened: NDArray | float = 0.0
+    opened: Array | float = 0.0
     """Share (rows, columns) of what is hidden in it, likewise."""
     error: float = 0.0
     """Predicted rms error that its cells leave [e/s]."""
@@ -71,17 +71,17 @@ def composed(shown: Iterable[Planes], hidden: Iterable[Planes]) -> Planes:
 
     Returns
     -------
-    light : NDArray
+    light : Array
         Light, in the shape of the layers'.
-    opened : NDArray
+    opened : Array
         Share of the hidden layers in it, in the shape of the covers.
     """
-    total: NDArray | float = 0.0
-    clear: NDArray | float = 1.0
+    total: Array | float = 0.0
+    clear: Array | float = 1.0
     for shone, covered in shown:
         total = total + shone * _visible(covered, clear)
         clear = np.maximum(clear - covered, 0)
-    behind: list[NDArray | float] = [0.0, 0.0]
+    behind: list[Array | float] = [0.0, 0.0]
     for layer in hidden:
         behind = [own + plane for own, plane in zip(behind, layer, strict=True)]
     light, cover = np.asarray(behind[0]), np.asarray(behind[1])
@@ -91,7 +91,7 @@ def composed(shown: Iterable[Planes], hidden: Iterable[Planes]) -> Planes:
     return np.asarray((total + light * visible) / known), np.asarray(opened)
 
 
-def _visible(cover: NDArray, clear: NDArray | float) -> NDArray:
+def _visible(cover: Array, clear: Array | float) -> Array:
     """Return the part of a layer that is seen where so much is not covered yet."""
     return np.where(cover > clear, clear / np.where(cover > 0, cover, 1), 1).astype(cover.dtype)
 
@@ -141,12 +141,12 @@ def ray_correction(path: OpticalPath, scene: DepthScene, full: float) -> RayCorr
     return RayCorrection(np.stack(planes[:-1]), planes[-1], error, cells.width, cells.values)
 
 
-def _rms(missing: NDArray) -> float:
+def _rms(missing: Array) -> float:
     """Return the rms of the light of planes (C + 1, h, w) in the color where it is most."""
     return float(np.sqrt(np.square(missing[:-1], dtype=float).mean(axis=(1, 2)).max()))
 
 
-def _at_pixels(plane: NDArray, path: OpticalPath, scene: DepthScene, cell: float) -> NDArray:
+def _at_pixels(plane: Array, path: OpticalPath, scene: DepthScene, cell: float) -> Array:
     """Return the means over the collecting areas of a plane (h, w) of cells."""
     g, (width, height) = path.geometry, scene.flat.extent
     x, y = pixel_centers(g, detector=True)
@@ -159,7 +159,7 @@ class _Cells:
     """Samples taken together, composed ray by ray."""
 
     scene: DepthScene
-    light: NDArray
+    light: Array
     """Light (C, h, w) of the samples [e/s]."""
     together: int
     """Samples along the side of a cell."""
@@ -171,7 +171,7 @@ class _Cells:
         """Side of a cell [m]."""
         return self.together * self.scene.flat.pitch_x
 
-    def missing(self) -> NDArray:
+    def missing(self) -> Array:
         """Return what the composition of means lacks in every cell (C + 1, rows, columns).
 
         It is light [e/s], and the share of what is hidden in it.
@@ -203,11 +203,11 @@ class _Cells:
         self.values = sum(counts)
         return out
 
-    def _tile(self, tile: tuple[slice, slice], reach: int) -> tuple[NDArray, int]:
+    def _tile(self, tile: tuple[slice, slice], reach: int) -> tuple[Array, int]:
         """Return the same in one tile, and how many values were moved for it."""
         layers = list(self._layers(self.light, tile, reach))
         means = [np.zeros((len(p), TILE, TILE), p.dtype) for _, p, _ in layers]
-        total: NDArray | float = 0.0
+        total: Array | float = 0.0
         for u, v in aperture_points(RAYS):
             seen = [_moved(p, radius * u, radius * v, reach) for radius, p, _ in layers]
             total = total + self._composed(layers, seen)
@@ -216,9 +216,7 @@ class _Cells:
         lacking = np.asarray(total / RAYS - self._composed(layers, means))
         return lacking, RAYS * sum(mean.size for mean in means)
 
-    def _composed(
-        self, layers: list[tuple[float, NDArray, bool]], planes: list[NDArray]
-    ) -> NDArray:
+    def _composed(self, layers: list[tuple[float, Array, bool]], planes: list[Array]) -> Array:
         """Return light and the share of what is hidden in it (C + 1, h, w)."""
         parts: tuple[list[Planes], list[Planes]] = ([], [])
         for (_, _, hidden), own in zip(layers, planes, strict=True):
@@ -227,8 +225,8 @@ class _Cells:
         return np.concatenate([light, opened[None]])
 
     def _layers(
-        self, samples: NDArray, tile: tuple[slice, slice], reach: int
-    ) -> Iterator[tuple[float, NDArray, bool]]:
+        self, samples: Array, tile: tuple[slice, slice], reach: int
+    ) -> Iterator[tuple[float, Array, bool]]:
         """Yield radius [cells], light and cover (C + 1, h, w) and whether it is hidden.
 
         They are those of layers in a tile and as far around it as they blur.
@@ -253,8 +251,8 @@ class _Cells:
             yield from self._present(light, first, cut.share.ravel()[source], True)
 
     def _present(
-        self, light: NDArray, first: NDArray, share: NDArray, hidden: bool
-    ) -> Iterator[tuple[float, NDArray, bool]]:
+        self, light: Array, first: Array, share: Array, hidden: bool
+    ) -> Iterator[tuple[float, Array, bool]]:
         n, radii = self.together, self.scene.cut.radii
         known = np.unique(first[first >= 0])
         for layer in np.union1d(known, known + 1):
@@ -278,12 +276,12 @@ def aperture_points(count: int) -> Iterator[tuple[float, float]]:
         yield radius * math.cos(angle), radius * math.sin(angle)
 
 
-def _mirrored(index: NDArray, count: int) -> NDArray:
+def _mirrored(index: Array, count: int) -> Array:
     index = index % (2 * count)
     return np.minimum(index, 2 * count - 1 - index)
 
 
-def _moved(planes: NDArray, x: float, y: float, reach: int) -> NDArray:
+def _moved(planes: Array, x: float, y: float, reach: int) -> Array:
     """Return the inner part of planes, displaced to the right and down by so many cells."""
     out = planes
     for axis, by in ((1, y), (2, x)):
@@ -296,14 +294,14 @@ def _moved(planes: NDArray, x: float, y: float, reach: int) -> NDArray:
     return out
 
 
-def box_means(plane: NDArray, at: NDArray, width: float) -> NDArray:
+def box_means(plane: Array, at: Array, width: float) -> Array:
     """Return the means of even rows over boxes of a width around places, counted in rows."""
     sums = np.concatenate([np.zeros_like(plane[:1]), np.cumsum(plane, axis=0)])
     low, high = (_interpolated(sums, at + side * width / 2) for side in (-1, 1))
     return (high - low) / plane.dtype.type(width)
 
 
-def _interpolated(plane: NDArray, at: NDArray) -> NDArray:
+def _interpolated(plane: Array, at: Array) -> Array:
     """Return a plane straight between its rows, at places counted in rows."""
     index = np.clip(at.astype(int), 0, len(plane) - 2)
     part = (at - index).astype(plane.dtype)[:, None]

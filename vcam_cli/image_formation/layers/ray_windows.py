@@ -22,8 +22,8 @@ from dataclasses import dataclass, field, replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.image_formation.layers.occlusion import (
     Compose,
     RayLayer,
@@ -82,7 +82,7 @@ class _Sum:
 
     window: Window
     level: int
-    light: NDArray
+    light: Array
     """(C, rows, columns) [e/s]"""
     error: float = 0.0
     """Sum of the squares of its difference from the sum before [(e/s)^2]."""
@@ -103,12 +103,12 @@ class RaySum:
     def __post_init__(self) -> None:
         object.__setattr__(self, "sharp", SharpImage(self.path))
 
-    def add(self, light: NDArray, windows: Sequence[Window], allowed: float) -> Hidden:
+    def add(self, light: Array, windows: Sequence[Window], allowed: float) -> Hidden:
         """Add the covariance in windows to the light of pixels.
 
         Parameters
         ----------
-        light : NDArray
+        light : Array
             Light (C, rows, columns) that is changed [e/s].
         windows : sequence of Window
             Windows that do not overlap.
@@ -191,12 +191,12 @@ def _too_coarse(sums: Sequence[_Sum], budget: float) -> list[_Sum]:
     return found
 
 
-def windows_with(bound: NDArray, allowed: float) -> tuple[list[Window], float]:
+def windows_with(bound: Array, allowed: float) -> tuple[list[Window], float]:
     """Return the windows of an array in which there may be too much to leave it out.
 
     Parameters
     ----------
-    bound : NDArray
+    bound : Array
         What there is in each pixel at most (rows, columns), in any unit.
     allowed : float
         What may be left out, rms over the array, in the same unit.
@@ -228,7 +228,7 @@ def windows_with(bound: NDArray, allowed: float) -> tuple[list[Window], float]:
     return windows, left_out
 
 
-def _rectangles(kept: NDArray) -> Iterator[tuple[int, int, int, int]]:
+def _rectangles(kept: Array) -> Iterator[tuple[int, int, int, int]]:
     """Yield rectangles (top, bottom, left, right) that together are all that is kept."""
     kept = kept.copy()
     while kept.any():

@@ -11,8 +11,9 @@ from itertools import pairwise
 
 import numpy as np
 
+from vcam_cli.arrays import Array
 from vcam_cli.parallel import product
-from vcam_cli.scenes.base import Array, Chart, Frame
+from vcam_cli.scenes.base import Chart, Frame
 from vcam_cli.scenes.cells import overlap
 from vcam_cli.spectra import Spectrum, colorchecker
 

@@ -25,7 +25,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vcam_cli.scenes.base import Array, Chart, Frame
+from vcam_cli.arrays import Array
+from vcam_cli.scenes.base import Chart, Frame
 from vcam_cli.scenes.closed_form import Products
 from vcam_cli.scenes.edge_energy import EdgeEnergy, Region
 from vcam_cli.spectra import Spectrum, srgb_reflectances

@@ -24,8 +24,9 @@ from functools import lru_cache
 
 import numpy as np
 
+from vcam_cli.arrays import Array
 from vcam_cli.scenes import discs
-from vcam_cli.scenes.base import Array, Chart, Frame
+from vcam_cli.scenes.base import Chart, Frame
 from vcam_cli.scenes.cells import cell_edges, cell_means
 from vcam_cli.scenes.disc_edges import MOST, Discs, divisions
 from vcam_cli.scenes.discs import Cells

@@ -21,8 +21,9 @@ from functools import cache
 
 import numpy as np
 
+from vcam_cli.arrays import Array
 from vcam_cli.scenes import polygons
-from vcam_cli.scenes.base import Array, Chart, Frame
+from vcam_cli.scenes.base import Chart, Frame
 from vcam_cli.scenes.edge_energy import EdgeEnergy, Region, counted_height
 
 PAPER, INK = 0.9, 0.04

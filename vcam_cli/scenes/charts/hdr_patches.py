@@ -11,9 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vcam_cli.arrays import Array
 from vcam_cli.parallel import product
 from vcam_cli.scenes import discs
-from vcam_cli.scenes.base import Array, Chart, Frame
+from vcam_cli.scenes.base import Chart, Frame
 from vcam_cli.scenes.cells import clip_cells, overlap
 from vcam_cli.scenes.closed_form import LightDisc
 from vcam_cli.scenes.disc_edges import Discs

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vcam_cli.arrays import Array
 from vcam_cli.scenes import discs
-from vcam_cli.scenes.base import Array, Chart
+from vcam_cli.scenes.base import Chart
 from vcam_cli.scenes.disc_edges import Discs
 from vcam_cli.scenes.edge_energy import EdgeEnergy, Region, counted_height
 

@@ -10,7 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vcam_cli.scenes.base import Array, Chart
+from vcam_cli.arrays import Array
+from vcam_cli.scenes.base import Chart
 from vcam_cli.scenes.closed_form import Products
 from vcam_cli.scenes.edge_energy import EdgeEnergy, Region
 from vcam_cli.scenes.waves import Wave, wave_averages, wave_products, wave_values

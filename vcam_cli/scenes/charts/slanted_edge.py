@@ -11,7 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vcam_cli.scenes.base import Array, Chart
+from vcam_cli.arrays import Array
+from vcam_cli.scenes.base import Chart
 from vcam_cli.scenes.closed_form import Profile
 from vcam_cli.scenes.edge_energy import EdgeEnergy, Region, counted_height
 from vcam_cli.scenes.runs import expand_ranges

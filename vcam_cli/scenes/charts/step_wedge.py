@@ -8,7 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vcam_cli.scenes.base import Array, Chart, Frame
+from vcam_cli.arrays import Array
+from vcam_cli.scenes.base import Chart, Frame
 from vcam_cli.scenes.closed_form import Profile
 
 

@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from vcam_cli.scenes.base import Array, Chart
+from vcam_cli.arrays import Array
+from vcam_cli.scenes.base import Chart
 from vcam_cli.scenes.cells import clip_cells
 from vcam_cli.scenes.charts.colorchecker import Card, ColorChecker
 from vcam_cli.scenes.charts.dead_leaves import PIGMENTS, DeadLeaves, PlacedLeaves

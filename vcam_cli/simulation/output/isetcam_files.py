@@ -18,9 +18,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vcam_cli import memory
+from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
 from vcam_cli.effects.readout_chain import electrical
 from vcam_cli.errors import CannotDo, bad
@@ -72,7 +72,7 @@ def write_isetcam(
     write_mat(new_file("volts.mat"), {"isa": _sensor(frame)})
 
 
-def _scene(frame: Frame, wavelengths: NDArray) -> dict[str, Any]:
+def _scene(frame: Frame, wavelengths: Array) -> dict[str, Any]:
     g, layout = frame.geometry, frame.layout
     levels = spectral_irradiance.spectral_levels(frame.camera, frame.scene.spectra, wavelengths)
     planes = (
@@ -99,11 +99,11 @@ def _scene(frame: Frame, wavelengths: NDArray) -> dict[str, Any]:
 
 
 def _optical_image(
-    frame: Frame, wavelengths: NDArray, workers: int, step: Callable[[int, int], None]
+    frame: Frame, wavelengths: Array, workers: int, step: Callable[[int, int], None]
 ) -> dict[str, Any]:
     g = frame.geometry
 
-    def planes() -> Iterable[NDArray]:
+    def planes() -> Iterable[Array]:
         for done, plane in enumerate(spectral_irradiance.planes(frame, workers)):
             step(done, len(wavelengths))
             yield plane
@@ -158,12 +158,12 @@ def _sensor(frame: Frame) -> dict[str, Any]:
     }
 
 
-def _last(values: NDArray) -> NDArray:
+def _last(values: Array) -> Array:
     """Return colors behind rows and columns."""
     return np.moveaxis(values, 0, -1) if values.ndim == 3 else values
 
 
-def _photons(planes: Iterable[NDArray], shape: tuple[int, int], wavelengths: NDArray) -> NDArray:
+def _photons(planes: Iterable[Array], shape: tuple[int, int], wavelengths: Array) -> Array:
     """Return planes in watts per meter as photons per nanometer (rows, columns, bands)."""
     size = 4 * math.prod(shape) * len(wavelengths)
     if size > LARGEST or 2 * size > memory.available():
@@ -176,12 +176,12 @@ def _photons(planes: Iterable[NDArray], shape: tuple[int, int], wavelengths: NDA
     return found
 
 
-def _per_watt(wavelengths: NDArray) -> NDArray:
+def _per_watt(wavelengths: Array) -> Array:
     """Return photons per second and nanometer of a watt per meter of wavelength."""
     return np.asarray(1e-9 * wavelengths / (PLANCK * SPEED_OF_LIGHT))
 
 
-def _nanometers(wavelengths: NDArray) -> NDArray:
+def _nanometers(wavelengths: Array) -> Array:
     return np.asarray(np.round(wavelengths * 1e9, 9))
 
 

@@ -16,9 +16,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 import vcam_cli
+from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
 from vcam_cli.files import atomic
 from vcam_cli.files.folder import OutputFolder
@@ -110,7 +110,7 @@ def write(result: Photograph, folder: OutputFolder) -> None:
     write_metrics(folder.new("metrics.csv"), metrics.rows)
 
 
-def write_render(result: Photograph, path: Path, render: NDArray) -> None:
+def write_render(result: Photograph, path: Path, render: Array) -> None:
     """Write the render, and how it was taken as its description."""
     taken = raw_file.photograph(result.frame)
     write_png(path, render, "; ".join(f"{name} {value}" for name, value in taken.items()))

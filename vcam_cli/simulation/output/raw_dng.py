@@ -16,8 +16,8 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import geometry
 from vcam_cli.camera.derived.mosaic import BLOCKS
@@ -118,7 +118,7 @@ def write_raw_dng(path: Path, frame: Frame, description: str) -> None:
     write_dng(path, image)
 
 
-def _preview(frame: Frame, codes: NDArray, levels: NDArray) -> NDArray:
+def _preview(frame: Frame, codes: Array, levels: Array) -> Array:
     """Return the frame as a small picture (rows, columns[, 3]) in sRGB codes, uint8.
 
     Pixels of a mosaic's block are one of the picture. `levels` are black, saturation and white of
@@ -135,7 +135,7 @@ def _preview(frame: Frame, codes: NDArray, levels: NDArray) -> NDArray:
     return _srgb_codes(np.minimum(signal / colors.neutral * exposure, 1.0) @ to_display.T)
 
 
-def _small(frame: Frame, codes: NDArray) -> NDArray:
+def _small(frame: Frame, codes: Array) -> Array:
     """Return means over squares of whole blocks (rows, columns, colors), of a linear ADC [DN]."""
     block = frame.mosaic.block if frame.camera.array.mosaic else ((frame.mosaic.colors[0],),)
     size = np.array([len(block), len(block[0])])
@@ -154,11 +154,11 @@ def _small(frame: Frame, codes: NDArray) -> NDArray:
     return np.stack(list(means.values()), axis=-1)
 
 
-def _srgb_codes(light: NDArray) -> NDArray:
+def _srgb_codes(light: Array) -> Array:
     return np.rint(255 * srgb(np.clip(light, 0.0, 1.0))).astype(np.uint8)
 
 
-def _shading(frame: Frame) -> NDArray | None:
+def _shading(frame: Frame) -> Array | None:
     """Return how much brighter the axis is than places from edge to edge; None where it is not."""
     gains, g = of_kind(frame.plan.active, Gain), frame.layout.grid
     half_width, half_height = g.columns * g.pitch_x / 2, g.rows * g.pitch_y / 2
@@ -195,7 +195,7 @@ def _colors(frame: Frame) -> Colors:
     return Colors(matrices, neutral / neutral.max())
 
 
-def color_matrix(frame: Frame, light: Spectrum) -> NDArray:
+def color_matrix(frame: Frame, light: Spectrum) -> Array:
     """Return the matrix from XYZ to the camera's colors that suits a light best.
 
     Parameters
@@ -224,7 +224,7 @@ def color_matrix(frame: Frame, light: Spectrum) -> NDArray:
     return np.asarray(np.linalg.inv(to_xyz @ fit.matrix @ np.diag(white.max() / white)))
 
 
-def _fit(frame: Frame, light: Spectrum) -> tuple[Fit, NDArray]:
+def _fit(frame: Frame, light: Spectrum) -> tuple[Fit, Array]:
     """Return the color correction of a light, and the camera's colors of its white."""
     start, stop = _band(frame)
     lit = [light, *(light.multiply(reflectance) for _, reflectance in colorchecker())]

@@ -18,9 +18,9 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 import vcam_cli
+from vcam_cli.arrays import Array
 from vcam_cli.camera.derived.electrical import Electrical
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.camera.scene.illuminant import IlluminantSpec
@@ -38,7 +38,7 @@ CURVE_STEP = 64
 UNITS = {"dn": "DN", "electrons": "e", "volts": "V"}
 """Unit of each channel of raw.exr."""
 
-Channel = Callable[[slice], NDArray]
+Channel = Callable[[slice], Array]
 """Some rows of a channel."""
 
 
@@ -84,9 +84,9 @@ def write_hdr(path: Path, frame: Frame, config_hash: str) -> None:
     _write(path, frame, {"photocurrent": (frame.photocurrent, None)}, said)
 
 
-Conversion = Callable[[NDArray], NDArray]
+Conversion = Callable[[Array], Array]
 """What some rows become in the file."""
-Values = dict[str, tuple[NDArray, Conversion | None]]
+Values = dict[str, tuple[Array, Conversion | None]]
 """What a file holds: by name an array in the shape of the raw frame, and what it becomes."""
 
 
@@ -116,11 +116,11 @@ def _channels(frame: Frame, values: Values) -> Iterator[tuple[str, Channel]]:
         yield "color", _rows_of(layout.color.reshape(1, -1), None)
 
 
-def _rows_of(array: NDArray, conversion: Conversion | None) -> Channel:
+def _rows_of(array: Array, conversion: Conversion | None) -> Channel:
     return lambda rows: array[rows] if conversion is None else conversion(array[rows])
 
 
-def _micrometers(values: NDArray) -> NDArray:
+def _micrometers(values: Array) -> Array:
     return values * 1e6
 
 

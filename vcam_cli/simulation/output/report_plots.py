@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
 from vcam_cli.effects.signal_chain import noise_sources
 from vcam_cli.files.plots import COLORS
 from vcam_cli.image_formation import photon_rate
@@ -38,7 +38,7 @@ def channel_style(frame: Frame) -> list[dict[str, Any]]:
     ]
 
 
-def noise_parts(frame: Frame) -> tuple[NDArray, dict[str, NDArray]]:
+def noise_parts(frame: Frame) -> tuple[Array, dict[str, Array]]:
     """Return signals of a pixel (n,) [e], and the variance that each source adds to each [e^2].
 
     Sources are those that the plan has on, and the rounding of the ADC. Of pixels that are read as
@@ -46,7 +46,7 @@ def noise_parts(frame: Frame) -> tuple[NDArray, dict[str, NDArray]]:
     """
     binning, dark = frame.layout.binning_groups.binning, frame.dark_rate * frame.exposure_time
     signal = np.geomspace(1, max(frame.electrical.full_well, 10), LEVELS)
-    parts: dict[str, NDArray] = {}
+    parts: dict[str, Array] = {}
     for scope in ("frame", "sensor"):
         for source in noise_sources(frame.plan.active, scope):
             each = [source.binned_variance(level + dark, dark, binning) for level in signal]
@@ -133,7 +133,7 @@ def draw_spectra(figure: Any, frame: Frame) -> None:
         middle.legend(fontsize=7.5, ncols=len(responses), loc="upper right")
 
 
-def _draw_spectrum(axes: Any, spectrum: Spectrum, wavelengths: NDArray, style: dict) -> None:
+def _draw_spectrum(axes: Any, spectrum: Spectrum, wavelengths: Array, style: dict) -> None:
     if spectrum.lines is not None:
         inside = [line for line in spectrum.lines if wavelengths[0] <= line[0] <= wavelengths[-1]]
         for wavelength, power in inside:
@@ -142,14 +142,14 @@ def _draw_spectrum(axes: Any, spectrum: Spectrum, wavelengths: NDArray, style: d
     axes.plot(wavelengths * 1e9, spectrum.evaluate(wavelengths), lw=1.3, **style)
 
 
-def _integral(spectrum: Spectrum, wavelengths: NDArray) -> float:
+def _integral(spectrum: Spectrum, wavelengths: Array) -> float:
     if spectrum.lines is not None:
         inside = (p for w, p in spectrum.lines if wavelengths[0] <= w <= wavelengths[-1])
         return float(sum(inside))
     return float(np.trapezoid(spectrum.evaluate(wavelengths), wavelengths))
 
 
-def mtf_parts(frame: Frame) -> tuple[NDArray, dict[str, NDArray]]:
+def mtf_parts(frame: Frame) -> tuple[Array, dict[str, Array]]:
     """Return frequencies along a row (n,) [cycles/m], and what each effect leaves of waves.
 
     They are those at the wavelength in the middle of the scene's light.
@@ -183,7 +183,7 @@ def draw_mtf(figure: Any, frame: Frame, names: Sequence[str]) -> None:
     axes.legend(fontsize=7.5)
 
 
-def histogram(frame: Frame) -> tuple[NDArray, list[NDArray]]:
+def histogram(frame: Frame) -> tuple[Array, list[Array]]:
     """Return the edges (n + 1,) of bins [DN], and the pixels of each color in them."""
     top = int(frame.electrical.highest_code) * frame.summed_codes
     bins = min(BINS, top + 1)
