@@ -23,9 +23,11 @@ from vcam_cli.progress import Callback, Observer, observer
 if TYPE_CHECKING:
     from vcam_cli.accuracy_study.study import Study
     from vcam_cli.characterization.characterize import Characterization
-    from vcam_cli.comparison.image_files import Comparison, Filters, Formula, Space
+    from vcam_cli.comparison.image_files import Comparison, Space
     from vcam_cli.datasets.dataset import DatasetResult
     from vcam_cli.fitting.result import Fit
+    from vcam_cli.quality.cielab import Formula
+    from vcam_cli.quality.eye import Filters
     from vcam_cli.simulation.planned import PlannedRun
     from vcam_cli.verification.model import Measurement
     from vcam_cli.verification.verify import Verification
@@ -191,6 +193,7 @@ def compare(
     """
     from vcam_cli.comparison import image_files as study
     from vcam_cli.files.report import hash_file
+    from vcam_cli.quality.display import D65
 
     require_name(image, "image")
     require_name(reference, "reference")
@@ -205,7 +208,7 @@ def compare(
     settings = study.Settings(
         samples_per_degree=_per_degree(ppd, dpi, distance),
         space=space,
-        white=study.D65 if white is None else white,
+        white=D65 if white is None else white,
         formula=delta_e,
         filters=filters,
     )

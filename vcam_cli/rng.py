@@ -77,7 +77,7 @@ def _normal_quantiles(dtype: type) -> Array:
 
     count = 1 << 16
     middle = ndtri((np.arange(count) + 0.5) / count)
-    quantiles = (middle / np.sqrt(np.mean(np.square(middle)))).astype(dtype)
+    quantiles: Array = (middle / np.sqrt(np.mean(np.square(middle)))).astype(dtype)
     quantiles.setflags(write=False)
     return quantiles
 

@@ -91,7 +91,7 @@ class Clock:
     runs: dict[str, list[float]] = field(default_factory=dict)
     """By `resolved` camera [s]"""
     _cameras: dict[str, Camera] = field(default_factory=dict)
-    _found: dict[tuple, str] = field(default_factory=dict)
+    _found: dict[tuple[str, str, tuple[str, ...], bytes], str] = field(default_factory=dict)
 
     def shot(self, camera: Camera, shared: Shared | None = None) -> Shot:
         """Return a frame of the camera; its time does not count.
@@ -153,7 +153,7 @@ def settings_key(camera: Camera) -> str:
     return f"{rest!r} {camera_settings(camera)!r}"
 
 
-def _computation(result: Result) -> tuple:
+def _computation(result: Result) -> tuple[str, str, tuple[str, ...], bytes]:
     """Return what two frames have in common of which each step is the same."""
     frame = result.frame
     chosen = replace(frame.settings, tolerance=0, oversampling=0)

@@ -36,7 +36,7 @@ def write(
 def pareto_arguments(found: Study) -> tuple[Any, ...]:
     """Return the arguments of `plots.pareto`: title, presets, curves, tolerance, panels, all on."""
 
-    def points(*knobs: str):
+    def points(*knobs: str) -> tuple[tuple[float, float, str], ...]:
         return tuple((p.seconds, p.rms_error, p.setting) for p in found.points if p.knob in knobs)
 
     curves = [

@@ -101,7 +101,7 @@ def rising_times(given: Any) -> tuple[float, ...]:
 
     def read(item: Any) -> float:
         nonlocal latest
-        time = TIME.read(item)
+        time: float = TIME.read(item)
         before, latest = latest, time
         if time <= before:
             raise ValueError("the times must rise; sort them")

@@ -223,7 +223,7 @@ def _neutral(name: str, given: Any) -> bool:
     if name == "zernike":
         return not given or given == Wavefront()
     try:
-        return Quantity("length").read(given) == 0
+        return bool(Quantity("length").read(given) == 0)
     except ValueError:
         return True
 

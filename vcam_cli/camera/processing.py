@@ -75,7 +75,7 @@ def _step(given: Any) -> Step:
     return _plugin_step(_plugin(name, given), name, given)
 
 
-def _plugin_step(model: type[PluginStep], name: str, given: Mapping) -> Step:
+def _plugin_step(model: type[PluginStep], name: str, given: Mapping[Any, Any]) -> Step:
     """Return a step of a package, whose own checks may end in any way."""
     try:
         step = model.model_validate(given)

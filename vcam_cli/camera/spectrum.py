@@ -435,7 +435,8 @@ class Spectral(YamlType):
             return _shipped_name(given)
         if given is None or isinstance(given, (list, tuple)):
             raise ValueError(f"{describe(given)} is not a spectrum; write {_FORMS}")
-        return Number(least=0, most=np.inf if self.most is None else self.most).read(given)
+        factor: float = Number(least=0, most=np.inf if self.most is None else self.most).read(given)
+        return factor
 
 
 def _shipped_name(given: str) -> str:

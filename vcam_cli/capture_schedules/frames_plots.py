@@ -53,7 +53,8 @@ def tones(values: Array, low: float, high: float) -> NDArray[np.uint8]:
     floor = np.nextafter(low, 0)
     safe = np.where(values > floor, values, low)
     share = np.log(safe / low) / np.log(high / low)
-    return np.rint(255 * np.clip(share, 0, 1)).astype(np.uint8)
+    gray: NDArray[np.uint8] = np.rint(255 * np.clip(share, 0, 1)).astype(np.uint8)
+    return gray
 
 
 def write_tones(path: Path | str, values: Array, low: float, high: float) -> None:

@@ -198,7 +198,7 @@ def representative_photocurrents(scene: Pdf | Floats) -> Floats:
     part = np.clip(np.searchsorted(below, quantiles, side="right") - 1, 0, scene.low.size - 1)
     tiny = np.finfo(float).tiny
     share = (quantiles - below[part]) / np.maximum(scene.probability[part], tiny)
-    light = scene.low[part] + np.clip(share, 0, 1) * (scene.high - scene.low)[part]
+    light: Floats = scene.low[part] + np.clip(share, 0, 1) * (scene.high - scene.low)[part]
     light[-1] = scene.max
     return light
 

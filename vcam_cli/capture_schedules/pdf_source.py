@@ -38,8 +38,10 @@ def _rate(given: Any) -> float:
     except ValueError:
         unit = ""
     if unit.endswith("A"):
-        return _CURRENT.read(given) / ELEMENTARY_CHARGE
-    return _RATE.read(given)
+        current: float = _CURRENT.read(given)
+        return current / ELEMENTARY_CHARGE
+    rate: float = _RATE.read(given)
+    return rate
 
 
 def _photocurrent(given: Any) -> float:

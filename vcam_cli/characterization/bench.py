@@ -185,7 +185,8 @@ class Bench:
         active = self.ready.plan.active
         electrons, _ = exposure.capture(rate, time, active, adc, seeds, self.workers)
         dn = np.rint(adc.response(electrons)) + self.pedestal
-        return np.clip(dn, 0, 2**adc.bits - 1 + self.pedestal)
+        clipped: Array = np.clip(dn, 0, 2**adc.bits - 1 + self.pedestal)
+        return clipped
 
     def color_pixels(self, frame: Array, color: str) -> Array:
         """Return the pixels of one color as lattices of equal size, (lattices, rows, columns)."""

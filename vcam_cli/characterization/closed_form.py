@@ -54,7 +54,8 @@ def clipped_variance(mean: ArrayLike, sigma: ArrayLike, limit: float) -> Array:
     above = ndtr(-a)
     first = a * above - density
     second = ndtr(a) - a * density + a**2 * above
-    return s**2 * (second - first**2)
+    variance: Array = s**2 * (second - first**2)
+    return variance
 
 
 def saturation_capacity(
@@ -153,7 +154,8 @@ def directional_mtf(
 def _blur(transfer: Transfer, color: int, fx: Array, fy: Array) -> Array:
     """Return H of the lens and the silicon at pairs of fx and fy: (n,) [e/s]."""
     if not transfer.plane_blurs:
-        return transfer.radial_response(np.hypot(fx, fy))[0, color]
+        response: Array = transfer.radial_response(np.hypot(fx, fy))[0, color]
+        return response
     # The plane over a few of each is quicker than one pair after another.
     parts = (slice(i, i + BATCH) for i in range(0, len(fx), BATCH))
     planes = (transfer.plane_response(fx[part], fy[part])[0, color] for part in parts)

@@ -1,6 +1,6 @@
 """`vcam plan`: what a run would simulate, what not, why, and at what cost."""
 
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -129,7 +129,7 @@ def plan(
             print_story(camera, report, told)
 
 
-def table(report: dict) -> str:
+def table(report: dict[str, Any]) -> str:
     """Return the decisions as text: one line an effect, its reason below it."""
     lines = []
     for effect in report["effects"]:
@@ -141,7 +141,7 @@ def table(report: dict) -> str:
     return "\n".join(lines)
 
 
-def settings_line(report: dict) -> str:
+def settings_line(report: dict[str, Any]) -> str:
     """Return the settings of image formation as a line."""
     from vcam_cli.units import render
 
@@ -151,8 +151,8 @@ def settings_line(report: dict) -> str:
 
 
 def facts(
-    report: dict,
-    geometry: dict,
+    report: dict[str, Any],
+    geometry: dict[str, Any],
     exposure_time: float,
     samples: tuple[float, ...] = (),
     frame_rate: str = "",

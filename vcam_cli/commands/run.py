@@ -1,6 +1,7 @@
 """`vcam run`: one camera, one scene, one photograph."""
 
 from pathlib import Path
+from typing import Any
 
 import typer
 
@@ -68,14 +69,17 @@ def run(
     options.end_with_expectations(model.limits, result.missed, quiet)
 
 
-def summary(record: dict, path: Path) -> dict:
+def summary(record: dict[str, Any], path: Path) -> dict[str, Any]:
     """Return the summary that `--json` prints."""
     names = ("name", "metrics", "plan", "geometry", "stages", "seconds", "peak_memory_bytes")
     return {"out": str(path), **{name: record[name] for name in names}}
 
 
 def print_summary(
-    metrics: tuple[tuple[str, float, str], ...], record: dict, path: Path, files: tuple[str, ...]
+    metrics: tuple[tuple[str, float, str], ...],
+    record: dict[str, Any],
+    path: Path,
+    files: tuple[str, ...],
 ) -> None:
     """Print what a run found: metrics, effects, time and files."""
     rows = [(name, f"{value:.6g}", unit, LABELS.get(name, "")) for name, value, unit in metrics]
@@ -107,7 +111,7 @@ LABELS = {
 """Metric -> what it is measured of, where its name leaves that open."""
 
 
-def exposure_lines(exposure: dict) -> list[str]:
+def exposure_lines(exposure: dict[str, Any]) -> list[str]:
     """Return how the frame was exposed, in words."""
     from vcam_cli.units import render
 
@@ -148,7 +152,7 @@ FILES = {
 """Files to look at that a run may write -> their descriptions."""
 
 
-def simulated_effects(plan: dict, measured: float) -> str:
+def simulated_effects(plan: dict[str, Any], measured: float) -> str:
     """Return how many effects were simulated, which were skipped, and the time of both."""
     effects = plan["effects"]
     on = [e for e in effects if e["state"] == "on"]
@@ -165,6 +169,6 @@ def simulated_effects(plan: dict, measured: float) -> str:
     return "; ".join([*parts, time])
 
 
-def _share(effect: dict) -> str:
+def _share(effect: dict[str, Any]) -> str:
     """Return an effect and how much it would change."""
     return f"{spoken(effect['name'])} ({100 * effect['contribution']:.2g} % {effect['unit']})"

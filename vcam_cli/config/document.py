@@ -115,7 +115,7 @@ def place_order(problem: Problem) -> tuple[str, int, int]:
     return (match[1], int(match[2]), int(match[3])) if match else (problem.where, 0, 0)
 
 
-def _document(file: Path, tree: Node, reader: PartReader) -> Document:
+def _document(file: Path, tree: Node, reader: PartReader[M]) -> Document[M]:
     found = reader.findings
     files, problems = tuple(reader.files), tuple(found.problems)
     return Document(file, tree, reader.format, files, problems, frozenset(found.failed))
@@ -161,7 +161,7 @@ def given_at(tree: Node, path: errors.Path) -> object:
 
 def _validate(
     tree: Node, format: FileFormat[M], origin: Origin, findings: Findings
-) -> tuple[M | None, set]:
+) -> tuple[M | None, set[str | int]]:
     """Return the model, and which of its sections are not the file's, since they are wrong there.
 
     What is wrong is added to the findings. None where no model can be made.

@@ -7,9 +7,10 @@ error.
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Generic
 
 from vcam_cli import errors
-from vcam_cli.config.file_format import FileFormat
+from vcam_cli.config.file_format import FileFormat, M
 from vcam_cli.config.file_names import referenced_file
 from vcam_cli.config.merge import merge
 from vcam_cli.config.yaml_reader import read_file
@@ -44,13 +45,13 @@ class Findings:
 
 
 @dataclass
-class PartReader:
+class PartReader(Generic[M]):
     """Reads files and expands trees; keeps a list of the files, and of what is wrong with parts.
 
     Paths are those in the whole tree; `chain` are the files that led to one.
     """
 
-    format: FileFormat
+    format: FileFormat[M]
     files: list[Path]
     findings: Findings
 

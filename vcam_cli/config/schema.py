@@ -51,9 +51,9 @@ def model_schema(model: type[Model]) -> Schema:
     for each in generator.models:
         _complete(schema if each is model else definitions[each.__name__], each)
     gathered: Schema = {}
-    schema = _gather(schema, gathered)
-    schema["$defs"] |= gathered
-    return schema
+    complete: Schema = _gather(schema, gathered)
+    complete["$defs"] |= gathered
+    return complete
 
 
 def file_schema(schema: Schema, title: str) -> Schema:

@@ -130,7 +130,7 @@ def frame_ids(file: DatasetFile) -> list[str]:
 
 def _scale(file: DatasetFile) -> int:
     """Return what codes are multiplied by in TIFF: what 16 bits leave of the ADC's."""
-    return 2 ** max(0, 16 - file.camera.adc.bits)
+    return 1 << max(0, 16 - file.camera.adc.bits)
 
 
 def _of_share(whole: list[Shard], execution: Execution) -> list[Shard]:

@@ -89,7 +89,8 @@ class Packer:
         self.folder.write(shard.id(self.format, self.scale), content)
         for point in shard.ids:
             self.folder.discard(point, (NPZ, "json"))
-        return content["files"]
+        files: dict[str, Fingerprint] = content["files"]
+        return files
 
     def _frames(self, shard: Shard, content: dict[str, Any]) -> Iterator[NamedArrays]:
         """Yield name and arrays of all frames but those that failed; fill in what is known."""
@@ -149,7 +150,8 @@ def whole_numbers(values: Array, factor: int) -> Array:
     What is larger than that holds, as an infinite depth, is its largest number.
     """
     whole = np.rint(np.clip(values.astype(float) * factor, 0, 2**32 - 1))
-    return whole.astype(np.uint16 if whole.max(initial=0) < 1 << 16 else np.uint32)
+    packed: Array = whole.astype(np.uint16 if whole.max(initial=0) < 1 << 16 else np.uint32)
+    return packed
 
 
 def _hash(values: Array) -> str:

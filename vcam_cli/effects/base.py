@@ -268,7 +268,8 @@ class Blur(Effect):
 
     def row_transfer(self, frequency: Array, wavelength: float) -> Array:
         """Return the contrast (n,) that it leaves of waves along a row."""
-        return np.abs(self.otf_plane(frequency, np.zeros(1), wavelength)[0])
+        contrast: Array = np.abs(self.otf_plane(frequency, np.zeros(1), wavelength)[0])
+        return contrast
 
 
 class RadialTransfer(Blur):
@@ -366,7 +367,10 @@ class FieldTransfer(Effect):
         """Return the contrast (n,) that it leaves of waves along a row, rms over some zones."""
         zones = self.zones(PLACES)
         some = [zone.blur for zone in zones[:: max(1, len(zones) // PLACES)]]
-        return np.sqrt(np.mean([blur.row_transfer(frequency, wavelength) ** 2 for blur in some], 0))
+        contrast: Array = np.sqrt(
+            np.mean([blur.row_transfer(frequency, wavelength) ** 2 for blur in some], 0)
+        )
+        return contrast
 
 
 class SeparableTransfer(Effect):

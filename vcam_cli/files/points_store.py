@@ -150,7 +150,8 @@ class SweepFolder:
         except (ValueError, TypeError, KeyError, AttributeError, RecursionError):
             self.corrupted[path.name] = None
             return None
-        return entry["point"]
+        point: dict[str, Any] = entry["point"]
+        return point
 
     def write(
         self, key: str, content: Mapping[str, Any], files: Mapping[str, bytes] | None = None

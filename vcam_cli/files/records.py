@@ -80,7 +80,7 @@ class Proofs:
     def __init__(self, folder: Path, *records: Mapping[str, Any] | None) -> None:
         self._folder = folder
         self._known: dict[str, list[Fingerprint]] = {}
-        self._read: dict[tuple, Fingerprint] = {}
+        self._read: dict[tuple[Any, ...], Fingerprint] = {}
         for record in filter(None, records):
             for name in record["files"]:
                 self._known.setdefault(name, [])

@@ -143,4 +143,4 @@ def _differences(mass: Array, beside: Array, size: int, codes: int, points: int)
 
 def neighbor_correlation(lag_one: float, rows_apart: int) -> float:
     """Return the correlation of neighboring rows from that of rows farther apart, at most 0.999."""
-    return min(max(lag_one, 0.0), 0.999) ** (1 / rows_apart)
+    return float(min(max(lag_one, 0.0), 0.999) ** (1 / rows_apart))

@@ -140,4 +140,5 @@ def _integral(sums: Array, plane: Array, position: Array, along: int) -> Array:
     shape = (-1, 1) if along == 0 else (1, -1)
     # The running sum holds the whole sample: the part of it beyond the position is taken back.
     back = (index + 1 - position).reshape(shape)
-    return np.take(sums, index, axis=along) - back * np.take(plane, index, axis=along)
+    integral: Array = np.take(sums, index, axis=along) - back * np.take(plane, index, axis=along)
+    return integral

@@ -136,7 +136,8 @@ class DiscWaves:
         squares[high - low > np.pi] /= 2
         sums = (np.add.reduceat(np.square(w[: e[-1]]), e[:-1]) for w, e in
                 ((self.down, y), (self.along, x)))  # fmt: skip
-        return squares * np.outer(*sums)
+        product: Array = squares * np.outer(*sums)
+        return product
 
 
 STEP = 0.01

@@ -314,7 +314,9 @@ class Axis:
     def _chirp(self, values: Array, axis: int, odd: bool) -> Array:
         """Evaluate a sum of exponentials by Bluestein's algorithm: its real or imaginary part."""
         size, before, kernel, after = self._chirp_parts
-        kind = np.complex64 if values.dtype == np.float32 else np.complex128
+        kind: type[np.complexfloating] = (
+            np.complex64 if values.dtype == np.float32 else np.complex128
+        )
         shape = (-1, 1) if axis == 0 else (1, -1)
         count, padded = values.shape[axis], list(values.shape)
         padded[axis] = size

@@ -104,7 +104,8 @@ def _wave_levels(path: OpticalPath, effects: tuple[Effect, ...], wave: Wave, zon
     fx, fy = np.array([wave.fx]), np.array([wave.fy])
     everywhere = path.transfer.with_effects(effects).otf(fx, fy)[:, 0, 0]
     weights = np.tensordot(wave.weights, path.transfer.weights, axes=1)
-    return (zones * everywhere) @ weights.T * _separable(effects, fx, fy)[0, 0]
+    amplitudes: Array = (zones * everywhere) @ weights.T * _separable(effects, fx, fy)[0, 0]
+    return amplitudes
 
 
 def _modes(

@@ -118,7 +118,8 @@ class EdgeImage:
     @property
     def level(self) -> Array:
         """Signal (C,) of white [e/s]."""
-        return self.path.transfer.level[0]
+        level: Array = self.path.transfer.level[0]
+        return level
 
     @property
     def brightest(self) -> float:

@@ -150,7 +150,8 @@ class Transfer:
     @property
     def level(self) -> Array:
         """H_kc at frequency 0, the signal (K, C) of a uniform scene [e/s]."""
-        return self.weights.sum(axis=-1)
+        level: Array = self.weights.sum(axis=-1)
+        return level
 
     @property
     def is_dark(self) -> bool:

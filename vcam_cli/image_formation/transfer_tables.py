@@ -174,7 +174,8 @@ class TableReader:
         values = steps.take(index, axis=-1)
         values *= position - index
         values += entries.take(index, axis=-1)
-        return values.reshape(*self.tables.shape, *radius.shape)
+        shaped: Array = values.reshape(*self.tables.shape, *radius.shape)
+        return shaped
 
 
 def reader(tables: Tables, parity: int, fx: Array) -> TableReader:

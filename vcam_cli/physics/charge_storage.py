@@ -51,7 +51,10 @@ def built_in_potential(
     """
     thermal = BOLTZMANN * _float(temperature) / ELEMENTARY_CHARGE
     n_i = _float(intrinsic)
-    return (thermal * (np.log(_float(donors) / n_i) + np.log(_float(acceptors) / n_i)))[()]
+    potential: Floats = (
+        thermal * (np.log(_float(donors) / n_i) + np.log(_float(acceptors) / n_i))
+    )[()]
+    return potential
 
 
 def abrupt_capacitance(donors: ArrayLike, acceptors: ArrayLike, built_in: ArrayLike) -> Floats:

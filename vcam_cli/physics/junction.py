@@ -128,7 +128,8 @@ def field_enhancement(field: ArrayLike, temperature: ArrayLike) -> Floats:
     mass, hbar = 0.25 * ELECTRON_MASS, PLANCK / (2 * np.pi)
     unit = np.sqrt(24 * mass * thermal) * thermal / (ELEMENTARY_CHARGE * hbar)
     ratio = np.abs(_float(field)) / unit
-    return (1 + 2 * np.sqrt(3 * np.pi) * ratio * np.exp(ratio**2))[()]
+    enhancement: Floats = (1 + 2 * np.sqrt(3 * np.pi) * ratio * np.exp(ratio**2))[()]
+    return enhancement
 
 
 def depletion_split(

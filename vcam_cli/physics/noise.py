@@ -137,4 +137,5 @@ def gaussian_shot_noise(mean: NDArray[np.floating], z: NDArray[np.floating]) -> 
     ndarray
         Electrons with their noise [electrons], in the shape of `mean`.
     """
-    return mean + z * np.sqrt(np.maximum(mean, 0))
+    drawn: Array = mean + z * np.sqrt(np.maximum(mean, 0))
+    return drawn

@@ -130,7 +130,8 @@ def _wavenumbers(wanted: Floats, slope: float) -> Floats:
     count = 4 + math.ceil(1.5 * 2 * np.pi * slope * half)
     if len(wanted) <= count:
         return wanted
-    return wanted[0] + half * (1 - np.cos(np.pi * (np.arange(count) + 0.5) / count))
+    nodes: Floats = wanted[0] + half * (1 - np.cos(np.pi * (np.arange(count) + 0.5) / count))
+    return nodes
 
 
 def _values(terms: Terms, wavenumbers: Floats, radians: float, angles: Floats) -> Array:
@@ -190,7 +191,8 @@ def _chebyshev(values: Array) -> Array:
     angle = (np.arange(count) + 0.5) * (np.pi / count)
     matrix = 2 / count * np.cos(np.outer(np.arange(count), angle))
     matrix[0] /= 2
-    return np.einsum("dh,nhm->ndm", matrix, values)
+    coefficients: Array = np.einsum("dh,nhm->ndm", matrix, values)
+    return coefficients
 
 
 def _lagrange(nodes: Floats, at: float) -> Floats:

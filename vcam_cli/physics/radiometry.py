@@ -192,7 +192,8 @@ def relative_illumination_exact(tan2_theta: ArrayLike, tan2_phi: ArrayLike) -> F
     total = root + np.abs(tilt)
     with np.errstate(over="ignore"):  # in the form that is not taken, for absurd angles
         part = np.where(tilt < 0, total / (2 * a), 2 / total)  # tilt < 0: pupil wider than far
-    return ((1 + a) * (part / root))[()]
+    relative: Floats = ((1 + a) * (part / root))[()]
+    return relative
 
 
 def relative_illumination_cos4(tan2_phi: ArrayLike) -> Floats:
@@ -259,4 +260,5 @@ def focal_length_of_field_of_view(
     if not ((angle > 0) & (angle < np.pi)).all():
         raise ValueError("a field of view lies between 0 and 180 degrees")
     image = _float(extent) / (2 * np.tan(angle / 2))
-    return (image / (1 + image / _float(object_distance)))[()]
+    focal_length: Floats = (image / (1 + image / _float(object_distance)))[()]
+    return focal_length

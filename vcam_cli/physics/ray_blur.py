@@ -231,7 +231,8 @@ def _mean_over_pupil(
         np.exp(-2j * np.pi * np.outer(f, at)) / (np.sinc(f * cell)[:, None] ** 4)
         for f, at in zip((fx, fy), places, strict=True)
     )
-    return down @ light @ across.T
+    transfer: NDArray[np.complex128] = down @ light @ across.T
+    return transfer
 
 
 def _rays(highest: float, working_f_number: float, terms: Terms) -> tuple[Floats, Floats, Floats]:

@@ -158,7 +158,8 @@ def collection_efficiency(
     below = np.empty(thin.shape)
     below[thin] = _neutral_region_by_quadrature(a[thin], k[thin], neutral[thin])
     below[~thin] = _neutral_region_closed_form(a[~thin], k[~thin], neutral[~thin])
-    return (-np.expm1(-a * depleted) + np.exp(-a * depleted) * below)[()]
+    collected: Floats = (-np.expm1(-a * depleted) + np.exp(-a * depleted) * below)[()]
+    return collected
 
 
 def _neutral_region_by_quadrature(a: Floats, k: Floats, depth: Floats) -> Floats:

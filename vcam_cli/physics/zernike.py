@@ -342,7 +342,8 @@ def _radial(n: int, m: int, rho: Floats) -> Floats:
     from scipy.special import eval_jacobi
 
     k = (n - m) // 2
-    return (-1) ** k * rho**m * eval_jacobi(k, m, 0, 1 - 2 * rho**2)
+    polynomial: Floats = (-1) ** k * rho**m * eval_jacobi(k, m, 0, 1 - 2 * rho**2)
+    return polynomial
 
 
 def _radial_slope(n: int, m: int, rho: Floats) -> Floats:
@@ -355,7 +356,8 @@ def _radial_slope(n: int, m: int, rho: Floats) -> Floats:
     if k:
         inner = (k + m + 1) / 2 * eval_jacobi(k - 1, m + 1, 1, t)
         slope = slope - 4 * rho ** (m + 1) * inner
-    return (-1) ** k * slope
+    derivative: Floats = (-1) ** k * slope
+    return derivative
 
 
 def _radial_over_rho(n: int, m: int, rho: Floats) -> Floats:
@@ -363,7 +365,8 @@ def _radial_over_rho(n: int, m: int, rho: Floats) -> Floats:
     from scipy.special import eval_jacobi
 
     k = (n - m) // 2
-    return (-1) ** k * _power(rho, m - 1) * eval_jacobi(k, m, 0, 1 - 2 * rho**2)
+    quotient: Floats = (-1) ** k * _power(rho, m - 1) * eval_jacobi(k, m, 0, 1 - 2 * rho**2)
+    return quotient
 
 
 def _power(rho: Floats, exponent: int) -> Floats:

@@ -190,7 +190,8 @@ def mirrored_index(index: np.ndarray, count: int) -> np.ndarray:
     """
     period = max(2 * (count - 1), 1)
     folded = np.abs(index) % period
-    return np.minimum(folded, period - folded)
+    mirrored: np.ndarray = np.minimum(folded, period - folded)
+    return mirrored
 
 
 def padded_block(dn: np.ndarray, start: int, stop: int, halo: int) -> Block:

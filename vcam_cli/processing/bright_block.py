@@ -94,7 +94,8 @@ def _sites(color: str, block: Block, context: Context, columns: int) -> np.ndarr
     """Return 1 where a mosaic measures a color, else 0: (rows, columns)."""
     names = np.array(context.pattern)
     rows = (block.first_row + np.arange(block.planes.shape[1])) % len(names)
-    return (names[rows][:, np.arange(columns) % names.shape[1]] == color).astype(float)
+    mask: np.ndarray = (names[rows][:, np.arange(columns) % names.shape[1]] == color).astype(float)
+    return mask
 
 
 def _block_sums(values: np.ndarray) -> np.ndarray:

@@ -78,7 +78,8 @@ class ColorCorrection:
     def process_colors(self, values: np.ndarray) -> np.ndarray:
         """Return the values in the display's colors."""
         matrix = np.asarray(self.matrix, dtype=values.dtype)
-        return np.einsum("ij,j...->i...", matrix, values)
+        corrected: np.ndarray = np.einsum("ij,j...->i...", matrix, values)
+        return corrected
 
 
 @dataclass(frozen=True)

@@ -217,10 +217,11 @@ def _neighbor_sums(values: np.ndarray, parity: int) -> np.ndarray:
 
     The values are of columns of the other parity.
     """
-    return (
+    sums: np.ndarray = (
         values[:, parity : values.shape[1] - 2 + parity]
         + values[:, 1 + parity :][:, : values.shape[1] - 2]
     )
+    return sums
 
 
 def _site(i: int, j: int) -> tuple[slice, slice]:

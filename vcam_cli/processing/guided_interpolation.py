@@ -129,7 +129,8 @@ class GuidedInterpolation:
         slope = mean(lead * shares) - lead_mean * own_mean
         slope /= np.maximum(variance, 0) + np.float32(NOISE_VARIANCE)
         line = mean(slope, None) * lead + mean(own_mean - slope * lead_mean, None)
-        return line + self.sites.mean(shares - line, color, width, rows)
+        plane: np.ndarray = line + self.sites.mean(shares - line, color, width, rows)
+        return plane
 
 
 def _roughness(shares: np.ndarray, here: list[np.ndarray], axis: int) -> np.ndarray:

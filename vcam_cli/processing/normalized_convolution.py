@@ -11,6 +11,7 @@ References
    doi:10.1109/CVPR.1993.341081.
 """
 
+from collections.abc import Hashable
 from dataclasses import dataclass, field
 from functools import lru_cache
 
@@ -69,7 +70,7 @@ class Sites:
     """Repeating block of colors."""
     shape: tuple[int, int]
     """Rows and columns of the frame."""
-    _weights: dict = field(default_factory=dict, compare=False, repr=False)
+    _weights: dict[Hashable, np.ndarray] = field(default_factory=dict, compare=False, repr=False)
 
     def mask(self, color: str | None, rows: np.ndarray) -> np.ndarray:
         """Return where the frame has a sample of a color.
@@ -91,7 +92,8 @@ class Sites:
         )
         there = ((rows >= 0) & (rows < self.shape[0])).astype(np.float32)
         columns = np.arange(self.shape[1]) % block.shape[1]
-        return block[rows % block.shape[0]][:, columns] * there[:, None]
+        mask: np.ndarray = block[rows % block.shape[0]][:, columns] * there[:, None]
+        return mask
 
     def mean(
         self,

@@ -45,6 +45,8 @@ from vcam_cli.processing.tone_map import ToneMap, sensor_white
 from vcam_cli.processing.white_balance import color_sums
 
 Path = tuple[str | int, ...]
+Apply = Callable[[Draft, Step, Path], Draft]
+"""What adds the operations of a step to a draft."""
 
 
 def process(
@@ -82,7 +84,7 @@ def process(
     draft = _initial_draft(dn, context, workers, any(step.name == "demosaic" for step in steps))
     for index, step in enumerate(steps):
         if step.value != "none":
-            apply = STEPS.get(step.name, _plugin)
+            apply: Apply = STEPS.get(step.name, _plugin)
             draft = apply(draft, step, ("processing", index, step.name))
     colors = draft.context.colors
     scale = _white_scale(draft.apply_to_colors(context.white_dn), colors)
@@ -304,7 +306,7 @@ def _tone(draft: Draft, step: Step, path: Path) -> Draft:
     return replace(draft, tone=step.value)
 
 
-STEPS: dict[str, Callable[[Draft, Step, Path], Draft]] = {
+STEPS: dict[str, Apply] = {
     "black_level": _black_level,
     "demosaic": _demosaic,
     "white_balance": _white_balance,

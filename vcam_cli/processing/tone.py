@@ -74,7 +74,8 @@ def codes(linear: np.ndarray, curve: Curve, bits: int) -> np.ndarray:
     """
     encoded = srgb(linear) if curve == "srgb" else power_law(linear, float(curve))
     dtype = np.uint8 if bits <= 8 else np.uint16
-    return np.floor(encoded * (2**bits - 1) + 0.5).astype(dtype)
+    codes: np.ndarray = np.floor(encoded * (2**bits - 1) + 0.5).astype(dtype)
+    return codes
 
 
 @dataclass(frozen=True)

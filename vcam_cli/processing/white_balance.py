@@ -133,4 +133,5 @@ class Gains:
     def process_colors(self, values: np.ndarray) -> np.ndarray:
         """Return the values times the gains."""
         gains = np.asarray(self.gains, dtype=values.dtype)
-        return values * gains.reshape(-1, *(1,) * (values.ndim - 1))
+        balanced: np.ndarray = values * gains.reshape(-1, *(1,) * (values.ndim - 1))
+        return balanced

@@ -104,7 +104,8 @@ def delta_e_1976(color: Array, reference: Array) -> Array:
     """
     change = color - reference
     np.square(change, out=change)
-    return np.sqrt(change[0] + change[1] + change[2])
+    difference: Array = np.sqrt(change[0] + change[1] + change[2])
+    return difference
 
 
 def delta_e_1994(color: Array, reference: Array) -> Array:
@@ -127,7 +128,10 @@ def delta_e_1994(color: Array, reference: Array) -> Array:
     chroma = of_color - of_reference
     hue2 = np.maximum(a * a + b * b - chroma * chroma, 0.0)
     chroma = chroma / (1.0 + 0.045 * of_reference)
-    return np.sqrt(light * light + chroma * chroma + hue2 / (1.0 + 0.015 * of_reference) ** 2)
+    difference: Array = np.sqrt(
+        light * light + chroma * chroma + hue2 / (1.0 + 0.015 * of_reference) ** 2
+    )
+    return difference
 
 
 def delta_e_2000(color: Array, reference: Array) -> Array:
@@ -168,7 +172,9 @@ def delta_e_2000(color: Array, reference: Array) -> Array:
     dc = (c2 - c1) / (1 + 0.045 * chroma)  # 19
     dh = hue / (1 + 0.015 * chroma * weight)  # 20
     twist = -2 * _toward_one(chroma) * np.sin(2 * rotation)  # 17, 21
-    return np.sqrt(np.maximum(dl * dl + dc * dc + dh * dh + twist * dc * dh, 0.0))  # 22
+    square = dl * dl + dc * dc + dh * dh + twist * dc * dh
+    difference: Array = np.sqrt(np.maximum(square, 0.0))  # 22
+    return difference
 
 
 def _toward_one(chroma: Array) -> Array:

@@ -56,7 +56,8 @@ class Screen:
     @property
     def white(self) -> NDArray[np.float64]:
         """XYZ of the values 1, 1, 1."""
-        return self.to_xyz.sum(axis=1)
+        white: NDArray[np.float64] = self.to_xyz.sum(axis=1)
+        return white
 
 
 def display_screen(display: Display, columns: int) -> Screen:
@@ -130,7 +131,8 @@ def rgb_to_xyz(primaries: Primaries, white: float = 100.0) -> NDArray[np.float64
         matrix = chromaticity * np.linalg.solve(chromaticity, np.array(D65))
     else:
         matrix = _crt_matrix()
-    return matrix * (white / matrix[1].sum())
+    scaled: NDArray[np.float64] = matrix * (white / matrix[1].sum())
+    return scaled
 
 
 @cache

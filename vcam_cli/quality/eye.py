@@ -72,7 +72,7 @@ class Kernel:
     @property
     def reach(self) -> int:
         """Pixels that the kernel covers on either side."""
-        return self.taps.shape[1] // 2
+        return int(self.taps.shape[1] // 2)
 
     def response(self, rows: int, columns: int) -> NDArray[np.float64]:
         """Return the kernel's factors on the DCT-II of a picture that is mirrored at its borders.
@@ -88,7 +88,8 @@ class Kernel:
             Factors (rows, columns) [dimensionless].
         """
         down, across = (_cosines(self.taps, count) for count in (rows, columns))
-        return np.einsum("i,ir,ic->rc", self.weights, down, across)
+        kernel: NDArray[np.float64] = np.einsum("i,ir,ic->rc", self.weights, down, across)
+        return kernel
 
 
 def kernels(filters: Filters, samples_per_degree: float) -> tuple[Kernel, ...]:
@@ -160,7 +161,8 @@ def _taps_continuous(plane: tuple[Gaussian, ...], per_degree: float) -> NDArray[
 
 
 def _unit_sum(rows: NDArray[np.float64]) -> NDArray[np.float64]:
-    return rows / rows.sum(axis=1, keepdims=True)
+    normalized: NDArray[np.float64] = rows / rows.sum(axis=1, keepdims=True)
+    return normalized
 
 
 def _cosines(taps: NDArray[np.float64], count: int) -> NDArray[np.float64]:

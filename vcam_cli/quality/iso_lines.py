@@ -85,16 +85,18 @@ def _row_means(values: Array, widths: Array) -> Array:
     center = np.arange(n) + 0.5
     half = np.minimum(np.maximum(widths, 1.0) / 2, np.minimum(center, n - center))
     total = np.concatenate([np.zeros((len(values), 1)), np.cumsum(values, axis=1)], axis=1)
-    return (_interpolate_rows(total, center + half) - _interpolate_rows(total, center - half)) / (
-        2 * half
-    )
+    average: Array = (
+        _interpolate_rows(total, center + half) - _interpolate_rows(total, center - half)
+    ) / (2 * half)
+    return average
 
 
 def _interpolate_rows(total: Array, at: Array) -> Array:
     """Return values along rows between their points, straight: (rows, n)."""
     left = np.minimum(at.astype(int), total.shape[1] - 2)
     part = at - left
-    return (1 - part) * total[:, left] + part * total[:, left + 1]
+    interpolated: Array = (1 - part) * total[:, left] + part * total[:, left + 1]
+    return interpolated
 
 
 def averaging_widths(frequency: Array, pitch: float, columns: int) -> Array:

@@ -135,7 +135,8 @@ def _maxima(values: Array) -> Array:
     """Return the indices of the maxima of enough prominence, from left to right."""
     from scipy.signal import find_peaks
 
-    return find_peaks(np.pad(values, 1), prominence=MIN_PROMINENCE * values.max())[0] - 1
+    peaks: Array = find_peaks(np.pad(values, 1), prominence=MIN_PROMINENCE * values.max())[0] - 1
+    return peaks
 
 
 def _critical_bandwidth(smoother: _Smoother, least: float, most: float) -> float:

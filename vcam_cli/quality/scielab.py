@@ -211,7 +211,8 @@ class _Places:
             return np.asarray(by_pixel.mean(axis=(1, 3)))
         weights = np.full(n, (1 - self.inside) / n, different.dtype)
         weights[n // 2] += different.dtype.type(self.inside)
-        return np.einsum("i,ricj,j->rc", weights, by_pixel, weights)
+        averages: Array = np.einsum("i,ricj,j->rc", weights, by_pixel, weights)
+        return averages
 
     def needed_bytes(self, dtype: np.dtype, workers: int) -> int:
         """Return the memory that it takes with so many threads."""

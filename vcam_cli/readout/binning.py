@@ -197,7 +197,8 @@ def _sums(values: Array, count: int, step: int, axis: int, dtype: type) -> Array
     total = parts[0].astype(dtype)
     for part in parts[1:]:
         total += part
-    return total.reshape(*before, -1, *after)
+    joined: Array = total.reshape(*before, -1, *after)
+    return joined
 
 
 ALONE = BinningGroups(Binning(rows=1, columns=1), (1, 1))

@@ -41,7 +41,8 @@ def mean_electrons(rate: Array, time: float, effects: tuple[Effect, ...]) -> Arr
     Array
         Mean signal in the shape and float type of `rate` [electrons].
     """
-    return rate * rate.dtype.type(time) + rate.dtype.type(mean_dark(time, effects))
+    signal: Array = rate * rate.dtype.type(time) + rate.dtype.type(mean_dark(time, effects))
+    return signal
 
 
 def mean_dark(time: float, effects: tuple[Effect, ...]) -> float:

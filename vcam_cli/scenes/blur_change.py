@@ -47,7 +47,8 @@ class BlurLoss:
     @property
     def level(self) -> Array:
         """Signal (K, C) of a component of 1 [e/s]."""
-        return np.abs(self.weights).sum(axis=2)
+        level: Array = np.abs(self.weights).sum(axis=2)
+        return level
 
     def of_wave(self, amplitudes: Array, frequency: float) -> Array:
         """Return the most that is taken from a wave, (C,) [e/s], wherever it is looked at.
@@ -135,7 +136,8 @@ def parallel_edges_change(places: Array, heights: Array, lengths: Array, loss: B
     steps = np.tensordot(loss.weights, heights, axes=(0, 0))  # (C, J, r, n)
     both = edge_energy(np.subtract.outer(places, places), loss.spread, loss.most)
     pairs = np.einsum("cjrm,jmn,cjrn->cjr", steps, both, steps, optimize=True)
-    return np.maximum(pairs, 0.0) @ lengths
+    changes: Array = np.maximum(pairs, 0.0) @ lengths
+    return changes
 
 
 def squares_factor(pitch: float, loss: BlurLoss) -> Array:
@@ -161,7 +163,8 @@ def squares_factor(pitch: float, loss: BlurLoss) -> Array:
     shell = np.arange(SHELLS) + 0.5
     others = np.minimum((loss.most / (2 * np.pi * shell)) ** 2, own[:, None])
     rest = (loss.most / (2 * np.pi)) ** 2 / SHELLS  # of the shells beyond, by their integral
-    return np.sqrt(own + 2 * others.sum(axis=1) - others[:, 0] + 2 * rest)
+    factors: Array = np.sqrt(own + 2 * others.sum(axis=1) - others[:, 0] + 2 * rest)
+    return factors
 
 
 SHELLS = 64

@@ -52,7 +52,8 @@ def edges_within(edges: Array, half: float) -> Array:
 def overlap(edges: Array, low: float, high: float) -> Array:
     """Return the part of every cell between `edges` that lies within [low, high]: (n,)."""
     inside = np.minimum(edges[1:], high) - np.maximum(edges[:-1], low)
-    return np.maximum(inside, 0.0) / np.diff(edges)
+    shares: Array = np.maximum(inside, 0.0) / np.diff(edges)
+    return shares
 
 
 def cell_means(planes: Array, count: int) -> Array:

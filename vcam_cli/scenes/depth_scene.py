@@ -99,7 +99,8 @@ class CutLayer(SampledScene):
         else:
             planes = self.flat.planes(mix[:, :-1]).reshape(len(mix), -1)
             light = planes[:, self.sources[np.ix_(rows, columns)]]
-        return (light + mix[:, -1, None, None]) * self.coverage[np.ix_(rows, columns)]
+        covered: Array = (light + mix[:, -1, None, None]) * self.coverage[np.ix_(rows, columns)]
+        return covered
 
     @property
     def brightest(self) -> float:

@@ -192,7 +192,7 @@ class _Columns:
         if self.step is None:
             return self.edges.searchsorted(position, side="right") - 1
         inner = np.floor((position - self.edges[1]) / self.step)
-        index = np.clip(inner, -1, len(self.edges) - 3).astype(np.int32) + 1
+        index: Array = np.clip(inner, -1, len(self.edges) - 3).astype(np.int32) + 1
         index[position < self.edges[0]] = -1
         index[position >= self.edges[-1]] = len(self.edges) - 1
         return index
@@ -200,7 +200,8 @@ class _Columns:
 
 def _half_chord(radius: Array, distance: Array) -> Array:
     """Return half the length of the chord at a distance from the center; 0 outside."""
-    return np.sqrt(np.maximum((radius - distance) * (radius + distance), 0.0))
+    half_chord: Array = np.sqrt(np.maximum((radius - distance) * (radius + distance), 0.0))
+    return half_chord
 
 
 def _labels(spans: _Spans, discs: int, shape: tuple[int, int], hidden: Cells | None) -> Array:

@@ -48,7 +48,8 @@ class Region:
             )
             low = np.maximum(low, ends.min(axis=0))
             high = np.minimum(high, ends.max(axis=0))
-        return np.hypot(*along) * np.maximum(high - low, 0.0)
+        lengths: Array = np.hypot(*along) * np.maximum(high - low, 0.0)
+        return lengths
 
 
 @dataclass(frozen=True)

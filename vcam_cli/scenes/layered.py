@@ -6,6 +6,7 @@ asks for, which is image formation's business; `flat` is the scene as a pinhole 
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -188,7 +189,7 @@ class FlatLayers(Chart):
 
     def _are_pixels(self, widths: Array) -> bool:
         """Return whether cells are pixels, or collecting areas with gaps between them."""
-        return widths.max() > self.pitch * (1 - 1e-9) or np.ptp(widths) > 1e-6 * widths.max()
+        return bool(widths.max() > self.pitch * (1 - 1e-9) or np.ptp(widths) > 1e-6 * widths.max())
 
     def edge_energy(self, region: Region, level: Array, ceiling: float) -> EdgeEnergy:
         """Return the energy of all layers: an edge may have the brightest light behind it."""
@@ -203,8 +204,8 @@ class FlatLayers(Chart):
         """Return the values at points."""
         return self._compose(mix, lambda chart, m: chart.values(x, y, m))
 
-    def _compose(self, mix, look):
-        total, clear = 0.0, 1.0
+    def _compose(self, mix: Array, look: Callable[[Chart, Array], Array]) -> Array:
+        total, clear = np.zeros(1, mix.dtype), np.ones(1, mix.dtype)
         for part in self.parts:
             own = mix[:, part.components]
             weights = np.zeros((len(mix) + 1, own.shape[1] + 1), mix.dtype)

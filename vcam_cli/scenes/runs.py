@@ -58,4 +58,5 @@ def expand_ranges(first: Array, last: Array) -> tuple[Array, Array]:
 def concatenate_ranges(first: Array, count: Array) -> Array:
     """Return first[0], first[0]+1, ... (count[0] numbers), first[1], ... concatenated."""
     before = np.cumsum(count) - count
-    return np.arange(int(count.sum())) + np.repeat(first - before, count)
+    indices: Array = np.arange(int(count.sum())) + np.repeat(first - before, count)
+    return indices

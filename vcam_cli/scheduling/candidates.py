@@ -205,4 +205,5 @@ def _distinct_times(times: Floats, constraints: Constraints) -> Floats:
     if constraints.frame_time:
         return np.unique(np.round(times / constraints.frame_time)) * constraints.frame_time
     times = np.unique(times)
-    return times[np.append(True, np.diff(times) > 1e-14 * times[1:])]
+    distinct: Floats = times[np.append(True, np.diff(times) > 1e-14 * times[1:])]
+    return distinct

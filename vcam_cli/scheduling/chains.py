@@ -70,7 +70,8 @@ class Rewards:
     def loss(self, captures: Indices, followers: Indices) -> Floats:
         """Return (M,) what each capture loses of `own` to the capture that follows it."""
         if self.weights.shape[1] == 1:
-            return self.weights[captures, 0] * self.sums[followers, self.block[captures], 0]
+            lost: Floats = self.weights[captures, 0] * self.sums[followers, self.block[captures], 0]
+            return lost
         table = self.sums[followers, self.block[captures]]
         return np.asarray(np.einsum("mp,mp->m", self.weights[captures], table))
 

@@ -37,7 +37,8 @@ def last_usable_sample(saturated: NDArray[np.bool_]) -> Indices:
         Indices; -1 where there is no such sample.
     """
     clean = np.logical_and.accumulate(~saturated, axis=0)
-    return clean.sum(axis=0) - 1
+    last: Indices = clean.sum(axis=0) - 1
+    return last
 
 
 def last_sample_before_saturation(
@@ -72,7 +73,8 @@ def last_sample_before_saturation(
     values, when = np.asarray(samples, dtype=np.float64), np.asarray(times, dtype=np.float64)
     index = np.maximum(last_usable_sample(saturated), 0)
     last = np.take_along_axis(values, index[None], axis=0)[0]
-    return last / when[index] - dark_rate
+    rate: Floats = last / when[index] - dark_rate
+    return rate
 
 
 def weighted_estimate(

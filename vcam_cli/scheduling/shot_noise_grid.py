@@ -172,7 +172,8 @@ def _cell_bottoms(low: Floats, high: Floats, density: Floats, width: float) -> F
     dark = low[segment] * np.exp(np.minimum(place, in_ratio[segment]) * ratio)
     bright = np.sqrt(turn)[segment] + (place - in_ratio[segment]) * step[segment]
     bottoms = np.where(place <= in_ratio[segment], dark, bright**2)
-    return np.clip(bottoms, low[segment], high[segment])
+    inside: Floats = np.clip(bottoms, low[segment], high[segment])
+    return inside
 
 
 def _largest_loss(pdf: Pdf, points: Floats) -> float:

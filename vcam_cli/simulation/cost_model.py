@@ -60,7 +60,7 @@ def slowness() -> float:
 
 def threads(workers: int) -> float:
     """Return how much faster so many threads are than one: memory is shared between them."""
-    return workers**0.75
+    return float(workers**0.75)
 
 
 def output_seconds(camera: Camera, geometry: Geometry, mosaic: Mosaic) -> float:

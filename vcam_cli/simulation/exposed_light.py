@@ -250,7 +250,11 @@ def _full_charge(
     if groups.summed_charges > 1:
         # Of joined pixels some may be full and others not: their mean is then the most.
         full = kind(full_rate)
-        return np.where(groups.collect(beyond) > 0, np.minimum(found, full), full)
+        joined: Array = np.where(groups.collect(beyond) > 0, np.minimum(found, full), full)
+        return joined
     shares = [each.timely_share(*lit.shape[-2:]) for each in of_kind(effects, Transport)]
     room = np.maximum(kind(full_rate - dark) - lit, kind(0))
-    return np.minimum(found + np.prod(shares, axis=0).astype(kind) * room, kind(full_rate))
+    limited: Array = np.minimum(
+        found + np.prod(shares, axis=0).astype(kind) * room, kind(full_rate)
+    )
+    return limited

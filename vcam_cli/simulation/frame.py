@@ -263,7 +263,10 @@ def _pedestal(ready: Prepared) -> Array | None:
     if not steps:
         return None
     listed = np.array([steps[color] for color in ready.mosaic.colors], ready.rate.dtype)
-    return listed[ready.layout.color] * ready.rate.dtype.type(ready.electrical.electrons_per_dn)
+    pedestal: Array = listed[ready.layout.color] * ready.rate.dtype.type(
+        ready.electrical.electrons_per_dn
+    )
+    return pedestal
 
 
 def take_frame(ready: Prepared, workers: int, stages: Stages | None = None) -> Frame:

@@ -22,6 +22,7 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from itertools import chain, combinations
+from typing import Any
 
 import numpy as np
 
@@ -89,7 +90,7 @@ class Plan:
     levels: tuple[float, ...] = ()
     """Noise-free signals of the scene at which noise is promised [electrons]."""
 
-    def report(self) -> dict:
+    def report(self) -> dict[str, Any]:
         """Return the plan as `run.json` and `--json` show it."""
         return {
             "effects": [asdict(d) for d in self.decisions],

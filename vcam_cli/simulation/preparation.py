@@ -98,7 +98,8 @@ class Prepared:
         mean = exposure.mean_electrons(self.rate, self.exposure_time, self.plan.active)
         if self.full_charge is not None:
             mean = np.minimum(mean, self.full_charge)
-        return np.minimum(mean, mean.dtype.type(full_well(self.plan.active)))
+        clipped: Array = np.minimum(mean, mean.dtype.type(full_well(self.plan.active)))
+        return clipped
 
     @property
     def dark_rate(self) -> float:

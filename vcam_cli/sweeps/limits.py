@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from typing import Any
 
 from vcam_cli.camera.expectations import Limit, read_limits
 from vcam_cli.sweeps.model import OPTIMUM
@@ -51,7 +52,7 @@ def _misses(limit: Limit, result: SweepResult) -> Iterator[str]:
     yield limit.miss(values[worst], where)
 
 
-def _place(row: dict, result: SweepResult) -> str:
+def _place(row: dict[str, Any], result: SweepResult) -> str:
     """Return what is varied at a row of means, in words."""
     names = [name for name in row if name not in (*METRICS, "error")]
     return ", ".join(f"{name} = {row[name]}" for name in names)

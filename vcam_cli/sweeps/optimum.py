@@ -267,7 +267,7 @@ def variance_of_mean(curves: Array) -> float:
         return math.nan
     rest = curves - curves.mean(axis=0)
     rest = rest - rest.mean(axis=1, keepdims=True)
-    return float(np.square(rest).sum()) / ((count - 1) * (points - 1) * count)
+    return float(np.square(rest).sum() / ((count - 1) * (points - 1) * count))
 
 
 def bootstrap_means(curves: Array, rest: float, least: int = MIN_BOOTSTRAP_CURVES) -> Array:

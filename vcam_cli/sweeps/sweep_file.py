@@ -13,13 +13,14 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from pydantic import ValidationError
 
 from vcam_cli import errors, units
 from vcam_cli.camera import load as cameras
-from vcam_cli.camera.camera import FORMAT
+from vcam_cli.camera.camera import FORMAT, Camera
 from vcam_cli.camera.load import merge
 from vcam_cli.config import validation_messages
 from vcam_cli.config.document import Document, given_at, place_order
@@ -31,7 +32,7 @@ from vcam_cli.config.yaml_reader import read_file
 from vcam_cli.config.yaml_tree import Node, Origin, PlacedKeys, Source, tree_at
 from vcam_cli.errors import BadInput, Problem, split
 from vcam_cli.sweeps import study_hints
-from vcam_cli.sweeps.model import VARY, Sweep
+from vcam_cli.sweeps.model import VARY, Sweep, Variation
 from vcam_cli.sweeps.quantities import QUALITY, symbol
 
 Cell = float | str
@@ -72,7 +73,7 @@ class StudyCase:
 
     name: str
     """Its name in tables, with the camera's where there are several."""
-    base: Document
+    base: Document[Camera]
     """The camera file with the overrides of the case."""
     parameters: dict[str, Parameter]
     """What is varied in it, by path."""
@@ -133,7 +134,7 @@ class StudyFile(PlacedKeys):
                 judged = tree_at(("quality",), quality)
                 yield StudyCase(name, base.overlay(own).overlay(judged), self.case_parameters(case))
 
-    def word_values(self, over: Node) -> Iterator[Document]:
+    def word_values(self, over: Node) -> Iterator[Document[Camera]]:
         """Yield what the overrides, and each word among the values, lead to by themselves.
 
         Names of parts are looked up anew for every camera, so what they lead to may change with no
@@ -160,7 +161,7 @@ class StudyFile(PlacedKeys):
         found = _cell_values(path, nodes, tuple(plain))
         return _convert_cells(found, unit) if found.unit != unit else found
 
-    def _parameters(self, vary: Mapping, *at: str) -> dict[str, Parameter]:
+    def _parameters(self, vary: Mapping[str, Variation], *at: str) -> dict[str, Parameter]:
         out = {}
         for path, variation in vary.items():
             node = self.node(*at, path)
@@ -208,7 +209,7 @@ def read(study: str | Path, folder: Path | None = None, sets: Sequence[str] = ()
     return found
 
 
-def _camera_files(study: StudyFile) -> Iterator[Document]:
+def _camera_files(study: StudyFile) -> Iterator[Document[Camera]]:
     """Yield the study's camera files. Raises BadInput for one that is none, or two of one name."""
     node = study.node("camera")
     names: set[str] = set()
@@ -227,7 +228,7 @@ def _camera_files(study: StudyFile) -> Iterator[Document]:
         yield base
 
 
-def _camera_name(base: Document) -> str:
+def _camera_name(base: Document[Camera]) -> str:
     node = base.tree.get("name")
     return str(node.value) if node is not None else base.file.stem
 
@@ -250,24 +251,26 @@ def _without_key_mark(problem: Problem) -> Problem:
     return replace(problem, path=tuple(p for p in problem.path if p != "[key]"))
 
 
-def _range(path: str, node: Node, variation) -> Parameter:
+def _range(path: str, node: Node, variation: Variation) -> Parameter:
     """Return values of equal steps or ratios, in the unit of the first.
 
     Steps are exact until they are written, ratios to twelve digits, so that decades are round
     numbers; both ends are as given. Of one value there is only the first.
     """
+    count = variation.count
+    assert count is not None  # as the file has no list of values
     start, unit = units.split(variation.start)
     stop = units.convert(*units.split(variation.stop), unit)
-    if variation.count > 1 and start == stop:
+    if count > 1 and start == stop:
         raise ValueError("start and stop are the same; give one value, or two ends")
-    steps = max(1, variation.count - 1)
-    numbers = [start + (stop - start) * Fraction(i, steps) for i in range(variation.count)]
+    steps = max(1, count - 1)
+    numbers = [start + (stop - start) * Fraction(i, steps) for i in range(count)]
     if variation.spacing == "log":
         if start <= 0 or stop <= 0:
             raise ValueError("log spacing needs ends above zero; write spacing: linear")
-        logs = np.linspace(math.log(start), math.log(stop), variation.count)
+        logs = np.linspace(math.log(start), math.log(stop), count)
         inner = [Fraction(f"{math.exp(log):.12g}") for log in logs[1:-1]]
-        numbers = [start, *inner, stop][: variation.count]
+        numbers = [start, *inner, stop][:count]
     whole = all(n.denominator == 1 for n in numbers)
     written: list[float] = [int(n) if whole else float(n) for n in numbers]
     place = node.get("start") or node
@@ -276,7 +279,7 @@ def _range(path: str, node: Node, variation) -> Parameter:
     return Parameter(path, unit, nodes, tuple(float(n) for n in numbers))
 
 
-def _cell_values(path: str, node: Node, values: tuple) -> Parameter:
+def _cell_values(path: str, node: Node, values: tuple[Any, ...]) -> Parameter:
     """Return values as they were written; numbers where all are, words otherwise."""
     assert isinstance(node.value, list)
     nodes = tuple(node.value)

@@ -145,7 +145,9 @@ def _refuse_sets(sets: Sequence[str], grid_paths: Collection[str]) -> None:
         raise BadInput(problems)
 
 
-def _refuse_too_many(model: Sweep, repeated: dict, cases: list[dict[str, Parameter]]) -> None:
+def _refuse_too_many(
+    model: Sweep, repeated: dict[str, Any], cases: list[dict[str, Parameter]]
+) -> None:
     each = model.seeds
     for parameter in repeated.values():
         each *= len(parameter.nodes)
@@ -206,7 +208,7 @@ def _require_metrics(camera: Camera, model: Sweep) -> None:
         raise BadInput(problems)
 
 
-def case_file(case: StudyCase, nodes: Mapping[str, Node], over: Node) -> Document:
+def case_file(case: StudyCase, nodes: Mapping[str, Node], over: Node) -> Document[Camera]:
     """Return the camera file of a case with values by path, overrides laid over all of it."""
     tree = Node({}, Source("", case.base.file.parent))
     for path, node in nodes.items():

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from vcam_cli.camera import load as cameras
+from vcam_cli.camera.camera import Camera
 from vcam_cli.config.document import Document
 from vcam_cli.config.file_names import current_folder
 from vcam_cli.errors import CannotDo, Problem, dotted_path, one_line
@@ -60,13 +61,13 @@ class Outcome:
     trace: str = ""
     """The traceback of a bug."""
 
-    def content(self) -> dict:
+    def content(self) -> dict[str, Any]:
         """Return what is kept of it."""
         names = ("metrics", "error", "final", "seconds")
         return {name: getattr(self, name) for name in names}
 
 
-def read_outcome(point: str, content: dict) -> Outcome:
+def read_outcome(point: str, content: dict[str, Any]) -> Outcome:
     """Return the outcome of what was kept of a point. Raises ValueError where it is none."""
     try:
         return Outcome(
@@ -264,7 +265,7 @@ def request_hash(study: StudyFile, sets: Sequence[str], extras: Extras) -> str:
     return hash_text(to_json(asked))
 
 
-def _files_named(base: Document) -> list[Any]:
+def _files_named(base: Document[Camera]) -> list[Any]:
     """Return what files say that names lead to, and which there are, with those beside them."""
     beside = [companion for path in base.inputs for companion in companions(path)]
     return [base.tree.plain(), [str(path) for path in (*base.inputs, *beside)]]

@@ -127,7 +127,7 @@ def _joint_optima(
 
 def _optimum(case: str, parameter: Parameter, values: Array, wanted: Optimize) -> CaseOptimum:
     """Return the optimum of values (values of the parameter, repeats x seeds)."""
-    good = np.isfinite(values).all(axis=1)
+    good = np.asarray(np.isfinite(values).all(axis=1))
     about = (case, parameter.path, parameter.unit)
     cells = [cell for cell, is_good in zip(parameter.cells, good, strict=True) if is_good]
     if any(isinstance(cell, str) for cell in cells):

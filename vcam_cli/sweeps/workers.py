@@ -146,7 +146,10 @@ def _compute_on_dask(
         ]
 
         def submit(slot: int, job: Task) -> Future[Outcome]:
-            return executors[slot].submit(compute_on_cluster, job, slots[slot][1])
+            future: Future[Outcome] = executors[slot].submit(
+                compute_on_cluster, job, slots[slot][1]
+            )
+            return future
 
         # Every slot has two points, so that it does not wait for the next one to be sent.
         numbers = [*range(len(slots)), *range(len(slots))]
@@ -191,7 +194,7 @@ class WorkerProcess:
         self._threads = threads
         self._lock = Lock()
         self._ended = False
-        self._process: subprocess.Popen | None = None
+        self._process: subprocess.Popen[bytes] | None = None
         self._connection: Connection
 
     def compute(self, job: Task) -> Outcome:
@@ -201,7 +204,8 @@ class WorkerProcess:
             self._start()
             try:
                 self._connection.send(job)
-                return self._connection.recv()
+                outcome: Outcome = self._connection.recv()
+                return outcome
             except (EOFError, OSError):
                 how = self._exit_text()
         message = f"its process died {TRIES} times ({how}); too little memory?"
@@ -263,7 +267,8 @@ def _outcome(job: Task, future: Any, lost: str) -> Outcome:
         raise CannotDo(message, "install vcam there, in the same version")
     if error is not None:
         return Outcome(job.id, error=f"lost on the cluster: {type(error).__name__}", final=False)
-    return future.result()
+    outcome: Outcome = future.result()
+    return outcome
 
 
 @contextmanager

@@ -96,7 +96,8 @@ class Verification:
     def errors(self) -> Array:
         """The errors of all means, relative; those of means that were measured as 0 have none."""
         every = np.array([row.error for row in self.rows if row.quantity.startswith("mean")])
-        return every[np.isfinite(every)]
+        finite: Array = every[np.isfinite(every)]
+        return finite
 
     @property
     def missed(self) -> tuple[Row, ...]:

@@ -60,7 +60,7 @@ class Circuit:
     @property
     def highest_code(self) -> int:
         """Highest ADC code [DN]."""
-        return 2**self.bits - 1
+        return (1 << self.bits) - 1
 
     @property
     def output(self) -> float:
@@ -75,7 +75,8 @@ class Circuit:
     def volts_of(self, electrons: Array) -> Array:
         """Return the voltage at the ADC of charges [e], in their shape and float type [V]."""
         if self.curve is None:
-            return electrons * electrons.dtype.type(self.conversion_gain * self.analog_gain)
+            volts: Array = electrons * electrons.dtype.type(self.conversion_gain * self.analog_gain)
+            return volts
         volts = self.curve.volts_of(electrons) * self.analog_gain
         return volts.astype(electrons.dtype)
 

@@ -103,7 +103,7 @@ class Process:
     quantum_efficiency_scale: float | None
     layout: Layout
 
-    def require(self, need: Need, *keys: str) -> list[Any]:
+    def require(self, need: Need, *keys: str) -> list[float]:
         """Return the numbers [SI] of dotted keys of a technology.
 
         Raises BadInput that names all that nobody gives, and where to write them.

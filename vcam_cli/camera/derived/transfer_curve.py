@@ -194,4 +194,5 @@ def _measured(points: Points, voltage: Array) -> NDArray[np.float64]:
             f" to {low:.4g} V"
         )
         raise bad(path, message, "measure it over all of the swing, or give another reset_voltage")
-    return np.interp(voltage, x, y)
+    output: NDArray[np.float64] = np.interp(voltage, x, y)
+    return output

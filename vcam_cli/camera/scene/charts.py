@@ -1,6 +1,6 @@
 """Test charts: scenes that are computed and not read from a file."""
 
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Literal, Self, TypeVar
 
 from pydantic import model_validator
 
@@ -10,6 +10,7 @@ from vcam_cli.config.quantities import Number, Quantity, Whole
 from vcam_cli.config.validation_messages import refusal
 from vcam_cli.config.values import Angle, Fraction, Frequency, Length
 
+Wave = TypeVar("Wave", bound="Sinusoid | Csf")
 Seed = Annotated[int, Whole(least=0, most=2**63 - 1, example="1")]
 
 
@@ -159,7 +160,7 @@ class HdrPatches(Chart):
     )
 
 
-def _no_more_than_white(chart: Any, contrast: float, name: str) -> Any:
+def _no_more_than_white(chart: Wave, contrast: float, name: str) -> Wave:
     brightest = chart.mean * (1 + contrast)
     if brightest > 1 + 1e-12:
         message = f"mean x (1 + {name}) is {brightest:.4g}, more than a reflectance can be"

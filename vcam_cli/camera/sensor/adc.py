@@ -33,7 +33,8 @@ class BlackLevels(YamlType):
     def read(self, given: Any) -> float | Mapping[str, float] | None:
         """Return the level or levels [DN]; raise ValueError with a sentence."""
         if not isinstance(given, Mapping):
-            return _ONE_LEVEL.read(given)
+            one: float | None = _ONE_LEVEL.read(given)
+            return one
         if not given:
             raise ValueError("a mapping of colors is empty; write {R: 66 DN, G: 64 DN, B: 61 DN}")
         levels = {}

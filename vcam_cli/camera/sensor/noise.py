@@ -34,7 +34,7 @@ class NoiseTable:
         for (low, before), (high, after) in zip(self.points, self.points[1:], strict=False):
             if gain <= high:
                 part = math.log(gain / low) / math.log(high / low)
-                return before * (after / before) ** part
+                return float(before * (after / before) ** part)
         return last[1]
 
 

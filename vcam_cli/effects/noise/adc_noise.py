@@ -8,9 +8,13 @@ n is the noise in codes, K the codes of an electron at the exposure's gain and t
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Self
 
+from vcam_cli.arrays import Array
+from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.effects.noise.quantization import Quantization
-from vcam_cli.effects.signal_chain import NoiseSource, Quantizer
+from vcam_cli.effects.signal_chain import NoiseSource, Quantizer, Site
 
 
 @dataclass(frozen=True)
@@ -33,7 +37,7 @@ class AdcNoise(NoiseSource):
     behind_well = True
 
     @classmethod
-    def from_camera(cls, camera, geometry):
+    def from_camera(cls, camera: Camera, geometry: Geometry) -> Self | None:
         """Return the noise of the ADC, or None where the file gives none."""
         if not camera.adc.noise:
             return None
@@ -43,12 +47,12 @@ class AdcNoise(NoiseSource):
         """Return a short clause with this camera's numbers and units."""
         return f"{self.codes:.4g} DN rms, {self.codes * self.adc.step(0.0):.4g} e in the dark"
 
-    def apply(self, electrons, site):
+    def apply(self, electrons: Array, site: Site) -> Array:
         """Return the block with the noise of one conversion in it [electrons]."""
         z = site.normal(self.name)
         z *= self.codes
         return self.adc.moved(electrons, z)
 
-    def variance(self, mean, dark=0.0):
+    def variance(self, mean: float, dark: float = 0.0) -> float:
         """Return the variance that it adds to a pixel [electrons squared]."""
         return (self.codes * self.adc.step(mean)) ** 2

@@ -8,10 +8,15 @@ is the noise of row k over its rms, r the correlation of neighbors, z normal num
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Self
 
 import numpy as np
 
-from vcam_cli.effects.signal_chain import NoiseSource
+from vcam_cli.arrays import Array
+from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.derived.geometry import Geometry
+from vcam_cli.camera.sensor.array import Binning
+from vcam_cli.effects.signal_chain import NoiseSource, Site
 
 
 @dataclass(frozen=True)
@@ -35,7 +40,7 @@ class CorrelatedRowNoise(NoiseSource):
     origin = "readout"
 
     @classmethod
-    def from_camera(cls, camera, geometry):
+    def from_camera(cls, camera: Camera, geometry: Geometry) -> Self | None:
         """Return the noise that the file gives, or None where it gives none."""
         given = camera.pixel.readout.correlated_row_noise
         return cls(given.rms, given.correlation) if given is not None and given.rms else None
@@ -44,18 +49,18 @@ class CorrelatedRowNoise(NoiseSource):
         """Return a short clause with this camera's numbers and units."""
         return f"{self.rms:.4g} e rms per row, correlation {self.correlation:g} between rows"
 
-    def split(self):
+    def split(self) -> tuple[Self | None, Self | None, Self | None]:
         """Return nothing of pixels by themselves nor of columns: all of it is the rows'."""
         return replace(self, rms=0.0), None, self
 
-    def apply(self, electrons, site):
+    def apply(self, electrons: Array, site: Site) -> Array:
         """Return the block with the noise of its rows in it; it reuses the array [electrons]."""
         if self.rms:
             rows = site.of_all_rows(self.name, self._autoregression)
             electrons += (self.rms * rows).astype(electrons.dtype)
         return electrons
 
-    def _autoregression(self, z):
+    def _autoregression(self, z: Array) -> Array:
         """Return the sequence of all rows of unit variance, of independent normal numbers."""
         from scipy.signal import lfilter
 
@@ -63,11 +68,11 @@ class CorrelatedRowNoise(NoiseSource):
         start = np.concatenate([z[:1], fresh * z[1:]])
         return lfilter([1.0], [1.0, -self.correlation], start)
 
-    def variance(self, mean, dark=0.0):
+    def variance(self, mean: float, dark: float = 0.0) -> float:
         """Return the variance that it adds to a pixel [electrons squared]."""
         return self.rms**2
 
-    def binned_variance(self, mean, dark, binning):
+    def binned_variance(self, mean: float, dark: float, binning: Binning | None) -> float:
         """Return the variance of the mean of pixels read as one, whose rows are neighbors.
 
         In mosaics, where they lie farther apart, it is an upper bound [electrons squared].

@@ -8,15 +8,18 @@ z are normal numbers of pixels (1, 3) and columns (2, 4), the same in every fram
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
 from vcam_cli.arrays import Array
+from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.electrical import circuit
+from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.camera.sensor.architecture import ARCHITECTURES
-from vcam_cli.effects.signal_chain import NoiseSource
+from vcam_cli.effects.signal_chain import NoiseSource, Site
 
 OVERFULL = 100
 """Full wells of charge in a hot pixel: more than the noise of any readout brings below one."""
@@ -57,12 +60,12 @@ class FixedPattern(NoiseSource):
     sample_draws = "common"
     parts = ("offset_pixel", "gain_pixel", "dark")
 
-    def __post_init__(self):
+    def __post_init__(self) -> None:
         # Where all pixels are defective they do not differ: the plan would see no noise in it.
         object.__setattr__(self, "removable", not (self.hot or self.dead))
 
     @classmethod
-    def from_camera(cls, camera, geometry):
+    def from_camera(cls, camera: Camera, geometry: Geometry) -> Self | None:
         """Return the fixed pattern that the pixel's architecture has, or None where it has none."""
         fpn, defects, name = camera.pixel.fpn, camera.pixel.defects, camera.pixel.architecture
         columns = fpn.offset_column, fpn.gain_column
@@ -87,19 +90,19 @@ class FixedPattern(NoiseSource):
             said += f"; {100 * self.hot:.3g} % hot, {100 * self.dead:.3g} % dead pixels"
         return said
 
-    def without_parts(self, names):
+    def without_parts(self, names: Collection[str]) -> Self:
         """Return it with some of its parts at 0."""
         gone: dict[str, Any] = dict.fromkeys(names, 0.0)
         return replace(self, **gone)
 
-    def split(self):
+    def split(self) -> tuple[FixedPattern, FixedPattern | None, None]:
         """Return the pixels' own pattern, the columns' and None: rows are alike."""
         own = replace(self, offset_column=0.0, gain_column=0.0)
         if not (self.offset_column or self.gain_column):
             return own, None, None
         return own, FixedPattern(0.0, self.offset_column, 0.0, self.gain_column), None
 
-    def before_shot(self, mean, site):
+    def before_shot(self, mean: Array, site: Site) -> Array:
         """Return the mean signal with dark currents and defects in it; it reuses the array."""
         if self.dark and site.dark:
             z = site.normal("fpn dark")
@@ -114,7 +117,7 @@ class FixedPattern(NoiseSource):
             mean[chance >= 1 - self.dead] = 0
         return mean
 
-    def apply(self, electrons, site):
+    def apply(self, electrons: Array, site: Site) -> Array:
         """Return the block with gains and offsets in it; it reuses the array [electrons]."""
         if self.gain_pixel or self.gain_column:
             gain: Array = 1 + self.gain_column * site.normal_columns("fpn gain column")
@@ -137,7 +140,7 @@ class FixedPattern(NoiseSource):
         """Whether there are hot pixels."""
         return self.hot > 0
 
-    def variance(self, mean, dark=0.0):
+    def variance(self, mean: float, dark: float = 0.0) -> float:
         """Return the variance that it adds to a pixel [electrons squared]."""
         offsets = self.offset_pixel**2 + self.offset_column**2
         gains = (self.gain_pixel**2 + self.gain_column**2) * mean**2
@@ -150,7 +153,7 @@ class FixedPattern(NoiseSource):
         between = self.hot * (self.full_well - center) ** 2 + working * (mean - center) ** 2
         return within + between + self.dead * center**2
 
-    def working_variance(self):
+    def working_variance(self) -> float:
         """Return the variance of the offsets of working pixels [electrons squared]."""
         return replace(self, hot=0.0, dead=0.0).variance(0.0)
 

@@ -8,11 +8,15 @@ a are drawn from the sensor seed and scaled to the rms, W and H are the sides of
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 
 from vcam_cli.arrays import Array
-from vcam_cli.effects.signal_chain import NoiseSource
+from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.derived.geometry import Geometry
+from vcam_cli.camera.sensor.array import Binning
+from vcam_cli.effects.signal_chain import NoiseSource, Site
 
 
 @dataclass(frozen=True)
@@ -40,7 +44,7 @@ class PatternShading(NoiseSource):
     sample_draws = "common"
 
     @classmethod
-    def from_camera(cls, camera, geometry):
+    def from_camera(cls, camera: Camera, geometry: Geometry) -> Self | None:
         """Return the pattern that the file gives, or None where it gives none."""
         given = camera.pixel.fpn.shading
         if given is None or not (given.offset or given.gain):
@@ -54,7 +58,7 @@ class PatternShading(NoiseSource):
             " array"
         )
 
-    def apply(self, electrons, site):
+    def apply(self, electrons: Array, site: Site) -> Array:
         """Return the block with gains and offsets in it; it reuses the array [electrons]."""
         offsets, gains = self._strengths(site)
         if self.gain:
@@ -63,7 +67,7 @@ class PatternShading(NoiseSource):
             electrons += self.offset * _cosines(offsets, site).astype(electrons.dtype)
         return electrons
 
-    def _strengths(self, site) -> tuple[Array, Array]:
+    def _strengths(self, site: Site) -> tuple[Array, Array]:
         """Return the strengths of the cosines, (along y, along x), for offsets and for gains."""
         half_cycles = 2 * self.cycles
         rows = np.arange(min(half_cycles + 1, site.all_rows))
@@ -76,16 +80,16 @@ class PatternShading(NoiseSource):
             gains = gains - (gains * offsets).sum() * offsets
         return offsets, gains / max(float(np.linalg.norm(gains)), np.finfo(float).tiny)
 
-    def variance(self, mean, dark=0.0):
+    def variance(self, mean: float, dark: float = 0.0) -> float:
         """Return the variance over the array that it adds [electrons squared]."""
         return self.offset**2 + (self.gain * mean) ** 2
 
-    def binned_variance(self, mean, dark, binning):
+    def binned_variance(self, mean: float, dark: float, binning: Binning | None) -> float:
         """Return the same of pixels that are read as one: neighbors are alike."""
         return self.variance(mean, dark)
 
 
-def _cosines(strengths: Array, site) -> Array:
+def _cosines(strengths: Array, site: Site) -> Array:
     """Return the sum of cosines at the pixels of a block, (rows, columns)."""
     rows = site.first_row + np.arange(site.rows)
     along_y = _basis(rows, site.all_rows, strengths.shape[0])

@@ -10,11 +10,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Self
 
 import numpy as np
 
 from vcam_cli.arrays import Array
-from vcam_cli.effects.signal_chain import NoiseSource
+from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.derived.geometry import Geometry
+from vcam_cli.effects.signal_chain import NoiseSource, Site
 
 LEAST_CHANCE = 2.0**-54
 """A number drawn evenly from 0 to 1 is kept this far from 0, half of the generator's step."""
@@ -79,7 +82,7 @@ class HeavyTailedNoise(NoiseSource):
     origin = "readout"
 
     @classmethod
-    def from_camera(cls, camera, geometry):
+    def from_camera(cls, camera: Camera, geometry: Geometry) -> Self | None:
         """Return the noise that the file gives, or None where it gives none."""
         given = camera.pixel.readout.heavy_tailed_noise
         return cls(given.rms, given.shape) if given is not None and given.rms else None
@@ -88,7 +91,7 @@ class HeavyTailedNoise(NoiseSource):
         """Return a short clause with this camera's numbers and units."""
         return f"{self.rms:.4g} e rms, Tukey lambda of shape {self.shape:g}"
 
-    def apply(self, electrons, site):
+    def apply(self, electrons: Array, site: Site) -> Array:
         """Return the block with the noise of one readout in it; it reuses the array [electrons]."""
         # 64 bits whatever the rest is computed in: tails end where the generator's steps begin.
         chance = site.stream(self.name).random((site.rows, site.columns))
@@ -97,6 +100,6 @@ class HeavyTailedNoise(NoiseSource):
         electrons += z.astype(electrons.dtype)
         return electrons
 
-    def variance(self, mean, dark=0.0):
+    def variance(self, mean: float, dark: float = 0.0) -> float:
         """Return the variance that it adds to a pixel [electrons squared]."""
         return self.rms**2

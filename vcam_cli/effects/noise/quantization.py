@@ -8,9 +8,13 @@ A logarithmic ADC takes the logarithm of 1 + electrons / bend in place of the el
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 
+from vcam_cli.arrays import Array
+from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.camera.derived.transfer_curve import Curve
 from vcam_cli.effects.readout_chain import electrical
 from vcam_cli.effects.signal_chain import Quantizer
@@ -30,7 +34,7 @@ class Quantization(Quantizer):
     seconds_per_pixel = 2e-9
 
     @classmethod
-    def from_camera(cls, camera, geometry):
+    def from_camera(cls, camera: Camera, geometry: Geometry) -> Quantizer:
         """Return the camera's ADC, linear or logarithmic, with the readout's curve."""
         e = electrical(camera)
         if e.curve is not None and e.reference is None:
@@ -45,17 +49,17 @@ class Quantization(Quantizer):
         """Return a short clause with this camera's numbers and units."""
         return f"{self.electrons_per_dn:.4g} e per step, {2**self.bits} codes"
 
-    def response(self, electrons):
+    def response(self, electrons: Array) -> Array:
         """Return the codes before rounding and clipping [DN]."""
         return electrons * (1 / self.electrons_per_dn) + self.offset
 
-    def moved(self, electrons, codes):
+    def moved(self, electrons: Array, codes: Array) -> Array:
         """Return the signal whose response is by so many codes [DN] another one [electrons]."""
         codes *= codes.dtype.type(self.electrons_per_dn)
         electrons += codes
         return electrons
 
-    def apply(self, electrons):
+    def apply(self, electrons: Array) -> Array:
         """Return the codes of `electrons`, rounded and clipped [DN]."""
         code = electrons * electrons.dtype.type(1 / self.electrons_per_dn)
         code += electrons.dtype.type(self.offset)
@@ -86,7 +90,7 @@ class LogarithmicQuantization(Quantizer):
     seconds_per_pixel = 15e-9
 
     @classmethod
-    def from_camera(cls, camera, geometry):
+    def from_camera(cls, camera: Camera, geometry: Geometry) -> Self | None:
         """Return the camera's ADC where it is logarithmic, else None."""
         found = Quantization.from_camera(camera, geometry)
         return found if isinstance(found, cls) else None
@@ -101,14 +105,14 @@ class LogarithmicQuantization(Quantizer):
 
     @property
     def _span(self) -> float:
-        return 2**self.bits - 1 - self.offset
+        return (1 << self.bits) - 1 - self.offset
 
     @property
     def _slope(self) -> float:
         """Codes per natural logarithm [DN]."""
         return self._span / float(np.log1p(self.full / self.bend))
 
-    def response(self, electrons):
+    def response(self, electrons: Array) -> Array:
         """Return the codes before rounding and clipping [DN]."""
         signal = np.maximum(electrons * (1 / self.bend), -1)
         with np.errstate(divide="ignore"):  # ln(0) = -inf, which is clipped
@@ -117,7 +121,7 @@ class LogarithmicQuantization(Quantizer):
         level += self.offset
         return level
 
-    def moved(self, electrons, codes):
+    def moved(self, electrons: Array, codes: Array) -> Array:
         """Return the signal whose response is by so many codes [DN] another one [electrons].
 
         Where the curve has no value it stays; no signal moves by more than the whole scale.
@@ -129,11 +133,11 @@ class LogarithmicQuantization(Quantizer):
         electrons += above * (factor - 1)
         return electrons
 
-    def apply(self, electrons):
+    def apply(self, electrons: Array) -> Array:
         """Return the codes of `electrons`, rounded and clipped [DN]."""
         return _round_and_clip(self.response(electrons), self.bits)
 
-    def linear(self, dn):
+    def linear(self, dn: Array) -> Array:
         """Return what a linear ADC of the same offset and full scale has for these codes [DN]."""
         signal = np.expm1((dn - self.offset) * (1 / self._slope))
         signal *= self._span * self.bend / self.full
@@ -160,7 +164,7 @@ class CurvedQuantization(Quantizer):
     seconds_per_pixel = 200e-9
 
     @classmethod
-    def from_camera(cls, camera, geometry):
+    def from_camera(cls, camera: Camera, geometry: Geometry) -> Self | None:
         """Return the camera's ADC behind a transfer curve, None where that is a line."""
         found = Quantization.from_camera(camera, geometry)
         return found if isinstance(found, cls) else None
@@ -176,25 +180,25 @@ class CurvedQuantization(Quantizer):
 
     @property
     def _codes_per_volt(self) -> float:
-        return (2**self.bits - 1 - self.offset) / self.full_scale
+        return ((1 << self.bits) - 1 - self.offset) / self.full_scale
 
-    def response(self, electrons):
+    def response(self, electrons: Array) -> Array:
         """Return the codes before rounding and clipping [DN]."""
         level = self.curve.volts_of(electrons)
         level *= self._codes_per_volt
         level += self.offset
         return level.astype(electrons.dtype)
 
-    def moved(self, electrons, codes):
+    def moved(self, electrons: Array, codes: Array) -> Array:
         """Return the signal whose response is by so many codes [DN] another one [electrons]."""
         volts = self.curve.volts_of(electrons) + codes / self._codes_per_volt
         return self.curve.electrons_of(volts).astype(electrons.dtype)
 
-    def apply(self, electrons):
+    def apply(self, electrons: Array) -> Array:
         """Return the codes of `electrons`, rounded and clipped [DN]."""
         return _round_and_clip(self.response(electrons), self.bits)
 
-    def linear(self, dn):
+    def linear(self, dn: Array) -> Array:
         """Return the codes [DN] of the curve's chord, where the processing takes the curve out."""
         if not self.curve.corrected:
             return dn
@@ -204,7 +208,7 @@ class CurvedQuantization(Quantizer):
         return signal.astype(dn.dtype)
 
 
-def _round_and_clip(level, bits):
+def _round_and_clip(level: Array, bits: int) -> Array:
     """Return the nearest codes, clipped; it overwrites its argument."""
     np.rint(level, out=level)
     return np.clip(level, 0, 2**bits - 1, out=level)

@@ -8,9 +8,13 @@ A column and a row have one draw each in a frame.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Self
 
+from vcam_cli.arrays import Array
+from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.camera.sensor.architecture import ARCHITECTURES
-from vcam_cli.effects.signal_chain import NoiseSource
+from vcam_cli.effects.signal_chain import NoiseSource, Site
 
 
 @dataclass(frozen=True)
@@ -33,7 +37,7 @@ class ReadNoise(NoiseSource):
     origin = "readout"
 
     @classmethod
-    def from_camera(cls, camera, geometry):
+    def from_camera(cls, camera: Camera, geometry: Geometry) -> Self | None:
         """Return the noise of the readout, or None where pixel, column and row have none."""
         given, name = camera.pixel.readout, camera.pixel.architecture
         missing = given.column_noise > 0 and not ARCHITECTURES[name].column_terms
@@ -54,13 +58,13 @@ class ReadNoise(NoiseSource):
             said += f" (no column noise in a {self.no_columns})"
         return said
 
-    def split(self):
+    def split(self) -> tuple[ReadNoise, ReadNoise | None, ReadNoise | None]:
         """Return the pixels' own noise, the columns' and the rows'."""
         column = ReadNoise(0.0, column=self.column) if self.column else None
         row = ReadNoise(0.0, row=self.row) if self.row else None
         return ReadNoise(self.electrons), column, row
 
-    def apply(self, electrons, site):
+    def apply(self, electrons: Array, site: Site) -> Array:
         """Return the block with the noise of one readout in it; it reuses the array [electrons]."""
         if self.electrons:
             z = site.normal(self.name)
@@ -72,6 +76,6 @@ class ReadNoise(NoiseSource):
             electrons += self.row * site.normal_rows("read_noise row")
         return electrons
 
-    def variance(self, mean, dark=0.0):
+    def variance(self, mean: float, dark: float = 0.0) -> float:
         """Return the variance that it adds to a pixel [electrons squared]."""
         return self.electrons**2 + self.column**2 + self.row**2

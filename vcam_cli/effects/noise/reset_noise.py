@@ -8,10 +8,14 @@ C is the capacitance that is reset, T its temperature.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Self
 
+from vcam_cli.arrays import Array
+from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.electrical import circuit
+from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.camera.sensor.architecture import ARCHITECTURES
-from vcam_cli.effects.signal_chain import NoiseSource
+from vcam_cli.effects.signal_chain import NoiseSource, Site
 from vcam_cli.physics import readout
 
 
@@ -35,7 +39,7 @@ class ResetNoise(NoiseSource):
     sample_draws = "common"
 
     @classmethod
-    def from_camera(cls, camera, geometry):
+    def from_camera(cls, camera: Camera, geometry: Geometry) -> Self | None:
         """Return the noise of the reset, or None where the architecture removes it."""
         electrons = _noise(camera)
         return cls(electrons) if electrons else None
@@ -44,19 +48,19 @@ class ResetNoise(NoiseSource):
         """Return a short clause with this camera's numbers and units."""
         return f"{self.electrons:.4g} e rms"
 
-    def apply(self, electrons, site):
+    def apply(self, electrons: Array, site: Site) -> Array:
         """Return the block with the noise of a reset in it; it reuses the array [electrons]."""
         z = site.normal(self.name)
         z *= self.electrons
         electrons += z
         return electrons
 
-    def variance(self, mean, dark=0.0):
+    def variance(self, mean: float, dark: float = 0.0) -> float:
         """Return the variance that it adds to a pixel [electrons squared]."""
         return self.electrons**2
 
 
-def _noise(camera) -> float:
+def _noise(camera: Camera) -> float:
     """Return the noise that the reset leaves in a frame [e rms]; 0 where there is none."""
     given = camera.pixel.readout.reset_noise
     of_what = ARCHITECTURES[camera.pixel.architecture].reset_noise
@@ -70,4 +74,5 @@ def _noise(camera) -> float:
         capacitance = circuit(camera).capacitance
     if capacitance is None:  # `electrical.check` refuses that where the file is read
         return 0.0
-    return float(readout.reset_noise_variance(capacitance, camera.pixel.temperature)) ** 0.5
+    variance = readout.reset_noise_variance(capacitance, camera.pixel.temperature)
+    return float(float(variance) ** 0.5)

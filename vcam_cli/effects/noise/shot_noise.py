@@ -8,8 +8,12 @@ mu is the mean number of electrons of light and dark current together.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Self
 
-from vcam_cli.effects.signal_chain import NoiseSource
+from vcam_cli.arrays import Array
+from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.derived.geometry import Geometry
+from vcam_cli.effects.signal_chain import NoiseSource, Site
 from vcam_cli.physics import noise
 
 
@@ -26,7 +30,7 @@ class ShotNoise(NoiseSource):
     sample_draws = "cumulative"
 
     @classmethod
-    def from_camera(cls, camera, geometry):
+    def from_camera(cls, camera: Camera, geometry: Geometry) -> Self | None:
         """Return the shot noise in the model that the file's accuracy asks for."""
         return cls(camera.accuracy.knobs.get("shot_noise", "exact"))
 
@@ -34,13 +38,13 @@ class ShotNoise(NoiseSource):
         """Return a short clause with this camera's numbers and units."""
         return "variance equal to the mean signal in electrons"
 
-    def apply(self, electrons, site):
+    def apply(self, electrons: Array, site: Site) -> Array:
         """Return Poisson numbers of the block's means [electrons]."""
         z = site.normal(self.name)
         if self.model == "gaussian":
             return noise.gaussian_shot_noise(electrons, z)
         return noise.poisson_from_normal(electrons, z)
 
-    def variance(self, mean, dark=0.0):
+    def variance(self, mean: float, dark: float = 0.0) -> float:
         """Return the variance of a Poisson number, its mean [electrons squared]."""
         return mean

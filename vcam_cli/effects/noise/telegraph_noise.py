@@ -9,12 +9,16 @@ distributed.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vcam_cli.arrays import Array
+from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.camera.sensor.architecture import ARCHITECTURES
-from vcam_cli.effects.signal_chain import NoiseSource
+from vcam_cli.effects.signal_chain import NoiseSource, Site
 
 
 @dataclass(frozen=True)
@@ -44,7 +48,7 @@ class TelegraphNoise(NoiseSource):
     seconds_per_pixel = 20e-9
 
     @classmethod
-    def from_camera(cls, camera, geometry):
+    def from_camera(cls, camera: Camera, geometry: Geometry) -> Self | None:
         """Return the noise that the file gives, or None where it gives none."""
         given = camera.pixel.readout.telegraph_noise
         if given is None or not given.fraction * given.amplitude:
@@ -62,7 +66,7 @@ class TelegraphNoise(NoiseSource):
             f" occupancy {100 * self.occupancy:.3g} %"
         )
 
-    def apply(self, electrons, site):
+    def apply(self, electrons: Array, site: Site) -> Array:
         """Return the block with the state of its traps in it; it reuses the array [electrons]."""
         shape = (site.rows, site.columns)
         # 64 bits whatever the rest is computed in: the same pixels in both.
@@ -79,11 +83,11 @@ class TelegraphNoise(NoiseSource):
         electrons[trapped] += (step * level[trapped]).astype(electrons.dtype)
         return electrons
 
-    def _filled(self, site, name: str, shape: tuple[int, int]) -> NDArray[np.float64]:
+    def _filled(self, site: Site, name: str, shape: tuple[int, int]) -> NDArray[np.float64]:
         """Return 1 where a trap would be filled at this readout, 0 where empty."""
         return (site.stream(name).random(shape) < self.occupancy).astype(np.float64)
 
-    def variance(self, mean, dark=0.0):
+    def variance(self, mean: float, dark: float = 0.0) -> float:
         """Return the variance that it adds, in the mean over the pixels [electrons squared]."""
         readouts = 2 if self.double_sampled else 1
         square = 2 * self.amplitude**2  # mean square of exponential steps

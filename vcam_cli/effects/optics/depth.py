@@ -12,7 +12,10 @@ layers, seen by a lens that is focused on it.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Self
 
+from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.camera.derived.geometry import geometry as solve
 from vcam_cli.camera.derived.scene_layers import layer_cameras
 from vcam_cli.effects.base import Effect
@@ -37,7 +40,7 @@ class Depth(Effect):
     origin = "lens"
 
     @classmethod
-    def from_camera(cls, camera, geometry):
+    def from_camera(cls, camera: Camera, geometry: Geometry) -> Self | None:
         """Return the layers of a scene, or None where it is flat, or sharp and at rest."""
         if camera.scene.has_depth:
             return cls((), geometry.pitch_x)

@@ -9,9 +9,13 @@ frequency 1 / (lambda N (1 - m)) on, earlier in red light than in blue.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 
+from vcam_cli.arrays import Array
+from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.effects.base import RadialTransfer, switched_off
 from vcam_cli.physics import diffraction
 
@@ -31,7 +35,7 @@ class Diffraction(RadialTransfer):
     largest_loss = 1.0
 
     @classmethod
-    def from_camera(cls, camera, geometry):
+    def from_camera(cls, camera: Camera, geometry: Geometry) -> Self | None:
         """Return the diffraction of the lens, or None where the file leaves it out."""
         replaced = camera.optics.measured_blur and not switched_off(camera, "aberration")
         if replaced or not camera.optics.diffraction:
@@ -43,21 +47,23 @@ class Diffraction(RadialTransfer):
         cutoff = self.cutoff(550e-9) / 1e3
         return f"cut-off {cutoff:.4g} lp/mm at 550 nm"
 
-    def otf(self, frequency, wavelength):
+    def otf(self, frequency: Array, wavelength: float) -> Array:
         """Return the transfer at `frequency` [cycles/m] and `wavelength` [m]."""
         return diffraction.otf_circular(frequency, wavelength, self.f_number, self.magnification)
 
-    def spectral_otf(self, frequency, wavelengths):
+    def spectral_otf(self, frequency: Array, wavelengths: Array) -> Array:
         """Return the transfer at every wavelength (J,) [m]: (J, *shape of `frequency`)."""
-        return self.otf(frequency, wavelengths.reshape(-1, *(1,) * frequency.ndim))
+        waves = wavelengths.reshape(-1, *(1,) * frequency.ndim)
+        return diffraction.otf_circular(frequency, waves, self.f_number, self.magnification)
 
-    def spread(self, wavelengths):
+    def spread(self, wavelengths: Array) -> Array:
         """Return a bound (J,) on |1 - H(f)| / (2 pi |f|) [m].
 
         The transfer is convex in nu: it lies above its tangent 1 - 4 nu / pi.
         """
-        return 2 / np.pi**2 / self.cutoff(wavelengths)
+        cutoff = diffraction.cutoff_frequency(wavelengths, self.f_number, self.magnification)
+        return 2 / np.pi**2 / cutoff
 
-    def cutoff(self, wavelength):
+    def cutoff(self, wavelength: float) -> float:
         """Return the frequency from which the transfer is zero, or inf [cycles/m]."""
-        return diffraction.cutoff_frequency(wavelength, self.f_number, self.magnification)
+        return float(diffraction.cutoff_frequency(wavelength, self.f_number, self.magnification))

@@ -15,7 +15,7 @@ import numpy as np
 from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry
-from vcam_cli.effects.base import FieldTransfer, Zone
+from vcam_cli.effects.base import FieldTransfer, SignalLevels, Zone
 from vcam_cli.effects.optics.wavefront_blur import (
     GREEN,
     AberrationBlur,
@@ -90,35 +90,35 @@ class FieldBlur(AberrationBlur, FieldTransfer):
             )
         )
 
-    def rings(self, count):
+    def rings(self, count: int) -> tuple[Zone, ...]:
         """Return `count` places from center to corner, or more, whose weights sum to 1.
 
         Places are added for every wave by which the wavefront changes, up to `MAX_PLACES`.
         """
-        stretches = self._stretches(self._enough(count))
         kind = DirectedBlur if self._azimuthal_order else SymmetricBlur
-        return tuple(
-            Zone(
-                kind(self.lens, self.wavefront(place)),
-                ZoneWeight(stretches, place, 0, 0, self.half_diagonal),
-            )
-            for place in sorted({place for nodes in stretches for place in nodes})
-        )
+        return tuple(Zone(kind(self.lens, terms), weight) for terms, weight in self._rings(count))
 
-    def zones(self, count):
+    def zones(self, count: int) -> tuple[Zone, ...]:
         """Return the rings cut into sectors, in each of which the wavefront is turned."""
-        rings = self.rings(count)
         if not self._azimuthal_order:
-            return rings
+            return self.rings(count)
         # As many harmonics around as powers outwards; a multiple of 4 has its quarter turns.
         around = 4 * math.ceil((2 * self._azimuthal_order * (self._enough(count) - 1) + 1) / 4)
         return tuple(
             Zone(
-                replace(ring.blur, angle=2 * math.pi * sector / around),
-                replace(ring.weight, sector=sector, around=around),
+                DirectedBlur(self.lens, terms, angle=2 * math.pi * sector / around),
+                replace(weight, sector=sector, around=around),
             )
-            for ring in rings
+            for terms, weight in self._rings(count)
             for sector in range(around)
+        )
+
+    def _rings(self, count: int) -> tuple[tuple[Terms, ZoneWeight], ...]:
+        """Return the wavefront and the weight of each place on the half-axis, rising."""
+        stretches = self._stretches(self._enough(count))
+        return tuple(
+            (self.wavefront(place), ZoneWeight(stretches, place, 0, 0, self.half_diagonal))
+            for place in sorted({place for nodes in stretches for place in nodes})
         )
 
     def _enough(self, count: int) -> int:
@@ -157,7 +157,7 @@ class FieldBlur(AberrationBlur, FieldTransfer):
             found.append((low, *inner, high))
         return tuple(found)
 
-    def mean_error(self, signal) -> float:
+    def mean_error(self, signal: SignalLevels) -> float:
         """Return a bound of the rms change of the mean signal by leaving it out [electrons]."""
         # Wavefronts change evenly in between: none is worse than that of one of its ends.
         blurs = (DirectedBlur(self.lens, self.wavefront(place)) for place in self._ends)

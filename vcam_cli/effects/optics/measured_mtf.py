@@ -16,7 +16,7 @@ from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.camera.derived.lens_mtf import MtfAtHeight, MtfCurve, lens_mtf
-from vcam_cli.effects.base import FieldTransfer, RadialTransfer, Zone
+from vcam_cli.effects.base import FieldTransfer, RadialTransfer, SignalLevels, Zone
 from vcam_cli.effects.optics.field_blur import ZoneWeight
 from vcam_cli.effects.optics.wavefront_blur import GREEN, AberrationBlur
 from vcam_cli.physics import diffraction
@@ -118,7 +118,7 @@ class MeasuredMtf(MtfBlur, RadialTransfer):
         within = 2 * np.pi * radii * (j1(phase) @ transfer) * (top / len(f))
         return float(radii[np.argmax(within > SHARE)]) if (within > SHARE).any() else radii[-1]
 
-    def mean_error(self, signal) -> float:
+    def mean_error(self, signal: SignalLevels) -> float:
         """Return a bound of the rms change of the mean signal by leaving it out [electrons]."""
         f = np.linspace(0, self.cutoff(GREEN), 1025)
         return float(np.abs(1 - self.otf(f, GREEN)).max()) * signal.full_signal
@@ -158,9 +158,10 @@ class FieldMtf(MtfBlur, FieldTransfer):
 
     def spread(self, wavelengths: Array) -> Array:
         """Return a bound (J,) on |1 - H(f)| / (2 pi |f|) at all places [m]."""
-        return np.max([place.spread(wavelengths) for place in self.places], axis=0)
+        largest: Array = np.max([place.spread(wavelengths) for place in self.places], axis=0)
+        return largest
 
-    def rings(self, count):
+    def rings(self, count: int) -> tuple[Zone, ...]:
         """Return the measured places, each with its weight; between two both are straight."""
         rings = [place.measured.height / self.half_diagonal for place in self.places]
         stretches = tuple(pairwise(rings))
@@ -169,7 +170,7 @@ class FieldMtf(MtfBlur, FieldTransfer):
             for place, ring in zip(self.places, rings, strict=True)
         )
 
-    def mean_error(self, signal) -> float:
+    def mean_error(self, signal: SignalLevels) -> float:
         """Return a bound of the rms change of the mean signal by leaving it out [electrons]."""
         return max(place.mean_error(signal) for place in self.places)
 

@@ -10,12 +10,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Self
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from vcam_cli.arrays import Array
+from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.falloff import falloff
-from vcam_cli.effects.base import Gain
+from vcam_cli.camera.derived.geometry import Geometry
+from vcam_cli.effects.base import Gain, SignalLevels
 from vcam_cli.floats import rms
 from vcam_cli.physics import radiometry
 
@@ -42,7 +46,7 @@ class OffAxis(Gain):
     seconds_per_pixel = 2e-9
 
     @classmethod
-    def from_camera(cls, camera, geometry):
+    def from_camera(cls, camera: Camera, geometry: Geometry) -> Gain | None:
         """Return the falloff, modeled or measured, or None where the file switches it off."""
         half = geometry.sensor_width / 2, geometry.sensor_height / 2
         if camera.optics.off_axis == "none":
@@ -50,7 +54,8 @@ class OffAxis(Gain):
         if measured := falloff(camera, geometry):
             return MeasuredFalloff(measured.heights, measured.values, *half)
         tan2_cone = 1 / (4 * geometry.working_f_number**2)
-        return cls(camera.optics.off_axis, tan2_cone, geometry.image_distance, *half)
+        model = "cos4" if camera.optics.off_axis == "cos4" else "exact"
+        return cls(model, tan2_cone, geometry.image_distance, *half)
 
     @property
     def corner(self) -> float:
@@ -62,26 +67,26 @@ class OffAxis(Gain):
         loss = 1 - float(self._relative_illumination((self.corner / self.image_distance) ** 2))
         return f"corners {100 * loss:.3g} % darker than the center"
 
-    def _relative_illumination(self, tan2):
+    def _relative_illumination(self, tan2: ArrayLike) -> Array:
         if self.model == "cos4":
             return radiometry.relative_illumination_cos4(tan2)
         return radiometry.relative_illumination_exact(self.tan2_cone, tan2)
 
-    def gain(self, x, y):
+    def gain(self, x: Array, y: Array) -> Array:
         """Return the factor at the positions x (columns,), y (rows,) [m]: (rows, columns)."""
         x2 = ((x / self.image_distance) ** 2).astype(x.dtype)
         y2 = ((y / self.image_distance) ** 2).astype(y.dtype)
         tan2 = x2[None, :] + y2[:, None]
         if tan2.dtype == np.float64 or self._polynomial is None:
             return self._relative_illumination(tan2).astype(tan2.dtype)
-        out = np.full_like(tan2, self._polynomial[-1])
+        out: Array = np.full_like(tan2, self._polynomial[-1])
         for coefficient in self._polynomial[-2::-1]:
             out *= tan2
             out += coefficient
         return out
 
     @cached_property
-    def _polynomial(self):
+    def _polynomial(self) -> tuple[np.float32, ...] | None:
         """Coefficients in tan^2(phi), rising, to 1e-7 up to the corner; None where 12 are too few.
 
         Why: the exact form costs ten passes in 64 bits over every pixel, this one a few in 32.
@@ -97,7 +102,7 @@ class OffAxis(Gain):
                 return tuple(series.convert(kind=np.polynomial.Polynomial).coef.astype(np.float32))
         return None
 
-    def mean_error(self, signal) -> float:
+    def mean_error(self, signal: SignalLevels) -> float:
         """Return a bound of the rms change of the mean signal by leaving it out [electrons]."""
         radius2 = _quadrant(self.half_width, self.half_height)
         loss = 1 - self._relative_illumination(radius2 / self.image_distance**2)
@@ -123,7 +128,7 @@ class MeasuredFalloff(Gain):
     seconds_per_pixel = OffAxis.seconds_per_pixel
 
     @classmethod
-    def from_camera(cls, camera, geometry):
+    def from_camera(cls, camera: Camera, geometry: Geometry) -> Self | None:
         """Return the falloff where the file has measured points, else None."""
         found = OffAxis.from_camera(camera, geometry)
         return found if isinstance(found, cls) else None
@@ -134,10 +139,10 @@ class MeasuredFalloff(Gain):
         kind = "darker" if corner <= 1 else "brighter"
         return f"measured: corners {100 * abs(1 - corner):.3g} % {kind} than the center"
 
-    def _relative_illumination(self, radius):
-        return np.interp(radius, self.heights, self.values)
+    def _relative_illumination(self, radius: Array | float) -> Array:
+        return np.asarray(np.interp(radius, self.heights, self.values))
 
-    def gain(self, x, y):
+    def gain(self, x: Array, y: Array) -> Array:
         """Return the factor at the positions x (columns,), y (rows,) [m]: (rows, columns)."""
         x2, y2 = np.square(x), np.square(y)
         if x.dtype == np.float64:
@@ -152,7 +157,7 @@ class MeasuredFalloff(Gain):
         return out
 
     @cached_property
-    def _table(self):
+    def _table(self) -> Array:
         """Values at equally many distances, of which the nearest is taken.
 
         Why: `np.interp` searches its segment for every pixel, in 64 bits. A value that falls from
@@ -162,7 +167,7 @@ class MeasuredFalloff(Gain):
             np.float32
         )
 
-    def mean_error(self, signal) -> float:
+    def mean_error(self, signal: SignalLevels) -> float:
         """Return a bound of the rms change of the mean signal by leaving it out [electrons]."""
         change = 1 - self._relative_illumination(
             np.sqrt(_quadrant(self.half_width, self.half_height))

@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 
+from vcam_cli.arrays import Array
+from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.effects.base import RadialTransfer
 from vcam_cli.physics.aberration import paraboloid_transfer
 
@@ -26,7 +30,7 @@ class Paraboloid(RadialTransfer):
     origin = "lens"
 
     @classmethod
-    def from_camera(cls, camera, geometry):
+    def from_camera(cls, camera: Camera, geometry: Geometry) -> Self | None:
         """Return None: cameras have it by their scene alone."""
         return None
 
@@ -39,10 +43,10 @@ class Paraboloid(RadialTransfer):
         """How far from its place the blur throws light [m]."""
         return self.radius
 
-    def cutoff(self, wavelength):
+    def cutoff(self, wavelength: float) -> float:
         """Return the frequency from which the transfer is zero, or inf [cycles/m]."""
         return np.inf
 
-    def otf(self, frequency, wavelength):
+    def otf(self, frequency: Array, wavelength: float) -> Array:
         """Return the transfer at `frequency` [cycles/m] and `wavelength` [m]."""
         return paraboloid_transfer(frequency, self.radius)

@@ -14,7 +14,7 @@ import numpy as np
 from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry
-from vcam_cli.effects.base import PlaneTransfer
+from vcam_cli.effects.base import PlaneTransfer, SignalLevels
 from vcam_cli.effects.optics.wavefront_blur import AberrationBlur, largest_loss
 from vcam_cli.physics.cache import ByteCache
 
@@ -87,20 +87,22 @@ class PointSpread(AberrationBlur, PlaneTransfer):
         y = (np.arange(rows) - (rows - 1) / 2) * self.pitch
         return x, y
 
-    def otf_plane(self, fx, fy, wavelength):
+    def otf_plane(self, fx: Array, fy: Array, wavelength: float) -> Array:
         """Return the transfer at all pairs of fx (n,) and fy (m,) [cycles/m]: complex (m, n)."""
         key = (fx.tobytes(), fy.tobytes())
         channels = self._transfer_cache.get(key, lambda: self._channel_transfers(fx, fy))
         if len(self.wavelengths) < 2:
-            return channels[0].copy()
+            copied: Array = channels[0].copy()
+            return copied
         order = np.argsort(self.wavelengths)
         at = np.interp(wavelength, np.array(self.wavelengths)[order], np.arange(len(order)))
         low = min(int(at), len(order) - 2)
         part = at - low
-        return (1 - part) * channels[order[low]] + part * channels[order[low + 1]]
+        transfer: Array = (1 - part) * channels[order[low]] + part * channels[order[low + 1]]
+        return transfer
 
     @cached_property
-    def _transfer_cache(self) -> ByteCache:
+    def _transfer_cache(self) -> ByteCache[Array]:
         """The last transfer of the channels, which the wavelengths share."""
         return ByteCache(0)
 
@@ -114,11 +116,11 @@ class PointSpread(AberrationBlur, PlaneTransfer):
         down = np.exp(-2j * np.pi * np.outer(fy, y)) * (np.abs(fy) < 0.5 / self.pitch)[:, None]
         return np.array([down @ plane @ along for plane in self._loaded_samples()])
 
-    def cutoff(self, wavelength):
+    def cutoff(self, wavelength: float) -> float:
         """Return the frequency from which the transfer is zero, or inf [cycles/m]."""
         return math.sqrt(0.5) / self.pitch
 
-    def mean_error(self, signal) -> float:
+    def mean_error(self, signal: SignalLevels) -> float:
         """Return a bound of the rms change of the mean signal by leaving it out [electrons]."""
         if self.samples is None:
             return signal.full_signal

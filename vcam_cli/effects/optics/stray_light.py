@@ -8,8 +8,11 @@ s is the share that is spread, the mean is that of a color over the array.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Self
 
-from vcam_cli.effects.base import VeilingGlare
+from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.derived.geometry import Geometry
+from vcam_cli.effects.base import SignalLevels, VeilingGlare
 
 
 @dataclass(frozen=True)
@@ -28,7 +31,7 @@ class StrayLight(VeilingGlare):
     seconds_per_pixel = 1.5e-9
 
     @classmethod
-    def from_camera(cls, camera, geometry):
+    def from_camera(cls, camera: Camera, geometry: Geometry) -> Self | None:
         """Return the veiling glare of the lens, or None where it has none."""
         fraction = camera.optics.stray_light
         return cls(fraction) if fraction > 0 else None
@@ -37,7 +40,7 @@ class StrayLight(VeilingGlare):
         """Return a short clause with this camera's numbers and units."""
         return f"{100 * self.fraction:.4g} % of the light, evenly over the sensor"
 
-    def mean_error(self, signal) -> float:
+    def mean_error(self, signal: SignalLevels) -> float:
         """Return a bound of the rms change of the mean signal by leaving it out [electrons]."""
         # Numbers from 0 to full signal deviate from their mean by half of it rms, at most.
         return self.fraction * signal.full_signal / 2

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from vcam_cli.arrays import Array
+from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.effects.base import PlaneTransfer, SeparableTransfer
 
 
@@ -32,7 +34,7 @@ class TurnedTransfer(PlaneTransfer):
         return self.still.reference
 
     @classmethod
-    def from_camera(cls, camera, geometry):
+    def from_camera(cls, camera: Camera, geometry: Geometry) -> None:
         """Return nothing: it is made of another effect."""
         return
 
@@ -54,7 +56,7 @@ class TurnedTransfer(PlaneTransfer):
         """Return how far it displaces light, at most (J,) [m]."""
         return np.full(len(wavelengths), self.reach)
 
-    def otf_along(self, frequency, across, wavelength):
+    def otf_along(self, frequency: Array, across: tuple[float, float], wavelength: float) -> Array:
         """Return the transfer (n,) of waves in one direction."""
         cosine, sine = math.cos(self.angle), math.sin(self.angle)
         along_x = self.still.along_x((cosine * across[0] - sine * across[1]) * frequency)

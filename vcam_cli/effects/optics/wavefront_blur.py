@@ -15,7 +15,7 @@ import numpy as np
 from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry
-from vcam_cli.effects.base import Effect, PlaneTransfer, RadialTransfer, switched_off
+from vcam_cli.effects.base import Effect, PlaneTransfer, RadialTransfer, SignalLevels, switched_off
 from vcam_cli.physics import aberration, diffraction, ray_blur, zernike
 from vcam_cli.physics.cache import ByteCache
 from vcam_cli.physics.zernike import Terms
@@ -146,7 +146,7 @@ class SymmetricBlur(UniformBlur, RadialTransfer):
             return None
         return cls(Lens.from_camera(camera, geometry), terms)
 
-    def otf(self, frequency, wavelength):
+    def otf(self, frequency: Array, wavelength: float) -> Array:
         """Return the transfer at `frequency` [cycles/m] and `wavelength` [m]."""
         if not self.lens.diffracts:
             return ray_blur.otf_symmetric(frequency, self.lens.working_f_number, self.terms)
@@ -154,7 +154,7 @@ class SymmetricBlur(UniformBlur, RadialTransfer):
             frequency, wavelength, self.lens.working_f_number, self.terms
         )
 
-    def spectral_otf(self, frequency, wavelengths):
+    def spectral_otf(self, frequency: Array, wavelengths: Array) -> Array:
         """Return the transfer at every wavelength (J,) [m]: (J, *shape of `frequency`)."""
         if not self.lens.diffracts:
             return super().spectral_otf(frequency, wavelengths)
@@ -162,7 +162,7 @@ class SymmetricBlur(UniformBlur, RadialTransfer):
             frequency, wavelengths, self.lens.working_f_number, self.terms
         )
 
-    def mean_error(self, signal) -> float:
+    def mean_error(self, signal: SignalLevels) -> float:
         """Return a bound of the rms change of the mean signal by leaving it out [electrons]."""
         otf = self.otf(np.linspace(0, _highest(self.lens, self.terms), 257), GREEN)
         return float(np.abs(1 - otf).max()) * signal.full_signal
@@ -182,7 +182,7 @@ class DirectedBlur(UniformBlur, PlaneTransfer):
             return None
         return cls(Lens.from_camera(camera, geometry), terms)
 
-    def otf_plane(self, fx, fy, wavelength):
+    def otf_plane(self, fx: Array, fy: Array, wavelength: float) -> Array:
         """Return the transfer at all pairs of fx (n,) and fy (m,) [cycles/m]: complex (m, n)."""
         if not self.lens.diffracts:
             return self._rays(fx, fy)
@@ -193,14 +193,16 @@ class DirectedBlur(UniformBlur, PlaneTransfer):
             cos * x + sin * y, cos * y - sin * x, wavelength, self.lens.working_f_number, self.terms
         )
 
-    def _rays(self, fx, fy):
-        def compute():
+    def _rays(self, fx: Array, fy: Array) -> Array:
+        def compute() -> Array:
             turned = zernike.rotate(self.terms, self.angle)
             return ray_blur.otf(fx, fy, self.lens.working_f_number, turned)
 
         return self._transfer_cache.get((fx.tobytes(), fy.tobytes()), compute)
 
-    def otf_along(self, frequency, across, wavelength):
+    def otf_along(
+        self, frequency: Array, across: tuple[float, float], wavelength: float
+    ) -> Array | None:
         """Return the transfer (n,) of waves in one direction; None by rays, which need a plane."""
         if not self.lens.diffracts:
             return None
@@ -217,20 +219,20 @@ class DirectedBlur(UniformBlur, PlaneTransfer):
             return self.lens.cutoff(wavelength)
         return ray_blur.MAX_CYCLES / ray_blur.blur_radius(rest, self.lens.working_f_number)
 
-    def kept_bytes(self, wavelengths, by_harmonics=False):
+    def kept_bytes(self, wavelengths: Array, by_harmonics: bool = False) -> int:
         """Return the memory of grids of the pupil, where there are any [bytes]."""
         few = by_harmonics and aberration.has_few_waves(wavelengths, self.terms)
         if few or not self.lens.diffracts:
             return 0
         return aberration.grid_bytes(wavelengths, self.terms)
 
-    def largest(self, frequency, wavelength):
+    def largest(self, frequency: Array, wavelength: float) -> Array:
         """Return the largest contrast (n,) in any direction by rays; 1 by waves, which end."""
         if self.lens.diffracts:
             return np.ones(frequency.shape)
         return ray_blur.largest(frequency, self.lens.working_f_number, self.terms)
 
-    def harmonics(self, frequency, wavelengths):
+    def harmonics(self, frequency: Array, wavelengths: Array) -> Array:
         """Return the transfer (J, n, m) as harmonics of the direction, for the angle 0."""
         working = self.lens.working_f_number
         if self.lens.diffracts:
@@ -239,11 +241,11 @@ class DirectedBlur(UniformBlur, PlaneTransfer):
         return np.broadcast_to(rays, (len(wavelengths), *rays.shape))
 
     @cached_property
-    def _transfer_cache(self) -> ByteCache:
+    def _transfer_cache(self) -> ByteCache[Array]:
         """The last transfer by rays, which is the same at all wavelengths."""
         return ByteCache(0)
 
-    def mean_error(self, signal) -> float:
+    def mean_error(self, signal: SignalLevels) -> float:
         """Return a bound of the rms change of the mean signal by leaving it out [electrons]."""
         return largest_loss(self, _highest(self.lens, self.terms)) * signal.full_signal
 

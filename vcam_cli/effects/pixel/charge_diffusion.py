@@ -20,9 +20,13 @@ doi:10.1109/16.163473.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 
+from vcam_cli.arrays import Array
+from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.camera.derived.photodiode import diffusion
 from vcam_cli.effects.base import RadialTransfer
 from vcam_cli.physics import silicon
@@ -45,7 +49,7 @@ class ChargeDiffusion(RadialTransfer):
     largest_loss = 1.0
 
     @classmethod
-    def from_camera(cls, camera, geometry):
+    def from_camera(cls, camera: Camera, geometry: Geometry) -> Self | None:
         """Return the diffusion in the camera's silicon, or None where the file describes none."""
         lengths = diffusion(camera)
         if lengths is None:
@@ -58,20 +62,25 @@ class ChargeDiffusion(RadialTransfer):
         green, red = (100 * float(self.otf(at, w)[0]) for w in (550e-9, 650e-9))
         return f"MTF at 100 lp/mm: {green:.3g} % at 550 nm, {red:.3g} % at 650 nm"
 
-    def otf(self, frequency, wavelength):
+    def otf(self, frequency: Array, wavelength: float) -> Array:
         """Return the transfer at `frequency` [cycles/m] and `wavelength` [m]."""
+        return self._transfer(frequency, silicon.absorption(wavelength))
+
+    def spectral_otf(self, frequency: Array, wavelengths: Array) -> Array:
+        """Return the transfer at every wavelength (J,) [m]: (J, *shape of `frequency`)."""
+        waves = wavelengths.reshape(-1, *(1,) * frequency.ndim)
+        return self._transfer(frequency, silicon.absorption(waves))
+
+    def _transfer(self, frequency: Array, absorption: Array) -> Array:
+        """Return the transfer of light with absorption coefficients that broadcast [1/m]."""
         return silicon.diffusion_mtf(
             frequency,
-            silicon.absorption(wavelength),
+            absorption,
             self.diffusion_length,
             self.depletion_width,
             self.neutral_depth,
         )
 
-    def spectral_otf(self, frequency, wavelengths):
-        """Return the transfer at every wavelength (J,) [m]: (J, *shape of `frequency`)."""
-        return self.otf(frequency, wavelengths.reshape(-1, *(1,) * frequency.ndim))
-
-    def cutoff(self, wavelength):
+    def cutoff(self, wavelength: float) -> float:
         """Return the frequency from which the transfer is zero, or inf [cycles/m]."""
         return np.inf

@@ -9,11 +9,14 @@ share e behind.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 
 from vcam_cli.arrays import Array
-from vcam_cli.effects.base import Transport
+from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.derived.geometry import Geometry
+from vcam_cli.effects.base import SignalLevels, Transport
 
 REST = 1e-9
 """Share of a packet that may be deferred further than is followed; it is lost."""
@@ -52,7 +55,7 @@ class ChargeTransfer(Transport):
     seconds_per_pixel = 4e-9
 
     @classmethod
-    def from_camera(cls, camera, geometry):
+    def from_camera(cls, camera: Camera, geometry: Geometry) -> Self | None:
         """Return the transfer of a ccd that defers charge, or None where none is deferred."""
         given = camera.pixel.readout.charge_transfer
         if given is None or given.inefficiency == 0:
@@ -75,7 +78,7 @@ class ChargeTransfer(Transport):
         down, along = (self.phases * np.arange(1, count + 1) for count in (rows, columns))
         return 1 - _deferred_share(self.inefficiency, down[:, None] + along)
 
-    def mean_error(self, signal) -> float:
+    def mean_error(self, signal: SignalLevels) -> float:
         """Return a bound of the rms change of the mean signal by leaving it out [electrons]."""
         # A pixel loses at most what it defers, and gains at most as much of others as bright.
         down = _deferred_share(self.inefficiency, self.phases * np.arange(1, self.rows + 1))
@@ -86,7 +89,8 @@ class ChargeTransfer(Transport):
 
 def _deferred_share(inefficiency: float, transfers: Array | int) -> Array:
     """Return the share of a packet that does not arrive in time."""
-    return -np.expm1(transfers * np.log1p(-inefficiency))
+    late: Array = -np.expm1(transfers * np.log1p(-inefficiency))
+    return late
 
 
 def _transfer_rows(signal: Array, inefficiency: float, phases: int) -> Array:

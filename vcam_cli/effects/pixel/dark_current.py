@@ -8,9 +8,12 @@ T is the exposure time. The rate is the density times the photodetector's area, 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Self
 
+from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.dark_current import dark_rate
-from vcam_cli.effects.base import Charge
+from vcam_cli.camera.derived.geometry import Geometry
+from vcam_cli.effects.base import Charge, SignalLevels
 
 
 @dataclass(frozen=True)
@@ -32,7 +35,7 @@ class DarkCurrent(Charge):
     seconds_per_pixel = 0.5e-9
 
     @classmethod
-    def from_camera(cls, camera, geometry):
+    def from_camera(cls, camera: Camera, geometry: Geometry) -> Self | None:
         """Return the dark current at the pixel's temperature, or None where it is 0."""
         pixels = camera.array.summed_charges
         rate = dark_rate(camera) * pixels
@@ -47,6 +50,6 @@ class DarkCurrent(Charge):
         """Return the mean electrons that a pixel collects per second [e/s]."""
         return self.electrons_per_second
 
-    def mean_error(self, signal) -> float:
+    def mean_error(self, signal: SignalLevels) -> float:
         """Return a bound of the rms change of the mean signal by leaving it out [electrons]."""
         return self.electrons_per_second * signal.time

@@ -13,10 +13,14 @@ signal, the same in all pixels. And the signal is an average over that larger ar
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 
-from vcam_cli.effects.base import Gain
+from vcam_cli.arrays import Array
+from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.derived.geometry import Geometry
+from vcam_cli.effects.base import Gain, SignalLevels
 
 
 @dataclass(frozen=True)
@@ -34,7 +38,7 @@ class Microlens(Gain):
     absent = "pixel.microlens is none"
 
     @classmethod
-    def from_camera(cls, camera, geometry):
+    def from_camera(cls, camera: Camera, geometry: Geometry) -> Self | None:
         """Return the gain by a microlens, or None where the pixel has none."""
         if camera.pixel.microlens is None:
             return None
@@ -49,10 +53,10 @@ class Microlens(Gain):
             return f"effective fill factor {100 * self.share:.4g} %; its gain is part of the QE"
         return f"{self.ratio:.4g} times the light; effective fill factor {100 * self.share:.4g} %"
 
-    def gain(self, x, y):
+    def gain(self, x: Array, y: Array) -> Array:
         """Return the factor at the positions x (columns,), y (rows,) [m]: (rows, columns)."""
         return np.full((1, 1), self.ratio, x.dtype)
 
-    def mean_error(self, signal) -> float:
+    def mean_error(self, signal: SignalLevels) -> float:
         """Return a bound of the rms change of the mean signal by leaving it out [electrons]."""
         return (1 - 1 / self.ratio) * signal.full_signal

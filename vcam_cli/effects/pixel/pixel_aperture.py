@@ -9,9 +9,13 @@ that of its microlens. What a pixel's pitch samples too coarsely then comes back
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 
+from vcam_cli.arrays import Array
+from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.effects.base import SeparableTransfer
 from vcam_cli.effects.optics.turned_transfer import TurnedTransfer
 
@@ -28,7 +32,7 @@ class PixelAperture(SeparableTransfer):
     absent = "every pixel has one"
 
     @classmethod
-    def from_camera(cls, camera, geometry):
+    def from_camera(cls, camera: Camera, geometry: Geometry) -> Self | None:
         """Return the aperture that collects the pixel's light."""
         return cls(geometry.collecting_width, geometry.collecting_height)
 
@@ -36,7 +40,7 @@ class PixelAperture(SeparableTransfer):
         """Return a short clause with this camera's numbers and units."""
         return f"averages over {self.width * 1e6:.4g} x {self.height * 1e6:.4g} um"
 
-    def seen_by_turned(self, angle):
+    def seen_by_turned(self, angle: float) -> TurnedTransfer:
         """Return the aperture as a scene meets it that is turned clockwise by an angle [rad]."""
         return TurnedTransfer(self, angle)
 
@@ -45,14 +49,14 @@ class PixelAperture(SeparableTransfer):
         """Width and height of the area that it averages over evenly [m]."""
         return self.width, self.height
 
-    def spread(self, wavelengths):
+    def spread(self, wavelengths: Array) -> Array:
         """Return a bound (J,) on |1 - H(f)| / (2 pi |f|): the rms distance from the center [m]."""
         return np.full(len(wavelengths), np.hypot(self.width, self.height) / np.sqrt(12))
 
-    def along_x(self, frequency):
+    def along_x(self, frequency: Array) -> Array:
         """Return the transfer along x at `frequency` [cycles/m]."""
         return np.sinc(frequency * self.width)
 
-    def along_y(self, frequency):
+    def along_y(self, frequency: Array) -> Array:
         """Return the transfer along y at `frequency` [cycles/m]."""
         return np.sinc(frequency * self.height)

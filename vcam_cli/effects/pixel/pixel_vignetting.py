@@ -18,13 +18,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Self
 
 import numpy as np
 from numpy.polynomial import chebyshev
 
 from vcam_cli.arrays import Array
+from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived import pixel_layout
-from vcam_cli.effects.base import Gain
+from vcam_cli.camera.derived.geometry import Geometry
+from vcam_cli.effects.base import Gain, SignalLevels
 from vcam_cli.floats import rms
 from vcam_cli.physics import vignetting
 
@@ -70,7 +73,7 @@ class PixelVignetting(Gain):
     seconds_per_pixel = 3e-9
 
     @classmethod
-    def from_camera(cls, camera, geometry):
+    def from_camera(cls, camera: Camera, geometry: Geometry) -> Self | None:
         """Return the loss in the pixel's tunnel, or None where no layers are described."""
         layers = pixel_layout.layers(camera)
         if not layers:
@@ -109,7 +112,7 @@ class PixelVignetting(Gain):
         )
         return share if self.internal else share / vignetting.stack_transmission(1.0, self.layers)
 
-    def gain(self, x, y):
+    def gain(self, x: Array, y: Array) -> Array:
         """Return the factor at the positions x (columns,), y (rows,) [m]: (rows, columns)."""
         series = _series(self)
         order = len(series) - 1
@@ -120,9 +123,10 @@ class PixelVignetting(Gain):
         rows, columns = (down @ series).astype(x.dtype), across.T.astype(x.dtype)
         # No BLAS: its threads would wait for each other in the threads that compute blocks.
         out = np.einsum("ik,kj->ij", rows, columns)
-        return np.maximum(out, 0, out=out)
+        gain: Array = np.maximum(out, 0, out=out)
+        return gain
 
-    def mean_error(self, signal) -> float:
+    def mean_error(self, signal: SignalLevels) -> float:
         """Return a bound of the rms change of the mean signal by leaving it out [electrons]."""
         # A field at full signal everywhere, the brightest pixel at full signal behind its tunnel:
         # rms of the loss over a quadrant by the midpoint rule.

@@ -8,11 +8,15 @@ Noise has been added by then, so that pixels that are full show none.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 
+from vcam_cli.arrays import Array
+from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.electrical import circuit
-from vcam_cli.effects.signal_chain import Limit
+from vcam_cli.camera.derived.geometry import Geometry
+from vcam_cli.effects.signal_chain import Limit, Site
 
 
 @dataclass(frozen=True)
@@ -27,7 +31,7 @@ class Saturation(Limit):
     seconds_per_pixel = 0.5e-9
 
     @classmethod
-    def from_camera(cls, camera, geometry):
+    def from_camera(cls, camera: Camera, geometry: Geometry) -> Self | None:
         """Return the limit at the full well of the camera's pixel."""
         return cls(circuit(camera).full_well)
 
@@ -40,6 +44,7 @@ class Saturation(Limit):
         """The most electrons that it lets through; a pixel that holds them is full."""
         return self.full_well
 
-    def apply(self, electrons, site=None):
+    def apply(self, electrons: Array, site: Site | None = None) -> Array:
         """Return the block clipped at the full well; it reuses the array [electrons]."""
-        return np.minimum(electrons, electrons.dtype.type(self.full_well), out=electrons)
+        clipped: Array = np.minimum(electrons, electrons.dtype.type(self.full_well), out=electrons)
+        return clipped

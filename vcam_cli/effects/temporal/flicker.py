@@ -9,10 +9,14 @@ whole number of periods sees steady light. A lamp with `duty` is on for that par
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Self
 
+from vcam_cli.arrays import Array
+from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.camera.derived.line_times import LineTimes, line_times
 from vcam_cli.camera.scene.illuminant import FlickerSpec
-from vcam_cli.effects.base import TemporalGain
+from vcam_cli.effects.base import SignalLevels, TemporalGain
 from vcam_cli.physics import flicker
 
 
@@ -34,7 +38,7 @@ class Flicker(TemporalGain):
     seconds_per_pixel = 1e-9
 
     @classmethod
-    def from_camera(cls, camera, geometry):
+    def from_camera(cls, camera: Camera, geometry: Geometry) -> Self | None:
         """Return the flicker of the scene's lamp, or None where its light is steady."""
         lamp = camera.scene.illuminant
         if lamp is None or lamp.flicker is None or lamp.flicker.depth == 0:
@@ -50,7 +54,7 @@ class Flicker(TemporalGain):
             where = f"{self.lines.last * lamp.frequency:.3g} bands over the frame"
         return f"{lamp.frequency:.6g} Hz, depth {100 * lamp.depth:.3g} %, {where}"
 
-    def gain(self, x, y, start, stop):
+    def gain(self, x: Array, y: Array, start: float, stop: float) -> Array:
         """Return the mean light from `start` to `stop` after a line's exposure begins [s]."""
         time, lamp = stop - start, self.lamp
         begin = self.lines.starts(x, y) + (self.begin + start)
@@ -59,7 +63,7 @@ class Flicker(TemporalGain):
             return flicker.sinusoid_mean(begin, time, *known, lamp.phase)
         return flicker.pulse_mean(begin, time, *known, lamp.duty, lamp.phase)
 
-    def mean_error(self, signal) -> float:
+    def mean_error(self, signal: SignalLevels) -> float:
         """Return a bound of the rms change of the mean signal by leaving it out [electrons]."""
         lamp = self.lamp
         most = flicker.most_change(signal.time, lamp.frequency, lamp.depth, lamp.duty)

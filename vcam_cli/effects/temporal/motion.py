@@ -20,6 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vcam_cli.arrays import Array
+from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.camera.derived.image_motion import ExposedMotion, exposed_motion
 from vcam_cli.effects.base import Effect, ImageMotion, PlaneTransfer, SeparableTransfer
@@ -38,7 +39,7 @@ class Motion(Effect):
     absent = "neither the source nor the camera moves"
 
     @classmethod
-    def from_camera(cls, camera, geometry):
+    def from_camera(cls, camera: Camera, geometry: Geometry) -> Effect | None:
         """Return the motion of the image, or None where it stands still."""
         found = exposed_motion(camera, geometry)
         return None if found is None else image_motion(found, geometry)
@@ -127,11 +128,11 @@ class EvenMotion(ImageMotion, Motion):
 class MotionAlongAxis(EvenMotion, SeparableTransfer):
     """Motion along rows, or along columns."""
 
-    def along_x(self, frequency):
+    def along_x(self, frequency: Array) -> Array:
         """Return the transfer along x at `frequency` [cycles/m]."""
         return np.sinc(frequency * self.path[0])
 
-    def along_y(self, frequency):
+    def along_y(self, frequency: Array) -> Array:
         """Return the transfer along y at `frequency` [cycles/m]."""
         return np.sinc(frequency * self.path[1])
 
@@ -145,16 +146,16 @@ class ObliqueMotion(EvenMotion, PlaneTransfer):
         """How far the blur throws light [m]."""
         return 0.5 * float(np.hypot(*self.path))
 
-    def cutoff(self, wavelength):
+    def cutoff(self, wavelength: float) -> float:
         """Return the frequency from which the transfer is zero, or inf [cycles/m]."""
         return np.inf
 
-    def otf_plane(self, fx, fy, wavelength):
+    def otf_plane(self, fx: Array, fy: Array, wavelength: float) -> Array:
         """Return the transfer at all pairs of fx (n,) and fy (m,) [cycles/m]: (m, n)."""
         path_x, path_y = self.path
         return np.sinc(fx[None, :] * path_x + fy[:, None] * path_y)
 
-    def otf_along(self, frequency, across, wavelength):
+    def otf_along(self, frequency: Array, across: tuple[float, float], wavelength: float) -> Array:
         """Return the transfer (n,) of waves in one direction."""
         return np.sinc(frequency * (across[0] * self.path[0] + across[1] * self.path[1]))
 
@@ -218,10 +219,10 @@ class RecordedMotion(ImageMotion, PlaneTransfer, Motion):
         exposed = self.exposed.part_of_exposure(start, stop)
         return RecordedMotion(exposed, self.width, self.height, self.pitch)
 
-    def cutoff(self, wavelength):
+    def cutoff(self, wavelength: float) -> float:
         """Return the frequency from which the transfer is zero, or inf [cycles/m]."""
         return np.inf
 
-    def otf_plane(self, fx, fy, wavelength):
+    def otf_plane(self, fx: Array, fy: Array, wavelength: float) -> Array:
         """Return the transfer at all pairs of fx (n,) and fy (m,) [cycles/m]: (m, n)."""
         return path_transfer(fx, fy, *self._path())

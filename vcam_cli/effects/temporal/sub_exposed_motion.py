@@ -13,6 +13,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from vcam_cli.arrays import Array
+from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.camera.derived.image_motion import ExposedMotion
 from vcam_cli.effects.base import ImageMotion
 
@@ -41,7 +43,7 @@ class SubExposedMotion(ImageMotion):
     absent = ""
 
     @classmethod
-    def from_camera(cls, camera, geometry):
+    def from_camera(cls, camera: Camera, geometry: Geometry) -> None:
         """Return nothing: `Motion.from_camera` chooses among the kinds of motion."""
         return
 

@@ -113,7 +113,8 @@ def _sampled(values: Array, code: Array) -> Array:
     """Return values between those of a table, and beyond 1 along its last step."""
     place = np.linspace(0, 1, len(values))
     beyond = np.maximum(np.asarray(code) - 1, 0) * (values[-1] - values[-2]) * (len(values) - 1)
-    return np.interp(code, place, values) + beyond
+    light: Array = np.interp(code, place, values) + beyond
+    return light
 
 
 def _parametric(kind: int, given: tuple[float, ...], code: Array) -> Array:

@@ -169,4 +169,5 @@ def _normalize(plane: Array) -> NDArray[np.float64]:
     if not top > 0:
         raise UnusableFile("is zero everywhere, which is no point spread function")
     light = np.maximum(light, 0.0) / top  # so that the sum of large numbers does not overflow
-    return light / light.sum()
+    normalized: NDArray[np.float64] = light / light.sum()
+    return normalized

@@ -162,7 +162,7 @@ def _product(path: Path, get: Lookup, coefficients: np.ndarray, basis: np.ndarra
     if coefficients.ndim != 3 or basis.ndim != 2 or coefficients.shape[2] != basis.shape[1]:
         raise UnusableFile("its mcCOEF and basis do not fit each other", _SAVE)
     check_memory(path, 8 * coefficients.shape[0] * coefficients.shape[1] * len(basis))
-    photons = coefficients @ basis.T
+    photons: np.ndarray = coefficients @ basis.T
     mean = get("imgMean")
     if mean is not None:
         mean = finite_numbers(mean, "its imgMean")

@@ -138,7 +138,8 @@ def line_spread_tail(blurs: Sequence[RadialTransfer], wavelength: float, distanc
     cutoff = min(blur.cutoff(wavelength) for blur in blurs)
 
     def otf(f: Array) -> Array:
-        return np.prod([blur.otf(f, wavelength) for blur in blurs], axis=0)
+        transfer: Array = np.prod([blur.otf(f, wavelength) for blur in blurs], axis=0)
+        return transfer
 
     if math.isinf(cutoff):
         periods, weights = _periods()

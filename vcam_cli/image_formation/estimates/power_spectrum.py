@@ -8,7 +8,7 @@ is sampled by the pixels.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -268,7 +268,7 @@ class PowerSpectrum:
         return frequency, np.array(left)
 
 
-def _largest(transfer, blocks: Blocks) -> Array:
+def _largest(transfer: Callable[[Array], Array], blocks: Blocks) -> Array:
     """Return the largest square of a transfer function along one axis in every block."""
     ends = [transfer(f) for f in (blocks.low, blocks.center, blocks.high)]
     return np.asarray(np.square(ends).max(axis=0))

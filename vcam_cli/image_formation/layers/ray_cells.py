@@ -77,7 +77,8 @@ class Cells:
     def middle(self) -> float:
         """Of the window, below that of the array [m]."""
         rows = self.window.rows
-        return ((rows.start + rows.stop - self.geometry.rows) / 2) * self.geometry.pitch_y
+        middle: float = ((rows.start + rows.stop - self.geometry.rows) / 2) * self.geometry.pitch_y
+        return middle
 
     def together(self, count: int) -> Cells:
         """Return cells that are each so many of these along either side."""
@@ -186,7 +187,8 @@ class SharpImage:
     def _blur(self, fx: Array, fy: Array) -> Array:
         """Return the response (C, m, n) of lens and silicon at pairs of frequencies [e/s]."""
         if self._transfer.plane_blurs:
-            return self._transfer.plane_response(fx, fy)[0]
+            response: Array = self._transfer.plane_response(fx, fy)[0]
+            return response
         table = np.linspace(0, np.hypot(fx.max(), np.abs(fy).max()), ENTRIES)
         radial, length = self._transfer.radial_response(table)[0], np.hypot(fx[None], fy[:, None])
         return np.stack([np.interp(length, table, one) for one in radial])

@@ -278,7 +278,8 @@ def aperture_points(count: int) -> Iterator[tuple[float, float]]:
 
 def _mirrored(index: Array, count: int) -> Array:
     index = index % (2 * count)
-    return np.minimum(index, 2 * count - 1 - index)
+    mirrored: Array = np.minimum(index, 2 * count - 1 - index)
+    return mirrored
 
 
 def _moved(planes: Array, x: float, y: float, reach: int) -> Array:
@@ -298,7 +299,8 @@ def box_means(plane: Array, at: Array, width: float) -> Array:
     """Return the means of even rows over boxes of a width around places, counted in rows."""
     sums = np.concatenate([np.zeros_like(plane[:1]), np.cumsum(plane, axis=0)])
     low, high = (_interpolated(sums, at + side * width / 2) for side in (-1, 1))
-    return (high - low) / plane.dtype.type(width)
+    means: Array = (high - low) / plane.dtype.type(width)
+    return means
 
 
 def _interpolated(plane: Array, at: Array) -> Array:

@@ -329,7 +329,8 @@ def _periodic_averages(plane: Array, edges: Array, axis: int) -> Array:
     sums = np.cumsum(plane, axis=axis, dtype=np.float64)
     before = sums.take(index, axis) - plane.take(index, axis)
     at_edges = before + part * plane.take(index, axis) + whole * sums.take([-1], axis)
-    return np.diff(at_edges, axis=axis) / (np.diff(edges) * FINEST).reshape(shape)
+    means: Array = np.diff(at_edges, axis=axis) / (np.diff(edges) * FINEST).reshape(shape)
+    return means
 
 
 def dead_leaves(seed: int, frame: Frame, cell_error: float = 0.0) -> DeadLeaves:

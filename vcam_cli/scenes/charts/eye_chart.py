@@ -18,6 +18,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
+from typing import TypeAlias
 
 import numpy as np
 
@@ -43,62 +44,68 @@ ROWS = ("NCKZO", "RHSDV", "KOZCN", "DSRVH", "ZNOKC", "HVDRS", "CKNOZ", "SRHVD", 
 """Letters of the rows; no letter is in two rows that follow each other."""
 
 
-def _arc(x: float, y: float, radius: float, start: float, stop: float) -> list[Array]:
+Outline: TypeAlias = list[tuple[float, float]]
+"""Corners (x, y) of a closed line [strokes], in order."""
+Letter: TypeAlias = list[Outline]
+
+
+def _arc(x: float, y: float, radius: float, start: float, stop: float) -> Outline:
     """Return points of an arc about (x, y) from angle start to stop [degrees].
 
     It runs counterclockwise, as y is up, where stop is larger.
     """
     count = max(2, round(CHORDS * abs(stop - start) / 360) + 1)
     angle = np.radians(np.linspace(start, stop, count))
-    return list(np.stack([x + radius * np.cos(angle), y + radius * np.sin(angle)], axis=1))
+    across, up = x + radius * np.cos(angle), y + radius * np.sin(angle)
+    return list(zip(across.tolist(), up.tolist(), strict=True))
 
 
 # Outlines in strokes, x to the right and y up from the lower left corner, counterclockwise, holes
 # clockwise. Slanting strokes are one stroke wide, too; numbers with a root follow from that.
 
 
-def _c() -> list[list]:
+def _c() -> Letter:
     gap = (math.degrees(math.asin(0.5 / radius)) for radius in (2.5, 1.5))
     outer, inner = gap
     ring = _arc(2.5, 2.5, 2.5, outer, 360 - outer) + _arc(2.5, 2.5, 1.5, 360 - inner, inner)
     return [ring]
 
 
-def _d() -> list[list]:
+def _d() -> Letter:
     outer = [(0, 0), *_arc(2.5, 2.5, 2.5, -90, 90), (0, 5)]
     return [outer, [(1, 1), (1, 4), *_arc(2.5, 2.5, 1.5, 90, -90)]]
 
 
-def _h() -> list[list]:
+def _h() -> Letter:
     right = [(0, 0), (1, 0), (1, 2), (4, 2), (4, 0), (5, 0)]
     return [[*right, *((x, 5 - y) for x, y in reversed(right))]]
 
 
-def _k() -> list[list]:
+def _k() -> Letter:
     root = math.sqrt(2)
     joint = (5 - root) / 2
     leg = [(joint, joint), (5 - root, 0), (5, 0), (2.5, 2.5)]
     return [[(0, 0), (1, 0), (1, 1), *leg, (5, 5), (5 - root, 5), (1, 1 + root), (1, 5), (0, 5)]]
 
 
-def _n() -> list[list]:
+def _n() -> Letter:
     drop = (90 - math.sqrt(90**2 - 4 * 8 * 216)) / 16  # 9 (5 - drop)^2 = 9 + drop^2
     half = [(0, 0), (1, 0), (1, drop), (4, 0), (5, 0)]
     return [[*half, *((5 - x, 5 - y) for x, y in half)]]
 
 
-def _o() -> list[list]:
+def _o() -> Letter:
     return [_arc(2.5, 2.5, 2.5, 0, 360)[:-1], _arc(2.5, 2.5, 1.5, 360, 0)[:-1]]
 
 
-def _r() -> list[list]:
+def _r() -> Letter:
     leg = [(2.25, 2), (3.75, 0), (5, 0)]  # slopes 3 : 4, so 5/4 strokes along the row
     outer = [(0, 0), (1, 0), (1, 2), *leg, *_arc(3.5, 3.5, 1.5, -90, 90), (0, 5)]
     return [outer, [(1, 3), (1, 4), *_arc(3.5, 3.5, 0.5, 90, -90)]]
 
 
-def _s() -> list[list]:
-    def edge(beyond: float) -> list:
+def _s() -> Letter:
+    def edge(beyond: float) -> Outline:
         """Return the stroke's edge from the lower left end to the upper right one."""
         low = _arc(1.5, 1.5, 1 + beyond, 180, 270) + _arc(3.5, 1.5, 1 + beyond, -90, 90)
         high = _arc(1.5, 3.5, 1 - beyond, 270, 90) + _arc(3.5, 3.5, 1 - beyond, 90, 0)
@@ -107,19 +114,19 @@ def _s() -> list[list]:
     return [[*edge(0.5), *reversed(edge(-0.5))]]
 
 
-def _v() -> list[list]:
+def _v() -> Letter:
     width = math.sqrt(29) / 5  # of a stroke along the row: its slope is 2 : 5
     inner = (2.5, 2.5 * width - 1.25)
     return [[(2, 0), (3, 0), (5, 5), (5 - width, 5), inner, (width, 5), (0, 5)]]
 
 
-def _z() -> list[list]:
+def _z() -> Letter:
     along = (math.sqrt(1188) - 10) / 16  # 9 along^2 = (5 - along)^2 + 9
     half = [(0, 0), (5, 0), (5, 1), (along, 1), (5, 4)]
     return [[*half, *((5 - x, 5 - y) for x, y in half)]]
 
 
-LETTERS: dict[str, Callable[[], list[list]]] = {
+LETTERS: dict[str, Callable[[], Letter]] = {
     "C": _c, "D": _d, "H": _h, "K": _k, "N": _n, "O": _o, "R": _r, "S": _s, "V": _v, "Z": _z,
 }  # fmt: skip
 

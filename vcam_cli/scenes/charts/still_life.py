@@ -71,7 +71,10 @@ class LeavesWithColorChecker(Chart):
         """Return the values at points."""
         cover = self.card.point_cover(x, y)
         leaves = self.leaves.values(x, y, mix[:, _patches_of_pigments()])
-        return leaves * (1 - np.outer(cover.down, cover.across)) + self.card.light(cover, mix)
+        light: Array = leaves * (1 - np.outer(cover.down, cover.across)) + self.card.light(
+            cover, mix
+        )
+        return light
 
 
 def _patches_of_pigments() -> list[int]:

@@ -155,7 +155,8 @@ def _small(frame: Frame, codes: Array) -> Array:
 
 
 def _srgb_codes(light: Array) -> Array:
-    return np.rint(255 * srgb(np.clip(light, 0.0, 1.0))).astype(np.uint8)
+    preview: Array = np.rint(255 * srgb(np.clip(light, 0.0, 1.0))).astype(np.uint8)
+    return preview
 
 
 def _shading(frame: Frame) -> Array | None:

@@ -133,7 +133,9 @@ def draw_spectra(figure: Any, frame: Frame) -> None:
         middle.legend(fontsize=7.5, ncols=len(responses), loc="upper right")
 
 
-def _draw_spectrum(axes: Any, spectrum: Spectrum, wavelengths: Array, style: dict) -> None:
+def _draw_spectrum(
+    axes: Any, spectrum: Spectrum, wavelengths: Array, style: dict[str, Any]
+) -> None:
     if spectrum.lines is not None:
         inside = [line for line in spectrum.lines if wavelengths[0] <= line[0] <= wavelengths[-1]]
         for wavelength, power in inside:
