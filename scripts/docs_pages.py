@@ -38,6 +38,7 @@ BOOST = {
     "reference/metrics.md": 1.5,
     "reference/not-simulated.md": 1.5,
     "reference/words.md": 1.5,
+    "reference/nomenclature.md": 1.5,
     "reference/effects.md": 1.2,
     "gallery.md": 0.3,
     "attacks.md": 0.5,
@@ -66,6 +67,7 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
         "reference/metrics.md": "\n".join(_metrics()),
         "reference/not-simulated.md": "\n".join(_not_simulated()),
         "reference/words.md": "\n".join(_words()),
+        "reference/nomenclature.md": "\n".join(_nomenclature()),
         "cite.md": _cite(),
     }
     if "thesis.md" not in files.src_uris:
@@ -193,6 +195,21 @@ def _not_simulated() -> Iterator[str]:
         yield f"## {name.replace('_', ' ')} {{ #{name} }}\n\n{sentence(escaped(about))}\n"
         if others:
             yield f"Also called {', '.join(other.replace('_', ' ') for other in others)}.\n"
+
+
+def _nomenclature() -> Iterator[str]:
+    from vcam_cli.commands.glossary import terms
+
+    yield "# Nomenclature\n"
+    yield "Terms that the documentation uses, with symbol, unit, definition and standard."
+    yield "`vcam explain TERM` prints an entry.\n"
+    yield "| term | symbol | unit | definition | standard or source |\n|---|---|---|---|---|"
+    for name, term in sorted(terms().items()):
+        also = f" ({', '.join(n.replace('_', ' ') for n in term.also)})" if term.also else ""
+        cells = (term.symbol, term.unit, f"{term.definition}.", term.standard)
+        said = " | ".join(escaped(cell) for cell in cells)
+        yield f"| {name.replace('_', ' ')}{also} | {said} |"
+    yield ""
 
 
 def _words() -> Iterator[str]:

@@ -51,7 +51,7 @@ def names() -> list[str]:
 
     found = [key.dotted for _, key in _all_keys()] + [key.name for _, key in _all_keys()]
     columns = [name for table in glossary.written().values() for name in table]
-    words = [*glossary.TERMS, *glossary.QUANTITIES, *columns, *QUANTITIES, *COMMANDS, *_units()]
+    words = [*glossary.called(), *glossary.QUANTITIES, *columns, *QUANTITIES, *COMMANDS, *_units()]
     values = [value for value, _ in _values()]
     return [*found, *_effects(), *_metrics(), *CHARTS, *hint_tables.KEYS, *words, *values]
 
@@ -77,6 +77,7 @@ def explanations(name: str) -> Iterator[dict[str, Any]]:
     yield from _of_value(word)
     if about := hint_tables.NOT_SIMULATED.get(word.replace("-", "_")):
         yield {"title": f"{word} (not simulated)", "about": f"{about[:1].upper()}{about[1:]}."}
+    yield from _of_term(word.replace("-", "_"))
 
 
 @cache
@@ -249,7 +250,7 @@ def _of_word(word: str) -> Iterator[dict[str, Any]]:
     if tables and about:
         entry = {"title": f"{word} (column)", "about": _sentence(about)}
         yield entry | {"in": ", ".join(tables)}
-    about = glossary.TERMS.get(word) or glossary.QUANTITIES.get(word)
+    about = glossary.QUANTITIES.get(word)
     if about is None and word in QUANTITIES and word not in _metrics():
         about = f"property of a camera that studies take, `{word}`"
         about += f" [{unit(word)}]" if unit(word) else ""
@@ -257,6 +258,24 @@ def _of_word(word: str) -> Iterator[dict[str, Any]]:
             about = None
     if about is not None and not (tables and word in glossary.COLUMNS):
         yield {"title": word, "about": _sentence(about)}
+
+
+def _of_term(word: str) -> Iterator[dict[str, Any]]:
+    """Yield the definition of a term of the field."""
+    from vcam_cli.commands import glossary
+
+    term = glossary.called().get(word)
+    if term is None:
+        return
+    others = [name for name in (term.name, *term.also) if name != word]
+    lines = {
+        "also called": ", ".join(name.replace("_", " ") for name in others),
+        "symbol": term.symbol,
+        "unit": term.unit,
+        "standard": term.standard,
+    }
+    entry = {"title": f"{word} (term)", "about": _sentence(term.definition)}
+    yield entry | {heading: said for heading, said in lines.items() if said}
 
 
 def _sentence(text: str) -> str:

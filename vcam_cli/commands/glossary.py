@@ -1,57 +1,47 @@
-"""Words that tables, data sheets and the trade have beside keys, effects and charts.
+"""Terms of the field, and the quantities and columns of tables.
 
+Terms are data in `terms.yaml`; the documentation's page Nomenclature lists them.
 A test holds that every column, metric and quantity that a file has is explained.
 """
 
 from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
 
-TERMS: Mapping[str, str] = {
-    "metrics": "numbers of a run in metrics.csv: `vcam list metrics` names them; those that judge"
-    " the picture are asked for in `quality`",
-    "columns": "every column of every table is a word of its own here, as in `vcam explain"
-    " gain_pixel`; units stand in brackets behind it, or in the column unit",
-    "mtf": "modulation transfer function: contrast of the image over that of the scene, by spatial"
-    " frequency. `vcam characterize` measures the system's at a slanted edge (ISO 12233); a"
-    " measured lens is given in optics.mtf",
-    "mtf50": "spatial frequency at which the MTF is one half, from a slanted edge (e-SFR of ISO"
-    " 12233): in metrics.csv [cycles/pixel], in characterize.csv [lp/mm]",
-    "mtf50_per_pixel": "mtf50 times the pixel pitch [cycles/pixel]",
-    "mtf_nyquist": "MTF at half a cycle per pixel, from a slanted edge (ISO 12233)",
-    "gray_snr_db": "mean signal over temporal noise of a gray that reflects 18 %, in this exposure,"
-    " 20 log10 [dB]",
-    "ptc": "photon transfer curve: variance of the raw over its mean, from dark to saturation. Its"
-    " slope is the system gain K, its start the dark noise, its fall the saturation (EMVA 1288"
-    " release 4.0); `vcam characterize CAMERA` measures it, `vcam fit` takes it from real frames",
-    "photon_transfer": "see PTC: `vcam explain ptc`",
-    "responsivity": "signal for exposure: V/(lx s) in data sheets (responsivity_a in illuminant A,"
-    " responsivity_green at 550 nm), DN per photon in EMVA 1288 (R, eq 49), which is system gain"
-    " times quantum efficiency; `vcam characterize` states all three",
-    "responsivity_a": "output of the pixel for the exposure of the sensor in illuminant A"
-    " [V/(lx s)], light measured behind the lens",
-    "responsivity_green": "output of the pixel for the exposure of the sensor by light of 550 nm"
-    " [V/(lx s)], light measured behind the lens",
-    "emva": "EMVA 1288 release 4.0, the standard by which cameras are characterized: `vcam"
-    " characterize`, `vcam fit`",
-    "emva_1288": "see EMVA: `vcam explain emva`",
-    "nir": "near infrared, about 700 to 1100 nm, which silicon sees: extend scene.wavelengths to"
-    " simulate it, and leave the infrared cut (ir-cut-650) out of optics.transmittance",
-    "video": "`vcam run CAMERA --frames N --fps F` takes frames one after another; everything that"
-    " moves goes on, noise is drawn anew, the fixed pattern stays",
-    "fixed_pattern_noise": "differences between pixels that stay from frame to frame: pixel.fpn",
-    "dark_noise": "temporal noise of a pixel without light: reset, readout and the shot noise of"
-    " the dark current",
-    "temporal_dark_noise": "temporal noise of a pixel without light [e] (EMVA 1288, eqs 53 and 54)",
-    "delta_e": "difference of two colors in CIELAB: 1 is about the least that the eye sees",
-    "s_cielab": "difference of two pictures as the eye sees it: CIELAB behind the blur of the eye",
-    "dng": "raw.dng, the raw frame for raw converters: `output.dng: true`",
-    "optimum": "value of the varied key at which a study's metric is best; low..high is what"
-    " repeats and seeds cannot tell apart",
-    "full_signal": "largest noise-free mean signal on the array, at most the full well, at least"
-    " 1 e: errors are relative to it",
-    "tolerance": "error of the mean raw that `accuracy` allows, over full signal",
-    "linearity_error": "deviation of the mean signal from a straight line (EMVA 1288, eq 62)",
-}
-"""A word of the trade -> what it means."""
+import yaml
+
+
+@dataclass(frozen=True)
+class Term:
+    """A term of the field."""
+
+    name: str
+    definition: str
+    standard: str
+    """Standard that defines it, or source."""
+    symbol: str = ""
+    unit: str = ""
+    also: tuple[str, ...] = ()
+    """Other names."""
+
+
+@cache
+def terms() -> dict[str, Term]:
+    """Return the terms by their names."""
+    text = (Path(__file__).parent / "terms.yaml").read_text("utf-8")
+    return {
+        name: Term(name, **{**entry, "also": tuple(entry.get("also", ()))})
+        for name, entry in yaml.safe_load(text).items()
+    }
+
+
+@cache
+def called() -> dict[str, Term]:
+    """Return the terms by all of their names."""
+    return {name: term for term in terms().values() for name in (term.name, *term.also)}
+
+
 QUANTITIES: Mapping[str, str] = {
     "mean_delta_e": "mean CIELAB Delta E of two pictures; ask for `cielab` in `quality`",
     "mean_s_cielab": "mean S-CIELAB Delta E of two pictures; ask for `s-cielab` in `quality`",
@@ -148,7 +138,7 @@ COLUMNS: Mapping[str, str] = {
     "case": "case of the study",
     "seed": "frame seed of the point; as a key: seed.frame",
     "error": "why a point failed; empty where it did not",
-    "optimum": TERMS["optimum"],
+    "optimum": "value of the varied key at which the metric is best; low..high is its interval",
     "spread": "standard deviation over repeats and seeds",
     "image_height_mm": "distance from the axis in the image plane [mm]",
     "x_um": "center of a pixel, right of the array's center [um]",
