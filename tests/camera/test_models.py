@@ -255,6 +255,13 @@ class TestValues:
             assert dark_rate(c) == pytest.approx(12 * factor, rel=1e-12)
             assert c.model_dump(mode="json")["pixel"]["photodetector"]["dark_current"] == written
 
+    def test_a_dark_current_that_follows_silicon(self):
+        """0.0372 e/s at 200 K of 6241.5 e/s at 300 K (Janesick 2001, section 7.1.1)."""
+        given = {"value": "6.2415 ke/s", "temperature": "300 K", "doubling": "silicon"}
+        c = camera(pixel__photodetector__dark_current=given, pixel__temperature="200 K")
+        assert dark_rate(c) == pytest.approx(0.0372, abs=6e-5)
+        assert c.model_dump(mode="json")["pixel"]["photodetector"]["dark_current"] == given
+
     def test_quantum_efficiency_of_a_pixel(self):
         of_detector = camera().pixel.photodetector.quantum_efficiency
         assert not of_detector.per_pixel

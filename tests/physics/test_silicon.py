@@ -5,6 +5,7 @@ itself, solved over depth and width by finite differences.
 """
 
 import json
+import math
 from pathlib import Path
 
 import mpmath
@@ -253,3 +254,17 @@ def test_collected_broadcasts():
 def test_collected_refuses_what_is_no_silicon(wrong):
     with pytest.raises(ValueError, match="diffusion length"):
         silicon.collection_efficiency(*wrong)
+
+
+def test_dark_current_falls_with_the_band_gap():
+    """0.0372 e/s at 200 K of 6241.5 e/s at 300 K (1 nA/cm2 on 10 um; Janesick 2001, 7.1.1)."""
+    assert 6241.5 * silicon.dark_current_ratio(200, 300) == pytest.approx(0.0372, abs=6e-5)
+    assert silicon.dark_current_ratio(300, 300) == 1
+
+
+@pytest.mark.parametrize(("kelvin", "doubling"), [(300, 8.5), (200, 3.9)])
+def test_dark_current_doubles_in_fewer_kelvins_where_it_is_cold(kelvin, doubling):
+    """The derivative of T^1.5 exp(-E_g / 2kT), by central differences of 1 mK."""
+    step = 1e-3
+    growth = math.log(silicon.dark_current_ratio(kelvin + step, kelvin - step)) / (2 * step)
+    assert math.log(2) / growth == pytest.approx(doubling, abs=0.05)

@@ -13,6 +13,8 @@ References
    coupled imagers", IEEE Transactions on Electron Devices 21, 210-217, 1974.
 .. [5] A. B. Sproul, M. A. Green, "Improved value for the silicon intrinsic carrier concentration
    from 275 to 375 K", Journal of Applied Physics 70, 846-854, 1991, doi:10.1063/1.349645.
+.. [6] J. R. Janesick, "Scientific Charge-Coupled Devices", SPIE Press, 2001, section 7.1.1: dark
+   current over temperature, with Varshni's band gap.
 """
 
 from functools import cache
@@ -28,6 +30,8 @@ PERMITTIVITY = 11.7 * 8.8541878128e-12
 """Permittivity of silicon [F/m]: relative permittivity x that of vacuum (CODATA 2018)."""
 ABSORPTION_RANGE = (350e-9, 1100e-9)
 """Wavelengths for which the absorption is tabulated [m]."""
+BOLTZMANN_EV = 8.617333262e-5
+"""Boltzmann's constant [eV/K] (CODATA 2018)."""
 TEMPERATURES = (77.0, 400.0)
 """Temperatures for which the intrinsic concentration holds [K]."""
 
@@ -77,6 +81,43 @@ def absorption(wavelength: ArrayLike) -> Floats:
             f"{float(asked.min()) * 1e9:.6g} to {float(asked.max()) * 1e9:.6g} nm"
         )
     return np.exp(table.evaluate(asked))[()]
+
+
+def band_gap(temperature: ArrayLike) -> Floats:
+    """Return the band gap of silicon [6].
+
+    Parameters
+    ----------
+    temperature : array_like
+        Temperature [K].
+
+    Returns
+    -------
+    ndarray
+        Band gap [eV].
+    """
+    kelvin = _float(temperature)
+    return (1.1557 - 7.021e-4 * kelvin**2 / (1108 + kelvin))[()]
+
+
+def dark_current_ratio(temperature: ArrayLike, reference: ArrayLike) -> Floats:
+    """Return the dark current at a temperature over that at another one [6].
+
+    Generation in the depletion region: T^1.5 exp(-E_g / (2 k T)).
+
+    Parameters
+    ----------
+    temperature, reference : array_like
+        Temperatures [K], above 0.
+
+    Returns
+    -------
+    ndarray
+        Ratio [dimensionless].
+    """
+    warm, cold = _float(temperature), _float(reference)
+    exponent = band_gap(cold) / cold - band_gap(warm) / warm
+    return ((warm / cold) ** 1.5 * np.exp(exponent / (2 * BOLTZMANN_EV)))[()]
 
 
 def intrinsic_concentration(temperature: ArrayLike) -> Floats:

@@ -11,6 +11,8 @@ References
 
 from __future__ import annotations
 
+from typing import Literal
+
 import numpy as np
 
 from vcam_cli.camera.derived import sense_node
@@ -142,16 +144,20 @@ def _density_at_temperature(camera: CameraModel, made: Process, density: float |
     return density * _growth(camera, given.temperature, doubling, path)
 
 
-def _growth(camera: CameraModel, temperature: float | None, doubling: float, path: str) -> float:
+def _growth(
+    camera: CameraModel, given_at: float | None, doubling: float | Literal["silicon"], path: str
+) -> float:
     """Return the factor on a dark current from a temperature [K], if any, to the pixel's, [2]."""
-    if temperature is None:
+    if given_at is None:
         return 1.0
-    doublings = (camera.pixel.temperature - temperature) / doubling
+    at = camera.pixel.temperature
+    if doubling == "silicon":
+        return float(silicon.dark_current_ratio(at, given_at))
+    doublings = (at - given_at) / doubling
     if abs(doublings) > MOST_DOUBLINGS:
         raise bad(
             path,
-            f"from {temperature:g} K to {camera.pixel.temperature:g} K it doubles"
-            f" {doublings:.3g} times",
-            "give it at a temperature nearer to the pixel's, or another doubling",
+            f"from {given_at:g} K to {at:g} K it doubles {doublings:.3g} times",
+            "give it at a temperature nearer to the pixel's, or write doubling: silicon",
         )
     return float(2**doublings)

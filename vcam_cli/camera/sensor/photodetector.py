@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Annotated, Any, Literal
 
-from vcam_cli.camera.sensor.technology import Junction
+from vcam_cli.camera.sensor.technology import DOUBLING, Junction
 from vcam_cli.camera.spectrum import Spectral, SpectrumSpec
 from vcam_cli.config.model import Model, all_or_none, at_most_one, key, needs
 from vcam_cli.config.quantities import Number, Quantity
@@ -68,8 +68,11 @@ class AtTemperature(Model):
     temperature: MaybeSiliconTemperature = key(
         "at which it holds; default the pixel's", example="300 K", default=None
     )
-    doubling: Annotated[float, Quantity("temperature", above=0, difference=True)] = key(
-        "rise of temperature that doubles it", example="8 K", default=8.0
+    doubling: Annotated[float | Literal["silicon"], DOUBLING] = key(
+        "rise of temperature that doubles it; silicon: by the band gap (8.5 K at 300 K, 3.9 K at"
+        " 200 K)",
+        example="8 K",
+        default=8.0,
     )
 
     rules = (needs("doubling", "temperature", "a doubling needs the temperature it starts from"),)

@@ -140,6 +140,9 @@ class JunctionCapacitance(Model):
     )
 
 
+DOUBLING = Quantity("temperature", above=0, difference=True, words={"silicon": "silicon"})
+
+
 class TechnologyDarkCurrent(Model):
     """Dark current of the photodiode."""
 
@@ -150,8 +153,8 @@ class TechnologyDarkCurrent(Model):
         "per length of perimeter", example="0.437 pA/cm", default=None
     )
     temperature: MaybeSiliconTemperature = key("at which both hold", example="300 K", default=None)
-    doubling: Annotated[float | None, Quantity("temperature", above=0, difference=True)] = key(
-        "rise of temperature that doubles them", example="8 K", default=None
+    doubling: Annotated[float | Literal["silicon"] | None, DOUBLING] = key(
+        "rise of temperature that doubles them, or silicon", example="8 K", default=None
     )
 
 
