@@ -33,6 +33,7 @@ FLOORS = (
     {"scenes", "effects"},
     {"image_formation"},
     {"readout"},
+    {"solve"},
     {"processing"},
     {"quality"},
     {"files"},

@@ -10,7 +10,7 @@ from making import GONE, camera
 
 from vcam_cli import simulate, spectra
 from vcam_cli.errors import BadInput
-from vcam_cli.simulation.idle_keys import idle_keys
+from vcam_cli.solve.idle_keys import idle_keys
 
 NM = np.array([380.0, 450.5, 550.0, 800.0])
 VALUES = {"R": np.array([0.01, 0.02, 0.3, 0.9]), "G": np.array([0.1, 0.2, 0.8, 0.05]),

@@ -20,8 +20,8 @@ from vcam_cli.commands.main import app
 from vcam_cli.config import shipped
 from vcam_cli.datasets import dataset_file
 from vcam_cli.effects.readout_chain import electrical
-from vcam_cli.simulation.plan import camera_effects
 from vcam_cli.simulation.scene_plans import scene_settings
+from vcam_cli.solve.effects import camera_effects
 from vcam_cli.sweeps import expectations, figures, sweep_file, sweep_points
 from vcam_cli.sweeps.study_cameras import StudyCameras
 
@@ -131,7 +131,7 @@ def test_the_benchmark_camera():
 def test_everything_has_every_effect_of_its_architecture():
     """But for what a CCD has, depth, which is of a scene, and what its read noise includes."""
     camera = load("everything")
-    described = camera_effects(camera, geometry(camera))
+    described = camera_effects(camera, geometry(camera)).found
     missing = {name for name, effect in described.items() if effect is None}
     assert missing == {"charge_transfer", "reset_noise", "depth", "adc_noise"}
     assert camera.effects == "auto"

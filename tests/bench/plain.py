@@ -16,7 +16,6 @@ from numpy.typing import NDArray
 
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import pixel_centers
-from vcam_cli.image_formation.photon_rate import responses
 from vcam_cli.physics.radiometry import irradiance_per_radiance
 from vcam_cli.simulation.simulate import prepare
 
@@ -72,7 +71,7 @@ def setup(camera: Camera, count: int = 31) -> tuple[Setup, Floats]:
     step[[0, -1]] /= 2
     cone = float(irradiance_per_radiance(g.f_number, g.magnification))
     # The responses have the transmittance of the lens in them.
-    per_photon = np.array([r.evaluate(w) for r in responses(camera, ready.mosaic)])
+    per_photon = np.array([r.evaluate(w) for r in ready.solved.response.spectra])
     x, y = pixel_centers(g)
     names = np.array(ready.mosaic.block)
     place = np.vectorize(ready.mosaic.colors.index)(names)

@@ -6,8 +6,8 @@ from making import CHARGE, QUIET, camera, radiance_for
 
 from vcam_cli.effects.readout_chain import electrical
 from vcam_cli.errors import BadInput
-from vcam_cli.simulation.idle_keys import idle_keys
 from vcam_cli.simulation.simulate import simulate
+from vcam_cli.solve.idle_keys import idle_keys
 
 CURVE = "pixel.readout.transfer_curve"
 FOLLOWER = {"threshold": "0.3 V", "overdrive": "0.1 V"}

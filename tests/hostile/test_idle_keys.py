@@ -22,10 +22,9 @@ from vcam_cli.camera.camera import Camera
 from vcam_cli.config import shipped
 from vcam_cli.config.quantities import Numeric, Whole
 from vcam_cli.errors import BadInput, CannotDo, dotted_path
-from vcam_cli.image_formation.photon_rate import responses
 from vcam_cli.quality.display import display_screen
-from vcam_cli.simulation.idle_keys import idle_keys
 from vcam_cli.simulation.simulate import Result, simulate
+from vcam_cli.solve.idle_keys import idle_keys
 
 FACTORS = (2.0, 0.5, 1.37, 0.73, 1.02, 0.98)
 """Tried in this order until one is allowed. Powers of two first: they round nothing."""
@@ -46,7 +45,7 @@ def _is_dark_at(wavelength: float, result: Result) -> bool:
     """Whether light of a wavelength [m] is not simulated, or no color responds to it."""
     camera = result.frame.camera
     band = camera.scene.wavelengths
-    seen = responses(camera, result.frame.mosaic)
+    seen = result.frame.solved.response.spectra
     simulated = band.start <= wavelength <= band.stop
     return not simulated or all(s.evaluate(np.array([wavelength]))[0] == 0 for s in seen)
 

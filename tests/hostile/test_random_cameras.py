@@ -13,12 +13,10 @@ from hypothesis import strategies as st
 from strategies import Tree, between, cameras, fractions
 
 from vcam_cli.accuracy_study.ablation import with_effects
-from vcam_cli.camera.derived.geometry import geometry
-from vcam_cli.effects.readout_chain import electrical
-from vcam_cli.readout.layout import camera_layout
 from vcam_cli.simulation import checks
 from vcam_cli.simulation.pixel_figures import pixel_figures
 from vcam_cli.simulation.simulate import Result, simulate
+from vcam_cli.solve.solved import solve
 
 SINGLE = np.finfo(np.float32).eps
 SLOW = [HealthCheck.too_slow, HealthCheck.data_too_large, HealthCheck.function_scoped_fixture]
@@ -182,9 +180,7 @@ def test_the_signal_to_noise_ratio_falls_with_each_noise(tree, name, level, fact
 
 def figures(camera):
     """SNR and dynamic range by their closed forms."""
-    solved = geometry(camera)
-    groups = camera_layout(camera, solved).binning_groups
-    return pixel_figures(camera, solved, electrical(camera), groups, camera.exposure.time)
+    return pixel_figures(solve(camera), camera.exposure.time)
 
 
 SETS = {

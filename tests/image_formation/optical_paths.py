@@ -10,20 +10,21 @@ from typing import Any
 import numpy as np
 
 from vcam_cli.camera.camera import Camera
-from vcam_cli.camera.derived.geometry import Geometry, geometry
-from vcam_cli.camera.derived.mosaic import Mosaic, mosaic
+from vcam_cli.camera.derived.geometry import Geometry
+from vcam_cli.camera.derived.mosaic import Mosaic
 from vcam_cli.effects.base import Blur, Effect, PlaneTransfer, RadialTransfer, of_kind
 from vcam_cli.effects.pixel.pixel_aperture import PixelAperture
 from vcam_cli.image_formation import photon_rate
 from vcam_cli.image_formation.estimates import bandwidth
 from vcam_cli.image_formation.optical_path import OpticalPath
-from vcam_cli.image_formation.settings import STANDARD, Settings, camera_settings
+from vcam_cli.image_formation.pixel_response import scene_transfer
+from vcam_cli.image_formation.settings import STANDARD, Settings
 from vcam_cli.image_formation.transfer_functions import Transfer
 from vcam_cli.scenes.base import Chart, ChartScene, Scene
 from vcam_cli.scenes.build import build
 from vcam_cli.scenes.framed import chart_scene
 from vcam_cli.scenes.image import ImageScene
-from vcam_cli.simulation import plan
+from vcam_cli.solve.solved import solve
 from vcam_cli.spectra import Spectrum
 
 PITCH = 2e-6
@@ -105,15 +106,12 @@ def signal(path: OpticalPath, scene: Scene) -> np.ndarray:
 
 def of_camera(made: Camera, picture: Any = None) -> tuple[OpticalPath, Scene]:
     """The path and the scene of a camera, as the simulation makes them."""
-    g, knobs, effects = (
-        geometry(made),
-        camera_settings(made),
-        plan.mean_signal_effects(made, geometry(made)),
-    )
-    band, colors = made.scene.wavelengths, mosaic(made)
+    solved = solve(made)
+    g, knobs, effects = solved.geometry, solved.settings, solved.effects.mean_signal
+    band, colors = made.scene.wavelengths, solved.layout.mosaic
     margin = bandwidth.margin(g, effects, (band.start, band.stop), knobs)
     scene = build(made.scene, photon_rate.view(g, knobs, margin), picture)
-    transfer = photon_rate.scene_transfer(made, g, knobs, scene.spectra, colors, effects)
+    transfer = scene_transfer(solved.response, scene.spectra, effects, knobs.wavelength_step)
     return OpticalPath(transfer, g, knobs, colors, effects, 1), scene
 
 

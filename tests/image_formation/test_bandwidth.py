@@ -36,10 +36,11 @@ from vcam_cli.image_formation.estimates import bandwidth, chart_cells
 from vcam_cli.image_formation.estimates.bandwidth import highest_passed, line_spread_tail, margin
 from vcam_cli.image_formation.light_plan import OMITTED_SHARE
 from vcam_cli.image_formation.photon_rate import photo_rate
-from vcam_cli.image_formation.settings import STANDARD, camera_settings
+from vcam_cli.image_formation.settings import STANDARD
 from vcam_cli.scenes.base import Chart
-from vcam_cli.simulation import setup
 from vcam_cli.simulation.simulate import prepare
+from vcam_cli.solve import solved
+from vcam_cli.solve.settings import camera_settings
 
 BAND = 550e-9, 550e-9
 
@@ -479,7 +480,7 @@ def test_the_margin_is_wide_enough_for_light_beyond_the_well(chart, time, tmp_pa
     made = camera(tmp_path, changes)
     usual = prepare(made, 1)[0]
     monkeypatch.setattr(
-        setup,
+        solved,
         "camera_settings",
         lambda camera: replace(camera_settings(camera), margin_scale=6.0),
     )

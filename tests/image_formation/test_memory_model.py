@@ -18,10 +18,11 @@ from vcam_cli.effects.optics.diffraction import Diffraction
 from vcam_cli.errors import CannotDo
 from vcam_cli.image_formation import strategies
 from vcam_cli.image_formation.estimates import memory_model
-from vcam_cli.image_formation.settings import STANDARD, camera_settings
+from vcam_cli.image_formation.settings import STANDARD
 from vcam_cli.image_formation.transfer_tables import TableSize
 from vcam_cli.scenes.charts.siemens_star import SiemensStar
 from vcam_cli.simulation.simulate import simulate
+from vcam_cli.solve.settings import camera_settings
 
 FEW = ["array.rows=24", "array.columns=32", "quality=[]"]
 SMALL = ["array.rows=24", "array.columns=32", "quality=[]", "accuracy=draft"]

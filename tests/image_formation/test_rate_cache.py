@@ -5,9 +5,9 @@ import pytest
 from making import camera
 
 from vcam_cli import simulate
-from vcam_cli.image_formation.rate_cache import INDEPENDENT_KEYS, light_key
-from vcam_cli.simulation import preparation
+from vcam_cli.simulation import scene_light
 from vcam_cli.simulation.shared import Shared
+from vcam_cli.solve.light_key import INDEPENDENT_KEYS, light_key
 
 BASE = {
     "array": {"rows": 20, "columns": 24, "pattern": "bayer-rggb"},
@@ -75,9 +75,9 @@ def test_the_light_does_not_depend_on_it(tmp_path, path, monkeypatch):
     plain = camera(tmp_path, before | ({path: BASE[path]} if path in BASE else {}))
     assert light_key(made) == light_key(plain)
     found = []
-    true = preparation.photon_rate.photo_rate
+    true = scene_light.photon_rate.photo_rate
     monkeypatch.setattr(
-        preparation.photon_rate, "photo_rate", lambda *args: found.append(true(*args)) or found[-1]
+        scene_light.photon_rate, "photo_rate", lambda *args: found.append(true(*args)) or found[-1]
     )
     for each in (plain, made):
         simulate(each, 1)
@@ -124,9 +124,9 @@ def test_shared_light_gives_the_same_bytes(tmp_path, changes):
 def brought(monkeypatch):
     """How often light is brought to the pixels."""
     calls = []
-    true = preparation.photon_rate.photo_rate
+    true = scene_light.photon_rate.photo_rate
     monkeypatch.setattr(
-        preparation.photon_rate, "photo_rate", lambda *args: calls.append(args) or true(*args)
+        scene_light.photon_rate, "photo_rate", lambda *args: calls.append(args) or true(*args)
     )
     return calls
 

@@ -8,9 +8,10 @@ from making import GONE, camera
 
 from vcam_cli.camera.derived.geometry import geometry
 from vcam_cli.errors import CannotDo
-from vcam_cli.image_formation.settings import camera_settings
-from vcam_cli.readout import layout as module
-from vcam_cli.readout.layout import FINER, FINEST, camera_layout, interpolate
+from vcam_cli.readout.layout import interpolate
+from vcam_cli.solve import layout as module
+from vcam_cli.solve.layout import FINER, FINEST, camera_layout
+from vcam_cli.solve.settings import camera_settings
 
 SIZE = {"array.rows": 6, "array.columns": 4, "output.render": "none"}
 

@@ -17,8 +17,8 @@ from vcam_cli.effects.pixel.saturation import Saturation
 from vcam_cli.effects.signal_chain import Quantizer
 from vcam_cli.errors import BadInput
 from vcam_cli.image_formation.estimates import memory_model
-from vcam_cli.image_formation.settings import camera_settings
 from vcam_cli.readout import exposure, nondestructive_samples
+from vcam_cli.solve.settings import camera_settings
 
 SEEDS = {"sensor": 1, "frame": 1}
 TIMES = (1e-3, 4e-3, 9e-3, 30e-3)

@@ -11,9 +11,9 @@ from vcam_cli.files.images.png import write_png
 from vcam_cli.image_formation.estimates import light_cost
 from vcam_cli.progress import Silent, Stages
 from vcam_cli.simulation import autofocus, cost_model
-from vcam_cli.simulation.idle_keys import idle_keys
 from vcam_cli.simulation.preparation import prepare as bring_light
 from vcam_cli.simulation.simulate import prepare
+from vcam_cli.solve.idle_keys import idle_keys
 
 EDGE = {
     "scene.source": {"kind": "chart", "chart": "slanted-edge"},

@@ -9,8 +9,8 @@ from making import GONE, LIGHT, PLANCK, camera
 
 from vcam_cli.commands.geometry_table import geometry_table
 from vcam_cli.errors import BadInput
-from vcam_cli.simulation.idle_keys import idle_keys
 from vcam_cli.simulation.simulate import simulate
+from vcam_cli.solve.idle_keys import idle_keys
 
 BARE = {"optics": "none", "scene.radiance": GONE, "scene.distance": GONE}
 LINE = {**BARE, "scene.irradiance": "0.01 W/m2"}

@@ -3,10 +3,9 @@
 import pytest
 from making import GONE, camera
 
-from vcam_cli.camera.derived.geometry import geometry
-from vcam_cli.camera.derived.mosaic import mosaic
 from vcam_cli.simulation import cost_model
 from vcam_cli.simulation.simulate import prepare
+from vcam_cli.solve.solved import solve
 
 MOSAIC = {
     "scene.illuminant": "D65",
@@ -20,7 +19,7 @@ JUDGED = {"quality": ["s-cielab"], "processing": [{"gamma": 2.2}], "output.rende
 
 def foretold(folder, **display) -> float:
     made = camera(folder, JUDGED | {"display": {"filters": "continuous", **display}})
-    return cost_model.output_seconds(made, geometry(made), mosaic(made))
+    return cost_model.output_seconds(solve(made))
 
 
 def test_looking_at_a_pixel_in_many_places_is_foretold(tmp_path) -> None:

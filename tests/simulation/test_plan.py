@@ -8,13 +8,14 @@ import pytest
 from making import GONE, QUIET, camera, long_except, radiance_for
 
 from vcam_cli import simulate
-from vcam_cli.camera.derived.geometry import geometry
 from vcam_cli.effects.base import Charge
 from vcam_cli.effects.order import ORDER
 from vcam_cli.effects.signal_chain import NoiseSource
 from vcam_cli.errors import BadInput
-from vcam_cli.simulation import plan
+from vcam_cli.simulation.checks import check_effects
+from vcam_cli.simulation.plan import Decision
 from vcam_cli.simulation.simulate import prepare
+from vcam_cli.solve.solved import solve
 
 NAMES = [kind.name for kind in ORDER]
 NOISE = {
@@ -133,7 +134,7 @@ EVERY = pytest.mark.parametrize(
 )
 
 
-def decisions(result) -> dict[str, plan.Decision]:
+def decisions(result) -> dict[str, Decision]:
     return {d.name: d for d in result.frame.plan.decisions}
 
 
@@ -335,7 +336,7 @@ def test_on_keeps_what_the_plan_would_leave_out(name, run, tmp_path):
 )
 def test_on_for_what_is_not_described_is_an_error(name, absent, tmp_path):
     made = camera(tmp_path, absent | {"effects": {name: "on"}})
-    for attempt in (lambda: plan.camera_effects(made, geometry(made)), lambda: simulate(made)):
+    for attempt in (lambda: check_effects(made), lambda: simulate(made)):
         with pytest.raises(BadInput) as caught:
             attempt()
         [problem] = caught.value.problems
@@ -348,7 +349,7 @@ def test_on_for_what_is_not_described_is_an_error(name, absent, tmp_path):
 def test_all_wishes_that_cannot_be_are_told_at_once(tmp_path):
     made = camera(tmp_path, {"effects": {"fpn": "on", "read_noise": "on", "shot_noise": "on"}})
     with pytest.raises(BadInput) as caught:
-        plan.check(made)
+        check_effects(made)
     paths = {p.path for p in caught.value.problems}
     assert paths == {("effects", "fpn"), ("effects", "read_noise")}
 
@@ -466,7 +467,7 @@ def test_a_smaller_tolerance_leaves_less_out(run):
 
 def test_optical_effects_are_those_that_need_no_signal_level(tmp_path):
     made = camera(tmp_path, EVERYTHING | {"effects": {"diffraction": "off"}})
-    found = plan.mean_signal_effects(made, geometry(made))
+    found = solve(made).effects.mean_signal
     assert not any(isinstance(e, Charge | NoiseSource) for e in found)
     assert "diffraction" not in {e.name for e in found}
     assert {"pixel_aperture", "off_axis"} <= {e.name for e in found}

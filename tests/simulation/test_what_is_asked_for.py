@@ -10,9 +10,10 @@ from sweeping import written
 from vcam_cli import simulate, sweep
 from vcam_cli.effects.noise.read_noise import ReadNoise
 from vcam_cli.errors import BadInput
-from vcam_cli.simulation import idle_keys
+from vcam_cli.simulation import pipeline
 from vcam_cli.simulation import simulate as engine
 from vcam_cli.simulation.output import outputs
+from vcam_cli.solve import idle_keys
 
 COLOR = {
     "array.pattern": "bayer-rggb",
@@ -38,8 +39,8 @@ def prepared(monkeypatch):
         found.append(dn)
         return original(dn, *args, **others)
 
-    original = engine.process
-    monkeypatch.setattr(engine, "process", process)
+    original = pipeline.process
+    monkeypatch.setattr(pipeline, "process", process)
     return found
 
 

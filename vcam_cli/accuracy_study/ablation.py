@@ -18,7 +18,7 @@ from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import geometry
 from vcam_cli.effects.base import Charge, of_kind
-from vcam_cli.effects.order import ORDER, quantizer
+from vcam_cli.effects.order import ORDER
 from vcam_cli.effects.signal_chain import (
     NoiseSource,
     Quantizer,
@@ -26,8 +26,8 @@ from vcam_cli.effects.signal_chain import (
     noise_sources,
 )
 from vcam_cli.readout import binned_readout, exposure
-from vcam_cli.simulation import plan
 from vcam_cli.simulation.preparation import Prepared
+from vcam_cli.solve.effects import camera_effects
 
 FLAT = (4, 1 << 16)
 """Rows and columns of the fields that noise is measured on: many columns, since some of it is the
@@ -71,14 +71,14 @@ def with_effects(camera: Camera, every: str, *left_out: str) -> Camera:
     off = {*left_out, *(name for name, wish in own.items() if wish == "off")}
     if every == "auto":
         return camera.model_copy(update={"effects": dict.fromkeys(sorted(off), "off") or "auto"})
-    found = {n for n, effect in plan.camera_effects(camera, geometry(camera)).items() if effect}
+    found = {n for n, e in camera_effects(camera, geometry(camera)).found.items() if e}
     states = {name: "off" if name in off else "on" for name in sorted(found | off)}
     return camera.model_copy(update={"effects": states})
 
 
 def wanted_effects(camera: Camera) -> list[str]:
     """Return the names of effects that the file has and does not switch off, in their order."""
-    names = {e.name for e in plan.enabled_effects(camera, geometry(camera))}
+    names = {e.name for e in camera_effects(camera, geometry(camera)).enabled}
     return [kind.name for kind in ORDER if kind.name in names]
 
 
@@ -169,8 +169,8 @@ def _draw_field(
 
     Hot pixels are full, as they are read. Of pixels that are read as one, their mean.
     """
-    seeds = {"sensor": ready.camera.seed.sensor, "frame": ready.camera.seed.frame}
-    adc = quantizer(ready.camera, ready.geometry)
+    seed, adc = ready.solved.seed, ready.solved.adc
+    seeds = {"sensor": seed.sensor, "frame": seed.frame}
     charges = of_kind(ready.plan.active, Charge)
     rate = field / ready.exposure_time - sum(e.rate() for e in charges)
     effects = (*charges, *draws)

@@ -16,7 +16,6 @@ import numpy as np
 from vcam_cli.accuracy_study import ablation
 from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
-from vcam_cli.image_formation.settings import camera_settings
 from vcam_cli.processing import process
 from vcam_cli.progress import Observer
 from vcam_cli.quality import display
@@ -25,6 +24,7 @@ from vcam_cli.simulation.preparation import Prepared
 from vcam_cli.simulation.scene_times import compute_frame
 from vcam_cli.simulation.shared import Shared
 from vcam_cli.simulation.simulate import Result, simulate
+from vcam_cli.solve.settings import camera_settings
 
 TURNS, TWICE, THRICE = 5, 4.0, 0.6
 """Runs of a camera at most; two where they take more than the second [s], three where more than

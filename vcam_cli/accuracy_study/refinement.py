@@ -12,9 +12,9 @@ from vcam_cli.accuracy_study.measurements import Shot
 from vcam_cli.accuracy_study.setting_errors import FLOOR
 from vcam_cli.camera.camera import Camera
 from vcam_cli.floats import rms
-from vcam_cli.image_formation.settings import camera_settings
 from vcam_cli.simulation.preparation import Prepared
 from vcam_cli.simulation.simulate import prepare
+from vcam_cli.solve.settings import camera_settings
 
 PART = 0.1
 """Of the smallest error that is shown: how good what it is measured against has to be."""

@@ -108,7 +108,7 @@ class NoiseMeasurement:
 
     def _charge(self, number: int) -> Floats:
         """Return samples of one integration in an endless well, rounded as the ADC does [e]."""
-        seed = self.ready.camera.seed
+        seed = self.ready.solved.seed
         seeds = {"sensor": seed.sensor, "frame": seed.frame + 1 + number}
         e = self.ready.electrical
         electrons, _ = nondestructive_samples.samples(

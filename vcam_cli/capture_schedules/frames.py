@@ -27,7 +27,6 @@ from vcam_cli.capture_schedules.frame_noise import MeasuredSnr, NoiseMeasurement
 from vcam_cli.capture_schedules.frames_plots import Picture
 from vcam_cli.capture_schedules.methods import Task, find_schedules
 from vcam_cli.capture_schedules.model import ScheduleFrames
-from vcam_cli.effects.order import quantizer
 from vcam_cli.errors import bad
 from vcam_cli.files.folder import OutputFolder
 from vcam_cli.files.images.exr import write_exr
@@ -42,7 +41,6 @@ from vcam_cli.scheduling.objective import expected_snr
 from vcam_cli.scheduling.pdf import Floats, Pdf, photocurrent_levels
 from vcam_cli.scheduling.sensor import SLACK, Sensor
 from vcam_cli.scheduling.weighted_snr import weighted_expected_snr
-from vcam_cli.simulation import plan
 from vcam_cli.simulation.frame import Frame, take_frame
 from vcam_cli.simulation.preparation import Prepared
 from vcam_cli.simulation.simulate import prepare
@@ -161,8 +159,7 @@ def take_frames(
     if ready.step_rates:
         message = "has a lamp that flickers, and schedules are for steady photocurrents"
         raise bad("frames.camera", message, "remove scene.illuminant.flicker there")
-    adc = quantizer(ready.camera, ready.geometry)
-    effects = plan.enabled_effects(camera, ready.geometry)
+    adc, effects = ready.solved.adc, ready.solved.effects.enabled
     longest = asked.max or camera.exposure.longest
     assert longest is not None
     sensor = sample_times.sensor(ready.electrical, effects, adc, longest)
@@ -265,9 +262,8 @@ def _heuristic_times(rate: Array, count: int, segments: int, sensor: Sensor) -> 
 
 def _take_frame(ready: Prepared, times: tuple[float, ...], estimator: str, workers: int) -> Frame:
     """Take the camera's frame with these times and this estimator in place of its own."""
-    exposure = ready.camera.exposure.model_copy(update={"captures": times, "estimator": estimator})
-    camera = ready.camera.model_copy(update={"exposure": exposure})
-    return take_frame(replace(ready, camera=camera, exposure_time=times[-1], times=times), workers)
+    solved = ready.solved.with_samples_at(times, estimator)
+    return take_frame(replace(ready, solved=solved, exposure_time=times[-1], times=times), workers)
 
 
 def _expected_snr(rate: Array, times: Sequence[float], sensor: Sensor, estimator: str) -> float:

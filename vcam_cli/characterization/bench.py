@@ -36,7 +36,6 @@ from vcam_cli.camera.derived.mosaic import BLOCKS, NONE, mosaic
 from vcam_cli.camera.optics import Wavefront
 from vcam_cli.camera.scene.charts import SlantedEdge, Uniform
 from vcam_cli.camera.scene.illuminant import IlluminantSpec
-from vcam_cli.effects.order import quantizer
 from vcam_cli.effects.signal_chain import noise_sources
 from vcam_cli.errors import bad
 from vcam_cli.progress import Stages
@@ -178,7 +177,7 @@ class Bench:
         (rows, columns) array
             Codes [DN].
         """
-        adc = quantizer(self.ready.camera, self.ready.geometry)
+        adc = self.ready.solved.adc
         seed = self.camera.seed
         # No frame of another frame seed has the same noise.
         seeds = {"sensor": seed.sensor, "frame": seed.frame + (number << 64)}
@@ -274,7 +273,7 @@ def prepare_edge_bench(bench: Bench, stages: Stages) -> Bench:
     if camera.accuracy.tolerance > EDGE_TOLERANCE:
         finer = camera.accuracy.model_copy(update={"preset": None, "tolerance": EDGE_TOLERANCE})
         camera = camera.model_copy(update={"accuracy": finer})
-    fixed = with_exposure_time(camera, bench.time, bench.ready.camera.exposure_gain)
+    fixed = with_exposure_time(camera, bench.time, bench.ready.solved.gain)
     ready, _ = prepare(fixed, bench.workers, stages.watch)
     return replace(bench, ready=ready)
 

@@ -17,7 +17,6 @@ from numpy.typing import ArrayLike
 from vcam_cli.arrays import Array
 from vcam_cli.effects.base import Effect, SeparableTransfer, of_kind
 from vcam_cli.image_formation.transfer_functions import Transfer
-from vcam_cli.simulation import plan
 from vcam_cli.simulation.preparation import Prepared
 
 NODES = 33
@@ -113,7 +112,7 @@ def system_mtf(
     (n,) array
         Transfer, 1 at frequency 0.
     """
-    effects = plan.mean_signal_effects(ready.camera, ready.geometry)
+    effects = ready.solved.effects.mean_signal
     return directional_mtf(ready.transfer, effects, color, frequency, direction)
 
 

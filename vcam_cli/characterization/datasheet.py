@@ -20,7 +20,6 @@ import numpy as np
 from vcam_cli.characterization.bench import Bench
 from vcam_cli.characterization.closed_form import saturation_capacity
 from vcam_cli.characterization.exposures import Channel
-from vcam_cli.effects.order import quantizer
 from vcam_cli.physics import readout
 from vcam_cli.quality.mtf import crossing_frequency
 from vcam_cli.quality.nonuniformity import Nonuniformity
@@ -31,7 +30,6 @@ from vcam_cli.quality.photon_transfer import (
     linearity,
     sensitivity_threshold,
 )
-from vcam_cli.readout.iso_speed import electrons_per_exposure
 from vcam_cli.spectra import Spectrum, illuminant
 
 COLUMNS = ("quantity", "channel", "measured", "expected", "unit", "definition")
@@ -178,7 +176,7 @@ def _photometric_rows(bench: Bench, channel: Channel) -> Iterator[Row]:
     if band.start <= GREEN <= band.stop:
         lights.append(("green", Spectrum.line(GREEN), f"light of {GREEN * 1e9:.0f} nm"))
     for name, light, said in lights:
-        per_exposure = electrons_per_exposure(camera, ready.geometry, ready.layout, light)
+        per_exposure = ready.solved.electrons_per_exposure(light)
         expected = volts * float(per_exposure[index])
         definition = (
             f"of the pixel's output in {said}, light measured behind the lens;"
@@ -191,7 +189,7 @@ def _expected_linearity(bench: Bench, channel: Channel) -> tuple[float, float, f
     """Return the linearity error of the readout's curve, its least and its largest deviation."""
     if bench.ready.electrical.curve is None:
         return 0.0, 0.0, 0.0
-    adc = quantizer(bench.ready.camera, bench.ready.geometry)
+    adc = bench.ready.solved.adc
     series = channel.transfer.series
     electrons = series.photons * bench.efficiency(channel.color) + bench.dark
     black = float(adc.response(np.array([bench.dark]))[0])

@@ -21,9 +21,9 @@ from vcam_cli.config.document import Document
 from vcam_cli.config.yaml_tree import Node, Source, node_of, tree_at
 from vcam_cli.datasets.model import Dataset, Distribution
 from vcam_cli.errors import split
-from vcam_cli.image_formation.rate_cache import changes_light
 from vcam_cli.rng import stream
 from vcam_cli.simulation.checks import CHECKS
+from vcam_cli.solve.light_key import changes_light
 
 SOURCE = ("scene", "source")
 NOWHERE = Source("what is drawn", Path(), lines=False)

@@ -69,7 +69,7 @@ def labels(result: Result) -> dict[str, float]:
     sources = of_kind(frame.plan.active, NoiseSource)
     rms = {f"{source.name} [e]": source.variance(dark, dark) ** 0.5 for source in sources}
     temporal = sum(s.variance(dark, dark) for s in sources if s.scope == "frame")
-    fpn = frame.camera.pixel.fpn
+    fpn = frame.solved.pixel.fpn
     return {
         "exposure_time [s]": frame.exposure_time,
         "exposure_gain": circuit.exposure_gain,

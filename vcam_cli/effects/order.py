@@ -32,8 +32,6 @@ which an automatic offset makes room for, is in `noise/sources.py`. It is writte
 
 from __future__ import annotations
 
-from vcam_cli.camera.camera import Camera
-from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.effects.base import Effect
 from vcam_cli.effects.noise.adc_noise import AdcNoise
 from vcam_cli.effects.noise.quantization import Quantization
@@ -50,7 +48,6 @@ from vcam_cli.effects.pixel.microlens import Microlens
 from vcam_cli.effects.pixel.pixel_aperture import PixelAperture
 from vcam_cli.effects.pixel.pixel_vignetting import PixelVignetting
 from vcam_cli.effects.pixel.saturation import Saturation
-from vcam_cli.effects.signal_chain import Quantizer
 from vcam_cli.effects.temporal.flicker import Flicker
 from vcam_cli.effects.temporal.motion import Motion
 
@@ -73,11 +70,3 @@ ORDER: tuple[type[Effect], ...] = (
     AdcNoise,
     Quantization,
 )
-
-
-def quantizer(camera: Camera, geometry: Geometry) -> Quantizer:
-    """Return a camera's ADC, whether the effect is switched off or not."""
-    [kind] = [kind for kind in ORDER if issubclass(kind, Quantizer)]
-    found = kind.from_camera(camera, geometry)
-    assert isinstance(found, Quantizer)
-    return found

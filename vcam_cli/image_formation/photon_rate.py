@@ -16,21 +16,17 @@ from itertools import pairwise
 import numpy as np
 
 from vcam_cli.arrays import Array
-from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry, pixel_centers
 from vcam_cli.camera.derived.mosaic import Mosaic
-from vcam_cli.camera.derived.photodiode import quantum_efficiency
-from vcam_cli.effects.base import Blur, Effect, Gain, ImageMotion, VeilingGlare, of_kind
+from vcam_cli.effects.base import Effect, Gain, ImageMotion, VeilingGlare, of_kind
 from vcam_cli.image_formation.light_plan import LightPlan, light_plan
 from vcam_cli.image_formation.optical_path import Layer, OpticalPath, SpectrumReport
 from vcam_cli.image_formation.settings import Settings
 from vcam_cli.image_formation.strategies import image_layers
-from vcam_cli.image_formation.transfer_functions import Band, Transfer, transfer
 from vcam_cli.parallel import each
 from vcam_cli.rng import blocks
 from vcam_cli.scenes.base import View
 from vcam_cli.scenes.layered import AnyScene
-from vcam_cli.spectra import Spectrum
 
 USED_SHARE = 0.95
 """Part of the tolerance that all errors of the mean signal may use together. Where the light turns
@@ -68,109 +64,6 @@ def view(geometry: Geometry, settings: Settings, margin: int) -> View:
         dtype=settings.dtype,
         cell_error=CELL_ERROR * settings.tolerance,
     )
-
-
-def responses(camera: Camera, mosaic: Mosaic) -> list[Spectrum]:
-    """Return the electrons per photon of each color: transmittance x filter x QE.
-
-    Parameters
-    ----------
-    camera : Camera
-        The camera.
-    mosaic : Mosaic
-        Colors of the pixels.
-
-    Returns
-    -------
-    list of Spectrum
-        Spectra without unit, one for each color.
-    """
-    common = (camera.optics.transmittance.resolve(), quantum_efficiency(camera))
-    out = []
-    for color in mosaic.colors:
-        spec = camera.array.filters.get(color)
-        filters = () if spec is None else (spec.resolve(),)
-        out.append(common[0].multiply(common[1], *filters))
-    return out
-
-
-def scene_transfer(
-    camera: Camera,
-    geometry: Geometry,
-    settings: Settings,
-    spectra: Sequence[Spectrum],
-    mosaic: Mosaic,
-    effects: Sequence[Effect],
-) -> Transfer:
-    """Return the transfer H_kc of scene spectra on the axis.
-
-    Of the effects it has the blurs that are the same everywhere, and the gains as they are on the
-    axis.
-
-    Parameters
-    ----------
-    camera : Camera
-        The camera.
-    geometry : Geometry
-        Geometry of the array.
-    settings : Settings
-        Settings of image formation.
-    spectra : sequence of Spectrum
-        Spectral radiances of the scene's components [W/(sr m2 m)].
-    mosaic : Mosaic
-        Colors of the pixels.
-    effects : sequence of Effect
-        Effects of the camera.
-
-    Returns
-    -------
-    Transfer
-        Transfer of the K components in C colors [e/s].
-
-    References
-    ----------
-    T. Chen, PhD thesis, Stanford University, 2003, eqs 2.18 and 2.23.
-    """
-    area = geometry.detector_area
-    if camera.pixel.photodetector.quantum_efficiency.per_pixel:
-        area = geometry.pixel_width * geometry.pixel_height
-    gains = of_kind(effects, Gain)
-    area *= math.prod(gain.on_axis for gain in gains)
-    wavelengths = camera.scene.wavelengths
-    return transfer(
-        spectra,
-        responses(camera, mosaic),
-        geometry.irradiance_per_radiance * area,
-        Band(wavelengths.start, wavelengths.stop, settings.wavelength_step),
-        of_kind(effects, Blur),
-    )
-
-
-def axis_levels(
-    camera: Camera,
-    geometry: Geometry,
-    settings: Settings,
-    spectra: Sequence[Spectrum],
-    mosaic: Mosaic,
-    gains: Sequence[Gain],
-) -> Array:
-    """Return the electrons per second of uniform radiances on the axis.
-
-    Parameters
-    ----------
-    camera, geometry, settings, spectra, mosaic
-        As those of `scene_transfer`.
-    gains : sequence of Gain
-        Gains of the camera.
-
-    Returns
-    -------
-    ndarray
-        (K, C) rates of K radiances in C colors [e/s].
-    """
-    # Levels are exact with any wavelengths: the first and the last are enough.
-    coarse = replace(settings, wavelength_step=math.inf)
-    return scene_transfer(camera, geometry, coarse, spectra, mosaic, gains).level
 
 
 @dataclass(frozen=True)
@@ -232,7 +125,7 @@ def _gathered(path: OpticalPath, scene: AnyScene, planes: bool) -> Rate:
     out: Array = np.zeros((count, g.rows, g.columns), path.settings.dtype)
     x, y = (axis.astype(out.dtype) for axis in pixel_centers(g))
     glares, gains = _glares_and_gains(path.effects)
-    # The light has the gain of the axis in it: see `scene_transfer`.
+    # The light has the gain of the axis in it: see `pixel_response.scene_transfer`.
     on_axis = {e: out.dtype.type(1 / (e.on_axis or 1.0)) for e in of_kind(path.effects, Gain)}
 
     def apply_gains(effects: Sequence[Gain], block: slice) -> None:

@@ -8,11 +8,9 @@ pictures; `reference` also computes in 64 bits, but for charts, and `draft` draw
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 
 import numpy as np
-
-from vcam_cli.camera.camera import Camera
 
 
 @dataclass(frozen=True)
@@ -71,24 +69,3 @@ DRAFT = Settings(20e-9, 2049, 2e-3, 3, 4, 32, coarse_normals=True)
 STANDARD = Settings(10e-9, 2049, 5e-4, 4, 8, 32)
 FINE = Settings(10e-9, 4097, 2e-4, 5, 10, 32)
 REFERENCE = Settings(2.5e-9, 32769, 2e-5, 6, 16, 64, far_cells=32)
-
-PERCENTILE_SHARE = 0.5
-"""Part of the tolerance for light of which a percentile times the exposure: what that one pixel
-errs, all pixels do."""
-LADDER = ((0.02, DRAFT), (0.005, STANDARD), (0.001, FINE), (0.0, REFERENCE))
-"""Settings for tolerances from the first number of each pair upward."""
-
-
-def camera_settings(camera: Camera) -> Settings:
-    """Return the settings for the camera's tolerance, with those that its file states itself."""
-    accuracy = camera.accuracy
-    chosen = next(s for least, s in LADDER if accuracy.tolerance >= least)
-    mixing = min(chosen.mixing_tolerance, accuracy.tolerance / 10)
-    auto = camera.exposure.auto
-    share = PERCENTILE_SHARE if auto is not None and auto.method == "percentile" else 1.0
-    chosen = replace(chosen, tolerance=share * accuracy.tolerance, mixing_tolerance=mixing)
-    if camera.scene.wavelengths.step is not None:
-        chosen = replace(chosen, wavelength_step=camera.scene.wavelengths.step)
-    if "float_width" in accuracy.knobs:
-        chosen = replace(chosen, chart_width=accuracy.knobs["float_width"])
-    return replace(chosen, **accuracy.knobs)

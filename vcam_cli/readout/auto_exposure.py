@@ -7,9 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from vcam_cli.arrays import Array
-from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.electrical import Electrical
-from vcam_cli.camera.exposure import AutoExposure
+from vcam_cli.camera.exposure import AutoExposure, Exposure
 
 
 @dataclass(frozen=True)
@@ -26,7 +25,7 @@ class ExposureSettings:
 
 
 def exposure_settings(
-    camera: Camera, rate: Array, white_rate: float, dark_rate: float, circuit: Electrical
+    exposure: Exposure, rate: Array, white_rate: float, dark_rate: float, circuit: Electrical
 ) -> ExposureSettings:
     """Return time and gain of a camera's exposure, given or chosen for the scene.
 
@@ -36,8 +35,8 @@ def exposure_settings(
 
     Parameters
     ----------
-    camera : Camera
-        Camera whose exposure is sought.
+    exposure : Exposure
+        What the file says of the exposure.
     rate : Array
         Photo-electrons per second of every pixel, of any shape [e/s].
     white_rate : float
@@ -52,12 +51,12 @@ def exposure_settings(
     ExposureSettings
         Time, gain, and the limit that stopped an automatic exposure.
     """
-    auto, gain = camera.exposure.auto, circuit.exposure_gain
+    auto, gain = exposure.auto, circuit.exposure_gain
     if auto is None:
-        assert camera.exposure.longest is not None
-        return ExposureSettings(camera.exposure.longest, gain)
+        assert exposure.longest is not None
+        return ExposureSettings(exposure.longest, gain)
     level = _level(auto, rate, white_rate) + dark_rate
-    target = _target(camera)
+    target = _target(exposure)
     wanted = target * circuit.saturation / level if level > 0 else np.inf
     time = float(min(max(wanted, auto.min), auto.max))
     if wanted < auto.min:
@@ -72,10 +71,10 @@ def exposure_settings(
     return ExposureSettings(time, float(min(max(wanted, gain), auto.max_gain)), limit)
 
 
-def _target(camera: Camera) -> float:
+def _target(exposure: Exposure) -> float:
     """Return the share of saturation that an automatic exposure aims at, compensation included."""
-    assert camera.exposure.auto is not None
-    return camera.exposure.auto.target * 2**camera.exposure.compensation
+    assert exposure.auto is not None
+    return exposure.auto.target * 2**exposure.compensation
 
 
 def _level(auto: AutoExposure, rate: Array, white_rate: float) -> float:
@@ -87,7 +86,7 @@ def _level(auto: AutoExposure, rate: Array, white_rate: float) -> float:
     return percentile(rate, auto.percentile)
 
 
-def ceiling(camera: Camera, white_rate: float, saturation: float) -> float:
+def ceiling(exposure: Exposure, white_rate: float, saturation: float) -> float:
     """Return the photo rate that fills a pixel, as far as it is known before the light is.
 
     A given exposure time determines it; of several samples the last, which asks for the finest
@@ -95,8 +94,8 @@ def ceiling(camera: Camera, white_rate: float, saturation: float) -> float:
 
     Parameters
     ----------
-    camera : Camera
-        Camera whose exposure is meant.
+    exposure : Exposure
+        What the file says of the exposure.
     white_rate : float
         Rate of the scene's perfect white on the axis in its brightest color [e/s].
     saturation : float
@@ -107,11 +106,11 @@ def ceiling(camera: Camera, white_rate: float, saturation: float) -> float:
     float
         Photo-electrons per second [e/s].
     """
-    auto = camera.exposure.auto
+    auto = exposure.auto
     if auto is None:
-        assert camera.exposure.longest is not None
-        return saturation / camera.exposure.longest
-    return max(white_rate / _target(camera), saturation / auto.max)
+        assert exposure.longest is not None
+        return saturation / exposure.longest
+    return max(white_rate / _target(exposure), saturation / auto.max)
 
 
 def percentile(values: Array, percent: float) -> float:

@@ -27,14 +27,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from vcam_cli.arrays import Array
-from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.camera.sensor.array import Binning
-from vcam_cli.errors import Collector, bad
 
 Block = tuple[tuple[str, ...], ...]
-SUM_BITS = 32
-"""Bits of the whole numbers that a raw frame is made of, at most."""
 
 
 @dataclass(frozen=True)
@@ -203,90 +199,3 @@ def _sums(values: Array, count: int, step: int, axis: int, dtype: type) -> Array
 
 ALONE = BinningGroups(Binning(rows=1, columns=1), (1, 1))
 """Every pixel read by itself."""
-
-
-def binning_groups(camera: Camera, block: Block, g: Geometry) -> BinningGroups:
-    """Return the groups of pixels that a camera reads as one.
-
-    Parameters
-    ----------
-    camera : Camera
-        Camera whose file may ask for binning.
-    block : Block
-        Colors of the array's repeating block; ((color,),) where all pixels have the same colors.
-    g : Geometry
-        Geometry of the array.
-
-    Returns
-    -------
-    BinningGroups
-        The groups; `ALONE` where every pixel is read by itself.
-
-    Raises
-    ------
-    BadInput
-        For an array that is no whole number of groups, for several samples of one integration that
-        are not joined in charge, and for sums of codes beyond what a raw frame holds.
-    """
-    binning = camera.array.binning
-    if binning is None or binning.count == 1:
-        return ALONE
-    _require_single(camera, binning)
-    _require_codes(camera, binning)
-    alike = _neighbors_are_alike(block, binning)
-    found = BinningGroups(binning, (1, 1) if alike else (len(block), len(block[0])))
-    _require_whole(camera, found, g)
-    return found
-
-
-def _neighbors_are_alike(block: Block, binning: Binning) -> bool:
-    """Return whether every group of neighbors is of one color."""
-    height, width = len(block), len(block[0])
-    return all(
-        block[row % height][column % width]
-        == block[row // binning.rows * binning.rows % height][
-            column // binning.columns * binning.columns % width
-        ]
-        for row in range(math.lcm(height, binning.rows))
-        for column in range(math.lcm(width, binning.columns))
-    )
-
-
-def _require_single(camera: Camera, binning: Binning) -> None:
-    if camera.exposure.captures and binning.kind != "charge":
-        raise bad(
-            "exposure.captures",
-            f"several samples of one integration cannot be joined as {binning.kind}",
-            "write kind: charge in array.binning, or one exposure time",
-        )
-
-
-def _require_codes(camera: Camera, binning: Binning) -> None:
-    bits = camera.adc.bits
-    if binning.kind != "digital" or binning.count * (2**bits - 1) < 1 << SUM_BITS:
-        return
-    most = SUM_BITS - math.ceil(math.log2(binning.count))
-    raise bad(
-        "adc.bits",
-        f"{binning.count} codes of {bits} bits add up to more than {SUM_BITS} bits hold",
-        f"write at most bits: {most}, or join fewer pixels (array.binning)",
-    )
-
-
-def _require_whole(camera: Camera, found: BinningGroups, g: Geometry) -> None:
-    problems = Collector()
-    sides = (("rows", "height", g.rows, g.pitch_y), ("columns", "width", g.columns, g.pitch_x))
-    for (name, side, count, pitch), whole in zip(sides, found.extent, strict=True):
-        if count % whole == 0:
-            continue
-        why = f"{count} {name} cannot be joined in groups of {whole}"
-        if whole > getattr(found.binning, name):
-            why += f", {getattr(found.binning, name)} of each color"
-        near = [n * whole for n in (count // whole, count // whole + 1) if n]
-        if camera.array.die is None:
-            remedy = f"write {name}: {' or '.join(str(n) for n in near)}"
-            problems.add(("array", name), why, remedy)
-        else:
-            sizes = " or ".join(f"{n * pitch * 1e3:.6g} mm" for n in near)
-            problems.add(("array", "die", side), why, f"write {side}: {sizes}")
-    problems.raise_if_any()

@@ -15,26 +15,14 @@ from functools import cached_property
 import numpy as np
 
 from vcam_cli.arrays import Array
-from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry, pixel_centers
-from vcam_cli.camera.derived.lattice import Places, places
-from vcam_cli.camera.derived.mosaic import Mosaic, channel_order, mosaic
-from vcam_cli.camera.sensor.array import Positions
-from vcam_cli.errors import CannotDo
+from vcam_cli.camera.derived.lattice import Places
+from vcam_cli.camera.derived.mosaic import Mosaic
 from vcam_cli.image_formation.settings import Settings
-from vcam_cli.readout.binning import ALONE, BinningGroups, binning_groups
+from vcam_cli.readout.binning import ALONE, BinningGroups
 
-FINER, FINEST = 8, 16
-"""Lattice points per pixel along each axis, for pixels at places of their own. A pixel averages
-over its own area, so that little of its signal turns faster than once in half a pixel; of that a
-polynomial through 8 points a side errs by 4 %, of what turns once in a pixel by 2e-4. Twice as
-many, where the tolerance is below `FINE`, leave a thousandth of the second and a hundredth of the
-first."""
-FINE = 1e-3
 REACH = 8
-"""Points a side of that polynomial."""
-MOST_POINTS = 1 << 27
-"""Of the lattice."""
+"""Points a side of the polynomial between a lattice's points."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -234,61 +222,6 @@ class Layout:
             row = self.places.y[mine] / g.pitch_y + (g.rows - 1) / 2
             out[0, mine] = interpolate(plane, row, column)
         return np.maximum(out, 0, out=out)
-
-
-def camera_layout(camera: Camera, geometry: Geometry) -> Layout:
-    """Return the layout of a camera's pixels.
-
-    Parameters
-    ----------
-    camera : Camera
-        Camera whose array is laid out.
-    geometry : Geometry
-        Geometry of the array.
-
-    Returns
-    -------
-    Layout
-        Places of the raw frame's pixels and the lattice of their light.
-
-    Raises
-    ------
-    BadInput
-        For pixels that cannot be read as one in the groups that the file asks for.
-    CannotDo
-        Where the positions of pixels need too fine a lattice.
-    """
-    pattern = camera.array.pattern
-    if pattern == "stacked":
-        colors = channel_order(camera.array.colors)
-        groups = binning_groups(camera, (("all",),), geometry)
-        raw = groups.geometry(geometry)
-        return Layout(raw, Mosaic((colors,)), geometry, planes=True, binning_groups=groups)
-    if pattern == "honeycomb":
-        twice = replace(geometry, columns=2 * geometry.columns, pitch_x=geometry.pitch_x / 2)
-        return Layout(geometry, mosaic(camera), twice)
-    if isinstance(pattern, Positions):
-        found = places(camera)
-        colors = channel_order(dict.fromkeys(found.colors))
-        fine = _fine_lattice(geometry, FINEST if camera.accuracy.tolerance < FINE else FINER)
-        return Layout(geometry, Mosaic((colors,)), fine, planes=True, places=found)
-    colors_of_lattice = mosaic(camera)
-    groups = binning_groups(camera, colors_of_lattice.block, geometry)
-    return Layout(groups.geometry(geometry), colors_of_lattice, geometry, binning_groups=groups)
-
-
-def _fine_lattice(g: Geometry, finer: int) -> Geometry:
-    """Return the lattice so much finer over a sensor; raise CannotDo for one that is vast."""
-    columns = max(REACH, round(g.sensor_width / g.pitch_x * finer))
-    rows = max(REACH, round(g.sensor_height / g.pitch_y * finer))
-    if rows * columns > MOST_POINTS:
-        raise CannotDo(
-            f"the positions span {g.sensor_width * 1e3:.4g} x {g.sensor_height * 1e3:.4g} mm,"
-            f" {rows * columns:.3g} points of a lattice {finer} times as fine as a pixel",
-            "give fewer pixels, closer together",
-        )
-    pitch_x, pitch_y = g.sensor_width / columns, g.sensor_height / rows
-    return replace(g, rows=rows, columns=columns, pitch_x=pitch_x, pitch_y=pitch_y)
 
 
 def interpolate(plane: Array, row: Array, column: Array) -> Array:

@@ -14,8 +14,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from vcam_cli.arrays import Array
-from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.electrical import Electrical
+from vcam_cli.camera.exposure import Exposure
 from vcam_cli.effects.base import Effect
 from vcam_cli.effects.signal_chain import Quantizer
 from vcam_cli.readout.exposure import mean_dark
@@ -59,7 +59,7 @@ def sensor(
 
 
 def choose_sample_times(
-    camera: Camera,
+    exposure: Exposure,
     rate: Array,
     electrical: Electrical,
     effects: Sequence[Effect],
@@ -69,8 +69,8 @@ def choose_sample_times(
 
     Parameters
     ----------
-    camera : Camera
-        Camera whose file gives the times or asks for a schedule.
+    exposure : Exposure
+        What the file says of the exposure: times, or a schedule that it asks for.
     rate : Array
         Photo-electrons per second of every pixel, of any shape [e/s].
     electrical : Electrical
@@ -86,9 +86,9 @@ def choose_sample_times(
         Times, rising [s]; empty where there is a single exposure. Scheduled samples are as many as
         asked for, fewer where more would coincide.
     """
-    asked = camera.exposure.schedule
+    asked = exposure.schedule
     if asked is None:
-        return camera.exposure.samples
+        return exposure.samples
     return optimal_times(rate, asked.count, sensor(electrical, effects, adc, asked.max))
 
 

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
 from vcam_cli.effects.base import Gain, of_kind
-from vcam_cli.image_formation import photon_rate
+from vcam_cli.image_formation.pixel_response import axis_levels
 from vcam_cli.simulation.preparation import Prepared
 
 INFRARED = 700e-9
@@ -31,19 +32,11 @@ def advice(ready: Prepared) -> Iterator[str]:
 
 def _infrared(ready: Prepared) -> Iterator[str]:
     """Yield how much of a color picture's signal no eye sees, where nothing cuts it off."""
-    camera, band = ready.camera, ready.camera.scene.wavelengths
+    band = ready.solved.scene.wavelengths
     if len(ready.mosaic.colors) == 1 or band.stop <= INFRARED or not ready.white_rate.any():
         return
-    beyond = band.model_copy(update={"start": max(INFRARED, band.start)})
-    scene = camera.scene.model_copy(update={"wavelengths": beyond})
-    levels = photon_rate.axis_levels(
-        camera.model_copy(update={"scene": scene}),
-        ready.geometry,
-        ready.settings,
-        [ready.scene.white],
-        ready.mosaic,
-        of_kind(ready.plan.active, Gain),
-    )
+    beyond = replace(ready.solved.response, start=max(INFRARED, band.start))
+    levels = axis_levels(beyond, [ready.scene.white], of_kind(ready.plan.active, Gain))
     known = ready.white_rate > 0
     summed = ready.layout.binning_groups.summed_charges
     shares = np.where(known, summed * levels[0] / np.where(known, ready.white_rate, 1), 0.0)
@@ -58,7 +51,7 @@ def _infrared(ready: Prepared) -> Iterator[str]:
 
 def _dark_render(ready: Prepared) -> Iterator[str]:
     """Yield why the render of an overexposed frame is dark."""
-    camera, circuit = ready.camera, ready.electrical
+    camera, circuit = ready.solved, ready.electrical
     shown = [step.value.white for step in camera.processing if step.name == "tone"]
     if camera.output.render is None or "sensor" in shown or ready.times:
         return
@@ -80,9 +73,9 @@ def _dark_render(ready: Prepared) -> Iterator[str]:
 
 def _unused_well(ready: Prepared) -> Iterator[str]:
     """Yield how much of the well the ADC does not convert at the lowest gain."""
-    circuit, camera = ready.electrical, ready.camera
+    circuit = ready.electrical
     share = circuit.adc_full_scale / circuit.full_well
-    if camera.exposure_gain != 1 or share > 1 - UNUSED_WELL:
+    if ready.solved.gain != 1 or share > 1 - UNUSED_WELL:
         return
     codes = circuit.highest_code - circuit.offset
     yield (

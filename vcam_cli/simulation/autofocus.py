@@ -15,18 +15,16 @@ magnitude as criterion function; search of its maximum).
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 
 from vcam_cli.arrays import Array
-from vcam_cli.camera.camera import Camera
-from vcam_cli.camera.derived.geometry import geometry
 from vcam_cli.camera.optics import FocusWindow
 from vcam_cli.errors import BadInput, bad
 from vcam_cli.progress import Stages
 from vcam_cli.simulation.cost_model import light_seconds
-from vcam_cli.simulation.preparation import Prepared, prepare, standing_still
+from vcam_cli.simulation.preparation import Prepared
+from vcam_cli.solve.solved import Solved
 
 CIRCLE = 8.0
 """Width of the circle of confusion at both ends of the range, in pixels."""
@@ -43,17 +41,21 @@ LEAST_GAIN = 1e-3
 """Relative gain in contrast below which nothing in the scene tells where it is sharp."""
 
 
+Prepare = Callable[[Solved], Prepared]
+"""Brings the light of the scene to the pixels of a camera."""
+
+
 def focused(
-    camera: Camera, picture: Any, workers: int, stages: Stages
-) -> tuple[Camera, tuple[str, ...], float]:
+    camera: Solved, prepare: Prepare, workers: int, stages: Stages
+) -> tuple[Solved, tuple[str, ...], float]:
     """Return the camera with its lens where the middle of the picture is sharpest.
 
     Parameters
     ----------
-    camera : Camera
+    camera : Solved
         The camera, with the samples of its lens.
-    picture : Any
-        What the scene's file holds; None for charts.
+    prepare : callable
+        Function that brings the light of the scene to the pixels of a camera.
     workers : int
         Number of threads.
     stages : Stages
@@ -61,7 +63,7 @@ def focused(
 
     Returns
     -------
-    camera : Camera
+    camera : Solved
         The camera, its focus fixed.
     notes : tuple of str
         How far the lens was moved, and what keeps it from being sharp.
@@ -79,19 +81,18 @@ def focused(
         what = "a measured blur is" if camera.optics.is_lens else "without a lens there is nothing"
         raise bad("optics.focus", f"{what} not to be focused", "write focus: fixed")
     with stages("autofocus"):
-        trials = _Trials(camera, picture, workers, stages)
+        trials = _Trials(camera, prepare, workers, stages)
         place, notes = _search(camera, trials)
-        return _moved(camera, place), notes, trials.seconds
+        return camera.focused_at(place), notes, trials.seconds
 
 
 class _Trials:
     """The sharpness of a camera at places of its image plane, and what trying them takes."""
 
-    def __init__(self, camera: Camera, picture: Any, workers: int, stages: Stages) -> None:
-        finer = camera.accuracy.model_copy(update={"preset": None, "tolerance": TOLERANCE})
-        self._camera = standing_still(camera).model_copy(update={"accuracy": finer})
+    def __init__(self, camera: Solved, prepare: Prepare, workers: int, stages: Stages) -> None:
+        self._camera = camera.standing_still().with_tolerance(TOLERANCE)
         self._window = camera.optics.focus_window
-        self._picture, self._workers, self._stages = picture, workers, stages
+        self._prepare, self._workers, self._stages = prepare, workers, stages
         self._count = 0
         self.seconds = 0.0
         """Estimated time of the trials so far [s]."""
@@ -100,18 +101,17 @@ class _Trials:
         """Return the contrast with the image plane at a place [m]."""
         self._stages.watch.step(self._count, TRIALS)
         self._count += 1
-        moved = _moved(self._camera, shift)
         try:
-            ready = prepare(moved, self._picture, self._workers, Stages())
+            ready = self._prepare(self._camera.focused_at(shift))
         except BadInput:  # a wavefront too steep to be followed: far from sharp
             return 0.0
         self.seconds += light_seconds(ready.layout, ready.spectrum, self._workers)
         return _contrast_of_pixels(ready, self._window)
 
 
-def _search(camera: Camera, trials: _Trials) -> tuple[float, tuple[str, ...]]:
+def _search(camera: Solved, trials: _Trials) -> tuple[float, tuple[str, ...]]:
     """Return the sharpest place [m], and notes."""
-    solved, start = geometry(camera), camera.optics.defocus
+    solved, start = camera.geometry, camera.optics.defocus
     reach = CIRCLE * max(solved.pitch_x, solved.pitch_y) * solved.working_f_number + abs(start)
     places = np.linspace(-reach, reach, COARSE)
     values = [trials.sharpness(float(place)) for place in places]
@@ -125,12 +125,6 @@ def _search(camera: Camera, trials: _Trials) -> tuple[float, tuple[str, ...]]:
     if best in (0, COARSE - 1):
         note += ", the end of its range: the lens may be out of focus still"
     return found, (note,)
-
-
-def _moved(camera: Camera, shift: float) -> Camera:
-    """Return the camera with its lens fixed, its image plane shifted [m]."""
-    optics = camera.optics.model_copy(update={"defocus": shift, "focus": "fixed"})
-    return camera.model_copy(update={"optics": optics})
 
 
 def _contrast_of_pixels(ready: Prepared, window: FocusWindow) -> float:

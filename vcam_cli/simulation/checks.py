@@ -26,12 +26,14 @@ from vcam_cli.effects.optics import aberration, point_spread
 from vcam_cli.errors import bad, split
 from vcam_cli.processing import check as check_steps
 from vcam_cli.quality.display import display_screen
-from vcam_cli.readout.layout import camera_layout
 from vcam_cli.scenes.build import SOURCE, check_channels
 from vcam_cli.scenes.hyperspectral import check_bands, check_coverage, check_place
-from vcam_cli.simulation import plan, scene_bands, spectral_irradiance
+from vcam_cli.simulation import scene_bands, spectral_irradiance
 from vcam_cli.simulation.output import isetcam_files, raw_dng
 from vcam_cli.simulation.scene_files import check_blur, read_map
+from vcam_cli.solve.effects import camera_effects
+from vcam_cli.solve.layout import camera_layout
+from vcam_cli.solve.response import responses
 
 
 def load(camera: str | Path, sets: Sequence[str] = ()) -> Camera:
@@ -53,7 +55,7 @@ def check_effects(camera: Camera) -> None:
     readout = camera.pixel.readout.model_copy(update=solved)
     pixel = camera.pixel.model_copy(update={"readout": readout})
     adc = good.adc.model_copy(update={"noise": camera.adc.noise})
-    plan.camera_effects(camera.model_copy(update={"pixel": pixel, "adc": adc}), geometry(good))
+    camera_effects(camera.model_copy(update={"pixel": pixel, "adc": adc}), geometry(good))
 
 
 def check_size(camera: Camera) -> None:
@@ -157,7 +159,8 @@ def check_spectral_file(camera: Camera) -> None:
         from vcam_cli.files.spectral.hyperspectral import read_bands
 
         bands = read_bands(source.file, (*SOURCE, "file"), source.names)
-        if scene_bands.unseen_share(camera, bands) > camera.accuracy.tolerance:
+        seen = responses(camera, camera_layout(camera, geometry(camera)).mosaic)
+        if scene_bands.unseen_share(camera.scene, seen, bands) > camera.accuracy.tolerance:
             check_coverage(camera.scene, bands)
 
 

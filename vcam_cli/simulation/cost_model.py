@@ -12,20 +12,17 @@ from functools import cache
 
 import numpy as np
 
-from vcam_cli.camera.camera import Camera
-from vcam_cli.camera.derived.geometry import Geometry
-from vcam_cli.camera.derived.mosaic import Mosaic
 from vcam_cli.effects.base import Effect, of_kind
 from vcam_cli.effects.signal_chain import ElectronEffect, Quantizer
 from vcam_cli.image_formation.estimates.light_cost import image_seconds
 from vcam_cli.image_formation.optical_path import SpectrumReport
-from vcam_cli.image_formation.settings import Settings
 from vcam_cli.image_formation.transfer_functions import Band
 from vcam_cli.quality.display import display_screen
 from vcam_cli.quality.scielab import places_per_pixel
 from vcam_cli.readout.layout import Layout
 from vcam_cli.scheduling.estimators import PASSES
 from vcam_cli.simulation.plan import Plan
+from vcam_cli.solve.solved import Solved
 
 NORMAL = 7.1e-9
 """Drawing one normal number, the unit of speed [s]."""
@@ -63,30 +60,31 @@ def threads(workers: int) -> float:
     return float(workers**0.75)
 
 
-def output_seconds(camera: Camera, geometry: Geometry, mosaic: Mosaic) -> float:
+def output_seconds(camera: Solved) -> float:
     """Return the core seconds of processing, metrics and files."""
-    pixels, colors = geometry.rows * geometry.columns, len(mosaic.colors)
+    geometry, colors = camera.layout.geometry, len(camera.layout.mosaic.colors)
+    pixels = geometry.rows * geometry.columns
     seconds = EXR * pixels * len(camera.output.raw)
     if camera.output.render:
         seconds += (PROCESS + PNG * colors) * pixels
     if camera.quality:
         seen = {"cielab", "s-cielab"} & set(camera.quality)
         shown = 3 if seen else colors  # gray is judged in the display's colors, too
-        seconds += (JUDGE * _places(camera, geometry) * shown + EXR * colors) * pixels
-    if camera.array.is_scattered and (camera.output.render or camera.quality):
+        seconds += (JUDGE * _places(camera) * shown + EXR * colors) * pixels
+    if camera.is_scattered and (camera.output.render or camera.quality):
         seconds += INTERPOLATE * pixels * colors
     return seconds
 
 
-def _places(camera: Camera, geometry: Geometry) -> int:
+def _places(camera: Solved) -> int:
     """Return at how many places of a pixel the metrics look."""
     if "s-cielab" not in camera.quality:
         return 1
-    screen = display_screen(camera.display, geometry.columns)
+    screen = display_screen(camera.display, camera.layout.geometry.columns)
     return places_per_pixel(screen, camera.display.filters)
 
 
-def sample_seconds(camera: Camera, geometry: Geometry, effects: Sequence[Effect]) -> float:
+def sample_seconds(camera: Solved, effects: Sequence[Effect]) -> float:
     """Return the core seconds that several samples take more than a single exposure."""
     count = camera.exposure.count
     if not count:
@@ -95,20 +93,19 @@ def sample_seconds(camera: Camera, geometry: Geometry, effects: Sequence[Effect]
     again = sum(e.seconds_per_pixel for e in repeated)
     passes = PASSES if camera.exposure.estimator == "weighted" else 1
     files = EXR * (count * len(camera.output.raw) + 1)
+    geometry = camera.layout.geometry
     pixels = geometry.rows * geometry.columns
     return pixels * ((count - 1) * again + count * passes * ESTIMATE + files)
 
 
-def irradiance_seconds(
-    camera: Camera, geometry: Geometry, settings: Settings, report: SpectrumReport
-) -> float:
+def irradiance_seconds(camera: Solved, report: SpectrumReport) -> float:
     """Return the core seconds of the spectral irradiance, 0 where no file asks for it.
 
     Its bands cost what colors do.
     """
     files = bool(camera.output.irradiance) + camera.output.isetcam
-    band = camera.scene.wavelengths
-    count = len(Band(band.start, band.stop, settings.wavelength_step).nodes())
+    band, geometry = camera.scene.wavelengths, camera.geometry
+    count = len(Band(band.start, band.stop, camera.settings.wavelength_step).nodes())
     together = image_seconds(geometry, BANDS_AT_ONCE, report) / BANDS_AT_ONCE
     return files * count * (together + EXR * geometry.rows * geometry.columns)
 
@@ -119,37 +116,24 @@ def light_seconds(layout: Layout, report: SpectrumReport, workers: int) -> float
     return core * slowness() / threads(workers)
 
 
-def first_estimate(camera: Camera, layout: Layout, workers: int) -> float:
+def first_estimate(camera: Solved, workers: int) -> float:
     """Return the seconds of a whole run, before anything is known of its scene."""
+    layout = camera.layout
     g = layout.lattice
     samples = 2 * g.rows * g.columns
     guess = SpectrumReport(cells=samples, terms=samples, planes=3, filters=1)
     core = image_seconds(g, len(layout.mosaic.colors), guess)
-    core += output_seconds(camera, layout.geometry, layout.mosaic)
+    core += output_seconds(camera)
     return core * slowness() / threads(workers)
 
 
-def frame_seconds(
-    camera: Camera,
-    geometry: Geometry,
-    layout: Layout,
-    settings: Settings,
-    report: SpectrumReport,
-    plan: Plan,
-    workers: int,
-) -> float:
+def frame_seconds(camera: Solved, report: SpectrumReport, plan: Plan, workers: int) -> float:
     """Return the seconds of a whole frame.
 
     Parameters
     ----------
-    camera : Camera
+    camera : Solved
         The camera.
-    geometry : Geometry
-        Geometry of its array.
-    layout : Layout
-        Layout of its pixels.
-    settings : Settings
-        Settings of image formation.
     report : SpectrumReport
         How its scene was sampled and filtered.
     plan : Plan
@@ -162,8 +146,9 @@ def frame_seconds(
     float
         Seconds on this machine.
     """
+    layout = camera.layout
     core = plan.seconds + image_seconds(layout.lattice, len(layout.mosaic.colors), report)
-    core += output_seconds(camera, layout.geometry, layout.mosaic)
-    core += sample_seconds(camera, layout.geometry, plan.active)
-    core += irradiance_seconds(camera, geometry, settings, report)
+    core += output_seconds(camera)
+    core += sample_seconds(camera, plan.active)
+    core += irradiance_seconds(camera, report)
     return core * slowness() / threads(workers)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -19,20 +19,19 @@ from vcam_cli.effects.base import (
     Transport,
     of_kind,
 )
-from vcam_cli.effects.order import quantizer
 from vcam_cli.effects.signal_chain import Limit, NoiseSource, extreme_signal
-from vcam_cli.errors import bad
 from vcam_cli.floats import rms
 from vcam_cli.image_formation import photon_rate, pixelwise, timed_gains
 from vcam_cli.image_formation.light_plan import PERCENTILES, LightPlan
 from vcam_cli.readout import auto_exposure, exposure, sample_times
 from vcam_cli.readout.binning import BinningGroups
 from vcam_cli.readout.layout import Layout
-from vcam_cli.simulation import plan
-from vcam_cli.simulation.setup import CameraSetup
-
-MOST_ELECTRONS = 1e25
-"""More than any pixel ever meets, and far from where 32-bit numbers end."""
+from vcam_cli.simulation.scene_light import (
+    MOST_ELECTRONS,
+    SceneLight,
+    light_during,
+    refuse_too_much,
+)
 
 
 @dataclass(frozen=True)
@@ -53,56 +52,47 @@ class ExposedLight:
     """As `Prepared.step_rates`."""
     full_charge: Array | None
     """As `Prepared.full_charge`."""
+    white_rate: Array
+    """As `Prepared.white_rate`."""
+    effects: tuple[Effect, ...]
+    """Effects that act before electrons are counted and are not left out of the light."""
 
 
-def expose(
-    setup: CameraSetup,
-    light: photon_rate.Rate,
-    white_rate: Array,
-    effects: Sequence[Effect],
-    optional: Sequence[Effect],
-    light_during: Callable[[float, float], Array],
-) -> ExposedLight:
+def expose(seen: SceneLight, light: photon_rate.Rate) -> ExposedLight:
     """Return the light of an exposure whose time is given or chosen for the scene.
 
     Parameters
     ----------
-    setup : CameraSetup
-        The camera, at the gain that its file gives.
+    seen : SceneLight
+        The scene before its camera, at the gain that its file gives.
     light : Rate
         Light of the whole exposure.
-    white_rate : Array
-        Rate of the scene's perfect white on the axis in every color (C,) [e/s].
-    effects : sequence of Effect
-        Effects that act before electrons are counted.
-    optional : sequence of Effect
-        Those of them that may be left out.
-    light_during : callable
-        Function from two times after a line's exposure begins [s] to the light between them, in
-        the shape of that of the whole exposure.
 
     Raises
     ------
     BadInput
         For more light than any unit could have meant.
     """
-    camera, layout, circuit = setup.camera, setup.layout, setup.electrical
-    groups, white = layout.binning_groups, float(white_rate.max())
-    enabled = plan.enabled_effects(camera, setup.geometry)
+    solved, path = seen.solved, seen.path
+    layout, circuit, enabled = solved.layout, solved.electrical, solved.effects.enabled
+    effects = tuple(effect for effect in path.effects if effect not in light.plan.omitted)
+    groups = layout.binning_groups
+    white_rate = seen.white_rate * groups.summed_charges / (light.plan.on_axis or 1.0)
+    white = float(white_rate.max())
     dark = exposure.mean_dark(1.0, enabled)
     pixel_dark = dark / groups.summed_charges
     collected = layout.select_pixels(light.values)
     rate = groups.collect(_transported(collected, pixel_dark, effects))
-    adc = quantizer(camera, setup.geometry)
-    times = sample_times.choose_sample_times(camera, rate, circuit, enabled, adc)
-    chosen = auto_exposure.exposure_settings(camera, rate, white, dark, circuit)
+    asked = solved.exposure
+    times = sample_times.choose_sample_times(asked, rate, circuit, enabled, solved.adc)
+    chosen = auto_exposure.exposure_settings(asked, rate, white, dark, circuit)
     if times:
         chosen = replace(chosen, time=times[-1])
     time = chosen.time
     # A full well holds no more, whatever falls on it.
     full_rate = circuit.full_well / time if of_kind(enabled, Limit) else math.inf
     light_plan = timed_gains.light_plan(
-        light.plan, effects, optional, time, setup.settings.tolerance
+        light.plan, effects, path.optional, time, solved.settings.tolerance
     )
     timed = tuple(e for e in of_kind(effects, TemporalGain) if e not in light_plan.omitted)
 
@@ -122,7 +112,9 @@ def expose(
         full_charge = _full_charge(groups, lit, rate, pixel_dark, effects, full_rate) * time
     moving = of_kind(effects, ImageMotion)
     steps = pairwise((0.0, *times)) if timed or moving else ()
-    step_rates = tuple(collect(light_during(start, stop), start, stop) for start, stop in steps)
+    step_rates = tuple(
+        collect(light_during(seen, light, start, stop), start, stop) for start, stop in steps
+    )
     peak = (float(rate.max()) + dark) * time
     refuse_too_much(max(peak, white * time, dark))
     lit = timed_gains.apply(light.values, timed, layout.lattice, 0.0, time)
@@ -137,26 +129,20 @@ def expose(
         deferred = np.minimum(rate, most) - np.minimum(groups.collect(collected), well)
         changes |= dict.fromkeys(transports, rms(deferred))
     full = max(1.0, min(circuit.full_well, peak))
-    alone = not times and camera.array.binning is None
+    alone = not times and solved.binning is None
     signal = SignalLevels(
         full,
         time,
         dark * time,
-        camera.array.binning,
+        solved.binning,
         _levels(layout, rate, dark, time, circuit.full_well),
         extreme_signal(of_kind(enabled, NoiseSource), peak, dark * time) if alone else math.inf,
     )
-    return ExposedLight(rate, times, signal, chosen, changes, light_plan, step_rates, full_charge)
-
-
-def refuse_too_much(electrons: float) -> None:
-    """Refuse light that no unit could have meant (BadInput)."""
-    if not electrons < MOST_ELECTRONS:
-        raise bad(
-            "scene",
-            f"light and dark current would make {electrons:.3g} electrons in a pixel or a second",
-            "look for a wrong unit in the light level, the dark current or the exposure",
-        )
+    return ExposedLight(
+        *(rate, times, signal, chosen, changes, light_plan, step_rates, full_charge),
+        white_rate=white_rate,
+        effects=effects,
+    )
 
 
 def _levels(

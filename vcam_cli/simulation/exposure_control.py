@@ -16,19 +16,19 @@ from dataclasses import replace
 import numpy as np
 
 from vcam_cli.camera.camera import Camera
-from vcam_cli.effects.readout_chain import electrical
-from vcam_cli.readout import auto_exposure, iso_speed
+from vcam_cli.readout import auto_exposure
 from vcam_cli.readout.auto_exposure import ExposureSettings
 from vcam_cli.simulation.preparation import Prepared
+from vcam_cli.solve.solved import Solved
 
 
-def next_exposure(camera: Camera, last: Prepared) -> ExposureSettings:
+def next_exposure(camera: Solved, last: Prepared) -> ExposureSettings:
     """Return time and gain of the frame after one that was taken.
 
     Parameters
     ----------
-    camera : Camera
-        The camera, with its automatic exposure.
+    camera : Solved
+        The camera, with its automatic exposure, at the gain that its file gives.
     last : Prepared
         The frame before.
 
@@ -39,13 +39,13 @@ def next_exposure(camera: Camera, last: Prepared) -> ExposureSettings:
     """
     auto = camera.exposure.auto
     assert auto is not None
-    base = iso_speed.set_gain(camera, last.base_iso)
-    circuit, time = electrical(base), last.exposure_time
-    gain = last.camera.exposure_gain
+    circuit, time, gain = camera.electrical, last.exposure_time, last.solved.gain
     full = min(circuit.full_well, circuit.adc_full_scale * circuit.exposure_gain / gain)
     metered = np.minimum(last.rate, max(full / time - last.dark_rate, 0.0))
     white = float(last.white_rate.max())
-    wanted = auto_exposure.exposure_settings(base, metered, white, last.dark_rate, circuit)
+    wanted = auto_exposure.exposure_settings(
+        camera.exposure, metered, white, last.dark_rate, circuit
+    )
     now = time * gain
     product = now * (wanted.time * wanted.gain / now) ** auto.follow
     chosen = min(max(product / circuit.exposure_gain, auto.min), auto.max)

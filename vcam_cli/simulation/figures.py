@@ -37,8 +37,7 @@ def figures(frame: Frame) -> list[tuple[str, float, str]]:
     `pixel_figures` computes dynamic ranges (eq 3.1), SNR (eq 3.2) and well capacity. Of several
     samples of one integration, all but the last two are of the last sample.
     """
-    e, groups = frame.electrical, frame.layout.binning_groups
-    known = pixel_figures(frame.camera, frame.geometry, e, groups, frame.exposure_time)
+    known = pixel_figures(frame.solved, frame.exposure_time)
     listed = [
         ("exposure_time", frame.exposure_time, "s"),
         ("mean_electrons", float(frame.electrons.mean(dtype=np.float64)), "e"),
@@ -52,7 +51,7 @@ def figures(frame: Frame) -> list[tuple[str, float, str]]:
         ("base_iso", frame.base_iso, ""),
         ("digital_gain", digital_gain(frame), ""),
     ]
-    mtf50 = edge_mtf50(frame) if frame.camera.has_edge else math.nan
+    mtf50 = edge_mtf50(frame) if frame.solved.has_edge else math.nan
     if math.isfinite(mtf50):
         listed.append(("mtf50", mtf50, "cycles/pixel"))
     return listed + _sample_figures(frame, known.dark, known.draws) if frame.times else listed
@@ -69,7 +68,7 @@ def _sample_figures(
     """
     first, last = frame.times[0], frame.times[-1]
     floor = sum(x.variance(0.0) for x in draws)
-    if frame.camera.exposure.estimator == "weighted":
+    if frame.solved.exposure.estimator == "weighted":
         read = sum(x.variance(0.0) for x in draws if x.sample_draws == "independent")
         noise = estimators.weighted_variance(0.0, frame.times, dark / last, read, floor - read)
         floor = float(noise) * last**2 - dark
@@ -124,7 +123,7 @@ def _snr_db(frame: Frame, light: float) -> float:
     """Return a mean signal [electrons] over its temporal noise, rounding included [dB]."""
     if light <= 0:
         return -math.inf
-    groups, binning = frame.layout.binning_groups, frame.camera.array.binning
+    groups, binning = frame.layout.binning_groups, frame.solved.binning
     summed, dark = groups.summed_codes, frame.dark_rate * frame.exposure_time
     sources = noise_sources(frame.plan.active, "frame")
     noise = sum(source.binned_variance(light + dark, dark, binning) for source in sources)
@@ -167,7 +166,7 @@ def digital_gain(frame: Frame) -> float:
     The raw is 1 where it saturates, the render at its white. A gain of 1 needs no more than that
     saturation is shown as white, as `tone: {white: sensor}` does.
     """
-    tone = next((s.value for s in frame.camera.processing if s.name == "tone"), None)
+    tone = next((s.value for s in frame.solved.processing if s.name == "tone"), None)
     stops = 2.0**tone.exposure if tone else 1.0
     codes = np.array([*frame.white_dn, frame.black_dn, frame.picture_saturated_dn])
     *white, black, saturated = frame.linear(codes)
@@ -202,12 +201,12 @@ class ExposureReport:
 
 def exposure_report(frame: Frame) -> ExposureReport:
     """Return how a frame was exposed; of several samples of one integration the last."""
-    gain = frame.camera.exposure_gain
+    gain = frame.solved.gain
     return ExposureReport(
         time=frame.exposure_time,
         gain=gain,
         iso=frame.base_iso * gain,
-        automatic=frame.camera.exposure.auto is not None,
+        automatic=frame.solved.exposure.auto is not None,
         stopped_by=frame.exposure_limit,
         raw_peak=_raw_peak(frame),
         clipped=_clipped(frame),

@@ -1,7 +1,4 @@
-"""One simulated frame: from a camera and its picture file's samples to raw numbers.
-
-`preparation.py` brings the light to the pixels and plans the rest; here the frame is taken.
-"""
+"""One simulated frame: from the light in every pixel to raw numbers."""
 
 from __future__ import annotations
 
@@ -12,20 +9,16 @@ from functools import cached_property, partial
 import numpy as np
 
 from vcam_cli.arrays import Array
-from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.scene.sources import Layers
 from vcam_cli.effects.base import Effect, Gain, Transport, of_kind
-from vcam_cli.effects.order import quantizer
 from vcam_cli.effects.signal_chain import NoiseSource, Quantizer, electron_effects
 from vcam_cli.floats import own_float_errors
-from vcam_cli.image_formation import photon_rate
-from vcam_cli.image_formation.rate_cache import RateCache
-from vcam_cli.parallel import available_workers
+from vcam_cli.image_formation.pixel_response import axis_levels
 from vcam_cli.progress import Stages
 from vcam_cli.readout import binned_readout, exposure, nondestructive_samples
 from vcam_cli.scenes.depth_scene import DepthScene
 from vcam_cli.scenes.layered import LayeredScene
-from vcam_cli.simulation.preparation import Prepared, prepare
+from vcam_cli.simulation.preparation import Prepared
 from vcam_cli.spectra import Spectrum, colorchecker
 
 
@@ -97,7 +90,7 @@ class Frame(Prepared):
     @property
     def adc(self) -> Quantizer:
         """The ADC."""
-        return quantizer(self.camera, self.geometry)
+        return self.solved.adc
 
     @property
     def black_dn(self) -> float:
@@ -171,15 +164,18 @@ class Frame(Prepared):
         rate = self.axis_rate(self.scene.spectra) + self.dark_rate * self.summed_codes
         return self.to_dn(rate * self.exposure_time)
 
-    def axis_rate(self, spectra: Sequence[Spectrum]) -> Array:
+    def axis_rate(
+        self, spectra: Sequence[Spectrum], band: tuple[float, float] | None = None
+    ) -> Array:
         """Return electrons per second (C, K) of K radiances on the axis, as they are read out.
 
-        Electrons of pixels whose codes are added are, too.
+        Electrons of pixels whose codes are added are, too. `band` has the shortest and the longest
+        wavelength [m] in place of the camera's own.
         """
-        gains = of_kind(self.plan.active, Gain)
-        levels = photon_rate.axis_levels(
-            self.camera, self.geometry, self.settings, spectra, self.mosaic, gains
-        )
+        response = self.solved.response
+        if band is not None:
+            response = replace(response, start=band[0], stop=band[1])
+        levels = axis_levels(response, spectra, of_kind(self.plan.active, Gain))
         return np.asarray(levels.T * self.layout.binning_groups.signal_ratio)
 
     @property
@@ -196,13 +192,13 @@ class Frame(Prepared):
 
         Of layers the nearest one counts that covers half of a place or more.
         """
-        layout, source = self.layout, self.camera.scene.source
+        layout, source = self.layout, self.solved.scene.source
         if isinstance(self.scene, LayeredScene) and isinstance(source, Layers):
             distances = np.array([layer.distance for layer in source.layers])
             return distances[self.scene.nearest_at(layout.picture_x, layout.picture_y)]
         if isinstance(self.scene, DepthScene):
             return self.scene.depth_at(layout.picture_x, layout.picture_y)
-        return np.full(layout.picture_shape, self.camera.scene.distance)
+        return np.full(layout.picture_shape, self.solved.scene.distance)
 
     def ideal_dn(self) -> Array:
         """Return the scene point-sampled at the pixels' centers, all colors everywhere [DN].
@@ -220,43 +216,6 @@ class Frame(Prepared):
         return self.to_dn(photo + self.dark_rate * self.exposure_time * self.summed_codes)
 
 
-def expose(
-    camera: Camera,
-    picture: Array | None,
-    workers: int | None,
-    stages: Stages,
-    rate_cache: RateCache | None = None,
-    earlier: float = 0.0,
-) -> Frame:
-    """Simulate one frame of `camera`, from its scene on.
-
-    Parameters
-    ----------
-    camera : Camera
-        The camera.
-    picture : Array or None
-        Samples of the scene's image file (h, w, channels) in linear light; None for charts.
-    workers : int or None
-        Number of threads; all processors by default.
-    stages : Stages
-        Observer of the stages.
-    rate_cache : RateCache, optional
-        Cache of the light for further cameras.
-    earlier : float
-        Estimated time of what came before, which the plan counts [s].
-
-    Raises
-    ------
-    BadInput
-        Where the camera contradicts itself.
-    CannotDo
-        Where memory does not suffice.
-    """
-    workers = workers or available_workers()
-    ready = prepare(camera, picture, workers, stages, rate_cache, earlier)
-    return take_frame(ready, workers, stages)
-
-
 def _pedestal(ready: Prepared) -> Array | None:
     """Return what black levels by color add to each pixel [electrons]; None without them."""
     steps = dict(ready.electrical.black_steps)
@@ -271,10 +230,10 @@ def _pedestal(ready: Prepared) -> Array | None:
 
 def take_frame(ready: Prepared, workers: int, stages: Stages | None = None) -> Frame:
     """Return one frame of a camera that is ready for it."""
-    stages, camera = stages or Stages(), ready.camera
+    stages, solved = stages or Stages(), ready.solved
     with stages("capture"):
-        active, adc = ready.plan.active, quantizer(camera, ready.geometry)
-        seeds = {"sensor": camera.seed.sensor, "frame": camera.seed.frame}
+        active, adc = ready.plan.active, solved.adc
+        seeds = {"sensor": solved.seed.sensor, "frame": solved.seed.frame}
         known = {field.name: getattr(ready, field.name) for field in fields(ready)}
         times, coarse = ready.times, ready.settings.coarse_normals
         if not times:
@@ -301,7 +260,7 @@ def take_frame(ready: Prepared, workers: int, stages: Stages | None = None) -> F
         light = nondestructive_samples.photocurrent(
             dn,
             times,
-            camera.exposure.estimator,
+            solved.exposure.estimator,
             active,
             adc,
             ready.electrical,

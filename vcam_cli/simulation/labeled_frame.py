@@ -76,11 +76,11 @@ def _raw_variables(result: Photograph, dims: tuple[str, ...]) -> Iterator[tuple[
 
 def _attributes(result: Photograph) -> dict[str, Any]:
     """Return what is said of the whole frame, as numbers and texts that NetCDF can hold."""
-    camera, metrics = result.frame.camera, result.metrics
+    camera, metrics = result.frame.solved, result.metrics
     return {
         "name": camera.name,
         "seed_sensor": camera.seed.sensor,
         "seed_frame": camera.seed.frame,
-        "gain": camera.exposure_gain,
+        "gain": camera.gain,
         **{f"metric_{name}": float(value) for name, value in metrics.items()},
     }

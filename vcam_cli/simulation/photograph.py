@@ -9,11 +9,9 @@ from functools import cached_property
 import numpy as np
 
 from vcam_cli.arrays import Array
-from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.electrical import no_volts
 from vcam_cli.camera.expectations import misses
 from vcam_cli.camera.processing_steps import Step
-from vcam_cli.camera.sensor.array import Positions
 from vcam_cli.floats import own_float_errors
 from vcam_cli.processing import ProcessedPicture
 from vcam_cli.progress import Stages
@@ -23,6 +21,7 @@ from vcam_cli.quality.mse import mse, psnr_db
 from vcam_cli.quality.scielab import cielab_map, s_cielab_map
 from vcam_cli.simulation.figures import figures
 from vcam_cli.simulation.frame import Frame
+from vcam_cli.solve.solved import Solved
 
 
 @dataclass(frozen=True)
@@ -55,12 +54,12 @@ class Photograph:
     def processed(self) -> ProcessedPicture:
         """The picture with its steps prepared; a raw frame alone does not need it."""
         with self.stages("balance"):
-            return self.process(self.frame.camera.processing)
+            return self.process(self.frame.solved.processing)
 
     @property
     def notes(self) -> tuple[str, ...]:
         """What a user should know of the frame, and of the picture where one is asked for."""
-        shown = needs_picture(self.frame.camera)
+        shown = needs_picture(self.frame.solved)
         return (*self.remarks, *(self.processed.notes if shown else ()))
 
     @property
@@ -155,7 +154,7 @@ class Photograph:
         """Values of the raw frame in the shape that a user sees."""
         if values.ndim == 3:
             return np.moveaxis(values, 0, -1)
-        places = isinstance(self.frame.camera.array.pattern, Positions)
+        places = self.frame.layout.places is not None
         return values[0] if places else values
 
     @cached_property
@@ -167,21 +166,21 @@ class Photograph:
         """
         picture = self.processed
         with self.stages("processing"):
-            return picture.encode(self.frame.camera.output.render or 8)
+            return picture.encode(self.frame.solved.output.render or 8)
 
     def renders_of_steps(self) -> Iterator[tuple[str, Array]]:
         """Yield step_01_NAME.png and so on, with the render as it were if steps ended there.
 
         Steps that do nothing are left out, and those after which no display can show the picture.
         """
-        steps = self.frame.camera.processing
+        steps = self.frame.solved.processing
         for number, step in enumerate(steps, 1):
             if step.value == "none":
                 continue
             with self.stages("processing"):
                 picture = self.process(steps[:number])
                 if picture.is_shown:
-                    render = picture.encode(self.frame.camera.output.render or 8)
+                    render = picture.encode(self.frame.solved.output.render or 8)
                     yield f"step_{number:02d}_{step.name}.png", render
 
     @cached_property
@@ -206,44 +205,44 @@ class Photograph:
         """S-CIELAB Delta E of the render from the ideal image on the camera's `display`."""
         image, ideal, screen = self.linear, self.ideal, self._screen
         with self.stages("quality"):
-            filters = self.frame.camera.display.filters
+            filters = self.frame.solved.display.filters
             return s_cielab_map(image, ideal, screen, filters, workers=self.workers)
 
     @property
     def _screen(self) -> display.Screen:
-        return display.display_screen(self.frame.camera.display, self.frame.layout.picture_shape[1])
+        return display.display_screen(self.frame.solved.display, self.frame.layout.picture_shape[1])
 
     @cached_property
     @own_float_errors
     def metrics(self) -> Metrics:
         """Metric -> value: those every run has, then those that `quality` asks for."""
         out = figures(self.frame)
-        if {"mse", "psnr"} & set(self.frame.camera.quality):
+        if {"mse", "psnr"} & set(self.frame.solved.quality):
             image, ideal = self.linear, self.ideal
             with self.stages("quality"):
                 error = mse(image, ideal)
                 out += [("mse", error, ""), ("psnr_db", psnr_db(image, ideal), "dB")]
-        if "cielab" in self.frame.camera.quality:
+        if "cielab" in self.frame.solved.quality:
             image, ideal = self.linear, self.ideal
             with self.stages("quality"):
                 each = cielab_map(image, ideal, self._screen, workers=self.workers)
                 out.append(("mean_delta_e", float(each.mean(dtype=float)), ""))
-        if "s-cielab" in self.frame.camera.quality:
+        if "s-cielab" in self.frame.solved.quality:
             out.append(("mean_s_cielab", float(self.s_cielab.mean(dtype=float)), ""))
         return Metrics(out)
 
     @property
     def missed(self) -> tuple[str, ...]:
         """A sentence for each limit of the camera's `expect` that the metrics do not keep."""
-        return misses(self.frame.camera.limits, self.metrics)
+        return misses(self.frame.solved.limits, self.metrics)
 
     def __repr__(self) -> str:
         """Return a line: name, shape of the raw frame, exposure time."""
         shape = " x ".join(map(str, self.dn.shape))
         time = f"{1000 * self.exposure_time:.4g} ms"
-        return f"<Result {self.frame.camera.name}: {shape} pixels, {time}>"
+        return f"<Result {self.frame.solved.name}: {shape} pixels, {time}>"
 
 
-def needs_picture(camera: Camera) -> bool:
-    """Return whether a camera file asks for more than the raw frame."""
+def needs_picture(camera: Solved) -> bool:
+    """Return whether a camera's file asks for more than the raw frame."""
     return camera.output.render is not None or bool(camera.quality)

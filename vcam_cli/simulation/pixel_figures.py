@@ -8,15 +8,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from vcam_cli.camera.camera import Camera
-from vcam_cli.camera.derived.electrical import Electrical
-from vcam_cli.camera.derived.geometry import Geometry
-from vcam_cli.effects.order import quantizer
 from vcam_cli.effects.signal_chain import NoiseSource, noise_sources
 from vcam_cli.physics import readout
-from vcam_cli.readout.binning import BinningGroups
 from vcam_cli.readout.exposure import mean_dark
-from vcam_cli.simulation import plan
+from vcam_cli.solve.solved import Solved
 
 SHARE = 0.2
 """Of the well: the signal that the SNR is told of."""
@@ -45,11 +40,13 @@ class PixelFigures:
     """What is new in every frame."""
 
 
-def pixel_figures(
-    camera: Camera, geometry: Geometry, electrical: Electrical, groups: BinningGroups, time: float
-) -> PixelFigures:
+def pixel_figures(solved: Solved, time: float) -> PixelFigures:
     """Return signal over noise of a pixel that is exposed for a time [s]."""
-    wanted = plan.enabled_effects(camera, geometry)
+    wanted, electrical, groups = (
+        solved.effects.enabled,
+        solved.electrical,
+        solved.layout.binning_groups,
+    )
     draws = noise_sources(wanted, "frame")
     # In electrons of all wells together, in which shot noise is Poisson's.
     wells = groups.count // groups.summed_charges
@@ -58,7 +55,7 @@ def pixel_figures(
     well, all_dark = electrical.full_well * wells, dark * wells
     most = electrical.saturation * wells
     conversions = groups.binning.conversions
-    one = quantizer(camera, geometry).rounding(dark, conversions * floor / wells**2)
+    one = solved.adc.rounding(dark, conversions * floor / wells**2)
     rounding = wells**2 * one / conversions
     return PixelFigures(
         snr_db=float(readout.snr_db(SHARE * well, all_dark, floor)),

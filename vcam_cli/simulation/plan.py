@@ -18,7 +18,7 @@ with the light at hand. Of the sets that keep the promises the one is left out t
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from itertools import chain, combinations
@@ -27,9 +27,6 @@ from typing import Any
 import numpy as np
 
 from vcam_cli.arrays import Array
-from vcam_cli.camera.camera import Camera
-from vcam_cli.camera.derived.geometry import Geometry
-from vcam_cli.camera.derived.geometry import geometry as solve
 from vcam_cli.effects.base import Charge, Effect, SignalLevels, Transport, of_kind
 from vcam_cli.effects.order import ORDER
 from vcam_cli.effects.signal_chain import (
@@ -40,9 +37,9 @@ from vcam_cli.effects.signal_chain import (
     noise_sources,
     total_variance,
 )
-from vcam_cli.errors import BadInput, Collector
 from vcam_cli.image_formation.light_plan import OMITTED_SHARE, LightPlan
 from vcam_cli.image_formation.settings import Settings
+from vcam_cli.solve.effects import CameraEffects
 
 VARIANCE_SHARE = 0.8
 """Part of the variance's tolerance for them; the rest is for percentiles that are estimated."""
@@ -101,74 +98,10 @@ class Plan:
         }
 
 
-def camera_effects(camera: Camera, geometry: Geometry) -> dict[str, Effect | None]:
-    """Return every effect with a camera's numbers, by name, or None where it does not have it.
-
-    Parameters
-    ----------
-    camera : Camera
-        The camera.
-    geometry : Geometry
-        Geometry of its array.
-
-    Returns
-    -------
-    dict
-        Name of an effect -> the effect, in the order of action.
-
-    Raises
-    ------
-    BadInput
-        For `on` for something that the file does not describe.
-    """
-    found = {kind.name: kind.from_camera(camera, geometry) for kind in ORDER}
-    if isinstance(camera.effects, dict):
-        problems = Collector()
-        absent = {kind.name: kind.absent for kind in ORDER}
-        for name, wish in camera.effects.items():
-            if wish == "on" and found.get(name) is None:
-                why = absent.get(name, "the file describes nothing of the kind")
-                problems.add(
-                    ("effects", name),
-                    f"on, but there is nothing to simulate: {why}",
-                    "describe it in its section, or remove this line",
-                )
-        problems.raise_if_any()
-    return found
-
-
-def check(camera: Camera) -> None:
-    """Refuse `effects` that ask for what the file does not describe (BadInput, with its place)."""
-    try:
-        camera_effects(camera, solve(camera))
-    except BadInput as error:
-        raise error.with_places(camera.locate) from None
-
-
-def enabled_effects(camera: Camera, geometry: Geometry) -> tuple[Effect, ...]:
-    """Return the effects that the camera has and the user has not switched off."""
-    return _enabled(camera, camera_effects(camera, geometry).values())
-
-
-def _enabled(camera: Camera, found: Iterable[Effect | None]) -> tuple[Effect, ...]:
-    return tuple(e for e in found if e is not None and _wish(camera, e) != "off")
-
-
-def mean_signal_effects(camera: Camera, geometry: Geometry) -> tuple[Effect, ...]:
-    """Return the wanted effects that act before electrons are counted, in the order of action."""
-    present = enabled_effects(camera, geometry)
-    later = of_kind(present, Charge, NoiseSource)
-    return tuple(effect for effect in present if effect not in later)
-
-
-def optional_effects(camera: Camera, effects: Iterable[Effect]) -> tuple[Effect, ...]:
-    """Return those of the effects that the plan may leave out."""
-    return tuple(e for e in effects if e.removable and _wish(camera, e) == "auto")
-
-
 def make(
-    camera: Camera,
-    geometry: Geometry,
+    effects: CameraEffects,
+    tolerance: float,
+    pixels: int,
     settings: Settings,
     light: LightPlan,
     signal: SignalLevels,
@@ -179,10 +112,12 @@ def make(
 
     Parameters
     ----------
-    camera : Camera
-        The camera.
-    geometry : Geometry
-        Its geometry.
+    effects : CameraEffects
+        Effects of the camera, and what its file wants of them.
+    tolerance : float
+        Error of the mean signal that the file allows, relative to full signal.
+    pixels : int
+        Number of pixels.
     settings : Settings
         Settings of image formation.
     light : LightPlan
@@ -194,40 +129,33 @@ def make(
     changes : mapping
         Name of an effect -> rms change of the signal by leaving it out, where known [e/s].
     """
-    effects = camera_effects(camera, geometry)
-    present = _enabled(camera, effects.values())
+    present = effects.enabled
     known = {name: min(c * signal.time / signal.full_signal, 1.0) for name, c in changes.items()}
     left_out = {effect.name: light.shares[effect.name] for effect in light.omitted}
     shares = light.shares | known | left_out
-    variances = _SceneVariances(present, signal, camera.accuracy.tolerance)
-    omitted = {*light.omitted, *_negligible(camera, variances, light, shares)}
+    variances = _SceneVariances(present, signal, tolerance)
+    omitted = {*light.omitted, *_negligible(effects, variances, light, shares)}
     on = tuple(effect for effect in present if effect not in omitted)
-    active, idle = _without_idle_draws(camera, on, variances)
-    weigh = _Weighing(present, signal, shares, geometry.rows * geometry.columns, idle)
-    decisions = [_decide(kind, effects[kind.name], camera, light, omitted, weigh) for kind in ORDER]
+    active, idle = _without_idle_draws(effects, on, variances)
+    weigh = _Weighing(present, signal, shares, pixels, idle, tolerance)
+    decisions = [_decide(kind, effects, light, omitted, weigh) for kind in ORDER]
     seconds = sum(decision.seconds for decision in decisions)
     return Plan(tuple(decisions), active, settings, seconds, memory_bytes, levels=signal.levels)
 
 
-def _wish(camera: Camera, effect: Effect) -> str:
-    """Return what the file wants of an effect it describes: on, off or auto."""
-    if camera.effects == "all":
-        return "on"
-    if camera.effects == "auto":
-        return "auto"
-    return camera.effects.get(effect.name, "auto")
-
-
 def _negligible(
-    camera: Camera, variances: _SceneVariances, light: LightPlan, shares: Mapping[str, float]
+    effects: CameraEffects,
+    variances: _SceneVariances,
+    light: LightPlan,
+    shares: Mapping[str, float],
 ) -> tuple[Effect, ...]:
     """Return the effects on electrons that may go together, without which most time is saved."""
     present, signal = variances.present, variances.signal
-    budget = OMITTED_SHARE * camera.accuracy.tolerance - light.share
+    budget = OMITTED_SHARE * variances.tolerance - light.share
     # Late charge is some of the dark signal's: with transport, the two stay together.
     moved = any(transport not in light.omitted for transport in of_kind(present, Transport))
     kinds = (ElectronEffect,) if moved else (Charge, ElectronEffect)
-    rest = optional_effects(camera, of_kind(present, *kinds))
+    rest = effects.optional(of_kind(present, *kinds))
 
     def mean_share(effect: Effect) -> float:
         if effect.name in shares and not of_kind([effect], Limit):
@@ -239,7 +167,7 @@ def _negligible(
         return variances.share_lost([effect for effect in present if effect not in effects])
 
     def use(effect: Effect) -> float:
-        of_mean = mean_share(effect) / (OMITTED_SHARE * camera.accuracy.tolerance)
+        of_mean = mean_share(effect) / (OMITTED_SHARE * variances.tolerance)
         return max(of_mean, variance_share([effect]))
 
     def worth(effects: tuple[Effect, ...]) -> tuple[float, int, float]:
@@ -306,7 +234,7 @@ class _SceneVariances:
 
 
 def _without_idle_draws(
-    camera: Camera, on: Sequence[Effect], variances: _SceneVariances
+    effects: CameraEffects, on: Sequence[Effect], variances: _SceneVariances
 ) -> tuple[tuple[Effect, ...], dict[str, tuple[str, ...]]]:
     """Return the effects that run less draws that hardly add to a variance, and those, by effect.
 
@@ -314,7 +242,7 @@ def _without_idle_draws(
     """
     lean, idle = dict[Effect, Effect](), dict[str, tuple[str, ...]]()
     for source in of_kind(on, NoiseSource):
-        if source.parts and _wish(camera, source) == "auto":
+        if source.parts and effects.wish(source) == "auto":
             others = [lean.get(effect, effect) for effect in on if effect is not source]
             if names := _idle_parts(source, others, variances):
                 lean[source], idle[source.name] = source.without_parts(names), names
@@ -347,6 +275,7 @@ class _Weighing:
     pixels: int
     idle: Mapping[str, tuple[str, ...]]
     """Name of an effect -> its draws that are not called for."""
+    tolerance: float
 
     def places(self, kind: type[Effect]) -> int:
         """Return how many pixels an effect acts on: those whose charge is joined count as one."""
@@ -365,20 +294,20 @@ class _Weighing:
 
 def _decide(
     kind: type[Effect],
-    effect: Effect | None,
-    camera: Camera,
+    effects: CameraEffects,
     light: LightPlan,
     omitted: Collection[Effect],
     weigh: _Weighing,
 ) -> Decision:
     """One line of the plan."""
+    effect = effects.found[kind.name]
     if effect is None:
         return Decision(kind.name, "off", "camera", kind.absent, None, None, "", 0.0)
     contribution, unit = weigh.contribution(effect)
     part = OMITTED_SHARE if unit == "of full signal" else 2.0
-    allowed = None if contribution is None else part * camera.accuracy.tolerance
+    allowed = None if contribution is None else part * weigh.tolerance
     weighed = contribution, allowed, unit
-    wish, what = _wish(camera, effect), effect.describe()
+    wish, what = effects.wish(effect), effect.describe()
     seconds = kind.seconds_per_pixel * weigh.places(kind)
     if wish == "off":
         return Decision(kind.name, "off", "user", "switched off in effects", *weighed, 0.0)
@@ -388,7 +317,7 @@ def _decide(
     free = (
         effect in light.idle
         and contribution is not None
-        and light.share + contribution <= OMITTED_SHARE * camera.accuracy.tolerance
+        and light.share + contribution <= OMITTED_SHARE * weigh.tolerance
     )
     if free:
         what += "; free: could be skipped, which would save no time"

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from vcam_cli.camera.camera import Camera
-from vcam_cli.camera.derived.frame_rate import FrameRate, frame_rate
+from vcam_cli.camera.derived.frame_rate import FrameRate
 from vcam_cli.progress import Observer
 from vcam_cli.simulation.preparation import Prepared
 from vcam_cli.simulation.remarks import Notes
@@ -52,7 +52,7 @@ class PlannedRun:
 
     def __repr__(self) -> str:
         """Return a line: name, effects that run, seconds and memory expected."""
-        plan, name = self.ready.plan.report(), self.ready.camera.name
+        plan, name = self.ready.plan.report(), self.ready.solved.name
         on = sum(effect["state"] == "on" for effect in plan["effects"])
         cost = f"{plan['seconds']:.2g} s, {plan['memory_bytes'] / 1e6:.0f} MB"
         return f"<PlannedRun {name}: {on} of {len(plan['effects'])} effects, {cost}>"
@@ -61,4 +61,4 @@ class PlannedRun:
 def planned_run(camera: Camera, workers: int | None, watch: Observer) -> PlannedRun:
     """Return the plan of a camera's frame. Raises BadInput, CannotDo."""
     ready, notes = prepare(camera, workers, watch)
-    return PlannedRun(ready, notes, frame_rate(camera))
+    return PlannedRun(ready, notes, ready.solved.frame_rate)

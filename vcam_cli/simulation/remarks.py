@@ -8,15 +8,13 @@ from typing import overload
 
 import numpy as np
 
-from vcam_cli.camera.derived import photodiode
 from vcam_cli.camera.derived.camera_angles import camera_angles
 from vcam_cli.camera.processing import SHOWN
 from vcam_cli.camera.scene.scene_files import ImageFile
 from vcam_cli.camera.sensor.architecture import ARCHITECTURES
 from vcam_cli.camera.sensor.noise import NoiseTable
 from vcam_cli.effects.base import ImageMotion, of_kind
-from vcam_cli.effects.order import quantizer
-from vcam_cli.effects.readout_chain import SIGMAS, dark_noise
+from vcam_cli.effects.readout_chain import SIGMAS
 from vcam_cli.floats import own_float_errors
 from vcam_cli.image_formation.light_plan import BLURS
 from vcam_cli.scenes.base import ChartScene
@@ -26,7 +24,6 @@ from vcam_cli.scenes.hyperspectral import CubeScene
 from vcam_cli.scenes.image import ImageScene
 from vcam_cli.scenes.layered import AnyScene, LayeredScene
 from vcam_cli.scenes.light import visible_range
-from vcam_cli.simulation import idle_keys, plan
 from vcam_cli.simulation.advice import advice
 from vcam_cli.simulation.preparation import Prepared
 from vcam_cli.spectra import luminance
@@ -82,10 +79,9 @@ class Notes(Sequence[str]):
 
 def remarks(ready: Prepared) -> tuple[str, ...]:
     """Return notes on the silicon, on times that the camera chose, and on a scene of spectra."""
-    scene, band = _picture(ready), ready.camera.scene.wavelengths
+    scene, band = _picture(ready), ready.solved.scene.wavelengths
     before = (
-        *idle_keys.notes(ready.camera),
-        *photodiode.remarks(ready.camera),
+        *ready.solved.notes,
         *_scheduled_times(ready),
         *_blind_colors(ready),
         *_noise_beyond_table(ready),
@@ -130,7 +126,7 @@ def _blind_colors(ready: Prepared) -> tuple[str, ...]:
 
 def _motion(ready: Prepared) -> tuple[str, ...]:
     """Return what motion brings in that the file does not have, and what is left out of it."""
-    g, turn = ready.geometry, ready.camera.scene.camera_motion
+    g, turn = ready.geometry, ready.solved.scene.camera_motion
     notes = []
     pixels = sum((e.travel for e in of_kind(ready.plan.active, ImageMotion)), 0.0) / g.pitch_x
     if pixels >= 1 and isinstance(_picture(ready), ImageScene):
@@ -139,7 +135,7 @@ def _motion(ready: Prepared) -> tuple[str, ...]:
         )
     if ready.spectrum.sub_exposures:
         notes.append(_sub_exposures(ready))
-    if ready.camera.exposure.is_timed_by_scene and pixels:
+    if ready.solved.exposure.is_timed_by_scene and pixels:
         notes.append("the automatic exposure meters the scene without motion")
     if turn is not None and turn.file is not None:
         read = camera_angles(turn.file)
@@ -172,7 +168,7 @@ def _edge_without_blur(ready: Prepared) -> tuple[str, ...]:
     if profile is None or len(profile.places) != 1:
         return ()
     omitted = {d.name for d in ready.plan.decisions if d.state == "off" and d.by == "plan"}
-    wanted = plan.enabled_effects(ready.camera, ready.geometry)
+    wanted = ready.solved.effects.enabled
     names = [blur.name for blur in of_kind(wanted, *BLURS) if blur.name in omitted]
     if not names:
         return ()
@@ -185,7 +181,7 @@ def _edge_without_blur(ready: Prepared) -> tuple[str, ...]:
 
 def _depth(ready: Prepared) -> tuple[str, ...]:
     """Return how layers were put one before the other, and where the lens was focused unasked."""
-    found, camera, notes = ready.spectrum.depth, ready.camera, []
+    found, camera, notes = ready.spectrum.depth, ready.solved, []
     if not isinstance(ready.scene, LayeredScene | DepthScene):
         return ()
     if camera.optics.focus_distance is None and "distance" not in camera.scene.model_fields_set:
@@ -234,7 +230,7 @@ def _cut(ready: Prepared) -> tuple[str, ...]:
 
 def _noise_beyond_table(ready: Prepared) -> tuple[str, ...]:
     """Return that a gain lies beyond those at which the noise of the readout is known."""
-    given, gain = ready.camera.pixel.readout.read_noise, ready.camera.exposure_gain
+    given, gain = ready.solved.pixel.readout.read_noise, ready.solved.gain
     if not isinstance(given, NoiseTable):
         return ()
     (least, _), (most, _) = given.points[0], given.points[-1]
@@ -250,10 +246,10 @@ def _noise_beyond_table(ready: Prepared) -> tuple[str, ...]:
 def _clipped_dark(ready: Prepared) -> tuple[str, ...]:
     """Return how many pixels are so dark that the ADC's offset clips their noise."""
     e, time = ready.electrical, min(ready.times, default=ready.exposure_time)
-    step = quantizer(ready.camera, ready.geometry).step(0.0)
-    own = ready.camera.adc.noise * step
-    missing = SIGMAS * math.hypot(dark_noise(ready.camera), own) - e.offset * step
-    if ready.camera.adc.offset is None or missing <= 0:
+    step = ready.solved.adc.step(0.0)
+    own = ready.solved.adc_keys.noise * step
+    missing = SIGMAS * math.hypot(ready.solved.dark_noise, own) - e.offset * step
+    if ready.solved.adc_keys.offset is None or missing <= 0:
         return ()
     threshold = missing / time - ready.dark_rate
     if float(ready.rate.min(initial=math.inf)) >= threshold:
@@ -273,7 +269,7 @@ def _clipped_dark(ready: Prepared) -> tuple[str, ...]:
 
 def _unused_codes(ready: Prepared) -> tuple[str, ...]:
     """Return why the ADC's highest codes are out of reach: at a low gain pixels are full before."""
-    e, gain, iso = ready.electrical, ready.camera.exposure_gain, ready.camera.exposure.iso
+    e, gain, iso = ready.electrical, ready.solved.gain, ready.solved.exposure.iso
     share = e.full_well / e.adc_full_scale
     if gain >= 1 or share > 1 - 1 / e.highest_code:
         return ()
@@ -297,7 +293,7 @@ def _overflow(ready: Prepared) -> tuple[str, ...]:
     share = beyond / (well * rate.size)
     if share < VISIBLE_OVERFLOW:
         return ()
-    ccd = ARCHITECTURES[ready.camera.pixel.architecture].transfers
+    ccd = ARCHITECTURES[ready.solved.pixel.architecture].transfers
     smear = ", and neither is smear" if ccd else ""
     return (
         f"excess charge, {share:.3g} times the capacity of all wells, is discarded: blooming is"
@@ -319,7 +315,7 @@ def _far_overexposed(ready: Prepared) -> tuple[str, ...]:
 
 def _scheduled_times(ready: Prepared) -> tuple[str, ...]:
     """Return the times of samples that the camera scheduled itself."""
-    asked = ready.camera.exposure.schedule
+    asked = ready.solved.exposure.schedule
     if asked is None:
         return ()
     listed = ", ".join(f"{1000 * time:.4g}" for time in ready.times)
@@ -330,7 +326,7 @@ def _scheduled_times(ready: Prepared) -> tuple[str, ...]:
 
 def _colors_of_picture(ready: Prepared) -> tuple[str, ...]:
     """Return what three channels are taken for, where the file does not say."""
-    source, scene = ready.camera.scene.source, _picture(ready)
+    source, scene = ready.solved.scene.source, _picture(ready)
     if not isinstance(source, ImageFile) or source.model != "auto":
         return ()
     if not isinstance(scene, ImageScene):
@@ -343,7 +339,7 @@ def _colors_of_picture(ready: Prepared) -> tuple[str, ...]:
 
 def _steps_not_shown(ready: Prepared) -> tuple[str, ...]:
     """Return why there are no pictures after the first steps, where they are asked for."""
-    if not (ready.camera.output.steps and ready.camera.processing):
+    if not (ready.solved.output.steps and ready.solved.processing):
         return ()
     colors = ready.mosaic.colors
     if len(colors) not in SHOWN and not ready.layout.full_color:

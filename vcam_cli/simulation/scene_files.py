@@ -9,25 +9,18 @@ import numpy as np
 from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import geometry
-from vcam_cli.camera.derived.scene_layers import (
-    DEPTH,
-    PATH,
-    camera_at,
-    flat_camera,
-    layer_cameras,
-)
+from vcam_cli.camera.derived.scene_layers import DEPTH, PATH, camera_at
 from vcam_cli.camera.scene.scene_files import DepthMap, Hyperspectral, ImageFile
 from vcam_cli.camera.scene.sources import Layers
 from vcam_cli.effects.base import Effect, of_kind
 from vcam_cli.effects.optics import aberration
 from vcam_cli.effects.optics.depth import Depth
+from vcam_cli.effects.optics.diffraction import Diffraction
 from vcam_cli.errors import BadInput, bad
 from vcam_cli.image_formation import photon_rate
 from vcam_cli.image_formation.optical_path import LayerOptics
-from vcam_cli.image_formation.settings import camera_settings
 from vcam_cli.physics.diffraction import otf_circular
 from vcam_cli.progress import Stages
-from vcam_cli.readout.layout import camera_layout
 from vcam_cli.scenes.base import View
 from vcam_cli.scenes.build import build
 from vcam_cli.scenes.build_layers import LayerFiles, PlacedLayer, build_layers
@@ -41,7 +34,7 @@ from vcam_cli.scenes.depth_scene import (
 from vcam_cli.scenes.hyperspectral import Cube
 from vcam_cli.scenes.image import ImageScene
 from vcam_cli.scenes.layered import AnyScene
-from vcam_cli.simulation import plan
+from vcam_cli.solve.solved import Solved
 
 ScenePicture = Array | Cube | DepthPicture | tuple[LayerFiles, ...] | None
 """Samples of an image file (h, w, channels) in linear light, the cube of a hyperspectral file, one
@@ -133,50 +126,48 @@ def check_blur(alone: Camera, path: tuple[str | int, ...]) -> None:
         raise bad(path, message, remedy) from None
 
 
-def flattened(camera: Camera, picture: ScenePicture) -> tuple[Camera, Any, tuple[str, ...]]:
+def flattened(solved: Solved, picture: ScenePicture) -> tuple[Solved, Any, tuple[str, ...]]:
     """Return the camera without a map of depth that is one distance within the tolerance, and why.
 
     Then the scene is flat, at that distance. An autofocus may yet tell distances apart.
     """
     if not isinstance(picture, DepthPicture):
-        return camera, picture, ()
-    layout = camera_layout(camera, geometry(camera))
-    settings = layout.settings(camera_settings(camera))
-    view = photon_rate.view(layout.lattice, settings, 0)
-    flat = _flat(camera, view, picture)
-    tolerance = 0.0 if camera.optics.focus == "auto" else camera.accuracy.tolerance
-    distance = flat_distance(flat, picture, view, _blur(camera), tolerance)
+        return solved, picture, ()
+    view = photon_rate.view(solved.layout.lattice, solved.settings, 0)
+    flat = _flat(solved, view, picture)
+    tolerance = 0.0 if solved.optics.focus == "auto" else solved.tolerance
+    distance = flat_distance(flat, picture, view, _blur(solved), tolerance)
     if distance is None:
-        return camera, picture, ()
+        return solved, picture, ()
     note = f"the map of depth is flat within the tolerance: the scene lies at {distance:.6g} m"
-    return flat_camera(camera, camera_at(camera, distance)), picture.picture, (note,)
+    return solved.flat_at(distance), picture.picture, (note,)
 
 
-def _flat(camera: Camera, view: View, picture: DepthPicture) -> ImageScene:
+def _flat(solved: Solved, view: View, picture: DepthPicture) -> ImageScene:
     """Return a picture with depth as a pinhole sees it."""
-    found = build(camera.scene, view, picture.picture, camera.display.primaries)
+    found = build(solved.scene, view, picture.picture, solved.display.primaries)
     assert isinstance(found, ImageScene)
     return found
 
 
-def _blur(camera: Camera) -> LensBlur:
+def _blur(solved: Solved) -> LensBlur:
     """Return how a camera's lens blurs points by their distance."""
-    solved = geometry(camera)
+    g, optics = solved.geometry, solved.optics
     # Blur over 1 / distance, at what is in focus; f (1 / P - 1) before the entrance pupil.
-    behind = solved.focal_length * (1 / solved.pupil_magnification - 1)
-    slope = solved.image_distance * solved.focal_length / (2 * solved.f_number)
-    slope /= 1 + behind / solved.focus_distance
-    shift = camera.optics.defocus / (2 * solved.working_f_number)
-    off = isinstance(camera.effects, dict) and camera.effects.get("diffraction") == "off"
-    wavelength = camera.scene.wavelengths.start
+    behind = g.focal_length * (1 / g.pupil_magnification - 1)
+    slope = g.image_distance * g.focal_length / (2 * g.f_number)
+    slope /= 1 + behind / g.focus_distance
+    shift = optics.defocus / (2 * g.working_f_number)
+    off = solved.effects.is_off(Diffraction.name)
+    wavelength = solved.scene.wavelengths.start
 
     def sharp(frequency: Array) -> Array:
-        if off or not camera.optics.diffraction:
+        if off or not optics.diffraction:
             return np.ones_like(frequency)
-        return otf_circular(frequency, wavelength, solved.working_f_number)
+        return otf_circular(frequency, wavelength, g.working_f_number)
 
-    aperture = solved.collecting_width, solved.collecting_height
-    return LensBlur(slope, shift - slope / solved.focus_distance, sharp, aperture)
+    aperture = g.collecting_width, g.collecting_height
+    return LensBlur(slope, shift - slope / g.focus_distance, sharp, aperture)
 
 
 def _read_layers(source: Layers) -> tuple[tuple[LayerFiles, ...], tuple[str, ...]]:
@@ -208,40 +199,34 @@ def scene_bytes(picture: ScenePicture) -> int:
     return getattr(picture, "nbytes", 0)
 
 
-def build_scene(camera: Camera, view: View, picture: ScenePicture) -> AnyScene:
+def build_scene(solved: Solved, view: View, picture: ScenePicture) -> AnyScene:
     """Return the scene of a camera on a view, from what its files hold; raises as `build` does."""
-    source = camera.scene.source
+    source = solved.scene.source
     if isinstance(picture, DepthPicture):
-        flat = _flat(camera, view, picture)
-        return depth_scene(flat, picture, view, _blur(camera), camera.accuracy.tolerance)
+        flat = _flat(solved, view, picture)
+        return depth_scene(flat, picture, view, _blur(solved), solved.tolerance)
     if not isinstance(source, Layers):
         if isinstance(picture, tuple):
             raise ValueError("a flat source has no layers")
-        return build(camera.scene, view, picture, camera.display.primaries)
+        return build(solved.scene, view, picture, solved.display.primaries)
     if not isinstance(picture, tuple):
         raise ValueError("layers need what their files hold")
     placed = []
-    layers = zip(source.layers, layer_cameras(camera), picture, strict=True)
+    layers = zip(source.layers, solved.layers, picture, strict=True)
     for layer, alone, files in layers:
-        solved = geometry(alone)
-        center = layer.position[0] * solved.scene_scale, layer.position[1] * solved.scene_scale
-        placed.append(PlacedLayer(alone.scene, solved.scene_width_on_sensor, center, files))
+        g = alone.geometry
+        center = layer.position[0] * g.scene_scale, layer.position[1] * g.scene_scale
+        placed.append(PlacedLayer(alone.scene, g.scene_width_on_sensor, center, files))
     return build_layers(placed, view)
 
 
 def layer_optics(
-    camera: Camera, effects: tuple[Effect, ...], scene: AnyScene
+    solved: Solved, effects: tuple[Effect, ...], scene: AnyScene
 ) -> tuple[LayerOptics, ...]:
     """Return what acts on the light of each layer; () of a scene that is seen flat."""
     if not of_kind(effects, Depth):
         return ()
-    cameras = layer_cameras(camera)
+    layers = solved.layers
     if isinstance(scene, DepthScene):
-        cameras = tuple(camera_at(camera, distance) for distance in scene.distances)
-    found = []
-    for alone in cameras:
-        solved = geometry(alone)
-        shift = alone.optics.defocus + solved.focus_shift
-        radius = shift / (2 * solved.working_f_number)
-        found.append(LayerOptics(plan.mean_signal_effects(alone, solved), radius))
-    return tuple(found)
+        layers = solved.layers_at(tuple(scene.distances))
+    return tuple(LayerOptics(alone.effects, alone.radius) for alone in layers)

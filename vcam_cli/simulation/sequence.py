@@ -24,10 +24,11 @@ from vcam_cli.files.images.video import VideoWriter, ffmpeg
 from vcam_cli.files.tables import write_table
 from vcam_cli.progress import Observer
 from vcam_cli.simulation import exposure_control
-from vcam_cli.simulation.idle_keys import sequence_notes
 from vcam_cli.simulation.output import outputs
 from vcam_cli.simulation.shared import Shared
 from vcam_cli.simulation.simulate import Result, simulate
+from vcam_cli.solve.idle_keys import sequence_notes
+from vcam_cli.solve.solved import solve
 from vcam_cli.units import render
 
 NO_VIDEO = (
@@ -97,7 +98,7 @@ def frames(
         Observer of stages.
     """
     shared, settings, reference = Shared(), None, camera.exposure.reference
-    lines = line_times(camera, geometry(camera))
+    solved = solve(camera)
     for each in frame_cameras(camera, count, rate):
         if settings is not None:
             each = exposure_control.set_exposure(each, settings)
@@ -106,8 +107,8 @@ def frames(
         result = simulate(each, workers, watch, shared)
         if camera.exposure.auto is not None:
             if reference is None:  # where the first frame has it, all others do
-                reference = result.exposure_time / 2 + lines.last / 2
-            settings = exposure_control.next_exposure(camera, result.frame)
+                reference = result.exposure_time / 2 + solved.lines.last / 2
+            settings = exposure_control.next_exposure(solved, result.frame)
         yield each, result
 
 
@@ -164,7 +165,7 @@ def write_sequence(
                     step = -(-render.shape[1] // STRIP_WIDTH)
                     shown.append(render[::step, ::step])
             columns = ("frame", "start [s]", "gain", "seed", *result.metrics)
-            gain = result.frame.camera.exposure_gain
+            gain = result.frame.solved.gain
             facts = (number + 1, each.exposure.start, gain, each.seed.frame)
             rows.append((*facts, *result.metrics.values()))
     assert first is not None

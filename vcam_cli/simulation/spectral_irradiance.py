@@ -26,6 +26,7 @@ from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry, pixel_centers
 from vcam_cli.camera.derived.mosaic import Mosaic
+from vcam_cli.camera.simulation import Output
 from vcam_cli.effects.base import Blur, Gain, VeilingGlare, of_kind
 from vcam_cli.effects.pixel.pixel_aperture import PixelAperture
 from vcam_cli.errors import bad
@@ -64,7 +65,7 @@ def check(camera: Camera) -> None:
 
 def nodes(ready: Prepared) -> Array:
     """Return the wavelengths at which it is given, (J,) rising [m]."""
-    band = ready.camera.scene.wavelengths
+    band = ready.solved.scene.wavelengths
     return Band(band.start, band.stop, ready.settings.wavelength_step).nodes()
 
 
@@ -100,7 +101,7 @@ def _bands(ready: Prepared, wavelengths: Array, level: Array, workers: int) -> I
     bands = Mosaic((tuple(f"{w * 1e9:.6f}" for w in wavelengths),))
     effects = (*in_lens, PixelAperture(g.pitch_x, g.pitch_y))
     omitted = {d.name for d in ready.plan.decisions if d.state == "off"}
-    optics = layer_optics(ready.camera, effects, ready.scene)
+    optics = layer_optics(ready.solved, effects, ready.scene)
     kept = tuple(layer.without_effects(omitted) for layer in optics)
     # As bright in every band, relative to white, as the frame is.
     full = min(1.0, float(ready.rate.max()) / float(ready.white_rate.max()))
@@ -139,20 +140,20 @@ def _scene(ready: Prepared) -> AnyScene:
     if isinstance(ready.scene, SampledScene) and ready.scene.samples == "squares":
         return ready.scene
     view = photon_rate.view(grid, ready.settings, MARGIN)
-    return build(ready.camera.scene, view, None)
+    return build(ready.solved.scene, view, None)
 
 
 def levels(ready: Prepared, wavelengths: Array) -> Array:
     """Return the irradiance of the K components on the axis, without blur: (K, J) [W/(m2 m)]."""
     per_radiance = ready.geometry.irradiance_per_radiance
-    transmittance = ready.camera.optics.transmittance.resolve()
+    transmittance = ready.solved.optics.transmittance.resolve()
     spectra = [s.multiply(transmittance) for s in ready.scene.spectra]
-    return per_radiance * spectral_levels(ready.camera, spectra, wavelengths)
+    return per_radiance * spectral_levels(ready.solved.output, spectra, wavelengths)
 
 
-def spectral_levels(camera: Camera, spectra: Sequence[Spectrum], wavelengths: Array) -> Array:
+def spectral_levels(output: Output, spectra: Sequence[Spectrum], wavelengths: Array) -> Array:
     """Return spectra as `output.irradiance` samples them: (K, J) [their unit per m]."""
-    if camera.output.irradiance_sampling == "point":
+    if output.irradiance_sampling == "point":
         return np.array([s.evaluate(wavelengths) for s in spectra])
     bands = np.array([hat_weights(s, wavelengths) for s in spectra])
     return np.asarray(bands / hat_weights(Spectrum.flat(1.0), wavelengths))

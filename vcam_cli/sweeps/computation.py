@@ -13,9 +13,9 @@ from vcam_cli.files.in_use import POINTS
 from vcam_cli.files.plots import in_formats
 from vcam_cli.files.points_store import SweepFolder
 from vcam_cli.files.report import hash_file
-from vcam_cli.image_formation.rate_cache import light_key
 from vcam_cli.progress import Observer
 from vcam_cli.simulation.output import provenance
+from vcam_cli.solve.light_key import light_key
 from vcam_cli.sweeps import (
     expectations,
     figures,

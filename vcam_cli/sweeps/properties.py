@@ -27,13 +27,13 @@ from vcam_cli.effects.optics.off_axis import OffAxis
 from vcam_cli.effects.pixel.pixel_vignetting import PixelVignetting
 from vcam_cli.effects.readout_chain import electrical
 from vcam_cli.errors import bad
-from vcam_cli.image_formation import photon_rate
-from vcam_cli.image_formation.settings import camera_settings
+from vcam_cli.image_formation.pixel_response import scene_transfer
 from vcam_cli.physics import readout, vignetting
-from vcam_cli.readout.layout import camera_layout
 from vcam_cli.scenes import light
-from vcam_cli.simulation import plan
 from vcam_cli.simulation.pixel_figures import pixel_figures
+from vcam_cli.solve.effects import camera_effects
+from vcam_cli.solve.layout import camera_layout
+from vcam_cli.solve.solved import solve
 from vcam_cli.sweeps.quantities import FREQUENCY, POSITION, PROPERTIES, WAVELENGTH
 
 FREQUENCIES = 161
@@ -78,13 +78,12 @@ def _corner_vignetting(camera: Camera, g: Geometry) -> float:
 def _pixel_figure(name: str) -> Callable[[Camera, Geometry], float]:
     """Return what computes a figure of signal and noise, eqs 3.1 and 3.2 of [1]."""
 
-    def value(camera: Camera, g: Geometry) -> float:
+    def value(camera: Camera, _: Geometry) -> float:
         time = camera.exposure.longest
         if time is None:
             message = f"{name} depends on the exposure time, which this camera chooses itself"
             raise bad("exposure", message, "add set: {exposure.time: 30 ms}")
-        groups = camera_layout(camera, g).binning_groups
-        return float(getattr(pixel_figures(camera, g, electrical(camera), groups, time), name))
+        return float(getattr(pixel_figures(solve(camera), time), name))
 
     return value
 
@@ -146,17 +145,16 @@ def _mtf(camera: Camera, nyquist: float) -> list[Curves]:
     if camera.scene.illuminant is None:
         message = "the light of this scene is known only by its file"
         raise bad("scene.source", message, "set a chart and an illuminant for this figure")
-    g, frequency = geometry(camera), np.linspace(0, nyquist * 1e3, FREQUENCIES)
-    mosaic, white = camera_layout(camera, g).mosaic, (light.white_radiance(camera.scene),)
+    solved, frequency = solve(camera), np.linspace(0, nyquist * 1e3, FREQUENCIES)
+    mosaic, white = solved.layout.mosaic, (light.white_radiance(camera.scene),)
 
     def transfer(effects: tuple[Effect, ...]) -> list[Array]:
-        found = photon_rate.scene_transfer(
-            camera, g, camera_settings(camera), white, mosaic, effects
-        )
+        step = solved.settings.wavelength_step
+        found = scene_transfer(solved.response, white, effects, step)
         colors = range(len(mosaic.colors))
         return [directional_mtf(found, effects, color, frequency, (1.0, 0.0)) for color in colors]
 
-    effects = plan.mean_signal_effects(camera, g)
+    effects = solved.effects.mean_signal
     both = transfer(effects), transfer(tuple(e for e in effects if e.origin != "lens"))
     x = {FREQUENCY: frequency / 1e3, "of_nyquist": frequency / (nyquist * 1e3)}
     return [
@@ -189,7 +187,7 @@ def _diagonal_curves(camera: Camera) -> Curves:
     Raises BadInput where all pixels collect alike.
     """
     g = geometry(camera)
-    gains = of_kind(plan.enabled_effects(camera, g), Gain)
+    gains = of_kind(camera_effects(camera, g).enabled, Gain)
     tunnel = next(iter(of_kind(gains, PixelVignetting)), None)
     falloff = next((e for e in gains if e.name == OffAxis.name), None)
     if tunnel is None and falloff is None:

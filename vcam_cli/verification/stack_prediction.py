@@ -110,14 +110,14 @@ def judge(
 
 def take_stack(ready: Prepared, count: int, turn: int) -> Array:
     """Return frames of one more sensor (n, rows, columns) [DN]."""
-    first = ready.camera.seed
+    first = ready.solved.seed
     frames = []
     for frame in range(count):
         # One sensor takes the stacks of a turn of all entries, as one has taken those measured.
         sensor = first.sensor + 1 + turn % STACKS
         seed = Seed(sensor=sensor, frame=first.frame + (turn + 1) * count + frame)
-        camera = ready.camera.model_copy(update={"seed": seed})
-        frames.append(take_frame(replace(ready, camera=camera), 1).dn)
+        again = replace(ready, solved=ready.solved.with_seed(seed))
+        frames.append(take_frame(again, 1).dn)
     return np.stack(frames)
 
 

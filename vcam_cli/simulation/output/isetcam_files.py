@@ -74,16 +74,20 @@ def write_isetcam(
 
 def _scene(frame: Frame, wavelengths: Array) -> dict[str, Any]:
     g, layout = frame.geometry, frame.layout
-    levels = spectral_irradiance.spectral_levels(frame.camera, frame.scene.spectra, wavelengths)
+    levels = spectral_irradiance.spectral_levels(
+        frame.solved.output, frame.scene.spectra, wavelengths
+    )
     planes = (
         frame.scene.values_at(layout.picture_x, layout.picture_y, level[np.newaxis])[0]
         for level in levels.T
     )
     shape = len(layout.picture_y), len(layout.picture_x)
-    white = spectral_irradiance.spectral_levels(frame.camera, (frame.scene.white,), wavelengths)[0]
+    white = spectral_irradiance.spectral_levels(
+        frame.solved.output, (frame.scene.white,), wavelengths
+    )[0]
     return {
         "type": "scene",
-        "name": frame.camera.name,
+        "name": frame.solved.name,
         "data": {"photons": _photons(planes, shape, wavelengths)},
         "spectrum": {"wave": _nanometers(wavelengths)},
         "illuminant": {
@@ -112,12 +116,12 @@ def _optical_image(
     distance = g.object_distance
     return {
         "type": "opticalimage",
-        "name": frame.camera.name,
+        "name": frame.solved.name,
         "data": {"photons": _photons(planes(), shape, wavelengths)},
         "spectrum": {"wave": _nanometers(wavelengths)},
         "optics": {
             "type": "optics",
-            "name": frame.camera.name,
+            "name": frame.solved.name,
             "model": "diffractionlimited",
             "fNumber": g.f_number,
             "focalLength": g.focal_length,
@@ -135,7 +139,7 @@ def _sensor(frame: Frame) -> dict[str, Any]:
     order = [[frame.mosaic.colors.index(color) + 1 for color in row] for row in block]
     return {
         "type": "sensor",
-        "name": frame.camera.name,
+        "name": frame.solved.name,
         "rows": g.rows,
         "cols": g.columns,
         "data": {"volts": _last(volts), "dv": _last(np.asarray(frame.dn, np.float32))},

@@ -58,7 +58,7 @@ def finish(
 
     seconds: the time that all of it took so far [s].
     """
-    if result.frame.camera.output.report:
+    if result.frame.solved.output.report:
         from vcam_cli.simulation.output import run_report
 
         known = record(result, inputs, seconds())
@@ -70,7 +70,7 @@ def finish(
 
 def write(result: Photograph, folder: OutputFolder) -> None:
     """Write the files of one run, all but the record `run.json`."""
-    camera = result.frame.camera
+    camera = result.frame.solved
     with ThreadPool(2) as pool:
         raw = (*_raw_jobs(result, folder), *_sample_jobs(result, folder))
         jobs = [pool.submit(job) for job in raw]
@@ -135,10 +135,10 @@ def _irradiance(result: Photograph, path: Path) -> None:
             yield plane * 1e-9
 
     said = {
-        "name": frame.camera.name,
+        "name": frame.solved.name,
         "vcam:version": vcam_cli.__version__,
         "vcam:quantity": "spectral irradiance on the sensor, mean over each pixel's cell"
-        + _SAMPLING[frame.camera.output.irradiance_sampling],
+        + _SAMPLING[frame.solved.output.irradiance_sampling],
         "vcam:unit": "W/(m2 nm)",
         **raw_file.photograph(frame),
         "vcam:configHash": config_hash(frame.camera),
@@ -157,10 +157,10 @@ def _raw_jobs(result: Photograph, folder: OutputFolder) -> Iterator[Callable[[],
     yield partial(write_raw, result, folder.new("raw.exr"))
     frame = result.frame
     said = config_hash(frame.camera)
-    if frame.camera.output.dng:
+    if frame.solved.output.dng:
         description = raw_file.description(frame, said)
         yield partial(raw_dng.write_raw_dng, folder.new("raw.dng"), frame, description)
-    if frame.camera.output.tiff:
+    if frame.solved.output.tiff:
         yield partial(raw_file.write_raw_tiff, folder.new("raw.tif"), frame, said)
 
 
@@ -204,10 +204,10 @@ def _ideal(result: Photograph, path: Path) -> None:
 def _ideal_attributes(frame: Frame) -> dict[str, Attribute]:
     """Return what ideal.exr says; chromaticities where its colors are corrected to a display's."""
     corrected = any(
-        step.name == "color_correction" and step.value != "none" for step in frame.camera.processing
+        step.name == "color_correction" and step.value != "none" for step in frame.solved.processing
     )
     return {
-        "name": frame.camera.name,
+        "name": frame.solved.name,
         "vcam:quantity": "the scene point-sampled at the pixels' centers, linear, white = 1",
         **({"chromaticities": CHROMATICITIES} if corrected else {}),
         **raw_file.photograph(frame),

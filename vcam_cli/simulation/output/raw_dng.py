@@ -12,7 +12,6 @@ know them (Adobe's, darktable's) make even light even again, LibRaw leaves it as
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -36,8 +35,8 @@ from vcam_cli.processing.base import Patches
 from vcam_cli.processing.color_correction import BRADFORD, RGB_TO_XYZ, Fit, fit_matrix
 from vcam_cli.processing.tone import srgb
 from vcam_cli.processing.white_balance import illuminant_gains
-from vcam_cli.readout.layout import camera_layout
 from vcam_cli.simulation.frame import Frame
+from vcam_cli.solve.layout import camera_layout
 from vcam_cli.spectra import Spectrum, cmf, colorchecker, illuminant, pair_weights
 
 RANGE = (360e-9, 830e-9)
@@ -72,7 +71,7 @@ def check(camera: Camera) -> None:
             " raw converters read others wrong: LibRaw all of more than 2 x 2, and some of 2 x 2"
         )
         raise bad(_PATH, message, _REMEDY)
-    bits = _highest_code(camera, layout.binning_groups.summed_codes).bit_length()
+    bits = _highest_code(camera.adc.bits, layout.binning_groups.summed_codes).bit_length()
     if bits > MOST_BITS:
         message = f"its codes have {bits} bits, and raw converters read at most {MOST_BITS}"
         raise bad(_PATH, message, _REMEDY)
@@ -81,8 +80,8 @@ def check(camera: Camera) -> None:
         raise bad(_PATH, f"{message}, and this one has {rows} x {columns}", _REMEDY)
 
 
-def _highest_code(camera: Camera, added: int) -> int:
-    return int((2**camera.adc.bits - 1) * added)
+def _highest_code(bits: int, added: int) -> int:
+    return int((2**bits - 1) * added)
 
 
 def write_raw_dng(path: Path, frame: Frame, description: str) -> None:
@@ -92,14 +91,16 @@ def write_raw_dng(path: Path, frame: Frame, description: str) -> None:
     linear = frame.linear(levels)
     table, (black, white) = None, levels[:2]
     if frame.electrical.linearized:
-        curve = frame.linear(np.arange(_highest_code(frame.camera, frame.summed_codes) + 1.0))
+        curve = frame.linear(
+            np.arange(_highest_code(frame.electrical.bits, frame.summed_codes) + 1.0)
+        )
         scale = TOP / (curve[-1] - curve[0])
         table = np.rint((curve - curve[0]) * scale).astype(np.uint16)
         black, white = (linear[:2] - curve[0]) * scale
     span, light = linear[1:] - linear[0]
     image = RawImage(
         codes=codes,
-        block=frame.mosaic.block if frame.camera.array.mosaic else (),
+        block=frame.mosaic.block if frame.solved.has_mosaic else (),
         colors=_colors(frame) if len(frame.mosaic.colors) > 1 else None,
         black=max(float(black), 0.0),
         white=round(white),
@@ -107,11 +108,11 @@ def write_raw_dng(path: Path, frame: Frame, description: str) -> None:
         baseline_exposure=float(np.log2(span / light)) if light > 0 < span else 0.0,
         shading=_shading(frame),
         noise=_noise(frame, span),
-        name=frame.camera.name,
+        name=frame.solved.name,
         exposure_time=frame.exposure_time,
         f_number=frame.geometry.f_number,
         focal_length=frame.geometry.focal_length,
-        iso=frame.base_iso * frame.camera.exposure_gain,
+        iso=frame.base_iso * frame.solved.gain,
         description=description,
         preview=_preview(frame, codes, linear),
     )
@@ -137,7 +138,7 @@ def _preview(frame: Frame, codes: Array, levels: Array) -> Array:
 
 def _small(frame: Frame, codes: Array) -> Array:
     """Return means over squares of whole blocks (rows, columns, colors), of a linear ADC [DN]."""
-    block = frame.mosaic.block if frame.camera.array.mosaic else ((frame.mosaic.colors[0],),)
+    block = frame.mosaic.block if frame.solved.has_mosaic else ((frame.mosaic.colors[0],),)
     size = np.array([len(block), len(block[0])])
     square = size * -(-max(codes.shape[:2] // size) // PREVIEW_SIZE)
     rows, columns = codes.shape[:2] // square
@@ -179,7 +180,7 @@ def _noise(frame: Frame, span: float) -> tuple[float, float]:
     """
     electrons = span * frame.electrical.electrons_per_dn / frame.summed_codes
     dark = frame.dark_rate * frame.exposure_time
-    sources, binning = noise_sources(frame.plan.active, "frame"), frame.camera.array.binning
+    sources, binning = noise_sources(frame.plan.active, "frame"), frame.solved.binning
     floor, full = (
         sum(source.binned_variance(mean, dark, binning) for source in sources)
         for mean in (dark, dark + electrons)
@@ -229,10 +230,7 @@ def _fit(frame: Frame, light: Spectrum) -> tuple[Fit, Array]:
     """Return the color correction of a light, and the camera's colors of its white."""
     start, stop = _band(frame)
     lit = [light, *(light.multiply(reflectance) for _, reflectance in colorchecker())]
-    band = frame.camera.scene.wavelengths.model_copy(update={"start": start, "stop": stop})
-    scene = frame.camera.scene.model_copy(update={"wavelengths": band})
-    camera = frame.camera.model_copy(update={"scene": scene})
-    white, *patches = replace(frame, camera=camera).axis_rate(lit).T
+    white, *patches = frame.axis_rate(lit, (start, stop)).T
     signals = np.transpose(patches)
     fit = fit_matrix(signals, white, True, Patches(signals, light, start, stop))
     return fit, white
@@ -240,5 +238,5 @@ def _fit(frame: Frame, light: Spectrum) -> tuple[Fit, Array]:
 
 def _band(frame: Frame) -> tuple[float, float]:
     """Return the wavelengths that are simulated and have a color [m]."""
-    band = frame.camera.scene.wavelengths
+    band = frame.solved.scene.wavelengths
     return max(band.start, RANGE[0]), min(band.stop, RANGE[1])

@@ -24,7 +24,6 @@ from vcam_cli.arrays import Array
 from vcam_cli.camera.derived.electrical import Electrical
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.camera.scene.illuminant import IlluminantSpec
-from vcam_cli.camera.sensor.array import Positions
 from vcam_cli.files.images import tiff
 from vcam_cli.files.images.exr import ExrWriter
 from vcam_cli.files.images.rows import Attribute
@@ -50,7 +49,7 @@ def write_raw(path: Path, frame: Frame, config_hash: str) -> None:
         "electrons": (frame.electrons, None),
         "volts": (frame.electrons, e.volts_of),
     }
-    asked = {name: values[name] for name in frame.camera.output.raw}
+    asked = {name: values[name] for name in frame.solved.output.raw}
     units: dict[str, Attribute] = {f"vcam:unit.{name}": UNITS[name] for name in asked}
     _write(path, frame, asked, attributes(frame, config_hash) | units)
 
@@ -60,7 +59,7 @@ def write_raw_tiff(path: Path, frame: Frame, config_hash: str) -> None:
     codes = tiff.whole_numbers(frame.dn, white_level(frame))
     if frame.layout.full_color:
         codes = np.moveaxis(codes, 0, -1)
-    has_block = frame.camera.array.mosaic and not frame.layout.is_scattered
+    has_block = frame.solved.has_mosaic and not frame.layout.is_scattered
     tags = tiff.mosaic_tags(frame.mosaic.block) if has_block else ()
     tiff.write_tiff(path, codes, description(frame, config_hash), tags)
 
@@ -77,7 +76,7 @@ def write_hdr(path: Path, frame: Frame, config_hash: str) -> None:
         **_camera_metadata(frame, config_hash),
         **photograph(frame),
         "vcam:captureTimes": ",".join(map(repr, frame.times)),
-        "vcam:estimator": frame.camera.exposure.estimator,
+        "vcam:estimator": frame.solved.exposure.estimator,
         "vcam:saturatedFrom": frame.electrical.saturation / frame.times[0] - frame.dark_rate,
         "vcam:unit": "e/s",
     }
@@ -171,8 +170,8 @@ def attributes(frame: Frame, config_hash: str) -> dict[str, Attribute]:
 
 def photograph(frame: Frame) -> dict[str, Attribute]:
     """Return how the picture was taken, by the names and in the units of OpenEXR's standard."""
-    iso = frame.base_iso * frame.camera.exposure_gain
-    light = frame.camera.scene.illuminant
+    iso = frame.base_iso * frame.solved.gain
+    light = frame.solved.scene.illuminant
     return {
         "software": tiff.SOFTWARE,
         "comments": "simulated, no photograph",
@@ -204,10 +203,10 @@ def _light_name(light: IlluminantSpec) -> str:
 def _camera_metadata(frame: Frame, config_hash: str) -> dict[str, Attribute]:
     """Which camera, with which seeds, and what colors its pixels have."""
     return {
-        "name": frame.camera.name,
+        "name": frame.solved.name,
         "vcam:version": vcam_cli.__version__,
-        "vcam:seedSensor": str(frame.camera.seed.sensor),
-        "vcam:seedFrame": str(frame.camera.seed.frame),
+        "vcam:seedSensor": str(frame.solved.seed.sensor),
+        "vcam:seedFrame": str(frame.solved.seed.frame),
         **_pattern(frame),
         **_binning(frame),
         "vcam:configHash": config_hash,
@@ -216,18 +215,18 @@ def _camera_metadata(frame: Frame, config_hash: str) -> dict[str, Attribute]:
 
 def _pattern(frame: Frame) -> dict[str, Attribute]:
     """Which color each pixel has."""
-    pattern, colors = frame.camera.array.pattern, frame.mosaic.colors
+    colors = frame.mosaic.colors
     listed: dict[str, Attribute] = {"vcam:colors": ",".join(colors)}
     if frame.layout.full_color:
         return {"vcam:cfa": "stacked", **listed}
     if not frame.layout.is_scattered:
         block = "/".join("".join(row) for row in frame.mosaic.block)
         return {"vcam:cfa": "monochrome" if len(colors) == 1 else block}
-    if isinstance(pattern, Positions):
+    if frame.layout.places is not None:
         return {"vcam:cfa": "positions", **listed, "vcam:positionUnit": "um"}
     rows, columns = frame.dn.shape
     size: dict[str, Attribute] = {"vcam:rows": rows, "vcam:columns": columns}
-    return {"vcam:cfa": str(pattern), **listed, "vcam:positionUnit": "um", **size}
+    return {"vcam:cfa": "honeycomb", **listed, "vcam:positionUnit": "um", **size}
 
 
 def _binning(frame: Frame) -> dict[str, Attribute]:

@@ -10,7 +10,6 @@ import numpy as np
 from vcam_cli.arrays import Array
 from vcam_cli.effects.signal_chain import noise_sources
 from vcam_cli.files.plots import COLORS
-from vcam_cli.image_formation import photon_rate
 from vcam_cli.simulation.frame import Frame
 from vcam_cli.spectra import Spectrum, photons
 
@@ -111,9 +110,9 @@ def mark_scene(axes: Any, frame: Frame) -> None:
 
 def draw_spectra(figure: Any, frame: Frame) -> None:
     """Draw the light of white, what lens, filters and silicon leave of it, and its electrons."""
-    band = frame.camera.scene.wavelengths
+    band = frame.solved.scene.wavelengths
     wavelengths = np.linspace(band.start, band.stop, 401)
-    light, responses = photons(frame.scene.white), photon_rate.responses(frame.camera, frame.mosaic)
+    light, responses = photons(frame.scene.white), frame.solved.response.spectra
     above, middle, below = figure.subplots(3, sharex=True)
     _draw_spectrum(above, light, wavelengths, {"color": "#777777"})
     above.set(ylabel="photons of white", yticklabels=())

@@ -62,8 +62,8 @@ def _about(frame: Frame) -> str:
 
 
 def _pictures(result: Photograph) -> Iterator[Part]:
-    frame, name = result.frame, result.frame.camera.name
-    if needs_picture(frame.camera):
+    frame, name = result.frame, result.frame.solved.name
+    if needs_picture(frame.solved):
         ideal, note = pictures.codes(tone.encode(result.ideal, "srgb", 8))
         about = "The scene at the centers of the pixels, without blur and noise, in the camera's"
         yield Picture("Scene", ideal, f"Ideal picture of the scene of {name}",
@@ -77,12 +77,12 @@ def _pictures(result: Photograph) -> Iterator[Part]:
             len(frame.mosaic.colors) > 1,
         )  # fmt: skip
     yield from _raw(result)
-    if needs_picture(frame.camera):
+    if needs_picture(frame.solved):
         codes = result.render if result.render.dtype == np.uint8 else result.render >> 8
         render, note = pictures.codes(codes.astype(np.uint8))
         yield Picture("Render", render, f"Photograph that {name} takes",
                       f"After {_steps(frame)}. {note}", group=GROUP)  # fmt: skip
-    if "s-cielab" in frame.camera.quality:
+    if "s-cielab" in frame.solved.quality:
         found = result.s_cielab
         note = f"S-CIELAB difference of render and scene, {found.mean():.3g} on average."
         yield pictures.map_picture(
@@ -101,13 +101,13 @@ def _raw(result: Photograph) -> Iterator[Part]:
     is_mosaic = len(frame.mosaic.colors) > 1 and shown.ndim == 2
     raw, note = pictures.codes(shown, is_mosaic)
     about = "Codes from the black level to saturation, brightened by a square root."
-    yield Picture("Raw frame", raw, f"Raw codes of {frame.camera.name} as shades of gray",
+    yield Picture("Raw frame", raw, f"Raw codes of {frame.solved.name} as shades of gray",
                   f"{about} {note}".strip(), group=GROUP,
                   far=pictures.without_mosaic(shown) if is_mosaic else "")  # fmt: skip
 
 
 def _steps(frame: Frame) -> str:
-    names = [step.name.replace("_", " ") for step in frame.camera.processing]
+    names = [step.name.replace("_", " ") for step in frame.solved.processing]
     return ", ".join(names) or "no processing"
 
 

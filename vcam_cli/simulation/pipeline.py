@@ -1,0 +1,172 @@
+"""A frame from its camera to its picture. Read this first.
+
+    stage         in                        out            what happens
+    ------------  ------------------------  -------------  -------------------------------------
+    read          Camera                    ReadCamera     files of the lens and of the scene
+    solve         Camera                    Solved         geometry, circuit, effects, settings
+    focus         Solved                    Solved         autofocus, where the file asks for it
+    scene         Solved, files             SceneLight     scene on the lattice, white, transfer
+    light         SceneLight                Rate           mean light on the lattice [e/s]
+    exposure      SceneLight, Rate          ExposedLight   time and gain; mean light of nodes [e/s]
+    plan          ... and ExposedLight      Prepared       which effects run
+    charge, DN    Prepared                  Frame          time x light + dark current, before_shot,
+                                                           noise, full well, ADC
+    picture       Frame                     processing     demosaic to tone, when it is asked for
+
+Every stage takes records and returns one; none of them is changed. What each effect does in its
+stage, `before_shot` among them, is in the table of `effects/order.py`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import partial
+
+from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.processing_steps import Step
+from vcam_cli.processing import Context, Patches, ProcessedPicture, process
+from vcam_cli.simulation import autofocus, cost_model
+from vcam_cli.simulation.exposed_light import expose
+from vcam_cli.simulation.frame import Frame, take_frame
+from vcam_cli.simulation.preparation import Prepared, plan_frame
+from vcam_cli.simulation.reading import read_camera
+from vcam_cli.simulation.run import Run
+from vcam_cli.simulation.scene_files import ScenePicture, flattened
+from vcam_cli.simulation.scene_light import formed_light, scene_light
+from vcam_cli.simulation.shared import Shared
+from vcam_cli.solve.solved import Solved
+
+
+def prepare(camera: Camera, run: Run, shared: Shared) -> tuple[Prepared, tuple[str, ...]]:
+    """Bring the light of a camera's scene to its pixels, time the exposure, plan what will run.
+
+    Parameters
+    ----------
+    camera : Camera
+        The camera.
+    run : Run
+        How it is computed.
+    shared : Shared
+        What cameras before this one had in common with it.
+
+    Returns
+    -------
+    ready : Prepared
+        The camera, ready to take its frame.
+    notes : tuple of str
+        What a user should know of its files, and of its focus.
+
+    Raises
+    ------
+    BadInput
+        Where the camera contradicts itself.
+    CannotDo
+        Where memory does not suffice.
+    """
+    solved, picture, notes = read_camera(camera, run.stages, shared)
+    solved, picture, flat = flattened(solved, picture)
+    trial = partial(_prepare, picture=picture, run=run.unseen())
+    solved, focused, seconds = autofocus.focused(solved, trial, run.workers, run.stages)
+    ready = prepare_light(solved, picture, run.after(seconds))
+    return ready, notes + flat + focused
+
+
+def prepare_light(solved: Solved, picture: ScenePicture, run: Run) -> Prepared:
+    """Return a camera in focus, ready to take its frame of the scene.
+
+    A camera that times its exposure by a scene that moves meters the scene at rest.
+
+    Parameters
+    ----------
+    solved : Solved
+        The camera.
+    picture : ScenePicture
+        What the scene's files hold.
+    run : Run
+        How it is computed.
+
+    Returns
+    -------
+    Prepared
+        The camera, ready to take its frame.
+    """
+    if not (solved.scene.moves and solved.exposure.is_timed_by_scene):
+        return _prepare(solved, picture, run)
+    with run.stages("metering"):
+        metered = _prepare(solved.standing_still(), picture, run.unseen(run.rate_cache))
+    once = cost_model.light_seconds(metered.layout, metered.spectrum, run.workers)
+    timed = solved.timed(metered.exposure_time, metered.solved.gain, metered.times)
+    ready = _prepare(timed, picture, run.after(once))
+    written = ready.solved.with_exposure(solved.exposure)
+    return replace(ready, solved=written, exposure_limit=metered.exposure_limit)
+
+
+def _prepare(solved: Solved, picture: ScenePicture, run: Run) -> Prepared:
+    """Return the same where times are given, or nothing moves."""
+    seen = scene_light(solved, picture, run)
+    light = formed_light(seen, run)
+    with run.stages("exposure"):
+        exposed = expose(seen, light)
+        return plan_frame(seen, light, exposed, run)
+
+
+def take(
+    camera: Camera, run: Run, shared: Shared
+) -> tuple[Frame, Callable[[Sequence[Step]], ProcessedPicture], tuple[str, ...]]:
+    """Take a frame of a camera.
+
+    Parameters
+    ----------
+    camera, run, shared
+        As those of `prepare`.
+
+    Returns
+    -------
+    frame : Frame
+        The raw frame.
+    process : callable
+        Function that prepares steps of processing for its picture.
+    notes : tuple of str
+        As those of `prepare`.
+    """
+    ready, notes = prepare(camera, run, shared)
+    frame = take_frame(ready, run.workers, run.stages)
+    return frame, picture_of(frame, run.workers), notes
+
+
+def picture_of(frame: Frame, workers: int) -> Callable[[Sequence[Step]], ProcessedPicture]:
+    """Return what makes a picture of a frame by some steps.
+
+    Parameters
+    ----------
+    frame : Frame
+        The raw frame.
+    workers : int
+        Number of threads.
+
+    Returns
+    -------
+    callable
+        Function of steps.
+    """
+    context = Context(
+        pattern=frame.mosaic.block,
+        colors=frame.mosaic.colors,
+        white_dn=frame.white_dn,
+        black_dn=frame.black_dn,
+        black_steps=frame.black_steps if frame.electrical.black_steps else None,
+        linearize=frame.linear if frame.electrical.linearized else None,
+        saturated_dn=frame.picture_saturated_dn,
+        patches=partial(_patches, frame),
+        primaries=frame.primaries_dn if frame.solved.scene.emits else None,
+        planes=frame.layout.full_color,
+        layout=frame.layout if frame.layout.is_scattered else None,
+    )
+    return partial(process, frame.picture_dn, context, workers=workers)
+
+
+def _patches(frame: Frame) -> Patches:
+    """Return the ColorChecker that color correction is fitted to."""
+    band = frame.solved.scene.wavelengths
+    return Patches(frame.patches_dn(), frame.scene.white, band.start, band.stop)

@@ -1,0 +1,30 @@
+"""How a frame is computed: no result depends on it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from vcam_cli.image_formation.rate_cache import RateCache
+from vcam_cli.progress import Stages
+
+
+@dataclass(frozen=True)
+class Run:
+    """Threads, observer and caches of the computation of a frame."""
+
+    workers: int
+    """Number of threads."""
+    stages: Stages
+    """Observer of the stages."""
+    rate_cache: RateCache | None = None
+    """Cache of the light for further cameras."""
+    earlier: float = 0.0
+    """Estimated time of what came before, such as the autofocus; the plan counts it [s]."""
+
+    def unseen(self, rate_cache: RateCache | None = None) -> Run:
+        """Return the same computation without an observer, for trials."""
+        return Run(self.workers, Stages(), rate_cache)
+
+    def after(self, seconds: float) -> Run:
+        """Return the same computation behind further work of so many seconds."""
+        return replace(self, earlier=self.earlier + seconds)

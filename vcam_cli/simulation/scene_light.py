@@ -1,0 +1,260 @@
+"""The scene before a camera, and its light on the lattice: the linear half of a frame."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import partial
+
+from vcam_cli import memory
+from vcam_cli.arrays import Array
+from vcam_cli.effects.base import Effect, ImageMotion, TemporalGain, Transport, of_kind
+from vcam_cli.effects.signal_chain import SIGMAS, NoiseSource, full_well
+from vcam_cli.errors import bad
+from vcam_cli.image_formation import photon_rate
+from vcam_cli.image_formation.estimates import bandwidth, memory_model
+from vcam_cli.image_formation.optical_path import OpticalPath
+from vcam_cli.image_formation.pixel_response import scene_transfer
+from vcam_cli.image_formation.rate_cache import RateCache
+from vcam_cli.image_formation.transfer_functions import Transfer
+from vcam_cli.quality import scielab
+from vcam_cli.quality.display import display_screen
+from vcam_cli.readout import auto_exposure, exposure
+from vcam_cli.scenes.base import ChartScene, HarmonicScene
+from vcam_cli.scenes.depth_scene import DepthScene
+from vcam_cli.scenes.layered import AnyScene, LayeredScene
+from vcam_cli.scenes.waves import WaveScene
+from vcam_cli.simulation import cost_model
+from vcam_cli.simulation.run import Run
+from vcam_cli.simulation.scene_files import ScenePicture, build_scene, layer_optics, scene_bytes
+from vcam_cli.solve.solved import Solved
+
+ASSUMED = 0.9
+"""Full signal over the scene's brightest light, as assumed before there is any signal."""
+OVERFULL = 2.0
+"""Full wells of light from which on a pixel counts as full, if six standard deviations of its noise
+leave it so."""
+MOST_ELECTRONS = 1e25
+"""More than any pixel ever meets, and far from where 32-bit numbers end."""
+
+
+@dataclass(frozen=True)
+class SceneLight:
+    """A scene before a camera, and the way of its light to the lattice."""
+
+    solved: Solved
+    scene: AnyScene
+    transfer: Transfer
+    """Transfer of the scene's components to one pixel of the lattice."""
+    white_rate: Array
+    """Photo-electrons per second (C,) of the perfect white on the axis, in every color [e/s]."""
+    path: OpticalPath
+    """Lens, pixels and settings through which the scene is seen."""
+    memory: int
+    """Memory of a frame without its scene [bytes]."""
+    picture_memory: int
+    """Memory of what was read of the scene [bytes]."""
+
+
+def scene_light(solved: Solved, picture: ScenePicture, run: Run) -> SceneLight:
+    """Put a scene before a camera.
+
+    Parameters
+    ----------
+    solved : Solved
+        The camera.
+    picture : ScenePicture
+        What the scene's files hold.
+    run : Run
+        How it is computed.
+
+    Returns
+    -------
+    SceneLight
+        The scene, and the way of its light.
+
+    Raises
+    ------
+    BadInput
+        For spectra that do not cover the wavelengths, and more light than any unit could mean.
+    CannotDo
+        Where memory does not suffice.
+    """
+    frame_bytes = _require_memory(solved)
+    run.stages.watch.expect(cost_model.first_estimate(solved, run.workers))
+    effects = solved.effects.mean_signal
+    with run.stages("scene"):
+        scene = _scene(solved, picture, effects)
+    with run.stages("optics"):
+        transfer, white_rate = _transfer(solved, scene, effects, run.rate_cache)
+        brightest = float(white_rate.max())
+        saturation = solved.electrical.saturation / solved.layout.binning_groups.summed_charges
+        ceiling = auto_exposure.ceiling(solved.exposure, brightest, saturation)
+        overexposure = _brightest_around(scene) * brightest / ceiling
+        if overexposure > 1:  # of what lies beside the array, too
+            scene = _scene(solved, picture, effects, overexposure)
+        path = OpticalPath(
+            transfer=transfer,
+            geometry=solved.layout.lattice,
+            settings=solved.settings,
+            mosaic=solved.layout.mosaic,
+            effects=effects,
+            workers=run.workers,
+            ceiling=ceiling,
+            full=min(ASSUMED * _brightest(scene) * brightest, ceiling),
+            fullness=_fullness(solved, scene, float(white_rate.min())),
+            optional=solved.effects.optional(effects),
+            layers=layer_optics(solved, effects, scene),
+        )
+    read = scene_bytes(picture)
+    return SceneLight(solved, scene, transfer, white_rate, path, frame_bytes, read)
+
+
+def formed_light(seen: SceneLight, run: Run) -> photon_rate.Rate:
+    """Return the light of the whole exposure on the lattice.
+
+    Parameters
+    ----------
+    seen : SceneLight
+        The scene before its camera.
+    run : Run
+        How it is computed.
+
+    Returns
+    -------
+    Rate
+        Photo-electrons per second in every place of the lattice [e/s].
+    """
+    form = partial(photon_rate.photo_rate, seen.path, seen.scene, seen.solved.layout.planes)
+    with run.stages("optics"):
+        if run.rate_cache is None:
+            return form()
+        return run.rate_cache.rate(seen.solved.light_key, seen.path.ceiling, form)
+
+
+def light_during(seen: SceneLight, light: photon_rate.Rate, start: float, stop: float) -> Array:
+    """Return the light from `start` to `stop` after a line's exposure begins [s], as `light` is.
+
+    It is that of the whole exposure where nothing is simulated to move.
+    """
+    whole = light.plan.reduced(seen.path)
+    if not of_kind(whole.effects, ImageMotion) and not any(
+        of_kind(layer.effects, ImageMotion) for layer in whole.layers
+    ):
+        return light.values
+    effects = tuple(effect.part_of_exposure(start, stop) for effect in whole.effects)
+    layers = tuple(layer.part_of_exposure(start, stop) for layer in whole.layers)
+    part = replace(
+        whole, effects=effects, transfer=whole.transfer.with_effects(effects), layers=layers
+    )
+    return photon_rate.photo_rate(part, seen.scene, seen.solved.layout.planes).values
+
+
+def refuse_too_much(electrons: float) -> None:
+    """Refuse light that no unit could have meant (BadInput)."""
+    if not electrons < MOST_ELECTRONS:
+        raise bad(
+            "scene",
+            f"light and dark current would make {electrons:.3g} electrons in a pixel or a second",
+            "look for a wrong unit in the light level, the dark current or the exposure",
+        )
+
+
+def _brightest(scene: AnyScene) -> float:
+    """Return a scene's brightest light, relative to white."""
+    flat = scene.flat if isinstance(scene, DepthScene) else scene
+    return flat.chart.brightest if isinstance(flat, HarmonicScene) else flat.brightest
+
+
+def _brightest_around(scene: AnyScene) -> float:
+    """Return the brightest light that a chart has beyond the array, relative to white; else 0."""
+    return _brightest(scene) if isinstance(scene, ChartScene | LayeredScene) else 0.0
+
+
+def _fullness(solved: Solved, scene: AnyScene, white_rate: float) -> float:
+    """Return the darkest light of a scene over that which fills a pixel whatever its noise.
+
+    `white_rate` is that of the perfect white in the color with least light [e/s]. It is 0 where
+    the darkest light is not known, or more than one charge, sample or time decides what is full.
+    """
+    time, enabled = solved.exposure.time, solved.effects.enabled
+    well = full_well(enabled)
+    # Of full packets that are transferred, too, some charge is late.
+    joined = solved.binning is not None or of_kind(enabled, TemporalGain, Transport)
+    if time is None or joined or math.isinf(well) or not isinstance(scene, ChartScene | WaveScene):
+        return 0.0
+    darkest = scene.chart.darkest if isinstance(scene, ChartScene) else scene.darkest
+    full = OVERFULL * well
+    dark = exposure.mean_dark(1.0, enabled) * time
+    variance = math.fsum(s.variance(full + dark, dark) for s in of_kind(enabled, NoiseSource))
+    if full - SIGMAS * math.sqrt(variance) < well:
+        return 0.0
+    return darkest * white_rate * time / full
+
+
+def _require_memory(solved: Solved) -> int:
+    """Return the bytes of a frame without its scene, and refuse one that does not fit.
+
+    What was read of the scene is in memory already.
+    """
+    layout, array = solved.layout, solved.geometry
+    colors = len(layout.mosaic.colors)
+    samples = solved.exposure.count * (colors if layout.full_color else 1)
+    lamp = solved.scene.illuminant
+    if solved.scene.moves or (lamp is not None and lamp.flicker is not None):
+        samples *= 2  # each has a rate of its own
+    scattered = array.rows * array.columns if layout.is_scattered else 0
+    judged = bool(solved.quality)
+    needed = memory_model.frame_bytes(
+        layout.lattice, solved.settings, colors, judged, samples, scattered
+    )
+    if "s-cielab" in solved.quality:
+        shape = layout.picture_shape
+        screen = display_screen(solved.display, shape[1])
+        # By one thread, which is all there are where memory is little.
+        needed += scielab.needed_bytes(shape, screen, solved.display.filters, 1)
+    memory.require(needed, array.rows, array.columns)
+    return needed
+
+
+def _scene(
+    solved: Solved,
+    picture: ScenePicture,
+    effects: tuple[Effect, ...],
+    overexposure: float = 1.0,
+) -> AnyScene:
+    """Return the scene, a chart with its margin: wider where what lies beside it is overexposed."""
+    band, lattice = solved.scene.wavelengths, solved.layout.lattice
+    pixels = bandwidth.margin(
+        lattice, effects, (band.start, band.stop), solved.settings, overexposure
+    )
+    return build_scene(solved, photon_rate.view(lattice, solved.settings, pixels), picture)
+
+
+def _transfer(
+    solved: Solved,
+    scene: AnyScene,
+    effects: tuple[Effect, ...],
+    rate_cache: RateCache | None,
+) -> tuple[Transfer, Array]:
+    """Return the transfer of the scene's components, and the rate (C,) of perfect white [e/s].
+
+    Spectra that do not cover the wavelengths are the user's error.
+    """
+    compute = partial(
+        scene_transfer,
+        solved.response,
+        (*scene.spectra, scene.white),
+        effects,
+        solved.settings.wavelength_step,
+    )
+    try:
+        whole = compute() if rate_cache is None else rate_cache.transfer(solved.light_key, compute)
+    except ValueError as error:
+        raise bad(
+            "scene.wavelengths", str(error), "narrow the wavelengths, or extend the spectrum"
+        ) from None
+    white_rate = whole.level[-1]
+    refuse_too_much(float(white_rate.max()))
+    # A cached transfer has another camera's effects, which are equal but not the same.
+    return replace(whole.with_effects(effects), weights=whole.weights[:-1]), white_rate

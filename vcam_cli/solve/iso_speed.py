@@ -1,0 +1,117 @@
+"""ISO speed of a camera: how much light fills it, and which gain an ISO speed asks for.
+
+Saturation-based, as ISO 12232 defines it: the camera faces daylight, and the exposure of the focal
+plane [lx s] is sought at which its brightest color is full, in the pixel or in the ADC. Light is
+measured behind the lens, so that only the spectrum of its transmittance counts, as that of a filter
+against infrared; dark signal does not count, as it depends on the time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from vcam_cli.arrays import Array
+from vcam_cli.camera.exposure import Exposure
+from vcam_cli.effects.base import Gain
+from vcam_cli.errors import bad
+from vcam_cli.image_formation.pixel_response import PixelResponse, axis_levels
+from vcam_cli.physics import readout
+from vcam_cli.spectra import VISIBLE, Spectrum, illuminant, luminance
+
+DAYLIGHT = "D55"
+"""Illuminant of ISO 12232 for daylight, ISO 7589."""
+
+
+def daylight() -> Spectrum:
+    """Return the light that a camera faces."""
+    return illuminant(DAYLIGHT)
+
+
+def base_iso(electrons_per_exposure: float, saturation: float) -> float:
+    """Return the saturation-based ISO speed of a camera at an exposure gain of 1.
+
+    Parameters
+    ----------
+    electrons_per_exposure : float
+        Electrons that the brightest color makes of daylight [e / (lx s)].
+    saturation : float
+        Electrons at which the well or the ADC is full at that gain [electrons].
+
+    Returns
+    -------
+    float
+        ISO speed.
+
+    References
+    ----------
+    ISO 12232:2019, section 6.2.
+    """
+    return float(readout.saturation_speed(saturation / electrons_per_exposure))
+
+
+def electrons_per_exposure(
+    response: PixelResponse, lens: Spectrum, gains: Sequence[Gain], light: Spectrum
+) -> Array:
+    """Return the electrons of a pixel on the axis for an exposure of the focal plane.
+
+    Light is measured behind the lens.
+
+    Parameters
+    ----------
+    response : PixelResponse
+        Response of the pixels.
+    lens : Spectrum
+        Transmittance of the lens.
+    gains : sequence of Gain
+        Gains of the camera.
+    light : Spectrum
+        Spectral radiance of the scene's white, in any scale.
+
+    Returns
+    -------
+    Array
+        Electrons of every color (C,) [e / (lx s)]; 0 behind a lens that passes no light.
+    """
+    levels = axis_levels(response, [light], gains)
+    start, stop = VISIBLE if lens.covers(*VISIBLE) else (response.start, response.stop)
+    behind = luminance(light.multiply(lens), start, stop)
+    lux = response.irradiance_per_radiance * behind
+    return np.asarray(levels[0] / lux if lux > 0 else np.zeros(len(levels[0])))
+
+
+def gain(exposure: Exposure, base_iso: float, given: float) -> float:
+    """Return the gain that an ISO speed asks for, gain = iso / base_iso.
+
+    Parameters
+    ----------
+    exposure : Exposure
+        What the file says of the exposure.
+    base_iso : float
+        ISO speed of the camera at gain 1; 0 of one that sees nothing of daylight.
+    given : float
+        Gain where no ISO speed is asked for.
+
+    Returns
+    -------
+    float
+        Gain of the exposure.
+
+    Raises
+    ------
+    BadInput
+        For an ISO speed of a camera that sees nothing of daylight, or beyond `max_gain`.
+    """
+    path = ("exposure", "iso")
+    if exposure.iso is None:
+        return given
+    if base_iso == 0:
+        message = "this camera sees nothing of daylight, and has no ISO speed"
+        raise bad(path, message, "give exposure.gain")
+    found = exposure.iso / base_iso
+    auto = exposure.auto
+    if auto and "max_gain" in auto.model_fields_set and found > auto.max_gain:
+        message = f"is a gain of {found:.4g} (base ISO {base_iso:.4g}), more than auto.max_gain"
+        raise bad(path, message, "raise max_gain, or lower iso")
+    return found

@@ -1,0 +1,79 @@
+"""What the light on the sensor depends on: cameras of one key share it.
+
+It is all of the camera file but the keys listed here, of which none is read before electrons are
+counted. A key that is not listed counts as one that changes the light, so a new one can cost time
+but no truth.
+"""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+from vcam_cli.camera.camera import Camera
+from vcam_cli.effects.base import Charge
+from vcam_cli.effects.order import ORDER
+from vcam_cli.effects.signal_chain import NoiseSource
+from vcam_cli.solve.settings import camera_settings
+
+INDEPENDENT_KEYS: tuple[tuple[str, ...], ...] = tuple(
+    tuple(path.split("."))
+    for path in (
+        *("name", "seed", "adc", "exposure", "processing", "quality", "output"),
+        *("accuracy.shot_noise", "display.dpi", "display.width", "display.viewing_distance"),
+        *("pixel.fpn", "pixel.defects"),
+        *(f"pixel.readout.{k}" for k in ("gain", "read_noise", "column_noise", "row_noise")),
+        *(f"pixel.readout.{k}" for k in ("heavy_tailed_noise", "correlated_row_noise")),
+        *(f"pixel.readout.{k}" for k in ("telegraph_noise", "reset_noise", "charge_transfer")),
+        "pixel.readout.timing",
+        *(f"pixel.photodetector.{k}" for k in ("dark_current", "dark_current_density")),
+        *("pixel.photodetector.dark_current_scale", "array.binning"),
+    )
+)
+"""Keys on which the light does not depend. Exposure, ADC and analog gain set the level at which a
+pixel is full, beyond which the light is not followed as exactly: see `RateCache.rate`."""
+_RANDOM = {kind.name for kind in ORDER if issubclass(kind, NoiseSource | Charge)}
+
+
+def light_key(camera: Camera) -> str:
+    """Return all that the light on the sensor depends on, as a text.
+
+    The level of saturation is not in it.
+
+    Parameters
+    ----------
+    camera : Camera
+        The camera.
+
+    Returns
+    -------
+    str
+        JSON of the camera file without the `INDEPENDENT_KEYS`.
+    """
+    form = camera.model_dump(mode="json")
+    moving = ("exposure",) if camera.scene.moves else ()
+    for path in INDEPENDENT_KEYS:
+        if path != moving:
+            _drop(form, path)
+    form["tolerance"] = camera_settings(camera).tolerance  # not that of the file alone
+    accuracy = form["accuracy"]  # a preset by itself is written as its name
+    if isinstance(accuracy, dict) and set(accuracy) == {"preset"}:
+        form["accuracy"] = accuracy["preset"]
+    if isinstance(form.get("effects"), dict):
+        own = {name: state for name, state in form["effects"].items() if name not in _RANDOM}
+        form["effects"] = own or "auto"
+    return json.dumps(form, sort_keys=True)
+
+
+def changes_light(path: str) -> bool:
+    """Return whether a key of a camera, by its dotted path, changes the light on the sensor."""
+    keys = tuple(path.split("."))
+    return not any(keys[: len(known)] == known for known in INDEPENDENT_KEYS)
+
+
+def _drop(form: Any, path: tuple[str, ...]) -> None:
+    *parents, last = path
+    for name in parents:
+        form = form.get(name) if isinstance(form, dict) else None
+    if isinstance(form, dict):
+        form.pop(last, None)

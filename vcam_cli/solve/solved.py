@@ -1,0 +1,313 @@
+"""All that follows from a camera before any light is known, solved once a frame.
+
+Nothing behind `solve` reads a `Camera`: what a file says is in the sections that `Solved` shows as
+they are (scene, exposure, output and so on), what follows from it is solved here. Who needs a
+camera with other values, to meter or to focus, asks for one by its methods.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any, Self
+
+from vcam_cli.arrays import Array
+from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.derived import photodiode
+from vcam_cli.camera.derived.electrical import Electrical
+from vcam_cli.camera.derived.frame_rate import FrameRate, frame_rate
+from vcam_cli.camera.derived.geometry import Geometry, geometry
+from vcam_cli.camera.derived.line_times import LineTimes, line_times
+from vcam_cli.camera.derived.scene_layers import camera_at, flat_camera, layer_cameras
+from vcam_cli.camera.expectations import Limit
+from vcam_cli.camera.exposure import Exposure
+from vcam_cli.camera.optics import Optics
+from vcam_cli.camera.processing import Steps
+from vcam_cli.camera.quality import Display
+from vcam_cli.camera.scene.scene import Scene
+from vcam_cli.camera.sensor.adc import Adc
+from vcam_cli.camera.sensor.array import Binning
+from vcam_cli.camera.sensor.pixel import Pixel
+from vcam_cli.camera.simulation import Output, Seed
+from vcam_cli.effects.base import Gain, of_kind
+from vcam_cli.effects.readout_chain import dark_noise, electrical
+from vcam_cli.effects.signal_chain import Quantizer
+from vcam_cli.image_formation.pixel_response import PixelResponse
+from vcam_cli.image_formation.settings import Settings
+from vcam_cli.readout.layout import Layout
+from vcam_cli.solve import idle_keys, iso_speed, light_key
+from vcam_cli.solve.effects import CameraEffects, camera_effects
+from vcam_cli.solve.layers import SolvedLayer, solve_layer
+from vcam_cli.solve.layout import camera_layout
+from vcam_cli.solve.response import pixel_response
+from vcam_cli.solve.settings import camera_settings
+from vcam_cli.spectra import Spectrum
+
+
+@dataclass(frozen=True, eq=False)
+class Solved:
+    """A camera, solved."""
+
+    camera: Camera
+    """What the file says, at the gain of the exposure: for records of where a frame comes from,
+    and for who makes other cameras of it."""
+    geometry: Geometry
+    """Geometry of the array, lens and scene."""
+    layout: Layout
+    """Where the pixels are, and the lattice on which their light is computed."""
+    electrical: Electrical
+    """Circuit of a pixel, and the ADC, at the gain of the exposure."""
+    effects: CameraEffects
+    """Every effect, and what the user wants of it."""
+    settings: Settings
+    """Settings of image formation on the lattice."""
+    response: PixelResponse
+    """What pixels on the axis make of radiance."""
+    base_iso: float
+    """ISO speed at gain 1; 0 of a camera that sees nothing of daylight."""
+
+    # --- what the file says --------------------------------------------------------------------
+
+    @property
+    def name(self) -> str:
+        """Name of the camera."""
+        return self.camera.name
+
+    @property
+    def scene(self) -> Scene:
+        """What stands in front of the lens."""
+        return self.camera.scene
+
+    @property
+    def optics(self) -> Optics:
+        """The lens, as the file describes it."""
+        return self.camera.optics
+
+    @property
+    def pixel(self) -> Pixel:
+        """One pixel, as the file describes it."""
+        return self.camera.pixel
+
+    @property
+    def binning(self) -> Binning | None:
+        """How pixels are read as one; None where the file does not ask for it."""
+        return self.camera.array.binning
+
+    @property
+    def is_scattered(self) -> bool:
+        """Whether the pixels lie in no rows and columns."""
+        return self.camera.array.is_scattered
+
+    @property
+    def has_edge(self) -> bool:
+        """Whether the scene is a slanted edge on rows and columns, whose MTF can be measured."""
+        return self.camera.has_edge
+
+    @property
+    def limits(self) -> tuple[Limit, ...]:
+        """What the file expects of the metrics."""
+        return self.camera.limits
+
+    @property
+    def has_mosaic(self) -> bool:
+        """Whether pixels of several colors lie side by side."""
+        return self.camera.array.mosaic
+
+    @property
+    def adc_keys(self) -> Adc:
+        """The ADC, as the file describes it."""
+        return self.camera.adc
+
+    @property
+    def exposure(self) -> Exposure:
+        """How the exposure is timed."""
+        return self.camera.exposure
+
+    @property
+    def processing(self) -> Steps:
+        """Steps from the raw frame to the picture."""
+        return self.camera.processing
+
+    @property
+    def quality(self) -> tuple[str, ...]:
+        """Metrics of the picture that are asked for."""
+        return self.camera.quality
+
+    @property
+    def display(self) -> Display:
+        """The display on which pictures are compared."""
+        return self.camera.display
+
+    @property
+    def output(self) -> Output:
+        """What is written."""
+        return self.camera.output
+
+    @property
+    def seed(self) -> Seed:
+        """What the random numbers depend on."""
+        return self.camera.seed
+
+    @property
+    def tolerance(self) -> float:
+        """Error of the mean signal that the file allows, relative to full signal."""
+        return self.camera.accuracy.tolerance
+
+    @property
+    def gain(self) -> float:
+        """Analog gain of the exposure."""
+        return self.electrical.exposure_gain
+
+    # --- what follows --------------------------------------------------------------------------
+
+    @property
+    def adc(self) -> Quantizer:
+        """The ADC, whether quantization is switched off or not."""
+        return self.effects.adc
+
+    @property
+    def dark_noise(self) -> float:
+        """Noise of pixels in the dark in front of the ADC, referred to the input [e rms]."""
+        return dark_noise(self.camera)
+
+    @property
+    def frame_rate(self) -> FrameRate | None:
+        """How fast frames are read; None where the file does not say."""
+        return frame_rate(self.camera)
+
+    @property
+    def lines(self) -> LineTimes:
+        """When the lines of the array are exposed."""
+        return line_times(self.camera, self.geometry)
+
+    @cached_property
+    def light_key(self) -> str:
+        """All that the light on the sensor depends on, but for the level of saturation."""
+        return light_key.light_key(self.camera)
+
+    @cached_property
+    def layers(self) -> tuple[SolvedLayer, ...]:
+        """Layers of the scene, the nearest first; () of a flat scene or one with a depth map."""
+        return tuple(solve_layer(alone) for alone in layer_cameras(self.camera))
+
+    def layers_at(self, distances: tuple[float, ...]) -> tuple[SolvedLayer, ...]:
+        """Return a picture with depth as layers at these distances [m]."""
+        return tuple(solve_layer(camera_at(self.camera, distance)) for distance in distances)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What to know of the file: keys that change nothing, and what the silicon is taken for."""
+        return (*idle_keys.notes(self.camera), *photodiode.remarks(self.camera))
+
+    def electrons_per_exposure(self, light: Spectrum) -> Array:
+        """Return the electrons of a pixel on the axis for an exposure of the focal plane.
+
+        Light is measured behind the lens.
+
+        Parameters
+        ----------
+        light : Spectrum
+            Spectral radiance of the scene's white, in any scale.
+
+        Returns
+        -------
+        Array
+            Electrons of every color (C,) [e / (lx s)]; 0 behind a lens that passes no light.
+        """
+        gains = of_kind(self.effects.enabled, Gain)
+        lens = self.optics.transmittance.resolve()
+        return iso_speed.electrons_per_exposure(self.response, lens, gains, light)
+
+    # --- the same camera with other values -----------------------------------------------------
+
+    def _with(self, **changes: Any) -> Self:
+        """Return the camera with some sections changed that nothing solved follows from."""
+        return replace(self, camera=self.camera.model_copy(update=changes))
+
+    def at_gain(self, gain: float) -> Self:
+        """Return the same camera at another gain of the exposure."""
+        camera = self.camera.with_exposure_gain(gain)
+        if gain == self.gain:
+            return replace(self, camera=camera)
+        effects = camera_effects(camera, self.geometry)
+        return replace(self, camera=camera, electrical=electrical(camera), effects=effects)
+
+    def with_seed(self, seed: Seed) -> Self:
+        """Return the same camera with other random numbers."""
+        return self._with(seed=seed)
+
+    def with_samples_at(self, times: tuple[float, ...], estimator: str) -> Self:
+        """Return the same camera with these times of samples [s], and this estimator."""
+        update = {"captures": times, "estimator": estimator}
+        return self._with(exposure=self.exposure.model_copy(update=update))
+
+    def standing_still(self) -> Solved:
+        """Return the camera as it meters and focuses: what moves stands where its file says."""
+        camera = self.camera
+        source = camera.scene.source.standing_still()
+        scene = camera.scene.model_copy(update={"source": source, "camera_motion": None})
+        effects = camera.effects
+        if isinstance(effects, dict):
+            effects = {name: wish for name, wish in effects.items() if name != "motion"}
+        return solve(camera.model_copy(update={"scene": scene, "effects": effects}))
+
+    def timed(self, time: float, gain: float, samples: tuple[float, ...]) -> Solved:
+        """Return the camera with the time [s] and gain, or samples [s], that it chose."""
+        fixed = self.exposure.single(time, gain)
+        if self.exposure.schedule is not None:
+            fixed = self.exposure.model_copy(update={"captures": samples})
+        camera = self.camera.model_copy(update={"exposure": fixed})
+        return solve(camera.with_exposure_gain(gain))
+
+    def with_exposure(self, exposure: Exposure) -> Self:
+        """Return the same camera, at the gain that it has, with the exposure as its file has it."""
+        gain = self.gain
+        camera = self.camera.model_copy(update={"exposure": exposure}).with_exposure_gain(gain)
+        return replace(self, camera=camera)
+
+    def with_tolerance(self, tolerance: float) -> Solved:
+        """Return the camera simulated with another tolerance, relative to full signal."""
+        update = {"preset": None, "tolerance": tolerance}
+        accuracy = self.camera.accuracy.model_copy(update=update)
+        return solve(self.camera.model_copy(update={"accuracy": accuracy}))
+
+    def focused_at(self, shift: float) -> Solved:
+        """Return the camera with its lens fixed, its image plane shifted [m]."""
+        optics = self.optics.model_copy(update={"defocus": shift, "focus": "fixed"})
+        return solve(self.camera.model_copy(update={"optics": optics}))
+
+    def flat_at(self, distance: float) -> Solved:
+        """Return the camera before a flat scene in place of its map of depth, at a distance [m]."""
+        return solve(flat_camera(self.camera, camera_at(self.camera, distance)))
+
+
+def solve(camera: Camera) -> Solved:
+    """Return all that follows from a camera before any light is known.
+
+    Parameters
+    ----------
+    camera : Camera
+        The camera, with what the files of its lens hold.
+
+    Raises
+    ------
+    BadInput
+        Where its file contradicts itself.
+    CannotDo
+        Where the positions of pixels need too fine a lattice.
+    """
+    found = geometry(camera)
+    layout = camera_layout(camera, found)
+    circuit = electrical(camera)
+    effects = camera_effects(camera, found)
+    settings = layout.settings(camera_settings(camera))
+    response = pixel_response(camera, found, layout.mosaic)
+    solved = Solved(camera, found, layout, circuit, effects, settings, response, base_iso=0.0)
+    per_exposure = solved.electrons_per_exposure(iso_speed.daylight())
+    most = float(per_exposure.max()) * layout.binning_groups.summed_charges
+    if most <= 0:
+        return solved.at_gain(iso_speed.gain(camera.exposure, 0.0, circuit.exposure_gain))
+    at_one = circuit if circuit.exposure_gain == 1 else electrical(camera.with_exposure_gain(1.0))
+    base_iso = iso_speed.base_iso(most, at_one.saturation)
+    gain = iso_speed.gain(camera.exposure, base_iso, circuit.exposure_gain)
+    return replace(solved, base_iso=base_iso).at_gain(gain)
