@@ -24,7 +24,7 @@ import vcam_cli
 PACKAGE = Path(vcam_cli.__file__).parent
 
 FLOORS = (
-    {"errors", "interrupts", "arguments"},
+    {"arrays", "errors", "interrupts", "arguments"},
     {"units", "rng", "progress", "parallel", "floats"},
     {"memory", "spectra", "scheduling", "source_code"},
     {"physics"},
