@@ -26,6 +26,18 @@ class ByteCache(Generic[T]):
         """Return the result of `compute`, or the one that is kept for the same key.
 
         Two threads may compute the same result at once; both get an equal one.
+
+        Parameters
+        ----------
+        key : hashable
+            What the result depends on.
+        compute : callable
+            What computes it; called without a lock.
+
+        Returns
+        -------
+        T
+            The result.
         """
         with self._lock:
             if key in self._kept:

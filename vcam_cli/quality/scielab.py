@@ -163,7 +163,20 @@ def needed_bytes(shape: tuple[int, int], screen: Screen, filters: Filters, worke
 
 
 def places_per_pixel(screen: Screen, filters: Filters) -> int:
-    """Return the number of places at which each pixel is looked at."""
+    """Return the number of places at which each pixel is looked at.
+
+    Parameters
+    ----------
+    screen : Screen
+        The display and its viewing distance.
+    filters : Filters
+        Filters of the eye.
+
+    Returns
+    -------
+    int
+        Places in each pixel: the square of those along one side.
+    """
     return _Places.prepare((1, 1), screen, filters).along ** 2
 
 

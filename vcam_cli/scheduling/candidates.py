@@ -51,6 +51,22 @@ class Candidates:
 def candidate_times(pdf: Pdf, sensor: Sensor, constraints: Constraints, count: int) -> Candidates:
     """Choose candidates for up to `count` captures.
 
+    Parameters
+    ----------
+    pdf : Pdf
+        Photocurrents [e/s].
+    sensor : Sensor
+        The pixel.
+    constraints : Constraints
+        What the readout demands of the times.
+    count : int
+        Most captures that a schedule may have.
+
+    Returns
+    -------
+    Candidates
+        Times [s], with the mean SNR lost by allowing no others.
+
     Raises
     ------
     ValueError
@@ -67,6 +83,20 @@ def level_candidates(pdf: Pdf, sensor: Sensor, constraints: Constraints) -> Cand
 
     A capture at any other time is delayed to the next of these: nothing more saturates, and no
     pixel's exposure is shorter.
+
+    Parameters
+    ----------
+    pdf : Pdf
+        Levels of photocurrent [e/s].
+    sensor : Sensor
+        The pixel.
+    constraints : Constraints
+        What the readout demands of the times.
+
+    Returns
+    -------
+    Candidates
+        Times [s]; moving a capture to one of them loses nothing.
 
     Raises
     ------

@@ -68,7 +68,20 @@ class Rewards:
     sums: Floats
 
     def loss(self, captures: Indices, followers: Indices) -> Floats:
-        """Return (M,) what each capture loses of `own` to the capture that follows it."""
+        """Return (M,) what each capture loses of `own` to the capture that follows it.
+
+        Parameters
+        ----------
+        captures : (M,) array
+            Indices of the captures' candidates.
+        followers : (M,) array
+            Index of the candidate that follows each.
+
+        Returns
+        -------
+        (M,) array
+            Loss of mean SNR.
+        """
         if self.weights.shape[1] == 1:
             lost: Floats = self.weights[captures, 0] * self.sums[followers, self.block[captures], 0]
             return lost
@@ -77,7 +90,22 @@ class Rewards:
 
 
 def last_sample_rewards(pdf: Pdf, times: Floats, sensor: Sensor) -> Rewards:
-    """Return the rewards under eq 4.1 with the last sample before saturation; times rise [s]."""
+    """Return the rewards under eq 4.1 with the last sample before saturation.
+
+    Parameters
+    ----------
+    pdf : Pdf
+        Photocurrents [e/s].
+    times : (G,) array
+        Candidate times, rising [s].
+    sensor : Sensor
+        The pixel.
+
+    Returns
+    -------
+    Rewards
+        Mean SNR of each candidate, and what it loses to a later one.
+    """
     noise, inverse = np.unique(sensor.dark + sensor.noise_floor / times, return_inverse=True)
     nodes, block, weights = _interpolation(noise)
     sums = _cumulative_integrals(pdf, times, sensor, nodes)
@@ -102,11 +130,33 @@ class Chains:
     choices: Indices
 
     def value(self, count: int) -> float:
-        """Return the mean SNR of the best `count` captures, the first at the first candidate."""
+        """Return the mean SNR of the best `count` captures, the first at the first candidate.
+
+        Parameters
+        ----------
+        count : int
+            Captures, from 1 to N.
+
+        Returns
+        -------
+        float
+            Mean SNR, as a power ratio.
+        """
         return float(self.values[count - 1, 0])
 
     def path(self, count: int) -> Indices:
-        """Return the (<= count,) candidates of those captures, in the order of time."""
+        """Return the candidates of those captures, in the order of time.
+
+        Parameters
+        ----------
+        count : int
+            Captures, from 1 to N.
+
+        Returns
+        -------
+        (<= count,) array
+            Indices of candidates; fewer where further captures gain nothing.
+        """
         path = [0]
         for left in range(count - 1, 0, -1):
             following = int(self.choices[left, path[-1]])

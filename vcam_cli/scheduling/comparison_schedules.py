@@ -47,9 +47,26 @@ def uniform_times(t1: float, longest: float, count: int) -> Floats:
 
 
 def exponential_times(t1: float, longest: float, count: int) -> Floats:
-    """Return min(2^(k-1) t_1, T), k = 1..N.
+    """Return min(2^(k-1) t_1, T), k = 1..N. Times are equal where they reach T.
 
-    Parameters, results and errors are those of `uniform_times`; times are equal where they reach T.
+    Parameters
+    ----------
+    t1 : float
+        First time t_1 [s]; T where that is shorter.
+    longest : float
+        Longest time T [s].
+    count : int
+        Number of captures N.
+
+    Returns
+    -------
+    (N,) array
+        Rising times [s].
+
+    Raises
+    ------
+    ValueError
+        If there is no capture, or a time is not finite and above 0.
     """
     first = _first_time(t1, longest, count)
     with np.errstate(over="ignore"):  # longer than any T
@@ -60,7 +77,24 @@ def exponential_times(t1: float, longest: float, count: int) -> Floats:
 def geometric_times(t1: float, longest: float, count: int) -> Floats:
     """Return t_1 (T / t_1)^((k-1)/(N-1)), k = 1..N.
 
-    Parameters, results and errors are those of `uniform_times`.
+    Parameters
+    ----------
+    t1 : float
+        First time t_1 [s]; T where that is shorter.
+    longest : float
+        Longest time T [s].
+    count : int
+        Number of captures N.
+
+    Returns
+    -------
+    (N,) array
+        Rising times [s].
+
+    Raises
+    ------
+    ValueError
+        If there is no capture, or a time is not finite and above 0.
     """
     first = _first_time(t1, longest, count)
     if count == 1:

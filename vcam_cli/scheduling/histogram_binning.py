@@ -104,6 +104,11 @@ def histogram_of_pdf(pdf: Pdf) -> tuple[Floats, Floats]:
     that the brightest photocurrent stays the brightest; the first is as wide as the second, and a
     level of 0, which no schedule can serve, goes with the next one.
 
+    Parameters
+    ----------
+    pdf : Pdf
+        Segments, or levels.
+
     Returns
     -------
     edges : (K + 1,) array

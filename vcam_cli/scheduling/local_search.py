@@ -109,7 +109,20 @@ def assigned_schedule(pdf: Pdf, count: int, starts: int = 1, seed: int = 0) -> S
 
 
 def assignment_count(pdf: Pdf, count: int) -> int:
-    """Return in how many ways `count` captures, one of them in the brightest, fall on segments."""
+    """Return in how many ways `count` captures, one of them in the brightest, fall on segments.
+
+    Parameters
+    ----------
+    pdf : Pdf
+        Segments of photocurrent.
+    count : int
+        Captures.
+
+    Returns
+    -------
+    int
+        Number of assignments of captures to segments with a probability above 0.
+    """
     segments = int(np.sum(pdf.probability > 0))
     return comb(count - 1 + segments - 1, segments - 1)
 

@@ -106,6 +106,13 @@ def expected_snr_bound(pdf: Pdf, sensor: Sensor = SHOT_NOISE) -> float:
 
     No schedule of any number of captures exceeds it. Exposures are at most `sensor.max_time`.
 
+    Parameters
+    ----------
+    pdf : Pdf
+        Photocurrents [e/s].
+    sensor : Sensor
+        The pixel.
+
     Returns
     -------
     float
@@ -176,13 +183,40 @@ def expected_snr_noisy_saturation(pdf: Pdf, times: ArrayLike, sensor: Sensor) ->
 def evaluate_schedule(
     pdf: Pdf, times: ArrayLike, sensor: Sensor = SHOT_NOISE, gap: float | None = None
 ) -> Schedule:
-    """Return the schedule of these times in any order [s] with its expected SNR over a pdf."""
+    """Return the schedule of these times with its expected SNR over a pdf.
+
+    Parameters
+    ----------
+    pdf : Pdf
+        Photocurrents [e/s].
+    times : (N,) array_like
+        Capture times in any order [s].
+    sensor : Sensor
+        The pixel.
+    gap : float or None
+        Certified gap of the schedule, relative; None where nothing is certified.
+
+    Returns
+    -------
+    Schedule
+        Rising times [s], the photocurrents that just fill the well in them [e/s], the mean SNR.
+    """
     when = np.sort(np.atleast_1d(np.asarray(times, float)))
     return Schedule(when, sensor.saturation_limit(when), expected_snr(pdf, when, sensor), gap)
 
 
 def sorted_times(times: ArrayLike) -> Floats:
-    """Return capture times (N,) in rising order [s].
+    """Return capture times in rising order.
+
+    Parameters
+    ----------
+    times : (N,) array_like
+        Capture times in any order [s].
+
+    Returns
+    -------
+    (N,) array
+        Rising times [s].
 
     Raises
     ------
@@ -220,6 +254,13 @@ def saturation_limits(pdf: Pdf, times: Floats, sensor: Sensor) -> Floats:
 
 def split_segments(pdf: Pdf, cuts: Floats) -> tuple[Floats, Floats, Floats]:
     """Split the segments of a pdf at some photocurrents.
+
+    Parameters
+    ----------
+    pdf : Pdf
+        Segments, or levels.
+    cuts : (C,) array
+        Photocurrents in any order; those outside of the pdf split nothing.
 
     Returns
     -------

@@ -68,12 +68,46 @@ class Pdf:
 
     @staticmethod
     def uniform(min: float, max: float) -> "Pdf":
-        """Return the uniform pdf between two photocurrents."""
+        """Return the uniform pdf between two photocurrents.
+
+        Parameters
+        ----------
+        min, max : float
+            Ends of the photocurrents, of any unit, min < max.
+
+        Returns
+        -------
+        Pdf
+            One segment.
+
+        Raises
+        ------
+        ValueError
+            If the ends make no pdf.
+        """
         return Pdf.segments([min], [max], [1.0])
 
     @staticmethod
     def segments(low: ArrayLike, high: ArrayLike, probability: ArrayLike) -> "Pdf":
-        """Return the piecewise uniform pdf of K segments with these ends and weights, (K,) each."""
+        """Return the piecewise uniform pdf of K segments.
+
+        Parameters
+        ----------
+        low, high : (K,) array_like
+            Ends of each segment, in any unit of photocurrent.
+        probability : (K,) array_like
+            Weight of each segment, of any sum.
+
+        Returns
+        -------
+        Pdf
+            The pdf.
+
+        Raises
+        ------
+        ValueError
+            If a segment has no width, or the arrays make no pdf.
+        """
         starts, ends = (np.atleast_1d(np.asarray(end, float)) for end in (low, high))
         if ends.shape == starts.shape and np.any(ends == starts):
             raise ValueError("a segment's max must be above its min")
@@ -81,7 +115,25 @@ class Pdf:
 
     @staticmethod
     def levels(values: ArrayLike, weights: ArrayLike) -> "Pdf":
-        """Return the pdf of discrete photocurrents in any order; weights of equal ones add up."""
+        """Return the pdf of discrete photocurrents.
+
+        Parameters
+        ----------
+        values : (K,) array_like
+            Levels in any order and unit; weights of equal ones add up.
+        weights : (K,) array_like
+            Their weights, of any sum.
+
+        Returns
+        -------
+        Pdf
+            The pdf, its levels rising.
+
+        Raises
+        ------
+        ValueError
+            If there are not as many weights as levels, or they make no pdf.
+        """
         where, weight = (np.atleast_1d(np.asarray(v, float)) for v in (values, weights))
         if where.ndim != 1 or where.shape != weight.shape:
             raise ValueError("as many weights as levels are needed")
@@ -92,7 +144,25 @@ class Pdf:
 
     @staticmethod
     def histogram(edges: ArrayLike, counts: Sequence[float] | ArrayLike) -> "Pdf":
-        """Return the piecewise uniform pdf of (K,) counts between (K + 1,) edges."""
+        """Return the piecewise uniform pdf of a histogram.
+
+        Parameters
+        ----------
+        edges : (K + 1,) array_like
+            Rising edges of the bins, in any unit of photocurrent.
+        counts : (K,) array_like
+            Weight of each bin, of any sum.
+
+        Returns
+        -------
+        Pdf
+            The pdf.
+
+        Raises
+        ------
+        ValueError
+            If there are fewer than two edges, or they make no pdf.
+        """
         ends = np.asarray(edges, float)
         if ends.ndim != 1 or ends.size < 2:
             raise ValueError("a histogram needs at least two edges")
@@ -137,12 +207,34 @@ class Pdf:
         return np.concatenate([[0.0], np.cumsum(self.probability * centers)])
 
     def cdf(self, x: ArrayLike) -> Floats:
-        """Return P(i <= x), the cumulative distribution function, in the shape of `x`."""
+        """Return P(i <= x), the cumulative distribution function.
+
+        Parameters
+        ----------
+        x : array_like
+            Photocurrents, in the unit of the pdf.
+
+        Returns
+        -------
+        array
+            Probabilities, in the shape of `x`.
+        """
         segment, share, _ = self._position(np.asarray(x, float))
         return self._cumulative[segment] + self._padded_probabilities[segment] * share
 
     def first_moment(self, x: ArrayLike) -> Floats:
-        """Return the integral of i f(i) up to and including `x`, in the shape of `x`."""
+        """Return the integral of i f(i) up to and including x.
+
+        Parameters
+        ----------
+        x : array_like
+            Photocurrents, in the unit of the pdf.
+
+        Returns
+        -------
+        array
+            Integrals in that unit, in the shape of `x`.
+        """
         segment, share, center = self._position(np.asarray(x, float))
         return self._moments[segment] + self._padded_probabilities[segment] * share * center
 

@@ -58,9 +58,17 @@ class Sensor:
         return self.noise_floor == 0 and self.dark == 0
 
     def saturation_limit(self, times: ArrayLike) -> Floats:
-        """Return the photocurrent that just fills the well in each of `times` [s], in e/s.
+        """Return the photocurrent that just fills the well in each of some times.
 
-        It is negative where dark current alone fills the well.
+        Parameters
+        ----------
+        times : array_like
+            Exposure times [s], above 0.
+
+        Returns
+        -------
+        array
+            Photocurrents [e/s]; negative where dark current alone fills the well.
         """
         return self.well / np.asarray(times, float) - self.dark
 
@@ -106,7 +114,18 @@ class Constraints:
         return max(self.least_gap, self.frame_time)
 
     def whole_frames(self, times: ArrayLike) -> Floats:
-        """Return the number of whole frames in each of `times` [s]; `frame_time` is above 0."""
+        """Return the number of whole frames in each of some times.
+
+        Parameters
+        ----------
+        times : array_like
+            Times [s]; `frame_time` must be above 0.
+
+        Returns
+        -------
+        array
+            Numbers of frames, as floats.
+        """
         return np.floor(np.asarray(times, float) / self.frame_time * (1 + SLACK))
 
 
@@ -116,6 +135,20 @@ UNCONSTRAINED = Constraints()
 
 def first_capture_time(pdf: Pdf, sensor: Sensor, constraints: Constraints = UNCONSTRAINED) -> float:
     """Return t_1, the longest time that does not saturate the brightest photocurrent [s].
+
+    Parameters
+    ----------
+    pdf : Pdf
+        Photocurrents [e/s].
+    sensor : Sensor
+        The pixel.
+    constraints : Constraints
+        What the readout demands of the time.
+
+    Returns
+    -------
+    float
+        Time [s], at most `sensor.max_time`, in whole frames where `frame_time` is given.
 
     Raises
     ------

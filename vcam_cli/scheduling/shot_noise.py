@@ -83,6 +83,19 @@ def objective_value(pdf: Pdf, captures: Floats) -> float:
     """Return J of photocurrents `captures` (N,) that fall from the brightest.
 
     Of captures in any other order it gives no more than of the same ones sorted.
+
+    Parameters
+    ----------
+    pdf : Pdf
+        Photocurrents, of any unit.
+    captures : (N,) array
+        Photocurrents that just fill the well in each capture, falling from the brightest, in that
+        unit.
+
+    Returns
+    -------
+    float
+        J, the mean charge of the pixels over the well.
     """
     moments = np.append(pdf.first_moment(captures), 0.0)
     return float(np.sum(-np.diff(moments) / captures))

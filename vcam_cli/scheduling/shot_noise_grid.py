@@ -70,7 +70,20 @@ class Grid:
     below: float
 
     def bound(self, on_grid: float, count: int) -> float:
-        """Return J that no `count` captures exceed, from J of the best `on_grid`."""
+        """Return J that no `count` captures exceed, from J of the best `on_grid`.
+
+        Parameters
+        ----------
+        on_grid : float
+            J of the best captures on the grid.
+        count : int
+            Captures.
+
+        Returns
+        -------
+        float
+            Upper bound of J.
+        """
         return on_grid + (count - 1) * self.loss + self.below
 
 
@@ -130,7 +143,20 @@ def best_captures(values: Floats, moments: Floats, count: int) -> list[Indices]:
 
 
 def concave_hull(m: Floats, v: Floats) -> Indices:
-    """Return the indices of the upper hull of points (m, v) with rising `m`, ends included."""
+    """Return the indices of the upper hull of points (m, v) with rising `m`, ends included.
+
+    Parameters
+    ----------
+    m : (P,) array
+        Rising abscissas.
+    v : (P,) array
+        Ordinates.
+
+    Returns
+    -------
+    (H,) array
+        Rising indices of the hull's points.
+    """
     kept = np.arange(m.size)
     for _ in range(ROUNDS):
         dents = np.flatnonzero(~_above_chords(m[kept], v[kept], 1))

@@ -100,7 +100,18 @@ def mean_snr(pdf: Pdf, schedules: Floats, sensor: Sensor, order: int = EXACT) ->
 
 @cache
 def gauss_rule(nodes: int) -> tuple[Floats, Floats]:
-    """Return points and weights of Gauss's rule on [-1, 1]."""
+    """Return points and weights of Gauss's rule on [-1, 1].
+
+    Parameters
+    ----------
+    nodes : int
+        Number of points.
+
+    Returns
+    -------
+    points, weights : (nodes,) arrays
+        Rising points in [-1, 1], and their weights, of sum 2.
+    """
     points, weights = np.polynomial.legendre.leggauss(nodes)
     return points, weights
 
@@ -179,7 +190,21 @@ def split_octaves(
 ) -> tuple[Indices, Floats, Floats, Floats]:
     """Split segments until their ends, moved by `shift`, are at most a factor 2 apart.
 
-    Returns the segment each part comes from, its ends, its share of that one's width.
+    Parameters
+    ----------
+    low, high : (K,) arrays
+        Ends of the segments, low < high.
+    shift : (K,) array
+        What is added to the ends of each before their ratio is taken, in their unit.
+
+    Returns
+    -------
+    source : (M,) array
+        Index of the segment that each part comes from.
+    low, high : (M,) arrays
+        Ends of the parts.
+    share : (M,) array
+        Width of each part over that of its segment.
     """
     start = np.maximum(shift, NEAR_ZERO * high - low)
     ratio = (high + start) / (low + start)
@@ -212,7 +237,18 @@ class Pixels:
     last: Indices
 
     def chosen(self, which: NDArray[np.bool_]) -> "Pixels":
-        """Return some of the pixels."""
+        """Return some of the pixels.
+
+        Parameters
+        ----------
+        which : (M,) array of bool
+            Whether to keep each kind.
+
+        Returns
+        -------
+        Pixels
+            Those that are kept.
+        """
         return Pixels(self.rate[which], self.weight[which], self.last[which])
 
 
