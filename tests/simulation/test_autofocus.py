@@ -9,9 +9,8 @@ from vcam_cli.camera.optics import FocusWindow
 from vcam_cli.errors import BadInput
 from vcam_cli.files.images.png import write_png
 from vcam_cli.image_formation.estimates import light_cost
-from vcam_cli.progress import Silent, Stages
+from vcam_cli.progress import Silent
 from vcam_cli.simulation import autofocus, cost_model
-from vcam_cli.simulation.preparation import prepare as bring_light
 from vcam_cli.simulation.simulate import prepare
 from vcam_cli.solve.idle_keys import idle_keys
 
@@ -46,7 +45,7 @@ def test_an_aberrated_lens_is_as_sharp_as_anywhere(tmp_path):
     def sharpness(shift):
         fixed = {"optics.focus": "fixed", "optics.defocus": f"{shift!r} m", "accuracy": "reference"}
         made = camera(tmp_path, aberrated | fixed)
-        return autofocus.contrast(bring_light(made, None, 1, Stages()).rate, 1, 1)
+        return autofocus.contrast(prepare(made, workers=1)[0].rate, 1, 1)
 
     best = max(sharpness(float(place)) for place in DEPTH / 4 * np.arange(-20, 21))
     # trials err by 1e-3 of full signal, and contrast is a square
