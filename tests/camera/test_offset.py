@@ -84,7 +84,7 @@ def test_nothing_is_clipped_in_the_dark(kind: str, tmp_path) -> None:
     dark |= {"adc.reference": "20 mV"} if kind == "logarithmic" else {}
     frame = simulate(camera(tmp_path, dark | AUTO)).frame
     assert (frame.dn == 0).mean() < 1e-3
-    electrons = frame.linear(frame.dn.astype(float)) - frame.electrical.offset
+    electrons = frame.chain.linear(frame.dn.astype(float)) - frame.electrical.offset
     electrons *= frame.electrical.electrons_per_dn
     sigma = math.hypot(30, 40, 25)
     assert abs(electrons.mean()) < 5 * sigma / 200 + 0.01 * sigma  # curve of the log at one step

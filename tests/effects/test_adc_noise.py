@@ -63,7 +63,7 @@ def test_the_curve_of_a_pixel_does_not_bend_it(tmp_path) -> None:
     }
     made = {"pixel.readout.transfer_curve": curve, "adc": {"bits": 14, "noise": "5 DN"}}
     frame = simulate(camera(tmp_path, DARK | made | {"pixel.readout.read_noise": "0 e"})).frame
-    adc, electrons = frame.adc, np.array([0.0, 2e4, 7e4])
+    adc, electrons = frame.chain.adc, np.array([0.0, 2e4, 7e4])
     moved = adc.moved(electrons.copy(), np.full(3, 11.0))
     np.testing.assert_allclose(adc.response(moved) - adc.response(electrons), 11, rtol=1e-6)
 
@@ -142,7 +142,7 @@ def test_every_sample_of_an_integration_has_its_own(tmp_path) -> None:
     times = {"exposure": {"captures": ["1 ms", "2 ms", "4 ms"]}}
     frame = simulate(camera(tmp_path, DARK | times)).frame
     assert frame.samples_dn is not None
-    read, common = variances(frame.plan.active, frame.adc)
+    read, common = variances(frame.chain)
     assert (read * 0.16, common) == (pytest.approx(0.64 + 4 + 1 / 12), 0)
     found = np.cov(frame.samples_dn.reshape(3, -1).astype(float))
     error = 5 * math.sqrt(2 / frame.dn.size) * read * 0.16

@@ -251,7 +251,7 @@ def test_a_lone_full_pixel_is_read_without_what_it_defers(over, noise, tmp_path)
     allowed = 6 * np.sqrt(expected + 1) if noise == "on" else 0.01
     assert np.all(abs(result.electrons - expected) <= allowed)
     assert result.metrics["saturated_fraction"] == pytest.approx(full.mean())
-    clean = result.frame.to_dn(expected)
+    clean = result.frame.chain.to_dn(expected)
     np.testing.assert_allclose(result.clean_dn, clean, atol=0.01)
 
 
@@ -266,8 +266,8 @@ def test_full_pixels_amid_full_ones_are_read_as_saturated(tmp_path):
     frame = simulate(camera(tmp_path, SPOT | bright | TRANSFER)).frame
     full = clocked(clocked(np.full((48, 64), 20e3), 1e-3, 2).T, 1e-3, 2).T
     np.testing.assert_allclose(frame.electrons, full, rtol=1e-6)
-    assert np.all(frame.dn >= frame.saturated_dn)
-    assert frame.saturated_dn > 0.99 * 65535
+    assert np.all(frame.dn >= frame.chain.saturated_dn)
+    assert frame.chain.saturated_dn > 0.99 * 65535
 
 
 def test_joined_full_pixels_are_read_without_what_they_defer(tmp_path):

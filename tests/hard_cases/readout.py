@@ -42,7 +42,7 @@ SATURATION = Case(
     "a well half way between two codes is rounded one way in float32, another in float64",
     "exactly all pixels full",
     lambda: [1, 1],
-    lambda: [np.mean(r.dn >= r.frame.saturated_dn) for r in _overexposed()],
+    lambda: [np.mean(r.dn >= r.frame.chain.saturated_dn) for r in _overexposed()],
     _by_code_of_well,
     "full from the code of the full well on",
     0.0,

@@ -147,7 +147,7 @@ def test_exposures_that_do_not_fill_a_pixel_share_it(tmp_path, brought):
         made = camera(tmp_path, BASE | {"exposure": {"time": time}, "quality": ["mse"]})
         result, alone = simulate(made, 1, shared=shared), simulate(made, 1)
         assert result.electrons.tobytes() == alone.electrons.tobytes()
-        full.append(bool((result.dn >= result.frame.saturated_dn).any()))
+        full.append(bool((result.dn >= result.frame.chain.saturated_dn).any()))
         times.append(len(brought))
     assert full == [False, False, False, True, True]
     assert np.diff([0, *times]).tolist() == [2, 1, 1, 2, 2]

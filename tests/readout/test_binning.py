@@ -301,11 +301,11 @@ def test_levels_are_those_of_frames(kind, adc, tmp_path):
     half = 0.5 * (N if kind == "digital" else 1) + 1e-3
     assert lit.dn == pytest.approx(lit.white_dn[0], abs=half)
     assert unlit.dn == pytest.approx(unlit.black_dn, abs=half)
-    assert (full.dn >= full.saturated_dn).all()
-    assert (lit.dn < lit.saturated_dn).all()
+    assert (full.dn >= full.chain.saturated_dn).all()
+    assert (lit.dn < lit.chain.saturated_dn).all()
     assert lit.ideal_dn() == pytest.approx(lit.white_dn[0])
     if adc == "logarithmic":  # codes of a linear ADC: equal steps of light are equal steps
-        dark, some, white = lit.linear(lit.to_dn(np.array([0.0, 400.0, 1200.0])))
+        dark, some, white = lit.chain.linear(lit.chain.to_dn(np.array([0.0, 400.0, 1200.0])))
         assert (white - dark) / (some - dark) == pytest.approx(3, rel=1e-9)
 
 

@@ -136,15 +136,15 @@ def test_a_sample_does_not_depend_on_those_that_follow(dtype, tmp_path):
     frame = simulate(camera(tmp_path, NOISY | several(*TEXTS))).frame
     effects = tuple(e for e in frame.plan.active if not isinstance(e, Quantizer))
     rate = frame.rate.astype(dtype)
-    long, codes = nondestructive_samples.samples(rate, TIMES, effects, frame.adc, SEEDS, 1)
+    long, codes = nondestructive_samples.samples(rate, TIMES, effects, frame.chain.adc, SEEDS, 1)
     assert long.dtype == dtype
     for count in (1, 2, 3):
         short, dn = nondestructive_samples.samples(
-            rate, TIMES[:count], effects, frame.adc, SEEDS, 1
+            rate, TIMES[:count], effects, frame.chain.adc, SEEDS, 1
         )
         assert short.tobytes() == long[:count].tobytes()
         assert dn.tobytes() == codes[:count].tobytes()
-    single, dn = exposure.capture(rate, TIMES[0], effects, frame.adc, SEEDS, 1)
+    single, dn = exposure.capture(rate, TIMES[0], effects, frame.chain.adc, SEEDS, 1)
     assert single.tobytes() == long[0].tobytes()
     assert dn.tobytes() == codes[0].tobytes()
 
@@ -340,7 +340,7 @@ def test_the_picture_shows_the_photocurrent_and_white_is_1(reflectance, tmp_path
     # the codes of the picture are those of the photocurrent in the last time, offset and dark there
     code = 200 + (result.photocurrent + 20e3) * TIMES[-1] / STEP
     np.testing.assert_allclose(result.frame.picture_dn, code, rtol=1e-5)
-    assert result.frame.saturated_dn == 2**14 - 1
+    assert result.frame.chain.saturated_dn == 2**14 - 1
     expected = 200 + 100e3 / TIMES[0] * TIMES[-1] / STEP
     assert result.frame.picture_saturated_dn == pytest.approx(expected, rel=1e-5)
 

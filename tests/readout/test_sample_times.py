@@ -139,7 +139,7 @@ def test_readout_and_reset_noise_count(tmp_path):
     made = camera(tmp_path, asked() | noise)
     frame = simulate(made).frame
     effects = frame.plan.active
-    pixel = sample_times.sensor(frame.electrical, effects, frame.adc, 0.1)
+    pixel = sample_times.sensor(frame.chain.with_effects(effects), 0.1)
     step = frame.electrical.electrons_per_dn
     assert pixel.read == pytest.approx(np.sqrt(25 + step**2 / 12))
     assert (pixel.reset, pixel.dark, pixel.max_time) == (30.0, 2000.0, 0.1)

@@ -102,7 +102,7 @@ def full_signal(ready: Prepared) -> float:
 
 def full_signal_of(ready: Prepared, mean: Array) -> float:
     """Return the full signal of a camera whose `mean_raw` is known [electrons]."""
-    return max(1.0, min(ready.electrical.full_well, float(mean.max())))
+    return max(1.0, min(ready.chain.metered.full_well, float(mean.max())))
 
 
 def variance_shares(ready: Prepared, full: float, workers: int) -> dict[str, float]:

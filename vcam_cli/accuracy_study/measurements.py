@@ -179,7 +179,7 @@ def _shot(result: Result) -> Shot:
     shown = frame.camera.output.render and processed.full_color and processed.channels in (1, 3)
     clean = None
     if shown:
-        codes = np.minimum(frame.to_dn(frame.mean_electrons), frame.picture_saturated_dn)
+        codes = np.minimum(frame.chain.to_dn(frame.mean_electrons), frame.picture_saturated_dn)
         steps = frame.camera.processing
         clean = process(codes, processed.context, steps, workers=processed.workers).linear
     names = Prepared.__dataclass_fields__

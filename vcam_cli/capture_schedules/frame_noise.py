@@ -14,9 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vcam_cli.effects.base import Effect, of_kind
-from vcam_cli.effects.signal_chain import Limit, Quantizer
+from vcam_cli.effects.signal_chain import Limit
 from vcam_cli.parallel import each
 from vcam_cli.readout import nondestructive_samples
+from vcam_cli.readout.raised_codes import RaisedCodes
 from vcam_cli.rng import blocks
 from vcam_cli.scheduling import estimators
 from vcam_cli.scheduling.pdf import Floats
@@ -25,6 +26,8 @@ from vcam_cli.simulation.preparation import Prepared
 
 Flags = NDArray[np.bool_]
 
+ENDLESS = 2**32 - 1
+"""Highest code where neither well nor ADC ends [DN]."""
 GROUP = 16
 """Pixels of nearly the same light whose errors are averaged where saturation is noisy."""
 
@@ -56,8 +59,6 @@ class NoiseMeasurement:
         The camera with the mean rate of its pixels.
     sensor : Sensor
         Its pixel.
-    adc : Quantizer
-        Its ADC.
     times : tuple of float
         (N,) rising capture times [s].
     workers : int
@@ -68,11 +69,10 @@ class NoiseMeasurement:
         self,
         ready: Prepared,
         sensor: Sensor,
-        adc: Quantizer,
         times: tuple[float, ...],
         workers: int,
     ) -> None:
-        self.ready, self.sensor, self.adc, self.times = ready, sensor, adc, times
+        self.ready, self.sensor, self.times = ready, sensor, times
         self.workers = workers
         self.rate = ready.rate.astype(np.float64)
         self.effects: tuple[Effect, ...] = tuple(
@@ -110,12 +110,13 @@ class NoiseMeasurement:
         """Return samples of one integration in an endless well, rounded as the ADC does [e]."""
         seed = self.ready.solved.seed
         seeds = {"sensor": seed.sensor, "frame": seed.frame + 1 + number}
-        e = self.ready.electrical
-        electrons, _ = nondestructive_samples.samples(
-            self.rate, self.times, self.effects, self.adc, seeds, self.workers
+        chain = self.ready.chain
+        # As many codes below black as above it, and far more: none of these samples is clipped.
+        adc = RaisedCodes(chain.adc, chain.highest_dn, ENDLESS)
+        _, dn = nondestructive_samples.samples(
+            self.rate, self.times, self.effects, adc, seeds, self.workers
         )
-        dn = np.rint(self.adc.response(electrons))
-        return (self.adc.linear(dn) - e.offset) * e.electrons_per_dn
+        return chain.to_electrons(dn.astype(np.float64) - adc.pedestal)
 
     def _estimate(self, charge: Floats, full: Flags, method: str) -> Floats:
         s = self.sensor

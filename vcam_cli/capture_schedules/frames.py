@@ -159,15 +159,14 @@ def take_frames(
     if ready.step_rates:
         message = "has a lamp that flickers, and schedules are for steady photocurrents"
         raise bad("frames.camera", message, "remove scene.illuminant.flicker there")
-    adc, effects = ready.solved.adc, ready.solved.effects.enabled
     longest = asked.max or camera.exposure.longest
     assert longest is not None
-    sensor = sample_times.sensor(ready.electrical, effects, adc, longest)
+    sensor = sample_times.sensor(ready.solved.chain, longest)
     count = asked.count or camera.exposure.count
     shots: list[Shot] = []
     for name, times in _schedules(asked, ready.rate, sensor, count).items():
         watch.begin(f"frames: {name}")
-        measurement = NoiseMeasurement(ready, sensor, adc, times, workers)
+        measurement = NoiseMeasurement(ready, sensor, times, workers)
         measured = measurement.measure(asked.estimators, asked.seeds)
         for estimator in asked.estimators:
             expected = _expected_snr(ready.rate, times, sensor, estimator)

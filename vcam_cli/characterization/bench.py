@@ -41,6 +41,7 @@ from vcam_cli.errors import bad
 from vcam_cli.progress import Stages
 from vcam_cli.quality.mtf import Lattice
 from vcam_cli.readout import exposure
+from vcam_cli.readout.raised_codes import RaisedCodes
 from vcam_cli.simulation.preparation import Prepared
 from vcam_cli.simulation.simulate import prepare
 from vcam_cli.spectra import integral, photons
@@ -98,17 +99,16 @@ class Bench:
     @property
     def saturation(self) -> float:
         """Photo-electrons that fill well or ADC, whichever is full first [e]."""
-        return self.ready.electrical.saturation - self.dark
+        return self.ready.chain.saturation - self.dark
 
     @property
     def noise_floor(self) -> float:
         """Temporal variance without any charge, of reset and readout [e^2]."""
-        return sum(e.variance(0.0) for e in noise_sources(self.ready.plan.active, "frame"))
+        return self.ready.chain.noise(0.0).analog
 
     def pattern_variance(self, mean: float) -> float:
         """Return the variance from pixel to pixel at a mean signal, dark included [e^2]."""
-        sources = noise_sources(self.ready.plan.active, "sensor")
-        return sum(e.variance(mean, self.dark) for e in sources)
+        return self.ready.chain.pattern_variance(mean, self.dark)
 
     def column_variance(self, mean: float) -> float:
         """Return the variance from column to column at a mean signal, dark included [e^2]."""
@@ -177,15 +177,13 @@ class Bench:
         (rows, columns) array
             Codes [DN].
         """
-        adc = self.ready.solved.adc
+        chain = self.ready.chain
+        adc = RaisedCodes(chain.adc, self.pedestal, chain.adc.highest_code + self.pedestal)
         seed = self.camera.seed
         # No frame of another frame seed has the same noise.
         seeds = {"sensor": seed.sensor, "frame": seed.frame + (number << 64)}
         active = self.ready.plan.active
-        electrons, _ = exposure.capture(rate, time, active, adc, seeds, self.workers)
-        dn = np.rint(adc.response(electrons)) + self.pedestal
-        clipped: Array = np.clip(dn, 0, 2**adc.bits - 1 + self.pedestal)
-        return clipped
+        return exposure.capture(rate, time, active, adc, seeds, self.workers)[1].astype(rate.dtype)
 
     def color_pixels(self, frame: Array, color: str) -> Array:
         """Return the pixels of one color as lattices of equal size, (lattices, rows, columns)."""
@@ -345,10 +343,10 @@ def _check_measurable(bench: Bench) -> None:
             "the photon transfer measures the gain by the noise of light, which is switched off",
             "remove this line",
         )
-    if bench.saturation <= 0.1 * ready.electrical.saturation:
+    if bench.saturation <= 0.1 * ready.chain.saturation:
         raise bad(
             ("exposure",),
-            f"dark current alone makes {bench.dark:.6g} of the {ready.electrical.saturation:.6g}"
+            f"dark current alone makes {bench.dark:.6g} of the {ready.chain.saturation:.6g}"
             " electrons that a pixel or the ADC holds",
             "expose for a shorter time, or cool the sensor",
         )

@@ -141,7 +141,7 @@ def notes(bench: Bench, channels: tuple[Channel, ...]) -> Iterator[str]:
 def _response_rows(bench: Bench, channel: Channel) -> Iterator[Row]:
     """Yield gain, efficiency and noise."""
     transfer, straight = channel.transfer, channel.linearity
-    gain = 1 / bench.ready.electrical.electrons_per_dn
+    gain = bench.ready.chain.system_gain
     efficiency = bench.efficiency(channel.color)
     dark_noise = math.sqrt(bench.noise_floor + bench.dark)
     read_noise = electrons_of_variance(channel.dark.variance, transfer.gain)
@@ -189,24 +189,24 @@ def _expected_linearity(bench: Bench, channel: Channel) -> tuple[float, float, f
     """Return the linearity error of the readout's curve, its least and its largest deviation."""
     if bench.ready.electrical.curve is None:
         return 0.0, 0.0, 0.0
-    adc = bench.ready.solved.adc
+    chain = bench.ready.chain
     series = channel.transfer.series
     electrons = series.photons * bench.efficiency(channel.color) + bench.dark
-    black = float(adc.response(np.array([bench.dark]))[0])
-    without_noise = replace(series, mean=adc.response(electrons), dark_mean=black)
+    black = chain.black_dn(bench.dark)
+    without_noise = replace(series, mean=chain.to_dn(electrons), dark_mean=black)
     straight = linearity(without_noise)
     return straight.error, straight.min_deviation, straight.max_deviation
 
 
 def _range_rows(bench: Bench, channel: Channel) -> Iterator[Row]:
     """Yield the range, from the least light that can be distinguished from none to the most."""
-    transfer, e = channel.transfer, bench.ready.electrical
+    transfer, chain = channel.transfer, bench.ready.chain
     efficiency = bench.efficiency(channel.color)
     floor, dark = bench.noise_floor, bench.dark
-    capacity = saturation_capacity(e.saturation, dark, floor, bench.pattern_variance)
-    least = sensitivity_threshold(floor + dark + ROUNDING * e.electrons_per_dn**2)
+    capacity = saturation_capacity(chain.saturation, dark, floor, bench.pattern_variance)
+    least = sensitivity_threshold(floor + dark + ROUNDING / chain.system_gain**2)
     definition = "electrons that the well or the ADC holds, whichever is full first"
-    yield "full_well", channel.full_well, e.saturation, "e", definition
+    yield "full_well", channel.full_well, chain.saturation, "e", definition
     definition = f"mu_e.sat, {R4} eq 24"
     yield "saturation_capacity", transfer.saturation_capacity, capacity, "e", definition
     photons, definition = capacity / efficiency, f"mu_p.sat, {R4} section 6"
@@ -219,7 +219,7 @@ def _range_rows(bench: Bench, channel: Channel) -> Iterator[Row]:
     expected, definition = _db(capacity / least), f"{R4} eq 28"
     yield "emva_dynamic_range_db", _db(transfer.dynamic_range), expected, "dB", definition
     measured = _db((channel.full_well - channel.dark_current * bench.time) / transfer.dark_noise)
-    expected = float(readout.dynamic_range_db(e.saturation, dark, floor))
+    expected = float(readout.dynamic_range_db(chain.saturation, dark, floor))
     yield "dynamic_range_db", measured, expected, "dB", "Chen 2003 eq 3.1"
     signal = SNR_LEVEL * bench.saturation
     expected = float(readout.snr_db(signal, dark, floor))

@@ -245,7 +245,7 @@ def _dark_measurements(
     """
     longest = bench.time
     if bench.ready.dark_rate > 0:
-        longest = DARK_LEVEL * bench.ready.electrical.saturation / bench.ready.dark_rate
+        longest = DARK_LEVEL * bench.ready.chain.saturation / bench.ready.dark_rate
     times = np.linspace(0, longest, DARK_TIMES)
     means = []
     for time in map(float, times):

@@ -92,7 +92,7 @@ def _snr_panel(result: Characterization) -> Panel:
 def _model_snr(result: Characterization, channel: Channel, photons: Array) -> Array:
     """Return the SNR of the camera's model at some photons on a pixel, rounding included."""
     bench = result.bench
-    rounding = ROUNDING * bench.ready.electrical.electrons_per_dn**2
+    rounding = ROUNDING / bench.ready.chain.system_gain**2
     electrons = bench.efficiency(channel.color) * photons
     return electrons / np.sqrt(electrons + (bench.noise_floor + bench.dark + rounding))
 

@@ -64,7 +64,7 @@ def labels(result: Result) -> dict[str, float]:
     as it does not saturate and its signal chain is linear.
     """
     frame, circuit = result.frame, result.frame.electrical
-    gain = 1 / circuit.electrons_per_dn
+    gain = frame.chain.system_gain
     dark = frame.dark_rate * frame.exposure_time
     sources = of_kind(frame.plan.active, NoiseSource)
     rms = {f"{source.name} [e]": source.variance(dark, dark) ** 0.5 for source in sources}
@@ -75,7 +75,7 @@ def labels(result: Result) -> dict[str, float]:
         "exposure_gain": circuit.exposure_gain,
         "system_gain [DN/e]": gain,
         "black_level [DN]": frame.black_dn,
-        "saturation [DN]": frame.saturated_dn,
+        "saturation [DN]": frame.chain.saturated_dn,
         "full_well [e]": circuit.full_well,
         "dark_signal [e]": dark,
         "dark_variance [DN2]": gain**2 * temporal + ROUNDING,
@@ -83,5 +83,5 @@ def labels(result: Result) -> dict[str, float]:
         "gain_pixel": fpn.gain_pixel or 0.0,
         "gain_column": fpn.gain_column or 0.0,
         "mean [DN]": float(result.dn.mean(dtype=float)),
-        "saturated_fraction": float(np.mean(result.dn >= frame.saturated_dn)),
+        "saturated_fraction": float(np.mean(result.dn >= frame.chain.saturated_dn)),
     }

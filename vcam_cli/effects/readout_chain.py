@@ -8,18 +8,24 @@ itself, which lifts it off zero.
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.derived import readouts
 from vcam_cli.camera.derived.electrical import Circuit, Electrical, circuit, full_scale, with_offset
 from vcam_cli.camera.derived.geometry import geometry
+from vcam_cli.camera.derived.readouts import has_several
+from vcam_cli.camera.sensor.adc import Companding
 from vcam_cli.effects.base import of_kind
 from vcam_cli.effects.noise.sources import SOURCES
 from vcam_cli.effects.signal_chain import NoiseSource
-from vcam_cli.errors import bad
+from vcam_cli.errors import bad, split
 
 SIGMAS = 4.0
 """Standard deviations below black that an automatic offset keeps: of normal noise 3 of 100 000
 pixels are lower."""
+MOST_BITS = 24
+"""Of merged codes: floats of 32 bits hold them exactly."""
 NEGLIGIBLE_CODE = 1e-9
 """Part of a code that rounding makes of none."""
 
@@ -64,15 +70,76 @@ def electrical(camera: Camera) -> Electrical:
         Where the file leaves it open or contradicts itself, and where the noise in the dark takes
         all codes of an automatic offset.
     """
-    found, offset = circuit(camera), camera.adc.level
-    if offset is None:
-        offset = _automatic_offset(camera, found)
-    return with_offset(camera, found, offset)
+    if has_several(camera):
+        readouts.check(camera)
+        solved = _merged_electrical(camera)
+    else:
+        found, offset = circuit(camera), camera.adc.level
+        if offset is None:
+            offset = _automatic_offset(camera, found)
+        solved = with_offset(camera, found, offset)
+    if camera.adc.companding is not None:
+        _check_companding(camera, solved, camera.adc.companding)
+    return solved
 
 
 def check(camera: Camera) -> None:
     """Raise BadInput where the ADC has no room for the dark noise, or no usable step."""
     electrical(camera)
+
+
+def _check_companding(camera: Camera, found: Electrical, companding: Companding) -> None:
+    """Raise BadInput for knees that leave codes out, or that another curve would bend again."""
+    path, [last, _] = "adc.companding", companding.knees[-1]
+    if last < found.highest_code:
+        message = f"the last knee is at code {last}, the highest is"
+        raise bad((*split(path), "knees"), f"{message} {found.highest_code}", "add a knee there")
+    binning = camera.array.binning
+    for refused, what, remedy in (
+        (found.reference is not None, "a logarithmic ADC", "write adc.kind: linear"),
+        (found.curve is not None, "a transfer curve", "write transfer_curve: linear"),
+        (bool(camera.adc.steps), "black levels by color", "write one adc.offset"),
+        (binning is not None and binning.count > 1, "binned pixels", "remove array.binning"),
+    ):
+        if refused:
+            raise bad(path, f"companding is not simulated with {what}", remedy)
+
+
+def merged_saturation(camera: Camera) -> float:
+    """Return the signal at which all readouts of a camera saturate [e of the large photodiode]."""
+    return max(
+        electrical(readout.camera).saturation / readout.sensitivity
+        for readout in readouts.readouts(camera)
+    )
+
+
+def _merged_electrical(camera: Camera) -> Electrical:
+    """Return the well and the ADC that a merge of several readouts is like.
+
+    Its steps, and its offset, are those of the finest readout; its codes go on to where the last
+    readout saturates. It has no volts: each readout has its own.
+    """
+    read = readouts.readouts(camera)
+    solved = [electrical(readout.camera) for readout in read]
+    steps = [e.electrons_per_dn / r.sensitivity for e, r in zip(solved, read, strict=True)]
+    step, well = min(steps), merged_saturation(camera)
+    offset = solved[steps.index(step)].offset
+    bits = math.ceil(offset + well / step).bit_length()
+    if bits > MOST_BITS:
+        path = readouts.GAINS if camera.pixel.readout.gains else readouts.SMALL
+        message = f"the merged codes would have {bits} bits, and raw files hold {MOST_BITS}"
+        raise bad(path, message, "write a lower gain, or fewer adc.bits")
+    first = solved[0]
+    codes = 2**bits - 1 - offset
+    return replace(
+        first,
+        full_well=well,
+        capacitance=None,
+        bits=bits,
+        companded=camera.adc.companding is not None,
+        offset=offset,
+        full_scale=step * codes * first.conversion_gain * first.analog_gain,
+    )
 
 
 def _automatic_offset(camera: Camera, found: Circuit) -> float:

@@ -267,6 +267,11 @@ class Quantizer(Effect):
     origin = "readout"
     bits: int
 
+    @property
+    def highest_code(self) -> int:
+        """The highest code that it writes [DN]."""
+        return (1 << self.bits) - 1
+
     @abstractmethod
     def apply(self, electrons: Array) -> Array:
         """Return the digital numbers of `electrons`, whole and of the same float type [DN]."""

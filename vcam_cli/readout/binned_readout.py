@@ -13,9 +13,6 @@ from vcam_cli.effects.base import Effect
 from vcam_cli.readout.binning import BinningGroups
 from vcam_cli.readout.exposure import codes_type
 
-SURE = 3
-"""Standard deviations of the readout by which a pixel of full wells may read less than they hold,
-where noise comes behind the wells."""
 Take = Callable[..., tuple[Array, Array]]
 """A frame of a rate [e/s] in a time [s] with effects: (electrons, dn)."""
 

@@ -194,8 +194,8 @@ def capture(
     Returns
     -------
     electrons : Array
-        Noisy signal, clipped above at the full well, in the float type of `rate` [electrons]. Noise
-        of the ADC is in it, and behind that clamp.
+        Noisy signal in front of the ADC, clipped above at the full well, in the float type of
+        `rate` [electrons]. Noise of the ADC is in the codes alone.
     dn : Array
         Codes as whole numbers, uint16, or uint32 from 17 bits on [DN].
 
@@ -226,9 +226,9 @@ def capture(
                 tile = effect.apply(tile, here[effect.scope])
             if full_charge is not None:
                 np.minimum(tile, full_charge[rows], out=tile)
+            electrons[rows] = tile
             for effect in electron_effects(effects, behind_well=True):
                 tile = effect.apply(tile, here[effect.scope])
-            electrons[rows] = tile
             dn[rows] = adc.apply(tile if pedestal is None else tile + pedestal[rows])
         if done is not None:
             done(block)

@@ -25,7 +25,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from vcam_cli.arrays import Array
-from vcam_cli.camera.derived.electrical import Electrical
 from vcam_cli.effects.base import Effect, of_kind
 from vcam_cli.effects.signal_chain import (
     ElectronEffect,
@@ -37,6 +36,7 @@ from vcam_cli.effects.signal_chain import (
     noise_sources,
 )
 from vcam_cli.parallel import each
+from vcam_cli.readout.chain import ReadoutChain
 from vcam_cli.readout.exposure import codes_type, mean_dark, mean_electrons, sites
 from vcam_cli.rng import blocks
 from vcam_cli.scheduling import estimators
@@ -106,9 +106,9 @@ def samples(
             read = _read_charge(charge.copy(), effects, sample_sites, common_sites)
             read[full] = well
             full = read >= well
+            electrons[number, block] = read
             for effect in electron_effects(effects, behind_well=True):
                 read = effect.apply(read, _site(effect, sample_sites, common_sites))
-            electrons[number, block] = read
             dn[number, block] = adc.apply(read)
             before = time
 
@@ -150,10 +150,7 @@ def photocurrent(
     dn: Array,
     times: Sequence[float],
     estimator: str,
-    effects: tuple[Effect, ...],
-    adc: Quantizer,
-    electrical: Electrical,
-    saturated_dn: float,
+    chain: ReadoutChain,
     workers: int,
 ) -> Array:
     """Return the photocurrent of every pixel, estimated from the codes of its samples.
@@ -170,14 +167,8 @@ def photocurrent(
     estimator : str
         'lsbs' (last sample before saturation) or 'weighted' (the best linear estimate from all
         samples before saturation).
-    effects : tuple of Effect
-        Effects that run, of which the mean dark current and the variances are known.
-    adc : Quantizer
-        The ADC.
-    electrical : Electrical
-        Conversion between electrons, volts and codes.
-    saturated_dn : float
-        Lowest code of a saturated pixel [DN].
+    chain : ReadoutChain
+        The way from codes back to electrons, with the effects that run.
     workers : int
         Number of threads; results do not depend on it.
 
@@ -191,15 +182,14 @@ def photocurrent(
     ----------
     X. Liu and A. El Gamal, IEEE Trans. Circuits Syst. I 50(4), 2003, doi:10.1109/TCSI.2003.809815.
     """
-    dark = mean_dark(1.0, effects)
-    read, reset = variances(effects, adc)
+    dark, saturated_dn = mean_dark(1.0, chain.effects), chain.saturated_dn
+    read, reset = variances(chain)
     out = np.empty(dn.shape[1:], np.float32)
 
     def estimate(block: slice) -> None:
         here = dn[..., block, :]
         full = here >= saturated_dn
-        linear = adc.linear(here.astype(np.float64))
-        charge = (linear - electrical.offset) * electrical.electrons_per_dn
+        charge = chain.to_electrons(here.astype(np.float64))
         if estimator == "weighted":
             found = estimators.weighted_estimate(charge, times, full, dark, read, reset)
         else:
@@ -210,15 +200,13 @@ def photocurrent(
     return out
 
 
-def variances(effects: tuple[Effect, ...], adc: Quantizer) -> tuple[float, float]:
+def variances(chain: ReadoutChain) -> tuple[float, float]:
     """Return the variances of one readout and of what all samples have in common.
 
     Parameters
     ----------
-    effects : tuple of Effect
-        Effects that run, of which the temporal noise counts.
-    adc : Quantizer
-        The ADC.
+    chain : ReadoutChain
+        The ADC, and the effects that run, of which the temporal noise counts.
 
     Returns
     -------
@@ -227,7 +215,7 @@ def variances(effects: tuple[Effect, ...], adc: Quantizer) -> tuple[float, float
     reset : float
         Variance that is common to all samples [electrons squared].
     """
-    sources = noise_sources(effects, "frame")
+    sources = noise_sources(chain.effects, "frame")
     sample_sites = sum(e.variance(0.0) for e in sources if e.sample_draws == "independent")
     common = sum(e.variance(0.0) for e in sources if e.sample_draws == "common")
-    return float(sample_sites + adc.step(0.0) ** 2 / 12), float(common)
+    return float(sample_sites + chain.adc.step(0.0) ** 2 / 12), float(common)

@@ -9,15 +9,11 @@ which effects a plan leaves out.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from vcam_cli.arrays import Array
-from vcam_cli.camera.derived.electrical import Electrical
 from vcam_cli.camera.exposure import Exposure
-from vcam_cli.effects.base import Effect
-from vcam_cli.effects.signal_chain import Quantizer
+from vcam_cli.readout.chain import ReadoutChain
 from vcam_cli.readout.exposure import mean_dark
 from vcam_cli.readout.nondestructive_samples import variances
 from vcam_cli.scheduling.full_noise import optimal_schedules
@@ -25,21 +21,15 @@ from vcam_cli.scheduling.pdf import photocurrent_levels
 from vcam_cli.scheduling.sensor import Sensor
 
 
-def sensor(
-    electrical: Electrical, effects: Sequence[Effect], adc: Quantizer, longest: float
-) -> Sensor:
+def sensor(chain: ReadoutChain, longest: float) -> Sensor:
     """Return the pixel as its schedule models it.
 
     Rounding of the ADC counts as readout noise, as it does in the reconstruction.
 
     Parameters
     ----------
-    electrical : Electrical
-        Full well and end of the ADC.
-    effects : sequence of Effect
-        Effects that the camera's file describes.
-    adc : Quantizer
-        The ADC.
+    chain : ReadoutChain
+        Well, ADC and noise, with the effects that the camera's file describes.
     longest : float
         Longest exposure time [s].
 
@@ -48,10 +38,10 @@ def sensor(
     Sensor
         Model of the pixel.
     """
-    read, reset = variances(tuple(effects), adc)
+    read, reset = variances(chain)
     return Sensor(
-        well=electrical.saturation,
-        dark=mean_dark(1.0, tuple(effects)),
+        well=chain.saturation,
+        dark=mean_dark(1.0, chain.effects),
         read=float(np.sqrt(read)),
         reset=float(np.sqrt(reset)),
         max_time=longest,
@@ -61,9 +51,7 @@ def sensor(
 def choose_sample_times(
     exposure: Exposure,
     rate: Array,
-    electrical: Electrical,
-    effects: Sequence[Effect],
-    adc: Quantizer,
+    chain: ReadoutChain,
 ) -> tuple[float, ...]:
     """Return the times of the samples of one integration.
 
@@ -73,12 +61,8 @@ def choose_sample_times(
         What the file says of the exposure: times, or a schedule that it asks for.
     rate : Array
         Photo-electrons per second of every pixel, of any shape [e/s].
-    electrical : Electrical
-        Full well and end of the ADC.
-    effects : sequence of Effect
-        Effects that the camera has.
-    adc : Quantizer
-        The ADC.
+    chain : ReadoutChain
+        Well, ADC and noise, with the effects that the camera has.
 
     Returns
     -------
@@ -89,7 +73,7 @@ def choose_sample_times(
     asked = exposure.schedule
     if asked is None:
         return exposure.samples
-    return optimal_times(rate, asked.count, sensor(electrical, effects, adc, asked.max))
+    return optimal_times(rate, asked.count, sensor(chain, asked.max))
 
 
 def optimal_times(rate: Array, count: int, pixel: Sensor) -> tuple[float, ...]:

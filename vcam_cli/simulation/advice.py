@@ -59,10 +59,10 @@ def _dark_render(ready: Prepared) -> Iterator[str]:
         return
     time, dark = ready.exposure_time, ready.dark_rate * ready.exposure_time
     white = float(ready.white_rate.max()) * time
-    held = circuit.saturation - dark
+    held = ready.chain.saturation - dark
     if not 0 < held < DARK_WHITE * white:
         return
-    if float((ready.rate * time + dark >= circuit.saturation).mean()) < VISIBLE_SATURATION:
+    if float((ready.rate * time + dark >= ready.chain.saturation).mean()) < VISIBLE_SATURATION:
         return
     yield (
         f"the scene's white is {white / held:.3g} times what saturates a pixel: saturated pixels"

@@ -84,8 +84,8 @@ def expose(seen: SceneLight, light: photon_rate.Rate) -> ExposedLight:
     collected = layout.select_pixels(light.values)
     rate = groups.collect(_transported(collected, pixel_dark, effects))
     asked = solved.exposure
-    times = sample_times.choose_sample_times(asked, rate, circuit, enabled, solved.adc)
-    chosen = auto_exposure.exposure_settings(asked, rate, white, dark, circuit)
+    times = sample_times.choose_sample_times(asked, rate, solved.chain)
+    chosen = auto_exposure.exposure_settings(asked, rate, white, dark, solved.chain.metered)
     if times:
         chosen = replace(chosen, time=times[-1])
     time = chosen.time
@@ -128,7 +128,7 @@ def expose(seen: SceneLight, light: photon_rate.Rate) -> ExposedLight:
         most = well if full_charge is None else full_charge / time - dark
         deferred = np.minimum(rate, most) - np.minimum(groups.collect(collected), well)
         changes |= dict.fromkeys(transports, rms(deferred))
-    full = max(1.0, min(circuit.full_well, peak))
+    full = max(1.0, min(solved.chain.metered.full_well, peak))
     alone = not times and solved.binning is None
     signal = SignalLevels(
         full,

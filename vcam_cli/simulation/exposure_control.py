@@ -39,7 +39,7 @@ def next_exposure(camera: Solved, last: Prepared) -> ExposureSettings:
     """
     auto = camera.exposure.auto
     assert auto is not None
-    circuit, time, gain = camera.electrical, last.exposure_time, last.solved.gain
+    circuit, time, gain = camera.chain.metered, last.exposure_time, last.solved.gain
     full = min(circuit.full_well, circuit.adc_full_scale * circuit.exposure_gain / gain)
     metered = np.minimum(last.rate, max(full / time - last.dark_rate, 0.0))
     white = float(last.white_rate.max())

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from vcam_cli.arrays import Array
-from vcam_cli.effects.signal_chain import NoiseSource, noise_sources
+from vcam_cli.effects.signal_chain import NoiseSource
 from vcam_cli.physics import readout
 from vcam_cli.processing.tone_map import sensor_white
 from vcam_cli.quality import mtf
@@ -72,7 +72,7 @@ def _sample_figures(
         read = sum(x.variance(0.0) for x in draws if x.sample_draws == "independent")
         noise = estimators.weighted_variance(0.0, frame.times, dark / last, read, floor - read)
         floor = float(noise) * last**2 - dark
-    well = frame.electrical.full_well * last / first
+    well = frame.chain.full_well * last / first
     nowhere = frame.picture_dn >= frame.picture_saturated_dn
     return [
         ("hdr_saturated_fraction", float(nowhere.mean()), ""),
@@ -83,10 +83,11 @@ def _sample_figures(
 def saturated_pixels(frame: Frame) -> Array:
     """Return which pixels of the raw frame are saturated, in the shape of `dn`."""
     e, groups = frame.electrical, frame.layout.binning_groups
-    if groups.count == groups.summed_charges and not frame.noise_of_full:
+    alone = groups.count == groups.summed_charges and frame.chain.merge is None
+    if alone and not frame.chain.noise_of_full:
         full = e.full_well if frame.full_charge is None else frame.full_charge
-        return np.asarray((frame.electrons >= full) | (frame.dn >= e.highest_code))
-    return np.asarray(frame.dn >= frame.saturated_dn)
+        return np.asarray((frame.electrons >= full) | (frame.dn >= frame.chain.highest_dn))
+    return np.asarray(frame.dn >= frame.chain.saturated_dn)
 
 
 def picture_snr_db(frame: Frame) -> float:
@@ -99,7 +100,7 @@ def picture_snr_db(frame: Frame) -> float:
     """
     groups = frame.layout.binning_groups
     signal = groups.join(frame.rate) * frame.exposure_time / groups.summed_codes
-    usable = signal + frame.dark_rate * frame.exposure_time < frame.electrical.saturation
+    usable = signal + frame.dark_rate * frame.exposure_time < frame.chain.saturation
     count = int(usable.sum())
     return _snr_db(frame, float(signal.sum(where=usable, dtype=np.float64)) / max(count, 1))
 
@@ -114,7 +115,7 @@ def gray_snr_db(frame: Frame) -> float:
     if not layout.full_color:
         counts = np.bincount(layout.color.ravel(), minlength=colors).astype(float)
     signal = GRAY * frame.white_rate * frame.exposure_time
-    usable = signal + frame.dark_rate * frame.exposure_time < frame.electrical.saturation
+    usable = signal + frame.dark_rate * frame.exposure_time < frame.chain.saturation
     weights = counts * usable
     return _snr_db(frame, float((weights * signal).sum() / max(weights.sum(), 1)))
 
@@ -123,12 +124,8 @@ def _snr_db(frame: Frame, light: float) -> float:
     """Return a mean signal [electrons] over its temporal noise, rounding included [dB]."""
     if light <= 0:
         return -math.inf
-    groups, binning = frame.layout.binning_groups, frame.solved.binning
-    summed, dark = groups.summed_codes, frame.dark_rate * frame.exposure_time
-    sources = noise_sources(frame.plan.active, "frame")
-    noise = sum(source.binned_variance(light + dark, dark, binning) for source in sources)
-    rounding = frame.adc.rounding(light + dark, summed * noise) / summed
-    return 20 * math.log10(light / math.sqrt(noise + rounding))
+    dark = frame.dark_rate * frame.exposure_time
+    return 20 * math.log10(light / math.sqrt(frame.chain.noise(light + dark, dark).total))
 
 
 def edge_mtf50(frame: Frame) -> float:
@@ -137,7 +134,7 @@ def edge_mtf50(frame: Frame) -> float:
     Of the color with the most pixels, the brightest of these. It is nan where no edge is found, inf
     where the transfer falls to no half.
     """
-    layout, codes = frame.layout, frame.linear(frame.picture_dn)
+    layout, codes = frame.layout, frame.chain.linear(frame.picture_dn)
     if layout.full_color:
         plane = codes[int(frame.white_rate.argmax())]
         parts = [(slice(None), slice(None))]
@@ -169,7 +166,7 @@ def digital_gain(frame: Frame) -> float:
     tone = next((s.value for s in frame.solved.processing if s.name == "tone"), None)
     stops = 2.0**tone.exposure if tone else 1.0
     codes = np.array([*frame.white_dn, frame.black_dn, frame.picture_saturated_dn])
-    *white, black, saturated = frame.linear(codes)
+    *white, black, saturated = frame.chain.linear(codes)
     needed = sensor_white(np.array(white), black, saturated)
     return stops if tone and tone.white == "sensor" and needed > 0 else needed * stops
 
@@ -220,8 +217,8 @@ def _raw_peak(frame: Frame) -> float:
     brightest = (float(groups.join(frame.rate).max()) / summed + frame.dark_rate) * (
         frame.exposure_time
     )
-    level = float(frame.adc.response(np.array([min(brightest, e.full_well)]))[0])
-    return min((level - e.offset) / (e.highest_code - e.offset), 1.0)
+    black, level = frame.chain.adc.response(np.array([0.0, min(brightest, e.full_well)]))
+    return min(float((level - black) / (frame.chain.adc.highest_code - black)), 1.0)
 
 
 def _clipped(frame: Frame) -> dict[str, float]:

@@ -2,20 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, fields, replace
 from functools import cached_property, partial
 
 import numpy as np
 
 from vcam_cli.arrays import Array
 from vcam_cli.camera.scene.sources import Layers
-from vcam_cli.effects.base import Effect, Gain, Transport, of_kind
-from vcam_cli.effects.signal_chain import NoiseSource, Quantizer, electron_effects
+from vcam_cli.effects.base import Gain, of_kind
 from vcam_cli.floats import own_float_errors
 from vcam_cli.image_formation.pixel_response import axis_levels
 from vcam_cli.progress import Stages
-from vcam_cli.readout import binned_readout, exposure, nondestructive_samples
+from vcam_cli.readout import (
+    binned_readout,
+    exposure,
+    nondestructive_samples,
+    several_readouts,
+)
 from vcam_cli.scenes.depth_scene import DepthScene
 from vcam_cli.scenes.layered import LayeredScene
 from vcam_cli.simulation.preparation import Prepared
@@ -37,6 +41,8 @@ class Frame(Prepared):
     """(N, rows, columns) as `electrons`; None of a single exposure."""
     samples_dn: Array | None = None
     """(N, rows, columns) as `dn`; None of a single exposure."""
+    readouts_dn: Mapping[str, Array] = field(default_factory=dict)
+    """Codes of every readout of an exposure by its name, as `dn`; {} where there is one."""
     photocurrent: Array | None = None
     """(rows, columns) what the samples tell of the light [e/s]; None of a single exposure."""
 
@@ -70,16 +76,15 @@ class Frame(Prepared):
     def picture_saturated_dn(self) -> float:
         """The value of `picture_dn` from which on a pixel is saturated in all its samples [DN]."""
         if not self.times:
-            return self.saturated_dn
-        linear = float(self.adc.linear(np.array([self.saturated_dn]))[0])
-        charge = (linear - self.electrical.offset) * self.electrical.electrons_per_dn
+            return self.chain.saturated_dn
+        charge = float(self.chain.to_electrons(np.array([self.chain.saturated_dn]))[0])
         # Not all of it: the photocurrent is rounded to 32 bits, and so is its code.
         least = charge / self.times[0] * (1 - 1e-6) - self.dark_rate
         return float(self._unclipped_codes(np.array([least]))[0])
 
     def _unclipped_codes(self, photocurrent: Array) -> Array:
         """Return codes of a photocurrent [e/s], neither rounded nor clipped [DN]."""
-        return self.to_dn((photocurrent + self.dark_rate) * self.exposure_time)
+        return self.chain.to_dn((photocurrent + self.dark_rate) * self.exposure_time)
 
     @property
     def mean_electrons(self) -> Array:
@@ -88,81 +93,26 @@ class Frame(Prepared):
         return self.layout.binning_groups.join(mean)
 
     @property
-    def adc(self) -> Quantizer:
-        """The ADC."""
-        return self.solved.adc
-
-    @property
     def black_dn(self) -> float:
         """Code of the mean dark signal, offset included [DN]."""
-        dark = self.dark_rate * self.exposure_time * self.summed_codes
-        return float(self.to_dn(np.array([dark]))[0])
-
-    @property
-    def black_steps(self) -> Array:
-        """How far the black level of each color is from that of `black_dn` (C,) [DN]."""
-        steps = dict(self.electrical.black_steps)
-        return np.array([steps.get(color, 0.0) for color in self.mosaic.colors])
-
-    @property
-    def summed_codes(self) -> int:
-        """Pixels whose codes are added."""
-        return self.layout.binning_groups.summed_codes
-
-    def to_dn(self, electrons: Array) -> Array:
-        """Return the ADC's curve before rounding and clipping; added codes are equal [DN]."""
-        n = self.summed_codes
-        return self.adc.response(electrons) if n == 1 else n * self.adc.response(electrons / n)
-
-    def linear(self, dn: Array) -> Array:
-        """Return what a linear ADC has for these codes, added where `to_dn` adds them [DN]."""
-        n = self.summed_codes
-        return self.adc.linear(dn) if n == 1 else n * self.adc.linear(dn / n)
+        return self.chain.black_dn(self.dark_rate * self.exposure_time)
 
     @property
     def white_dn(self) -> Array:
         """Codes (C,) of perfect white on the axis, noise-free, with dark, not clipped [DN]."""
         electrons = (self.white_rate + self.dark_rate) * self.exposure_time
-        return np.asarray(self.to_dn(electrons * self.summed_codes))
-
-    @property
-    def saturated_dn(self) -> float:
-        """The lowest code of a saturated pixel: of a full well, or the ADC's highest [DN].
-
-        Of pixels that are read as one, and of a ccd that defers charge, where all of them are.
-        """
-        well, highest = self.electrical.full_well, float(self.electrical.highest_code)
-        # Amid full pixels the first one loses most: no packet before it has left it any charge.
-        for transport in of_kind(self.plan.active, Transport):
-            well *= float(transport.timely_share(1, 1)[0, 0])
-        well -= binned_readout.SURE * self.noise_of_full
-        # In both float types: where the well lies half way between two codes they round apart.
-        codes = [self.adc.apply(np.full(1, well, kind))[0] for kind in (np.float32, np.float64)]
-        return self.summed_codes * float(min(*codes, highest))
-
-    @property
-    def noise_of_full(self) -> float:
-        """Noise behind full wells, not clipped with them [e rms].
-
-        It is the ADC's; of joined voltages all of the readout's.
-        """
-        well = self.electrical.full_well
-        effects: Sequence[Effect] = electron_effects(self.plan.active, behind_well=True)
-        if self.layout.binning_groups.binning.kind == "voltage":
-            effects = binned_readout.effects_in_readout(self.plan.active)
-        sources = of_kind(effects, NoiseSource)
-        return float(np.sqrt(sum(e.variance(well) for e in sources)))
+        return np.asarray(self.chain.to_dn(electrons * self.chain.summed_codes))
 
     def patches_dn(self) -> Array:
         """Return the codes (C, 24) of a ColorChecker in the scene's light, as `white_dn` [DN]."""
         lit = [self.scene.white.multiply(reflectance) for _, reflectance in colorchecker()]
-        rate = self.axis_rate(lit) + self.dark_rate * self.summed_codes
-        return self.to_dn(rate * self.exposure_time)
+        rate = self.axis_rate(lit) + self.dark_rate * self.chain.summed_codes
+        return self.chain.to_dn(rate * self.exposure_time)
 
     def primaries_dn(self) -> Array:
         """Return the codes (C, 3) of each channel of a picture that emits, as `white_dn` [DN]."""
-        rate = self.axis_rate(self.scene.spectra) + self.dark_rate * self.summed_codes
-        return self.to_dn(rate * self.exposure_time)
+        rate = self.axis_rate(self.scene.spectra) + self.dark_rate * self.chain.summed_codes
+        return self.chain.to_dn(rate * self.exposure_time)
 
     def axis_rate(
         self, spectra: Sequence[Spectrum], band: tuple[float, float] | None = None
@@ -185,7 +135,7 @@ class Frame(Prepared):
         They end where the well and the ADC are full, as those of `dn` do.
         """
         held = self.layout.binning_groups.join(self.held_electrons)
-        return np.clip(self.to_dn(held), 0, self.summed_codes * self.electrical.highest_code)
+        return self.chain.clipped(self.chain.to_dn(held))
 
     def depth(self) -> Array:
         """Return how far away is what the pixels' centers see, along the axis (rows, columns) [m].
@@ -210,10 +160,11 @@ class Frame(Prepared):
         level = self.transfer.level.T * self.exposure_time * layout.binning_groups.signal_ratio
         photo = self.scene.values_at(layout.picture_x, layout.picture_y, level)
         if self.electrical.curve is not None and not self.electrical.curve.corrected:
-            white = self.white_rate * self.exposure_time * self.summed_codes
+            white = self.white_rate * self.exposure_time * self.chain.summed_codes
             span = np.where(white > 0, self.white_dn - self.black_dn, 0.0)
             return self.black_dn + photo * (span / np.where(white > 0, white, 1))[:, None, None]
-        return self.to_dn(photo + self.dark_rate * self.exposure_time * self.summed_codes)
+        dark = self.dark_rate * self.exposure_time * self.chain.summed_codes
+        return self.chain.to_dn(photo + dark)
 
 
 def _pedestal(ready: Prepared) -> Array | None:
@@ -232,10 +183,16 @@ def take_frame(ready: Prepared, workers: int, stages: Stages | None = None) -> F
     """Return one frame of a camera that is ready for it."""
     stages, solved = stages or Stages(), ready.solved
     with stages("capture"):
-        active, adc = ready.plan.active, solved.adc
+        active, adc = ready.plan.active, ready.chain.adc
         seeds = {"sensor": solved.seed.sensor, "frame": solved.seed.frame}
         known = {field.name: getattr(ready, field.name) for field in fields(ready)}
         times, coarse = ready.times, ready.settings.coarse_normals
+        if ready.chain.merge is not None:
+            several = several_readouts.capture(
+                *(ready.rate, ready.exposure_time, ready.chain, seeds, workers, coarse)
+            )
+            known |= {"electrons": several.electrons, "dn": several.dn}
+            return Frame(**known, readouts_dn=several.readouts)
         if not times:
             take = partial(
                 exposure.capture,
@@ -261,10 +218,7 @@ def take_frame(ready: Prepared, workers: int, stages: Stages | None = None) -> F
             dn,
             times,
             solved.exposure.estimator,
-            active,
-            adc,
-            ready.electrical,
-            last.saturated_dn,
+            ready.chain,
             workers,
         )
     return replace(last, samples_electrons=electrons, samples_dn=dn, photocurrent=light)

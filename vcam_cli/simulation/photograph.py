@@ -81,7 +81,7 @@ class Photograph:
         e = self.frame.electrical
         if not e.has_volts:
             raise no_volts("pixel.readout", "volts", "take electrons")
-        return e.volts_of(self.electrons)
+        return self.frame.chain.to_volts(self.electrons)
 
     @property
     def mean_electrons(self) -> Array:

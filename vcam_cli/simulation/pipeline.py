@@ -150,13 +150,14 @@ def picture_of(frame: Frame, workers: int) -> Callable[[Sequence[Step]], Process
     callable
         Function of steps.
     """
+    steps = frame.chain.black_steps(frame.mosaic.colors)
     context = Context(
         pattern=frame.mosaic.block,
         colors=frame.mosaic.colors,
         white_dn=frame.white_dn,
         black_dn=frame.black_dn,
-        black_steps=frame.black_steps if frame.electrical.black_steps else None,
-        linearize=frame.linear if frame.electrical.linearized else None,
+        black_steps=steps if steps.any() else None,
+        linearize=frame.chain.linear if frame.chain.linearized else None,
         saturated_dn=frame.picture_saturated_dn,
         patches=partial(_patches, frame),
         primaries=frame.primaries_dn if frame.solved.scene.emits else None,

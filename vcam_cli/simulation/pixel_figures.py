@@ -8,6 +8,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
 from vcam_cli.effects.signal_chain import NoiseSource, noise_sources
 from vcam_cli.physics import readout
 from vcam_cli.readout.exposure import mean_dark
@@ -42,28 +44,29 @@ class PixelFigures:
 
 def pixel_figures(solved: Solved, time: float) -> PixelFigures:
     """Return signal over noise of a pixel that is exposed for a time [s]."""
-    wanted, electrical, groups = (
-        solved.effects.enabled,
-        solved.electrical,
-        solved.layout.binning_groups,
-    )
-    draws = noise_sources(wanted, "frame")
+    chain, groups = solved.chain, solved.layout.binning_groups
     # In electrons of all wells together, in which shot noise is Poisson's.
     wells = groups.count // groups.summed_charges
-    floor = sum(x.binned_variance(0.0, 0.0, groups.binning) for x in draws) * wells**2
-    dark = mean_dark(time, wanted)
-    well, all_dark = electrical.full_well * wells, dark * wells
-    most = electrical.saturation * wells
+    floor = chain.noise(0.0).analog * wells**2
+    dark = mean_dark(time, chain.effects)
+    well, all_dark = chain.full_well * wells, dark * wells
+    most = chain.saturation * wells
     conversions = groups.binning.conversions
-    one = solved.adc.rounding(dark, conversions * floor / wells**2)
+    one = chain.adc.rounding(dark, conversions * floor / wells**2)
     rounding = wells**2 * one / conversions
+    if chain.merge is not None:
+        rounding += chain.merge.rounding(dark)
+    snr = readout.snr_db(SHARE * well, all_dark, floor)
+    if chain.merge is not None:  # the readout that holds so much decides, and its light
+        noise = chain.noise(SHARE * well + dark, dark).analog
+        snr = 20 * np.log10(SHARE * well / np.sqrt(noise))
     return PixelFigures(
-        snr_db=float(readout.snr_db(SHARE * well, all_dark, floor)),
+        snr_db=float(snr),
         dynamic_range_db=float(readout.dynamic_range_db(well, all_dark, floor)),
         quantized_dynamic_range_db=float(
             readout.dynamic_range_db(most, all_dark, floor + rounding)
         ),
-        well_capacity=electrical.full_well * groups.summed_codes,
+        well_capacity=chain.full_well * groups.summed_codes,
         dark=dark,
-        draws=draws,
+        draws=noise_sources(chain.effects, "frame"),
     )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from vcam_cli.image_formation.optical_path import SpectrumReport
 from vcam_cli.image_formation.settings import Settings
 from vcam_cli.image_formation.transfer_functions import Transfer
 from vcam_cli.readout import exposure
+from vcam_cli.readout.chain import ReadoutChain
 from vcam_cli.readout.layout import Layout
 from vcam_cli.scenes.layered import AnyScene
 from vcam_cli.simulation import cost_model, plan
@@ -95,6 +97,11 @@ class Prepared:
     def base_iso(self) -> float:
         """ISO speed at gain 1; 0 of a camera that sees nothing of daylight."""
         return self.solved.base_iso
+
+    @cached_property
+    def chain(self) -> ReadoutChain:
+        """The way from electrons to codes and back, with what runs of its noise."""
+        return self.solved.chain.with_effects(self.plan.active)
 
     @property
     def held_electrons(self) -> Array:

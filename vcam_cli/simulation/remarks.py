@@ -246,7 +246,7 @@ def _noise_beyond_table(ready: Prepared) -> tuple[str, ...]:
 def _clipped_dark(ready: Prepared) -> tuple[str, ...]:
     """Return how many pixels are so dark that the ADC's offset clips their noise."""
     e, time = ready.electrical, min(ready.times, default=ready.exposure_time)
-    step = ready.solved.adc.step(0.0)
+    step = ready.chain.adc.step(0.0)
     own = ready.solved.adc_keys.noise * step
     missing = SIGMAS * math.hypot(ready.solved.dark_noise, own) - e.offset * step
     if ready.solved.adc_keys.offset is None or missing <= 0:

@@ -90,6 +90,8 @@ def scene_light(solved: Solved, picture: ScenePicture, run: Run) -> SceneLight:
         brightest = float(white_rate.max())
         saturation = solved.electrical.saturation / solved.layout.binning_groups.summed_charges
         ceiling = auto_exposure.ceiling(solved.exposure, brightest, saturation)
+        metered = solved.chain.metered.saturation / solved.layout.binning_groups.summed_charges
+        full = auto_exposure.ceiling(solved.exposure, brightest, metered)
         overexposure = _brightest_around(scene) * brightest / ceiling
         if overexposure > 1:  # of what lies beside the array, too
             scene = _scene(solved, picture, effects, overexposure)
@@ -101,7 +103,7 @@ def scene_light(solved: Solved, picture: ScenePicture, run: Run) -> SceneLight:
             effects=effects,
             workers=run.workers,
             ceiling=ceiling,
-            full=min(ASSUMED * _brightest(scene) * brightest, ceiling),
+            full=min(ASSUMED * _brightest(scene) * brightest, full),
             fullness=_fullness(solved, scene, float(white_rate.min())),
             optional=solved.effects.optional(effects),
             layers=layer_optics(solved, effects, scene),

@@ -8,10 +8,13 @@ from functools import cached_property
 
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry
+from vcam_cli.camera.derived.readouts import has_several
 from vcam_cli.effects.base import Charge, Effect, of_kind
 from vcam_cli.effects.order import ORDER
 from vcam_cli.effects.signal_chain import NoiseSource, Quantizer
 from vcam_cli.errors import Collector
+from vcam_cli.readout.merged_noise import merged_effects
+from vcam_cli.solve.merge import camera_merge
 
 
 @dataclass(frozen=True)
@@ -72,6 +75,8 @@ def camera_effects(camera: Camera, geometry: Geometry) -> CameraEffects:
         For `on` for something that the file does not describe.
     """
     found = {kind.name: kind.from_camera(camera, geometry) for kind in ORDER}
+    if has_several(camera):
+        found = merged_effects(found, camera_merge(camera, geometry))
     if isinstance(camera.effects, dict):
         problems = Collector()
         absent = {kind.name: kind.absent for kind in ORDER}

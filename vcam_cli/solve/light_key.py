@@ -25,7 +25,7 @@ INDEPENDENT_KEYS: tuple[tuple[str, ...], ...] = tuple(
         *(f"pixel.readout.{k}" for k in ("gain", "read_noise", "column_noise", "row_noise")),
         *(f"pixel.readout.{k}" for k in ("heavy_tailed_noise", "correlated_row_noise")),
         *(f"pixel.readout.{k}" for k in ("telegraph_noise", "reset_noise", "charge_transfer")),
-        "pixel.readout.timing",
+        *(f"pixel.readout.{k}" for k in ("timing", "gains", "merge", "small")),
         *(f"pixel.photodetector.{k}" for k in ("dark_current", "dark_current_density")),
         *("pixel.photodetector.dark_current_scale", "array.binning"),
     )

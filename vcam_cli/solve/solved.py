@@ -18,6 +18,7 @@ from vcam_cli.camera.derived.electrical import Electrical
 from vcam_cli.camera.derived.frame_rate import FrameRate, frame_rate
 from vcam_cli.camera.derived.geometry import Geometry, geometry
 from vcam_cli.camera.derived.line_times import LineTimes, line_times
+from vcam_cli.camera.derived.readouts import has_several, metered
 from vcam_cli.camera.derived.scene_layers import camera_at, flat_camera, layer_cameras
 from vcam_cli.camera.expectations import Limit
 from vcam_cli.camera.exposure import Exposure
@@ -34,8 +35,10 @@ from vcam_cli.effects.readout_chain import dark_noise, electrical
 from vcam_cli.effects.signal_chain import Quantizer
 from vcam_cli.image_formation.pixel_response import PixelResponse
 from vcam_cli.image_formation.settings import Settings
+from vcam_cli.readout.chain import ReadoutChain
 from vcam_cli.readout.layout import Layout
 from vcam_cli.solve import idle_keys, iso_speed, light_key
+from vcam_cli.solve.chain import readout_chain
 from vcam_cli.solve.effects import CameraEffects, camera_effects
 from vcam_cli.solve.layers import SolvedLayer, solve_layer
 from vcam_cli.solve.layout import camera_layout
@@ -164,6 +167,12 @@ class Solved:
     def adc(self) -> Quantizer:
         """The ADC, whether quantization is switched off or not."""
         return self.effects.adc
+
+    @cached_property
+    def chain(self) -> ReadoutChain:
+        """The way from electrons to codes and back, with all noise that is wanted."""
+        groups = self.layout.binning_groups
+        return readout_chain(self.camera, self.geometry, self.electrical, self.effects, groups)
 
     @property
     def dark_noise(self) -> float:
@@ -307,7 +316,9 @@ def solve(camera: Camera) -> Solved:
     most = float(per_exposure.max()) * layout.binning_groups.summed_charges
     if most <= 0:
         return solved.at_gain(iso_speed.gain(camera.exposure, 0.0, circuit.exposure_gain))
-    at_one = circuit if circuit.exposure_gain == 1 else electrical(camera.with_exposure_gain(1.0))
+    at_one = circuit
+    if circuit.exposure_gain != 1 or has_several(camera):
+        at_one = electrical(metered(camera.with_exposure_gain(1.0)))
     base_iso = iso_speed.base_iso(most, at_one.saturation)
     gain = iso_speed.gain(camera.exposure, base_iso, circuit.exposure_gain)
     return replace(solved, base_iso=base_iso).at_gain(gain)

@@ -156,7 +156,7 @@ def _before_edge(camera: Camera, stack: Stack, measured: dict[str, list[EdgeResp
     }
     ready, _ = prepare(with_every_effect(camera.with_(changes)), 1)
     rate, dark = ready.rate.astype(np.float64), ready.dark_rate
-    colors, gain = ready.mosaic.colors, 1 / ready.electrical.electrons_per_dn
+    colors, gain = ready.mosaic.colors, ready.chain.system_gain
     for color, responses in measured.items():
         here = ... if len(colors) == 1 else ready.layout.color == colors.index(color)
         levels = np.mean([_levels(r) for r in responses], axis=0) - ready.electrical.offset

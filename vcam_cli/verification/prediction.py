@@ -96,10 +96,10 @@ def predict(camera: Camera, point: Point) -> Signal:
     if point.signal.channel == "electrons":
         value = chosen
     elif point.signal.channel == "dn":
-        codes = frame.to_dn(chosen) + dict(frame.electrical.black_steps).get(point.channel, 0.0)
-        value = np.clip(codes, 0, frame.electrical.highest_code * frame.summed_codes)
+        step = dict(frame.electrical.black_steps).get(point.channel, 0.0)
+        value = frame.chain.clipped(frame.chain.to_dn(chosen) + step)
     else:
-        value = frame.electrical.volts_of(chosen)
+        value = frame.chain.to_volts(chosen)
     return Signal(float(value.mean()), point.signal.channel)
 
 

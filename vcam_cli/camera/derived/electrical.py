@@ -93,11 +93,17 @@ class Electrical(Circuit):
     """Voltage at which a logarithmic ADC's curve bends [V]; None for a linear one."""
     black_steps: tuple[tuple[str, float], ...] = ()
     """Colors, and how far their black level is from `offset`, the mean of all [DN]."""
+    companded: bool = False
+    """Whether codes are compressed behind the ADC."""
 
     @property
     def linearized(self) -> bool:
         """Whether codes are made linear before the processing."""
-        return self.reference is not None or (self.curve is not None and self.curve.corrected)
+        return (
+            self.companded
+            or self.reference is not None
+            or (self.curve is not None and self.curve.corrected)
+        )
 
     @property
     def electrons_per_dn(self) -> float:
@@ -180,6 +186,7 @@ def with_offset(camera: CameraModel, found: Circuit, offset: float) -> Electrica
         full_scale=volts,
         reference=reference,
         black_steps=tuple(adc.steps.items()),
+        companded=adc.companding is not None,
     )
     _check_counts(solved)
     return solved

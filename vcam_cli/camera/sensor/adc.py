@@ -1,14 +1,17 @@
 """The analog-to-digital converter."""
 
 from collections.abc import Iterator, Mapping
+from itertools import pairwise
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import model_validator
 from pydantic_core import InitErrorDetails
 
+from vcam_cli.config.lists import read_items
 from vcam_cli.config.model import Model, key
 from vcam_cli.config.quantities import Quantity, Whole
-from vcam_cli.config.validation_messages import fault, refusal
+from vcam_cli.config.validation_messages import describe, fault, refusal
+from vcam_cli.config.values import Either, word_or
 from vcam_cli.config.yaml_type import YamlType
 
 
@@ -66,6 +69,41 @@ _ONE_LEVEL = Quantity("dn", least=0, words={"auto": None})
 BLACK = BlackLevels()
 
 
+_CODE = Whole(least=0, most=2**24 - 1, example="1023")
+Knee = tuple[int, int]
+
+
+def _knee(given: Any) -> Knee:
+    if not isinstance(given, (list, tuple)) or len(given) != 2:
+        raise ValueError(f"{describe(given)} is not a pair of codes, such as [1023, 1023]")
+    code, written = read_items(enumerate(given), _CODE.read)
+    return code, written
+
+
+def _knees(given: Any) -> tuple[Knee, ...]:
+    if not isinstance(given, (list, tuple)) or not given:
+        raise ValueError(
+            f"{describe(given)} is not a list of knees; write [[1023, 1023], [65535, 4095]]"
+        )
+    found = tuple(read_items(enumerate(given), _knee))
+    for before, after in pairwise(((0, 0), *found)):
+        if not (before[0] < after[0] and before[1] < after[1]):
+            raise ValueError("both codes of the knees must rise, from 0 on; sort them")
+    return found
+
+
+class Companding(Model):
+    """Codes of fewer bits: straight from knee to knee, rounded."""
+
+    knees: Annotated[
+        tuple[Knee, ...],
+        Either(_knees, list[Knee], yaml_form=lambda knees: [list(knee) for knee in knees]),
+    ] = key(
+        "[code of the ADC, code that is written], rising; straight between, from [0, 0] on [DN]",
+        example=[[1023, 1023], [65535, 4095]],
+    )
+
+
 class Adc(Model):
     """From volts to numbers, rounded and clipped to 0..2^bits - 1.
 
@@ -104,6 +142,13 @@ class Adc(Model):
     reference: Annotated[float | None, Quantity("voltage", above=0)] = key(
         "of a logarithmic ADC: where its curve bends; default full_scale / 1000",
         example="1.38 mV",
+        default=None,
+    )
+
+    companding: Annotated[Companding | None, word_or(Companding, {"none": None})] = key(
+        "codes compressed to fewer bits, piecewise linear; made linear again where the processing"
+        " begins",
+        example={"knees": [[1023, 1023], [65535, 4095]]},
         default=None,
     )
 

@@ -16,6 +16,7 @@ from vcam_cli.camera.sensor.noise import (
     TelegraphNoise,
 )
 from vcam_cli.camera.sensor.photodetector import Photodetector
+from vcam_cli.camera.sensor.several_readouts import GAINS, SmallPhotodiode
 from vcam_cli.camera.sensor.technology import CHOICE, TechnologyChoice
 from vcam_cli.camera.sensor.transfer_curve import TransferCurve
 from vcam_cli.config.model import Model, at_most_one, exactly_one, key
@@ -100,6 +101,23 @@ class Readout(Model):
     gain: Positive = key(
         "analog gain of the fixed readout chain; the photographer's is exposure.gain", default=1.0
     )
+    gains: Annotated[tuple[float, ...], GAINS] = key(
+        "conversion gains with which every pixel is read in one exposure, times exposure.gain, and"
+        " merged; channels dn (merged) and dn.gain1, dn.gain8",
+        example=[1, 8],
+        default=(),
+    )
+    merge: Literal["snr", "switch"] = key(
+        "how several readouts become one: snr, by inverse variance of those that do not saturate;"
+        " or switch, the highest gain that does not saturate",
+        default="snr",
+    )
+    small: Annotated[SmallPhotodiode | None, word_or(SmallPhotodiode, {"none": None})] = key(
+        "split pixel: a second photodiode of little light, read, merged and written like a further"
+        " gain (dn.small)",
+        example={"sensitivity": "1 %", "full_well": "60 ke"},
+        default=None,
+    )
     read_noise: Annotated[float | NoiseTable, NoiseByGain()] = key(
         "temporal noise of one readout of a pixel, rms, in electrons of the pixel; reset noise,"
         " that of columns and rows, and the ADC's noise and rounding come on top; or a table by"
@@ -164,6 +182,9 @@ class Readout(Model):
 
     @model_validator(mode="after")
     def _check_agreement(self) -> Self:
+        if self.merge == "switch" and not self.gains and self.small is None:
+            message = "there is one readout, and nothing to merge"
+            raise refusal(("merge",), message, "add gains: [1, 8], or remove merge")
         g, v, well = self.conversion_gain, self.voltage_swing, self.full_well
         if g is not None and v is not None and well is not None and abs(v / g / well - 1) > AGREE:
             message = f"voltage_swing / conversion_gain is {v / g:.6g} e, not {well:.6g} e"

@@ -41,7 +41,7 @@ class AdcNoise(NoiseSource):
         """Return the noise of the ADC, or None where the file gives none."""
         if not camera.adc.noise:
             return None
-        return cls(camera.adc.noise, Quantization.from_camera(camera, geometry))
+        return cls(camera.adc.noise, Quantization.uncompanded(camera))
 
     def describe(self) -> str:
         """Return a short clause with this camera's numbers and units."""

@@ -16,6 +16,7 @@ from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.camera.derived.transfer_curve import Curve
+from vcam_cli.effects.noise.companding import CompandedQuantization
 from vcam_cli.effects.readout_chain import electrical
 from vcam_cli.effects.signal_chain import Quantizer
 
@@ -35,6 +36,13 @@ class Quantization(Quantizer):
 
     @classmethod
     def from_camera(cls, camera: Camera, geometry: Geometry) -> Quantizer:
+        """Return the camera's ADC with the curve of the readout, and with companding behind it."""
+        found = cls.uncompanded(camera)
+        companding = camera.adc.companding
+        return found if companding is None else CompandedQuantization(found, companding.knees)
+
+    @classmethod
+    def uncompanded(cls, camera: Camera) -> Quantizer:
         """Return the camera's ADC, linear or logarithmic, with the readout's curve."""
         e = electrical(camera)
         if e.curve is not None and e.reference is None:

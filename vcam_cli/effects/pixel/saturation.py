@@ -16,6 +16,8 @@ from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.electrical import circuit
 from vcam_cli.camera.derived.geometry import Geometry
+from vcam_cli.camera.derived.readouts import has_several
+from vcam_cli.effects.readout_chain import merged_saturation
 from vcam_cli.effects.signal_chain import Limit, Site
 
 
@@ -24,15 +26,23 @@ class Saturation(Limit):
     """Clips above at the full well [electrons]; never below."""
 
     full_well: float
+    several: bool = False
+    """Whether it is where the last of several readouts saturates: others do before."""
 
     name = "saturation"
     reference = "Chen 2003, eq 2.26: Q_max = V_s / g"
     absent = "every pixel has it"
     seconds_per_pixel = 0.5e-9
 
+    def __post_init__(self) -> None:
+        # Light that one readout holds may fill another: the clamp of each has to stay.
+        object.__setattr__(self, "removable", not self.several)
+
     @classmethod
     def from_camera(cls, camera: Camera, geometry: Geometry) -> Self | None:
-        """Return the limit at the full well of the camera's pixel."""
+        """Return the limit at the full well; of several readouts where the last one saturates."""
+        if has_several(camera):
+            return cls(merged_saturation(camera), several=True)
         return cls(circuit(camera).full_well)
 
     def describe(self) -> str:

@@ -186,7 +186,7 @@ def _samples(frame: Frame) -> list[dict[str, Any]]:
     said = []
     for number, name in enumerate(_sample_files(frame)):
         sample = frame.sample(number)
-        full = float((sample.dn >= frame.saturated_dn).mean())
+        full = float((sample.dn >= frame.chain.saturated_dn).mean())
         said.append({"file": name, "time": sample.exposure_time, "saturated_fraction": full})
     return said
 

@@ -21,7 +21,7 @@ from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import geometry
 from vcam_cli.camera.derived.mosaic import BLOCKS
 from vcam_cli.effects.base import Gain, of_kind
-from vcam_cli.effects.signal_chain import noise_sources
+from vcam_cli.effects.noise.quantization import Quantization
 from vcam_cli.errors import bad
 from vcam_cli.files.images.dng import (
     LEAST_SIZE,
@@ -71,7 +71,8 @@ def check(camera: Camera) -> None:
             " raw converters read others wrong: LibRaw all of more than 2 x 2, and some of 2 x 2"
         )
         raise bad(_PATH, message, _REMEDY)
-    bits = _highest_code(camera.adc.bits, layout.binning_groups.summed_codes).bit_length()
+    added = layout.binning_groups.summed_codes
+    bits = (Quantization.from_camera(camera, geometry(camera)).highest_code * added).bit_length()
     if bits > MOST_BITS:
         message = f"its codes have {bits} bits, and raw converters read at most {MOST_BITS}"
         raise bad(_PATH, message, _REMEDY)
@@ -80,20 +81,15 @@ def check(camera: Camera) -> None:
         raise bad(_PATH, f"{message}, and this one has {rows} x {columns}", _REMEDY)
 
 
-def _highest_code(bits: int, added: int) -> int:
-    return int((2**bits - 1) * added)
-
-
 def write_raw_dng(path: Path, frame: Frame, description: str) -> None:
     """Write raw.dng."""
     codes = np.moveaxis(frame.dn, 0, -1) if frame.layout.full_color else frame.dn
-    levels = np.array([frame.black_dn, frame.saturated_dn, frame.white_dn.max()])
-    linear = frame.linear(levels)
+    levels = np.array([frame.black_dn, frame.chain.saturated_dn, frame.white_dn.max()])
+    chain = frame.chain
+    linear = chain.linear(levels)
     table, (black, white) = None, levels[:2]
-    if frame.electrical.linearized:
-        curve = frame.linear(
-            np.arange(_highest_code(frame.electrical.bits, frame.summed_codes) + 1.0)
-        )
+    if chain.linearized:
+        curve = chain.linear(np.arange(chain.highest_dn + 1.0))
         scale = TOP / (curve[-1] - curve[0])
         table = np.rint((curve - curve[0]) * scale).astype(np.uint16)
         black, white = (linear[:2] - curve[0]) * scale
@@ -145,11 +141,12 @@ def _small(frame: Frame, codes: Array) -> Array:
     whole = codes[: rows * square[0], : columns * square[1]]
     if frame.layout.full_color:
         kept = whole.reshape(rows, square[0], columns, square[1], -1)
-        return np.asarray(frame.linear(kept.astype(np.float32)).mean(axis=(1, 3), dtype=float))
+        straight = frame.chain.linear(kept.astype(np.float32))
+        return np.asarray(straight.mean(axis=(1, 3), dtype=float))
     means = dict.fromkeys(frame.mosaic.colors, 0.0)
     names = [name for line in block for name in line]
     for (row, column), name in zip(np.ndindex(*size), names, strict=True):
-        part = frame.linear(whole[row :: size[0], column :: size[1]].astype(np.float32))
+        part = frame.chain.linear(whole[row :: size[0], column :: size[1]].astype(np.float32))
         kept = part.reshape(rows, square[0] // size[0], columns, square[1] // size[1])
         means[name] = means[name] + kept.mean(axis=(1, 3), dtype=float) / names.count(name)
     return np.stack(list(means.values()), axis=-1)
@@ -178,20 +175,16 @@ def _noise(frame: Frame, span: float) -> tuple[float, float]:
 
     `span` is from black to white, of codes of a linear ADC [DN].
     """
-    electrons = span * frame.electrical.electrons_per_dn / frame.summed_codes
-    dark = frame.dark_rate * frame.exposure_time
-    sources, binning = noise_sources(frame.plan.active, "frame"), frame.solved.binning
-    floor, full = (
-        sum(source.binned_variance(mean, dark, binning) for source in sources)
-        for mean in (dark, dark + electrons)
-    )
-    rounding = frame.adc.rounding(dark, floor * frame.summed_codes) / frame.summed_codes
-    return (full - floor) / electrons**2, (floor + rounding) / electrons**2
+    chain, dark = frame.chain, frame.dark_rate * frame.exposure_time
+    electrons = span / chain.system_gain / chain.summed_codes
+    floor, full = (chain.noise(mean, dark) for mean in (dark, dark + electrons))
+    return (full.analog - floor.analog) / electrons**2, floor.total / electrons**2
 
 
 def _colors(frame: Frame) -> Colors:
     """Return the camera's colors of the scene's white, and its color matrices."""
-    white = frame.linear(frame.white_dn) - float(frame.linear(np.array([frame.black_dn]))[0])
+    *white, black = frame.chain.linear(np.array([*frame.white_dn, frame.black_dn]))
+    white = np.array(white) - black
     neutral = 1 / illuminant_gains(white)
     matrices = {name: color_matrix(frame, illuminant(name)) for name in LIGHT_SOURCES}
     return Colors(matrices, neutral / neutral.max())

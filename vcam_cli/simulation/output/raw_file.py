@@ -43,15 +43,21 @@ Channel = Callable[[slice], Array]
 
 def write_raw(path: Path, frame: Frame, config_hash: str) -> None:
     """Write raw.exr, block by block."""
-    e = frame.electrical
     values: Values = {
         "dn": (frame.dn, None),
         "electrons": (frame.electrons, None),
-        "volts": (frame.electrons, e.volts_of),
+        "volts": (frame.electrons, frame.chain.to_volts),
     }
     asked = {name: values[name] for name in frame.solved.output.raw}
-    units: dict[str, Attribute] = {f"vcam:unit.{name}": UNITS[name] for name in asked}
-    _write(path, frame, asked, attributes(frame, config_hash) | units)
+    said: dict[str, Attribute] = {f"vcam:unit.{name}": UNITS[name] for name in asked}
+    if "dn" in asked:
+        asked |= {f"dn.{name}": (codes, None) for name, codes in frame.readouts_dn.items()}
+        for branch in frame.chain.branches:
+            said[f"vcam:unit.dn.{branch.name}"] = UNITS["dn"]
+            said[f"vcam:adcOffset.{branch.name}"] = branch.circuit.offset
+            said[f"vcam:electronsPerDN.{branch.name}"] = branch.circuit.electrons_per_dn
+            said[f"vcam:sensitivity.{branch.name}"] = branch.sensitivity
+    _write(path, frame, asked, attributes(frame, config_hash) | said)
 
 
 def write_raw_tiff(path: Path, frame: Frame, config_hash: str) -> None:
@@ -77,7 +83,7 @@ def write_hdr(path: Path, frame: Frame, config_hash: str) -> None:
         **photograph(frame),
         "vcam:captureTimes": ",".join(map(repr, frame.times)),
         "vcam:estimator": frame.solved.exposure.estimator,
-        "vcam:saturatedFrom": frame.electrical.saturation / frame.times[0] - frame.dark_rate,
+        "vcam:saturatedFrom": frame.chain.saturation / frame.times[0] - frame.dark_rate,
         "vcam:unit": "e/s",
     }
     _write(path, frame, {"photocurrent": (frame.photocurrent, None)}, said)
@@ -150,7 +156,7 @@ def _meaning(frame: Frame) -> str:
 
 def white_level(frame: Frame) -> float:
     """Return the highest code, of as many codes as are added [DN]."""
-    return float(frame.electrical.highest_code * frame.layout.binning_groups.summed_codes)
+    return float(frame.chain.highest_dn)
 
 
 def attributes(frame: Frame, config_hash: str) -> dict[str, Attribute]:

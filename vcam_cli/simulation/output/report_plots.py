@@ -50,13 +50,7 @@ def noise_parts(frame: Frame) -> tuple[Array, dict[str, Array]]:
         for source in noise_sources(frame.plan.active, scope):
             each = [source.binned_variance(level + dark, dark, binning) for level in signal]
             parts[source.name] = np.array(each)
-    conversions = binning.conversions
-    temporal = sum(parts[s.name] for s in noise_sources(frame.plan.active, "frame"))
-    noise = np.broadcast_to(temporal, signal.shape)
-    rounding = [
-        frame.adc.rounding(level + dark, conversions * float(n)) / conversions
-        for level, n in zip(signal, noise, strict=True)
-    ]
+    rounding = [frame.chain.noise(level + dark, dark).rounding for level in signal]
     return signal, parts | {"quantization": np.array(rounding)}
 
 
@@ -186,7 +180,7 @@ def draw_mtf(figure: Any, frame: Frame, names: Sequence[str]) -> None:
 
 def histogram(frame: Frame) -> tuple[Array, list[Array]]:
     """Return the edges (n + 1,) of bins [DN], and the pixels of each color in them."""
-    top = int(frame.electrical.highest_code) * frame.summed_codes
+    top = frame.chain.highest_dn
     bins = min(BINS, top + 1)
     edges = np.linspace(-0.5, top + 0.5, bins + 1)
     dn, colors = frame.dn, range(len(frame.mosaic.colors))

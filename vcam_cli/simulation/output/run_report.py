@@ -96,8 +96,8 @@ def _raw(result: Photograph) -> Iterator[Part]:
     if dn.ndim == 1 or min(dn.shape[:2]) < 2 or (dn.ndim == 3 and dn.shape[2] != 3):
         return
     frame = result.frame
-    low = min(frame.black_dn, frame.saturated_dn - 1)
-    shown = pictures.shades(dn - dn.dtype.type(low), frame.saturated_dn - low)
+    low = min(frame.black_dn, frame.chain.saturated_dn - 1)
+    shown = pictures.shades(dn - dn.dtype.type(low), frame.chain.saturated_dn - low)
     is_mosaic = len(frame.mosaic.colors) > 1 and shown.ndim == 2
     raw, note = pictures.codes(shown, is_mosaic)
     about = "Codes from the black level to saturation, brightened by a square root."
