@@ -98,6 +98,11 @@ class Effect(ABC):
     """Why a camera does not have it: a sentence."""
     seconds_per_pixel: ClassVar[float] = 0.0
     """Cost on one core of 2020s hardware, for the plan's estimate."""
+    acts_on_light: ClassVar[bool] = True
+    """Whether the mean light on the lattice may depend on whether it runs."""
+    keys_behind_light: ClassVar[tuple[str, ...]] = ()
+    """Dotted keys of the camera file that only change what it does behind the light: cameras that
+    differ in them share their light."""
     removable: ClassVar[bool] = True
     """Whether the plan may leave it out (a user always may)."""
     origin: ClassVar[Literal["lens", "pixel", "readout"]] = "pixel"
@@ -463,6 +468,8 @@ class TemporalGain(Effect):
 
 class Charge(Effect):
     """Electrons that are not light."""
+
+    acts_on_light = False
 
     @abstractmethod
     def rate(self) -> float:

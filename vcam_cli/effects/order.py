@@ -4,15 +4,17 @@
     ---------------------  -----------------  -----------------------------  -----------------------
     radiance of the scene  (always there)     camera equation, eq 2.18       photons / (s m2 m)
     spectrum of the image  Blur               diffraction, aberration,       electrons / s, blurred
-                                              depth, charge_diffusion
+                                              depth
     spectrum of the image  ImageMotion        motion                         electrons / s, blurred
     spectrum of the image  SeparableTransfer  pixel_aperture                 electrons / s, blurred
+    spectrum of the image  Blur               charge_diffusion               electrons / s, blurred
     electrons / s          Gain               off_axis                       electrons / s
     electrons / s          VeilingGlare       stray_light                    electrons / s
     electrons / s          Gain               pixel_vignetting, microlens    electrons / s
     electrons / s          TemporalGain       flicker                        electrons / s
     electrons / s          Charge             dark_current                   electrons (mean signal)
     electrons              Transport          charge_transfer                electrons (mean signal)
+    electrons              before_shot        fpn                            electrons (mean signal)
     electrons              NoiseSource        shot_noise, fpn, fpn_shading,  electrons
                                               reset_noise, read_noise,
                                               heavy_tailed_noise,
@@ -23,8 +25,9 @@
     electrons              Quantizer          quantization                   DN
 
 Kinds are classes of `base.py` and `signal_chain.py`; an aberration that changes over the field is a
-FieldTransfer. Transfer functions multiply, so their order does not matter. Gains act on the blurred
-image: they are taken as constant over a pixel and a point spread function.
+FieldTransfer; `before_shot` is a method of a NoiseSource: it changes the mean signal whose shot
+noise is drawn. Transfer functions multiply, so their order does not matter. Gains act on the
+blurred image: they are taken as constant over a pixel and a point spread function.
 
 Within a kind the order of this tuple is the order of action; that of the noise in front of the ADC,
 which an automatic offset makes room for, is in `noise/sources.py`. It is written nowhere else.

@@ -109,6 +109,8 @@ def electron_effects(effects: Iterable[Effect], behind_well: bool) -> tuple[Elec
 class NoiseSource(ElectronEffect):
     """A random contribution; whoever adds it also states its variance."""
 
+    acts_on_light = False
+
     parts: ClassVar[tuple[str, ...]] = ()
     """Names of its strengths, where it has several that each take a draw of their own from every
     pixel; one at 0 is not drawn."""

@@ -1,38 +1,42 @@
 """What the light on the sensor depends on: cameras of one key share it.
 
-It is all of the camera file but the keys listed here, of which none is read before electrons are
-counted. A key that is not listed counts as one that changes the light, so a new one can cost time
-but no truth.
+It is all of the camera file but the keys that effects say act behind the light, and those listed
+here: none is read before electrons are counted. A key that is not listed counts as one that changes
+the light, so a new one can cost time but no truth.
 """
 
 from __future__ import annotations
 
 import json
+from itertools import accumulate
 from typing import Any
 
 from vcam_cli.camera.camera import Camera
-from vcam_cli.effects.base import Charge
 from vcam_cli.effects.order import ORDER
-from vcam_cli.effects.signal_chain import NoiseSource
 from vcam_cli.solve.settings import camera_settings
 
-INDEPENDENT_KEYS: tuple[tuple[str, ...], ...] = tuple(
-    tuple(path.split("."))
-    for path in (
-        *("name", "seed", "adc", "exposure", "processing", "quality", "output"),
-        *("accuracy.shot_noise", "display.dpi", "display.width", "display.viewing_distance"),
-        *("pixel.fpn", "pixel.defects"),
-        *(f"pixel.readout.{k}" for k in ("gain", "read_noise", "column_noise", "row_noise")),
-        *(f"pixel.readout.{k}" for k in ("heavy_tailed_noise", "correlated_row_noise")),
-        *(f"pixel.readout.{k}" for k in ("telegraph_noise", "reset_noise", "charge_transfer")),
-        *(f"pixel.readout.{k}" for k in ("timing", "gains", "merge", "small")),
-        *(f"pixel.photodetector.{k}" for k in ("dark_current", "dark_current_density")),
-        *("pixel.photodetector.dark_current_scale", "array.binning"),
-    )
+OTHER_KEYS = (
+    *("name", "seed", "exposure", "processing", "quality", "output"),
+    *("display.dpi", "display.width", "display.viewing_distance"),
+    *("array.binning", "pixel.readout.gain", "pixel.readout.timing"),
+    *(f"pixel.readout.{key}" for key in ("gains", "merge", "small")),
 )
-"""Keys on which the light does not depend. Exposure, ADC and analog gain set the level at which a
-pixel is full, beyond which the light is not followed as exactly: see `RateCache.rate`."""
-_RANDOM = {kind.name for kind in ORDER if issubclass(kind, NoiseSource | Charge)}
+"""Keys behind the light that belong to no effect. Exposure, ADC and analog gain set the level at
+which a pixel is full, beyond which the light is not followed as exactly: see `RateCache.rate`."""
+_LISTED = {*OTHER_KEYS, *(key for kind in ORDER for key in kind.keys_behind_light)}
+
+
+def _within_another(path: str) -> bool:
+    """Return whether a section that the key is in is listed, too."""
+    *parents, _ = accumulate(path.split("."), "{}.{}".format)
+    return not _LISTED.isdisjoint(parents)
+
+
+INDEPENDENT_KEYS = tuple(
+    tuple(path.split(".")) for path in sorted(_LISTED) if not _within_another(path)
+)
+"""Keys on which the light does not depend."""
+_BEHIND_LIGHT = {kind.name for kind in ORDER if not kind.acts_on_light}
 
 
 def light_key(camera: Camera) -> str:
@@ -60,7 +64,7 @@ def light_key(camera: Camera) -> str:
     if isinstance(accuracy, dict) and set(accuracy) == {"preset"}:
         form["accuracy"] = accuracy["preset"]
     if isinstance(form.get("effects"), dict):
-        own = {name: state for name, state in form["effects"].items() if name not in _RANDOM}
+        own = {name: state for name, state in form["effects"].items() if name not in _BEHIND_LIGHT}
         form["effects"] = own or "auto"
     return json.dumps(form, sort_keys=True)
 

@@ -54,6 +54,7 @@ class FixedPattern(NoiseSource):
 
     name = "fpn"
     reference = "Chen 2003, eq 2.26 (Q_f); El Gamal et al., Proc. SPIE 3301, 1998"
+    keys_behind_light = ("pixel.fpn", "pixel.defects")
     absent = "pixel.fpn and pixel.defects have nothing that the architecture has"
     seconds_per_pixel = 20e-9
     scope = "sensor"

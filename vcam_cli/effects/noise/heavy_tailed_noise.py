@@ -77,6 +77,7 @@ class HeavyTailedNoise(NoiseSource):
         "Wei et al., A physics-based noise formation model for extreme low-light raw denoising,"
         " CVPR 2020, section 3.2 (read noise)"
     )
+    keys_behind_light = ("pixel.readout.heavy_tailed_noise",)
     absent = "pixel.readout.heavy_tailed_noise is none or 0"
     seconds_per_pixel = 60e-9
     origin = "readout"

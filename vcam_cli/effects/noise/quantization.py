@@ -31,6 +31,7 @@ class Quantization(Quantizer):
 
     name = "quantization"
     reference = "Chen 2003, section 2.3.4"
+    keys_behind_light = ("adc",)
     absent = "every camera has it"
     seconds_per_pixel = 2e-9
 

@@ -32,6 +32,11 @@ class ReadNoise(NoiseSource):
 
     name = "read_noise"
     reference = "Chen 2003, eq 2.26 (Q_r); column and row parts: EMVA 1288 release 4.0, section 8"
+    keys_behind_light = (
+        "pixel.readout.read_noise",
+        "pixel.readout.column_noise",
+        "pixel.readout.row_noise",
+    )
     absent = "pixel.readout has no read, column or row noise that its architecture has"
     seconds_per_pixel = 9e-9
     origin = "readout"

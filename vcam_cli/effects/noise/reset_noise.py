@@ -31,6 +31,7 @@ class ResetNoise(NoiseSource):
 
     name = "reset_noise"
     reference = "Chen 2003, section 2.2.3: kTC, sigma^2 = kTC/q^2"
+    keys_behind_light = ("pixel.readout.reset_noise",)
     absent = (
         "pixel.readout.reset_noise is none or 0, or correlated double sampling removes it"
         " (aps-4t, ccd)"

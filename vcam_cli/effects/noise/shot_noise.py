@@ -25,6 +25,7 @@ class ShotNoise(NoiseSource):
 
     name = "shot_noise"
     reference = "Chen 2003, eq 2.26: variance = number of electrons collected"
+    keys_behind_light = ("accuracy.shot_noise",)
     absent = "every pixel has it"
     seconds_per_pixel = 20e-9
     sample_draws = "cumulative"

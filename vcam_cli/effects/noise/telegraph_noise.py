@@ -44,6 +44,7 @@ class TelegraphNoise(NoiseSource):
         "Wang, Rao, Mierop and Theuwissen, Random telegraph signal in CMOS image sensor pixels,"
         " IEDM 2006, doi:10.1109/IEDM.2006.346973"
     )
+    keys_behind_light = ("pixel.readout.telegraph_noise",)
     absent = "pixel.readout.telegraph_noise is none or 0"
     seconds_per_pixel = 20e-9
 

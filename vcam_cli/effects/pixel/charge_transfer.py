@@ -51,6 +51,7 @@ class ChargeTransfer(Transport):
 
     name = "charge_transfer"
     reference = "Janesick, Scientific Charge-Coupled Devices, 2001, section 5.2.3"
+    keys_behind_light = ("pixel.readout.charge_transfer",)
     absent = "pixel.readout.charge_transfer has no inefficiency"
     seconds_per_pixel = 4e-9
 

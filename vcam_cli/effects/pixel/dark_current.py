@@ -31,6 +31,11 @@ class DarkCurrent(Charge):
     reference = (
         "Chen 2003, eqs 2.26 and 2.31; temperature: Janesick, Scientific CCDs, 2001, section 7.1.1"
     )
+    keys_behind_light = (
+        "pixel.photodetector.dark_current",
+        "pixel.photodetector.dark_current_density",
+        "pixel.photodetector.dark_current_scale",
+    )
     absent = "the photodetector has no dark current"
     seconds_per_pixel = 0.5e-9
 
