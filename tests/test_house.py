@@ -260,9 +260,35 @@ def asks_for_an_effects_kind(module: Module) -> list[str]:
     return found
 
 
+BEHIND_SOLVE = {"image_formation", "readout", "processing", "quality", "simulation"}
+"""Packages behind `solve`."""
+READS_CAMERAS = {
+    "simulation.simulate", "simulation.pipeline", "simulation.reading", "simulation.shared",
+    "simulation.planned", "simulation.sequence", "simulation.exposure_control",
+    "simulation.scene_times",  # who simulates a camera
+    "simulation.checks", "simulation.scene_files", "simulation.spectral_irradiance",
+    "simulation.output.isetcam_files", "simulation.output.raw_dng",  # who checks or reads its files
+    "simulation.output.outputs", "simulation.output.provenance",  # who says where a frame is from
+}  # fmt: skip
+"""Modules of them in which functions take what a camera file says."""
+
+
+def reads_a_camera(module: Module) -> list[str]:
+    """Parameters behind `solve` that are a whole camera."""
+    if module.room not in BEHIND_SOLVE or module.name in READS_CAMERAS:
+        return []
+    given = (node for node in ast.walk(module.tree) if isinstance(node, ast.arg))
+    taken = (a for a in given if a.annotation is not None)
+    return [
+        f"{module.name}:{a.lineno}: {a.arg}"
+        for a in taken
+        if a.annotation and re.search(r"\bCamera(Model)?\b", ast.unparse(a.annotation))
+    ]
+
+
 RULES = (
     climbs, image_library, heavy, writes, undocumented, unfinished, names_a_camera,
-    asks_for_an_effects_kind,
+    asks_for_an_effects_kind, reads_a_camera,
 )  # fmt: skip
 
 
@@ -302,6 +328,8 @@ BROKEN = [
     (names_a_camera, "config.x", "def camera_file():\n    pass\n"),
     (names_a_camera, "config.x", "from vcam_cli.config.x import PixelWidth\n"),
     (names_a_camera, "config.x", "f(lens=1)\n"),
+    (reads_a_camera, "readout.x", "def f(a, camera: Camera | None):\n    pass\n"),
+    (reads_a_camera, "simulation.x", "def f(*, c: 'camera.Camera'):\n    pass\n"),
     (asks_for_an_effects_kind, "readout.x", "from vcam_cli.effects.base import Charge, Gain\n"
      "if isinstance(a, Charge):\n    pass\nelif isinstance(a, int | Gain):\n    pass\n"),
     (asks_for_an_effects_kind, "readout.x", "from vcam_cli.effects import base\n"
@@ -331,6 +359,8 @@ KEPT = [
     (writes, "commands.x", "atomic.write_text('a', 'b')\n'a'.replace('a', 'b')\n"),
     (writes, "files.x", "open('a', 'w')\n"),
     (undocumented, "x", "'''Module.'''\ndef _private():\n    pass\n"),
+    (reads_a_camera, "readout.x", "def f(camera: Solved, other: CameraEffects):\n    pass\n"),
+    (reads_a_camera, "solve.x", "def f(camera: Camera):\n    pass\n"),
     (names_a_camera, "config.x", "a = 'write pixel.width'\n"),
     (names_a_camera, "camera.x", "pixel = 1\n"),
     (
