@@ -89,9 +89,18 @@ class Harmonics(Protocol):
         """Period along x and y [m]."""
 
     def amplitudes(self, count_x: int, count_y: int) -> Array:
-        """Return the amplitudes (count_y, count_x) of the cosine series.
+        """Return the amplitudes of the cosine series.
 
-        Entry (l, k) is that of cos(2 pi k x / p_x) cos(2 pi l y / p_y).
+        Parameters
+        ----------
+        count_x, count_y : int
+            Terms along x and y.
+
+        Returns
+        -------
+        Array
+            Amplitudes (count_y, count_x), relative to the perfect white. Entry (l, k) is that of
+            cos(2 pi k x / p_x) cos(2 pi l y / p_y).
         """
 
 
@@ -108,13 +117,43 @@ class HarmonicScene:
     chart: "ChartScene"
 
     def values_at(self, x: Array, y: Array, mix: Array) -> Array:
-        """Return sum_k mix[r, k] B_k at the points (y[i], x[j]): (R, m, n)."""
+        """Return sum_k mix[r, k] B_k at points.
+
+        Parameters
+        ----------
+        x, y : Array
+            Places (n,) along the rows and (m,) along the columns [m].
+        mix : Array
+            Mixtures (R, K) of the components.
+
+        Returns
+        -------
+        Array
+            Values (R, m, n), in the unit of `mix`.
+        """
         return self.chart.values_at(x, y, mix)
 
     def change_bounds(
         self, losses: Sequence[BlurLoss], geometry: Geometry, ceiling: float, allowed: float
     ) -> ChangeBounds:
-        """Return that no bound is known: a lens that ends the series saves more than it costs."""
+        """Return that no bound is known: a lens that ends the series saves more than it costs.
+
+        Parameters
+        ----------
+        losses : sequence of BlurLoss
+            The blurs, all of one light.
+        geometry : Geometry
+            Geometry of the array.
+        ceiling : float
+            Rate that fills a pixel [e/s].
+        allowed : float
+            Change over full signal that matters.
+
+        Returns
+        -------
+        ChangeBounds
+            inf for each blur.
+        """
         return ChangeBounds(0.0, [math.inf] * len(losses))
 
 
@@ -182,7 +221,18 @@ class SampledScene(ABC):
         """Brightest light of a component, relative to what the perfect white has of it."""
 
     def rectangles(self, mix: Array) -> Rectangles | None:
-        """Return the whole grid's area as even rectangles; None where it is not made of them."""
+        """Return the whole grid's area as even rectangles; None where it is not made of them.
+
+        Parameters
+        ----------
+        mix : Array
+            Mixtures (R, K) of the components.
+
+        Returns
+        -------
+        Rectangles or None
+            The rectangles; None where the light is not made of them.
+        """
         return None
 
     def change_bounds(
@@ -264,10 +314,34 @@ class Chart(ABC):
 
     @abstractmethod
     def values(self, x: Array, y: Array, mix: Array) -> Array:
-        """Return the values (R, len(y), len(x)) at points."""
+        """Return the values at points.
+
+        Parameters
+        ----------
+        x, y : Array
+            Places along the rows and columns [m].
+        mix : Array
+            Mixtures (R, K) of the components.
+
+        Returns
+        -------
+        Array
+            Values (R, len(y), len(x)), in the unit of `mix`.
+        """
 
     def crop_to_cells(self, x_edges: Array, y_edges: Array) -> "Chart":
-        """Return a chart that looks the same on these cells, if one is faster there."""
+        """Return a chart that looks the same on these cells, if one is faster there.
+
+        Parameters
+        ----------
+        x_edges, y_edges : Array
+            Rising edges of the cells [m].
+
+        Returns
+        -------
+        Chart
+            That chart, or this one.
+        """
         return self
 
     def edges(self) -> tuple[Array, Array] | None:
@@ -279,18 +353,60 @@ class Chart(ABC):
         return None
 
     def even_values(self, x: Array, y: Array, mix: Array) -> Array:
-        """Return the values (R, len(y), len(x)) of even rectangles at points, without discs."""
+        """Return the values of even rectangles at points, without discs.
+
+        Parameters
+        ----------
+        x, y : Array
+            Places along the rows and columns [m].
+        mix : Array
+            Mixtures (R, K) of the components.
+
+        Returns
+        -------
+        Array
+            Values (R, len(y), len(x)), in the unit of `mix`.
+        """
         return self.values(x, y, mix)
 
     def discs(self, mix: Array) -> tuple[LightDisc, ...]:
-        """Return the discs that lie on a chart of even rectangles, if it has any."""
+        """Return the discs that lie on a chart of even rectangles, if it has any.
+
+        Parameters
+        ----------
+        mix : Array
+            Mixtures (R, K) of the components.
+
+        Returns
+        -------
+        tuple of LightDisc
+            The discs; () where there are none.
+        """
         return ()
 
     separates: ClassVar[bool] = False
     """Whether its light is a sum of few products of functions of x and y: `products`."""
 
     def products(self, x_edges: Array, y_edges: Array, mix: Array) -> Products:
-        """Return the light as such a sum, averaged over cells between edges [m]."""
+        """Return the light as such a sum, averaged over cells between edges [m].
+
+        Parameters
+        ----------
+        x_edges, y_edges : Array
+            Rising edges of the cells [m].
+        mix : Array
+            Mixtures (R, K) of the components.
+
+        Returns
+        -------
+        Products
+            Functions of y and of x whose products add up to the light.
+
+        Raises
+        ------
+        ValueError
+            If the chart is no such sum.
+        """
         raise ValueError(f"{type(self).__name__} is no sum of products")
 
     def profile(self) -> Profile | None:
@@ -347,7 +463,20 @@ class Chart(ABC):
         return energy
 
     def averages(self, x_edges: Array, y_edges: Array, mix: Array) -> Array:
-        """Return the averages over the cells: (R, len(y_edges) - 1, len(x_edges) - 1)."""
+        """Return the averages over cells.
+
+        Parameters
+        ----------
+        x_edges, y_edges : Array
+            Rising edges of the cells [m].
+        mix : Array
+            Mixtures (R, K) of the components.
+
+        Returns
+        -------
+        Array
+            Averages (R, len(y_edges) - 1, len(x_edges) - 1), in the unit and float type of `mix`.
+        """
         out = np.empty((len(mix), len(y_edges) - 1, len(x_edges) - 1), mix.dtype)
         self.paint(x_edges, y_edges, mix, out)
         return out
@@ -362,13 +491,37 @@ class ChartScene(SampledScene):
     """Of the cells, x and y from the array's center [m]."""
 
     def with_cells(self, shape: tuple[int, int]) -> "ChartScene":
-        """Return the same part of the chart on a grid of so many cells (ny, nx)."""
+        """Return the same part of the chart on another grid of cells.
+
+        Parameters
+        ----------
+        shape : tuple of int
+            Cells (ny, nx).
+
+        Returns
+        -------
+        ChartScene
+            The scene.
+        """
         ny, nx = shape
         width, height = self.extent
         return replace(self, shape=shape, pitch_x=width / nx, pitch_y=height / ny)
 
     def crop(self, center: tuple[float, float], width: float, height: float) -> "ChartScene":
-        """Return a rectangle of the chart around a place (x, y) [m], as a single cell."""
+        """Return a rectangle of the chart as a single cell.
+
+        Parameters
+        ----------
+        center : tuple of float
+            Its center (x, y) [m].
+        width, height : float
+            Its sides [m].
+
+        Returns
+        -------
+        ChartScene
+            The scene.
+        """
         return replace(self, shape=(1, 1), pitch_x=width, pitch_y=height, center=center)
 
     def planes(self, mix: Array, workers: int = 1) -> Array:
@@ -379,7 +532,18 @@ class ChartScene(SampledScene):
         return out
 
     def painter(self, mix: Array) -> Callable[[slice, Array], None]:
-        """Return what writes the averages over the cells of rows into an array (R, rows, nx)."""
+        """Return what writes the averages over the cells of some rows.
+
+        Parameters
+        ----------
+        mix : Array
+            Mixtures (R, K) of the components.
+
+        Returns
+        -------
+        callable
+            Takes a slice of rows, and the array (R, rows, nx) to write into.
+        """
         ny, nx = self.shape
         x_edges = self.center[0] + cell_edges(nx, self.pitch_x)
         y_edges = self.center[1] + cell_edges(ny, self.pitch_y)

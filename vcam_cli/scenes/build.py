@@ -85,7 +85,22 @@ def build(
 
 
 def chart_and_reflectances(source: object, view: View) -> tuple[Chart, tuple[Spectrum, ...]]:
-    """Return a chart on the view's frame, and the reflectances of its parts."""
+    """Return a chart on the view's frame, and the reflectances of its parts.
+
+    Parameters
+    ----------
+    source : object
+        The chart of the camera file.
+    view : View
+        The array, and the size of the scene.
+
+    Returns
+    -------
+    chart : Chart
+        The chart.
+    reflectances : tuple of Spectrum
+        Reflectance of each part, without unit.
+    """
     waves = _waves(source)
     return _chart(source, view) if waves is None else (WaveChart(waves), (Spectrum.flat(1.0),))
 
@@ -148,7 +163,22 @@ def _image(
 
 
 def picture_spectra(scene: SceneModel, model: str, picture: Array) -> tuple[Spectrum, ...]:
-    """Return the radiance of every channel of a lit picture (h, w, channels) where it is 1."""
+    """Return the radiance of every channel of a lit picture where it is 1.
+
+    Parameters
+    ----------
+    scene : Scene
+        What the file says of the scene.
+    model : str
+        What the channels mean: a `model` of the file's image.
+    picture : Array
+        The picture (h, w, channels).
+
+    Returns
+    -------
+    tuple of Spectrum
+        Radiances [W/(sr m2 m)].
+    """
     return _spectra_and_white(scene, model, picture, "")[0]
 
 
@@ -174,14 +204,40 @@ def _model(scene: SceneModel, model: str, primaries: str) -> tuple[tuple[Spectru
 
 
 def picture_model(model: str, channels: int) -> str:
-    """Return what so many channels mean where the file leaves it to them (`auto`)."""
+    """Return what the channels of a picture mean.
+
+    Parameters
+    ----------
+    model : str
+        What the file says; "auto": by the number of channels.
+    channels : int
+        Number of channels.
+
+    Returns
+    -------
+    str
+        The model.
+    """
     if model != "auto":
         return model
     return "reflectance" if channels == 1 else "mallett"
 
 
 def check_channels(model: str, channels: int) -> None:
-    """Refuse an image file whose color channels are not what the model needs (BadInput)."""
+    """Refuse an image file whose color channels are not what the model needs.
+
+    Parameters
+    ----------
+    model : str
+        What the file says that the channels mean.
+    channels : int
+        Color channels of the image file.
+
+    Raises
+    ------
+    BadInput
+        If the model needs another number of channels.
+    """
     model = picture_model(model, channels)
     needed = 1 if model == "reflectance" else 3
     if channels != needed:

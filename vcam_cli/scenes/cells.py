@@ -11,7 +11,20 @@ EVEN = (0.7548776662466927, 0.5698402909980532)
 
 
 def cell_edges(count: int, pitch: float) -> Array:
-    """Return the count + 1 edges of cells centered on 0 [m]."""
+    """Return the edges of cells centered on 0.
+
+    Parameters
+    ----------
+    count : int
+        Number of cells.
+    pitch : float
+        Their pitch [m].
+
+    Returns
+    -------
+    Array
+        Rising edges (count + 1,) [m].
+    """
     return (np.arange(count + 1) - count / 2) * pitch
 
 
@@ -44,22 +57,58 @@ def clip_cells(edges: Array, half: float) -> tuple[slice, Array, Array]:
 
 
 def edges_within(edges: Array, half: float) -> Array:
-    """Return the edges inside [-half, half], and these two."""
+    """Return the edges inside [-half, half], and these two.
+
+    Parameters
+    ----------
+    edges : Array
+        Rising edges [m].
+    half : float
+        Half the width of the interval [m].
+
+    Returns
+    -------
+    Array
+        Rising edges from -half to half [m].
+    """
     inside = edges[(edges > -half) & (edges < half)]
     return np.concatenate([[-half], np.unique(inside), [half]])
 
 
 def overlap(edges: Array, low: float, high: float) -> Array:
-    """Return the part of every cell between `edges` that lies within [low, high]: (n,)."""
+    """Return the part of every cell that lies within an interval.
+
+    Parameters
+    ----------
+    edges : Array
+        Rising edges (n + 1,) of the cells [m].
+    low, high : float
+        Ends of the interval [m].
+
+    Returns
+    -------
+    Array
+        Parts (n,), from 0 to 1.
+    """
     inside = np.minimum(edges[1:], high) - np.maximum(edges[:-1], low)
     shares: Array = np.maximum(inside, 0.0) / np.diff(edges)
     return shares
 
 
 def cell_means(planes: Array, count: int) -> Array:
-    """Return the means over so many cells along either side of planes (..., rows, columns).
+    """Return the means over square blocks of cells.
 
-    Slices are added: NumPy's mean over two axes takes eight times as long.
+    Parameters
+    ----------
+    planes : Array
+        Planes (..., rows, columns), whose sides are whole multiples of `count`.
+    count : int
+        Cells along either side of a block.
+
+    Returns
+    -------
+    Array
+        Means (..., rows / count, columns / count).
     """
     if count == 1:
         return planes

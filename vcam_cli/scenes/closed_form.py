@@ -46,7 +46,18 @@ class LightDisc:
     """(R,) what its light adds."""
 
     def lies_within(self, width: float, height: float) -> bool:
-        """Return whether all of it lies in a centered rectangle [m]."""
+        """Return whether all of it lies in a centered rectangle.
+
+        Parameters
+        ----------
+        width, height : float
+            Sides of the rectangle [m].
+
+        Returns
+        -------
+        bool
+            Whether it does.
+        """
         inside = abs(self.x) + self.radius <= width / 2
         return inside and abs(self.y) + self.radius <= height / 2
 

@@ -54,11 +54,33 @@ class Detail:
     """Mean squares (n,) of the picture without its mean, relative to the square of full signal."""
 
     def rms(self, transfer: Array) -> float:
-        """Return the rms, over full signal, of the detail behind a transfer (n,)."""
+        """Return the rms of the detail behind a transfer, over full signal.
+
+        Parameters
+        ----------
+        transfer : Array
+            Transfer (n,) at the frequencies of the detail.
+
+        Returns
+        -------
+        float
+            Rms, without unit.
+        """
         return float(np.sqrt((self.power * np.square(transfer)).sum()))
 
     def blur_change(self, *parts: tuple[float, float]) -> float:
-        """Return the rms, over full signal, of a sum of blurs: pairs of a factor and radius [m]."""
+        """Return the rms of a sum of blurs of the detail, over full signal.
+
+        Parameters
+        ----------
+        *parts : tuple of float
+            A factor, and the radius of a disc [m].
+
+        Returns
+        -------
+        float
+            Rms, without unit.
+        """
         blurs = [factor * disc_transfer(self.frequency, radius) for factor, radius in parts]
         return self.rms(np.sum(blurs, axis=0))
 
@@ -92,13 +114,37 @@ class DepthCut:
     """Predicted rms error by the layers' spacing, relative to full signal."""
 
     def coverage(self, layer: int, rows: Array, columns: Array) -> Array:
-        """Return what of samples (rows x columns) belongs to a layer, 0 to 1."""
+        """Return what part of samples belongs to a layer.
+
+        Parameters
+        ----------
+        layer : int
+            Number of the layer.
+        rows, columns : Array
+            Indices (m,) and (n,) of the samples.
+
+        Returns
+        -------
+        Array
+            Parts (m, n), from 0 to 1.
+        """
         here = np.ix_(rows, columns)
         first, share = self.first[here], self.share[here]
         return np.where(first == layer, 1 - share, np.where(first == layer - 1, share, 0))
 
     def radius(self, samples: Array) -> Array:
-        """Return the blur's radius of samples (n,), given by their index in the flattened map."""
+        """Return the blur's radius of samples.
+
+        Parameters
+        ----------
+        samples : Array
+            Their indices (n,) in the flattened map.
+
+        Returns
+        -------
+        Array
+            Radii (n,) [m], positive when nearer than the focus.
+        """
         first, share = self.first.ravel()[samples].astype(int), self.share.ravel()[samples]
         behind = np.minimum(first + 1, len(self.radii) - 1)
         return np.asarray(self.radii[first] * (1 - share) + self.radii[behind] * share)
@@ -138,7 +184,22 @@ def disc_transfer(frequency: Array, radius: float) -> Array:
 
 
 def full_signal(picture: Array, pitch: float, pixel: float) -> float:
-    """Return the brightest light (h, w) of a picture in the means over pixels, at most white."""
+    """Return the brightest light of a picture in the means over pixels, at most white.
+
+    Parameters
+    ----------
+    picture : Array
+        Light (h, w), relative to white.
+    pitch : float
+        Pitch of its samples [m].
+    pixel : float
+        Pitch of the pixels [m].
+
+    Returns
+    -------
+    float
+        Light, relative to white.
+    """
     together = max(int(pixel / pitch), 1)
     return min(float(block_means(picture, together).max(initial=0.0)), 1.0)
 
@@ -188,7 +249,20 @@ def picture_detail(
 
 
 def block_means(picture: Array, side: int) -> Array:
-    """Return the means over whole blocks of samples; of a smaller picture over all of it."""
+    """Return the means over whole blocks of samples.
+
+    Parameters
+    ----------
+    picture : Array
+        Samples (h, w).
+    side : int
+        Samples along a side of a block; at most all of a smaller picture's.
+
+    Returns
+    -------
+    Array
+        Means, one a block.
+    """
     down, across = (min(side, count) for count in picture.shape)
     rows, columns = picture.shape[0] // down, picture.shape[1] // across
     whole = picture[: rows * down, : columns * across]
@@ -196,7 +270,22 @@ def block_means(picture: Array, side: int) -> Array:
 
 
 def is_flat(radius: Array, detail: Detail, allowed: float) -> bool:
-    """Return whether a map of blur radii may be taken as one distance, in the middle of all."""
+    """Return whether a map of blur radii may be taken as one distance, in the middle of all.
+
+    Parameters
+    ----------
+    radius : Array
+        Radii of the blur [m].
+    detail : Detail
+        Detail of the picture.
+    allowed : float
+        Rms change that counts for nothing, over full signal.
+
+    Returns
+    -------
+    bool
+        Whether the change is at most `allowed` at both ends of the map.
+    """
     low, high = float(radius.min()), float(radius.max())
     middle = (low + high) / 2
     return max(detail.blur_change((1, middle), (-1, end)) for end in (low, high)) <= allowed

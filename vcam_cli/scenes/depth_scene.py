@@ -60,11 +60,33 @@ class LensBlur:
     """Width and height of the areas over which pixels average [m]."""
 
     def radius(self, depth: Array) -> Array:
-        """Return the radius of the blur at distances, positive when nearer than the focus [m]."""
+        """Return the radius of the blur at distances.
+
+        Parameters
+        ----------
+        depth : Array
+            Distances from the lens [m].
+
+        Returns
+        -------
+        Array
+            Radii [m], positive when nearer than the focus.
+        """
         return np.asarray(self.slope / np.asarray(depth, float) + self.offset)
 
     def distance(self, radius: float) -> float:
-        """Return the distance of a blur's radius [m]."""
+        """Return the distance at which the blur has a radius.
+
+        Parameters
+        ----------
+        radius : float
+            Radius [m], positive when nearer than the focus.
+
+        Returns
+        -------
+        float
+            Distance [m]; inf where no distance has it.
+        """
         inverse = (radius - self.offset) / self.slope
         return 1 / inverse if inverse > 0 else math.inf
 
@@ -169,20 +191,66 @@ class DepthScene:
         return self.flat.white
 
     def values_at(self, x: Array, y: Array, mix: Array) -> Array:
-        """Return sum_k mix[r, k] B_k of the picture at the points (y[i], x[j]): (R, m, n)."""
+        """Return sum_k mix[r, k] B_k of the picture at points.
+
+        Parameters
+        ----------
+        x, y : Array
+            Places (n,) along the rows and (m,) along the columns [m].
+        mix : Array
+            Mixtures (R, K) of the components.
+
+        Returns
+        -------
+        Array
+            Values (R, m, n), in the unit of `mix`.
+        """
         return self.flat.values_at(x, y, mix)
 
     def depth_at(self, x: Array, y: Array) -> Array:
-        """Return the distance of the samples under points (m, n) [m]."""
+        """Return the distance of the samples under points.
+
+        Parameters
+        ----------
+        x, y : Array
+            Places (n,) along the rows and (m,) along the columns [m].
+
+        Returns
+        -------
+        Array
+            Distances (m, n) [m].
+        """
         return np.asarray(self.depth[np.ix_(*self.flat.samples_under(x, y))])
 
     def shown(self, number: int) -> CutLayer:
-        """Return what the picture shows of a layer."""
+        """Return what the picture shows of a layer.
+
+        Parameters
+        ----------
+        number : int
+            Number of the layer.
+
+        Returns
+        -------
+        CutLayer
+            What is seen of it.
+        """
         rows, columns = (np.arange(count) for count in self.depth.shape)
         return self._layer(self.cut.coverage(number, rows, columns), None)
 
     def hidden(self, number: int) -> CutLayer | None:
-        """Return what of a layer goes on behind nearer samples; None where nothing does."""
+        """Return the part of a layer that goes on behind nearer samples.
+
+        Parameters
+        ----------
+        number : int
+            Number of the layer.
+
+        Returns
+        -------
+        CutLayer or None
+            What is hidden of it; None where nothing is.
+        """
         cut, found = self.cut, self.cut.hidden
         first, share = cut.first.ravel()[found.sources], cut.share.ravel()[found.sources]
         own = np.where(first == number, 1 - share, np.where(first + 1 == number, share, 0))
@@ -196,7 +264,18 @@ class DepthScene:
         return self._layer(coverage.reshape(shape), sources.reshape(shape))
 
     def sloped(self, number: int) -> SlopeLayer | None:
-        """Return what slopes add to a layer behind a paraboloid; None where none counts."""
+        """Return what slopes add to a layer behind a paraboloid.
+
+        Parameters
+        ----------
+        number : int
+            Number of the layer.
+
+        Returns
+        -------
+        SlopeLayer or None
+            What they add; None where no slope counts.
+        """
         if self.rises is None:
             return None
         shown, finer = self.shown(number), self.finer
@@ -270,7 +349,23 @@ def depth_scene(
 ) -> DepthScene:
     """Return a picture with depth, cut into layers as finely as the tolerance asks.
 
-    Parameters are those of `flat_distance`.
+    Parameters
+    ----------
+    flat : ImageScene
+        The picture at one distance.
+    given : DepthPicture
+        The picture's distances.
+    view : View
+        The array, and the size of the scene.
+    blur : LensBlur
+        Blur of the lens by distance.
+    tolerance : float
+        Rms error of the mean signal, over full signal.
+
+    Returns
+    -------
+    DepthScene
+        The scene.
     """
     depth = _on_sensor(flat, given, view)
     radius, light = blur.radius(depth), _brightness(flat)

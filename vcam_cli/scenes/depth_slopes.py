@@ -115,9 +115,19 @@ def _on_faces(rise: Array, axis: int, finer: int) -> Array:
 
 
 def steepest(rises: tuple[Array, Array]) -> float:
-    """Return a bound on what slopes change of light that is 1 at most: two thirds of the largest.
+    """Return a bound on what slopes change of light that is 1 at most.
 
-    That is the mean of |u| over the aperture.
+    It is two thirds of the steepest slope, the mean of |u| over the aperture.
+
+    Parameters
+    ----------
+    rises : tuple of Array
+        Rises of the blur's radius from sample to sample, down and to the right.
+
+    Returns
+    -------
+    float
+        Bound, in the unit of the light.
     """
     down, right = (float(np.abs(rise).max(initial=0.0)) for rise in rises)
     return 2 / 3 * math.hypot(down, right)

@@ -22,7 +22,18 @@ leaf's radius, where most edges meet in those of 0.4."""
 
 
 def divisions(error: float) -> int:
-    """Return how often cells are to be divided that may err so much, rms of white."""
+    """Return how often crossed cells are divided.
+
+    Parameters
+    ----------
+    error : float
+        Rms error that their averages may have, relative to white.
+
+    Returns
+    -------
+    int
+        Number of divisions, at most `MOST`.
+    """
     if error <= 0:
         return MOST
     return min(max(math.ceil(math.log(error / UNDIVIDED) / math.log(DIVIDED)), 0), MOST)
@@ -44,11 +55,33 @@ class Discs:
         return len(self.x)
 
     def select(self, index: Array) -> "Discs":
-        """Return some of the discs."""
+        """Return some of the discs.
+
+        Parameters
+        ----------
+        index : Array
+            Their indices.
+
+        Returns
+        -------
+        Discs
+            These discs, in the order of `index`.
+        """
         return Discs(self.x[index], self.y[index], self.radius[index])
 
     def find_near(self, left: float, right: float, top: float, bottom: float) -> Array:
-        """Return indices, in order, of the discs whose bounding box meets a rectangle."""
+        """Return the discs whose bounding box meets a rectangle.
+
+        Parameters
+        ----------
+        left, right, top, bottom : float
+            Ends of the rectangle, in the unit of the discs.
+
+        Returns
+        -------
+        Array
+            Indices, rising.
+        """
         return np.flatnonzero(
             (self.x + self.radius > left)
             & (self.x - self.radius < right)
@@ -72,9 +105,23 @@ class CrossedCells:
 
 
 def average_colors(discs: Discs, cells: CrossedCells, color: Array, divided: int = MOST) -> Array:
-    """Return the average colors (R, m) of crossed cells, `divided` so often.
+    """Return the average colors of crossed cells.
 
-    `color` is (R, labels).
+    Parameters
+    ----------
+    discs : Discs
+        The discs; a later one lies in front.
+    cells : CrossedCells
+        The cells (m,) that edges cross.
+    color : Array
+        Color (R, labels) of the ground and of every disc.
+    divided : int
+        How often a cell of several edges is divided.
+
+    Returns
+    -------
+    Array
+        Averages (R, m), in the unit of `color`.
     """
     out = np.empty((len(color), len(cells.back)))
     several = cells.count > 1
@@ -205,7 +252,22 @@ def _layer_shares(discs: Discs, parts: _Parts) -> tuple[Array, Array]:
 
 
 def cover(discs: Discs, index: Array, box: Array) -> Array:
-    """Return the part of each rectangle, 0..1, that lies in its disc: exact."""
+    """Return the exact part of rectangles that lies in discs.
+
+    Parameters
+    ----------
+    discs : Discs
+        The discs.
+    index : Array
+        Index (m,) of the disc of each rectangle.
+    box : Array
+        Left, right, top and bottom (4, m) of the rectangles, in the unit of the discs.
+
+    Returns
+    -------
+    Array
+        Parts (m,), from 0 to 1.
+    """
     left, right, top, bottom = box
     radius, x, y = discs.radius[index], discs.x[index], discs.y[index]
     sides = [_side((left - x) / radius), _side((right - x) / radius)]

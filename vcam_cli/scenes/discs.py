@@ -68,14 +68,44 @@ def paint(
 
 
 def averages(discs: Discs, color: Array, x_edges: Array, y_edges: Array) -> Array:
-    """Return what `paint` writes, in the dtype of `color`."""
+    """Return what `paint` writes, in the dtype of `color`.
+
+    Parameters
+    ----------
+    discs : Discs
+        The discs; a later one lies in front.
+    color : Array
+        Color (R, n + 1) of the ground and of every disc.
+    x_edges, y_edges : Array
+        Rising edges of the cells, in the unit of the discs.
+
+    Returns
+    -------
+    Array
+        Averages (R, len(y_edges) - 1, len(x_edges) - 1).
+    """
     out = np.empty((len(color), len(y_edges) - 1, len(x_edges) - 1), color.dtype)
     paint(discs, color, x_edges, y_edges, out)
     return out
 
 
 def values(discs: Discs, color: Array, x: Array, y: Array) -> Array:
-    """Return point values at (y[i], x[j]), both rising: (R, len(y), len(x))."""
+    """Return the colors at points.
+
+    Parameters
+    ----------
+    discs : Discs
+        The discs; a later one lies in front.
+    color : Array
+        Color (R, n + 1) of the ground and of every disc.
+    x, y : Array
+        Rising places along the rows and columns, in the unit of the discs.
+
+    Returns
+    -------
+    Array
+        Values (R, len(y), len(x)).
+    """
     near = discs.find_near(x[0], x[-1], y[0], y[-1])
     discs = discs.select(near)
     color = np.concatenate([color[:, :1], color[:, near + 1]], axis=1)
@@ -96,7 +126,20 @@ def values(discs: Discs, color: Array, x: Array, y: Array) -> Array:
 
 
 def separate_cover(discs: Discs, x_edges: Array, y_edges: Array) -> Array:
-    """Return the part of every cell that discs cover which do not overlap, exact: (ny, nx)."""
+    """Return the exact part of every cell that discs cover.
+
+    Parameters
+    ----------
+    discs : Discs
+        Discs that do not overlap.
+    x_edges, y_edges : Array
+        Rising edges of the cells, in the unit of the discs.
+
+    Returns
+    -------
+    Array
+        Parts (len(y_edges) - 1, len(x_edges) - 1), from 0 to 1.
+    """
     shape = len(y_edges) - 1, len(x_edges) - 1
     spans = _spans(discs, x_edges, y_edges)
     # whole cells: 1 at the first of a run, -1 behind its last, summed from the left
@@ -119,9 +162,23 @@ def separate_cover(discs: Discs, x_edges: Array, y_edges: Array) -> Array:
 def visible_discs(
     discs: Discs, x_edges: Array, y_edges: Array, hidden: Cells | None = None
 ) -> Array:
-    """Return indices, in order, of the discs that may be seen on a grid: hardly more than are seen.
+    """Return the discs that may be seen on a grid: hardly more than are seen.
 
     Left out are those that touch no cell but such as are covered whole by a disc before them.
+
+    Parameters
+    ----------
+    discs : Discs
+        The discs; a later one lies in front.
+    x_edges, y_edges : Array
+        Rising edges of the cells, in the unit of the discs.
+    hidden : Cells or None
+        Cells in which nothing is seen.
+
+    Returns
+    -------
+    Array
+        Indices, rising.
     """
     spans = _spans(discs, x_edges, y_edges)
     label = _labels(spans, len(discs), (len(y_edges) - 1, len(x_edges) - 1), hidden)

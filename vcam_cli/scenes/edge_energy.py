@@ -34,11 +34,33 @@ class Region:
         return self.size[0] * self.size[1]
 
     def moved(self, x: float, y: float) -> Region:
-        """Return the region as it is seen from a place (x, y) [m]."""
+        """Return the region as it is seen from another place.
+
+        Parameters
+        ----------
+        x, y : float
+            The place [m].
+
+        Returns
+        -------
+        Region
+            The region.
+        """
         return Region((self.center[0] - x, self.center[1] - y), self.size)
 
     def lengths_inside(self, start: Array, stop: Array) -> Array:
-        """Return the lengths (n,) of straight lines from (2, n) to (2, n) within it [m]."""
+        """Return the lengths of straight lines within it.
+
+        Parameters
+        ----------
+        start, stop : Array
+            Ends (2, n) of the lines, x and y [m].
+
+        Returns
+        -------
+        Array
+            Lengths (n,) [m].
+        """
         along = stop - start
         low, high = np.zeros(start.shape[1]), np.ones(start.shape[1])
         for axis in (0, 1):
@@ -66,7 +88,18 @@ class EdgeEnergy:
         return EdgeEnergy(self.aligned + other.aligned, self.oblique + other.oblique)
 
     def scaled(self, factor: float) -> EdgeEnergy:
-        """Return it times a factor."""
+        """Return it times a factor.
+
+        Parameters
+        ----------
+        factor : float
+            The factor, without unit.
+
+        Returns
+        -------
+        EdgeEnergy
+            The product.
+        """
         return EdgeEnergy(self.aligned * factor, self.oblique * factor)
 
 
@@ -113,5 +146,16 @@ def rectangle_energy(
 
 
 def total_energy(parts: Iterable[EdgeEnergy]) -> EdgeEnergy:
-    """Return the energy of several parts together."""
+    """Return the energy of several parts together.
+
+    Parameters
+    ----------
+    parts : iterable of EdgeEnergy
+        Energy of each part.
+
+    Returns
+    -------
+    EdgeEnergy
+        Their sum.
+    """
     return sum(parts, EdgeEnergy())

@@ -17,7 +17,21 @@ def chart_scene(
 ) -> ChartScene:
     """Return the chart on the view's cells, black outside the frame where it has a width.
 
-    Its parts have the spectral radiances `spectra`, and perfect white has `white` [W/(sr m2 m)].
+    Parameters
+    ----------
+    chart : Chart
+        The chart.
+    spectra : tuple of Spectrum
+        Radiance of each of its parts [W/(sr m2 m)].
+    white : Spectrum
+        Radiance of the perfect white [W/(sr m2 m)].
+    view : View
+        The array, and the size of the scene.
+
+    Returns
+    -------
+    ChartScene
+        The scene.
     """
     if view.scene_width is not None:
         chart = Framed(chart, view.frame)

@@ -125,13 +125,39 @@ class CubeScene(ImageScene):
 
 
 def covers(scene: Scene, bands: Bands) -> bool:
-    """Return whether the light of a file is known at all wavelengths simulated."""
+    """Return whether the light of a file is known at all wavelengths simulated.
+
+    Parameters
+    ----------
+    scene : Scene
+        What the file says of the scene.
+    bands : Bands
+        Wavelengths of the file of light.
+
+    Returns
+    -------
+    bool
+        Whether it is.
+    """
     table = Table(bands.wavelengths, bands.wavelengths)
     return bands.dark_beyond or table.covers(scene.wavelengths.start, scene.wavelengths.stop)
 
 
 def check_coverage(scene: Scene, bands: Bands) -> None:
-    """Raise BadInput where wavelengths are simulated at which a file's light is not known."""
+    """Check that a file's light is known at all wavelengths simulated.
+
+    Parameters
+    ----------
+    scene : Scene
+        What the file says of the scene.
+    bands : Bands
+        Wavelengths of the file of light.
+
+    Raises
+    ------
+    BadInput
+        If it is not.
+    """
     start, stop = scene.wavelengths.start, scene.wavelengths.stop
     if not covers(scene, bands):
         low, high = (f"{w * 1e9:.6g} nm" for w in bands.wavelengths[[0, -1]])
@@ -144,7 +170,20 @@ def check_coverage(scene: Scene, bands: Bands) -> None:
 
 
 def check_bands(scene: Scene, bands: Bands) -> None:
-    """Raise BadInput where a file's light contradicts the scene's lamp or level."""
+    """Check that a file's light does not contradict the scene's lamp or level.
+
+    Parameters
+    ----------
+    scene : Scene
+        What the file says of the scene.
+    bands : Bands
+        What the file of light holds.
+
+    Raises
+    ------
+    BadInput
+        If it does.
+    """
     if bands.quantity != "reflectance" and scene.illuminant is not None:
         raise bad(
             ("scene", "illuminant"),
@@ -165,7 +204,20 @@ def check_bands(scene: Scene, bands: Bands) -> None:
 
 
 def check_place(bands: Bands, has_lens: bool) -> None:
-    """Raise BadInput where light that lies on a sensor is to be seen through a lens."""
+    """Check that light that lies on a sensor is not seen through a lens.
+
+    Parameters
+    ----------
+    bands : Bands
+        What the file of light holds.
+    has_lens : bool
+        Whether the camera has a lens.
+
+    Raises
+    ------
+    BadInput
+        If the file holds irradiances, and there is a lens.
+    """
     if bands.quantity == "irradiance" and has_lens:
         message = "the file holds irradiances on a sensor, which no lens has before it"
         raise bad(FILE, message, "write optics: none, or give a file of radiances")
@@ -174,7 +226,24 @@ def check_place(bands: Bands, has_lens: bool) -> None:
 def cube_scene(scene: Scene, cube: Cube, view: View) -> CubeScene:
     """Return the cube on the sensor plane, in the light that the scene names or its own.
 
-    Raises BadInput as `check_bands` and `check_coverage` do, and for a file without light.
+    Parameters
+    ----------
+    scene : Scene
+        What the file says of the scene.
+    cube : Cube
+        Light or reflectances (h, w, bands) of the file.
+    view : View
+        The array, and the size of the scene.
+
+    Returns
+    -------
+    CubeScene
+        The scene.
+
+    Raises
+    ------
+    BadInput
+        As `check_bands` and `check_coverage` do, and for a file without light.
     """
     check_coverage(scene, cube.bands)
     check_bands(scene, cube.bands)
@@ -196,9 +265,26 @@ def cube_scene(scene: Scene, cube: Cube, view: View) -> CubeScene:
 
 
 def file_white(scene: Scene, cube: Cube) -> Array:
-    """Return the radiance of the perfect white in a file of radiances (bands,) [W/(sr m2 m)].
+    """Return the radiance of the perfect white in a file of radiances.
 
     It is as the file has it, before the scene's level; the module says what counts as white.
+
+    Parameters
+    ----------
+    scene : Scene
+        What the file says of the scene.
+    cube : Cube
+        Radiances (h, w, bands) of the file.
+
+    Returns
+    -------
+    Array
+        Radiances (bands,) [W/(sr m2 m)].
+
+    Raises
+    ------
+    BadInput
+        If the file has no light in the scene's wavelengths.
     """
     if cube.bands.white is not None:
         return cube.bands.white

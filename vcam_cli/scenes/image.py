@@ -39,7 +39,20 @@ class Placement:
 
 
 def placement(rows: int, columns: int, view: View) -> Placement:
-    """Return scale and crop of a picture of rows x columns samples; the module says how."""
+    """Return scale and crop of a picture of rows x columns samples; the module says how.
+
+    Parameters
+    ----------
+    rows, columns : int
+        Samples of the picture.
+    view : View
+        The array, and the size of the scene.
+
+    Returns
+    -------
+    Placement
+        Pitch of the samples [m], and how many are cut off at each side.
+    """
     if view.scene_width is None:
         pitch = max(view.width / columns, view.height / rows)
         while pitch * columns < view.width or pitch * rows < view.height:  # a rounding error
@@ -115,7 +128,18 @@ class ImageScene(SampledScene):
         return np.asarray(mixed.reshape(len(mix), len(rows), len(columns)))
 
     def samples_under(self, x: Array, y: Array) -> tuple[Array, Array]:
-        """Return the rows and columns of the samples under points, of a picture without border."""
+        """Return which samples of a picture without border lie under points.
+
+        Parameters
+        ----------
+        x, y : Array
+            Places (n,) along the rows and (m,) along the columns [m].
+
+        Returns
+        -------
+        tuple of Array
+            Rows (m,) and columns (n,) of the samples.
+        """
         rows, _ = self._samples_at(y, self.pitch_y, 0)
         return rows, self._samples_at(x, self.pitch_x, 1)[0]
 
@@ -232,7 +256,24 @@ def samples_in_boxes(place: Array, half: float, count: int, black: int) -> Array
 def image_scene(
     picture: Array, spectra: tuple[Spectrum, ...], white: Spectrum, view: View
 ) -> ImageScene:
-    """Return the picture (h, w, K) on the sensor plane, channel k with spectrum k."""
+    """Return a picture on the sensor plane.
+
+    Parameters
+    ----------
+    picture : Array
+        Samples (h, w, K), relative to the spectra.
+    spectra : tuple of Spectrum
+        Radiance of each channel where it is 1 [W/(sr m2 m)].
+    white : Spectrum
+        Radiance of the perfect white [W/(sr m2 m)].
+    view : View
+        The array, and the size of the scene.
+
+    Returns
+    -------
+    ImageScene
+        The scene.
+    """
     rows, columns, _ = picture.shape
     placed = placement(rows, columns, view)
     top, left = max(placed.cut_y, 0), max(placed.cut_x, 0)

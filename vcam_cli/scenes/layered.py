@@ -267,11 +267,35 @@ class LayeredScene:
         return self.flat.white
 
     def values_at(self, x: Array, y: Array, mix: Array) -> Array:
-        """Return sum_k mix[r, k] B_k of the picture at the points (y[i], x[j]): (R, m, n)."""
+        """Return sum_k mix[r, k] B_k of the picture at points.
+
+        Parameters
+        ----------
+        x, y : Array
+            Places (n,) along the rows and (m,) along the columns [m].
+        mix : Array
+            Mixtures (R, K) of the components.
+
+        Returns
+        -------
+        Array
+            Values (R, m, n), in the unit of `mix`.
+        """
         return self.flat.values_at(x, y, mix)
 
     def nearest_at(self, x: Array, y: Array) -> Array:
-        """Return the number of the nearest layer that covers half of a point or more (m, n)."""
+        """Return the number of the nearest layer that covers half of a point or more.
+
+        Parameters
+        ----------
+        x, y : Array
+            Places (n,) along the rows and (m,) along the columns [m].
+
+        Returns
+        -------
+        Array
+            Numbers (m, n), 0 for the nearest layer.
+        """
         found = np.full((len(y), len(x)), len(self.parts) - 1)
         for number in reversed(range(len(self.parts) - 1)):
             part = self.parts[number]

@@ -24,10 +24,23 @@ LASER_LINES = (650e-9, 550e-9, 450e-9)
 
 
 def white_radiance(scene: Scene) -> Spectrum:
-    """Return the spectral radiance of a perfect white diffuser under the illuminant [W/(sr m2 m)].
+    """Return the spectral radiance of a perfect white diffuser under the illuminant.
 
-    Raises BadInput where the illuminant does not cover the scene's wavelengths, or emits nothing
-    there that the stated level could measure.
+    Parameters
+    ----------
+    scene : Scene
+        What the file says of the scene.
+
+    Returns
+    -------
+    Spectrum
+        Radiance [W/(sr m2 m)].
+
+    Raises
+    ------
+    BadInput
+        If there is no illuminant, it does not cover the scene's wavelengths, or it emits nothing
+        there that the stated level could measure.
     """
     path = ("scene", "illuminant")
     if scene.illuminant is None:
@@ -46,6 +59,23 @@ def laser_white(scene: Scene) -> tuple[tuple[Spectrum, ...], Spectrum]:
     """Return the radiances of full red, green and blue laser light, and of their sum, white.
 
     Equal planes are equal radiances in watts; their sum has the stated level [1].
+
+    Parameters
+    ----------
+    scene : Scene
+        What the file says of the scene.
+
+    Returns
+    -------
+    colors : tuple of Spectrum
+        Radiances [W/(sr m2 m)] of red, green and blue.
+    white : Spectrum
+        Their sum.
+
+    Raises
+    ------
+    BadInput
+        If a line lies outside of the scene's wavelengths.
     """
     start, stop = scene.wavelengths.start, scene.wavelengths.stop
     if min(LASER_LINES) < start or max(LASER_LINES) > stop:
@@ -63,7 +93,25 @@ def display_white(scene: Scene, primaries: str) -> tuple[tuple[Spectrum, ...], S
     """Return the radiances of a display's full red, green and blue, and of their sum, white.
 
     The white has the stated level; the share of each primary in it is the display's own.
-    `primaries` is as in `spectra.display_primaries`.
+
+    Parameters
+    ----------
+    scene : Scene
+        What the file says of the scene.
+    primaries : str
+        As in `spectra.display_primaries`.
+
+    Returns
+    -------
+    colors : tuple of Spectrum
+        Radiances [W/(sr m2 m)] of red, green and blue.
+    white : Spectrum
+        Their sum.
+
+    Raises
+    ------
+    BadInput
+        If the stated level cannot be reached within the scene's wavelengths.
     """
     colors, relative = display_primaries(primaries)
     try:
@@ -74,7 +122,25 @@ def display_white(scene: Scene, primaries: str) -> tuple[tuple[Spectrum, ...], S
 
 
 def scale_to_level(relative: Spectrum, scene: Scene) -> Spectrum:
-    """Return a spectrum at the scene's stated level; ValueError where that cannot be."""
+    """Return a spectrum at the scene's stated level.
+
+    Parameters
+    ----------
+    relative : Spectrum
+        Its shape, of any scale.
+    scene : Scene
+        What the file says of the scene.
+
+    Returns
+    -------
+    Spectrum
+        Radiance [W/(sr m2 m)].
+
+    Raises
+    ------
+    ValueError
+        If the light has nothing within the wavelengths that the level could measure.
+    """
     start, stop = scene.wavelengths.start, scene.wavelengths.stop
     power = _radiance(scene)
     if power is not None:
@@ -92,9 +158,21 @@ def scale_to_level(relative: Spectrum, scene: Scene) -> Spectrum:
 
 
 def visible_range(light: Spectrum, start: float, stop: float) -> tuple[float, float]:
-    """Return the wavelengths over which luminance counts [m].
+    """Return the wavelengths over which luminance counts.
 
     They are those simulated and all that is visible, as far as the light is known there.
+
+    Parameters
+    ----------
+    light : Spectrum
+        The light.
+    start, stop : float
+        Ends of the wavelengths simulated [m].
+
+    Returns
+    -------
+    tuple of float
+        Ends [m].
     """
     known = [table for table in light.tables if table.outside == "error"]
     first = max([VISIBLE[0], *(table.start for table in known)])

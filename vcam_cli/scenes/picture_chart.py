@@ -80,7 +80,18 @@ class PictureChart(Chart):
         return EdgeEnergy(aligned=float(steps_x * down + steps_y * across) / area)
 
     def channel(self, number: int) -> "PictureChart":
-        """Return one of its channels alone."""
+        """Return one of its channels alone.
+
+        Parameters
+        ----------
+        number : int
+            Number of the channel.
+
+        Returns
+        -------
+        PictureChart
+            A picture of one channel.
+        """
         return replace(self, picture=self.picture[..., number, None])
 
     @property
@@ -89,7 +100,18 @@ class PictureChart(Chart):
         return replace(self, picture=np.square(self.picture))
 
     def cells(self, x_edges: Array, y_edges: Array) -> tuple[slice, slice]:
-        """Return the columns and rows of cells that the picture reaches."""
+        """Return the columns and rows of cells that the picture reaches.
+
+        Parameters
+        ----------
+        x_edges, y_edges : Array
+            Rising edges of the cells [m].
+
+        Returns
+        -------
+        tuple of slice
+            Columns and rows.
+        """
         if self.mirrored:
             return slice(0, len(x_edges) - 1), slice(0, len(y_edges) - 1)
         columns, _, _ = clip_cells(x_edges, self.frame.width / 2)

@@ -36,27 +36,75 @@ class Sides:
     """Ends down (n,)."""
 
     def scale_and_move(self, scale: float, x: float, y: float) -> "Sides":
-        """Return the sides `scale` times as large, then moved by x and y."""
+        """Return the sides `scale` times as large, then moved by x and y.
+
+        Parameters
+        ----------
+        scale : float
+            Factor on all coordinates.
+        x, y : float
+            What is added to them afterwards.
+
+        Returns
+        -------
+        Sides
+            The sides.
+        """
         return Sides(
             self.x0 * scale + x, self.y0 * scale + y, self.x1 * scale + x, self.y1 * scale + y
         )
 
 
 def sides(outlines: Iterable[Array]) -> Sides:
-    """Return the sides of outlines, each the corners (n, 2) of a closed polygon."""
+    """Return the sides of closed polygons.
+
+    Parameters
+    ----------
+    outlines : iterable of Array
+        Corners (n, 2) of each, in order.
+
+    Returns
+    -------
+    Sides
+        All sides.
+    """
     starts = [np.asarray(outline, float) for outline in outlines]
     stops = [np.roll(start, -1, axis=0) for start in starts]
     return Sides(*np.concatenate(starts).T, *np.concatenate(stops).T)
 
 
 def join_sides(parts: Iterable[Sides]) -> Sides:
-    """Return all the sides of several polygons."""
+    """Return all the sides of several polygons.
+
+    Parameters
+    ----------
+    parts : iterable of Sides
+        Sides of each polygon.
+
+    Returns
+    -------
+    Sides
+        All sides.
+    """
     rows = [np.stack([p.x0, p.y0, p.x1, p.y1]) for p in parts]
     return Sides(*np.concatenate(rows, axis=1))
 
 
 def cover(polygons: Sides, x_edges: Array, y_edges: Array) -> Array:
-    """Return the part of every cell that polygons cover: (len(y_edges) - 1, len(x_edges) - 1)."""
+    """Return the part of every cell that polygons cover.
+
+    Parameters
+    ----------
+    polygons : Sides
+        Sides of the polygons [m].
+    x_edges, y_edges : Array
+        Rising edges of the cells [m].
+
+    Returns
+    -------
+    Array
+        Parts (len(y_edges) - 1, len(x_edges) - 1), from 0 to 1.
+    """
     row, xa, xb, ya, yb = _cut_at_rows(_sides_that_count(polygons, x_edges, y_edges), y_edges)
     rise = (yb - ya) / np.diff(y_edges)[row]
     low, high = np.minimum(xa, xb), np.maximum(xa, xb)
@@ -82,7 +130,20 @@ def cover(polygons: Sides, x_edges: Array, y_edges: Array) -> Array:
 
 
 def contains_points(polygons: Sides, x: Array, y: Array) -> Array:
-    """Return 1 where the points (y[i], x[j]), both rising, lie in a polygon: (len(y), len(x))."""
+    """Return where points lie in a polygon.
+
+    Parameters
+    ----------
+    polygons : Sides
+        Sides of the polygons [m].
+    x, y : Array
+        Rising places along the rows and columns [m].
+
+    Returns
+    -------
+    Array
+        1 or 0, (len(y), len(x)).
+    """
     polygons = _sides_that_count(polygons, x, y)
     low, high = np.minimum(polygons.y0, polygons.y1), np.maximum(polygons.y0, polygons.y1)
     side, row = expand_ranges(y.searchsorted(low), y.searchsorted(high))

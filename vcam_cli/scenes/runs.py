@@ -16,9 +16,24 @@ LEVELS = 32
 
 
 def topmost_numbers(start: Array, stop: Array, number: Array, size: int, line: int) -> Array:
-    """Return per cell of `size` the largest number of the runs [start, stop) that hold it, else 0.
+    """Return for every cell the largest number of the runs that hold it, 0 where none does.
 
-    No run is empty or leaves its line, the cells [k line, (k + 1) line). Numbers are positive.
+    Parameters
+    ----------
+    start, stop : Array
+        First cell of each run (n,), and that behind its last. No run is empty or leaves its line,
+        the cells [k line, (k + 1) line).
+    number : Array
+        Positive number of each run (n,).
+    size : int
+        Number of cells.
+    line : int
+        Cells of a line.
+
+    Returns
+    -------
+    Array
+        Numbers (size,), int32.
     """
     label = np.zeros(size, np.int32)
     piece = line * max(1, CELLS_AT_ONCE // line)
@@ -49,14 +64,38 @@ def _propagate_marks(label: Array, start: Array, stop: Array, number: Array, bou
 
 
 def expand_ranges(first: Array, last: Array) -> tuple[Array, Array]:
-    """Return every (item, number) with first[item] <= number < last[item], item by item."""
+    """Return every (item, number) with first[item] <= number < last[item], item by item.
+
+    Parameters
+    ----------
+    first, last : Array
+        Ends (n,) of each item's range; it is empty where last <= first.
+
+    Returns
+    -------
+    item, number : Array
+        The pairs, one each (M,).
+    """
     count = np.maximum(last - first, 0)
     item = np.repeat(np.arange(len(count), dtype=np.int32), count)
     return item, concatenate_ranges(first, count)
 
 
 def concatenate_ranges(first: Array, count: Array) -> Array:
-    """Return first[0], first[0]+1, ... (count[0] numbers), first[1], ... concatenated."""
+    """Return first[0], first[0]+1, ... (count[0] numbers), first[1], ... concatenated.
+
+    Parameters
+    ----------
+    first : Array
+        First number of each range (n,).
+    count : Array
+        How many numbers it has (n,).
+
+    Returns
+    -------
+    Array
+        The numbers (sum of `count`,).
+    """
     before = np.cumsum(count) - count
     indices: Array = np.arange(int(count.sum())) + np.repeat(first - before, count)
     return indices

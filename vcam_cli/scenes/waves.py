@@ -55,13 +55,43 @@ class WaveScene:
         return level, sum(abs(wave.weights[0]) for wave in self.waves if wave not in steady)
 
     def values_at(self, x: Array, y: Array, mix: Array) -> Array:
-        """Return sum_k mix[r, k] B_k at the points (y[i], x[j]): (R, m, n)."""
+        """Return sum_k mix[r, k] B_k at points.
+
+        Parameters
+        ----------
+        x, y : Array
+            Places (n,) along the rows and (m,) along the columns [m].
+        mix : Array
+            Mixtures (R, K) of the components.
+
+        Returns
+        -------
+        Array
+            Values (R, m, n), in the unit of `mix`.
+        """
         return wave_values(self.waves, x, y, mix)
 
     def change_bounds(
         self, losses: Sequence[BlurLoss], geometry: Geometry, ceiling: float, allowed: float
     ) -> ChangeBounds:
-        """Return what blurs change, as `SampledScene` does: of each wave by itself."""
+        """Return what blurs change, as `SampledScene` does: of each wave by itself.
+
+        Parameters
+        ----------
+        losses : sequence of BlurLoss
+            The blurs, all of one light.
+        geometry : Geometry
+            Geometry of the array.
+        ceiling : float
+            Rate that fills a pixel [e/s].
+        allowed : float
+            Change over full signal that matters.
+
+        Returns
+        -------
+        ChangeBounds
+            The bounds.
+        """
         full = min(float(self._least_mean(losses[0].level, geometry).max()), ceiling)
         waves = [(np.array(w.weights), w.frequency) for w in self.waves if w.fx or w.fy]
         of_waves = ([loss.of_wave(*wave) for wave in waves] for loss in losses)
@@ -142,6 +172,20 @@ def wave_products(waves: tuple[Wave, ...], x_edges: Array, y_edges: Array, mix: 
     """Return the averages over cells as products of functions of y and x, two for each wave.
 
     Parameters are those of `wave_averages`.
+
+    Parameters
+    ----------
+    waves : tuple of Wave
+        The waves.
+    x_edges, y_edges : Array
+        Rising edges of the cells [m].
+    mix : Array
+        Mixtures (R, K) of the components.
+
+    Returns
+    -------
+    Products
+        Functions of y and of x whose products add up to the light.
     """
     down, along = [], []
     for wave in waves:

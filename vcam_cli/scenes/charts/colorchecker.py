@@ -37,12 +37,36 @@ def reflectances() -> tuple[Spectrum, ...]:
 
 
 def largest_card(frame: Frame) -> "Card":
-    """Return the largest card that fits, in the middle of the frame."""
+    """Return the largest card that fits, in the middle of the frame.
+
+    Parameters
+    ----------
+    frame : Frame
+        Size of the frame [m].
+
+    Returns
+    -------
+    Card
+        The card.
+    """
     return Card(min(frame.width / WIDTH, frame.height / HEIGHT))
 
 
 def card_of_height(part: float, frame: Frame) -> "Card":
-    """Return a card of a part (0..1) of the frame's height, or what fits its width."""
+    """Return a card of a part of the frame's height, or what fits its width.
+
+    Parameters
+    ----------
+    part : float
+        Height of the card over that of the frame, 0 to 1.
+    frame : Frame
+        Size of the frame [m].
+
+    Returns
+    -------
+    Card
+        The card.
+    """
     return Card(min(part * frame.height / HEIGHT, frame.width / WIDTH))
 
 
@@ -72,6 +96,18 @@ class Card:
         """Return the light of card and patches times their cover, 0 around them.
 
         It is a product of matrices, since x and y separate.
+
+        Parameters
+        ----------
+        cover : Cover
+            Parts of cells, or points, that card and patches cover.
+        mix : Array
+            Mixtures (R, K) of the components: a patch each.
+
+        Returns
+        -------
+        Array
+            Light (R, rows, columns), in the unit of `mix`.
         """
         card = CARD * mix[:, BLACK]
         patches = mix[:, :BLACK].reshape(-1, ROWS, COLUMNS) - card[:, None, None]
@@ -84,14 +120,35 @@ class Card:
         return np.stack([product(product(down.T, plane), across) for plane in block])
 
     def add_light(self, cover: "Cover", mix: Array, out: Array) -> None:
-        """Add the light of card and patches to `out`."""
+        """Add the light of card and patches to `out`.
+
+        Parameters
+        ----------
+        cover : Cover
+            Parts of cells that card and patches cover.
+        mix : Array
+            Mixtures (R, K) of the components.
+        out : Array
+            Planes (R, rows, columns) that it is added to.
+        """
         alike = cover.row_runs()
         light = self.light(cover.select_rows([rows.start for rows in alike]), mix)
         for number, rows in enumerate(alike):
             out[:, rows] += light[:, number, None]
 
     def cell_cover(self, x_edges: Array, y_edges: Array) -> "Cover":
-        """Return the parts of cells that card and patches cover: exact, for they are rectangles."""
+        """Return the parts of cells that card and patches cover: exact, for they are rectangles.
+
+        Parameters
+        ----------
+        x_edges, y_edges : Array
+            Rising edges of the cells [m].
+
+        Returns
+        -------
+        Cover
+            Parts from 0 to 1.
+        """
         return Cover(
             overlap(x_edges, -self.half_width, self.half_width),
             overlap(y_edges, -self.half_height, self.half_height),
@@ -100,7 +157,18 @@ class Card:
         )
 
     def point_cover(self, x: Array, y: Array) -> "Cover":
-        """Return whether card and patches cover points: 0 or 1."""
+        """Return whether card and patches cover points.
+
+        Parameters
+        ----------
+        x, y : Array
+            Places along the rows and columns [m].
+
+        Returns
+        -------
+        Cover
+            0 or 1.
+        """
         return Cover(
             _is_between(x, -self.half_width, self.half_width),
             _is_between(y, -self.half_height, self.half_height),
@@ -142,7 +210,18 @@ class Cover:
         return [slice(*ends) for ends in pairwise(bounds)]
 
     def select_rows(self, index: list[int]) -> "Cover":
-        """Return the cover of some rows alone."""
+        """Return the cover of some rows alone.
+
+        Parameters
+        ----------
+        index : list of int
+            The rows.
+
+        Returns
+        -------
+        Cover
+            Their cover.
+        """
         return replace(self, down=self.down[index], rows=self.rows[:, index])
 
 

@@ -41,7 +41,18 @@ None stands for what makes the luminances equal.
 
 
 def modulation_colors(modulation: str) -> tuple[Spectrum, ...]:
-    """Return the reflectances of the parts of a chart: one of white, or two whose sum is white."""
+    """Return the reflectances of the parts of a chart: one of white, or two whose sum is white.
+
+    Parameters
+    ----------
+    modulation : str
+        "luminance", or a pair of colors of `FIRST_COLOR_SHARES`.
+
+    Returns
+    -------
+    tuple of Spectrum
+        Reflectances without unit.
+    """
     if modulation == "luminance":
         return (Spectrum.flat(1.0),)
     known = FIRST_COLOR_SHARES[modulation]

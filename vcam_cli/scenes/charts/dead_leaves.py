@@ -93,20 +93,50 @@ class Leaves:
     """Factor of each leaf's reflectance (n,)."""
 
     def select(self, index: Array) -> "Leaves":
-        """Return some of the leaves."""
+        """Return some of the leaves.
+
+        Parameters
+        ----------
+        index : Array
+            Their numbers.
+
+        Returns
+        -------
+        Leaves
+            These leaves, in the order of `index`.
+        """
         return Leaves(self.discs.select(index), self.pigment[index], self.factor[index])
 
     def color(self, mix: Array) -> Array:
-        """Return the color of the ground and of every leaf (R, n + 1)."""
+        """Return the color of the ground and of every leaf.
+
+        Parameters
+        ----------
+        mix : Array
+            Mixtures (R, K) of the components: a pigment each.
+
+        Returns
+        -------
+        Array
+            Colors (R, n + 1), in the unit of `mix`, the ground first.
+        """
         ground = GROUND * mix[:, :1]
         return np.concatenate([ground, mix[:, self.pigment] * self.factor], axis=1)
 
 
 @lru_cache(maxsize=16)
 def generate_leaves(seed: int) -> Leaves:
-    """Return the leaves of a seed, about 60 000; a later one lies in front.
+    """Return the leaves of a seed, about 60 000, on a torus of side `PERIOD`.
 
-    They lie on the torus of side `PERIOD`. The seed is a whole number, 0 or more.
+    Parameters
+    ----------
+    seed : int
+        Seed, 0 or more.
+
+    Returns
+    -------
+    Leaves
+        The leaves; a later one lies in front.
     """
     smallest, largest = SMALLEST, LARGEST
     ratio = (smallest / largest) ** 2
@@ -334,7 +364,22 @@ def _periodic_averages(plane: Array, edges: Array, axis: int) -> Array:
 
 
 def dead_leaves(seed: int, frame: Frame, cell_error: float = 0.0) -> DeadLeaves:
-    """Return the leaves of a seed, spread over a frame; cells may err so much, rms of white."""
+    """Return the leaves of a seed, spread over a frame.
+
+    Parameters
+    ----------
+    seed : int
+        Seed, 0 or more.
+    frame : Frame
+        Size of the frame [m].
+    cell_error : float
+        Rms error that averages over cells may have, relative to white.
+
+    Returns
+    -------
+    DeadLeaves
+        The chart.
+    """
     return DeadLeaves(seed, max(frame.width, frame.height), divisions(cell_error))
 
 

@@ -133,7 +133,18 @@ LETTERS: dict[str, Callable[[], Letter]] = {
 
 @cache
 def letter(name: str) -> polygons.Sides:
-    """Return a letter of height 1, its upper left corner at (0, 0), y down."""
+    """Return a letter of height 1, its upper left corner at (0, 0), y down.
+
+    Parameters
+    ----------
+    name : str
+        One of `LETTERS`.
+
+    Returns
+    -------
+    Sides
+        Its sides, in units of its height, rising along x and y.
+    """
     turned = [np.array([1, -1]) * np.array(outline) + [0, STROKES] for outline in LETTERS[name]()]
     return polygons.sides(turned).scale_and_move(1 / STROKES, 0, 0)
 
@@ -175,7 +186,20 @@ class EyeChart(Chart):
 
 
 def eye_chart(rows: int, frame: Frame) -> EyeChart:
-    """Return a chart of so many rows, centered, as large as fits."""
+    """Return a chart of letters, centered, as large as fits.
+
+    Parameters
+    ----------
+    rows : int
+        Rows of letters.
+    frame : Frame
+        Size of the frame [m].
+
+    Returns
+    -------
+    EyeChart
+        The chart.
+    """
     sizes = RATIO ** np.arange(rows)
     tops = np.concatenate([[0], np.cumsum(sizes[:-1] + sizes[1:])])
     count = len(ROWS[0])

@@ -121,7 +121,24 @@ class HdrPatches(Chart):
 
 
 def hdr_patches(patches: int, dynamic_range: float, lamp: float, frame: Frame) -> HdrPatches:
-    """Return the patches as large as they fit below the lamp."""
+    """Return the patches as large as they fit below the lamp.
+
+    Parameters
+    ----------
+    patches : int
+        Number of patches, 2 or more.
+    dynamic_range : float
+        Light of the brightest patch over that of the darkest.
+    lamp : float
+        Light of the lamp, relative to white.
+    frame : Frame
+        Size of the frame [m].
+
+    Returns
+    -------
+    HdrPatches
+        The chart.
+    """
     height = (1 - HEADROOM) * frame.height
     columns = max(range(1, patches + 1), key=lambda n: _pitch(n, patches, frame.width, height))
     rows = math.ceil(patches / columns)

@@ -53,6 +53,16 @@ class PointGrid(Chart):
 
         It is pi d^2 / 4 p^2 times 2 J1(x) / x, with x = pi d sqrt(k^2 + l^2) / p; a cosine with
         k > 0 stands for k and -k.
+
+        Parameters
+        ----------
+        count_x, count_y : int
+            Terms along x and y.
+
+        Returns
+        -------
+        Array
+            Amplitudes (count_y, count_x), relative to the perfect white.
         """
         from scipy.special import j1
 

@@ -46,15 +46,44 @@ class StepWedge(Chart):
 
 
 def step_wedge(steps: int, density_range: float, frame: Frame) -> StepWedge:
-    """Return bars of equal width over the frame."""
+    """Return bars of equal width over the frame.
+
+    Parameters
+    ----------
+    steps : int
+        Number of bars, 2 or more.
+    density_range : float
+        Optical density of the last bar less that of the first.
+    frame : Frame
+        Size of the frame [m].
+
+    Returns
+    -------
+    StepWedge
+        The chart.
+    """
     density = density_range * np.arange(steps) / (steps - 1)
     return StepWedge(10.0**-density, (np.arange(1, steps) / steps - 0.5) * frame.width)
 
 
 def step_averages(levels: Array, borders: Array, edges: Array) -> Array:
-    """Return averages (n,) between rising edges of a function that is constant between borders.
+    """Return averages of a function that is constant between borders.
 
     They are sums of positive parts: a dark bar keeps all its digits beside a bright one.
+
+    Parameters
+    ----------
+    levels : Array
+        Values (b + 1,) between the borders, and beyond the outermost.
+    borders : Array
+        Rising borders (b,) [m].
+    edges : Array
+        Rising edges (n + 1,) of the cells [m].
+
+    Returns
+    -------
+    Array
+        Averages (n,), in the unit of `levels`.
     """
     within = borders[(borders > edges[0]) & (borders < edges[-1])]
     ends = np.sort(np.concatenate([edges, within]))

@@ -4,5 +4,16 @@ from vcam_cli.scenes.waves import Wave
 
 
 def waves(reflectance: float) -> tuple[Wave, ...]:
-    """Return one wave of frequency zero of a reflectance 0..1, where 1 is the perfect diffuser."""
+    """Return one wave of frequency zero.
+
+    Parameters
+    ----------
+    reflectance : float
+        Reflectance, from 0 to 1, the perfect diffuser.
+
+    Returns
+    -------
+    tuple of Wave
+        The wave.
+    """
     return (Wave((reflectance,)),)
