@@ -67,6 +67,22 @@ def product_spectrum(
     """Return the spectrum of a sum of products, each factor transformed by itself.
 
     Parameters are those of `closed_spectrum`.
+
+    Parameters
+    ----------
+    scene : ChartScene
+        The chart; its light is a sum of products.
+    mix : Array
+        Mixtures (R, K) of its parts.
+    axes : sequence of Axis
+        Axes along y and x.
+    dtype : type
+        Floating-point type of the result.
+
+    Returns
+    -------
+    ProductSpectrum
+        Its spectrum.
     """
     counts = [FINER * max(axis.terms, 64) for axis in axes]
     y, x = (
@@ -111,7 +127,18 @@ class DiscWaves:
     """2 J1(z) / z at z = 0, `STEP`, 2 `STEP` ..."""
 
     def terms(self, y: Index, x: Index) -> Array:
-        """Return the terms (len(y), len(x)) of these indices, of a disc of height 1."""
+        """Return terms of a disc of height 1.
+
+        Parameters
+        ----------
+        y, x : index
+            Indices of the terms along y and x.
+
+        Returns
+        -------
+        Array
+            Terms (len(y), len(x)).
+        """
         place = np.hypot(self.z_down[y][:, None], self.z_along[x]) * (1 / STEP)
         index = place.astype(np.intp)
         place -= index
@@ -126,6 +153,16 @@ class DiscWaves:
         """Return the sums of squared terms over blocks between edges, at most.
 
         J1^2 is at most J1^2 + Y1^2, and half of it in the mean where a block holds a whole wave.
+
+        Parameters
+        ----------
+        y, x : Array
+            Edges of the blocks, rising indices of terms along y and x.
+
+        Returns
+        -------
+        Array
+            Bounds (len(y) - 1, len(x) - 1), of a disc of height 1.
         """
         from scipy.special import j1, y1
 
@@ -156,14 +193,42 @@ class DiscSpectrum:
         return len(self.even)
 
     def rows(self, plane: int, index: Index, count: int | None = None) -> Array:
-        """Return rows of a plane's coefficients: (n, count)."""
+        """Return rows of a plane's coefficients.
+
+        Parameters
+        ----------
+        plane : int
+            Number of the plane.
+        index : index
+            Indices (n,) of the rows.
+        count : int or None
+            Terms along x; None for all.
+
+        Returns
+        -------
+        Array
+            Coefficients (n, count).
+        """
         light = self.even.rows(plane, index, count)
         for disc in self.discs:
             light += disc.height[plane] * disc.terms(index, slice(count))
         return light.astype(self.dtype)
 
     def products(self, y: Array, x: Array, workers: int) -> Array:
-        """Return sums of products over blocks of terms, at most: as if all were in phase."""
+        """Return a bound on sums of products over blocks of terms: as if all were in phase.
+
+        Parameters
+        ----------
+        y, x : Array
+            Edges of the blocks, rising indices of terms along y and x.
+        workers : int
+            Number of threads.
+
+        Returns
+        -------
+        Array
+            Bounds (pairs, len(y) - 1, len(x) - 1), in the order of `scene_spectrum.pairs`.
+        """
         every = self.even.products(y, x, workers)
         of_discs = [disc.power(y, x) for disc in self.discs]
         own = {}
@@ -177,7 +242,22 @@ class DiscSpectrum:
 
 
 def disc_waves(disc: LightDisc, scene: ChartScene, axes: Sequence[Axis]) -> DiscWaves:
-    """Return the spectrum of a disc on a scene's area, for axes along y and x."""
+    """Return the spectrum of a disc on a scene's area.
+
+    Parameters
+    ----------
+    disc : LightDisc
+        The disc [m].
+    scene : ChartScene
+        The scene.
+    axes : sequence of Axis
+        Axes along y and x.
+
+    Returns
+    -------
+    DiscWaves
+        The spectrum.
+    """
     from scipy.special import j1
 
     width, height = scene.extent
@@ -212,11 +292,39 @@ class ProductSpectrum:
         return len(self.along_x)
 
     def rows(self, plane: int, index: Index, count: int | None = None) -> Array:
-        """Return rows of a plane's coefficients: (n, count)."""
+        """Return rows of a plane's coefficients.
+
+        Parameters
+        ----------
+        plane : int
+            Number of the plane.
+        index : index
+            Indices (n,) of the rows.
+        count : int or None
+            Terms along x; None for all.
+
+        Returns
+        -------
+        Array
+            Coefficients (n, count).
+        """
         return product(self.along_y[index], self.along_x[plane, :, :count])
 
     def products(self, y: Array, x: Array, workers: int) -> Array:
-        """Return sums of products of two planes' coefficients over blocks of terms."""
+        """Return sums of products of two planes' coefficients over blocks of terms.
+
+        Parameters
+        ----------
+        y, x : Array
+            Edges of the blocks, rising indices of terms along y and x.
+        workers : int
+            Number of threads.
+
+        Returns
+        -------
+        Array
+            Sums (pairs, len(y) - 1, len(x) - 1), in the order of `scene_spectrum.pairs`.
+        """
         planes, runs, columns = self.along_x.shape
         below = self.along_y.astype(np.float64)
         in_rows = np.array([below[s].T @ below[s] for s in _blocks(y)]).reshape(-1, runs**2)

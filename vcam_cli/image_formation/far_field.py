@@ -60,9 +60,19 @@ class FarPart:
     """1 of an outer rectangle, -1 of an inner."""
 
     def nyquist(self, geometry: Geometry) -> float:
-        """Return the Nyquist frequency of its cells, beyond which nothing is left [pixel Nyquist].
+        """Return the Nyquist frequency of its cells, beyond which nothing is left.
 
         Filters have to reach it: a spectrum that ends before its low-pass does rings.
+
+        Parameters
+        ----------
+        geometry : Geometry
+            Geometry of the array.
+
+        Returns
+        -------
+        float
+            Frequency [pixel Nyquist].
         """
         pixels = geometry.pitch_x / self.scene.pitch_x, geometry.pitch_y / self.scene.pitch_y
         return max(pixels)

@@ -233,21 +233,56 @@ class Family:
     is_imaginary: bool
 
     def table(self, changes: Sequence[Array], share: Array) -> Array:
-        """Return the sum of all rings' tables, each with its share: (R, C, n) [e/s]."""
+        """Return the sum of all rings' tables, each with its share.
+
+        Parameters
+        ----------
+        changes : sequence of Array
+            Harmonics (m, R, C, n) of each ring [e/s].
+        share : Array
+            Share of each ring.
+
+        Returns
+        -------
+        Array
+            Table (R, C, n) [e/s].
+        """
         total: Array = np.zeros(changes[0].shape[1:])
         for change, part in zip(changes, share, strict=True):
             total += part * self.of_ring(change)
         return total
 
     def of_ring(self, change: Array) -> Array:
-        """Return the table (R, C, n) of a ring's harmonics (m, R, C, n) [e/s]."""
+        """Return the table of a ring.
+
+        Parameters
+        ----------
+        change : Array
+            Its harmonics (m, R, C, n) [e/s].
+
+        Returns
+        -------
+        Array
+            Table (R, C, n) [e/s].
+        """
         if self.order >= len(change):
             return np.zeros(change.shape[1:])
         harmonic = change[self.order]
         return np.asarray(harmonic.imag if self.is_imaginary else harmonic.real)
 
     def turned(self, azimuth: Array) -> list[tuple[bool, Array]]:
-        """Return whether the direction has a sine, and the factor by azimuth, of both parts."""
+        """Return whether the direction has a sine, and the factor by azimuth, of both parts.
+
+        Parameters
+        ----------
+        azimuth : Array
+            Azimuths of places of the field [rad].
+
+        Returns
+        -------
+        list of tuple
+            (has a sine, factor in the shape of `azimuth`) of each part.
+        """
         if not self.order:
             return [(False, np.ones_like(azimuth))]
         cosine, sine = np.cos(self.order * azimuth), np.sin(self.order * azimuth)

@@ -46,7 +46,20 @@ class Series:
     """Cosines (False) and sines (True): (C, rows, folded x) [electrons / s]."""
 
     def signal(self, color: int, rows: slice) -> Array:
-        """Return the signal (rows, columns) of a color at the photodetectors of some rows [e/s]."""
+        """Return the signal of a color at the photodetectors of some rows.
+
+        Parameters
+        ----------
+        color : int
+            Number of the color.
+        rows : slice
+            Rows of the array.
+
+        Returns
+        -------
+        Array
+            Signal (rows, columns) [e/s].
+        """
         parts = {odd: part[color, rows] for odd, part in self.parts.items()}
         if self.x.row_shifts is not None:
             parts = self._shift_rows(parts, self.x.row_shifts[rows])

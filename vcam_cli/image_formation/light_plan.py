@@ -89,7 +89,18 @@ class LightPlan:
         return math.prod((gain.on_axis for gain in of_kind(self.omitted, Gain)), start=1.0)
 
     def reduced(self, path: OpticalPath) -> OpticalPath:
-        """Return the path without the omitted effects."""
+        """Return the path without the omitted effects.
+
+        Parameters
+        ----------
+        path : OpticalPath
+            The path with all effects.
+
+        Returns
+        -------
+        OpticalPath
+            The path without them.
+        """
         path = path.with_effects([e for e in path.effects if e not in self.omitted])
         on_axis = self.on_axis or 1.0
         transfer = replace(path.transfer, weights=path.transfer.weights / on_axis)

@@ -33,11 +33,33 @@ class LayerOptics:
     """Of a point's blur by defocus; positive where the layer is nearer than what is in focus [m]"""
 
     def without_effects(self, names: Collection[str]) -> LayerOptics:
-        """Return the same without some effects."""
+        """Return the same without some effects.
+
+        Parameters
+        ----------
+        names : collection of str
+            Names of these effects.
+
+        Returns
+        -------
+        LayerOptics
+            The layer's optics.
+        """
         return replace(self, effects=tuple(e for e in self.effects if e.name not in names))
 
     def part_of_exposure(self, start: float, stop: float) -> LayerOptics:
-        """Return the same from `start` to `stop` after a line's exposure begins [s]."""
+        """Return the same during a part of the exposure.
+
+        Parameters
+        ----------
+        start, stop : float
+            Times since a line's exposure began [s].
+
+        Returns
+        -------
+        LayerOptics
+            The layer's optics.
+        """
         return replace(self, effects=tuple(e.part_of_exposure(start, stop) for e in self.effects))
 
 
@@ -69,7 +91,18 @@ class OpticalPath:
     """Whether it is that of a layer, half of whose colors are its opacity."""
 
     def with_effects(self, kept: Sequence[Effect]) -> OpticalPath:
-        """Return the path with some of its effects alone."""
+        """Return the path with some of its effects alone.
+
+        Parameters
+        ----------
+        kept : sequence of Effect
+            These effects.
+
+        Returns
+        -------
+        OpticalPath
+            The path.
+        """
         gone = {effect.name for effect in self.effects if effect not in kept}
         return replace(
             self,

@@ -135,7 +135,18 @@ class EdgeImage:
         return SHARE * self.path.settings.tolerance * full / (heights or 1.0)
 
     def response(self, effects: Sequence[Effect]) -> Array:
-        """Return the transfer (C, n) through some of the effects [e/s]."""
+        """Return the transfer through some of the effects.
+
+        Parameters
+        ----------
+        effects : sequence of Effect
+            These effects; those without a transfer count for nothing.
+
+        Returns
+        -------
+        Array
+            Transfer (C, n) [e/s], complex where a blur is.
+        """
         weights = self.path.transfer.weights[0]
         otf: Array = np.ones((weights.shape[1], next(iter(self.otfs.values())).shape[1]))
         for effect in effects:

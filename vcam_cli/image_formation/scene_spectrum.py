@@ -65,7 +65,18 @@ class SceneSpectrum(Protocol):
 
 
 def pairs(planes: int) -> list[tuple[int, int]]:
-    """Return the pairs (r, s), r <= s, of so many planes."""
+    """Return the pairs (r, s), r <= s, of planes.
+
+    Parameters
+    ----------
+    planes : int
+        Number of planes.
+
+    Returns
+    -------
+    list of tuple of int
+        The pairs.
+    """
     return list(combinations_with_replacement(range(planes), 2))
 
 
@@ -85,11 +96,39 @@ class SampledSpectrum:
         return len(self.coefficients)
 
     def rows(self, plane: int, index: Index, count: int | None = None) -> Array:
-        """Return rows of a plane's coefficients: (n, count)."""
+        """Return rows of a plane's coefficients.
+
+        Parameters
+        ----------
+        plane : int
+            Number of the plane.
+        index : index
+            Indices (n,) of the rows.
+        count : int or None
+            Terms along x; None for all.
+
+        Returns
+        -------
+        Array
+            Coefficients (n, count).
+        """
         return self.coefficients[plane, index, :count]
 
     def products(self, y: Array, x: Array, workers: int) -> Array:
-        """Return sums of products of two planes' coefficients over blocks of terms."""
+        """Return sums of products of two planes' coefficients over blocks of terms.
+
+        Parameters
+        ----------
+        y, x : Array
+            Edges of the blocks, rising indices of terms along y and x.
+        workers : int
+            Number of threads.
+
+        Returns
+        -------
+        Array
+            Sums (pairs, len(y) - 1, len(x) - 1), in the order of `pairs`.
+        """
         every = pairs(len(self))
         return np.array([self._pair_products(pair, y, x, workers) for pair in every])
 

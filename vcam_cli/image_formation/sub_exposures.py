@@ -75,7 +75,20 @@ class FineImage:
     """Largest signal that counts [e/s]."""
 
     def look(self, color: int, x: Array, y: Array) -> Array:
-        """Return the signal of a color at places x, y of one shape [m], in that shape [e/s]."""
+        """Return the signal of a color at places.
+
+        Parameters
+        ----------
+        color : int
+            Number of the color.
+        x, y : Array
+            Places of one shape [m].
+
+        Returns
+        -------
+        Array
+            Signal in that shape [e/s].
+        """
         g = self.geometry
         pitches = g.pitch_x * g.sampling_scale, g.pitch_y * g.sampling_scale
         column = (x - g.collecting_x) / pitches[0] + (g.columns - 1) / 2
@@ -88,7 +101,18 @@ class FineImage:
 
 
 def sub_exposed_motion(path: OpticalPath) -> SubExposedMotion | None:
-    """Return the motion of a path that asks for sub-exposures; None where there is none."""
+    """Return the motion of a path that asks for sub-exposures; None where there is none.
+
+    Parameters
+    ----------
+    path : OpticalPath
+        The path of the light.
+
+    Returns
+    -------
+    SubExposedMotion or None
+        The motion.
+    """
     found = of_kind(path.effects, SubExposedMotion)
     return found[0] if found else None
 

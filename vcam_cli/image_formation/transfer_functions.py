@@ -100,7 +100,18 @@ class Transfer:
         return self.spectral_sum(self.otf(fx, fy))
 
     def otf(self, fx: Array, fy: Array) -> Array:
-        """Return the complex transfer (J, m, n) of all blurs at every wavelength."""
+        """Return the complex transfer of all blurs at every wavelength.
+
+        Parameters
+        ----------
+        fx, fy : Array
+            Frequencies (n,) and (m,) [cycles/m].
+
+        Returns
+        -------
+        Array
+            Transfer (J, m, n).
+        """
         otf = self.otf_radial(np.hypot(fx[None, :], fy[:, None])).astype(np.complex128)
         for plane, wavelength in zip(otf, self.wavelengths, strict=True):
             for effect in self.plane_blurs:
@@ -108,7 +119,18 @@ class Transfer:
         return otf
 
     def otf_radial(self, frequency: Array) -> Array:
-        """Return the transfer (J, *shape) of the radial blurs at every wavelength."""
+        """Return the transfer of the radial blurs at every wavelength.
+
+        Parameters
+        ----------
+        frequency : Array
+            Frequencies of any shape [cycles/m].
+
+        Returns
+        -------
+        Array
+            Transfer (J, *shape).
+        """
         otf = np.ones((len(self.wavelengths), *frequency.shape))
         for some in pieces(len(otf), max(1, VALUES // max(1, frequency.size))):
             for effect in self.radial_blurs:
@@ -116,7 +138,18 @@ class Transfer:
         return otf
 
     def spectral_sum(self, otf: Array) -> Array:
-        """Return the spectral sum (K, C, *shape) of transfers (J, *shape) [e/s]."""
+        """Return the spectral sum of transfers.
+
+        Parameters
+        ----------
+        otf : Array
+            Transfers (J, *shape) at the wavelengths.
+
+        Returns
+        -------
+        Array
+            Sums (K, C, *shape) [e/s].
+        """
         components, colors, count = self.weights.shape
         total = product(self.weights.reshape(-1, count), otf.reshape(count, -1))
         return total.reshape(components, colors, *otf.shape[1:])
@@ -140,11 +173,33 @@ class Transfer:
         return replace(self, wavelengths=self.wavelengths[keep], weights=weights[..., keep])
 
     def with_effects(self, effects: Sequence[Effect]) -> Transfer:
-        """Return the same light through other effects, of which only blurs count."""
+        """Return the same light through other effects.
+
+        Parameters
+        ----------
+        effects : sequence of Effect
+            These effects, of which only blurs count.
+
+        Returns
+        -------
+        Transfer
+            The transfer.
+        """
         return replace(self, effects=of_kind(effects, Blur))
 
     def with_mixtures(self, mix: Array) -> Transfer:
-        """Return the transfer of mixtures (R, K) of the components."""
+        """Return the transfer of mixtures of the components.
+
+        Parameters
+        ----------
+        mix : Array
+            Mixtures (R, K).
+
+        Returns
+        -------
+        Transfer
+            The transfer, its components the mixtures.
+        """
         return replace(self, weights=np.tensordot(mix, self.weights, axes=1))
 
     @property

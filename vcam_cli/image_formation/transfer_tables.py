@@ -43,7 +43,18 @@ class TableSize:
     """Largest number of mixtures; None: as many as the tolerance asks for."""
 
     def plane_entries(self, blurs: Sequence[PlaneTransfer]) -> int:
-        """Return the entries along an axis of a table over fx and fy for these blurs."""
+        """Return the entries along an axis of a table over fx and fy for these blurs.
+
+        Parameters
+        ----------
+        blurs : sequence of PlaneTransfer
+            These blurs.
+
+        Returns
+        -------
+        int
+            Entries, from `SMALLEST_PLANE` to `LARGEST_PLANE`.
+        """
         periods = self.top * max(blur.reach for blur in blurs)
         return int(min(max(self.steps_per_period * periods + 1, SMALLEST_PLANE), LARGEST_PLANE))
 
@@ -95,7 +106,18 @@ class Tables:
         return int(np.abs(self.radial[..., 0]).sum(axis=0).argmax())
 
     def of_color(self, color: int) -> Tables:
-        """Return the tables of a single color."""
+        """Return the tables of a single color.
+
+        Parameters
+        ----------
+        color : int
+            Number of the color.
+
+        Returns
+        -------
+        Tables
+            Its tables.
+        """
         only = slice(color, color + 1)
         return replace(
             self,
@@ -179,7 +201,22 @@ class TableReader:
 
 
 def reader(tables: Tables, parity: int, fx: Array) -> TableReader:
-    """Return a reader of the tables of one parity at the frequencies fx (n,), rising [cycles/m]."""
+    """Return a reader of the tables of one parity.
+
+    Parameters
+    ----------
+    tables : Tables
+        The tables.
+    parity : int
+        Number of the parity.
+    fx : Array
+        Rising frequencies (n,) along x [cycles/m].
+
+    Returns
+    -------
+    TableReader
+        The reader.
+    """
     plane, radial = tables.planes[parity], None
     if parity == tables.radial_parity and tables.radial is not None:
         radial = tables.radial, np.diff(tables.radial)
@@ -200,9 +237,19 @@ def _spline_coefficients(plane: Array) -> Array:
 
 
 def spline_weights(entries: int, position: Array) -> Any:
-    """Return what each coefficient of a table counts in a cubic spline: sparse (n, entries).
+    """Return what each coefficient of a table counts in a cubic spline.
 
-    Positions (n,) are parts of the table's length; beyond 1 that of the end holds.
+    Parameters
+    ----------
+    entries : int
+        Entries of the table.
+    position : Array
+        Positions (n,) as parts of the table's length; beyond 1 the value of the end holds.
+
+    Returns
+    -------
+    sparse array
+        Weights (n, entries).
     """
     from scipy.interpolate import BSpline
 
@@ -212,7 +259,22 @@ def spline_weights(entries: int, position: Array) -> Any:
 
 
 def tabulate(exact: Transfer, size: TableSize, mixing: Mixing) -> Tables:
-    """Return the tables of a transfer function for the given mixtures of its components."""
+    """Return the tables of a transfer function.
+
+    Parameters
+    ----------
+    exact : Transfer
+        The transfer of the components.
+    size : TableSize
+        Highest frequency and number of entries.
+    mixing : Mixing
+        Mixtures (R, K) of the components, and the error that they leave.
+
+    Returns
+    -------
+    Tables
+        The tables of the mixtures.
+    """
     mix, error = mixing
     mixed = exact.with_mixtures(mix)
     tables = Tables(mix, radial_table(mixed, size), size.top, error)
@@ -225,7 +287,20 @@ def tabulate(exact: Transfer, size: TableSize, mixing: Mixing) -> Tables:
 
 
 def radial_table(transfer: Transfer, size: TableSize) -> Array:
-    """Return the radial part of a transfer function over |f|: (K, C, entries) [e/s]."""
+    """Return the radial part of a transfer function over |f|.
+
+    Parameters
+    ----------
+    transfer : Transfer
+        The transfer.
+    size : TableSize
+        Highest frequency and number of entries.
+
+    Returns
+    -------
+    Array
+        Table (K, C, entries) [e/s].
+    """
     return transfer.radial_response(np.linspace(0, size.top, size.entries))
 
 
@@ -233,6 +308,20 @@ def bounding_tables(exact: Transfer, size: TableSize, mixing: Mixing) -> Tables:
     """Return tables that no lens exceeds whose radial part is this one.
 
     It is as if no light canceled.
+
+    Parameters
+    ----------
+    exact : Transfer
+        The transfer of the components.
+    size : TableSize
+        Highest frequency and number of entries.
+    mixing : Mixing
+        Mixtures (R, K) of the components, and the error that they leave.
+
+    Returns
+    -------
+    Tables
+        The tables, without directions.
     """
     mixed = exact.with_mixtures(mixing[0])
     bound = replace(mixed.with_effects(mixed.radial_blurs), weights=np.abs(mixed.weights))
@@ -304,7 +393,22 @@ def split_by_parity(plus: Array, minus: Array) -> Array:
 
 
 def plane_grid(transfer: Transfer, top: float, entries: int) -> PlaneGrid:
-    """Return a grid of so many frequencies from 0 to `top` [cycles/m] along each axis."""
+    """Return a grid of frequencies from 0 along each axis.
+
+    Parameters
+    ----------
+    transfer : Transfer
+        The transfer.
+    top : float
+        Highest frequency [cycles/m].
+    entries : int
+        Frequencies along each axis.
+
+    Returns
+    -------
+    PlaneGrid
+        The grid.
+    """
     radial_transfer = transfer.with_effects(transfer.radial_blurs).with_half_the_wavelengths()
     f = np.linspace(0, top, entries)
     length = np.hypot(f[None, :], np.concatenate([f, f])[:, None])

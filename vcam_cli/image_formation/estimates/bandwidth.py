@@ -324,6 +324,17 @@ def table_size(path: OpticalPath, highest: float, entries: int | None = None) ->
 
 
 def reach(path: OpticalPath) -> float:
-    """Return how far the blurs of a lens throw light, its diffraction aside [m]."""
+    """Return how far the blurs of a lens throw light, its diffraction aside.
+
+    Parameters
+    ----------
+    path : OpticalPath
+        The path of the light.
+
+    Returns
+    -------
+    float
+        Distance [m].
+    """
     blurs = [*path.transfer.effects, *(ring.blur for ring in path.field_rings)]
     return max((blur.reach for blur in blurs), default=0.0)

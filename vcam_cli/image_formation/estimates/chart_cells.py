@@ -130,7 +130,22 @@ class CellError:
 
     @classmethod
     def of_chart(cls, path: OpticalPath, scene: ChartScene, highest: float) -> CellError:
-        """Return that of a chart before the pixels."""
+        """Return that of a chart before the pixels.
+
+        Parameters
+        ----------
+        path : OpticalPath
+            The path of the light.
+        scene : ChartScene
+            The chart.
+        highest : float
+            Highest frequency that the image has [pixel Nyquist].
+
+        Returns
+        -------
+        CellError
+            The error of its cells.
+        """
         g = path.geometry
         around = 2 * AROUND * g.pitch_x, 2 * AROUND * g.pitch_y
         size = g.sensor_width + around[0], g.sensor_height + around[1]
@@ -170,7 +185,18 @@ class CellError:
         return float(f[np.count_nonzero(beyond > error**2)])
 
     def rms(self, per_pixel: float) -> float:
-        """Return the error of so many cells per pixel pitch [e/s]."""
+        """Return the rms error that cells cause.
+
+        Parameters
+        ----------
+        per_pixel : float
+            Cells along a pixel pitch.
+
+        Returns
+        -------
+        float
+            Error [e/s].
+        """
         g = self.path.geometry
         side = max(g.pitch_x, g.pitch_y) / per_pixel
         squares = self.energy.aligned * self._of_aligned(side) if self.energy.aligned else 0.0

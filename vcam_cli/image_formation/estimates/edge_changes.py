@@ -56,7 +56,18 @@ class EdgeGroup:
 
 
 def has_straight_edges(scene: Scene) -> TypeGuard[ChartScene]:
-    """Return whether a scene is even light between straight edges and nothing else."""
+    """Return whether a scene is even light between straight edges and nothing else.
+
+    Parameters
+    ----------
+    scene : Scene
+        The scene.
+
+    Returns
+    -------
+    bool
+        Whether it is.
+    """
     if not isinstance(scene, ChartScene):
         return False
     if scene.chart.profile() is not None:

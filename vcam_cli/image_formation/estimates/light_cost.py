@@ -180,7 +180,18 @@ class LightCost:
     """Effects that blur -> seconds of the image that they make, as far as asked for."""
 
     def saved(self, omitted: Collection[Effect]) -> float:
-        """Return the core seconds that leaving out some effects saves."""
+        """Return the time that leaving out some effects saves.
+
+        Parameters
+        ----------
+        omitted : collection of Effect
+            These effects.
+
+        Returns
+        -------
+        float
+            Time [core seconds].
+        """
         pixels = self.path.geometry.rows * self.path.geometry.columns
         gains = sum(effect.seconds_per_pixel for effect in omitted) * pixels
         kinds = Blur, SeparableTransfer, FieldTransfer, ImageMotion

@@ -73,6 +73,18 @@ def with_sufficient_precision(path: OpticalPath, scene: SampledScene) -> Optical
 
     They are 64 where 32 would take more than their share of the tolerance; else what the settings
     say of charts and of pictures.
+
+    Parameters
+    ----------
+    path : OpticalPath
+        The path of the light.
+    scene : SampledScene
+        The scene.
+
+    Returns
+    -------
+    OpticalPath
+        The path, its settings with that `float_width` [bits].
     """
     knobs = path.settings
     brightest = scene.brightest * float(np.abs(path.transfer.level).sum(axis=0).max())
