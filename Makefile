@@ -11,10 +11,10 @@ run: $(VENV)/.runtime  ## simulate the shipped still life: out/still-life/
 	$(BIN)/vcam run $(CAMERA)
 
 test: $(VENV)/.dev  ## the tests, but for those that take long
-	$(BIN)/python -m pytest -q -n auto -m "not long" tests
+	$(BIN)/python -m pytest -q -n auto --dist worksteal -m "not long" tests
 
 test-all: $(VENV)/.dev  ## all tests
-	$(BIN)/python -m pytest -q -n auto tests
+	$(BIN)/python -m pytest -q -n auto --dist worksteal tests
 
 lint: $(VENV)/.dev  ## format, lint, spelling, types
 	$(BIN)/ruff format --check $(SOURCES)

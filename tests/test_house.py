@@ -13,6 +13,7 @@ import sys
 import tokenize
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from graphlib import CycleError, TopologicalSorter
 from itertools import pairwise
 from pathlib import Path
@@ -78,9 +79,14 @@ class Module:
     def room(self) -> str:
         return self.name.partition(".")[0]
 
-    @property
+    @cached_property
     def tree(self) -> ast.Module:
         return ast.parse(self.text)
+
+    @cached_property
+    def nodes(self) -> tuple[ast.AST, ...]:
+        """All nodes of the tree, walked once for all rules."""
+        return tuple(ast.walk(self.tree))
 
 
 def sources() -> list[Module]:
@@ -95,20 +101,27 @@ def sources() -> list[Module]:
 MODULES = sources()
 
 
+def last_name(called: ast.expr) -> str:
+    """The name behind the last dot of what is called; "" where it ends with no name."""
+    if isinstance(called, ast.Attribute):
+        return called.attr
+    return called.id if isinstance(called, ast.Name) else ""
+
+
 def imported(node: ast.AST) -> list[str]:
     """The dotted names that a statement imports, `from a import b` as a.b."""
     if isinstance(node, ast.Import):
         return [alias.name for alias in node.names]
     if isinstance(node, ast.ImportFrom):
         return ["." * node.level + f"{node.module or ''}.{alias.name}" for alias in node.names]
-    if isinstance(node, ast.Call) and "import_module" in ast.unparse(node.func):
+    if isinstance(node, ast.Call) and "import_module" in last_name(node.func):
         return [a.value for a in node.args if isinstance(a, ast.Constant)]
     return []
 
 
 def imports(module: Module) -> Iterator[tuple[int, str]]:
     """(line, dotted name) of every import, inside functions and TYPE_CHECKING as well."""
-    for node in ast.walk(module.tree):
+    for node in module.nodes:
         for name in imported(node):
             yield getattr(node, "lineno", 0), name
 
@@ -159,15 +172,17 @@ def writes(module: Module) -> list[str]:
     """Calls that change the disk outside files/."""
     if module.room == "files":
         return []
-    calls = [node for node in ast.walk(module.tree) if isinstance(node, ast.Call)]
+    calls = [node for node in module.nodes if isinstance(node, ast.Call)]
     found = [f"{module.name}:{c.lineno}: {ast.unparse(c)}" for c in calls if _writes(c)]
     names = {f"{owner}.{name}" for owner in ("os", "shutil") for name in WRITERS | OF_OS}
     return found + [f"{module.name}:{line}: {n}" for line, n in imports(module) if n in names]
 
 
 def _writes(call: ast.Call) -> bool:
+    name = last_name(call.func)
+    if name not in {"open", "save"} | WRITERS | OF_OS:
+        return False
     whole = ast.unparse(call.func)
-    name = whole.rpartition(".")[2]
     if name == "open":
         return _opens_to_write(call, whole)
     if whole in ("np.save", "numpy.save"):
@@ -195,7 +210,7 @@ def undocumented(module: Module) -> list[str]:
     """
     tree = module.tree
     found = [module.name] if module.text.strip() and not ast.get_docstring(tree) else []
-    for node in ast.walk(tree):
+    for node in module.nodes:
         named = isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef)
         if not named or node.name.startswith("_") or ast.get_docstring(node):
             continue
@@ -207,6 +222,8 @@ def undocumented(module: Module) -> list[str]:
 def unfinished(module: Module) -> list[str]:
     """Words of work left undone, in code and comments."""
     words = re.compile(rf"\b({'|'.join(UNFINISHED)})\b")
+    if not words.search(module.text):
+        return []
     tokens = tokenize.generate_tokens(io.StringIO(module.text).readline)
     return [
         f"{module.name}:{t.start[0]}: {t.line.strip()}" for t in tokens if words.search(t.string)
@@ -224,7 +241,7 @@ def names_a_camera(module: Module) -> list[str]:
     if module.room != "config":
         return []
     found = []
-    for node in ast.walk(module.tree):
+    for node in module.nodes:
         for field in ("id", "attr", "arg", "name", "asname"):
             name = getattr(node, field, None)
             if isinstance(name, str):
@@ -243,14 +260,14 @@ def asks_for_an_effects_kind(module: Module) -> list[str]:
         return []
     imported_names = {
         alias.asname or alias.name
-        for node in ast.walk(module.tree)
+        for node in module.nodes
         if isinstance(node, ast.ImportFrom) and f"{node.module}.".startswith("vcam_cli.effects.")
         for alias in node.names
     }
     found = []
-    for node in ast.walk(module.tree):
+    for node in module.nodes:
         kinds: list[ast.expr] = []
-        if isinstance(node, ast.Call) and ast.unparse(node.func) == "isinstance":
+        if isinstance(node, ast.Call) and last_name(node.func) == "isinstance":
             kinds = node.args[1:]
         elif isinstance(node, ast.MatchClass):
             kinds = [node.cls]

@@ -1,6 +1,7 @@
 """A finished sweep of which nothing has changed is read; any change is noticed."""
 
 import json
+import shutil
 import subprocess
 import sys
 from dataclasses import replace
@@ -26,10 +27,22 @@ STUDY = {
 }
 
 
+@pytest.fixture(scope="module")
+def swept(tmp_path_factory):
+    """A folder with a finished sweep, a copy of all of it, and the result."""
+    folder, kept = tmp_path_factory.mktemp("swept"), tmp_path_factory.mktemp("kept") / "copy"
+    result = sweep(written(folder, **STUDY), folder / "out", workers=1)
+    shutil.copytree(folder, kept)
+    return folder, kept, result
+
+
 @pytest.fixture
-def finished(tmp_path):
-    study = written(tmp_path, **STUDY)
-    return study, tmp_path / "out", sweep(study, tmp_path / "out", workers=1)
+def finished(swept):
+    """The finished sweep, which a test may change: it is put back in its place for the next one."""
+    folder, kept, result = swept
+    yield folder / "study.yaml", folder / "out", result
+    shutil.rmtree(folder)
+    shutil.copytree(kept, folder)
 
 
 @pytest.fixture
@@ -120,10 +133,10 @@ def edit_study(folder):
         lambda folder: next((folder / "out" / "points").glob("*.json")).unlink(),
     ],
 )
-def test_every_change_is_noticed_and_mended(finished, resolved, tmp_path, change):
+def test_every_change_is_noticed_and_mended(finished, resolved, change):
     study, out, _ = finished
     before = {p.name: p.read_bytes() for p in out.glob("*.csv")}
-    change(tmp_path)
+    change(study.parent)
     sweep(study, out, workers=1)
     assert len(resolved) == 1
     if change is not edit_study:
