@@ -9,7 +9,7 @@ from itertools import groupby
 from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry
-from vcam_cli.effects.base import Effect
+from vcam_cli.effects.base import Effect, of_kind
 from vcam_cli.effects.signal_chain import NoiseSource, Site
 from vcam_cli.readout.merging import Merge
 
@@ -116,11 +116,13 @@ def merged_effects(found: Mapping[str, Effect | None], merge: Merge) -> dict[str
     merge : Merge
         Its readouts.
     """
-    by_readout = [{e.name: e for e in r.chain.effects} for r in merge.readouts]
+    by_readout = [
+        {source.name: source for source in of_kind(readout.chain.effects, NoiseSource)}
+        for readout in merge.readouts
+    ]
     changed = dict(found)
     for name in found:
-        sources = [effects.get(name) for effects in by_readout]
-        noises = tuple(s if isinstance(s, NoiseSource) else None for s in sources)
-        if any(noise is not None for noise in noises):
-            changed[name] = MergedNoise(noises, merge)
+        sources = tuple(effects.get(name) for effects in by_readout)
+        if any(source is not None for source in sources):
+            changed[name] = MergedNoise(sources, merge)
     return changed
