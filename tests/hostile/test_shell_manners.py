@@ -10,6 +10,7 @@ import os
 import re
 import socket
 import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -98,6 +99,12 @@ def test_what_is_an_address(address):
     assert Execution(scheduler=address).scheduler == address
 
 
+IMPATIENT = (
+    "from vcam_cli.sweeps import workers; workers.CONNECT_TIMEOUT = 0.5;"
+    "from vcam_cli.commands.main import main; main()"
+)
+
+
 @pytest.mark.parametrize(
     "address",
     long_except(["tcp://127.0.0.1:1"], ["tcp://127.0.0.1:1", "tls://127.0.0.1:1", "127.0.0.1:{}"]),
@@ -109,7 +116,7 @@ def test_a_scheduler_that_is_none(tmp_path, address):
     with socket.create_server(("127.0.0.1", 0)) as silent:
         place = address.format(silent.getsockname()[1])
         done = subprocess.run(
-            [*VCAM, "sweep", "study.yaml", "-q", "--scheduler", place],
+            [sys.executable, "-c", IMPATIENT, "sweep", "study.yaml", "-q", "--scheduler", place],
             cwd=tmp_path, env=environment(), capture_output=True, text=True, timeout=120,
         )  # fmt: skip
     assert done.returncode == 3, done

@@ -21,10 +21,11 @@ from vcam_cli.sweeps.execution import Share
 TABLES = ("points.csv", "optimum.csv")
 OPTIMIZE = {"metric": "mean_electrons", "goal": "max"}
 LONG = {
-    "vary": {"pixel.width": {"start": "4 um", "stop": "6 um", "count": 12}},
+    "vary": {"pixel.width": {"start": "4 um", "stop": "6 um", "count": 6}},
     "seeds": 4,
     "optimize": OPTIMIZE,
 }
+POINTS = 24
 
 
 def tables(folder):
@@ -42,7 +43,7 @@ def files(folder):
 
 @pytest.fixture(scope="module")
 def long(tmp_path_factory):
-    """A study of 48 points, and its tables from one process that was never stopped."""
+    """A study of `POINTS` points, and its tables from one process that was never stopped."""
     folder = tmp_path_factory.mktemp("long")
     study = written(folder, **LONG)
     sweep(study, folder / "out", workers=1)
@@ -81,14 +82,14 @@ def test_the_rows_are_what_a_run_of_each_camera_gives(tmp_path):
 def test_two_processes_with_two_threads_give_the_same_bytes_as_one(long, tmp_path):
     study, expected = long
     result = sweep(study, tmp_path / "out", workers=2)
-    assert (result.computed, result.exit_code) == (48, 0)
+    assert (result.computed, result.exit_code) == (POINTS, 0)
     assert tables(tmp_path / "out") == expected
 
 
 def test_shares_add_up(long, tmp_path):
     study, expected = long
     counts = [sweep(study, tmp_path / "o", workers=1, shard=(i, 3)).computed for i in (2, 1, 3)]
-    assert sum(counts) == 48
+    assert sum(counts) == POINTS
     assert max(counts) - min(counts) <= 4
     assert tables(tmp_path / "o") == expected
     assert sweep(study, tmp_path / "o", workers=1, shard=(2, 3)).computed == 0
@@ -129,9 +130,9 @@ def test_killed_at_any_moment_and_started_again(long, tmp_path):
     process.wait()
     before = len(files(out))
     assert before >= 5
-    assert not (out / "points.csv").exists() or before == 48
+    assert not (out / "points.csv").exists() or before == POINTS
     result = sweep(study, out, workers=1)
-    assert result.computed == 48 - before
+    assert result.computed == POINTS - before
     assert tables(out) == expected
 
 
@@ -146,7 +147,7 @@ def test_two_processes_share_a_folder(long, tmp_path):
     told = [json.loads(p.communicate(timeout=60)[0]) for p in both]
     assert [p.returncode for p in both] == [0, 0]
     # No point is computed twice: each is claimed.
-    assert sum(t["computed"] for t in told) == 48
+    assert sum(t["computed"] for t in told) == POINTS
     assert tables(out) == expected
 
 
@@ -284,7 +285,7 @@ class TestFailures:
         monkeypatch.undo()
         kept = len(files(tmp_path / "out"))
         assert kept == 9  # and the record
-        assert sweep(study, tmp_path / "out", workers=1).computed == 48 - kept
+        assert sweep(study, tmp_path / "out", workers=1).computed == POINTS - kept
 
     def test_folders_that_are_not_vcams(self, tmp_path):
         study = written(tmp_path / "in")
@@ -363,7 +364,7 @@ class TestWorkers:
 
         monkeypatch.setattr(workers.subprocess, "Popen", Process)
         result = sweep(study, tmp_path / "out", workers=2, watch=Watch())
-        assert (result.computed, result.exit_code) == (48, 0)
+        assert (result.computed, result.exit_code) == (POINTS, 0)
         assert len(started) == 3  # one more than the two that were asked for
 
     def test_a_point_that_kills_them_is_given_up(self, tmp_path, monkeypatch):
