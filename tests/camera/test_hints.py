@@ -316,12 +316,10 @@ def test_what_is_not_simulated_is_said(word):
 @pytest.mark.parametrize(
     "guess",
     [
-        "pixel.readout.gains=[1, 8]", "exposure.gains=[1, 8]", "adc.gains=[1, 8]",
         "optics.distortion={k1: -0.1}", "optics.k1=-0.1", "lens.distortion=-0.1",
         "optics.lateral_color={table: {450: -0.02 %}}", "optics.tca=1 um",
         "pixel.readout.blooming=5 %", "array.crosstalk=1 %", "effects.crosstalk=on",
-        "pixel.photodetector.optical_crosstalk=1 %", "adc.companding={knees: [[1, 1]]}",
-        "adc.kind=companding",
+        "pixel.photodetector.optical_crosstalk=1 %",
     ],
 )  # fmt: skip
 def test_what_is_not_simulated_is_said_wherever_it_is_looked_for(guess):

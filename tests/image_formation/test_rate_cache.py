@@ -43,6 +43,9 @@ CHANGES = {
     "pixel.readout.reset_noise": "9 e",
     "pixel.readout.charge_transfer": {"inefficiency": 1e-3},
     "pixel.readout.timing": {"pixel_time": "1 us"},
+    "pixel.readout.gains": [1, 8],
+    "pixel.readout.merge": "switch",
+    "pixel.readout.small": {"sensitivity": "1 %", "full_well": "60 ke"},
     "pixel.photodetector.dark_current": "900 e/s",
     "pixel.photodetector.dark_current_density": "5 nA/cm2",
     "pixel.photodetector.dark_current_scale": 3,
@@ -51,6 +54,7 @@ CHANGES = {
     "effects": {"shot_noise": "off", "dark_current": "off"},
 }
 """Another value of every key on which the light does not depend."""
+SEVERAL_READOUTS = ("pixel.readout.gains", "pixel.readout.merge", "pixel.readout.small")
 
 
 def changed(path, value):
@@ -59,8 +63,10 @@ def changed(path, value):
     out = BASE | {path: value}
     if path in ("pixel.photodetector.dark_current_density",):
         out = {k: v for k, v in out.items() if k != "pixel.photodetector.dark_current"}
-    if path == "pixel.readout.column_noise":
+    if path == "pixel.readout.column_noise" or path in SEVERAL_READOUTS:
         out |= {"pixel.architecture": "aps-3t"}
+    if path == "pixel.readout.merge":
+        out |= {"pixel.readout.gains": [1, 8]}
     return out
 
 

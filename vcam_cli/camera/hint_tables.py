@@ -74,6 +74,13 @@ KEYS: Mapping[str, str] = {
         ("system_gain", "overall_system_gain", "conversion_factor", "k"), "adc.gain: 0.25 DN/e"
     ),
     **dict.fromkeys(("black_level", "pedestal", "blacklevel"), "adc.offset: 64 DN"),
+    **dict.fromkeys(
+        ("dual_conversion_gain", "dual_gain", "conversion_gains", "dcg"),
+        "pixel.readout.gains: [1, 8]",
+    ),
+    **dict.fromkeys(
+        ("pwl", "piecewise_linear"), "adc.companding: {knees: [[1023, 1023], [65535, 4095]]}"
+    ),
     "bit_depth": "adc.bits: 12",
     "bitdepth": "adc.bits: 12",
     **dict.fromkeys(
@@ -236,7 +243,7 @@ FORMS: Mapping[str, tuple[tuple[str, str], ...]] = {
     "adc.kind": (
         (
             "(?i)compand.*|pwl|piecewise.*|knees?",
-            "write logarithmic, or linear, as an ADC with knees is not simulated",
+            "write linear, and its knees in adc.companding: {knees: [[1023, 1023], [65535, 4095]]}",
         ),
     ),
     "pixel.fpn": (
@@ -323,11 +330,6 @@ NOT_SIMULATED: Mapping[str, str] = {
         ("prescription", "zemax"),
         "a lens is given by what it does, in optics.zernike, optics.psf or optics.mtf",
     ),
-    **dict.fromkeys(
-        ("dual_conversion_gain", "gains", "dual_gain", "conversion_gains", "dcg"),
-        "every pixel is read with one gain, pixel.readout.gain",
-    ),
-    **dict.fromkeys(("companding", "knees", "pwl"), "adc.kind is linear or logarithmic"),
     "flash": "the light of the scene is scene.illuminant at one level",
     **dict.fromkeys(
         ("phase_detection", "pdaf", "dual_pixel"),

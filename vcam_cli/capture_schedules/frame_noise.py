@@ -17,12 +17,12 @@ from vcam_cli.effects.base import Effect, of_kind
 from vcam_cli.effects.signal_chain import Limit
 from vcam_cli.parallel import each
 from vcam_cli.readout import nondestructive_samples
-from vcam_cli.readout.raised_codes import RaisedCodes
 from vcam_cli.rng import blocks
 from vcam_cli.scheduling import estimators
 from vcam_cli.scheduling.pdf import Floats
 from vcam_cli.scheduling.sensor import SLACK, Sensor
 from vcam_cli.simulation.preparation import Prepared
+from vcam_cli.solve.raised_codes import RaisedCodes
 
 Flags = NDArray[np.bool_]
 

@@ -41,9 +41,9 @@ from vcam_cli.errors import bad
 from vcam_cli.progress import Stages
 from vcam_cli.quality.mtf import Lattice
 from vcam_cli.readout import exposure
-from vcam_cli.readout.raised_codes import RaisedCodes
 from vcam_cli.simulation.preparation import Prepared
 from vcam_cli.simulation.simulate import prepare
+from vcam_cli.solve.raised_codes import RaisedCodes
 from vcam_cli.spectra import integral, photons
 
 FIELD = 512

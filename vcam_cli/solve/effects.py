@@ -13,8 +13,8 @@ from vcam_cli.effects.base import Charge, Effect, of_kind
 from vcam_cli.effects.order import ORDER
 from vcam_cli.effects.signal_chain import NoiseSource, Quantizer
 from vcam_cli.errors import Collector
-from vcam_cli.readout.merged_noise import merged_effects
 from vcam_cli.solve.merge import camera_merge
+from vcam_cli.solve.merged_noise import merged_effects
 
 
 @dataclass(frozen=True)
