@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, get_args
 
 from pydantic import BaseModel
@@ -35,7 +36,7 @@ class Key:
         """The last part of its path."""
         return str(self.path[-1])
 
-    @property
+    @cached_property  # `explain` compares a word with those of all keys
     def dotted(self) -> str:
         """Its path as `--set` writes it."""
         return dotted_path(self.path)
