@@ -78,14 +78,22 @@ def test_opaque_layers_of_rectangles_are_rectangles(mirrored):
     mix = np.random.default_rng(2).uniform(0, 1, (2, 26))
     averages = overlaps(layered.rectangles(mix), layered)
     painted = layered.planes(mix)
-    # Painted, the two are averaged before they are multiplied: cells on the border err, and no more
-    # than by what lies in them.
-    wrong = np.abs(averages - painted).max(axis=0) > 1e-12
-    assert np.count_nonzero(wrong) <= 2 * sum(layered.shape)
-    assert np.abs(averages - painted).max() <= 0.25 * painted.max()
+    np.testing.assert_allclose(painted, averages, atol=1e-12)
     assert painted.max() > 0.5
     other = PictureChart(np.ones((2, 2, 1)), Frame(61.3e-6, 47.7e-6), mirrored)
     assert MaskedChart(card, other).edges() is None
+
+
+def test_bars_within_a_cell_choose_the_light_that_is_seen():
+    """Light and opacity that both change within cells: the mean of their product, by hand."""
+    frame = Frame(4.0, 4.0)
+    light = PictureChart(np.array([[1.0, 0, 0, 1], [1.0, 0, 1, 0]])[:, :, None], frame, True)
+    bars = PictureChart(np.array([[0.0, 1, 0, 1]])[:, :, None], frame, mirrored=False)
+    edges = np.array([-3.0, 0.0, 2.5])
+    found = MaskedChart(light, bars).averages(edges, np.array([-2.0, 1.0]), np.eye(2))
+    # From -3 to 0: samples 0 (clear) and 1 (dark); from 0 to 2.5: 2 (clear) and 3 (bright above).
+    np.testing.assert_allclose(found[0], [[0, 2 / 3 / 2.5]], atol=1e-15)
+    np.testing.assert_allclose(found[1], [[1 / 3, 1 / 2.5]], atol=1e-15)
 
 
 def covers(edges, cells):

@@ -4,14 +4,17 @@ import numpy as np
 import pytest
 from scipy.signal import fftconvolve
 
-from vcam_cli.scenes.depth_cut import (
-    LEAST_JUMP,
-    cut_depth,
-    disc_transfer,
-    full_signal,
-    picture_detail,
+from vcam_cli.scenes.depth_cut import LEAST_JUMP, cut_depth
+from vcam_cli.scenes.depth_detail import disc_transfer, full_signal, picture_detail
+from vcam_cli.scenes.depth_slopes import (
+    divided,
+    mean_slope,
+    slope_change,
+    slope_error,
+    slopes,
+    source,
+    steepest,
 )
-from vcam_cli.scenes.depth_slopes import mean_slope, slope_error, slopes, source, steepest
 
 PITCH = 1e-6
 PIXEL = 4e-6
@@ -113,12 +116,26 @@ def test_what_rays_pass_by_is_hidden_and_no_more():
     assert hidden.unknown > 0.1
 
 
-@pytest.mark.parametrize("kind", ["slope", "small step"])
+@pytest.mark.parametrize("kind", ["slope", "steep slope", "small step"])
 def test_smooth_surfaces_hide_nothing(kind):
+    """A slope folds under the rays, and hides itself, where it rises by a sample a sample."""
     columns = np.arange(48) * np.ones((48, 1))
-    step = 0.9 * LEAST_JUMP * PIXEL  # so much from sample to sample is a step, too
-    radius = 0.3 * PITCH * columns if kind == "slope" else np.where(columns < 24, step, 0)
+    rise = {"slope": 0.3, "steep slope": 0.9, "small step": 0}[kind]
+    step = 0.9 * LEAST_JUMP * PIXEL if kind == "small step" else 0
+    radius = rise * PITCH * columns + np.where(columns < 24, step, 0)
     assert not len(cut(radius).hidden.samples)
+
+
+def test_parts_of_samples_lie_on_the_slope_and_steps_stay():
+    """Straight between the middles of samples; a jump is not smoothed."""
+    slope = 0.3 * np.arange(8) + np.zeros((6, 1))
+    fine = divided(slope, 4)
+    assert fine.shape == (24, 32)
+    inner = 0.3 * ((np.arange(32) + 0.5) / 4 - 0.5)
+    assert fine[:, 2:-2] == pytest.approx(np.broadcast_to(inner[2:-2], (24, 28)))
+    assert fine[:, :2] == pytest.approx(0)  # the picture goes on as its mirror image
+    step = np.where(np.arange(8) < 4, 3.0, 0.0) + np.zeros((6, 1))
+    assert (divided(step, 3) == step.repeat(3, 0).repeat(3, 1)).all()
 
 
 def test_even_backgrounds_are_known():
@@ -135,17 +152,14 @@ def test_slopes_are_the_gradient_of_a_paraboloid_and_keep_light():
     assert not down.any()
     assert right == pytest.approx(0.1)
     assert steepest((down, right)) == pytest.approx(0.2 / 3)
-    tilted = source(np.ones((1, 32, 48)), (down, right), 2.0, 2)[0]
-    assert tilted.shape == (64, 96)
-    assert tilted[:, 3:-3] == pytest.approx(0, abs=1e-12)  # its flux is even
+    tilted = source(np.ones((1, 32, 48)), (down, right), 2.0)[0]
+    assert tilted[:, 1:-1] == pytest.approx(0, abs=1e-12)  # its flux is even
     light = noise()[None]
-    moved = source(
-        light, slopes(0.1 * np.arange(light.shape[2]) * np.ones(light.shape[1:])), 3.0, 3
-    )
+    moved = source(light, slopes(0.1 * np.arange(light.shape[2]) * np.ones(light.shape[1:])), 3.0)
     assert moved.sum() == pytest.approx(0, abs=1e-9)  # to one side comes what the other lacks
-    for high, jump in ((5.0, 1.0), (0.4, 0.3), (0.4, 1.0)):
+    for high in (5.0, 0.4):
         step = np.where(np.arange(48) < 24, high, 0.0) * np.ones((32, 1))
-        assert not any(rise.any() for rise in slopes(step, jump))
+        assert not any(rise.any() for rise in slopes(step))
 
 
 def test_a_map_in_steps_rises_as_a_smooth_one_and_its_error_is_predicted():
@@ -157,6 +171,6 @@ def test_a_map_in_steps_rises_as_a_smooth_one_and_its_error_is_predicted():
     picture = noise()
     full = full_signal(picture, PITCH, PIXEL)
     detail = picture_detail(picture, PITCH, (PIXEL, PIXEL), passes, full)
-    found = [slope_error(detail, PITCH * r, PITCH, 4, 0) for r in (steps, smooth)]
+    found = [slope_change(detail, PITCH * r, PITCH, 4) for r in (steps, smooth)]
     assert found[0] == pytest.approx(found[1], rel=0.1)
-    assert 0 < slope_error(detail, PITCH * smooth, PITCH, 4, 2) < found[1]
+    assert 0 < slope_error(detail, PITCH * smooth, PITCH, 4) < found[1]

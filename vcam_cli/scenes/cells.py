@@ -140,6 +140,8 @@ def means_of_parts(planes: Array, parts: tuple[Array, Array], cells: tuple[Array
         Means (..., rows, columns) over the cells.
     """
     for axis, of_parts, of_cells in zip((-2, -1), parts, cells, strict=True):
+        if len(of_parts) == len(of_cells):  # no cell is divided
+            continue
         shape = (-1, 1) if axis == -2 else (-1,)
         first = np.searchsorted(of_parts, of_cells[:-1])
         weighed = planes * np.diff(of_parts).astype(planes.dtype).reshape(shape)

@@ -17,13 +17,14 @@ guess is worth is told by another one, the picture's mirror image at the edge.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.fft
 
 from vcam_cli.arrays import Array
+from vcam_cli.scenes.depth_detail import Detail
+from vcam_cli.scenes.depth_slopes import slopes
 
 MOST_LAYERS = 256
 """Layers of a picture, at most."""
@@ -38,51 +39,8 @@ STEPS = 24
 """Groups of radii, each of which is searched at once for what lies behind it."""
 EDGE = 1.0
 """Samples by which the middles of those at an edge are apart."""
-BINS = 256
-"""Frequencies of a power spectrum."""
 FEW = 10_000
 """Samples that tell whether a map has few values."""
-
-
-@dataclass(frozen=True)
-class Detail:
-    """What the pixels of a lens see of a picture's detail by length of the spatial frequency."""
-
-    frequency: Array
-    """(n,) [cycles/m]."""
-    power: Array
-    """Mean squares (n,) of the picture without its mean, relative to the square of full signal."""
-
-    def rms(self, transfer: Array) -> float:
-        """Return the rms of the detail behind a transfer, over full signal.
-
-        Parameters
-        ----------
-        transfer : Array
-            Transfer (n,) at the frequencies of the detail.
-
-        Returns
-        -------
-        float
-            Rms, without unit.
-        """
-        return float(np.sqrt((self.power * np.square(transfer)).sum()))
-
-    def blur_change(self, *parts: tuple[float, float]) -> float:
-        """Return the rms of a sum of blurs of the detail, over full signal.
-
-        Parameters
-        ----------
-        *parts : tuple of float
-            A factor, and the radius of a disc [m].
-
-        Returns
-        -------
-        float
-            Rms, without unit.
-        """
-        blurs = [factor * disc_transfer(self.frequency, radius) for factor, radius in parts]
-        return self.rms(np.sum(blurs, axis=0))
 
 
 @dataclass(frozen=True)
@@ -155,118 +113,6 @@ class DepthCut:
         near = np.bincount(self.first.ravel(), minlength=count)
         behind = np.bincount(self.first[self.share > 0].ravel() + 1, minlength=count)
         return np.asarray(near[:count] + behind[:count] > 0)
-
-
-def disc_transfer(frequency: Array, radius: float) -> Array:
-    """Return the transfer 2 J1(z) / z, z = 2 pi f r, of an even disc.
-
-    Parameters
-    ----------
-    frequency : Array
-        Spatial frequencies (n,) [cycles/m].
-    radius : float
-        Radius of the disc; its sign does not matter [m].
-
-    Returns
-    -------
-    Array
-        Transfer (n,) without unit.
-
-    References
-    ----------
-    .. [1] H. H. Hopkins, "The frequency response of a defocused optical system", Proc. R. Soc.
-       London A 231, 91-103, 1955, doi:10.1098/rspa.1955.0158 (its limit by rays).
-    """
-    from scipy.special import j1
-
-    z = 2 * np.pi * np.asarray(frequency, float) * abs(radius)
-    return np.where(z > 1e-6, 2 * j1(z) / np.where(z > 1e-6, z, 1.0), 1.0)
-
-
-def full_signal(picture: Array, pitch: float, pixel: float) -> float:
-    """Return the brightest light of a picture in the means over pixels, at most white.
-
-    Parameters
-    ----------
-    picture : Array
-        Light (h, w), relative to white.
-    pitch : float
-        Pitch of its samples [m].
-    pixel : float
-        Pitch of the pixels [m].
-
-    Returns
-    -------
-    float
-        Light, relative to white.
-    """
-    together = max(int(pixel / pitch), 1)
-    return min(float(block_means(picture, together).max(initial=0.0)), 1.0)
-
-
-def picture_detail(
-    picture: Array,
-    pitch: float,
-    aperture: tuple[float, float],
-    lens: Callable[[Array], Array],
-    full: float,
-) -> Detail:
-    """Return the detail of a picture in the color of all its channels together.
-
-    Parameters
-    ----------
-    picture : Array
-        Light (h, w) of its samples, relative to white.
-    pitch : float
-        Pitch of the samples on the sensor [m].
-    aperture : tuple of float
-        Width and height of the areas over which pixels average [m].
-    lens : callable
-        What the lens passes at frequencies (n,) [cycles/m] where it is in focus.
-    full : float
-        Full signal, relative to white.
-
-    Returns
-    -------
-    Detail
-        The detail.
-    """
-    together = max(int(min(aperture) / pitch) // 2, 1)  # finer than these nothing is seen
-    picture, pitch = block_means(picture, together), pitch * together
-    squares = np.square(scipy.fft.dctn(picture.astype(np.float32), type=2, norm="ortho"))
-    squares[0, 0] = 0
-    fy, fx = (np.arange(count) / (2 * count * pitch) for count in picture.shape)
-    length = np.hypot(fx[None, :], fy[:, None])
-    squares *= np.outer(np.square(np.sinc(fy * aperture[1])), np.square(np.sinc(fx * aperture[0])))
-    top = float(np.hypot(0.5, 0.5) / pitch)
-    bins = np.minimum((np.sqrt(length / top) * BINS).astype(int), BINS - 1).ravel()
-    power = np.bincount(bins, squares.ravel(), BINS) / picture.size
-    weighted = np.bincount(bins, (squares * length).ravel(), BINS) / picture.size
-    seen = power > 0
-    frequency = weighted[seen] / power[seen]
-    passed = np.square(lens(frequency))
-    return Detail(frequency, power[seen] * passed / (full**2 or 1.0))
-
-
-def block_means(picture: Array, side: int) -> Array:
-    """Return the means over whole blocks of samples.
-
-    Parameters
-    ----------
-    picture : Array
-        Samples (h, w).
-    side : int
-        Samples along a side of a block; at most all of a smaller picture's.
-
-    Returns
-    -------
-    Array
-        Means, one a block.
-    """
-    down, across = (min(side, count) for count in picture.shape)
-    rows, columns = picture.shape[0] // down, picture.shape[1] // across
-    whole = picture[: rows * down, : columns * across]
-    return np.asarray(whole.reshape(rows, down, columns, across).mean(axis=(1, 3)))
 
 
 def is_flat(radius: Array, detail: Detail, allowed: float) -> bool:
@@ -391,13 +237,14 @@ def _sources(radius: Array, jump: float) -> Iterator[tuple[Array, Array]]:
 
     Rays see as far behind a sample as both radii differ.
     """
-    from scipy.ndimage import distance_transform_edt, minimum_filter
+    from scipy.ndimage import distance_transform_edt, maximum_filter, minimum_filter
 
     low, high = float(radius.min()), float(radius.max())
     if high - low < jump:
         return
     reach = min(int(np.ceil(high - low + EDGE)), max(radius.shape))
     over = radius - minimum_filter(radius, 2 * reach + 1, mode="nearest") >= jump
+    over &= maximum_filter(_at_jumps(radius, jump), 2 * reach + 1, mode="constant")
     group = max((high - low) / STEPS, jump)
     number = np.where(over, ((radius - low) / group).astype(int), -1)
     for step in np.unique(number[over]):
@@ -418,6 +265,17 @@ def _sources(radius: Array, jump: float) -> Iterator[tuple[Array, Array]]:
             (y + top) * width + x + left,
             (index[0][seen] + top) * width + index[1][seen] + left,
         )
+
+
+def _at_jumps(radius: Array, jump: float) -> Array:
+    """Return the samples (h, w) beside which the radius jumps: rays do not pass by a slope."""
+    found = np.zeros(radius.shape, bool)
+    for axis, slope in enumerate(slopes(radius)):
+        jumps = np.moveaxis(np.abs(np.diff(radius, axis=axis) - slope) >= jump, axis, 0)
+        own = np.moveaxis(found, axis, 0)
+        own[:-1] |= jumps
+        own[1:] |= jumps
+    return found
 
 
 def _mirrored(radius: Array, behind: Array, source: Array, jump: float) -> Array:

@@ -10,16 +10,17 @@ import numpy as np
 
 from vcam_cli.arrays import Array
 from vcam_cli.scenes.base import SampledScene, View
-from vcam_cli.scenes.depth_cut import (
-    LEAST_JUMP,
-    DepthCut,
-    Detail,
-    cut_depth,
-    full_signal,
-    is_flat,
-    picture_detail,
+from vcam_cli.scenes.depth_cut import DepthCut, cut_depth, is_flat
+from vcam_cli.scenes.depth_detail import Detail, full_signal, picture_detail
+from vcam_cli.scenes.depth_slopes import (
+    MOST_FINE,
+    divided,
+    slope_change,
+    slope_error,
+    slopes,
+    source,
+    steepest,
 )
-from vcam_cli.scenes.depth_slopes import FINE, slope_error, slopes, source, steepest
 from vcam_cli.scenes.hyperspectral import Cube
 from vcam_cli.scenes.image import ImageScene, image_scene
 from vcam_cli.spectra import Spectrum
@@ -27,7 +28,7 @@ from vcam_cli.spectra import Spectrum
 SHARE = 0.3
 """Part of the tolerance that the cuts between layers may use."""
 SLOPE_SHARE = 0.1
-"""Part of the tolerance within which slopes count as steps."""
+"""Part of the tolerance within which slopes count as steps, and that their samples may err."""
 
 
 @dataclass(frozen=True)
@@ -139,12 +140,10 @@ class SlopeLayer(SampledScene):
     """Rises of the blur's radius from sample to sample [samples]."""
     radius: float
     """Of the layer's blur, with its sign [samples]."""
-    finer: int
-    """Samples along the side of one of the layer's."""
 
     def planes(self, mix: Array, workers: int = 1) -> Array:
         """Return the linear combinations (R, h, w) of the parts."""
-        return source(self.layer.planes(mix, workers), self.rises, self.radius, self.finer)
+        return source(self.layer.planes(mix, workers), self.rises, self.radius)
 
     def values_at(self, x: Array, y: Array, mix: Array) -> Array:
         """Return the sample under each point."""
@@ -175,8 +174,6 @@ class DepthScene:
     """Of the layers [m]."""
     rises: tuple[Array, Array] | None
     """Rises of the blur's radius from sample to sample; None where no slope counts [samples]."""
-    finer: int
-    """Fine samples along the side of one on which the light of slopes is known."""
     slope_error: float
     """Predicted rms error by slopes, relative to full signal."""
 
@@ -278,19 +275,18 @@ class DepthScene:
         """
         if self.rises is None:
             return None
-        shown, finer = self.shown(number), self.finer
+        shown = self.shown(number)
         return SlopeLayer(
             spectra=shown.spectra,
             white=shown.white,
-            shape=(shown.shape[0] * finer, shown.shape[1] * finer),
-            pitch_x=shown.pitch_x / finer,
-            pitch_y=shown.pitch_y / finer,
+            shape=shown.shape,
+            pitch_x=shown.pitch_x,
+            pitch_y=shown.pitch_y,
             samples="squares",
             dtype=shown.dtype,
             layer=shown,
             rises=self.rises,
             radius=float(self.cut.radii[number]) / shown.pitch_x,
-            finer=finer,
         )
 
     def _layer(self, coverage: Array, sources: Array | None) -> CutLayer:
@@ -345,42 +341,47 @@ def flat_distance(
 
 
 def depth_scene(
-    flat: ImageScene, given: DepthPicture, view: View, blur: LensBlur, tolerance: float
+    flat: ImageScene,
+    given: DepthPicture,
+    view: View,
+    blur: LensBlur,
+    tolerance: float,
+    most: float = 1.0,
 ) -> DepthScene:
     """Return a picture with depth, cut into layers as finely as the tolerance asks.
 
-    Parameters
-    ----------
-    flat : ImageScene
-        The picture at one distance.
-    given : DepthPicture
-        The picture's distances.
-    view : View
-        The array, and the size of the scene.
-    blur : LensBlur
-        Blur of the lens by distance.
-    tolerance : float
-        Rms error of the mean signal, over full signal.
-
-    Returns
-    -------
-    DepthScene
-        The scene.
+    Parameters are those of `flat_distance`, and the most light that counts, relative to white:
+    where pixels are full.
     """
     depth = _on_sensor(flat, given, view)
-    radius, light = blur.radius(depth), _brightness(flat)
-    pixel = max(view.pitch_x, view.pitch_y)
-    detail = _detail(flat, view, blur)
-    cut = cut_depth(radius, light, flat.pitch_x, pixel, detail, SHARE * tolerance)
-    pitch, side = flat.pitch_x, max(int(min(view.pitch_x, view.pitch_y) / flat.pitch_x), 1)
-    rises, finer = (
-        slopes(radius / pitch, LEAST_JUMP * pixel / pitch),
-        max(math.ceil(FINE / side), 1),
+    pixel, pitch = min(view.pitch_x, view.pitch_y), flat.pitch_x
+    detail, radius = _detail(flat, view, blur, most), blur.radius(depth)
+    side = max(int(pixel / pitch), 1)
+    count, error = 1, 0.0
+    counts = steepest(slopes(radius / pitch)) > SLOPE_SHARE * tolerance * detail.full
+    if counts:
+        error = slope_error(detail, radius, pitch, side)
+        count = math.ceil(math.sqrt(error / (SLOPE_SHARE * tolerance))) if tolerance else MOST_FINE
+        count = min(max(count, 1), math.ceil(MOST_FINE / side))
+        error /= count**2
+        radius, depth = (
+            divided(radius / pitch, count) * pitch,
+            depth.repeat(count, 0).repeat(count, 1),
+        )
+        flat = flat.divided(count)
+    else:
+        error = slope_change(detail, radius, pitch, side)
+    cut = cut_depth(
+        radius,
+        _brightness(flat),
+        flat.pitch_x,
+        max(view.pitch_x, view.pitch_y),
+        detail,
+        SHARE * tolerance,
     )
-    counts = steepest(rises) > SLOPE_SHARE * tolerance
-    error = slope_error(detail, radius, pitch, side, finer if counts else 0)
     distances = tuple(blur.distance(float(r)) for r in cut.radii)
-    return DepthScene(flat, depth, cut, distances, rises if counts else None, finer, error)
+    rises = slopes(radius / flat.pitch_x) if counts else None
+    return DepthScene(flat, depth, cut, distances, rises, error)
 
 
 def _on_sensor(flat: ImageScene, given: DepthPicture, view: View) -> Array:
@@ -395,7 +396,7 @@ def _brightness(flat: ImageScene) -> Array:
     return np.asarray(flat.planes(np.full((1, count), 1 / count))[0])
 
 
-def _detail(flat: ImageScene, view: View, blur: LensBlur) -> Detail:
+def _detail(flat: ImageScene, view: View, blur: LensBlur, most: float = 1.0) -> Detail:
     light, pixel = _brightness(flat), min(view.pitch_x, view.pitch_y)
-    full = full_signal(light, flat.pitch_x, pixel)
+    full = min(full_signal(light, flat.pitch_x, pixel), most)
     return picture_detail(light, flat.pitch_x, blur.aperture, blur.sharp, full)

@@ -22,24 +22,26 @@ import numpy as np
 
 from vcam_cli.arrays import Array
 from vcam_cli.physics.aberration import paraboloid_transfer
-from vcam_cli.scenes.depth_cut import Detail, block_means
+from vcam_cli.scenes.depth_detail import Detail, block_means
 
 STEEPEST = 1.0
 """Difference of the radii of samples side by side from which on they are no slope, whatever else
 says so: it would fold under the rays [samples]."""
-FINE = 8
-"""Samples along a pixel's side on which differences are taken, at least."""
+MOST_FINE = 16
+"""Samples along a pixel's side into which samples are divided, at most."""
+RIGID = 1.2
+"""Error of slopes by samples that move as a whole and by differences between them, over their
+change and (pi f w)^2, with samples of the side w: 2 / 3 by differences, 1 / 3 by the width that a
+sample keeps along a slope, and as much by what it moves aside."""
 
 
-def slopes(radius: Array, jump: float = STEEPEST) -> tuple[Array, Array]:
+def slopes(radius: Array) -> tuple[Array, Array]:
     """Return by how much the radius of the blur rises from sample to sample, on slopes.
 
     Parameters
     ----------
     radius : Array
         Radius (h, w) of the blur at every sample's distance, with its sign [samples].
-    jump : float, optional
-        Difference of radii from which on one sample hides another, and is no slope [samples].
 
     Returns
     -------
@@ -50,21 +52,46 @@ def slopes(radius: Array, jump: float = STEEPEST) -> tuple[Array, Array]:
     found = []
     for axis in (0, 1):
         rise = np.moveaxis(np.diff(radius, axis=axis), axis, 0)
-        rise = np.where(np.abs(rise) < min(jump, STEEPEST), rise, 0)
-        if not len(rise):
-            found.append(np.moveaxis(rise, 0, axis))
-            continue
-        before, after = (
-            np.concatenate(pair) for pair in ((rise[:1], rise[:-1]), (rise[1:], rise[-1:]))
-        )
+        rise = np.where(np.abs(rise) < STEEPEST, rise, 0)
+        none = np.zeros_like(rise[:1])
+        before, after = np.concatenate([none, rise[:-1]]), np.concatenate([rise[1:], none])
         alike = [np.where(rise * other > 0, np.abs(other), 0) for other in (before, after)]
         most = np.maximum(*alike)
         found.append(np.moveaxis(np.clip(rise, -most, most), 0, axis))
     return found[0], found[1]
 
 
-def source(light: Array, rises: tuple[Array, Array], radius: float, finer: int) -> Array:
-    """Return Q of samples of one radius, on samples that are so many times as fine.
+def divided(radius: Array, count: int) -> Array:
+    """Return the radius on so many parts along the sides of samples.
+
+    On slopes it is straight between the middles of samples.
+
+    Parameters
+    ----------
+    radius : Array
+        Radius (h, w) of the blur at every sample's distance, with its sign [samples].
+    count : int
+        Parts along a sample's side.
+
+    Returns
+    -------
+    Array
+        Radius (count h, count w) [samples].
+    """
+    height, width = radius.shape
+    out = np.zeros((height, count, width, count)) + radius[:, None, :, None]
+    place = (np.arange(count) + 0.5) / count - 0.5
+    for axis, rise in enumerate(slopes(radius)):
+        ahead, behind = ([(0, 0)] * 2 for _ in range(2))
+        ahead[axis], behind[axis] = (0, 1), (1, 0)  # in the ends of a row there is no slope
+        after, before = (np.pad(rise, pads)[:, None, :, None] for pads in (ahead, behind))
+        at = place[:, None, None] if axis == 0 else place
+        out += np.maximum(at, 0) * after + np.minimum(at, 0) * before
+    return out.reshape(height * count, width * count)
+
+
+def source(light: Array, rises: tuple[Array, Array], radius: float) -> Array:
+    """Return Q of samples of one radius.
 
     Parameters
     ----------
@@ -74,44 +101,22 @@ def source(light: Array, rises: tuple[Array, Array], radius: float, finer: int) 
         Those of `slopes`.
     radius : float
         Radius of the blur, with its sign [samples].
-    finer : int
-        Fine samples along the side of one.
 
     Returns
     -------
     Array
-        Source (R, finer h, finer w), in the light's unit.
+        Source (R, h, w), in the light's unit.
     """
-    fine = light.repeat(finer, axis=1).repeat(finer, axis=2)
-    out = np.zeros_like(fine)
+    out = np.zeros_like(light)
     for axis, rise in ((1, rises[0]), (2, rises[1])):
-        along, across = axis - 1, 2 - axis
-        faces = _on_faces(rise, along, finer).repeat(finer, axis=across).astype(fine.dtype)
         low, high = (
             tuple(slice(*ends) if k == axis else slice(None) for k in range(3))
             for ends in ((None, -1), (1, None))
         )
-        flux = faces * (fine[low] + fine[high]) * fine.dtype.type(radius * finer / 8)
+        flux = rise.astype(light.dtype) * (light[low] + light[high]) * light.dtype.type(radius / 8)
         out[low] -= flux
         out[high] += flux
     return out
-
-
-def _on_faces(rise: Array, axis: int, finer: int) -> Array:
-    """Return the rise of the radius a length, along an axis, between fine samples.
-
-    Between the middles of two samples it is that from one to the other, in the ends of a row none.
-    """
-    rise = np.moveaxis(rise, axis, 0)
-    ends = np.zeros_like(rise, shape=(1, *rise.shape[1:]))
-    padded = np.concatenate([ends, rise, ends]) if len(rise) else np.concatenate([ends, ends])
-    count = (len(padded) - 1) * finer
-    at = (np.arange(1, count) / finer + 0.5).astype(int)
-    middle = np.arange(1, count) % finer * 2 == finer  # in the middle of a sample: of both sides
-    found = padded[at]
-    if middle.any():
-        found[middle] = (padded[at[middle]] + padded[at[middle] - 1]) / 2
-    return np.moveaxis(found, 0, axis)
 
 
 def steepest(rises: tuple[Array, Array]) -> float:
@@ -133,8 +138,10 @@ def steepest(rises: tuple[Array, Array]) -> float:
     return 2 / 3 * math.hypot(down, right)
 
 
-def slope_error(detail: Detail, radius: Array, pitch: float, side: int, finer: int) -> float:
-    """Return the rms error, over full signal, by differences between fine samples.
+def slope_error(detail: Detail, radius: Array, pitch: float, side: int) -> float:
+    """Return the rms error, over full signal, by samples that move as a whole.
+
+    It falls as the square of the parts into which samples are divided.
 
     Parameters
     ----------
@@ -146,18 +153,26 @@ def slope_error(detail: Detail, radius: Array, pitch: float, side: int, finer: i
         Pitch of the samples [m].
     side : int
         Side of a pixel, within which steps of a map are taken together [samples].
-    finer : int
-        Fine samples along the side of one; 0 where slopes are not computed.
 
     Returns
     -------
     float
         Error without unit.
     """
+    return _slope_change(
+        detail, radius, pitch, side, RIGID * (np.pi * detail.frequency * pitch) ** 2
+    )
+
+
+def slope_change(detail: Detail, radius: Array, pitch: float, side: int) -> float:
+    """Return what slopes change, rms, over full signal; parameters as of `slope_error`."""
+    return _slope_change(detail, radius, pitch, side, np.ones_like(detail.frequency))
+
+
+def _slope_change(detail: Detail, radius: Array, pitch: float, side: int, part: Array) -> float:
     middle = float(np.sqrt(np.square(radius).mean()))
     z = 2 * np.pi * detail.frequency * middle
-    lost = 1 - np.sinc(2 * detail.frequency * pitch / finer) if finer else np.ones_like(z)
-    tilt = detail.rms(z / 4 * paraboloid_transfer(detail.frequency, middle) * lost)
+    tilt = detail.rms(z / 4 * paraboloid_transfer(detail.frequency, middle) * part)
     return mean_slope(radius / pitch, side) * tilt
 
 

@@ -8,8 +8,9 @@ samples around it until array and margin are covered.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 
@@ -142,6 +143,17 @@ class ImageScene(SampledScene):
         """
         rows, _ = self._samples_at(y, self.pitch_y, 0)
         return rows, self._samples_at(x, self.pitch_x, 1)[0]
+
+    def divided(self, count: int) -> Self:
+        """Return the same light on samples of which so many lie along the side of one."""
+        return replace(
+            self,
+            shape=(self.shape[0] * count, self.shape[1] * count),
+            pitch_x=self.pitch_x / count,
+            pitch_y=self.pitch_y / count,
+            picture=self.picture.repeat(count, axis=0).repeat(count, axis=1),
+            black=(self.black[0] * count, self.black[1] * count),
+        )
 
     @cached_property
     def brightest(self) -> float:

@@ -26,6 +26,9 @@ the other. How fine cells within pixels are to be is chosen by what they err, wi
 MOST_BORDERS = 16
 """Borders of samples in a cell that divide it, at most, in the mean: then their light and opacity
 vary together by a sixteenth of what they are, of one in so many squared samples."""
+MOST_PARTS = 8192
+"""Parts along an axis, at most, that samples of opacity divide: beyond, in margins as wide as many
+arrays, light and opacity are averaged apart."""
 SAME = 1e-6
 """Part of a cell below which two places are one."""
 
@@ -47,15 +50,17 @@ class MaskedChart(Chart):
         return self.light.brightest
 
     def paint(self, x_edges: Array, y_edges: Array, mix: Array, out: Array) -> None:
-        """Write the averages over the cells, as if light and opacity did not both change in one."""
+        """Write the averages over the cells: exact, since samples of opacity divide them."""
         out[:] = 0
         columns, rows = self.opacity.cells(x_edges, y_edges)
         if columns.stop > columns.start and rows.stop > rows.start:
-            x, y = _edges(x_edges, columns), _edges(y_edges, rows)
+            edges = _edges(x_edges, columns), _edges(y_edges, rows)
+            borders = self.opacity.sample_borders(*edges)
+            x, y = (_with_borders(*both) for both in zip(edges, borders, strict=True))
             seen = self.light.averages(x, y, mix[:, :-1])
             seen += mix[:, -1, None, None]
             seen *= self.opacity.averages(x, y, np.ones((1, 1), mix.dtype))
-            out[:, rows, columns] = seen
+            out[:, rows, columns] = means_of_parts(seen, (y, x), edges[::-1])
 
     def sample_borders(self, x_edges: Array, y_edges: Array) -> tuple[Array, Array]:
         """Return where light or opacity may change within cells."""
@@ -222,16 +227,24 @@ def _edges(edges: Array, cells: slice) -> Array:
 
 
 def _divided(edges: Array, borders: Array) -> Array:
-    """Return the edges of cells, those between so many parts of each, and borders within them.
-
-    More borders than a few a cell are left out: the parts average over them.
-    """
+    """Return the edges of cells, those between so many parts of each, and borders within them."""
     steps = np.arange(PARTS) / PARTS
     parts = edges[:-1, None] + np.diff(edges)[:, None] * steps
     parts = np.append(parts.ravel(), edges[-1])
     if len(borders) > MOST_BORDERS * len(edges):
         return parts
-    near = SAME * float(np.diff(edges).min())  # what differs by rounding is one place
+    return _with_borders(parts, borders)
+
+
+def _with_borders(parts: Array, borders: Array) -> Array:
+    """Return the edges of parts, and borders within them.
+
+    More borders than a few a part are left out: the parts average over them.
+    """
+    few = min(MOST_BORDERS * len(parts), MOST_PARTS)
+    if not len(borders) or len(borders) > few:
+        return parts
+    near = SAME * float(np.diff(parts).min())  # what differs by rounding is one place
     borders = np.unique(borders)
     after = np.clip(np.searchsorted(parts, borders), 1, len(parts) - 1)
     clear = np.minimum(borders - parts[after - 1], parts[after] - borders) > near

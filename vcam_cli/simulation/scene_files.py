@@ -199,12 +199,18 @@ def scene_bytes(picture: ScenePicture) -> int:
     return getattr(picture, "nbytes", 0)
 
 
-def build_scene(solved: Solved, view: View, picture: ScenePicture) -> AnyScene:
-    """Return the scene of a camera on a view, from what its files hold; raises as `build` does."""
+def build_scene(
+    solved: Solved, view: View, picture: ScenePicture, overexposure: float = 1.0
+) -> AnyScene:
+    """Return the scene of a camera on a view, from what its files hold; raises as `build` does.
+
+    `overexposure` is white over what fills a pixel; below 1 it counts as 1.
+    """
     source = solved.scene.source
     if isinstance(picture, DepthPicture):
         flat = _flat(solved, view, picture)
-        return depth_scene(flat, picture, view, _blur(solved), solved.tolerance)
+        most = 1 / max(overexposure, 1.0)
+        return depth_scene(flat, picture, view, _blur(solved), solved.tolerance, most)
     if not isinstance(source, Layers):
         if isinstance(picture, tuple):
             raise ValueError("a flat source has no layers")

@@ -170,6 +170,8 @@ def _brightest(scene: AnyScene) -> float:
 
 def _brightest_around(scene: AnyScene) -> float:
     """Return the brightest light that a chart has beyond the array, relative to white; else 0."""
+    if isinstance(scene, DepthScene):  # errors of its layers are relative to white
+        return 1.0
     return _brightest(scene) if isinstance(scene, ChartScene | LayeredScene) else 0.0
 
 
@@ -230,7 +232,8 @@ def _scene(
     pixels = bandwidth.margin(
         lattice, effects, (band.start, band.stop), solved.settings, overexposure
     )
-    return build_scene(solved, photon_rate.view(lattice, solved.settings, pixels), picture)
+    view = photon_rate.view(lattice, solved.settings, pixels)
+    return build_scene(solved, view, picture, overexposure)
 
 
 def _transfer(

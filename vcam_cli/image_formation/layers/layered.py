@@ -31,7 +31,7 @@ from vcam_cli.effects.base import (
     SeparableTransfer,
     of_kind,
 )
-from vcam_cli.image_formation.estimates.bandwidth import margin
+from vcam_cli.image_formation.estimates.bandwidth import MARGIN_SHARE, margin
 from vcam_cli.image_formation.layers.layer_edges import (
     even_motion,
     moves_otherwise,
@@ -62,6 +62,10 @@ err less."""
 PART = 0.5
 """Part of the tolerance that the image of each layer may use."""
 
+WIDEST = 4
+"""Arrays that a layer's chart goes on beyond the array, at most. A lens at f/10000 throws light
+farther; what is cut is in the predicted error."""
+
 
 @dataclass(frozen=True)
 class SeenLayer:
@@ -79,12 +83,15 @@ class SeenLayer:
     beyond: int
     """Pixels by which its chart goes on beyond the window."""
     report: SpectrumReport
+    cut_rms: float
+    """What the cut margin of its chart lacks, rms [e/s]."""
 
     def lost_rms(self, g: Geometry) -> float:
         """Return a bound on what the layer's own image lacks, rms over all of an array [e/s]."""
         rows, columns = self.window.pixels
         area = rows * columns / _share_seen(self.window, self.beyond)
-        return self.report.lost_rms * math.sqrt(area / (g.rows * g.columns))
+        own = self.report.lost_rms * math.sqrt(area / (g.rows * g.columns))
+        return math.hypot(own, self.cut_rms)
 
 
 def layered_image(
@@ -142,11 +149,11 @@ def _layers_seen(path: OpticalPath, scene: LayeredScene, form: FormImage) -> Ite
         hides = part is not scene.parts[-1]
         seen = _layer_path(path, part, effects, scene.brightest, hides)
         if seen is not None:
-            window, own, beyond = seen
+            window, own, beyond, cut_rms = seen
             light, cover, report = _light_and_cover(
                 own, part, window.center(path.geometry), beyond, scene.white, form
             )
-            yield SeenLayer(number, window, light, cover, own, beyond, report)
+            yield SeenLayer(number, window, light, cover, own, beyond, report, cut_rms)
 
 
 def _composed(
@@ -218,12 +225,12 @@ def gathered(
 
 def _layer_path(
     path: OpticalPath, part: LayerPart, effects: tuple[Effect, ...], brightest: float, hides: bool
-) -> tuple[Window, OpticalPath, int] | None:
+) -> tuple[Window, OpticalPath, int, float] | None:
     """Return where a layer is seen, and the path of its light; None where it is beside the array.
 
     Of a layer that hides others the path has twice the colors: those of the light, and of the
     opacity in light as bright as the scene's brightest, relative to white. The third value are the
-    pixels by which its chart is to go on beyond the window.
+    pixels by which its chart is to go on beyond the window, the last one what it lacks [e/s].
     """
     g = path.geometry
     # Opacity counts as the scene's brightest light, which may lie behind it; no light is cut.
@@ -231,7 +238,11 @@ def _layer_path(
     tolerance = PART * path.settings.tolerance * min(1.0, path.ceiling / (level or 1.0))
     knobs = replace(path.settings, tolerance=tolerance)
     band = float(path.transfer.wavelengths[0]), float(path.transfer.wavelengths[-1])
-    beyond = margin(g, effects, band, knobs)
+    wanted = margin(g, effects, band, knobs)
+    beyond = min(wanted, WIDEST * max(g.rows, g.columns))
+    # The tail of a line falls with its distance: what it has left at the wanted one is a share of
+    # the tolerance.
+    cut_rms = MARGIN_SHARE * tolerance * level * (wanted / beyond) if wanted > beyond else 0.0
     far = beyond * max(g.pitch_x, g.pitch_y)
     if of_kind(effects, FieldTransfer, ImageMotion):
         far = math.inf
@@ -260,7 +271,7 @@ def _layer_path(
         full=min(level, path.full),
         has_opacity=hides,
     )
-    return window, own, beyond
+    return window, own, beyond, cut_rms
 
 
 def _light_and_cover(

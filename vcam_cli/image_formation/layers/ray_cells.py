@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -118,6 +119,15 @@ class SharpImage:
         blurs = (*lens, *of_kind(behind, Blur))
         self._transfer = Transfer(path.transfer.wavelengths, white, blurs)
         self._known: dict[tuple[int, tuple[int, int]], Array] = {}
+
+        self.inner_part = 1.0
+        """Radius of the disc that is as large as all middles of pairs of points of the pupil from
+        which waves of half the pixels' Nyquist frequency come [radii of the pupil]."""
+        if lens:
+            g = path.geometry
+            middle = np.array([0.25 / max(g.pitch_x, g.pitch_y)])
+            passed = np.mean([lens[0].otf(middle, w) for w in path.transfer.wavelengths])
+            self.inner_part = math.sqrt(float(passed))
 
     @property
     def is_local(self) -> bool:

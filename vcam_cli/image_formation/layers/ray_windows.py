@@ -12,6 +12,11 @@ In all others the covariance is summed over rays (`occlusion.py`), by two sets t
 radii nor angles nor cells. The finer of the two is taken, and their difference is its error. Where
 that is too much a still finer set of the other kind follows, window by window, until all errors
 together are within what is allowed.
+
+Waves of the image that a lens diffracts come from pairs of points of its pupil, whose middles lie
+the closer to its center the finer the wave is; rays have all of it. What the sum changes if rays
+are kept to the part that waves of half the pixels' Nyquist frequency come from is added to the
+error: no finer sum takes it out.
 """
 
 from __future__ import annotations
@@ -87,6 +92,8 @@ class _Sum:
     error: float = 0.0
     """Sum of the squares of its difference from the sum before [(e/s)^2]."""
     values: int = 0
+    diffracted: float = 0.0
+    """The same of what diffraction changes of it, which no finer sum takes out [(e/s)^2]."""
 
 
 @dataclass(frozen=True)
@@ -133,7 +140,8 @@ class RaySum:
         if not used:
             return Hidden()
         finest = max(one.level for one in used)
-        error = math.sqrt(sum(one.error for one in sums) / (g.rows * g.columns))
+        squares = sum(one.error + one.diffracted for one in sums)
+        error = math.sqrt(squares / (g.rows * g.columns))
         return Hidden(*LEVELS[finest], error, 0.0, sum(one.values for one in sums))
 
     def _first_sum(self, window: Window) -> _Sum:
@@ -144,7 +152,11 @@ class RaySum:
             colors = len(self.path.mosaic.colors)
             return _Sum(window, 1, np.zeros((colors, *window.pixels), self.path.settings.dtype))
         halves = LEVELS[1][0] // LEVELS[0][0]
-        coarse = self._summed(0, cells.together(halves), [own.together(halves) for own in layers])
+        on, seen = cells.together(halves), [own.together(halves) for own in layers]
+        coarse = self._summed(0, on, seen)
+        if self.sharp.inner_part < 1:
+            narrow = self._summed(0, on, seen, self.sharp.inner_part)
+            coarse = replace(coarse, diffracted=_squares(coarse, narrow))
         return self._compared(self._summed(1, cells, layers), coarse)
 
     def _refined(self, coarse: _Sum) -> _Sum:
@@ -153,8 +165,12 @@ class RaySum:
         return self._compared(self._summed(level, cells, self.paint(cells)), coarse)
 
     def _compared(self, fine: _Sum, coarse: _Sum) -> _Sum:
-        squares = np.square(fine.light - coarse.light, dtype=float).sum(axis=(1, 2))
-        return replace(fine, error=float(squares.max()), values=fine.values + coarse.values)
+        return replace(
+            fine,
+            error=_squares(fine, coarse),
+            diffracted=coarse.diffracted,
+            values=fine.values + coarse.values,
+        )
 
     def _cells(self, window: Window, level: int) -> Cells:
         per_pixel, g = LEVELS[level][0], self.path.geometry
@@ -166,12 +182,21 @@ class RaySum:
         single = self.path.settings.dtype == np.float32
         return Cells(g, window, per_pixel, border, (down, right), single)
 
-    def _summed(self, level: int, cells: Cells, layers: Sequence[RayLayer]) -> _Sum:
+    def _summed(
+        self, level: int, cells: Cells, layers: Sequence[RayLayer], part: float = 1.0
+    ) -> _Sum:
+        """Return the sum of a level over the inner part of the aperture, in its radii."""
         count, dtype = LEVELS[level][1], self.path.settings.dtype
         seen = partial(self.sharp.at_pixels, cells)
-        light = covariance(layers, rays(count, level % 2), cells.reach, seen, self.compose)
+        traced = rays(count, level % 2) * (part, part, 1, 1, 1)
+        light = covariance(layers, traced, cells.reach, seen, self.compose)
         values = count * len(layers) * len(layers[0].planes) * math.prod(cells.inner)
         return _Sum(cells.window, level, light.astype(dtype), values=values)
+
+
+def _squares(one: _Sum, other: _Sum) -> float:
+    """Return the sum of the squared differences in the color where it is largest [(e/s)^2]."""
+    return float(np.square(one.light - other.light, dtype=float).sum(axis=(1, 2)).max())
 
 
 def _too_coarse(sums: Sequence[_Sum], budget: float) -> list[_Sum]:
