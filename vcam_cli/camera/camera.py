@@ -31,7 +31,7 @@ FILE_KEYS = frozenset({"file", "positions", "mask", "image.depth"})
 
 _EXCLUSIVE = (
     "luminance | radiance | illuminance | irradiance",
-    "time | auto | captures",
+    "time | auto | captures | bracket",
     "rows columns | die",
     "fill_factor | width height x y",
     "focal_length | field_of_view",

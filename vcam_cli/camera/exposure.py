@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping
+from itertools import accumulate
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import model_validator
@@ -115,8 +116,16 @@ def times_to_yaml(times: tuple[float, ...]) -> list[str]:
     return [TIME.text(time) for time in times]
 
 
+def _bracket(given: Any) -> tuple[float, ...]:
+    if not isinstance(given, (list, tuple)) or len(given) == 1:
+        raise ValueError(
+            f"{describe(given)} is not a list of two or more times; write for example [10 ms, 1 ms]"
+        )
+    return tuple(read_items(enumerate(given), TIME.read))
+
+
 class Exposure(Model):
-    """Exactly one of time, auto and captures; and the gain, or the ISO speed."""
+    """Exactly one of time, auto, captures and bracket; and the gain, or the ISO speed."""
 
     time: MaybeTime = key("exposure time", example="30 ms", default=None)
     auto: Annotated[AutoExposure | None, mapping(AutoExposure)] = key(
@@ -166,6 +175,21 @@ class Exposure(Model):
         example=["5 ms", "15 ms", "30 ms", "200 ms"],
         default=None,
     )
+    bracket: Annotated[
+        tuple[float, ...],
+        Either(_bracket, list[Annotated[float, TIME]], yaml_form=lambda v: times_to_yaml(v)),
+    ] = key(
+        "exposures one after the other without a pause, each with noise of its own; merged to"
+        " hdr.exr, raw.exr is the longest",
+        unit="ms",
+        example=["10 ms", "1 ms", "0.1 ms"],
+        default=(),
+    )
+    merge: Literal["snr", "switch"] = key(
+        "how the exposures of a bracket become one: by inverse variance of those that do not"
+        " saturate, or the longest of them",
+        default="snr",
+    )
     estimator: Literal["lsbs", "weighted"] = key(
         "how captures become one picture: the last sample before saturation, or the optimal "
         "weighted mean",
@@ -174,13 +198,18 @@ class Exposure(Model):
 
     rules = (
         exactly_one(
-            "time", "auto", "captures", of="the exposure", remedy="write for example time: 30 ms"
+            *("time", "auto", "captures", "bracket"),
+            of="the exposure",
+            remedy="write for example time: 30 ms",
         ),
         at_most_one("gain", "iso"),
     )
 
     @model_validator(mode="after")
     def _check_automatic(self) -> Self:
+        if self.merge == "switch" and not self.bracket:
+            message = "there is one exposure, and nothing to merge"
+            raise refusal(("merge",), message, "add bracket: [10 ms, 1 ms], or remove merge")
         if self.auto is None and self.compensation:
             message = "only an automatic exposure is compensated"
             raise refusal(("compensation",), message, "change the time, or write auto in its place")
@@ -192,10 +221,23 @@ class Exposure(Model):
             raise refusal(("auto", "max_gain"), message, "raise it, or lower gain")
         return self
 
+    def exposures(self) -> tuple["Exposure", ...]:
+        """Return the exposures of a bracket in the order of time; () where there is none."""
+        begins = accumulate(self.bracket, initial=self.start)
+        return tuple(
+            self.single(time).with_derived(start=begin)
+            for time, begin in zip(self.bracket, begins, strict=False)
+        )
+
     @property
     def samples(self) -> tuple[float, ...]:
         """Times that the file gives for samples of one integration [s]; () where it gives none."""
         return self.captures if isinstance(self.captures, tuple) else ()
+
+    @property
+    def has_samples(self) -> bool:
+        """Whether a frame is several samples of an integration, or several exposures."""
+        return bool(self.captures or self.bracket)
 
     @property
     def schedule(self) -> CaptureSchedule | None:
@@ -217,6 +259,8 @@ class Exposure(Model):
         """Longest time that the file allows an exposure or a sample [s]; None with `auto`."""
         if self.schedule:
             return self.schedule.max
+        if self.bracket:
+            return max(self.bracket)
         return self.samples[-1] if self.samples else self.time
 
     @property
@@ -236,7 +280,10 @@ class Exposure(Model):
 
         Its gain is the file's where none is given.
         """
-        fixed = {"auto": None, "captures": None, "compensation": 0.0, "time": time}
+        fixed = {
+            **{"auto": None, "captures": None, "bracket": (), "merge": "snr"},
+            **{"compensation": 0.0, "time": time},
+        }
         return self.model_copy(
             update=fixed if gain is None else {**fixed, "gain": gain, "iso": None}
         )

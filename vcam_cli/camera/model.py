@@ -111,7 +111,7 @@ class CameraModel(FileModel):
             *code_mistakes(self.processing, render),
             *self._capture_mistakes(),
             *unmeasured_mistakes(
-                self.expect, self.quality, self.has_edge, bool(self.exposure.captures)
+                self.expect, self.quality, self.has_edge, self.exposure.has_samples
             ),
         ]
         if mistakes:
@@ -162,7 +162,7 @@ class CameraModel(FileModel):
     def with_expectations(self, texts: Sequence[str]) -> Self:
         """Return the same camera with further limits, those of `--expect`. Raises BadInput."""
         limits = read_limits(texts, UNITS)
-        measures = self.quality, self.has_edge, bool(self.exposure.captures)
+        measures = self.quality, self.has_edge, self.exposure.has_samples
         problems = [
             Problem((), f"this camera does not measure {limit.metric}", remedy, "--expect")
             for limit in limits

@@ -39,8 +39,8 @@ METRICS_OF = {
 """Entry of `quality` -> the metric that it asks for."""
 NEEDS = {
     "mtf50": {"edge": "write scene.source: {kind: chart, chart: slanted-edge}"},
-    "hdr_saturated_fraction": {"samples": "give exposure.captures"},
-    "hdr_dynamic_range_db": {"samples": "give exposure.captures"},
+    "hdr_saturated_fraction": {"samples": "give exposure.captures or bracket"},
+    "hdr_dynamic_range_db": {"samples": "give exposure.captures or bracket"},
 }
 """Metric that not every run has -> what it needs, and the remedy where that is missing."""
 METRICS = tuple(METRICS_OF)

@@ -66,9 +66,9 @@ def _sample_figures(
     the estimate in the dark. `dark` is of the last sample [electrons]; `draws` are new in every
     frame.
     """
-    first, last = frame.times[0], frame.times[-1]
+    first, last = min(frame.times), max(frame.times)
     floor = sum(x.variance(0.0) for x in draws)
-    if frame.solved.exposure.estimator == "weighted":
+    if frame.solved.exposure.estimator == "weighted" and not frame.solved.exposure.bracket:
         read = sum(x.variance(0.0) for x in draws if x.sample_draws == "independent")
         noise = estimators.weighted_variance(0.0, frame.times, dark / last, read, floor - read)
         floor = float(noise) * last**2 - dark

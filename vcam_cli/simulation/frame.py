@@ -30,7 +30,8 @@ from vcam_cli.spectra import Spectrum, colorchecker
 class Frame(Prepared):
     """A raw frame and all that is known of how it came about.
 
-    Where the camera takes several samples of one integration, it is the last of them.
+    Where the camera takes several samples of one integration, it is the last of them; of a bracket
+    the longest exposure.
     """
 
     electrons: Array
@@ -57,6 +58,7 @@ class Frame(Prepared):
             times=(),
             samples_electrons=None,
             samples_dn=None,
+            readouts_dn={},
             photocurrent=None,
         )
 
@@ -79,7 +81,7 @@ class Frame(Prepared):
             return self.chain.saturated_dn
         charge = float(self.chain.to_electrons(np.array([self.chain.saturated_dn]))[0])
         # Not all of it: the photocurrent is rounded to 32 bits, and so is its code.
-        least = charge / self.times[0] * (1 - 1e-6) - self.dark_rate
+        least = charge / min(self.times) * (1 - 1e-6) - self.dark_rate
         return float(self._unclipped_codes(np.array([least]))[0])
 
     def _unclipped_codes(self, photocurrent: Array) -> Array:

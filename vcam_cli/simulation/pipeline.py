@@ -27,6 +27,7 @@ from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.processing_steps import Step
 from vcam_cli.processing import Context, Patches, ProcessedPicture, process
 from vcam_cli.simulation import autofocus, cost_model
+from vcam_cli.simulation.bracket import bracket_cameras, bracket_note, longest_of, merged_bracket
 from vcam_cli.simulation.exposed_light import expose
 from vcam_cli.simulation.frame import Frame, take_frame
 from vcam_cli.simulation.preparation import Prepared, plan_frame
@@ -64,12 +65,16 @@ def prepare(camera: Camera, run: Run, shared: Shared) -> tuple[Prepared, tuple[s
     CannotDo
         Where memory does not suffice.
     """
+    of_bracket: tuple[str, ...] = ()
+    if camera.exposure.bracket:
+        of_bracket = (bracket_note(camera.exposure),)
+        camera = bracket_cameras(camera)[longest_of(camera)]
     solved, picture, notes = read_camera(camera, run.stages, shared)
     solved, picture, flat = flattened(solved, picture)
     trial = partial(_prepare, picture=picture, run=run.unseen())
     solved, focused, seconds = autofocus.focused(solved, trial, run.workers, run.stages)
     ready = prepare_light(solved, picture, run.after(seconds))
-    return ready, notes + flat + focused
+    return ready, of_bracket + notes + flat + focused
 
 
 def prepare_light(solved: Solved, picture: ScenePicture, run: Run) -> Prepared:
@@ -130,9 +135,27 @@ def take(
     notes : tuple of str
         As those of `prepare`.
     """
-    ready, notes = prepare(camera, run, shared)
-    frame = take_frame(ready, run.workers, run.stages)
+    if camera.exposure.bracket:
+        frame, notes = _take_bracket(camera, run, shared)
+    else:
+        ready, notes = prepare(camera, run, shared)
+        frame = take_frame(ready, run.workers, run.stages)
     return frame, picture_of(frame, run.workers), notes
+
+
+def _take_bracket(camera: Camera, run: Run, shared: Shared) -> tuple[Frame, tuple[str, ...]]:
+    """Take the exposures of a bracket, and merge them: the longest, with all in it, and its notes.
+
+    Each is a frame of its own: with noise of its own, and with what has moved on meanwhile.
+    """
+    taken = []
+    for single in bracket_cameras(camera):
+        ready, notes = prepare(single, run, shared)
+        taken.append((take_frame(ready, run.workers, run.stages), notes))
+    frame, notes = taken[longest_of(camera)]
+    with run.stages("reconstruction"):
+        merged = merged_bracket(frame, [each for each, _ in taken], camera.exposure, run.workers)
+    return merged, notes
 
 
 def picture_of(frame: Frame, workers: int) -> Callable[[Sequence[Step]], ProcessedPicture]:

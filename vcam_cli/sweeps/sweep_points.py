@@ -197,7 +197,7 @@ def _points(
 
 def _require_metrics(camera: Camera, model: Sweep) -> None:
     """Raise BadInput where a camera does not measure a metric of the study."""
-    measures = camera.quality, camera.has_edge, bool(camera.exposure.captures)
+    measures = camera.quality, camera.has_edge, camera.exposure.has_samples
     found = [(name, unmeasured(name, *measures)) for name in model.metrics]
     problems = [
         Problem(("metrics",), f"this camera does not measure {name}", remedy)

@@ -23,6 +23,7 @@ import vcam_cli
 from vcam_cli.arrays import Array
 from vcam_cli.camera.derived.electrical import Electrical
 from vcam_cli.camera.derived.geometry import Geometry
+from vcam_cli.camera.exposure import Exposure
 from vcam_cli.camera.scene.illuminant import IlluminantSpec
 from vcam_cli.files.images import tiff
 from vcam_cli.files.images.exr import ExrWriter
@@ -82,11 +83,18 @@ def write_hdr(path: Path, frame: Frame, config_hash: str) -> None:
         **_camera_metadata(frame, config_hash),
         **photograph(frame),
         "vcam:captureTimes": ",".join(map(repr, frame.times)),
-        "vcam:estimator": frame.solved.exposure.estimator,
-        "vcam:saturatedFrom": frame.chain.saturation / frame.times[0] - frame.dark_rate,
+        **_merge(frame.solved.exposure),
+        "vcam:saturatedFrom": frame.chain.saturation / min(frame.times) - frame.dark_rate,
         "vcam:unit": "e/s",
     }
     _write(path, frame, {"photocurrent": (frame.photocurrent, None)}, said)
+
+
+def _merge(exposure: Exposure) -> dict[str, Attribute]:
+    """Return how samples, or exposures, became one picture."""
+    if exposure.bracket:
+        return {"vcam:merge": exposure.merge}
+    return {"vcam:estimator": exposure.estimator}
 
 
 Conversion = Callable[[Array], Array]
