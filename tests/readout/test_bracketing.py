@@ -44,8 +44,8 @@ def test_each_exposure_is_the_frame_of_its_time(tmp_path) -> None:
 
 @pytest.mark.parametrize("rule", ["snr", "switch"])
 @pytest.mark.parametrize("electrons", [300, 19_500, 20_000, 20_400, 1e5, 199_000, 202_000, 1e6])
-def test_merged_photocurrent_is_unbiased_through_the_switches(rule, electrons, tmp_path) -> None:
-    """Within five standard errors, which are 0.25 % or less; the mean light of 40 000 pixels, clipping included."""
+def test_merged_mean_is_unbiased_through_the_switches(rule, electrons, tmp_path) -> None:
+    """Within five standard errors, 0.25 % or less, of 40 000 pixels, clipping included."""
     exposure = PIXEL["exposure"] | {"merge": rule}
     found = bracket(tmp_path, electrons, exposure=exposure).photocurrent
     error = 5 * float(found.std()) / math.sqrt(found.size)

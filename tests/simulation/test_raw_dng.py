@@ -345,6 +345,20 @@ def test_codes_of_a_logarithmic_adc_are_made_straight_by_the_table(tmp_path):
     assert (np.abs(light * 1e5 - result.electrons) < step / 2 + 1e5 / (white - black)).all()
 
 
+def test_companded_codes_are_made_straight_by_the_table(tmp_path):
+    """LibRaw finds the signal within half a step of its segment: 16 codes of the ADC above 4095."""
+    adc = {"bits": 16, "companding": {"knees": [[4095, 4095], [65535, 7935]]}}
+    result, path = taken(tmp_path, {"adc": adc, "array.pattern": "monochrome"})
+    with rawpy.imread(str(path)) as file:
+        levels = file.raw_image.astype(float)
+        black, white = file.black_level_per_channel[0], file.white_level
+    assert np.array_equal(np.squeeze(dngpy.Dng(str(path)).raw_pixels), result.dn)
+    assert 4095 < result.dn.max() <= 7935
+    light = (levels - black) / (white - black)
+    code = 1e5 / 65535
+    assert (np.abs(light * 1e5 - result.electrons) < (8 + 1) * code).all()
+
+
 @pytest.mark.parametrize(
     "more",
     [

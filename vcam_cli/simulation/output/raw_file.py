@@ -146,6 +146,10 @@ _CURVED = (
     " adcOffset) x adcFullScale is the output of the pixel in volts, and transferCurve lists"
     " electrons:volts of it"
 )
+_COMPANDED = (
+    "dn are whole numbers, companded: between the pairs code:dn of companding codes are straight;"
+    " electrons are (code - adcOffset) x electronsPerDN"
+)
 _LOGARITHMIC = (
     "dn are the whole numbers of the ADC, not parts of 1; with r = adcFullScale / adcReference and"
     " s = (dn - adcOffset) / (whiteLevel - adcOffset), light from 0 to 1 is ((1 + r)^s - 1) / r"
@@ -154,6 +158,8 @@ _LOGARITHMIC = (
 
 def _meaning(frame: Frame) -> str:
     """Return how codes become light, for tools that take 1 for white."""
+    if frame.electrical.companded:
+        return _COMPANDED
     if frame.electrical.curve is not None:
         return _CURVED
     if frame.electrical.reference is None:
@@ -179,6 +185,7 @@ def attributes(frame: Frame, config_hash: str) -> dict[str, Attribute]:
         "vcam:dnMeaning": _meaning(frame),
         **({"vcam:conversionGain": e.conversion_gain} if e.has_volts else {}),
         **_curve(e),
+        **_companding(frame),
     }
 
 
@@ -250,6 +257,19 @@ def _binning(frame: Frame) -> dict[str, Attribute]:
         return {}
     given = groups.binning
     return {"vcam:binning": f"{given.rows}x{given.columns} {given.kind}"}
+
+
+def _companding(frame: Frame) -> dict[str, Attribute]:
+    """Return what turns companded codes back into those of the ADC."""
+    companding = frame.solved.adc_keys.companding
+    if companding is None:
+        return {}
+    knees = ((0, 0), *companding.knees)
+    said: dict[str, Attribute] = {
+        "vcam:companding": ",".join(f"{code}:{written}" for code, written in knees),
+        "vcam:adcOffset": frame.electrical.offset,
+    }
+    return said
 
 
 def _curve(e: Electrical) -> dict[str, Attribute]:
