@@ -71,6 +71,14 @@ CASES: dict[str, Case] = {
         {"scene.camera_motion": {"pan": "0 deg/s"}},
         {"scene.source": WAVE},
     ),
+    "distortion": Case(
+        {"optics.distortion": {"k1": -25}}, {"optics.distortion": "none"}, {"scene.source": WAVE}
+    ),
+    "lateral_color": Case(
+        {"optics.lateral_color": {"table": {500: "1 %", 600: "2 %"}}},
+        {"optics.lateral_color": "none"},
+        {"scene.source": WAVE},
+    ),
     "pixel_aperture": Case({}, None, {"scene.source": WAVE}),
     "charge_diffusion": Case(
         {

@@ -51,6 +51,19 @@ KEYS: Mapping[str, str] = {
         ("flare", "veiling_glare", "glare", "ghosting", "ghost"), "optics.stray_light: 2 %"
     ),
     "cos4": "optics.off_axis: cos4",
+    **dict.fromkeys(
+        ("lens_distortion", "radial_distortion", "k1", "k2", "k3", "p1", "p2", "dist_coeffs"),
+        "optics.distortion: {k1: -0.1}",
+    ),
+    "fisheye": "optics.projection: equidistant",
+    **dict.fromkeys(
+        ("lateral_chromatic_aberration", "transverse_color", "tca", "chromatic_aberration"),
+        "optics.lateral_color: {table: {450: -0.02 %, 650: 0.03 %}}",
+    ),
+    **dict.fromkeys(
+        ("longitudinal_color", "axial_color", "axial_chromatic_aberration"),
+        "optics.focus_shift: {table: {450: 12 um, 650: -8 um}}",
+    ),
     "wavefront": "optics.zernike: {4: 0.05 um}",
     "aberrations": "optics.zernike: {4: 0.05 um}",
     "size": "pixel.width: 3 um",
@@ -313,18 +326,6 @@ NOT_SIMULATED: Mapping[str, str] = {
     **dict.fromkeys(
         ("crosstalk", "optical_crosstalk", "electrical_crosstalk"),
         "pixels share light and charge by pixel.photodetector.charge_diffusion alone",
-    ),
-    **dict.fromkeys(
-        ("distortion", "lens_distortion", "radial_distortion", "k1", "k2", "k3"),
-        "the lens images straight lines as straight lines",
-    ),
-    **dict.fromkeys(
-        ("lateral_color", "lateral_chromatic_aberration", "transverse_color", "tca"),
-        "the lens images all wavelengths in one size",
-    ),
-    **dict.fromkeys(
-        ("chromatic_aberration", "longitudinal_color", "axial_color", "focus_shift"),
-        "wavefronts in optics.zernike are the same length at all wavelengths",
     ),
     **dict.fromkeys(
         ("prescription", "zemax"),

@@ -10,10 +10,12 @@ from numpy.typing import NDArray
 from pydantic_core import InitErrorDetails
 
 from vcam_cli.arrays import Array
+from vcam_cli.camera.color_errors import ByWavelength, WavelengthTable
+from vcam_cli.camera.lens_distortion import DISTORTION, AnyDistortion, one_projection
 from vcam_cli.camera.spectrum import Spectral, SpectrumSpec, flat
 from vcam_cli.config.lists import read_items, repeats
 from vcam_cli.config.model import Model, Rule, at_most_one, exactly_one, key
-from vcam_cli.config.quantities import Number, Quantity
+from vcam_cli.config.quantities import Number, Percentage, Quantity
 from vcam_cli.config.validation_messages import describe, failure, fault
 from vcam_cli.config.values import (
     Either,
@@ -211,7 +213,7 @@ def _is_determined(given: Mapping[str, Any]) -> Iterator[InitErrorDetails]:
 def _measured_alone(given: Mapping[str, Any]) -> Iterator[InitErrorDetails]:
     """Refuse defocus, aberrations or each other beside a measured blur, which has all in it."""
     measured = [name for name in ("psf", "mtf") if given.get(name) not in (None, "none")]
-    for name in ("defocus", "zernike", *measured[1:]):
+    for name in ("defocus", "focus_shift", "zernike", *measured[1:]):
         if measured and name in given and (name in measured or not _neutral(name, given[name])):
             message = f"cannot be given beside {measured[0]}, which has all aberrations in it"
             remedy = f"remove {name}, or write {measured[0]}: none"
@@ -222,6 +224,8 @@ def _neutral(name: str, given: Any) -> bool:
     """Return whether a defocus or a wavefront is that of a perfect lens."""
     if name == "zernike":
         return not given or given == Wavefront()
+    if name == "focus_shift":
+        return given in (None, "none")
     try:
         return bool(Quantity("length").read(given) == 0)
     except ValueError:
@@ -337,6 +341,43 @@ class Optics(Model):
         example="0 um",
         default=0.0,
     )
+    focus_shift: Annotated[
+        WavelengthTable | None,
+        ByWavelength(Quantity("length"), example="{table: {450: 12 um, 650: -8 um}}"),
+    ] = key(
+        "longitudinal color: shift of the image plane by wavelength, as defocus is one of all; "
+        "straight in between, the nearest beyond",
+        unit="um",
+        example={"table": {"450": "12 um", "650": "-8 um"}},
+        default=None,
+    )
+    lateral_color: Annotated[
+        WavelengthTable | None,
+        ByWavelength(
+            Percentage(least=-0.2, most=0.2, example="0.03 %"),
+            example="{table: {450: -0.02 %, 650: 0.03 %}}",
+        ),
+    ] = key(
+        "lateral color: change of magnification by wavelength; straight in between, the nearest "
+        "beyond",
+        unit="%",
+        example={"table": {"450": "-0.02 %", "650": "0.03 %"}},
+        default=None,
+    )
+    projection: Literal[
+        "rectilinear", "equidistant", "equisolid", "stereographic", "orthographic"
+    ] = key(
+        "height in the image by the field angle: rectilinear (f tan), or that of a fisheye, "
+        "equidistant (f theta), equisolid (2 f sin theta/2), stereographic (2 f tan theta/2), "
+        "orthographic (f sin)",
+        default="rectilinear",
+    )
+    distortion: Annotated[AnyDistortion | None, DISTORTION] = key(
+        "where the lens images a direction, beside its projection: OpenCV's coefficients, those of "
+        "its fisheye model, or a table; the center of the array is the axis",
+        example={"k1": -0.1},
+        default=None,
+    )
     zernike: Annotated[Wavefront, Zernike()] = key(
         "wavefront by Noll index; or a list of {field: 0.7, ...} (0 center, 1 corner): what it is "
         "to the right of the center, straight in between; the lens is symmetric about its axis, so "
@@ -360,7 +401,7 @@ class Optics(Model):
         "fraction of the mean irradiance that is spread evenly", default=0.0
     )
 
-    rules: ClassVar[tuple[Rule, ...]] = (_is_determined, _measured_alone)
+    rules: ClassVar[tuple[Rule, ...]] = (_is_determined, _measured_alone, one_projection)
 
     @property
     def is_lens(self) -> bool:

@@ -16,6 +16,8 @@ EFFECTS = {
     "diffraction": "blur by the lens's aperture",
     "aberration": "blur by an imperfect lens",
     "depth": "layers at their own distances, each with its own sharpness",
+    "distortion": "a lens that images directions elsewhere than a pinhole would",
+    "lateral_color": "a lens that magnifies by wavelength",
     "stray_light": "light spread evenly over the sensor",
     "motion": "blur and skew by motion of scene or camera",
     "pixel_aperture": "blur by the photodetector's area",

@@ -6,8 +6,10 @@ kind says in mathematics what it does, and so where in the order it acts (`order
     Blur               multiplies the spectrum of the image, H(f, wavelength)   no unit
     FieldTransfer      does so by another blur in every place of the field      no unit
     SeparableTransfer  does so by a product, H_x(fx) H_y(fy)                    no unit
-    ImageMotion        is one of these, and displaces what every row sees; or   no unit
-                       a mean over instants of the image elsewhere
+    Warp               looks elsewhere in the image, by place, wavelength and   no unit
+                       time
+    ImageMotion        is a warp by time; where nothing else warps it may be    no unit
+                       one of these blurs, and displace what every row sees
     Gain               multiplies the signal, pixel by pixel                    no unit
     VeilingGlare       spreads part of the light over the whole sensor          no unit
     TemporalGain       multiplies the signal by the light of each line's time   no unit
@@ -37,6 +39,7 @@ import numpy as np
 from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry
+from vcam_cli.camera.derived.image_motion import ExposedMotion
 from vcam_cli.camera.sensor.array import Binning
 
 Kind = TypeVar("Kind", bound="Effect")
@@ -158,7 +161,7 @@ class Effect(ABC):
 
     @property
     def is_uniform(self) -> bool:
-        """Whether it blurs all places alike."""
+        """Whether `spread` bounds it as a blur that is the same in all places."""
         return True
 
     def spread(self, wavelengths: Array) -> Array | None:
@@ -399,8 +402,127 @@ class SeparableTransfer(Effect):
         """Return the transfer along y at `frequency` [cycles/m]."""
 
 
-class ImageMotion(Effect):
+class Warp(Effect):
+    """Where in the unwarped image lies what a place of the sensor sees.
+
+    The warps of a camera are composed once, before colors are summed over the wavelengths, in
+    their order from the scene to the sensor (`image_formation.warps`). Irradiance keeps: an image
+    that is stretched is as bright as before.
+    """
+
+    origin = "lens"
+
+    @abstractmethod
+    def places(
+        self, x: Array, y: Array, wavelength: float, time: Array | float
+    ) -> tuple[Array, Array]:
+        """Return where in the unwarped image the places x, y look at a time.
+
+        Parameters
+        ----------
+        x, y : Array
+            Places right of the axis and below it, of shapes that broadcast [m].
+        wavelength : float
+            Wavelength [m].
+        time : Array or float
+            Time, of a shape that broadcasts with theirs [s].
+
+        Returns
+        -------
+        tuple of Array
+            Places in the unwarped image [m]; NaN for those that see nothing.
+        """
+
+    @abstractmethod
+    def images(
+        self, x: Array, y: Array, wavelength: float, time: Array | float
+    ) -> tuple[Array, Array]:
+        """Return where places x, y of the unwarped image are seen: the inverse of `places`."""
+
+    @property
+    def changes_with_time(self) -> bool:
+        """Whether it is another one at other times."""
+        return False
+
+    @property
+    @abstractmethod
+    def travel(self) -> float:
+        """How far from its place light comes to lie [m]."""
+
+    def mean_error(self, signal: SignalLevels) -> float:
+        """Return the most that leaving it out can change, light in place of dark [electrons]."""
+        return float(signal.full_signal)
+
+
+class StillWarp(Warp):
+    """A warp that is the same at all times: it warps the scene, before all blurs."""
+
+    largest_loss = 2.0 * math.sqrt(2)
+
+    @property
+    def travel(self) -> float:
+        """No motion: what it displaces is displaced in the scene."""
+        return 0.0
+
+    @property
+    def knots(self) -> tuple[float, ...]:
+        """Wavelengths between which it is straight [m]; none of one that is the same at all."""
+        return ()
+
+    @abstractmethod
+    def displacements(self, wavelengths: Array) -> Array:
+        """Return how far it displaces what the sensor sees, at most, at wavelengths (J,): (J,) [m].
+
+        Of what it sees in the unwarped image, and of what of that is seen elsewhere.
+        """
+
+    def spread(self, wavelengths: Array) -> Array:
+        """Return a bound (J,) on |1 - H(f)| / (2 pi |f|) for what it changes [m].
+
+        Of an image split at a frequency in two parts, the lower one changes by its gradient times
+        the displacement at most, and the upper one by twice itself; the squares of both add to no
+        more than twice their sum.
+        """
+        return math.sqrt(2) * self.displacements(wavelengths)
+
+
+class Magnification(StillWarp):
+    """A still warp that magnifies about the axis, by a factor of the wavelength."""
+
+    @abstractmethod
+    def factor(self, wavelength: float) -> float:
+        """Return the factor at a wavelength [m]."""
+
+    def places(
+        self, x: Array, y: Array, wavelength: float, time: Array | float
+    ) -> tuple[Array, Array]:
+        """Return where in the unwarped image the places x, y look [m]."""
+        return x / self.factor(wavelength), y / self.factor(wavelength)
+
+    def images(
+        self, x: Array, y: Array, wavelength: float, time: Array | float
+    ) -> tuple[Array, Array]:
+        """Return where places x, y of the unwarped image are seen [m]."""
+        return x * self.factor(wavelength), y * self.factor(wavelength)
+
+
+class ImageMotion(Warp):
     """Motion of the image: a blur, and a displacement of what rows see at their own times."""
+
+    exposed: ExposedMotion
+    """The motion, and when lines see it."""
+
+    def places(
+        self, x: Array, y: Array, wavelength: float, time: Array | float
+    ) -> tuple[Array, Array]:
+        """Return where in the still image the places x, y look at a time [m]."""
+        return self.exposed.trajectory.still_places(x, y, np.asarray(time))
+
+    def images(
+        self, x: Array, y: Array, wavelength: float, time: Array | float
+    ) -> tuple[Array, Array]:
+        """Return where places x, y of the still image are at a time [m]."""
+        return self.exposed.trajectory.moved_places(x, y, np.asarray(time))
 
     @property
     @abstractmethod
@@ -413,9 +535,9 @@ class ImageMotion(Effect):
         """Displacement of the image in the array's middle, along x and y [m]."""
 
     @property
-    @abstractmethod
-    def travel(self) -> float:
-        """How far from its place light comes to lie [m]."""
+    def changes_with_time(self) -> bool:
+        """Yes."""
+        return True
 
     def spread(self, wavelengths: Array) -> Array:
         """Return a bound (J,) on |1 - H(f)| / (2 pi |f|): no light moves further [m]."""
@@ -425,10 +547,6 @@ class ImageMotion(Effect):
     def is_uniform(self) -> bool:
         """Whether all rows see the image in the same place."""
         return not any(self.drift)
-
-    def mean_error(self, signal: SignalLevels) -> float:
-        """Return the most that leaving it out can change, light in place of dark [electrons]."""
-        return float(signal.full_signal)
 
 
 class Gain(Effect):

@@ -3,9 +3,10 @@
     in                     kind               effects                        out
     ---------------------  -----------------  -----------------------------  -----------------------
     radiance of the scene  (always there)     camera equation, eq 2.18       photons / (s m2 m)
+    radiance of the scene  ImageMotion        motion                         the same, elsewhere
+    radiance of the scene  StillWarp          distortion, lateral_color      the same, elsewhere
     spectrum of the image  Blur               diffraction, aberration,       electrons / s, blurred
                                               depth
-    spectrum of the image  ImageMotion        motion                         electrons / s, blurred
     spectrum of the image  SeparableTransfer  pixel_aperture                 electrons / s, blurred
     spectrum of the image  Blur               charge_diffusion               electrons / s, blurred
     electrons / s          Gain               off_axis                       electrons / s
@@ -26,8 +27,10 @@
 
 Kinds are classes of `base.py` and `signal_chain.py`; an aberration that changes over the field is a
 FieldTransfer; `before_shot` is a method of a NoiseSource: it changes the mean signal whose shot
-noise is drawn. Transfer functions multiply, so their order does not matter. Gains act on the
-blurred image: they are taken as constant over a pixel and a point spread function.
+noise is drawn. Warps are composed in their order, from the scene to the sensor; where nothing else
+warps, motion may be a transfer function. Transfer functions multiply, so their order does not
+matter. Gains act on the blurred image: they are taken as constant over a pixel and a point spread
+function.
 
 Within a kind the order of this tuple is the order of action; that of the noise in front of the ADC,
 which an automatic offset makes room for, is in `noise/sources.py`. It is written nowhere else.
@@ -42,6 +45,8 @@ from vcam_cli.effects.noise.sources import SOURCES
 from vcam_cli.effects.optics.aberration import Aberration
 from vcam_cli.effects.optics.depth import Depth
 from vcam_cli.effects.optics.diffraction import Diffraction
+from vcam_cli.effects.optics.distortion import Distortion
+from vcam_cli.effects.optics.lateral_color import LateralColor
 from vcam_cli.effects.optics.off_axis import OffAxis
 from vcam_cli.effects.optics.stray_light import StrayLight
 from vcam_cli.effects.pixel.charge_diffusion import ChargeDiffusion
@@ -55,10 +60,12 @@ from vcam_cli.effects.temporal.flicker import Flicker
 from vcam_cli.effects.temporal.motion import Motion
 
 ORDER: tuple[type[Effect], ...] = (
+    Motion,
+    Distortion,
+    LateralColor,
     Diffraction,
     Aberration,
     Depth,
-    Motion,
     PixelAperture,
     ChargeDiffusion,
     OffAxis,

@@ -25,10 +25,10 @@ from vcam_cli.effects.base import (
     SignalLevels,
     Transport,
     VeilingGlare,
+    Warp,
     of_kind,
 )
 from vcam_cli.effects.pixel.pixel_aperture import PixelAperture
-from vcam_cli.effects.temporal.sub_exposed_motion import SubExposedMotion
 from vcam_cli.image_formation.estimates.edge_changes import exact_changes, has_straight_edges
 from vcam_cli.image_formation.estimates.light_cost import LightCost
 from vcam_cli.image_formation.optical_path import OpticalPath
@@ -48,8 +48,8 @@ PERCENTILES = (1, 10, 50, 90, 99)
 """Percentiles of the scene's own light at which noise is promised."""
 PLACES = 33
 """Places along each side of the array at which a gain, which is smooth, is looked at."""
-BLURS = (Blur, SeparableTransfer, FieldTransfer, SubExposedMotion)
-"""Kinds of effects that blur the light."""
+BLURS = (Blur, SeparableTransfer, FieldTransfer, Warp)
+"""Kinds of effects that blur the light, or displace it."""
 KINDS = (*BLURS, Gain, VeilingGlare, Transport)
 """Kinds of effects on the light, and on the charge that it makes."""
 EXACT = 10e-3

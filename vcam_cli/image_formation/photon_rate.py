@@ -22,7 +22,7 @@ from vcam_cli.effects.base import Effect, Gain, ImageMotion, VeilingGlare, of_ki
 from vcam_cli.image_formation.light_plan import LightPlan, light_plan
 from vcam_cli.image_formation.optical_path import Layer, OpticalPath, SpectrumReport
 from vcam_cli.image_formation.settings import Settings
-from vcam_cli.image_formation.strategies import image_layers
+from vcam_cli.image_formation.warps import warped_layers
 from vcam_cli.parallel import each
 from vcam_cli.rng import blocks
 from vcam_cli.scenes.base import View
@@ -37,7 +37,12 @@ As cells are finer than the blur, pixels err by 0.07 tolerances by it at most: m
 and the still life from `draft` to `reference`, well exposed and ten times over."""
 
 
-def view(geometry: Geometry, settings: Settings, margin: int) -> View:
+def view(
+    geometry: Geometry,
+    settings: Settings,
+    margin: int,
+    covered: tuple[float, float] | None = None,
+) -> View:
     """Return the rectangle that a scene has to fill, with a margin.
 
     Parameters
@@ -48,6 +53,8 @@ def view(geometry: Geometry, settings: Settings, margin: int) -> View:
         Settings of image formation.
     margin : int
         Pixels that a chart goes on beyond the array.
+    covered : tuple of float, optional
+        Width and height that a scene covers before a lens that distorts [m].
 
     Returns
     -------
@@ -63,6 +70,7 @@ def view(geometry: Geometry, settings: Settings, margin: int) -> View:
         scene_width=geometry.scene_width_on_sensor,
         dtype=settings.dtype,
         cell_error=CELL_ERROR * settings.tolerance,
+        covered=covered,
     )
 
 
@@ -115,7 +123,7 @@ def photo_rate(path: OpticalPath, scene: AnyScene, planes: bool = False) -> Rate
 
 def _gathered(path: OpticalPath, scene: AnyScene, planes: bool) -> Rate:
     """Return the light in every place of the lattice, all effects acting that a path has."""
-    layers, report = image_layers(path, scene)
+    layers, report = warped_layers(path, scene)
     if path.is_displaced:  # more changes than the blur, of which the report knows
         moved = {motion.name for motion in of_kind(path.effects, ImageMotion)}
         known = {name: change for name, change in report.changes.items() if name not in moved}

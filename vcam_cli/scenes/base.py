@@ -36,7 +36,8 @@ class View:
     rows, columns: pixels; pitch_x, pitch_y: [m]; oversampling: chart samples per pixel pitch;
     margin: pixels that a chart goes on beyond the array on every side;
     scene_width: [m] on the sensor when the scene's extent has a width, None when the scene covers
-    the array; dtype of planes; cell_error: what means over a chart's cells may err, rms of white.
+    the array; dtype of planes; cell_error: what means over a chart's cells may err, rms of white;
+    covered: [m] width and height that a scene covers where a lens distorts, None for the array's.
     """
 
     rows: int
@@ -48,6 +49,7 @@ class View:
     scene_width: float | None = None
     dtype: DTypeLike = np.float64
     cell_error: float = 0.0
+    covered: tuple[float, float] | None = None
 
     @property
     def width(self) -> float:
@@ -60,10 +62,15 @@ class View:
         return self.rows * self.pitch_y
 
     @property
+    def size(self) -> tuple[float, float]:
+        """Width and height that a scene covers [m]."""
+        return self.covered or (self.width, self.height)
+
+    @property
     def frame(self) -> "Frame":
-        """Where a chart's picture lies: the array, or `scene_width` in the array's aspect."""
+        """Where a chart's picture lies: what the array sees, or `scene_width` in its aspect."""
         if self.scene_width is None:
-            return Frame(self.width, self.height)
+            return Frame(*self.size)
         return Frame(self.scene_width, self.scene_width * self.height / self.width)
 
     @property

@@ -55,8 +55,9 @@ def placement(rows: int, columns: int, view: View) -> Placement:
         Pitch of the samples [m], and how many are cut off at each side.
     """
     if view.scene_width is None:
-        pitch = max(view.width / columns, view.height / rows)
-        while pitch * columns < view.width or pitch * rows < view.height:  # a rounding error
+        width, height = view.size
+        pitch = max(width / columns, height / rows)
+        while pitch * columns < width or pitch * rows < height:  # a rounding error
             pitch = math.nextafter(pitch, math.inf)
     else:
         pitch = view.scene_width / columns
@@ -71,8 +72,9 @@ def placement(rows: int, columns: int, view: View) -> Placement:
 
 def _extent_with_margin(view: View) -> tuple[float, float]:
     """Return width and height of the array and its margin [m]."""
-    width = view.width + 2 * view.margin * view.pitch_x
-    return width, view.height + 2 * view.margin * view.pitch_y
+    width, height = view.size
+    margin_x = 2 * view.margin * view.pitch_x * (width / view.width)
+    return width + margin_x, height + 2 * view.margin * view.pitch_y * (height / view.height)
 
 
 def _visible_pitch(pitch: float, samples: int, needed: float) -> float:
@@ -306,7 +308,7 @@ def image_scene(
         picture=picture[top : rows - top, left : columns - left],
         black=(max(-placed.cut_y, 0), max(-placed.cut_x, 0)),
         seen=(
-            min(view.height / (placed.pitch * rows), 1.0),
-            min(view.width / (placed.pitch * columns), 1.0),
+            min(view.size[1] / (placed.pitch * rows), 1.0),
+            min(view.size[0] / (placed.pitch * columns), 1.0),
         ),
     )

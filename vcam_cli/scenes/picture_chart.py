@@ -150,3 +150,34 @@ class PictureChart(Chart):
             return np.clip(index, 0, count - 1), (index >= 0) & (index < count)
         index = index % (2 * count)
         return np.minimum(index, 2 * count - 1 - index), np.ones(index.shape, bool)
+
+
+@dataclass(frozen=True, eq=False)
+class CubeChart(PictureChart):
+    """A cube of spectra as such a chart."""
+
+    units: Array
+    """Value of band k at which component k is 1 (bands,)."""
+
+    @property
+    def brightest(self) -> float:
+        """Brightest light of a band over that of white there."""
+        return float((self.picture.reshape(-1, len(self.units)).max(axis=0) / self.units).max())
+
+    def paint(self, x_edges: Array, y_edges: Array, mix: Array, out: Array) -> None:
+        """Write the exact averages over the cells of mixtures, of which there are few."""
+        height, width, _ = self.picture.shape
+        down, rows = self._shares(y_edges * (height / self.frame.height) + height / 2, height)
+        across, columns = self._shares(x_edges * (width / self.frame.width) + width / 2, width)
+        seen = self.picture[rows, columns] @ np.asarray(mix / self.units, self.picture.dtype).T
+        lines = (down @ seen.reshape(len(seen), -1)).reshape(len(out[0]), -1, len(mix))
+        for plane, one in zip(out, np.moveaxis(lines, 2, 0), strict=True):
+            plane[:] = (across @ one.T).T
+
+    def values(self, x: Array, y: Array, mix: Array) -> Array:
+        """Return the samples at points."""
+        return super().values(x, y, np.asarray(mix / self.units, mix.dtype))
+
+    def edge_energy(self, region: Region, level: Array, ceiling: float) -> EdgeEnergy:
+        """Return the energy of the steps from sample to sample, and of the cube's border."""
+        return super().edge_energy(region, np.asarray(level / self.units), ceiling)

@@ -113,6 +113,21 @@ class Trajectory:
             seen_x - self.scene_x * late, seen_y - self.scene_y * late, self.scene_turn * late
         )
 
+    def moved_places(self, x: Array, y: Array, times: Array) -> tuple[Array, Array]:
+        """Return where on the sensor is at its time what lies at places of the still image.
+
+        The inverse of `still_places`, with its parameters [m], [s].
+        """
+        late = times - self.reference
+        pan, tilt, roll = self.camera_angles(times)
+        seen_x, seen_y = x, y
+        if self.turns:
+            seen_x, seen_y = turned_back(x, y, -self.scene_turn * late)
+        seen_x, seen_y = seen_x + self.scene_x * late, seen_y + self.scene_y * late
+        if self.turns:
+            seen_x, seen_y = turned_back(seen_x, seen_y, roll)
+        return seen_x - pan * self.image_distance, seen_y + tilt * self.image_distance
+
 
 @dataclass(frozen=True)
 class ExposedMotion:

@@ -15,9 +15,9 @@ from vcam_cli.effects.base import (
     Blur,
     Effect,
     FieldTransfer,
-    ImageMotion,
     PlaneTransfer,
     SeparableTransfer,
+    Warp,
     of_kind,
 )
 from vcam_cli.image_formation.estimates.bandwidth import FREQUENCY_SHARE, highest_passed, reach
@@ -194,7 +194,7 @@ class LightCost:
         """
         pixels = self.path.geometry.rows * self.path.geometry.columns
         gains = sum(effect.seconds_per_pixel for effect in omitted) * pixels
-        kinds = Blur, SeparableTransfer, FieldTransfer, ImageMotion
+        kinds = Blur, SeparableTransfer, FieldTransfer, Warp
         if not of_kind(omitted, *kinds):  # the image is the same, whatever it takes
             return gains
         blurs = of_kind(self.path.effects, *kinds)
