@@ -14,6 +14,7 @@ from vcam_cli.camera.processing_steps import (
     Gamma,
     GamutMapping,
     Jpeg,
+    LensDistortion,
     Matrix,
     Sharpen,
     Step,
@@ -39,6 +40,7 @@ _ANY = (
     | Denoise
     | Sharpen
     | GamutMapping
+    | LensDistortion
     | Tone
     | Gamma
     | Jpeg

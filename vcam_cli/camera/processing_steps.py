@@ -180,6 +180,18 @@ class GamutMapping(Step):
     )
 
 
+class LensDistortion(Step):
+    """Straight lines as straight lines again, by what optics.distortion and projection say."""
+
+    acts_on = "colors"
+
+    lens_distortion: Literal["correct", "none"] = key(
+        "correct: each pixel is taken from where the lens has imaged it, by cubic splines; the"
+        " picture is magnified until it has no empty rim",
+        example="correct",
+    )
+
+
 class Compression(Model):
     """How strongly a picture is compressed."""
 

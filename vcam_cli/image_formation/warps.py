@@ -283,6 +283,41 @@ def covered(effects: Sequence[Effect], geometry: Geometry) -> tuple[float, float
     return width, height
 
 
+def ideal_values(
+    scene: AnyScene, effects: Sequence[Effect], geometry: Geometry, x: Array, y: Array, mix: Array
+) -> Array:
+    """Return a scene's values at points of the sensor, displaced as a lens displaces green light.
+
+    That is the ideal picture: distortion belongs to it as perspective does, lateral color is an
+    error.
+
+    Parameters
+    ----------
+    scene : AnyScene
+        The scene.
+    effects : sequence of Effect
+        Effects of the camera, of which still warps count but magnifications.
+    geometry : Geometry
+        Geometry of the array.
+    x, y : Array
+        Positions (n,) right of the array's center and (m,) below it [m].
+    mix : Array
+        Mixtures (R, K) of the components.
+
+    Returns
+    -------
+    Array
+        Values (R, m, n).
+    """
+    still = of_kind(effects, StillWarp)
+    kept = tuple(warp for warp in still if warp not in of_kind(still, Magnification))
+    if not kept or isinstance(scene, LayeredScene | DepthScene) or _is_even(scene):
+        return scene.values_at(x, y, mix)
+    half = geometry.sensor_width / 2, geometry.sensor_height / 2
+    sees = Warps(kept).map_at(GREEN, half, moved=False)
+    return WarpedChart(_chart(scene), sees).values(x, y, mix)
+
+
 def _extremes(still: Sequence[StillWarp]) -> list[float]:
     """Return wavelengths at which warps displace most [m]."""
     return [GREEN, *(w for warp in still for w in warp.knots)]
@@ -321,24 +356,11 @@ def _as_chart(path: OpticalPath, scene: AnyScene) -> ChartScene:
         return scene.chart
     if isinstance(scene, ChartScene):
         return scene
+    if isinstance(scene, LayeredScene | DepthScene):
+        raise TypeError(f"a {type(scene).__name__} is warped by its layers")
     g = path.geometry
     band = float(path.transfer.wavelengths[0]), float(path.transfer.wavelengths[-1])
     beyond = margin(g, path.effects, band, path.settings)
-    chart: Chart
-    match scene:
-        case WaveScene():
-            chart = WaveChart(scene.waves)
-        case ImageScene():
-            frame = Frame(
-                scene.picture.shape[1] * scene.pitch_x, scene.picture.shape[0] * scene.pitch_y
-            )
-            mirrored = scene.black == (0, 0)
-            if isinstance(scene, CubeScene):
-                chart = CubeChart(scene.picture, frame, mirrored, scene.units)
-            else:
-                chart = PictureChart(scene.picture, frame, mirrored)
-        case _:
-            raise ValueError(f"no warp of a {type(scene).__name__}")
     return ChartScene(
         spectra=scene.spectra,
         white=scene.white,
@@ -347,8 +369,27 @@ def _as_chart(path: OpticalPath, scene: AnyScene) -> ChartScene:
         pitch_y=g.pitch_y,
         samples="averages",
         dtype=path.settings.dtype,
-        chart=chart,
+        chart=_chart(scene),
     )
+
+
+def _chart(scene: Scene) -> Chart:
+    """Return a scene as a chart."""
+    match scene:
+        case HarmonicScene():
+            return scene.chart.chart
+        case ChartScene():
+            return scene.chart
+        case WaveScene():
+            return WaveChart(scene.waves)
+        case ImageScene():
+            height, width, _ = scene.picture.shape
+            frame = Frame(width * scene.pitch_x, height * scene.pitch_y)
+            mirrored = scene.black == (0, 0)
+            if isinstance(scene, CubeScene):
+                return CubeChart(scene.picture, frame, mirrored, scene.units)
+            return PictureChart(scene.picture, frame, mirrored)
+    raise ValueError(f"no warp of a {type(scene).__name__}")
 
 
 def _groups(path: OpticalPath, seen: _SeenScene, warps: Warps) -> list[tuple[float, Array]]:

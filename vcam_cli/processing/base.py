@@ -41,6 +41,17 @@ class Patches:
     """Last wavelength that is simulated [m]."""
 
 
+class Correction(Protocol):
+    """Where a corrected picture takes its pixels from."""
+
+    @property
+    def halo(self) -> int:
+        """Rows above and below that a row looks at, at most."""
+
+    def sources(self, start: int, stop: int) -> tuple[np.ndarray, np.ndarray]:
+        """Return rows and columns in the distorted picture of rows of the corrected one."""
+
+
 class Layout(Protocol):
     """Positions of pixels that fill no rows and columns of squares.
 
@@ -100,6 +111,10 @@ class Context:
 
     It is in the codes of pixels alone: signals that are free of noise have the level `black_dn`.
     """
+
+    correction: Correction | None = None
+    """Where a picture without its lens's distortion takes its pixels from; None where the lens has
+    none."""
 
     @property
     def mosaic(self) -> bool:

@@ -18,6 +18,7 @@ CHOICES: dict[str, tuple[str, ...]] = {
     "denoise": (),
     "sharpen": (),
     "gamut_mapping": ("desaturate", "none"),
+    "lens_distortion": ("correct", "none"),
     "tone": (),
     "gamma": ("srgb",),
     "jpeg": (),

@@ -27,6 +27,7 @@ from vcam_cli.processing import (
     color_correction,
     foreign_step,
     jpeg,
+    lens_distortion,
     picture_steps,
     scattered_pixels,
     white_balance,
@@ -262,6 +263,14 @@ def _sharpen(draft: Draft, step: Step, path: Path) -> Draft:
     return _with_neighbors(draft, work, picture_steps.blur_reach(mask.radius))
 
 
+def _lens_distortion(draft: Draft, step: Step, path: Path) -> Draft:
+    correction = draft.context.correction
+    if correction is None:
+        note = "lens_distortion: there is none to correct"
+        return replace(draft, notes=(*draft.notes, note))
+    return draft.with_operations(lens_distortion.Undistort(correction, draft.dn.shape[-2]))
+
+
 def _gamut_mapping(draft: Draft, step: Step, path: Path) -> Draft:
     colors = draft.context.colors
     shares = np.array([LUMINANCE.get(color, 1.0) for color in colors])
@@ -314,6 +323,7 @@ STEPS: dict[str, Apply] = {
     "denoise": _denoise,
     "sharpen": _sharpen,
     "gamut_mapping": _gamut_mapping,
+    "lens_distortion": _lens_distortion,
     "tone": _tone,
     "gamma": _gamma,
     "jpeg": _jpeg,

@@ -17,7 +17,7 @@ import numpy as np
 from scipy import ndimage
 
 from vcam_cli.arrays import Array
-from vcam_cli.parallel import pieces
+from vcam_cli.parallel import pieces, product
 from vcam_cli.scenes.base import Chart
 from vcam_cli.scenes.cells import cell_means
 from vcam_cli.scenes.edge_energy import EdgeEnergy, Region
@@ -39,7 +39,7 @@ values are straight."""
 DEGREES = (16, 32, 64, 128)
 """Degrees of the series of a map that are tried."""
 PRECISE = 1e-11
-"""Last coefficients over the first at which a series is taken as the map: 1e-7 pixels of 10,000."""
+"""Coefficients over the largest that a series does without: 1e-7 pixels of 10,000."""
 MOST_APART = 0.3
 """Part of the second moments along x and y that the distance of two boxes makes, at most: what is
 left for the boxes is more than that of the finer cells."""
@@ -68,7 +68,7 @@ class SmoothMap:
         """Return where the places of columns x (n,) and rows y (m,) [m] look: two of (m, n) [m]."""
         along_x, beyond_x = self._terms(x, self.half[0])
         along_y, beyond_y = self._terms(y, self.half[1])
-        found_x, found_y = along_y @ self.series @ along_x.T
+        found_x, found_y = (product(product(along_y, s), along_x.T) for s in self.series)
         found_x += self._slopes[0] * beyond_x
         found_y += self._slopes[1] * beyond_y[:, None]
         return found_x, found_y
@@ -90,8 +90,9 @@ class SmoothMap:
 
     def on_grid_inside(self, x: Array, y: Array) -> tuple[Array, Array]:
         """Return the same of places that lie in the rectangle."""
-        found = self._terms(y, self.half[1])[0] @ self.series @ self._terms(x, self.half[0])[0].T
-        return found[0], found[1]
+        along_x, along_y = self._terms(x, self.half[0])[0], self._terms(y, self.half[1])[0]
+        found_x, found_y = (product(product(along_y, s), along_x.T) for s in self.series)
+        return found_x, found_y
 
     @cached_property
     def _jacobian(self) -> tuple[Array, Array]:
@@ -135,10 +136,12 @@ def smooth_map(places: Places, half: tuple[float, float]) -> SmoothMap | None:
         terms = np.polynomial.chebyshev.chebvander(nodes, degree) * (2 / (degree + 1))
         terms[:, 0] /= 2
         series = terms.T @ seen @ terms
-        last = max(np.abs(series[:, -2:]).max(), np.abs(series[:, :, -2:]).max())
-        if last <= PRECISE * np.abs(series).max():
+        size = np.abs(series).max(axis=0)
+        counts = np.argwhere(size > PRECISE * size.max())
+        needed = int(counts.max()) + 1
+        if needed < degree:
             break
-    return SmoothMap(series, half)
+    return SmoothMap(np.ascontiguousarray(series[:, :needed, :needed]), half)
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,6 +12,7 @@ from vcam_cli.arrays import Array
 from vcam_cli.camera.scene.sources import Layers
 from vcam_cli.effects.base import Gain, of_kind
 from vcam_cli.floats import own_float_errors
+from vcam_cli.image_formation import warps
 from vcam_cli.image_formation.pixel_response import axis_levels
 from vcam_cli.progress import Stages
 from vcam_cli.readout import (
@@ -152,6 +153,14 @@ class Frame(Prepared):
             return self.scene.depth_at(layout.picture_x, layout.picture_y)
         return np.full(layout.picture_shape, self.solved.scene.distance)
 
+    def _ideal_light(self, x: Array, y: Array, level: Array) -> Array:
+        """Return the scene at points as the picture shows it: distorted, or corrected."""
+        if (correction := self.solved.lens_correction) is not None:
+            zoom = correction.zoom
+            return self.scene.values_at(x / zoom, y / zoom, level)
+        effects, grid = self.plan.active, self.layout.grid
+        return warps.ideal_values(self.scene, effects, grid, x, y, level)
+
     def ideal_dn(self) -> Array:
         """Return the scene point-sampled at the pixels' centers, all colors everywhere [DN].
 
@@ -160,7 +169,7 @@ class Frame(Prepared):
         """
         layout = self.layout
         level = self.transfer.level.T * self.exposure_time * layout.binning_groups.signal_ratio
-        photo = self.scene.values_at(layout.picture_x, layout.picture_y, level)
+        photo = self._ideal_light(layout.picture_x, layout.picture_y, level)
         if self.electrical.curve is not None and not self.electrical.curve.corrected:
             white = self.white_rate * self.exposure_time * self.chain.summed_codes
             span = np.where(white > 0, self.white_dn - self.black_dn, 0.0)

@@ -186,6 +186,7 @@ def picture_of(frame: Frame, workers: int) -> Callable[[Sequence[Step]], Process
         primaries=frame.primaries_dn if frame.solved.scene.emits else None,
         planes=frame.layout.full_color,
         layout=frame.layout if frame.layout.is_scattered else None,
+        correction=frame.solved.lens_correction,
     )
     return partial(process, frame.picture_dn, context, workers=workers)
 

@@ -17,6 +17,7 @@ from vcam_cli.camera.derived import photodiode
 from vcam_cli.camera.derived.electrical import Electrical
 from vcam_cli.camera.derived.frame_rate import FrameRate, frame_rate
 from vcam_cli.camera.derived.geometry import Geometry, geometry
+from vcam_cli.camera.derived.lens_correction import LensCorrection, lens_correction
 from vcam_cli.camera.derived.line_times import LineTimes, line_times
 from vcam_cli.camera.derived.readouts import has_several, metered
 from vcam_cli.camera.derived.scene_layers import camera_at, flat_camera, layer_cameras
@@ -188,6 +189,11 @@ class Solved:
     def lines(self) -> LineTimes:
         """When the lines of the array are exposed."""
         return line_times(self.camera, self.geometry)
+
+    @cached_property
+    def lens_correction(self) -> LensCorrection | None:
+        """The correction of distortion that processing makes; None where it makes none."""
+        return lens_correction(self.camera, self.layout.grid)
 
     @cached_property
     def light_key(self) -> str:

@@ -26,10 +26,11 @@ from vcam_cli.effects.optics.wavefront_blur import (
     DirectedBlur,
     Lens,
     SymmetricBlur,
+    focus_table,
     wavefronts,
 )
 from vcam_cli.errors import bad
-from vcam_cli.physics import aberration
+from vcam_cli.physics import aberration, zernike
 
 KINDS = (PointSpread, MeasuredMtf, FieldMtf, SymmetricBlur, DirectedBlur, FieldBlur)
 """Kinds of blur; a camera has at most one of them."""
@@ -64,11 +65,17 @@ def check(camera: Camera, geometry: Geometry) -> None:
     if camera.optics.measured_blur or not Lens.from_camera(camera, geometry).diffracts:
         return
     shortest = camera.scene.wavelengths.start
+    table = focus_table(camera)
+    moved = [shift for _, shift in table.points] if table else [0.0]
     slopes = [
-        aberration.slope_in_waves(terms, shortest) for _, terms in wavefronts(camera, geometry)
+        aberration.slope_in_waves(
+            zernike.combine(terms, zernike.defocus(shift, geometry.working_f_number)), shortest
+        )
+        for _, terms in wavefronts(camera, geometry)
+        for shift in {min(moved), max(moved)}
     ]
     if max(slopes) > aberration.MAX_SLOPE:
-        key = "zernike" if camera.optics.zernike.terms else "defocus"
+        key = "zernike" if camera.optics.zernike.terms else "focus_shift" if table else "defocus"
         key = "focus_distance" if geometry.focus_shift else key
         raise bad(
             ("optics", key),

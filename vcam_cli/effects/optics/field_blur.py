@@ -14,6 +14,7 @@ import numpy as np
 
 from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.color_errors import WavelengthTable
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.effects.base import FieldTransfer, SignalLevels, Zone
 from vcam_cli.effects.optics.wavefront_blur import (
@@ -22,6 +23,8 @@ from vcam_cli.effects.optics.wavefront_blur import (
     DirectedBlur,
     Lens,
     SymmetricBlur,
+    describe_focus,
+    focus_table,
     uniform_wavefront,
     wavefronts,
 )
@@ -45,6 +48,8 @@ class FieldBlur(AberrationBlur, FieldTransfer):
     """((place from 0 center to 1 corner, terms), ...), rising"""
     half_diagonal: float
     """Half the diagonal of the sensor [m]."""
+    focus: WavelengthTable | None = None
+    """Shift of the image plane by wavelength [m]; None of one that is the same at all."""
 
     @classmethod
     def from_camera(cls, camera: Camera, geometry: Geometry) -> FieldBlur | None:
@@ -54,30 +59,36 @@ class FieldBlur(AberrationBlur, FieldTransfer):
         places = wavefronts(camera, geometry)
         listed = tuple((place or 0.0, terms) for place, terms in places)
         half_diagonal = math.hypot(geometry.sensor_width, geometry.sensor_height) / 2
-        return cls(Lens.from_camera(camera, geometry), listed, half_diagonal)
+        lens = Lens.from_camera(camera, geometry)
+        return cls(lens, listed, half_diagonal, focus_table(camera))
 
     def describe(self) -> str:
         """Return a short clause with this camera's numbers and units."""
         center, corner = (self.lens.describe(self.wavefront(place)) for place in (0.0, 1.0))
-        return f"center: {center}; corner: {corner}"
+        found = f"center: {center}; corner: {corner}"
+        return found if self.focus is None else f"{found}; {describe_focus(self.focus)}"
 
     @property
     def reach(self) -> float:
         """How far from its place the blur throws almost all of the light, diffraction aside [m]."""
-        return max(self.lens.reach(self.wavefront(place)) for place, _ in self.places)
+        return max(self._blur(place).reach for place, _ in self.places)
 
     def spread(self, wavelengths: Array) -> Array:
         """Return a bound (J,) on |1 - H(f)| / (2 pi |f|) [m].
 
         Wavefronts change evenly between places, so that no slope exceeds those there.
         """
-        farthest = max(self.lens.farthest_ray(self.wavefront(p)) for p in self._ends)
-        return np.full(len(wavelengths), farthest)
+        spreads = [self._blur(place).spread(wavelengths) for place in self._ends]
+        return np.asarray(np.max(spreads, axis=0))
 
     @property
     def _ends(self) -> tuple[float, ...]:
         """Places between which the wavefront changes evenly, center and corner among them."""
         return (0.0, *(place for place, _ in self.places if 0 < place < 1), 1.0)
+
+    def _blur(self, place: float) -> DirectedBlur:
+        """Return the blur on the half-axis to the right, at a place from 0 to 1."""
+        return DirectedBlur(self.lens, self.wavefront(place), self.focus)
 
     def wavefront(self, place: float) -> Terms:
         """Return the wavefront on the half-axis to the right, at a place from 0 to 1."""
@@ -96,7 +107,8 @@ class FieldBlur(AberrationBlur, FieldTransfer):
         Places are added for every wave by which the wavefront changes, up to `MAX_PLACES`.
         """
         kind = DirectedBlur if self._azimuthal_order else SymmetricBlur
-        return tuple(Zone(kind(self.lens, terms), weight) for terms, weight in self._rings(count))
+        found = self._rings(count)
+        return tuple(Zone(kind(self.lens, terms, self.focus), weight) for terms, weight in found)
 
     def zones(self, count: int) -> tuple[Zone, ...]:
         """Return the rings cut into sectors, in each of which the wavefront is turned."""
@@ -106,7 +118,7 @@ class FieldBlur(AberrationBlur, FieldTransfer):
         around = 4 * math.ceil((2 * self._azimuthal_order * (self._enough(count) - 1) + 1) / 4)
         return tuple(
             Zone(
-                DirectedBlur(self.lens, terms, angle=2 * math.pi * sector / around),
+                DirectedBlur(self.lens, terms, self.focus, angle=2 * math.pi * sector / around),
                 replace(weight, sector=sector, around=around),
             )
             for terms, weight in self._rings(count)
@@ -160,8 +172,7 @@ class FieldBlur(AberrationBlur, FieldTransfer):
     def mean_error(self, signal: SignalLevels) -> float:
         """Return a bound of the rms change of the mean signal by leaving it out [electrons]."""
         # Wavefronts change evenly in between: none is worse than that of one of its ends.
-        blurs = (DirectedBlur(self.lens, self.wavefront(place)) for place in self._ends)
-        return max(blur.mean_error(signal) for blur in blurs)
+        return max(self._blur(place).mean_error(signal) for place in self._ends)
 
 
 @dataclass(frozen=True)

@@ -64,4 +64,4 @@ class LateralColor(Magnification):
     def displacements(self, wavelengths: Array) -> Array:
         """Return how far it displaces what the sensor sees, at most: (J,) [m]."""
         change = np.abs(self.table.at(wavelengths))
-        return self.corner * change / (1 - change)
+        return np.asarray(self.corner * change / (1 - change))

@@ -7,13 +7,15 @@ switched off it is the blur of geometrical rays.
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Self
 
 import numpy as np
 
 from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
+from vcam_cli.camera.color_errors import WavelengthTable
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.effects.base import Effect, PlaneTransfer, RadialTransfer, SignalLevels, switched_off
 from vcam_cli.physics import aberration, diffraction, ray_blur, zernike
@@ -33,7 +35,7 @@ class AberrationBlur(Effect):
 
     name = "aberration"
     reference = "Hopkins 1955, doi:10.1098/rspa.1955.0158; Noll 1976, doi:10.1364/JOSA.66.000207"
-    absent = "optics has no defocus, zernike, psf or mtf"
+    absent = "optics has no defocus, focus_shift, zernike, psf or mtf"
     origin = "lens"
 
 
@@ -98,6 +100,18 @@ def wavefronts(camera: Camera, geometry: Geometry) -> tuple[tuple[float | None, 
     )
 
 
+def focus_table(camera: Camera) -> WavelengthTable | None:
+    """Return the shift of the image plane by wavelength; None where it is the same at all."""
+    table = camera.optics.focus_shift
+    return table if table is not None and any(shift for _, shift in table.points) else None
+
+
+def describe_focus(table: WavelengthTable) -> str:
+    """Return a clause with the numbers of a shift by wavelength."""
+    shifts = [1e6 * shift for _, shift in table.points]
+    return f"focus shifts by {min(shifts):.3g} to {max(shifts):.3g} um over the wavelengths"
+
+
 def uniform_wavefront(camera: Camera, geometry: Geometry) -> Terms | None:
     """Return the wavefront that is the same everywhere, or None where it changes or turns."""
     (place, terms), *others = wavefronts(camera, geometry)
@@ -111,15 +125,35 @@ class UniformBlur(AberrationBlur):
 
     lens: Lens
     terms: Terms
+    focus: WavelengthTable | None = None
+    """Shift of the image plane by wavelength [m]; None of one that is the same at all."""
+
+    def at(self, wavelength: float) -> Self:
+        """Return what it is at a wavelength [m], where its focus shifts."""
+        assert self.focus is not None
+        return self._shifted(float(self.focus.at(wavelength)))
+
+    def _shifted(self, shift: float) -> Self:
+        moved = zernike.defocus(shift, self.lens.working_f_number)
+        return replace(self, terms=zernike.combine(self.terms, moved), focus=None)
+
+    @property
+    def extremes(self) -> tuple[Self, ...]:
+        """What it is where its focus shifts most; itself where it does not."""
+        if self.focus is None:
+            return (self,)
+        shifts = [shift for _, shift in self.focus.points]
+        return self._shifted(min(shifts)), self._shifted(max(shifts))
 
     def describe(self) -> str:
         """Return a short clause with this camera's numbers and units."""
-        return self.lens.describe(self.terms)
+        found = self.lens.describe(self.terms)
+        return found if self.focus is None else f"{found}; {describe_focus(self.focus)}"
 
     @property
     def reach(self) -> float:
         """How far from its place the blur throws almost all of the light, diffraction aside [m]."""
-        return self.lens.reach(self.terms)
+        return max(self.lens.reach(blur.terms) for blur in self.extremes)
 
     def cutoff(self, wavelength: float) -> float:
         """Return the frequency from which the transfer is zero, or inf [cycles/m]."""
@@ -131,6 +165,9 @@ class UniformBlur(AberrationBlur):
         The phases that are averaged are those of points of the pupil 2 lambda N f radii apart, and
         at most 2 pi f times 2 N times the steepest slope of the wavefront.
         """
+        if self.focus is not None:
+            own = [self.lens.farthest_ray(self.at(float(w)).terms) for w in wavelengths]
+            return np.array(own)
         return np.full(len(wavelengths), self.lens.farthest_ray(self.terms))
 
 
@@ -141,13 +178,15 @@ class SymmetricBlur(UniformBlur, RadialTransfer):
     @classmethod
     def from_camera(cls, camera: Camera, geometry: Geometry) -> SymmetricBlur | None:
         """Return the blur of a wavefront that is symmetric everywhere, else None."""
-        terms = uniform_wavefront(camera, geometry)
-        if not terms or not zernike.is_symmetric(terms):
+        terms, focus = uniform_wavefront(camera, geometry), focus_table(camera)
+        if terms is None or not (terms or focus) or not zernike.is_symmetric(terms):
             return None
-        return cls(Lens.from_camera(camera, geometry), terms)
+        return cls(Lens.from_camera(camera, geometry), terms, focus)
 
     def otf(self, frequency: Array, wavelength: float) -> Array:
         """Return the transfer at `frequency` [cycles/m] and `wavelength` [m]."""
+        if self.focus is not None:
+            return self.at(wavelength).otf(frequency, wavelength)
         if not self.lens.diffracts:
             return ray_blur.otf_symmetric(frequency, self.lens.working_f_number, self.terms)
         return aberration.otf_ratio_symmetric(
@@ -156,7 +195,7 @@ class SymmetricBlur(UniformBlur, RadialTransfer):
 
     def spectral_otf(self, frequency: Array, wavelengths: Array) -> Array:
         """Return the transfer at every wavelength (J,) [m]: (J, *shape of `frequency`)."""
-        if not self.lens.diffracts:
+        if self.focus is not None or not self.lens.diffracts:
             return super().spectral_otf(frequency, wavelengths)
         return aberration.otf_ratio_symmetric(
             frequency, wavelengths, self.lens.working_f_number, self.terms
@@ -164,8 +203,11 @@ class SymmetricBlur(UniformBlur, RadialTransfer):
 
     def mean_error(self, signal: SignalLevels) -> float:
         """Return a bound of the rms change of the mean signal by leaving it out [electrons]."""
-        otf = self.otf(np.linspace(0, _highest(self.lens, self.terms), 257), GREEN)
-        return float(np.abs(1 - otf).max()) * signal.full_signal
+        losses = []
+        for blur in self.extremes:
+            otf = blur.otf(np.linspace(0, _highest(blur.lens, blur.terms), 257), GREEN)
+            losses.append(float(np.abs(1 - otf).max()))
+        return max(losses) * float(signal.full_signal)
 
 
 @dataclass(frozen=True)
@@ -180,10 +222,12 @@ class DirectedBlur(UniformBlur, PlaneTransfer):
         terms = uniform_wavefront(camera, geometry)
         if not terms or zernike.is_symmetric(terms):
             return None
-        return cls(Lens.from_camera(camera, geometry), terms)
+        return cls(Lens.from_camera(camera, geometry), terms, focus_table(camera))
 
     def otf_plane(self, fx: Array, fy: Array, wavelength: float) -> Array:
         """Return the transfer at all pairs of fx (n,) and fy (m,) [cycles/m]: complex (m, n)."""
+        if self.focus is not None:
+            return self.at(wavelength).otf_plane(fx, fy, wavelength)
         if not self.lens.diffracts:
             return self._rays(fx, fy)
         # Turned frequencies rather than a turned wavefront: one grid serves all angles.
@@ -204,6 +248,8 @@ class DirectedBlur(UniformBlur, PlaneTransfer):
         self, frequency: Array, across: tuple[float, float], wavelength: float
     ) -> Array | None:
         """Return the transfer (n,) of waves in one direction; None by rays, which need a plane."""
+        if self.focus is not None:
+            return self.at(wavelength).otf_along(frequency, across, wavelength)
         if not self.lens.diffracts:
             return None
         cos, sin = math.cos(self.angle), math.sin(self.angle)
@@ -217,10 +263,14 @@ class DirectedBlur(UniformBlur, PlaneTransfer):
         rest, _ = zernike.split_tilt(self.terms)
         if self.lens.diffracts or zernike.is_symmetric(rest):
             return self.lens.cutoff(wavelength)
+        if self.focus is not None:
+            return min(blur.cutoff(wavelength) for blur in self.extremes)
         return ray_blur.MAX_CYCLES / ray_blur.blur_radius(rest, self.lens.working_f_number)
 
     def kept_bytes(self, wavelengths: Array, by_harmonics: bool = False) -> int:
         """Return the memory of grids of the pupil, where there are any [bytes]."""
+        if self.focus is not None:
+            return max(blur.kept_bytes(wavelengths, by_harmonics) for blur in self.extremes)
         few = by_harmonics and aberration.has_few_waves(wavelengths, self.terms)
         if few or not self.lens.diffracts:
             return 0
@@ -230,11 +280,19 @@ class DirectedBlur(UniformBlur, PlaneTransfer):
         """Return the largest contrast (n,) in any direction by rays; 1 by waves, which end."""
         if self.lens.diffracts:
             return np.ones(frequency.shape)
+        if self.focus is not None:
+            return self.at(wavelength).largest(frequency, wavelength)
         return ray_blur.largest(frequency, self.lens.working_f_number, self.terms)
 
     def harmonics(self, frequency: Array, wavelengths: Array) -> Array:
         """Return the transfer (J, n, m) as harmonics of the direction, for the angle 0."""
         working = self.lens.working_f_number
+        if self.focus is not None:
+            own = [self.at(float(w)).harmonics(frequency, np.array([w]))[0] for w in wavelengths]
+            out = np.zeros((len(own), len(frequency), max(one.shape[1] for one in own)), complex)
+            for plane, one in zip(out, own, strict=True):
+                plane[:, : one.shape[1]] = one
+            return out
         if self.lens.diffracts:
             return aberration.otf_ratio_harmonics(frequency, wavelengths, working, self.terms)
         rays = ray_blur.otf_harmonics(frequency, working, self.terms)
@@ -247,7 +305,8 @@ class DirectedBlur(UniformBlur, PlaneTransfer):
 
     def mean_error(self, signal: SignalLevels) -> float:
         """Return a bound of the rms change of the mean signal by leaving it out [electrons]."""
-        return largest_loss(self, _highest(self.lens, self.terms)) * signal.full_signal
+        losses = [largest_loss(e, _highest(e.lens, e.terms)) for e in self.extremes]
+        return max(losses) * float(signal.full_signal)
 
 
 def _highest(lens: Lens, terms: Terms) -> float:
