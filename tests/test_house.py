@@ -282,7 +282,7 @@ BEHIND_SOLVE = {"image_formation", "readout", "processing", "quality", "simulati
 READS_CAMERAS = {
     "simulation.simulate", "simulation.pipeline", "simulation.reading", "simulation.shared",
     "simulation.planned", "simulation.sequence", "simulation.exposure_control",
-    "simulation.scene_times",  # who simulates a camera
+    "simulation.scene_times", "simulation.bracket",  # who simulates a camera
     "simulation.checks", "simulation.scene_files", "simulation.spectral_irradiance",
     "simulation.output.isetcam_files", "simulation.output.raw_dng",  # who checks or reads its files
     "simulation.output.outputs", "simulation.output.provenance",  # who says where a frame is from

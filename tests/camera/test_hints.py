@@ -316,8 +316,6 @@ def test_what_is_not_simulated_is_said(word):
 @pytest.mark.parametrize(
     "guess",
     [
-        "optics.distortion={k1: -0.1}", "optics.k1=-0.1", "lens.distortion=-0.1",
-        "optics.lateral_color={table: {450: -0.02 %}}", "optics.tca=1 um",
         "pixel.readout.blooming=5 %", "array.crosstalk=1 %", "effects.crosstalk=on",
         "pixel.photodetector.optical_crosstalk=1 %",
     ],

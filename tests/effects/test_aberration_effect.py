@@ -204,7 +204,7 @@ def test_zones_of_a_ring_are_one_wavefront_turned():
     quarter = outer[len(outer) // 4].blur
     difference = turned.otf_plane(F, F, GREEN) - quarter.otf_plane(F, F, GREEN)
     assert np.abs(difference).max() < 1e-3  # two grids, each good to 1e-4 of full contrast
-    rays = DirectedBlur(RAYS, ((8, 3e-7),), math.pi / 2)
+    rays = DirectedBlur(RAYS, ((8, 3e-7),), angle=math.pi / 2)
     same = DirectedBlur(RAYS, turned.terms)
     np.testing.assert_allclose(rays.otf_plane(F, F, GREEN), same.otf_plane(F, F, GREEN), atol=1e-9)
 

@@ -28,6 +28,7 @@ from vcam_cli.effects.base import (
     TemporalGain,
     Transport,
     VeilingGlare,
+    Warp,
 )
 from vcam_cli.effects.optics.depth import Depth
 from vcam_cli.effects.order import ORDER
@@ -534,6 +535,12 @@ def test_finite_on_hostile_input(kind, dtype, tmp_path):
         results = [effect.gain(places, places, 0, time) for time in (1e-9, 1e9)]
     elif isinstance(effect, Depth):
         results = [np.array(effect.blurs)]
+    elif isinstance(effect, Warp):  # there and back, at places of the sensor
+        x, y = np.linspace(-1e-4, 1e-4, 7), np.linspace(-1e-4, 1e-4, 5)[:, None]
+        places = effect.places(x, y, 550e-9, 0.0)
+        results = [*places, *effect.images(*places, 550e-9, 0.0)]
+        assert np.allclose(results[2], x, atol=1e-12)
+        assert np.allclose(results[3], y, atol=1e-12)
     elif isinstance(effect, VeilingGlare):
         results = [np.array(effect.fraction)]
         assert 0 < effect.fraction <= 1

@@ -36,7 +36,7 @@ def by_own_wavefronts(picture: np.ndarray, g, field: FieldBlur, lens: Diffractio
         at = (row + 0.5) * PITCH, (column + 0.5) * PITCH
         y, x = at[0] - g.sensor_height / 2, at[1] - g.sensor_width / 2
         terms = field.wavefront(np.hypot(x, y) / field.half_diagonal)
-        own = DirectedBlur(field.lens, terms, np.arctan2(y, x))
+        own = DirectedBlur(field.lens, terms, angle=np.arctan2(y, x))
         total = sum(own.otf_plane(fx, fy, w) * perfect[w] for w in WAVELENGTHS) / len(WAVELENGTHS)
         # the samples' first center lies half a pitch from the edge
         along_y, along_x = (

@@ -55,7 +55,15 @@ CAMERAS = {
     | {"scene.radiance": radiance_for(5e4), "pixel.fpn.shading": {"gain": "1 %"}},
     "a lot of dark current": {DARK: "40 ke/s", "accuracy": "standard"} | NOISE | CSF,
     "overexposed": {"accuracy": "standard", "scene.radiance": radiance_for(4e5)} | NOISE | LONG,
-    "daylight in color": {"accuracy": "standard", DARK: "100 e/s"} | BAYER | PATCHES | NOISE | LONG,
+    "daylight in color": {
+        "accuracy": "standard",
+        DARK: "100 e/s",
+        "optics.lateral_color": {"table": {450: "-2 %", 650: "2 %"}},
+    }
+    | BAYER
+    | PATCHES
+    | NOISE
+    | LONG,
     "no tolerance to speak of": {"accuracy": "reference"} | NOISE | WIDE | CSF | {DARK: "9 e/s"},
     "all traces": {
         "accuracy": "2 %",
@@ -72,6 +80,8 @@ CAMERAS = {
         "accuracy": "standard",
         DARK: "5 ke/s",
         "optics.zernike": {4: "0.05 um"},
+        "optics.distortion": {"k1": -0.5},
+        "optics.lateral_color": {"table": {450: "-0.5 %", 650: "0.5 %"}},
         "optics.stray_light": 0.03,
         "pixel.architecture": "ccd",
         "pixel.readout.charge_transfer": {"inefficiency": 2e-4},

@@ -52,7 +52,7 @@ KEYS: Mapping[str, str] = {
     ),
     "cos4": "optics.off_axis: cos4",
     **dict.fromkeys(
-        ("lens_distortion", "radial_distortion", "k1", "k2", "k3", "p1", "p2", "dist_coeffs"),
+        ("radial_distortion", "k1", "k2", "k3", "p1", "p2", "dist_coeffs"),
         "optics.distortion: {k1: -0.1}",
     ),
     "fisheye": "optics.projection: equidistant",

@@ -124,7 +124,7 @@ def _meant_key(path: Path, given: object) -> str:
     same = sorted((key for key in places if key.name == word), key=lambda key: len(key.path))
     if same and word not in _SEPARATE:
         return "write " + " or ".join(_place(key, given) for key in same[:3])
-    if len(word) < 4 or nearest(word, here):
+    if len(word) < 4 or word in SECTIONS or nearest(word, here):
         return ""
     close = nearest(word, [*(key.name for key in places), *KEYS], _CLOSE)
     if close is not None and close in KEYS:

@@ -161,13 +161,18 @@ def key(
     )
 
 
+def _is_given(given: Mapping[str, Any], key: str) -> bool:
+    """Return whether a key is given, and no empty list, which says as much as no key."""
+    return key in given and given[key] not in ([], ())
+
+
 def exactly_one(*keys: str, of: str, remedy: str) -> Rule:
     """Return the rule that one of `keys` is given, and no second: they say what `of` names."""
     at_most = at_most_one(*keys)
     listed = f"{', '.join(keys[:-1])} or {keys[-1]}"
 
     def rule(given: Mapping[str, Any]) -> Iterator[InitErrorDetails]:
-        if not any(name in given for name in keys):
+        if not any(_is_given(given, name) for name in keys):
             yield fault((), f"{of} is missing: give one of {listed}", remedy)
         yield from at_most(given)
 
@@ -178,7 +183,7 @@ def at_most_one(*keys: str) -> Rule:
     """Return the rule that no two of `keys` are given."""
 
     def rule(given: Mapping[str, Any]) -> Iterator[InitErrorDetails]:
-        first, *others = [name for name in keys if name in given] or [""]
+        first, *others = [name for name in keys if _is_given(given, name)] or [""]
         for name in others:
             message = f"{name} and {first} cannot both be given"
             yield fault((name,), message, "keep one of them", given[name])
