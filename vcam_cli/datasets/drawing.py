@@ -20,7 +20,7 @@ from vcam_cli.camera.camera import Camera
 from vcam_cli.config.document import Document
 from vcam_cli.config.yaml_tree import Node, Source, node_of, tree_at
 from vcam_cli.datasets.model import Dataset, Distribution
-from vcam_cli.errors import split
+from vcam_cli.errors import BadInput, Problem, split
 from vcam_cli.rng import stream
 from vcam_cli.simulation.checks import CHECKS
 from vcam_cli.solve.light_key import changes_light
@@ -106,10 +106,10 @@ def draw_frame(model: Dataset, scenes: tuple[Scene, ...], number: int) -> Frame:
     """
     each = 1 if model.scenes is None else model.scenes.frames_each
     view = number // each
-    values = {
-        path: _draw(model.seed, path, drawn, view if changes_light(path) else number)
-        for path, drawn in model.vary.items()
-    }
+    values: dict[str, Any] = {}
+    for path, drawn in model.vary.items():
+        index = view if changes_light(path) else number
+        values[path] = _draw(model, path, drawn, index, values)
     seed = int(stream(model.seed, "dataset frame", block=number).integers(2**63))
     if not scenes:
         return Frame(number, seed, values)
@@ -119,8 +119,12 @@ def draw_frame(model: Dataset, scenes: tuple[Scene, ...], number: int) -> Frame:
     return Frame(number, seed, values, scene, _draw_crop(model, scene, view))
 
 
-def _draw(seed: int, path: str, drawn: Distribution, index: int) -> Any:
-    generator = stream(seed, f"dataset {path}", block=index)
+def _draw(model: Dataset, path: str, drawn: Distribution, index: int, above: dict[str, Any]) -> Any:
+    """Return a value; above: path -> those of the keys above it."""
+    generator = stream(model.seed, f"dataset {path}", block=index)
+    if drawn.formula is not None:
+        factor = math.exp(drawn.scatter * float(generator.standard_normal()))
+        return _computed(model, path, above, factor)
     if drawn.choice is not None:
         return drawn.choice[int(generator.integers(len(drawn.choice)))]
     if drawn.integers is not None:
@@ -135,6 +139,20 @@ def _draw(seed: int, path: str, drawn: Distribution, index: int) -> Any:
         number = math.exp(math.log(low) + (math.log(high) - math.log(low)) * share)
     number = float(f"{number:.{DIGITS}g}")
     return f"{number!r} {unit}" if unit else number
+
+
+def _computed(model: Dataset, path: str, values: dict[str, Any], factor: float = 1.0) -> Any:
+    """Return what the formula of a key gives, of the values of those above it. Raises BadInput."""
+    formula = model.vary[path].formula
+    assert formula is not None
+    known = {name: values[model.named(name)[0]] for name in formula.names}
+    try:
+        return formula.value(known, factor)
+    except ValueError as error:
+        key = ("vary", path, "from")
+        said = ", ".join(f"{name} = {value}" for name, value in known.items())
+        remedy = f"correct the formula{f' or what it is of ({said})' if said else ''}"
+        raise BadInput([Problem(key, str(error), remedy, model.locate(key))]) from None
 
 
 def crop_size(model: Dataset) -> tuple[int, int]:
@@ -155,8 +173,14 @@ def _draw_crop(model: Dataset, scene: Scene, view: int) -> dict[str, int]:
 
 
 def extremes(model: Dataset, frame: Frame) -> Iterator[tuple[str, Frame]]:
-    """Yield path and frame with each end, or each choice, of what is drawn."""
+    """Yield path and frame with each end, or each choice, of what is drawn.
+
+    What formulas give follows, without scatter.
+    """
     for path, drawn in model.vary.items():
-        ends = drawn.choice or drawn.uniform or drawn.log_uniform or drawn.integers
-        for value in ends or ():
-            yield path, replace(frame, values=frame.values | {path: value})
+        for value in drawn.values:
+            values = frame.values | {path: value}
+            for other, tied in model.vary.items():
+                if tied.formula is not None:
+                    values[other] = _computed(model, other, values)
+            yield path, replace(frame, values=values)

@@ -62,9 +62,8 @@ def _label_columns(packer: Packer, found: list[Shard]) -> list[str]:
 
 
 def _unit(file: DatasetFile, path: str) -> str:
-    """Return the unit of a parameter's column: that of the first value written."""
-    drawn = file.model.vary[path]
-    first = (drawn.uniform or drawn.log_uniform or drawn.integers or drawn.choice or ("",))[0]
+    """Return the unit of a parameter's column: that of the first value written or computed."""
+    first = (file.model.vary[path].values or (file.frame(0).values[path],))[0]
     try:
         return units.split(first)[1]
     except ValueError:

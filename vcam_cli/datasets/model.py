@@ -11,6 +11,7 @@ from vcam_cli.config.model import FileModel, Model, at_most_one, exactly_one, ke
 from vcam_cli.config.quantities import Number, Whole
 from vcam_cli.config.validation_messages import describe, failure, fault, refusal
 from vcam_cli.config.values import Either, Text, Word, mapping
+from vcam_cli.datasets.formulas import Formula, read_formula
 
 KINDS = ("raw", "clean", "ideal", "depth")
 """What may be written of a frame."""
@@ -44,6 +45,12 @@ def _whole_ends(given: Any) -> tuple[int, int]:
     return given[0], given[1]
 
 
+def _formula(given: Any) -> str:
+    if not isinstance(given, str):
+        raise ValueError(f"{describe(given)} is no formula; write for example 20 ms / gain")
+    return read_formula(given).text
+
+
 _ENDS = list[str | float]
 
 
@@ -69,13 +76,51 @@ class Distribution(Model):
         "one of these values, equally probable", example=[1, 4, 16], default=None
     )
 
+    from_: Annotated[str | None, Either(_formula, str)] = key(
+        "a formula over keys above it, by their paths or last words, with units, + - * / ^, sqrt,"
+        " exp, log (natural), min, max: what ties draws together",
+        example="20 ms / exposure.gain",
+        alias="from",
+        default=None,
+    )
+    scatter: Annotated[float, Number(least=0, most=10, example="0.25")] = key(
+        "of from: standard deviation of the natural logarithm of what it is multiplied by, which is"
+        " drawn from a normal distribution",
+        default=0.0,
+    )
+
     rules = (
         exactly_one(
-            *("uniform", "log_uniform", "integers", "choice"),
+            *("uniform", "log_uniform", "integers", "choice", "from"),
             of="what it is drawn from",
             remedy="write {uniform: [10 ms, 30 ms]}",
         ),
     )
+
+    @property
+    def formula(self) -> Formula | None:
+        """The formula; None of what is drawn by itself."""
+        return None if self.from_ is None else read_formula(self.from_)
+
+    @property
+    def values(self) -> tuple[Any, ...]:
+        """Each choice, or both ends; none of a formula."""
+        return self.choice or self.uniform or self.log_uniform or self.integers or ()
+
+    @property
+    def is_number(self) -> bool:
+        """Whether all that is drawn are numbers, or quantities with a unit."""
+        try:
+            return bool([units.split(value) for value in self.values]) or self.from_ is not None
+        except ValueError:
+            return False
+
+    @model_validator(mode="after")
+    def _only_a_formula_scatters(self) -> Self:
+        if self.scatter and self.from_ is None:
+            message = "only what a formula gives scatters"
+            raise refusal(("scatter",), message, "remove it, or write from")
+        return self
 
 
 def _patterns(given: Any) -> tuple[str, ...]:
@@ -144,7 +189,7 @@ class Dataset(FileModel):
         default=None,
     )
     vary: dict[str, Distribution] = key(
-        "path in the camera -> what it is drawn from",
+        "path in the camera -> what it is drawn from, or a formula over keys above it",
         example={"exposure.time": {"log_uniform": ["1 ms", "100 ms"]}},
         default=dict,
     )
@@ -177,7 +222,7 @@ class Dataset(FileModel):
 
     @model_validator(mode="after")
     def _agrees(self) -> Self:
-        mistakes = list(self._wrong_paths())
+        mistakes = [*self._wrong_paths(), *self._wrong_names()]
         if mistakes:
             raise failure(mistakes)
         if self.scenes is not None and self.scenes.files and self.size is None:
@@ -187,6 +232,25 @@ class Dataset(FileModel):
             message = f"{self.frames} frames do not fill {self.shards} shards"
             raise refusal(("shards",), message, "ask for fewer shards")
         return self
+
+    def named(self, name: str) -> list[str]:
+        """Return the paths of `vary` that a name of a formula may mean."""
+        return [path for path in self.vary if path == name or path.endswith(f".{name}")]
+
+    def _wrong_names(self) -> Iterator[Any]:
+        """Yield names of formulas that mean no key above, or several, or no number."""
+        above: list[str] = []
+        for path, drawn in self.vary.items():
+            for name in drawn.formula.names if drawn.formula else ():
+                found = self.named(name)
+                if len(found) != 1 or found[0] not in above:
+                    some = f"{name!r} means {', '.join(found)}" if found else f"{name!r} is unknown"
+                    remedy = f"write one of the keys above: {', '.join(above) or '(none)'}"
+                    yield fault(("vary", path, "from"), some, remedy)
+                elif not self.vary[found[0]].is_number:
+                    message = f"{found[0]} is drawn from what is no number"
+                    yield fault(("vary", path, "from"), message, "name another key")
+            above.append(path)
 
     def _wrong_paths(self) -> Iterator[Any]:
         taken = {"seed.frame": "the seeds follow from the key seed"}

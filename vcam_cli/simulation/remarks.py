@@ -12,7 +12,6 @@ from vcam_cli.camera.derived.camera_angles import camera_angles
 from vcam_cli.camera.processing import SHOWN
 from vcam_cli.camera.scene.scene_files import ImageFile
 from vcam_cli.camera.sensor.architecture import ARCHITECTURES
-from vcam_cli.camera.sensor.noise import NoiseTable
 from vcam_cli.effects.base import ImageMotion, of_kind
 from vcam_cli.effects.readout_chain import SIGMAS
 from vcam_cli.floats import own_float_errors
@@ -228,19 +227,18 @@ def _cut(ready: Prepared) -> tuple[str, ...]:
     return tuple(notes)
 
 
-def _noise_beyond_table(ready: Prepared) -> tuple[str, ...]:
-    """Return that a gain lies beyond those at which the noise of the readout is known."""
-    given, gain = ready.solved.pixel.readout.read_noise, ready.solved.gain
-    if not isinstance(given, NoiseTable):
-        return ()
-    (least, _), (most, _) = given.points[0], given.points[-1]
-    if least <= gain <= most:
-        return ()
-    return (
-        f"the read noise at an exposure.gain of {gain:.4g} is taken to be that at"
-        f" {min(max(gain, least), most):.4g}, {given.at_gain(gain):.4g} e: the table of"
-        f" pixel.readout.read_noise has gains from {least:.4g} to {most:.4g}",
-    )
+def _noise_beyond_table(ready: Prepared) -> Iterator[str]:
+    """Yield that a gain lies beyond those at which a noise of the readout is known."""
+    gain = ready.solved.gain
+    for path, noise in ready.solved.pixel.readout.noise_tables.items():
+        (least, _), (most, _) = noise.points[0], noise.points[-1]
+        if least <= gain <= most:
+            continue
+        yield (
+            f"the noise at an exposure.gain of {gain:.4g} is taken to be that at"
+            f" {min(max(gain, least), most):.4g}, {noise.at_gain(gain):.4g} e: the table of"
+            f" {path} has gains from {least:.4g} to {most:.4g}"
+        )
 
 
 def _clipped_dark(ready: Prepared) -> tuple[str, ...]:

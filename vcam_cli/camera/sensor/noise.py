@@ -8,7 +8,7 @@ from typing import Annotated, Any
 from pydantic import model_validator
 
 from vcam_cli.config.lists import read_items
-from vcam_cli.config.model import Model, key
+from vcam_cli.config.model import Model, exactly_one, key
 from vcam_cli.config.quantities import Number, Quantity, Whole
 from vcam_cli.config.validation_messages import describe, refusal
 from vcam_cli.config.values import MOST_ELECTRONS, Electrons, Percent
@@ -82,6 +82,23 @@ class NoiseByGain(YamlType):
         return {"anyOf": [_ONE_NOISE.json_schema({}), by_gain]}
 
 
+Noise = Annotated[float | NoiseTable, NoiseByGain()]
+"""A noise [electrons rms], or a table of it by exposure.gain."""
+
+
+def at_gain(noise: float | NoiseTable, gain: float) -> float:
+    """Return a noise at a gain of the exposure [electrons rms].
+
+    Parameters
+    ----------
+    noise : float or NoiseTable
+        One number [electrons rms], or a table by gain.
+    gain : float
+        Gain of the exposure.
+    """
+    return noise.at_gain(gain) if isinstance(noise, NoiseTable) else noise
+
+
 def _point(item: tuple[Any, Any]) -> tuple[float, float]:
     try:
         gain = float(item[0])
@@ -94,11 +111,30 @@ def _point(item: tuple[Any, Any]) -> tuple[float, float]:
 class HeavyTailedNoise(Model):
     """Noise of a readout with more large values than a normal distribution has."""
 
-    rms: Electrons = key("standard deviation, beside that of read_noise", example="3 e")
-    shape: Annotated[float, Number(least=-0.4, most=0.14, example="-0.1")] = key(
-        "of Tukey's lambda distribution: 0.14 is nearly normal, 0 logistic, below it heavier tails",
+    rms: Annotated[float | NoiseTable | None, NoiseByGain()] = key(
+        "standard deviation, beside that of read_noise; or a table by exposure.gain as there",
+        unit="e",
+        example="3 e",
+        default=None,
+    )
+    scale: Annotated[float | NoiseTable | None, NoiseByGain()] = key(
+        "in place of rms: scale of the distribution, as probability plots estimate it; of shape 0"
+        " the standard deviation is 1.81 of it, of 0.14 1.47, of -0.1 2.16",
+        unit="e",
+        example="1.6 e",
+        default=None,
+    )
+    shape: Annotated[float, Number(least=-0.4, most=0.5, example="-0.1")] = key(
+        "of Tukey's lambda distribution: 0.14 is nearly normal, 0 logistic; tails are heavier below"
+        " and lighter above",
         example=-0.1,
         default=-0.1,
+    )
+
+    rules = (
+        exactly_one(
+            "rms", "scale", of="the strength of the noise", remedy="write for example rms: 3 e"
+        ),
     )
 
 

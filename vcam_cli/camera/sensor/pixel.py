@@ -10,7 +10,7 @@ from vcam_cli.camera.sensor.architecture import ARCHITECTURES, article
 from vcam_cli.camera.sensor.noise import (
     CorrelatedRowNoise,
     HeavyTailedNoise,
-    NoiseByGain,
+    Noise,
     NoiseTable,
     PatternShading,
     TelegraphNoise,
@@ -118,7 +118,7 @@ class Readout(Model):
         example={"sensitivity": "1 %", "full_well": "60 ke"},
         default=None,
     )
-    read_noise: Annotated[float | NoiseTable, NoiseByGain()] = key(
+    read_noise: Noise = key(
         "temporal noise of one readout of a pixel, rms, in electrons of the pixel; reset noise,"
         " that of columns and rows, and the ADC's noise and rounding come on top; or a table by"
         " exposure.gain, {table: {1: 5 e, 16: 1.5 e}}: between its gains the logarithm of the noise"
@@ -127,10 +127,19 @@ class Readout(Model):
         example="5 e",
         default=0.0,
     )
-    column_noise: Electrons = key(
-        "temporal, one draw a column and frame; none in dps and ccd", example="0 e", default=0.0
+    column_noise: Noise = key(
+        "temporal, one draw a column and frame, or a table by exposure.gain as of read_noise; none"
+        " in dps and ccd",
+        unit="e",
+        example="0 e",
+        default=0.0,
     )
-    row_noise: Electrons = key("temporal, one draw a row and frame", example="0 e", default=0.0)
+    row_noise: Noise = key(
+        "temporal, one draw a row and frame, or a table by exposure.gain as of read_noise",
+        unit="e",
+        example="0 e",
+        default=0.0,
+    )
     heavy_tailed_noise: Annotated[
         HeavyTailedNoise | None, word_or(HeavyTailedNoise, {"none": None})
     ] = key(
@@ -175,10 +184,22 @@ class Readout(Model):
         "clocks, for the frame rate of vcam plan alone", example={"row_time": "10 us"}, default=None
     )
 
-    def read_noise_at(self, gain: float) -> float:
-        """Return the noise of one readout at a gain of the exposure [e rms]."""
-        given = self.read_noise
-        return given.at_gain(gain) if isinstance(given, NoiseTable) else given
+    @property
+    def noise_tables(self) -> dict[str, NoiseTable]:
+        """The noises that are given by gain, each by its path in the camera."""
+        tails = self.heavy_tailed_noise
+        noises = {
+            "read_noise": self.read_noise,
+            "column_noise": self.column_noise,
+            "row_noise": self.row_noise,
+            "heavy_tailed_noise.rms": tails and tails.rms,
+            "heavy_tailed_noise.scale": tails and tails.scale,
+        }
+        return {
+            f"pixel.readout.{name}": noise
+            for name, noise in noises.items()
+            if isinstance(noise, NoiseTable)
+        }
 
     @model_validator(mode="after")
     def _check_agreement(self) -> Self:

@@ -3,7 +3,8 @@
     noise = rms Q(u) / std(Q),   Q(u) = (u^s - (1 - u)^s) / s
 
 u is a number drawn evenly from 0 to 1 and s the shape: 0.14 is close to normal, 0 is
-logistic, and below tails are heavier.
+logistic; below tails are heavier, above lighter. The file may give the scale, rms / std(Q), in
+place of rms.
 """
 
 from __future__ import annotations
@@ -17,6 +18,7 @@ import numpy as np
 from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry
+from vcam_cli.camera.sensor.noise import at_gain
 from vcam_cli.effects.signal_chain import NoiseSource, Site
 
 LEAST_CHANCE = 2.0**-54
@@ -86,7 +88,14 @@ class HeavyTailedNoise(NoiseSource):
     def from_camera(cls, camera: Camera, geometry: Geometry) -> Self | None:
         """Return the noise that the file gives, or None where it gives none."""
         given = camera.pixel.readout.heavy_tailed_noise
-        return cls(given.rms, given.shape) if given is not None and given.rms else None
+        if given is None:
+            return None
+        if given.rms is not None:
+            rms = at_gain(given.rms, camera.exposure_gain)
+        else:
+            scale = at_gain(given.scale, camera.exposure_gain)
+            rms = scale * tukey_lambda_spread(given.shape)
+        return cls(rms, given.shape) if rms else None
 
     def describe(self) -> str:
         """Return a short clause with this camera's numbers and units."""

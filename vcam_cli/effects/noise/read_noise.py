@@ -14,6 +14,7 @@ from vcam_cli.arrays import Array
 from vcam_cli.camera.camera import Camera
 from vcam_cli.camera.derived.geometry import Geometry
 from vcam_cli.camera.sensor.architecture import ARCHITECTURES
+from vcam_cli.camera.sensor.noise import at_gain
 from vcam_cli.effects.signal_chain import NoiseSource, Site
 
 
@@ -45,12 +46,13 @@ class ReadNoise(NoiseSource):
     def from_camera(cls, camera: Camera, geometry: Geometry) -> Self | None:
         """Return the noise of the readout, or None where pixel, column and row have none."""
         given, name = camera.pixel.readout, camera.pixel.architecture
-        missing = given.column_noise > 0 and not ARCHITECTURES[name].column_terms
-        column = 0.0 if missing else given.column_noise
-        pixel = given.read_noise_at(camera.exposure_gain)
-        if not any((pixel, column, given.row_noise)):
+        noises = (given.read_noise, given.column_noise, given.row_noise)
+        pixel, column, row = (at_gain(noise, camera.exposure_gain) for noise in noises)
+        missing = column > 0 and not ARCHITECTURES[name].column_terms
+        column = 0.0 if missing else column
+        if not any((pixel, column, row)):
             return None
-        return cls(pixel, column, given.row_noise, name if missing else "")
+        return cls(pixel, column, row, name if missing else "")
 
     def describe(self) -> str:
         """Return a short clause with this camera's numbers and units."""
