@@ -1,10 +1,12 @@
 """Renew figures and numbers of the documentation that depend on the engine's speed and plan.
 
-Run it as `python scripts/doc_figures.py [scenes] [accuracy] [hard-cases]`; without a word, all:
+Run it as `python scripts/doc_figures.py [scenes] [accuracy] [hard-cases] [colors]`; without a word,
+all:
 
 - scenes: docs/scenes-everything.png, from `vcam plan everything --scenes all --measure`; minutes;
 - accuracy: docs/accuracy-starter.png, from `vcam accuracy starter`;
-- hard-cases: the table of README.md, from the cases of `make stability`.
+- hard-cases: the table of README.md, from the cases of `make stability`;
+- colors: the table of docs/measured-color.md, from scripts/color_table.py.
 
 Measure on a machine that does nothing else.
 """
@@ -32,7 +34,6 @@ SHOWN = {
     "4.1 mean SNR over segments 1e-14 wide": "mean SNR over a segment 1e-14 wide",
 }
 """Case of `make stability` -> its words in README.md."""
-MARKS = "<!-- hard cases: scripts/doc_figures.py writes this table -->\n", "<!-- end -->\n"
 
 
 def scenes(turns: int) -> None:
@@ -57,9 +58,22 @@ def _draw(name: str, target: Path, *command: str) -> None:
 
 def hard_cases(turns: int, path: Path = ROOT / "README.md") -> None:
     """Write the table of README.md, or of a file like it."""
-    text = path.read_text(encoding="utf-8")
-    before, after = (re.escape(mark) for mark in MARKS)
-    renewed = re.sub(f"({before}).*({after})", rf"\g<1>\n{table()}\n\g<2>", text, flags=re.DOTALL)
+    _write_between("hard cases", table(), path)
+
+
+def colors(turns: int, path: Path = ROOT / "docs" / "measured-color.md") -> None:
+    """Write the table of docs/measured-color.md, or of a file like it."""
+    import color_table
+
+    _write_between("colors", color_table.table(), path)
+
+
+def _write_between(name: str, text: str, path: Path) -> None:
+    """Write a table between its marks."""
+    start = f"<!-- {name}: scripts/doc_figures.py writes this table -->\n"
+    before, after = re.escape(start), re.escape("<!-- end -->\n")
+    page = path.read_text(encoding="utf-8")
+    renewed = re.sub(f"({before}).*({after})", rf"\g<1>\n{text}\n\g<2>", page, flags=re.DOTALL)
     path.write_text(renewed, encoding="utf-8")
 
 
@@ -90,6 +104,7 @@ FIGURES: dict[str, Callable[[int], None]] = {
     "scenes": scenes,
     "accuracy": accuracy,
     "hard-cases": hard_cases,
+    "colors": colors,
 }
 
 
