@@ -1,18 +1,15 @@
 """Measured filter sets: white balance as integrals by hand, color differences as the page says."""
 
 import csv
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from scripts import color_table
 from vcam_cli.config import shipped
 
 ROOT = Path(__file__).parents[1]
-sys.path.insert(0, str(ROOT / "scripts"))
-import color_table  # noqa: E402
-
 MEASURED = sorted(shipped.folder().glob("filters/measured/*.csv"))
 
 

@@ -9,14 +9,13 @@ import pytest
 from typer.testing import CliRunner
 
 from scripts import doc_figures
-
-MARKS = "<!-- hard cases: scripts/doc_figures.py writes this table -->\n", "<!-- end -->\n"
 from tests import documents
 from tests.documents import ROOT
 from vcam_cli.commands.list_ import KINDS
 from vcam_cli.commands.main import COMMANDS, app
 
 README = documents.read(ROOT / "README.md")
+MARKS = "<!-- hard cases: scripts/doc_figures.py writes this table -->\n", "<!-- end -->\n"
 BLOCKS = [(block.language, block.text) for block in documents.blocks(README)]
 PAGES = [documents.read(page) for page in documents.pages()]
 CASE = re.compile(r"^\| (.+?) \| ([\d.e-]+)(?: \(absolute\))? \| ([\d.e-]+) \|$", re.MULTILINE)
