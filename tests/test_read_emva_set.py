@@ -59,7 +59,7 @@ def test_levels_beyond_the_linear_range_are_not_predicted(folder):
     """Of every second level: the last, 20 000 photons, lies at 0.62 of the codes, above 0.2."""
     script = runpy.run_path(str(SCRIPT))
     script["measurements"].__globals__["LINEAR"] = 0.2
-    _, held = script["measurements"](folder)
+    _, held, _ = script["measurements"](folder)
     limit = (0.2 * 4095 - BLACK) / GAIN / EFFICIENCY
     found = [entry["photons"] for entry in held["frames"]]
     assert found == [photons for photons in PHOTONS[1::2] if photons < limit]

@@ -142,6 +142,8 @@ def filter_set(name: str) -> dict[str, SpectrumSpec]:
         raise ValueError(f"{problem.message}; {problem.remedy}") from None
 
     def absolute_item(item: Any) -> Any:
+        if isinstance(item, list):  # a product of spectra
+            return [absolute_item(factor) for factor in item]
         named = isinstance(item, Mapping) and "file" in item
         return {**item, "file": str(path.parent / item["file"])} if named else item
 
