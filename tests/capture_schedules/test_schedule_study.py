@@ -218,6 +218,34 @@ class TestMethods:
             assert gain["uniform", n] == pytest.approx(by_hand, rel=1e-9)
         (note,) = found.notes
         assert note.startswith("no exposure is longer than 17.153 t_1")
+        assert {row["upper_bound"] for row in found.summary_rows} == {2.0}, "eq 4.2's, as it is"
+
+    def test_the_shipped_study_draws_figure_4_3(self):
+        """Uniform above exponential ones where captures are many, and the bound of eq 4.2 is 2."""
+        found = schedule("captures", out=None, sets=["counts=[5, 10, 15, 20]", "targets=[]"])
+        gain = {(r["method"], r["count"]): r["gain"] for r in found.summary_rows}
+        assert gain["uniform", 20] == pytest.approx(1.628, abs=5e-4)
+        assert gain["exponential", 20] == pytest.approx(1.473, abs=5e-4)
+        uniform = [gain["uniform", n] for n in (5, 10, 15, 20)]
+        assert uniform == sorted(uniform)
+        assert all(gain["uniform", n] > gain["exponential", n] for n in (10, 15, 20))
+        assert {row["upper_bound"] for row in found.summary_rows} == {2.0}
+
+    @pytest.mark.parametrize(
+        ("name", "segments_"),
+        [
+            ("captures-two-segments", [(0.05, 0.4, 0.5), (0.6, 1, 0.5)]),
+            (
+                "captures-three-segments",
+                [(0.002, 0.08, 0.74), (0.08, 0.4, 0.215), (0.85, 1, 0.045)],
+            ),
+        ],
+    )
+    def test_the_bound_of_shipped_segments_is_that_of_eq_4_2(self, name, segments_):
+        found = schedule(name, out=None, sets=["counts=[2]", "methods=[uniform]"])
+        mean = sum(p * (low + high) / 2 for low, high, p in segments_)
+        (row,) = found.summary_rows
+        assert row["upper_bound"] == pytest.approx(1 / mean, rel=1e-12)
 
     def test_no_method_beats_what_is_certified(self):
         methods = ["optimal", "heuristic", "uniform", "exponential", "geometric", "sqp"]

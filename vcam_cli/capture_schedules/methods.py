@@ -90,6 +90,9 @@ class Task:
         The pdf that schedules are found on; by default `pdf` itself.
     seed, starts : int
         Seed and number of random starts.
+    bounded : Sensor, optional
+        The pixel that the stated bound is of; by default `sensor` itself. A longest exposure that
+        all schedules share restricts them, and leaves eq 4.2's imax / E(I) as it is.
 
     Raises
     ------
@@ -105,9 +108,11 @@ class Task:
         plan: Pdf | None = None,
         seed: int = 0,
         starts: int = 1,
+        bounded: Sensor | None = None,
     ) -> None:
         self.pdf, self.plan = pdf, plan or pdf
         self.sensor, self.constraints = sensor, constraints
+        self._bounded = bounded or sensor
         self.seed, self.starts = seed, starts
         self.first = first_capture_time(pdf, sensor, constraints)
         self._optimum: Schedules = {}
@@ -132,12 +137,17 @@ class Task:
     @cached_property
     def bound(self) -> float:
         """Mean SNR with each photocurrent at its own longest unsaturated time."""
-        return objective.expected_snr_bound(self.pdf, self.sensor)
+        return objective.expected_snr_bound(self.pdf, self._bounded)
 
     @property
     def largest_gain(self) -> float:
-        """Gain that no number of captures exceeds."""
+        """The stated bound as a gain: imax / E(I) of shot noise alone."""
         return self.bound / self.single
+
+    @property
+    def reachable_gain(self) -> float:
+        """Gain that no number of captures exceeds within the longest exposure."""
+        return objective.expected_snr_bound(self.pdf, self.sensor) / self.single
 
     def gain(self, schedule: Schedule) -> float:
         """Return the mean SNR of a schedule over that of a single capture."""

@@ -206,8 +206,8 @@ class _StudyRun:
             task = Task(self.pdf, sensor, constraints, plan, *start)
             if (count := self.model.max_time_of) is not None:
                 longest = float(task.exact_task.optimum([count])[count].times[-1])
-                sensor = replace(sensor, max_time=longest)
-                task = Task(self.pdf, sensor, constraints, plan, *start)
+                limited = replace(sensor, max_time=longest)
+                task = Task(self.pdf, limited, constraints, plan, *start, bounded=sensor)
         except ValueError as error:
             raise self._error(("constraints", "frame_time"), error) from None
         self._check_room(task)
@@ -269,7 +269,7 @@ class _StudyRun:
         if not self.model.targets:
             return ()
         self.watch.begin("fewest captures")
-        largest = self.task.largest_gain
+        largest = self.task.reachable_gain
         return fewest_captures(self._optimal_gain, self.model.targets, MOST_CAPTURES, largest)
 
     def _optimal_gain(self, count: int) -> float:

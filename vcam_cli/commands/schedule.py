@@ -99,7 +99,7 @@ def print_report(result: "ScheduleResult") -> None:
     for line in schedule_lines(result):
         console.print(line)
     for target in result.targets:
-        console.print(target_sentence(target, result.task.largest_gain))
+        console.print(target_sentence(target, result.task.reachable_gain))
     console.print(f"{result.study.model.name}: {result.out}/")
 
 
