@@ -3,6 +3,7 @@
 import csv
 import json
 import math
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -246,6 +247,29 @@ class TestMethods:
         mean = sum(p * (low + high) / 2 for low, high, p in segments_)
         (row,) = found.summary_rows
         assert row["upper_bound"] == pytest.approx(1 / mean, rel=1e-12)
+
+    def test_figure_4_8_as_its_axis_has_it(self):
+        """Densities 4/3 and 2/3 of the two halves; gains by hand in fractions, eq 4.4 summed."""
+        found = schedule("captures-heuristic", out=None)
+        captures = [row for row in found.schedule_rows if row["method"] == "heuristic"]
+        currents = [Fraction(row["photocurrent"]) for row in captures]
+        assert currents == [1, *(Fraction(n, 8) for n in (6, 4, 3, 2, 1))]
+        half = Fraction(1, 2)
+
+        def moment(x):  # of the photocurrent up to x: the integral of i f(i)
+            low, high = min(x, half), max(x, half)
+            return (Fraction(4, 3) * low**2 + Fraction(2, 3) * (high**2 - half**2)) / 2
+
+        snr = sum(
+            (moment(high) - moment(low)) / high
+            for high, low in zip(currents, [*currents[1:], Fraction(0)], strict=True)
+        )
+        gain = {row["method"]: row["gain"] for row in found.summary_rows}
+        assert snr / moment(Fraction(1)) == Fraction(28, 15)
+        assert gain["heuristic"] == pytest.approx(28 / 15, rel=1e-12)
+        # 1.87049: a dynamic program of its own over 1e4 levels of the figure's pdf.
+        assert gain["optimal"] == pytest.approx(1.87049, abs=1e-5)
+        assert found.summary_rows[0]["upper_bound"] == pytest.approx(2.4, rel=1e-12)
 
     def test_no_method_beats_what_is_certified(self):
         methods = ["optimal", "heuristic", "uniform", "exponential", "geometric", "sqp"]
